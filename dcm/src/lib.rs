@@ -1,0 +1,3 @@
+//! dcm
+#![no_std]
+#![forbid(unsafe_code)]

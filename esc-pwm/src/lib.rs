@@ -1,0 +1,3 @@
+//! esc-pwm
+#![no_std]
+#![forbid(unsafe_code)]

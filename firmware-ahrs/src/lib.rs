@@ -1,0 +1,3 @@
+//! firmware-ahrs
+#![no_std]
+#![forbid(unsafe_code)]

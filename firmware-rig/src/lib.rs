@@ -1,0 +1,3 @@
+//! firmware-rig
+#![no_std]
+#![forbid(unsafe_code)]

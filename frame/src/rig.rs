@@ -1,0 +1,227 @@
+//! One instant of the rig: raw codes with their verdicts.
+//!
+//! What it is: what the rig board measures and commands at one tick, before any conversion.
+//! What can go wrong: each code carries a verdict (`Missed`, `Saturated`, ...); the host decides what to do with it.
+//! Units: capture-timer ticks, ADC counts, nanoseconds of pulse.
+//! Reference: specification `rig.md`, "Four RPM capture channels" and "Acquisition".
+
+use crate::units::{PulseWidth, Ticks};
+use serde::{Deserialize, Serialize};
+
+/// Number of RPM capture channels: beam, reflective opto, hall, encoder, in this order.
+pub const CAPTURE_CHANNELS: usize = 4;
+/// Number of ADC channels: strain, torque, current, voltage, temperature, in this order.
+pub const ADC_CHANNELS: usize = 5;
+/// Log column of each capture channel.
+pub const CAPTURE_NAMES: [&str; CAPTURE_CHANNELS] = ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder"];
+/// Log column of each ADC channel.
+pub const ADC_NAMES: [&str; ADC_CHANNELS] = ["thrust_n", "torque_nm", "current_a", "voltage_v", "temp_c"];
+
+/// Where the arming machine stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum RigState {
+    /// Minimum pulses; nothing asked for. The state after every reset.
+    #[default]
+    Disarmed,
+    /// Minimum pulses; waiting for the ESC to be powered and its long beep.
+    ArmHoldMin,
+    /// Minimum pulses; the long beep was heard, waiting for the cell-count beeps.
+    ArmCells,
+    /// Minimum pulses; waiting for the "1-2-3".
+    ArmReady,
+    /// Armed and ready to run, still at minimum throttle.
+    Armed,
+    /// Throttle follows the schedule or the manual setting.
+    Running,
+    /// Range calibration: maximum pulses towards an ESC that is known to be unpowered, waiting for two beeps.
+    CalibrateHoldMax,
+    /// Range calibration: minimum pulses, waiting for long beep, cell beeps and ready.
+    CalibrateHoldMin,
+    /// The ESC entered its programming mode: minimum pulses until the operator has cut its power.
+    ProgrammingEscape,
+    /// A latched fault: minimum pulses until the operator clears it.
+    Faulted,
+}
+
+/// What stopped the rig. Bits of a [`FaultSet`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Fault {
+    /// The operator's stop: command or stop input.
+    OperatorStop = 0,
+    /// Nothing was heard from the host for the link time-out.
+    LinkLost = 1,
+    /// Rotor speed above the configured limit.
+    Overspeed = 2,
+    /// Current above the configured limit.
+    OverCurrent = 3,
+    /// Supply below the configured limit.
+    UnderVoltage = 4,
+    /// Load cell beyond its yield margin.
+    LoadCellOverload = 5,
+    /// RPM channels disagree.
+    SensorDisagreement = 6,
+    /// The control task missed its deadline.
+    ControlStalled = 7,
+    /// The ESC did not answer as the arming table expects.
+    ArmingTimeout = 8,
+    /// The ESC reported a failed self-test (twenty short beeps).
+    EscSelfTest = 9,
+    /// Conversion data missing or damaged.
+    AdcLost = 10,
+}
+
+/// A set of latched [`Fault`]s.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FaultSet(pub u16);
+
+impl FaultSet {
+    /// No fault.
+    pub const NONE: Self = Self(0);
+
+    /// The set with `fault` in it as well.
+    #[must_use]
+    pub const fn with(self, fault: Fault) -> Self {
+        Self(self.0 | (1 << fault as u8))
+    }
+
+    /// Whether `fault` is in the set.
+    #[must_use]
+    pub const fn contains(self, fault: Fault) -> bool {
+        self.0 & (1 << fault as u8) != 0
+    }
+
+    /// Whether nothing is latched.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+/// All reasons why a command was refused. Bits, so that a refusal lists every one of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Refusals(pub u16);
+
+impl Refusals {
+    /// The command does not belong to this state.
+    pub const WRONG_STATE: u16 = 1;
+    /// A fault is latched.
+    pub const FAULT_LATCHED: u16 = 1 << 1;
+    /// The throttle setting is not at minimum.
+    pub const THROTTLE_NOT_LOW: u16 = 1 << 2;
+    /// No low-throttle interval has passed since the last run.
+    pub const NO_LOW_INTERVAL: u16 = 1 << 3;
+    /// The ESC is powered, or might be, where it must not be.
+    pub const ESC_POWERED: u16 = 1 << 4;
+    /// The command's own confirmation is missing.
+    pub const NOT_CONFIRMED: u16 = 1 << 5;
+    /// A value is out of its range.
+    pub const OUT_OF_RANGE: u16 = 1 << 6;
+    /// The schedule holds no step.
+    pub const EMPTY_SCHEDULE: u16 = 1 << 7;
+    /// The rotor turns although it should stand.
+    pub const ROTOR_TURNING: u16 = 1 << 8;
+
+    /// Nothing speaks against it.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Adds `reason` when `present`.
+    #[must_use]
+    pub const fn and(self, reason: u16, present: bool) -> Self {
+        if present { Self(self.0 | reason) } else { self }
+    }
+}
+
+/// What a capture channel says of its own reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum CaptureVerdict {
+    /// Whole revolutions between two edges of the same mark.
+    Nominal,
+    /// No edge within the time-out: the rotor stands.
+    #[default]
+    Stopped,
+    /// Edges have stopped coming although the speed was known.
+    Lost,
+    /// The timer's over-capture flag was set: an edge was overwritten.
+    OverCapture,
+    /// Edges are missing from the pattern.
+    Missed,
+    /// Edges too many in the pattern.
+    Doubled,
+    /// Periods alternate (two marks not opposite, or a wrong polarity).
+    Alternating,
+    /// Disagrees with the other channels.
+    Disagrees,
+    /// This channel is not fitted.
+    Absent,
+}
+
+/// Raw reading of one capture channel: `edges` equal marks passed in `span` timer ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CaptureCode {
+    /// Edges in the span, a whole number of revolutions' worth; 0 when stopped.
+    pub edges: u16,
+    /// Span in ticks of the capture timer.
+    pub span: u32,
+    /// What the channel says of it.
+    pub verdict: CaptureVerdict,
+}
+
+/// What an ADC channel says of its own reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum AdcVerdict {
+    /// Within range.
+    Nominal,
+    /// Some conversion touched either end of the range.
+    Saturated,
+    /// Every conversion sat at one end: open wire or short.
+    Stuck,
+    /// No conversion in this interval.
+    #[default]
+    Missing,
+}
+
+/// Raw reading of one ADC channel over one logging interval.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AdcCode {
+    /// Sum of the conversions, counts.
+    pub sum: u32,
+    /// Number of conversions; 0 means missing.
+    pub count: u16,
+    /// Root mean square about the mean, 1/256 counts.
+    pub rms_q8: u32,
+    /// What the channel says of it.
+    pub verdict: AdcVerdict,
+}
+
+/// Everything that the rig board knows at one logging instant, raw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RigSample {
+    /// End of the logging interval.
+    pub at: Ticks,
+    /// Pulse that the timer was told to give.
+    pub pulse: PulseWidth,
+    /// State of the arming machine.
+    pub state: RigState,
+    /// Latched faults.
+    pub faults: FaultSet,
+    /// Capture channels: beam, reflective, hall, encoder.
+    pub rpm: [CaptureCode; CAPTURE_CHANNELS],
+    /// ADC channels: strain, torque, current, voltage, temperature.
+    pub adc: [AdcCode; ADC_CHANNELS],
+}

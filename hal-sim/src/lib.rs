@@ -1,0 +1,2 @@
+//! hal-sim
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! ident
+#![forbid(unsafe_code)]

@@ -1,0 +1,3 @@
+//! quadrig
+#![forbid(unsafe_code)]
+fn main() {}
