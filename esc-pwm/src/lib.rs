@@ -1,3 +1,27 @@
-//! esc-pwm
+//! From a command to an ESC pulse that is always safe.
+//!
+//! What it is: exact pulse arithmetic ([`timer`]), the arming machine as a table ([`arming`]), throttle schedules as
+//! pure functions of elapsed time ([`schedule`]), and the limits that bring the throttle to minimum ([`protection`]).
+//!
+//! What can go wrong: a timer clock that cannot divide the 20 ms period exactly is refused at construction; every
+//! refused command lists all of its reasons; every tripped limit latches until the operator clears it.
+//!
+//! Units: nanoseconds of pulse, timer ticks, milliseconds of schedule; SI for the limits.
+//!
+//! Reference: specification `rig.md`, "ESC pulse and arming"; Beharie 2013, section 3.2 and Appendix C.
 #![no_std]
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod arming;
+pub mod protection;
+pub mod schedule;
+pub mod timer;
+
+pub use arming::{ArmingEvent, ArmingTimes, Objections, Step, Transition, pulse_for, step, time_out};
+pub use protection::{Limits, Protection, Readings};
+pub use schedule::{Chirp, Schedule, ScheduleStep, Slew, Staircase, ThrottleCurve, Uploaded};
+pub use timer::{PulseTimer, TimerError};

@@ -1,0 +1,448 @@
+//! The arming machine as a table.
+//!
+//! What it is: (state, event, standing objections) -> next state, pure, so that it can be explored exhaustively;
+//! beside it the pulse each state gives, its time-out and its message to the operator.
+//! What can go wrong: an event without a row changes nothing; a command without a row is refused as `WRONG_STATE`
+//! together with every other objection that the command would meet.
+//! Units: milliseconds.
+//! Reference: Beharie 2013, Fig. 3.10 and Appendix C; specification `rig.md`, "ESC pulse and arming".
+
+use frame::message::Beep;
+use frame::rig::{Fault, Refusals, RigState};
+use frame::units::PulseWidth;
+
+/// What the machine reacts to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ArmingEvent {
+    /// The operator asks for the normal start.
+    Arm,
+    /// The operator asks for the throttle-range calibration.
+    Calibrate,
+    /// A setting or a schedule asks for throttle.
+    Run,
+    /// One long beep: the ESC recognised minimum throttle.
+    Long,
+    /// Short beeps: number of cells.
+    Cells,
+    /// "1-2-3": the ESC is ready.
+    Ready,
+    /// Two beeps: the ESC stored maximum throttle.
+    Double,
+    /// The special tone: the ESC is in its programming mode.
+    Programming,
+    /// Continuous beeping: the ESC sees no signal.
+    NoSignal,
+    /// Twenty short beeps: the ESC's self-test failed.
+    SelfTestFailed,
+    /// The state lasted longer than its time-out.
+    TimeOut,
+    /// The schedule ended or the setting went back to minimum.
+    Finished,
+    /// The operator's stop.
+    Stop,
+    /// A protection tripped.
+    Trip,
+    /// The operator clears the latched faults.
+    Clear,
+}
+
+impl ArmingEvent {
+    /// All of them, for exploration.
+    pub const ALL: [Self; 15] = [
+        Self::Arm,
+        Self::Calibrate,
+        Self::Run,
+        Self::Long,
+        Self::Cells,
+        Self::Ready,
+        Self::Double,
+        Self::Programming,
+        Self::NoSignal,
+        Self::SelfTestFailed,
+        Self::TimeOut,
+        Self::Finished,
+        Self::Stop,
+        Self::Trip,
+        Self::Clear,
+    ];
+
+    /// A command of the operator, which is refused rather than ignored where it does not belong.
+    #[must_use]
+    pub const fn is_command(self) -> bool {
+        matches!(self, Self::Arm | Self::Calibrate | Self::Run | Self::Clear)
+    }
+
+    /// The fault that this event latches when the machine takes it to `Faulted`.
+    #[must_use]
+    pub const fn fault(self) -> Option<Fault> {
+        match self {
+            Self::Stop => Some(Fault::OperatorStop),
+            Self::SelfTestFailed => Some(Fault::EscSelfTest),
+            Self::TimeOut | Self::NoSignal => Some(Fault::ArmingTimeout),
+            _ => None,
+        }
+    }
+}
+
+impl From<Beep> for ArmingEvent {
+    fn from(beep: Beep) -> Self {
+        match beep {
+            Beep::Long => Self::Long,
+            Beep::Cells(_) => Self::Cells,
+            Beep::Ready => Self::Ready,
+            Beep::Double => Self::Double,
+            Beep::Programming => Self::Programming,
+            Beep::NoSignal => Self::NoSignal,
+            Beep::SelfTestFailed => Self::SelfTestFailed,
+        }
+    }
+}
+
+/// Every state, for exploration.
+pub const STATES: [RigState; 10] = [
+    RigState::Disarmed,
+    RigState::ArmHoldMin,
+    RigState::ArmCells,
+    RigState::ArmReady,
+    RigState::Armed,
+    RigState::Running,
+    RigState::CalibrateHoldMax,
+    RigState::CalibrateHoldMin,
+    RigState::ProgrammingEscape,
+    RigState::Faulted,
+];
+
+/// What speaks against commands at this moment: bits of [`Refusals`], each a guard that does not hold.
+pub type Objections = Refusals;
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Transition {
+    /// State in which the row applies.
+    pub from: RigState,
+    /// Event that it answers.
+    pub on: ArmingEvent,
+    /// Objections that forbid it.
+    pub unless: u16,
+    /// State that follows.
+    pub to: RigState,
+}
+
+const ARM_UNLESS: u16 =
+    Refusals::FAULT_LATCHED | Refusals::THROTTLE_NOT_LOW | Refusals::NO_LOW_INTERVAL | Refusals::ROTOR_TURNING;
+const CALIBRATE_UNLESS: u16 = ARM_UNLESS | Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED;
+const RUN_UNLESS: u16 = Refusals::FAULT_LATCHED | Refusals::OUT_OF_RANGE | Refusals::EMPTY_SCHEDULE;
+
+const fn row(from: RigState, on: ArmingEvent, unless: u16, to: RigState) -> Transition {
+    Transition { from, on, unless, to }
+}
+
+/// The machine. Stop and Trip lead to `Faulted` from everywhere (see [`step`]) except where the row says otherwise.
+pub const TABLE: &[Transition] = {
+    use ArmingEvent as E;
+    use RigState as S;
+    &[
+        row(S::Disarmed, E::Arm, ARM_UNLESS, S::ArmHoldMin),
+        row(S::Disarmed, E::Calibrate, CALIBRATE_UNLESS, S::CalibrateHoldMax),
+        row(S::Disarmed, E::Clear, 0, S::Disarmed),
+        // normal start
+        row(S::ArmHoldMin, E::Long, 0, S::ArmCells),
+        row(S::ArmHoldMin, E::Double, 0, S::ProgrammingEscape), // the ESC believes that it saw full throttle
+        row(S::ArmHoldMin, E::Programming, 0, S::ProgrammingEscape),
+        row(S::ArmHoldMin, E::NoSignal, 0, S::Faulted),
+        row(S::ArmHoldMin, E::SelfTestFailed, 0, S::Faulted),
+        row(S::ArmHoldMin, E::TimeOut, 0, S::Faulted),
+        row(S::ArmCells, E::Cells, 0, S::ArmReady),
+        row(S::ArmCells, E::Programming, 0, S::ProgrammingEscape),
+        row(S::ArmCells, E::NoSignal, 0, S::Faulted),
+        row(S::ArmCells, E::SelfTestFailed, 0, S::Faulted),
+        row(S::ArmCells, E::TimeOut, 0, S::Faulted),
+        row(S::ArmReady, E::Ready, 0, S::Armed),
+        row(S::ArmReady, E::Programming, 0, S::ProgrammingEscape),
+        row(S::ArmReady, E::NoSignal, 0, S::Faulted),
+        row(S::ArmReady, E::SelfTestFailed, 0, S::Faulted),
+        row(S::ArmReady, E::TimeOut, 0, S::Faulted),
+        // work
+        row(S::Armed, E::Run, RUN_UNLESS, S::Running),
+        row(S::Armed, E::NoSignal, 0, S::Faulted),
+        row(S::Armed, E::SelfTestFailed, 0, S::Faulted),
+        row(S::Armed, E::TimeOut, 0, S::Disarmed), // left alone: nothing to be blamed, but arm again
+        row(S::Running, E::Run, RUN_UNLESS, S::Running),
+        row(S::Running, E::Finished, 0, S::Armed),
+        row(S::Running, E::NoSignal, 0, S::Faulted),
+        // throttle-range calibration
+        row(S::CalibrateHoldMax, E::Double, 0, S::CalibrateHoldMin),
+        row(S::CalibrateHoldMax, E::Programming, 0, S::ProgrammingEscape),
+        row(S::CalibrateHoldMax, E::NoSignal, 0, S::Faulted),
+        row(S::CalibrateHoldMax, E::SelfTestFailed, 0, S::Faulted),
+        row(S::CalibrateHoldMax, E::TimeOut, 0, S::ProgrammingEscape), // it may have been entered unheard
+        row(S::CalibrateHoldMin, E::Ready, 0, S::Armed),
+        row(S::CalibrateHoldMin, E::Programming, 0, S::ProgrammingEscape),
+        row(S::CalibrateHoldMin, E::NoSignal, 0, S::Faulted),
+        row(S::CalibrateHoldMin, E::SelfTestFailed, 0, S::Faulted),
+        row(S::CalibrateHoldMin, E::TimeOut, 0, S::Faulted),
+        // ways back
+        row(S::ProgrammingEscape, E::Stop, 0, S::ProgrammingEscape), // minimum already; the ESC still needs its power cut
+        row(S::ProgrammingEscape, E::Trip, 0, S::ProgrammingEscape),
+        row(S::ProgrammingEscape, E::Clear, Refusals::ESC_POWERED, S::Disarmed),
+        row(S::Faulted, E::Clear, 0, S::Disarmed),
+    ]
+};
+
+/// What came of an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Step {
+    /// Taken; the state that follows (it may be the same).
+    To(RigState),
+    /// Does not concern this state.
+    Ignored,
+    /// A command that was refused, with every reason.
+    Refused(Refusals),
+}
+
+/// One step of the machine: no clock, no memory.
+#[must_use]
+pub fn step(state: RigState, event: ArmingEvent, objections: Objections) -> Step {
+    match TABLE.iter().find(|row| row.from == state && row.on == event) {
+        Some(row) => match Refusals(objections.0 & row.unless) {
+            refusals if refusals.is_empty() => Step::To(row.to),
+            refusals => Step::Refused(refusals),
+        },
+        None if matches!(event, ArmingEvent::Stop | ArmingEvent::Trip) => Step::To(RigState::Faulted),
+        None if event.is_command() => {
+            let elsewhere = TABLE.iter().filter(|row| row.on == event).fold(0, |mask, row| mask | row.unless);
+            Step::Refused(Refusals(objections.0 & elsewhere | Refusals::WRONG_STATE))
+        }
+        None => Step::Ignored,
+    }
+}
+
+/// The pulse of a state: what the schedule commands only in `Running`, maximum only in `CalibrateHoldMax`, else minimum.
+#[must_use]
+pub const fn pulse_for(state: RigState, commanded: PulseWidth) -> PulseWidth {
+    match state {
+        RigState::Running => commanded.clamped(),
+        RigState::CalibrateHoldMax => PulseWidth::MAX,
+        RigState::Disarmed
+        | RigState::ArmHoldMin
+        | RigState::ArmCells
+        | RigState::ArmReady
+        | RigState::Armed
+        | RigState::CalibrateHoldMin
+        | RigState::ProgrammingEscape
+        | RigState::Faulted => PulseWidth::MIN,
+    }
+}
+
+/// How long each waiting state may last, milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ArmingTimes {
+    /// Waiting for the operator to power the ESC, and its long beep.
+    pub hold_min_ms: u32,
+    /// Waiting for the cell-count beeps.
+    pub cells_ms: u32,
+    /// Waiting for "1-2-3".
+    pub ready_ms: u32,
+    /// Armed and unused.
+    pub armed_ms: u32,
+    /// Holding maximum, waiting for power and the two beeps.
+    pub hold_max_ms: u32,
+    /// Back at minimum, waiting for the three answers.
+    pub calibrate_min_ms: u32,
+    /// Minimum throttle needed after a run before the next arming.
+    pub low_interval_ms: u32,
+}
+
+impl Default for ArmingTimes {
+    /// Time to walk to the battery, and twice what the beeps take.
+    fn default() -> Self {
+        Self {
+            hold_min_ms: 60_000,
+            cells_ms: 10_000,
+            ready_ms: 10_000,
+            armed_ms: 600_000,
+            hold_max_ms: 30_000,
+            calibrate_min_ms: 20_000,
+            low_interval_ms: 2_000,
+        }
+    }
+}
+
+/// Latest return to minimum after the two beeps: at 5 s the ESC stops waiting, at 6 s it programs itself (Appendix C).
+///
+/// The machine leaves `CalibrateHoldMax` with the event itself, so this is a bound for tests and not a timer.
+pub const MINIMUM_AFTER_DOUBLE_MS: u32 = 4_500;
+
+/// Time-out of a state, if it has one.
+#[must_use]
+pub const fn time_out(state: RigState, times: &ArmingTimes) -> Option<u32> {
+    match state {
+        RigState::ArmHoldMin => Some(times.hold_min_ms),
+        RigState::ArmCells => Some(times.cells_ms),
+        RigState::ArmReady => Some(times.ready_ms),
+        RigState::Armed => Some(times.armed_ms),
+        RigState::CalibrateHoldMax => Some(times.hold_max_ms),
+        RigState::CalibrateHoldMin => Some(times.calibrate_min_ms),
+        RigState::Disarmed | RigState::Running | RigState::ProgrammingEscape | RigState::Faulted => None,
+    }
+}
+
+/// What the operator is told in a state.
+#[must_use]
+pub const fn message(state: RigState) -> &'static str {
+    match state {
+        RigState::Disarmed => "Disarmed: minimum throttle. Arm, or calibrate with the ESC unpowered.",
+        RigState::ArmHoldMin => "Holding minimum: connect the ESC battery and wait for one long beep.",
+        RigState::ArmCells => "Minimum recognised: wait for the beeps that count the cells.",
+        RigState::ArmReady => "Cells counted: wait for 1-2-3.",
+        RigState::Armed => "Armed: keep clear, the rotor will turn on the next setting.",
+        RigState::Running => "Running: keep clear.",
+        RigState::CalibrateHoldMax => "Holding MAXIMUM: connect the ESC battery now and confirm the two beeps at once.",
+        RigState::CalibrateHoldMin => "Maximum stored: wait for one long beep, the cell beeps and 1-2-3.",
+        RigState::ProgrammingEscape => "The ESC is in its programming mode: cut its power, clear, and start again.",
+        RigState::Faulted => "Stopped: minimum throttle. Remove the cause, then clear the faults.",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::vec::Vec;
+
+    /// Every combination of the nine objections.
+    fn objections() -> impl Iterator<Item = Objections> {
+        (0..1u16 << 9).map(Refusals)
+    }
+
+    /// States reachable from reset, with one way each was reached.
+    fn reachable() -> BTreeSet<u8> {
+        let mut seen = BTreeSet::from([RigState::Disarmed as u8]);
+        let mut open = Vec::from([RigState::Disarmed]);
+        while let Some(state) = open.pop() {
+            for event in ArmingEvent::ALL {
+                for guard in objections() {
+                    if let Step::To(next) = step(state, event, guard)
+                        && seen.insert(next as u8)
+                    {
+                        open.push(next);
+                    }
+                }
+            }
+        }
+        seen
+    }
+
+    #[test]
+    fn every_state_is_reachable_and_no_row_is_dead() {
+        assert_eq!(reachable().len(), STATES.len());
+        for (i, a) in TABLE.iter().enumerate() {
+            assert!(!TABLE[..i].iter().any(|b| b.from == a.from && b.on == a.on), "row {a:?} is hidden by an earlier one");
+        }
+    }
+
+    /// Pulses above minimum only in Running and CalibrateHoldMax, whatever is commanded.
+    #[test]
+    fn live_pulses_in_two_states_only() {
+        for state in STATES {
+            for commanded in [0, 999_999, 1_000_000, 1_000_001, 1_500_000, 2_000_000, u32::MAX] {
+                let pulse = pulse_for(state, PulseWidth(commanded));
+                assert!(pulse >= PulseWidth::MIN && pulse <= PulseWidth::MAX);
+                if !matches!(state, RigState::Running | RigState::CalibrateHoldMax) {
+                    assert_eq!(pulse, PulseWidth::MIN, "{state:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn stop_and_trip_give_minimum_from_every_state() {
+        for state in STATES {
+            for guard in objections() {
+                for event in [ArmingEvent::Stop, ArmingEvent::Trip] {
+                    let Step::To(next) = step(state, event, guard) else { panic!("{event:?} in {state:?} was not taken") };
+                    assert_eq!(pulse_for(next, PulseWidth::MAX), PulseWidth::MIN);
+                    assert!(matches!(next, RigState::Faulted | RigState::ProgrammingEscape));
+                }
+            }
+        }
+    }
+
+    /// The only ways into the two live states.
+    #[test]
+    fn live_states_are_entered_by_their_own_command_only() {
+        for state in STATES {
+            for event in ArmingEvent::ALL {
+                for guard in objections() {
+                    match step(state, event, guard) {
+                        Step::To(RigState::Running) => {
+                            assert!(matches!(state, RigState::Armed | RigState::Running) && event == ArmingEvent::Run);
+                            assert_eq!(guard.0 & RUN_UNLESS, 0);
+                        }
+                        Step::To(RigState::CalibrateHoldMax) => {
+                            assert!(state == RigState::Disarmed && event == ArmingEvent::Calibrate);
+                            assert_eq!(guard.0 & (Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED | Refusals::FAULT_LATCHED), 0);
+                        }
+                        Step::To(RigState::Armed) => assert!(
+                            matches!(event, ArmingEvent::Ready | ArmingEvent::Finished),
+                            "{state:?} {event:?} armed without the ESC's own answer"
+                        ),
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+
+    /// A latched state is left by the operator's clearing alone, and never towards a live state.
+    #[test]
+    fn faults_latch() {
+        for event in ArmingEvent::ALL {
+            for guard in objections() {
+                for state in [RigState::Faulted, RigState::ProgrammingEscape] {
+                    if let Step::To(next) = step(state, event, guard)
+                        && next != state
+                    {
+                        assert_eq!((event, next), (ArmingEvent::Clear, RigState::Disarmed));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_refusal_lists_every_reason() {
+        let all = Refusals((1 << 9) - 1);
+        assert_eq!(step(RigState::Disarmed, ArmingEvent::Calibrate, all), Step::Refused(Refusals(CALIBRATE_UNLESS)));
+        assert_eq!(
+            step(RigState::Running, ArmingEvent::Arm, Refusals(Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW)),
+            Step::Refused(Refusals(Refusals::WRONG_STATE | Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW))
+        );
+    }
+
+    #[test]
+    fn the_two_start_procedures() {
+        use ArmingEvent::{Arm, Calibrate, Cells, Double, Long, Ready, Run};
+        let walk = |events: &[ArmingEvent]| {
+            events.iter().fold(RigState::Disarmed, |state, event| match step(state, *event, Refusals::default()) {
+                Step::To(next) => next,
+                _ => state,
+            })
+        };
+        assert_eq!(walk(&[Arm, Long, Cells, Ready]), RigState::Armed);
+        assert_eq!(walk(&[Arm, Cells, Ready]), RigState::ArmHoldMin, "beeps out of order do not arm");
+        assert_eq!(walk(&[Calibrate, Double, Long, Cells, Ready, Run]), RigState::Running);
+        assert_eq!(walk(&[Calibrate, Run]), RigState::CalibrateHoldMax);
+    }
+
+    #[test]
+    fn every_waiting_state_has_a_time_out_that_is_taken() {
+        for state in STATES {
+            let taken = matches!(step(state, ArmingEvent::TimeOut, Refusals::default()), Step::To(_));
+            assert_eq!(time_out(state, &ArmingTimes::default()).is_some(), taken, "{state:?}");
+            assert!(!message(state).is_empty());
+        }
+    }
+}

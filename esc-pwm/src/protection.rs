@@ -1,0 +1,186 @@
+//! The limits that bring the throttle to minimum.
+//!
+//! What it is: readings in, tripped faults out, with how long each limit must be exceeded before it trips.
+//! What can go wrong: a reading that is missing trips nothing by itself; missing conversions are a fault of their own.
+//! Units: SI and rev/min; milliseconds.
+//! Reference: specification `rig.md`, "Protection"; beam yield margin Beharie 2013, Eq. 5.53-5.56.
+
+use frame::rig::{Fault, FaultSet, RigState};
+use frame::units::{Ampere, Newton, RevPerMin, Volt};
+
+/// Limits and their times. The time from cause to minimum throttle is the limit's time plus one control tick and one
+/// ESC frame (20 ms).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Limits {
+    /// Highest rotor speed.
+    pub speed: RevPerMin,
+    /// Highest current while running.
+    pub current: Ampere,
+    /// Highest current while the ESC is meant to stand: above it, maximum pulses are not for calibration any more.
+    pub idle_current: Ampere,
+    /// Lowest supply while armed or running.
+    pub voltage: Volt,
+    /// Largest load on the cell, either way.
+    pub load: Newton,
+    /// Channels that may disagree with the others before it counts as a fault.
+    pub disagreeing: u8,
+    /// Longest silence of the host while armed or running, milliseconds.
+    pub link_ms: u32,
+    /// Longest time between two control ticks, milliseconds.
+    pub stall_ms: u32,
+    /// How long speed must be exceeded, milliseconds.
+    pub speed_ms: u32,
+    /// How long current, voltage and load limits must be exceeded, milliseconds.
+    pub analogue_ms: u32,
+    /// How long sensors must disagree or conversions be missing, milliseconds.
+    pub sensor_ms: u32,
+}
+
+/// What the limits look at, one control tick.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Readings {
+    /// Fastest healthy channel.
+    pub speed: Option<RevPerMin>,
+    /// Current over the last tick.
+    pub current: Option<Ampere>,
+    /// Supply over the last tick.
+    pub voltage: Option<Volt>,
+    /// Load on the cell, motor's weight included.
+    pub load: Option<Newton>,
+    /// The strain code sits at an end of its range.
+    pub load_saturated: bool,
+    /// Channels that disagree with the others at this moment.
+    pub disagreeing: u8,
+    /// No conversions came since the last tick.
+    pub adc_missing: bool,
+    /// Milliseconds since the host was heard.
+    pub silence_ms: u32,
+    /// Milliseconds since the last control tick.
+    pub tick_ms: u32,
+}
+
+/// Counts how long each limit has been exceeded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Protection {
+    speed_ms: u32,
+    current_ms: u32,
+    voltage_ms: u32,
+    load_ms: u32,
+    disagree_ms: u32,
+    adc_ms: u32,
+}
+
+/// Advances a timer while `exceeded`; says whether it has reached `limit`.
+fn lasted(timer: &mut u32, exceeded: bool, tick_ms: u32, limit: u32) -> bool {
+    *timer = if exceeded { timer.saturating_add(tick_ms.max(1)) } else { 0 };
+    exceeded && *timer >= limit
+}
+
+impl Protection {
+    /// One control tick: which limits are tripped now. Latching them is the caller's state machine.
+    pub fn check(&mut self, state: RigState, readings: &Readings, limits: &Limits) -> FaultSet {
+        let tick = readings.tick_ms;
+        let live = matches!(state, RigState::Running | RigState::CalibrateHoldMax);
+        let linked = live || matches!(state, RigState::Armed | RigState::CalibrateHoldMin);
+        let powered = matches!(state, RigState::Running | RigState::Armed);
+        let current_limit = if state == RigState::CalibrateHoldMax { limits.idle_current } else { limits.current };
+
+        let speed = lasted(&mut self.speed_ms, readings.speed.is_some_and(|v| v > limits.speed), tick, limits.speed_ms);
+        let current = lasted(&mut self.current_ms, readings.current.is_some_and(|v| v > current_limit), tick, limits.analogue_ms);
+        let under = powered && readings.voltage.is_some_and(|v| v < limits.voltage);
+        let voltage = lasted(&mut self.voltage_ms, under, tick, limits.analogue_ms);
+        let heavy = readings.load_saturated || readings.load.is_some_and(|v| v > limits.load || v < Newton(-limits.load.0));
+        let load = lasted(&mut self.load_ms, live && heavy, tick, limits.analogue_ms);
+        let disagree = lasted(&mut self.disagree_ms, live && readings.disagreeing > limits.disagreeing, tick, limits.sensor_ms);
+        let adc = lasted(&mut self.adc_ms, live && readings.adc_missing, tick, limits.sensor_ms);
+
+        [
+            (Fault::Overspeed, speed),
+            (Fault::OverCurrent, current),
+            (Fault::UnderVoltage, voltage),
+            (Fault::LoadCellOverload, load),
+            (Fault::SensorDisagreement, disagree),
+            (Fault::AdcLost, adc),
+            (Fault::LinkLost, linked && readings.silence_ms > limits.link_ms),
+            (Fault::ControlStalled, readings.tick_ms > limits.stall_ms),
+        ]
+        .into_iter()
+        .fold(FaultSet::NONE, |set, (fault, tripped)| if tripped { set.with(fault) } else { set })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits {
+        speed: RevPerMin(10_000.0),
+        current: Ampere(30.0),
+        idle_current: Ampere(1.0),
+        voltage: Volt(9.0),
+        load: Newton(30.0),
+        disagreeing: 1,
+        link_ms: 1000,
+        stall_ms: 5,
+        speed_ms: 5,
+        analogue_ms: 50,
+        sensor_ms: 500,
+    };
+
+    fn good() -> Readings {
+        Readings {
+            speed: Some(RevPerMin(4000.0)),
+            current: Some(Ampere(5.0)),
+            voltage: Some(Volt(11.5)),
+            load: Some(Newton(3.0)),
+            tick_ms: 1,
+            ..Readings::default()
+        }
+    }
+
+    /// Ticks until `fault` trips, at most two seconds.
+    fn trips_after(state: RigState, readings: Readings, fault: Fault) -> Option<u32> {
+        let mut protection = Protection::default();
+        (1..=2000).find(|_| protection.check(state, &readings, &LIMITS).contains(fault))
+    }
+
+    #[test]
+    fn good_readings_trip_nothing() {
+        let mut protection = Protection::default();
+        for _ in 0..5000 {
+            assert!(protection.check(RigState::Running, &good(), &LIMITS).is_empty());
+        }
+    }
+
+    #[test]
+    fn each_limit_trips_within_its_time() {
+        use RigState::{Armed, CalibrateHoldMax, Disarmed, Running};
+        let over = Readings { current: Some(Ampere(31.0)), ..good() };
+        assert_eq!(trips_after(Running, over, Fault::OverCurrent), Some(50));
+        assert_eq!(trips_after(CalibrateHoldMax, good(), Fault::OverCurrent), Some(50), "5 A is more than idle");
+        assert_eq!(trips_after(Running, Readings { speed: Some(RevPerMin(10_001.0)), ..good() }, Fault::Overspeed), Some(5));
+        let low = Readings { voltage: Some(Volt(8.9)), ..good() };
+        assert_eq!(trips_after(Running, low, Fault::UnderVoltage), Some(50));
+        assert_eq!(trips_after(Disarmed, low, Fault::UnderVoltage), None, "an unpowered ESC is no fault before arming");
+        assert_eq!(trips_after(Running, Readings { load: Some(Newton(-31.0)), ..good() }, Fault::LoadCellOverload), Some(50));
+        assert_eq!(trips_after(Running, Readings { load_saturated: true, ..good() }, Fault::LoadCellOverload), Some(50));
+        assert_eq!(trips_after(Running, Readings { disagreeing: 2, ..good() }, Fault::SensorDisagreement), Some(500));
+        assert_eq!(trips_after(Running, Readings { disagreeing: 1, ..good() }, Fault::SensorDisagreement), None);
+        assert_eq!(trips_after(Running, Readings { adc_missing: true, ..good() }, Fault::AdcLost), Some(500));
+        let silent = Readings { silence_ms: 1001, ..good() };
+        assert_eq!(trips_after(Armed, silent, Fault::LinkLost), Some(1));
+        assert_eq!(trips_after(Disarmed, silent, Fault::LinkLost), None);
+        assert_eq!(trips_after(Disarmed, Readings { tick_ms: 6, ..good() }, Fault::ControlStalled), Some(1));
+    }
+
+    #[test]
+    fn a_short_peak_is_forgiven() {
+        let mut protection = Protection::default();
+        let peak = Readings { current: Some(Ampere(60.0)), ..good() };
+        for i in 0..1000 {
+            let readings = if i % 50 == 49 { good() } else { peak };
+            assert!(protection.check(RigState::Running, &readings, &LIMITS).is_empty());
+        }
+    }
+}

@@ -1,0 +1,428 @@
+//! Throttle schedules as pure functions of elapsed time.
+//!
+//! What it is: the thesis staircase, up-down staircase, repeated visits, ramp, step, chirp and uploaded schedules,
+//! all answering "which pulse at this time?"; beside them the slew limit and the throttle curve.
+//! What can go wrong: a schedule without steps, a zero step or a level out of 1000 to 2000 us is refused ([`Schedule::check`]).
+//! Units: milliseconds of elapsed time, nanoseconds of pulse, millihertz.
+//! Reference: Beharie 2013, section 3.2.6 (errata: 21 levels, 20 increments); specification `rig.md`.
+
+use frame::message::MAX_UPLOAD;
+use frame::rig::Refusals;
+use frame::units::PulseWidth;
+use heapless::Vec;
+
+/// Levels of equal height and equal hold, from minimum throttle upwards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Staircase {
+    /// Height of one step.
+    pub step: PulseWidth,
+    /// Hold of each level, milliseconds.
+    pub hold_ms: u32,
+    /// Highest level.
+    pub top: PulseWidth,
+    /// Come down again by the same levels.
+    pub down: bool,
+    /// How often the whole staircase is walked (repeated visits); 0 counts as 1.
+    pub visits: u16,
+}
+
+impl Staircase {
+    /// 1000 to 2000 us by 50 us, 30 s a level, upwards once: 21 levels (Beharie 2013, section 3.2.6).
+    pub const THESIS: Self = Self { step: PulseWidth(50_000), hold_ms: 30_000, top: PulseWidth::MAX, down: false, visits: 1 };
+
+    /// Increments on the way up.
+    #[must_use]
+    pub const fn increments(&self) -> u32 {
+        match self.top.0.saturating_sub(PulseWidth::MIN.0).checked_div(self.step.0) {
+            Some(n) => n,
+            None => 0,
+        }
+    }
+
+    /// Levels of one visit, both ends included.
+    #[must_use]
+    pub const fn levels(&self) -> u32 {
+        let up = self.increments() + 1;
+        if self.down { 2 * up - 1 } else { up }
+    }
+
+    fn pulse_at(&self, ms: u64) -> Option<PulseWidth> {
+        let index = ms.checked_div(u64::from(self.hold_ms))?;
+        let levels = u64::from(self.levels());
+        if index >= levels * u64::from(self.visits.max(1)) {
+            return None;
+        }
+        let level = index % levels; // levels() is at least 1
+        let up = u64::from(self.increments());
+        let level = if level > up { 2 * up - level } else { level };
+        Some(PulseWidth(PulseWidth::MIN.0 + self.step.0 * level as u32))
+    }
+}
+
+/// One step of an uploaded schedule.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ScheduleStep {
+    /// Pulse to go to.
+    pub pulse: PulseWidth,
+    /// How long it takes, milliseconds.
+    pub hold_ms: u32,
+    /// Move there linearly during the hold instead of at its beginning.
+    pub ramp: bool,
+}
+
+/// A schedule uploaded from the host.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Uploaded {
+    steps: Vec<ScheduleStep, MAX_UPLOAD>,
+}
+
+impl Uploaded {
+    /// Empty.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { steps: Vec::new() }
+    }
+
+    /// Puts `step` at `index`; index 0 clears what was there.
+    ///
+    /// # Errors
+    /// [`Refusals::OUT_OF_RANGE`] when a step would be left out, there is no room, or the pulse or its hold is impossible.
+    pub fn put(&mut self, index: u8, step: ScheduleStep) -> Result<(), Refusals> {
+        let refused = Refusals(Refusals::OUT_OF_RANGE);
+        if step.pulse != step.pulse.clamped() || step.hold_ms == 0 {
+            return Err(refused);
+        }
+        if index == 0 {
+            self.steps.clear();
+        }
+        if usize::from(index) != self.steps.len() {
+            return Err(refused);
+        }
+        self.steps.push(step).map_err(|_| refused)
+    }
+
+    /// The steps.
+    #[must_use]
+    pub fn steps(&self) -> &[ScheduleStep] {
+        &self.steps
+    }
+
+    fn pulse_at(&self, ms: u64) -> Option<PulseWidth> {
+        let mut from = PulseWidth::MIN;
+        let mut left = ms;
+        for step in &self.steps {
+            let hold = u64::from(step.hold_ms);
+            if left < hold {
+                return Some(if step.ramp { between(from, step.pulse, left, hold) } else { step.pulse });
+            }
+            left -= hold;
+            from = step.pulse;
+        }
+        None
+    }
+}
+
+/// `from` + (`to` - `from`) * `at` / `whole`, in integers.
+fn between(from: PulseWidth, to: PulseWidth, at: u64, whole: u64) -> PulseWidth {
+    let (from, to) = (i64::from(from.0), i64::from(to.0));
+    let moved = ((to - from) * at as i64).checked_div(whole as i64).unwrap_or(0);
+    PulseWidth((from + moved) as u32)
+}
+
+/// A sine about a centre whose frequency rises linearly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Chirp {
+    /// Middle of the sine.
+    pub centre: PulseWidth,
+    /// Its amplitude.
+    pub amplitude: PulseWidth,
+    /// Frequency at the beginning, millihertz.
+    pub from_mhz: u32,
+    /// Frequency at the end, millihertz.
+    pub to_mhz: u32,
+    /// Duration, milliseconds.
+    pub length_ms: u32,
+}
+
+impl Chirp {
+    fn pulse_at(&self, ms: u64) -> Option<PulseWidth> {
+        if ms >= u64::from(self.length_ms) {
+            return None;
+        }
+        // Phase in millionths of a turn: exact integers, so the end of a long chirp is as sharp as its beginning.
+        let (t, length) = (i128::from(ms), i128::from(self.length_ms));
+        let sweep = i128::from(self.to_mhz) - i128::from(self.from_mhz);
+        let phase = i128::from(self.from_mhz) * t + (sweep * t * t).checked_div(2 * length)?;
+        let turn = phase.rem_euclid(1_000_000) as f32 / 1e6;
+        let offset = self.amplitude.0 as f32 * libm::sinf(turn * core::f32::consts::TAU);
+        let pulse = i64::from(self.centre.0) + offset as i64;
+        Some(PulseWidth(pulse.clamp(i64::from(PulseWidth::MIN.0), i64::from(PulseWidth::MAX.0)) as u32))
+    }
+}
+
+/// What the throttle follows while running.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Schedule {
+    /// A constant setting, without end: the manual override.
+    Manual(PulseWidth),
+    /// Equal levels.
+    Staircase(Staircase),
+    /// From one pulse to another in a straight line.
+    Ramp {
+        /// Beginning.
+        from: PulseWidth,
+        /// End.
+        to: PulseWidth,
+        /// Duration, milliseconds.
+        length_ms: u32,
+    },
+    /// One level, then another.
+    Step {
+        /// Before the step.
+        before: PulseWidth,
+        /// After the step.
+        after: PulseWidth,
+        /// Hold of each of the two, milliseconds.
+        hold_ms: u32,
+    },
+    /// Swept sine.
+    Chirp(Chirp),
+    /// From the host.
+    Uploaded(Uploaded),
+}
+
+impl Schedule {
+    /// Pulse at `ms` milliseconds after the beginning; `None` when the schedule is over.
+    #[must_use]
+    pub fn pulse_at(&self, ms: u64) -> Option<PulseWidth> {
+        match self {
+            Self::Manual(pulse) => Some(*pulse),
+            Self::Staircase(stairs) => stairs.pulse_at(ms),
+            Self::Ramp { from, to, length_ms } => {
+                (ms < u64::from(*length_ms)).then(|| between(*from, *to, ms, u64::from(*length_ms)))
+            }
+            Self::Step { before, after, hold_ms } => match ms.checked_div(u64::from(*hold_ms))? {
+                0 => Some(*before),
+                1 => Some(*after),
+                _ => None,
+            },
+            Self::Chirp(chirp) => chirp.pulse_at(ms),
+            Self::Uploaded(uploaded) => uploaded.pulse_at(ms),
+        }
+    }
+
+    /// What speaks against running this schedule: bits of [`Refusals`].
+    #[must_use]
+    pub fn check(&self) -> Refusals {
+        let out = |pulse: &PulseWidth| *pulse != pulse.clamped();
+        let bad = match self {
+            Self::Manual(pulse) => out(pulse),
+            Self::Staircase(s) => s.step.0 == 0 || s.hold_ms == 0 || out(&s.top) || s.increments() == 0,
+            Self::Ramp { from, to, length_ms } => out(from) || out(to) || *length_ms == 0,
+            Self::Step { before, after, hold_ms } => out(before) || out(after) || *hold_ms == 0,
+            Self::Chirp(c) => {
+                c.length_ms == 0
+                    || out(&c.centre)
+                    || out(&PulseWidth(c.centre.0.saturating_add(c.amplitude.0)))
+                    || out(&PulseWidth(c.centre.0.saturating_sub(c.amplitude.0)))
+            }
+            Self::Uploaded(_) => false, // each step was checked when it came
+        };
+        let empty = matches!(self, Self::Uploaded(uploaded) if uploaded.steps().is_empty());
+        Refusals::default().and(Refusals::OUT_OF_RANGE, bad).and(Refusals::EMPTY_SCHEDULE, empty)
+    }
+}
+
+/// Limits how fast the throttle moves. Falling to minimum is never limited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Slew {
+    /// Most change of pulse in a millisecond, nanoseconds; `u32::MAX` is no limit.
+    pub ns_per_ms: u32,
+}
+
+impl Slew {
+    /// No limit.
+    pub const NONE: Self = Self { ns_per_ms: u32::MAX };
+
+    /// The pulse `ms` milliseconds after `now`, on the way to `target`.
+    #[must_use]
+    pub const fn toward(self, now: PulseWidth, target: PulseWidth, ms: u32) -> PulseWidth {
+        if target.0 <= PulseWidth::MIN.0 {
+            return PulseWidth::MIN;
+        }
+        let most = self.ns_per_ms.saturating_mul(ms);
+        let lowest = now.0.saturating_sub(most);
+        let highest = now.0.saturating_add(most);
+        PulseWidth(if target.0 > highest {
+            highest
+        } else if target.0 < lowest {
+            lowest
+        } else {
+            target.0
+        })
+    }
+}
+
+/// Maps a setting to the pulse that is sent: a straight line, or five points as on a radio transmitter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ThrottleCurve {
+    /// The setting is the pulse.
+    #[default]
+    Linear,
+    /// Pulses at settings of 1000, 1250, 1500, 1750 and 2000 us, straight lines between.
+    Points([PulseWidth; 5]),
+}
+
+impl ThrottleCurve {
+    /// The pulse for `setting`. Minimum always stays minimum.
+    #[must_use]
+    pub fn apply(&self, setting: PulseWidth) -> PulseWidth {
+        const SPACING: u32 = 250_000;
+        let setting = setting.clamped();
+        let Self::Points(points) = self else { return setting };
+        if !setting.is_live() {
+            return PulseWidth::MIN;
+        }
+        let above = setting.0 - PulseWidth::MIN.0;
+        let segment = (above / SPACING) as usize;
+        match (points.get(segment), points.get(segment + 1)) {
+            (Some(a), Some(b)) => between(*a, *b, u64::from(above % SPACING), u64::from(SPACING)).clamped(),
+            (Some(a), None) => a.clamped(),
+            _ => PulseWidth::MIN,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec as List;
+
+    fn us(us: u32) -> PulseWidth {
+        PulseWidth::from_us(us)
+    }
+
+    /// Beharie 2013, section 3.2.6 with the errata: 21 levels are 630 s.
+    #[test]
+    fn the_thesis_staircase() {
+        let schedule = Schedule::Staircase(Staircase::THESIS);
+        assert_eq!(Staircase::THESIS.levels(), 21);
+        assert_eq!(schedule.pulse_at(0), Some(us(1000)));
+        assert_eq!(schedule.pulse_at(29_999), Some(us(1000)));
+        assert_eq!(schedule.pulse_at(30_000), Some(us(1050)));
+        assert_eq!(schedule.pulse_at(629_999), Some(us(2000)));
+        assert_eq!(schedule.pulse_at(630_000), None);
+        assert!(schedule.check().is_empty());
+    }
+
+    #[test]
+    fn up_and_down_and_again() {
+        let stairs = Staircase { step: us(250), hold_ms: 10, top: us(1500), down: true, visits: 2 };
+        let schedule = Schedule::Staircase(stairs);
+        let walked: List<u32> = (0..).map_while(|i| schedule.pulse_at(i * 10)).map(|p| p.0 / 1000).collect();
+        assert_eq!(walked, [1000, 1250, 1500, 1250, 1000, 1000, 1250, 1500, 1250, 1000]);
+    }
+
+    #[test]
+    fn uploads() {
+        let mut up = Uploaded::new();
+        let step = |pulse, hold_ms, ramp| ScheduleStep { pulse: us(pulse), hold_ms, ramp };
+        assert!(up.put(1, step(1500, 10, false)).is_err(), "a gap");
+        assert!(up.put(0, step(999, 10, false)).is_err(), "below minimum");
+        up.put(0, step(1500, 100, true)).unwrap();
+        up.put(1, step(1200, 50, false)).unwrap();
+        let schedule = Schedule::Uploaded(up.clone());
+        assert_eq!(schedule.pulse_at(50), Some(us(1250)));
+        assert_eq!(schedule.pulse_at(100), Some(us(1200)));
+        assert_eq!(schedule.pulse_at(150), None);
+        for i in 2..MAX_UPLOAD as u8 {
+            up.put(i, step(1100, 1, false)).unwrap();
+        }
+        assert!(up.put(MAX_UPLOAD as u8, step(1100, 1, false)).is_err(), "full");
+        up.put(0, step(1300, 1, false)).unwrap();
+        assert_eq!(up.steps().len(), 1);
+    }
+
+    #[test]
+    fn impossible_schedules_are_refused() {
+        let stairs = |step, hold_ms, top| Schedule::Staircase(Staircase { step, hold_ms, top, down: false, visits: 1 });
+        for bad in [
+            stairs(us(0), 10, us(1500)),
+            stairs(us(50), 0, us(1500)),
+            stairs(us(50), 10, us(2001)),
+            Schedule::Manual(us(900)),
+            Schedule::Ramp { from: us(1000), to: us(1500), length_ms: 0 },
+            Schedule::Chirp(Chirp { centre: us(1900), amplitude: us(200), from_mhz: 100, to_mhz: 1000, length_ms: 1000 }),
+        ] {
+            assert_eq!(bad.check(), Refusals(Refusals::OUT_OF_RANGE), "{bad:?}");
+        }
+        assert_eq!(Schedule::Uploaded(Uploaded::new()).check(), Refusals(Refusals::EMPTY_SCHEDULE));
+    }
+
+    #[test]
+    fn a_chirp_of_constant_frequency_is_a_sine() {
+        let chirp = Chirp { centre: us(1500), amplitude: us(100), from_mhz: 2000, to_mhz: 2000, length_ms: 10_000 };
+        let schedule = Schedule::Chirp(chirp);
+        for k in 0..20 {
+            let at = |ms: u64| i64::from(schedule.pulse_at(k * 500 + ms).unwrap().0);
+            assert!((at(0) - 1_500_000).abs() <= 20, "zero crossing");
+            assert!((at(125) - 1_600_000).abs() <= 20, "crest");
+            assert!((at(375) - 1_400_000).abs() <= 20, "trough");
+        }
+        assert_eq!(schedule.pulse_at(10_000), None);
+    }
+
+    #[test]
+    fn five_point_curve() {
+        let curve = ThrottleCurve::Points([us(1000), us(1100), us(1300), us(1600), us(2000)]);
+        assert_eq!(curve.apply(us(1000)), us(1000));
+        assert_eq!(curve.apply(us(1125)), us(1050));
+        assert_eq!(curve.apply(us(1500)), us(1300));
+        assert_eq!(curve.apply(us(2000)), us(2000));
+        assert_eq!(ThrottleCurve::Points([us(1500); 5]).apply(PulseWidth::MIN), PulseWidth::MIN);
+        assert_eq!(ThrottleCurve::Linear.apply(us(1777)), us(1777));
+    }
+
+    fn any_schedule() -> impl Strategy<Value = Schedule> {
+        let pulse = || (1_000_000u32..=2_000_000).prop_map(PulseWidth);
+        prop_oneof![
+            pulse().prop_map(Schedule::Manual),
+            (1u32..300_000, 1u32..100, pulse(), any::<bool>(), 0u16..4).prop_map(|(step, hold_ms, top, down, visits)| {
+                Schedule::Staircase(Staircase { step: PulseWidth(step), hold_ms, top, down, visits })
+            }),
+            (pulse(), pulse(), 1u32..5000).prop_map(|(from, to, length_ms)| Schedule::Ramp { from, to, length_ms }),
+            (pulse(), pulse(), 1u32..5000).prop_map(|(before, after, hold_ms)| Schedule::Step { before, after, hold_ms }),
+            (1_400_000u32..1_600_000, 0u32..400_000, 0u32..50_000, 0u32..50_000, 1u32..100_000).prop_map(|(c, a, f, t, l)| {
+                let (centre, amplitude) = (PulseWidth(c), PulseWidth(a));
+                Schedule::Chirp(Chirp { centre, amplitude, from_mhz: f, to_mhz: t, length_ms: l })
+            }),
+        ]
+    }
+
+    proptest! {
+        /// No schedule that passed its check ever leaves 1000 to 2000 us.
+        #[test]
+        fn within_range(schedule in any_schedule(), ms in 0u64..200_000) {
+            if schedule.check().is_empty() && let Some(pulse) = schedule.pulse_at(ms) {
+                prop_assert_eq!(pulse, pulse.clamped());
+            }
+        }
+
+        #[test]
+        fn slew_is_kept_except_to_minimum(now in 1_000_000u32..=2_000_000, to in 1_000_000u32..=2_000_000, rate in 0u32..5000, ms in 0u32..20) {
+            let next = Slew { ns_per_ms: rate }.toward(PulseWidth(now), PulseWidth(to), ms);
+            if to == 1_000_000 {
+                prop_assert_eq!(next, PulseWidth::MIN);
+            } else {
+                prop_assert!(next.0.abs_diff(now) <= rate * ms);
+                prop_assert!(next.0.abs_diff(to) <= now.abs_diff(to), "never away from the target");
+            }
+        }
+    }
+}
