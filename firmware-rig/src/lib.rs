@@ -1,3 +1,29 @@
-//! firmware-rig
+//! The rig board's portable half: the same code on the board, in the native simulation and in the emulator.
+//!
+//! What it is: [`Rig::tick`] takes what the peripherals delivered since the last tick and gives the pulse, and from time to
+//! time a raw sample and an event. Nothing here reads a clock or a register.
+//!
+//! What can go wrong: lost edges, missing conversions, late ticks and a silent host all arrive as data and leave as
+//! verdicts and latched faults; no input makes it panic.
+//!
+//! Units: ticks of the capture timer, ADC counts, nanoseconds of pulse; SI in the [`config`].
+//!
+//! Reference: specification `rig.md`; Beharie 2013, sections 3.2, 5.2-5.7.
 #![no_std]
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod capture;
+pub mod config;
+mod operator;
+pub mod rig;
+pub mod sampling;
+pub mod strain;
+
+pub use capture::CaptureChannel;
+pub use config::Config;
+pub use rig::{Inputs, Outputs, Rig};
+pub use sampling::AdcBlock;

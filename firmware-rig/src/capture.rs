@@ -1,0 +1,292 @@
+//! Speed from captured edges, over whole revolutions.
+//!
+//! What it is: one state for each of the four channels, and the bank that compares them. A reading is the time between two
+//! edges of the same mark over the shortest whole number of revolutions of at least 50 ms.
+//! What can go wrong: edges that were overwritten restart the history (`OverCapture`); silence is `Lost` while the rotor is
+//! known to turn and `Stopped` after the time-out; a channel 1 % off the median twice running is flagged `Disagrees`.
+//! The pattern verdicts (`Missed`, `Doubled`, `Alternating`) come from [`CaptureChannel::periods`].
+//! Units: ticks of the capture timer; all differences of raw captures wrap at 32 bits.
+//! Reference: specification `rig.md`, "Four RPM capture channels"; Beharie 2013, sections 5.4 and 5.7.2.
+
+use crate::config::{CaptureTimes, Config};
+use frame::rig::{CAPTURE_CHANNELS, CaptureCode, CaptureVerdict};
+use frame::units::{RevPerMin, Ticks};
+
+/// Edges kept: 50 ms and a revolution of 25 marks at 20 000 rev/min.
+const DEPTH: usize = 512;
+/// Longest silence that is bridged, in 32-bit captures of the whole timer range.
+const LONGEST_S: u32 = 10;
+/// Deviation from the median that counts as disagreement (specification: 1 % on hardware).
+const DISAGREEMENT: f32 = 0.01;
+
+/// One capture channel.
+#[derive(Debug, Clone)]
+pub struct CaptureChannel {
+    marks: u16,
+    times: CaptureTimes,
+    ceiling: u64,
+    ring: [u32; DEPTH],
+    next: usize,
+    held: usize,
+    primed: bool,
+    overwritten: bool,
+    last: Ticks,
+    reading: Option<(u16, u32)>,
+    deviations: u8,
+}
+
+impl CaptureChannel {
+    /// A channel that sees `marks` equal marks a revolution; 0 where none is fitted.
+    #[must_use]
+    pub fn new(marks: u16, timer_hz: u32, times: CaptureTimes) -> Self {
+        let ceiling = timer_hz.saturating_mul(LONGEST_S).min(u32::MAX / (u32::from(marks) + 1));
+        Self {
+            marks,
+            times,
+            ceiling: u64::from(ceiling),
+            ring: [0; DEPTH],
+            next: 0,
+            held: 0,
+            primed: false,
+            overwritten: false,
+            last: Ticks(0),
+            reading: None,
+            deviations: 0,
+        }
+    }
+
+    /// Edge `back` places before the latest.
+    fn edge(&self, back: usize) -> Option<u32> {
+        (back < self.held).then(|| (self.next + DEPTH - 1 - back) % DEPTH).and_then(|i| self.ring.get(i).copied())
+    }
+
+    /// Times between successive edges, the latest first: for tests of the pattern.
+    pub fn periods(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.held).map_while(|i| Some(self.edge(i)?.wrapping_sub(self.edge(i + 1)?)))
+    }
+
+    fn forget(&mut self) {
+        self.held = 0;
+        self.reading = None;
+    }
+
+    fn store(&mut self, edge: u32) {
+        if let Some(slot) = self.ring.get_mut(self.next) {
+            *slot = edge;
+        }
+        self.next = (self.next + 1) % DEPTH;
+        self.held = (self.held + 1).min(DEPTH);
+    }
+
+    /// Takes the captures since the last tick.
+    pub fn take(&mut self, now: Ticks, edges: &[u32], over_capture: bool) {
+        if self.marks == 0 {
+            return;
+        }
+        let mut edges = edges;
+        if !self.primed {
+            // The first capture after the timer started is its own compare match and no edge.
+            let Some((_, rest)) = edges.split_first() else { return };
+            self.primed = true;
+            edges = rest;
+        }
+        if over_capture {
+            self.forget();
+            self.overwritten = true;
+            edges = edges.last().map_or(&[][..], core::slice::from_ref);
+        }
+        for edge in edges {
+            let gap = self.edge(0).map_or(0, |before| edge.wrapping_sub(before));
+            if self.patience().is_some_and(|most| u64::from(gap) > most) {
+                self.forget();
+            }
+            self.store(*edge);
+        }
+        if let Some(edge) = edges.last() {
+            let age = (now.0 as u32).wrapping_sub(*edge);
+            let age = if age > u32::MAX / 2 { 0 } else { age }; // captured while `now` was read
+            self.last = Ticks(now.0.saturating_sub(u64::from(age)));
+            self.reading = self.measure();
+        } else if self.held > 0 && now.since(self.last).0 > self.stop_after() {
+            self.forget();
+        }
+    }
+
+    /// The shortest whole number of revolutions of at least the configured span.
+    fn measure(&self) -> Option<(u16, u32)> {
+        let latest = self.edge(0)?;
+        let mut best = None;
+        let mut count = self.marks;
+        while let Some(edge) = self.edge(usize::from(count)) {
+            let span = latest.wrapping_sub(edge);
+            best = Some((count, span));
+            if u64::from(span) >= self.times.span.0 {
+                return best;
+            }
+            count = count.checked_add(self.marks)?;
+        }
+        if self.held == DEPTH { best } else { None }
+    }
+
+    /// Ticks of one revolution at the last reading.
+    #[must_use]
+    pub fn revolution(&self) -> Option<u64> {
+        let (edges, span) = self.reading?;
+        (u64::from(span) * u64::from(self.marks)).checked_div(u64::from(edges))
+    }
+
+    fn expected(&self, revolution: u64) -> u64 {
+        revolution.checked_div(u64::from(self.marks)).unwrap_or(0)
+    }
+
+    /// Silence that a turning rotor can explain.
+    fn patience(&self) -> Option<u64> {
+        self.revolution().map(|r| 3 * self.expected(r) + self.times.lost_margin.0)
+    }
+
+    fn stop_after(&self) -> u64 {
+        match self.revolution() {
+            Some(r) => (3 * self.expected(r)).max(self.times.stop.0).min(self.ceiling),
+            None => self.ceiling,
+        }
+    }
+
+    /// Speed is known and the edges keep coming.
+    #[must_use]
+    pub fn is_turning(&self, now: Ticks) -> bool {
+        self.patience().is_some_and(|most| now.since(self.last).0 <= most)
+    }
+
+    /// Speed of the last reading.
+    #[must_use]
+    pub fn speed(&self, timer_hz: u32) -> Option<RevPerMin> {
+        self.revolution().filter(|r| *r > 0).map(|r| RevPerMin(60.0 * timer_hz as f32 / r as f32))
+    }
+
+    /// What the channel reports, when the others turn with `others` = (ticks a revolution, since when), if they do.
+    fn code(&self, now: Ticks, others: Option<(u64, Ticks)>) -> CaptureCode {
+        let bare = |verdict| CaptureCode { edges: 0, span: 0, verdict };
+        let full = |verdict| match self.reading {
+            Some((edges, span)) => CaptureCode { edges, span, verdict },
+            None => bare(verdict),
+        };
+        if self.marks == 0 {
+            return bare(CaptureVerdict::Absent);
+        }
+        if self.overwritten {
+            return full(CaptureVerdict::OverCapture);
+        }
+        if self.is_turning(now) {
+            return full(CaptureVerdict::Nominal);
+        }
+        match others {
+            Some((revolution, since)) => {
+                let silent = now.since(self.last.max(since)).0;
+                if silent > 3 * self.expected(revolution) + self.times.lost_margin.0 {
+                    bare(CaptureVerdict::Lost)
+                } else if self.reading.is_some() {
+                    full(CaptureVerdict::Nominal)
+                } else {
+                    bare(CaptureVerdict::Stopped)
+                }
+            }
+            None if self.reading.is_some() => bare(CaptureVerdict::Lost),
+            None => bare(CaptureVerdict::Stopped),
+        }
+    }
+}
+
+/// The four channels together.
+#[derive(Debug, Clone)]
+pub struct CaptureBank {
+    channels: [CaptureChannel; CAPTURE_CHANNELS],
+    timer_hz: u32,
+    turning_since: Option<Ticks>,
+    flagged: u8,
+}
+
+impl CaptureBank {
+    /// Channels of `config`.
+    #[must_use]
+    pub fn new(config: &Config) -> Self {
+        let channels = config.marks.map(|marks| CaptureChannel::new(marks, config.timer_hz, config.capture));
+        Self { channels, timer_hz: config.timer_hz, turning_since: None, flagged: 0 }
+    }
+
+    /// Takes the captures since the last tick.
+    pub fn take(&mut self, now: Ticks, edges: &[&[u32]; CAPTURE_CHANNELS], over_capture: &[bool; CAPTURE_CHANNELS]) {
+        for ((channel, edges), over) in self.channels.iter_mut().zip(edges).zip(over_capture) {
+            channel.take(now, edges, *over);
+        }
+        let turning = self.channels.iter().any(|c| c.is_turning(now));
+        self.turning_since = turning.then(|| self.turning_since.unwrap_or(now));
+    }
+
+    /// The channels.
+    #[must_use]
+    pub fn channels(&self) -> &[CaptureChannel; CAPTURE_CHANNELS] {
+        &self.channels
+    }
+
+    /// Whether any channel sees the rotor turn.
+    #[must_use]
+    pub fn is_turning(&self) -> bool {
+        self.turning_since.is_some()
+    }
+
+    /// Median speed of the channels that see it turn.
+    #[must_use]
+    pub fn consensus(&self, now: Ticks) -> Option<RevPerMin> {
+        let speeds = self.channels.each_ref().map(|c| c.speed(self.timer_hz).filter(|_| c.is_turning(now)));
+        median(speeds.map(|s| s.map(|v| v.0))).map(RevPerMin)
+    }
+
+    /// Channels that were lost or disagreed in the last sample.
+    #[must_use]
+    pub fn flagged(&self) -> u8 {
+        self.flagged
+    }
+
+    /// The codes of one sample.
+    pub fn sample(&mut self, now: Ticks) -> [CaptureCode; CAPTURE_CHANNELS] {
+        let known = self.channels.each_ref().map(|c| c.revolution().filter(|_| c.is_turning(now)).map(|r| r as f32));
+        let others = median(known).map(|r| r as u64).zip(self.turning_since);
+        let mut codes = self.channels.each_ref().map(|c| c.code(now, others));
+        let hz = self.timer_hz;
+        let healthy =
+            |c: &CaptureChannel, code: &CaptureCode| c.speed(hz).filter(|_| code.verdict == CaptureVerdict::Nominal).map(|v| v.0);
+        let mut speeds = [None; CAPTURE_CHANNELS];
+        for ((speed, channel), code) in speeds.iter_mut().zip(&self.channels).zip(&codes) {
+            *speed = healthy(channel, code);
+        }
+        let middle = median(speeds);
+        for ((channel, code), speed) in self.channels.iter_mut().zip(&mut codes).zip(speeds) {
+            let apart = match (speed, middle) {
+                (Some(speed), Some(middle)) => (speed - middle).abs() > DISAGREEMENT * middle,
+                _ => false,
+            };
+            if apart && channel.deviations > 0 {
+                code.verdict = CaptureVerdict::Disagrees;
+            }
+            channel.deviations = u8::from(apart);
+            // An over-capture is told once; until a whole span has been seen again the channel has no reading.
+            channel.overwritten &= channel.reading.is_none();
+        }
+        let bad = |code: &&CaptureCode| matches!(code.verdict, CaptureVerdict::Disagrees | CaptureVerdict::Lost);
+        self.flagged = codes.iter().filter(bad).count() as u8;
+        codes
+    }
+}
+
+/// Median of those present; the mean of the middle two when they are even in number.
+fn median(values: [Option<f32>; CAPTURE_CHANNELS]) -> Option<f32> {
+    let mut sorted = values.map(|v| v.unwrap_or(f32::INFINITY));
+    sorted.sort_unstable_by(f32::total_cmp);
+    let n = values.iter().flatten().count();
+    let at = |i: usize| sorted.get(i).copied();
+    match n {
+        0 => None,
+        n if n % 2 == 1 => at(n / 2),
+        n => Some(0.5 * (at(n / 2 - 1)? + at(n / 2)?)),
+    }
+}

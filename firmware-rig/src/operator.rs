@@ -1,0 +1,86 @@
+//! What the rig does with each command of the host.
+//!
+//! What it is: every variant of [`Command`] in one `match`, answered by an event: accepted, or refused with all reasons.
+//! What can go wrong: an impossible value is refused as `OUT_OF_RANGE`, in addition to what else speaks against it.
+//! Units: as in [`frame::message`].
+//! Reference: specification `rig.md`, "Acquisition".
+
+use crate::rig::Rig;
+use esc_pwm::{ArmingEvent, Schedule, ScheduleStep, Staircase, Step};
+use frame::message::{Command, Event};
+use frame::rig::{AdcVerdict, Refusals, RigState};
+use frame::units::{PulseWidth, Ticks};
+
+impl Rig {
+    /// Does what the host asks and tells the answer.
+    pub(crate) fn obey(&mut self, now: Ticks, command: &Command) {
+        let answer = match *command {
+            Command::Ping | Command::Identify => return, // hearing it is all; the caller answers Identify
+            Command::Beep(beep) => {
+                self.apply(now, beep.into(), Refusals::default());
+                return;
+            }
+            Command::Arm => self.ask(now, ArmingEvent::Arm, Refusals::default()),
+            Command::CalibrateRange { confirm } => {
+                let missing = Refusals::default().and(Refusals::NOT_CONFIRMED, confirm != Command::CALIBRATE_CONFIRM);
+                self.ask(now, ArmingEvent::Calibrate, missing)
+            }
+            Command::ScheduleStep { index, pulse, hold_ms, ramp } => {
+                self.upload.put(index, ScheduleStep { pulse, hold_ms, ramp })
+            }
+            Command::RunSchedule => self.run(now, Schedule::Uploaded(self.upload.clone())),
+            Command::RunStaircase { step, hold_ms, top, down } => {
+                self.run(now, Schedule::Staircase(Staircase { step, hold_ms, top, down, visits: 1 }))
+            }
+            Command::SetPulse(pulse) if pulse == PulseWidth::MIN && self.state == RigState::Running => {
+                self.ask(now, ArmingEvent::Finished, Refusals::default())
+            }
+            Command::SetPulse(pulse) => self.run(now, Schedule::Manual(pulse)),
+            Command::Stop => {
+                self.stop(now);
+                Ok(())
+            }
+            Command::Tare => self.tare(),
+            Command::ClearFaults => self.ask(now, ArmingEvent::Clear, Refusals::default()),
+        };
+        self.tell(match answer {
+            Ok(()) => Event::Accepted,
+            Err(reasons) => Event::Refused(reasons),
+        });
+    }
+
+    /// Puts a command to the arming machine, with `more` beside the standing objections.
+    fn ask(&mut self, now: Ticks, event: ArmingEvent, more: Refusals) -> Result<(), Refusals> {
+        let objections = Refusals(self.objections(now).0 | more.0);
+        match self.apply(now, event, objections) {
+            Step::To(_) => Ok(()),
+            Step::Refused(reasons) => Err(reasons),
+            Step::Ignored => Err(Refusals(Refusals::WRONG_STATE)),
+        }
+    }
+
+    fn run(&mut self, now: Ticks, schedule: Schedule) -> Result<(), Refusals> {
+        self.ask(now, ArmingEvent::Run, schedule.check())?;
+        self.schedule = schedule;
+        self.started = now;
+        Ok(())
+    }
+
+    /// Takes the means of the last whole log interval as the zeros of strain and torque.
+    fn tare(&mut self) -> Result<(), Refusals> {
+        let live = matches!(self.state, RigState::Running | RigState::CalibrateHoldMax);
+        let [strain, torque, ..] = &self.codes;
+        let unusable = |code: &frame::rig::AdcCode| code.verdict != AdcVerdict::Nominal;
+        let refusals = Refusals::default()
+            .and(Refusals::WRONG_STATE, live)
+            .and(Refusals::ROTOR_TURNING, self.bank.is_turning())
+            .and(Refusals::OUT_OF_RANGE, unusable(strain) || unusable(torque));
+        if !refusals.is_empty() {
+            return Err(refusals);
+        }
+        for (scale, code) in self.calibration.adc.iter_mut().zip(&self.codes).take(2) {
+            scale.zero = (f64::from(code.sum) / f64::from(code.count)) as f32;
+        }
+        Ok(())
+    }
+}

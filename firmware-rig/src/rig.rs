@@ -1,0 +1,310 @@
+//! One control tick of the rig.
+//!
+//! What it is: [`Rig::tick`], which orders protection, command, time-out, schedule and sample, and owns the small mutable
+//! state beside the immutable [`Config`].
+//! What can go wrong: faults latch and are told as events; a full event queue drops the newest event, never a state.
+//! Units: ticks of the capture timer; the tick is called at 1 kHz.
+//! Reference: specification `rig.md`; house rule "ticks without I/O".
+
+use crate::capture::CaptureBank;
+use crate::config::Config;
+use crate::sampling::AdcBlock;
+use esc_pwm::{ArmingEvent, Objections, Protection, Readings, Schedule, Step, Uploaded, pulse_for, step, time_out};
+use frame::calibration::Calibration;
+use frame::message::{BoardId, Command, Event, Hello};
+use frame::rig::{ADC_CHANNELS, AdcCode, AdcVerdict, CAPTURE_CHANNELS, Fault, FaultSet, Refusals, RigSample, RigState};
+use frame::units::{Ampere, Newton, PulseWidth, Ticks, Volt};
+use heapless::Deque;
+
+/// What the peripherals delivered since the last tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Inputs<'a> {
+    /// 64-bit extended ticks of the capture timer.
+    pub now: Ticks,
+    /// Raw 32-bit captures since the last tick, a slice a channel, in order.
+    pub edges: [&'a [u32]; CAPTURE_CHANNELS],
+    /// The channel's over-capture flag was set, or its queue was full.
+    pub over_capture: [bool; CAPTURE_CHANNELS],
+    /// What the converter delivered since the last tick.
+    pub adc: [AdcBlock; ADC_CHANNELS],
+    /// At most one decoded command of the host.
+    pub command: Option<Command>,
+    /// The hardware stop line.
+    pub stop_input: bool,
+}
+
+/// What the board has to do now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outputs {
+    /// Pulse for the ESC, from its next frame on.
+    pub pulse: PulseWidth,
+    /// A sample, once a log period.
+    pub sample: Option<RigSample>,
+    /// The oldest event that has not been told yet.
+    pub event: Option<Event>,
+}
+
+/// The rig.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    pub(crate) config: Config,
+    pub(crate) calibration: Calibration,
+    pub(crate) untared: Calibration,
+    pub(crate) state: RigState,
+    pub(crate) faults: FaultSet,
+    pub(crate) schedule: Schedule,
+    pub(crate) started: Ticks,
+    pub(crate) upload: Uploaded,
+    pub(crate) bank: CaptureBank,
+    pub(crate) codes: [AdcCode; ADC_CHANNELS],
+    entered: Ticks,
+    setting: PulseWidth,
+    last_live: Option<Ticks>,
+    blocks: [AdcBlock; ADC_CHANNELS],
+    supply: Option<Volt>,
+    protection: Protection,
+    heard: Ticks,
+    last_tick: Option<Ticks>,
+    next_sample: Ticks,
+    events: Deque<Event, 16>,
+}
+
+impl Rig {
+    /// A rig after reset: disarmed, at minimum.
+    #[must_use]
+    pub fn new(config: Config) -> Self {
+        let untared = config.calibration();
+        Self {
+            bank: CaptureBank::new(&config),
+            calibration: untared,
+            untared,
+            state: RigState::Disarmed,
+            faults: FaultSet::NONE,
+            schedule: Schedule::Manual(PulseWidth::MIN),
+            started: Ticks(0),
+            upload: Uploaded::new(),
+            codes: [AdcCode::default(); ADC_CHANNELS],
+            entered: Ticks(0),
+            setting: PulseWidth::MIN,
+            last_live: None,
+            blocks: [AdcBlock::default(); ADC_CHANNELS],
+            supply: None,
+            protection: Protection::default(),
+            heard: Ticks(0),
+            last_tick: None,
+            next_sample: Ticks(0),
+            events: Deque::new(),
+            config,
+        }
+    }
+
+    /// State of the arming machine.
+    #[must_use]
+    pub fn state(&self) -> RigState {
+        self.state
+    }
+
+    /// Latched faults.
+    #[must_use]
+    pub fn faults(&self) -> FaultSet {
+        self.faults
+    }
+
+    /// What turns the raw codes into values, with the present tare in it.
+    #[must_use]
+    pub fn calibration(&self) -> Calibration {
+        self.calibration
+    }
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// Who speaks, after a reset of the given cause.
+    #[must_use]
+    pub fn hello(&self, reset_cause: u8) -> Hello {
+        let fitted = self.config.marks.iter().rev().fold(0, |mask, marks| mask << 1 | u8::from(*marks > 0));
+        Hello { board: BoardId::Rig, firmware: VERSION, core_hz: self.config.core_hz, reset_cause, present: fitted }
+    }
+
+    /// One control tick.
+    pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
+        let now = inputs.now;
+        let tick_ms = self.advance(now);
+        if inputs.command.is_some() {
+            self.heard = now;
+        }
+        self.bank.take(now, &inputs.edges, &inputs.over_capture);
+        for (whole, part) in self.blocks.iter_mut().zip(&inputs.adc) {
+            whole.add(part);
+        }
+        self.protect(now, tick_ms, &inputs.adc);
+        if inputs.stop_input {
+            self.stop(now);
+        }
+        if let Some(command) = inputs.command {
+            self.obey(now, &command);
+        }
+        if let Some(limit) = time_out(self.state, &self.config.times)
+            && self.ms_since(now, self.entered) >= u64::from(limit)
+        {
+            self.apply(now, ArmingEvent::TimeOut, Refusals::default());
+        }
+        let pulse = self.drive(now, tick_ms);
+        let sample = (now >= self.next_sample).then(|| self.sample(now, pulse));
+        Outputs { pulse, sample, event: self.events.pop_front() }
+    }
+
+    /// Notes the tick; milliseconds since the one before, rounded.
+    fn advance(&mut self, now: Ticks) -> u32 {
+        let per_ms = u64::from(self.config.ticks_per_ms());
+        let Some(before) = self.last_tick.replace(now) else {
+            self.entered = now;
+            self.heard = now;
+            self.next_sample = Ticks(now.0 + self.config.log_period().0);
+            return 1;
+        };
+        u32::try_from((now.since(before).0 + per_ms / 2) / per_ms).unwrap_or(u32::MAX)
+    }
+
+    pub(crate) fn ms_since(&self, now: Ticks, then: Ticks) -> u64 {
+        now.since(then).0 / u64::from(self.config.ticks_per_ms())
+    }
+
+    /// Value of an ADC channel over one tick, untared.
+    fn value(&self, channel: usize, blocks: &[AdcBlock; ADC_CHANNELS]) -> Option<f32> {
+        let scale = self.untared.adc.get(channel)?;
+        Some((blocks.get(channel)?.mean()? - scale.zero) * scale.gain)
+    }
+
+    fn protect(&mut self, now: Ticks, tick_ms: u32, adc: &[AdcBlock; ADC_CHANNELS]) {
+        let [strain, ..] = adc;
+        let end = strain.verdict(self.config.converter.top(), true);
+        let voltage = self.value(3, adc).map(Volt);
+        self.supply = voltage.or(self.supply);
+        let readings = Readings {
+            speed: self.bank.consensus(now),
+            current: self.value(2, adc).map(Ampere),
+            voltage,
+            load: self.value(0, adc).map(Newton),
+            load_saturated: end == AdcVerdict::Stuck,
+            disagreeing: self.bank.flagged(),
+            adc_missing: end == AdcVerdict::Missing,
+            silence_ms: u32::try_from(self.ms_since(now, self.heard)).unwrap_or(u32::MAX),
+            tick_ms,
+        };
+        let tripped = self.protection.check(self.state, &readings, &self.config.limits);
+        if !tripped.is_empty() {
+            self.latch(now, tripped);
+            self.apply(now, ArmingEvent::Trip, Refusals::default());
+        }
+    }
+
+    fn latch(&mut self, now: Ticks, faults: FaultSet) {
+        let all = FaultSet(self.faults.0 | faults.0);
+        if all != self.faults {
+            self.faults = all;
+            self.tell(Event::Faults { faults: all, at: now });
+        }
+    }
+
+    pub(crate) fn tell(&mut self, event: Event) {
+        // Full only when sixteen ticks could not drain what they caused; the newest is then the least useful.
+        let _ = self.events.push_back(event);
+    }
+
+    pub(crate) fn stop(&mut self, now: Ticks) {
+        self.latch(now, FaultSet::NONE.with(Fault::OperatorStop));
+        self.apply(now, ArmingEvent::Stop, Refusals::default());
+    }
+
+    /// Everything that speaks against a command at this moment.
+    pub(crate) fn objections(&self, now: Ticks) -> Objections {
+        let low_ms = u64::from(self.config.times.low_interval_ms);
+        let recent = self.last_live.is_some_and(|at| self.ms_since(now, at) < low_ms);
+        Refusals::default()
+            .and(Refusals::FAULT_LATCHED, !self.faults.is_empty())
+            .and(Refusals::THROTTLE_NOT_LOW, self.setting.is_live())
+            .and(Refusals::NO_LOW_INTERVAL, recent)
+            .and(Refusals::ESC_POWERED, self.supply.is_some_and(|v| v >= self.config.powered))
+            .and(Refusals::ROTOR_TURNING, self.bank.is_turning())
+    }
+
+    /// Puts `event` to the arming machine and does what follows from it.
+    pub(crate) fn apply(&mut self, now: Ticks, event: ArmingEvent, objections: Objections) -> Step {
+        let from = self.state;
+        let answer = step(from, event, objections);
+        if let Step::To(to) = answer {
+            if to == RigState::Faulted
+                && let Some(fault) = event.fault()
+            {
+                self.latch(now, FaultSet::NONE.with(fault));
+            }
+            if event == ArmingEvent::Clear {
+                self.faults = FaultSet::NONE;
+            }
+            if to != RigState::Running {
+                self.schedule = Schedule::Manual(PulseWidth::MIN);
+                self.setting = PulseWidth::MIN;
+            }
+            if to != from {
+                self.state = to;
+                self.entered = now;
+                self.tell(Event::State { from, to, at: now });
+            }
+        }
+        answer
+    }
+
+    /// Follows the schedule and gives the pulse of this tick.
+    fn drive(&mut self, now: Ticks, tick_ms: u32) -> PulseWidth {
+        if self.state == RigState::Running {
+            match self.schedule.pulse_at(self.ms_since(now, self.started)) {
+                Some(target) => {
+                    let target = self.config.curve.apply(target);
+                    self.setting = self.config.slew.toward(self.setting, target, tick_ms);
+                }
+                None => {
+                    self.tell(Event::ScheduleDone { at: now });
+                    self.apply(now, ArmingEvent::Finished, Refusals::default());
+                }
+            }
+        }
+        let pulse = pulse_for(self.state, self.setting);
+        if pulse.is_live() {
+            self.last_live = Some(now);
+        }
+        pulse
+    }
+
+    fn sample(&mut self, now: Ticks, pulse: PulseWidth) -> RigSample {
+        let period = self.config.log_period().0;
+        let behind = now.since(self.next_sample).0.checked_div(period).unwrap_or(0);
+        self.next_sample = Ticks(self.next_sample.0 + (behind + 1) * period);
+        let top = self.config.converter.top();
+        for ((code, block), live) in self.codes.iter_mut().zip(&mut self.blocks).zip(self.config.live_zero) {
+            *code = core::mem::take(block).code(top, live);
+        }
+        let rpm = self.bank.sample(now);
+        RigSample { at: now, pulse, state: self.state, faults: self.faults, rpm, adc: self.codes }
+    }
+}
+
+/// Firmware version from the package.
+const VERSION: [u8; 3] =
+    [number(env!("CARGO_PKG_VERSION_MAJOR")), number(env!("CARGO_PKG_VERSION_MINOR")), number(env!("CARGO_PKG_VERSION_PATCH"))];
+
+/// A decimal number below 256, at compile time.
+const fn number(mut text: &str) -> u8 {
+    let mut value = 0u8;
+    while let Some((digit, rest)) = text.as_bytes().split_first() {
+        value = value * 10 + (*digit - b'0');
+        text = match core::str::from_utf8(rest) {
+            Ok(rest) => rest,
+            Err(_) => "",
+        };
+    }
+    value
+}
