@@ -1,0 +1,317 @@
+//! The bench: ESC, powerplant, beam and sensors on one clock.
+//!
+//! What it is: the rig as its board meets it. Pulses go in with the time of their end; edges, pin voltages and beeps come out.
+//! The native run takes it a millisecond at a time ([`Bench::millisecond`]); an emulated board takes it to any instant
+//! ([`Bench::advance_to`]) and asks for edges and voltages.
+//! What can go wrong: nothing here fails; a powerplant that gives a NaN or a negative speed is taken as a resting rotor.
+//! Units: ns since power-up of the board for every time; V at the pins.
+//! Reference: specification `rig.md`, "The simulator"; house rule 7 (the simulator owns the only clock).
+//!
+//! For a driver with its own clock:
+//!
+//! ```
+//! use hal_sim::{Bench, EdgeDetail, Scenario};
+//! let mut bench = Bench::new(&Scenario::demo(1, None).unwrap(), None, EdgeDetail::Pins);
+//! bench.set_power(true);
+//! bench.pulse(1_000_000, 1_000_000); // a pulse of 1 ms ended at t = 1 ms
+//! bench.advance_to(5_000_000);
+//! while let Some(edge) = bench.edge_until(5_000_000) { /* drive the pin at edge.at_ns */ }
+//! let wake = bench.next_edge_ns().unwrap_or(bench.horizon_ns()); // the next instant worth stopping at
+//! let strain_v = bench.voltages()[0];
+//! let beep = bench.beep();
+//! # let _ = (wake, strain_v, beep);
+//! ```
+
+use crate::effect::{EffectKind, Levers};
+use crate::noise::{Source, Stream};
+use crate::plant::beam::BeamMode;
+use crate::plant::bridge::BridgeState;
+use crate::plant::{Beam, Bridge, Esc, EscDialogue, EscState, Parts, PlantState, Powerplant, RigPlant};
+use crate::scenario::Scenario;
+use crate::sensor::{AnalogFront, Block, Converter, Edge, EdgeDetail, Geometry, Tachometers};
+use core::f64::consts::TAU;
+use frame::calibration::Calibration;
+use frame::message::Beep;
+use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
+use frame::units::Ticks;
+use std::collections::VecDeque;
+
+/// Integration step, ns.
+pub const STEP_NS: u64 = 100_000;
+/// Integration step, s.
+pub const STEP_S: f64 = 1.0e-4;
+/// Steps in a millisecond.
+const STEPS_PER_MS: usize = 10;
+/// Ticks of 84 MHz in a step.
+const STEP_TICKS: u64 = 8_400;
+
+/// Everything that a bench is built of. Effects may change it before the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BenchParts {
+    /// The powerplant's parts.
+    pub plant: Parts,
+    /// The ESC's dialogue.
+    pub esc: Esc,
+    /// Cantilever.
+    pub beam: Beam,
+    /// Bridge and amplifier.
+    pub bridge: Bridge,
+    /// Speed sensors.
+    pub geometry: Geometry,
+    /// Standard deviation of the mean over 0.1 s of each analogue channel, in its unit.
+    pub noise: [f64; ADC_CHANNELS],
+}
+
+/// What is really there at one instant, for judging what was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Truth {
+    /// Seconds since run start; negative before.
+    pub run_s: f64,
+    /// Pulse that the ESC follows, us.
+    pub pulse_us: f64,
+    /// Powerplant.
+    pub plant: PlantState,
+    /// Force that the gauges see, N.
+    pub beam_n: f64,
+}
+
+/// What the board's peripherals gathered in one millisecond.
+#[derive(Debug, Clone, Default)]
+pub struct Millisecond {
+    /// Rising edges of each capture channel, ticks modulo 2^32.
+    pub edges: [Vec<u32>; CAPTURE_CHANNELS],
+    /// Conversions of each ADC channel.
+    pub adc: [Block; ADC_CHANNELS],
+}
+
+/// The rig.
+pub struct Bench {
+    esc: EscDialogue,
+    plant: Box<dyn Powerplant>,
+    effects: Vec<EffectKind>,
+    levers: Levers,
+    beam: Beam,
+    mode: BeamMode,
+    bridge: BridgeState,
+    front: AnalogFront,
+    converter: Converter,
+    geometry: Geometry,
+    tachometers: Tachometers,
+    steps: u64,
+    run_start_steps: Option<u64>,
+    angle_rev: f64,
+    heavy_spot_rev: f64,
+    strain_v: [f64; STEPS_PER_MS],
+    pins_v: [f64; ADC_CHANNELS],
+    output_us: f64,
+    edges: VecDeque<Edge>,
+    truth: Truth,
+}
+
+impl Bench {
+    /// A bench at rest without ESC power. `plant` takes the place of the scenario's own powerplant; effects on the
+    /// powerplant then have nothing to act on, those on the load cell and the sensors still do.
+    #[must_use]
+    pub fn new(scenario: &Scenario, plant: Option<Box<dyn Powerplant>>, detail: EdgeDetail) -> Self {
+        let mut parts = scenario.parts();
+        for effect in &scenario.effects {
+            effect.fit(&mut parts);
+        }
+        let seed = scenario.seed;
+        let mut phase = Stream::new(seed, Source::Phase, 0);
+        let angle_rev = phase.uniform();
+        let cells = parts.plant.supply.cells();
+        let front = AnalogFront::new(&parts.bridge);
+        let plant = plant.unwrap_or_else(|| Box::new(RigPlant::new(parts.plant, seed)));
+        Self {
+            esc: EscDialogue::new(parts.esc, cells),
+            plant,
+            effects: scenario.effects.clone(),
+            levers: Levers::default(),
+            mode: BeamMode::new(&parts.beam, STEP_S),
+            beam: parts.beam,
+            bridge: BridgeState::new(parts.bridge, STEP_S),
+            converter: Converter::new(&front, parts.noise, seed),
+            tachometers: Tachometers::new(&parts.geometry, detail, seed, angle_rev),
+            geometry: parts.geometry,
+            steps: 0,
+            run_start_steps: None,
+            angle_rev,
+            heavy_spot_rev: phase.uniform(),
+            strain_v: [front.zero_v[0]; STEPS_PER_MS],
+            pins_v: front.zero_v,
+            front,
+            output_us: 1000.0,
+            edges: VecDeque::new(),
+            truth: Truth::default(),
+        }
+    }
+
+    /// The operator's switch: connects or cuts the ESC's power.
+    pub fn set_power(&mut self, on: bool) {
+        self.esc.set_power(on);
+    }
+
+    /// The run starts now: from here the effects count their time.
+    pub fn start_run(&mut self) {
+        self.run_start_steps = Some(self.steps);
+    }
+
+    /// A pulse of `width_ns` on the ESC pin ended at `at_ns`.
+    pub fn pulse(&mut self, at_ns: u64, width_ns: u32) {
+        self.esc.pulse(at_ns, width_ns);
+    }
+
+    /// Integrates until [`Bench::horizon_ns`] is at least `at_ns`. The look-ahead is less than one step of 0.1 ms.
+    pub fn advance_to(&mut self, at_ns: u64) {
+        while self.horizon_ns() < at_ns {
+            self.step();
+        }
+    }
+
+    /// Time up to which everything is integrated, ns.
+    #[must_use]
+    pub fn horizon_ns(&self) -> u64 {
+        self.steps * STEP_NS
+    }
+
+    /// Time of the earliest edge that was not fetched yet; `None` when there is none before [`Bench::horizon_ns`].
+    #[must_use]
+    pub fn next_edge_ns(&self) -> Option<u64> {
+        self.edges.front().map(|e| e.at_ns)
+    }
+
+    /// Fetches the earliest edge if it is due at or before `at_ns`.
+    pub fn edge_until(&mut self, at_ns: u64) -> Option<Edge> {
+        if self.next_edge_ns()? <= at_ns { self.edges.pop_front() } else { None }
+    }
+
+    /// Level of a capture pin after the edges made so far (with [`EdgeDetail::Pins`]); for set-up after a reset.
+    #[must_use]
+    pub fn level(&self, channel: usize) -> bool {
+        self.tachometers.level(channel)
+    }
+
+    /// Voltages at the pins of strain, torque, current, voltage and temperature, noise of the wires included, V.
+    #[must_use]
+    pub fn voltages(&self) -> [f64; ADC_CHANNELS] {
+        core::array::from_fn(|i| self.pins_v[i] + self.converter.offset_v(i))
+    }
+
+    /// One conversion of an ADC channel now, with its own noise, 12 bits. Each call draws new noise.
+    pub fn convert(&mut self, channel: usize) -> u16 {
+        self.converter.convert(channel, self.pins_v[channel])
+    }
+
+    /// The next beep pattern that has ended, with the time of its end, ns.
+    pub fn beep(&mut self) -> Option<(u64, Beep)> {
+        self.esc.beep()
+    }
+
+    /// Where the ESC stands.
+    #[must_use]
+    pub fn esc_state(&self) -> EscState {
+        self.esc.state()
+    }
+
+    /// What is really there now.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        self.truth
+    }
+
+    /// The calibration that fits this bench exactly.
+    #[must_use]
+    pub fn calibration(&self) -> Calibration {
+        Calibration { timer_hz: Ticks::HZ, marks: self.geometry.marks(), adc: self.front.scales() }
+    }
+
+    /// One millisecond of a native run. Call it at whole milliseconds only, and not together with [`Bench::advance_to`].
+    pub fn millisecond(&mut self, out: &mut Millisecond) {
+        for _ in 0..STEPS_PER_MS {
+            self.step();
+        }
+        for edges in &mut out.edges {
+            edges.clear();
+        }
+        while let Some(edge) = self.edges.pop_front() {
+            if edge.rising {
+                out.edges[usize::from(edge.channel)].push(edge.at_ticks as u32);
+            }
+        }
+        // Five channels at 480 cycles each and 21 MHz: 8.5 conversions of each in a millisecond.
+        let count = 8 + (self.steps / STEPS_PER_MS as u64 & 1) as u16;
+        let pins_v = self.pins_v;
+        for (channel, block) in out.adc.iter_mut().enumerate() {
+            *block = match channel {
+                0 => self.converter.block(0, count, &self.strain_v),
+                _ => self.converter.block(channel, count, &pins_v[channel..=channel]),
+            };
+        }
+    }
+
+    fn each_millisecond(&mut self) {
+        self.esc.advance_to(self.horizon_ns());
+        self.output_us = self.esc.output_us();
+        self.converter.renew();
+        let run_s = match self.run_start_steps {
+            Some(start) => (self.steps - start) as f64 * STEP_S,
+            None => -1.0,
+        };
+        self.levers = Levers::default();
+        self.levers.plant.run_s = run_s;
+        if run_s >= 0.0 {
+            for effect in &self.effects {
+                effect.act(run_s, &mut self.levers);
+            }
+        }
+        self.plant.adjust(&self.levers.plant);
+        self.truth.run_s = run_s;
+    }
+
+    fn step(&mut self) {
+        if self.steps.is_multiple_of(STEPS_PER_MS as u64) {
+            self.each_millisecond();
+        }
+        let mut state = self.plant.advance(STEP_S, self.output_us);
+        if !(state.rpm >= 0.0 && state.rpm < 1.0e6) {
+            state.rpm = 0.0;
+        }
+        if !self.esc.powered() {
+            (state.voltage_v, state.current_a) = (0.0, 0.0);
+        }
+
+        let speed_rev_s = state.rpm / 60.0;
+        let from = self.angle_rev;
+        let to = from + speed_rev_s * STEP_S;
+        let (start_ns, start_ticks) = (self.steps * STEP_NS, self.steps * STEP_TICKS);
+        let edges = &mut self.edges;
+        let before = edges.len();
+        self.tachometers.step(from, to, |channel, rising, fraction| {
+            edges.push_back(Edge {
+                channel,
+                rising,
+                at_ns: start_ns + (fraction * STEP_NS as f64) as u64,
+                at_ticks: start_ticks + (fraction * STEP_TICKS as f64) as u64,
+            });
+        });
+        if edges.len() > before + 1 {
+            edges.make_contiguous()[before..].sort_by_key(|e| (e.at_ns, e.channel));
+        }
+        self.angle_rev = to;
+
+        let speed = speed_rev_s * TAU;
+        let mut force = state.thrust_n;
+        if speed > 0.0 {
+            let turn = to + self.heavy_spot_rev;
+            force += self.beam.shaking_n(speed, libm::cos(TAU * (turn - turn.floor())));
+        }
+        let beam_n = self.mode.step(force);
+        let zero_n = self.levers.strain_zero_n + self.levers.torque_to_lift * state.torque_nm;
+        let strain_v = self.bridge.step(beam_n, zero_n, self.levers.strain_gain, state.temp_c);
+        self.pins_v = self.front.pins(strain_v, &state);
+        self.strain_v[(self.steps % STEPS_PER_MS as u64) as usize] = strain_v;
+        self.truth = Truth { run_s: self.truth.run_s, pulse_us: self.output_us, plant: state, beam_n };
+        self.steps += 1;
+    }
+}

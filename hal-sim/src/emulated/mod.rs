@@ -1,0 +1,17 @@
+//! The emulated board: runs the very image that gets flashed.
+//!
+//! What it is: an STM32F405 with register-level peripherals under the unmodified ELF file, on virtual time, with models of
+//! ours on its pins and buses. The emulator crate is hidden in here.
+//!
+//! What can go wrong: the image is not built ([`EmulatedError::NoImage`] says how); the emulated part is a superset of ours
+//! (an STM32F427), so a register that only the larger part has would not be noticed; one instruction takes one cycle, so
+//! instruction counts are right and worst-case times are not.
+//!
+//! Units: nanoseconds since power-up; bytes; volts at the pins.
+//!
+//! Reference: RM0090 rev 22; crate rigless 0.4.
+
+pub mod ahrs;
+mod machine;
+
+pub use machine::{Accesses, EmulatedError, Machine, Outcome, Pins, World, firmware, run};

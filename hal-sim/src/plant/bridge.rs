@@ -1,0 +1,161 @@
+//! Strain bridge and its amplifier, up to the ADC pin.
+//!
+//! What it is: full bridge on the beam, instrumentation amplifier with a zero, rails and an output stage that may fall slower
+//! than it rises, a visco-elastic share of the beam (creep), divider, and the meter's own filter.
+//! What can go wrong: beyond its rails the amplifier saturates; the pin then shows the rail.
+//! Units: newton of lift (up is positive) in, volt at the ADC pin out.
+//! Reference: Beharie 2013 Eq. 5.47-5.55 (corrected: V = 6 K F L G V_in/(b h^2 E)), Table 7; errata "signal after the amplifier".
+
+/// Standard gravity, m/s^2.
+const G: f64 = 9.806_65;
+
+/// Parameters of bridge and amplifier.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bridge {
+    /// Amplifier output per newton at the tip, V/N.
+    pub volt_per_newton: f64,
+    /// Amplifier output of the unloaded beam, V.
+    pub zero_v: f64,
+    /// Rails of the amplifier output, V.
+    pub rails_v: (f64, f64),
+    /// Divider between amplifier and ADC pin.
+    pub divider: f64,
+    /// Mass of motor and tachometer on the beam, kg; it pulls down.
+    pub tip_mass_kg: f64,
+    /// Time constant of the output stage while it rises, s.
+    pub rise_s: f64,
+    /// Time constant of the output stage while it falls, s.
+    pub fall_s: f64,
+    /// Time constant of the meter's RC filter ahead of the ADC, s; 0 where there is none.
+    pub filter_s: f64,
+    /// Share of the load that the beam gives only after [`Bridge::creep_s`]; 0 where there is none.
+    pub creep_share: f64,
+    /// Time constant of the creep, s.
+    pub creep_s: f64,
+    /// Zero shift with temperature, N/K.
+    pub zero_n_per_k: f64,
+    /// Temperature at which the zero was set, degC.
+    pub zero_temperature_c: f64,
+}
+
+impl Default for Bridge {
+    /// Table 7 at length 115 mm and gain 1000: 231.4 g/V, zero 2.30 V, 244 g on the beam, divider 0.5.
+    fn default() -> Self {
+        let (k, length, gain, excitation) = (2.0, 0.115, 1000.0, 11.5);
+        let (b, h, e) = (0.020, 0.003, 200.0e9);
+        Self {
+            volt_per_newton: 6.0 * k * length * gain * excitation / (b * h * h * e),
+            zero_v: 2.30,
+            rails_v: (0.05, 5.0),
+            divider: 0.5,
+            tip_mass_kg: 0.244,
+            rise_s: 0.4e-3,
+            fall_s: 0.4e-3,
+            filter_s: 0.0,
+            creep_share: 0.0,
+            creep_s: 60.0,
+            zero_n_per_k: 0.0,
+            zero_temperature_c: 23.0,
+        }
+    }
+}
+
+impl Bridge {
+    /// Pin voltage of a resting, tared rig, V.
+    #[must_use]
+    pub fn resting_v(&self) -> f64 {
+        self.divider * (self.zero_v + self.volt_per_newton * self.tip_mass_kg * G)
+    }
+
+    /// Lift per volt at the pin, N/V; negative because lift unloads the beam.
+    #[must_use]
+    pub fn newton_per_volt(&self) -> f64 {
+        -1.0 / (self.volt_per_newton * self.divider)
+    }
+}
+
+/// State of amplifier, creep and filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BridgeState {
+    bridge: Bridge,
+    creep_n: f64,
+    output_v: f64,
+    pin_v: f64,
+    rise: f64,
+    fall: f64,
+    filter: f64,
+    creep: f64,
+}
+
+/// Fraction of a first-order lag covered in one step; 1 when there is no lag.
+fn share(dt_s: f64, tau_s: f64) -> f64 {
+    if tau_s > 0.0 { 1.0 - libm::exp(-dt_s / tau_s) } else { 1.0 }
+}
+
+impl BridgeState {
+    /// At rest, for steps of `dt_s`.
+    #[must_use]
+    pub fn new(bridge: Bridge, dt_s: f64) -> Self {
+        let output_v = bridge.resting_v() / bridge.divider;
+        Self {
+            bridge,
+            creep_n: 0.0,
+            output_v,
+            pin_v: bridge.resting_v(),
+            rise: share(dt_s, bridge.rise_s),
+            fall: share(dt_s, bridge.fall_s),
+            filter: share(dt_s, bridge.filter_s),
+            creep: share(dt_s, bridge.creep_s),
+        }
+    }
+
+    /// One step: `lift_n` on the beam, `zero_n` and `gain` of the moment, rig temperature; gives the pin voltage.
+    pub fn step(&mut self, lift_n: f64, zero_n: f64, gain: f64, temperature_c: f64) -> f64 {
+        let b = &self.bridge;
+        self.creep_n += (b.creep_share * lift_n - self.creep_n) * self.creep;
+        let shift = zero_n + b.zero_n_per_k * (temperature_c - b.zero_temperature_c);
+        let seen_n = (lift_n + self.creep_n) * gain + shift;
+        let wanted = (b.zero_v + b.volt_per_newton * (b.tip_mass_kg * G - seen_n)).clamp(b.rails_v.0, b.rails_v.1);
+        let error = wanted - self.output_v;
+        self.output_v += error * if error > 0.0 { self.rise } else { self.fall };
+        self.pin_v += (b.divider * self.output_v - self.pin_v) * self.filter;
+        self.pin_v
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_and_the_voltages_of_the_errata_come_out() {
+        let b = Bridge::default();
+        let grams_per_volt = 1000.0 / (b.volt_per_newton * G);
+        assert!((grams_per_volt - 231.37).abs() < 0.2, "{grams_per_volt}");
+        // 3.35 V at +244 g, 0.40 V at -440 g
+        assert!((b.resting_v() / b.divider - 3.35).abs() < 0.01);
+        assert!((b.zero_v - b.volt_per_newton * 0.440 * G - 0.40).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_slow_fall_lifts_the_mean_of_a_vibration_and_leaves_a_constant_alone() {
+        let dt = 1.0e-4;
+        let run = |fall_s, amplitude: f64| {
+            let b = Bridge { fall_s, ..Bridge::default() };
+            let mut s = BridgeState::new(b, dt);
+            let mut sum = 0.0;
+            let n = 200_000;
+            for i in 0..n {
+                let lift = 1.0 + amplitude * libm::sin(260.0 * dt * f64::from(i));
+                let v = s.step(lift, 0.0, 1.0, 23.0);
+                if i >= n / 2 {
+                    sum += (v - b.resting_v()) * b.newton_per_volt();
+                }
+            }
+            sum / f64::from(n / 2)
+        };
+        assert!((run(2.0e-3, 0.0) - 1.0).abs() < 1e-9);
+        assert!((run(0.4e-3, 0.5) - 1.0).abs() < 2e-3);
+        assert!((run(2.0e-3, 0.5) - 1.0).abs() > 0.02);
+    }
+}

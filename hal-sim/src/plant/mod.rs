@@ -1,0 +1,26 @@
+//! The things that the rig measures: what turns, bends and heats.
+//!
+//! What it is: one file for each part, parameters with their units and sources, states integrated at a fixed step.
+//! What can go wrong: see each part.
+//! Units: SI; rev/min and us at the edges.
+//! Reference: specification `rig.md`, "The simulator"; errata for every figure.
+
+pub mod air;
+pub mod beam;
+pub mod bridge;
+pub mod esc;
+pub mod motor;
+pub mod powerplant;
+pub mod propeller;
+pub mod supply;
+pub mod thermal;
+
+pub use air::Air;
+pub use beam::Beam;
+pub use bridge::Bridge;
+pub use esc::{Esc, EscDialogue, EscState};
+pub use motor::Motor;
+pub use powerplant::{Parts, PlantLevers, PlantState, Powerplant, RigPlant};
+pub use propeller::Propeller;
+pub use supply::Supply;
+pub use thermal::Thermal;
