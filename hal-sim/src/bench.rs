@@ -28,8 +28,9 @@ use crate::plant::beam::BeamMode;
 use crate::plant::bridge::BridgeState;
 use crate::plant::{Beam, Bridge, Esc, EscDialogue, EscState, Parts, PlantState, Powerplant, RigPlant};
 use crate::scenario::Scenario;
-use crate::sensor::{AnalogFront, Block, Converter, Edge, EdgeDetail, Geometry, Tachometers};
+use crate::sensor::{AnalogFront, Converter, Edge, EdgeDetail, Geometry, Tachometers};
 use core::f64::consts::TAU;
+use firmware_rig::AdcBlock;
 use frame::calibration::Calibration;
 use frame::message::Beep;
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
@@ -81,7 +82,7 @@ pub struct Millisecond {
     /// Rising edges of each capture channel, ticks modulo 2^32.
     pub edges: [Vec<u32>; CAPTURE_CHANNELS],
     /// Conversions of each ADC channel.
-    pub adc: [Block; ADC_CHANNELS],
+    pub adc: [AdcBlock; ADC_CHANNELS],
 }
 
 /// The rig.

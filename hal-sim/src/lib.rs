@@ -16,12 +16,14 @@ pub mod bench;
 pub mod effect;
 #[cfg(feature = "emulated")]
 pub mod emulated;
+pub mod native;
 pub mod noise;
 pub mod plant;
 pub mod scenario;
 pub mod sensor;
 
 pub use bench::{Bench, Millisecond, Truth};
+pub use native::{RunRecord, SimError, run};
 pub use plant::{PlantState, Powerplant};
 pub use scenario::{Scenario, ScenarioError};
 pub use sensor::{Edge, EdgeDetail};

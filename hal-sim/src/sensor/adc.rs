@@ -8,6 +8,7 @@
 
 use crate::noise::{Coloured, Source, Stream};
 use crate::plant::{Bridge, PlantState};
+use firmware_rig::AdcBlock;
 use frame::calibration::AdcScale;
 use frame::rig::ADC_CHANNELS;
 
@@ -62,21 +63,6 @@ impl AnalogFront {
     }
 }
 
-/// What one channel converted in one millisecond.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Block {
-    /// Sum of the codes.
-    pub sum: u32,
-    /// Sum of their squares.
-    pub sum_sq: u64,
-    /// Number of conversions.
-    pub count: u16,
-    /// Smallest code.
-    pub min: u16,
-    /// Largest code.
-    pub max: u16,
-}
-
 /// The converter with the noise on its five wires.
 #[derive(Debug, Clone)]
 pub struct Converter {
@@ -126,8 +112,8 @@ impl Converter {
     }
 
     /// `count` conversions of `channel`, spread over the voltages of one millisecond.
-    pub fn block(&mut self, channel: usize, count: u16, pins_v: &[f64]) -> Block {
-        let mut block = Block { min: u16::MAX, ..Block::default() };
+    pub fn block(&mut self, channel: usize, count: u16, pins_v: &[f64]) -> AdcBlock {
+        let mut block = AdcBlock { min: u16::MAX, ..AdcBlock::default() };
         for i in 0..count {
             let pin = pins_v[usize::from(i) * pins_v.len() / usize::from(count.max(1))];
             let code = self.convert(channel, pin);

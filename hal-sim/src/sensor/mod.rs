@@ -8,5 +8,5 @@
 pub mod adc;
 pub mod edge;
 
-pub use adc::{AnalogFront, Block, Converter};
+pub use adc::{AnalogFront, Converter};
 pub use edge::{Edge, EdgeDetail, Geometry, Tachometers};
