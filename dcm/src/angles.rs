@@ -1,0 +1,143 @@
+//! Euler angles and quaternion of a rotation matrix.
+//!
+//! What it is: conversions out of (and for start-up into) the matrix body to earth, R = Rz(yaw) Ry(pitch) Rx(roll).
+//! What can go wrong: at pitch +-90 degrees roll and yaw are not separate; within 0.06 degrees of it roll is 0 and yaw takes
+//! the whole heading. The angles come from libm: micromath's arc tangent is off by up to 0.16 degrees.
+//! Units: radians; roll and yaw in (-pi, pi], pitch in [-pi/2, pi/2].
+//! Reference: Beharie 2013 Eq. 4.19-4.30 with errata (4.25 has the wrong sign, 4.28 and 4.30 need atan2); Shepperd 1978.
+
+use crate::{Mat3, Vec3, rotation::unit};
+use libm::{atan2f, cosf, sinf, sqrtf};
+
+/// cos^2(pitch) below which roll and yaw are not told apart.
+const POLE: f32 = 1e-6;
+
+/// Roll, pitch and yaw, rad.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Euler {
+    /// About body x, right wing down positive.
+    pub roll: f32,
+    /// About the horizontal right axis, nose up positive.
+    pub pitch: f32,
+    /// Compass heading of body x, clockwise from north seen from above.
+    pub yaw: f32,
+}
+
+/// Euler angles of the rotation body to earth.
+#[must_use]
+pub fn euler_of(r: &Mat3) -> Euler {
+    let (r11, r12, r21, r22) = (r.m11, r.m12, r.m21, r.m22);
+    let cos2 = r11 * r11 + r21 * r21;
+    let pitch = atan2f(-r.m31, sqrtf(cos2));
+    if cos2 < POLE {
+        return Euler { roll: 0.0, pitch, yaw: atan2f(-r12, r22) };
+    }
+    Euler { roll: atan2f(r.m32, r.m33), pitch, yaw: atan2f(r21, r11) }
+}
+
+/// The rotation body to earth of three Euler angles.
+#[must_use]
+pub fn matrix_of(e: &Euler) -> Mat3 {
+    let (sf, cf) = (sinf(e.roll), cosf(e.roll));
+    let (st, ct) = (sinf(e.pitch), cosf(e.pitch));
+    let (sp, cp) = (sinf(e.yaw), cosf(e.yaw));
+    Mat3::new(
+        ct * cp,
+        sf * st * cp - cf * sp,
+        cf * st * cp + sf * sp,
+        ct * sp,
+        sf * st * sp + cf * cp,
+        cf * st * sp - sf * cp,
+        -st,
+        sf * ct,
+        cf * ct,
+    )
+}
+
+/// Unit quaternion body to earth, Hamilton, scalar first and not negative.
+#[must_use]
+pub fn quaternion_of(r: &Mat3) -> [f32; 4] {
+    let trace = r.m11 + r.m22 + r.m33;
+    // four times each squared component; the largest is at least 1, so its root is safe to divide by
+    let four = [1.0 + trace, 1.0 + 2.0 * r.m11 - trace, 1.0 + 2.0 * r.m22 - trace, 1.0 + 2.0 * r.m33 - trace];
+    let (a, b, c) = (r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12);
+    let (d, e, f) = (r.m12 + r.m21, r.m13 + r.m31, r.m23 + r.m32);
+    let [w, x, y, z] = four;
+    let raw = if w >= x && w >= y && w >= z {
+        [w, a, b, c]
+    } else if x >= y && x >= z {
+        [a, x, d, e]
+    } else if y >= z {
+        [b, d, y, f]
+    } else {
+        [c, e, f, z]
+    };
+    let square: f32 = raw.iter().map(|q| q * q).sum();
+    let sign = if raw.first().is_some_and(|w| *w < 0.0) { -1.0 } else { 1.0 };
+    let k = sign / sqrtf(square);
+    raw.map(|q| q * k)
+}
+
+/// The rotation body to earth whose down axis is `down` (unit, body axes) and whose heading is that of `heading` (body axes,
+/// any length, points to where earth x lies); `None` when the two are parallel.
+pub(crate) fn matrix_from(down: &Vec3, heading: &Vec3) -> Option<Mat3> {
+    let east = unit(&down.cross(heading))?;
+    let north = east.cross(down);
+    Some(Mat3::from_rows(&[north.transpose(), east.transpose(), down.transpose()]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f32::consts::{FRAC_PI_2, PI};
+    use proptest::prelude::*;
+
+    #[test]
+    fn signs_of_small_angles() {
+        let r = matrix_of(&Euler { roll: 0.1, pitch: 0.2, yaw: 0.3 });
+        assert!(r.m31 < 0.0, "nose up: body x points against down (4.25 as printed has the other sign)");
+        assert!(r.m32 > 0.0, "right wing down: body y points down");
+        assert!(r.m21 > 0.0, "turned right: body x points east");
+    }
+
+    #[test]
+    fn at_the_pole_roll_is_zero_and_yaw_takes_the_whole_heading() {
+        for (pitch, sign) in [(FRAC_PI_2, -1.0), (-FRAC_PI_2, 1.0)] {
+            let e = euler_of(&matrix_of(&Euler { roll: 0.4, pitch, yaw: 1.0 }));
+            assert_eq!(e.roll, 0.0);
+            assert!((e.pitch - pitch).abs() < 1e-3);
+            assert!((e.yaw - (1.0 + sign * 0.4)).abs() < 1e-4, "{e:?}");
+        }
+    }
+
+    #[test]
+    fn down_and_heading_make_the_matrix() {
+        let r = matrix_of(&Euler { roll: -0.3, pitch: 0.9, yaw: -2.0 });
+        let down = r.row(2).transpose();
+        let field = r.transpose() * Vec3::new(0.4, 0.0, 0.8);
+        assert!((matrix_from(&down, &field).unwrap() - r).abs().max() < 1e-6);
+        assert_eq!(matrix_from(&Vec3::z(), &(Vec3::z() * 3.0)), None);
+    }
+
+    proptest! {
+        #[test]
+        fn angles_come_back(roll in -PI..PI, pitch in -1.55f32..1.55, yaw in -PI..PI) {
+            let e = euler_of(&matrix_of(&Euler { roll, pitch, yaw }));
+            let near = |a: f32, b: f32, tol: f32| { let d = (a - b).abs(); d < tol || (2.0 * PI - d).abs() < tol };
+            let tol = 2e-6 / libm::cosf(pitch);
+            prop_assert!(near(e.roll, roll, tol) && near(e.yaw, yaw, tol) && near(e.pitch, pitch, 2e-5), "{e:?}");
+        }
+
+        #[test]
+        fn quaternion_turns_vectors_as_the_matrix_does(roll in -PI..PI, pitch in -1.6f32..1.6, yaw in -PI..PI) {
+            let r = matrix_of(&Euler { roll, pitch, yaw });
+            let [w, x, y, z] = quaternion_of(&r);
+            prop_assert!(w >= 0.0);
+            let (v, p) = (Vec3::new(x, y, z), Vec3::new(0.3, -0.5, 0.8));
+            let t = v.cross(&p) * 2.0;
+            let turned = p + t * w + v.cross(&t);
+            prop_assert!((turned - r * p).abs().max() < 2e-6);
+        }
+    }
+}
