@@ -1,0 +1,238 @@
+//! One tick of the IMU board.
+//!
+//! What it is: readings and a timestamp in, a telemetry sample with raw words and attitude out. It reads no clock and no
+//! register; the RTIC task, the tests and the emulated board call it alike.
+//!
+//! What can go wrong: a missing reading repeats the last word and clears its `fresh` bit; a magnetometer overflow counts as
+//! missing; a saturated gyro or accelerometer is passed on, flagged in [`Outputs::saturated`], and not shown to the filter
+//! where it would mislead it (accelerometer).
+//!
+//! Units: counts and ticks in; counts, ticks and 2^-30 quaternion units out; rad/s, m/s^2, gauss towards the filter.
+//!
+//! Reference: specification `ahrs.md`, "Board"; Beharie 2013 Eq. 4.1-4.7 with errata.
+
+use crate::sampler::Readings;
+use crate::{ACCEL, GYRO, MAG, Mounting, TICK_HZ, adxl345, hmc5883l, itg3200};
+use dcm::{Dcm, Measurement, STANDARD_GRAVITY, Step, Vec3};
+use frame::message::BoardId;
+use frame::{Hello, ImuSample, Ticks};
+
+/// Configuration of the board; nothing here changes while it runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AhrsConfig {
+    /// How the gyro sits on the body.
+    pub gyro: Mounting,
+    /// How the accelerometer sits on the body.
+    pub accel: Mounting,
+    /// How the magnetometer sits on the body.
+    pub mag: Mounting,
+    /// The attitude filter.
+    pub filter: dcm::Config,
+}
+
+impl Default for AhrsConfig {
+    fn default() -> Self {
+        Self { gyro: Mounting::FLAT, accel: Mounting::FLAT, mag: Mounting::FLAT, filter: dcm::Config::default() }
+    }
+}
+
+/// What a tick takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Inputs {
+    /// When the gyro was read.
+    pub now: Ticks,
+    /// What the sampler found.
+    pub readings: Readings,
+}
+
+/// What a tick gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Outputs {
+    /// To be sent; `None` while no sensor lives, because there is nothing to say.
+    pub sample: Option<ImuSample>,
+    /// Sensors at the end of their range: bits as in [`ImuSample::fresh`].
+    pub saturated: u8,
+    /// What the filter used of this tick.
+    pub filter: Step,
+}
+
+/// The IMU board's state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ahrs {
+    config: AhrsConfig,
+    filter: Dcm,
+    last: ImuSample,
+    before: Option<Ticks>,
+}
+
+impl Ahrs {
+    /// A board that has seen nothing yet.
+    #[must_use]
+    pub fn new(config: AhrsConfig) -> Self {
+        Self { config, filter: Dcm::new(config.filter), last: ImuSample::default(), before: None }
+    }
+
+    /// The first message after reset and the answer to `Identify`. `present` as found by the sampler.
+    #[must_use]
+    pub const fn hello(core_hz: u32, reset_cause: u8, present: u8) -> Hello {
+        Hello { board: BoardId::Ahrs, firmware: FIRMWARE, core_hz, reset_cause, present }
+    }
+
+    /// The attitude filter, for reading.
+    #[must_use]
+    pub fn filter(&self) -> &Dcm {
+        &self.filter
+    }
+
+    /// Takes one instant.
+    pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
+        let Readings { gyro, accel, mag, alive } = inputs.readings;
+        let mut saturated = 0;
+        let mut measured = Measurement::default();
+        let sample = &mut self.last;
+        sample.at = inputs.now;
+        sample.alive = alive;
+        sample.fresh = 0;
+
+        if let Some(reading) = gyro {
+            sample.gyro = self.config.gyro.to_body(reading.rate);
+            sample.temperature = reading.temperature;
+            sample.fresh |= GYRO;
+            measured.gyro = Some(scaled(&sample.gyro, RAD_S_PER_LSB));
+            if reading.saturated() {
+                saturated |= GYRO;
+            }
+        }
+        if let Some(words) = accel {
+            sample.accel = self.config.accel.to_body(words);
+            sample.fresh |= ACCEL;
+            if adxl345::saturated(&words) {
+                saturated |= ACCEL;
+            } else {
+                measured.accel = Some(scaled(&sample.accel, STANDARD_GRAVITY / adxl345::LSB_PER_G));
+            }
+        }
+        match mag {
+            Some(words) if hmc5883l::overflowed(&words) => saturated |= MAG,
+            Some(words) => {
+                sample.mag = self.config.mag.to_body(words);
+                sample.fresh |= MAG;
+                measured.mag = Some(scaled(&sample.mag, 1.0 / hmc5883l::LSB_PER_GAUSS));
+            }
+            None => {}
+        }
+
+        let since = self.before.map_or(NOMINAL, |before| inputs.now.since(before));
+        self.before = Some(inputs.now);
+        let filter = self.filter.update(since.as_s() as f32, &measured);
+        sample.quaternion_q30 =
+            if self.filter.is_started() { self.filter.quaternion().map(|q| (q * Q30) as i32) } else { [0; 4] };
+        Outputs { sample: (alive != 0).then_some(*sample), saturated, filter }
+    }
+}
+
+/// Time between ticks, for the first of them.
+const NOMINAL: Ticks = Ticks::from_ms(1000 / TICK_HZ as u64);
+/// 2^30, the scale of the quaternion on the wire.
+const Q30: f32 = 1_073_741_824.0;
+/// Gyro scale in rad/s per count.
+const RAD_S_PER_LSB: f32 = core::f32::consts::PI / 180.0 / itg3200::LSB_PER_DEG_S;
+/// Version of this package.
+const FIRMWARE: [u8; 3] =
+    [digits(env!("CARGO_PKG_VERSION_MAJOR")), digits(env!("CARGO_PKG_VERSION_MINOR")), digits(env!("CARGO_PKG_VERSION_PATCH"))];
+
+/// A decimal number of the package version, at compile time.
+const fn digits(text: &str) -> u8 {
+    let mut value = 0;
+    let mut rest = text.as_bytes();
+    while let [digit, tail @ ..] = rest {
+        value = value * 10 + (*digit - b'0');
+        rest = tail;
+    }
+    value
+}
+
+fn scaled(words: &[i16; 3], scale: f32) -> Vec3 {
+    Vec3::from(words.map(|w| f32::from(w) * scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::itg3200::GyroReading;
+
+    const ALL: u8 = GYRO | ACCEL | MAG;
+
+    /// Level and pointing to magnetic north, chips mounted flat: gravity reaction along chip +z, field down along chip -z.
+    fn level(now: Ticks) -> Inputs {
+        let readings = Readings {
+            gyro: Some(GyroReading { temperature: -13_200, rate: [0; 3] }),
+            accel: Some([0, 0, 256]),
+            mag: Some([218, 0, -470]),
+            alive: ALL,
+        };
+        Inputs { now, readings }
+    }
+
+    #[test]
+    fn level_is_the_unit_quaternion() {
+        let mut ahrs = Ahrs::new(AhrsConfig::default());
+        let out = ahrs.tick(&level(Ticks(0)));
+        let sample = out.sample.unwrap();
+        assert_eq!((sample.fresh, sample.alive, out.saturated), (ALL, ALL, 0));
+        assert_eq!((sample.accel, sample.mag), ([0, 0, -256], [218, 0, 470]));
+        let [w, rest @ ..] = sample.quaternion_q30;
+        assert!((w - (1 << 30)).abs() < 1000 && rest.iter().all(|q| q.abs() < 1000), "{w} {rest:?}");
+    }
+
+    #[test]
+    fn one_second_of_yaw_rate_is_yaw_and_turns_right() {
+        let mut ahrs = Ahrs::new(AhrsConfig::default());
+        for k in 0..=200u64 {
+            let mut i = level(Ticks::from_ms(5 * k));
+            i.readings.mag = None;
+            // -30 deg/s about chip z (up) is +30 deg/s about body z (down)
+            i.readings.gyro = Some(GyroReading { temperature: 0, rate: [0, 0, -431] });
+            ahrs.tick(&i);
+        }
+        let e = ahrs.filter().euler();
+        assert!((e.yaw.to_degrees() - 29.98).abs() < 0.1, "{}", e.yaw.to_degrees());
+        assert!(e.roll.abs() < 1e-3 && e.pitch.abs() < 1e-3);
+    }
+
+    #[test]
+    fn missing_words_repeat_and_are_not_fresh() {
+        let mut ahrs = Ahrs::new(AhrsConfig::default());
+        ahrs.tick(&level(Ticks(0)));
+        let gone = Readings { alive: GYRO, ..Readings::default() };
+        let sample = ahrs.tick(&Inputs { now: Ticks::from_ms(5), readings: gone }).sample.unwrap();
+        assert_eq!((sample.fresh, sample.alive), (0, GYRO));
+        assert_eq!((sample.accel, sample.mag), ([0, 0, -256], [218, 0, 470]));
+        assert_eq!(ahrs.tick(&Inputs::default()).sample, None, "nothing lives: nothing to say");
+    }
+
+    #[test]
+    fn saturation_is_flagged_and_misleads_nobody() {
+        let mut ahrs = Ahrs::new(AhrsConfig::default());
+        ahrs.tick(&level(Ticks(0)));
+        let mut i = level(Ticks::from_ms(5));
+        i.readings.accel = Some([4095, 0, 256]);
+        i.readings.mag = Some([-4096, 0, -470]);
+        i.readings.gyro = Some(GyroReading { temperature: 0, rate: [i16::MAX, 0, 0] });
+        let out = ahrs.tick(&i);
+        assert_eq!(out.saturated, ALL);
+        assert!(!out.filter.accel_used && !out.filter.mag_used && out.filter.gyro_used);
+        let sample = out.sample.unwrap();
+        assert_eq!(sample.accel, [4095, 0, -256], "the raw word travels");
+        assert_eq!((sample.mag, sample.fresh), ([218, 0, 470], GYRO | ACCEL));
+    }
+
+    #[test]
+    fn the_version_is_the_package_version() {
+        assert_eq!(digits("0"), 0);
+        assert_eq!(digits("117"), 117);
+        assert_eq!(Ahrs::hello(168_000_000, 4, ALL).firmware, [0, 1, 0]);
+    }
+}

@@ -1,0 +1,233 @@
+//! Reads the three sensors once a tick.
+//!
+//! What it is: the only code of the portable half that touches the bus. It keeps one small state a sensor: absent or
+//! alive, and since when it fails.
+//!
+//! What can go wrong: a sensor that fails [`MISSES_ALLOWED`] reads in a row counts as dead; an absent or dead sensor is
+//! identified and configured again every [`RETRY_EVERY`] ticks, one sensor a tick, so that a loose plug heals itself and a
+//! missing sensor costs almost no bus time.
+//!
+//! Units: sensor counts in chip axes; ticks of the sampling clock.
+//!
+//! Reference: specification `ahrs.md`, "Sensors".
+
+use crate::itg3200::GyroReading;
+use crate::{ACCEL, GYRO, MAG, TICK_HZ, adxl345, hmc5883l, itg3200};
+use embedded_hal::i2c::I2c;
+
+/// Failed reads in a row after which a sensor counts as dead: 25 ms.
+pub const MISSES_ALLOWED: u8 = 5;
+/// Ticks between two attempts to bring a sensor back: 1 s.
+pub const RETRY_EVERY: u32 = TICK_HZ;
+/// The magnetometer is read on every n-th tick, so that each read finds a new sample (200/3 Hz is below its 75 Hz).
+pub const MAG_EVERY: u32 = TICK_HZ / hmc5883l::RATE_HZ + 1;
+
+/// What one tick found on the bus; `None` where there is no new reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Readings {
+    /// Gyro.
+    pub gyro: Option<GyroReading>,
+    /// Accelerometer.
+    pub accel: Option<[i16; 3]>,
+    /// Magnetometer.
+    pub mag: Option<[i16; 3]>,
+    /// Which sensors are alive: bits as in [`frame::ImuSample::alive`].
+    pub alive: u8,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Health {
+    #[default]
+    Absent,
+    Alive {
+        misses: u8,
+    },
+}
+
+impl Health {
+    /// Books the outcome of one access and passes the value on.
+    fn book<T, E>(&mut self, outcome: Result<T, E>) -> Option<T> {
+        match (outcome, *self) {
+            (Ok(value), _) => {
+                *self = Self::Alive { misses: 0 };
+                Some(value)
+            }
+            (Err(_), Self::Alive { misses }) if misses + 1 < MISSES_ALLOWED => {
+                *self = Self::Alive { misses: misses + 1 };
+                None
+            }
+            (Err(_), _) => {
+                *self = Self::Absent;
+                None
+            }
+        }
+    }
+
+    fn is_alive(self) -> bool {
+        self != Self::Absent
+    }
+}
+
+/// Reads the sensors through any embedded-hal I2C bus.
+#[derive(Debug)]
+pub struct Sampler<B> {
+    bus: B,
+    gyro: Health,
+    accel: Health,
+    mag: Health,
+    tick: u32,
+}
+
+impl<B: I2c> Sampler<B> {
+    /// Identifies and configures what is there; [`Sampler::alive`] says what was found.
+    pub fn new(bus: B) -> Self {
+        let mut sampler = Self { bus, gyro: Health::Absent, accel: Health::Absent, mag: Health::Absent, tick: 0 };
+        let bus = &mut sampler.bus;
+        sampler.gyro.book(itg3200::configure(bus));
+        sampler.accel.book(adxl345::configure(bus));
+        sampler.mag.book(hmc5883l::configure(bus));
+        sampler
+    }
+
+    /// Sensors that answered with the right identity and still do: bits as in [`frame::Hello::present`].
+    #[must_use]
+    pub fn alive(&self) -> u8 {
+        let bit = |health: Health, bit| if health.is_alive() { bit } else { 0 };
+        bit(self.gyro, GYRO) | bit(self.accel, ACCEL) | bit(self.mag, MAG)
+    }
+
+    /// Reads whatever is due on this tick.
+    pub fn read(&mut self) -> Readings {
+        let tick = self.tick;
+        self.tick = tick.wrapping_add(1);
+        let bus = &mut self.bus;
+        match tick % RETRY_EVERY {
+            50 if !self.gyro.is_alive() => drop(self.gyro.book(itg3200::configure(bus))),
+            100 if !self.accel.is_alive() => drop(self.accel.book(adxl345::configure(bus))),
+            150 if !self.mag.is_alive() => drop(self.mag.book(hmc5883l::configure(bus))),
+            _ => {}
+        }
+        let mut readings = Readings::default();
+        if self.gyro.is_alive() {
+            readings.gyro = self.gyro.book(itg3200::read(bus));
+        }
+        if self.accel.is_alive() {
+            readings.accel = self.accel.book(adxl345::read(bus));
+        }
+        if self.mag.is_alive() && tick.is_multiple_of(MAG_EVERY) {
+            readings.mag = self.mag.book(hmc5883l::read(bus));
+        }
+        readings.alive = self.alive();
+        readings
+    }
+
+    /// Gives the bus back.
+    pub fn release(self) -> B {
+        self.bus
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embedded_hal::i2c::{Error, ErrorKind, ErrorType, NoAcknowledgeSource, Operation};
+
+    /// A bus with three register files of 64 bytes; each sensor can be pulled out.
+    struct Bench {
+        fitted: [bool; 3],
+        files: [[u8; 64]; 3],
+        accesses: [u32; 3],
+    }
+
+    #[derive(Debug)]
+    struct Nack;
+    impl Error for Nack {
+        fn kind(&self) -> ErrorKind {
+            ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address)
+        }
+    }
+    impl ErrorType for Bench {
+        type Error = Nack;
+    }
+    impl I2c for Bench {
+        fn transaction(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result<(), Nack> {
+            let n = [0x68, 0x53, 0x1E].iter().position(|a| *a == address).ok_or(Nack)?;
+            self.accesses[n] += 1;
+            if !self.fitted[n] {
+                return Err(Nack);
+            }
+            let mut pointer = 0usize;
+            for operation in operations {
+                match operation {
+                    Operation::Write(bytes) => {
+                        pointer = bytes[0].into();
+                        self.files[n][pointer..pointer + bytes.len() - 1].copy_from_slice(&bytes[1..]);
+                    }
+                    Operation::Read(into) => {
+                        let len = into.len();
+                        into.copy_from_slice(&self.files[n][pointer..pointer + len]);
+                    }
+                }
+            }
+            Ok(())
+        }
+    }
+
+    fn bench() -> Bench {
+        let mut files = [[0; 64]; 3];
+        files[0][0] = 0x69;
+        files[1][0] = 0xE5;
+        files[2][10..13].copy_from_slice(b"H43");
+        Bench { fitted: [true; 3], files, accesses: [0; 3] }
+    }
+
+    #[test]
+    fn all_three_are_found_and_configured() {
+        let sampler = Sampler::new(bench());
+        assert_eq!(sampler.alive(), GYRO | ACCEL | MAG);
+        let bench = sampler.release();
+        assert_eq!([bench.files[0][0x16], bench.files[1][0x2D], bench.files[2][0x00]], [0x1A, 0x08, 0x18]);
+    }
+
+    #[test]
+    fn the_magnetometer_is_read_on_every_third_tick() {
+        let mut sampler = Sampler::new(bench());
+        let fresh = [0; 9].map(|_| sampler.read().mag.is_some());
+        assert_eq!(fresh, [true, false, false, true, false, false, true, false, false]);
+    }
+
+    #[test]
+    fn a_few_lost_reads_are_forgiven_and_more_are_not() {
+        let mut sampler = Sampler::new(bench());
+        sampler.bus.fitted[0] = false;
+        for _ in 0..MISSES_ALLOWED - 1 {
+            let r = sampler.read();
+            assert_eq!((r.gyro, r.alive & GYRO), (None, GYRO));
+        }
+        assert_eq!(sampler.read().alive, ACCEL | MAG);
+    }
+
+    #[test]
+    fn a_sensor_that_was_plugged_in_late_comes_alive_within_a_second() {
+        let mut bus = bench();
+        bus.fitted = [false; 3];
+        let mut sampler = Sampler::new(bus);
+        assert_eq!(sampler.alive(), 0);
+        sampler.bus.fitted = [true; 3];
+        let alive = (0..RETRY_EVERY).map(|_| sampler.read().alive).last();
+        assert_eq!(alive, Some(GYRO | ACCEL | MAG));
+        assert_eq!(sampler.bus.files[0][0x16], 0x1A, "configured again, not only read");
+    }
+
+    #[test]
+    fn an_absent_sensor_costs_one_attempt_a_second() {
+        let mut bus = bench();
+        bus.fitted[2] = false;
+        let mut sampler = Sampler::new(bus);
+        for _ in 0..10 * RETRY_EVERY {
+            assert_eq!(sampler.read().alive, GYRO | ACCEL);
+        }
+        assert_eq!(sampler.bus.accesses[2], 1 + 10);
+    }
+}
