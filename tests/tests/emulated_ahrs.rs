@@ -1,0 +1,119 @@
+//! The flash image of the IMU board, run on the emulated STM32F405 with three sensor models on its bus.
+//!
+//! Build the image first: `cargo build -p firmware-ahrs --release --target thumbv7em-none-eabihf --target-dir target/fw`
+#![cfg(feature = "emulated")]
+
+use frame::message::BoardId;
+use frame::wire::{Decoder, LinkStats};
+use frame::{Hello, ImuSample, Message, Ticks};
+use hal_sim::emulated::ahrs::{AhrsRun, ChipKind, Motion, Served, ahrs};
+
+/// Registers that the emulator stores without a model and that the image is known to touch.
+const STORED_ONLY: [&str; 0] = [];
+
+/// 30 deg/s about an oblique axis, from an oblique attitude: every word moves and has its own value.
+const OBLIQUE: Motion = Motion { start: [0.3, -0.4, 1.9], rate: [0.35, -0.2, 0.33], ..Motion::LEVEL };
+
+fn decoded(run: &AhrsRun) -> (Hello, Vec<ImuSample>, LinkStats) {
+    let mut decoder = Decoder::default();
+    let messages: Vec<Message> =
+        run.outcome.telemetry.iter().filter_map(|b| decoder.push::<Message>(*b)).map(|r| r.message).collect();
+    let Some(Message::Hello(hello)) = messages.first() else { panic!("the first message is not Hello: {messages:?}") };
+    let samples = messages.iter().filter_map(|m| if let Message::Imu(s) = m { Some(*s) } else { None }).collect();
+    (*hello, samples, decoder.stats())
+}
+
+fn run(motion: Motion, fitted: &[ChipKind], milliseconds: u64) -> AhrsRun {
+    let run = ahrs(motion, fitted, milliseconds).unwrap_or_else(|error| panic!("{error}"));
+    run.outcome.accesses.only(&STORED_ONLY).unwrap();
+    run
+}
+
+/// The board lies flat: chip y and z are opposite to body y and z.
+fn body(served: &Served) -> [i16; 3] {
+    let [x, y, z] = served.words;
+    [x, -y, -z]
+}
+
+/// Every word that was sent as fresh is the word that the chip handed out, in order, none left out.
+fn words_match(samples: &[ImuSample], served: &[Vec<Served>; 3]) {
+    for (n, served) in served.iter().enumerate() {
+        let fresh: Vec<[i16; 3]> =
+            samples.iter().filter(|s| s.fresh & 1 << n != 0).map(|s| [s.gyro, s.accel, s.mag][n]).collect();
+        let handed: Vec<[i16; 3]> = served.iter().take(fresh.len()).map(body).collect();
+        assert_eq!(fresh, handed, "sensor {n}");
+        assert!(served.len() <= fresh.len() + 2, "sensor {n}: the last readings may still be on the line, no more");
+    }
+}
+
+#[test]
+fn the_image_boots_finds_three_sensors_and_streams_their_words() {
+    let run = run(OBLIQUE, &ChipKind::ALL, 1000);
+    let (hello, samples, link) = decoded(&run);
+
+    assert_eq!((hello.board, hello.core_hz, hello.present), (BoardId::Ahrs, 168_000_000, 0b111));
+    assert_eq!((link.damaged, link.missing, link.foreign), (0, 0, 0));
+    words_match(&samples, &run.served);
+
+    // 200 Hz, to the tick of the timestamp clock but for the interrupt latency
+    assert!((195..=200).contains(&samples.len()), "{} samples in a second", samples.len());
+    for pair in samples.windows(2) {
+        let step = pair[1].at.since(pair[0].at);
+        assert!(step.0.abs_diff(Ticks::from_ms(5).0) <= 84, "{} ticks", step.0);
+    }
+    let fresh = |bit: u8| samples.iter().filter(|s| s.fresh & bit != 0).count();
+    assert_eq!((fresh(1), fresh(2)), (samples.len(), samples.len()), "gyro and accelerometer on every tick");
+    assert_eq!(fresh(4), samples.len().div_ceil(3), "magnetometer on every third");
+    assert!(samples.iter().all(|s| s.alive == 0b111 && s.temperature == -13_200));
+    let distinct: std::collections::BTreeSet<_> = samples.iter().map(|s| s.accel).collect();
+    assert!(distinct.len() > 100, "the body turns, so the words change: {}", distinct.len());
+}
+
+#[test]
+fn the_attitude_on_the_wire_is_that_of_the_body() {
+    let run = run(OBLIQUE, &ChipKind::ALL, 1000);
+    let (_, samples, _) = decoded(&run);
+    let mut worst = 0.0f64;
+    for (sample, served) in samples.iter().zip(&run.served[0]) {
+        let [w, x, y, z] = sample.quaternion_q30.map(|q| f64::from(q) / f64::from(1 << 30));
+        let told = [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ];
+        let truth = OBLIQUE.attitude(served.at_ns);
+        let trace: f64 = (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(|(i, j)| told[i][j] * truth[i][j]).sum();
+        worst = worst.max(((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees());
+    }
+    // the words are rounded to 0.22 degrees of tilt and 0.26 of heading, and the start is taken from one of them
+    println!("worst attitude error {worst:.3} deg");
+    assert!(worst < 0.5, "{worst}");
+}
+
+#[test]
+fn a_missing_sensor_is_absent_in_hello_and_the_rest_streams() {
+    for (missing, name) in ChipKind::ALL.iter().enumerate() {
+        let fitted: Vec<ChipKind> = ChipKind::ALL.into_iter().filter(|kind| kind != name).collect();
+        let run = run(Motion::LEVEL, &fitted, 300);
+        let (hello, samples, _) = decoded(&run);
+        let expected = 0b111 & !(1 << missing);
+        assert_eq!(hello.present, expected, "{name:?} is missing");
+        assert!(samples.len() >= 55, "{} samples", samples.len());
+        assert!(samples.iter().all(|s| s.alive == expected && s.fresh & 1 << missing == 0));
+        words_match(&samples, &run.served);
+    }
+}
+
+#[test]
+fn with_no_sensor_at_all_the_board_says_hello_and_stays_alive() {
+    let run = run(Motion::LEVEL, &[], 300);
+    let (hello, samples, link) = decoded(&run);
+    assert_eq!((hello.present, samples.len(), link.good), (0, 0, 1));
+}
+
+#[test]
+fn the_run_is_the_same_every_time() {
+    let once = || run(Motion::LEVEL, &ChipKind::ALL, 100).outcome;
+    let (a, b) = (once(), once());
+    assert_eq!((a.telemetry, a.instructions), (b.telemetry, b.instructions));
+}
