@@ -1,2 +1,27 @@
-//! ident
+//! From a log to the powerplant model, what it leaves over, the cause of that, and the corrected model.
+//!
+//! What it is: `log -> plateaus -> fits -> residual -> effect -> corrected model`, each arrow one function that can be called alone.
+//! What can go wrong: unusable input is refused with its place; a residual that no known effect explains is said to be one.
+//! Units: SI, rev/min and microseconds, as the column names say.
+//! Reference: specification `identification.md` and `closing-the-loop.md`.
 #![forbid(unsafe_code)]
+
+pub mod close;
+pub mod context;
+pub mod design;
+pub mod diagnose;
+pub mod effects;
+pub mod experiment;
+pub mod heldout;
+pub mod hypothesis;
+pub mod identify;
+pub mod import;
+pub mod log;
+pub mod model;
+pub mod noise;
+pub mod plateau;
+pub mod report;
+pub mod residual;
+pub mod simulate;
+pub mod solve;
+pub mod verdict;

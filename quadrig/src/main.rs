@@ -1,3 +1,60 @@
-//! quadrig
+//! `quadrig`: the command line.
+//!
+//! What it is: one subcommand a job, each a thin layer over `ident` and `hal-sim`.
+//! What can go wrong: bad input gives one line on stderr and exit status 1, wrong usage 2; nothing is left half-written.
+//! Units: as the files state.
+//! Reference: specification `formats.md`, "Command line".
 #![forbid(unsafe_code)]
-fn main() {}
+
+mod close_loop;
+mod identify;
+mod import;
+mod predict;
+mod progress;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Rig controller, simulator, identification: from a motor command to a named effect on measured data.
+#[derive(Parser)]
+#[command(version, about, arg_required_else_help = true)]
+struct Cli {
+    /// No progress, no tables: files and exit status only.
+    #[arg(long, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// A thrust stand's export becomes a rig log; what was repaired is reported.
+    Import(import::Args),
+    /// Plateaus, fits and quality figures of a log.
+    Identify(identify::Args),
+    /// Residual, cause, corrected model, error before and after.
+    CloseLoop(close_loop::Args),
+    /// A model's prediction of every measured channel, row for row.
+    Predict(predict::Args),
+}
+
+/// What went wrong, as one line.
+type Failure = Box<dyn std::error::Error>;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let done = match &cli.command {
+        Command::Import(args) => import::run(args, cli.quiet),
+        Command::Identify(args) => identify::run(args, cli.quiet),
+        Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
+        Command::Predict(args) => predict::run(args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            let line = e.to_string().replace('\n', " ");
+            eprintln!("quadrig: {line}");
+            ExitCode::from(1)
+        }
+    }
+}

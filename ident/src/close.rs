@@ -1,0 +1,182 @@
+//! The loop itself: log in, verdict and corrected model out.
+//!
+//! What it is: `diagnose` put into the contract's words, with figures before and after, intervals and evidence.
+//! What can go wrong: a log with no relation to test is refused.
+//! Units: as the channels state.
+//! Reference: specification `closing-the-loop.md`, steps 1 to 8.
+
+use crate::context::{Context, Relation, unit_of};
+use crate::diagnose::{Diagnosis, diagnose};
+use crate::effects::Estimate;
+use crate::heldout;
+use crate::hypothesis::{Declared, Fit};
+use crate::log::Log;
+use crate::model::Model;
+use crate::residual::whiteness;
+use crate::verdict::{Alternative, BeforeAfter, Channel, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict};
+use std::collections::BTreeMap;
+
+/// Why the loop cannot be closed on a log.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CloseError {
+    /// Nothing can be predicted from anything.
+    #[error("{run}: no channel can be fitted; expected at least two related channels (pulse, rpm, thrust, torque, current, voltage) with more than 8 common samples")]
+    NoRelation {
+        /// The log.
+        run: String,
+    },
+}
+
+/// Everything that closing the loop on one log gives.
+#[derive(Debug, Clone)]
+pub struct Closed {
+    /// The log made ready.
+    pub context: Context,
+    /// What the search found.
+    pub diagnosis: Diagnosis,
+    /// Declared model.
+    pub declared: Model,
+    /// Corrected model.
+    pub model: Model,
+    /// The contract's words.
+    pub verdict: Verdict,
+}
+
+/// Closes the loop on a log.
+///
+/// # Errors
+/// [`CloseError`] when no channel can be fitted.
+pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut dyn FnMut(f64)) -> Result<Closed, CloseError> {
+    let context = Context::new(log, model.map(|m| m.start_pulse_us));
+    let declared = Declared { model };
+    let refused = || CloseError::NoRelation { run: log.name.clone() };
+    if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > 8) {
+        return Err(refused());
+    }
+    let diagnosis = diagnose(&context, declared, progress).ok_or_else(refused)?;
+    let before_model = Model::from_fit(&context, log, declared, &diagnosis.declared);
+    let after_model = Model::from_fit(&context, log, declared, &diagnosis.best.fit);
+    let mut verdict = Verdict {
+        format: FORMAT,
+        run: log.name.clone(),
+        verdict: kind(&diagnosis),
+        channels: channels(&context, declared, &diagnosis),
+        effects: entries(&context, declared, &diagnosis),
+        alternatives: diagnosis.rivals.iter().filter(|r| !r.0.fit.placed.is_empty()).map(|(c, p)| Alternative { ids: c.ids(), probability: *p }).collect(),
+        next_experiment: None,
+        validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
+    };
+    if verdict.verdict == Kind::Ambiguous {
+        verdict.next_experiment = crate::experiment::next(&context, &after_model, &diagnosis);
+    }
+    Ok(Closed { context, diagnosis, declared: before_model, model: after_model, verdict })
+}
+
+fn kind(diagnosis: &Diagnosis) -> Kind {
+    if diagnosis.best.fit.placed.is_empty() {
+        Kind::None
+    } else if diagnosis.unknown {
+        Kind::Unattributed
+    } else if diagnosis.ambiguous() {
+        Kind::Ambiguous
+    } else {
+        Kind::Attributed
+    }
+}
+
+fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMap<String, Channel> {
+    let figures = |fit: &Fit, held: &[f64]| -> Vec<Figures> {
+        heldout::residuals(context, declared, fit)
+            .iter()
+            .zip(held)
+            .zip(&context.targets)
+            .map(|((r, held), target)| {
+                let t: Vec<f64> = target.rows.iter().map(|i| context.t[*i]).collect();
+                let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
+                Figures { rms, heldout_rms: if held.is_finite() { *held } else { rms }, whiteness_p: whiteness(&t, r) }
+            })
+            .collect()
+    };
+    let (before, after) = (figures(&d.declared, &d.heldout_before), figures(&d.best.fit, &d.heldout_after));
+    context
+        .targets
+        .iter()
+        .zip(before.into_iter().zip(after))
+        .filter(|(t, _)| t.relation != Relation::ThrustRms)
+        .map(|(t, (before, after))| (t.name.to_owned(), Channel { unit: unit_of(t.name).to_owned(), noise_floor_rms: t.noise.rms, before, after }))
+        .collect()
+}
+
+fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<EffectEntry> {
+    d.best
+        .fit
+        .placed
+        .iter()
+        .enumerate()
+        .map(|(k, p)| {
+            let about = p.effect.about();
+            let estimates = p.effect.report(context, &p.instance, d.best.fit.estimates(context, declared, k));
+            let (first, reduction) = quoted(context, d, k);
+            let mut channels = p.instance.channels.clone();
+            if let Some(at) = channels.iter().position(|c| *c == first) {
+                channels.swap(0, at);
+            }
+            let mut depends_on: Vec<String> = about.depends_on.iter().map(|v| (*v).to_owned()).collect();
+            if d.unknown {
+                depends_on.push(p.instance.form.clone());
+            }
+            EffectEntry {
+                id: p.effect.id().to_owned(),
+                depends_on,
+                equation: if p.instance.form.is_empty() { about.equation.to_owned() } else { format!("{} [{}]", about.equation, p.instance.form) },
+                probability: d.probability,
+                parameters: estimates.iter().map(parameter).collect(),
+                heldout_error_reduction: reduction,
+                evidence: format!(
+                    "{}; without it the held-out error of {first} is {:.2} times as large",
+                    about.signature,
+                    1.0 / (1.0 - reduction).max(1e-6)
+                ),
+                channels,
+            }
+        })
+        .collect()
+}
+
+/// The channel that an effect's figure is quoted for (the one it helps most) and the figure.
+fn quoted(context: &Context, d: &Diagnosis, k: usize) -> (String, f64) {
+    let p = &d.best.fit.placed[k];
+    context
+        .targets
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| p.instance.touches(t.name) && t.relation != Relation::ThrustRms)
+        .map(|(i, t)| (t.name.to_owned(), 1.0 - d.heldout_after[i] / d.heldout_without[k][i]))
+        .filter(|(_, r)| r.is_finite())
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or_else(|| (p.instance.channels.first().cloned().unwrap_or_default(), 0.0))
+}
+
+fn parameter(e: &Estimate) -> Parameter {
+    let half = if e.se.is_finite() { 1.96 * e.se } else { 0.0 };
+    Parameter { name: e.name.clone(), value: e.value, unit: e.unit.clone(), ci95: [e.value - half, e.value + half] }
+}
+
+/// Both models on another run of the same rig, as they stand.
+fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
+    let context = Context::new(other, Some(after.start_pulse_us));
+    let error = |model: &Model, name: &'static str| -> Option<f64> {
+        let prediction = model.predict(&context, name)?;
+        let target = &context.targets[context.target(name)?];
+        let sum: f64 = target.rows.iter().zip(&target.y).map(|(i, y)| (y - prediction[*i]).powi(2)).sum();
+        Some((sum / target.rows.len() as f64).sqrt())
+    };
+    let channels = context
+        .targets
+        .iter()
+        .filter(|t| t.relation != Relation::ThrustRms)
+        .filter_map(|t| Some((t.name.to_owned(), BeforeAfter { before: error(before, t.name)?, after: error(after, t.name)? })))
+        .collect();
+    Validation { run: other.name.clone(), channels }
+}

@@ -1,0 +1,368 @@
+//! A log made ready for questions: consensus speed, gap-free regressors, targets, noise.
+//!
+//! What it is: everything that a relation may be predicted from, on every row, computed once a log.
+//! What can go wrong: a regressor with gaps is bridged linearly in time; targets keep only their own samples; single-row speed
+//! drop-outs are replaced in the consensus (the rule stands in `model.toml`), never in a target.
+//! Units: SI, rev/min, us; regressors of the polynomials are rpm/1000 and (pulse - 1000)/1000.
+//! Reference: specification `formats.md` (primary relations), `closing-the-loop.md` step 2.
+
+use crate::log::{Log, MODELLED, SPEED};
+use crate::noise::{self, Noise};
+
+/// What a target channel is predicted from, and by which polynomial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Relation {
+    /// rpm from pulse: cubic above the starting pulse, 0 below.
+    SpeedFromPulse,
+    /// rpm without a command: its own mean (nothing to predict it from).
+    SpeedAlone,
+    /// voltage: a constant.
+    Voltage,
+    /// torque from rpm: quadratic.
+    Torque,
+    /// current from rpm: cubic.
+    Current,
+    /// thrust from rpm: quadratic.
+    Thrust,
+    /// rms of the strain from rpm: quadratic. Evidence only; no verdict speaks of it.
+    ThrustRms,
+}
+
+impl Relation {
+    /// Degree of the declared polynomial.
+    #[must_use]
+    pub fn degree(self) -> usize {
+        match self {
+            Self::SpeedFromPulse | Self::Current => 3,
+            Self::SpeedAlone | Self::Voltage => 0,
+            Self::Torque | Self::Thrust | Self::ThrustRms => 2,
+        }
+    }
+
+    /// The relation of a channel.
+    #[must_use]
+    pub fn of(channel: &str, has_pulse: bool) -> Option<Self> {
+        Some(match channel {
+            c if SPEED.contains(&c) && has_pulse => Self::SpeedFromPulse,
+            c if SPEED.contains(&c) => Self::SpeedAlone,
+            "voltage_v" => Self::Voltage,
+            "torque_nm" => Self::Torque,
+            "current_a" => Self::Current,
+            "thrust_n" => Self::Thrust,
+            "thrust_rms_n" => Self::ThrustRms,
+            _ => return None,
+        })
+    }
+}
+
+/// Unit of a modelled channel.
+#[must_use]
+pub fn unit_of(channel: &str) -> &'static str {
+    match channel {
+        c if c.starts_with("rpm") => "rev/min",
+        "thrust_n" | "thrust_rms_n" => "N",
+        "torque_nm" => "N.m",
+        "current_a" => "A",
+        "voltage_v" => "V",
+        "temp_c" => "degC",
+        "t_s" => "s",
+        "pulse_us" => "us",
+        _ => "",
+    }
+}
+
+/// One measured channel as a target.
+#[derive(Debug, Clone)]
+pub struct Target {
+    /// Column name.
+    pub name: &'static str,
+    /// What it is predicted from.
+    pub relation: Relation,
+    /// Rows that hold a sample.
+    pub rows: Vec<usize>,
+    /// The samples, one for each of `rows`.
+    pub y: Vec<f64>,
+    /// Noise as the data show it inside steady stretches.
+    pub noise: Noise,
+    /// Share of this target in a joint likelihood: four speed channels see one rotor.
+    pub weight: f64,
+}
+
+/// How the consensus speed is made; stands in `model.toml`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Consensus {
+    /// Channels whose median is taken.
+    pub channels: Vec<String>,
+    /// Channels that disagree with the others, left out.
+    pub excluded: Vec<String>,
+    /// Rows whose speed dropped out for at most three rows and came back: bridged.
+    pub bridged_rows: usize,
+}
+
+/// A log made ready.
+#[derive(Debug, Clone)]
+pub struct Context {
+    /// Name of the log.
+    pub name: String,
+    /// Time, s.
+    pub t: Vec<f64>,
+    /// Time is a row index.
+    pub time_is_row: bool,
+    /// Command, us, bridged over gaps.
+    pub pulse: Option<Vec<f64>>,
+    /// Consensus speed, rev/min, on every row; empty when no speed was measured.
+    pub rpm: Vec<f64>,
+    /// How it was made.
+    pub consensus: Consensus,
+    /// Measured current, A, bridged.
+    pub current: Option<Vec<f64>>,
+    /// Measured voltage, V, bridged.
+    pub voltage: Option<Vec<f64>>,
+    /// Measured temperature, degC, bridged.
+    pub temperature: Option<Vec<f64>>,
+    /// Measured torque, N.m, bridged.
+    pub torque: Option<Vec<f64>>,
+    /// Further numeric columns, bridged.
+    pub covariates: Vec<(String, Vec<f64>)>,
+    /// Pulse at which the motor starts, us (midpoint between standing and turning).
+    pub start_pulse_us: f64,
+    /// Targets in the order of [`MODELLED`], then evidence channels.
+    pub targets: Vec<Target>,
+    /// Steady stretches as row ranges `[from, to)`.
+    pub steady: Vec<(usize, usize)>,
+}
+
+impl Context {
+    /// Prepares a log. `start_pulse_us` is taken from a model where one is given.
+    #[must_use]
+    pub fn new(log: &Log, start_pulse_us: Option<f64>) -> Self {
+        let bridged = |name: &str| log.column(name).filter(|c| c.iter().any(|v| v.is_finite())).map(|c| bridge(&log.t, c));
+        let pulse = bridged("pulse_us");
+        let (rpm, consensus) = consensus(log);
+        let steady = steady_stretches(&log.t, pulse.as_deref(), &rpm);
+        let start = start_pulse_us.unwrap_or_else(|| start_pulse(pulse.as_deref(), &rpm));
+        let mut context = Self {
+            name: log.name.clone(),
+            t: log.t.clone(),
+            time_is_row: log.time_is_row(),
+            current: bridged("current_a"),
+            voltage: bridged("voltage_v"),
+            temperature: bridged("temp_c"),
+            torque: bridged("torque_nm"),
+            covariates: log
+                .columns
+                .iter()
+                .filter(|c| !MODELLED.contains(&c.name.as_str()) && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&c.name.as_str()))
+                .filter(|c| c.values.iter().any(|v| v.is_finite()))
+                .map(|c| (c.name.clone(), bridge(&log.t, &c.values)))
+                .collect(),
+            pulse,
+            rpm,
+            consensus,
+            start_pulse_us: start,
+            targets: Vec::new(),
+            steady,
+        };
+        context.targets = targets(log, &context);
+        context
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there is no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// Index of a target by its channel name.
+    #[must_use]
+    pub fn target(&self, name: &str) -> Option<usize> {
+        self.targets.iter().position(|t| t.name == name)
+    }
+
+    /// Indices of the targets with this relation.
+    pub fn with_relation(&self, relation: Relation) -> impl Iterator<Item = usize> + '_ {
+        self.targets.iter().enumerate().filter(move |(_, t)| t.relation == relation).map(|(i, _)| i)
+    }
+
+    /// The regressor of a relation on every row, scaled; `None` where the log lacks it.
+    #[must_use]
+    pub fn regressor(&self, relation: Relation) -> Option<Vec<f64>> {
+        match relation {
+            Relation::SpeedFromPulse => self.pulse.as_ref().map(|p| p.iter().map(|v| (v - 1000.0) / 1000.0).collect()),
+            Relation::SpeedAlone | Relation::Voltage => Some(vec![0.0; self.len()]),
+            _ => (!self.rpm.is_empty()).then(|| self.rpm.iter().map(|v| v / 1000.0).collect()),
+        }
+    }
+
+    /// Median time step, s.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        let mut d: Vec<f64> = self.t.windows(2).map(|w| w[1] - w[0]).collect();
+        if d.is_empty() { 1.0 } else { noise::median(&mut d) }
+    }
+
+    /// Length of the run, s.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.t.last().unwrap_or(&0.0) - self.t.first().unwrap_or(&0.0)
+    }
+}
+
+/// Linear bridge over missing samples, constant at the ends.
+#[must_use]
+pub fn bridge(t: &[f64], values: &[f64]) -> Vec<f64> {
+    let mut out = values.to_vec();
+    let mut last: Option<usize> = None;
+    for i in 0..out.len() {
+        if !values[i].is_finite() {
+            continue;
+        }
+        match last {
+            None => out[..i].fill(values[i]),
+            Some(j) => {
+                for k in j + 1..i {
+                    let u = (t[k] - t[j]) / (t[i] - t[j]);
+                    out[k] = values[j] + u * (values[i] - values[j]);
+                }
+            }
+        }
+        last = Some(i);
+    }
+    if let Some(j) = last {
+        let v = values[j];
+        out[j + 1..].fill(v);
+    }
+    out
+}
+
+fn consensus(log: &Log) -> (Vec<f64>, Consensus) {
+    let present: Vec<&str> = SPEED.into_iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).collect();
+    if present.is_empty() {
+        return (Vec::new(), Consensus::default());
+    }
+    let all = median_of(log, &present);
+    let scale = all.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max).max(1.0);
+    let excluded: Vec<&str> = if present.len() >= 3 {
+        present.iter().copied().filter(|name| disagreement(log, name, &all, scale) > 0.005).collect()
+    } else {
+        Vec::new()
+    };
+    let kept: Vec<&str> = if excluded.len() * 2 < present.len() { present.iter().copied().filter(|n| !excluded.contains(n)).collect() } else { present.clone() };
+    let excluded = if kept.len() == present.len() { Vec::new() } else { excluded };
+    let mut rpm = if excluded.is_empty() { all } else { median_of(log, &kept) };
+    let bridged_rows = remove_dropouts(&mut rpm, scale);
+    let info = Consensus {
+        channels: kept.iter().map(|s| (*s).to_owned()).collect(),
+        excluded: excluded.iter().map(|s| (*s).to_owned()).collect(),
+        bridged_rows,
+    };
+    (bridge(&log.t, &rpm), info)
+}
+
+fn median_of(log: &Log, names: &[&str]) -> Vec<f64> {
+    let columns: Vec<&[f64]> = names.iter().filter_map(|n| log.column(n)).collect();
+    (0..log.len())
+        .map(|i| {
+            let mut v: Vec<f64> = columns.iter().map(|c| c[i]).filter(|v| v.is_finite()).collect();
+            if v.is_empty() { f64::NAN } else { noise::median(&mut v) }
+        })
+        .collect()
+}
+
+/// Median relative deviation of a channel from the median of all, while the rotor turns.
+fn disagreement(log: &Log, name: &str, all: &[f64], scale: f64) -> f64 {
+    let Some(column) = log.column(name) else { return 0.0 };
+    let mut d: Vec<f64> = column
+        .iter()
+        .zip(all)
+        .filter(|(v, m)| v.is_finite() && m.is_finite() && **m > 0.1 * scale)
+        .map(|(v, m)| ((v - m) / m).abs())
+        .collect();
+    if d.is_empty() { 0.0 } else { noise::median(&mut d) }
+}
+
+/// A speed that leaves by more than 2 % for at most three rows and comes back to within 1 % is a sensor's drop-out:
+/// no rotor does that. Such rows become missing and are bridged.
+fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
+    let mut removed = 0;
+    let finite: Vec<usize> = (0..rpm.len()).filter(|i| rpm[*i].is_finite()).collect();
+    let mut k = 1;
+    while k + 1 < finite.len() {
+        let before = rpm[finite[k - 1]];
+        if before > 0.05 * scale && (rpm[finite[k]] - before).abs() > 0.02 * before {
+            let back = (1..=3).find(|m| finite.get(k + m).is_some_and(|j| (rpm[*j] - before).abs() < 0.01 * before));
+            if let Some(m) = back {
+                for j in &finite[k..k + m] {
+                    rpm[*j] = f64::NAN;
+                    removed += 1;
+                }
+                k += m;
+            }
+        }
+        k += 1;
+    }
+    removed
+}
+
+fn start_pulse(pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
+    let Some(pulse) = pulse else { return 1000.0 };
+    if rpm.is_empty() {
+        return 1000.0;
+    }
+    let top = rpm.iter().copied().fold(0.0, f64::max);
+    let turning = |v: f64| v > 0.01 * top;
+    let lowest_on = pulse.iter().zip(rpm).filter(|(_, r)| turning(**r)).map(|(p, _)| *p).fold(f64::INFINITY, f64::min);
+    let highest_off = pulse.iter().zip(rpm).filter(|(p, r)| !turning(**r) && **p < lowest_on).map(|(p, _)| *p).fold(f64::NEG_INFINITY, f64::max);
+    if !lowest_on.is_finite() {
+        return 2500.0;
+    }
+    if highest_off.is_finite() { 0.5 * (lowest_on + highest_off) } else { lowest_on - 0.5 }
+}
+
+/// Row ranges in which the command (or, without one, the speed) holds still.
+fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> Vec<(usize, usize)> {
+    let n = t.len();
+    let (signal, tolerance): (&[f64], f64) = match pulse {
+        Some(p) => (p, 0.5),
+        None if !rpm.is_empty() => (rpm, 0.01 * rpm.iter().copied().fold(0.0, f64::max)),
+        None => return vec![(0, n)],
+    };
+    let mut out = Vec::new();
+    let mut from = 0;
+    for i in 1..=n {
+        let ends = i == n || (signal[i] - signal[i - 1]).abs() > tolerance || (pulse.is_none() && (signal[i] - signal[from]).abs() > 2.0 * tolerance);
+        if ends {
+            if i - from >= 6 {
+                out.push((from, i));
+            }
+            from = i;
+        }
+    }
+    out
+}
+
+fn targets(log: &Log, context: &Context) -> Vec<Target> {
+    let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
+    let mut out = Vec::new();
+    for name in MODELLED.into_iter().chain(["thrust_rms_n"]) {
+        let Some(column) = log.column(name) else { continue };
+        let Some(relation) = Relation::of(name, context.pulse.is_some()) else { continue };
+        let needs_rpm = matches!(relation, Relation::Thrust | Relation::Torque | Relation::Current | Relation::ThrustRms);
+        let relation = if needs_rpm && context.rpm.is_empty() { continue } else { relation };
+        let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let y: Vec<f64> = rows.iter().map(|i| column[*i]).collect();
+        let noise = noise::estimate(&rows, &y, &context.rpm, &context.steady);
+        let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
+        out.push(Target { name, relation, rows, y, noise, weight });
+    }
+    out
+}

@@ -1,0 +1,116 @@
+//! The linear part of a hypothesis: for each target the columns whose weighted sum is the prediction.
+//!
+//! What it is: baseline polynomial columns, changed by each effect in causal order (regressor, gain, additive term, output).
+//! What can go wrong: an effect that is asked for a channel that the log lacks leaves the design alone.
+//! Units: each column is in the target's unit for a unit coefficient.
+//! Reference: separable least squares, Golub & Pereyra 1973.
+
+use crate::context::{Context, Relation};
+
+/// What a column's coefficient means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Label {
+    /// Power of the regressor in the declared polynomial.
+    Base(usize),
+    /// Amplitude `amplitude` of the effect at position `effect` of the hypothesis.
+    Effect {
+        /// Position in the hypothesis.
+        effect: usize,
+        /// Position in that effect's list of amplitudes.
+        amplitude: usize,
+    },
+}
+
+/// One column over all rows of the log.
+#[derive(Debug, Clone)]
+pub struct Column {
+    /// What its coefficient means.
+    pub label: Label,
+    /// One value a row.
+    pub values: Vec<f64>,
+}
+
+/// Columns of one target.
+#[derive(Debug, Clone)]
+pub struct TargetDesign {
+    /// Channel name.
+    pub name: &'static str,
+    /// Its relation.
+    pub relation: Relation,
+    /// Columns with free coefficients.
+    pub columns: Vec<Column>,
+    /// Known part of the prediction (a fixed `--model`); empty when there is none.
+    pub fixed: Vec<f64>,
+    /// Variance that an effect adds to the noise, one value a row; empty when there is none.
+    pub extra_variance: Vec<f64>,
+}
+
+impl TargetDesign {
+    /// The declared baseline of a target.
+    #[must_use]
+    pub fn baseline(context: &Context, name: &'static str, relation: Relation) -> Self {
+        let n = context.len();
+        let x = context.regressor(relation).unwrap_or_else(|| vec![0.0; n]);
+        let live: Option<Vec<bool>> = match (relation, &context.pulse) {
+            (Relation::SpeedFromPulse, Some(p)) => Some(p.iter().map(|v| *v >= context.start_pulse_us).collect()),
+            _ => None,
+        };
+        let columns = (0..=relation.degree())
+            .map(|k| {
+                let mut values: Vec<f64> = x.iter().map(|v| v.powi(k as i32)).collect();
+                if let Some(live) = &live {
+                    for (v, on) in values.iter_mut().zip(live) {
+                        if !on {
+                            *v = 0.0;
+                        }
+                    }
+                }
+                Column { label: Label::Base(k), values }
+            })
+            .collect();
+        Self { name, relation, columns, fixed: Vec::new(), extra_variance: Vec::new() }
+    }
+
+    /// The same target with its baseline coefficients held at given values.
+    #[must_use]
+    pub fn pinned(mut self, coefficients: &[f64]) -> Self {
+        self.fixed = weighted_sum(&self.columns, coefficients, self.columns.first().map_or(0, |c| c.values.len()));
+        self.columns.clear();
+        self
+    }
+
+    /// Lets `change` act on every column and on the known part: for gains and output operators.
+    pub fn map_columns(&mut self, change: impl Fn(&mut Vec<f64>)) {
+        for column in &mut self.columns {
+            change(&mut column.values);
+        }
+        if !self.fixed.is_empty() {
+            change(&mut self.fixed);
+        }
+    }
+
+    /// Adds a column for an effect's amplitude.
+    pub fn add(&mut self, effect: usize, amplitude: usize, values: Vec<f64>) {
+        self.columns.push(Column { label: Label::Effect { effect, amplitude }, values });
+    }
+
+    /// The prediction on every row.
+    #[must_use]
+    pub fn predict(&self, coefficients: &[f64], n: usize) -> Vec<f64> {
+        let mut out = weighted_sum(&self.columns, coefficients, n);
+        for (o, f) in out.iter_mut().zip(&self.fixed) {
+            *o += f;
+        }
+        out
+    }
+}
+
+fn weighted_sum(columns: &[Column], coefficients: &[f64], n: usize) -> Vec<f64> {
+    let mut out = vec![0.0; n];
+    for (column, c) in columns.iter().zip(coefficients) {
+        for (o, v) in out.iter_mut().zip(&column.values) {
+            *o += c * v;
+        }
+    }
+    out
+}

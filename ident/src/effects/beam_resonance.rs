@@ -1,0 +1,87 @@
+//! `beam_resonance`: the beam's first mode is excited where once-per-revolution or blade pass meets it.
+//!
+//! What it is: a bump of the mean, extra scatter of the mean, and a peak of thrust_rms_n around the resonant speed.
+//! What can go wrong: a well decimated mean hides it; a sweep that steps over the resonance does not excite it.
+//! Units: Hz, 1; bump, scatter and vibration amplitude in N.
+//! Reference: rotating imbalance on a one-degree-of-freedom oscillator, Den Hartog 1956, section 2.11; Beharie 2013, section 5.7.1.
+
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, present};
+use crate::context::{Context, Relation};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct BeamResonance;
+
+impl Effect for BeamResonance {
+    fn id(&self) -> &'static str {
+        "beam_resonance"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Resonance of the load-cell beam",
+            equation: "thrust_n += bump * A^2 with scatter * A, thrust_rms_n += vibration * A, A = r^2 / sqrt((1 - r^2)^2 + (2 damping_ratio r)^2) over its peak, r = f_excitation / natural_frequency",
+            source: "Den Hartog 1956, section 2.11; Beharie 2013, section 5.7.1",
+            depends_on: &["rpm"],
+            signature: "scatter, rms and a small bump of the thrust around one speed, whenever that speed is visited",
+            look_alikes: &["unknown"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let channels = present(context, &["thrust_n", "thrust_rms_n"]);
+        if channels.first() == Some(&"thrust_n") {
+            vec![Instance::new(&channels, "once_per_rev"), Instance::new(&channels, "blade_pass")]
+        } else {
+            Vec::new()
+        }
+    }
+
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        let order = order(instance);
+        let top = context.rpm.iter().copied().fold(1.0, f64::max) / 60.0 * order;
+        let (lo, hi) = (0.1 * top, 1.05 * top);
+        let noise = context.target("thrust_n").map_or(1e-3, |i| context.targets[i].noise.rms);
+        vec![
+            Shape { name: "natural_frequency", unit: "Hz", range: (lo, hi), starts: geometric(lo, hi, 40) },
+            Shape { name: "damping_ratio", unit: "1", range: (0.003, 0.3), starts: vec![0.015, 0.05] },
+            Shape { name: "scatter", unit: "N", range: (0.0, 300.0 * noise), starts: vec![0.5 * noise, 5.0 * noise] },
+        ]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "bump", unit: "N" }, Amplitude { name: "vibration", unit: "N" }]
+    }
+
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        let [frequency, damping, scatter] = shape else { return };
+        let order = order(instance);
+        let peak = 1.0 / (2.0 * damping * (1.0 - damping * damping).sqrt());
+        let a: Vec<f64> = context
+            .rpm
+            .iter()
+            .map(|rpm| {
+                let r2 = (rpm / 60.0 * order / frequency).powi(2);
+                r2 / ((1.0 - r2).powi(2) + 4.0 * damping * damping * r2).sqrt() / peak
+            })
+            .collect();
+        if design.relation == Relation::ThrustRms {
+            design.add(position, 1, a);
+        } else {
+            design.extra_variance = a.iter().map(|v| (scatter * v).powi(2)).collect();
+            design.add(position, 0, a.iter().map(|v| v * v).collect());
+        }
+    }
+
+    fn plausible(&self, _: &Instance, fitted: &[Estimate]) -> bool {
+        fitted.iter().all(|e| e.name != "vibration" || e.value > -1e-6)
+    }
+}
+
+fn order(instance: &Instance) -> f64 {
+    if instance.form == "blade_pass" { 2.0 } else { 1.0 }
+}

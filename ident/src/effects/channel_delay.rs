@@ -1,0 +1,61 @@
+//! `channel_delay`: a channel is late.
+//!
+//! What it is: the reading is the truth some time ago.
+//! What can go wrong: a filter looks alike on coarse samples.
+//! Units: s, positive is late.
+//! Reference: pure transport delay of a logger.
+
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, present};
+use crate::context::{Context};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct ChannelDelay;
+
+impl Effect for ChannelDelay {
+    fn id(&self) -> &'static str {
+        "channel_delay"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "A channel is late",
+            equation: "reading(t) = truth(t - delay)",
+            source: "transport delay of a logger",
+            depends_on: &["t_s", "time_since_step"],
+            signature: "rectangular spikes of the residual at every change of the load, as long as the delay",
+            look_alikes: &["channel_filter", "clock_drift"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Output
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        if context.time_is_row {
+            return Vec::new();
+        }
+        let mut sets: Vec<Vec<&str>> = present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
+        let both = present(context, &["thrust_n", "torque_nm"]);
+        if both.len() == 2 {
+            sets.push(both);
+        }
+        sets.iter().map(|s| Instance::new(s, "")).collect()
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        let most = (15.0 * context.step()).max(2.0);
+        let starts = (-6..=24).map(|k| most * f64::from(k) / 24.0).filter(|d| d.abs() > 1e-9).collect();
+        vec![Shape { name: "delay", unit: "s", range: (-0.5 * most, 1.2 * most), starts }]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let [delay] = shape else { return };
+        design.map_columns(|column| *column = operator::delayed(&context.t, column, *delay));
+    }
+}

@@ -1,0 +1,58 @@
+//! `creep`: the load cell follows a load change by a few per cent more, slowly.
+//!
+//! What it is: thrust_n = F + amplitude * lag_tau(F): adhesive and beam relax exponentially.
+//! What can go wrong: with levels much longer than tau only the transitions show it, and the gain takes the rest.
+//! Units: 1, s.
+//! Reference: Hoffmann, *An Introduction to Stress Analysis using Strain Gauges*, section 3.3 (creep).
+
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, operator, present};
+use crate::context::{Context};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct Creep;
+
+impl Effect for Creep {
+    fn id(&self) -> &'static str {
+        "creep"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Creep of the load cell after a load change",
+            equation: "thrust_n = F + amplitude * (F lagged by tau)",
+            source: "Hoffmann, An Introduction to Stress Analysis using Strain Gauges, section 3.3",
+            depends_on: &["t_s", "thrust_n", "time_since_step"],
+            signature: "after each step the thrust residual relaxes exponentially, in proportion to the step",
+            look_alikes: &["channel_filter", "hysteresis", "zero_drift"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Output
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        if context.time_is_row || present(context, &["thrust_n"]).is_empty() { Vec::new() } else { vec![Instance::new(&["thrust_n"], "")] }
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        let (lo, hi) = ((5.0 * context.step()).max(1.0), (0.5 * context.duration()).max(2.0));
+        vec![
+            Shape { name: "amplitude", unit: "1", range: (-0.3, 0.3), starts: vec![0.03] },
+            Shape { name: "tau", unit: "s", range: (lo, hi), starts: geometric(lo, hi, 12) },
+        ]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let [amplitude, tau] = shape else { return };
+        design.map_columns(|column| {
+            let slow = operator::first_order(&context.t, column, *tau);
+            column.iter_mut().zip(slow).for_each(|(v, s)| *v += amplitude * s);
+        });
+    }
+}

@@ -1,0 +1,67 @@
+//! `gain_change`: the load cell's gain changes during the run.
+//!
+//! What it is: thrust_n *= 1 + gain_change for t >= t0 (step), or *= 1 + rate * t (drift).
+//! What can go wrong: the tare is not scaled apart from the force: at small loads it looks like nothing.
+//! Units: 1, 1/s, s.
+//! Reference: Beharie 2013, Eq. 5.34-5.35 (two calibrations differ by 9.7 % in slope).
+
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
+use crate::context::{Context};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct GainChange;
+
+impl Effect for GainChange {
+    fn id(&self) -> &'static str {
+        "gain_change"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Gain of the load cell changes",
+            equation: "thrust_n *= 1 + gain_change for t >= t0, or thrust_n *= 1 + rate * t",
+            source: "Beharie 2013, Eq. 5.34-5.35",
+            depends_on: &["t_s", "thrust_n"],
+            signature: "the thrust residual grows with the thrust, after an instant or with time; torque(rpm) holds",
+            look_alikes: &["blade_damage", "air_density", "creep"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Gain
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        if context.time_is_row || present(context, &["thrust_n"]).is_empty() {
+            Vec::new()
+        } else {
+            vec![Instance::new(&["thrust_n"], "step"), Instance::new(&["thrust_n"], "drift")]
+        }
+    }
+
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form == "drift" {
+            let most = 0.5 / context.duration().max(1.0);
+            vec![Shape { name: "rate", unit: "1/s", range: (-most, most), starts: vec![0.01 * most] }]
+        } else {
+            vec![Shape { name: "gain_change", unit: "1", range: (-0.5, 0.5), starts: vec![0.02] }, super::tare_shift::onset(context)]
+        }
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let factor: Vec<f64> = match (instance.form.as_str(), shape) {
+            ("drift", [rate]) => {
+                let t0 = context.t.first().copied().unwrap_or(0.0);
+                context.t.iter().map(|t| 1.0 + rate * (t - t0)).collect()
+            }
+            (_, [change, t0]) => super::tare_shift::step(context, *t0).iter().map(|s| 1.0 + change * s).collect(),
+            _ => return,
+        };
+        design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
+    }
+}

@@ -1,0 +1,82 @@
+//! `hysteresis`: the load cell reads differently on the way down.
+//!
+//! What it is: thrust_n += width * (direction / 2) * 4 f (1 - f), f the share of the full load, direction -1 going up and +1 coming down.
+//! What can go wrong: needs a schedule that comes back; drift over an up-down sweep looks alike.
+//! Units: N, at mid range.
+//! Reference: OIML R 60 (load cells), hysteresis error.
+
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
+use crate::context::{Context};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct Hysteresis;
+
+impl Effect for Hysteresis {
+    fn id(&self) -> &'static str {
+        "hysteresis"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Hysteresis of the load cell",
+            equation: "thrust_n += width * direction / 2 * 4 f (1 - f), f = (rpm / rpm_max)^2",
+            source: "OIML R 60",
+            depends_on: &["direction", "thrust_n"],
+            signature: "the thrust residual of the way up and of the way down bend apart in the middle and meet at the ends",
+            look_alikes: &["creep", "zero_drift"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let direction = direction(context);
+        let (up, down) = (direction.iter().filter(|d| **d < 0.0).count(), direction.iter().filter(|d| **d > 0.0).count());
+        if present(context, &["thrust_n"]).is_empty() || up.min(down) * 20 < context.len() { Vec::new() } else { vec![Instance::new(&["thrust_n"], "")] }
+    }
+
+    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "width", unit: "N" }]
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+        let top = context.rpm.iter().copied().fold(1.0, f64::max);
+        let values = direction(context)
+            .iter()
+            .zip(&context.rpm)
+            .map(|(d, rpm)| {
+                let f = (rpm / top).powi(2).clamp(0.0, 1.0);
+                0.5 * d * 4.0 * f * (1.0 - f)
+            })
+            .collect();
+        design.add(position, 0, values);
+    }
+}
+
+/// -1 while the last step of the load went up, +1 while it went down, 0 before any.
+pub(crate) fn direction(context: &Context) -> Vec<f64> {
+    let (signal, threshold): (&[f64], f64) = match &context.pulse {
+        Some(p) => (p, 2.0),
+        None => (&context.rpm, 0.02 * context.rpm.iter().copied().fold(0.0, f64::max)),
+    };
+    let mut out = Vec::with_capacity(signal.len());
+    let (mut anchor, mut state) = (signal.first().copied().unwrap_or(0.0), 0.0);
+    for v in signal {
+        if *v > anchor + threshold {
+            state = -1.0;
+            anchor = *v;
+        } else if *v < anchor - threshold {
+            state = 1.0;
+            anchor = *v;
+        }
+        out.push(state);
+    }
+    out
+}

@@ -1,0 +1,181 @@
+//! The library: one file an effect, one line each in [`library`].
+//!
+//! What it is: physical effects in compact form, each saying which channels it touches and how it changes their columns.
+//! What can go wrong: an effect is offered only where the log has what it needs ([`Effect::instances`] is empty otherwise).
+//! Units: stated on each parameter.
+//! Reference: specification `closing-the-loop.md`, list of effects.
+
+mod battery_discharge;
+mod beam_resonance;
+mod channel_delay;
+mod channel_filter;
+mod creep;
+mod gain_change;
+mod hysteresis;
+mod operator;
+mod rotor_inertia;
+mod spinup_lag;
+mod supply_sag;
+mod tare_shift;
+mod thermal_zero;
+pub(crate) mod unknown;
+mod zero_drift;
+
+use crate::context::Context;
+use crate::design::TargetDesign;
+
+/// Where in the causal chain an effect acts; effects are applied in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// On what goes into the relation.
+    Input,
+    /// On the relation itself: a factor.
+    Gain,
+    /// A further term.
+    Term,
+    /// On the reading: filter, delay, hold.
+    Output,
+}
+
+/// What an effect is, for reports and documentation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct About {
+    /// Name of the effect in plain words.
+    pub title: &'static str,
+    /// Equation as it stands in verdicts.
+    pub equation: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// Variables that it depends on, by column name.
+    pub depends_on: &'static [&'static str],
+    /// What it looks like in the residual.
+    pub signature: &'static str,
+    /// Effects that it is easily taken for.
+    pub look_alikes: &'static [&'static str],
+}
+
+/// One way in which an effect may be present in this log: which channels it touches, in which form.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Instance {
+    /// Channels, the first of which is the one that figures are quoted for.
+    pub channels: Vec<String>,
+    /// Form of the equation, empty where there is only one.
+    pub form: String,
+}
+
+impl Instance {
+    pub(crate) fn new(channels: &[&str], form: &str) -> Self {
+        Self { channels: channels.iter().map(|c| (*c).to_owned()).collect(), form: form.to_owned() }
+    }
+
+    /// Whether this instance touches a channel.
+    #[must_use]
+    pub fn touches(&self, channel: &str) -> bool {
+        self.channels.iter().any(|c| c == channel)
+    }
+}
+
+/// A parameter that enters the equation non-linearly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Name, a contract of the verdict file.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Plausible range.
+    pub range: (f64, f64),
+    /// Values at which the search starts.
+    pub starts: Vec<f64>,
+}
+
+/// A parameter that multiplies a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Amplitude {
+    /// Name, a contract of the verdict file.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+}
+
+/// An estimated parameter as it is reported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value.
+    pub value: f64,
+    /// Standard error.
+    pub se: f64,
+}
+
+/// One physical effect.
+pub trait Effect: Sync {
+    /// Identifier, a contract of the verdict file.
+    fn id(&self) -> &'static str;
+    /// What it is.
+    fn about(&self) -> About;
+    /// Where it acts.
+    fn stage(&self) -> Stage;
+    /// The ways in which this log could hold it; none where the log lacks what it needs.
+    fn instances(&self, context: &Context) -> Vec<Instance>;
+    /// Non-linear parameters with ranges and starts for this log.
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape>;
+    /// Linear parameters.
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude>;
+    /// Changes the design of one target that this instance touches.
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign);
+    /// Parameters as they are reported, from those that were fitted (shapes first, then amplitudes).
+    fn report(&self, _context: &Context, _instance: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
+        fitted
+    }
+    /// Whether the estimate makes physical sense (a negative resistance does not).
+    fn plausible(&self, _instance: &Instance, _fitted: &[Estimate]) -> bool {
+        true
+    }
+}
+
+/// Every effect that can be named.
+#[must_use]
+pub fn library() -> &'static [&'static dyn Effect] {
+    &[
+        &supply_sag::SupplySag,
+        &battery_discharge::BatteryDischarge,
+        &spinup_lag::SpinupLag,
+        &rotor_inertia::RotorInertia,
+        &zero_drift::ZeroDrift,
+        &thermal_zero::ThermalZero,
+        &tare_shift::TareShift,
+        &gain_change::GainChange,
+        &creep::Creep,
+        &hysteresis::Hysteresis,
+        &beam_resonance::BeamResonance,
+        &channel_filter::ChannelFilter,
+        &channel_delay::ChannelDelay,
+    ]
+}
+
+/// The effect with this identifier, the empirical correction included.
+#[must_use]
+pub fn by_id(id: &str) -> Option<&'static dyn Effect> {
+    if id == "unknown" {
+        return Some(&unknown::Unknown);
+    }
+    library().iter().copied().find(|e| e.id() == id)
+}
+
+/// Channels of the log among `names`.
+fn present<'a>(context: &Context, names: &[&'a str]) -> Vec<&'a str> {
+    names.iter().copied().filter(|n| context.target(n).is_some()).collect()
+}
+
+/// Speed channels of the log.
+fn speeds(context: &Context) -> Vec<&'static str> {
+    context.targets.iter().filter(|t| t.relation == crate::context::Relation::SpeedFromPulse).map(|t| t.name).collect()
+}
+
+fn geometric(from: f64, to: f64, n: usize) -> Vec<f64> {
+    let (from, to) = (from.max(1e-9), to.max(from * 1.0001));
+    (0..n).map(|k| from * (to / from).powf(k as f64 / (n.max(2) - 1) as f64)).collect()
+}

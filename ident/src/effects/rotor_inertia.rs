@@ -1,0 +1,75 @@
+//! `rotor_inertia`: speeding the rotor up costs torque and current.
+//!
+//! What it is: torque_nm += inertia * domega/dt, current_a += current_gain * domega/dt.
+//! What can go wrong: shows only in transients; a lag between the channels looks alike.
+//! Units: kg.m2, A.s2/rad.
+//! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt).
+
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
+use crate::context::{Context, Relation};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct RotorInertia;
+
+impl Effect for RotorInertia {
+    fn id(&self) -> &'static str {
+        "rotor_inertia"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Accelerating the rotor takes torque and current",
+            equation: "torque_nm += inertia * d(omega)/dt, current_a += current_gain * d(omega)/dt",
+            source: "Beharie 2013, Eq. 2.21 as corrected",
+            depends_on: &["rpm_rate"],
+            signature: "spikes of torque and current at each step, with the sign of the step; thrust(rpm) holds",
+            look_alikes: &["channel_delay", "channel_filter"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        if context.time_is_row || context.rpm.is_empty() {
+            return Vec::new();
+        }
+        let (torque, current) = (present(context, &["torque_nm"]), present(context, &["current_a"]));
+        let both = present(context, &["torque_nm", "current_a"]);
+        let mut out = Vec::new();
+        for set in [both, torque, current] {
+            let instance = Instance::new(&set, "");
+            if !set.is_empty() && !out.contains(&instance) {
+                out.push(instance);
+            }
+        }
+        out
+    }
+
+    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "inertia", unit: "kg.m2" }, Amplitude { name: "current_gain", unit: "A.s2/rad" }]
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+        let amplitude = usize::from(design.relation == Relation::Current);
+        design.add(position, amplitude, acceleration(context));
+    }
+}
+
+/// Angular acceleration by central differences of the consensus speed, rad/s^2.
+pub(crate) fn acceleration(context: &Context) -> Vec<f64> {
+    let (t, rpm) = (&context.t, &context.rpm);
+    let n = t.len();
+    (0..n)
+        .map(|i| {
+            let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
+            if b > a { (rpm[b] - rpm[a]) / (t[b] - t[a]) * std::f64::consts::TAU / 60.0 } else { 0.0 }
+        })
+        .collect()
+}

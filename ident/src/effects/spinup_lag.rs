@@ -1,0 +1,84 @@
+//! `spinup_lag`: the rotor takes time to follow the command.
+//!
+//! What it is: rpm follows its static value by a first-order lag, with different time constants up and down.
+//! What can go wrong: needs steps and samples inside the transient; with none it is not offered.
+//! Units: s.
+//! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
+
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
+use crate::context::{Context};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct SpinupLag;
+
+impl Effect for SpinupLag {
+    fn id(&self) -> &'static str {
+        "spinup_lag"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Rotor follows the command with a lag",
+            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down",
+            source: "Beharie 2013, section 5.7.3",
+            depends_on: &["pulse_us", "time_since_step"],
+            signature: "rpm(pulse) is off for a moment after every step and right before the next; thrust(rpm) holds throughout",
+            look_alikes: &["channel_filter", "channel_delay"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Output
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let channels = speeds(context);
+        if context.time_is_row || channels.is_empty() { Vec::new() } else { vec![Instance::new(&channels, "")] }
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        let dt = context.step();
+        let starts: Vec<f64> = [0.3, 1.0, 3.0, 10.0].iter().map(|k| k * dt).collect();
+        let range = (0.02 * dt, (100.0 * dt).max(5.0));
+        vec![
+            Shape { name: "tau_up", unit: "s", range, starts: starts.clone() },
+            Shape { name: "tau_down", unit: "s", range, starts },
+        ]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let ([up, down], Some(pulse)) = (shape, &context.pulse) else { return };
+        // which of the two constants holds is decided by the command alone, so that every column sees the same operator
+        let mut state = pulse.first().copied().unwrap_or(0.0);
+        let mut rising = Vec::with_capacity(pulse.len());
+        for i in 0..pulse.len() {
+            let up_now = pulse[i] >= state;
+            rising.push(up_now);
+            if i > 0 {
+                let tau = if up_now { *up } else { *down };
+                state = pulse[i] + (state - pulse[i]) * (-(context.t[i] - context.t[i - 1]) / tau.max(1e-9)).exp();
+            }
+        }
+        design.map_columns(|column| {
+            // a pulse train acts from the row in which it is commanded: the input is a staircase, not a ramp between rows
+            let mut state = column.first().copied().unwrap_or(0.0);
+            for i in 0..column.len() {
+                if i > 0 {
+                    let tau = if rising[i] { *up } else { *down };
+                    let e = (-(context.t[i] - context.t[i - 1]) / tau.max(1e-9)).exp();
+                    state = column[i] + (state - column[i]) * e;
+                }
+                column[i] = state;
+            }
+        });
+    }
+
+    fn plausible(&self, _: &Instance, fitted: &[Estimate]) -> bool {
+        fitted.iter().all(|e| e.value > 0.0)
+    }
+}

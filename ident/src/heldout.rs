@@ -1,0 +1,98 @@
+//! Errors on rows that the fit did not see.
+//!
+//! What it is: five contiguous time blocks, and every second interior plateau level, each left out in turn.
+//! What can go wrong: a fold that leaves too little to fit is skipped; its rows then do not count.
+//! Units: the channel's.
+//! Reference: specification `formats.md` (`heldout_rms`); blocked cross-validation, Roberts et al. 2017, Ecography 40:913.
+
+use crate::context::Context;
+use crate::hypothesis::{Declared, Fit, Placed, Rows, design, fit_target, refine};
+
+/// For each fold the rows that are left out.
+#[must_use]
+pub fn folds(context: &Context) -> Vec<Vec<bool>> {
+    let n = context.len();
+    let (t0, span) = (context.t.first().copied().unwrap_or(0.0), context.duration().max(1e-9));
+    let mut out: Vec<Vec<bool>> = (0..5)
+        .map(|k| context.t.iter().map(|t| (((t - t0) / span * 5.0) as usize).min(4) == k).collect())
+        .collect();
+    let levels = levels(context);
+    let last = levels.iter().copied().flatten().max().unwrap_or(0);
+    let odd: Vec<bool> = (0..n).map(|i| levels[i].is_some_and(|l| l > 0 && l < last && l % 2 == 1)).collect();
+    if odd.iter().any(|o| *o) {
+        out.push(odd);
+    }
+    out
+}
+
+/// Index of the load level that each row belongs to, from low to high; `None` in between.
+fn levels(context: &Context) -> Vec<Option<usize>> {
+    let (signal, tolerance): (&[f64], f64) = match &context.pulse {
+        Some(p) => (p, 3.0),
+        None => (&context.rpm, 0.015 * context.rpm.iter().copied().fold(0.0, f64::max)),
+    };
+    let mut out = vec![None; context.len()];
+    if signal.is_empty() {
+        return out;
+    }
+    let mut stretches: Vec<(f64, usize, usize)> =
+        context.steady.iter().map(|(a, b)| (signal[*a..*b].iter().sum::<f64>() / (b - a) as f64, *a, *b)).collect();
+    stretches.sort_by(|x, y| x.0.total_cmp(&y.0));
+    let (mut level, mut anchor) = (0, f64::NEG_INFINITY);
+    for (k, (value, a, b)) in stretches.iter().enumerate() {
+        if k > 0 && value - anchor > tolerance {
+            level += 1;
+            anchor = *value;
+        } else if k == 0 {
+            anchor = *value;
+        }
+        out[*a..*b].fill(Some(level));
+    }
+    out
+}
+
+/// Held-out root mean square error of each target of the context under a hypothesis.
+#[must_use]
+pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec<bool>]) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0usize); context.targets.len()];
+    for out in folds {
+        let keep: Vec<bool> = out.iter().map(|o| !o).collect();
+        let placed = refine(context, declared, &fit.placed, Rows::Where(&keep), 40 * fit.placed.len().min(2));
+        add_fold(context, declared, &placed, &keep, &mut sums);
+    }
+    sums.iter().map(|(s, n)| if *n > 0 { (s / *n as f64).sqrt() } else { f64::NAN }).collect()
+}
+
+fn add_fold(context: &Context, declared: Declared<'_>, placed: &[Placed], keep: &[bool], sums: &mut [(f64, usize)]) {
+    for (target, sum) in context.targets.iter().zip(sums) {
+        let design = design(context, declared, placed, target);
+        let Some(fitted) = fit_target(context, target, &design, Rows::Where(keep)) else { continue };
+        let prediction = design.predict(&fitted.coefficients, context.len());
+        for (row, y) in target.rows.iter().zip(&target.y) {
+            if !keep[*row] {
+                sum.0 += (y - prediction[*row]).powi(2);
+                sum.1 += 1;
+            }
+        }
+    }
+}
+
+/// Root mean square error of each target over all its rows.
+#[must_use]
+pub fn insample(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<f64> {
+    residuals(context, declared, fit).iter().map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt()).collect()
+}
+
+/// Residual of each target on its own rows.
+#[must_use]
+pub fn residuals(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<Vec<f64>> {
+    context
+        .targets
+        .iter()
+        .zip(&fit.targets)
+        .map(|(target, f)| {
+            let prediction = design(context, declared, &fit.placed, target).predict(&f.coefficients, context.len());
+            target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).collect()
+        })
+        .collect()
+}

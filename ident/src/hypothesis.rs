@@ -1,0 +1,351 @@
+//! A hypothesis: the declared model and a set of effects, fitted jointly.
+//!
+//! What it is: separable least squares. For given shape parameters each target is a linear problem; the shapes are searched
+//! by the profile likelihood over all targets that the effects touch.
+//! What can go wrong: a shape that ends on its bound, or an implausible amplitude, disqualifies the hypothesis.
+//! Units: log-likelihood in nats; parameters in the units that the effects state.
+//! Reference: Golub & Pereyra 1973; Nelder & Mead 1965; profile likelihood, Barndorff-Nielsen & Cox 1994, section 3.4.
+
+use crate::context::{Context, Target};
+use crate::design::{Label, TargetDesign};
+use crate::effects::{Effect, Estimate, Instance};
+use crate::model::Model;
+use crate::solve::{Normal, Solution};
+use nalgebra::DMatrix;
+
+/// An effect placed in a hypothesis.
+#[derive(Clone)]
+pub struct Placed {
+    /// The effect.
+    pub effect: &'static dyn Effect,
+    /// Which channels, which form.
+    pub instance: Instance,
+    /// Values of its shape parameters.
+    pub shape: Vec<f64>,
+}
+
+impl std::fmt::Debug for Placed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {:?} {} {:?}", self.effect.id(), self.instance.channels, self.instance.form, self.shape)
+    }
+}
+
+/// What the effects are added to.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Declared<'a> {
+    /// A model that stands as it is; `None` is the thesis baseline, refitted.
+    pub model: Option<&'a Model>,
+}
+
+/// Fit of one target.
+#[derive(Debug, Clone)]
+pub struct TargetFit {
+    /// Coefficients in the order of the design's columns.
+    pub coefficients: Vec<f64>,
+    /// Their meaning.
+    pub labels: Vec<Label>,
+    /// Covariance of the coefficients.
+    pub covariance: DMatrix<f64>,
+    /// Log-likelihood, weighted for shared rotors and coloured noise.
+    pub loglik: f64,
+}
+
+/// A fitted hypothesis.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The effects with their shapes.
+    pub placed: Vec<Placed>,
+    /// One fit for each target of the context.
+    pub targets: Vec<TargetFit>,
+    /// Sum over targets.
+    pub loglik: f64,
+}
+
+/// Builds the design of one target under a hypothesis.
+#[must_use]
+pub fn design(context: &Context, declared: Declared<'_>, placed: &[Placed], target: &Target) -> TargetDesign {
+    let mut design = match declared.model {
+        None => TargetDesign::baseline(context, target.name, target.relation),
+        Some(model) => model.pinned(context, target),
+    };
+    let mut order: Vec<usize> = (0..placed.len()).collect();
+    order.sort_by_key(|i| placed[*i].effect.stage());
+    for i in order {
+        let p = &placed[i];
+        if p.instance.touches(target.name) {
+            p.effect.apply(context, &p.instance, &p.shape, i, &mut design);
+        }
+    }
+    design
+}
+
+/// Which rows may teach: all, or those that a mask leaves in.
+#[derive(Debug, Clone, Copy)]
+pub enum Rows<'a> {
+    /// Every row.
+    All,
+    /// Every n-th sample of a target, for quick scans.
+    Every(usize),
+    /// Rows for which the mask is true.
+    Where(&'a [bool]),
+}
+
+/// Fits one target for given shapes.
+#[must_use]
+pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
+    let k = design.columns.len();
+    let mut normal = Normal::new(k);
+    let mut row = vec![0.0; k];
+    let mut log_sigma = 0.0;
+    let stride = if let Rows::Every(n) = rows { n.max(1) } else { 1 };
+    for (j, i) in target.rows.iter().enumerate().step_by(stride) {
+        if let Rows::Where(mask) = rows
+            && !mask[*i]
+        {
+            continue;
+        }
+        let speed = if context.rpm.is_empty() { 0.0 } else { context.rpm[*i] };
+        let variance = target.noise.variance(speed) + design.extra_variance.get(*i).copied().unwrap_or(0.0);
+        for (r, column) in row.iter_mut().zip(&design.columns) {
+            *r = column.values[*i];
+        }
+        let y = target.y[j] - design.fixed.get(*i).copied().unwrap_or(0.0);
+        normal.add(&row, y, 1.0 / variance);
+        log_sigma += 0.5 * variance.ln();
+    }
+    if normal.count < k + 3 {
+        return None;
+    }
+    let Solution { coefficients, inverse, rss } = normal.solve()?;
+    let n = normal.count as f64;
+    // the scale of the noise is profiled, but never below a tenth of the floor
+    let scale = (rss / n).max(0.01);
+    let share = target.noise.effective_share() * target.weight * stride as f64;
+    let loglik = share * (-0.5 * n * scale.ln() - 0.5 * rss / scale - log_sigma);
+    let covariance = inverse * (scale / target.noise.effective_share());
+    Some(TargetFit { coefficients, labels: design.columns.iter().map(|c| c.label).collect(), covariance, loglik })
+}
+
+/// Fits every target that the effects touch; the others come from `rest`.
+#[must_use]
+pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: Option<&Fit>, rows: Rows<'_>) -> Option<Fit> {
+    let mut targets = Vec::with_capacity(context.targets.len());
+    for (i, target) in context.targets.iter().enumerate() {
+        let touched = placed.iter().any(|p| p.instance.touches(target.name));
+        match rest {
+            Some(rest) if !touched => targets.push(rest.targets[i].clone()),
+            _ => targets.push(fit_target(context, target, &design(context, declared, placed, target), rows)?),
+        }
+    }
+    let loglik = targets.iter().map(|t| t.loglik).sum();
+    Some(Fit { placed: placed.to_vec(), targets, loglik })
+}
+
+/// Log-likelihood of the touched targets only: what a search compares.
+fn touched_loglik(context: &Context, declared: Declared<'_>, placed: &[Placed], moving: &[&str], rows: Rows<'_>) -> f64 {
+    let mut sum = 0.0;
+    for target in context.targets.iter().filter(|t| moving.contains(&t.name)) {
+        match fit_target(context, target, &design(context, declared, placed, target), rows) {
+            Some(f) => sum += f.loglik,
+            None => return f64::NEG_INFINITY,
+        }
+    }
+    sum
+}
+
+/// The rows stride that keeps a scan of the longest target near `most` samples.
+fn scan_stride(context: &Context, most: usize) -> usize {
+    context.targets.iter().map(|t| t.rows.len()).max().unwrap_or(1).div_ceil(most).max(1)
+}
+
+/// Best start of one candidate added to a fixed set: a scan of its grid.
+#[must_use]
+pub fn scan(context: &Context, declared: Declared<'_>, base: &[Placed], effect: &'static dyn Effect, instance: &Instance) -> Option<(Vec<f64>, f64)> {
+    let shapes = effect.shapes(context, instance);
+    let moving: Vec<&str> = instance.channels.iter().map(String::as_str).collect();
+    let rows = Rows::Every(scan_stride(context, 4000));
+    let before = touched_loglik(context, declared, base, &moving, rows);
+    let mut best: Option<(Vec<f64>, f64)> = None;
+    let total: usize = shapes.iter().map(|s| s.starts.len()).product();
+    for index in 0..total {
+        let mut rest = index;
+        let shape: Vec<f64> = shapes
+            .iter()
+            .map(|s| {
+                let v = s.starts[rest % s.starts.len()];
+                rest /= s.starts.len();
+                v
+            })
+            .collect();
+        let mut placed = base.to_vec();
+        placed.push(Placed { effect, instance: instance.clone(), shape: shape.clone() });
+        let gain = touched_loglik(context, declared, &placed, &moving, rows) - before;
+        if gain.is_finite() && best.as_ref().is_none_or(|b| gain > b.1) {
+            best = Some((shape, gain));
+        }
+    }
+    best
+}
+
+/// Improves all shapes of a hypothesis together (Nelder-Mead within the plausible ranges).
+#[must_use]
+pub fn refine(context: &Context, declared: Declared<'_>, placed: &[Placed], rows: Rows<'_>, evaluations: usize) -> Vec<Placed> {
+    let ranges: Vec<(f64, f64)> = placed.iter().flat_map(|p| p.effect.shapes(context, &p.instance)).map(|s| s.range).collect();
+    let start: Vec<f64> = placed.iter().flat_map(|p| p.shape.iter().copied()).collect();
+    let free: Vec<usize> = (0..start.len()).filter(|i| ranges[*i].1 > ranges[*i].0).collect();
+    if free.is_empty() {
+        return placed.to_vec();
+    }
+    let moving = touched_by_shapes(placed);
+    let cost = |x: &[f64]| -> f64 {
+        let mut full = start.clone();
+        for (i, v) in free.iter().zip(x) {
+            full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
+        }
+        // a soft wall keeps the simplex inside the plausible box
+        let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
+        -touched_loglik(context, declared, &with_shapes(placed, &full), &moving, rows) + 1e3 * wall
+    };
+    let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
+    let steps: Vec<f64> = free.iter().map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0))).collect();
+    let best = nelder_mead(&cost, &x0, &steps, evaluations);
+    let mut full = start.clone();
+    for (i, v) in free.iter().zip(&best) {
+        full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
+    }
+    with_shapes(placed, &full)
+}
+
+fn touched_by_shapes(placed: &[Placed]) -> Vec<&str> {
+    let mut out: Vec<&str> = placed.iter().filter(|p| !p.shape.is_empty()).flat_map(|p| p.instance.channels.iter().map(String::as_str)).collect();
+    out.sort_unstable();
+    out.dedup();
+    out
+}
+
+fn with_shapes(placed: &[Placed], full: &[f64]) -> Vec<Placed> {
+    let mut at = 0;
+    placed
+        .iter()
+        .map(|p| {
+            let shape = full[at..at + p.shape.len()].to_vec();
+            at += p.shape.len();
+            Placed { shape, ..p.clone() }
+        })
+        .collect()
+}
+
+fn nelder_mead(cost: &dyn Fn(&[f64]) -> f64, x0: &[f64], steps: &[f64], evaluations: usize) -> Vec<f64> {
+    let n = x0.len();
+    let mut simplex: Vec<(Vec<f64>, f64)> = vec![(x0.to_vec(), cost(x0))];
+    for i in 0..n {
+        let mut x = x0.to_vec();
+        x[i] += steps[i];
+        let c = cost(&x);
+        simplex.push((x, c));
+    }
+    let mut used = n + 1;
+    while used < evaluations {
+        simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
+        if simplex[n].1 - simplex[0].1 < 1e-5 {
+            break;
+        }
+        let centre: Vec<f64> = (0..n).map(|j| simplex[..n].iter().map(|s| s.0[j]).sum::<f64>() / n as f64).collect();
+        let along = |k: f64| -> Vec<f64> { (0..n).map(|j| centre[j] + k * (simplex[n].0[j] - centre[j])).collect() };
+        let reflected = along(-1.0);
+        let c = cost(&reflected);
+        used += 1;
+        if c < simplex[0].1 {
+            let expanded = along(-2.0);
+            let e = cost(&expanded);
+            used += 1;
+            simplex[n] = if e < c { (expanded, e) } else { (reflected, c) };
+        } else if c < simplex[n - 1].1 {
+            simplex[n] = (reflected, c);
+        } else {
+            let inside = along(if c < simplex[n].1 { -0.5 } else { 0.5 });
+            let i = cost(&inside);
+            used += 1;
+            if i < simplex[n].1.min(c) {
+                simplex[n] = (inside, i);
+            } else {
+                let best = simplex[0].0.clone();
+                for s in simplex.iter_mut().skip(1) {
+                    for (v, b) in s.0.iter_mut().zip(&best) {
+                        *v = b + 0.5 * (*v - b);
+                    }
+                    s.1 = cost(&s.0);
+                    used += 1;
+                }
+            }
+        }
+    }
+    simplex.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(|| x0.to_vec(), |s| s.0)
+}
+
+impl Fit {
+    /// Fitted parameters of the effect at `position`: shapes with standard errors from the curvature of the profile
+    /// likelihood, then amplitudes with theirs.
+    #[must_use]
+    pub fn estimates(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<Estimate> {
+        let p = &self.placed[position];
+        let mut out = Vec::new();
+        let errors = self.shape_errors(context, declared, position);
+        for ((shape, value), se) in p.effect.shapes(context, &p.instance).iter().zip(&p.shape).zip(errors) {
+            out.push(Estimate { name: shape.name.into(), unit: shape.unit.into(), value: *value, se });
+        }
+        for (k, a) in p.effect.amplitudes(&p.instance).iter().enumerate() {
+            for t in &self.targets {
+                if let Some(j) = t.labels.iter().position(|l| *l == (Label::Effect { effect: position, amplitude: k })) {
+                    let estimate = Estimate { name: a.name.into(), unit: a.unit.into(), value: t.coefficients[j], se: t.covariance[(j, j)].max(0.0).sqrt() };
+                    if !out.iter().any(|e| e.name == estimate.name) {
+                        out.push(estimate);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Standard errors of the shape parameters of one effect.
+    fn shape_errors(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<f64> {
+        let p = &self.placed[position];
+        let shapes = p.effect.shapes(context, &p.instance);
+        let n = p.shape.len();
+        if n == 0 {
+            return Vec::new();
+        }
+        let moving: Vec<&str> = p.instance.channels.iter().map(String::as_str).collect();
+        let value = |x: &[f64]| {
+            let mut placed = self.placed.clone();
+            placed[position].shape = x.to_vec();
+            touched_loglik(context, declared, &placed, &moving, Rows::All)
+        };
+        let h: Vec<f64> = shapes.iter().zip(&p.shape).map(|(s, v)| (0.02 * v.abs()).max(1e-4 * (s.range.1 - s.range.0)).max(1e-9)).collect();
+        let at = |moves: &[(usize, f64)]| {
+            let mut x = p.shape.clone();
+            for (i, d) in moves {
+                x[*i] += d * h[*i];
+            }
+            value(&x)
+        };
+        let centre = at(&[]);
+        let mut hessian = DMatrix::zeros(n, n);
+        for i in 0..n {
+            hessian[(i, i)] = -(at(&[(i, 1.0)]) - 2.0 * centre + at(&[(i, -1.0)])) / (h[i] * h[i]);
+            for j in 0..i {
+                let mixed = (at(&[(i, 1.0), (j, 1.0)]) - at(&[(i, 1.0), (j, -1.0)]) - at(&[(i, -1.0), (j, 1.0)]) + at(&[(i, -1.0), (j, -1.0)])) / (4.0 * h[i] * h[j]);
+                hessian[(i, j)] = -mixed;
+                hessian[(j, i)] = -mixed;
+            }
+        }
+        let inverse = hessian.clone().try_inverse();
+        (0..n)
+            .map(|i| match &inverse {
+                Some(v) if v[(i, i)] > 0.0 => v[(i, i)].sqrt(),
+                _ if hessian[(i, i)] > 0.0 => 1.0 / hessian[(i, i)].sqrt(),
+                _ => shapes[i].range.1 - shapes[i].range.0,
+            })
+            .collect()
+    }
+}

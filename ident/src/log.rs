@@ -1,0 +1,447 @@
+//! The rig log, `quadrig-log 1`: reading, checking, writing.
+//!
+//! What it is: columns of numbers over strictly increasing time, with metadata in comment lines at the head.
+//! What can go wrong: anything that is not the format is refused with file, line, column and what was expected; a line longer
+//! than [`MAX_LINE`] is refused without being read to its end.
+//! Units: carried by the column names (`thrust_n`, `pulse_us`, ...); a missing sample is NaN in memory, an empty field on disk.
+//! Reference: specification `formats.md`, "Rig log".
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
+
+/// First line of the format.
+pub const FORMAT: &str = "quadrig-log 1";
+/// Longest line that a reader takes, bytes.
+pub const MAX_LINE: usize = 1 << 20;
+/// The measured channels that a verdict speaks of, in the order of the questions that are asked of them.
+pub const MODELLED: [&str; 9] =
+    ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder", "rpm", "thrust_n", "torque_nm", "current_a", "voltage_v"];
+/// The speed channels among [`MODELLED`].
+pub const SPEED: [&str; 5] = ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder", "rpm"];
+
+/// Why a file was refused: one line, with the place and the way out.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file could not be opened or read.
+    #[error("{file}: {source}")]
+    Io {
+        /// The file as it was named.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The content is not what the format asks for.
+    #[error("{file}:{line}: {place}{found}; expected {expected}")]
+    Content {
+        /// The file as it was named.
+        file: String,
+        /// Line, counted from 1.
+        line: usize,
+        /// `column NAME: ` or empty.
+        place: String,
+        /// What stands there.
+        found: String,
+        /// What should stand there, and what to do.
+        expected: String,
+    },
+}
+
+/// A message under construction: where in which file.
+#[derive(Debug, Clone)]
+pub(crate) struct Place<'a> {
+    pub(crate) file: &'a str,
+    pub(crate) line: usize,
+}
+
+impl Place<'_> {
+    pub(crate) fn refuse(&self, column: Option<&str>, found: impl Into<String>, expected: impl Into<String>) -> ReadError {
+        ReadError::Content {
+            file: self.file.to_owned(),
+            line: self.line,
+            place: column.map(|c| format!("column {c}: ")).unwrap_or_default(),
+            found: found.into(),
+            expected: expected.into(),
+        }
+    }
+}
+
+/// One named column; NaN is a missing sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name, with its unit as suffix.
+    pub name: String,
+    /// One value a row.
+    pub values: Vec<f64>,
+}
+
+/// A run in memory.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Log {
+    /// File name without its folder, as verdicts quote it.
+    pub name: String,
+    /// `key = value` comment lines at the head.
+    pub meta: BTreeMap<String, toml::Value>,
+    /// Time, s, strictly increasing (row index where `time = "row"`).
+    pub t: Vec<f64>,
+    /// All other columns in the order of the file.
+    pub columns: Vec<Column>,
+}
+
+impl Log {
+    /// Number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there is no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// The values of a column.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
+    }
+
+    /// Whether time is a row index, so that no time-dependent effect may be offered.
+    #[must_use]
+    pub fn time_is_row(&self) -> bool {
+        self.meta.get("time").and_then(toml::Value::as_str) == Some("row")
+    }
+
+    /// The modelled channels that hold at least one sample, in the order of [`MODELLED`].
+    pub fn measured(&self) -> impl Iterator<Item = &'static str> + '_ {
+        MODELLED.into_iter().filter(|m| self.column(m).is_some())
+    }
+
+    /// Reads a log.
+    ///
+    /// # Errors
+    /// [`ReadError`] with file, line and column for anything that is not the format.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        let file = path.display().to_string();
+        let handle = File::open(path).map_err(|source| ReadError::Io { file: file.clone(), source })?;
+        let mut log = Self::parse(&file, BufReader::new(handle))?;
+        log.name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or(file);
+        Ok(log)
+    }
+
+    /// Reads a log from any source; `file` is the name for messages.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn parse(file: &str, source: impl BufRead) -> Result<Self, ReadError> {
+        let mut lines = Lines::new(file, source);
+        let mut log = Self { name: file.to_owned(), ..Self::default() };
+        let header = read_head(&mut lines, &mut log)?;
+        for name in header.iter().skip(1) {
+            log.columns.push(Column { name: name.clone(), values: Vec::new() });
+        }
+        while let Some(line) = lines.next_line()? {
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            let place = lines.place();
+            read_row(&line, &header, &place, &mut log)?;
+        }
+        if log.is_empty() {
+            return Err(lines.place().refuse(None, "no data rows", "at least one line of numbers under the header"));
+        }
+        Ok(log)
+    }
+
+    /// Writes the log so that a reader never sees half of it: temporary file, sync, rename.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write(&self, path: &Path) -> std::io::Result<()> {
+        write_whole(path, |out| self.write_to(out))
+    }
+
+    /// Writes the log to any sink.
+    ///
+    /// # Errors
+    /// What the sink says.
+    pub fn write_to(&self, out: &mut dyn Write) -> std::io::Result<()> {
+        writeln!(out, "# {FORMAT}")?;
+        for (key, value) in &self.meta {
+            writeln!(out, "# {key} = {value}")?;
+        }
+        write!(out, "t_s")?;
+        for column in &self.columns {
+            write!(out, ",{}", column.name)?;
+        }
+        writeln!(out)?;
+        let digits: Vec<usize> = self.columns.iter().map(|c| decimals(&c.name)).collect();
+        for (row, t) in self.t.iter().enumerate() {
+            write!(out, "{}", trimmed(*t, 6))?;
+            for (column, digits) in self.columns.iter().zip(&digits) {
+                let v = column.values[row];
+                if v.is_finite() { write!(out, ",{}", trimmed(v, *digits))? } else { write!(out, ",")? }
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes a file whole or not at all: temporary file in the same folder, sync, rename.
+///
+/// # Errors
+/// What the system says.
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder)?;
+    {
+        let mut buffered = std::io::BufWriter::new(file.as_file_mut());
+        fill(&mut buffered)?;
+        buffered.flush()?;
+    }
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}
+
+fn decimals(name: &str) -> usize {
+    match name {
+        "torque_nm" => 6,
+        "thrust_n" | "thrust_rms_n" => 5,
+        n if n.starts_with("rpm") => 3,
+        "pulse_us" => 3,
+        _ => 4,
+    }
+}
+
+fn trimmed(value: f64, digits: usize) -> String {
+    let mut s = format!("{value:.digits$}");
+    if s.contains('.') {
+        let keep = s.trim_end_matches('0').trim_end_matches('.').len();
+        s.truncate(keep);
+    }
+    if s == "-0" { "0".to_owned() } else { s }
+}
+
+/// Bounded line reader that knows where it is.
+pub(crate) struct Lines<'a, R> {
+    file: &'a str,
+    source: R,
+    number: usize,
+    unterminated: bool,
+}
+
+impl<'a, R: BufRead> Lines<'a, R> {
+    pub(crate) fn new(file: &'a str, source: R) -> Self {
+        Self { file, source, number: 0, unterminated: false }
+    }
+
+    pub(crate) fn place(&self) -> Place<'a> {
+        Place { file: self.file, line: self.number.max(1) }
+    }
+
+    /// Whether the last line that was read ended without a line feed: the mark of a truncated file.
+    pub(crate) fn unterminated(&self) -> bool {
+        self.unterminated
+    }
+
+    pub(crate) fn next_line(&mut self) -> Result<Option<String>, ReadError> {
+        let mut bytes = Vec::new();
+        let n = (&mut self.source)
+            .take(MAX_LINE as u64 + 1)
+            .read_until(b'\n', &mut bytes)
+            .map_err(|source| ReadError::Io { file: self.file.to_owned(), source })?;
+        if n == 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        if n > MAX_LINE {
+            return Err(self.place().refuse(None, format!("a line longer than {MAX_LINE} bytes"), "a text file with one short line a sample"));
+        }
+        self.unterminated = bytes.last() != Some(&b'\n');
+        while matches!(bytes.last(), Some(b'\n' | b'\r')) {
+            bytes.pop();
+        }
+        if self.number == 1 && bytes.starts_with(&[0xEF, 0xBB, 0xBF]) {
+            bytes.drain(..3);
+        }
+        String::from_utf8(bytes)
+            .map(Some)
+            .map_err(|_| self.place().refuse(None, "bytes that are not UTF-8", "a CSV text file in UTF-8"))
+    }
+}
+
+fn read_head<R: BufRead>(lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<String>, ReadError> {
+    let mut format_seen = false;
+    loop {
+        let Some(line) = lines.next_line()? else {
+            return Err(lines.place().refuse(None, "the file is empty or ends before its header", format!("'# {FORMAT}' and a header line that starts with t_s")));
+        };
+        let place = lines.place();
+        if let Some(comment) = line.strip_prefix('#') {
+            let comment = comment.trim();
+            if !format_seen {
+                if comment != FORMAT {
+                    return Err(place.refuse(None, format!("'{line}'"), format!("'# {FORMAT}' on the first line (use `quadrig import` for other formats)")));
+                }
+                format_seen = true;
+            } else if let Ok(table) = comment.parse::<toml::Table>() {
+                log.meta.extend(table);
+            }
+            continue;
+        }
+        if line.trim().is_empty() {
+            continue;
+        }
+        if !format_seen {
+            return Err(place.refuse(None, "no format line", format!("'# {FORMAT}' on the first line (use `quadrig import` for other formats)")));
+        }
+        return check_header(&line, &place);
+    }
+}
+
+fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError> {
+    let names: Vec<String> = line.split(',').map(|n| n.trim().to_owned()).collect();
+    if names.first().map(String::as_str) != Some("t_s") {
+        return Err(place.refuse(names.first().map(String::as_str), "not the time column", "t_s (seconds) as the first column"));
+    }
+    for (i, name) in names.iter().enumerate() {
+        if name.is_empty() {
+            return Err(place.refuse(None, format!("column {} has no name", i + 1), "a name for every column"));
+        }
+        if names[..i].contains(name) {
+            return Err(place.refuse(Some(name), "it stands twice", "each column once"));
+        }
+        if let Some(right) = wrong_unit(name) {
+            return Err(place.refuse(Some(name), "a known quantity in another unit", format!("{right}; convert the values and rename the column")));
+        }
+    }
+    if names.len() < 3 {
+        return Err(place.refuse(None, format!("{} column(s)", names.len()), "t_s and at least two measured columns"));
+    }
+    Ok(names)
+}
+
+/// The contract's name for a column that carries a known quantity in a unit that the contract does not use.
+fn wrong_unit(name: &str) -> Option<&'static str> {
+    const KNOWN: [(&str, &str, &[&str]); 7] = [
+        ("thrust_", "thrust_n", &["g", "gf", "kg", "kgf", "lbf", "lb", "mn", "oz"]),
+        ("torque_", "torque_nm", &["n_m", "ncm", "mnm", "nmm", "lbfin", "gcm"]),
+        ("current_", "current_a", &["ma", "ka"]),
+        ("voltage_", "voltage_v", &["mv", "kv"]),
+        ("temp_", "temp_c", &["k", "f"]),
+        ("pulse_", "pulse_us", &["ms", "ns", "s", "percent", "pct", "duty"]),
+        ("t_", "t_s", &["ms", "us", "ns", "min"]),
+    ];
+    KNOWN.iter().find_map(|(stem, right, wrong)| wrong.contains(&name.strip_prefix(stem)?).then_some(*right))
+}
+
+fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> Result<(), ReadError> {
+    let fields = line.split(',').count();
+    if fields != header.len() {
+        return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header (is the file truncated?)", header.len())));
+    }
+    for ((i, text), name) in line.split(',').enumerate().zip(header) {
+        let text = text.trim();
+        let value = if text.is_empty() {
+            f64::NAN
+        } else {
+            match text.parse::<f64>() {
+                Ok(v) if v.is_finite() => v,
+                Ok(_) => return Err(place.refuse(Some(name), format!("'{text}'"), "a finite number, or an empty field for a missing sample")),
+                Err(_) => return Err(place.refuse(Some(name), format!("'{}'", short(text)), "a decimal number, or an empty field for a missing sample")),
+            }
+        };
+        if i == 0 {
+            check_time(value, log, place)?;
+            log.t.push(value);
+        } else {
+            check_range(name, value, place)?;
+            log.columns[i - 1].values.push(value);
+        }
+    }
+    Ok(())
+}
+
+fn check_time(value: f64, log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
+    if value.is_nan() {
+        return Err(place.refuse(Some("t_s"), "an empty field", "a time stamp on every row"));
+    }
+    match log.t.last() {
+        Some(last) if value == *last => {
+            Err(place.refuse(Some("t_s"), format!("{value} repeats the row before"), "strictly increasing time (`quadrig import` repairs it by a stated rule)"))
+        }
+        Some(last) if value < *last => {
+            Err(place.refuse(Some("t_s"), format!("{value} steps back from {last}"), "strictly increasing time (`quadrig import` repairs it by a stated rule)"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_range(name: &str, value: f64, place: &Place<'_>) -> Result<(), ReadError> {
+    if name == "pulse_us" && value.is_finite() && !(500.0..=2500.0).contains(&value) {
+        return Err(place.refuse(Some(name), format!("{value}"), "500 to 2500 us (duty in percent is pulse_us / 200)"));
+    }
+    Ok(())
+}
+
+pub(crate) fn short(text: &str) -> String {
+    if text.chars().count() > 40 { text.chars().take(40).chain("...".chars()).collect() } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Log, String> {
+        Log::parse("run.csv", text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_small_log_reads_and_writes_back() {
+        let text = "# quadrig-log 1\n# motor = \"570KV\"\n# sample_hz = 10.0\nt_s,pulse_us,rpm,thrust_n\n0,1000,0,0.001\n0.1,1050,,0.002\n";
+        let log = parse(text).unwrap();
+        assert_eq!(log.t, [0.0, 0.1]);
+        assert!(log.column("rpm").unwrap()[1].is_nan());
+        let mut out = Vec::new();
+        log.write_to(&mut out).unwrap();
+        let again = Log::parse("run.csv", out.as_slice()).unwrap();
+        assert_eq!(again.meta, log.meta);
+        assert_eq!(again.column("thrust_n"), log.column("thrust_n"));
+    }
+
+    #[test]
+    fn each_fault_names_its_place() {
+        let head = "# quadrig-log 1\nt_s,pulse_us,thrust_n\n";
+        for (text, wanted) in [
+            (String::new(), "run.csv:1: the file is empty"),
+            ("t_s,a,b\n0,1,2\n".to_owned(), "run.csv:1: no format line"),
+            (head.to_owned(), "run.csv:2: no data rows"),
+            (format!("{head}0,1000,0.1\n0.1,1000\n"), "run.csv:4: 2 fields; expected 3"),
+            (format!("{head}0,1000,NaN\n"), "run.csv:3: column thrust_n: 'NaN'; expected a finite number"),
+            (format!("{head}0,1000,inf\n"), "column thrust_n: 'inf'"),
+            (format!("{head}0,1000,x\n"), "run.csv:3: column thrust_n: 'x'; expected a decimal number"),
+            (format!("{head}0,1000,1\n0,1000,1\n"), "run.csv:4: column t_s: 0 repeats"),
+            (format!("{head}1,1000,1\n0.5,1000,1\n"), "run.csv:4: column t_s: 0.5 steps back from 1"),
+            (format!("{head}0,7.5,1\n"), "column pulse_us: 7.5; expected 500 to 2500 us"),
+            ("# quadrig-log 1\nt_s,pulse_us,thrust_g\n".to_owned(), "run.csv:2: column thrust_g: a known quantity in another unit; expected thrust_n"),
+            ("# quadrig-log 1\nt_s,rpm\n0,1\n".to_owned(), "expected t_s and at least two"),
+            ("# quadrig-log 1\nrpm,thrust_n\n0,1\n".to_owned(), "column rpm: not the time column"),
+        ] {
+            let message = parse(&text).unwrap_err();
+            assert!(message.contains(wanted), "{message:?} lacks {wanted:?}");
+            assert_eq!(message.lines().count(), 1);
+        }
+    }
+
+    #[test]
+    fn an_endless_line_is_refused_without_reading_it() {
+        let source = BufReader::new(std::io::repeat(b'7').take(1 << 30));
+        let message = Log::parse("run.csv", source).unwrap_err().to_string();
+        assert!(message.contains("a line longer than"), "{message}");
+    }
+}

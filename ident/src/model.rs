@@ -1,0 +1,370 @@
+//! The powerplant model, `model.toml`: declared polynomials, added effects, and how the consensus speed is made.
+//!
+//! What it is: complete enough to predict every measured channel of any run of the rig, by its relations or from the command.
+//! What can go wrong: a file that does not say what it must is refused with its place.
+//! Units: in the key of each number; polynomials in krpm (rev/min / 1000) or kus ((pulse - 1000 us) / 1000).
+//! Reference: specification `formats.md`, "Powerplant model".
+
+use crate::context::{Context, Relation, Target, unit_of};
+use crate::design::{Label, TargetDesign};
+use crate::effects::{self, Estimate, Instance};
+use crate::hypothesis::{Declared, Fit, Placed, design};
+use crate::log::Log;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// First key of the format.
+pub const FORMAT: &str = "quadrig-model 1";
+
+/// Declared polynomial of one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polynomial {
+    /// Channel.
+    pub channel: String,
+    /// Coefficients from order 0 up, in the channel's unit per power of the scaled regressor.
+    pub coefficients: Vec<f64>,
+    /// Their standard errors.
+    pub errors: Vec<f64>,
+}
+
+/// An effect in the model, with the values of its parameters.
+#[derive(Debug, Clone)]
+pub struct AddedEffect {
+    /// The effect, its channels and form, its shapes.
+    pub placed: Placed,
+    /// Amplitudes in the order of [`effects::Effect::amplitudes`], one list a channel.
+    pub amplitudes: Vec<(String, Vec<f64>)>,
+    /// What was estimated, for the reader.
+    pub estimates: Vec<Estimate>,
+}
+
+/// A model.
+#[derive(Debug, Clone, Default)]
+pub struct Model {
+    /// Log that it was identified from.
+    pub source: String,
+    /// Motor, propeller, ... as the log states them.
+    pub meta: Table,
+    /// Pulse at which the motor starts, us.
+    pub start_pulse_us: f64,
+    /// Channels of the consensus speed.
+    pub consensus: Vec<String>,
+    /// Declared polynomials.
+    pub polynomials: Vec<Polynomial>,
+    /// Added effects.
+    pub effects: Vec<AddedEffect>,
+}
+
+/// Why a model was refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// The file could not be read.
+    #[error("{file}: {source}")]
+    Io {
+        /// The file.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not TOML; the message carries line and column.
+    #[error("{file}: {message}")]
+    Syntax {
+        /// The file.
+        file: String,
+        /// First line of what the parser says.
+        message: String,
+    },
+    /// A key is missing or wrong.
+    #[error("{file}: key {key}: {found}; expected {expected}")]
+    Key {
+        /// The file.
+        file: String,
+        /// Path of the key.
+        key: String,
+        /// What stands there.
+        found: String,
+        /// What should.
+        expected: String,
+    },
+}
+
+fn slug(unit: &str) -> String {
+    let mut out = String::new();
+    for c in unit.chars() {
+        match c {
+            'a'..='z' | '0'..='9' => out.push(c),
+            'A'..='Z' => out.push(c.to_ascii_lowercase()),
+            '/' => out.push_str("_per_"),
+            _ => {}
+        }
+    }
+    out.trim_matches('_').to_owned()
+}
+
+fn keyed(name: &str, unit: &str) -> String {
+    let slug = slug(unit);
+    if slug.is_empty() || slug == "1" { name.to_owned() } else { format!("{name}_{slug}") }
+}
+
+fn coefficient_key(channel: &str, order: usize) -> String {
+    let unit = slug(unit_of(channel));
+    let per = if channel.starts_with("rpm") { "kus" } else { "krpm" };
+    match order {
+        0 => format!("c0_{unit}"),
+        1 => format!("c1_{unit}_per_{per}"),
+        n => format!("c{n}_{unit}_per_{per}{n}"),
+    }
+}
+
+impl Model {
+    /// The model that a fitted hypothesis amounts to.
+    #[must_use]
+    pub fn from_fit(context: &Context, log: &Log, declared: Declared<'_>, fit: &Fit) -> Self {
+        let mut model = match declared.model {
+            Some(m) => m.clone(),
+            None => Self {
+                source: log.name.clone(),
+                meta: log.meta.iter().map(|(k, v)| (k.clone(), v.clone())).collect(),
+                start_pulse_us: context.start_pulse_us,
+                consensus: context.consensus.channels.clone(),
+                ..Self::default()
+            },
+        };
+        if declared.model.is_none() {
+            for (target, t) in context.targets.iter().zip(&fit.targets) {
+                let base = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+                    t.labels.iter().enumerate().filter(|(_, l)| matches!(l, Label::Base(_))).map(|(j, _)| f(j)).collect()
+                };
+                model.polynomials.push(Polynomial {
+                    channel: target.name.to_owned(),
+                    coefficients: base(&|j| t.coefficients[j]),
+                    errors: base(&|j| t.covariance[(j, j)].max(0.0).sqrt()),
+                });
+            }
+        }
+        for (position, placed) in fit.placed.iter().enumerate() {
+            let count = placed.effect.amplitudes(&placed.instance).len();
+            let mut amplitudes = Vec::new();
+            for (target, t) in context.targets.iter().zip(&fit.targets) {
+                if placed.instance.touches(target.name) {
+                    let mut values = vec![0.0; count];
+                    for (l, c) in t.labels.iter().zip(&t.coefficients) {
+                        if let Label::Effect { effect, amplitude } = l
+                            && *effect == position
+                        {
+                            values[*amplitude] = *c;
+                        }
+                    }
+                    amplitudes.push((target.name.to_owned(), values));
+                }
+            }
+            model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates: fit.estimates(context, declared, position) });
+        }
+        model
+    }
+
+    fn placed(&self) -> Vec<Placed> {
+        self.effects.iter().map(|e| e.placed.clone()).collect()
+    }
+
+    /// Prediction of one channel by its primary relation, on every row; `None` where the model does not know the channel.
+    #[must_use]
+    pub fn predict(&self, context: &Context, channel: &'static str) -> Option<Vec<f64>> {
+        let target = context.targets.iter().find(|t| t.name == channel)?;
+        let (design, coefficients) = self.design(context, target)?;
+        Some(design.predict(&coefficients, context.len()))
+    }
+
+    fn design(&self, context: &Context, target: &Target) -> Option<(TargetDesign, Vec<f64>)> {
+        let polynomial = self.polynomials.iter().find(|p| p.channel == target.name)?;
+        let design = design(context, Declared::default(), &self.placed(), target);
+        let coefficients = design
+            .columns
+            .iter()
+            .map(|c| match c.label {
+                Label::Base(k) => polynomial.coefficients.get(k).copied().unwrap_or(0.0),
+                Label::Effect { effect, amplitude } => self.effects[effect]
+                    .amplitudes
+                    .iter()
+                    .find(|(channel, _)| channel == target.name)
+                    .and_then(|(_, v)| v.get(amplitude).copied())
+                    .unwrap_or(0.0),
+            })
+            .collect();
+        Some((design, coefficients))
+    }
+
+    /// The model as the known part of a design, for `--model`: nothing of it is refitted.
+    #[must_use]
+    pub fn pinned(&self, context: &Context, target: &Target) -> TargetDesign {
+        match self.design(context, target) {
+            Some((design, coefficients)) => design.pinned(&coefficients),
+            None => TargetDesign::baseline(context, target.name, target.relation),
+        }
+    }
+
+    /// The file's text.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let mut root = Table::new();
+        root.insert("format".into(), FORMAT.into());
+        root.insert("source".into(), self.source.clone().into());
+        root.insert("start_pulse_us".into(), self.start_pulse_us.into());
+        if !self.meta.is_empty() {
+            root.insert("rig".into(), Value::Table(self.meta.clone()));
+        }
+        let mut consensus = Table::new();
+        consensus.insert("rule".into(), "median of the channels; speeds that leave by 2 % for at most three rows and come back are bridged".into());
+        consensus.insert("channels".into(), self.consensus.clone().into());
+        root.insert("consensus".into(), consensus.into());
+        let mut channels = Table::new();
+        for p in &self.polynomials {
+            let mut t = Table::new();
+            let has_pulse = p.coefficients.len() > 1;
+            t.insert("relation".into(), relation_text(&p.channel, has_pulse).into());
+            for (k, (c, e)) in p.coefficients.iter().zip(&p.errors).enumerate() {
+                t.insert(coefficient_key(&p.channel, k), (*c).into());
+                t.insert(format!("{}_se", coefficient_key(&p.channel, k)), (*e).into());
+            }
+            channels.insert(p.channel.clone(), t.into());
+        }
+        root.insert("channel".into(), channels.into());
+        let list: Vec<Value> = self.effects.iter().map(|e| Value::Table(e.to_table(&self.source))).collect();
+        if !list.is_empty() {
+            root.insert("effect".into(), list.into());
+        }
+        format!("# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors.\n{root}")
+    }
+
+    /// Reads a model.
+    ///
+    /// # Errors
+    /// [`ModelError`] with file and key.
+    pub fn read(path: &Path) -> Result<Self, ModelError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|source| ModelError::Io { file: file.clone(), source })?;
+        Self::parse(&file, &text)
+    }
+
+    /// Parses the file's text; `file` is the name for messages.
+    ///
+    /// # Errors
+    /// As [`Model::read`].
+    pub fn parse(file: &str, text: &str) -> Result<Self, ModelError> {
+        let root: Table = text.parse().map_err(|e: toml::de::Error| {
+            let line = e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
+            ModelError::Syntax { file: format!("{file}:{line}"), message: format!("{}; expected a model written by `quadrig identify` or `close-loop`", e.message().lines().next().unwrap_or("not TOML")) }
+        })?;
+        let refuse = |key: &str, found: &str, expected: &str| ModelError::Key { file: file.to_owned(), key: key.to_owned(), found: found.to_owned(), expected: expected.to_owned() };
+        match root.get("format").and_then(Value::as_str) {
+            Some(FORMAT) => {}
+            other => return Err(refuse("format", &other.map_or("missing".into(), |o| format!("'{o}'")), &format!("'{FORMAT}'"))),
+        }
+        let mut model = Self { source: root.get("source").and_then(Value::as_str).unwrap_or_default().to_owned(), ..Self::default() };
+        model.start_pulse_us = root.get("start_pulse_us").and_then(number).ok_or_else(|| refuse("start_pulse_us", "missing or not a number", "microseconds"))?;
+        model.meta = root.get("rig").and_then(Value::as_table).cloned().unwrap_or_default();
+        model.consensus = root
+            .get("consensus")
+            .and_then(|c| c.get("channels"))
+            .and_then(Value::as_array)
+            .map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect())
+            .unwrap_or_default();
+        let channels = root.get("channel").and_then(Value::as_table).ok_or_else(|| refuse("channel", "missing", "one table for each channel"))?;
+        for (name, table) in channels {
+            let read = |k: usize, suffix: &str| table.get(format!("{}{suffix}", coefficient_key(name, k))).and_then(number);
+            let coefficients: Vec<f64> = (0..).map_while(|k| read(k, "")).collect();
+            if coefficients.is_empty() || !coefficients.iter().all(|c| c.is_finite()) {
+                return Err(refuse(&format!("channel.{name}.{}", coefficient_key(name, 0)), "missing or not a finite number", "a coefficient"));
+            }
+            let errors = (0..coefficients.len()).map(|k| read(k, "_se").unwrap_or(0.0)).collect();
+            model.polynomials.push(Polynomial { channel: name.clone(), coefficients, errors });
+        }
+        for (i, value) in root.get("effect").and_then(Value::as_array).into_iter().flatten().enumerate() {
+            let key = format!("effect[{i}]");
+            let effect = AddedEffect::from_table(value).map_err(|(k, found, expected)| refuse(&format!("{key}.{k}"), &found, &expected))?;
+            model.effects.push(effect);
+        }
+        Ok(model)
+    }
+}
+
+fn number(v: &Value) -> Option<f64> {
+    v.as_float().or_else(|| v.as_integer().map(|i| i as f64))
+}
+
+/// Where an effect's numbers are kept: `shape.<name_unit>`, `amplitude.<channel>.<name_unit>`.
+impl AddedEffect {
+    fn to_table(&self, source: &str) -> Table {
+        let mut t = Table::new();
+        let p = &self.placed;
+        t.insert("id".into(), p.effect.id().into());
+        t.insert("channels".into(), p.instance.channels.clone().into());
+        if !p.instance.form.is_empty() {
+            t.insert("form".into(), p.instance.form.clone().into());
+        }
+        t.insert("equation".into(), p.effect.about().equation.into());
+        t.insert("run".into(), source.into());
+        t.insert("shape".into(), Value::Array(p.shape.iter().map(|v| (*v).into()).collect()));
+        let mut amplitude = Table::new();
+        let names = p.effect.amplitudes(&p.instance);
+        for (channel, values) in &self.amplitudes {
+            let per: Table = names.iter().zip(values).filter(|(_, v)| **v != 0.0).map(|(a, v)| (keyed(a.name, a.unit), (*v).into())).collect();
+            if !per.is_empty() {
+                amplitude.insert(channel.clone(), per.into());
+            }
+        }
+        t.insert("amplitude".into(), amplitude.into());
+        let mut parameters = Table::new();
+        for e in &self.estimates {
+            parameters.insert(keyed(&e.name, &e.unit), e.value.into());
+            parameters.insert(format!("{}_se", keyed(&e.name, &e.unit)), e.se.into());
+        }
+        t.insert("parameter".into(), parameters.into());
+        t
+    }
+
+    fn from_table(value: &Value) -> Result<Self, (String, String, String)> {
+        let missing = |k: &str, expected: &str| (k.to_owned(), "missing or of the wrong kind".to_owned(), expected.to_owned());
+        let id = value.get("id").and_then(Value::as_str).ok_or_else(|| missing("id", "the id of an effect"))?;
+        let effect = effects::by_id(id).ok_or_else(|| {
+            let known: Vec<&str> = effects::library().iter().map(|e| e.id()).collect();
+            ("id".to_owned(), format!("'{id}'"), format!("one of {}", known.join(", ")))
+        })?;
+        let strings = |k: &str| -> Option<Vec<String>> { value.get(k)?.as_array().map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect()) };
+        let channels = strings("channels").ok_or_else(|| missing("channels", "a list of channels"))?;
+        let form = value.get("form").and_then(Value::as_str).unwrap_or_default().to_owned();
+        let instance = Instance { channels, form };
+        let shape: Vec<f64> = value.get("shape").and_then(Value::as_array).ok_or_else(|| missing("shape", "a list of numbers"))?.iter().filter_map(number).collect();
+        let names = effect.amplitudes(&instance);
+        let amplitudes = instance
+            .channels
+            .iter()
+            .map(|c| {
+                let per = value.get("amplitude").and_then(|a| a.get(c));
+                (c.clone(), names.iter().map(|a| per.and_then(|p| p.get(keyed(a.name, a.unit))).and_then(number).unwrap_or(0.0)).collect())
+            })
+            .collect();
+        let parameters = value.get("parameter").and_then(Value::as_table);
+        let estimates = parameters
+            .into_iter()
+            .flatten()
+            .filter(|(k, _)| !k.ends_with("_se"))
+            .filter_map(|(k, v)| Some(Estimate { name: k.clone(), unit: String::new(), value: number(v)?, se: parameters?.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0) }))
+            .collect();
+        Ok(Self { placed: Placed { effect, instance, shape }, amplitudes, estimates })
+    }
+}
+
+fn relation_text(channel: &str, has_pulse: bool) -> &'static str {
+    match Relation::of(channel, has_pulse) {
+        Some(Relation::SpeedFromPulse) => "rpm(pulse), cubic above start_pulse_us, 0 below",
+        Some(Relation::SpeedAlone) => "constant (no command was logged)",
+        Some(Relation::Voltage) => "constant",
+        Some(Relation::Current) => "current(rpm), cubic in the consensus speed",
+        Some(Relation::Torque) => "torque(rpm), quadratic in the consensus speed",
+        Some(Relation::Thrust) => "thrust(rpm), quadratic in the consensus speed",
+        Some(Relation::ThrustRms) => "rms of the strain about its mean, quadratic in the consensus speed",
+        None => "none",
+    }
+}

@@ -1,0 +1,215 @@
+//! The noise floor, from the data.
+//!
+//! What it is: the scatter of a channel about its own course inside steady stretches, as a function of speed, with its colour.
+//! What can go wrong: quantisation hides the scatter (a floor of step/sqrt 12 is kept); too few steady rows fall back on all
+//! successive differences, robustly.
+//! Units: the channel's.
+//! Reference: von Neumann 1941 (mean square successive difference); notes on method: never from the fit residual.
+
+/// Noise of one channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Variance that does not depend on speed.
+    pub a: f64,
+    /// Variance for each (rpm/1000)^2.
+    pub b: f64,
+    /// Lag-one autocorrelation of the noise, 0 when white.
+    pub rho: f64,
+    /// Root mean square over the run.
+    pub rms: f64,
+}
+
+impl Noise {
+    /// Variance at a speed, rev/min.
+    #[must_use]
+    pub fn variance(&self, rpm: f64) -> f64 {
+        let k = rpm / 1000.0;
+        self.a + self.b * k * k
+    }
+
+    /// Share of independent samples that the colour leaves.
+    #[must_use]
+    pub fn effective_share(&self) -> f64 {
+        ((1.0 - self.rho) / (1.0 + self.rho)).clamp(0.02, 1.0)
+    }
+}
+
+/// Median of a slice, which it reorders; NaN for an empty one.
+#[must_use]
+pub fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    let n = values.len();
+    let (_, mid, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
+    let mid = *mid;
+    if n % 2 == 1 {
+        mid
+    } else {
+        let low = values[..n / 2].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        0.5 * (low + mid)
+    }
+}
+
+/// Estimates the noise of a channel given at `rows`.
+#[must_use]
+pub fn estimate(rows: &[usize], y: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Noise {
+    let quantum = quantum(y);
+    let floor = quantum * quantum / 12.0;
+    let mut samples: Vec<(f64, f64)> = Vec::new(); // (speed/1000)^2, squared second difference scaled to a variance
+    let (mut c0, mut c1, mut pairs) = (0.0, 0.0, 0usize);
+    for (from, to) in steady {
+        // the first tenth of a stretch, and at least two rows, belong to settling
+        let skip = from + 2 + (to - from) / 10;
+        let lo = rows.partition_point(|r| *r < skip);
+        let hi = rows.partition_point(|r| *r < *to);
+        if hi < lo + 4 {
+            continue;
+        }
+        let z = &y[lo..hi];
+        for (k, w) in z.windows(3).enumerate() {
+            // the second difference of white noise has six times its variance, and a slope drops out
+            let d = w[0] - 2.0 * w[1] + w[2];
+            let speed = if rpm.is_empty() { 0.0 } else { rpm[rows[lo + k + 1]] / 1000.0 };
+            samples.push((speed * speed, d * d / 6.0));
+        }
+        let (v, c) = detrended_covariance(z);
+        c0 += v;
+        c1 += c;
+        pairs += z.len();
+    }
+    if samples.len() < 20 {
+        samples = y.windows(3).enumerate().map(|(k, w)| {
+            let d = w[0] - 2.0 * w[1] + w[2];
+            let speed = if rpm.is_empty() { 0.0 } else { rpm[rows[k + 1]] / 1000.0 };
+            (speed * speed, d * d / 6.0)
+        }).collect();
+        trim(&mut samples);
+    }
+    let (a, b) = variance_line(&samples);
+    let (a, b) = (a.max(floor).max(1e-30), b.max(0.0));
+    let rho = if pairs > 30 && c0 > 0.0 { (c1 / c0).clamp(0.0, 0.98) } else { 0.0 };
+    // positive colour makes successive differences too small: gamma_d2 = var (6 - 8 rho + 2 rho^2) for an AR(1)
+    let widen = 6.0 / (6.0 - 8.0 * rho + 2.0 * rho * rho).max(0.3);
+    let (a, b) = (a * widen, b * widen);
+    let mean_sq = if rpm.is_empty() { 0.0 } else { rows.iter().map(|r| (rpm[*r] / 1000.0).powi(2)).sum::<f64>() / rows.len() as f64 };
+    Noise { a, b, rho, rms: (a + b * mean_sq).sqrt() }
+}
+
+/// Smallest non-zero step between sorted distinct values: the resolution of the log.
+#[must_use]
+pub fn quantum(y: &[f64]) -> f64 {
+    let mut v: Vec<f64> = y.iter().copied().take(20_000).collect();
+    v.sort_unstable_by(f64::total_cmp);
+    let mut steps: Vec<f64> = v.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 1e-12).collect();
+    if steps.len() < 8 {
+        return 0.0;
+    }
+    steps.sort_unstable_by(f64::total_cmp);
+    steps[steps.len() / 20]
+}
+
+/// Sums of lag-zero and lag-one products about a straight line.
+fn detrended_covariance(z: &[f64]) -> (f64, f64) {
+    let n = z.len() as f64;
+    let mean_x = (n - 1.0) / 2.0;
+    let mean_z = z.iter().sum::<f64>() / n;
+    let sxx: f64 = (0..z.len()).map(|i| (i as f64 - mean_x).powi(2)).sum();
+    let sxz: f64 = z.iter().enumerate().map(|(i, v)| (i as f64 - mean_x) * (v - mean_z)).sum();
+    let slope = sxz / sxx.max(1e-12);
+    let r: Vec<f64> = z.iter().enumerate().map(|(i, v)| v - mean_z - slope * (i as f64 - mean_x)).collect();
+    let v: f64 = r.iter().map(|v| v * v).sum();
+    // detrending biases the lag-one covariance by about -2 var/n a sample
+    let c: f64 = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() + 2.0 * v / n;
+    (v, c)
+}
+
+/// Keeps the quieter nine tenths: what is left over from transients goes.
+fn trim(samples: &mut Vec<(f64, f64)>) {
+    samples.sort_unstable_by(|p, q| p.1.total_cmp(&q.1));
+    samples.truncate((samples.len() * 9 / 10).max(1));
+}
+
+/// Non-negative line variance = a + b x through binned means, robust against single bins.
+fn variance_line(samples: &[(f64, f64)]) -> (f64, f64) {
+    if samples.is_empty() {
+        return (1e-30, 0.0);
+    }
+    let top = samples.iter().map(|s| s.0).fold(0.0, f64::max);
+    let mut bins: Vec<(f64, f64, f64)> = vec![(0.0, 0.0, 0.0); 12];
+    for (x, v) in samples {
+        let k = if top > 0.0 { ((x / top * 12.0) as usize).min(11) } else { 0 };
+        bins[k].0 += x;
+        bins[k].1 += v;
+        bins[k].2 += 1.0;
+    }
+    let points: Vec<(f64, f64, f64)> = bins.iter().filter(|b| b.2 >= 5.0).map(|b| (b.0 / b.2, b.1 / b.2, b.2)).collect();
+    let mean = samples.iter().map(|s| s.1).sum::<f64>() / samples.len() as f64;
+    if points.len() < 3 {
+        return (mean, 0.0);
+    }
+    // relative errors of a variance are alike in every bin: weight by count / variance^2, twice re-weighted
+    let (mut a, mut b) = (mean, 0.0);
+    for _ in 0..6 {
+        let (mut s, mut sx, mut sxx, mut sy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (x, v, n) in &points {
+            let model = (a + b * x).max(1e-3 * mean);
+            // a bin that stands far above the line (a resonance) must not tilt it
+            let excess = (v / model).max(1.0);
+            let w = n / (model * model) / (excess * excess);
+            s += w;
+            sx += w * x;
+            sxx += w * x * x;
+            sy += w * v;
+            sxy += w * x * v;
+        }
+        let det = s * sxx - sx * sx;
+        if det.abs() < 1e-300 {
+            break;
+        }
+        b = ((s * sxy - sx * sy) / det).max(0.0);
+        a = if b == 0.0 { sy / s } else { (sy - b * sx) / s };
+        if a < 0.0 {
+            a = 1e-3 * mean;
+            b = ((sxy - a * sx) / sxx).max(0.0);
+        }
+    }
+    (a, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hash_noise(i: usize) -> f64 {
+        // sum of twelve uniform numbers from a small mixing function: standard normal to a few per cent
+        let mut s = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        (0..12).map(|_| { s ^= s >> 29; s = s.wrapping_mul(0xBF58_476D_1CE4_E5B9); s ^= s >> 32; (s >> 11) as f64 / (1u64 << 53) as f64 }).sum::<f64>() - 6.0
+    }
+
+    #[test]
+    fn a_known_level_is_found_through_drift() {
+        let y: Vec<f64> = (0..4000).map(|i| 0.02 * hash_noise(i) + 1e-3 * i as f64).collect();
+        let rows: Vec<usize> = (0..4000).collect();
+        let noise = estimate(&rows, &y, &[], &[(0, 2000), (2000, 4000)]);
+        assert!((noise.rms / 0.02 - 1.0).abs() < 0.06, "{noise:?}");
+        assert!(noise.rho < 0.08);
+    }
+
+    #[test]
+    fn growth_with_speed_is_found() {
+        let rpm: Vec<f64> = (0..12_000).map(|i| 1000.0 * (1 + i / 2000) as f64).collect();
+        let y: Vec<f64> = (0..12_000).map(|i| hash_noise(i) * (0.01 + 0.0004 * (rpm[i] / 1000.0).powi(2)).sqrt()).collect();
+        let rows: Vec<usize> = (0..12_000).collect();
+        let steady: Vec<(usize, usize)> = (0..6).map(|k| (2000 * k, 2000 * (k + 1))).collect();
+        let noise = estimate(&rows, &y, &rpm, &steady);
+        assert!((noise.a / 0.01 - 1.0).abs() < 0.15, "{noise:?}");
+        assert!((noise.b / 0.0004 - 1.0).abs() < 0.25, "{noise:?}");
+    }
+
+    #[test]
+    fn median_of_even_and_odd() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), 2.5);
+    }
+}

@@ -1,0 +1,76 @@
+//! `quadrig predict`.
+//!
+//! What it is: a model's prediction of every measured channel of a log, one line for each row of the log.
+//! What can go wrong: a model that knows none of the log's channels is refused.
+//! Units: the log's.
+//! Reference: specification `formats.md`.
+
+use crate::Failure;
+use clap::ValueEnum;
+use ident::context::Context;
+use ident::log::{Column, Log, write_whole};
+use ident::model::Model;
+use ident::simulate::from_command;
+use std::path::PathBuf;
+
+/// What a prediction starts from.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum From {
+    /// Each channel by its primary relation, from measured regressors.
+    Relations,
+    /// Everything from the command alone.
+    Command,
+}
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The model.
+    model: PathBuf,
+    /// The log whose rows are predicted.
+    log: PathBuf,
+    /// Where the prediction goes.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// What the prediction starts from.
+    #[arg(long, value_enum, default_value_t = From::Relations)]
+    from: From,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let model = Model::read(&args.model)?;
+    let log = Log::read(&args.log)?;
+    let columns = match args.from {
+        From::Relations => by_relations(&model, &log),
+        From::Command => by_command(&model, &log)?,
+    };
+    if columns.is_empty() {
+        return Err(format!("{}: knows none of the channels of {}; expected a model of the same rig", args.model.display(), args.log.display()).into());
+    }
+    write_whole(&args.output, |out| {
+        let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+        writeln!(out, "t_s,{}", names.join(","))?;
+        for (i, t) in log.t.iter().enumerate() {
+            write!(out, "{t}")?;
+            for c in &columns {
+                if c.values[i].is_finite() { write!(out, ",{:.9}", c.values[i])? } else { write!(out, ",")? }
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    })
+    .map_err(|e| format!("{}: {e}", args.output.display()).into())
+}
+
+fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
+    let context = Context::new(log, Some(model.start_pulse_us));
+    log.measured().filter_map(|name| Some(Column { name: name.to_owned(), values: model.predict(&context, name)? })).collect()
+}
+
+fn by_command(model: &Model, log: &Log) -> Result<Vec<Column>, Failure> {
+    let pulse = log.column("pulse_us").ok_or_else(|| format!("{}: no column pulse_us; --from command needs one", log.name))?;
+    let pulse = ident::context::bridge(&log.t, pulse);
+    let predicted = from_command(model, &log.name, &log.t, &pulse, &log.columns);
+    Ok(log.measured().filter_map(|name| predicted.columns.iter().find(|c| c.name == name).cloned()).collect())
+}
