@@ -165,6 +165,7 @@ impl Chirp {
 
 /// What the throttle follows while running.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[allow(clippy::large_enum_variant)] // no heap on the board: the uploaded steps live in place, once
 pub enum Schedule {
     /// A constant setting, without end: the manual override.
     Manual(PulseWidth),

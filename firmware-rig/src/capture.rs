@@ -93,6 +93,7 @@ impl CaptureChannel {
         if over_capture {
             self.forget();
             self.overwritten = true;
+            self.last = now;
             edges = edges.last().map_or(&[][..], core::slice::from_ref);
         }
         for edge in edges {
@@ -269,8 +270,8 @@ impl CaptureBank {
                 code.verdict = CaptureVerdict::Disagrees;
             }
             channel.deviations = u8::from(apart);
-            // An over-capture is told once; until a whole span has been seen again the channel has no reading.
-            channel.overwritten &= channel.reading.is_none();
+            // An over-capture is told once, and on until a whole span has been seen again or the rotor stands.
+            channel.overwritten &= channel.reading.is_none() && now.since(channel.last).0 <= channel.stop_after();
         }
         let bad = |code: &&CaptureCode| matches!(code.verdict, CaptureVerdict::Disagrees | CaptureVerdict::Lost);
         self.flagged = codes.iter().filter(bad).count() as u8;

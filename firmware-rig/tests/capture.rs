@@ -1,0 +1,231 @@
+//! Speed from edges: exact to the tick, across the wrap of the timer, with verdicts that tell the truth.
+
+use firmware_rig::Config;
+use firmware_rig::capture::CaptureBank;
+use frame::rig::{CaptureCode, CaptureVerdict};
+use frame::units::Ticks;
+use proptest::prelude::*;
+
+const MS: u64 = 84_000;
+
+/// Four sensors on one rotor at constant speed, a tick a millisecond.
+struct Rotor {
+    bank: CaptureBank,
+    config: Config,
+    now: u64,
+    /// Ticks a revolution of the next steps; 0 stands still.
+    revolution: u64,
+    /// Time of the last mark of each channel.
+    last: [u64; 4],
+    /// Channels that give edges.
+    alive: [bool; 4],
+    /// Scale of the period of each channel in parts per 1000.
+    skew: [u64; 4],
+}
+
+impl Rotor {
+    fn new(start: u64) -> Self {
+        let config = Config::thesis_570kv();
+        let bank = CaptureBank::new(&config);
+        Self { bank, config, now: start, revolution: 0, last: [start; 4], alive: [true; 4], skew: [1000; 4] }
+    }
+
+    fn run(&mut self, ms: u64) {
+        for _ in 0..ms {
+            self.now += MS;
+            let mut edges: [Vec<u32>; 4] = Default::default();
+            for (c, list) in edges.iter_mut().enumerate() {
+                let period = self.revolution * self.skew[c] / 1000 / u64::from(self.config.marks[c]);
+                if period == 0 {
+                    self.last[c] = self.now;
+                    continue;
+                }
+                while self.last[c] + period <= self.now {
+                    self.last[c] += period;
+                    if self.alive[c] {
+                        list.push(self.last[c] as u32);
+                    }
+                }
+            }
+            self.bank.take(Ticks(self.now), &edges.each_ref().map(Vec::as_slice), &[false; 4]);
+        }
+    }
+
+    fn sample(&mut self) -> [CaptureCode; 4] {
+        self.bank.sample(Ticks(self.now))
+    }
+
+    fn rpm(&self, channel: usize, code: &CaptureCode) -> Option<f64> {
+        self.config.calibration().speed(channel, code)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// At any speed and any phase of the 32-bit timer: each channel spans whole revolutions, the shortest of at least 50 ms,
+    /// exactly.
+    #[test]
+    fn spans_are_exact_and_shortest(rpm in 120u64..11_000, start in (u64::from(u32::MAX) - 400_000_000)..u64::from(u32::MAX)) {
+        let mut rotor = Rotor::new(start);
+        rotor.revolution = 84_000_000 * 60 / rpm / 50 * 50; // divisible by every mark count
+        rotor.run(2500);
+        let codes = rotor.sample();
+        for (c, code) in codes.iter().enumerate() {
+            let marks = u64::from(rotor.config.marks[c]);
+            prop_assert_eq!(code.verdict, CaptureVerdict::Nominal);
+            prop_assert_eq!(u64::from(code.edges) % marks, 0);
+            let turns = u64::from(code.edges) / marks;
+            prop_assert_eq!(u64::from(code.span), turns * rotor.revolution);
+            prop_assert!(u64::from(code.span) >= 50 * MS);
+            prop_assert!(turns == 1 || (turns - 1) * rotor.revolution < 50 * MS, "{} turns are not the shortest", turns);
+        }
+    }
+
+    /// Garbage edges never panic, and never give a reading of zero span.
+    #[test]
+    fn garbage_is_survived(edges in proptest::collection::vec(any::<u32>(), 0..200), over in any::<[bool; 4]>(), steps in proptest::collection::vec(0u64..200_000_000, 1..30)) {
+        let config = Config::thesis_570kv();
+        let mut bank = CaptureBank::new(&config);
+        let mut now = 0;
+        for (i, step) in steps.iter().enumerate() {
+            now += step;
+            let part: Vec<u32> = edges.iter().skip(i * 7).take(11).copied().collect();
+            bank.take(Ticks(now), &[&part, &part, &[], &part], &over);
+            for (c, code) in bank.sample(Ticks(now)).iter().enumerate() {
+                let speed = config.calibration().speed(c, code);
+                prop_assert!(speed.is_none_or(f64::is_finite));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_constant_speed_is_read_by_all_four() {
+    let mut rotor = Rotor::new(0);
+    rotor.revolution = 84_000_000 * 60 / 4000;
+    rotor.run(500);
+    let codes = rotor.sample();
+    for (c, code) in codes.iter().enumerate() {
+        assert_eq!(rotor.rpm(c, code), Some(4000.0), "channel {c}");
+    }
+}
+
+#[test]
+fn the_first_capture_is_dropped() {
+    let config = Config::thesis_570kv();
+    let mut bank = CaptureBank::new(&config);
+    // The timer's own match at 0, then one revolution of 60 ms on the opto channel.
+    bank.take(Ticks(MS), &[&[], &[0], &[], &[]], &[false; 4]);
+    bank.take(Ticks(10 * MS), &[&[], &[10 * MS as u32], &[], &[]], &[false; 4]);
+    assert_eq!(bank.sample(Ticks(10 * MS))[1].verdict, CaptureVerdict::Stopped, "one edge is no speed");
+    bank.take(Ticks(70 * MS), &[&[], &[70 * MS as u32], &[], &[]], &[false; 4]);
+    let code = bank.sample(Ticks(70 * MS))[1];
+    assert_eq!((code.edges, code.span), (1, 60 * MS as u32));
+}
+
+/// Specification: a lost channel within three expected periods plus 20 ms.
+#[test]
+fn a_dead_channel_is_lost_and_the_others_are_not() {
+    for (channel, marks) in [(0, 2), (1, 1), (2, 2), (3, 25)] {
+        let mut rotor = Rotor::new(0);
+        rotor.revolution = 84_000_000 * 60 / 3000; // 20 ms
+        rotor.run(400);
+        rotor.alive[channel] = false;
+        rotor.run((3 * 20u64).div_ceil(marks) + 20 + 21 / marks); // within a period of the last edge, and three more
+        let codes = rotor.sample();
+        for (c, code) in codes.iter().enumerate() {
+            let expected = if c == channel { CaptureVerdict::Lost } else { CaptureVerdict::Nominal };
+            assert_eq!(code.verdict, expected, "channel {c} when {channel} died");
+        }
+        rotor.run(2000);
+        let codes = rotor.sample();
+        assert_eq!(codes[channel].verdict, CaptureVerdict::Lost, "it stays lost while the rotor turns");
+        assert_eq!(rotor.rpm(channel, &codes[channel]), None, "and claims no speed of zero");
+        rotor.alive[channel] = true;
+        rotor.run(500);
+        let codes = rotor.sample();
+        assert_eq!(rotor.rpm(channel, &codes[channel]), Some(3000.0), "the gap is not counted as a slow revolution");
+    }
+}
+
+/// Specification: zero after max(0.25 s, 3 expected periods).
+#[test]
+fn a_standing_rotor_is_zero_after_the_time_out() {
+    let mut rotor = Rotor::new(0);
+    rotor.revolution = 84_000_000 * 60 / 3000;
+    rotor.run(400);
+    rotor.revolution = 0;
+    rotor.run(200);
+    assert!(rotor.sample().iter().all(|c| c.verdict == CaptureVerdict::Lost), "not known to stand yet");
+    rotor.run(75);
+    let codes = rotor.sample();
+    for (c, code) in codes.iter().enumerate() {
+        assert_eq!(code.verdict, CaptureVerdict::Stopped, "channel {c}");
+        assert_eq!(rotor.rpm(c, code), Some(0.0));
+    }
+    assert!(!rotor.bank.is_turning());
+}
+
+#[test]
+fn a_disagreeing_channel_is_flagged_in_the_second_sample() {
+    let mut rotor = Rotor::new(0);
+    rotor.revolution = 84_000_000 * 60 / 3000;
+    rotor.skew[2] = 980; // hall reads 2 % fast
+    rotor.run(400);
+    assert!(rotor.sample().iter().all(|c| c.verdict == CaptureVerdict::Nominal), "once may be chance");
+    rotor.run(100);
+    let codes = rotor.sample();
+    assert_eq!(codes.map(|c| c.verdict == CaptureVerdict::Disagrees), [false, false, true, false]);
+    assert!(rotor.rpm(2, &codes[2]).is_some_and(|rpm| rpm > 3050.0), "its number is still told");
+    assert_eq!(rotor.bank.flagged(), 1);
+    rotor.skew[2] = 1000;
+    rotor.run(200);
+    rotor.sample();
+    rotor.run(100);
+    assert_eq!(rotor.sample()[2].verdict, CaptureVerdict::Nominal);
+}
+
+#[test]
+fn half_a_percent_is_no_disagreement() {
+    let mut rotor = Rotor::new(0);
+    rotor.revolution = 84_000_000 * 60 / 3000;
+    rotor.skew[0] = 995;
+    for _ in 0..5 {
+        rotor.run(300);
+        assert!(rotor.sample().iter().all(|c| c.verdict == CaptureVerdict::Nominal));
+    }
+}
+
+#[test]
+fn an_over_capture_is_told_and_never_bridged() {
+    let config = Config::thesis_570kv();
+    let mut bank = CaptureBank::new(&config);
+    let period = 84_000_000 * 60 / 3000; // opto: one mark
+    let edge = |bank: &mut CaptureBank, i: u64, over| {
+        let at = i * period;
+        bank.take(Ticks(at), &[&[], &[at as u32], &[], &[]], &[false, over, false, false]);
+        Ticks(at)
+    };
+    for i in 1..20 {
+        edge(&mut bank, i, false);
+    }
+    // Two revolutions passed, one capture was overwritten.
+    let at = edge(&mut bank, 21, true);
+    assert_eq!(bank.sample(at)[1].verdict, CaptureVerdict::OverCapture);
+    assert_eq!(config.calibration().speed(1, &bank.sample(at)[1]), None);
+    for i in 22..26 {
+        edge(&mut bank, i, false);
+    }
+    let at = edge(&mut bank, 26, false);
+    let first = bank.sample(at)[1];
+    assert_eq!(first.verdict, CaptureVerdict::OverCapture, "the interval that had it says so");
+    let code = bank.sample(at)[1];
+    assert_eq!((code.verdict, code.span), (CaptureVerdict::Nominal, 3 * period as u32));
+
+    edge(&mut bank, 27, true);
+    let later = Ticks(27 * period + 11_000 * MS);
+    bank.take(later, &[&[]; 4], &[false; 4]);
+    assert_eq!(bank.sample(later)[1].verdict, CaptureVerdict::OverCapture, "told");
+    assert_eq!(bank.sample(later)[1].verdict, CaptureVerdict::Stopped, "and over when the rotor stands");
+}

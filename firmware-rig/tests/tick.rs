@@ -1,0 +1,387 @@
+//! The rig through its one door, `Rig::tick`, at 1 kHz with a host that answers.
+
+use firmware_rig::{AdcBlock, Config, Inputs, Outputs, Rig};
+use frame::message::{Beep, Command, Event};
+use frame::rig::{AdcVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
+use frame::units::{PulseWidth, Ticks};
+use proptest::prelude::*;
+
+const MS: u64 = 84_000;
+
+/// A bench without physics: counts and a host.
+struct Bench {
+    rig: Rig,
+    ms: u64,
+    counts: [u16; 5],
+    stop_line: bool,
+    linked: bool,
+    pulse: PulseWidth,
+    events: Vec<Event>,
+    samples: Vec<RigSample>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self::with(Config::thesis_570kv())
+    }
+
+    fn with(config: Config) -> Self {
+        Self {
+            rig: Rig::new(config),
+            ms: 0,
+            counts: [1427, 2048, 248, 0, 900], // nothing powered, 22.5 degC
+            stop_line: false,
+            linked: true,
+            pulse: PulseWidth(0),
+            events: Vec::new(),
+            samples: Vec::new(),
+        }
+    }
+
+    fn tick_with(&mut self, command: Option<Command>, edges: &[u32]) -> Outputs {
+        self.ms += 1;
+        let keep_alive = (self.linked && self.ms.is_multiple_of(100)).then_some(Command::Ping);
+        let adc = self.counts.map(|code| {
+            let mut block = AdcBlock::default();
+            (0..8).for_each(|_| block.push(code));
+            block
+        });
+        let inputs = Inputs {
+            now: Ticks(self.ms * MS),
+            edges: [edges, &[], &[], &[]],
+            over_capture: [false; 4],
+            adc,
+            command: command.or(keep_alive),
+            stop_input: self.stop_line,
+        };
+        let outputs = self.rig.tick(&inputs);
+        self.pulse = outputs.pulse;
+        self.events.extend(outputs.event);
+        self.samples.extend(outputs.sample);
+        outputs
+    }
+
+    fn run(&mut self, ms: u64) {
+        (0..ms).for_each(|_| {
+            self.tick_with(None, &[]);
+        });
+    }
+
+    /// Sends a command and gives the answer to it.
+    fn say(&mut self, command: Command) -> Option<Event> {
+        self.run(20); // let earlier events out
+        self.events.clear();
+        self.tick_with(Some(command), &[]);
+        self.run(10);
+        self.events.iter().copied().find(|e| matches!(e, Event::Accepted | Event::Refused(_)))
+    }
+
+    fn beep(&mut self, beep: Beep) {
+        self.tick_with(Some(Command::Beep(beep)), &[]);
+    }
+
+    fn power(&mut self) {
+        self.counts[3] = 2379; // 11.5 V
+    }
+
+    fn armed() -> Self {
+        let mut bench = Self::new();
+        assert_eq!(bench.say(Command::Arm), Some(Event::Accepted));
+        bench.power();
+        bench.run(500);
+        bench.beep(Beep::Long);
+        bench.run(300);
+        bench.beep(Beep::Cells(3));
+        bench.run(300);
+        bench.beep(Beep::Ready);
+        assert_eq!(bench.rig.state(), RigState::Armed);
+        bench
+    }
+
+    fn running(us: u32) -> Self {
+        let mut bench = Self::armed();
+        assert_eq!(bench.say(Command::SetPulse(PulseWidth::from_us(us))), Some(Event::Accepted));
+        bench.run(200);
+        assert_eq!(bench.pulse, PulseWidth::from_us(us));
+        bench
+    }
+}
+
+fn refused(reasons: u16) -> Option<Event> {
+    Some(Event::Refused(Refusals(reasons)))
+}
+
+#[test]
+fn arming_goes_through_every_state_and_tells_it() {
+    let mut bench = Bench::new();
+    bench.run(50);
+    assert_eq!(bench.pulse, PulseWidth::MIN, "the train starts with minimum");
+    bench.tick_with(Some(Command::Arm), &[]);
+    for beep in [Beep::Long, Beep::Cells(3), Beep::Ready] {
+        bench.run(200);
+        bench.beep(beep);
+        assert_eq!(bench.pulse, PulseWidth::MIN);
+    }
+    bench.run(10);
+    let path: Vec<RigState> =
+        bench.events.iter().filter_map(|e| if let Event::State { to, .. } = e { Some(*to) } else { None }).collect();
+    assert_eq!(path, [RigState::ArmHoldMin, RigState::ArmCells, RigState::ArmReady, RigState::Armed]);
+}
+
+#[test]
+fn throttle_needs_arming() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.say(Command::SetPulse(PulseWidth::from_us(1500))), refused(Refusals::WRONG_STATE));
+    assert_eq!(bench.say(Command::RunSchedule), refused(Refusals::WRONG_STATE | Refusals::EMPTY_SCHEDULE));
+    bench.run(500);
+    assert_eq!(bench.pulse, PulseWidth::MIN);
+}
+
+#[test]
+fn a_stop_gives_minimum_on_its_own_tick_and_latches() {
+    let mut bench = Bench::running(1800);
+    let outputs = bench.tick_with(Some(Command::Stop), &[]);
+    assert_eq!(outputs.pulse, PulseWidth::MIN);
+    assert_eq!(bench.rig.state(), RigState::Faulted);
+    assert_eq!(bench.rig.faults(), FaultSet::NONE.with(Fault::OperatorStop));
+    assert_eq!(
+        bench.say(Command::Arm),
+        refused(Refusals::WRONG_STATE | Refusals::FAULT_LATCHED | Refusals::NO_LOW_INTERVAL),
+        "every reason at once"
+    );
+    assert_eq!(bench.say(Command::ClearFaults), Some(Event::Accepted));
+    assert_eq!(bench.say(Command::Arm), refused(Refusals::NO_LOW_INTERVAL));
+    bench.run(2000);
+    assert_eq!(bench.say(Command::Arm), Some(Event::Accepted));
+}
+
+#[test]
+fn the_stop_line_works_without_a_host() {
+    let mut bench = Bench::running(1300);
+    bench.stop_line = true;
+    assert_eq!(bench.tick_with(None, &[]).pulse, PulseWidth::MIN);
+    assert_eq!(bench.say(Command::ClearFaults), Some(Event::Accepted));
+    bench.run(5);
+    assert_eq!(bench.rig.state(), RigState::Faulted, "held, it latches again");
+}
+
+#[test]
+fn a_silent_host_stops_the_motor_and_only_the_motor() {
+    let mut bench = Bench::new();
+    bench.linked = false;
+    bench.run(5000);
+    assert_eq!(bench.rig.state(), RigState::Disarmed, "nobody needs a host while disarmed");
+    let mut bench = Bench::running(1500);
+    bench.linked = false;
+    let mut passed = 0;
+    while bench.pulse.is_live() {
+        bench.run(1);
+        passed += 1;
+    }
+    assert!((900..=1001).contains(&passed), "{passed} ms");
+    assert!(bench.rig.faults().contains(Fault::LinkLost));
+}
+
+#[test]
+fn a_late_tick_stops_the_motor() {
+    let mut bench = Bench::running(1500);
+    bench.ms += 6;
+    assert_eq!(bench.tick_with(None, &[]).pulse, PulseWidth::MIN);
+    assert!(bench.rig.faults().contains(Fault::ControlStalled));
+}
+
+#[test]
+fn analogue_limits_trip_in_time() {
+    for (channel, counts, fault) in [
+        (2, 2200, Fault::OverCurrent),
+        (3, 1800, Fault::UnderVoltage),
+        (0, 4095, Fault::LoadCellOverload),
+        (0, 0, Fault::LoadCellOverload),
+    ] {
+        let mut bench = Bench::running(1500);
+        bench.counts[channel] = counts;
+        bench.run(99);
+        assert!(bench.pulse.is_live(), "{fault:?} trips too early");
+        bench.run(1);
+        assert_eq!(bench.pulse, PulseWidth::MIN, "{fault:?} does not trip");
+        assert!(bench.rig.faults().contains(fault), "{fault:?}");
+    }
+}
+
+#[test]
+fn range_calibration() {
+    let confirmed = Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM };
+    let mut bench = Bench::new();
+    assert_eq!(bench.say(Command::CalibrateRange { confirm: 1 }), refused(Refusals::NOT_CONFIRMED));
+    bench.power();
+    assert_eq!(bench.say(confirmed), refused(Refusals::ESC_POWERED));
+    bench.counts[3] = 0;
+    assert_eq!(bench.say(confirmed), Some(Event::Accepted));
+    assert_eq!(bench.pulse, PulseWidth::MAX);
+    bench.power();
+    bench.run(1000);
+    assert_eq!(bench.pulse, PulseWidth::MAX);
+    bench.beep(Beep::Double);
+    assert_eq!(bench.pulse, PulseWidth::MIN, "minimum at once, 5 s before the programming mode");
+    for beep in [Beep::Long, Beep::Cells(3), Beep::Ready] {
+        assert_eq!(bench.rig.state(), RigState::CalibrateHoldMin);
+        bench.beep(beep);
+    }
+    assert_eq!(bench.rig.state(), RigState::Armed);
+}
+
+#[test]
+fn current_above_idle_ends_maximum_pulses() {
+    let mut bench = Bench::new();
+    bench.say(Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM });
+    bench.counts[2] = 248 + 125; // 2 A
+    bench.run(101);
+    assert_eq!((bench.pulse, bench.rig.state()), (PulseWidth::MIN, RigState::Faulted));
+    assert!(bench.rig.faults().contains(Fault::OverCurrent));
+}
+
+#[test]
+fn the_programming_mode_is_left_through_unpowered() {
+    let mut bench = Bench::new();
+    bench.say(Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM });
+    bench.power();
+    bench.beep(Beep::Programming);
+    assert_eq!((bench.pulse, bench.rig.state()), (PulseWidth::MIN, RigState::ProgrammingEscape));
+    assert_eq!(bench.say(Command::ClearFaults), refused(Refusals::ESC_POWERED));
+    bench.counts[3] = 0;
+    assert_eq!(bench.say(Command::ClearFaults), Some(Event::Accepted));
+    assert_eq!(bench.rig.state(), RigState::Disarmed);
+}
+
+#[test]
+fn an_esc_that_does_not_answer_ends_in_a_fault() {
+    let mut bench = Bench::new();
+    bench.say(Command::Arm);
+    bench.run(59_900);
+    assert_eq!(bench.rig.state(), RigState::ArmHoldMin);
+    bench.run(200);
+    assert_eq!(bench.rig.state(), RigState::Faulted);
+    assert!(bench.rig.faults().contains(Fault::ArmingTimeout));
+}
+
+#[test]
+fn a_staircase_runs_to_its_end() {
+    let mut bench = Bench::armed();
+    let us = PulseWidth::from_us;
+    let stairs = Command::RunStaircase { step: us(100), hold_ms: 500, top: us(1300), down: true };
+    assert_eq!(bench.say(stairs), Some(Event::Accepted));
+    bench.run(3500);
+    assert_eq!(bench.rig.state(), RigState::Armed);
+    assert!(bench.events.iter().any(|e| matches!(e, Event::ScheduleDone { .. })));
+    let mut levels: Vec<u32> = bench.samples.iter().filter(|s| s.state == RigState::Running).map(|s| s.pulse.0 / 1000).collect();
+    levels.dedup();
+    assert_eq!(levels, [1000, 1100, 1200, 1300, 1200, 1100, 1000]);
+}
+
+#[test]
+fn an_upload_runs_and_manual_override_ends_it() {
+    let mut bench = Bench::armed();
+    let us = PulseWidth::from_us;
+    let step = |index, pulse, ramp| Command::ScheduleStep { index, pulse: us(pulse), hold_ms: 1000, ramp };
+    assert_eq!(bench.say(Command::RunSchedule), refused(Refusals::EMPTY_SCHEDULE));
+    assert_eq!(bench.say(step(0, 1400, true)), Some(Event::Accepted));
+    assert_eq!(bench.say(step(2, 1400, true)), refused(Refusals::OUT_OF_RANGE));
+    assert_eq!(bench.say(step(1, 1200, false)), Some(Event::Accepted));
+    assert_eq!(bench.say(Command::RunSchedule), Some(Event::Accepted));
+    bench.run(490);
+    assert_eq!(bench.pulse, us(1200), "half-way up the ramp");
+    assert_eq!(bench.say(Command::SetPulse(us(2500))), refused(Refusals::OUT_OF_RANGE));
+    assert_eq!(bench.say(Command::SetPulse(us(1600))), Some(Event::Accepted));
+    bench.run(3000);
+    assert_eq!(bench.pulse, us(1600));
+    assert_eq!(bench.say(Command::SetPulse(PulseWidth::MIN)), Some(Event::Accepted));
+    assert_eq!(bench.rig.state(), RigState::Armed);
+}
+
+#[test]
+fn tare_takes_the_last_means_as_zero() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.say(Command::Tare), refused(Refusals::OUT_OF_RANGE), "no sample yet");
+    bench.counts[0] = 2081; // the motor's weight
+    bench.run(250);
+    let last = *bench.samples.last().unwrap();
+    let before = bench.rig.calibration().convert(&last).adc[0].unwrap();
+    assert!((before + 2.39).abs() < 0.02, "244 g before: {before}");
+    assert_eq!(bench.say(Command::Tare), Some(Event::Accepted));
+    assert_eq!(bench.rig.calibration().convert(&last).adc[0], Some(0.0));
+    let mut bench = Bench::running(1500);
+    assert_eq!(bench.say(Command::Tare), refused(Refusals::WRONG_STATE));
+}
+
+#[test]
+fn samples_come_at_the_log_rate_without_drift() {
+    for ms in [10, 100, 1000] {
+        let mut bench = Bench::with(Config { log_period: Ticks::from_ms(ms), ..Config::thesis_570kv() });
+        bench.run(5001);
+        let times: Vec<u64> = bench.samples.iter().map(|s| s.at.as_ms()).collect();
+        let expected: Vec<u64> = (1..).map(|i| 1 + i * ms).take_while(|t| *t <= 5001).collect();
+        assert_eq!(times, expected);
+        let counted: u64 = bench.samples.iter().map(|s| u64::from(s.adc[0].count)).sum();
+        assert_eq!(counted, (5000 / ms * ms + 1) * 8, "no conversion is lost or counted twice");
+        assert!(bench.samples.iter().all(|s| s.adc[3].verdict == AdcVerdict::Nominal), "an unpowered supply reads zero");
+    }
+}
+
+#[test]
+fn hello_tells_what_is_fitted() {
+    let rig = Rig::new(Config { marks: [2, 0, 2, 25], ..Config::thesis_570kv() });
+    let hello = rig.hello(0x14);
+    assert_eq!((hello.present, hello.reset_cause, hello.core_hz), (0b1101, 0x14, 168_000_000));
+}
+
+fn any_command() -> impl Strategy<Value = Command> {
+    prop_oneof![
+        Just(Command::Ping),
+        Just(Command::Arm),
+        prop_oneof![Just(Command::CALIBRATE_CONFIRM), any::<u32>()].prop_map(|confirm| Command::CalibrateRange { confirm }),
+        prop_oneof![
+            Just(Beep::Long),
+            any::<u8>().prop_map(Beep::Cells),
+            Just(Beep::Ready),
+            Just(Beep::Double),
+            Just(Beep::Programming),
+            Just(Beep::NoSignal),
+            Just(Beep::SelfTestFailed)
+        ]
+        .prop_map(Command::Beep),
+        (0u8..4, 900_000u32..2_100_000, 0u32..2000, any::<bool>()).prop_map(|(index, pulse, hold_ms, ramp)| {
+            Command::ScheduleStep { index, pulse: PulseWidth(pulse), hold_ms, ramp }
+        }),
+        Just(Command::RunSchedule),
+        (900_000u32..2_100_000).prop_map(|ns| Command::SetPulse(PulseWidth(ns))),
+        Just(Command::Stop),
+        Just(Command::Tare),
+        Just(Command::ClearFaults),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Whatever the host says and the sensors show: pulses stay within 1000 to 2000 us, above minimum in two states only, and
+    /// a latched fault means minimum.
+    #[test]
+    fn no_sequence_of_commands_breaks_the_pulse_law(
+        script in proptest::collection::vec((any_command(), 1u64..300, 0u16..4096, any::<bool>()), 1..40),
+    ) {
+        let mut bench = Bench::new();
+        for (command, wait, counts, stop) in script {
+            bench.counts[3] = counts;
+            bench.stop_line = stop && wait > 250;
+            for i in 0..wait {
+                let outputs = bench.tick_with((i == 0).then_some(command), &[]);
+                prop_assert_eq!(outputs.pulse, outputs.pulse.clamped());
+                if outputs.pulse.is_live() {
+                    prop_assert!(matches!(bench.rig.state(), RigState::Running | RigState::CalibrateHoldMax));
+                    prop_assert!(bench.rig.faults().is_empty());
+                    prop_assert!(!bench.stop_line);
+                }
+            }
+        }
+    }
+}
