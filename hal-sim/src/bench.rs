@@ -241,7 +241,7 @@ impl Bench {
             }
         }
         // Five channels at 480 cycles each and 21 MHz: 8.5 conversions of each in a millisecond.
-        let count = 8 + (self.steps / STEPS_PER_MS as u64 & 1) as u16;
+        let count = 8 + ((self.steps / STEPS_PER_MS as u64) & 1) as u16;
         let pins_v = self.pins_v;
         for (channel, block) in out.adc.iter_mut().enumerate() {
             *block = match channel {

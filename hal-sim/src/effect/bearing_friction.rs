@@ -32,8 +32,8 @@ impl Effect for BearingFriction {
 
     fn draw(stream: &mut Stream, run_s: f64) -> Self {
         Self {
-            constant_nm: stream.log_between(2.0e-3, 8.0e-3),
-            viscous_nms: stream.between(0.0, 1.0e-5),
+            constant_nm: stream.log_between(1.0e-3, 4.0e-3),
+            viscous_nms: stream.between(0.0, 5.0e-6),
             t0_s: run_s * stream.between(0.35, 0.6),
             share: 0.0,
         }

@@ -25,7 +25,7 @@ impl Effect for Creep {
     const EQUATION: &'static str = "thrust_n += z, tau * dz/dt + z = amplitude * thrust";
 
     fn draw(stream: &mut Stream, _run_s: f64) -> Self {
-        Self { amplitude: stream.log_between(0.02, 0.06), tau_s: stream.between(15.0, 60.0) }
+        Self { amplitude: stream.log_between(0.01, 0.04), tau_s: stream.between(15.0, 60.0) }
     }
 
     fn fit(&self, parts: &mut BenchParts) {

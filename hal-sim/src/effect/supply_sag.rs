@@ -25,7 +25,7 @@ impl Effect for SupplySag {
     const EQUATION: &'static str = "voltage_v = source - resistance * current_a";
 
     fn draw(stream: &mut Stream, _run_s: f64) -> Self {
-        Self { resistance_ohm: stream.log_between(0.05, 0.25), t0_s: 0.0 }
+        Self { resistance_ohm: stream.log_between(0.03, 0.12), t0_s: 0.0 }
     }
 
     fn act(&self, run_s: f64, levers: &mut Levers) {

@@ -25,7 +25,7 @@ impl Effect for ZeroDrift {
     const EQUATION: &'static str = "thrust_n += rate * (t - t0)";
 
     fn draw(stream: &mut Stream, run_s: f64) -> Self {
-        Self { rate_n_per_s: stream.sign() * stream.log_between(0.06, 0.25) / run_s, t0_s: 0.0 }
+        Self { rate_n_per_s: stream.sign() * stream.log_between(0.05, 0.2) / run_s, t0_s: 0.0 }
     }
 
     fn act(&self, run_s: f64, levers: &mut Levers) {

@@ -14,7 +14,17 @@ use rigless::{
     mcu::{Mcu, Operate},
     session::Session,
     snapshot::Store,
-    soc::stm32f427::Stm32f427,
+    device::Level,
+    soc::{
+        st::tim::Channel as TimerChannel,
+        stm32f427::{
+            Stm32f427,
+            peripherals::{
+                adc::Channel as AdcChannel,
+                gpio::{Gpio, Pin},
+            },
+        },
+    },
     time::VirtualNanos,
 };
 use std::collections::VecDeque;
@@ -24,6 +34,10 @@ use std::path::{Path, PathBuf};
 const CORE_HZ: u64 = 168_000_000;
 const CRYSTAL_HZ: u64 = 8_000_000;
 const SUPPLY_MV: u32 = 3300;
+/// Units of a converter input in one count: the model answers input x 4095 / reference, rounded down.
+const ADC_UNITS: u32 = 1000;
+/// Reference in the same units, so that a code goes in and comes out unchanged.
+const ADC_REFERENCE: u32 = 4095 * ADC_UNITS;
 
 /// Why an image could not be run.
 #[derive(Debug, thiserror::Error)]
@@ -129,6 +143,9 @@ impl Machine {
         let mut mcu = Stm32f427::new().map_err(EmulatedError::emulator)?;
         mcu.rcc.attach_crystals(CRYSTAL_HZ, Crystal::NONE.0);
         mcu.set_supply(SUPPLY_MV);
+        for converter in &mut mcu.adc {
+            converter.set_reference(ADC_REFERENCE);
+        }
         mcu.usart[0].attach(FarEnd::default());
         Ok(Self { mcu })
     }
@@ -138,13 +155,88 @@ impl Machine {
     }
 }
 
+/// A PWM output as it stands on its pin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PulseTrain {
+    /// The pin is high now.
+    pub high: bool,
+    /// Width of the pulses, ns.
+    pub width_ns: u64,
+    /// Time between them, ns.
+    pub period_ns: u64,
+}
+
+/// Number of a GPIO port: A is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Port {
+    /// GPIOA.
+    A = 0,
+    /// GPIOB.
+    B = 1,
+    /// GPIOC.
+    C = 2,
+}
+
+/// A general-purpose timer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GeneralTimer {
+    /// TIM2.
+    Tim2 = 0,
+    /// TIM3.
+    Tim3 = 1,
+}
+
 /// What a [`World`] may do to the board at one instant.
 pub struct Pins<'a> {
-    pub(super) machine: &'a mut Machine,
-    pub(super) at: VirtualNanos,
+    machine: &'a mut Machine,
+    at: VirtualNanos,
+}
+
+fn level(high: bool) -> Level {
+    if high { Level::High } else { Level::Low }
 }
 
 impl Pins<'_> {
+    /// Alternate function that a pin is switched to; `None` when it is not, or when there is no such pin.
+    pub fn alternate(&mut self, port: Port, pin: u8) -> Option<u8> {
+        let (_, registers) = self.machine.mcu.port(port as usize);
+        Gpio::function(Pin::new(pin)?, registers)
+    }
+
+    /// Drives a pin from outside.
+    pub fn drive(&mut self, port: Port, pin: u8, high: bool) {
+        if let Some(pin) = Pin::new(pin) {
+            self.machine.mcu.drive_port(self.at, port as usize, |gpio, registers, context| {
+                gpio.drive(pin, Some(level(high)), registers, context);
+            });
+        }
+    }
+
+    /// Drives the input of a timer channel (1 to 4). The emulator does not connect pins and timers: ask [`Pins::alternate`].
+    pub fn drive_timer(&mut self, timer: GeneralTimer, channel: u8, high: bool) {
+        if let Some(channel) = TimerChannel::new(channel) {
+            self.machine.mcu.drive_timer(self.at, timer as usize, |timer, registers, context| {
+                timer.drive_input(channel, level(high), registers, context);
+            });
+        }
+    }
+
+    /// Output of a timer channel in PWM mode; `None` while the timer does not drive it.
+    pub fn pulses(&mut self, timer: GeneralTimer, channel: u8) -> Option<PulseTrain> {
+        let channel = TimerChannel::new(channel)?;
+        let (timer, registers) = self.machine.mcu.timer(timer as usize);
+        let pulse = timer.pulse(channel, registers)?;
+        let high = timer.output(channel, registers)? == Level::High;
+        Some(PulseTrain { high, width_ns: pulse.width.0, period_ns: pulse.period.0 })
+    }
+
+    /// Lets ADC1 read `code` (12 bits) on `channel` from now on.
+    pub fn set_adc(&mut self, channel: u8, code: u16) {
+        if let Some(channel) = AdcChannel::new(channel) {
+            self.machine.mcu.adc[0].set_input(channel, u32::from(code.min(4095)) * ADC_UNITS + ADC_UNITS / 2);
+        }
+    }
+
     /// Bytes that arrived on the serial line so far.
     #[must_use]
     pub fn heard(&mut self) -> &[u8] {

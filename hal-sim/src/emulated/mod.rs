@@ -13,5 +13,8 @@
 
 pub mod ahrs;
 mod machine;
+pub mod rig;
 
-pub use machine::{Accesses, EmulatedError, Machine, Outcome, Pins, World, firmware, run};
+pub use machine::{
+    Accesses, EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run,
+};

@@ -37,7 +37,7 @@ pub struct PlantState {
 }
 
 /// What turns a pulse into motion, force and current.
-pub trait Powerplant {
+pub trait Powerplant: Send {
     /// Steps by `dt_s` with the ESC following a pulse of `pulse_us` (1000 is off).
     fn advance(&mut self, dt_s: f64, pulse_us: f64) -> PlantState;
 
@@ -214,5 +214,99 @@ impl Powerplant for RigPlant {
             voltage_v: voltage,
             temp_c,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::supply::Source as Feed;
+
+    fn parts(resistance_ohm: f64) -> Parts {
+        Parts {
+            supply: Supply::new(Feed::Bench { voltage_v: 11.5 }, resistance_ohm),
+            motor: Motor::named("570KV").unwrap(),
+            propeller: Propeller::named("11x4.7").unwrap(),
+            air: Air::standard(0.0),
+            thermal: Thermal::default(),
+            start_throttle: 0.06,
+            throttle_lag_s: (0.0, 0.0),
+            gust: 0.0,
+        }
+    }
+
+    fn settled(parts: &Parts, pulse_us: f64) -> PlantState {
+        let mut plant = RigPlant::new(parts.clone(), 1);
+        (0..30_000).map(|_| plant.advance(1.0e-4, pulse_us)).last().unwrap()
+    }
+
+    /// Positive root of R k_Q/K w^2 + K w + R I_0 = duty V, with the wiring resistance seen through the duty cycle.
+    #[test]
+    fn steady_state_is_the_closed_form() {
+        for resistance in [0.0, 0.2] {
+            for duty in [0.1, 0.5, 1.0] {
+                let p = parts(resistance);
+                let k = p.motor.torque_constant();
+                let r = p.motor.resistance_ohm + duty * duty * resistance;
+                let q = p.propeller.torque_coefficient * p.air.density() / p.propeller.reference_density;
+                let (a, b) = (r * q / k, k);
+                let c = r * p.motor.no_load_current_a - duty * (11.5 - resistance * ESC_IDLE_A);
+                let w = (-b + (b * b - 4.0 * a * c).sqrt()) / (2.0 * a);
+                let state = settled(&p, 1000.0 + 1000.0 * duty);
+                assert!((state.rpm / RPM_PER_RAD_S / w - 1.0).abs() < 1e-6, "{} {w}", state.rpm / RPM_PER_RAD_S);
+                let current = duty * (q * w * w / k + p.motor.no_load_current_a) + ESC_IDLE_A;
+                assert!((state.current_a / current - 1.0).abs() < 1e-6);
+                assert!((state.voltage_v - (11.5 - resistance * current)).abs() < 1e-6);
+                assert!((state.torque_nm / (q * w * w) - 1.0).abs() < 1e-6);
+            }
+        }
+    }
+
+    /// Errata: 5.779 N at 7.33 A and full throttle; hover 2.879 N near 8.36 % duty and 4100 rev/min.
+    #[test]
+    fn the_figures_of_the_errata_come_out() {
+        let full = settled(&parts(0.0), 2000.0);
+        assert!((full.thrust_n / 5.779 - 1.0).abs() < 0.01, "{}", full.thrust_n);
+        assert!((full.current_a / 7.33 - 1.0).abs() < 0.02, "{}", full.current_a);
+        let hover = settled(&parts(0.0), 200.0 * 8.36);
+        assert!((hover.rpm / 4100.0 - 1.0).abs() < 0.03, "{}", hover.rpm);
+        assert!((hover.thrust_n / 2.879 - 1.0).abs() < 0.05, "{}", hover.thrust_n);
+    }
+
+    /// What the supply gives is heat, friction, air and motion.
+    #[test]
+    fn energy_is_accounted_for() {
+        let p = parts(0.1);
+        let mut plant = RigPlant::new(p.clone(), 1);
+        let (mut given, mut spent) = (0.0, 0.0);
+        let dt = 1.0e-4;
+        let duty = 0.7;
+        let mut w = 0.0;
+        for _ in 0..20_000 {
+            let s = plant.advance(dt, 1000.0 + 1000.0 * duty);
+            w = s.rpm / RPM_PER_RAD_S;
+            given += 11.5 * s.current_a * dt;
+            let motor_a = (s.current_a - ESC_IDLE_A) / duty;
+            let air = plant.opposing(w).2;
+            let heat = motor_a * motor_a * p.motor.resistance_ohm + s.current_a * s.current_a * 0.1 + s.voltage_v * ESC_IDLE_A;
+            spent += (heat + (p.motor.friction_nm() + air) * w) * dt;
+        }
+        let inertia = p.motor.inertia_kgm2 + p.propeller.inertia_kgm2;
+        let motion = 0.5 * inertia * w * w;
+        assert!(motion > 0.02 * given, "the spin-up is part of the test: {motion} of {given}");
+        assert!((given / (spent + motion) - 1.0).abs() < 2e-3, "{given} {spent} {motion}");
+    }
+
+    #[test]
+    fn thin_air_gives_less_thrust_and_more_speed() {
+        let thin = Parts { air: Air::standard(2000.0), ..parts(0.0) };
+        let (low, high) = (settled(&parts(0.0), 1600.0), settled(&thin, 1600.0));
+        assert!(high.rpm > low.rpm && high.thrust_n < 0.95 * low.thrust_n);
+    }
+
+    #[test]
+    fn below_the_start_throttle_it_rests() {
+        assert_eq!(settled(&parts(0.0), 1050.0).rpm, 0.0);
+        assert!(settled(&parts(0.0), 1100.0).rpm > 300.0);
     }
 }

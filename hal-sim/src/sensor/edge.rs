@@ -197,3 +197,67 @@ impl Tachometers {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Turns at a constant rate and gives every edge as (channel, rising, revolution).
+    fn turn(geometry: &Geometry, detail: EdgeDetail, revolutions: f64) -> Vec<(u8, bool, f64)> {
+        let mut t = Tachometers::new(geometry, detail, 9, 0.4);
+        let step = 0.0071;
+        let mut out = Vec::new();
+        let mut at = 0.4;
+        while at < 0.4 + revolutions {
+            t.step(at, at + step, |channel, rising, fraction| out.push((channel, rising, at + fraction * step)));
+            at += step;
+        }
+        out
+    }
+
+    #[test]
+    fn a_revolution_has_the_marks_of_its_geometry() {
+        let edges = turn(&Geometry::default(), EdgeDetail::Captured, 1000.0);
+        for (channel, marks) in Geometry::default().marks().into_iter().enumerate() {
+            let n = edges.iter().filter(|e| usize::from(e.0) == channel).count();
+            assert!(n.abs_diff(1000 * usize::from(marks)) <= 1, "{channel}: {n}");
+        }
+        assert!(edges.iter().all(|e| e.1));
+    }
+
+    #[test]
+    fn pins_alternate_and_the_encoder_shows_all_its_steps() {
+        let edges = turn(&Geometry::default(), EdgeDetail::Pins, 100.0);
+        for channel in 0..4 {
+            let own: Vec<_> = edges.iter().filter(|e| e.0 == channel).collect();
+            assert!(own.windows(2).all(|w| w[0].1 != w[1].1 && w[0].2 <= w[1].2), "{channel}");
+            if channel == 3 {
+                assert!(own.len().abs_diff(20_000) <= 2, "{}", own.len());
+            }
+        }
+    }
+
+    #[test]
+    fn every_fourth_edge_of_the_pin_is_what_the_prescaler_captures() {
+        let quiet = Geometry { jitter_deg: [0.0; 4], ..Geometry::default() };
+        let pin: Vec<f64> = turn(&quiet, EdgeDetail::Pins, 5.0).iter().filter(|e| e.0 == 3 && e.1).map(|e| e.2).collect();
+        let captured: Vec<f64> = turn(&quiet, EdgeDetail::Captured, 5.0).iter().filter(|e| e.0 == 3).map(|e| e.2).collect();
+        let first = pin.iter().position(|e| (e - captured[0]).abs() < 1e-9).expect("the captured edge is one of the pin's");
+        for (a, b) in captured.iter().zip(pin.iter().skip(first).step_by(ENCODER_PRESCALER)) {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn a_missed_mark_and_a_crooked_magnet_show() {
+        let g = Geometry { miss: [0.2, 0.0, 0.0, 0.0], magnet_error_deg: 10.0, jitter_deg: [0.0; 4], ..Geometry::default() };
+        for detail in [EdgeDetail::Captured, EdgeDetail::Pins] {
+            let edges = turn(&g, detail, 2000.0);
+            let beam = edges.iter().filter(|e| e.0 == 0 && e.1).count();
+            assert!((3000..3400).contains(&beam), "{beam}");
+            let hall: Vec<f64> = edges.iter().filter(|e| e.0 == 2 && e.1).map(|e| e.2).collect();
+            let gap = hall[1] - hall[0];
+            assert!((gap - 0.5).abs() > 0.02, "{gap}");
+        }
+    }
+}

@@ -6,9 +6,11 @@
 //! Units: ms of simulated time in the loop; raw codes in the record.
 //! Reference: specification `rig.md`, "ESC pulse and arming" and "Acquisition"; `formats.md`, "Telemetry".
 
+mod host;
+
 use crate::bench::{Bench, Millisecond, Truth};
 use crate::plant::Powerplant;
-use crate::scenario::{Scenario, Schedule, pulse_width};
+use crate::scenario::Scenario;
 use crate::sensor::EdgeDetail;
 use firmware_rig::{Config, Inputs, Rig};
 use frame::calibration::{Calibration, Converted};
@@ -16,7 +18,7 @@ use frame::message::{Command, Event, Hello, Message};
 use frame::rig::{FaultSet, Refusals, RigSample, RigState};
 use frame::units::{PulseWidth, Ticks};
 use frame::wire::{Decoder, Encoder, LinkStats, MAX_WIRE};
-use std::collections::VecDeque;
+use host::{Host, Phase};
 
 /// Why a run did not come to its end.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -90,209 +92,8 @@ impl RunRecord {
     }
 }
 
-/// What the host is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Phase {
-    Identifying,
-    Arming,
-    Settling,
-    Taring,
-    Uploading,
-    RestBefore,
-    Running,
-    RestAfter,
-    Done,
-}
-
-impl Phase {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Identifying => "identifying itself",
-            Self::Arming => "arming",
-            Self::Settling => "settling",
-            Self::Taring => "taring",
-            Self::Uploading => "taking the schedule",
-            Self::RestBefore => "resting before the schedule",
-            Self::Running => "running",
-            Self::RestAfter => "resting after the schedule",
-            Self::Done => "done",
-        }
-    }
-}
-
-/// Time between "minimum pulses are there" and the power switch, ms.
-const SWITCH_AFTER_MS: u64 = 300;
-/// Quiet time before the tare, ms; longer than the longest logging interval.
-const SETTLE_MS: u64 = 2500;
-/// Longest silence of the host, ms.
-const PING_MS: u64 = 200;
 /// Time beyond the run itself after which a session counts as stuck, ms.
 const OVERHEAD_MS: u64 = 90_000;
-
-/// The host's side of the wire.
-struct Host {
-    encoder: Encoder,
-    decoder: Decoder,
-    outbox: VecDeque<Command>,
-    waiting: Option<Command>,
-    phase: Phase,
-    since_ms: u64,
-    sent_ms: u64,
-    schedule: Vec<Command>,
-    rest_ms: u64,
-    hello: Option<Hello>,
-    calibration: Option<Calibration>,
-    state: RigState,
-    state_ms: u64,
-    start: Option<Ticks>,
-    samples: Vec<RigSample>,
-    events: Vec<Event>,
-}
-
-impl Host {
-    fn new(scenario: &Scenario) -> Self {
-        Self {
-            encoder: Encoder::default(),
-            decoder: Decoder::default(),
-            outbox: VecDeque::from([Command::Identify]),
-            waiting: None,
-            phase: Phase::Identifying,
-            since_ms: 0,
-            sent_ms: 0,
-            schedule: commands(&scenario.schedule),
-            rest_ms: (scenario.rest_s * 1000.0) as u64,
-            hello: None,
-            calibration: None,
-            state: RigState::Disarmed,
-            state_ms: 0,
-            start: None,
-            samples: Vec::new(),
-            events: Vec::new(),
-        }
-    }
-
-    fn enter(&mut self, phase: Phase, ms: u64) {
-        self.phase = phase;
-        self.since_ms = ms;
-    }
-
-    /// The next command, when one is due. One command is answered before the next is sent.
-    fn send(&mut self, ms: u64) -> Option<Command> {
-        if self.waiting.is_some() {
-            return None;
-        }
-        let command = match self.outbox.pop_front() {
-            Some(command) => command,
-            None if ms >= self.sent_ms + PING_MS => Command::Ping,
-            None => return None,
-        };
-        self.sent_ms = ms;
-        let answered = !matches!(command, Command::Ping | Command::Identify | Command::Beep(_));
-        self.waiting = answered.then_some(command);
-        Some(command)
-    }
-
-    /// Takes a message of the board.
-    fn take(&mut self, message: Message, ms: u64) -> Result<(), SimError> {
-        match message {
-            Message::Hello(hello) => self.hello = Some(hello),
-            Message::Calibration(calibration) => self.calibration = Some(calibration),
-            Message::Rig(sample) => {
-                if matches!(self.phase, Phase::RestBefore | Phase::Running | Phase::RestAfter) {
-                    self.start.get_or_insert(sample.at);
-                    self.samples.push(sample);
-                }
-            }
-            Message::Event(event) => {
-                self.events.push(event);
-                match event {
-                    Event::State { to, .. } => {
-                        self.state = to;
-                        self.state_ms = ms;
-                    }
-                    Event::Accepted => self.waiting = None,
-                    Event::Refused(reasons) => {
-                        let command = self.waiting.unwrap_or(Command::Ping);
-                        return Err(SimError::Refused { command, phase: self.phase.name(), reasons });
-                    }
-                    Event::Faults { faults, at } => {
-                        return Err(SimError::Faulted { faults, phase: self.phase.name(), at_s: at.as_s() });
-                    }
-                    Event::ScheduleDone { .. } if self.phase == Phase::Running => self.enter(Phase::RestAfter, ms),
-                    Event::ScheduleDone { .. } => {}
-                }
-            }
-            Message::Imu(_) => {}
-        }
-        Ok(())
-    }
-
-    /// Goes on to the next phase when this one has come to its end.
-    fn step(&mut self, ms: u64, bench: &mut Bench) {
-        let age = ms - self.since_ms;
-        let idle = self.outbox.is_empty() && self.waiting.is_none();
-        while let Some((_, beep)) = bench.beep() {
-            self.outbox.push_back(Command::Beep(beep));
-        }
-        match self.phase {
-            Phase::Identifying if self.hello.is_some() && self.calibration.is_some() && age > 100 => {
-                self.outbox.push_back(Command::Arm);
-                self.enter(Phase::Arming, ms);
-            }
-            Phase::Arming => {
-                if self.state == RigState::ArmHoldMin && ms == self.state_ms + SWITCH_AFTER_MS {
-                    bench.set_power(true);
-                }
-                if self.state == RigState::Armed {
-                    self.enter(Phase::Settling, ms);
-                }
-            }
-            Phase::Settling if age >= SETTLE_MS => {
-                self.outbox.push_back(Command::Tare);
-                self.calibration = None;
-                self.enter(Phase::Taring, ms);
-            }
-            Phase::Taring if idle && self.calibration.is_some() => {
-                let uploads = self.schedule.len() - 1;
-                self.outbox.extend(self.schedule.drain(..uploads));
-                self.enter(Phase::Uploading, ms);
-            }
-            Phase::Uploading if idle => self.enter(Phase::RestBefore, ms),
-            Phase::RestBefore if age >= self.rest_ms => {
-                self.outbox.extend(self.schedule.drain(..));
-                self.enter(Phase::Running, ms);
-            }
-            Phase::RestAfter if age >= self.rest_ms => self.enter(Phase::Done, ms),
-            _ => {}
-        }
-    }
-}
-
-/// The commands that make the rig follow a schedule; the last one starts it.
-fn commands(schedule: &Schedule) -> Vec<Command> {
-    let ms = |s: f64| (s * 1000.0 + 0.5) as u32;
-    let staircase = |step_us, hold_s, top_us, down| {
-        vec![Command::RunStaircase { step: pulse_width(step_us), hold_ms: ms(hold_s), top: pulse_width(top_us), down }]
-    };
-    match schedule {
-        Schedule::Staircase { step_us, hold_s, top_us } => staircase(*step_us, *hold_s, *top_us, false),
-        Schedule::UpDown { step_us, hold_s, top_us } => staircase(*step_us, *hold_s, *top_us, true),
-        Schedule::Steps { steps } => {
-            let mut list: Vec<_> = steps
-                .iter()
-                .enumerate()
-                .map(|(i, s)| Command::ScheduleStep {
-                    index: i as u8,
-                    pulse: pulse_width(s.pulse_us),
-                    hold_ms: ms(s.hold_s),
-                    ramp: s.ramp,
-                })
-                .collect();
-            list.push(Command::RunSchedule);
-            list
-        }
-    }
-}
 
 /// The board's side: firmware, codec and the timer that makes the pulses.
 struct Board {
@@ -330,7 +131,7 @@ pub fn firmware_config(scenario: &Scenario) -> Config {
     let mut config = Config { marks: scenario.parts().geometry.marks(), log_period: period, ..Config::thesis_570kv() };
     // While the rotor coasts to a stop, a revolution lasts longer than it takes to lose a tenth of the speed: the channels
     // read different instants and disagree until it stands, which takes about a second.
-    config.limits.sensor_ms = config.limits.sensor_ms.max(1500);
+    config.limits.sensor_ms = config.limits.sensor_ms.max(2500);
     config
 }
 

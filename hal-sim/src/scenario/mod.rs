@@ -6,12 +6,17 @@
 //! Units: each key carries its own.
 //! Reference: specification `rig.md`, "The simulator"; `docs/scenario.md` lists every key.
 
+mod section;
+
+pub use section::{AirSection, LogSection, NoiseSection, Schedule, SensorSection, SpeedSensor, Step, SupplySection};
+
 use crate::bench::BenchParts;
 use crate::effect::{self, EffectKind};
 use crate::plant::{Air, Beam, Bridge, Esc, Motor, Parts, Propeller, Supply, Thermal, supply};
 use crate::sensor::Geometry;
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::PulseWidth;
+use section::positive;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use std::path::{Path, PathBuf};
 
@@ -82,152 +87,6 @@ pub struct Scenario {
     pub effects: Vec<EffectKind>,
 }
 
-/// What feeds the ESC.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum SupplySection {
-    /// Bench supply.
-    Bench {
-        /// Set voltage, V.
-        #[serde(deserialize_with = "positive")]
-        voltage_v: f64,
-    },
-    /// Battery.
-    Lipo {
-        /// Cells in series.
-        cells: u32,
-        /// Charge from full to empty, A.h.
-        #[serde(deserialize_with = "positive")]
-        capacity_ah: f64,
-        /// Resistance of the pack, ohm.
-        #[serde(deserialize_with = "not_negative")]
-        resistance_ohm: f64,
-    },
-}
-
-/// Air at the rig.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AirSection {
-    /// Temperature, degC; the rig starts with it.
-    #[serde(deserialize_with = "celsius")]
-    pub temperature_c: f64,
-    /// Pressure, Pa.
-    #[serde(deserialize_with = "positive")]
-    pub pressure_pa: f64,
-}
-
-/// One step of a schedule.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Step {
-    /// Pulse, us.
-    #[serde(deserialize_with = "pulse")]
-    pub pulse_us: f64,
-    /// How long to hold it, s.
-    #[serde(deserialize_with = "positive")]
-    pub hold_s: f64,
-    /// Ramp to it during the hold instead of stepping.
-    #[serde(default)]
-    pub ramp: bool,
-}
-
-/// What the throttle does.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Schedule {
-    /// Levels upwards from 1000 us.
-    Staircase {
-        /// Height of a step, us.
-        #[serde(deserialize_with = "positive")]
-        step_us: f64,
-        /// Hold of each level, s.
-        #[serde(deserialize_with = "positive")]
-        hold_s: f64,
-        /// Highest level, us.
-        #[serde(deserialize_with = "pulse")]
-        top_us: f64,
-    },
-    /// The same, and down again.
-    UpDown {
-        /// Height of a step, us.
-        #[serde(deserialize_with = "positive")]
-        step_us: f64,
-        /// Hold of each level, s.
-        #[serde(deserialize_with = "positive")]
-        hold_s: f64,
-        /// Highest level, us.
-        #[serde(deserialize_with = "pulse")]
-        top_us: f64,
-    },
-    /// A list, uploaded step by step; 64 at most.
-    Steps {
-        /// The list.
-        #[serde(deserialize_with = "steps")]
-        steps: Vec<Step>,
-    },
-}
-
-/// Speed sensors.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SensorSection {
-    /// Which are fitted.
-    pub fitted: Vec<SpeedSensor>,
-    /// Deviation of the hall sensor's second magnet from 180 degrees, deg.
-    pub magnet_error_deg: f64,
-}
-
-/// The four speed sensors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SpeedSensor {
-    /// Infra-red beam.
-    Beam,
-    /// Reflective opto sensor.
-    Opto,
-    /// Hall sensor.
-    Hall,
-    /// Encoder.
-    Encoder,
-}
-
-/// The log.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LogSection {
-    /// Samples a second, 1 to 100, a divisor of 1000.
-    #[serde(deserialize_with = "log_rate")]
-    pub rate_hz: u32,
-}
-
-/// Noise: standard deviation of the mean over 0.1 s of the analogue channels, jitter of the edges, turbulence.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct NoiseSection {
-    /// Thrust, N.
-    #[serde(deserialize_with = "not_negative")]
-    pub thrust_n: f64,
-    /// Torque, N.m.
-    #[serde(deserialize_with = "not_negative")]
-    pub torque_nm: f64,
-    /// Current, A.
-    #[serde(deserialize_with = "not_negative")]
-    pub current_a: f64,
-    /// Voltage, V.
-    #[serde(deserialize_with = "not_negative")]
-    pub voltage_v: f64,
-    /// Temperature, K.
-    #[serde(deserialize_with = "not_negative")]
-    pub temp_k: f64,
-    /// Angle at which the beam, the reflective and the hall sensor see a mark, deg; the encoder has 0.4 of it.
-    #[serde(deserialize_with = "not_negative")]
-    pub edge_deg: f64,
-    /// Relative fluctuation of the drag torque in the rotor's own wake.
-    #[serde(deserialize_with = "not_negative")]
-    pub gust: f64,
-}
-
 impl Default for Scenario {
     fn default() -> Self {
         Self {
@@ -243,45 +102,6 @@ impl Default for Scenario {
             log: LogSection::default(),
             noise: NoiseSection::default(),
             effects: Vec::new(),
-        }
-    }
-}
-
-impl Default for AirSection {
-    /// 15 degC at 101 325 Pa, where the catalogue's coefficients hold.
-    fn default() -> Self {
-        Self { temperature_c: 15.0, pressure_pa: 101_325.0 }
-    }
-}
-
-impl Default for SensorSection {
-    fn default() -> Self {
-        let fitted = vec![SpeedSensor::Beam, SpeedSensor::Opto, SpeedSensor::Hall, SpeedSensor::Encoder];
-        Self { fitted, magnet_error_deg: 0.0 }
-    }
-}
-
-impl Default for LogSection {
-    fn default() -> Self {
-        Self { rate_hz: 10 }
-    }
-}
-
-impl Default for NoiseSection {
-    fn default() -> Self {
-        Self { thrust_n: 0.007, torque_nm: 0.0003, current_a: 0.03, voltage_v: 0.01, temp_k: 0.1, edge_deg: 0.12, gust: 0.002 }
-    }
-}
-
-impl Schedule {
-    /// How long it takes, s.
-    #[must_use]
-    pub fn duration_s(&self) -> f64 {
-        let levels = |step: f64, top: f64| ((top - 1000.0) / step + 1.0e-9).floor() + 1.0;
-        match self {
-            Self::Staircase { step_us, hold_s, top_us } => levels(*step_us, *top_us) * hold_s,
-            Self::UpDown { step_us, hold_s, top_us } => (2.0 * levels(*step_us, *top_us) - 1.0) * hold_s,
-            Self::Steps { steps } => steps.iter().map(|s| s.hold_s).sum(),
         }
     }
 }
@@ -375,46 +195,6 @@ impl Scenario {
     }
 }
 
-fn checked<'de, D: Deserializer<'de>>(d: D, ok: impl Fn(f64) -> bool, expected: &str) -> Result<f64, D::Error> {
-    let value = f64::deserialize(d)?;
-    if ok(value) { Ok(value) } else { Err(D::Error::custom(format!("expected {expected}, found {value}"))) }
-}
-
-fn positive<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
-    checked(d, |v| v > 0.0 && v.is_finite(), "a number above 0")
-}
-
-fn not_negative<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
-    checked(d, |v| v >= 0.0 && v.is_finite(), "a number not below 0")
-}
-
-fn celsius<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
-    checked(d, |v| (-40.0..=85.0).contains(&v), "a temperature from -40 to 85 degC")
-}
-
-fn pulse<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
-    checked(d, |v| (1000.0..=2000.0).contains(&v), "a pulse from 1000 to 2000 us")
-}
-
-fn log_rate<'de, D: Deserializer<'de>>(d: D) -> Result<u32, D::Error> {
-    let rate = u32::deserialize(d)?;
-    if (1..=100).contains(&rate) && 1000 % rate == 0 {
-        Ok(rate)
-    } else {
-        Err(D::Error::custom(format!("expected a rate from 1 to 100 Hz that divides 1000, found {rate}")))
-    }
-}
-
-fn steps<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<Step>, D::Error> {
-    let list = Vec::<Step>::deserialize(d)?;
-    let most = frame::message::MAX_UPLOAD;
-    if (1..=most).contains(&list.len()) {
-        Ok(list)
-    } else {
-        Err(D::Error::custom(format!("expected 1 to {most} steps, found {}", list.len())))
-    }
-}
-
 fn motor_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
     let name = String::deserialize(d)?;
     if Motor::named(&name).is_some() {
@@ -437,4 +217,50 @@ fn propeller_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
 #[must_use]
 pub(crate) fn pulse_width(us: f64) -> PulseWidth {
     PulseWidth((us * 1000.0 + 0.5) as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Scenario, ScenarioError> {
+        Scenario::parse(text, Path::new("run.toml"))
+    }
+
+    #[test]
+    fn an_empty_file_is_the_demonstration() {
+        assert_eq!(parse("").unwrap(), Scenario { seed: 1, ..Scenario::demo(1, None).unwrap() });
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        for entry in effect::catalogue() {
+            let s = Scenario::demo(4, Some(entry.id)).unwrap();
+            assert_eq!(parse(&toml::to_string(&s).unwrap()).unwrap(), s);
+        }
+        assert!(matches!(Scenario::demo(4, Some("gremlin")), Err(ScenarioError::UnknownEffect(_))));
+    }
+
+    #[test]
+    fn refusals_name_file_line_and_column() {
+        for (text, start, word) in [
+            ("seed = 1\nmoter = \"570KV\"\n", "run.toml:2:1: ", "moter"),
+            ("seed = 1\nmotor = \"571KV\"\n", "run.toml:2:9: ", "570KV"),
+            ("[log]\nrate_hz = 7\n", "run.toml:2:11: ", "divides 1000"),
+            ("[air]\ntemperature_c = \"warm\"\n", "run.toml:2:17: ", "f64"),
+            ("rest_s = -1.0\n", "run.toml:1:10: ", "above 0"),
+            ("[[effect]]\nid = \"supply_sag\"\n", "run.toml:1:1: ", "resistance_ohm"),
+            ("seed = \n", "run.toml:1:", ""),
+        ] {
+            let message = parse(text).unwrap_err().to_string();
+            assert!(message.starts_with(start), "{message}");
+            assert!(message.contains(word) && !message.contains('\n'), "{message}");
+        }
+    }
+
+    #[test]
+    fn durations() {
+        assert_eq!(Schedule::UpDown { step_us: 50.0, hold_s: 8.0, top_us: 2000.0 }.duration_s(), 41.0 * 8.0);
+        assert_eq!(Schedule::Staircase { step_us: 50.0, hold_s: 30.0, top_us: 2000.0 }.duration_s(), 630.0);
+    }
 }

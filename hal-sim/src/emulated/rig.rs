@@ -1,0 +1,228 @@
+//! The motor rig on the emulator: the flash image against the same bench as the native run.
+//!
+//! What it is: a [`World`] in which the image's pulses drive the bench's ESC, the bench's sensors drive the capture pins at
+//! exact instants and set the ADC codes, and an [`Operator`] talks to the board over its serial line.
+//! What can go wrong: a pin that is not switched to its timer carries nothing, here as on the board. A pulse is noticed at
+//! most 0.1 ms after its edge (the bench's step); its width is exact.
+//! Units: ns since power-up of the board; counts; ns of pulse.
+//! Reference: pin table in `firmware-rig/src/board/mod.rs`, written down here again on purpose.
+
+use super::machine::{EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
+use crate::bench::{Bench, STEP_NS, Truth};
+use crate::scenario::Scenario;
+use crate::sensor::EdgeDetail;
+use frame::message::{Beep, Command, Message};
+use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
+use frame::units::Ticks;
+use frame::wire::{Decoder, Encoder, LinkStats, MAX_WIRE};
+
+/// Capture channels: pin of port A with AF1, and channel of TIM2.
+const CAPTURE_PINS: [(u8, u8); CAPTURE_CHANNELS] = [(0, 1), (1, 2), (2, 3), (3, 4)];
+/// Alternate function of TIM2 on those pins.
+const CAPTURE_FUNCTION: u8 = 1;
+/// ADC1 inputs of strain, torque, current, voltage, temperature.
+const ADC_INPUTS: [u8; ADC_CHANNELS] = [10, 11, 12, 13, 14];
+/// ESC pulse: pin of port A with AF2, TIM3 channel 1.
+const PULSE_PIN: (u8, u8) = (6, 2);
+/// Operator's stop key: pin of port B, active low.
+const STOP_PIN: u8 = 12;
+const MS: u64 = 1_000_000;
+
+/// What an operator does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Action {
+    /// Sends a command to the board.
+    Send(Command),
+    /// Throws the ESC's power switch.
+    Power(bool),
+    /// Presses (or lets go) the stop key.
+    StopKey(bool),
+    /// The run of the schedule begins: effects count their time from here.
+    StartRun,
+}
+
+/// What an operator learns in a millisecond.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Heard {
+    /// The board sent a message.
+    Board(Message),
+    /// The ESC beeped.
+    Esc(Beep),
+}
+
+/// Who sits at the host.
+pub trait Operator: Send {
+    /// Called every millisecond; does something by pushing onto `actions`.
+    fn millisecond(&mut self, ms: u64, heard: &[Heard], actions: &mut Vec<Action>);
+}
+
+/// One pulse seen on the ESC pin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SeenPulse {
+    /// When its rising edge was noticed, ns.
+    pub at_ns: u64,
+    /// Its width, ns.
+    pub width_ns: u64,
+    /// Time to the next one as the timer stands, ns.
+    pub period_ns: u64,
+}
+
+/// Rig, bench and operator around the board.
+pub struct RigWorld<O> {
+    bench: Bench,
+    operator: O,
+    decoder: Decoder,
+    encoder: Encoder,
+    read: usize,
+    next_ms: u64,
+    connected: bool,
+    running_pulse: Option<PulseTrain>,
+    pulses: Vec<SeenPulse>,
+    truth: Vec<(u64, Truth)>,
+    messages: Vec<(Ticks, Message)>,
+}
+
+impl<O: Operator> RigWorld<O> {
+    fn new(scenario: &Scenario, operator: O) -> Self {
+        Self {
+            bench: Bench::new(scenario, None, EdgeDetail::Pins),
+            operator,
+            decoder: Decoder::default(),
+            encoder: Encoder::default(),
+            read: 0,
+            next_ms: 0,
+            connected: false,
+            running_pulse: None,
+            pulses: Vec::new(),
+            truth: Vec::new(),
+            messages: Vec::new(),
+        }
+    }
+
+    /// Passes the ESC pulse from the pin to the bench when it has ended.
+    fn watch_pulse(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
+        let muxed = pins.alternate(Port::A, PULSE_PIN.0) == Some(PULSE_PIN.1);
+        let train = pins.pulses(GeneralTimer::Tim3, 1).filter(|train| muxed && train.high);
+        match (train, self.running_pulse) {
+            (Some(train), None) => {
+                self.running_pulse = Some(train);
+                self.pulses.push(SeenPulse { at_ns: now_ns, width_ns: train.width_ns, period_ns: train.period_ns });
+            }
+            (None, Some(train)) => {
+                self.running_pulse = None;
+                self.bench.pulse(now_ns, train.width_ns as u32);
+            }
+            _ => {}
+        }
+    }
+
+    /// Drives every edge that is due.
+    fn drive_edges(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
+        while let Some(edge) = self.bench.edge_until(now_ns) {
+            let (_, channel) = CAPTURE_PINS[usize::from(edge.channel)];
+            if self.connected {
+                pins.drive_timer(GeneralTimer::Tim2, channel, edge.rising);
+            }
+        }
+    }
+
+    /// Once the image has switched its capture pins to the timer, their levels reach it.
+    fn connect(&mut self, pins: &mut Pins<'_>) {
+        let muxed = CAPTURE_PINS.iter().all(|(pin, _)| pins.alternate(Port::A, *pin) == Some(CAPTURE_FUNCTION));
+        if muxed && !self.connected {
+            for (n, (_, channel)) in CAPTURE_PINS.iter().enumerate() {
+                pins.drive_timer(GeneralTimer::Tim2, *channel, self.bench.level(n));
+            }
+        }
+        self.connected = muxed;
+    }
+
+    fn converse(&mut self, ms: u64, pins: &mut Pins<'_>) {
+        let mut heard = Vec::new();
+        let bytes = pins.heard();
+        for byte in &bytes[self.read.min(bytes.len())..] {
+            if let Some(received) = self.decoder.push::<Message>(*byte) {
+                self.messages.push((received.at, received.message));
+                heard.push(Heard::Board(received.message));
+            }
+        }
+        self.read = bytes.len();
+        while let Some((_, beep)) = self.bench.beep() {
+            heard.push(Heard::Esc(beep));
+        }
+        let mut actions = Vec::new();
+        self.operator.millisecond(ms, &heard, &mut actions);
+        for action in actions {
+            match action {
+                Action::Send(command) => {
+                    let mut wire = [0; MAX_WIRE];
+                    if let Ok(used) = self.encoder.encode(Ticks::from_ms(ms), &command, &mut wire) {
+                        pins.say(&wire[..used]);
+                    }
+                }
+                Action::Power(on) => self.bench.set_power(on),
+                Action::StopKey(pressed) => pins.drive(Port::B, STOP_PIN, !pressed),
+                Action::StartRun => self.bench.start_run(),
+            }
+        }
+    }
+}
+
+impl<O: Operator> World for RigWorld<O> {
+    fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
+        self.drive_edges(now_ns, pins);
+        if now_ns >= self.bench.horizon_ns() {
+            self.watch_pulse(now_ns, pins);
+            for (n, input) in ADC_INPUTS.iter().enumerate() {
+                let code = self.bench.convert(n);
+                pins.set_adc(*input, code);
+            }
+            if now_ns >= self.next_ms * MS {
+                if self.next_ms == 0 {
+                    pins.drive(Port::B, STOP_PIN, true);
+                }
+                self.connect(pins);
+                self.converse(self.next_ms, pins);
+                self.truth.push((now_ns, self.bench.truth()));
+                self.next_ms += 1;
+            }
+            self.bench.advance_to(now_ns + STEP_NS);
+        }
+        self.bench.next_edge_ns().map_or(self.bench.horizon_ns(), |edge| edge.min(self.bench.horizon_ns()))
+    }
+}
+
+/// What a rig run leaves behind.
+#[derive(Debug)]
+pub struct RigRun<O> {
+    /// The operator as the run left them.
+    pub operator: O,
+    /// Every decoded message with the board's time of sending.
+    pub messages: Vec<(Ticks, Message)>,
+    /// Counters of the host's decoder.
+    pub link: LinkStats,
+    /// Every pulse on the ESC pin.
+    pub pulses: Vec<SeenPulse>,
+    /// What was really there, every millisecond.
+    pub truth: Vec<(u64, Truth)>,
+    /// The run itself.
+    pub outcome: Outcome<()>,
+}
+
+/// Runs the rig image for `milliseconds` on the bench of `scenario` with `operator` at the host.
+///
+/// # Errors
+/// [`EmulatedError`] when there is no image or the emulator gives up.
+pub fn rig<O: Operator + 'static>(scenario: &Scenario, operator: O, milliseconds: u64) -> Result<RigRun<O>, EmulatedError> {
+    let elf = firmware("firmware-rig")?;
+    let outcome = run(&elf, Machine::new()?, RigWorld::new(scenario, operator), milliseconds * MS)?;
+    let Outcome { world, telemetry, now_ns, instructions, accesses, machine } = outcome;
+    Ok(RigRun {
+        operator: world.operator,
+        messages: world.messages,
+        link: world.decoder.stats(),
+        pulses: world.pulses,
+        truth: world.truth,
+        outcome: Outcome { world: (), telemetry, now_ns, instructions, accesses, machine },
+    })
+}
