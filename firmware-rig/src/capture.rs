@@ -4,11 +4,12 @@
 //! edges of the same mark over the shortest whole number of revolutions of at least 50 ms.
 //! What can go wrong: edges that were overwritten restart the history (`OverCapture`); silence is `Lost` while the rotor is
 //! known to turn and `Stopped` after the time-out; a channel 1 % off the median twice running is flagged `Disagrees`.
-//! The pattern verdicts (`Missed`, `Doubled`, `Alternating`) come from [`CaptureChannel::periods`].
+//! Within a reading the pattern of the periods is judged as well ([`crate::pattern`]).
 //! Units: ticks of the capture timer; all differences of raw captures wrap at 32 bits.
 //! Reference: specification `rig.md`, "Four RPM capture channels"; Beharie 2013, sections 5.4 and 5.7.2.
 
 use crate::config::{CaptureTimes, Config};
+use crate::pattern::judge;
 use frame::rig::{CAPTURE_CHANNELS, CaptureCode, CaptureVerdict};
 use frame::units::{RevPerMin, Ticks};
 
@@ -60,7 +61,7 @@ impl CaptureChannel {
         (back < self.held).then(|| (self.next + DEPTH - 1 - back) % DEPTH).and_then(|i| self.ring.get(i).copied())
     }
 
-    /// Times between successive edges, the latest first: for tests of the pattern.
+    /// Times between successive edges, the latest first.
     pub fn periods(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.held).map_while(|i| Some(self.edge(i)?.wrapping_sub(self.edge(i + 1)?)))
     }
@@ -178,7 +179,8 @@ impl CaptureChannel {
             return full(CaptureVerdict::OverCapture);
         }
         if self.is_turning(now) {
-            return full(CaptureVerdict::Nominal);
+            let edges = self.reading.map_or(0, |(edges, _)| usize::from(edges));
+            return full(judge(self.marks, self.periods().take(edges)));
         }
         match others {
             Some((revolution, since)) => {
@@ -242,7 +244,7 @@ impl CaptureBank {
         median(speeds.map(|s| s.map(|v| v.0))).map(RevPerMin)
     }
 
-    /// Channels that were lost or disagreed in the last sample.
+    /// Channels whose speed could not be trusted in the last sample.
     #[must_use]
     pub fn flagged(&self) -> u8 {
         self.flagged
@@ -273,7 +275,10 @@ impl CaptureBank {
             // An over-capture is told once, and on until a whole span has been seen again or the rotor stands.
             channel.overwritten &= channel.reading.is_none() && now.since(channel.last).0 <= channel.stop_after();
         }
-        let bad = |code: &&CaptureCode| matches!(code.verdict, CaptureVerdict::Disagrees | CaptureVerdict::Lost);
+        let bad = |code: &&CaptureCode| {
+            use CaptureVerdict::{Disagrees, Doubled, Lost, Missed};
+            matches!(code.verdict, Disagrees | Doubled | Lost | Missed)
+        };
         self.flagged = codes.iter().filter(bad).count() as u8;
         codes
     }

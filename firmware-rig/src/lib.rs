@@ -19,6 +19,7 @@ extern crate std;
 pub mod capture;
 pub mod config;
 mod operator;
+pub mod pattern;
 pub mod rig;
 pub mod sampling;
 pub mod strain;

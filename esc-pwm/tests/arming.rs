@@ -1,0 +1,149 @@
+//! The arming machine, explored: every state, event and combination of objections.
+
+use esc_pwm::arming::{STATES, TABLE, message};
+use esc_pwm::{ArmingEvent, ArmingTimes, Objections, Step, pulse_for, step, time_out};
+use frame::rig::{Refusals, RigState};
+use frame::units::PulseWidth;
+use std::collections::BTreeSet;
+
+const RUN_UNLESS: u16 = Refusals::FAULT_LATCHED | Refusals::OUT_OF_RANGE | Refusals::EMPTY_SCHEDULE;
+const CALIBRATE_UNLESS: u16 = Refusals::FAULT_LATCHED
+    | Refusals::THROTTLE_NOT_LOW
+    | Refusals::NO_LOW_INTERVAL
+    | Refusals::ROTOR_TURNING
+    | Refusals::ESC_POWERED
+    | Refusals::NOT_CONFIRMED;
+
+/// Every combination of the nine objections.
+fn objections() -> impl Iterator<Item = Objections> {
+    (0..1u16 << 9).map(Refusals)
+}
+
+/// States reachable from reset, with one way each was reached.
+fn reachable() -> BTreeSet<u8> {
+    let mut seen = BTreeSet::from([RigState::Disarmed as u8]);
+    let mut open = Vec::from([RigState::Disarmed]);
+    while let Some(state) = open.pop() {
+        for event in ArmingEvent::ALL {
+            for guard in objections() {
+                if let Step::To(next) = step(state, event, guard)
+                    && seen.insert(next as u8)
+                {
+                    open.push(next);
+                }
+            }
+        }
+    }
+    seen
+}
+
+#[test]
+fn every_state_is_reachable_and_no_row_is_dead() {
+    assert_eq!(reachable().len(), STATES.len());
+    for (i, a) in TABLE.iter().enumerate() {
+        assert!(!TABLE[..i].iter().any(|b| b.from == a.from && b.on == a.on), "row {a:?} is hidden by an earlier one");
+    }
+}
+
+/// Pulses above minimum only in Running and CalibrateHoldMax, whatever is commanded.
+#[test]
+fn live_pulses_in_two_states_only() {
+    for state in STATES {
+        for commanded in [0, 999_999, 1_000_000, 1_000_001, 1_500_000, 2_000_000, u32::MAX] {
+            let pulse = pulse_for(state, PulseWidth(commanded));
+            assert!(pulse >= PulseWidth::MIN && pulse <= PulseWidth::MAX);
+            if !matches!(state, RigState::Running | RigState::CalibrateHoldMax) {
+                assert_eq!(pulse, PulseWidth::MIN, "{state:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn stop_and_trip_give_minimum_from_every_state() {
+    for state in STATES {
+        for guard in objections() {
+            for event in [ArmingEvent::Stop, ArmingEvent::Trip] {
+                let Step::To(next) = step(state, event, guard) else { panic!("{event:?} in {state:?} was not taken") };
+                assert_eq!(pulse_for(next, PulseWidth::MAX), PulseWidth::MIN);
+                assert!(matches!(next, RigState::Faulted | RigState::ProgrammingEscape));
+            }
+        }
+    }
+}
+
+/// The only ways into the two live states.
+#[test]
+fn live_states_are_entered_by_their_own_command_only() {
+    for state in STATES {
+        for event in ArmingEvent::ALL {
+            for guard in objections() {
+                match step(state, event, guard) {
+                    Step::To(RigState::Running) => {
+                        assert!(matches!(state, RigState::Armed | RigState::Running) && event == ArmingEvent::Run);
+                        assert_eq!(guard.0 & RUN_UNLESS, 0);
+                    }
+                    Step::To(RigState::CalibrateHoldMax) => {
+                        assert!(state == RigState::Disarmed && event == ArmingEvent::Calibrate);
+                        assert_eq!(guard.0 & (Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED | Refusals::FAULT_LATCHED), 0);
+                    }
+                    Step::To(RigState::Armed) => assert!(
+                        matches!(event, ArmingEvent::Ready | ArmingEvent::Finished),
+                        "{state:?} {event:?} armed without the ESC's own answer"
+                    ),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
+
+/// A latched state is left by the operator's clearing alone, and never towards a live state.
+#[test]
+fn faults_latch() {
+    for event in ArmingEvent::ALL {
+        for guard in objections() {
+            for state in [RigState::Faulted, RigState::ProgrammingEscape] {
+                if let Step::To(next) = step(state, event, guard)
+                    && next != state
+                {
+                    assert_eq!((event, next), (ArmingEvent::Clear, RigState::Disarmed));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_refusal_lists_every_reason() {
+    let all = Refusals((1 << 9) - 1);
+    assert_eq!(step(RigState::Disarmed, ArmingEvent::Calibrate, all), Step::Refused(Refusals(CALIBRATE_UNLESS)));
+    assert_eq!(
+        step(RigState::Running, ArmingEvent::Arm, Refusals(Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW)),
+        Step::Refused(Refusals(Refusals::WRONG_STATE | Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW))
+    );
+}
+
+#[test]
+fn the_two_start_procedures() {
+    use ArmingEvent::{Arm, Calibrate, Cells, Double, Long, Ready, Run};
+    let walk = |events: &[ArmingEvent]| {
+        events.iter().fold(RigState::Disarmed, |state, event| match step(state, *event, Refusals::default()) {
+            Step::To(next) => next,
+            _ => state,
+        })
+    };
+    assert_eq!(walk(&[Arm, Long, Cells, Ready]), RigState::Armed);
+    assert_eq!(walk(&[Arm, Cells, Ready]), RigState::ArmHoldMin, "beeps out of order do not arm");
+    assert_eq!(walk(&[Calibrate, Double, Long, Cells, Ready, Run]), RigState::Running);
+    assert_eq!(walk(&[Calibrate, Run]), RigState::CalibrateHoldMax);
+}
+
+#[test]
+fn every_waiting_state_has_a_time_out_that_is_taken() {
+    for state in STATES {
+        let taken = matches!(step(state, ArmingEvent::TimeOut, Refusals::default()), Step::To(_));
+        assert_eq!(time_out(state, &ArmingTimes::default()).is_some(), taken, "{state:?}");
+        assert!(!message(state).is_empty());
+    }
+}

@@ -1,0 +1,115 @@
+//! What the pattern of one channel's periods says of its sensor.
+//!
+//! What it is: a window of four periods moves over the edges of a reading and looks for a period that is too long between two
+//! short ones (a mark was missed), two that share the time of one (a mark was seen twice), and, for two marks, periods
+//! that are long and short by turns.
+//! What can go wrong: a rotor that speeds up changes all periods the same way and matches none of these; the newest period has
+//! one neighbour only and is judged in the next reading.
+//! Units: ticks; ratios.
+//! Reference: specification `rig.md`, "missed- and double-pulse detection, alternating-period detection"; Beharie 2013,
+//! Fig. 5.14 and 5.27.
+
+use frame::rig::CaptureVerdict;
+
+/// A period this many tenths of both neighbours hides a missed mark.
+const MISSED_TENTHS: u64 = 16;
+/// Two periods that together stay below this many tenths of both neighbours are one mark seen twice.
+const DOUBLED_TENTHS: u64 = 13;
+/// Difference between even and odd periods, in per cent of their mean, that counts as alternating.
+const ALTERNATING_PERCENT: u64 = 10;
+/// Fewest periods that show a pattern of two.
+const ALTERNATING_PERIODS: u32 = 6;
+
+/// Judges `periods`, the latest first, of a channel with `marks` marks a revolution.
+pub fn judge(marks: u16, periods: impl Iterator<Item = u32>) -> CaptureVerdict {
+    let mut window = [0u64; 4];
+    let mut seen = 0u32;
+    let mut by_turns = marks == 2;
+    let mut sums = [0u64; 2];
+    let mut found = CaptureVerdict::Nominal;
+    for period in periods {
+        let period = u64::from(period);
+        let [_, a, b, c] = window;
+        window = [a, b, c, period];
+        seen += 1;
+        let [even, odd] = &mut sums;
+        *(if seen.is_multiple_of(2) { even } else { odd }) += period;
+        if seen >= 3 {
+            let [_, before, middle, after] = window;
+            by_turns &= (before < middle) == (after < middle);
+            if 10 * middle > MISSED_TENTHS * before.max(after) {
+                found = CaptureVerdict::Missed;
+            }
+        }
+        if seen >= 4 {
+            let [before, first, second, after] = window;
+            if 10 * (first + second) < DOUBLED_TENTHS * before.min(after) {
+                found = CaptureVerdict::Doubled;
+            }
+        }
+    }
+    let [even, odd] = sums;
+    let uneven = 100 * even.abs_diff(odd) > ALTERNATING_PERCENT * (even + odd) / 2;
+    if by_turns && uneven && seen >= ALTERNATING_PERIODS && seen.is_multiple_of(2) { CaptureVerdict::Alternating } else { found }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use CaptureVerdict::{Alternating, Doubled, Missed, Nominal};
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn of(marks: u16, periods: &[u32]) -> CaptureVerdict {
+        judge(marks, periods.iter().copied())
+    }
+
+    #[test]
+    fn one_of_each() {
+        assert_eq!(of(2, &[100; 10]), Nominal);
+        assert_eq!(of(25, &[100, 100, 200, 100, 100]), Missed);
+        assert_eq!(of(1, &[100, 100, 30, 70, 100, 100]), Doubled);
+        assert_eq!(of(2, &[90, 110, 90, 110, 90, 110]), Alternating);
+        assert_eq!(of(2, &[35, 65, 35, 65, 35, 65]), Alternating, "two marks far from opposite, and no missed ones");
+        assert_eq!(of(2, &[98, 102, 98, 102, 98, 102]), Nominal, "within the tolerance of a magnet glued by hand");
+        assert_eq!(of(1, &[90, 110, 90, 110, 90, 110]), Nominal, "one mark cannot alternate by itself");
+        assert_eq!(of(2, &[]), Nominal);
+    }
+
+    proptest! {
+        /// A rotor that speeds up or slows down steadily, with the electrical error of an encoder, is not at fault.
+        #[test]
+        fn steady_change_is_nominal(
+            first in 1000u32..1_000_000,
+            per_mille in -200i64..200,
+            jitter in proptest::collection::vec(-60i64..60, 8..60),
+            marks in prop_oneof![Just(1u16), Just(2), Just(25)],
+        ) {
+            let mut period = i64::from(first);
+            let periods: Vec<u32> = jitter.iter().map(|j| {
+                period = (period + period * per_mille / 1000).clamp(100, 1 << 30);
+                let jitter = if marks == 25 { period * j / 1000 } else { 0 };
+                (period + jitter) as u32
+            }).collect();
+            prop_assert_eq!(of(marks, &periods), Nominal);
+        }
+
+        /// One mark left out, anywhere but at the ends, is found at any speed.
+        #[test]
+        fn a_missed_mark_is_found(period in 100u32..1_000_000, n in 3usize..40, at in 1usize..39) {
+            prop_assume!(at + 1 < n);
+            let mut periods = std::vec![period; n];
+            periods[at] = 2 * period;
+            prop_assert_eq!(of(25, &periods), Missed);
+        }
+
+        #[test]
+        fn a_doubled_mark_is_found(period in 100u32..1_000_000, n in 4usize..40, at in 1usize..38, split in 1u32..100) {
+            prop_assume!(at + 2 < n);
+            let mut periods = std::vec![period; n];
+            periods[at] = period * split / 100;
+            periods[at + 1] = period - periods[at];
+            prop_assert_eq!(of(25, &periods), Doubled);
+        }
+    }
+}
