@@ -13,6 +13,7 @@
 
 pub mod ahrs;
 mod machine;
+pub mod operator;
 pub mod rig;
 
 pub use machine::{
