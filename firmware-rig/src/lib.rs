@@ -20,6 +20,7 @@ pub mod capture;
 pub mod config;
 mod operator;
 pub mod pattern;
+pub mod queue;
 pub mod rig;
 pub mod sampling;
 pub mod strain;

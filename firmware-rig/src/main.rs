@@ -18,7 +18,7 @@ fn main() {
 #[cfg(target_os = "none")]
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use crate::board::captures::{self, Clock, EdgeQueue, Edges, EdgesIn, EdgesOut};
+    use crate::board::captures::{self, Clock, Edges};
     use crate::board::converter::Converter;
     use crate::board::link::Link;
     use crate::board::pulse::PulseOutput;
@@ -44,8 +44,6 @@ mod app {
 
     #[local]
     struct Local {
-        edges_in: EdgesIn,
-        edges_out: EdgesOut,
         edges: Edges,
         clock: Clock,
         converter: Converter,
@@ -60,12 +58,7 @@ mod app {
         reset_cause: u8,
     }
 
-    #[init(local = [
-        beam: EdgeQueue = EdgeQueue::new(),
-        opto: EdgeQueue = EdgeQueue::new(),
-        hall: EdgeQueue = EdgeQueue::new(),
-        encoder: EdgeQueue = EdgeQueue::new(),
-    ])]
+    #[init]
     fn init(cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
         let reset_cause = take_reset_cause(&device.RCC);
@@ -115,13 +108,7 @@ mod app {
         tick_timer.cr1().write(|w| w.cen().set_bit());
         let watchdog = Watchdog::start(device.IWDG);
 
-        let (beam_in, beam_out) = cx.local.beam.split();
-        let (opto_in, opto_out) = cx.local.opto.split();
-        let (hall_in, hall_out) = cx.local.hall.split();
-        let (encoder_in, encoder_out) = cx.local.encoder.split();
         let local = Local {
-            edges_in: [beam_in, opto_in, hall_in, encoder_in],
-            edges_out: [beam_out, opto_out, hall_out, encoder_out],
             edges: Edges::default(),
             clock,
             converter,
@@ -145,19 +132,18 @@ mod app {
         }
     }
 
-    #[task(binds = TIM2, priority = 3, shared = [capture_timer], local = [edges_in])]
+    #[task(binds = TIM2, priority = 3, shared = [capture_timer])]
     fn capture(mut cx: capture::Context) {
-        let queues = cx.local.edges_in;
-        cx.shared.capture_timer.lock(|timer| captures::serve(timer, queues));
+        cx.shared.capture_timer.lock(|timer| captures::serve(timer));
     }
 
     #[task(binds = TIM4, priority = 2, shared = [capture_timer], local = [
-        edges_out, edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, rig, told, reset_cause
+        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, rig, told, reset_cause
     ])]
     fn tick(mut cx: tick::Context) {
         let board = cx.local;
         board.tick_timer.sr().write(|w| w.uif().clear());
-        let over_capture = captures::drain(board.edges_out, board.edges);
+        let over_capture = captures::drain(board.edges);
         let counter = cx.shared.capture_timer.lock(|timer| timer.cnt().read().bits());
         let now = board.clock.now(counter);
         MILLIS.store(now.as_ms() as u32, Ordering::Relaxed);

@@ -7,21 +7,14 @@
 //! Reference: RM0090 section 18.3.5 (input capture), 18.4.5 (CCxIF clears on reading CCRx, CCxOF by writing 0).
 
 use core::sync::atomic::{AtomicU8, Ordering};
+use firmware_rig::queue::{CAPACITY, EdgeQueue};
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::Ticks;
 use heapless::Vec;
-use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::pac::TIM2;
 
-/// Captures a channel can hold between two ticks, plus one.
-pub(crate) const QUEUE: usize = 128;
-/// Queue of one channel.
-pub(crate) type EdgeQueue = Queue<u32, QUEUE>;
-/// Interrupt's ends of the queues.
-pub(crate) type EdgesIn = [Producer<'static, u32>; CAPTURE_CHANNELS];
-/// Tick's ends of the queues.
-pub(crate) type EdgesOut = [Consumer<'static, u32>; CAPTURE_CHANNELS];
-
+/// Captures since the last tick: the interrupt puts them in, the tick takes them out.
+static QUEUES: [EdgeQueue; CAPTURE_CHANNELS] = [const { EdgeQueue::new() }; CAPTURE_CHANNELS];
 /// Channels that lost an edge since the last tick, a bit each.
 static OVERRUN: AtomicU8 = AtomicU8::new(0);
 
@@ -40,20 +33,20 @@ pub(crate) fn start(timer: &TIM2) {
 }
 
 /// The capture interrupt.
-pub(crate) fn serve(timer: &TIM2, queues: &mut EdgesIn) {
+pub(crate) fn serve(timer: &TIM2) {
     let status = timer.sr().read();
     let mut lost = 0;
-    let [a, b, c, d] = queues;
-    if status.cc1if().bit() && a.enqueue(timer.ccr1().read().bits()).is_err() {
+    let [beam, opto, hall, encoder] = &QUEUES;
+    if status.cc1if().bit() && !beam.put(timer.ccr1().read().bits()) {
         lost |= 1;
     }
-    if status.cc2if().bit() && b.enqueue(timer.ccr2().read().bits()).is_err() {
+    if status.cc2if().bit() && !opto.put(timer.ccr2().read().bits()) {
         lost |= 2;
     }
-    if status.cc3if().bit() && c.enqueue(timer.ccr3().read().bits()).is_err() {
+    if status.cc3if().bit() && !hall.put(timer.ccr3().read().bits()) {
         lost |= 4;
     }
-    if status.cc4if().bit() && d.enqueue(timer.ccr4().read().bits()).is_err() {
+    if status.cc4if().bit() && !encoder.put(timer.ccr4().read().bits()) {
         lost |= 8;
     }
     let over = (status.bits() >> 9) as u8 & 0xf; // CC4OF..CC1OF
@@ -67,16 +60,16 @@ pub(crate) fn serve(timer: &TIM2, queues: &mut EdgesIn) {
 }
 
 /// Edges of one tick.
-pub(crate) type Edges = [Vec<u32, QUEUE>; CAPTURE_CHANNELS];
+pub(crate) type Edges = [Vec<u32, CAPACITY>; CAPTURE_CHANNELS];
 
 /// Drains the queues; call it before [`Clock::now`], so that no edge lies in the future.
-pub(crate) fn drain(queues: &mut EdgesOut, edges: &mut Edges) -> [bool; CAPTURE_CHANNELS] {
+pub(crate) fn drain(edges: &mut Edges) -> [bool; CAPTURE_CHANNELS] {
     let lost = OVERRUN.swap(0, Ordering::Relaxed);
-    for (queue, edges) in queues.iter_mut().zip(edges.iter_mut()) {
+    for (queue, edges) in QUEUES.iter().zip(edges.iter_mut()) {
         edges.clear();
         while !edges.is_full() {
-            let Some(edge) = queue.dequeue() else { break };
-            let _ = edges.push(edge);
+            let Some(edge) = queue.take() else { break };
+            let _ = edges.push(edge); // not full: asked above
         }
     }
     [lost & 1 != 0, lost & 2 != 0, lost & 4 != 0, lost & 8 != 0]
