@@ -17,7 +17,7 @@ use frame::units::{RevPerMin, Ticks};
 const DEPTH: usize = 512;
 /// Longest silence that is bridged, in 32-bit captures of the whole timer range.
 const LONGEST_S: u32 = 10;
-/// Deviation from the median that counts as disagreement (specification: 1 % on hardware).
+/// Deviation from the median that counts as disagreement at constant speed (specification: 1 % on hardware).
 const DISAGREEMENT: f32 = 0.01;
 
 /// One capture channel.
@@ -205,6 +205,8 @@ pub struct CaptureBank {
     channels: [CaptureChannel; CAPTURE_CHANNELS],
     timer_hz: u32,
     turning_since: Option<Ticks>,
+    /// Two earlier medians and their times, each at least a revolution and a half after the other.
+    before: [Option<(Ticks, f32)>; 2],
     flagged: u8,
 }
 
@@ -213,7 +215,7 @@ impl CaptureBank {
     #[must_use]
     pub fn new(config: &Config) -> Self {
         let channels = config.marks.map(|marks| CaptureChannel::new(marks, config.timer_hz, config.capture));
-        Self { channels, timer_hz: config.timer_hz, turning_since: None, flagged: 0 }
+        Self { channels, timer_hz: config.timer_hz, turning_since: None, before: [None; 2], flagged: 0 }
     }
 
     /// Takes the captures since the last tick.
@@ -223,6 +225,9 @@ impl CaptureBank {
         }
         let turning = self.channels.iter().any(|c| c.is_turning(now));
         self.turning_since = turning.then(|| self.turning_since.unwrap_or(now));
+        if !turning {
+            self.flagged = 0; // they were lost one after the other because the rotor stopped
+        }
     }
 
     /// The channels.
@@ -263,9 +268,10 @@ impl CaptureBank {
             *speed = healthy(channel, code);
         }
         let middle = median(speeds);
+        let tolerance = self.tolerance(now, middle);
         for ((channel, code), speed) in self.channels.iter_mut().zip(&mut codes).zip(speeds) {
             let apart = match (speed, middle) {
-                (Some(speed), Some(middle)) => (speed - middle).abs() > DISAGREEMENT * middle,
+                (Some(speed), Some(middle)) => (speed - middle).abs() > tolerance * middle,
                 _ => false,
             };
             if apart && channel.deviations > 0 {
@@ -275,12 +281,31 @@ impl CaptureBank {
             // An over-capture is told once, and on until a whole span has been seen again or the rotor stands.
             channel.overwritten &= channel.reading.is_none() && now.since(channel.last).0 <= channel.stop_after();
         }
-        let bad = |code: &&CaptureCode| {
-            use CaptureVerdict::{Disagrees, Doubled, Lost, Missed};
-            matches!(code.verdict, Disagrees | Doubled | Lost | Missed)
+        let bad = |code: &&CaptureCode| match code.verdict {
+            CaptureVerdict::Disagrees | CaptureVerdict::Doubled | CaptureVerdict::Missed => true,
+            CaptureVerdict::Lost => others.is_some(), // all together: the rotor stops
+            _ => false,
         };
         self.flagged = codes.iter().filter(bad).count() as u8;
         codes
+    }
+
+    /// Relative deviation that is still agreement: 1 %, and what the speed changed lately, because the channels' spans begin
+    /// and end up to a revolution and a half apart.
+    fn tolerance(&mut self, now: Ticks, middle: Option<f32>) -> f32 {
+        let Some(middle) = middle.filter(|m| *m > 0.0) else {
+            self.before = [None; 2];
+            return f32::INFINITY;
+        };
+        let apart = (1.5 * 60.0 * self.timer_hz as f32 / middle) as u64;
+        let [older, newer] = self.before;
+        if newer.is_none_or(|(then, _)| now.since(then).0 >= apart) {
+            self.before = [newer, Some((now, middle))];
+        }
+        match older.or(newer) {
+            Some((_, before)) => DISAGREEMENT + (middle - before).abs() / middle,
+            None => f32::INFINITY,
+        }
     }
 }
 

@@ -160,7 +160,7 @@ impl Config {
     #[must_use]
     pub fn log_period(&self) -> Ticks {
         let ms = u64::from(self.timer_hz / 1000);
-        Ticks(self.log_period.0.clamp(10 * ms, 1000 * ms))
+        Ticks(self.log_period.0.max(10 * ms).min(1000 * ms)) // not clamp(): it can panic
     }
 
     /// Ticks of the capture timer in a millisecond.
