@@ -63,7 +63,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         verdict: kind(&diagnosis),
         channels: channels(&context, declared, &diagnosis),
         effects: entries(&context, declared, &diagnosis),
-        alternatives: diagnosis.rivals.iter().filter(|r| !r.0.fit.placed.is_empty()).map(|(c, p)| Alternative { ids: c.ids(), probability: *p }).collect(),
+        alternatives: diagnosis.rivals.iter().map(|r| Alternative { ids: r.ids.clone(), probability: r.probability }).collect(),
         next_experiment: None,
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
     };

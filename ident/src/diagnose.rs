@@ -12,15 +12,19 @@ use crate::context::{Context, Relation};
 use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{self, Effect, Instance};
 use crate::heldout;
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, refine, scan};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, refine, refine_newest, scan};
 
-/// Most effects in one hypothesis.
-const MOST_EFFECTS: usize = 3;
+/// Most effects on one channel.
+const MOST_ON_A_CHANNEL: usize = 3;
+/// Most effects in one hypothesis, over all channels.
+const MOST_EFFECTS: usize = 6;
 /// Net evidence, nats, that an effect must bring beyond its penalty: a library of about fifty instances then raises a false
 /// alarm in about one clean run of a hundred.
 const NEEDED_EVIDENCE: f64 = 7.0;
 /// Share of the held-out error on its first channel that an effect must remove to be worth a name.
 const NEEDED_REDUCTION: f64 = 0.03;
+/// Share of the held-out error below which a further effect is named only if nothing else explains it as well.
+const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
 const REFINED: usize = 7;
 /// Softmax temperature from evidence to probability.
@@ -45,6 +49,17 @@ impl Candidate {
     }
 }
 
+/// Another hypothesis: one effect of the winner replaced.
+#[derive(Debug, Clone)]
+pub struct Rival {
+    /// Its effects.
+    pub ids: Vec<String>,
+    /// Its probability.
+    pub probability: f64,
+    /// Its fit in the round in which it lost.
+    pub fit: Fit,
+}
+
 /// What the search found.
 #[derive(Debug, Clone)]
 pub struct Diagnosis {
@@ -54,8 +69,8 @@ pub struct Diagnosis {
     pub best: Candidate,
     /// Its probability.
     pub probability: f64,
-    /// The others with their probabilities, best first.
-    pub rivals: Vec<(Candidate, f64)>,
+    /// Other hypotheses, most probable first.
+    pub rivals: Vec<Rival>,
     /// The winner is the empirical correction.
     pub unknown: bool,
     /// Held-out errors of the declared model, by target.
@@ -72,7 +87,7 @@ impl Diagnosis {
     /// Whether two hypotheses explain the residual about equally well.
     #[must_use]
     pub fn ambiguous(&self) -> bool {
-        !self.unknown && !self.best.fit.placed.is_empty() && self.rivals.first().is_some_and(|r| r.1 >= RIVAL && !r.0.fit.placed.is_empty())
+        !self.unknown && !self.best.fit.placed.is_empty() && self.rivals.first().is_some_and(|r| r.probability >= RIVAL)
     }
 }
 
@@ -83,87 +98,155 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let folds = heldout::folds(context);
     let heldout_before = heldout::errors(context, declared, &start, &folds);
     let mut best = Candidate { fit: start.clone(), evidence: 0.0 };
-    let mut rivals: Vec<Candidate> = Vec::new();
-    let mut rounds: Vec<Vec<Candidate>> = Vec::new();
+    let mut rounds: Vec<(f64, Vec<(Candidate, f64)>)> = Vec::new();
     let mut errors = heldout_before.clone();
+    let mut offers = offers(context);
     for round in 0..MOST_EFFECTS {
-        let ranked = round_of(context, declared, &best, &start, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
-        let Some((winner, held)) = ranked.iter().find_map(|c| {
-            (c.evidence > best.evidence + NEEDED_EVIDENCE).then(|| heldout::errors(context, declared, &c.fit, &folds)).filter(|held| worth_a_name(context, c, held, &errors)).map(|held| (c.clone(), held))
-        }) else {
-            break;
-        };
-        best = winner;
-        errors = held;
-        rounds.push(ranked);
+        let ranked = round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
+        let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else { break };
+        best = chosen.winner;
+        errors = chosen.held;
+        rounds.push((chosen.probability, chosen.rivals));
     }
-    if let Some(last) = rounds.pop() {
-        let ids = best.ids();
-        rivals.extend(last.into_iter().filter(|c| c.ids() != ids));
-    }
+    let mut probability: f64 = rounds.iter().map(|r| r.0).product();
+    let mut rivals = rivals_of(&best, rounds);
     let unknown = opponent(context, declared, &start, &folds, &heldout_before, &best, &errors);
     let is_unknown = unknown.is_some();
     if let Some((candidate, held)) = unknown {
-        rivals.insert(0, std::mem::replace(&mut best, candidate));
+        let named = std::mem::replace(&mut best, candidate);
+        let p = 1.0 / (1.0 + ((named.evidence - best.evidence) / TEMPERATURE).exp());
+        rivals.clear();
+        if !named.fit.placed.is_empty() {
+            rivals.push(Rival { ids: named.ids(), probability: 1.0 - p, fit: named.fit });
+        }
+        probability = p;
         errors = held;
     }
     let heldout_without = (0..best.fit.placed.len())
         .map(|k| without(context, declared, &best.fit, k, &start).map_or_else(|| heldout_before.clone(), |f| heldout::errors(context, declared, &f, &folds)))
         .collect();
     progress(1.0);
-    let (probability, rivals) = probabilities(&best, rivals);
     Some(Diagnosis { declared: start, best, probability, rivals, unknown: is_unknown, heldout_before, heldout_after: errors, heldout_without, folds })
 }
 
-/// Every instance of every effect added to `best`, refined where promising, best first.
-fn round_of(context: &Context, declared: Declared<'_>, best: &Candidate, start: &Fit, progress: &mut dyn FnMut(f64)) -> Vec<Candidate> {
-    let used: Vec<&str> = best.fit.placed.iter().map(|p| p.effect.id()).collect();
-    let offers: Vec<(&'static dyn Effect, Instance)> = effects::library()
+/// What a scan of one instance gave; it stays valid until an effect is added on one of its channels.
+struct Scanned {
+    effect: &'static dyn Effect,
+    instance: Instance,
+    found: Option<(Vec<f64>, f64)>,
+}
+
+/// Every instance of every effect that the log could hold, scanned against the declared model.
+fn offers(context: &Context) -> Vec<Scanned> {
+    effects::library()
         .iter()
-        .filter(|e| !used.contains(&e.id()))
-        .flat_map(|e| e.instances(context).into_iter().map(|i| (*e, i)))
-        .collect();
-    let mut scanned: Vec<(f64, Vec<Placed>)> = Vec::new();
-    for (k, (effect, instance)) in offers.iter().enumerate() {
-        progress(0.7 * k as f64 / offers.len() as f64);
-        if let Some((shape, gain)) = scan(context, declared, &best.fit.placed, *effect, instance) {
-            let mut placed = best.fit.placed.clone();
-            placed.push(Placed { effect: *effect, instance: instance.clone(), shape });
-            scanned.push((gain - penalty(context, placed.last().unwrap_or(&best.fit.placed[0])), placed));
-        }
-    }
-    scanned.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut out: Vec<Candidate> = Vec::new();
-    let mut refined = 0;
-    for (k, (gain, placed)) in scanned.into_iter().enumerate() {
-        progress(0.7 + 0.3 * (k as f64 / offers.len() as f64).min(1.0));
-        if gain < -20.0 {
+        .flat_map(|e| e.instances(context).into_iter().map(|instance| Scanned { effect: *e, instance, found: None }))
+        .collect()
+}
+
+/// Whether an instance may join: not twice the same effect on a channel, not too many effects on one channel.
+fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
+    instance.channels.iter().all(|c| {
+        let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
+        there.len() < MOST_ON_A_CHANNEL && there.iter().all(|p| p.effect.id() != effect.id())
+    })
+}
+
+/// Every instance added to `best`, refined where promising, best first.
+fn round_of(context: &Context, declared: Declared<'_>, best: &Candidate, offers: &mut [Scanned], progress: &mut dyn FnMut(f64)) -> Vec<Candidate> {
+    let count = offers.len().max(1) as f64;
+    let newest = best.fit.placed.last();
+    let mut ranked: Vec<(f64, Vec<Placed>)> = Vec::new();
+    for (k, offer) in offers.iter_mut().enumerate() {
+        progress(0.7 * k as f64 / count);
+        if !may_join(&best.fit.placed, offer.effect, &offer.instance) {
             continue;
         }
-        let placed = if refined < REFINED {
-            refined += 1;
-            refine(context, declared, &placed, Rows::All, 60 + 60 * placed.len())
-        } else {
-            placed
-        };
-        let Some(candidate) = candidate(context, declared, start, placed) else { continue };
-        if plausible(context, declared, &candidate.fit) {
-            out.push(candidate);
+        let stale = newest.is_some_and(|n| offer.instance.channels.iter().any(|c| n.instance.touches(c)));
+        if stale || offer.found.is_none() {
+            offer.found = scan(context, declared, &best.fit.placed, offer.effect, &offer.instance);
         }
+        if let Some((shape, gain)) = &offer.found {
+            let added = Placed { effect: offer.effect, instance: offer.instance.clone(), shape: shape.clone() };
+            let net = gain - penalty(context, &added);
+            ranked.push((net, best.fit.placed.iter().cloned().chain([added]).collect()));
+        }
+    }
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut out: Vec<Candidate> = Vec::new();
+    for (k, (gain, placed)) in ranked.into_iter().enumerate() {
+        progress(0.7 + 0.3 * (k as f64 / count));
+        if gain < -20.0 {
+            break;
+        }
+        let placed = if k < REFINED { refine_newest(context, declared, &placed, Rows::All, 120) } else { placed };
+        if let Some(fitted) = fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f)) {
+            out.push(Candidate { fit: fitted, evidence: 0.0 });
+        }
+    }
+    let shares = shares(context, out.iter().map(|c| &c.fit));
+    for c in &mut out {
+        c.evidence = best.evidence + net_gain(context, &c.fit, &best.fit, &shares);
     }
     out.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     out
 }
 
-fn candidate(context: &Context, declared: Declared<'_>, start: &Fit, placed: Vec<Placed>) -> Option<Candidate> {
-    let fitted = fit(context, declared, &placed, Some(start), Rows::All)?;
-    let price: f64 = placed.iter().map(|p| penalty(context, p)).sum();
-    Some(Candidate { evidence: fitted.loglik - start.loglik - price, fit: fitted })
+/// For each target the share of independent samples that the colour of the best fit's residual leaves: the same for every
+/// candidate of a round, so that none wins by leaving a larger but whiter residual.
+fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64> {
+    let mut best = vec![(f64::NEG_INFINITY, 1.0); context.targets.len()];
+    for f in fits {
+        for (b, t) in best.iter_mut().zip(&f.targets) {
+            if t.loglik > b.0 {
+                *b = (t.loglik, t.share);
+            }
+        }
+    }
+    best.into_iter().map(|b| b.1).collect()
+}
+
+/// Evidence, in nats, that the newest effect adds over a fit without it, its price paid.
+fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) -> f64 {
+    let gain: f64 = new.targets.iter().zip(&old.targets).zip(shares).map(|((n, o), share)| share * (n.loglik - o.loglik)).sum();
+    gain - new.placed.last().map_or(0.0, |p| penalty(context, p))
+}
+
+/// What one round chose.
+struct Chosen {
+    winner: Candidate,
+    held: Vec<f64>,
+    probability: f64,
+    rivals: Vec<(Candidate, f64)>,
+}
+
+/// The first candidate in the ranking that brings enough evidence, predicts held-out rows better, and is either clearly itself
+/// or large: a small further effect that could as well be another one is left unnamed.
+fn choose(context: &Context, declared: Declared<'_>, ranked: &[Candidate], best: &Candidate, errors: &[f64], folds: &[Vec<bool>]) -> Option<Chosen> {
+    for (k, winner) in ranked.iter().enumerate().take_while(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
+        let held = heldout::errors_after_newest(context, declared, &winner.fit, folds, errors);
+        if !worth_a_name(context, winner, &held, errors) {
+            continue;
+        }
+        let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
+        let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL);
+        if unclear && !best.fit.placed.is_empty() && largest_reduction(context, winner, &held, errors) < CLEAR_REDUCTION {
+            continue;
+        }
+        return Some(Chosen { winner: winner.clone(), held, probability, rivals });
+    }
+    None
+}
+
+/// Largest share of the held-out error that the newest effect removes from one of its channels.
+fn largest_reduction(context: &Context, candidate: &Candidate, held: &[f64], before: &[f64]) -> f64 {
+    let Some(newest) = candidate.fit.placed.last() else { return 0.0 };
+    context.targets.iter().enumerate().filter(|(_, t)| newest.instance.touches(t.name)).map(|(i, _)| 1.0 - held[i] / before[i]).fold(0.0, f64::max)
 }
 
 /// Price of an effect: half a log of the sample for each parameter, and the log of the grid that was searched.
 fn penalty(context: &Context, placed: &Placed) -> f64 {
-    let n: f64 = context.targets.iter().filter(|t| placed.instance.touches(t.name)).map(|t| t.rows.len() as f64 * t.noise.effective_share() * t.weight).sum();
+    let n: f64 = context.targets.iter().filter(|t| placed.instance.touches(t.name)).map(|t| t.rows.len() as f64 * t.weight).sum();
     let shapes = placed.effect.shapes(context, &placed.instance);
     let grid: usize = shapes.iter().map(|s| s.starts.len()).product();
     let amplitudes = placed.effect.amplitudes(&placed.instance).len().min(placed.instance.channels.len().max(1));
@@ -218,7 +301,7 @@ fn opponent(
 ) -> Option<(Candidate, Vec<f64>)> {
     let mut champion: Option<(f64, Candidate, Vec<f64>)> = None;
     for (i, target) in context.targets.iter().enumerate() {
-        if target.relation == Relation::ThrustRms {
+        if matches!(target.relation, Relation::ThrustRms | Relation::SpeedAlone) {
             continue;
         }
         for variable in variables(context) {
@@ -233,11 +316,13 @@ fn opponent(
             }
             let instance = Instance::new(&[target.name], &variable);
             let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
-            let Some(candidate) = candidate(context, declared, start, vec![Placed { effect: &Unknown, instance, shape }]) else { continue };
+            let Some(fitted) = fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All) else { continue };
+            let shares = shares(context, [&fitted, &best.fit].into_iter());
+            let candidate = Candidate { evidence: net_gain(context, &fitted, start, &shares), fit: fitted };
             if candidate.evidence < 2.0 * NEEDED_EVIDENCE {
                 continue;
             }
-            let held = heldout::errors(context, declared, &candidate.fit, folds);
+            let held = heldout::errors_after_newest(context, declared, &candidate.fit, folds, before);
             let gain = (before[i] / held[i]).ln();
             let rival = (before[i] / named[i]).ln();
             let clearly = gain > (1.0 / (1.0 - NEEDED_REDUCTION)).ln() && (best.fit.placed.is_empty() || gain > rival + 0.15);
@@ -246,30 +331,43 @@ fn opponent(
             }
         }
     }
-    // a name that explains another channel much better than the opponent explains its own stays
-    champion.filter(|(gain, ..)| best.fit.placed.is_empty() || before.iter().zip(named).all(|(b, n)| (b / n).ln() < *gain)).map(|(_, c, h)| (c, h))
+    // names that explain more of the run as a whole stay
+    champion.filter(|(_, c, _)| c.evidence > best.evidence).map(|(_, c, h)| (c, h))
 }
 
-/// Softmax over hypotheses with different sets of effects.
-fn probabilities(best: &Candidate, rivals: Vec<Candidate>) -> (f64, Vec<(Candidate, f64)>) {
-    let mut seen = vec![best.ids()];
-    let mut kept: Vec<Candidate> = Vec::new();
-    for r in rivals {
-        let ids = r.ids();
-        if !seen.contains(&ids) {
-            seen.push(ids);
-            kept.push(r);
+/// Softmax over the effects that could stand in the winner's place: those that share a channel with it, and nothing at all.
+fn probabilities(winner: &Candidate, followers: &[Candidate], nothing: f64) -> (f64, Vec<(Candidate, f64)>) {
+    let Some(newest) = winner.fit.placed.last() else { return (1.0, Vec::new()) };
+    let mut seen = vec![newest.effect.id()];
+    let mut kept: Vec<&Candidate> = Vec::new();
+    for c in followers {
+        let Some(other) = c.fit.placed.last() else { continue };
+        if !seen.contains(&other.effect.id()) && other.instance.channels.iter().any(|ch| newest.instance.touches(ch)) {
+            seen.push(other.effect.id());
+            kept.push(c);
         }
     }
-    let top = best.evidence.max(kept.iter().map(|c| c.evidence).fold(f64::NEG_INFINITY, f64::max));
-    let weight = |e: f64| ((e - top) / TEMPERATURE).exp();
-    // "nothing is there" is a hypothesis like the others, with evidence zero plus what a name must bring
-    let none = if best.fit.placed.is_empty() { 0.0 } else { weight(NEEDED_EVIDENCE) };
-    let total: f64 = weight(best.evidence) + kept.iter().map(|c| weight(c.evidence)).sum::<f64>() + none;
-    let share = |e: f64| weight(e) / total;
-    let probability = share(best.evidence);
-    let mut rivals: Vec<(Candidate, f64)> = kept.into_iter().map(|c| { let p = share(c.evidence); (c, p) }).filter(|(_, p)| *p > 1e-4).collect();
-    rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
-    rivals.truncate(6);
-    (probability, rivals)
+    let weight = |e: f64| ((e - winner.evidence) / TEMPERATURE).exp();
+    let total: f64 = 1.0 + kept.iter().map(|c| weight(c.evidence)).sum::<f64>() + weight(nothing + NEEDED_EVIDENCE);
+    (1.0 / total, kept.into_iter().map(|c| (c.clone(), weight(c.evidence) / total)).collect())
+}
+
+/// The winner with one of its effects replaced by what came close to it in its round.
+fn rivals_of(best: &Candidate, rounds: Vec<(f64, Vec<(Candidate, f64)>)>) -> Vec<Rival> {
+    let product: f64 = rounds.iter().map(|r| r.0).product();
+    let ids = best.ids();
+    let mut out: Vec<Rival> = Vec::new();
+    for (k, (own, rivals)) in rounds.into_iter().enumerate() {
+        for (candidate, p) in rivals {
+            let mut other = ids.clone();
+            if let (Some(slot), Some(placed)) = (other.get_mut(k), candidate.fit.placed.last()) {
+                *slot = placed.effect.id().to_owned();
+            }
+            out.push(Rival { ids: other, probability: product / own * p, fit: candidate.fit });
+        }
+    }
+    out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    out.truncate(6);
+    out.retain(|r| r.probability > 1e-4);
+    out
 }

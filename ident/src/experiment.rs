@@ -34,7 +34,7 @@ fn families(top: f64) -> Vec<(&'static str, Vec<ScheduleStep>)> {
 /// The best of the families for the winner and its closest rival.
 #[must_use]
 pub fn next(context: &Context, model: &Model, diagnosis: &Diagnosis) -> Option<NextExperiment> {
-    let (rival, _) = diagnosis.rivals.first()?;
+    let rival = diagnosis.rivals.first()?;
     let source = Log { name: context.name.clone(), ..Log::default() };
     let other = Model::from_fit(context, &source, Declared::default(), &rival.fit);
     let top = context.pulse.as_ref().map_or(2000.0, |p| p.iter().copied().fold(1000.0, f64::max));
@@ -46,7 +46,7 @@ pub fn next(context: &Context, model: &Model, diagnosis: &Diagnosis) -> Option<N
         why: format!(
             "{} and {} explain this run about equally well; {}: their predictions then differ by {:.1} times the noise (rms)",
             diagnosis.best.ids().join(" + "),
-            rival.ids().join(" + "),
+            rival.ids.join(" + "),
             best.1,
             best.0
         ),

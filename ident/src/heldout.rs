@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md` (`heldout_rms`); blocked cross-validation, Roberts et al. 2017, Ecography 40:913.
 
 use crate::context::Context;
-use crate::hypothesis::{Declared, Fit, Placed, Rows, design, fit_target, refine};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, connected, design, fit_target, refine, refine_newest};
 
 /// For each fold the rows that are left out.
 #[must_use]
@@ -54,27 +54,47 @@ fn levels(context: &Context) -> Vec<Option<usize>> {
 /// Held-out root mean square error of each target of the context under a hypothesis.
 #[must_use]
 pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec<bool>]) -> Vec<f64> {
+    let all = vec![true; context.targets.len()];
+    pooled(context, declared, folds, &all, &|keep| refine(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS))
+        .into_iter()
+        .map(|e| e.unwrap_or(f64::NAN))
+        .collect()
+}
+
+/// The same after an effect was added: targets that no effect of its group touches keep their `previous` error.
+#[must_use]
+pub fn errors_after_newest(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec<bool>], previous: &[f64]) -> Vec<f64> {
+    let Some(newest) = fit.placed.len().checked_sub(1) else { return previous.to_vec() };
+    let group = connected(&fit.placed, newest);
+    let moved: Vec<bool> = context.targets.iter().map(|t| group.iter().any(|k| fit.placed[*k].instance.touches(t.name))).collect();
+    pooled(context, declared, folds, &moved, &|keep| refine_newest(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS))
+        .into_iter()
+        .zip(previous)
+        .map(|(e, p)| e.unwrap_or(*p))
+        .collect()
+}
+
+/// Evaluations that each fold may spend on its shapes, starting from those of all rows.
+const EVALUATIONS: usize = 40;
+
+fn pooled(context: &Context, declared: Declared<'_>, folds: &[Vec<bool>], wanted: &[bool], refined: &dyn Fn(&[bool]) -> Vec<Placed>) -> Vec<Option<f64>> {
     let mut sums = vec![(0.0, 0usize); context.targets.len()];
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
-        let placed = refine(context, declared, &fit.placed, Rows::Where(&keep), 40 * fit.placed.len().min(2));
-        add_fold(context, declared, &placed, &keep, &mut sums);
-    }
-    sums.iter().map(|(s, n)| if *n > 0 { (s / *n as f64).sqrt() } else { f64::NAN }).collect()
-}
-
-fn add_fold(context: &Context, declared: Declared<'_>, placed: &[Placed], keep: &[bool], sums: &mut [(f64, usize)]) {
-    for (target, sum) in context.targets.iter().zip(sums) {
-        let design = design(context, declared, placed, target);
-        let Some(fitted) = fit_target(context, target, &design, Rows::Where(keep)) else { continue };
-        let prediction = design.predict(&fitted.coefficients, context.len());
-        for (row, y) in target.rows.iter().zip(&target.y) {
-            if !keep[*row] {
-                sum.0 += (y - prediction[*row]).powi(2);
-                sum.1 += 1;
+        let placed = refined(&keep);
+        for ((target, sum), _) in context.targets.iter().zip(&mut sums).zip(wanted).filter(|(_, w)| **w) {
+            let design = design(context, declared, &placed, target);
+            let Some(fitted) = fit_target(context, target, &design, Rows::Where(&keep)) else { continue };
+            let prediction = design.predict(&fitted.coefficients, context.len());
+            for (row, y) in target.rows.iter().zip(&target.y) {
+                if out[*row] {
+                    sum.0 += (y - prediction[*row]).powi(2);
+                    sum.1 += 1;
+                }
             }
         }
     }
+    sums.iter().map(|(s, n)| (*n > 0).then(|| (s / *n as f64).sqrt())).collect()
 }
 
 /// Root mean square error of each target over all its rows.

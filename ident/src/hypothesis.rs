@@ -46,8 +46,10 @@ pub struct TargetFit {
     pub labels: Vec<Label>,
     /// Covariance of the coefficients.
     pub covariance: DMatrix<f64>,
-    /// Log-likelihood, weighted for shared rotors and coloured noise.
+    /// Log-likelihood, weighted for shared rotors.
     pub loglik: f64,
+    /// Share of independent samples that the colour of this fit's residual leaves, 1 when white.
+    pub share: f64,
 }
 
 /// A fitted hypothesis.
@@ -91,6 +93,8 @@ pub enum Rows<'a> {
 }
 
 /// Fits one target for given shapes.
+///
+/// The likelihood counts samples as independent; [`TargetFit::share`] says how many of them the colour of the residual leaves.
 #[must_use]
 pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
     let k = design.columns.len();
@@ -98,6 +102,7 @@ pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, row
     let mut row = vec![0.0; k];
     let mut log_sigma = 0.0;
     let stride = if let Rows::Every(n) = rows { n.max(1) } else { 1 };
+    let mut kept: Vec<(usize, f64, f64)> = Vec::with_capacity(target.rows.len() / stride + 1);
     for (j, i) in target.rows.iter().enumerate().step_by(stride) {
         if let Rows::Where(mask) = rows
             && !mask[*i]
@@ -112,18 +117,34 @@ pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, row
         let y = target.y[j] - design.fixed.get(*i).copied().unwrap_or(0.0);
         normal.add(&row, y, 1.0 / variance);
         log_sigma += 0.5 * variance.ln();
+        kept.push((*i, y, variance));
     }
     if normal.count < k + 3 {
         return None;
     }
     let Solution { coefficients, inverse, rss } = normal.solve()?;
     let n = normal.count as f64;
-    // the scale of the noise is profiled, but never below a tenth of the floor
+    let rho = lag_one(design, &coefficients, &kept);
+    // the scale of the noise is profiled, but never below a tenth of the floor's standard deviation
     let scale = (rss / n).max(0.01);
-    let share = target.noise.effective_share() * target.weight * stride as f64;
-    let loglik = share * (-0.5 * n * scale.ln() - 0.5 * rss / scale - log_sigma);
-    let covariance = inverse * (scale / target.noise.effective_share());
-    Some(TargetFit { coefficients, labels: design.columns.iter().map(|c| c.label).collect(), covariance, loglik })
+    let weight = target.weight * stride as f64;
+    let loglik = weight * (-0.5 * n * scale.ln() - 0.5 * rss / scale - log_sigma);
+    let share = (1.0 - rho) / (1.0 + rho);
+    let covariance = inverse * (scale / share);
+    Some(TargetFit { coefficients, labels: design.columns.iter().map(|c| c.label).collect(), covariance, loglik, share })
+}
+
+/// Lag-one autocorrelation of the scaled residual.
+fn lag_one(design: &TargetDesign, coefficients: &[f64], kept: &[(usize, f64, f64)]) -> f64 {
+    let (mut c0, mut c1, mut last) = (0.0, 0.0, 0.0);
+    for (i, y, variance) in kept {
+        let fitted: f64 = design.columns.iter().zip(coefficients).map(|(c, b)| c.values[*i] * b).sum();
+        let r = (y - fitted) / variance.sqrt();
+        c0 += r * r;
+        c1 += r * last;
+        last = r;
+    }
+    if c0 > 0.0 { (c1 / c0).clamp(0.0, 0.999) } else { 0.0 }
 }
 
 /// Fits every target that the effects touch; the others come from `rest`.
@@ -187,16 +208,56 @@ pub fn scan(context: &Context, declared: Declared<'_>, base: &[Placed], effect: 
     best
 }
 
-/// Improves all shapes of a hypothesis together (Nelder-Mead within the plausible ranges).
+/// Improves the shapes of a hypothesis together (Nelder-Mead within the plausible ranges): those of its newest effect and of
+/// every effect that shares a channel with it, directly or through others. The rest is independent of them.
+#[must_use]
+pub fn refine_newest(context: &Context, declared: Declared<'_>, placed: &[Placed], rows: Rows<'_>, evaluations: usize) -> Vec<Placed> {
+    let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
+    refine_group(context, declared, placed, &connected(placed, newest), rows, evaluations)
+}
+
+/// Improves all shapes of a hypothesis, each group of effects that share channels on its own.
 #[must_use]
 pub fn refine(context: &Context, declared: Declared<'_>, placed: &[Placed], rows: Rows<'_>, evaluations: usize) -> Vec<Placed> {
+    let mut out = placed.to_vec();
+    let mut done = vec![false; placed.len()];
+    for k in 0..placed.len() {
+        if !done[k] {
+            let group = connected(placed, k);
+            out = refine_group(context, declared, &out, &group, rows, evaluations);
+            for g in group {
+                done[g] = true;
+            }
+        }
+    }
+    out
+}
+
+/// Positions that share channels with position `k`, directly or through others.
+pub(crate) fn connected(placed: &[Placed], k: usize) -> Vec<usize> {
+    let mut group = vec![k];
+    let mut at = 0;
+    while at < group.len() {
+        for (j, p) in placed.iter().enumerate() {
+            if !group.contains(&j) && p.instance.channels.iter().any(|c| placed[group[at]].instance.touches(c)) {
+                group.push(j);
+            }
+        }
+        at += 1;
+    }
+    group.sort_unstable();
+    group
+}
+
+fn refine_group(context: &Context, declared: Declared<'_>, placed: &[Placed], group: &[usize], rows: Rows<'_>, evaluations: usize) -> Vec<Placed> {
     let ranges: Vec<(f64, f64)> = placed.iter().flat_map(|p| p.effect.shapes(context, &p.instance)).map(|s| s.range).collect();
     let start: Vec<f64> = placed.iter().flat_map(|p| p.shape.iter().copied()).collect();
-    let free: Vec<usize> = (0..start.len()).filter(|i| ranges[*i].1 > ranges[*i].0).collect();
+    let owner: Vec<usize> = placed.iter().enumerate().flat_map(|(k, p)| std::iter::repeat_n(k, p.shape.len())).collect();
+    let free: Vec<usize> = (0..start.len()).filter(|i| ranges[*i].1 > ranges[*i].0 && group.contains(&owner[*i])).collect();
     if free.is_empty() {
         return placed.to_vec();
     }
-    let moving = touched_by_shapes(placed);
+    let moving = touched_by_shapes(placed, group);
     let cost = |x: &[f64]| -> f64 {
         let mut full = start.clone();
         for (i, v) in free.iter().zip(x) {
@@ -216,8 +277,9 @@ pub fn refine(context: &Context, declared: Declared<'_>, placed: &[Placed], rows
     with_shapes(placed, &full)
 }
 
-fn touched_by_shapes(placed: &[Placed]) -> Vec<&str> {
-    let mut out: Vec<&str> = placed.iter().filter(|p| !p.shape.is_empty()).flat_map(|p| p.instance.channels.iter().map(String::as_str)).collect();
+fn touched_by_shapes<'p>(placed: &'p [Placed], group: &[usize]) -> Vec<&'p str> {
+    let moved = group.iter().map(|k| &placed[*k]).filter(|p| !p.shape.is_empty());
+    let mut out: Vec<&str> = moved.flat_map(|p| p.instance.channels.iter().map(String::as_str)).collect();
     out.sort_unstable();
     out.dedup();
     out
@@ -339,6 +401,8 @@ impl Fit {
                 hessian[(j, i)] = -mixed;
             }
         }
+        let share = context.targets.iter().zip(&self.targets).filter(|(t, _)| p.instance.touches(t.name)).map(|(_, f)| f.share).fold(1.0, f64::min);
+        hessian *= share;
         let inverse = hessian.clone().try_inverse();
         (0..n)
             .map(|i| match &inverse {
