@@ -6,7 +6,7 @@
 use frame::message::BoardId;
 use frame::wire::{Decoder, LinkStats};
 use frame::{Hello, ImuSample, Message, Ticks};
-use hal_sim::emulated::ahrs::{AhrsRun, ChipKind, Motion, Served, ahrs};
+use hal_sim::emulated::ahrs::{AhrsRun, ChipKind, LoosePlug, Motion, Served, ahrs};
 
 /// Registers that the emulator stores without a model and that the image is known to touch.
 const STORED_ONLY: [&str; 0] = [];
@@ -24,7 +24,7 @@ fn decoded(run: &AhrsRun) -> (Hello, Vec<ImuSample>, LinkStats) {
 }
 
 fn run(motion: Motion, fitted: &[ChipKind], milliseconds: u64) -> AhrsRun {
-    let run = ahrs(motion, fitted, milliseconds).unwrap_or_else(|error| panic!("{error}"));
+    let run = ahrs(motion, fitted, None, milliseconds).unwrap_or_else(|error| panic!("{error}"));
     run.outcome.accesses.only(&STORED_ONLY).unwrap();
     run
 }
@@ -116,4 +116,25 @@ fn the_run_is_the_same_every_time() {
     let once = || run(Motion::LEVEL, &ChipKind::ALL, 100).outcome;
     let (a, b) = (once(), once());
     assert_eq!((a.telemetry, a.instructions), (b.telemetry, b.instructions));
+}
+
+#[test]
+fn a_loose_plug_is_told_and_heals() {
+    let plug = LoosePlug { nth: 1, off_ns: 200_000_000, back_ns: 400_000_000 };
+    let run = ahrs(OBLIQUE, &ChipKind::ALL, Some(plug), 1600).unwrap_or_else(|error| panic!("{error}"));
+    run.outcome.accesses.only(&STORED_ONLY).unwrap();
+    let (_, samples, link) = decoded(&run);
+    assert_eq!((link.damaged, link.missing), (0, 0));
+    let told = |ms: u64| samples.iter().find(|s| s.at.as_ms() >= ms).map(|s| (s.alive, s.fresh & 3)).unwrap();
+    assert_eq!(told(190), (0b111, 0b11));
+    assert_eq!(told(205), (0b111, 0b01), "a reading is lost, the sensor not yet");
+    assert_eq!(told(240), (0b101, 0b01), "after five lost readings it is");
+    assert_eq!(told(1550), (0b111, 0b11), "back within a second of the plug");
+}
+
+#[test]
+fn a_missing_image_says_how_to_build_it() {
+    let error = hal_sim::emulated::firmware("firmware-none").unwrap_err().to_string();
+    assert!(error.contains("cargo build -p firmware-none --release --target thumbv7em-none-eabihf"), "{error}");
+    assert_eq!(error.lines().count(), 1);
 }

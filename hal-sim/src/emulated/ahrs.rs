@@ -8,7 +8,7 @@
 //! Reference: the data sheets named in the drivers of `firmware-ahrs`; addresses and defaults written down here again on
 //! purpose, not taken from them.
 
-use super::machine::{EmulatedError, Machine, Outcome, firmware, run};
+use super::machine::{EmulatedError, Machine, Outcome, Pins, World, firmware, run};
 use rigless::{
     chip::{Timeline, i2c},
     snapshot::Store,
@@ -248,11 +248,36 @@ impl i2c::Peer for Chip {
     fn stop(&mut self, _: &mut Timeline<'_, '_>) {}
 }
 
+/// A loose plug: one chip is off the bus for a while.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LoosePlug {
+    /// Which of the fitted chips, in their order.
+    pub nth: usize,
+    /// When it goes, ns.
+    pub off_ns: u64,
+    /// When it comes back, ns.
+    pub back_ns: u64,
+}
+
+/// What happens around the IMU board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ImuWorld {
+    plug: Option<LoosePlug>,
+}
+
+impl World for ImuWorld {
+    fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
+        let Some(plug) = self.plug else { return u64::MAX };
+        pins.unplug(plug.nth, (plug.off_ns..plug.back_ns).contains(&now_ns));
+        [plug.off_ns, plug.back_ns].into_iter().find(|at| *at > now_ns).unwrap_or(u64::MAX)
+    }
+}
+
 /// What an IMU run leaves behind.
 #[derive(Debug)]
 pub struct AhrsRun {
     /// The run itself.
-    pub outcome: Outcome<()>,
+    pub outcome: Outcome<ImuWorld>,
     /// What each chip handed out, in the order of [`ChipKind::ALL`]; empty for a chip that was not fitted.
     pub served: [Vec<Served>; 3],
 }
@@ -261,16 +286,16 @@ pub struct AhrsRun {
 ///
 /// # Errors
 /// [`EmulatedError`] when there is no image or the emulator gives up.
-pub fn ahrs(motion: Motion, fitted: &[ChipKind], milliseconds: u64) -> Result<AhrsRun, EmulatedError> {
+pub fn ahrs(motion: Motion, fitted: &[ChipKind], plug: Option<LoosePlug>, milliseconds: u64) -> Result<AhrsRun, EmulatedError> {
     let elf = firmware("firmware-ahrs")?;
     let mut machine = Machine::new()?;
     for kind in fitted {
         machine.mcu.i2c[0].attach(Chip::new(*kind, motion));
     }
-    let mut outcome = run(&elf, machine, (), milliseconds * 1_000_000)?;
+    let (outcome, mut machine) = run(&elf, machine, ImuWorld { plug }, milliseconds * 1_000_000)?;
     let served = ChipKind::ALL.map(|kind| {
         let place = fitted.iter().position(|f| *f == kind);
-        let chip = place.and_then(|n| outcome.machine.mcu.i2c[0].chip_mut::<Chip>(n));
+        let chip = place.and_then(|n| machine.mcu.i2c[0].chip_mut::<Chip>(n));
         chip.map(|chip| std::mem::take(&mut chip.served)).unwrap_or_default()
     });
     Ok(AhrsRun { outcome, served })

@@ -8,13 +8,13 @@
 
 use rigless::{
     chip::{Timeline, uart},
+    device::Level,
     emulator::{self, Driver, Host, Start, Stop},
     image::Image,
     machine::{Board, Crystal, Target, armv7m},
     mcu::{Mcu, Operate},
     session::Session,
     snapshot::Store,
-    device::Level,
     soc::{
         st::tim::Channel as TimerChannel,
         stm32f427::{
@@ -237,6 +237,12 @@ impl Pins<'_> {
         }
     }
 
+    /// Pulls the `nth` chip of I2C1 (in the order of fitting) off the bus, or puts it back; a change waits for the end of an
+    /// open transfer. `false` when there is no such chip.
+    pub fn unplug(&mut self, nth: usize, unplugged: bool) -> bool {
+        self.machine.mcu.i2c[0].silence(nth, unplugged)
+    }
+
     /// Bytes that arrived on the serial line so far.
     #[must_use]
     pub fn heard(&mut self) -> &[u8] {
@@ -253,15 +259,8 @@ impl Pins<'_> {
 
 /// Whatever is outside of the microcontroller.
 pub trait World: Send {
-    /// Called at the instant asked for before (first at 0 + `FIRST_STOP_NS`); returns the next instant to be called at.
+    /// Called at the instant asked for before (first a microsecond after power-up); returns the next instant to be called at.
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64;
-}
-
-/// A world without time: only the buses' own models act.
-impl World for () {
-    fn wake(&mut self, _: u64, _: &mut Pins<'_>) -> u64 {
-        u64::MAX
-    }
 }
 
 /// Accesses that a correct image does not make, as text for a test's message, and the resets of the run.
@@ -307,8 +306,6 @@ pub struct Outcome<W> {
     pub instructions: u64,
     /// Accesses that a correct image does not make.
     pub accesses: Accesses,
-    /// The board, for the models' own records.
-    pub machine: Machine,
 }
 
 struct Clockwork<W> {
@@ -331,11 +328,16 @@ impl<W: World> Driver<Machine> for Clockwork<W> {
 /// First instant at which the world is asked, ns.
 const FIRST_STOP_NS: u64 = 1000;
 
-/// Runs the image at `elf` on `machine` until `end_ns`.
+/// Runs the image at `elf` on `machine` until `end_ns`; gives the board back for the models' own records.
 ///
 /// # Errors
 /// [`EmulatedError::Emulator`] when the image cannot be read or the emulator gives up.
-pub fn run<W: World + 'static>(elf: &Path, machine: Machine, world: W, end_ns: u64) -> Result<Outcome<W>, EmulatedError> {
+pub fn run<W: World + 'static>(
+    elf: &Path,
+    machine: Machine,
+    world: W,
+    end_ns: u64,
+) -> Result<(Outcome<W>, Machine), EmulatedError> {
     let images = [Image::read(elf, None).map_err(EmulatedError::emulator)?];
     let session = Session::new(Box::new(machine), 0, VirtualNanos(FIRST_STOP_NS)).map_err(EmulatedError::emulator)?;
     let finished = emulator::run(session, &Start::new(&images), Clockwork { world, end_ns }).map_err(EmulatedError::emulator)?;
@@ -350,12 +352,6 @@ pub fn run<W: World + 'static>(elf: &Path, machine: Machine, world: W, end_ns: u
     };
     let telemetry = session.board_mut().far_end().map(|far| std::mem::take(&mut far.heard)).unwrap_or_default();
     let machine = std::mem::replace(session.board_mut(), Machine::new()?);
-    Ok(Outcome {
-        world: finished.driver.world,
-        telemetry,
-        now_ns: stop.at.0,
-        instructions: stop.instruction_count,
-        accesses,
-        machine,
-    })
+    let (now_ns, instructions) = (stop.at.0, stop.instruction_count);
+    Ok((Outcome { world: finished.driver.world, telemetry, now_ns, instructions, accesses }, machine))
 }

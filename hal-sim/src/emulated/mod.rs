@@ -16,6 +16,4 @@ mod machine;
 pub mod operator;
 pub mod rig;
 
-pub use machine::{
-    Accesses, EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run,
-};
+pub use machine::{Accesses, EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};

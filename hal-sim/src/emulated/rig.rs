@@ -215,14 +215,14 @@ pub struct RigRun<O> {
 /// [`EmulatedError`] when there is no image or the emulator gives up.
 pub fn rig<O: Operator + 'static>(scenario: &Scenario, operator: O, milliseconds: u64) -> Result<RigRun<O>, EmulatedError> {
     let elf = firmware("firmware-rig")?;
-    let outcome = run(&elf, Machine::new()?, RigWorld::new(scenario, operator), milliseconds * MS)?;
-    let Outcome { world, telemetry, now_ns, instructions, accesses, machine } = outcome;
+    let (outcome, _) = run(&elf, Machine::new()?, RigWorld::new(scenario, operator), milliseconds * MS)?;
+    let Outcome { world, telemetry, now_ns, instructions, accesses } = outcome;
     Ok(RigRun {
         operator: world.operator,
         messages: world.messages,
         link: world.decoder.stats(),
         pulses: world.pulses,
         truth: world.truth,
-        outcome: Outcome { world: (), telemetry, now_ns, instructions, accesses, machine },
+        outcome: Outcome { world: (), telemetry, now_ns, instructions, accesses },
     })
 }
