@@ -30,7 +30,7 @@ impl Effect for SpinupLag {
     }
 
     fn fit(&self, parts: &mut BenchParts) {
-        parts.plant.throttle_lag_s = (self.tau_up_s, self.tau_down_s);
+        parts.plant.limiter.lag_s = (self.tau_up_s, self.tau_down_s);
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64, &'static str)> {

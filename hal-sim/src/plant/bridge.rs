@@ -6,6 +6,10 @@
 //! Units: newton of lift (up is positive) in, volt at the ADC pin out.
 //! Reference: Beharie 2013 Eq. 5.47-5.55 (corrected: V = 6 K F L G V_in/(b h^2 E)), Table 7; errata "signal after the amplifier".
 
+use super::meter::{Meter, MeterState};
+
+/// Share of a change of load that the joint's friction holds back until it slips (assumed).
+const JOINT_SHARE: f64 = 0.3;
 /// Standard gravity, m/s^2.
 const G: f64 = 9.806_65;
 
@@ -32,6 +36,10 @@ pub struct Bridge {
     pub creep_share: f64,
     /// Time constant of the creep, s.
     pub creep_s: f64,
+    /// Width of the loop between rising and falling load, N: dry friction in the joint of the beam.
+    pub hysteresis_n: f64,
+    /// Digital meter ahead of the ADC.
+    pub meter: Meter,
     /// Zero shift with temperature, N/K.
     pub zero_n_per_k: f64,
     /// Temperature at which the zero was set, degC.
@@ -54,6 +62,8 @@ impl Default for Bridge {
             filter_s: 0.0,
             creep_share: 0.0,
             creep_s: 60.0,
+            hysteresis_n: 0.0,
+            meter: Meter::default(),
             zero_n_per_k: 0.0,
             zero_temperature_c: 23.0,
         }
@@ -75,12 +85,15 @@ impl Bridge {
 }
 
 /// State of amplifier, creep and filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct BridgeState {
     bridge: Bridge,
     creep_n: f64,
+    lift_n: f64,
+    stuck_n: f64,
     output_v: f64,
     pin_v: f64,
+    meter: MeterState,
     rise: f64,
     fall: f64,
     filter: f64,
@@ -100,6 +113,9 @@ impl BridgeState {
         Self {
             bridge,
             creep_n: 0.0,
+            lift_n: 0.0,
+            stuck_n: 0.0,
+            meter: MeterState::new(bridge.meter, bridge.resting_v(), dt_s),
             output_v,
             pin_v: bridge.resting_v(),
             rise: share(dt_s, bridge.rise_s),
@@ -114,12 +130,16 @@ impl BridgeState {
         let b = &self.bridge;
         self.creep_n += (b.creep_share * lift_n - self.creep_n) * self.creep;
         let shift = zero_n + b.zero_n_per_k * (temperature_c - b.zero_temperature_c);
-        let seen_n = (lift_n + self.creep_n) * gain + shift;
+        // A slider in the joint holds back a share of each change of load until it slips (Jenkins element).
+        let half = 0.5 * b.hysteresis_n;
+        self.stuck_n = (self.stuck_n + JOINT_SHARE * (lift_n - self.lift_n)).clamp(-half, half);
+        self.lift_n = lift_n;
+        let seen_n = (lift_n + self.creep_n - self.stuck_n) * gain + shift;
         let wanted = (b.zero_v + b.volt_per_newton * (b.tip_mass_kg * G - seen_n)).clamp(b.rails_v.0, b.rails_v.1);
         let error = wanted - self.output_v;
         self.output_v += error * if error > 0.0 { self.rise } else { self.fall };
         self.pin_v += (b.divider * self.output_v - self.pin_v) * self.filter;
-        self.pin_v
+        self.meter.step(self.pin_v)
     }
 }
 

@@ -34,15 +34,13 @@ pub struct Esc {
     pub range_min_ns: u32,
     /// Stored pulse of full throttle, ns.
     pub range_max_ns: u32,
-    /// Least throttle at which the motor is driven, 0..1.
-    pub start_throttle: f64,
     /// Fails its self-test.
     pub self_test_fails: bool,
 }
 
 impl Default for Esc {
     fn default() -> Self {
-        Self { range_min_ns: 1_000_000, range_max_ns: 2_000_000, start_throttle: 0.06, self_test_fails: false }
+        Self { range_min_ns: 1_000_000, range_max_ns: 2_000_000, self_test_fails: false }
     }
 }
 

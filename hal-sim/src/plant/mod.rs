@@ -7,8 +7,11 @@
 
 pub mod air;
 pub mod beam;
+pub mod blade;
 pub mod bridge;
 pub mod esc;
+pub mod limiter;
+pub mod meter;
 pub mod motor;
 pub mod powerplant;
 pub mod propeller;
@@ -17,8 +20,11 @@ pub mod thermal;
 
 pub use air::Air;
 pub use beam::Beam;
+pub use blade::Blade;
 pub use bridge::Bridge;
 pub use esc::{Esc, EscDialogue, EscState};
+pub use limiter::Limiter;
+pub use meter::Meter;
 pub use motor::Motor;
 pub use powerplant::{Parts, PlantLevers, PlantState, Powerplant, RigPlant};
 pub use propeller::Propeller;

@@ -7,6 +7,8 @@
 //! Reference: Beharie 2013 section 2.3 and Eq. 5.11 corrected; errata 2.22-2.24 (the frame feels inertia and drag, not friction).
 
 use super::air::Air;
+use super::blade::Blade;
+use super::limiter::{Limiter, LimiterState};
 use super::motor::Motor;
 use super::propeller::Propeller;
 use super::supply::Supply;
@@ -64,6 +66,8 @@ pub struct PlantLevers {
     pub thrust_factor: f64,
     /// Factor on the torque coefficient.
     pub torque_factor: f64,
+    /// Density of the air over that at run start.
+    pub density_factor: f64,
 }
 
 impl Default for PlantLevers {
@@ -76,6 +80,7 @@ impl Default for PlantLevers {
             drag_share: 0.0,
             thrust_factor: 1.0,
             torque_factor: 1.0,
+            density_factor: 1.0,
         }
     }
 }
@@ -93,10 +98,10 @@ pub struct Parts {
     pub air: Air,
     /// Temperature node.
     pub thermal: Thermal,
-    /// Least throttle at which the motor is driven, 0..1.
-    pub start_throttle: f64,
-    /// Time constants of the ESC's soft response to a higher and a lower throttle, s; 0 where it follows at once.
-    pub throttle_lag_s: (f64, f64),
+    /// ESC output stage.
+    pub limiter: Limiter,
+    /// Departure of the blades from the square law.
+    pub blade: Blade,
     /// Turbulence: relative standard deviation of the drag torque.
     pub gust: f64,
 }
@@ -109,9 +114,10 @@ pub struct RigPlant {
     thermal: ThermalState,
     gusts: Coloured,
     gust: f64,
+    blade: (f64, f64),
     to_gust_s: f64,
     speed: f64,
-    throttle: f64,
+    limiter: LimiterState,
     thrust_k: f64,
     torque_k: f64,
     inertia: f64,
@@ -137,9 +143,10 @@ impl RigPlant {
             levers: PlantLevers::default(),
             gusts,
             gust: 1.0,
+            blade: (1.0, 1.0),
             to_gust_s: 0.0,
             speed: 0.0,
-            throttle: 0.0,
+            limiter: LimiterState::default(),
             parts,
         }
     }
@@ -158,7 +165,7 @@ impl RigPlant {
     fn opposing(&self, w: f64) -> (f64, f64, f64) {
         let l = &self.levers;
         let extra = l.drag_nm + l.drag_nms * w;
-        let air = self.torque_k * l.torque_factor * self.gust * w * w;
+        let air = self.torque_k * l.torque_factor * l.density_factor * self.blade.1 * self.gust * w * w;
         (self.parts.motor.friction_nm(), extra, air)
     }
 
@@ -181,12 +188,12 @@ impl Powerplant for RigPlant {
         if self.to_gust_s <= 0.0 {
             self.to_gust_s += GUST_INTERVAL_S;
             self.gust = 1.0 + self.gusts.next();
+            self.blade = self.parts.blade.factors(self.speed * RPM_PER_RAD_S);
         }
-        let asked = ((pulse_us - 1000.0) * 1.0e-3).clamp(0.0, 1.0);
-        let (up, down) = self.parts.throttle_lag_s;
-        let lag = if asked > self.throttle { up } else { down };
-        self.throttle = if lag > 0.0 { self.throttle + (asked - self.throttle) * (dt_s / lag).min(1.0) } else { asked };
-        let duty = if self.throttle < self.parts.start_throttle { 0.0 } else { self.throttle };
+        let line = self.parts.supply.resistance_ohm + self.levers.resistance_ohm;
+        let open_v = self.parts.supply.open_circuit_v();
+        let asked = self.limiter.duty(&self.parts.limiter, pulse_us, dt_s);
+        let duty = self.parts.limiter.limited(asked, self.kt * self.speed, open_v, self.parts.motor.resistance_ohm, line);
 
         // Heun's rule: two evaluations, second order; the rotor's own time constant is some 40 ms.
         let w = self.speed;
@@ -199,8 +206,8 @@ impl Powerplant for RigPlant {
 
         let current = self.motor_current(next, duty);
         let supply_current = duty * current + ESC_IDLE_A;
-        let line = self.parts.supply.resistance_ohm + self.levers.resistance_ohm;
-        let voltage = self.parts.supply.open_circuit_v() - line * supply_current;
+        let voltage = open_v - line * supply_current;
+        self.limiter.warm(&self.parts.limiter, supply_current, dt_s);
         self.parts.supply.draw(supply_current, dt_s);
         let (friction, extra, air) = self.opposing(next);
         let loss = current * current * self.parts.motor.resistance_ohm + friction * next;
@@ -208,7 +215,7 @@ impl Powerplant for RigPlant {
         let seen_drag = if next > 0.0 { self.levers.drag_share * extra } else { 0.0 };
         PlantState {
             rpm: next * RPM_PER_RAD_S,
-            thrust_n: self.thrust_k * self.levers.thrust_factor * next * next,
+            thrust_n: self.thrust_k * self.levers.thrust_factor * self.levers.density_factor * self.blade.0 * next * next,
             torque_nm: air + seen_drag + self.inertia * acceleration,
             current_a: supply_current,
             voltage_v: voltage,
@@ -229,8 +236,8 @@ mod tests {
             propeller: Propeller::named("11x4.7").unwrap(),
             air: Air::standard(0.0),
             thermal: Thermal::default(),
-            start_throttle: 0.06,
-            throttle_lag_s: (0.0, 0.0),
+            limiter: Limiter::default(),
+            blade: Blade::default(),
             gust: 0.0,
         }
     }

@@ -12,7 +12,7 @@ pub use section::{AirSection, LogSection, NoiseSection, Schedule, SensorSection,
 
 use crate::bench::BenchParts;
 use crate::effect::{self, EffectKind};
-use crate::plant::{Air, Beam, Bridge, Esc, Motor, Parts, Propeller, Supply, Thermal, supply};
+use crate::plant::{Air, Beam, Blade, Bridge, Esc, Limiter, Motor, Parts, Propeller, Supply, Thermal, supply};
 use crate::sensor::Geometry;
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::PulseWidth;
@@ -183,8 +183,8 @@ impl Scenario {
                 propeller,
                 air: Air { temperature_c: self.air.temperature_c, pressure_pa: self.air.pressure_pa },
                 thermal: Thermal { ambient_c: self.air.temperature_c, ..Thermal::default() },
-                start_throttle: Esc::default().start_throttle,
-                throttle_lag_s: (0.0, 0.0),
+                limiter: Limiter::default(),
+                blade: Blade::default(),
                 gust: n.gust,
             },
             esc: Esc::default(),
