@@ -29,22 +29,28 @@ fn scenario() -> Scenario {
     Scenario { schedule, ..Scenario::default() }
 }
 
+/// Runs the image and checks that it touched nothing undefined; resets are only those of the key.
 fn run<O: Operator + 'static>(operator: O, milliseconds: u64) -> RigRun<O> {
-    let run = rig(&scenario(), operator, milliseconds).unwrap_or_else(|error| panic!("{error}"));
+    let mut run = rig(&scenario(), operator, milliseconds).unwrap_or_else(|error| panic!("{error}"));
+    let resets = std::mem::take(&mut run.outcome.accesses.resets);
+    assert_eq!(resets.len(), run.resets.len(), "{resets:?}");
     run.outcome.accesses.only(&STORED_ONLY).unwrap();
     run
+}
+
+fn staircase() -> Command {
+    Command::RunStaircase {
+        step: PulseWidth::from_us(STEP_US),
+        hold_ms: HOLD_MS as u32,
+        top: PulseWidth::from_us(LEVELS[3]),
+        down: false,
+    }
 }
 
 /// One whole session: boot, arming through the ESC's beeps, four levels, stop, a second of coasting.
 static SESSION: LazyLock<RigRun<ArmAndRun>> = LazyLock::new(|| {
     let begun = std::time::Instant::now();
-    let staircase = Command::RunStaircase {
-        step: PulseWidth::from_us(STEP_US),
-        hold_ms: HOLD_MS as u32,
-        top: PulseWidth::from_us(LEVELS[3]),
-        down: false,
-    };
-    let run = run(ArmAndRun::new([staircase], Some(STOP_AFTER_MS)), 9_500);
+    let run = run(ArmAndRun::new([staircase()], Some(STOP_AFTER_MS)), 9_500);
     println!("{:.1} s simulated in {:.1} s", run.outcome.now_ns as f64 * 1e-9, begun.elapsed().as_secs_f64());
     run
 });
@@ -185,31 +191,105 @@ fn a_stop_gives_minimum_pulses_and_latches() {
     assert!(before.into_iter().all(|s| s.faults == FaultSet::NONE), "no fault before the stop");
 }
 
+/// What goes wrong half a second after the rotor began to turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Mishap {
+    StopKey,
+    Silence,
+    Reset,
+}
+
+/// Arms and runs, then meets a mishap.
+#[derive(Debug)]
+struct Unlucky {
+    inner: ArmAndRun,
+    mishap: Mishap,
+    met: Option<u64>,
+}
+
+impl Operator for Unlucky {
+    fn millisecond(&mut self, ms: u64, heard: &[Heard], actions: &mut Vec<Action>) {
+        self.inner.millisecond(ms, heard, actions);
+        let due = self.inner.started.is_some_and(|at| ms >= at + HOLD_MS + 500);
+        if due && self.met.is_none() {
+            self.met = Some(ms);
+            match self.mishap {
+                Mishap::StopKey => actions.push(Action::StopKey(true)),
+                Mishap::Reset => actions.push(Action::Reset),
+                Mishap::Silence => {}
+            }
+        }
+        if self.met.is_some() && self.mishap == Mishap::Silence {
+            actions.retain(|action| !matches!(action, Action::Send(_)));
+        }
+    }
+}
+
+/// The run, when the mishap came (ns), and the starts of the live pulses after it.
+fn mishap(mishap: Mishap) -> (RigRun<Unlucky>, u64, Vec<u64>) {
+    let run = run(Unlucky { inner: ArmAndRun::new([staircase()], None), mishap, met: None }, 7_200);
+    let met = run.operator.met.expect("the rig ran") * 1_000_000;
+    assert!(run.pulses.iter().any(|p| p.at_ns < met && p.width_ns == 1_150_000), "the rotor was turning");
+    let live = run.pulses.iter().filter(|p| p.at_ns > met && p.width_ns > 1_000_000).map(|p| p.at_ns).collect();
+    (run, met, live)
+}
+
+#[test]
+fn the_stop_key_gives_minimum_pulses() {
+    let (run, met, live) = mishap(Mishap::StopKey);
+    assert!(live.iter().all(|at| *at <= met + 2_000_000), "{live:?} after {met}");
+    let last = run.operator.inner.samples.last().expect("samples");
+    assert!(last.state == RigState::Faulted && last.faults.contains(Fault::OperatorStop), "{last:?}");
+}
+
+#[test]
+fn a_silent_host_stops_the_rotor_after_a_second() {
+    let (run, met, live) = mishap(Mishap::Silence);
+    // the last ping was at most 0.2 s before the host fell silent, and the link's time-out is 1 s
+    let last = live.last().expect("the rig goes on at first") - met;
+    println!("last live pulse {:.3} s after the silence", last as f64 * 1e-9);
+    assert!((780_000_000..=1_020_000_000).contains(&last), "{last}");
+    let sample = run.operator.inner.samples.last().expect("samples");
+    assert!(sample.state == RigState::Faulted && sample.faults.contains(Fault::LinkLost), "{sample:?}");
+}
+
+#[test]
+fn a_reset_in_the_run_gives_minimum_within_40_ms_and_disarms() {
+    let (run, met, live) = mishap(Mishap::Reset);
+    assert_eq!(live, [], "nothing above minimum after the reset");
+    let first = run.pulses.iter().find(|p| p.at_ns > met).expect("the train goes on").at_ns - met;
+    assert!(first <= 40_000_000, "first pulse {first} ns after the reset");
+    let last = run.operator.inner.samples.last().expect("samples");
+    assert_eq!((last.state, last.pulse), (RigState::Disarmed, PulseWidth::MIN));
+    let hello = run.operator.inner.hello.expect("a second Hello");
+    assert_eq!(hello.reset_cause, 0x04, "the pin flag of RCC_CSR, and no other");
+}
+
 /// The same schedule in the native run: plateau means of every channel agree.
 #[test]
 fn the_native_run_measures_the_same() {
     let record = native::run(&scenario(), None, &mut |_| {}).expect("the native run");
     let native_start = started(record.events.iter().copied());
     let calibration = SESSION.operator.calibration.expect("a calibration");
-    for n in 0..LEVELS.len() {
+    for (n, level) in LEVELS.iter().enumerate() {
         let emulated = plateau(&SESSION.operator.samples, session_start(), n);
         let native = plateau(&record.samples, native_start, n);
         assert!(emulated.len() >= 3 && native.len() >= 3, "{} and {}", emulated.len(), native.len());
-        for channel in 0..4 {
+        for (channel, name) in CAPTURE_NAMES.iter().enumerate() {
             let speed = |samples: &[RigSample]| {
                 mean(samples.iter().map(|s| calibration.speed(channel, &s.rpm[channel]).expect("a speed")))
             };
             let (a, b) = (speed(&emulated), speed(&native));
-            println!("{} us {}: {a:.2} and {b:.2} rev/min", LEVELS[n], CAPTURE_NAMES[channel]);
-            assert!((a - b).abs() <= 2.0e-3 * b, "{}: {a} and {b}", CAPTURE_NAMES[channel]);
+            println!("{level} us {name}: {a:.2} and {b:.2} rev/min");
+            assert!((a - b).abs() <= 2.0e-3 * b, "{name}: {a} and {b}");
         }
-        for channel in 0..5 {
+        for (channel, name) in ADC_NAMES.iter().enumerate() {
             let counts = |samples: &[RigSample]| {
                 mean(samples.iter().map(|s| f64::from(s.adc[channel].sum) / f64::from(s.adc[channel].count)))
             };
             let (a, b) = (counts(&emulated), counts(&native));
-            println!("{} us {}: {a:.2} and {b:.2} counts", LEVELS[n], ADC_NAMES[channel]);
-            assert!((a - b).abs() <= 4.0, "{}: {a} and {b}", ADC_NAMES[channel]);
+            println!("{level} us {name}: {a:.2} and {b:.2} counts");
+            assert!((a - b).abs() <= 4.0, "{name}: {a} and {b}");
         }
     }
 }

@@ -190,6 +190,7 @@ pub enum GeneralTimer {
 pub struct Pins<'a> {
     machine: &'a mut Machine,
     at: VirtualNanos,
+    reset: bool,
 }
 
 fn level(high: bool) -> Level {
@@ -235,6 +236,11 @@ impl Pins<'_> {
         if let Some(channel) = AdcChannel::new(channel) {
             self.machine.mcu.adc[0].set_input(channel, u32::from(code.min(4095)) * ADC_UNITS + ADC_UNITS / 2);
         }
+    }
+
+    /// Presses the reset key. Levels that were driven from outside are gone afterwards: drive them again.
+    pub fn press_reset(&mut self) {
+        self.reset = true;
     }
 
     /// Pulls the `nth` chip of I2C1 (in the order of fitting) off the bus, or puts it back; a change waits for the end of an
@@ -314,13 +320,16 @@ struct Clockwork<W> {
 }
 
 impl<W: World> Driver<Machine> for Clockwork<W> {
-    fn on_stop(&mut self, session: &mut Session<Machine>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+    fn on_stop(&mut self, session: &mut Session<Machine>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         let now = stop.at.0;
         if now >= self.end_ns {
             return None;
         }
-        let mut pins = Pins { machine: session.board_mut(), at: stop.at };
+        let mut pins = Pins { machine: session.board_mut(), at: stop.at, reset: false };
         let next = self.world.wake(now, &mut pins);
+        if pins.reset {
+            session.reset_by_pin(stop.at, stop.instruction_count, host);
+        }
         Some(VirtualNanos(next.clamp(now + 1, self.end_ns)))
     }
 }

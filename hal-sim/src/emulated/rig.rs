@@ -37,6 +37,8 @@ pub enum Action {
     Power(bool),
     /// Presses (or lets go) the stop key.
     StopKey(bool),
+    /// Presses the board's reset key.
+    Reset,
     /// The run of the schedule begins: effects count their time from here.
     StartRun,
 }
@@ -76,6 +78,8 @@ pub struct RigWorld<O> {
     read: usize,
     next_ms: u64,
     connected: bool,
+    strapped: bool,
+    resets: Vec<u64>,
     running_pulse: Option<PulseTrain>,
     pulses: Vec<SeenPulse>,
     truth: Vec<(u64, Truth)>,
@@ -92,6 +96,8 @@ impl<O: Operator> RigWorld<O> {
             read: 0,
             next_ms: 0,
             connected: false,
+            strapped: false,
+            resets: Vec::new(),
             running_pulse: None,
             pulses: Vec::new(),
             truth: Vec::new(),
@@ -162,6 +168,13 @@ impl<O: Operator> RigWorld<O> {
                 }
                 Action::Power(on) => self.bench.set_power(on),
                 Action::StopKey(pressed) => pins.drive(Port::B, STOP_PIN, !pressed),
+                Action::Reset => {
+                    pins.press_reset();
+                    self.connected = false;
+                    self.strapped = false;
+                    self.running_pulse = None;
+                    self.resets.push(ms * MS);
+                }
                 Action::StartRun => self.bench.start_run(),
             }
         }
@@ -178,8 +191,9 @@ impl<O: Operator> World for RigWorld<O> {
                 pins.set_adc(*input, code);
             }
             if now_ns >= self.next_ms * MS {
-                if self.next_ms == 0 {
+                if !self.strapped {
                     pins.drive(Port::B, STOP_PIN, true);
+                    self.strapped = true;
                 }
                 self.connect(pins);
                 self.converse(self.next_ms, pins);
@@ -201,6 +215,8 @@ pub struct RigRun<O> {
     pub messages: Vec<(Ticks, Message)>,
     /// Counters of the host's decoder.
     pub link: LinkStats,
+    /// When the reset key was pressed, ns.
+    pub resets: Vec<u64>,
     /// Every pulse on the ESC pin.
     pub pulses: Vec<SeenPulse>,
     /// What was really there, every millisecond.
@@ -221,6 +237,7 @@ pub fn rig<O: Operator + 'static>(scenario: &Scenario, operator: O, milliseconds
         operator: world.operator,
         messages: world.messages,
         link: world.decoder.stats(),
+        resets: world.resets,
         pulses: world.pulses,
         truth: world.truth,
         outcome: Outcome { world: (), telemetry, now_ns, instructions, accesses },
