@@ -108,8 +108,10 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
         .collect()
 }
 
+/// One entry an effect, the one that helps most first.
 fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<EffectEntry> {
-    d.best
+    let mut out: Vec<EffectEntry> = d
+        .best
         .fit
         .placed
         .iter()
@@ -141,7 +143,9 @@ fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<Effe
                 channels,
             }
         })
-        .collect()
+        .collect();
+    out.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
+    out
 }
 
 /// The channel that an effect's figure is quoted for (the one it helps most) and the figure.

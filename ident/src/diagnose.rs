@@ -325,7 +325,10 @@ fn opponent(
             let held = heldout::errors_after_newest(context, declared, &candidate.fit, folds, before);
             let gain = (before[i] / held[i]).ln();
             let rival = (before[i] / named[i]).ln();
-            let clearly = gain > (1.0 / (1.0 - NEEDED_REDUCTION)).ln() && (best.fit.placed.is_empty() || gain > rival + 0.15);
+            // a name that depends on the same variable has found the dependence; only its form may be rough
+            let same = best.fit.placed.iter().any(|p| p.instance.touches(target.name) && p.effect.about().depends_on.contains(&variable.as_str()));
+            let margin = if same { std::f64::consts::LN_2 } else { 0.15 };
+            let clearly = gain > (1.0 / (1.0 - NEEDED_REDUCTION)).ln() && (best.fit.placed.is_empty() || gain > rival + margin);
             if clearly && champion.as_ref().is_none_or(|c| gain > c.0) {
                 champion = Some((gain, candidate, held));
             }

@@ -110,7 +110,7 @@ pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, row
             continue;
         }
         let speed = if context.rpm.is_empty() { 0.0 } else { context.rpm[*i] };
-        let variance = target.noise.variance(speed) + design.extra_variance.get(*i).copied().unwrap_or(0.0);
+        let variance = target.noise.weight_variance(speed) + design.extra_variance.get(*i).copied().unwrap_or(0.0);
         for (r, column) in row.iter_mut().zip(&design.columns) {
             *r = column.values[*i];
         }

@@ -27,10 +27,11 @@ impl Noise {
         self.a + self.b * k * k
     }
 
-    /// Share of independent samples that the colour leaves.
+    /// Variance by which a sample is weighted: half the run's mean variance is added, because where a polynomial misfits, a
+    /// nearly noiseless stretch must not outvote the rest of the run.
     #[must_use]
-    pub fn effective_share(&self) -> f64 {
-        ((1.0 - self.rho) / (1.0 + self.rho)).clamp(0.02, 1.0)
+    pub fn weight_variance(&self, rpm: f64) -> f64 {
+        0.5 * (self.variance(rpm) + self.rms * self.rms)
     }
 }
 

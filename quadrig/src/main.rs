@@ -7,10 +7,13 @@
 #![forbid(unsafe_code)]
 
 mod close_loop;
+mod demo;
 mod identify;
 mod import;
 mod predict;
 mod progress;
+mod run_log;
+mod sim;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -28,6 +31,10 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// The main job end to end on the built-in rig, no hardware.
+    Demo(demo::Args),
+    /// Runs the firmware against a simulated rig described by a scenario file.
+    Sim(sim::Args),
     /// A thrust stand's export becomes a rig log; what was repaired is reported.
     Import(import::Args),
     /// Plateaus, fits and quality figures of a log.
@@ -44,6 +51,8 @@ type Failure = Box<dyn std::error::Error>;
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match &cli.command {
+        Command::Demo(args) => demo::run(args, cli.quiet),
+        Command::Sim(args) => sim::run(args, cli.quiet),
         Command::Import(args) => import::run(args, cli.quiet),
         Command::Identify(args) => identify::run(args, cli.quiet),
         Command::CloseLoop(args) => close_loop::run(args, cli.quiet),

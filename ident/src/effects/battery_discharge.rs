@@ -1,9 +1,11 @@
 //! `battery_discharge`: the battery empties during the run.
 //!
-//! What it is: voltage_v falls with the charge drawn, and the speed at a given pulse falls with the voltage.
-//! What can go wrong: a short run draws little charge; with a bench supply it is not plausible.
-//! Units: Ah; V/Ah and 1/Ah inside.
-//! Reference: open-circuit voltage of a lithium-polymer cell, 4.2 V full to 3.5 V at the knee, taken as linear over the usable charge.
+//! What it is: voltage_v falls with the charge drawn, along the cells' open-circuit curve (a parabola over the part of it that
+//! a run covers), and the speed at a given pulse follows the voltage.
+//! What can go wrong: the capacity follows from the slope only as well as one knows the cell's curve: 15 % are added to its error.
+//! Units: V/Ah, V/Ah2, Ah.
+//! Reference: open-circuit voltage of lithium-polymer cells falls by 0.65 V +- 15 % per unit of charge between full and the
+//! knee: 4.20 V full, 3.87 V at 50 % (Chen & Rincon-Mora 2006, Fig. 8, and common discharge tables).
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present, speeds};
 use crate::context::{Context, Relation};
@@ -12,10 +14,10 @@ use crate::design::TargetDesign;
 /// See the module.
 pub(crate) struct BatteryDischarge;
 
-/// Fall of the open-circuit voltage of one cell over its usable charge, V.
-const CELL_SWING: f64 = 0.7;
-/// Mean open-circuit voltage of a cell near full charge, V.
-const CELL_FULL: f64 = 4.15;
+/// Mean voltage of a cell in use, V: what the number of cells is counted by.
+const CELL_V: f64 = 3.95;
+/// Fall of one cell's open-circuit voltage per unit of charge, V, and how well it is known.
+const CELL_SLOPE: (f64, f64) = (0.65, 0.15);
 
 impl Effect for BatteryDischarge {
     fn id(&self) -> &'static str {
@@ -25,8 +27,8 @@ impl Effect for BatteryDischarge {
     fn about(&self) -> About {
         About {
             title: "Battery discharges during the run",
-            equation: "voltage_v = V0 - slope * charge, rpm *= 1 - speed_loss * charge, charge = integral of current_a",
-            source: "open-circuit voltage of a LiPo cell against charge, linear over the usable part",
+            equation: "voltage_v = V0 - slope q - bend q^2, rpm *= 1 - speed_loss q, q = charge drawn",
+            source: "open-circuit voltage of lithium-polymer cells, Chen & Rincon-Mora 2006",
             depends_on: &["charge"],
             signature: "voltage and speed at the same pulse fall together, fastest at high current, and never come back",
             look_alikes: &["supply_sag", "thermal_derate"],
@@ -51,29 +53,33 @@ impl Effect for BatteryDischarge {
             return Vec::new();
         }
         let total = charge(context).last().copied().unwrap_or(0.0).max(1e-6);
-        vec![Shape { name: "speed_loss", unit: "1/Ah", range: (0.0, 0.5 / total), starts: vec![0.02 / total] }]
+        vec![Shape { name: "speed_loss", unit: "1/Ah", range: (-0.02 / total, 0.5 / total), starts: vec![0.02 / total] }]
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "slope", unit: "V/Ah" }]
+        vec![Amplitude { name: "slope", unit: "V/Ah" }, Amplitude { name: "bend", unit: "V/Ah2" }]
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let charge = charge(context);
         if design.relation == Relation::Voltage {
             design.add(position, 0, charge.iter().map(|q| -q).collect());
+            design.add(position, 1, charge.iter().map(|q| -q * q).collect());
         } else if let [loss] = shape {
             design.map_columns(|column| column.iter_mut().zip(&charge).for_each(|(v, q)| *v *= 1.0 - loss * q));
         }
     }
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
-        if let Some(slope) = fitted.iter().find(|e| e.name == "slope").filter(|e| e.value > 0.0) {
-            let full = context.voltage.as_ref().and_then(|v| v.first().copied()).unwrap_or(CELL_FULL);
-            let cells = (full / CELL_FULL).round().max(1.0);
-            let value = cells * CELL_SWING / slope.value;
-            let capacity = Estimate { name: "capacity".into(), unit: "Ah".into(), value, se: value * slope.se / slope.value };
-            fitted.insert(0, capacity);
+        let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or((0.0, 0.0), |e| (e.value, e.se));
+        let drawn = charge(context).last().copied().unwrap_or(0.0);
+        let ((slope, se), (bend, _)) = (value("slope"), value("bend"));
+        let mean_slope = slope + bend * drawn;
+        if mean_slope > 0.0 {
+            let volts = context.voltage.as_ref().and_then(|v| v.first().copied()).unwrap_or(CELL_V);
+            let capacity = (volts / CELL_V).round().max(1.0) * CELL_SLOPE.0 / mean_slope;
+            let relative = (se / mean_slope).hypot(CELL_SLOPE.1);
+            fitted.insert(0, Estimate { name: "capacity".into(), unit: "Ah".into(), value: capacity, se: capacity * relative });
         }
         fitted
     }

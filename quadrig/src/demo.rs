@@ -1,0 +1,112 @@
+//! `quadrig demo`: the main job end to end, without hardware.
+//!
+//! What it is: arm, sweep, log, identify, find the residual, name the effect, correct the model, simulate with it, report.
+//! What can go wrong: nothing that a newcomer has to know; a failure says what failed.
+//! Units: as the log states.
+//! Reference: specification `formats.md`, `quadrig demo`.
+
+use crate::Failure;
+use crate::close_loop::{number, table, write_folder};
+use crate::progress::Bar;
+use crate::sim::{fly, fly_model};
+use hal_sim::Scenario;
+use ident::close::close;
+use ident::context::Context;
+use ident::log::Log;
+use ident::plateau::plateaus;
+use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// The effects among which the seed draws.
+const HIDDEN: [&str; 6] = ["supply_sag", "battery_discharge", "thermal_zero", "zero_drift", "beam_resonance", "channel_filter"];
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Draws the hidden effect and every noise; from the clock when not given.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Hides this effect instead of drawing one.
+    #[arg(long)]
+    effect: Option<String>,
+    /// Folder for log, model, verdict and report.
+    #[arg(short, long, default_value = "out/demo")]
+    output: PathBuf,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let seed = args.seed.unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |d| d.as_millis() as u64 % 1_000_000));
+    let id = args.effect.clone().unwrap_or_else(|| HIDDEN[(mixed(seed) % HIDDEN.len() as u64) as usize].to_owned());
+    let scenario = Scenario::demo(seed, Some(&id))?;
+    let say = |line: String| {
+        if !quiet {
+            println!("{line}");
+        }
+    };
+    say(format!("seed {seed}: a 570 KV motor with an 11x4.7 propeller, and one effect hidden in the rig (repeat with --seed {seed})"));
+    let log = fly(&scenario, None, "run.csv", "flying", quiet)?;
+    std::fs::create_dir_all(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    let path = args.output.join("run.csv");
+    log.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let found = plateaus(&Context::new(&log, None), &log).len();
+    say(format!("the rig firmware armed the ESC, flew an up-down staircase and logged {} samples; {found} plateaus\n", log.len()));
+
+    // from here on only the log is known, as it was written
+    let log = Log::read(&path)?;
+    let closed = {
+        let bar = Bar::new("searching", quiet);
+        close(&log, None, &[], &mut |share| bar.set(share))?
+    };
+    write_folder(&args.output, &log, &closed, &serde_json::to_string_pretty(&closed.verdict)?)?;
+    say(table(&closed.verdict));
+
+    let again = fly_model(&scenario, &closed.model, &log, "again.csv", quiet)?;
+    let path = args.output.join("again.csv");
+    again.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    say(resimulated(&closed.model, &again));
+
+    let truth = &scenario.effects[0];
+    let named = closed.verdict.effects.iter().any(|e| e.id == truth.id());
+    let parameters: Vec<String> = truth.parameters().iter().map(|(n, v, u)| format!("{n} = {} {u}", number(*v))).collect();
+    say(format!("hidden was {} ({}): {}", truth.id(), parameters.join(", "), if named { "found" } else { "NOT FOUND" }));
+    say(format!("the page to look at: {}", args.output.join("report.html").display()));
+    Ok(())
+}
+
+/// What the corrected model leaves over on the run that was simulated with it.
+fn resimulated(model: &ident::model::Model, again: &Log) -> String {
+    let context = Context::new(again, Some(model.start_pulse_us));
+    let mut out = String::from("the corrected model as the plant, same schedule:\n");
+    for target in context.targets.iter().filter(|t| ident::log::MODELLED.contains(&t.name)) {
+        let Some(prediction) = model.predict(&context, target.name) else { continue };
+        let residual: Vec<f64> = target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).collect();
+        let rms = (residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64).sqrt();
+        out += &format!("  {:<12} rms {:>10.5}, noise floor {:>10.5}\n", target.name, rms, target.noise.rms);
+    }
+    out
+}
+
+/// Spreads neighbouring seeds (splitmix64).
+fn mixed(seed: u64) -> u64 {
+    let z = (seed.wrapping_add(0x9E37_79B9_7F4A_7C15)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    (z ^ (z >> 31)).wrapping_mul(0x94D0_49BB_1331_11EB) >> 33
+}
+
+/// Every effect that can be hidden is one that the simulator knows.
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hal_sim::effect;
+
+    #[test]
+    fn the_simulator_knows_what_the_demonstration_hides() {
+        assert!(HIDDEN.iter().all(|id| effect::find(id).is_some()));
+    }
+
+    #[test]
+    fn seeds_draw_every_effect() {
+        let drawn: std::collections::BTreeSet<u64> = (0..60).map(|s| mixed(s) % HIDDEN.len() as u64).collect();
+        assert_eq!(drawn.len(), HIDDEN.len());
+    }
+}

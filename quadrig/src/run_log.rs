@@ -1,0 +1,87 @@
+//! From a simulated run to a rig log, and from an identified model back to a plant.
+//!
+//! What it is: the two hand-overs between `hal-sim` and `ident`, which never see each other.
+//! What can go wrong: nothing; missing codes become missing samples.
+//! Units: as in the log.
+//! Reference: specification `formats.md`; `closing-the-loop.md`, step 9.
+
+use hal_sim::plant::PlantLevers;
+use hal_sim::{PlantState, Powerplant, RunRecord, Scenario};
+use ident::log::{Column, Log};
+use ident::model::Model;
+use ident::simulate::from_command;
+
+/// The log of a run, as `quadrig log` would record it.
+pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str) -> Log {
+    let rows: Vec<_> = record.converted().collect();
+    let mut log = Log { name: name.to_owned(), t: rows.iter().map(|r| r.t_s).collect(), ..Log::default() };
+    let text = |s: &str| toml::Value::String(s.to_owned());
+    log.meta.insert("motor".into(), text(&scenario.motor));
+    log.meta.insert("propeller".into(), text(&scenario.propeller));
+    log.meta.insert("sample_hz".into(), toml::Value::Float(f64::from(scenario.log.rate_hz)));
+    log.columns.push(Column { name: "pulse_us".into(), values: rows.iter().map(|r| r.pulse_us).collect() });
+    let mut push = |name: &str, values: Vec<f64>| {
+        if values.iter().any(|v| v.is_finite()) {
+            log.columns.push(Column { name: name.into(), values });
+        }
+    };
+    for (i, name) in frame::rig::CAPTURE_NAMES.iter().enumerate() {
+        push(name, rows.iter().map(|r| r.rpm[i].unwrap_or(f64::NAN)).collect());
+    }
+    for (i, name) in frame::rig::ADC_NAMES.iter().enumerate() {
+        push(name, rows.iter().map(|r| r.adc[i].unwrap_or(f64::NAN)).collect());
+    }
+    push("thrust_rms_n", rows.iter().map(|r| r.thrust_rms_n.unwrap_or(f64::NAN)).collect());
+    log
+}
+
+/// An identified model in the powerplant's place: it plays, for the command of one run, what it predicts from that command.
+pub(crate) struct IdentifiedPlant {
+    run_s: f64,
+    t: Vec<f64>,
+    rows: Vec<PlantState>,
+    at_rest: PlantState,
+}
+
+impl IdentifiedPlant {
+    /// Predicts the run that `log` commands. Temperatures are taken from the log: no model here predicts the weather.
+    pub(crate) fn new(model: &Model, log: &Log) -> Option<Self> {
+        let pulse = ident::context::bridge(&log.t, log.column("pulse_us")?);
+        let covariates: Vec<Column> =
+            log.columns.iter().map(|c| Column { name: c.name.clone(), values: ident::context::bridge(&log.t, &c.values) }).collect();
+        let predicted = from_command(model, &log.name, &log.t, &pulse, &covariates);
+        let column = |name: &str| predicted.column(name).map(<[f64]>::to_vec);
+        let speed = ident::log::SPEED.iter().find_map(|s| column(s))?;
+        let zero = || vec![0.0; log.len()];
+        let (thrust, torque) = (column("thrust_n").unwrap_or_else(zero), column("torque_nm").unwrap_or_else(zero));
+        let (current, voltage) = (column("current_a").unwrap_or_else(zero), column("voltage_v").unwrap_or_else(zero));
+        let temperature = column("temp_c").unwrap_or_else(|| vec![20.0; log.len()]);
+        let rows: Vec<PlantState> = (0..log.len())
+            .map(|i| PlantState {
+                rpm: speed[i].max(0.0),
+                thrust_n: thrust[i],
+                torque_nm: torque[i],
+                current_a: current[i],
+                voltage_v: voltage[i],
+                temp_c: temperature[i],
+            })
+            .collect();
+        let at_rest = PlantState { rpm: 0.0, thrust_n: 0.0, torque_nm: 0.0, ..rows.first().copied()? };
+        Some(Self { run_s: -1.0, t: log.t.clone(), rows, at_rest })
+    }
+}
+
+impl Powerplant for IdentifiedPlant {
+    fn advance(&mut self, _dt_s: f64, _pulse_us: f64) -> PlantState {
+        if self.run_s < 0.0 {
+            return self.at_rest;
+        }
+        // a row is the mean over the interval that ends at its time stamp
+        let i = self.t.partition_point(|t| *t < self.run_s).min(self.rows.len() - 1);
+        self.rows[i]
+    }
+
+    fn adjust(&mut self, levers: &PlantLevers) {
+        self.run_s = levers.run_s;
+    }
+}
