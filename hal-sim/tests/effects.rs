@@ -63,12 +63,19 @@ fn expectation(id: &str) -> (&'static [&'static str], [bool; 5]) {
     let load_cell = [false, true, true, true, true];
     match id {
         "supply_sag" | "battery_discharge" => (&["rpm", "voltage"], [false, false, false, false, true]),
-        "spinup_lag" => (&["rpm"], [false, false, false, true, true]),
+        "spinup_lag" | "throttle_quantisation" => (&["rpm"], [false, false, false, true, true]),
+        "thermal_derate" => (&["rpm"], [false, false, false, true, true]),
+        "current_limit" => (&["rpm", "current"], [false, false, false, true, true]),
         "bearing_friction" => (&["rpm", "current"], [false, false, false, true, true]),
-        "blade_damage" => (&["rpm", "thrust", "torque"], [false, false, false, true, true]),
+        "reynolds_thrust" => (&["thrust"], load_cell),
+        "air_density" => (&["rpm", "thrust", "torque", "temp"], [false, false, false, true, false]),
+        "blade_damage" | "blade_flex" => (&["rpm", "thrust", "torque"], [false, false, false, true, true]),
         "thermal_zero" => (&["thrust", "temp"], [false, true, true, true, false]),
-        "zero_drift" | "tare_shift" | "gain_change" | "creep" | "beam_resonance" => (&["thrust"], load_cell),
-        "channel_filter" => (&["thrust"], load_cell),
+        "missed_pulses" => (&["reading"], [true; 5]),
+        "zero_drift" | "tare_shift" | "gain_change" | "creep" | "hysteresis" | "beam_resonance" | "torque_crosstalk" => {
+            (&["thrust"], load_cell)
+        }
+        "amplifier_saturation" | "channel_filter" | "channel_delay" | "sample_hold" | "quantisation" => (&["thrust"], load_cell),
         _ => panic!("say what {id} is expected to do"),
     }
 }
@@ -85,6 +92,7 @@ fn each_effect_moves_its_channels_and_no_other() {
             for name in moved {
                 let ratio = match *name {
                     "rpm" => rpm_apart(&clean, &with),
+                    "reading" => clean.samples.iter().zip(&with.samples).filter(|(a, b)| a.rpm != b.rpm).count() as f64,
                     "thrust" => apart(&clean, &with, 0) / NOISE[0],
                     "torque" => apart(&clean, &with, 1) / NOISE[1],
                     "current" => apart(&clean, &with, 2) / NOISE[2],
@@ -102,7 +110,7 @@ fn each_effect_moves_its_channels_and_no_other() {
                     );
                 }
             }
-            if !moved.contains(&"rpm") {
+            if !moved.contains(&"rpm") && !moved.contains(&"reading") {
                 assert!(clean.samples.iter().zip(&with.samples).all(|(a, b)| a.rpm == b.rpm), "{id}");
             }
         }

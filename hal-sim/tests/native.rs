@@ -147,3 +147,15 @@ fn progress_grows_to_one() {
     assert!(heard.len() > 10 && heard.windows(2).all(|w| w[0] <= w[1]));
     assert_eq!(heard.last(), Some(&1.0));
 }
+
+/// The reference page is true: its example reads, and it names every effect.
+#[test]
+fn the_reference_page_covers_the_catalogue() {
+    let page = include_str!("../../docs/scenario.md");
+    let example = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("the page has an example");
+    let scenario = Scenario::parse(example, std::path::Path::new("scenario.md")).unwrap();
+    assert_eq!(scenario.effects.len(), 1);
+    for entry in hal_sim::effect::catalogue() {
+        assert!(page.contains(&format!("| `{}`", entry.id)), "{} is not on the page", entry.id);
+    }
+}

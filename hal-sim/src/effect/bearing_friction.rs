@@ -32,9 +32,9 @@ impl Effect for BearingFriction {
 
     fn draw(stream: &mut Stream, run_s: f64) -> Self {
         Self {
-            constant_nm: stream.log_between(1.0e-3, 4.0e-3),
+            constant_nm: stream.log_between(2.0e-3, 6.0e-3),
             viscous_nms: stream.between(0.0, 5.0e-6),
-            t0_s: run_s * stream.between(0.35, 0.6),
+            t0_s: run_s * stream.between(0.2, 0.7),
             share: 0.0,
         }
     }

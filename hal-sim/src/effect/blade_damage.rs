@@ -26,8 +26,8 @@ impl Effect for BladeDamage {
     const EQUATION: &'static str = "thrust_n *= 1 + thrust_change and torque_nm *= 1 + torque_change from t0";
 
     fn draw(stream: &mut Stream, run_s: f64) -> Self {
-        let thrust_change = -stream.log_between(0.012, 0.05);
-        Self { thrust_change, torque_change: thrust_change * stream.between(0.4, 0.8), t0_s: run_s * stream.between(0.35, 0.6) }
+        let thrust_change = -stream.log_between(0.02, 0.06);
+        Self { thrust_change, torque_change: thrust_change * stream.between(0.4, 0.8), t0_s: run_s * stream.between(0.2, 0.7) }
     }
 
     fn act(&self, run_s: f64, levers: &mut Levers) {

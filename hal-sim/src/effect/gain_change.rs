@@ -31,7 +31,7 @@ impl Effect for GainChange {
     fn draw(stream: &mut Stream, run_s: f64) -> Self {
         Self {
             gain_change: stream.sign() * stream.log_between(0.01, 0.04),
-            t0_s: run_s * stream.between(0.3, 0.6),
+            t0_s: run_s * stream.between(0.2, 0.7),
             rate_per_s: 0.0,
         }
     }

@@ -178,4 +178,17 @@ mod tests {
         assert!((run(0.4e-3, 0.5) - 1.0).abs() < 2e-3);
         assert!((run(2.0e-3, 0.5) - 1.0).abs() > 0.02);
     }
+
+    #[test]
+    fn friction_in_the_joint_opens_a_loop_of_its_width() {
+        let b = Bridge { hysteresis_n: 0.1, ..Bridge::default() };
+        let mut s = BridgeState::new(b, 1.0e-3);
+        let mut read = |lift: f64| {
+            let v = (0..200).map(|_| s.step(lift, 0.0, 1.0, 23.0)).last().unwrap();
+            (v - b.resting_v()) * b.newton_per_volt()
+        };
+        let up: Vec<f64> = (0..=10).map(|i| read(f64::from(i) * 0.4)).collect();
+        let down: Vec<f64> = (0..=10).rev().map(|i| read(f64::from(i) * 0.4)).collect();
+        assert!((down[5] - up[5] - 0.1).abs() < 1e-9, "{} {}", up[5], down[5]);
+    }
 }

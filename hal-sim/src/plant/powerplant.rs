@@ -66,8 +66,6 @@ pub struct PlantLevers {
     pub thrust_factor: f64,
     /// Factor on the torque coefficient.
     pub torque_factor: f64,
-    /// Density of the air over that at run start.
-    pub density_factor: f64,
 }
 
 impl Default for PlantLevers {
@@ -80,7 +78,6 @@ impl Default for PlantLevers {
             drag_share: 0.0,
             thrust_factor: 1.0,
             torque_factor: 1.0,
-            density_factor: 1.0,
         }
     }
 }
@@ -98,6 +95,8 @@ pub struct Parts {
     pub air: Air,
     /// Temperature node.
     pub thermal: Thermal,
+    /// The density of the air follows the room temperature.
+    pub air_follows_room: bool,
     /// ESC output stage.
     pub limiter: Limiter,
     /// Departure of the blades from the square law.
@@ -115,6 +114,7 @@ pub struct RigPlant {
     gusts: Coloured,
     gust: f64,
     blade: (f64, f64),
+    thinning: f64,
     to_gust_s: f64,
     speed: f64,
     limiter: LimiterState,
@@ -144,6 +144,7 @@ impl RigPlant {
             gusts,
             gust: 1.0,
             blade: (1.0, 1.0),
+            thinning: 1.0,
             to_gust_s: 0.0,
             speed: 0.0,
             limiter: LimiterState::default(),
@@ -165,7 +166,7 @@ impl RigPlant {
     fn opposing(&self, w: f64) -> (f64, f64, f64) {
         let l = &self.levers;
         let extra = l.drag_nm + l.drag_nms * w;
-        let air = self.torque_k * l.torque_factor * l.density_factor * self.blade.1 * self.gust * w * w;
+        let air = self.torque_k * l.torque_factor * self.thinning * self.blade.1 * self.gust * w * w;
         (self.parts.motor.friction_nm(), extra, air)
     }
 
@@ -188,6 +189,9 @@ impl Powerplant for RigPlant {
         if self.to_gust_s <= 0.0 {
             self.to_gust_s += GUST_INTERVAL_S;
             self.gust = 1.0 + self.gusts.next();
+            if self.parts.air_follows_room {
+                self.thinning = self.parts.thermal.thinning(self.levers.run_s.max(0.0));
+            }
             self.blade = self.parts.blade.factors(self.speed * RPM_PER_RAD_S);
         }
         let line = self.parts.supply.resistance_ohm + self.levers.resistance_ohm;
@@ -215,7 +219,7 @@ impl Powerplant for RigPlant {
         let seen_drag = if next > 0.0 { self.levers.drag_share * extra } else { 0.0 };
         PlantState {
             rpm: next * RPM_PER_RAD_S,
-            thrust_n: self.thrust_k * self.levers.thrust_factor * self.levers.density_factor * self.blade.0 * next * next,
+            thrust_n: self.thrust_k * self.levers.thrust_factor * self.thinning * self.blade.0 * next * next,
             torque_nm: air + seen_drag + self.inertia * acceleration,
             current_a: supply_current,
             voltage_v: voltage,
@@ -236,6 +240,7 @@ mod tests {
             propeller: Propeller::named("11x4.7").unwrap(),
             air: Air::standard(0.0),
             thermal: Thermal::default(),
+            air_follows_room: false,
             limiter: Limiter::default(),
             blade: Blade::default(),
             gust: 0.0,

@@ -25,6 +25,20 @@ impl Default for Thermal {
     }
 }
 
+impl Thermal {
+    /// Room temperature `run_s` into the run, degC.
+    #[must_use]
+    pub fn room_c(&self, run_s: f64) -> f64 {
+        self.ambient_c + self.ambient_rate_k_per_s * run_s
+    }
+
+    /// Density of the air in the room over that at run start, at constant pressure.
+    #[must_use]
+    pub fn thinning(&self, run_s: f64) -> f64 {
+        (self.ambient_c + 273.15) / (self.room_c(run_s) + 273.15)
+    }
+}
+
 /// State of the node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThermalState {
@@ -43,7 +57,7 @@ impl ThermalState {
     /// One step with `loss_w` of motor loss, `run_s` into the run.
     pub fn step(&mut self, loss_w: f64, run_s: f64, dt_s: f64) -> f64 {
         let n = &self.node;
-        let goal = n.ambient_c + n.ambient_rate_k_per_s * run_s + n.rise_k_per_w * loss_w;
+        let goal = n.room_c(run_s) + n.rise_k_per_w * loss_w;
         self.temperature_c += (goal - self.temperature_c) * (dt_s / n.tau_s).min(1.0);
         self.temperature_c
     }

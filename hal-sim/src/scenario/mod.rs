@@ -183,6 +183,7 @@ impl Scenario {
                 propeller,
                 air: Air { temperature_c: self.air.temperature_c, pressure_pa: self.air.pressure_pa },
                 thermal: Thermal { ambient_c: self.air.temperature_c, ..Thermal::default() },
+                air_follows_room: false,
                 limiter: Limiter::default(),
                 blade: Blade::default(),
                 gust: n.gust,
