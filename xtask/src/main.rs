@@ -1,3 +1,59 @@
-//! xtask
+//! `cargo xtask`: the workshop.
+//!
+//! What it is: set-up of a bare machine, the two flash images with their size budgets, and the test command that people and CI
+//! run alike.
+//!
+//! What can go wrong: a tool that cannot be had, a step that fails: one line says which, exit status 1; wrong usage is 2.
+//!
+//! Units: bytes, seconds.
+//!
+//! Reference: `budgets/`, `.cargo/image.toml`, `.ci/run`.
 #![forbid(unsafe_code)]
-fn main() {}
+
+mod image;
+mod place;
+mod run;
+mod setup;
+mod test;
+mod verdict;
+
+use place::Place;
+use std::process::ExitCode;
+
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+  setup            Rust target of the boards, Python environment of the verdict checker
+  image            build both flash images, print their sizes, compare with budgets/size.toml
+  image --bless    the same, and make the present sizes (with 2 % headroom) the budget
+  test             everything: format, lints, images, tests, emulated boards, verdicts
+  test --quick     format, lints and tests of the host, nothing else
+";
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let place = Place::find();
+    let done = match words.as_slice() {
+        ["setup"] => setup::target(&place).and_then(|()| setup::python(&place).map(|_| ())),
+        ["image"] => image::image(&place, false),
+        ["image", "--bless"] => image::image(&place, true),
+        ["test"] => test::everything(&place),
+        ["test", "--quick"] => test::quick(&place),
+        ["help" | "--help" | "-h"] => {
+            print!("{USAGE}");
+            return ExitCode::SUCCESS;
+        }
+        _ => {
+            eprint!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("xtask: {failure}");
+            ExitCode::from(1)
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! The flash images and their size budgets.
+//!
+//! What it is: builds both images with `.cargo/image.toml` and reads from the ELF files what they take of the chip.
+//!
+//! What can go wrong: an image that outgrows `budgets/size.toml`; make it smaller, or move the budget by a visible diff with
+//! `cargo xtask image --bless`.
+//!
+//! Units: bytes.
+//!
+//! Reference: STM32F405RG, RM0090 section 2.3: 1 MiB flash, 128 KiB SRAM, 64 KiB core-coupled RAM; `memory.x`.
+
+use crate::place::{BOARD, Place};
+use crate::run::{Failure, cargo, run};
+use object::elf::SHF_ALLOC;
+use object::{Object, ObjectSection, SectionFlags, SectionKind};
+use std::fmt::Write;
+use std::path::Path;
+
+/// The packages whose binaries are flash images.
+pub(crate) const PACKAGES: [&str; 2] = ["firmware-rig", "firmware-ahrs"];
+const BUDGETS: &str = "budgets/size.toml";
+/// 128 KiB SRAM and 64 KiB core-coupled RAM. RM0090 section 2.3.1.
+const RAM: [std::ops::Range<u64>; 2] = [0x2000_0000..0x2002_0000, 0x1000_0000..0x1001_0000];
+/// Flash of the STM32F405RG. RM0090 section 3.4.
+const FLASH_BYTES: u64 = 1024 * 1024;
+/// SRAM that static data and stack share. RM0090 section 2.3.1.
+const SRAM_BYTES: u64 = 128 * 1024;
+
+/// What an image takes of the chip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Size {
+    /// Code, constants and initial values.
+    flash: u64,
+    /// Static data, initialised or not, and buffers that are never initialised.
+    ram: u64,
+}
+
+/// Builds, measures, and compares or blesses.
+pub(crate) fn image(place: &Place, bless: bool) -> Result<(), Failure> {
+    build(place)?;
+    let mut sizes = Vec::new();
+    for package in PACKAGES {
+        sizes.push((package, measure(&place.images().join(package))?));
+    }
+    let file = place.root.join(BUDGETS);
+    if bless {
+        if let Some(folder) = file.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        std::fs::write(&file, budget(&sizes))?;
+    }
+    let text = std::fs::read_to_string(&file)
+        .map_err(|error| Failure(format!("{BUDGETS}: {error}; `cargo xtask image --bless` writes it")))?;
+    let limits = read_budget(&text)?;
+    print!("{}", table(&sizes, &limits));
+    compare(&sizes, &limits)
+}
+
+/// The build command of both images.
+pub(crate) fn build(place: &Place) -> Result<(), Failure> {
+    let mut command = cargo(place, &["build", "--config", ".cargo/image.toml", "--release", "--target", BOARD]);
+    command.args(PACKAGES.iter().flat_map(|p| ["-p", p])).arg("--target-dir").arg("target/fw");
+    run(&mut command)
+}
+
+fn measure(path: &Path) -> Result<Size, Failure> {
+    let bytes = std::fs::read(path).map_err(|error| Failure(format!("{}: {error}", path.display())))?;
+    let size = size(&bytes).map_err(|error| Failure(format!("{}: {error}", path.display())))?;
+    if size.flash == 0 {
+        return Err(Failure(format!("{}: holds nothing for the flash; is it an image of the board?", path.display())));
+    }
+    Ok(size)
+}
+
+fn size(bytes: &[u8]) -> Result<Size, object::Error> {
+    let file = object::File::parse(bytes)?;
+    let mut size = Size { flash: 0, ram: 0 };
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags, .. } = section.flags() else { continue };
+        if !sh_flags.contains(SHF_ALLOC) {
+            continue;
+        }
+        if RAM.iter().any(|r| r.contains(&section.address())) {
+            size.ram += section.size();
+        }
+        if section.kind() != SectionKind::UninitializedData {
+            size.flash += section.size();
+        }
+    }
+    Ok(size)
+}
+
+fn budget(sizes: &[(&str, Size)]) -> String {
+    let mut text =
+        "# Upper limits of the flash images, bytes; `cargo xtask image --bless` writes them from the present sizes plus 2 %.\n"
+            .to_owned();
+    for (package, size) in sizes {
+        let _ = write!(text, "\n[{package}]\nflash = {}\nram = {}\n", headroom(size.flash), headroom(size.ram));
+    }
+    text
+}
+
+/// Two per cent more, rounded up to 16 bytes.
+fn headroom(bytes: u64) -> u64 {
+    (bytes * 102).div_ceil(100).next_multiple_of(16)
+}
+
+fn read_budget(text: &str) -> Result<Vec<(String, Size)>, Failure> {
+    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| Failure(format!("{BUDGETS}: {}", error.message())))?;
+    let number = |package: &str, key: &str| {
+        let value = table.get(package).and_then(|t| t.get(key)).and_then(toml::Value::as_integer);
+        value
+            .and_then(|v| u64::try_from(v).ok())
+            .ok_or_else(|| Failure(format!("{BUDGETS}: [{package}] {key}: expected a number of bytes")))
+    };
+    table.keys().map(|p| Ok((p.clone(), Size { flash: number(p, "flash")?, ram: number(p, "ram")? }))).collect()
+}
+
+fn limit(limits: &[(String, Size)], package: &str) -> Option<Size> {
+    limits.iter().find(|(p, _)| p == package).map(|(_, s)| *s)
+}
+
+fn table(sizes: &[(&str, Size)], limits: &[(String, Size)]) -> String {
+    let mut text = format!(
+        "{:<14} {:>8} {:>8} {:>6} {:>11} {:>8} {:>11}\n",
+        "image", "flash", "budget", "chip", "static RAM", "budget", "stack room"
+    );
+    for (package, size) in sizes {
+        let none = "none".to_owned();
+        let (flash, ram) = limit(limits, package).map_or((none.clone(), none), |l| (l.flash.to_string(), l.ram.to_string()));
+        let share = 100.0 * size.flash as f64 / FLASH_BYTES as f64;
+        let room = SRAM_BYTES.saturating_sub(size.ram);
+        let _ = writeln!(text, "{package:<14} {:>8} {flash:>8} {share:>5.1}% {:>11} {ram:>8} {room:>11}", size.flash, size.ram);
+    }
+    text
+}
+
+fn compare(sizes: &[(&str, Size)], limits: &[(String, Size)]) -> Result<(), Failure> {
+    for (package, size) in sizes {
+        let Some(limit) = limit(limits, package) else {
+            return Err(Failure(format!("{BUDGETS}: no entry [{package}]; `cargo xtask image --bless` writes it")));
+        };
+        for (what, is, most) in [("flash", size.flash, limit.flash), ("static RAM", size.ram, limit.ram)] {
+            if is > most {
+                return Err(Failure(format!("{package}: {is} bytes of {what}, the budget is {most} ({BUDGETS})")));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: [(&str, Size); 2] = [("a", Size { flash: 1000, ram: 100 }), ("b", Size { flash: 2000, ram: 200 })];
+
+    #[test]
+    fn a_blessed_budget_reads_back_with_two_per_cent_of_headroom() {
+        let limits = read_budget(&budget(&NOW)).unwrap();
+        assert_eq!(limit(&limits, "a"), Some(Size { flash: 1024, ram: 112 }));
+        assert!(compare(&NOW, &limits).is_ok());
+    }
+
+    #[test]
+    fn growth_beyond_the_budget_is_refused_and_named() {
+        let limits = read_budget(&budget(&NOW)).unwrap();
+        for (grown, wanted) in [
+            (Size { flash: 1025, ram: 100 }, "a: 1025 bytes of flash"),
+            (Size { flash: 1024, ram: 113 }, "a: 113 bytes of static RAM"),
+        ] {
+            let failure = compare(&[("a", grown)], &limits).unwrap_err().to_string();
+            assert!(failure.contains(wanted), "{failure}");
+        }
+        assert!(compare(&[("c", NOW[0].1)], &limits).unwrap_err().to_string().contains("no entry [c]"));
+    }
+
+    #[test]
+    fn a_broken_budget_is_refused() {
+        for text in ["[a]\nflash = 1\n", "[a]\nflash = -1\nram = 1\n", "a = 1\n", "[a\n"] {
+            assert!(read_budget(text).is_err(), "{text}");
+        }
+    }
+
+    /// An ELF file for ARM with one section of each kind, by the ELF specification's field order.
+    fn elf() -> Vec<u8> {
+        let sections: [(u32, u32, u32, u32); 7] = [
+            (0, 0, 0, 0),
+            (1, 2 | 4, 0x0800_0000, 300), // code
+            (1, 2 | 1, 0x2000_0000, 20),  // initial values: in flash and in RAM
+            (8, 2 | 1, 0x2000_0014, 500), // zeroed
+            (8, 2 | 1, 0x1000_0000, 64),  // core-coupled
+            (1, 0, 0, 9000),              // debug information
+            (3, 0, 0, 1),                 // names, all empty
+        ];
+        let (header, entry) = (52_u32, 40_u32);
+        let data = header + entry * sections.len() as u32;
+        let mut bytes = vec![0x7F, b'E', b'L', b'F', 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+        for half in [2_u16, 40] {
+            bytes.extend(half.to_le_bytes());
+        }
+        for word in [1_u32, 0x0800_0000, 0, header, 0] {
+            bytes.extend(word.to_le_bytes());
+        }
+        for half in [52_u16, 32, 0, 40, sections.len() as u16, sections.len() as u16 - 1] {
+            bytes.extend(half.to_le_bytes());
+        }
+        for (kind, flags, address, size) in sections {
+            for word in [0, kind, flags, address, data, size, 0, 0, 4, 0] {
+                bytes.extend(word.to_le_bytes());
+            }
+        }
+        bytes.resize(bytes.len() + 9000, 0);
+        bytes
+    }
+
+    #[test]
+    fn sections_are_charged_to_flash_and_ram() {
+        assert_eq!(size(&elf()).unwrap(), Size { flash: 320, ram: 584 });
+        assert!(size(b"not an image").is_err());
+    }
+}

@@ -1,0 +1,112 @@
+//! The test command.
+//!
+//! What it is: every check in order, cheap ones first, each under its own heading with its own time; stops at the first failure.
+//!
+//! What can go wrong: any step; the last lines say which and how long each took.
+//!
+//! Units: seconds.
+//!
+//! Reference: `.ci/run` calls exactly this.
+
+use crate::image;
+use crate::place::{BOARD, Place};
+use crate::run::{Failure, Tally, cargo, run, tests};
+use crate::setup;
+use crate::verdict;
+use std::time::{Duration, Instant};
+
+/// The steps that were taken, with their times.
+#[derive(Debug, Default)]
+struct Steps {
+    taken: Vec<(&'static str, Duration)>,
+    tally: Tally,
+}
+
+impl Steps {
+    fn step(&mut self, name: &'static str, work: impl FnOnce(&mut Tally) -> Result<(), Failure>) -> Result<(), Failure> {
+        println!("\n==== {name}");
+        let start = Instant::now();
+        let done = work(&mut self.tally).map_err(|failure| Failure(format!("{name}: {failure}")));
+        self.taken.push((name, start.elapsed()));
+        println!("---- {name}: {:.1} s", start.elapsed().as_secs_f64());
+        done
+    }
+
+    fn finish(self, done: Result<(), Failure>) -> Result<(), Failure> {
+        println!();
+        for (name, time) in &self.taken {
+            println!("{:>7.1} s  {name}", time.as_secs_f64());
+        }
+        let all: Duration = self.taken.iter().map(|(_, t)| *t).sum();
+        println!("{:>7.1} s  in all", all.as_secs_f64());
+        let failed = self.tally.failed + usize::from(done.is_err() && self.tally.failed == 0);
+        println!("{} passed, {failed} failed", self.tally.passed);
+        done
+    }
+}
+
+/// Everything that CI runs.
+pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
+    let mut steps = Steps::default();
+    let done = (|| {
+        steps.step("set-up", |_| {
+            setup::target(place)?;
+            setup::python(place).map(|_| ())
+        })?;
+        host_lints(place, &mut steps)?;
+        steps.step("lints of the flash images", |_| {
+            let mut clippy = cargo(place, &["clippy", "--config", ".cargo/image.toml", "--release", "--target", BOARD]);
+            clippy.args(image::PACKAGES.iter().flat_map(|p| ["-p", p])).args([
+                "--target-dir",
+                "target/fw",
+                "--",
+                "-D",
+                "warnings",
+            ]);
+            run(&mut clippy)
+        })?;
+        steps.step("flash images and their size", |_| image::image(place, false))?;
+        host_tests(place, &mut steps)?;
+        steps.step("the images on emulated boards", |tally| emulated(place, tally))?;
+        steps.step("verdict contract", |tally| verdict::verdicts(place, tally))
+    })();
+    steps.finish(done)
+}
+
+/// Format, lints and tests of the host.
+pub(crate) fn quick(place: &Place) -> Result<(), Failure> {
+    let mut steps = Steps::default();
+    let done = host_lints(place, &mut steps).and_then(|()| host_tests(place, &mut steps));
+    steps.finish(done)
+}
+
+fn host_lints(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
+    steps.step("format", |_| run(&mut cargo(place, &["fmt", "--all", "--check"])))?;
+    // the profile of the tests, so that build scripts and procedural macros compile once
+    steps.step("lints of the host", |_| {
+        run(&mut cargo(place, &["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"]))
+    })
+}
+
+fn host_tests(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
+    steps.step("tests of the host", |tally| tests(&mut cargo(place, &["test", "--release", "--workspace"]), tally))
+}
+
+/// The tests that load the flash images into the emulator. It declares a newer Rust than the pinned one and compiles on it.
+fn emulated(place: &Place, tally: &mut Tally) -> Result<(), Failure> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(place.root.join("tests/tests"))? {
+        let path = entry?.path();
+        if let Some(name) = path.file_stem().and_then(|n| n.to_str()).filter(|n| n.starts_with("emulated_")) {
+            files.push(name.to_owned());
+        }
+    }
+    files.sort();
+    if files.is_empty() {
+        return Err(Failure("tests/tests holds no emulated_*.rs".to_owned()));
+    }
+    const FEATURE: [&str; 5] = ["--release", "--workspace", "--features", "quadrig-tests/emulated", "--ignore-rust-version"];
+    let mut command = cargo(place, &["test"]);
+    command.args(FEATURE).args(files.iter().flat_map(|f| ["--test", f])).env("QUADRIG_FW_DIR", place.images());
+    tests(&mut command, tally)
+}
