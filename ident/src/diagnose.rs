@@ -8,7 +8,7 @@
 //! Units: evidence in nats.
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
-use crate::context::{Context, Relation};
+use crate::context::{Context, Relation, Target};
 use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{self, Effect, Instance};
 use crate::heldout;
@@ -22,7 +22,7 @@ const MOST_EFFECTS: usize = 6;
 /// alarm in about one clean run of a hundred.
 const NEEDED_EVIDENCE: f64 = 7.0;
 /// Share of the held-out error on its first channel that an effect must remove to be worth a name.
-const NEEDED_REDUCTION: f64 = 0.03;
+const NEEDED_REDUCTION: f64 = 0.05;
 /// Share of the held-out error below which a further effect is named only if nothing else explains it as well.
 const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
@@ -136,11 +136,19 @@ struct Scanned {
     found: Option<(Vec<f64>, f64)>,
 }
 
-/// Every instance of every effect that the log could hold, scanned against the declared model.
+/// Fewest samples of a channel on which an effect with shape parameters is tried; a bare amplitude needs fewer.
+const FEWEST_SAMPLES: (usize, usize) = (30, 10);
+
+/// Every instance of every effect that the log could hold.
 fn offers(context: &Context) -> Vec<Scanned> {
+    let enough = |e: &dyn Effect, instance: &Instance| {
+        let fewest = if e.shapes(context, instance).is_empty() { FEWEST_SAMPLES.1 } else { FEWEST_SAMPLES.0 };
+        context.targets.iter().filter(|t| instance.touches(t.name)).all(|t| t.rows.len() >= fewest)
+    };
     effects::library()
         .iter()
         .flat_map(|e| e.instances(context).into_iter().map(|instance| Scanned { effect: *e, instance, found: None }))
+        .filter(|o| enough(o.effect, &o.instance))
         .collect()
 }
 
@@ -259,7 +267,7 @@ fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
             let margin = 1e-3 * (s.range.1 - s.range.0);
             s.range.1 <= s.range.0 || (*v > s.range.0 - margin && *v < s.range.1 - margin)
         });
-        inside && p.effect.plausible(&p.instance, &fit.estimates(context, declared, k))
+        inside && p.effect.plausible(context, &p.instance, &fit.estimates(context, declared, k))
     })
 }
 
@@ -305,13 +313,7 @@ fn opponent(
             continue;
         }
         for variable in variables(context) {
-            let own = match target.relation {
-                Relation::SpeedFromPulse => variable == "pulse_us" || variable == "rpm" || variable == "current_a",
-                Relation::Voltage => variable == "voltage_v",
-                Relation::Current => variable == "current_a",
-                _ => false,
-            };
-            if own {
+            if is_load(context, target, &variable) {
                 continue;
             }
             let instance = Instance::new(&[target.name], &variable);
@@ -336,6 +338,33 @@ fn opponent(
     }
     // names that explain more of the run as a whole stay
     champion.filter(|(_, c, _)| c.evidence > best.evidence).map(|(_, c, h)| (c, h))
+}
+
+/// Whether a variable stands for the channel itself or for the load that its relation already holds.
+fn is_load(context: &Context, target: &Target, name: &str) -> bool {
+    let load = ["pulse_us", "rpm", "current_a", "voltage_v"];
+    match target.relation {
+        Relation::SpeedFromPulse => load.contains(&name),
+        Relation::Voltage if context.current.is_some() => load.contains(&name),
+        Relation::Voltage => name == "voltage_v",
+        Relation::Current => name == "current_a",
+        _ => false,
+    } || twin(context, target, name)
+}
+
+/// Whether a column repeats the target in other units: squared correlation above 0.98 on its rows.
+fn twin(context: &Context, target: &Target, name: &str) -> bool {
+    let Some((_, values)) = context.covariates.iter().find(|c| c.0 == name) else { return false };
+    let n = target.rows.len() as f64;
+    let (mx, my) = (target.rows.iter().map(|i| values[*i]).sum::<f64>() / n, target.y.iter().sum::<f64>() / n);
+    let (mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0);
+    for (i, y) in target.rows.iter().zip(&target.y) {
+        let (dx, dy) = (values[*i] - mx, y - my);
+        sxx += dx * dx;
+        sxy += dx * dy;
+        syy += dy * dy;
+    }
+    sxy * sxy > 0.98 * sxx * syy
 }
 
 /// Softmax over the effects that could stand in the winner's place: those that share a channel with it, and nothing at all.

@@ -75,7 +75,7 @@ impl Effect for BatteryDischarge {
         let drawn = charge(context).last().copied().unwrap_or(0.0);
         let ((slope, se), (bend, _)) = (value("slope"), value("bend"));
         let mean_slope = slope + bend * drawn;
-        if mean_slope > 0.0 {
+        if mean_slope > 0.0 && drawn > 0.0 {
             let volts = context.voltage.as_ref().and_then(|v| v.first().copied()).unwrap_or(CELL_V);
             let capacity = (volts / CELL_V).round().max(1.0) * CELL_SLOPE.0 / mean_slope;
             let relative = (se / mean_slope).hypot(CELL_SLOPE.1);
@@ -84,8 +84,11 @@ impl Effect for BatteryDischarge {
         fitted
     }
 
-    fn plausible(&self, _: &Instance, fitted: &[Estimate]) -> bool {
-        fitted.iter().any(|e| e.name == "slope" && e.value > 0.0)
+    /// A run that takes less than a hundredth of the charge shows a supply that drifts, not a battery.
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        let drawn = charge(context).last().copied().unwrap_or(0.0);
+        let reported = self.report(context, instance, fitted.to_vec());
+        reported.iter().any(|e| e.name == "capacity" && e.value < 100.0 * drawn)
     }
 }
 

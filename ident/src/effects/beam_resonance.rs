@@ -78,7 +78,7 @@ impl Effect for BeamResonance {
         }
     }
 
-    fn plausible(&self, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or(0.0, |e| e.value);
         // the bump is of second order in the motion that makes the scatter
         value("vibration") > -1e-6 && value("bump").abs() < 10.0 * value("scatter").max(value("vibration"))

@@ -131,7 +131,7 @@ pub trait Effect: Sync {
         fitted
     }
     /// Whether the estimate makes physical sense (a negative resistance does not).
-    fn plausible(&self, _instance: &Instance, _fitted: &[Estimate]) -> bool {
+    fn plausible(&self, _context: &Context, _instance: &Instance, _fitted: &[Estimate]) -> bool {
         true
     }
 }

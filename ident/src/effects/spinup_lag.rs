@@ -78,7 +78,7 @@ impl Effect for SpinupLag {
         });
     }
 
-    fn plausible(&self, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         fitted.iter().all(|e| e.value > 0.0)
     }
 }

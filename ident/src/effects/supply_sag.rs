@@ -49,7 +49,7 @@ impl Effect for SupplySag {
         design.add(position, 0, current.iter().map(|i| -i).collect());
     }
 
-    fn plausible(&self, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         fitted.iter().all(|e| e.value > 0.0 && e.value < 5.0)
     }
 }

@@ -62,7 +62,9 @@ impl Effect for Unknown {
         let ([lo, hi], Some(values)) = (shape, variable(context, &instance.form)) else { return };
         let half = (0.5 * (hi - lo)).max(1e-12);
         let x: Vec<f64> = values.iter().map(|v| ((v - lo) / half - 1.0).clamp(-1.0, 1.0)).collect();
-        for (k, _) in TERMS.iter().enumerate() {
+        // orders that the declared polynomial of the same variable holds already are left to it
+        let held = if ["rpm", "pulse_us"].contains(&instance.form.as_str()) { design.relation.degree() } else { 0 };
+        for (k, _) in TERMS.iter().enumerate().skip(held) {
             design.add(position, k, x.iter().map(|x| legendre(k + 1, *x)).collect());
         }
     }
