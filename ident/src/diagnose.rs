@@ -343,13 +343,14 @@ fn opponent(
 /// Whether a variable stands for the channel itself or for the load that its relation already holds.
 fn is_load(context: &Context, target: &Target, name: &str) -> bool {
     let load = ["pulse_us", "rpm", "current_a", "voltage_v"];
-    match target.relation {
+    let held = match target.relation {
         Relation::SpeedFromPulse => load.contains(&name),
         Relation::Voltage if context.current.is_some() => load.contains(&name),
         Relation::Voltage => name == "voltage_v",
         Relation::Current => name == "current_a",
         _ => false,
-    } || twin(context, target, name)
+    };
+    held || twin(context, target, name)
 }
 
 /// Whether a column repeats the target in other units: squared correlation above 0.98 on its rows.
