@@ -101,8 +101,10 @@ mod app {
         let gpiob = ctx.device.GPIOB.split(&mut rcc);
         let mut clock = Clock::new(ctx.device.TIM2, &mut rcc);
 
-        let (i2c, _pins) = I2c::new(ctx.device.I2C1, (gpiob.pb6, gpiob.pb7), 400.kHz(), &mut rcc).release();
-        let sampler = Sampler::new(Bus::new(i2c));
+        let Some(bus) = Bus::new(I2c::new(ctx.device.I2C1, (gpiob.pb6, gpiob.pb7), 400.kHz(), &mut rcc)) else {
+            cortex_m::peripheral::SCB::sys_reset() // these are the pins it takes: cannot happen
+        };
+        let sampler = Sampler::new(bus);
         let hello = Ahrs::hello(CORE_HZ, reset_cause, sampler.alive());
         defmt::info!("boot: {}", hello);
 

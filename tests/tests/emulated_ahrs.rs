@@ -6,7 +6,7 @@
 use frame::message::BoardId;
 use frame::wire::{Decoder, LinkStats};
 use frame::{Hello, ImuSample, Message, Ticks};
-use hal_sim::emulated::ahrs::{AhrsRun, ChipKind, LoosePlug, Motion, Served, ahrs};
+use hal_sim::emulated::ahrs::{AhrsRun, BusFault, ChipKind, Motion, Served, ahrs};
 
 /// Registers that the emulator stores without a model and that the image is known to touch.
 const STORED_ONLY: [&str; 0] = [];
@@ -24,8 +24,14 @@ fn decoded(run: &AhrsRun) -> (Hello, Vec<ImuSample>, LinkStats) {
 }
 
 fn run(motion: Motion, fitted: &[ChipKind], milliseconds: u64) -> AhrsRun {
-    let run = ahrs(motion, fitted, None, milliseconds).unwrap_or_else(|error| panic!("{error}"));
+    run_with(motion, fitted, BusFault::None, milliseconds)
+}
+
+/// Runs the image; it touches nothing undefined, is never reset, and refuses the last byte of every read.
+fn run_with(motion: Motion, fitted: &[ChipKind], fault: BusFault, milliseconds: u64) -> AhrsRun {
+    let run = ahrs(motion, fitted, fault, milliseconds).unwrap_or_else(|error| panic!("{error}"));
     run.outcome.accesses.only(&STORED_ONLY).unwrap();
+    assert_eq!(run.unfinished, 0, "reads whose last byte was acknowledged");
     run
 }
 
@@ -120,9 +126,8 @@ fn the_run_is_the_same_every_time() {
 
 #[test]
 fn a_loose_plug_is_told_and_heals() {
-    let plug = LoosePlug { nth: 1, off_ns: 200_000_000, back_ns: 400_000_000 };
-    let run = ahrs(OBLIQUE, &ChipKind::ALL, Some(plug), 1600).unwrap_or_else(|error| panic!("{error}"));
-    run.outcome.accesses.only(&STORED_ONLY).unwrap();
+    let plug = BusFault::LoosePlug { nth: 1, off_ns: 200_000_000, back_ns: 400_000_000 };
+    let run = run_with(OBLIQUE, &ChipKind::ALL, plug, 1600);
     let (_, samples, link) = decoded(&run);
     assert_eq!((link.damaged, link.missing), (0, 0));
     let told = |ms: u64| samples.iter().find(|s| s.at.as_ms() >= ms).map(|s| (s.alive, s.fresh & 3)).unwrap();
@@ -130,6 +135,31 @@ fn a_loose_plug_is_told_and_heals() {
     assert_eq!(told(205), (0b111, 0b01), "a reading is lost, the sensor not yet");
     assert_eq!(told(240), (0b101, 0b01), "after five lost readings it is");
     assert_eq!(told(1550), (0b111, 0b11), "back within a second of the plug");
+}
+
+#[test]
+fn a_held_data_line_is_clocked_free() {
+    let held = BusFault::HeldData { from_ns: 201_000_000, clocks: 5 };
+    let run = run_with(OBLIQUE, &ChipKind::ALL, held, 400);
+    let (_, samples, link) = decoded(&run);
+    assert_eq!((link.damaged, link.missing), (0, 0));
+    assert_eq!(run.outcome.world.clocks_seen, 5);
+    let lost: Vec<_> = samples.iter().filter(|s| s.fresh & 3 != 3).collect();
+    assert!(lost.len() <= 1, "one reading is the price: {lost:?}");
+    assert!(samples.iter().all(|s| s.alive == 0b111));
+    assert!(samples.last().unwrap().at.as_ms() > 390);
+}
+
+#[test]
+fn a_bus_that_stays_held_costs_the_sensors_and_not_the_board() {
+    let held = BusFault::HeldData { from_ns: 201_000_000, clocks: 0 };
+    let run = run_with(OBLIQUE, &ChipKind::ALL, held, 700);
+    let (_, samples, link) = decoded(&run);
+    assert_eq!((link.damaged, link.missing), (0, 0));
+    let last = samples.last().unwrap();
+    // 5 failed reads of the magnetometer take 15 ticks; then nothing lives and there is nothing to say
+    assert!((200..300).contains(&last.at.as_ms()), "{last:?}");
+    assert!(run.outcome.world.clocks_seen >= 9 * 5, "{} clocks", run.outcome.world.clocks_seen);
 }
 
 #[test]

@@ -4,17 +4,22 @@
 //! not used, because they wait for ever on a stuck bus.
 //!
 //! What can go wrong: nobody acknowledges ([`BusError::Nack`]), another master or a glitch wins
-//! ([`BusError::ArbitrationLost`]), a line is held down ([`BusError::Timeout`]). After the last two the peripheral is reset.
+//! ([`BusError::ArbitrationLost`]), a line is held down ([`BusError::Timeout`]). After the last two the bus is recovered: up to
+//! nine clocks until the chip that holds SDA has shifted its byte out, a stop condition, and a reset of the peripheral.
 //! An interrupt between two bytes only stretches the clock: the last bytes of a read follow the reference manual's
 //! byte-transfer-finished procedure, not a race with the shift register.
 //!
 //! Units: bytes; microseconds of patience, counted in core cycles.
 //!
-//! Reference: RM0090 section 27.3.3, figures 242 to 245; errata ES0182 2.8 (BERR is to be ignored).
+//! Reference: RM0090 section 27.3.3, figures 242 to 245; errata ES0182 2.8 (BERR is to be ignored); I2C-bus specification
+//! UM10204 section 3.1.16 (bus clear).
 
 use super::CORE_HZ;
 use cortex_m::peripheral::DWT;
 use embedded_hal::i2c::{Error, ErrorKind, ErrorType, I2c, NoAcknowledgeSource, Operation};
+use stm32f4xx_hal::gpio::alt::i2c1::{Scl, Sda};
+use stm32f4xx_hal::gpio::{Alternate, OpenDrain, PB6, PB7, PinState};
+use stm32f4xx_hal::i2c::I2c as Configured;
 use stm32f4xx_hal::pac::{I2C1, i2c1};
 
 /// Longest wait for one flag: a byte takes 23 us, the sensors do not stretch the clock.
@@ -52,9 +57,16 @@ impl Error for BusError {
     }
 }
 
+/// Half a clock of the recovery: 100 kHz.
+const HALF_CLOCK: u32 = CORE_HZ / 200_000;
+/// Clocks after which no chip can still be in the middle of a byte (UM10204 section 3.1.16).
+const CLEARING_CLOCKS: u32 = 9;
+
 /// The bus.
 pub(crate) struct Bus {
     i2c: I2C1,
+    scl: PB6<Alternate<4, OpenDrain>>,
+    sda: PB7<Alternate<4, OpenDrain>>,
 }
 
 impl ErrorType for Bus {
@@ -62,9 +74,12 @@ impl ErrorType for Bus {
 }
 
 impl Bus {
-    /// Takes the peripheral after the HAL has set up clock, pins and timing.
-    pub(crate) fn new(i2c: I2C1) -> Self {
-        Self { i2c }
+    /// Takes the peripheral from the HAL, which has set up clock, pins and timing; `None` when it is on other pins.
+    pub(crate) fn new(configured: Configured<I2C1>) -> Option<Self> {
+        match configured.release() {
+            (i2c, (Scl::PB6(scl), Sda::PB7(sda))) => Some(Self { i2c, scl, sda }),
+            _ => None,
+        }
     }
 
     /// Polls SR1 until `ready`, an error flag or the end of patience.
@@ -197,6 +212,31 @@ impl Bus {
         Ok(())
     }
 
+    /// Clocks a held data line free and ends with a stop condition, by hand.
+    fn clear(&mut self) {
+        let Self { scl, sda, .. } = self;
+        scl.with_open_drain_output_in_state(PinState::High, |scl| {
+            sda.with_open_drain_output_in_state(PinState::High, |sda| {
+                for _ in 0..CLEARING_CLOCKS {
+                    if sda.is_high() {
+                        break;
+                    }
+                    scl.set_low();
+                    cortex_m::asm::delay(HALF_CLOCK);
+                    scl.set_high();
+                    cortex_m::asm::delay(HALF_CLOCK);
+                }
+                scl.set_low();
+                sda.set_low();
+                cortex_m::asm::delay(HALF_CLOCK);
+                scl.set_high();
+                cortex_m::asm::delay(HALF_CLOCK);
+                sda.set_high();
+                cortex_m::asm::delay(HALF_CLOCK);
+            });
+        });
+    }
+
     /// Software reset of the peripheral, keeping the timing that the HAL computed.
     #[allow(unsafe_code)] // the words written are the ones just read from the same registers
     fn reset(&self) {
@@ -218,7 +258,11 @@ impl I2c for Bus {
             Err(BusError::Nack(_)) => {
                 self.i2c.cr1().modify(|_, w| w.stop().set_bit());
             }
-            Err(_) => self.reset(),
+            Err(_) => {
+                self.i2c.cr1().modify(|_, w| w.pe().clear_bit()); // off the pins' state machine while they are ours
+                self.clear();
+                self.reset();
+            }
         }
         outcome
     }

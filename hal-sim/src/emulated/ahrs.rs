@@ -8,7 +8,7 @@
 //! Reference: the data sheets named in the drivers of `firmware-ahrs`; addresses and defaults written down here again on
 //! purpose, not taken from them.
 
-use super::machine::{EmulatedError, Machine, Outcome, Pins, World, firmware, run};
+use super::machine::{EmulatedError, Machine, Outcome, Pins, Port, World, firmware, run};
 use rigless::{
     chip::{Timeline, i2c},
     snapshot::Store,
@@ -147,6 +147,8 @@ struct Chip {
     pointer: u8,
     pointer_comes: bool,
     served: Vec<Served>,
+    driving: bool,
+    unfinished: u32,
 }
 
 fn rounded(value: f64, limit: f64) -> i16 {
@@ -155,7 +157,16 @@ fn rounded(value: f64, limit: f64) -> i16 {
 
 impl Chip {
     fn new(kind: ChipKind, motion: Motion) -> Self {
-        Self { kind, motion, registers: kind.reset_registers(), pointer: 0, pointer_comes: false, served: Vec::new() }
+        Self {
+            kind,
+            motion,
+            registers: kind.reset_registers(),
+            pointer: 0,
+            pointer_comes: false,
+            served: Vec::new(),
+            driving: false,
+            unfinished: 0,
+        }
     }
 
     /// The words that the chip would measure now in the state that its registers put it into.
@@ -205,6 +216,12 @@ impl Chip {
         self.served.push(Served { at_ns, words });
     }
 
+    /// A start or stop came: a chip whose last byte was acknowledged still drives SDA then, and the bus locks up.
+    fn interrupted(&mut self) {
+        self.unfinished += u32::from(self.driving);
+        self.driving = false;
+    }
+
     fn advance_pointer(&mut self) {
         self.pointer = match (self.kind, self.pointer) {
             (ChipKind::Hmc5883l, 0x08) => 0x03, // data sheet, page 11
@@ -218,6 +235,7 @@ impl Store for Chip {}
 
 impl i2c::Peer for Chip {
     fn start(&mut self, address: u8, read: bool, line: &mut Timeline<'_, '_>) -> bool {
+        self.interrupted();
         if address != self.kind.address() {
             return false;
         }
@@ -239,37 +257,98 @@ impl i2c::Peer for Chip {
         true
     }
 
-    fn read(&mut self, _: bool, _: &mut Timeline<'_, '_>) -> u8 {
+    fn read(&mut self, last: bool, _: &mut Timeline<'_, '_>) -> u8 {
+        self.driving = !last;
         let byte = self.registers[usize::from(self.pointer)];
         self.advance_pointer();
         byte
     }
 
-    fn stop(&mut self, _: &mut Timeline<'_, '_>) {}
+    fn stop(&mut self, _: &mut Timeline<'_, '_>) {
+        self.interrupted();
+    }
 }
 
-/// A loose plug: one chip is off the bus for a while.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LoosePlug {
-    /// Which of the fitted chips, in their order.
-    pub nth: usize,
-    /// When it goes, ns.
-    pub off_ns: u64,
-    /// When it comes back, ns.
-    pub back_ns: u64,
+/// What goes wrong on the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BusFault {
+    /// Nothing.
+    #[default]
+    None,
+    /// One chip is off the bus for a while.
+    LoosePlug {
+        /// Which of the fitted chips, in their order.
+        nth: usize,
+        /// When it goes, ns.
+        off_ns: u64,
+        /// When it comes back, ns.
+        back_ns: u64,
+    },
+    /// A chip holds SDA low until it has seen some clocks.
+    HeldData {
+        /// When it begins to, ns.
+        from_ns: u64,
+        /// Rising edges of SCL after which it lets go; 0 for never.
+        clocks: u32,
+    },
 }
 
 /// What happens around the IMU board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ImuWorld {
-    plug: Option<LoosePlug>,
+    fault: BusFault,
+    pulled_up: bool,
+    held: bool,
+    clock_high: bool,
+    /// Rising edges of SCL while the data line was held.
+    pub clocks_seen: u32,
+}
+
+/// Pins of the bus: port B.
+const SCL: u8 = 6;
+const SDA: u8 = 7;
+
+impl ImuWorld {
+    fn hold(&mut self, held: bool, pins: &mut Pins<'_>) {
+        self.held = held;
+        self.clock_high = pins.level(Port::B, SCL);
+        pins.hold_i2c(held);
+        pins.drive(Port::B, SDA, !held);
+    }
 }
 
 impl World for ImuWorld {
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
-        let Some(plug) = self.plug else { return u64::MAX };
-        pins.unplug(plug.nth, (plug.off_ns..plug.back_ns).contains(&now_ns));
-        [plug.off_ns, plug.back_ns].into_iter().find(|at| *at > now_ns).unwrap_or(u64::MAX)
+        if !self.pulled_up {
+            pins.drive(Port::B, SCL, true);
+            pins.drive(Port::B, SDA, true);
+            self.pulled_up = true;
+        }
+        match self.fault {
+            BusFault::None => u64::MAX,
+            BusFault::LoosePlug { nth, off_ns, back_ns } => {
+                pins.unplug(nth, (off_ns..back_ns).contains(&now_ns));
+                [off_ns, back_ns].into_iter().find(|at| *at > now_ns).unwrap_or(u64::MAX)
+            }
+            BusFault::HeldData { from_ns, .. } if now_ns < from_ns => from_ns,
+            BusFault::HeldData { .. } => {
+                self.hold(true, pins);
+                u64::MAX
+            }
+        }
+    }
+
+    fn watches(&self) -> bool {
+        self.held
+    }
+
+    fn accessed(&mut self, pins: &mut Pins<'_>) {
+        let high = pins.level(Port::B, SCL);
+        self.clocks_seen += u32::from(high && !self.clock_high);
+        self.clock_high = high;
+        if matches!(self.fault, BusFault::HeldData { clocks, .. } if clocks > 0 && self.clocks_seen >= clocks) {
+            self.hold(false, pins);
+        }
     }
 }
 
@@ -280,23 +359,29 @@ pub struct AhrsRun {
     pub outcome: Outcome<ImuWorld>,
     /// What each chip handed out, in the order of [`ChipKind::ALL`]; empty for a chip that was not fitted.
     pub served: [Vec<Served>; 3],
+    /// Reads whose last byte was acknowledged, so that the chip still drove the bus at their end.
+    pub unfinished: u32,
 }
 
 /// Runs the IMU image for `milliseconds` with the chips in `fitted` on a body that moves as `motion`.
 ///
 /// # Errors
 /// [`EmulatedError`] when there is no image or the emulator gives up.
-pub fn ahrs(motion: Motion, fitted: &[ChipKind], plug: Option<LoosePlug>, milliseconds: u64) -> Result<AhrsRun, EmulatedError> {
+pub fn ahrs(motion: Motion, fitted: &[ChipKind], fault: BusFault, milliseconds: u64) -> Result<AhrsRun, EmulatedError> {
     let elf = firmware("firmware-ahrs")?;
     let mut machine = Machine::new()?;
     for kind in fitted {
-        machine.mcu.i2c[0].attach(Chip::new(*kind, motion));
+        machine.mcu.i2c1.inner.attach(Chip::new(*kind, motion));
     }
-    let (outcome, mut machine) = run(&elf, machine, ImuWorld { plug }, milliseconds * 1_000_000)?;
+    let (outcome, mut machine) = run(&elf, machine, ImuWorld { fault, ..ImuWorld::default() }, milliseconds * 1_000_000)?;
+    let mut unfinished = 0;
     let served = ChipKind::ALL.map(|kind| {
         let place = fitted.iter().position(|f| *f == kind);
-        let chip = place.and_then(|n| machine.mcu.i2c[0].chip_mut::<Chip>(n));
-        chip.map(|chip| std::mem::take(&mut chip.served)).unwrap_or_default()
+        let chip = place.and_then(|n| machine.mcu.i2c1.inner.chip_mut::<Chip>(n));
+        chip.map_or_else(Vec::new, |chip| {
+            unfinished += chip.unfinished;
+            std::mem::take(&mut chip.served)
+        })
     });
-    Ok(AhrsRun { outcome, served })
+    Ok(AhrsRun { outcome, served, unfinished })
 }

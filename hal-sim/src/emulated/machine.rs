@@ -6,10 +6,11 @@
 //! Units: ns since power-up.
 //! Reference: crate rigless 0.4 (register models section by section of RM0090).
 
+use super::part::Part;
 use rigless::{
     chip::{Timeline, uart},
     device::Level,
-    emulator::{self, Driver, Host, Start, Stop},
+    emulator::{self, Driver, Host, Settled, Start, Stop},
     image::Image,
     machine::{Board, Crystal, Target, armv7m},
     mcu::{Mcu, Operate},
@@ -98,7 +99,7 @@ impl uart::Peer for FarEnd {
 /// The board before it is switched on.
 #[derive(Debug)]
 pub struct Machine {
-    pub(super) mcu: Stm32f427,
+    pub(super) mcu: Part,
 }
 
 impl Store for Machine {}
@@ -140,18 +141,18 @@ impl Machine {
     /// # Errors
     /// [`EmulatedError::Emulator`] when the emulator cannot build its part.
     pub fn new() -> Result<Self, EmulatedError> {
-        let mut mcu = Stm32f427::new().map_err(EmulatedError::emulator)?;
-        mcu.rcc.attach_crystals(CRYSTAL_HZ, Crystal::NONE.0);
-        mcu.set_supply(SUPPLY_MV);
-        for converter in &mut mcu.adc {
+        let mut chip = Stm32f427::new().map_err(EmulatedError::emulator)?;
+        chip.rcc.attach_crystals(CRYSTAL_HZ, Crystal::NONE.0);
+        chip.set_supply(SUPPLY_MV);
+        for converter in &mut chip.adc {
             converter.set_reference(ADC_REFERENCE);
         }
-        mcu.usart[0].attach(FarEnd::default());
-        Ok(Self { mcu })
+        chip.usart[0].attach(FarEnd::default());
+        Ok(Self { mcu: Part::new(chip).map_err(EmulatedError::emulator)? })
     }
 
     fn far_end(&mut self) -> Option<&mut FarEnd> {
-        self.mcu.usart[0].chip_mut::<FarEnd>()
+        self.mcu.chip.usart[0].chip_mut::<FarEnd>()
     }
 }
 
@@ -200,14 +201,14 @@ fn level(high: bool) -> Level {
 impl Pins<'_> {
     /// Alternate function that a pin is switched to; `None` when it is not, or when there is no such pin.
     pub fn alternate(&mut self, port: Port, pin: u8) -> Option<u8> {
-        let (_, registers) = self.machine.mcu.port(port as usize);
+        let (_, registers) = self.machine.mcu.chip.port(port as usize);
         Gpio::function(Pin::new(pin)?, registers)
     }
 
     /// Drives a pin from outside.
     pub fn drive(&mut self, port: Port, pin: u8, high: bool) {
         if let Some(pin) = Pin::new(pin) {
-            self.machine.mcu.drive_port(self.at, port as usize, |gpio, registers, context| {
+            self.machine.mcu.chip.drive_port(self.at, port as usize, |gpio, registers, context| {
                 gpio.drive(pin, Some(level(high)), registers, context);
             });
         }
@@ -216,7 +217,7 @@ impl Pins<'_> {
     /// Drives the input of a timer channel (1 to 4). The emulator does not connect pins and timers: ask [`Pins::alternate`].
     pub fn drive_timer(&mut self, timer: GeneralTimer, channel: u8, high: bool) {
         if let Some(channel) = TimerChannel::new(channel) {
-            self.machine.mcu.drive_timer(self.at, timer as usize, |timer, registers, context| {
+            self.machine.mcu.chip.drive_timer(self.at, timer as usize, |timer, registers, context| {
                 timer.drive_input(channel, level(high), registers, context);
             });
         }
@@ -225,7 +226,7 @@ impl Pins<'_> {
     /// Output of a timer channel in PWM mode; `None` while the timer does not drive it.
     pub fn pulses(&mut self, timer: GeneralTimer, channel: u8) -> Option<PulseTrain> {
         let channel = TimerChannel::new(channel)?;
-        let (timer, registers) = self.machine.mcu.timer(timer as usize);
+        let (timer, registers) = self.machine.mcu.chip.timer(timer as usize);
         let pulse = timer.pulse(channel, registers)?;
         let high = timer.output(channel, registers)? == Level::High;
         Some(PulseTrain { high, width_ns: pulse.width.0, period_ns: pulse.period.0 })
@@ -234,7 +235,7 @@ impl Pins<'_> {
     /// Lets ADC1 read `code` (12 bits) on `channel` from now on.
     pub fn set_adc(&mut self, channel: u8, code: u16) {
         if let Some(channel) = AdcChannel::new(channel) {
-            self.machine.mcu.adc[0].set_input(channel, u32::from(code.min(4095)) * ADC_UNITS + ADC_UNITS / 2);
+            self.machine.mcu.chip.adc[0].set_input(channel, u32::from(code.min(4095)) * ADC_UNITS + ADC_UNITS / 2);
         }
     }
 
@@ -243,10 +244,21 @@ impl Pins<'_> {
         self.reset = true;
     }
 
+    /// Electrical level of a pin.
+    pub fn level(&mut self, port: Port, pin: u8) -> bool {
+        let (gpio, registers) = self.machine.mcu.chip.port(port as usize);
+        Pin::new(pin).is_some_and(|pin| gpio.level(pin, registers) == Level::High)
+    }
+
+    /// Lets a chip hold I2C1 (SDA low for ever, no start taken), or lets it go. The pin itself is driven apart.
+    pub fn hold_i2c(&mut self, held: bool) {
+        self.machine.mcu.i2c1.held = held;
+    }
+
     /// Pulls the `nth` chip of I2C1 (in the order of fitting) off the bus, or puts it back; a change waits for the end of an
     /// open transfer. `false` when there is no such chip.
     pub fn unplug(&mut self, nth: usize, unplugged: bool) -> bool {
-        self.machine.mcu.i2c[0].silence(nth, unplugged)
+        self.machine.mcu.i2c1.inner.silence(nth, unplugged)
     }
 
     /// Bytes that arrived on the serial line so far.
@@ -267,6 +279,14 @@ impl Pins<'_> {
 pub trait World: Send {
     /// Called at the instant asked for before (first a microsecond after power-up); returns the next instant to be called at.
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64;
+
+    /// Called after every register access of the firmware, if [`World::watches`].
+    fn accessed(&mut self, _pins: &mut Pins<'_>) {}
+
+    /// Whether the world wants to hear of accesses now.
+    fn watches(&self) -> bool {
+        false
+    }
 }
 
 /// Accesses that a correct image does not make, as text for a test's message, and the resets of the run.
@@ -320,6 +340,13 @@ struct Clockwork<W> {
 }
 
 impl<W: World> Driver<Machine> for Clockwork<W> {
+    fn on_settled(&mut self, session: &mut Session<Machine>, _: &mut dyn Host, settled: Settled) {
+        if let (true, Settled::Access { access, .. }) = (self.world.watches(), settled) {
+            let mut pins = Pins { machine: session.board_mut(), at: access.virtual_time, reset: false };
+            self.world.accessed(&mut pins);
+        }
+    }
+
     fn on_stop(&mut self, session: &mut Session<Machine>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         let now = stop.at.0;
         if now >= self.end_ns {

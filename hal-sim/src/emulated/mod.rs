@@ -14,6 +14,7 @@
 pub mod ahrs;
 mod machine;
 pub mod operator;
+mod part;
 pub mod rig;
 
 pub use machine::{Accesses, EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
