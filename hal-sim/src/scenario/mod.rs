@@ -153,6 +153,9 @@ impl Scenario {
     }
 
     /// The parts of the bench before any effect.
+    ///
+    /// # Panics
+    /// When a caller, not a file, put a motor or propeller in that the catalogue does not know.
     #[must_use]
     pub fn parts(&self) -> BenchParts {
         let propeller = Propeller::named(&self.propeller).expect("the name was checked on reading");
