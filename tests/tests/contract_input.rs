@@ -1,0 +1,415 @@
+//! Refused input, whole outputs, repeatable bytes: what the command line promises whatever it is fed.
+//!
+//! What it is: the built program on broken files; each fault is made by one edit of a good log, so that its place is known.
+//! What can go wrong: a fault that is accepted, a message without its place, a second line, a half-written file, memory that
+//! grows with a line.
+//! Units: as the channels state.
+//! Reference: specification `formats.md`, "Command line" and "Rig log".
+
+use quadrig_tests::{Said, call, quadrig};
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// Lines of the good log before its first row: format, metadata, header.
+const HEAD: usize = 3;
+/// Plateaus of the good log, us.
+const PULSES: [f64; 7] = [1000.0, 1200.0, 1350.0, 1500.0, 1650.0, 1800.0, 1000.0];
+/// Rows of each plateau, at 10 Hz.
+const ROWS: usize = 60;
+
+/// A run of a made-up rig: a quadratic propeller on a motor with a time constant, a little repeatable noise.
+fn good_log() -> String {
+    let mut text = "# quadrig-log 1\n# sample_hz = 10.0\nt_s,pulse_us,rpm,thrust_n,current_a,voltage_v\n".to_owned();
+    let (mut rpm, mut seed) = (0.0_f64, 7_u64);
+    let mut noise = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+    };
+    for (n, pulse) in PULSES.iter().flat_map(|p| std::iter::repeat_n(p, ROWS)).enumerate() {
+        let steady = if *pulse > 1060.0 { 8.0 * (pulse - 1000.0) } else { 0.0 };
+        rpm += (steady - rpm) * 0.7;
+        let measured = (rpm + 6.0 * noise()).max(0.0);
+        let thrust = 1.1e-7 * rpm * rpm + 0.01 * noise();
+        let current = 0.05 + 2e-11 * rpm.powi(3) + 0.02 * noise();
+        let voltage = 11.5 + 0.01 * noise();
+        text += &format!("{:.1},{pulse:.1},{measured:.1},{thrust:.4},{current:.3},{voltage:.3}\n", n as f64 * 0.1);
+    }
+    text
+}
+
+/// One file with a fault, and where it lies.
+struct Fault {
+    name: &'static str,
+    text: String,
+    /// What the one line must hold: place and column.
+    said: Vec<String>,
+    /// Whether `import` refuses it too; the importer repairs some faults of real loggers by a stated rule.
+    import: bool,
+}
+
+/// The good log with one cell replaced; `row` counts data rows from 1.
+fn with_cell(row: usize, column: usize, value: &str) -> String {
+    edited(row, |line| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        cells[column] = value;
+        cells.join(",")
+    })
+}
+
+fn edited(row: usize, edit: impl Fn(&str) -> String) -> String {
+    let mut lines: Vec<String> = good_log().lines().map(str::to_owned).collect();
+    lines[HEAD + row - 1] = edit(&lines[HEAD + row - 1]);
+    lines.join("\n") + "\n"
+}
+
+fn faults() -> Vec<Fault> {
+    let at = |row: usize| format!("broken.csv:{}: ", HEAD + row);
+    let cut_at_row = |row: usize, tail: &str| {
+        let text = good_log();
+        let whole: Vec<&str> = text.lines().take(HEAD + row - 1).collect();
+        whole.join("\n") + "\n" + tail
+    };
+    let header = |from: &str, to: &str| good_log().replacen(from, to, 1);
+    let fault =
+        |name, text, said: &[&str], import| Fault { name, text, said: said.iter().map(|s| (*s).to_owned()).collect(), import };
+    vec![
+        fault("truncated in a row", cut_at_row(200, "19.9,1500.0,40"), &[&at(200), "expected"], false),
+        fault("truncated after the header", cut_at_row(1, ""), &["broken.csv:", "expected"], true),
+        fault("thrust in grams", header("thrust_n", "thrust_g"), &["broken.csv:3: ", "column thrust_g", "thrust_n"], false),
+        fault("pulse in milliseconds", header("pulse_us", "pulse_ms"), &["broken.csv:3: ", "column pulse_ms", "pulse_us"], false),
+        fault("pulse as duty in percent", with_cell(90, 1, "7.5"), &[&at(90), "column pulse_us", "7.5"], false),
+        fault("not a number", with_cell(33, 3, "NaN"), &[&at(33), "column thrust_n", "NaN"], true),
+        fault("infinite", with_cell(34, 4, "-inf"), &[&at(34), "column current_a", "inf"], true),
+        fault("a word", with_cell(35, 5, "twelve"), &[&at(35), "column voltage_v", "twelve"], true),
+        fault("a repeated time stamp", with_cell(50, 0, "4.8"), &[&at(50), "column t_s", "repeats"], false),
+        fault("a time stamp that steps back", with_cell(60, 0, "1.0"), &[&at(60), "column t_s", "back"], false),
+        fault("a missing time stamp", with_cell(61, 0, ""), &[&at(61), "column t_s"], false),
+        fault(
+            "a missing field",
+            edited(70, |line| line.rsplit_once(',').expect("a row has commas").0.to_owned()),
+            &[&at(70), "expected"],
+            true,
+        ),
+        fault("a surplus field", edited(71, |line| format!("{line},1")), &[&at(71), "expected"], true),
+        fault("no time column", header("t_s,pulse_us", "seconds,pulse_us"), &["broken.csv:3: ", "column seconds", "t_s"], false),
+        fault("time alone", "# quadrig-log 1\nt_s\n0\n1\n".to_owned(), &["broken.csv:2: ", "expected"], false),
+        fault("a column twice", header("current_a", "thrust_n"), &["broken.csv:3: ", "column thrust_n"], true),
+        fault("no known channel", "# quadrig-log 1\nt_s,a,b\n0,1,2\n1,2,3\n".to_owned(), &["broken.csv", "expected"], true),
+        fault(
+            "no format line",
+            good_log().lines().skip(2).collect::<Vec<_>>().join("\n") + "\n",
+            &["broken.csv:1: ", "quadrig-log 1"],
+            false,
+        ),
+        fault("empty", String::new(), &["broken.csv:1: ", "empty"], true),
+    ]
+}
+
+/// A folder with a good log, a good model, and room for outputs.
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let bench = Self { folder: TempDir::new().unwrap() };
+        fs::write(bench.path("good.csv"), good_log()).unwrap();
+        bench.call(&["--quiet", "identify", "good.csv", "-o", "model.toml"]).succeeded();
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn call(&self, words: &[&str]) -> Said {
+        call(self.folder.path(), words)
+    }
+
+    /// Every name in the folder, so that anything left behind shows.
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(self.folder.path()).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+/// The commands that read a log.
+fn readers(log: &str) -> [Vec<&str>; 5] {
+    [
+        vec!["identify", log, "-o", "out.toml"],
+        vec!["close-loop", log, "-o", "out", "--json"],
+        vec!["close-loop", "good.csv", "--validate", log, "-o", "out", "--json"],
+        vec!["predict", "model.toml", log, "-o", "out.csv"],
+        vec!["predict", "model.toml", log, "-o", "out.csv", "--from", "command"],
+    ]
+}
+
+#[test]
+fn the_good_log_is_good() {
+    let bench = Bench::new();
+    for words in readers("good.csv") {
+        bench.call(&words).succeeded();
+    }
+    bench.call(&["import", "good.csv", "-o", "imported.csv"]).succeeded();
+    assert!(fs::read_to_string(bench.path("imported.csv")).unwrap().starts_with("# quadrig-log 1\n"));
+}
+
+#[test]
+fn faults_of_a_log_are_refused_with_their_place() {
+    let bench = Bench::new();
+    for fault in faults() {
+        fs::write(bench.path("broken.csv"), &fault.text).unwrap();
+        let before = bench.names();
+        let said: Vec<&str> = fault.said.iter().map(String::as_str).collect();
+        for words in readers("broken.csv") {
+            if fault.name == "no known channel" && words.contains(&"--validate") {
+                continue; // a run to validate on may lack channels: it is then reported without them
+            }
+            println!("{}: quadrig {}", fault.name, words.join(" "));
+            bench.call(&words).refused(&said);
+            assert_eq!(bench.names(), before, "{}: something was left behind", fault.name);
+        }
+    }
+}
+
+#[test]
+fn the_importer_refuses_what_no_rule_repairs() {
+    let bench = Bench::new();
+    for fault in faults().into_iter().filter(|fault| fault.import) {
+        fs::write(bench.path("broken.csv"), &fault.text).unwrap();
+        let before = bench.names();
+        println!("{}", fault.name);
+        bench.call(&["import", "broken.csv", "-o", "out.csv"]).refused(&["broken.csv", "expected"]);
+        assert_eq!(bench.names(), before, "{}: something was left behind", fault.name);
+    }
+}
+
+#[test]
+fn the_importer_refuses_a_unit_that_it_does_not_know() {
+    let bench = Bench::new();
+    fs::write(bench.path("export.csv"), "Time (s),Motor Electrical Speed (RPM),Thrust (stone)\n0,1000,1\n1,2000,4\n").unwrap();
+    let before = bench.names();
+    bench.call(&["import", "export.csv", "-o", "out.csv"]).refused(&["export.csv:1: ", "column Thrust (stone)", "expected"]);
+    bench
+        .call(&["import", "export.csv", "-o", "out.csv", "--map", "thrust_n=Load*9.81"])
+        .refused(&["export.csv:1: ", "column Load"]);
+    assert_eq!(bench.names(), before);
+    bench.call(&["import", "export.csv", "-o", "out.csv", "--map", "thrust_n=Thrust (stone)*62.275"]).succeeded();
+}
+
+#[test]
+fn the_importer_repairs_by_stated_rules_and_counts() {
+    let bench = Bench::new();
+    for (name, text, rule) in [
+        ("repeated", with_cell(50, 0, "4.8"), "repeat the row before"),
+        ("backward", with_cell(60, 0, "1.0"), "step back"),
+        ("cut", good_log() + "42.0,1000.0,0", "cut short"),
+    ] {
+        fs::write(bench.path("export.csv"), text).unwrap();
+        let said = bench.call(&["import", "export.csv", "-o", "out.csv"]).succeeded();
+        assert!(said.out.contains(rule), "{name}: {}", said.out);
+        // what it writes is a log that every other command takes
+        bench.call(&["--quiet", "identify", "out.csv", "-o", "out.toml"]).succeeded();
+    }
+}
+
+/// A line of a gigabyte is refused in bounded memory: the whole address space of the process is limited to less than that.
+#[cfg(unix)]
+#[test]
+fn a_line_of_a_gigabyte_costs_no_memory() {
+    let bench = Bench::new();
+    let mut file = File::create(bench.path("broken.csv")).unwrap();
+    file.write_all(good_log().as_bytes()).unwrap();
+    file.set_len(1 << 30).unwrap(); // a hole: it takes no room on the disk, and reads as one line of zero bytes
+    drop(file);
+    let limited = |words: &[&str]| {
+        let output = Command::new("sh")
+            .args(["-c", "ulimit -v 600000 && exec \"$0\" \"$@\""])
+            .arg(quadrig())
+            .args(words)
+            .current_dir(bench.folder.path())
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        Said::new(words, output)
+    };
+    limited(&["--quiet", "identify", "good.csv", "-o", "model.toml"]).succeeded(); // the limit itself is no hindrance
+    let line = format!("broken.csv:{}: a line longer than", HEAD + PULSES.len() * ROWS + 1);
+    for words in readers("broken.csv").iter().map(Vec::as_slice).chain([["import", "broken.csv", "-o", "out.csv"].as_slice()]) {
+        println!("quadrig {}", words.join(" "));
+        limited(words).refused(&[&line]);
+    }
+    limited(&["predict", "broken.csv", "good.csv", "-o", "out.csv"]).refused(&["broken.csv"]); // as a model
+}
+
+#[test]
+fn bad_models_are_refused() {
+    let bench = Bench::new();
+    let model = fs::read_to_string(bench.path("model.toml")).unwrap();
+    let format = model.lines().find(|l| l.starts_with("format")).expect("a model names its format").to_owned();
+    for (name, text) in [
+        ("empty", String::new()),
+        ("not TOML", "[channel\n".to_owned()),
+        ("another format", model.replacen(&format, "format = \"something else\"", 1)),
+        ("no format", model.replacen(&format, "", 1)),
+        ("cut in half", model[..model.len() / 2].rsplit_once('=').expect("keys have values").0.to_owned()),
+        ("a log", good_log()),
+    ] {
+        fs::write(bench.path("bad.toml"), text).unwrap();
+        let before = bench.names();
+        for words in
+            [["predict", "bad.toml", "good.csv", "-o", "out.csv"], ["close-loop", "good.csv", "--json", "--model", "bad.toml"]]
+        {
+            println!("{name}: quadrig {}", words.join(" "));
+            bench.call(&words).refused(&["bad.toml", "expected"]);
+            assert_eq!(bench.names(), before, "{name}");
+        }
+    }
+}
+
+#[test]
+fn absent_inputs_are_refused_by_name() {
+    let bench = Bench::new();
+    let before = bench.names();
+    for words in readers("nowhere.csv").iter().map(Vec::as_slice).chain([["import", "nowhere.csv", "-o", "out.csv"].as_slice()]) {
+        bench.call(words).refused(&["nowhere.csv"]);
+    }
+    bench.call(&["predict", "nowhere.toml", "good.csv", "-o", "out.csv"]).refused(&["nowhere.toml"]);
+    bench.call(&["close-loop", ".", "--json"]).refused(&[]);
+    assert_eq!(bench.names(), before);
+}
+
+/// An output that cannot be written is refused by name. (A file in the place of a folder: permissions do not stop root.)
+#[test]
+fn unwritable_outputs_are_refused_by_name() {
+    let bench = Bench::new();
+    fs::write(bench.path("taken"), "a file\n").unwrap();
+    fs::create_dir(bench.path("folder")).unwrap();
+    let before = bench.names();
+    for words in [
+        ["--quiet", "identify", "good.csv", "-o", "taken/model.toml"].as_slice(),
+        &["--quiet", "identify", "good.csv", "-o", "absent/model.toml"],
+        &["--quiet", "identify", "good.csv", "-o", "folder"],
+        &["--quiet", "import", "good.csv", "-o", "absent/log.csv"],
+        &["--quiet", "import", "good.csv", "-o", "folder"],
+        &["predict", "model.toml", "good.csv", "-o", "absent/pred.csv"],
+        &["--quiet", "close-loop", "good.csv", "-o", "taken"],
+        &["--quiet", "close-loop", "good.csv", "-o", "taken/out"],
+    ] {
+        println!("quadrig {}", words.join(" "));
+        let output = words.last().expect("the output is the last word");
+        bench.call(words).refused(&[output]);
+        assert_eq!(bench.names(), before);
+        assert_eq!(fs::read_dir(bench.path("folder")).unwrap().count(), 0);
+        assert_eq!(fs::read_to_string(bench.path("taken")).unwrap(), "a file\n");
+    }
+}
+
+#[test]
+fn wrong_usage_is_status_two() {
+    let bench = Bench::new();
+    let before = bench.names();
+    for words in [
+        ["no-such-command"].as_slice(),
+        &[],
+        &["import"],
+        &["import", "good.csv"],
+        &["identify", "good.csv"],
+        &["identify", "good.csv", "-o"],
+        &["identify", "good.csv", "-o", "out.toml", "--no-such-flag"],
+        &["close-loop"],
+        &["close-loop", "good.csv", "--model"],
+        &["predict", "model.toml", "-o", "out.csv"],
+        &["predict", "model.toml", "good.csv", "-o", "out.csv", "--from", "nowhere"],
+        &["import", "good.csv", "-o", "out.csv", "--map", "thrust"],
+        &["import", "good.csv", "-o", "out.csv", "--map", "thrust_n=Load*heavy"],
+    ] {
+        let said = bench.call(words);
+        assert_eq!(said.status, Some(2), "`quadrig {}`: {}", said.words, said.err);
+        assert_eq!(said.out, "", "`quadrig {}`", said.words);
+        assert!(said.err.contains("Usage") || said.err.contains("--help"), "`quadrig {}`: {}", said.words, said.err);
+        assert_eq!(bench.names(), before);
+    }
+    for words in [["--help"].as_slice(), &["--version"], &["close-loop", "--help"]] {
+        assert!(!bench.call(words).succeeded().out.is_empty());
+    }
+}
+
+/// The names of every file under a folder, with their bytes.
+fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            found.extend(contents(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
+        } else {
+            found.push((name, fs::read(&path).unwrap()));
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn the_same_input_twice_gives_the_same_bytes() {
+    let once = || {
+        let bench = Bench::new();
+        let said: Vec<String> = [
+            ["import", "good.csv", "-o", "imported.csv"].as_slice(),
+            &["identify", "good.csv", "-o", "model.toml"],
+            &["close-loop", "good.csv", "--validate", "imported.csv", "-o", "out", "--json"],
+            &["predict", "out/model.toml", "good.csv", "-o", "pred.csv"],
+            &["predict", "out/model.toml", "good.csv", "-o", "command.csv", "--from", "command"],
+        ]
+        .into_iter()
+        .map(|words| bench.call(words).succeeded().out)
+        .collect();
+        (said, contents(bench.folder.path()))
+    };
+    let ((said, files), (said_again, files_again)) = (once(), once());
+    assert_eq!(said, said_again);
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "command.csv",
+            "good.csv",
+            "imported.csv",
+            "model.toml",
+            "out/model.toml",
+            "out/report.html",
+            "out/verdict.json",
+            "pred.csv"
+        ]
+    );
+    for (one, other) in files.iter().zip(&files_again) {
+        assert!(one == other, "{} differs from run to run", one.0);
+    }
+}
+
+#[test]
+fn predictions_stand_row_for_row() {
+    let bench = Bench::new();
+    bench.call(&["predict", "model.toml", "good.csv", "-o", "pred.csv"]).succeeded();
+    let pred = fs::read_to_string(bench.path("pred.csv")).unwrap();
+    let lines: Vec<&str> = pred.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(lines.len(), 1 + PULSES.len() * ROWS);
+    assert_eq!(lines[0], "t_s,rpm,thrust_n,current_a,voltage_v");
+    assert!(pred.ends_with('\n'));
+}
+
+#[test]
+fn json_on_standard_output_is_the_verdict_and_nothing_else() {
+    let bench = Bench::new();
+    let said = bench.call(&["close-loop", "good.csv", "-o", "out", "--json"]).succeeded();
+    let verdict: serde_json::Value = serde_json::from_str(&said.out).expect("one JSON document");
+    assert_eq!(verdict["format"], "quadrig-verdict 1");
+    assert_eq!(verdict["run"], "good.csv");
+    assert_eq!(said.out, fs::read_to_string(bench.path("out/verdict.json")).unwrap());
+}

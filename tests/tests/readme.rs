@@ -1,0 +1,113 @@
+//! What the README tells people to type is typed here.
+//!
+//! What it is: every line of the README's `sh` blocks that calls the command line is run, in order, in a folder that looks like a
+//! fresh clone; what it writes lands there and not in the work tree.
+//! What can go wrong: a command that was renamed, an option that went, a file that does not exist. A block that needs a board
+//! carries `sh hardware` and is not run.
+//! Units: none.
+//! Reference: `README.md`; CommonMark, fenced code blocks.
+
+use quadrig_tests::{quadrig, root};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// How the README calls the command line.
+const CALL: &str = "cargo run --release -- ";
+
+/// The command lines of the blocks whose first word is `sh` and that need no board; a line that ends in a backslash goes on.
+fn commands(markdown: &str) -> Vec<String> {
+    let mut found: Vec<String> = Vec::new();
+    let (mut fenced, mut wanted, mut goes_on) = (false, false, false);
+    for line in markdown.lines().map(str::trim) {
+        if let Some(info) = line.strip_prefix("```") {
+            let mut words = info.split_whitespace();
+            wanted = !fenced && words.next() == Some("sh") && !words.any(|w| w == "hardware");
+            (fenced, goes_on) = (!fenced, false);
+            continue;
+        }
+        let line = line.strip_prefix("$ ").unwrap_or(line);
+        if !wanted || line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let (part, more) = line.strip_suffix('\\').map_or((line, false), |part| (part.trim_end(), true));
+        match found.last_mut() {
+            Some(last) if goes_on => *last += &format!(" {part}"),
+            _ => found.push(part.to_owned()),
+        }
+        goes_on = more;
+    }
+    found
+}
+
+/// A folder with links to everything in the workspace but the build output and what git ignores.
+fn clone_like() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    for entry in std::fs::read_dir(root()).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name();
+        if !["target", "report", "out", ".git"].iter().any(|skipped| name == *skipped) {
+            link(&entry.path(), &folder.path().join(name));
+        }
+    }
+    folder
+}
+
+#[cfg(unix)]
+fn link(from: &Path, to: &Path) {
+    std::os::unix::fs::symlink(from, to).unwrap();
+}
+
+#[cfg(not(unix))]
+fn link(from: &Path, to: &Path) {
+    if from.is_file() {
+        std::fs::copy(from, to).unwrap();
+    }
+}
+
+#[test]
+fn every_command_of_the_readme_runs() {
+    let markdown = std::fs::read_to_string(root().join("README.md")).expect("the project has a README.md");
+    let commands: Vec<String> = commands(&markdown).into_iter().filter(|line| line.starts_with(CALL)).collect();
+    assert!(!commands.is_empty(), "README.md shows no line `{CALL}...` in a block marked sh");
+    let folder = clone_like();
+    for command in commands {
+        println!("{command}");
+        // the very words, with the built program in the place of cargo, so that every line does not wait for cargo
+        let line = command.replace(CALL, "\"$QUADRIG\" ");
+        let done = Command::new("sh")
+            .args(["-c", &line])
+            .env("QUADRIG", quadrig())
+            .current_dir(folder.path())
+            .stdin(Stdio::null())
+            .output()
+            .expect("a shell");
+        assert!(done.status.success(), "`{command}`: {}\n{}", done.status, String::from_utf8_lossy(&done.stderr));
+    }
+}
+
+/// In the workspace `cargo run` finds the command line among all programs, as every line of the README takes for granted.
+#[test]
+fn cargo_run_is_the_command_line() {
+    let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .args(["run", "--quiet", "--release", "--", "--version"])
+        .current_dir(root())
+        .stdin(Stdio::null())
+        .output()
+        .expect("cargo runs");
+    let out = String::from_utf8_lossy(&done.stdout);
+    assert!(done.status.success() && out.starts_with("quadrig "), "{out}{}", String::from_utf8_lossy(&done.stderr));
+}
+
+#[test]
+fn commands_are_found_in_sh_blocks_only() {
+    let markdown = "text cargo run --release -- no\n\n```sh\n# a comment\n$ cargo run --release -- demo\ncargo run --release -- sim a.toml \\\n  -o b.csv\n\ncargo xtask test\n```\n\
+                    ```text\ncargo run --release -- no\n```\n  ```sh hardware\n  cargo run --release -- log --port P\n  ```\n```sh run\ncargo run --release -- beam\n```\n";
+    let wanted = [
+        "cargo run --release -- demo",
+        "cargo run --release -- sim a.toml -o b.csv",
+        "cargo xtask test",
+        "cargo run --release -- beam",
+    ];
+    assert_eq!(commands(markdown), wanted);
+}
