@@ -7,12 +7,18 @@
 
 mod battery_discharge;
 mod beam_resonance;
+mod bearing_friction;
+mod air_density;
+mod blade_damage;
+mod blade_flex;
 mod channel_delay;
 mod channel_filter;
 mod creep;
+mod encoder_drag;
 mod gain_change;
 mod hysteresis;
 mod operator;
+mod reynolds_thrust;
 mod rotor_inertia;
 mod spinup_lag;
 mod supply_sag;
@@ -153,6 +159,12 @@ pub fn library() -> &'static [&'static dyn Effect] {
         &beam_resonance::BeamResonance,
         &channel_filter::ChannelFilter,
         &channel_delay::ChannelDelay,
+        &blade_damage::BladeDamage,
+        &bearing_friction::BearingFriction,
+        &encoder_drag::EncoderDrag,
+        &blade_flex::BladeFlex,
+        &reynolds_thrust::ReynoldsThrust,
+        &air_density::AirDensity,
     ]
 }
 
@@ -178,4 +190,17 @@ fn speeds(context: &Context) -> Vec<&'static str> {
 fn geometric(from: f64, to: f64, n: usize) -> Vec<f64> {
     let (from, to) = (from.max(1e-9), to.max(from * 1.0001));
     (0..n).map(|k| from * (to / from).powf(k as f64 / (n.max(2) - 1) as f64)).collect()
+}
+
+/// Channels that feel the rotor's load: thrust where asked for, torque, current and every speed.
+fn load_channels(context: &Context, with_thrust: bool) -> Vec<&'static str> {
+    let names: &[&'static str] = if with_thrust { &["thrust_n", "torque_nm", "current_a"] } else { &["torque_nm", "current_a"] };
+    let mut out = present(context, names);
+    out.extend(speeds(context));
+    out
+}
+
+/// Throttle above the starting pulse, kus, 0 below it.
+fn throttle(context: &Context) -> Vec<f64> {
+    context.pulse.as_ref().map_or_else(|| vec![0.0; context.len()], |p| p.iter().map(|p| (p - context.start_pulse_us).max(0.0) / 1000.0).collect())
 }

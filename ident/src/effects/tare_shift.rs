@@ -6,7 +6,7 @@
 //! Reference: step change with unknown instant, Basseville & Nikiforov 1993, section 2.2.
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -33,7 +33,11 @@ impl Effect for TareShift {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.time_is_row || present(context, &["thrust_n"]).is_empty() { Vec::new() } else { vec![Instance::new(&["thrust_n"], "")] }
+        if context.time_is_row || present(context, &["thrust_n"]).is_empty() {
+            Vec::new()
+        } else {
+            vec![Instance::new(&["thrust_n"], "")]
+        }
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
@@ -59,6 +63,13 @@ pub(super) fn onset(context: &Context) -> Shape {
         range: (t0 + 0.02 * span, t0 + 0.98 * span),
         starts: (1..48).map(|k| t0 + span * f64::from(k) / 48.0).collect(),
     }
+}
+
+/// The same with 24 starts, for effects on many channels.
+pub(super) fn coarse_onset(context: &Context) -> Shape {
+    let mut shape = onset(context);
+    shape.starts = shape.starts.into_iter().skip(1).step_by(2).collect();
+    shape
 }
 
 /// 0 before `t0`, 1 after it, linear over the sample in between so that the instant can be refined.

@@ -6,7 +6,7 @@
 //! Reference: Beharie 2013, Table 6 (temperature coefficients of gauge and beam).
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -58,7 +58,7 @@ impl Effect for ThermalZero {
 }
 
 /// Centred mean of 21 rows: a housing is slow, a thermometer is noisy.
-fn smoothed(x: &[f64]) -> Vec<f64> {
+pub(super) fn smoothed(x: &[f64]) -> Vec<f64> {
     let mut prefix = Vec::with_capacity(x.len() + 1);
     prefix.push(0.0);
     for v in x {

@@ -1,0 +1,149 @@
+//! `bearing_friction`: something starts to rub on the rotor.
+//!
+//! What it is: from t0 on the motor carries an extra torque constant + viscous * omega: the supply pays for it at once, the
+//! speed at a pulse falls, and the torque arm sees the share that is not carried by the arm itself.
+//! What can go wrong: without a measured current the size is known only as far as the torque arm sees it; friction that was
+//! there from the start belongs to the baseline.
+//! Units: N.m, N.m.s/rad, s, 1; internally rev/min for the loss of speed.
+//! Reference: errata to Beharie 2013, Eq. 2.22-2.24 (friction costs current, not frame torque); power balance of a
+//! brushless motor with winding loss R Q^2/Kt^2, Drela 2007, *First-Order DC Electric Motor Model*.
+
+use super::blade_damage::STANDSTILL;
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, load_channels};
+use crate::context::{Context, Relation};
+use crate::design::TargetDesign;
+use crate::solve::Normal;
+
+/// See the module.
+pub(crate) struct BearingFriction;
+
+impl Effect for BearingFriction {
+    fn id(&self) -> &'static str {
+        "bearing_friction"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Friction sets in on the rotor",
+            equation: "Q_f = constant + viscous omega for t >= t0; current_a += Q_f (omega + 2 rho Q) / V, torque_nm += share Q_f, rpm(pulse) falls",
+            source: "errata to Beharie 2013, Eq. 2.22-2.24; Drela 2007, First-Order DC Electric Motor Model",
+            depends_on: &["t_s", "rpm"],
+            signature: "from one instant on more current and less speed at the same pulse; thrust(rpm) holds",
+            look_alikes: &["encoder_drag", "blade_damage", "thermal_derate"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let channels = load_channels(context, false);
+        if context.time_is_row || context.rpm.is_empty() || channels.len() < 2 {
+            return Vec::new();
+        }
+        vec![Instance::new(&channels, CONSTANT), Instance::new(&channels, "constant_and_viscous")]
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        vec![super::tare_shift::coarse_onset(context)]
+    }
+
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        if instance.form == CONSTANT { AMPLITUDES[..3].to_vec() } else { AMPLITUDES.to_vec() }
+    }
+
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        let [t0] = shape else { return };
+        drag(context, &super::tare_shift::step(context, *t0), instance.form != CONSTANT, position, design);
+    }
+
+    fn report(&self, _: &Context, _: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
+        with_share(fitted)
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        brakes(fitted)
+    }
+}
+
+/// Form of a drag that does not grow with speed.
+pub(super) const CONSTANT: &str = "constant";
+
+/// Amplitudes of a dragging torque, for this effect and `encoder_drag`; the first three are those of a constant drag.
+pub(super) const AMPLITUDES: [Amplitude; 6] = [
+    Amplitude { name: "constant", unit: "N.m" },
+    Amplitude { name: "arm_constant", unit: "N.m" },
+    Amplitude { name: "speed_loss", unit: "rev/min" },
+    Amplitude { name: "viscous", unit: "N.m.s/rad" },
+    Amplitude { name: "arm_viscous", unit: "N.m.s/rad" },
+    Amplitude { name: "speed_loss_viscous", unit: "rev/min.s/rad" },
+];
+
+/// Adds the columns of an extra torque on the rotor that acts where `on` is 1.
+pub(super) fn drag(context: &Context, on: &[f64], viscous: bool, position: usize, design: &mut TargetDesign) {
+    let rho = winding(context);
+    let load = |i: usize| context.torque.as_ref().map_or(0.0, |q| q[i].max(0.0));
+    let volts = |i: usize| context.voltage.as_ref().map_or(12.0, |v| v[i].max(1.0));
+    let omega = |i: usize| context.rpm[i] * OMEGA;
+    let (first, per_torque): (usize, &dyn Fn(usize) -> f64) = match design.relation {
+        Relation::Torque => (1, &|_| 1.0),
+        // V dI = dQ (omega + 2 rho Q)
+        Relation::Current => (0, &|i| (omega(i) + 2.0 * rho * load(i)) / volts(i)),
+        // d(omega) (1 + 2 rho Q / omega) = -rho dQ at a given share of the supply voltage
+        Relation::SpeedFromPulse => (2, &|i| -1.0 / (1.0 + 2.0 * rho * load(i) / omega(i))),
+        _ => return,
+    };
+    let column: Vec<f64> =
+        (0..context.len()).map(|i| if context.rpm[i] > STANDSTILL { on[i] * per_torque(i) } else { 0.0 }).collect();
+    if viscous {
+        design.add(position, first + 3, column.iter().enumerate().map(|(i, v)| v * omega(i)).collect());
+    }
+    design.add(position, first, column);
+}
+
+/// rad/s in a rev/min.
+const OMEGA: f64 = std::f64::consts::TAU / 60.0;
+
+/// rho = R/Kt^2 of the winding, W/(N.m)^2, from the run's own balance of electrical and mechanical power; zero, which leaves
+/// the winding out, where torque, current or voltage was not measured.
+fn winding(context: &Context) -> f64 {
+    let (Some(torque), Some(current), Some(voltage)) = (&context.torque, &context.current, &context.voltage) else { return 0.0 };
+    let n = context.len();
+    let mut normal = Normal::new(2);
+    for i in (0..n).step_by((n / 1000).max(1)).filter(|i| context.rpm[*i] > STANDSTILL) {
+        let omega = context.rpm[i] * OMEGA;
+        normal.add(&[omega, torque[i] * torque[i]], voltage[i] * current[i] - torque[i] * omega, 1.0);
+    }
+    normal.solve().map_or(0.0, |s| s.coefficients[1].max(0.0))
+}
+
+/// Adds the share of the drag that the torque arm sees; where the current says nothing of its size, the arm does.
+pub(super) fn with_share(mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+    let find = |name: &str| fitted.iter().find(|e| e.name == name).cloned();
+    match (find("constant"), find("arm_constant")) {
+        (Some(whole), Some(arm)) if whole.value != 0.0 => {
+            let share = arm.value / whole.value;
+            let se = (arm.se / whole.value).hypot(share * whole.se / whole.value);
+            fitted.push(Estimate { name: "share".into(), unit: "1".into(), value: share, se });
+        }
+        (None, Some(arm)) => {
+            let viscous = find("arm_viscous");
+            fitted.insert(0, Estimate { name: "constant".into(), ..arm });
+            fitted.extend(viscous.map(|v| Estimate { name: "viscous".into(), ..v }));
+        }
+        _ => {}
+    }
+    fitted
+}
+
+/// Friction takes: current rises, the rotor slows down, and the arm sees nothing that pushes; nor does drag fall with speed.
+pub(super) fn brakes(fitted: &[Estimate]) -> bool {
+    let value = |name: &str| fitted.iter().find(|e| e.name == name);
+    // at 300 rad/s; a missing term is none
+    let sum = |a: &str, b: &str| value(a).map(|a| a.value + 300.0 * value(b).map_or(0.0, |b| b.value));
+    let some = |name: &str| value(name).is_none_or(|e| e.value > -2.0 * e.se);
+    sum("constant", "viscous").is_none_or(|v| v > 0.0)
+        && sum("speed_loss", "speed_loss_viscous").is_none_or(|v| v > 0.0)
+        && AMPLITUDES.iter().all(|a| some(a.name))
+}

@@ -1,0 +1,75 @@
+//! `blade_flex`: blades untwist and bend under load at high speed.
+//!
+//! What it is: above an onset speed thrust falls short of its square law by the factor (onset / rpm)^exponent, torque likewise
+//! with `torque_ratio` times the exponent.
+//! What can go wrong: an onset below the slowest speed of the run is a changed exponent (`reynolds_thrust`), not a bend.
+//! Units: rev/min, 1.
+//! Reference: aeroelastic washout of light propellers, Brandt & Selig 2011 (AIAA 2011-1255), static data at high speed.
+
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, present};
+use crate::context::{Context, Relation};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct BladeFlex;
+
+impl Effect for BladeFlex {
+    fn id(&self) -> &'static str {
+        "blade_flex"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Blades flex at high speed",
+            equation: "thrust_n *= (onset / rpm)^exponent and torque_nm *= (onset / rpm)^(torque_ratio exponent) above onset",
+            source: "Brandt & Selig 2011, AIAA 2011-1255",
+            depends_on: &["rpm"],
+            signature: "thrust and torque fall short of the square law above one speed, whenever that speed is visited",
+            look_alikes: &["stall", "reynolds_thrust", "amplifier_saturation"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Gain
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let channels = present(context, &["thrust_n", "torque_nm"]);
+        if channels.first() == Some(&"thrust_n") { vec![Instance::new(&channels, "")] } else { Vec::new() }
+    }
+
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        let mut out = vec![
+            upper_speeds(context, 10),
+            Shape { name: "exponent", unit: "1", range: (0.0, 3.0), starts: vec![0.03, 0.1, 0.4] },
+        ];
+        if instance.channels.len() > 1 {
+            out.push(Shape { name: "torque_ratio", unit: "1", range: (-0.5, 3.0), starts: vec![0.3, 1.0] });
+        }
+        out
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let [onset, exponent, rest @ ..] = shape else { return };
+        let exponent =
+            if design.relation == Relation::Torque { exponent * rest.first().copied().unwrap_or(1.0) } else { *exponent };
+        let factor: Vec<f64> = context.rpm.iter().map(|r| if r > onset { (onset / r).powf(exponent) } else { 1.0 }).collect();
+        design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        // both fall short: a torque that grows where thrust falls is a stall
+        let ratio = fitted.iter().find(|e| e.name == "torque_ratio").is_none_or(|e| e.value > 2.0 * e.se);
+        ratio && fitted.iter().any(|e| e.name == "exponent" && e.value > 3.0 * e.se)
+    }
+}
+
+/// A speed above which something sets in: from a fifth of the top speed up, where rows above it are left to show it.
+pub(super) fn upper_speeds(context: &Context, count: usize) -> Shape {
+    let top = context.rpm.iter().copied().fold(1.0, f64::max);
+    Shape { name: "onset", unit: "rpm", range: (0.1 * top, 0.98 * top), starts: geometric(0.3 * top, 0.94 * top, count) }
+}

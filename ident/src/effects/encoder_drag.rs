@@ -1,0 +1,89 @@
+//! `encoder_drag`: the shaft encoder brakes the rotor while it is coupled.
+//!
+//! What it is: while rpm_encoder reads, the rotor carries an extra constant torque: more current, less speed at the same pulse,
+//! and the torque arm sees the share that is not carried by the arm itself.
+//! What can go wrong: an encoder that is coupled throughout belongs to the baseline, and nothing is offered.
+//! Units: N.m, 1; internally as `bearing_friction`.
+//! Reference: Beharie 2013, section 5.7.1 (the four speed sensors compared); power balance as `bearing_friction`.
+
+use super::bearing_friction::{AMPLITUDES, brakes, drag, with_share};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, load_channels};
+use crate::context::Context;
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct EncoderDrag;
+
+impl Effect for EncoderDrag {
+    fn id(&self) -> &'static str {
+        "encoder_drag"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "The shaft encoder brakes the rotor",
+            equation: "while rpm_encoder reads: Q_f = constant; current_a += Q_f (omega + 2 rho Q) / V, torque_nm += share Q_f, rpm(pulse) falls",
+            source: "Beharie 2013, section 5.7.1; Drela 2007, First-Order DC Electric Motor Model",
+            depends_on: &["rpm_encoder", "rpm"],
+            signature: "exactly while the encoder is coupled: more current and less speed at the same pulse; thrust(rpm) holds",
+            look_alikes: &["bearing_friction"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let mut channels = load_channels(context, false);
+        // the encoder's own channel has no sample with the encoder off: nothing changes on it
+        channels.retain(|c| *c != "rpm_encoder");
+        let coupled: f64 = coupled(context).iter().sum();
+        let share = coupled / context.len().max(1) as f64;
+        if context.rpm.is_empty() || channels.is_empty() || !(0.05..=0.95).contains(&share) {
+            Vec::new()
+        } else {
+            vec![Instance::new(&channels, "")]
+        }
+    }
+
+    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        AMPLITUDES[..3].to_vec()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+        drag(context, &coupled(context), false, position, design);
+    }
+
+    fn report(&self, _: &Context, _: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
+        with_share(fitted)
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        brakes(fitted)
+    }
+}
+
+/// Longest gap between two samples, s, over which the encoder counts as coupled.
+const GAP: f64 = 2.0;
+
+/// 1 while the encoder reads, 0 while it does not; gaps shorter than [`GAP`] are lost samples.
+fn coupled(context: &Context) -> Vec<f64> {
+    let mut out = vec![0.0; context.len()];
+    let Some(target) = context.target("rpm_encoder").map(|k| &context.targets[k]) else { return out };
+    let mut last: Option<usize> = None;
+    for (i, y) in target.rows.iter().zip(&target.y) {
+        // a decoupled shaft that stands still while the rotor turns
+        if *y < 0.05 * context.rpm[*i] {
+            continue;
+        }
+        let from = last.filter(|l| context.t[*i] - context.t[*l] < GAP).map_or(*i, |l| l + 1);
+        out[from..=*i].fill(1.0);
+        last = Some(*i);
+    }
+    out
+}

@@ -1,0 +1,73 @@
+//! `reynolds_thrust`: the thrust coefficient depends on the Reynolds number.
+//!
+//! What it is: thrust_n = zero + k rpm^(2 + exponent) in place of the quadratic polynomial: C_T ~ Re^exponent, Re ~ rpm.
+//! What can go wrong: over a narrow range of speeds the polynomial bends as well; the standard error then says so.
+//! Units: 1.
+//! Reference: Deters, Ananda & Selig 2014 (AIAA 2014-2151), Reynolds number effects on small propellers.
+
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
+use crate::context::Context;
+use crate::design::{Label, TargetDesign};
+
+/// See the module.
+pub(crate) struct ReynoldsThrust;
+
+impl Effect for ReynoldsThrust {
+    fn id(&self) -> &'static str {
+        "reynolds_thrust"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Thrust coefficient depends on the Reynolds number",
+            equation: "thrust_n = zero + k rpm^(2 + exponent)",
+            source: "Deters, Ananda & Selig 2014, AIAA 2014-2151",
+            depends_on: &["rpm"],
+            signature: "thrust(rpm) follows a power other than two from standstill to full speed; torque(rpm) holds",
+            look_alikes: &["blade_flex", "torque_crosstalk"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Input
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        if present(context, &["thrust_n"]).is_empty() { Vec::new() } else { vec![Instance::new(&["thrust_n"], "")] }
+    }
+
+    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
+        vec![Shape {
+            name: "exponent",
+            unit: "1",
+            range: (-1.2, 1.5),
+            starts: vec![-0.7, -0.4, -0.2, -0.1, -0.05, -0.02, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0],
+        }]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let [exponent] = shape else { return };
+        let factor: Vec<f64> = context
+            .rpm
+            .iter()
+            .map(|r| (r.max(0.0) / 1000.0).powf(*exponent))
+            .map(|f| if f.is_finite() { f } else { 0.0 })
+            .collect();
+        for column in &mut design.columns {
+            match column.label {
+                Label::Base(1) => column.values.fill(0.0),
+                Label::Base(2) => column.values.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f),
+                _ => {}
+            }
+        }
+        design.fixed.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f);
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        fitted.iter().all(|e| e.value.abs() > 3.0 * e.se)
+    }
+}
