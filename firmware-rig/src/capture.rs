@@ -20,6 +20,10 @@ const LONGEST_S: u32 = 10;
 /// Deviation from the median that counts as disagreement at constant speed (specification: 1 % on hardware).
 const DISAGREEMENT: f32 = 0.01;
 
+/// Speed below which channels are not judged against each other, rev/min: with one mark a revolution then takes nearly as
+/// long as the time-out to zero (0.25 s), so that channels read zero one after the other.
+const SLOWEST_JUDGED: u64 = 300;
+
 /// One capture channel.
 #[derive(Debug, Clone)]
 pub struct CaptureChannel {
@@ -286,7 +290,8 @@ impl CaptureBank {
             CaptureVerdict::Lost => others.is_some(), // all together: the rotor stops
             _ => false,
         };
-        self.flagged = codes.iter().filter(bad).count() as u8;
+        let slow = others.is_some_and(|(revolution, _)| revolution > 60 * u64::from(hz) / SLOWEST_JUDGED);
+        self.flagged = if slow { 0 } else { codes.iter().filter(bad).count() as u8 };
         codes
     }
 

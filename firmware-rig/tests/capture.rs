@@ -256,3 +256,28 @@ fn an_over_capture_is_told_and_never_bridged() {
     assert_eq!(bank.sample(later)[1].verdict, CaptureVerdict::OverCapture, "told");
     assert_eq!(bank.sample(later)[1].verdict, CaptureVerdict::Stopped, "and over when the rotor stands");
 }
+
+/// Below 300 rev/min a one-mark channel reads zero between its marks: channels are then not judged against each other, while
+/// a channel that dies at speed is.
+#[test]
+fn slow_rotors_raise_no_disagreement() {
+    let mut rotor = Rotor::new(0);
+    rotor.revolution = 84_000_000 * 60 / 1000;
+    rotor.run(600);
+    rotor.sample();
+    while rotor.revolution < 84_000_000 * 60 / 120 {
+        rotor.revolution += rotor.revolution / 800; // down to half a second a revolution, twice the time-out
+        rotor.run(1);
+    }
+    for k in 0..30 {
+        rotor.run(100);
+        rotor.sample();
+        assert_eq!(rotor.bank.flagged(), 0, "{k}");
+    }
+    rotor.revolution = 84_000_000 * 60 / 1000;
+    rotor.run(1000);
+    rotor.alive = [true, false, false, true];
+    rotor.run(400);
+    rotor.sample();
+    assert_eq!(rotor.bank.flagged(), 2);
+}

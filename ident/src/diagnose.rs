@@ -29,8 +29,8 @@ const CLEAR_REDUCTION: f64 = 0.15;
 const REFINED: usize = 7;
 /// Softmax temperature from evidence to probability.
 const TEMPERATURE: f64 = 4.0;
-/// Probability at which a second hypothesis makes the verdict ambiguous.
-const RIVAL: f64 = 0.25;
+/// Share of the winner's probability at which a second hypothesis makes the verdict ambiguous.
+const RIVAL: f64 = 0.5;
 
 /// A candidate hypothesis with its evidence.
 #[derive(Debug, Clone)]
@@ -87,7 +87,7 @@ impl Diagnosis {
     /// Whether two hypotheses explain the residual about equally well.
     #[must_use]
     pub fn ambiguous(&self) -> bool {
-        !self.unknown && !self.best.fit.placed.is_empty() && self.rivals.first().is_some_and(|r| r.probability >= RIVAL)
+        !self.unknown && !self.best.fit.placed.is_empty() && self.rivals.first().is_some_and(|r| r.probability >= RIVAL * self.probability)
     }
 }
 
@@ -164,6 +164,7 @@ fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool
 fn round_of(context: &Context, declared: Declared<'_>, best: &Candidate, offers: &mut [Scanned], progress: &mut dyn FnMut(f64)) -> Vec<Candidate> {
     let count = offers.len().max(1) as f64;
     let newest = best.fit.placed.last();
+    let whole = vec![1.0; context.targets.len()];
     let mut ranked: Vec<(f64, Vec<Placed>)> = Vec::new();
     for (k, offer) in offers.iter_mut().enumerate() {
         progress(0.7 * k as f64 / count);
@@ -176,7 +177,7 @@ fn round_of(context: &Context, declared: Declared<'_>, best: &Candidate, offers:
         }
         if let Some((shape, gain)) = &offer.found {
             let added = Placed { effect: offer.effect, instance: offer.instance.clone(), shape: shape.clone() };
-            let net = gain - penalty(context, &added);
+            let net = gain - penalty(context, &added, &whole);
             ranked.push((net, best.fit.placed.iter().cloned().chain([added]).collect()));
         }
     }
@@ -217,7 +218,7 @@ fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64
 /// Evidence, in nats, that the newest effect adds over a fit without it, its price paid.
 fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) -> f64 {
     let gain: f64 = new.targets.iter().zip(&old.targets).zip(shares).map(|((n, o), share)| share * (n.loglik - o.loglik)).sum();
-    gain - new.placed.last().map_or(0.0, |p| penalty(context, p))
+    gain - new.placed.last().map_or(0.0, |p| penalty(context, p, shares))
 }
 
 /// What one round chose.
@@ -237,7 +238,7 @@ fn choose(context: &Context, declared: Declared<'_>, ranked: &[Candidate], best:
             continue;
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
-        let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL);
+        let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL * probability);
         if unclear && !best.fit.placed.is_empty() && largest_reduction(context, winner, &held, errors) < CLEAR_REDUCTION {
             continue;
         }
@@ -252,9 +253,10 @@ fn largest_reduction(context: &Context, candidate: &Candidate, held: &[f64], bef
     context.targets.iter().enumerate().filter(|(_, t)| newest.instance.touches(t.name)).map(|(i, _)| 1.0 - held[i] / before[i]).fold(0.0, f64::max)
 }
 
-/// Price of an effect: half a log of the sample for each parameter, and the log of the grid that was searched.
-fn penalty(context: &Context, placed: &Placed) -> f64 {
-    let n: f64 = context.targets.iter().filter(|t| placed.instance.touches(t.name)).map(|t| t.rows.len() as f64 * t.weight).sum();
+/// Price of an effect: half a log of the effective sample for each parameter, and half a log of the grid that was searched.
+fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
+    let touched = context.targets.iter().zip(shares).filter(|(t, _)| placed.instance.touches(t.name));
+    let n: f64 = touched.map(|(t, share)| t.rows.len() as f64 * t.weight * share).sum();
     let shapes = placed.effect.shapes(context, &placed.instance);
     let grid: usize = shapes.iter().map(|s| s.starts.len()).product();
     let amplitudes = placed.effect.amplitudes(&placed.instance).len().min(placed.instance.channels.len().max(1));
@@ -340,15 +342,12 @@ fn opponent(
     champion.filter(|(_, c, _)| c.evidence > best.evidence).map(|(_, c, h)| (c, h))
 }
 
-/// Whether a variable stands for the channel itself or for the load that its relation already holds.
+/// Whether a variable stands for the channel itself or for the load, which its relation holds already. (The departure of
+/// thrust from its polynomial in the speed is still a question; current and voltage follow the load with their own lags.)
 fn is_load(context: &Context, target: &Target, name: &str) -> bool {
-    let load = ["pulse_us", "rpm", "current_a", "voltage_v"];
     let held = match target.relation {
-        Relation::SpeedFromPulse => load.contains(&name),
-        Relation::Voltage if context.current.is_some() => load.contains(&name),
-        Relation::Voltage => name == "voltage_v",
-        Relation::Current => name == "current_a",
-        _ => false,
+        Relation::Torque | Relation::Thrust | Relation::Current => ["pulse_us", "current_a", "voltage_v"].contains(&name),
+        _ => ["pulse_us", "current_a", "voltage_v", "rpm"].contains(&name),
     };
     held || twin(context, target, name)
 }

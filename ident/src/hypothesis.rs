@@ -97,12 +97,23 @@ pub enum Rows<'a> {
 /// The likelihood counts samples as independent; [`TargetFit::share`] says how many of them the colour of the residual leaves.
 #[must_use]
 pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
+    let mut kept = Vec::with_capacity(target.rows.len());
+    let (solution, loglik) = solve_target(context, target, design, rows, Some(&mut kept))?;
+    let Solution { coefficients, inverse, rss } = solution;
+    let share = effective_share(design, &coefficients, &kept);
+    let covariance = inverse * ((rss / kept.len() as f64).max(0.01) / share);
+    Some(TargetFit { coefficients, labels: design.columns.iter().map(|c| c.label).collect(), covariance, loglik, share })
+}
+
+/// Row, sample and variance of what went into a fit.
+type Kept = (usize, f64, f64);
+
+fn solve_target(context: &Context, target: &Target, design: &TargetDesign, rows: Rows<'_>, mut kept: Option<&mut Vec<Kept>>) -> Option<(Solution, f64)> {
     let k = design.columns.len();
     let mut normal = Normal::new(k);
     let mut row = vec![0.0; k];
     let mut log_sigma = 0.0;
     let stride = if let Rows::Every(n) = rows { n.max(1) } else { 1 };
-    let mut kept: Vec<(usize, f64, f64)> = Vec::with_capacity(target.rows.len() / stride + 1);
     for (j, i) in target.rows.iter().enumerate().step_by(stride) {
         if let Rows::Where(mask) = rows
             && !mask[*i]
@@ -117,34 +128,45 @@ pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, row
         let y = target.y[j] - design.fixed.get(*i).copied().unwrap_or(0.0);
         normal.add(&row, y, 1.0 / variance);
         log_sigma += 0.5 * variance.ln();
-        kept.push((*i, y, variance));
+        if let Some(kept) = kept.as_deref_mut() {
+            kept.push((*i, y, variance));
+        }
     }
     if normal.count < k + 3 {
         return None;
     }
-    let Solution { coefficients, inverse, rss } = normal.solve()?;
+    let solution = normal.solve()?;
     let n = normal.count as f64;
-    let rho = lag_one(design, &coefficients, &kept);
     // the scale of the noise is profiled, but never below a tenth of the floor's standard deviation
-    let scale = (rss / n).max(0.01);
-    let weight = target.weight * stride as f64;
-    let loglik = weight * (-0.5 * n * scale.ln() - 0.5 * rss / scale - log_sigma);
-    let share = (1.0 - rho) / (1.0 + rho);
-    let covariance = inverse * (scale / share);
-    Some(TargetFit { coefficients, labels: design.columns.iter().map(|c| c.label).collect(), covariance, loglik, share })
+    let scale = (solution.rss / n).max(0.01);
+    let loglik = target.weight * stride as f64 * (-0.5 * n * scale.ln() - 0.5 * solution.rss / scale - log_sigma);
+    Some((solution, loglik))
 }
 
-/// Lag-one autocorrelation of the scaled residual.
-fn lag_one(design: &TargetDesign, coefficients: &[f64], kept: &[(usize, f64, f64)]) -> f64 {
-    let (mut c0, mut c1, mut last) = (0.0, 0.0, 0.0);
-    for (i, y, variance) in kept {
-        let fitted: f64 = design.columns.iter().zip(coefficients).map(|(c, b)| c.values[*i] * b).sum();
-        let r = (y - fitted) / variance.sqrt();
-        c0 += r * r;
-        c1 += r * last;
-        last = r;
+/// One over the integrated autocorrelation time of the scaled residual, in samples: 1 when white.
+///
+/// The autocorrelation is taken at lags 1, 2, 4, 8, ... and integrated in between until it falls below 0.05.
+fn effective_share(design: &TargetDesign, coefficients: &[f64], kept: &[Kept]) -> f64 {
+    let residual: Vec<f64> = kept
+        .iter()
+        .map(|(i, y, variance)| {
+            let fitted: f64 = design.columns.iter().zip(coefficients).map(|(c, b)| c.values[*i] * b).sum();
+            (y - fitted) / variance.sqrt()
+        })
+        .collect();
+    let c0: f64 = residual.iter().map(|r| r * r).sum();
+    let (mut time, mut last, mut lag) = (1.0, 1.0, 1usize);
+    while c0 > 0.0 && lag < residual.len() / 4 {
+        let rho = residual.iter().zip(&residual[lag..]).map(|(a, b)| a * b).sum::<f64>() / c0;
+        if rho < 0.05 {
+            break;
+        }
+        let width = if lag == 1 { 1.0 } else { (lag / 2) as f64 };
+        time += 2.0 * width * if lag == 1 { rho } else { 0.5 * (rho + last) };
+        last = rho;
+        lag *= 2;
     }
-    if c0 > 0.0 { (c1 / c0).clamp(0.0, 0.999) } else { 0.0 }
+    1.0 / time
 }
 
 /// Fits every target that the effects touch; the others come from `rest`.
@@ -166,8 +188,8 @@ pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: O
 fn touched_loglik(context: &Context, declared: Declared<'_>, placed: &[Placed], moving: &[&str], rows: Rows<'_>) -> f64 {
     let mut sum = 0.0;
     for target in context.targets.iter().filter(|t| moving.contains(&t.name)) {
-        match fit_target(context, target, &design(context, declared, placed, target), rows) {
-            Some(f) => sum += f.loglik,
+        match solve_target(context, target, &design(context, declared, placed, target), rows, None) {
+            Some((_, loglik)) => sum += loglik,
             None => return f64::NEG_INFINITY,
         }
     }

@@ -61,10 +61,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     write_folder(&args.output, &log, &closed, &serde_json::to_string_pretty(&closed.verdict)?)?;
     say(table(&closed.verdict));
 
-    let again = fly_model(&scenario, &closed.model, &log, "again.csv", quiet)?;
-    let path = args.output.join("again.csv");
-    again.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    say(resimulated(&closed.model, &again));
+    match fly_model(&scenario, &closed.model, &log, "again.csv", quiet) {
+        Ok(again) => {
+            let path = args.output.join("again.csv");
+            again.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+            say(resimulated(&closed.model, &again));
+        }
+        Err(e) => say(format!("the corrected model as the plant: the firmware stopped the run ({e})\n")),
+    }
 
     let truth = &scenario.effects[0];
     let named = closed.verdict.effects.iter().any(|e| e.id == truth.id());

@@ -128,11 +128,7 @@ impl Board {
 #[must_use]
 pub fn firmware_config(scenario: &Scenario) -> Config {
     let period = Ticks::from_ms(1000 / u64::from(scenario.log.rate_hz));
-    let mut config = Config { marks: scenario.parts().geometry.marks(), log_period: period, ..Config::thesis_570kv() };
-    // While the rotor coasts to a stop, a revolution lasts longer than it takes to lose a tenth of the speed: the channels
-    // read different instants and disagree until it stands, which takes about a second.
-    config.limits.sensor_ms = config.limits.sensor_ms.max(2500);
-    config
+    Config { marks: scenario.parts().geometry.marks(), log_period: period, ..Config::thesis_570kv() }
 }
 
 /// Flies a scenario. `plant` takes the place of the scenario's own powerplant. `progress` hears the share that is done.
