@@ -8,6 +8,7 @@
 
 mod close_loop;
 mod demo;
+mod flash;
 mod identify;
 mod import;
 mod predict;
@@ -41,6 +42,8 @@ enum Command {
     Identify(identify::Args),
     /// Residual, cause, corrected model, error before and after.
     CloseLoop(close_loop::Args),
+    /// Builds, flashes and attaches through probe-rs.
+    Flash(flash::Args),
     /// A model's prediction of every measured channel, row for row.
     Predict(predict::Args),
 }
@@ -56,6 +59,7 @@ fn main() -> ExitCode {
         Command::Import(args) => import::run(args, cli.quiet),
         Command::Identify(args) => identify::run(args, cli.quiet),
         Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
+        Command::Flash(args) => flash::run(args),
         Command::Predict(args) => predict::run(args),
     };
     match done {
