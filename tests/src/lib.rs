@@ -7,6 +7,8 @@
 //! Reference: `QUADRIG_DATA` names the data folder, `CI` marks a build server.
 #![forbid(unsafe_code)]
 
+pub mod blind;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;

@@ -1,0 +1,175 @@
+//! Blind campaign from the command line.
+//!
+//! What it is: `blind --runs N --clean M`, resumable, one line a run; `--dump SEED DIR` writes one run and its truth.
+//! What can go wrong: an interrupted line is cut short; it is left out on reading and run again.
+//! Units: sizes in noise floors.
+//! Reference: specification `closing-the-loop.md`, "What counts as proof".
+
+use indicatif::{ProgressBar, ProgressStyle};
+use quadrig_tests::blind::scenario::{CLEAN, Hidden, Scenario};
+use quadrig_tests::blind::score::{HEADER, Line, score};
+use quadrig_tests::blind::{tally, write};
+use std::collections::BTreeSet;
+use std::fs::{self, OpenOptions};
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--seed-from S] [--out FILE.csv] [--threads T] [--failures] | blind --dump SEED DIR | blind --plan N";
+
+struct Options {
+    runs: usize,
+    clean: usize,
+    odd: bool,
+    effect: Option<String>,
+    from: u64,
+    out: PathBuf,
+    threads: usize,
+    failures: bool,
+}
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    match command(&words) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            eprintln!("blind: {why}");
+            ExitCode::from(if why.starts_with("usage") { 2 } else { 1 })
+        }
+    }
+}
+
+fn command(words: &[String]) -> Result<(), String> {
+    match words.first().map(String::as_str) {
+        Some("--dump") => {
+            let [_, seed, folder] = words else { return Err(USAGE.into()) };
+            dump(seed.parse().map_err(|_| USAGE)?, &PathBuf::from(folder)).map_err(|e| e.to_string())
+        }
+        Some("--plan") => {
+            for seed in 0..words.get(1).and_then(|n| n.parse().ok()).ok_or(USAGE)? {
+                let s = Scenario::new(seed);
+                println!(
+                    "{seed} {:?} sizes {:?} shown {:?} strengths {:?}",
+                    s.hidden,
+                    s.sizes,
+                    s.shown,
+                    s.effects.iter().map(|e| e.strength).collect::<Vec<_>>()
+                );
+            }
+            Ok(())
+        }
+        _ => campaign(&options(words)?),
+    }
+}
+
+fn options(words: &[String]) -> Result<Options, String> {
+    let mut o = Options {
+        runs: 2000,
+        clean: 1000,
+        odd: true,
+        effect: None,
+        from: 0,
+        out: PathBuf::from("blind.csv"),
+        threads: 2,
+        failures: false,
+    };
+    let mut i = words.iter();
+    while let Some(flag) = i.next() {
+        if flag == "--failures" {
+            o.failures = true;
+            continue;
+        }
+        let value = i.next().ok_or(USAGE)?;
+        let number = || value.parse::<u64>().map_err(|_| format!("{flag} {value}: expected a whole number"));
+        match flag.as_str() {
+            "--runs" => o.runs = number()? as usize,
+            "--clean" => o.clean = number()? as usize,
+            "--half" => {
+                o.odd = match value.as_str() {
+                    "judging" => true,
+                    "tuning" => false,
+                    _ => return Err(format!("--half {value}: expected tuning or judging")),
+                }
+            }
+            "--effect" => o.effect = Some(value.clone()),
+            "--seed-from" => o.from = number()?,
+            "--out" => o.out = PathBuf::from(value),
+            "--threads" => o.threads = (number()? as usize).max(1),
+            _ => return Err(USAGE.into()),
+        }
+    }
+    Ok(o)
+}
+
+/// The seeds of a campaign: even ones tune, odd ones judge.
+fn seeds(o: &Options) -> Vec<u64> {
+    let half = u64::from(o.odd);
+    let first = o.from / 2 * 2 + half;
+    let wanted = |s: &u64| o.effect.as_ref().is_none_or(|id| Hidden::of(*s).ids().contains(&id.as_str()));
+    let mut all: Vec<u64> = (0..).map(|k| first + 2 * k).take_while(|s| *s < CLEAN).filter(wanted).take(o.runs).collect();
+    // a clean run after every few others, so that an interrupted campaign has both
+    let clean: Vec<u64> = (0..o.clean as u64).map(|k| CLEAN + first + 2 * k).collect();
+    let every = (all.len() / clean.len().max(1)).max(1);
+    for (k, c) in clean.into_iter().enumerate() {
+        let at = ((every + 1) * k).min(all.len());
+        all.insert(at, c);
+    }
+    all
+}
+
+fn campaign(o: &Options) -> Result<(), String> {
+    let fault = |e: std::io::Error| format!("{}: {e}", o.out.display());
+    let known = if o.out.exists() { fs::read_to_string(&o.out).map_err(fault)? } else { String::new() };
+    let mut lines: Vec<Line> = known.lines().filter_map(Line::parse).collect();
+    let done: BTreeSet<u64> = lines.iter().map(|l| l.seed).collect();
+    let wanted = seeds(o);
+    let left: Vec<u64> = wanted.iter().copied().filter(|s| !done.contains(s)).collect();
+    let mut file = OpenOptions::new().create(true).append(true).open(&o.out).map_err(fault)?;
+    if known.is_empty() {
+        writeln!(file, "{HEADER}").map_err(fault)?;
+    } else if !known.ends_with('\n') {
+        writeln!(file).map_err(fault)?;
+    }
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(wanted.len() as u64) } else { ProgressBar::hidden() };
+    bar.set_style(
+        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} left").map_err(|e| e.to_string())?,
+    );
+    bar.set_position((wanted.len() - left.len()) as u64);
+    std::panic::set_hook(Box::new(|_| {})); // a panic of the tool is a figure of the campaign
+    let (next, sink) = (AtomicUsize::new(0), Mutex::new((file, Vec::new())));
+    std::thread::scope(|scope| {
+        for _ in 0..o.threads {
+            scope.spawn(|| {
+                while let Some(seed) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let line = score(*seed);
+                    let Ok(mut sink) = sink.lock() else { return };
+                    let _ = writeln!(sink.0, "{}", line.csv()).and_then(|()| sink.0.flush());
+                    sink.1.push(line);
+                    bar.inc(1);
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    let (_, fresh) = sink.into_inner().map_err(|e| e.to_string())?;
+    lines.extend(fresh);
+    let asked: BTreeSet<u64> = wanted.into_iter().collect();
+    lines.retain(|l| asked.contains(&l.seed));
+    lines.sort_by_key(|l| l.seed);
+    println!("{}", tally::markdown(&lines));
+    if o.failures {
+        println!("{}", tally::failures(&lines));
+    }
+    Ok(())
+}
+
+fn dump(seed: u64, folder: &std::path::Path) -> std::io::Result<()> {
+    let s = Scenario::new(seed);
+    fs::create_dir_all(folder)?;
+    for (which, name) in ["csv", "validate.csv"].iter().enumerate() {
+        fs::write(folder.join(format!("{seed}.{name}")), write::text(&s.rig, &s.run(which)))?;
+    }
+    fs::write(folder.join(format!("{seed}.truth.txt")), write::truth(&s))
+}

@@ -1,0 +1,103 @@
+//! Effects of the load cell and its amplifier.
+//!
+//! What it is: the true thrust over time in, the strain reading over time out.
+//! What can go wrong: the resonance's shaft phase must run on the fine grid, or its alias depends on the sampling of the generator.
+//! Units: N, s, Hz.
+//! Reference: creep as a first-order after-effect; hysteresis as dz/dx = -(z - z_branch)/L (Coleman and Hodgdon); a mode of one degree
+//! of freedom under a rotating imbalance; amplifier that clips.
+
+use super::Effect;
+use super::drive::Air;
+use crate::blind::chance::Chance;
+use crate::blind::rig::{Rig, poly};
+
+/// The reading that the amplifier clips at, N.
+#[must_use]
+pub fn level(e: &Effect, rig: &Rig) -> f64 {
+    poly(&rig.thrust, rig.top / 1000.0) * (1.0 - e.strength)
+}
+
+/// Opening of the loop at mid range, down minus up, N: a full cycle walked through.
+#[must_use]
+pub fn width(e: &Effect) -> f64 {
+    let (mut z, mut up) = (0.0, 0.0);
+    let n = 400;
+    for lap in 0..3 {
+        for (dir, k) in (0..n).map(|k| (1.0, k)).chain((0..n).map(|k| (-1.0, k))) {
+            z += 1.0 / f64::from(n) / e.b * (-dir * 0.5 * e.signed() - z);
+            if k == n / 2 && lap == 2 {
+                if dir > 0.0 { up = z } else { return z - up }
+            }
+        }
+    }
+    0.0
+}
+
+/// What the cell adds besides the reading itself.
+#[derive(Debug, Clone, Default)]
+pub struct Strain {
+    /// Reading before noise, N.
+    pub reading: Vec<f64>,
+    /// Rms of the raw strain about the mean, N.
+    pub rms: Vec<f64>,
+}
+
+/// Passes the thrust through the cell. `h` is the grid step, `window` the averaging time of one logged sample, s.
+#[must_use]
+pub fn pass(
+    rig: &Rig,
+    effects: &[Effect],
+    h: f64,
+    window: f64,
+    n: &[f64],
+    thrust: &[f64],
+    torque: &[f64],
+    air: &[Air],
+    k: &mut Chance,
+) -> Strain {
+    let mut y = thrust.to_vec();
+    let mut rms = vec![0.0; y.len()];
+    let full = poly(&rig.thrust, rig.top / 1000.0);
+    for e in effects {
+        let a = e.signed();
+        let time = |i: usize| i as f64 * h;
+        let mut state = [0.0f64; 2];
+        for i in 0..y.len() {
+            match e.id {
+                "zero_drift" => y[i] += a * time(i),
+                "thermal_zero" => y[i] += a * (air[i].temperature - air[0].temperature),
+                "tare_shift" if time(i) >= e.t0 => y[i] += a,
+                "gain_change" if e.form == 0 && time(i) >= e.t0 => y[i] *= 1.0 + a,
+                "gain_change" if e.form == 1 => y[i] *= 1.0 + a * time(i) / e.b,
+                "torque_crosstalk" => y[i] += a * torque[i],
+                "creep" => {
+                    state[0] += (y[i] - state[0]) * (1.0 - (-h / e.b).exp());
+                    y[i] += a * state[0];
+                }
+                "hysteresis" => {
+                    let x = y[i] / full;
+                    let d = x - state[1];
+                    state[1] = x;
+                    let target = -d.signum() * 0.5 * a;
+                    state[0] = target + (state[0] - target) * (-d.abs() / e.b).exp();
+                    y[i] += state[0];
+                }
+                "beam_resonance" => {
+                    let per_rev = if e.form == 1 { 2.0 } else { 1.0 };
+                    let f = per_rev * n[i] / 60.0;
+                    let r = f / e.b;
+                    // force grows with the square of speed; its share of thrust at full speed is the strength
+                    let force = e.strength * full * (n[i] / rig.top).powi(2);
+                    let amp = force / ((1.0 - r * r).powi(2) + (2.0 * e.c * r).powi(2)).sqrt();
+                    state[0] = (state[0] + f * h).fract();
+                    let arg = std::f64::consts::PI * f * window;
+                    let kept = if arg.abs() < 1e-6 { 1.0 } else { arg.sin() / arg };
+                    rms[i] = amp * std::f64::consts::FRAC_1_SQRT_2;
+                    y[i] += amp * kept * (std::f64::consts::TAU * state[0] + k.between(0.0, 0.5)).sin() + 0.04 * amp;
+                }
+                _ => super::super::unknown::cell(e, rig, i, time(i), h, n, &mut state, &mut y[i], k),
+            }
+        }
+    }
+    Strain { reading: y, rms }
+}
