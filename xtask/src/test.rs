@@ -89,7 +89,9 @@ fn host_lints(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
 }
 
 fn host_tests(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
-    steps.step("tests of the host", |tally| tests(&mut cargo(place, &["test", "--release", "--workspace", "--no-fail-fast"]), tally))
+    steps.step("tests of the host", |tally| {
+        tests(&mut cargo(place, &["test", "--release", "--workspace", "--no-fail-fast"]), tally)
+    })
 }
 
 /// The tests that load the flash images into the emulator. It declares a newer Rust than the pinned one and compiles on it.
