@@ -71,6 +71,12 @@ fn the_image_boots_finds_three_sensors_and_streams_their_words() {
     assert_eq!((fresh(1), fresh(2)), (samples.len(), samples.len()), "gyro and accelerometer on every tick");
     assert_eq!(fresh(4), samples.len().div_ceil(3), "magnetometer on every third");
     assert!(samples.iter().all(|s| s.alive == 0b111 && s.temperature == -13_200));
+
+    // and the words are what the physics says, not merely what the models said: a chip in a wrong range or asleep shows here
+    assert!(samples.iter().all(|s| s.gyro == [288, -165, 272]), "0.35, -0.2, 0.33 rad/s at 14.375 LSB per deg/s");
+    let length = |words: [i16; 3]| words.iter().map(|w| f64::from(*w).powi(2)).sum::<f64>().sqrt();
+    assert!(samples.iter().all(|s| (length(s.accel) - 256.0).abs() < 1.0), "1 g at 256 LSB");
+    assert!(samples.iter().all(|s| (length(s.mag) - 0.4833 * 1090.0).abs() < 1.0), "0.4833 G at 1090 LSB");
     let distinct: std::collections::BTreeSet<_> = samples.iter().map(|s| s.accel).collect();
     assert!(distinct.len() > 100, "the body turns, so the words change: {}", distinct.len());
 }

@@ -32,7 +32,9 @@ use std::collections::VecDeque;
 use std::num::{NonZeroU32, NonZeroU64};
 use std::path::{Path, PathBuf};
 
-const CORE_HZ: u64 = 168_000_000;
+const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
+/// The part's SysTick reference is the core clock over 8.
+const SYSTICK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).unwrap();
 const CRYSTAL_HZ: u64 = 8_000_000;
 const SUPPLY_MV: u32 = 3300;
 /// Units of a converter input in one count: the model answers input x 4095 / reference, rounded down.
@@ -119,14 +121,13 @@ impl Board for Machine {
 
     fn targets(&mut self) -> Vec<Target<'_>> {
         let lines = u32::from(Operate::cpu(&self.mcu).interrupt_lines);
-        let hz = NonZeroU64::new(CORE_HZ).expect("not zero");
         let core = armv7m::Core {
             variant: armv7m::Variant::M4,
-            clock_hz: hz,
-            interrupt_lines: NonZeroU32::new(lines).expect("the part has interrupts"),
+            clock_hz: CORE_HZ,
+            interrupt_lines: NonZeroU32::new(lines).unwrap_or(NonZeroU32::MIN),
             priority_bits: 4,
-            refclk_divider: NonZeroU32::new(8).expect("not zero"),
-            instructions_per_second: hz,
+            refclk_divider: SYSTICK_DIVIDER,
+            instructions_per_second: CORE_HZ,
             boot: "flash",
         };
         let windows = rigless::cpu::armv7m::windows(Mcu::bus(&self.mcu));
