@@ -289,7 +289,8 @@ fn the_native_run_measures_the_same() {
             };
             let (a, b) = (counts(&emulated), counts(&native));
             println!("{level} us {name}: {a:.2} and {b:.2} counts");
-            assert!((a - b).abs() <= 4.0, "{name}: {a} and {b}");
+            // four samples each, of which the noisiest channel has 2.1 counts rms: 6 counts are four sigma of the difference
+            assert!((a - b).abs() <= 6.0, "{name}: {a} and {b}");
         }
     }
 }
