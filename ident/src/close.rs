@@ -5,7 +5,7 @@
 //! Units: as the channels state.
 //! Reference: specification `closing-the-loop.md`, steps 1 to 8.
 
-use crate::context::{Context, Relation, unit_of};
+use crate::context::{Context, DIFFERENCES, unit_of};
 use crate::diagnose::{Diagnosis, diagnose};
 use crate::effects::Estimate;
 use crate::heldout;
@@ -103,7 +103,7 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
         .targets
         .iter()
         .zip(before.into_iter().zip(after))
-        .filter(|(t, _)| t.relation != Relation::ThrustRms)
+        .filter(|(t, _)| !t.relation.is_evidence())
         .map(|(t, (before, after))| (t.name.to_owned(), Channel { unit: unit_of(t.name).to_owned(), noise_floor_rms: t.noise.rms, before, after }))
         .collect()
 }
@@ -120,7 +120,7 @@ fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<Effe
             let about = p.effect.about();
             let estimates = p.effect.report(context, &p.instance, d.best.fit.estimates(context, declared, k));
             let (first, reduction) = quoted(context, d, k);
-            let mut channels = p.instance.channels.clone();
+            let mut channels: Vec<String> = p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();
             if let Some(at) = channels.iter().position(|c| *c == first) {
                 channels.swap(0, at);
             }
@@ -155,7 +155,7 @@ fn quoted(context: &Context, d: &Diagnosis, k: usize) -> (String, f64) {
         .targets
         .iter()
         .enumerate()
-        .filter(|(_, t)| p.instance.touches(t.name) && t.relation != Relation::ThrustRms)
+        .filter(|(_, t)| p.instance.touches(t.name) && !t.relation.is_evidence())
         .map(|(i, t)| (t.name.to_owned(), 1.0 - d.heldout_after[i] / d.heldout_without[k][i]))
         .filter(|(_, r)| r.is_finite())
         .max_by(|a, b| a.1.total_cmp(&b.1))
@@ -179,7 +179,7 @@ fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
     let channels = context
         .targets
         .iter()
-        .filter(|t| t.relation != Relation::ThrustRms)
+        .filter(|t| !t.relation.is_evidence())
         .filter_map(|t| Some((t.name.to_owned(), BeforeAfter { before: error(before, t.name)?, after: error(after, t.name)? })))
         .collect();
     Validation { run: other.name.clone(), channels }

@@ -26,6 +26,8 @@ pub enum Relation {
     Thrust,
     /// rms of the strain from rpm: quadratic. Evidence only; no verdict speaks of it.
     ThrustRms,
+    /// one speed channel less the consensus of at least three: a constant. Evidence only; no verdict speaks of it.
+    SpeedDifference,
 }
 
 impl Relation {
@@ -34,7 +36,7 @@ impl Relation {
     pub fn degree(self) -> usize {
         match self {
             Self::SpeedFromPulse | Self::Current => 3,
-            Self::SpeedAlone | Self::Voltage => 0,
+            Self::SpeedAlone | Self::Voltage | Self::SpeedDifference => 0,
             Self::Torque | Self::Thrust | Self::ThrustRms => 2,
         }
     }
@@ -50,10 +52,25 @@ impl Relation {
             "current_a" => Self::Current,
             "thrust_n" => Self::Thrust,
             "thrust_rms_n" => Self::ThrustRms,
+            c if DIFFERENCES.iter().any(|d| d.1 == c) => Self::SpeedDifference,
             _ => return None,
         })
     }
+
+    /// Whether the relation only bears witness: no verdict speaks of it.
+    #[must_use]
+    pub fn is_evidence(self) -> bool {
+        matches!(self, Self::ThrustRms | Self::SpeedDifference)
+    }
 }
+
+/// Speed channels and the names of their differences from the consensus.
+pub const DIFFERENCES: [(&str, &str); 4] = [
+    ("rpm_beam", "rpm_beam_difference"),
+    ("rpm_opto", "rpm_opto_difference"),
+    ("rpm_hall", "rpm_hall_difference"),
+    ("rpm_encoder", "rpm_encoder_difference"),
+];
 
 /// Unit of a modelled channel.
 #[must_use]
@@ -364,5 +381,22 @@ fn targets(log: &Log, context: &Context) -> Vec<Target> {
         let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
         out.push(Target { name, relation, rows, y, noise, weight });
     }
+    out.extend(differences(log, context));
     out
+}
+
+/// Each speed channel less the consensus: what all of them share (supply, load, lag) drops out. With fewer than three channels
+/// nobody can be outvoted, and there are none.
+fn differences(log: &Log, context: &Context) -> Vec<Target> {
+    let present: Vec<_> = DIFFERENCES.into_iter().filter_map(|(channel, name)| Some((name, log.column(channel)?))).collect();
+    if present.iter().filter(|(_, c)| c.iter().any(|v| v.is_finite())).count() < 3 {
+        return Vec::new();
+    }
+    let difference = |(name, column): (&'static str, &[f64])| {
+        let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
+        let y: Vec<f64> = rows.iter().map(|i| column[*i] - context.rpm[*i]).collect();
+        let noise = noise::estimate(&rows, &y, &context.rpm, &context.steady);
+        Target { name, relation: Relation::SpeedDifference, rows, y, noise, weight: 1.0 }
+    };
+    present.into_iter().map(difference).filter(|t| t.rows.len() > 8).collect()
 }

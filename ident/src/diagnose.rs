@@ -12,6 +12,7 @@ use crate::context::{Context, Relation, Target};
 use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{self, Effect, Instance};
 use crate::heldout;
+use crate::residual::whiteness;
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, refine, refine_newest, scan};
 
 /// Most effects on one channel.
@@ -122,9 +123,28 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         probability = p;
         errors = held;
     }
-    let heldout_without = (0..best.fit.placed.len())
-        .map(|k| without(context, declared, &best.fit, k, &start).map_or_else(|| heldout_before.clone(), |f| heldout::errors(context, declared, &f, &folds)))
-        .collect();
+    let is_unknown = is_unknown || best.fit.placed.is_empty() && {
+        let forced = nameless(context, declared, &start, &best.fit);
+        let found = forced.is_some();
+        if let Some(candidate) = forced {
+            errors = heldout::errors(context, declared, &candidate.fit, &folds);
+            best = candidate;
+        }
+        found
+    };
+    let heldout_without = loop {
+        let without: Vec<Vec<f64>> = (0..best.fit.placed.len())
+            .map(|k| without(context, declared, &best.fit, k, &start).map_or_else(|| heldout_before.clone(), |f| heldout::errors(context, declared, &f, &folds)))
+            .collect();
+        let idle = (0..without.len()).find(|k| !is_unknown && without.len() > 1 && is_idle(context, &best.fit.placed[*k], &errors, &without[*k]));
+        let Some(idle) = idle else { break without };
+        // a later effect has taken over what this one was named for
+        let mut placed = best.fit.placed.clone();
+        let dropped = placed.remove(idle).effect.id().to_owned();
+        rivals.iter_mut().for_each(|r| r.ids.retain(|id| *id != dropped));
+        best.fit = fit(context, declared, &refine(context, declared, &placed, Rows::All, 60), Some(&start), Rows::All)?;
+        errors = heldout::errors(context, declared, &best.fit, &folds);
+    };
     progress(1.0);
     Some(Diagnosis { declared: start, best, probability, rivals, unknown: is_unknown, heldout_before, heldout_after: errors, heldout_without, folds })
 }
@@ -283,12 +303,47 @@ fn worth_a_name(context: &Context, candidate: &Candidate, held: &[f64], before: 
         }
         let share = 1.0 - held[i] / before[i];
         helps |= share > NEEDED_REDUCTION;
-        if share < -NEEDED_REDUCTION && target.relation != Relation::ThrustRms {
+        if share < -NEEDED_REDUCTION && !target.relation.is_evidence() {
             return false;
         }
     }
     // extra scatter has no mean to predict: the evidence alone must carry it
     helps || (newest.effect.id() == "beam_resonance" && candidate.evidence > 4.0 * NEEDED_EVIDENCE)
+}
+
+/// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.
+fn is_idle(context: &Context, placed: &Placed, errors: &[f64], without: &[f64]) -> bool {
+    let most = context.targets.iter().enumerate().filter(|(_, t)| placed.instance.touches(t.name)).map(|(i, _)| 1.0 - errors[i] / without[i]).fold(0.0, f64::max);
+    most < 0.5 * NEEDED_REDUCTION && placed.effect.id() != "beam_resonance"
+}
+
+/// Residual over noise floor, and whiteness, beyond which something is there even if nothing that we try predicts it.
+const LEFT_OVER: (f64, f64) = (1.15, 1e-6);
+
+/// Where no name and no smooth function won although a residual is large and coloured, something is there all the same: the
+/// smooth function that takes most of it stands for it.
+fn nameless(context: &Context, declared: Declared<'_>, start: &Fit, best: &Fit) -> Option<Candidate> {
+    let residuals = heldout::residuals(context, declared, best);
+    let (i, target) = context.targets.iter().enumerate().filter(|(i, target)| {
+        let r = &residuals[*i];
+        let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
+        let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
+        let asked = !target.relation.is_evidence() && target.relation != Relation::SpeedAlone;
+        asked && r.len() >= FEWEST_SAMPLES.0 && rms > LEFT_OVER.0 * target.noise.rms && whiteness(&t, r) < LEFT_OVER.1
+    }).max_by(|a, b| {
+        let excess = |i: usize| residuals[i].iter().map(|v| v * v).sum::<f64>() / (residuals[i].len() as f64 * context.targets[i].noise.rms.powi(2));
+        excess(a.0).total_cmp(&excess(b.0))
+    })?;
+    variables(context)
+        .into_iter()
+        .filter(|v| !is_load(context, target, v))
+        .filter_map(|variable| {
+            let instance = Instance::new(&[target.name], &variable);
+            let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
+            fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
+        })
+        .map(|f| Candidate { evidence: f.targets[i].loglik - start.targets[i].loglik, fit: f })
+        .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 
 fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, k: usize, start: &Fit) -> Option<Fit> {
@@ -311,7 +366,7 @@ fn opponent(
 ) -> Option<(Candidate, Vec<f64>)> {
     let mut champion: Option<(f64, Candidate, Vec<f64>)> = None;
     for (i, target) in context.targets.iter().enumerate() {
-        if matches!(target.relation, Relation::ThrustRms | Relation::SpeedAlone) {
+        if target.relation.is_evidence() || target.relation == Relation::SpeedAlone {
             continue;
         }
         for variable in variables(context) {

@@ -5,7 +5,7 @@
 //! Units: as the channels.
 //! Reference: specification `formats.md`, `predict --from command`.
 
-use crate::context::Context;
+use crate::context::{Context, Relation};
 use crate::log::{Column, Log, SPEED};
 use crate::model::Model;
 
@@ -14,7 +14,7 @@ use crate::model::Model;
 pub fn from_command(model: &Model, name: &str, t: &[f64], pulse_us: &[f64], covariates: &[Column]) -> Log {
     let mut log = Log { name: name.to_owned(), t: t.to_vec(), ..Log::default() };
     log.columns.push(Column { name: "pulse_us".into(), values: pulse_us.to_vec() });
-    for p in &model.polynomials {
+    for p in model.polynomials.iter().filter(|p| Relation::of(&p.channel, true) != Some(Relation::SpeedDifference)) {
         log.columns.push(Column { name: p.channel.clone(), values: vec![0.0; t.len()] });
     }
     log.columns.extend(covariates.iter().filter(|c| !model.polynomials.iter().any(|p| p.channel == c.name) && c.name != "pulse_us").cloned());

@@ -44,7 +44,8 @@ impl Effect for BeamResonance {
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         let order = order(instance);
         let top = context.rpm.iter().copied().fold(1.0, f64::max) / 60.0 * order;
-        let (lo, hi) = (0.1 * top, 1.05 * top);
+        // the scatter must be seen to fall again beyond the resonance: growth with speed alone is no resonance
+        let (lo, hi) = (0.1 * top, 0.92 * top);
         let noise = context.target("thrust_n").map_or(1e-3, |i| context.targets[i].noise.rms);
         vec![
             Shape { name: "natural_frequency", unit: "Hz", range: (lo, hi), starts: geometric(lo, hi, 40) },

@@ -6,7 +6,7 @@
 //! Reference: Hoffmann, *An Introduction to Stress Analysis using Strain Gauges*, section 3.3 (creep).
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, operator, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -33,14 +33,18 @@ impl Effect for Creep {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.time_is_row || present(context, &["thrust_n"]).is_empty() { Vec::new() } else { vec![Instance::new(&["thrust_n"], "")] }
+        if context.time_is_row || present(context, &["thrust_n"]).is_empty() {
+            Vec::new()
+        } else {
+            vec![Instance::new(&["thrust_n"], "")]
+        }
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
         let (lo, hi) = ((5.0 * context.step()).max(1.0), (0.5 * context.duration()).max(2.0));
         vec![
-            Shape { name: "amplitude", unit: "1", range: (-0.3, 0.3), starts: vec![0.03] },
-            Shape { name: "tau", unit: "s", range: (lo, hi), starts: geometric(lo, hi, 12) },
+            Shape { name: "amplitude", unit: "1", range: (-0.3, 0.3), starts: vec![-0.03, 0.01, 0.04] },
+            Shape { name: "tau", unit: "s", range: (lo, hi), starts: geometric(lo, hi, 8) },
         ]
     }
 

@@ -6,7 +6,7 @@
 //! Reference: Beharie 2013, Eq. 5.34-5.35 (two calibrations differ by 9.7 % in slope).
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -43,9 +43,17 @@ impl Effect for GainChange {
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         if instance.form == "drift" {
             let most = 0.5 / context.duration().max(1.0);
-            vec![Shape { name: "rate", unit: "1/s", range: (-most, most), starts: vec![0.01 * most] }]
+            vec![Shape {
+                name: "rate",
+                unit: "1/s",
+                range: (-most, most),
+                starts: [-0.3, -0.1, -0.03, -0.01, 0.01, 0.03, 0.1, 0.3].map(|k| k * most).to_vec(),
+            }]
         } else {
-            vec![Shape { name: "gain_change", unit: "1", range: (-0.5, 0.5), starts: vec![0.02] }, super::tare_shift::onset(context)]
+            vec![
+                Shape { name: "gain_change", unit: "1", range: (-0.5, 0.5), starts: vec![-0.1, -0.03, -0.01, 0.01, 0.03, 0.1] },
+                super::tare_shift::coarse_onset(context),
+            ]
         }
     }
 

@@ -5,25 +5,41 @@
 //! Units: stated on each parameter.
 //! Reference: specification `closing-the-loop.md`, list of effects.
 
+mod air_density;
+mod alternating_period;
+mod amplifier_saturation;
 mod battery_discharge;
 mod beam_resonance;
 mod bearing_friction;
-mod air_density;
 mod blade_damage;
 mod blade_flex;
+mod blade_twist;
 mod channel_delay;
 mod channel_filter;
+mod clock_drift;
+mod coupling_slip;
 mod creep;
+mod current_limit;
+mod dead_rotor_speed;
+mod double_pulses;
 mod encoder_drag;
 mod gain_change;
 mod hysteresis;
+mod missed_pulses;
 mod operator;
+mod quantisation;
 mod reynolds_thrust;
 mod rotor_inertia;
+mod sample_hold;
+mod speed_channel;
 mod spinup_lag;
+mod stall;
 mod supply_sag;
 mod tare_shift;
+mod thermal_derate;
 mod thermal_zero;
+mod throttle_quantisation;
+mod torque_crosstalk;
 pub(crate) mod unknown;
 mod zero_drift;
 
@@ -165,6 +181,21 @@ pub fn library() -> &'static [&'static dyn Effect] {
         &blade_flex::BladeFlex,
         &reynolds_thrust::ReynoldsThrust,
         &air_density::AirDensity,
+        &stall::Stall,
+        &amplifier_saturation::AmplifierSaturation,
+        &current_limit::CurrentLimit,
+        &thermal_derate::ThermalDerate,
+        &torque_crosstalk::TorqueCrosstalk,
+        &clock_drift::ClockDrift,
+        &sample_hold::SampleHold,
+        &quantisation::Quantisation,
+        &throttle_quantisation::ThrottleQuantisation,
+        &blade_twist::BladeTwist,
+        &coupling_slip::CouplingSlip,
+        &missed_pulses::MissedPulses,
+        &double_pulses::DoublePulses,
+        &alternating_period::AlternatingPeriod,
+        &dead_rotor_speed::DeadRotorSpeed,
     ]
 }
 

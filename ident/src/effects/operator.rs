@@ -65,10 +65,15 @@ pub(crate) fn first_order_varying(t: &[f64], x: &[f64], tau: impl Fn(usize) -> f
 
 /// The signal `delay` seconds ago (ahead when negative), linear between rows.
 pub(crate) fn delayed(t: &[f64], x: &[f64], delay: f64) -> Vec<f64> {
+    delayed_varying(t, x, |_| delay)
+}
+
+/// The signal as long ago as `delay` says at each instant.
+pub(crate) fn delayed_varying(t: &[f64], x: &[f64], delay: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut j = 0;
     (0..t.len())
         .map(|i| {
-            let at = t[i] - delay;
+            let at = t[i] - delay(t[i]);
             if at <= t[0] {
                 return x[0];
             }

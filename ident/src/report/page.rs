@@ -7,7 +7,7 @@
 
 use super::svg::{Chart, Series, escape};
 use crate::close::Closed;
-use crate::context::{Relation, unit_of};
+use crate::context::unit_of;
 use crate::effects::unknown::variable;
 use crate::log::Log;
 use crate::verdict::Kind;
@@ -98,7 +98,7 @@ fn figures(out: &mut String, closed: &Closed) {
     let context = &closed.context;
     out.push_str("<h2>What was left over, and what is left now</h2>\n");
     let touched: Vec<&str> = closed.verdict.effects.iter().flat_map(|e| e.channels.iter().map(String::as_str)).collect();
-    for target in context.targets.iter().filter(|t| t.relation != Relation::ThrustRms) {
+    for target in context.targets.iter().filter(|t| !t.relation.is_evidence()) {
         if !touched.is_empty() && !touched.contains(&target.name) {
             continue;
         }

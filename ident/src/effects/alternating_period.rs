@@ -1,0 +1,81 @@
+//! `alternating_period`: two magnets that do not stand opposite each other.
+//!
+//! What it is: a sensor that times one of two unequal periods reads rpm (1 +- angle/180) by turns.
+//! What can go wrong: which of the two it caught is known from the reading alone, so only readings with two clear values are
+//! taken for it; a sensor that counts whole turns shows nothing.
+//! Units: deg, deviation from 180.
+//! Reference: Beharie 2013, section 5.7.1 (Hall sensor with two magnets).
+
+use super::speed_channel::{LEAST, difference, instances, shares};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use crate::context::{Context, Relation};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct AlternatingPeriod;
+
+/// Kurtosis of the difference below which it has two values: 1 for two points, 1.8 for a uniform, 3 for a normal distribution.
+const TWO_VALUED: f64 = 1.7;
+
+impl Effect for AlternatingPeriod {
+    fn id(&self) -> &'static str {
+        "alternating_period"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Unequal magnets: the period alternates",
+            equation: "rpm_x = rpm (1 + angle/180) or rpm (1 - angle/180), by turns",
+            source: "Beharie 2013, section 5.7.1",
+            depends_on: &["rpm"],
+            signature: "one speed channel jumps between two values about the others, in proportion to the speed",
+            look_alikes: &["missed_pulses", "double_pulses"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        instances(context, "")
+            .into_iter()
+            .filter(|i| {
+                difference(context, i)
+                    .is_some_and(|t| kurtosis(&shares(context, t).map(|s| s.1).collect::<Vec<_>>()) < TWO_VALUED)
+            })
+            .collect()
+    }
+
+    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "angle", unit: "deg" }]
+    }
+
+    fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+        let (Relation::SpeedDifference, Some(target)) = (design.relation, difference(context, instance)) else { return };
+        let mut column = vec![0.0; context.len()];
+        for (i, share) in shares(context, target) {
+            column[i] = (share - 1.0).signum() * context.rpm[i] / 180.0;
+        }
+        design.add(position, 0, column);
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        fitted.iter().all(|e| e.value > 180.0 * LEAST && e.value < 60.0)
+    }
+}
+
+fn kurtosis(x: &[f64]) -> f64 {
+    let n = x.len() as f64;
+    if n < 30.0 {
+        return 3.0;
+    }
+    let mean = x.iter().sum::<f64>() / n;
+    let moment = |k: i32| x.iter().map(|v| (v - mean).powi(k)).sum::<f64>() / n;
+    let second = moment(2);
+    if second > 0.0 { moment(4) / (second * second) } else { 3.0 }
+}

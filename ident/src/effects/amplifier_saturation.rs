@@ -1,0 +1,89 @@
+//! `amplifier_saturation`: the bridge amplifier runs into its rail.
+//!
+//! What it is: thrust_n stands still at `level` wherever the true force is above it.
+//! What can go wrong: at a single level above the rail nothing tells it from a polynomial that bends.
+//! Units: N.
+//! Reference: output swing of instrumentation amplifiers; Beharie 2013, section 4.4 (bridge and amplifier).
+
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
+use crate::context::Context;
+use crate::design::{Label, TargetDesign};
+
+/// See the module.
+pub(crate) struct AmplifierSaturation;
+
+impl Effect for AmplifierSaturation {
+    fn id(&self) -> &'static str {
+        "amplifier_saturation"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Load-cell amplifier saturates",
+            equation: "thrust_n = min(thrust_n, level)",
+            source: "Beharie 2013, section 4.4",
+            depends_on: &["thrust_n"],
+            signature: "above one speed the thrust reads one and the same value while torque goes on growing",
+            look_alikes: &["stall", "blade_flex"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Input
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        if present(context, &["thrust_n"]).is_empty() { Vec::new() } else { vec![Instance::new(&["thrust_n"], "")] }
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        let shape = super::blade_flex::upper_speeds(context, 24);
+        vec![Shape { name: "reached_at", ..shape }]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let [reached] = shape else { return };
+        hold_above(&mut design.fixed, &context.rpm, *reached);
+        for column in &mut design.columns {
+            if let Label::Base(power) = column.label {
+                let at = (reached / 1000.0).powi(power as i32);
+                column.values.iter_mut().zip(&context.rpm).filter(|(_, r)| *r > reached).for_each(|(v, _)| *v = at);
+            }
+        }
+    }
+
+    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        let Some(reached) = fitted.iter().find(|e| e.name == "reached_at").map(|e| e.value) else { return fitted };
+        let Some(target) = context.target("thrust_n").map(|k| &context.targets[k]) else { return fitted };
+        // a little beyond, so that the noise of the speed does not mix in rows below the rail
+        let above: Vec<f64> =
+            target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > 1.005 * reached).map(|(_, y)| *y).collect();
+        let n = above.len() as f64;
+        let level = above.iter().sum::<f64>() / n;
+        let se = (above.iter().map(|v| (v - level).powi(2)).sum::<f64>()).sqrt() / n;
+        if level.is_finite() {
+            fitted.insert(0, Estimate { name: "level".into(), unit: "N".into(), value: level, se });
+        }
+        fitted
+    }
+
+    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        // some speeds above the rail, apart from each other: otherwise there is nothing to see
+        let reached = fitted.iter().find(|e| e.name == "reached_at").map_or(f64::INFINITY, |e| e.value);
+        let above: Vec<f64> = context.rpm.iter().copied().filter(|r| *r > reached).collect();
+        let top = above.iter().copied().fold(0.0, f64::max);
+        above.len() > 20 && top > 1.02 * reached
+    }
+}
+
+/// Holds a known prediction at its value where the driving quantity reaches `reached`.
+pub(super) fn hold_above(fixed: &mut [f64], driver: &[f64], reached: f64) {
+    let at = fixed.iter().zip(driver).filter(|(_, r)| **r <= reached).max_by(|a, b| a.1.total_cmp(b.1)).map(|(v, _)| *v);
+    if let Some(at) = at {
+        fixed.iter_mut().zip(driver).filter(|(_, r)| **r > reached).for_each(|(v, _)| *v = at);
+    }
+}

@@ -1,0 +1,61 @@
+//! `clock_drift`: thrust and torque come from a logger whose own clock runs slow.
+//!
+//! What it is: they fall behind by rate * t: what stands at t was true at t - rate * t.
+//! What can go wrong: needs load changes late in the run; one constant delay fits as well where they are all at one time.
+//! Units: 1 (seconds late a second), positive falls behind.
+//! Reference: frequency tolerance of two free-running oscillators.
+
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, present};
+use crate::context::Context;
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct ClockDrift;
+
+impl Effect for ClockDrift {
+    fn id(&self) -> &'static str {
+        "clock_drift"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Thrust and torque come from a slow clock",
+            equation: "reading(t) = truth(t - rate t), t from the first row",
+            source: "tolerance of two free-running oscillators",
+            depends_on: &["t_s", "time_since_step"],
+            signature: "spikes of the thrust and torque residual at every change of the load, wider and wider with time",
+            look_alikes: &["channel_delay", "channel_filter"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Output
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let channels = present(context, &["thrust_n", "torque_nm"]);
+        if context.time_is_row || channels.is_empty() { Vec::new() } else { vec![Instance::new(&channels, "")] }
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        // lateness at the end of the run, in rows
+        let rows: [f64; 17] = [0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0, 30.0, 45.0, 70.0, -1.0, -3.0, -8.0, -20.0];
+        let unit = context.step() / context.duration().max(1e-9);
+        vec![Shape {
+            name: "rate",
+            unit: "1",
+            range: (-40.0 * unit, 150.0 * unit),
+            starts: rows.iter().map(|r| r * unit).collect(),
+        }]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let [rate] = shape else { return };
+        let t0 = context.t.first().copied().unwrap_or(0.0);
+        design.map_columns(|column| *column = operator::delayed_varying(&context.t, column, |t| rate * (t - t0)));
+    }
+}

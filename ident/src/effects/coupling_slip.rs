@@ -1,0 +1,57 @@
+//! `coupling_slip`: the encoder's coupling slips at high speed.
+//!
+//! What it is: above an onset speed rpm_encoder reads too low.
+//! What can go wrong: lost encoder counts at high speed look alike.
+//! Units: rev/min, 1.
+//! Reference: Beharie 2013, section 5.7.1 (shaft encoder against the optical sensors).
+
+use super::blade_flex::upper_speeds;
+use super::speed_channel::{HINGE, LEAST, add_hinge, hinge_at_top, instance};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use crate::context::Context;
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct CouplingSlip;
+
+impl Effect for CouplingSlip {
+    fn id(&self) -> &'static str {
+        "coupling_slip"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "The encoder's coupling slips",
+            equation: "rpm_encoder += slope (rpm - onset) + bend (rpm - onset)^2 / onset above onset, downwards",
+            source: "Beharie 2013, section 5.7.1",
+            depends_on: &["rpm"],
+            signature: "rpm_encoder leaves the other speed channels downwards above one speed",
+            look_alikes: &["missed_pulses"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        instance(context, "rpm_encoder", "").into_iter().collect()
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        vec![upper_speeds(context, 14)]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        HINGE.to_vec()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        let [onset] = shape else { return };
+        add_hinge(context, *onset, position, design);
+    }
+
+    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        hinge_at_top(context, fitted) < -LEAST
+    }
+}

@@ -1,0 +1,91 @@
+//! `current_limit`: the speed controller or the supply caps the current.
+//!
+//! What it is: above the pulse at which `limit` is reached, more throttle brings no more speed; current(rpm) holds.
+//! What can go wrong: a throttle end point below the longest pulse looks alike; the flat current tells.
+//! Units: A; internally us.
+//! Reference: constant-current limit of bench supplies and of speed controllers' firmware.
+
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
+use crate::context::Context;
+use crate::design::{Label, TargetDesign};
+
+/// See the module.
+pub(crate) struct CurrentLimit;
+
+impl Effect for CurrentLimit {
+    fn id(&self) -> &'static str {
+        "current_limit"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Current is limited",
+            equation: "rpm(pulse) = rpm(min(pulse, reached_at)), current_a <= limit",
+            source: "constant-current limit of supplies and speed controllers",
+            depends_on: &["pulse_us", "current_a"],
+            signature: "above one pulse speed and current stand still; thrust, torque and current go on following the speed",
+            look_alikes: &["thermal_derate", "throttle_quantisation"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Input
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let channels = speeds(context);
+        if channels.is_empty() || context.current.is_none() { Vec::new() } else { vec![Instance::new(&channels, "")] }
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        let top = context.pulse.as_ref().map_or(2000.0, |p| p.iter().copied().fold(1000.0, f64::max));
+        let (from, to) = (context.start_pulse_us, top);
+        let at = |u: f64| from + u * (to - from);
+        vec![Shape {
+            name: "reached_at",
+            unit: "us",
+            range: (at(0.1), at(0.99)),
+            starts: (0..20).map(|k| at(0.3 + 0.034 * f64::from(k))).collect(),
+        }]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let ([reached], Some(pulse)) = (shape, &context.pulse) else { return };
+        super::amplifier_saturation::hold_above(&mut design.fixed, pulse, *reached);
+        for column in &mut design.columns {
+            if let Label::Base(power) = column.label {
+                let at = ((reached - 1000.0) / 1000.0).powi(power as i32);
+                column.values.iter_mut().zip(pulse).filter(|(_, p)| *p > reached).for_each(|(v, _)| *v = at);
+            }
+        }
+    }
+
+    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        let (Some(reached), Some(pulse)) = (fitted.iter().find(|e| e.name == "reached_at").map(|e| e.value), &context.pulse)
+        else {
+            return fitted;
+        };
+        let Some(target) = context.target("current_a").map(|k| &context.targets[k]) else { return fitted };
+        // a little after each arrival, so that spin-up is over
+        let settled = |i: usize| i >= 10 && pulse[i - 10..=i].iter().all(|p| *p > reached + 5.0);
+        let above: Vec<f64> = target.rows.iter().zip(&target.y).filter(|(i, _)| settled(**i)).map(|(_, y)| *y).collect();
+        let n = above.len() as f64;
+        let limit = above.iter().sum::<f64>() / n;
+        let se = above.iter().map(|v| (v - limit).powi(2)).sum::<f64>().sqrt() / n;
+        if limit.is_finite() {
+            fitted.insert(0, Estimate { name: "limit".into(), unit: "A".into(), value: limit, se });
+        }
+        fitted
+    }
+
+    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        // the run must go well beyond, and the current must stand as still there as it does in steady stretches
+        let reached = fitted.iter().find(|e| e.name == "reached_at").map_or(f64::INFINITY, |e| e.value);
+        let top = context.pulse.as_ref().map_or(0.0, |p| p.iter().copied().fold(0.0, f64::max));
+        top > reached + 10.0
+    }
+}

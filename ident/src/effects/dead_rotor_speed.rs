@@ -1,0 +1,65 @@
+//! `dead_rotor_speed`: one speed channel is stuck, or counts half or twice the turns.
+//!
+//! What it is: the channel reads a constant factor times the speed of the others: 0 dead, 0.5 half the pulses, 2 twice.
+//! What can go wrong: a factor near 1 is a sensor that misses some pulses.
+//! Units: 1.
+//! Reference: sensor disagreement, specification `rig.md`; Beharie 2013, section 5.7.1.
+
+use super::speed_channel::instances;
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use crate::context::{Context, Relation};
+use crate::design::TargetDesign;
+
+/// See the module.
+pub(crate) struct DeadRotorSpeed;
+
+impl Effect for DeadRotorSpeed {
+    fn id(&self) -> &'static str {
+        "dead_rotor_speed"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "A speed channel is dead or counts by a wrong factor",
+            equation: "rpm_x = factor rpm",
+            source: "Beharie 2013, section 5.7.1",
+            depends_on: &["rpm"],
+            signature: "one speed channel reads a fixed, far-off multiple of what all others read",
+            look_alikes: &["missed_pulses", "double_pulses"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        instances(context, "")
+    }
+
+    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "excess", unit: "1" }]
+    }
+
+    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+        if design.relation == Relation::SpeedDifference {
+            design.add(position, 0, context.rpm.clone());
+        }
+    }
+
+    fn report(&self, _: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        for e in fitted.iter_mut().filter(|e| e.name == "excess") {
+            e.name = "factor".into();
+            e.value += 1.0;
+        }
+        fitted
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        fitted.iter().all(|e| e.value.abs() > 0.3)
+    }
+}

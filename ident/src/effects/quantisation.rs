@@ -1,0 +1,85 @@
+//! `quantisation`: a channel resolves only coarse steps.
+//!
+//! What it is: the reading is the nearest multiple of `step`; the departure from the truth is a saw-tooth of the truth.
+//! What can go wrong: noise as large as the step smears the saw-tooth out, and nothing is offered then.
+//! Units: the channel's.
+//! Reference: Widrow & Kollar 2008, *Quantization Noise*.
+
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use crate::context::{Context, Relation, Target};
+use crate::design::TargetDesign;
+use crate::solve::Normal;
+
+/// See the module.
+pub(crate) struct Quantisation;
+
+impl Effect for Quantisation {
+    fn id(&self) -> &'static str {
+        "quantisation"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "A channel resolves only coarse steps",
+            equation: "reading = step * round(truth / step)",
+            source: "Widrow & Kollar 2008, Quantization Noise",
+            depends_on: &["reading"],
+            signature: "all readings are multiples of one step, and the residual is a saw-tooth of the reading",
+            look_alikes: &["sample_hold", "throttle_quantisation"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let coarse =
+            |t: &&Target| matches!(t.relation, Relation::Thrust | Relation::Torque | Relation::Current) && step(t).is_some();
+        context.targets.iter().filter(coarse).map(|t| Instance::new(&[t.name], "")).collect()
+    }
+
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        // read off the values, not fitted
+        let found = context.targets.iter().find(|t| instance.touches(t.name)).and_then(step).unwrap_or(0.0);
+        vec![Shape { name: "step", unit: "channel", range: (found, found), starts: vec![found] }]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "depth", unit: "1" }]
+    }
+
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        let ([step], Some(target)) = (shape, context.targets.iter().find(|t| instance.touches(t.name))) else { return };
+        if *step <= 0.0 {
+            return;
+        }
+        // the truth as the relation's own columns give it: errors of the fit are far below a step
+        let mut normal = Normal::new(design.columns.len());
+        let mut row = vec![0.0; design.columns.len()];
+        for (i, y) in target.rows.iter().zip(&target.y) {
+            row.iter_mut().zip(&design.columns).for_each(|(r, c)| *r = c.values[*i]);
+            normal.add(&row, y - design.fixed.get(*i).copied().unwrap_or(0.0), 1.0);
+        }
+        let Some(solution) = normal.solve() else { return };
+        let truth = design.predict(&solution.coefficients, context.len());
+        design.add(position, 0, truth.iter().map(|v| step * (v / step).round() - v).collect());
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        fitted.iter().any(|e| e.name == "depth" && e.value > 0.2 && e.value < 1.5)
+    }
+}
+
+/// The step of a channel whose readings all lie on a coarse grid: at least as large as the scatter between rows.
+fn step(target: &Target) -> Option<f64> {
+    let mut values = target.y.clone();
+    values.sort_unstable_by(f64::total_cmp);
+    let span = values.last()? - values.first()?;
+    let gaps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1e-9 * span).collect();
+    let step = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    let mean = values.iter().map(|v| (v / step - (v / step).round()).abs()).sum::<f64>() / values.len() as f64;
+    // few distinct values, on a grid, and most successive readings in steady stretches repeat
+    let repeats = target.y.windows(2).filter(|w| (w[0] - w[1]).abs() < 0.5 * step).count() as f64 / target.y.len() as f64;
+    (step.is_finite() && span / step < 2000.0 && mean < 0.05 && repeats > 0.35).then_some(step)
+}

@@ -1,0 +1,99 @@
+//! One speed channel against the others.
+//!
+//! What it is: what the effects on a single speed channel share: the difference from the consensus as evidence, the speed that
+//! a term is a function of, rows that read grossly too low or too high.
+//! What can go wrong: with fewer than three speed channels nobody can be outvoted, and no such effect is offered.
+//! Units: rev/min.
+//! Reference: Beharie 2013, section 5.7.1 (four speed sensors compared; Fig. 5.54-5.63).
+
+use super::blade_damage::STANDSTILL;
+use super::{Amplitude, Estimate, Instance};
+use crate::context::{Context, DIFFERENCES, Relation, Target};
+use crate::design::TargetDesign;
+use crate::solve::Normal;
+
+/// Share of the speed below which a channel agrees with the others: a quarter of the 1 % within which healthy sensors on real
+/// rigs agree (specification `rig.md`).
+pub(super) const LEAST: f64 = 0.0025;
+
+/// The instance that touches a speed channel and its difference from the consensus.
+pub(super) fn instance(context: &Context, channel: &str, form: &str) -> Option<Instance> {
+    let difference = DIFFERENCES.iter().find(|d| d.0 == channel)?.1;
+    context.target(difference)?;
+    Some(Instance::new(&[channel, difference], form))
+}
+
+/// Instances for every speed channel that can be compared.
+pub(super) fn instances(context: &Context, form: &str) -> Vec<Instance> {
+    DIFFERENCES.iter().filter_map(|d| instance(context, d.0, form)).collect()
+}
+
+/// The difference target of an instance.
+pub(super) fn difference<'c>(context: &'c Context, instance: &Instance) -> Option<&'c Target> {
+    context.targets.iter().find(|t| t.relation == Relation::SpeedDifference && instance.touches(t.name))
+}
+
+/// The speed that a term on a channel is a function of: the consensus for the difference; for the channel itself what the
+/// command makes of it, because the consensus holds the channel's own fluctuation.
+pub(super) fn speed(context: &Context, relation: Relation) -> Vec<f64> {
+    match (&context.pulse, relation) {
+        (Some(_), Relation::SpeedFromPulse) => expected(context),
+        _ => context.rpm.clone(),
+    }
+}
+
+/// Speed that the pulse alone makes one expect: a cubic above the starting pulse.
+pub(super) fn expected(context: &Context) -> Vec<f64> {
+    let u = super::throttle(context);
+    let row = |u: f64| [1.0, u, u * u, u * u * u];
+    let mut normal = Normal::new(4);
+    for i in (0..u.len()).step_by((u.len() / 1000).max(1)).filter(|i| u[*i] > 0.0) {
+        normal.add(&row(u[i]), context.rpm[i], 1.0);
+    }
+    let Some(solution) = normal.solve() else { return vec![0.0; u.len()] };
+    u.iter().map(|u| if *u > 0.0 { row(*u).iter().zip(&solution.coefficients).map(|(a, c)| a * c).sum() } else { 0.0 }).collect()
+}
+
+/// Adds `slope` and `bend` of a departure that grows from an onset speed up: (rpm - onset) and its square over the onset.
+pub(super) fn add_hinge(context: &Context, onset: f64, position: usize, design: &mut TargetDesign) {
+    let over: Vec<f64> = speed(context, design.relation).iter().map(|r| (r - onset).max(0.0)).collect();
+    let first = if design.relation == Relation::SpeedDifference { 0 } else { 2 };
+    design.add(position, first + 1, over.iter().map(|v| v * v / onset.max(1.0)).collect());
+    design.add(position, first, over);
+}
+
+/// Amplitudes of a departure that grows above an onset: of the difference, then of the channel's own relation, whose cubic
+/// leaves them uncertain.
+pub(super) const HINGE: [Amplitude; 4] = [
+    Amplitude { name: "slope", unit: "1" },
+    Amplitude { name: "bend", unit: "1" },
+    Amplitude { name: "slope_of_pulse", unit: "1" },
+    Amplitude { name: "bend_of_pulse", unit: "1" },
+];
+
+/// Departure at the top speed as a share of it.
+pub(super) fn hinge_at_top(context: &Context, fitted: &[Estimate]) -> f64 {
+    let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or(0.0, |e| e.value);
+    let top = context.rpm.iter().copied().fold(1.0, f64::max);
+    let (onset, over) = (value("onset"), (top - value("onset")).max(0.0));
+    (value("slope") * over + value("bend") * over * over / onset.max(1.0)) / top
+}
+
+/// Rows of a difference target on which the rotor turns, with the reading as a share of the consensus.
+pub(super) fn shares<'c>(context: &'c Context, target: &'c Target) -> impl Iterator<Item = (usize, f64)> + 'c {
+    target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > STANDSTILL).map(|(i, d)| (*i, 1.0 + d / context.rpm[*i]))
+}
+
+/// Share by which a reading must be off to be counted as one pulse too few or too many.
+pub(super) const GROSS: f64 = 0.15;
+
+/// 1 on rows that read grossly too low (`sign` -1) or too high (+1), 0 elsewhere.
+pub(super) fn gross(context: &Context, target: &Target, sign: f64) -> Vec<f64> {
+    let mut out = vec![0.0; context.len()];
+    for (i, share) in shares(context, target) {
+        if sign * (share - 1.0) > GROSS {
+            out[i] = 1.0;
+        }
+    }
+    out
+}
