@@ -30,9 +30,8 @@ pub fn polyfit(x: &[f64], y: &[f64], degree: usize) -> Vec<f64> {
         for r in 0..m {
             if r != i {
                 let f = a[r][i] / a[i][i];
-                for k in i..=m {
-                    a[r][k] -= f * a[i][k];
-                }
+                let row = a[i].clone();
+                a[r].iter_mut().zip(&row).skip(i).for_each(|(v, p)| *v -= f * p);
             }
         }
     }

@@ -188,8 +188,7 @@ impl Rig {
             poly(&self.current, self.top / 1000.0),
         ];
         let coloured = c.happens(0.3);
-        for i in 0..5 {
-            let mut n = ChannelNoise::default();
+        for (i, n) in self.noise.iter_mut().enumerate() {
             match i {
                 0 => n.fixed = c.log_between(0.002, 0.02),
                 1 => n.fixed = c.log_between(0.000_05, 0.0004),
@@ -210,7 +209,6 @@ impl Rig {
                 3 => c.of(&[0.001, 0.005]),
                 _ => c.of(&[0.01, 0.0625, 0.1]),
             };
-            self.noise[i] = n;
         }
     }
 

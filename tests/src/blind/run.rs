@@ -46,7 +46,7 @@ fn surroundings(rig: &Rig, effects: &[Effect], duration: f64, h: f64, n: usize, 
     let warm = effects.iter().find(|e| e.id == "air_density").map(|e| e.strength);
     let thermal = effects.iter().any(|e| e.id == "thermal_zero");
     let reach = warm.unwrap_or(if thermal { k.between(3.0, 15.0) } else { k.log_between(0.2, 6.0) });
-    let (shape, phase, turns) = (k.of(&[0u8, 1, 2]), k.between(0.0, 6.28), k.between(0.6, 2.0));
+    let (shape, phase, turns) = (k.of(&[0u8, 1, 2]), k.between(0.0, std::f64::consts::TAU), k.between(0.6, 2.0));
     let (weather, humid) = (k.between(-3.0, 3.0), k.between(8.0, 20.0) * k.sign());
     let humid_turns = k.between(0.6, 1.8);
     (0..n)
@@ -94,22 +94,21 @@ pub fn run(rig: &Rig, effects: &[Effect], schedule: &Schedule, seed: u64, stream
     let speed: Vec<f64> = out.iter().map(|o| o.speed).collect();
     let thrust: Vec<f64> = out.iter().map(|o| o.thrust).collect();
     let torque: Vec<f64> = out.iter().map(|o| o.torque).collect();
-    let strain = cell::pass(rig, effects, h, 1.0 / rig.hz, &speed, &thrust, &torque, &air, &mut Chance::new(seed, stream + 2));
+    let strain = cell::pass(
+        rig,
+        effects,
+        &cell::Loads { step: h, window: 1.0 / rig.hz, speed: &speed, thrust: &thrust, torque: &torque, air: &air },
+        &mut Chance::new(seed, stream + 2),
+    );
 
     let mut clock = Chance::new(seed, stream + 3);
     let step = 1.0 / rig.hz;
-    let at: Vec<usize> = (0..rows)
-        .map(|r| {
-            let shift = if rig.jitter > 0.0 && r > 0 { (clock.normal() * rig.jitter).clamp(-0.2, 0.2) } else { 0.0 };
-            (((r as f64 + shift) * per as f64).round().max(0.0) as usize).min(n - 1)
-        })
-        .collect();
-    // a grid too coarse for the jitter leaves the stamps where they are; the rest of it goes into the stamp alone
-    let t: Vec<f64> = (0..rows)
-        .map(|r| {
-            r as f64 * step + if rig.jitter > 0.0 && r > 0 { (clock.normal() * rig.jitter).clamp(-0.2, 0.2) * step } else { 0.0 }
-        })
-        .collect();
+    // stamps wander; the sample is taken at the nearest point of the grid
+    let shift: Vec<f64> =
+        (0..rows).map(|r| if rig.jitter > 0.0 && r > 0 { (clock.normal() * rig.jitter).clamp(-0.2, 0.2) } else { 0.0 }).collect();
+    let at: Vec<usize> =
+        shift.iter().enumerate().map(|(r, s)| (((r as f64 + s) * per as f64).round().max(0.0) as usize).min(n - 1)).collect();
+    let t: Vec<f64> = shift.iter().enumerate().map(|(r, s)| (r as f64 + s) * step).collect();
     let mut r = Run { t, ..Run::default() };
     let sampled = |y: &[f64]| -> Vec<f64> { at.iter().map(|i| y[*i]).collect() };
     let mut log = Chance::new(seed, stream + 4);

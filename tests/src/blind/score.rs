@@ -211,7 +211,7 @@ fn judge(s: &Scenario, v: &Verdict, other: &Run, line: &mut Line) {
     if s.effects.iter().any(super::effect::Effect::by_chance) {
         return;
     }
-    let floor = realised(&s.rig, other, s.effects.is_empty());
+    let floor = realised(&s.rig, other);
     let Some(validation) = v.validation.first() else { return };
     let mut worst = (f64::NAN, f64::NAN);
     for (channel, noise) in floor {
@@ -219,7 +219,7 @@ fn judge(s: &Scenario, v: &Verdict, other: &Run, line: &mut Line) {
             || s.effects.is_empty()
             || (s.shown.iter().any(|c| c.starts_with("rpm")) && channel.starts_with("rpm"));
         let Some(c) = validation.channels.get(channel) else { continue };
-        if shown && !(c.after / noise <= worst.0) {
+        if shown && (worst.0.is_nan() || c.after / noise > worst.0) {
             worst = (c.after / noise, c.before / noise);
         }
     }
@@ -227,7 +227,7 @@ fn judge(s: &Scenario, v: &Verdict, other: &Run, line: &mut Line) {
 }
 
 /// Rms of the noise that was really added to each channel's primary relation.
-fn realised(rig: &Rig, run: &Run, _clean: bool) -> Vec<(&'static str, f64)> {
+fn realised(rig: &Rig, run: &Run) -> Vec<(&'static str, f64)> {
     let rows = run.t.len();
     let quiet: Vec<(&'static str, Vec<f64>)> = run.quiet.iter().map(|(n, y)| (*n, y.clone())).collect();
     let seen: Vec<f64> = (0..rows).map(|r| consensus(&run.columns, r)).collect();

@@ -42,19 +42,27 @@ pub struct Strain {
     pub rms: Vec<f64>,
 }
 
-/// Passes the thrust through the cell. `h` is the grid step, `window` the averaging time of one logged sample, s.
+/// What acts on the cell, on the fine grid.
+#[derive(Debug)]
+pub struct Loads<'a> {
+    /// Grid step, s.
+    pub step: f64,
+    /// Averaging time of one logged sample, s.
+    pub window: f64,
+    /// Speed, rev/min.
+    pub speed: &'a [f64],
+    /// Thrust, N.
+    pub thrust: &'a [f64],
+    /// Torque, N.m.
+    pub torque: &'a [f64],
+    /// Surroundings.
+    pub air: &'a [Air],
+}
+
+/// Passes the thrust through the cell.
 #[must_use]
-pub fn pass(
-    rig: &Rig,
-    effects: &[Effect],
-    h: f64,
-    window: f64,
-    n: &[f64],
-    thrust: &[f64],
-    torque: &[f64],
-    air: &[Air],
-    k: &mut Chance,
-) -> Strain {
+pub fn pass(rig: &Rig, effects: &[Effect], loads: &Loads<'_>, k: &mut Chance) -> Strain {
+    let Loads { step: h, window, speed: n, thrust, torque, air } = *loads;
     let mut y = thrust.to_vec();
     let mut rms = vec![0.0; y.len()];
     let full = poly(&rig.thrust, rig.top / 1000.0);

@@ -1,0 +1,27 @@
+//! A small seeded part of the blind campaign, from the tuning half.
+//!
+//! What it is: loose floors under the rates of the whole campaign (`cargo xtask blind`), so that a change that breaks the search
+//! is seen in every test run.
+//! What can go wrong: too few runs for a figure to publish; the floors only catch a collapse.
+//! Units: rates.
+//! Reference: specification `closing-the-loop.md`, "What counts as proof".
+
+use quadrig_tests::blind::scenario::{CLEAN, Hidden};
+use quadrig_tests::blind::score::score;
+
+#[test]
+fn clean_runs_are_called_clean() {
+    let lines: Vec<_> = (0..20u64).map(|k| score(CLEAN + 2 * k)).collect();
+    let alarms: Vec<_> = lines.iter().filter(|l| l.verdict != "none").map(|l| (l.seed, l.named.clone())).collect();
+    assert!(alarms.len() <= 6, "{alarms:?}");
+}
+
+#[test]
+fn hidden_effects_are_found() {
+    let seeds: Vec<u64> = (0..400u64).map(|k| 2 * k).filter(|s| matches!(Hidden::of(*s), Hidden::One(_))).take(40).collect();
+    let lines: Vec<_> = seeds.into_iter().map(score).filter(|l| l.size >= 3.0).collect();
+    let first = lines.iter().filter(|l| l.first).count();
+    let missed: Vec<_> = lines.iter().filter(|l| !l.first).map(|l| (l.seed, l.truth.clone(), l.named.clone())).collect();
+    assert!(lines.iter().all(|l| l.verdict != "panic" && l.verdict != "refused"));
+    assert!(first * 10 >= lines.len() * 3, "{first} of {}: {missed:?}", lines.len());
+}
