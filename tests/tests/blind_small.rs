@@ -6,19 +6,26 @@
 //! Units: rates.
 //! Reference: specification `closing-the-loop.md`, "What counts as proof".
 
-use quadrig_tests::blind::scenario::{CLEAN, Hidden};
+use quadrig_tests::blind::scenario::{CLEAN, Hidden, Scenario};
 use quadrig_tests::blind::score::score;
+
+/// Whether the run of a seed is short: the part of the campaign that is cheap.
+fn short(seed: u64) -> bool {
+    let s = Scenario::new(seed);
+    s.schedules[0].duration * s.rig.hz < 2600.0
+}
 
 #[test]
 fn clean_runs_are_called_clean() {
-    let lines: Vec<_> = (0..20u64).map(|k| score(CLEAN + 2 * k)).collect();
+    let lines: Vec<_> = (0..200u64).map(|k| CLEAN + 2 * k).filter(|s| short(*s)).take(12).map(score).collect();
     let alarms: Vec<_> = lines.iter().filter(|l| l.verdict != "none").map(|l| (l.seed, l.named.clone())).collect();
     assert!(alarms.len() <= 6, "{alarms:?}");
 }
 
 #[test]
 fn hidden_effects_are_found() {
-    let seeds: Vec<u64> = (0..400u64).map(|k| 2 * k).filter(|s| matches!(Hidden::of(*s), Hidden::One(_))).take(40).collect();
+    let seeds: Vec<u64> =
+        (0..400u64).map(|k| 2 * k).filter(|s| matches!(Hidden::of(*s), Hidden::One(_)) && short(*s)).take(24).collect();
     let lines: Vec<_> = seeds.into_iter().map(score).filter(|l| l.size >= 3.0).collect();
     let first = lines.iter().filter(|l| l.first).count();
     let missed: Vec<_> = lines.iter().filter(|l| !l.first).map(|l| (l.seed, l.truth.clone(), l.named.clone())).collect();

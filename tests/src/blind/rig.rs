@@ -92,6 +92,8 @@ pub struct Rig {
     pub jitter: f64,
     /// Share of missing samples.
     pub missing: f64,
+    /// Whether commands change at the instant of a sample, as where one host commands and logs.
+    pub aligned: bool,
     /// Head of the log.
     pub meta: Vec<String>,
 }
@@ -134,6 +136,7 @@ impl Rig {
             hz: c.of(&[10.0, 12.5, 16.0, 20.0, 25.0, 50.0]),
             jitter: if c.happens(0.35) { c.between(0.003, 0.02) } else { 0.0 },
             missing: if c.happens(0.55) { c.between(0.001, 0.015) } else { 0.0 },
+            aligned: c.happens(0.8),
             meta: Vec::new(),
         };
         for (name, p) in [("vibration_g", 0.1), ("humidity_pct", 0.12), ("esc_temp_c", 0.1)] {

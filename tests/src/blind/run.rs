@@ -136,7 +136,7 @@ pub fn run(rig: &Rig, effects: &[Effect], schedule: &Schedule, seed: u64, stream
         ("temp_c", rig.present[3], air.iter().map(|a| a.temperature).collect()),
     ];
     for (k, (name, present, stream)) in channels.into_iter().enumerate() {
-        let quiet = sampled(&sense::meter(effects, name, h, stream));
+        let mut quiet = sampled(&sense::meter(effects, name, h, stream));
         let mut y = quiet.clone();
         if noisy {
             let noise = rig.noise[k];
@@ -151,6 +151,10 @@ pub fn run(rig: &Rig, effects: &[Effect], schedule: &Schedule, seed: u64, stream
             y.iter_mut().for_each(|v| *v = (*v / rig.noise[k].quantum).round() * rig.noise[k].quantum);
         }
         if present {
+            // what a model of the true form would say: it clips and holds as well
+            let known: Vec<Effect> =
+                effects.iter().filter(|e| matches!(e.id, "amplifier_saturation" | "sample_hold")).cloned().collect();
+            sense::samples(&known, rig, name, &r.t, &mut quiet, &mut hits);
             r.quiet.insert(name, quiet);
             r.columns.push((name, y));
         }

@@ -136,7 +136,11 @@ impl Scenario {
                 break s;
             }
         };
-        let schedules = [Schedule::draw(shape, duration, low, high, &mut k), Schedule::draw(second, other, low, high, &mut k)];
+        let mut schedules =
+            [Schedule::draw(shape, duration, low, high, &mut k), Schedule::draw(second, other, low, high, &mut k)];
+        if rig.aligned {
+            schedules.iter_mut().for_each(|s| s.align(1.0 / rig.hz));
+        }
         let frame = Frame { shortest: duration.min(other), duration, charge: run::charge(&rig, &schedules[0]) };
         let mut s = Self { seed, hidden, rig, effects: Vec::new(), sizes: Vec::new(), shown: Vec::new(), schedules };
         let wanted = s.wanted();

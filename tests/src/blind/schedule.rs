@@ -109,6 +109,11 @@ impl Schedule {
         s
     }
 
+    /// Moves every change to the nearest multiple of `step`, s.
+    pub fn align(&mut self, step: f64) {
+        self.points.iter_mut().for_each(|p| p.0 = (p.0 / step).round() * step);
+    }
+
     fn hold(&mut self, level: f64, until: f64) {
         let from = self.points.last().map_or(0.0, |p| p.0);
         self.points.push((from, level));

@@ -228,6 +228,8 @@ impl Effect {
             "hysteresis" => vec![("width", cell::width(self))],
             "gain_change" if self.form == 0 => vec![("gain_change", s), ("t0", self.t0)],
             "gain_change" => vec![("rate", s / self.b)],
+            // twice a turn at twice the frequency looks the same, so that only the damping is comparable then
+            "beam_resonance" if self.form == 1 => vec![("damping_ratio", self.c)],
             "beam_resonance" => vec![("natural_frequency", self.b), ("damping_ratio", self.c)],
             "torque_crosstalk" => vec![("coefficient", s)],
             "amplifier_saturation" => vec![("level", cell::level(self, rig))],
