@@ -28,6 +28,8 @@ usage: cargo xtask COMMAND
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
   test             everything: format, lints, images, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
+  test --emulated  the images on emulated boards, nothing else
+  test --verdicts  the verdict contract on recorded and simulated logs, nothing else
 ";
 
 fn main() -> ExitCode {
@@ -40,6 +42,8 @@ fn main() -> ExitCode {
         ["image", "--bless"] => image::image(&place, true),
         ["test"] => test::everything(&place),
         ["test", "--quick"] => test::quick(&place),
+        ["test", "--emulated"] => test::on_boards(&place),
+        ["test", "--verdicts"] => test::on_logs(&place),
         ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             return ExitCode::SUCCESS;

@@ -49,10 +49,7 @@ impl Steps {
 pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
     let done = (|| {
-        steps.step("set-up", |_| {
-            setup::target(place)?;
-            setup::python(place).map(|_| ())
-        })?;
+        set_up(place, &mut steps)?;
         host_lints(place, &mut steps)?;
         steps.step("lints of the flash images", |_| {
             let mut clippy = cargo(place, &["clippy", "--config", ".cargo/image.toml", "--release", "--target", BOARD]);
@@ -65,10 +62,10 @@ pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
             ]);
             run(&mut clippy)
         })?;
-        steps.step("flash images and their size", |_| image::image(place, false))?;
+        images(place, &mut steps)?;
         host_tests(place, &mut steps)?;
-        steps.step("the images on emulated boards", |tally| emulated(place, tally))?;
-        steps.step("verdict contract", |tally| verdict::verdicts(place, tally))
+        boards(place, &mut steps)?;
+        logs(place, &mut steps)
     })();
     steps.finish(done)
 }
@@ -78,6 +75,36 @@ pub(crate) fn quick(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
     let done = host_lints(place, &mut steps).and_then(|()| host_tests(place, &mut steps));
     steps.finish(done)
+}
+
+/// The flash images in the emulator.
+pub(crate) fn on_boards(place: &Place) -> Result<(), Failure> {
+    let mut steps = Steps::default();
+    let done = images(place, &mut steps).and_then(|()| boards(place, &mut steps));
+    steps.finish(done)
+}
+
+/// The verdict contract.
+pub(crate) fn on_logs(place: &Place) -> Result<(), Failure> {
+    let mut steps = Steps::default();
+    let done = logs(place, &mut steps);
+    steps.finish(done)
+}
+
+fn set_up(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
+    steps.step("set-up", |_| setup::target(place).and_then(|()| setup::python(place).map(|_| ())))
+}
+
+fn images(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
+    steps.step("flash images and their size", |_| image::image(place, false))
+}
+
+fn boards(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
+    steps.step("the images on emulated boards", |tally| emulated(place, tally))
+}
+
+fn logs(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
+    steps.step("verdict contract", |tally| verdict::verdicts(place, tally))
 }
 
 fn host_lints(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
