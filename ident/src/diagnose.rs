@@ -13,7 +13,7 @@ use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{self, Effect, Instance};
 use crate::heldout;
 use crate::residual::whiteness;
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, refine, refine_newest, scan};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, refine, refine_newest, scan, scatters};
 
 /// Most effects on one channel.
 const MOST_ON_A_CHANNEL: usize = 3;
@@ -227,8 +227,8 @@ fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64
     let mut best = vec![(f64::NEG_INFINITY, 1.0); context.targets.len()];
     for f in fits {
         for (b, t) in best.iter_mut().zip(&f.targets) {
-            if t.loglik > b.0 {
-                *b = (t.loglik, t.share);
+            if t.loglik.mean > b.0 {
+                *b = (t.loglik.mean, t.share);
             }
         }
     }
@@ -237,7 +237,13 @@ fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64
 
 /// Evidence, in nats, that the newest effect adds over a fit without it, its price paid.
 fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) -> f64 {
-    let gain: f64 = new.targets.iter().zip(&old.targets).zip(shares).map(|((n, o), share)| share * (n.loglik - o.loglik)).sum();
+    let parts = context.targets.iter().zip(&new.targets).zip(&old.targets).zip(shares);
+    let gain: f64 = parts
+        .map(|(((target, n), o), share)| {
+            let scattering = target.relation == Relation::Thrust && scatters(&new.placed, target.name);
+            share * (n.loglik.of(scattering) - o.loglik.of(scattering))
+        })
+        .sum();
     gain - new.placed.last().map_or(0.0, |p| penalty(context, p, shares))
 }
 
@@ -308,13 +314,13 @@ fn worth_a_name(context: &Context, candidate: &Candidate, held: &[f64], before: 
         }
     }
     // extra scatter has no mean to predict: the evidence alone must carry it
-    helps || (newest.effect.id() == "beam_resonance" && candidate.evidence > 4.0 * NEEDED_EVIDENCE)
+    helps || (newest.effect.scatters() && candidate.evidence > 4.0 * NEEDED_EVIDENCE)
 }
 
 /// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.
 fn is_idle(context: &Context, placed: &Placed, errors: &[f64], without: &[f64]) -> bool {
     let most = context.targets.iter().enumerate().filter(|(_, t)| placed.instance.touches(t.name)).map(|(i, _)| 1.0 - errors[i] / without[i]).fold(0.0, f64::max);
-    most < 0.5 * NEEDED_REDUCTION && placed.effect.id() != "beam_resonance"
+    most < 0.5 * NEEDED_REDUCTION && !placed.effect.scatters()
 }
 
 /// Residual over noise floor, and whiteness, beyond which something is there even if nothing that we try predicts it.
@@ -342,7 +348,7 @@ fn nameless(context: &Context, declared: Declared<'_>, start: &Fit, best: &Fit) 
             let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
             fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
         })
-        .map(|f| Candidate { evidence: f.targets[i].loglik - start.targets[i].loglik, fit: f })
+        .map(|f| Candidate { evidence: f.targets[i].loglik.mean - start.targets[i].loglik.mean, fit: f })
         .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 

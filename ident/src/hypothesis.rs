@@ -6,7 +6,7 @@
 //! Units: log-likelihood in nats; parameters in the units that the effects state.
 //! Reference: Golub & Pereyra 1973; Nelder & Mead 1965; profile likelihood, Barndorff-Nielsen & Cox 1994, section 3.4.
 
-use crate::context::{Context, Target};
+use crate::context::{Context, Relation, Target};
 use crate::design::{Label, TargetDesign};
 use crate::effects::{Effect, Estimate, Instance};
 use crate::model::Model;
@@ -47,7 +47,7 @@ pub struct TargetFit {
     /// Covariance of the coefficients.
     pub covariance: DMatrix<f64>,
     /// Log-likelihood, weighted for shared rotors.
-    pub loglik: f64,
+    pub loglik: Likelihood,
     /// Share of independent samples that the colour of this fit's residual leaves, 1 when white.
     pub share: f64,
 }
@@ -59,8 +59,29 @@ pub struct Fit {
     pub placed: Vec<Placed>,
     /// One fit for each target of the context.
     pub targets: Vec<TargetFit>,
-    /// Sum over targets.
-    pub loglik: f64,
+}
+
+/// Log-likelihood under the two views of the noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Likelihood {
+    /// With levelled variances: asks how well the mean is predicted, and does not let a nearly noiseless stretch decide that.
+    pub mean: f64,
+    /// With the variances as they are: asks about the scatter too.
+    pub scatter: f64,
+}
+
+impl Likelihood {
+    /// The view that answers for a hypothesis that does or does not speak of scatter.
+    #[must_use]
+    pub fn of(self, scatters: bool) -> f64 {
+        if scatters { self.scatter } else { self.mean }
+    }
+}
+
+/// Whether any of the effects says something of the scatter of a channel.
+#[must_use]
+pub fn scatters(placed: &[Placed], channel: &str) -> bool {
+    placed.iter().any(|p| p.effect.scatters() && p.instance.touches(channel))
 }
 
 /// Builds the design of one target under a hypothesis.
@@ -108,12 +129,14 @@ pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, row
 /// Row, sample and variance of what went into a fit.
 type Kept = (usize, f64, f64);
 
-fn solve_target(context: &Context, target: &Target, design: &TargetDesign, rows: Rows<'_>, mut kept: Option<&mut Vec<Kept>>) -> Option<(Solution, f64)> {
+/// Solves for the coefficients with levelled weights (see [`crate::noise::Noise::weight_variance`]) and counts both likelihoods.
+fn solve_target(context: &Context, target: &Target, design: &TargetDesign, rows: Rows<'_>, kept: Option<&mut Vec<Kept>>) -> Option<(Solution, Likelihood)> {
     let k = design.columns.len();
     let mut normal = Normal::new(k);
     let mut row = vec![0.0; k];
-    let mut log_sigma = 0.0;
     let stride = if let Rows::Every(n) = rows { n.max(1) } else { 1 };
+    let mut log_levelled = 0.0;
+    let mut samples: Vec<Kept> = Vec::with_capacity(target.rows.len() / stride + 1);
     for (j, i) in target.rows.iter().enumerate().step_by(stride) {
         if let Rows::Where(mask) = rows
             && !mask[*i]
@@ -121,27 +144,46 @@ fn solve_target(context: &Context, target: &Target, design: &TargetDesign, rows:
             continue;
         }
         let speed = if context.rpm.is_empty() { 0.0 } else { context.rpm[*i] };
-        let variance = target.noise.weight_variance(speed) + design.extra_variance.get(*i).copied().unwrap_or(0.0);
+        let extra = design.extra_variance.get(*i).copied().unwrap_or(0.0);
         for (r, column) in row.iter_mut().zip(&design.columns) {
             *r = column.values[*i];
         }
         let y = target.y[j] - design.fixed.get(*i).copied().unwrap_or(0.0);
-        normal.add(&row, y, 1.0 / variance);
-        log_sigma += 0.5 * variance.ln();
-        if let Some(kept) = kept.as_deref_mut() {
-            kept.push((*i, y, variance));
-        }
+        let levelled = target.noise.weight_variance(speed, LEVELLED) + extra;
+        normal.add(&row, y, 1.0 / levelled);
+        log_levelled += 0.5 * levelled.ln();
+        samples.push((*i, y, target.noise.weight_variance(speed, FLOORED) + extra));
     }
     if normal.count < k + 3 {
         return None;
     }
     let solution = normal.solve()?;
     let n = normal.count as f64;
+    let (mut rss, mut log_sigma) = (0.0, 0.0);
+    if kept.is_some() || !design.extra_variance.is_empty() {
+        for (i, y, variance) in &samples {
+            let fitted: f64 = design.columns.iter().zip(&solution.coefficients).map(|(c, b)| c.values[*i] * b).sum();
+            rss += (y - fitted).powi(2) / variance;
+            log_sigma += 0.5 * variance.ln();
+        }
+    }
     // the scale of the noise is profiled, but never below a tenth of the floor's standard deviation
-    let scale = (solution.rss / n).max(0.01);
-    let loglik = target.weight * stride as f64 * (-0.5 * n * scale.ln() - 0.5 * solution.rss / scale - log_sigma);
+    let profile = |rss: f64, log_sigma: f64| {
+        let scale = (rss / n).max(0.01);
+        target.weight * stride as f64 * (-0.5 * n * scale.ln() - 0.5 * rss / scale - log_sigma)
+    };
+    let loglik = Likelihood { mean: profile(solution.rss, log_levelled), scatter: profile(rss, log_sigma) };
+    if let Some(kept) = kept {
+        *kept = samples;
+    }
     Some((solution, loglik))
 }
+
+/// Share of the mean variance in the weights of the least squares: a stretch with little noise must not outvote the others
+/// where a polynomial misfits.
+const LEVELLED: f64 = 0.5;
+/// Share of the mean variance in the likelihood: enough to keep a standing rotor's silence from counting without bound.
+const FLOORED: f64 = 0.05;
 
 /// One over the integrated autocorrelation time of the scaled residual, in samples: 1 when white.
 ///
@@ -180,16 +222,17 @@ pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: O
             _ => targets.push(fit_target(context, target, &design(context, declared, placed, target), rows)?),
         }
     }
-    let loglik = targets.iter().map(|t| t.loglik).sum();
-    Some(Fit { placed: placed.to_vec(), targets, loglik })
+    Some(Fit { placed: placed.to_vec(), targets })
 }
 
 /// Log-likelihood of the touched targets only: what a search compares.
-fn touched_loglik(context: &Context, declared: Declared<'_>, placed: &[Placed], moving: &[&str], rows: Rows<'_>) -> f64 {
+fn touched_loglik(context: &Context, declared: Declared<'_>, placed: &[Placed], moving: &[&str], rows: Rows<'_>, scattering: bool) -> f64 {
     let mut sum = 0.0;
     for target in context.targets.iter().filter(|t| moving.contains(&t.name)) {
-        match solve_target(context, target, &design(context, declared, placed, target), rows, None) {
-            Some((_, loglik)) => sum += loglik,
+        let view = scattering && target.relation == Relation::Thrust;
+        let mut kept = Vec::new();
+        match solve_target(context, target, &design(context, declared, placed, target), rows, view.then_some(&mut kept)) {
+            Some((_, loglik)) => sum += loglik.of(view),
             None => return f64::NEG_INFINITY,
         }
     }
@@ -207,7 +250,8 @@ pub fn scan(context: &Context, declared: Declared<'_>, base: &[Placed], effect: 
     let shapes = effect.shapes(context, instance);
     let moving: Vec<&str> = instance.channels.iter().map(String::as_str).collect();
     let rows = Rows::Every(scan_stride(context, 4000));
-    let before = touched_loglik(context, declared, base, &moving, rows);
+    let scattering = effect.scatters() || base.iter().any(|p| p.effect.scatters());
+    let before = touched_loglik(context, declared, base, &moving, rows, scattering);
     let mut best: Option<(Vec<f64>, f64)> = None;
     let total: usize = shapes.iter().map(|s| s.starts.len()).product();
     for index in 0..total {
@@ -222,7 +266,7 @@ pub fn scan(context: &Context, declared: Declared<'_>, base: &[Placed], effect: 
             .collect();
         let mut placed = base.to_vec();
         placed.push(Placed { effect, instance: instance.clone(), shape: shape.clone() });
-        let gain = touched_loglik(context, declared, &placed, &moving, rows) - before;
+        let gain = touched_loglik(context, declared, &placed, &moving, rows, scattering) - before;
         if gain.is_finite() && best.as_ref().is_none_or(|b| gain > b.1) {
             best = Some((shape, gain));
         }
@@ -280,6 +324,7 @@ fn refine_group(context: &Context, declared: Declared<'_>, placed: &[Placed], gr
         return placed.to_vec();
     }
     let moving = touched_by_shapes(placed, group);
+    let scattering = placed.iter().any(|p| p.effect.scatters());
     let cost = |x: &[f64]| -> f64 {
         let mut full = start.clone();
         for (i, v) in free.iter().zip(x) {
@@ -287,7 +332,7 @@ fn refine_group(context: &Context, declared: Declared<'_>, placed: &[Placed], gr
         }
         // a soft wall keeps the simplex inside the plausible box
         let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
-        -touched_loglik(context, declared, &with_shapes(placed, &full), &moving, rows) + 1e3 * wall
+        -touched_loglik(context, declared, &with_shapes(placed, &full), &moving, rows, scattering) + 1e3 * wall
     };
     let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
     let steps: Vec<f64> = free.iter().map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0))).collect();
@@ -400,10 +445,11 @@ impl Fit {
             return Vec::new();
         }
         let moving: Vec<&str> = p.instance.channels.iter().map(String::as_str).collect();
+        let scattering = self.placed.iter().any(|p| p.effect.scatters());
         let value = |x: &[f64]| {
             let mut placed = self.placed.clone();
             placed[position].shape = x.to_vec();
-            touched_loglik(context, declared, &placed, &moving, Rows::All)
+            touched_loglik(context, declared, &placed, &moving, Rows::All, scattering)
         };
         let h: Vec<f64> = shapes.iter().zip(&p.shape).map(|(s, v)| (0.02 * v.abs()).max(1e-4 * (s.range.1 - s.range.0)).max(1e-9)).collect();
         let at = |moves: &[(usize, f64)]| {

@@ -6,6 +6,8 @@
 //! Units: the channel's.
 //! Reference: von Neumann 1941 (mean square successive difference); notes on method: never from the fit residual.
 
+use crate::solve::Normal;
+
 /// Noise of one channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
@@ -13,6 +15,8 @@ pub struct Noise {
     pub a: f64,
     /// Variance for each (rpm/1000)^2.
     pub b: f64,
+    /// Variance for each (rpm/1000)^4.
+    pub c: f64,
     /// Lag-one autocorrelation of the noise, 0 when white.
     pub rho: f64,
     /// Root mean square over the run.
@@ -24,14 +28,15 @@ impl Noise {
     #[must_use]
     pub fn variance(&self, rpm: f64) -> f64 {
         let k = rpm / 1000.0;
-        self.a + self.b * k * k
+        let x = k * k;
+        self.a + x * (self.b + x * self.c)
     }
 
-    /// Variance by which a sample is weighted: half the run's mean variance is added, because where a polynomial misfits, a
-    /// nearly noiseless stretch must not outvote the rest of the run.
+    /// Variance by which a sample is weighted: a `share` of it is the run's mean variance, because where a polynomial misfits,
+    /// a nearly noiseless stretch must not outvote the rest of the run.
     #[must_use]
-    pub fn weight_variance(&self, rpm: f64) -> f64 {
-        0.5 * (self.variance(rpm) + self.rms * self.rms)
+    pub fn weight_variance(&self, rpm: f64, share: f64) -> f64 {
+        (1.0 - share) * self.variance(rpm) + share * self.rms * self.rms
     }
 }
 
@@ -87,14 +92,15 @@ pub fn estimate(rows: &[usize], y: &[f64], rpm: &[f64], steady: &[(usize, usize)
         }).collect();
         trim(&mut samples);
     }
-    let (a, b) = variance_line(&samples);
-    let (a, b) = (a.max(floor).max(1e-30), b.max(0.0));
+    let [a, b, c] = variance_curve(&samples);
+    let a = a.max(floor).max(1e-30);
     let rho = if pairs > 30 && c0 > 0.0 { (c1 / c0).clamp(0.0, 0.98) } else { 0.0 };
     // positive colour makes successive differences too small: gamma_d2 = var (6 - 8 rho + 2 rho^2) for an AR(1)
     let widen = 6.0 / (6.0 - 8.0 * rho + 2.0 * rho * rho).max(0.3);
-    let (a, b) = (a * widen, b * widen);
-    let mean_sq = if rpm.is_empty() { 0.0 } else { rows.iter().map(|r| (rpm[*r] / 1000.0).powi(2)).sum::<f64>() / rows.len() as f64 };
-    Noise { a, b, rho, rms: (a + b * mean_sq).sqrt() }
+    let mut noise = Noise { a: a * widen, b: b * widen, c: c * widen, rho, rms: 0.0 };
+    let speed = |r: &usize| if rpm.is_empty() { 0.0 } else { rpm[*r] };
+    noise.rms = (rows.iter().map(|r| noise.variance(speed(r))).sum::<f64>() / rows.len().max(1) as f64).sqrt();
+    noise
 }
 
 /// Smallest non-zero step between sorted distinct values: the resolution of the log.
@@ -131,51 +137,67 @@ fn trim(samples: &mut Vec<(f64, f64)>) {
     samples.truncate((samples.len() * 9 / 10).max(1));
 }
 
-/// Non-negative line variance = a + b x through binned means, robust against single bins.
-fn variance_line(samples: &[(f64, f64)]) -> (f64, f64) {
+/// Non-negative variance = a + b x + c x^2 over the squared speed x, through binned means, robust against single bins: a bin
+/// that stands far above the curve (a resonance) must not bend it.
+fn variance_curve(samples: &[(f64, f64)]) -> [f64; 3] {
     if samples.is_empty() {
-        return (1e-30, 0.0);
+        return [1e-30, 0.0, 0.0];
     }
     let top = samples.iter().map(|s| s.0).fold(0.0, f64::max);
-    let mut bins: Vec<(f64, f64, f64)> = vec![(0.0, 0.0, 0.0); 12];
+    let mut bins: Vec<(f64, f64, f64)> = vec![(0.0, 0.0, 0.0); 16];
     for (x, v) in samples {
-        let k = if top > 0.0 { ((x / top * 12.0) as usize).min(11) } else { 0 };
+        let k = if top > 0.0 { (((x / top).sqrt() * 16.0) as usize).min(15) } else { 0 };
         bins[k].0 += x;
         bins[k].1 += v;
         bins[k].2 += 1.0;
     }
     let points: Vec<(f64, f64, f64)> = bins.iter().filter(|b| b.2 >= 5.0).map(|b| (b.0 / b.2, b.1 / b.2, b.2)).collect();
     let mean = samples.iter().map(|s| s.1).sum::<f64>() / samples.len() as f64;
-    if points.len() < 3 {
-        return (mean, 0.0);
+    if points.len() < 4 {
+        return [mean, 0.0, 0.0];
     }
-    // relative errors of a variance are alike in every bin: weight by count / variance^2, twice re-weighted
-    let (mut a, mut b) = (mean, 0.0);
-    for _ in 0..6 {
-        let (mut s, mut sx, mut sxx, mut sy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (x, v, n) in &points {
-            let model = (a + b * x).max(1e-3 * mean);
-            // a bin that stands far above the line (a resonance) must not tilt it
-            let excess = (v / model).max(1.0);
-            let w = n / (model * model) / (excess * excess);
-            s += w;
-            sx += w * x;
-            sxx += w * x * x;
-            sy += w * v;
-            sxy += w * x * v;
+    let mut curve = [mean, 0.0, 0.0];
+    for _ in 0..8 {
+        // relative errors of a variance are alike in every bin: weight by count / variance^2
+        let weighted: Vec<(f64, f64, f64)> = points
+            .iter()
+            .map(|(x, v, n)| {
+                let model = (curve[0] + x * (curve[1] + x * curve[2])).max(1e-3 * mean);
+                let excess = (v / model).max(1.0);
+                (x / top.max(1e-12), *v, n / (model * model) / (excess * excess))
+            })
+            .collect();
+        curve = non_negative(&weighted);
+        curve[1] /= top.max(1e-12);
+        curve[2] /= (top * top).max(1e-24);
+    }
+    curve
+}
+
+/// Weighted least squares over 1, x, x^2 with coefficients that are not negative: the best of the admissible subsets.
+fn non_negative(points: &[(f64, f64, f64)]) -> [f64; 3] {
+    let subsets: [&[usize]; 6] = [&[0, 1, 2], &[0, 1], &[0, 2], &[1, 2], &[0], &[2]];
+    let cost = |c: &[f64; 3]| points.iter().map(|(x, v, w)| w * (v - c[0] - x * (c[1] + x * c[2])).powi(2)).sum::<f64>();
+    let mut best: Option<(f64, [f64; 3])> = None;
+    for subset in subsets {
+        let mut normal = Normal::new(subset.len());
+        for (x, v, w) in points {
+            let row: Vec<f64> = subset.iter().map(|k| x.powi(*k as i32)).collect();
+            normal.add(&row, *v, *w);
         }
-        let det = s * sxx - sx * sx;
-        if det.abs() < 1e-300 {
-            break;
-        }
-        b = ((s * sxy - sx * sy) / det).max(0.0);
-        a = if b == 0.0 { sy / s } else { (sy - b * sx) / s };
-        if a < 0.0 {
-            a = 1e-3 * mean;
-            b = ((sxy - a * sx) / sxx).max(0.0);
+        let Some(solution) = normal.solve() else { continue };
+        if solution.coefficients.iter().all(|c| *c >= 0.0) {
+            let mut c = [0.0; 3];
+            for (k, value) in subset.iter().zip(&solution.coefficients) {
+                c[*k] = *value;
+            }
+            let cost = cost(&c);
+            if best.is_none_or(|b| cost < b.0) {
+                best = Some((cost, c));
+            }
         }
     }
-    (a, b)
+    best.map_or([1e-30, 0.0, 0.0], |b| b.1)
 }
 
 #[cfg(test)]
@@ -204,8 +226,10 @@ mod tests {
         let rows: Vec<usize> = (0..12_000).collect();
         let steady: Vec<(usize, usize)> = (0..6).map(|k| (2000 * k, 2000 * (k + 1))).collect();
         let noise = estimate(&rows, &y, &rpm, &steady);
-        assert!((noise.a / 0.01 - 1.0).abs() < 0.15, "{noise:?}");
-        assert!((noise.b / 0.0004 - 1.0).abs() < 0.25, "{noise:?}");
+        for speed in [1000.0, 3000.0, 6000.0] {
+            let truth = 0.01 + 0.0004 * (speed / 1000.0_f64).powi(2);
+            assert!((noise.variance(speed) / truth - 1.0).abs() < 0.15, "{speed}: {noise:?}");
+        }
     }
 
     #[test]

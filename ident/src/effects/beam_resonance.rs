@@ -79,6 +79,10 @@ impl Effect for BeamResonance {
         }
     }
 
+    fn scatters(&self) -> bool {
+        true
+    }
+
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or(0.0, |e| e.value);
         // the bump is of second order in the motion that makes the scatter

@@ -152,6 +152,10 @@ pub trait Effect: Sync {
     fn report(&self, _context: &Context, _instance: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
         fitted
     }
+    /// Whether it says something of the scatter of the thrust, not only of its mean.
+    fn scatters(&self) -> bool {
+        false
+    }
     /// Whether the estimate makes physical sense (a negative resistance does not).
     fn plausible(&self, _context: &Context, _instance: &Instance, _fitted: &[Estimate]) -> bool {
         true
