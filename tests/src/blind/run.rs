@@ -117,7 +117,7 @@ pub fn run(rig: &Rig, effects: &[Effect], schedule: &Schedule, seed: u64, stream
 
     r.columns.push(("pulse_us", sampled(&pulse)));
     for (name, gain) in &rig.speeds {
-        let stream: Vec<f64> = sense::meter(effects, name, h, speed.clone());
+        let stream: Vec<f64> = sense::meter(effects, name, h, per, speed.clone());
         let quiet: Vec<f64> =
             at.iter().map(|i| gain * sense::speed(effects, name, stream[*i], revolutions[*i], &mut hits)).collect();
         let mut y: Vec<f64> = quiet
@@ -136,7 +136,7 @@ pub fn run(rig: &Rig, effects: &[Effect], schedule: &Schedule, seed: u64, stream
         ("temp_c", rig.present[3], air.iter().map(|a| a.temperature).collect()),
     ];
     for (k, (name, present, stream)) in channels.into_iter().enumerate() {
-        let mut quiet = sampled(&sense::meter(effects, name, h, stream));
+        let mut quiet = sampled(&sense::meter(effects, name, h, per, stream));
         let mut y = quiet.clone();
         if noisy {
             let noise = rig.noise[k];

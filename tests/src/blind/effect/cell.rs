@@ -7,7 +7,7 @@
 //! of freedom under a rotating imbalance; amplifier that clips.
 
 use super::Effect;
-use super::drive::Air;
+use super::drive::{Air, REFERENCE};
 use crate::blind::chance::Chance;
 use crate::blind::rig::{Rig, poly};
 
@@ -73,7 +73,7 @@ pub fn pass(rig: &Rig, effects: &[Effect], loads: &Loads<'_>, k: &mut Chance) ->
         for i in 0..y.len() {
             match e.id {
                 "zero_drift" => y[i] += a * time(i),
-                "thermal_zero" => y[i] += a * (air[i].temperature - air[0].temperature),
+                "thermal_zero" => y[i] += a * (air[i].temperature - REFERENCE.temperature),
                 "tare_shift" if time(i) >= e.t0 => y[i] += a,
                 "gain_change" if e.form == 0 && time(i) >= e.t0 => y[i] *= 1.0 + a,
                 "gain_change" if e.form == 1 => y[i] *= 1.0 + a * time(i) / e.b,

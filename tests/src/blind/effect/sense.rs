@@ -40,17 +40,17 @@ pub fn speed(effects: &[Effect], name: &str, n: f64, revolutions: f64, k: &mut C
     out
 }
 
-/// A channel's stream as its meter hands it on.
+/// A channel's stream as its meter hands it on. `h` is the grid step, `per` the grid steps of a logged sample.
 #[must_use]
-pub fn meter(effects: &[Effect], name: &str, h: f64, mut y: Vec<f64>) -> Vec<f64> {
+pub fn meter(effects: &[Effect], name: &str, h: f64, per: usize, mut y: Vec<f64>) -> Vec<f64> {
     for e in effects {
         let here = e.channel == name || (e.id == "clock_drift" && (name == "thrust_n" || name == "torque_nm"));
         if !here {
             continue;
         }
         match e.id {
-            "channel_delay" => y = (0..y.len()).map(|i| at(&y, i as f64 - e.strength / h)).collect(),
-            "clock_drift" => y = (0..y.len()).map(|i| at(&y, i as f64 * (1.0 - e.strength))).collect(),
+            "channel_delay" => y = shifted(&y, per, e.form, |x| x - e.strength / h),
+            "clock_drift" => y = shifted(&y, per, e.form, |x| x * (1.0 - e.strength)),
             "channel_filter" if e.form == 0 => {
                 let m = (e.strength / h).max(1.0);
                 let mut sum = vec![0.0; y.len() + 1];
@@ -76,6 +76,15 @@ pub fn meter(effects: &[Effect], name: &str, h: f64, mut y: Vec<f64>) -> Vec<f64
         }
     }
     y
+}
+
+/// A stream read at another instant: on the grid itself, or (form 1) by a logger that draws lines between its own samples.
+fn shifted(y: &[f64], per: usize, form: u8, when: impl Fn(f64) -> f64) -> Vec<f64> {
+    if form == 0 {
+        return (0..y.len()).map(|i| at(y, when(i as f64))).collect();
+    }
+    let coarse: Vec<f64> = y.iter().step_by(per).copied().collect();
+    (0..y.len()).map(|i| at(&coarse, when(i as f64) / per as f64)).collect()
 }
 
 fn at(y: &[f64], x: f64) -> f64 {
