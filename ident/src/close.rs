@@ -21,7 +21,9 @@ use std::collections::BTreeMap;
 #[non_exhaustive]
 pub enum CloseError {
     /// Nothing can be predicted from anything.
-    #[error("{run}: no channel can be fitted; expected at least two related channels (pulse, rpm, thrust, torque, current, voltage) with more than 8 common samples")]
+    #[error(
+        "{run}: no channel can be fitted; expected at least two related channels (pulse, rpm, thrust, torque, current, voltage) with more than 8 common samples"
+    )]
     NoRelation {
         /// The log.
         run: String,
@@ -104,7 +106,9 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
         .iter()
         .zip(before.into_iter().zip(after))
         .filter(|(t, _)| !t.relation.is_evidence())
-        .map(|(t, (before, after))| (t.name.to_owned(), Channel { unit: unit_of(t.name).to_owned(), noise_floor_rms: t.noise.rms, before, after }))
+        .map(|(t, (before, after))| {
+            (t.name.to_owned(), Channel { unit: unit_of(t.name).to_owned(), noise_floor_rms: t.noise.rms, before, after })
+        })
         .collect()
 }
 
@@ -120,7 +124,8 @@ fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<Effe
             let about = p.effect.about();
             let estimates = p.effect.report(context, &p.instance, d.best.fit.estimates(context, declared, k));
             let (first, reduction) = quoted(context, d, k);
-            let mut channels: Vec<String> = p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();
+            let mut channels: Vec<String> =
+                p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();
             if let Some(at) = channels.iter().position(|c| *c == first) {
                 channels.swap(0, at);
             }
@@ -131,7 +136,11 @@ fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<Effe
             EffectEntry {
                 id: p.effect.id().to_owned(),
                 depends_on,
-                equation: if p.instance.form.is_empty() { about.equation.to_owned() } else { format!("{} [{}]", about.equation, p.instance.form) },
+                equation: if p.instance.form.is_empty() {
+                    about.equation.to_owned()
+                } else {
+                    format!("{} [{}]", about.equation, p.instance.form)
+                },
                 probability: d.probability,
                 parameters: estimates.iter().map(parameter).collect(),
                 heldout_error_reduction: reduction,

@@ -169,7 +169,9 @@ impl Context {
             covariates: log
                 .columns
                 .iter()
-                .filter(|c| !MODELLED.contains(&c.name.as_str()) && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&c.name.as_str()))
+                .filter(|c| {
+                    !MODELLED.contains(&c.name.as_str()) && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&c.name.as_str())
+                })
                 .filter(|c| c.values.iter().any(|v| v.is_finite()))
                 .map(|c| (c.name.clone(), bridge(&log.t, &c.values)))
                 .collect(),
@@ -259,7 +261,8 @@ pub fn bridge(t: &[f64], values: &[f64]) -> Vec<f64> {
 }
 
 fn consensus(log: &Log) -> (Vec<f64>, Consensus) {
-    let present: Vec<&str> = SPEED.into_iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).collect();
+    let present: Vec<&str> =
+        SPEED.into_iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).collect();
     if present.is_empty() {
         return (Vec::new(), Consensus::default());
     }
@@ -270,7 +273,11 @@ fn consensus(log: &Log) -> (Vec<f64>, Consensus) {
     } else {
         Vec::new()
     };
-    let kept: Vec<&str> = if excluded.len() * 2 < present.len() { present.iter().copied().filter(|n| !excluded.contains(n)).collect() } else { present.clone() };
+    let kept: Vec<&str> = if excluded.len() * 2 < present.len() {
+        present.iter().copied().filter(|n| !excluded.contains(n)).collect()
+    } else {
+        present.clone()
+    };
     let excluded = if kept.len() == present.len() { Vec::new() } else { excluded };
     let mut rpm = if excluded.is_empty() { all } else { median_of(log, &kept) };
     let bridged_rows = remove_dropouts(&mut rpm, scale);
@@ -335,7 +342,12 @@ fn start_pulse(pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
     let top = rpm.iter().copied().fold(0.0, f64::max);
     let turning = |v: f64| v > 0.01 * top;
     let lowest_on = pulse.iter().zip(rpm).filter(|(_, r)| turning(**r)).map(|(p, _)| *p).fold(f64::INFINITY, f64::min);
-    let highest_off = pulse.iter().zip(rpm).filter(|(p, r)| !turning(**r) && **p < lowest_on).map(|(p, _)| *p).fold(f64::NEG_INFINITY, f64::max);
+    let highest_off = pulse
+        .iter()
+        .zip(rpm)
+        .filter(|(p, r)| !turning(**r) && **p < lowest_on)
+        .map(|(p, _)| *p)
+        .fold(f64::NEG_INFINITY, f64::max);
     if !lowest_on.is_finite() {
         return 2500.0;
     }
@@ -353,7 +365,9 @@ fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> Vec<(usize
     let mut out = Vec::new();
     let mut from = 0;
     for i in 1..=n {
-        let ends = i == n || (signal[i] - signal[i - 1]).abs() > tolerance || (pulse.is_none() && (signal[i] - signal[from]).abs() > 2.0 * tolerance);
+        let ends = i == n
+            || (signal[i] - signal[i - 1]).abs() > tolerance
+            || (pulse.is_none() && (signal[i] - signal[from]).abs() > 2.0 * tolerance);
         if ends {
             if i - from >= 6 {
                 out.push((from, i));

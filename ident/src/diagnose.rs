@@ -12,8 +12,8 @@ use crate::context::{Context, Relation, Target};
 use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{self, Effect, Instance};
 use crate::heldout;
-use crate::residual::whiteness;
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, refine, refine_newest, scan, scatters};
+use crate::residual::whiteness;
 
 /// Most effects on one channel.
 const MOST_ON_A_CHANNEL: usize = 3;
@@ -88,7 +88,9 @@ impl Diagnosis {
     /// Whether two hypotheses explain the residual about equally well.
     #[must_use]
     pub fn ambiguous(&self) -> bool {
-        !self.unknown && !self.best.fit.placed.is_empty() && self.rivals.first().is_some_and(|r| r.probability >= RIVAL * self.probability)
+        !self.unknown
+            && !self.best.fit.placed.is_empty()
+            && self.rivals.first().is_some_and(|r| r.probability >= RIVAL * self.probability)
     }
 }
 
@@ -103,7 +105,8 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let mut errors = heldout_before.clone();
     let mut offers = offers(context);
     for round in 0..MOST_EFFECTS {
-        let ranked = round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
+        let ranked =
+            round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else { break };
         best = chosen.winner;
         errors = chosen.held;
@@ -123,20 +126,25 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         probability = p;
         errors = held;
     }
-    let is_unknown = is_unknown || best.fit.placed.is_empty() && {
-        let forced = nameless(context, declared, &start, &best.fit);
-        let found = forced.is_some();
-        if let Some(candidate) = forced {
-            errors = heldout::errors(context, declared, &candidate.fit, &folds);
-            best = candidate;
-        }
-        found
-    };
+    let is_unknown = is_unknown
+        || best.fit.placed.is_empty() && {
+            let forced = nameless(context, declared, &start, &best.fit);
+            let found = forced.is_some();
+            if let Some(candidate) = forced {
+                errors = heldout::errors(context, declared, &candidate.fit, &folds);
+                best = candidate;
+            }
+            found
+        };
     let heldout_without = loop {
         let without: Vec<Vec<f64>> = (0..best.fit.placed.len())
-            .map(|k| without(context, declared, &best.fit, k, &start).map_or_else(|| heldout_before.clone(), |f| heldout::errors(context, declared, &f, &folds)))
+            .map(|k| {
+                without(context, declared, &best.fit, k, &start)
+                    .map_or_else(|| heldout_before.clone(), |f| heldout::errors(context, declared, &f, &folds))
+            })
             .collect();
-        let idle = (0..without.len()).find(|k| !is_unknown && without.len() > 1 && is_idle(context, &best.fit.placed[*k], &errors, &without[*k]));
+        let idle = (0..without.len())
+            .find(|k| !is_unknown && without.len() > 1 && is_idle(context, &best.fit.placed[*k], &errors, &without[*k]));
         let Some(idle) = idle else { break without };
         // a later effect has taken over what this one was named for
         let mut placed = best.fit.placed.clone();
@@ -146,7 +154,17 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         errors = heldout::errors(context, declared, &best.fit, &folds);
     };
     progress(1.0);
-    Some(Diagnosis { declared: start, best, probability, rivals, unknown: is_unknown, heldout_before, heldout_after: errors, heldout_without, folds })
+    Some(Diagnosis {
+        declared: start,
+        best,
+        probability,
+        rivals,
+        unknown: is_unknown,
+        heldout_before,
+        heldout_after: errors,
+        heldout_without,
+        folds,
+    })
 }
 
 /// What a scan of one instance gave; it stays valid until an effect is added on one of its channels.
@@ -181,7 +199,13 @@ fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool
 }
 
 /// Every instance added to `best`, refined where promising, best first.
-fn round_of(context: &Context, declared: Declared<'_>, best: &Candidate, offers: &mut [Scanned], progress: &mut dyn FnMut(f64)) -> Vec<Candidate> {
+fn round_of(
+    context: &Context,
+    declared: Declared<'_>,
+    best: &Candidate,
+    offers: &mut [Scanned],
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Candidate> {
     let count = offers.len().max(1) as f64;
     let newest = best.fit.placed.last();
     let whole = vec![1.0; context.targets.len()];
@@ -209,7 +233,9 @@ fn round_of(context: &Context, declared: Declared<'_>, best: &Candidate, offers:
             break;
         }
         let placed = if k < REFINED { refine_newest(context, declared, &placed, Rows::All, 120) } else { placed };
-        if let Some(fitted) = fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f)) {
+        if let Some(fitted) =
+            fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
+        {
             out.push(Candidate { fit: fitted, evidence: 0.0 });
         }
     }
@@ -257,7 +283,14 @@ struct Chosen {
 
 /// The first candidate in the ranking that brings enough evidence, predicts held-out rows better, and is either clearly itself
 /// or large: a small further effect that could as well be another one is left unnamed.
-fn choose(context: &Context, declared: Declared<'_>, ranked: &[Candidate], best: &Candidate, errors: &[f64], folds: &[Vec<bool>]) -> Option<Chosen> {
+fn choose(
+    context: &Context,
+    declared: Declared<'_>,
+    ranked: &[Candidate],
+    best: &Candidate,
+    errors: &[f64],
+    folds: &[Vec<bool>],
+) -> Option<Chosen> {
     for (k, winner) in ranked.iter().enumerate().take_while(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
         let held = heldout::errors_after_newest(context, declared, &winner.fit, folds, errors);
         if !worth_a_name(context, winner, &held, errors) {
@@ -276,7 +309,13 @@ fn choose(context: &Context, declared: Declared<'_>, ranked: &[Candidate], best:
 /// Largest share of the held-out error that the newest effect removes from one of its channels.
 fn largest_reduction(context: &Context, candidate: &Candidate, held: &[f64], before: &[f64]) -> f64 {
     let Some(newest) = candidate.fit.placed.last() else { return 0.0 };
-    context.targets.iter().enumerate().filter(|(_, t)| newest.instance.touches(t.name)).map(|(i, _)| 1.0 - held[i] / before[i]).fold(0.0, f64::max)
+    context
+        .targets
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| newest.instance.touches(t.name))
+        .map(|(i, _)| 1.0 - held[i] / before[i])
+        .fold(0.0, f64::max)
 }
 
 /// Price of an effect: half a log of the effective sample for each parameter, and half a log of the grid that was searched.
@@ -319,7 +358,13 @@ fn worth_a_name(context: &Context, candidate: &Candidate, held: &[f64], before: 
 
 /// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.
 fn is_idle(context: &Context, placed: &Placed, errors: &[f64], without: &[f64]) -> bool {
-    let most = context.targets.iter().enumerate().filter(|(_, t)| placed.instance.touches(t.name)).map(|(i, _)| 1.0 - errors[i] / without[i]).fold(0.0, f64::max);
+    let most = context
+        .targets
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| placed.instance.touches(t.name))
+        .map(|(i, _)| 1.0 - errors[i] / without[i])
+        .fold(0.0, f64::max);
     most < 0.5 * NEEDED_REDUCTION && !placed.effect.scatters()
 }
 
@@ -330,16 +375,24 @@ const LEFT_OVER: (f64, f64) = (1.15, 1e-6);
 /// smooth function that takes most of it stands for it.
 fn nameless(context: &Context, declared: Declared<'_>, start: &Fit, best: &Fit) -> Option<Candidate> {
     let residuals = heldout::residuals(context, declared, best);
-    let (i, target) = context.targets.iter().enumerate().filter(|(i, target)| {
-        let r = &residuals[*i];
-        let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
-        let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
-        let asked = !target.relation.is_evidence() && target.relation != Relation::SpeedAlone;
-        asked && r.len() >= FEWEST_SAMPLES.0 && rms > LEFT_OVER.0 * target.noise.rms && whiteness(&t, r) < LEFT_OVER.1
-    }).max_by(|a, b| {
-        let excess = |i: usize| residuals[i].iter().map(|v| v * v).sum::<f64>() / (residuals[i].len() as f64 * context.targets[i].noise.rms.powi(2));
-        excess(a.0).total_cmp(&excess(b.0))
-    })?;
+    let (i, target) = context
+        .targets
+        .iter()
+        .enumerate()
+        .filter(|(i, target)| {
+            let r = &residuals[*i];
+            let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
+            let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
+            let asked = !target.relation.is_evidence() && target.relation != Relation::SpeedAlone;
+            asked && r.len() >= FEWEST_SAMPLES.0 && rms > LEFT_OVER.0 * target.noise.rms && whiteness(&t, r) < LEFT_OVER.1
+        })
+        .max_by(|a, b| {
+            let excess = |i: usize| {
+                residuals[i].iter().map(|v| v * v).sum::<f64>()
+                    / (residuals[i].len() as f64 * context.targets[i].noise.rms.powi(2))
+            };
+            excess(a.0).total_cmp(&excess(b.0))
+        })?;
     variables(context)
         .into_iter()
         .filter(|v| !is_load(context, target, v))
@@ -381,7 +434,10 @@ fn opponent(
             }
             let instance = Instance::new(&[target.name], &variable);
             let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
-            let Some(fitted) = fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All) else { continue };
+            let Some(fitted) = fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
+            else {
+                continue;
+            };
             let shares = shares(context, [&fitted, &best.fit].into_iter());
             let candidate = Candidate { evidence: net_gain(context, &fitted, start, &shares), fit: fitted };
             if candidate.evidence < 2.0 * NEEDED_EVIDENCE {
@@ -391,7 +447,11 @@ fn opponent(
             let gain = (before[i] / held[i]).ln();
             let rival = (before[i] / named[i]).ln();
             // a name that depends on the same variable has found the dependence; only its form may be rough
-            let same = best.fit.placed.iter().any(|p| p.instance.touches(target.name) && p.effect.about().depends_on.contains(&variable.as_str()));
+            let same = best
+                .fit
+                .placed
+                .iter()
+                .any(|p| p.instance.touches(target.name) && p.effect.about().depends_on.contains(&variable.as_str()));
             let margin = if same { std::f64::consts::LN_2 } else { 0.15 };
             let clearly = gain > (1.0 / (1.0 - NEEDED_REDUCTION)).ln() && (best.fit.placed.is_empty() || gain > rival + margin);
             if clearly && champion.as_ref().is_none_or(|c| gain > c.0) {

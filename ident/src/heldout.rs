@@ -13,9 +13,8 @@ use crate::hypothesis::{Declared, Fit, Placed, Rows, connected, design, fit_targ
 pub fn folds(context: &Context) -> Vec<Vec<bool>> {
     let n = context.len();
     let (t0, span) = (context.t.first().copied().unwrap_or(0.0), context.duration().max(1e-9));
-    let mut out: Vec<Vec<bool>> = (0..5)
-        .map(|k| context.t.iter().map(|t| (((t - t0) / span * 5.0) as usize).min(4) == k).collect())
-        .collect();
+    let mut out: Vec<Vec<bool>> =
+        (0..5).map(|k| context.t.iter().map(|t| (((t - t0) / span * 5.0) as usize).min(4) == k).collect()).collect();
     let levels = levels(context);
     let last = levels.iter().copied().flatten().max().unwrap_or(0);
     let odd: Vec<bool> = (0..n).map(|i| levels[i].is_some_and(|l| l > 0 && l < last && l % 2 == 1)).collect();
@@ -63,21 +62,36 @@ pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec
 
 /// The same after an effect was added: targets that no effect of its group touches keep their `previous` error.
 #[must_use]
-pub fn errors_after_newest(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec<bool>], previous: &[f64]) -> Vec<f64> {
+pub fn errors_after_newest(
+    context: &Context,
+    declared: Declared<'_>,
+    fit: &Fit,
+    folds: &[Vec<bool>],
+    previous: &[f64],
+) -> Vec<f64> {
     let Some(newest) = fit.placed.len().checked_sub(1) else { return previous.to_vec() };
     let group = connected(&fit.placed, newest);
-    let moved: Vec<bool> = context.targets.iter().map(|t| group.iter().any(|k| fit.placed[*k].instance.touches(t.name))).collect();
-    pooled(context, declared, folds, &moved, &|keep| refine_newest(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS))
-        .into_iter()
-        .zip(previous)
-        .map(|(e, p)| e.unwrap_or(*p))
-        .collect()
+    let moved: Vec<bool> =
+        context.targets.iter().map(|t| group.iter().any(|k| fit.placed[*k].instance.touches(t.name))).collect();
+    pooled(context, declared, folds, &moved, &|keep| {
+        refine_newest(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS)
+    })
+    .into_iter()
+    .zip(previous)
+    .map(|(e, p)| e.unwrap_or(*p))
+    .collect()
 }
 
 /// Evaluations that each fold may spend on its shapes, starting from those of all rows.
 const EVALUATIONS: usize = 40;
 
-fn pooled(context: &Context, declared: Declared<'_>, folds: &[Vec<bool>], wanted: &[bool], refined: &dyn Fn(&[bool]) -> Vec<Placed>) -> Vec<Option<f64>> {
+fn pooled(
+    context: &Context,
+    declared: Declared<'_>,
+    folds: &[Vec<bool>],
+    wanted: &[bool],
+    refined: &dyn Fn(&[bool]) -> Vec<Placed>,
+) -> Vec<Option<f64>> {
     let mut sums = vec![(0.0, 0usize); context.targets.len()];
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
@@ -100,7 +114,10 @@ fn pooled(context: &Context, declared: Declared<'_>, folds: &[Vec<bool>], wanted
 /// Root mean square error of each target over all its rows.
 #[must_use]
 pub fn insample(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<f64> {
-    residuals(context, declared, fit).iter().map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt()).collect()
+    residuals(context, declared, fit)
+        .iter()
+        .map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt())
+        .collect()
 }
 
 /// Residual of each target on its own rows.

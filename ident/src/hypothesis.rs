@@ -130,7 +130,13 @@ pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, row
 type Kept = (usize, f64, f64);
 
 /// Solves for the coefficients with levelled weights (see [`crate::noise::Noise::weight_variance`]) and counts both likelihoods.
-fn solve_target(context: &Context, target: &Target, design: &TargetDesign, rows: Rows<'_>, kept: Option<&mut Vec<Kept>>) -> Option<(Solution, Likelihood)> {
+fn solve_target(
+    context: &Context,
+    target: &Target,
+    design: &TargetDesign,
+    rows: Rows<'_>,
+    kept: Option<&mut Vec<Kept>>,
+) -> Option<(Solution, Likelihood)> {
     let k = design.columns.len();
     let mut normal = Normal::new(k);
     let mut row = vec![0.0; k];
@@ -226,7 +232,14 @@ pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: O
 }
 
 /// Log-likelihood of the touched targets only: what a search compares.
-fn touched_loglik(context: &Context, declared: Declared<'_>, placed: &[Placed], moving: &[&str], rows: Rows<'_>, scattering: bool) -> f64 {
+fn touched_loglik(
+    context: &Context,
+    declared: Declared<'_>,
+    placed: &[Placed],
+    moving: &[&str],
+    rows: Rows<'_>,
+    scattering: bool,
+) -> f64 {
     let mut sum = 0.0;
     for target in context.targets.iter().filter(|t| moving.contains(&t.name)) {
         let view = scattering && target.relation == Relation::Thrust;
@@ -246,7 +259,13 @@ fn scan_stride(context: &Context, most: usize) -> usize {
 
 /// Best start of one candidate added to a fixed set: a scan of its grid.
 #[must_use]
-pub fn scan(context: &Context, declared: Declared<'_>, base: &[Placed], effect: &'static dyn Effect, instance: &Instance) -> Option<(Vec<f64>, f64)> {
+pub fn scan(
+    context: &Context,
+    declared: Declared<'_>,
+    base: &[Placed],
+    effect: &'static dyn Effect,
+    instance: &Instance,
+) -> Option<(Vec<f64>, f64)> {
     let shapes = effect.shapes(context, instance);
     let moving: Vec<&str> = instance.channels.iter().map(String::as_str).collect();
     let rows = Rows::Every(scan_stride(context, 4000));
@@ -277,7 +296,13 @@ pub fn scan(context: &Context, declared: Declared<'_>, base: &[Placed], effect: 
 /// Improves the shapes of a hypothesis together (Nelder-Mead within the plausible ranges): those of its newest effect and of
 /// every effect that shares a channel with it, directly or through others. The rest is independent of them.
 #[must_use]
-pub fn refine_newest(context: &Context, declared: Declared<'_>, placed: &[Placed], rows: Rows<'_>, evaluations: usize) -> Vec<Placed> {
+pub fn refine_newest(
+    context: &Context,
+    declared: Declared<'_>,
+    placed: &[Placed],
+    rows: Rows<'_>,
+    evaluations: usize,
+) -> Vec<Placed> {
     let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
     refine_group(context, declared, placed, &connected(placed, newest), rows, evaluations)
 }
@@ -315,7 +340,14 @@ pub(crate) fn connected(placed: &[Placed], k: usize) -> Vec<usize> {
     group
 }
 
-fn refine_group(context: &Context, declared: Declared<'_>, placed: &[Placed], group: &[usize], rows: Rows<'_>, evaluations: usize) -> Vec<Placed> {
+fn refine_group(
+    context: &Context,
+    declared: Declared<'_>,
+    placed: &[Placed],
+    group: &[usize],
+    rows: Rows<'_>,
+    evaluations: usize,
+) -> Vec<Placed> {
     let ranges: Vec<(f64, f64)> = placed.iter().flat_map(|p| p.effect.shapes(context, &p.instance)).map(|s| s.range).collect();
     let start: Vec<f64> = placed.iter().flat_map(|p| p.shape.iter().copied()).collect();
     let owner: Vec<usize> = placed.iter().enumerate().flat_map(|(k, p)| std::iter::repeat_n(k, p.shape.len())).collect();
@@ -335,7 +367,10 @@ fn refine_group(context: &Context, declared: Declared<'_>, placed: &[Placed], gr
         -touched_loglik(context, declared, &with_shapes(placed, &full), &moving, rows, scattering) + 1e3 * wall
     };
     let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
-    let steps: Vec<f64> = free.iter().map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0))).collect();
+    let steps: Vec<f64> = free
+        .iter()
+        .map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0)))
+        .collect();
     let best = nelder_mead(&cost, &x0, &steps, evaluations);
     let mut full = start.clone();
     for (i, v) in free.iter().zip(&best) {
@@ -426,7 +461,12 @@ impl Fit {
         for (k, a) in p.effect.amplitudes(&p.instance).iter().enumerate() {
             for t in &self.targets {
                 if let Some(j) = t.labels.iter().position(|l| *l == (Label::Effect { effect: position, amplitude: k })) {
-                    let estimate = Estimate { name: a.name.into(), unit: a.unit.into(), value: t.coefficients[j], se: t.covariance[(j, j)].max(0.0).sqrt() };
+                    let estimate = Estimate {
+                        name: a.name.into(),
+                        unit: a.unit.into(),
+                        value: t.coefficients[j],
+                        se: t.covariance[(j, j)].max(0.0).sqrt(),
+                    };
                     if !out.iter().any(|e| e.name == estimate.name) {
                         out.push(estimate);
                     }
@@ -451,7 +491,8 @@ impl Fit {
             placed[position].shape = x.to_vec();
             touched_loglik(context, declared, &placed, &moving, Rows::All, scattering)
         };
-        let h: Vec<f64> = shapes.iter().zip(&p.shape).map(|(s, v)| (0.02 * v.abs()).max(1e-4 * (s.range.1 - s.range.0)).max(1e-9)).collect();
+        let h: Vec<f64> =
+            shapes.iter().zip(&p.shape).map(|(s, v)| (0.02 * v.abs()).max(1e-4 * (s.range.1 - s.range.0)).max(1e-9)).collect();
         let at = |moves: &[(usize, f64)]| {
             let mut x = p.shape.clone();
             for (i, d) in moves {
@@ -464,12 +505,20 @@ impl Fit {
         for i in 0..n {
             hessian[(i, i)] = -(at(&[(i, 1.0)]) - 2.0 * centre + at(&[(i, -1.0)])) / (h[i] * h[i]);
             for j in 0..i {
-                let mixed = (at(&[(i, 1.0), (j, 1.0)]) - at(&[(i, 1.0), (j, -1.0)]) - at(&[(i, -1.0), (j, 1.0)]) + at(&[(i, -1.0), (j, -1.0)])) / (4.0 * h[i] * h[j]);
+                let mixed = (at(&[(i, 1.0), (j, 1.0)]) - at(&[(i, 1.0), (j, -1.0)]) - at(&[(i, -1.0), (j, 1.0)])
+                    + at(&[(i, -1.0), (j, -1.0)]))
+                    / (4.0 * h[i] * h[j]);
                 hessian[(i, j)] = -mixed;
                 hessian[(j, i)] = -mixed;
             }
         }
-        let share = context.targets.iter().zip(&self.targets).filter(|(t, _)| p.instance.touches(t.name)).map(|(_, f)| f.share).fold(1.0, f64::min);
+        let share = context
+            .targets
+            .iter()
+            .zip(&self.targets)
+            .filter(|(t, _)| p.instance.touches(t.name))
+            .map(|(_, f)| f.share)
+            .fold(1.0, f64::min);
         hessian *= share;
         let inverse = hessian.clone().try_inverse();
         (0..n)

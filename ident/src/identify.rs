@@ -78,14 +78,26 @@ pub fn identify(log: &Log) -> Result<Identified, CloseError> {
             let mean = t.y.iter().sum::<f64>() / n;
             let total: f64 = t.y.iter().map(|y| (y - mean).powi(2)).sum();
             let left: f64 = r.iter().map(|v| v * v).sum();
-            Quality { channel: t.name, unit: unit_of(t.name), rms: (left / n).sqrt(), noise_floor: t.noise.rms, r2: 1.0 - left / total.max(1e-300) }
+            Quality {
+                channel: t.name,
+                unit: unit_of(t.name),
+                rms: (left / n).sqrt(),
+                noise_floor: t.noise.rms,
+                r2: 1.0 - left / total.max(1e-300),
+            }
         })
         .collect();
     let constants = [("k_T", Relation::Thrust, "N.s2"), ("k_Q", Relation::Torque, "N.m.s2")]
         .into_iter()
         .filter_map(|(name, relation, unit)| square_law(&context, relation).map(|(value, se)| Constant { name, value, se, unit }))
         .collect();
-    Ok(Identified { model, plateaus: plateaus(&context, log), columns: log.columns.iter().map(|c| c.name.clone()).collect(), quality, constants })
+    Ok(Identified {
+        model,
+        plateaus: plateaus(&context, log),
+        columns: log.columns.iter().map(|c| c.name.clone()).collect(),
+        quality,
+        constants,
+    })
 }
 
 /// Coefficient of omega^2 with a free zero, and its standard error.

@@ -263,7 +263,11 @@ impl<'a, R: BufRead> Lines<'a, R> {
         }
         self.number += 1;
         if n > MAX_LINE {
-            return Err(self.place().refuse(None, format!("a line longer than {MAX_LINE} bytes"), "a text file with one short line a sample"));
+            return Err(self.place().refuse(
+                None,
+                format!("a line longer than {MAX_LINE} bytes"),
+                "a text file with one short line a sample",
+            ));
         }
         self.unterminated = bytes.last() != Some(&b'\n');
         while matches!(bytes.last(), Some(b'\n' | b'\r')) {
@@ -282,14 +286,22 @@ fn read_head<R: BufRead>(lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<
     let mut format_seen = false;
     loop {
         let Some(line) = lines.next_line()? else {
-            return Err(lines.place().refuse(None, "the file is empty or ends before its header", format!("'# {FORMAT}' and a header line that starts with t_s")));
+            return Err(lines.place().refuse(
+                None,
+                "the file is empty or ends before its header",
+                format!("'# {FORMAT}' and a header line that starts with t_s"),
+            ));
         };
         let place = lines.place();
         if let Some(comment) = line.strip_prefix('#') {
             let comment = comment.trim();
             if !format_seen {
                 if comment != FORMAT {
-                    return Err(place.refuse(None, format!("'{line}'"), format!("'# {FORMAT}' on the first line (use `quadrig import` for other formats)")));
+                    return Err(place.refuse(
+                        None,
+                        format!("'{line}'"),
+                        format!("'# {FORMAT}' on the first line (use `quadrig import` for other formats)"),
+                    ));
                 }
                 format_seen = true;
             } else if let Ok(table) = comment.parse::<toml::Table>() {
@@ -301,7 +313,11 @@ fn read_head<R: BufRead>(lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<
             continue;
         }
         if !format_seen {
-            return Err(place.refuse(None, "no format line", format!("'# {FORMAT}' on the first line (use `quadrig import` for other formats)")));
+            return Err(place.refuse(
+                None,
+                "no format line",
+                format!("'# {FORMAT}' on the first line (use `quadrig import` for other formats)"),
+            ));
         }
         return check_header(&line, &place);
     }
@@ -320,7 +336,11 @@ fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError>
             return Err(place.refuse(Some(name), "it stands twice", "each column once"));
         }
         if let Some(right) = wrong_unit(name) {
-            return Err(place.refuse(Some(name), "a known quantity in another unit", format!("{right}; convert the values and rename the column")));
+            return Err(place.refuse(
+                Some(name),
+                "a known quantity in another unit",
+                format!("{right}; convert the values and rename the column"),
+            ));
         }
     }
     if names.len() < 3 {
@@ -346,7 +366,11 @@ fn wrong_unit(name: &str) -> Option<&'static str> {
 fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> Result<(), ReadError> {
     let fields = line.split(',').count();
     if fields != header.len() {
-        return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header (is the file truncated?)", header.len())));
+        return Err(place.refuse(
+            None,
+            format!("{fields} fields"),
+            format!("{} as in the header (is the file truncated?)", header.len()),
+        ));
     }
     for ((i, text), name) in line.split(',').enumerate().zip(header) {
         let text = text.trim();
@@ -355,8 +379,20 @@ fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> 
         } else {
             match text.parse::<f64>() {
                 Ok(v) if v.is_finite() => v,
-                Ok(_) => return Err(place.refuse(Some(name), format!("'{text}'"), "a finite number, or an empty field for a missing sample")),
-                Err(_) => return Err(place.refuse(Some(name), format!("'{}'", short(text)), "a decimal number, or an empty field for a missing sample")),
+                Ok(_) => {
+                    return Err(place.refuse(
+                        Some(name),
+                        format!("'{text}'"),
+                        "a finite number, or an empty field for a missing sample",
+                    ));
+                }
+                Err(_) => {
+                    return Err(place.refuse(
+                        Some(name),
+                        format!("'{}'", short(text)),
+                        "a decimal number, or an empty field for a missing sample",
+                    ));
+                }
             }
         };
         if i == 0 {
@@ -375,12 +411,16 @@ fn check_time(value: f64, log: &Log, place: &Place<'_>) -> Result<(), ReadError>
         return Err(place.refuse(Some("t_s"), "an empty field", "a time stamp on every row"));
     }
     match log.t.last() {
-        Some(last) if value == *last => {
-            Err(place.refuse(Some("t_s"), format!("{value} repeats the row before"), "strictly increasing time (`quadrig import` repairs it by a stated rule)"))
-        }
-        Some(last) if value < *last => {
-            Err(place.refuse(Some("t_s"), format!("{value} steps back from {last}"), "strictly increasing time (`quadrig import` repairs it by a stated rule)"))
-        }
+        Some(last) if value == *last => Err(place.refuse(
+            Some("t_s"),
+            format!("{value} repeats the row before"),
+            "strictly increasing time (`quadrig import` repairs it by a stated rule)",
+        )),
+        Some(last) if value < *last => Err(place.refuse(
+            Some("t_s"),
+            format!("{value} steps back from {last}"),
+            "strictly increasing time (`quadrig import` repairs it by a stated rule)",
+        )),
         _ => Ok(()),
     }
 }
@@ -431,7 +471,10 @@ mod tests {
             (format!("{head}0,1000,1\n0,1000,1\n"), "run.csv:4: column t_s: 0 repeats"),
             (format!("{head}1,1000,1\n0.5,1000,1\n"), "run.csv:4: column t_s: 0.5 steps back from 1"),
             (format!("{head}0,7.5,1\n"), "column pulse_us: 7.5; expected 500 to 2500 us"),
-            ("# quadrig-log 1\nt_s,pulse_us,thrust_g\n".to_owned(), "run.csv:2: column thrust_g: a known quantity in another unit; expected thrust_n"),
+            (
+                "# quadrig-log 1\nt_s,pulse_us,thrust_g\n".to_owned(),
+                "run.csv:2: column thrust_g: a known quantity in another unit; expected thrust_n",
+            ),
             ("# quadrig-log 1\nt_s,rpm\n0,1\n".to_owned(), "expected t_s and at least two"),
             ("# quadrig-log 1\nrpm,thrust_n\n0,1\n".to_owned(), "column rpm: not the time column"),
         ] {

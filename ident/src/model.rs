@@ -159,7 +159,11 @@ impl Model {
                     amplitudes.push((target.name.to_owned(), values));
                 }
             }
-            model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates: fit.estimates(context, declared, position) });
+            model.effects.push(AddedEffect {
+                placed: placed.clone(),
+                amplitudes,
+                estimates: fit.estimates(context, declared, position),
+            });
         }
         model
     }
@@ -215,7 +219,10 @@ impl Model {
             root.insert("rig".into(), Value::Table(self.meta.clone()));
         }
         let mut consensus = Table::new();
-        consensus.insert("rule".into(), "median of the channels; speeds that leave by 2 % for at most three rows and come back are bridged".into());
+        consensus.insert(
+            "rule".into(),
+            "median of the channels; speeds that leave by 2 % for at most three rows and come back are bridged".into(),
+        );
         consensus.insert("channels".into(), self.consensus.clone().into());
         root.insert("consensus".into(), consensus.into());
         let mut channels = Table::new();
@@ -234,7 +241,9 @@ impl Model {
         if !list.is_empty() {
             root.insert("effect".into(), list.into());
         }
-        format!("# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors.\n{root}")
+        format!(
+            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors.\n{root}"
+        )
     }
 
     /// Reads a model.
@@ -254,15 +263,30 @@ impl Model {
     pub fn parse(file: &str, text: &str) -> Result<Self, ModelError> {
         let root: Table = text.parse().map_err(|e: toml::de::Error| {
             let line = e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
-            ModelError::Syntax { file: format!("{file}:{line}"), message: format!("{}; expected a model written by `quadrig identify` or `close-loop`", e.message().lines().next().unwrap_or("not TOML")) }
+            ModelError::Syntax {
+                file: format!("{file}:{line}"),
+                message: format!(
+                    "{}; expected a model written by `quadrig identify` or `close-loop`",
+                    e.message().lines().next().unwrap_or("not TOML")
+                ),
+            }
         })?;
-        let refuse = |key: &str, found: &str, expected: &str| ModelError::Key { file: file.to_owned(), key: key.to_owned(), found: found.to_owned(), expected: expected.to_owned() };
+        let refuse = |key: &str, found: &str, expected: &str| ModelError::Key {
+            file: file.to_owned(),
+            key: key.to_owned(),
+            found: found.to_owned(),
+            expected: expected.to_owned(),
+        };
         match root.get("format").and_then(Value::as_str) {
             Some(FORMAT) => {}
             other => return Err(refuse("format", &other.map_or("missing".into(), |o| format!("'{o}'")), &format!("'{FORMAT}'"))),
         }
-        let mut model = Self { source: root.get("source").and_then(Value::as_str).unwrap_or_default().to_owned(), ..Self::default() };
-        model.start_pulse_us = root.get("start_pulse_us").and_then(number).ok_or_else(|| refuse("start_pulse_us", "missing or not a number", "microseconds"))?;
+        let mut model =
+            Self { source: root.get("source").and_then(Value::as_str).unwrap_or_default().to_owned(), ..Self::default() };
+        model.start_pulse_us = root
+            .get("start_pulse_us")
+            .and_then(number)
+            .ok_or_else(|| refuse("start_pulse_us", "missing or not a number", "microseconds"))?;
         model.meta = root.get("rig").and_then(Value::as_table).cloned().unwrap_or_default();
         model.consensus = root
             .get("consensus")
@@ -270,19 +294,27 @@ impl Model {
             .and_then(Value::as_array)
             .map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect())
             .unwrap_or_default();
-        let channels = root.get("channel").and_then(Value::as_table).ok_or_else(|| refuse("channel", "missing", "one table for each channel"))?;
+        let channels = root
+            .get("channel")
+            .and_then(Value::as_table)
+            .ok_or_else(|| refuse("channel", "missing", "one table for each channel"))?;
         for (name, table) in channels {
             let read = |k: usize, suffix: &str| table.get(format!("{}{suffix}", coefficient_key(name, k))).and_then(number);
             let coefficients: Vec<f64> = (0..).map_while(|k| read(k, "")).collect();
             if coefficients.is_empty() || !coefficients.iter().all(|c| c.is_finite()) {
-                return Err(refuse(&format!("channel.{name}.{}", coefficient_key(name, 0)), "missing or not a finite number", "a coefficient"));
+                return Err(refuse(
+                    &format!("channel.{name}.{}", coefficient_key(name, 0)),
+                    "missing or not a finite number",
+                    "a coefficient",
+                ));
             }
             let errors = (0..coefficients.len()).map(|k| read(k, "_se").unwrap_or(0.0)).collect();
             model.polynomials.push(Polynomial { channel: name.clone(), coefficients, errors });
         }
         for (i, value) in root.get("effect").and_then(Value::as_array).into_iter().flatten().enumerate() {
             let key = format!("effect[{i}]");
-            let effect = AddedEffect::from_table(value).map_err(|(k, found, expected)| refuse(&format!("{key}.{k}"), &found, &expected))?;
+            let effect = AddedEffect::from_table(value)
+                .map_err(|(k, found, expected)| refuse(&format!("{key}.{k}"), &found, &expected))?;
             model.effects.push(effect);
         }
         Ok(model)
@@ -309,7 +341,8 @@ impl AddedEffect {
         let mut amplitude = Table::new();
         let names = p.effect.amplitudes(&p.instance);
         for (channel, values) in &self.amplitudes {
-            let per: Table = names.iter().zip(values).filter(|(_, v)| **v != 0.0).map(|(a, v)| (keyed(a.name, a.unit), (*v).into())).collect();
+            let per: Table =
+                names.iter().zip(values).filter(|(_, v)| **v != 0.0).map(|(a, v)| (keyed(a.name, a.unit), (*v).into())).collect();
             if !per.is_empty() {
                 amplitude.insert(channel.clone(), per.into());
             }
@@ -331,18 +364,32 @@ impl AddedEffect {
             let known: Vec<&str> = effects::library().iter().map(|e| e.id()).collect();
             ("id".to_owned(), format!("'{id}'"), format!("one of {}", known.join(", ")))
         })?;
-        let strings = |k: &str| -> Option<Vec<String>> { value.get(k)?.as_array().map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect()) };
+        let strings = |k: &str| -> Option<Vec<String>> {
+            value.get(k)?.as_array().map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect())
+        };
         let channels = strings("channels").ok_or_else(|| missing("channels", "a list of channels"))?;
         let form = value.get("form").and_then(Value::as_str).unwrap_or_default().to_owned();
         let instance = Instance { channels, form };
-        let shape: Vec<f64> = value.get("shape").and_then(Value::as_array).ok_or_else(|| missing("shape", "a list of numbers"))?.iter().filter_map(number).collect();
+        let shape: Vec<f64> = value
+            .get("shape")
+            .and_then(Value::as_array)
+            .ok_or_else(|| missing("shape", "a list of numbers"))?
+            .iter()
+            .filter_map(number)
+            .collect();
         let names = effect.amplitudes(&instance);
         let amplitudes = instance
             .channels
             .iter()
             .map(|c| {
                 let per = value.get("amplitude").and_then(|a| a.get(c));
-                (c.clone(), names.iter().map(|a| per.and_then(|p| p.get(keyed(a.name, a.unit))).and_then(number).unwrap_or(0.0)).collect())
+                (
+                    c.clone(),
+                    names
+                        .iter()
+                        .map(|a| per.and_then(|p| p.get(keyed(a.name, a.unit))).and_then(number).unwrap_or(0.0))
+                        .collect(),
+                )
             })
             .collect();
         let parameters = value.get("parameter").and_then(Value::as_table);
@@ -350,7 +397,14 @@ impl AddedEffect {
             .into_iter()
             .flatten()
             .filter(|(k, _)| !k.ends_with("_se"))
-            .filter_map(|(k, v)| Some(Estimate { name: k.clone(), unit: String::new(), value: number(v)?, se: parameters?.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0) }))
+            .filter_map(|(k, v)| {
+                Some(Estimate {
+                    name: k.clone(),
+                    unit: String::new(),
+                    value: number(v)?,
+                    se: parameters?.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0),
+                })
+            })
             .collect();
         Ok(Self { placed: Placed { effect, instance, shape }, amplitudes, estimates })
     }

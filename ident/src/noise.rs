@@ -85,11 +85,15 @@ pub fn estimate(rows: &[usize], y: &[f64], rpm: &[f64], steady: &[(usize, usize)
         pairs += z.len();
     }
     if samples.len() < 20 {
-        samples = y.windows(3).enumerate().map(|(k, w)| {
-            let d = w[0] - 2.0 * w[1] + w[2];
-            let speed = if rpm.is_empty() { 0.0 } else { rpm[rows[k + 1]] / 1000.0 };
-            (speed * speed, d * d / 6.0)
-        }).collect();
+        samples = y
+            .windows(3)
+            .enumerate()
+            .map(|(k, w)| {
+                let d = w[0] - 2.0 * w[1] + w[2];
+                let speed = if rpm.is_empty() { 0.0 } else { rpm[rows[k + 1]] / 1000.0 };
+                (speed * speed, d * d / 6.0)
+            })
+            .collect();
         trim(&mut samples);
     }
     let [a, b, c] = variance_curve(&samples);
@@ -207,7 +211,15 @@ mod tests {
     fn hash_noise(i: usize) -> f64 {
         // sum of twelve uniform numbers from a small mixing function: standard normal to a few per cent
         let mut s = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        (0..12).map(|_| { s ^= s >> 29; s = s.wrapping_mul(0xBF58_476D_1CE4_E5B9); s ^= s >> 32; (s >> 11) as f64 / (1u64 << 53) as f64 }).sum::<f64>() - 6.0
+        (0..12)
+            .map(|_| {
+                s ^= s >> 29;
+                s = s.wrapping_mul(0xBF58_476D_1CE4_E5B9);
+                s ^= s >> 32;
+                (s >> 11) as f64 / (1u64 << 53) as f64
+            })
+            .sum::<f64>()
+            - 6.0
     }
 
     #[test]

@@ -86,7 +86,11 @@ mod tests {
             s += (3.0 * (p - 1000.0) - s) * 0.2;
             rpm.push(s);
         }
-        let log = Log { t, columns: vec![Column { name: "pulse_us".into(), values: pulse }, Column { name: "rpm".into(), values: rpm }], ..Log::default() };
+        let log = Log {
+            t,
+            columns: vec![Column { name: "pulse_us".into(), values: pulse }, Column { name: "rpm".into(), values: rpm }],
+            ..Log::default()
+        };
         let context = Context::new(&log, None);
         let found = plateaus(&context, &log);
         assert_eq!(found.len(), 6);

@@ -56,7 +56,14 @@ mod tests {
     #[test]
     fn white_is_white_and_a_wave_is_not() {
         let mut s = 9u64;
-        let noise: Vec<f64> = (0..2000).map(|_| { s ^= s << 13; s ^= s >> 7; s ^= s << 17; (s >> 11) as f64 / (1u64 << 53) as f64 - 0.5 }).collect();
+        let noise: Vec<f64> = (0..2000)
+            .map(|_| {
+                s ^= s << 13;
+                s ^= s >> 7;
+                s ^= s << 17;
+                (s >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            })
+            .collect();
         let t: Vec<f64> = (0..2000).map(|i| f64::from(i) * 0.1).collect();
         assert!(whiteness(&t, &noise) > 0.01);
         let wave: Vec<f64> = noise.iter().zip(&t).map(|(n, t)| n + 0.4 * (0.5 * t).sin()).collect();

@@ -17,12 +17,15 @@ pub fn from_command(model: &Model, name: &str, t: &[f64], pulse_us: &[f64], cova
     for p in model.polynomials.iter().filter(|p| Relation::of(&p.channel, true) != Some(Relation::SpeedDifference)) {
         log.columns.push(Column { name: p.channel.clone(), values: vec![0.0; t.len()] });
     }
-    log.columns.extend(covariates.iter().filter(|c| !model.polynomials.iter().any(|p| p.channel == c.name) && c.name != "pulse_us").cloned());
+    log.columns.extend(
+        covariates.iter().filter(|c| !model.polynomials.iter().any(|p| p.channel == c.name) && c.name != "pulse_us").cloned(),
+    );
     // speed, then what hangs on it, then what hangs on current, and speed again where it hangs on the charge
     for _ in 0..3 {
         for speed_pass in [true, false] {
             let context = Context::new(&log, Some(model.start_pulse_us));
-            let names: Vec<&'static str> = context.targets.iter().map(|t| t.name).filter(|n| SPEED.contains(n) == speed_pass).collect();
+            let names: Vec<&'static str> =
+                context.targets.iter().map(|t| t.name).filter(|n| SPEED.contains(n) == speed_pass).collect();
             for name in names {
                 if let Some(values) = model.predict(&context, name)
                     && let Some(column) = log.columns.iter_mut().find(|c| c.name == name)

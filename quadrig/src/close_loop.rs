@@ -75,16 +75,28 @@ pub(crate) fn table(verdict: &Verdict) -> String {
     for e in &verdict.effects {
         out += &format!("\n{} (p = {:.2}) on {}\n  {}\n", e.id, e.probability, e.channels.join(", "), e.equation);
         for p in &e.parameters {
-            out += &format!("  {} = {} {}  (95 %: {} to {})\n", p.name, number(p.value), p.unit, number(p.ci95[0]), number(p.ci95[1]));
+            out += &format!(
+                "  {} = {} {}  (95 %: {} to {})\n",
+                p.name,
+                number(p.value),
+                p.unit,
+                number(p.ci95[0]),
+                number(p.ci95[1])
+            );
         }
         out += &format!("  evidence: {}\n", e.evidence);
     }
     if !verdict.alternatives.is_empty() {
-        let list: Vec<String> = verdict.alternatives.iter().map(|a| format!("{} ({:.3})", a.ids.join(" + "), a.probability)).collect();
+        let list: Vec<String> =
+            verdict.alternatives.iter().map(|a| format!("{} ({:.3})", a.ids.join(" + "), a.probability)).collect();
         out += &format!("\nalternatives: {}\n", list.join(", "));
     }
     if let Some(next) = &verdict.next_experiment {
-        out += &format!("\nnext experiment: {}\n  {}\n", next.why, next.schedule.iter().map(|s| format!("{} us x {} s", s.pulse_us, s.hold_s)).collect::<Vec<_>>().join(", "));
+        out += &format!(
+            "\nnext experiment: {}\n  {}\n",
+            next.why,
+            next.schedule.iter().map(|s| format!("{} us x {} s", s.pulse_us, s.hold_s)).collect::<Vec<_>>().join(", ")
+        );
     }
     for v in &verdict.validation {
         out += &format!("\non {}:\n", v.run);

@@ -36,7 +36,8 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let seed = args.seed.unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |d| d.as_millis() as u64 % 1_000_000));
+    let seed =
+        args.seed.unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |d| d.as_millis() as u64 % 1_000_000));
     let id = args.effect.clone().unwrap_or_else(|| HIDDEN[(mixed(seed) % HIDDEN.len() as u64) as usize].to_owned());
     let scenario = Scenario::demo(seed, Some(&id))?;
     let say = |line: String| {
@@ -44,13 +45,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             println!("{line}");
         }
     };
-    say(format!("seed {seed}: a 570 KV motor with an 11x4.7 propeller, and one effect hidden in the rig (repeat with --seed {seed})"));
+    say(format!(
+        "seed {seed}: a 570 KV motor with an 11x4.7 propeller, and one effect hidden in the rig (repeat with --seed {seed})"
+    ));
     let log = fly(&scenario, None, "run.csv", "flying", quiet)?;
     std::fs::create_dir_all(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
     let path = args.output.join("run.csv");
     log.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
     let found = plateaus(&Context::new(&log, None), &log).len();
-    say(format!("the rig firmware armed the ESC, flew an up-down staircase and logged {} samples; {found} plateaus\n", log.len()));
+    say(format!(
+        "the rig firmware armed the ESC, flew an up-down staircase and logged {} samples; {found} plateaus\n",
+        log.len()
+    ));
 
     // from here on only the log is known, as it was written
     let log = Log::read(&path)?;

@@ -60,12 +60,18 @@ fn find_probe() -> Result<(), Failure> {
     while child.try_wait()?.is_none() {
         if begun.elapsed() > LIST_TIME {
             child.kill()?;
-            return Err(format!("probe-rs did not list its probes within {} s; unplug and plug the probe", LIST_TIME.as_secs()).into());
+            return Err(
+                format!("probe-rs did not list its probes within {} s; unplug and plug the probe", LIST_TIME.as_secs()).into()
+            );
         }
         std::thread::sleep(Duration::from_millis(50));
     }
     let listed = String::from_utf8_lossy(&child.wait_with_output()?.stdout).into_owned();
-    if listed.contains("[0]") { Ok(()) } else { Err("no debug probe was found; connect an ST-Link, J-Link or CMSIS-DAP probe to the board's SWD port".into()) }
+    if listed.contains("[0]") {
+        Ok(())
+    } else {
+        Err("no debug probe was found; connect an ST-Link, J-Link or CMSIS-DAP probe to the board's SWD port".into())
+    }
 }
 
 /// Builds the image from the source tree that this program was built from.
@@ -77,7 +83,18 @@ fn build(board: Board) -> Result<PathBuf, Failure> {
     };
     let status = Command::new("cargo")
         .current_dir(root)
-        .args(["build", "--release", "--package", package, "--target", TARGET, "--target-dir", "target/fw", "--config", ".cargo/image.toml"])
+        .args([
+            "build",
+            "--release",
+            "--package",
+            package,
+            "--target",
+            TARGET,
+            "--target-dir",
+            "target/fw",
+            "--config",
+            ".cargo/image.toml",
+        ])
         .status()
         .map_err(|e| format!("cargo cannot be started in {} ({e}); give --elf", root.display()))?;
     if !status.success() {

@@ -25,18 +25,35 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let log = Log::read(&args.log)?;
     let found = identify(&log)?;
-    write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes())).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes()))
+        .map_err(|e| format!("{}: {e}", args.output.display()))?;
     if quiet {
         return Ok(());
     }
     println!("{} plateaus", found.plateaus.len());
-    println!("{:>9} {:>9} {:>6}  {}", "from s", "to s", "rows", found.columns.iter().map(|c| format!("{c:>22}")).collect::<String>());
+    println!(
+        "{:>9} {:>9} {:>6}  {}",
+        "from s",
+        "to s",
+        "rows",
+        found.columns.iter().map(|c| format!("{c:>22}")).collect::<String>()
+    );
     for p in &found.plateaus {
-        let means: String = p.means.iter().map(|m| m.map_or_else(|| format!("{:>22}", "-"), |(v, se)| format!("{:>12.4} +- {:>6.4}", v, se))).collect();
+        let means: String = p
+            .means
+            .iter()
+            .map(|m| m.map_or_else(|| format!("{:>22}", "-"), |(v, se)| format!("{:>12.4} +- {:>6.4}", v, se)))
+            .collect();
         println!("{:>9.2} {:>9.2} {:>6}  {means}", p.from_s, p.to_s, p.rows);
     }
     for p in &found.model.polynomials {
-        let terms: Vec<String> = p.coefficients.iter().zip(&p.errors).enumerate().map(|(k, (c, e))| format!("c{k} = {} +- {}", number(*c), number(*e))).collect();
+        let terms: Vec<String> = p
+            .coefficients
+            .iter()
+            .zip(&p.errors)
+            .enumerate()
+            .map(|(k, (c, e))| format!("c{k} = {} +- {}", number(*c), number(*e)))
+            .collect();
         println!("{:<12} {}", p.channel, terms.join(", "));
     }
     for q in &found.quality {

@@ -28,7 +28,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     log.write(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
     if !quiet {
         print!("{}", report.table());
-        println!("{} rows, {:.3} s, columns t_s {}", log.len(), log.t[log.len() - 1] - log.t[0], log.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" "));
+        println!(
+            "{} rows, {:.3} s, columns t_s {}",
+            log.len(),
+            log.t[log.len() - 1] - log.t[0],
+            log.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" ")
+        );
     }
     Ok(())
 }

@@ -46,7 +46,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         From::Command => by_command(&model, &log)?,
     };
     if columns.is_empty() {
-        return Err(format!("{}: knows none of the channels of {}; expected a model of the same rig", args.model.display(), args.log.display()).into());
+        return Err(format!(
+            "{}: knows none of the channels of {}; expected a model of the same rig",
+            args.model.display(),
+            args.log.display()
+        )
+        .into());
     }
     write_whole(&args.output, |out| {
         let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();

@@ -47,8 +47,11 @@ impl IdentifiedPlant {
     /// Predicts the run that `log` commands. Temperatures are taken from the log: no model here predicts the weather.
     pub(crate) fn new(model: &Model, log: &Log) -> Option<Self> {
         let pulse = ident::context::bridge(&log.t, log.column("pulse_us")?);
-        let covariates: Vec<Column> =
-            log.columns.iter().map(|c| Column { name: c.name.clone(), values: ident::context::bridge(&log.t, &c.values) }).collect();
+        let covariates: Vec<Column> = log
+            .columns
+            .iter()
+            .map(|c| Column { name: c.name.clone(), values: ident::context::bridge(&log.t, &c.values) })
+            .collect();
         let predicted = from_command(model, &log.name, &log.t, &pulse, &covariates);
         let column = |name: &str| predicted.column(name).map(<[f64]>::to_vec);
         let speed = ident::log::SPEED.iter().find_map(|s| column(s))?;

@@ -42,7 +42,13 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 }
 
 /// One simulated run as a log.
-pub(crate) fn fly(scenario: &Scenario, plant: Option<Box<dyn Powerplant>>, name: &str, word: &str, quiet: bool) -> Result<Log, Failure> {
+pub(crate) fn fly(
+    scenario: &Scenario,
+    plant: Option<Box<dyn Powerplant>>,
+    name: &str,
+    word: &str,
+    quiet: bool,
+) -> Result<Log, Failure> {
     let bar = Bar::new(word, quiet);
     let record = hal_sim::run(scenario, plant, &mut |share| bar.set(share))?;
     Ok(to_log(scenario, &record, name))
@@ -50,7 +56,8 @@ pub(crate) fn fly(scenario: &Scenario, plant: Option<Box<dyn Powerplant>>, name:
 
 /// The same schedule with an identified model as the plant; `like` is the run whose command it follows.
 pub(crate) fn fly_model(scenario: &Scenario, model: &Model, like: &Log, name: &str, quiet: bool) -> Result<Log, Failure> {
-    let plant = IdentifiedPlant::new(model, like).ok_or("the model predicts no speed from a command; expected one identified from a log with pulse_us")?;
+    let plant = IdentifiedPlant::new(model, like)
+        .ok_or("the model predicts no speed from a command; expected one identified from a log with pulse_us")?;
     let healthy = Scenario { effects: Vec::new(), ..scenario.clone() };
     fly(&healthy, Some(Box::new(plant)), name, "re-flying", quiet)
 }

@@ -1,12 +1,13 @@
 //! `air_density`: thrust and torque scale with the density of the air.
 //!
 //! What it is: factor (density / 1.2041 kg/m3)^exponent, density from temp_c and, where it is logged, pressure_hpa or pressure_pa;
-//! the current follows the torque with a size of its own.
+//! current and speed follow the torque with sizes of their own.
 //! What can go wrong: a motor that warms a thermometer nearby is not warm air; torque tells it from a thermal zero.
-//! Units: 1; internally A/krpm3.
+//! Units: 1; internally A/krpm3 and 1 for current and speed.
 //! Reference: ideal gas, ISO 2533 (287.05 J/(kg.K)); thrust and torque proportional to density, Beharie 2013, Eq. 2.17-2.18.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
+use super::speed_channel::expected;
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -39,16 +40,7 @@ impl Effect for AirDensity {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let density = log_density(context);
         let (lo, hi) = density.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        let channels = present(context, &["thrust_n", "torque_nm", "current_a"]);
-        if hi - lo < LEAST_SPREAD || channels.first() != Some(&"thrust_n") {
-            return Vec::new();
-        }
-        let mut out = vec![Instance::new(&channels, "")];
-        let without_current: Vec<&str> = channels.iter().copied().filter(|c| *c != "current_a").collect();
-        if without_current.len() < channels.len() {
-            out.push(Instance::new(&without_current, ""));
-        }
-        out
+        if hi - lo < LEAST_SPREAD { Vec::new() } else { super::blade_flex::with_and_without_load(context) }
     }
 
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
@@ -56,16 +48,24 @@ impl Effect for AirDensity {
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "current_gain", unit: "A/krpm3" }]
+        vec![Amplitude { name: "current_gain", unit: "A/krpm3" }, Amplitude { name: "speed_loss", unit: "1" }]
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let [exponent] = shape else { return };
         let density = log_density(context);
-        if design.relation == Relation::Current {
-            design.add(position, 0, density.iter().zip(&context.rpm).map(|(d, r)| exponent * d * (r / 1000.0).powi(3)).collect());
-        } else {
-            design.map_columns(|column| column.iter_mut().zip(&density).for_each(|(v, d)| *v *= (exponent * d).exp()));
+        match design.relation {
+            Relation::Thrust | Relation::Torque => {
+                design.map_columns(|column| column.iter_mut().zip(&density).for_each(|(v, d)| *v *= (exponent * d).exp()));
+            }
+            Relation::Current => {
+                design.add(
+                    position,
+                    0,
+                    density.iter().zip(&context.rpm).map(|(d, r)| exponent * d * (r / 1000.0).powi(3)).collect(),
+                );
+            }
+            _ => design.add(position, 1, density.iter().zip(expected(context)).map(|(d, r)| -exponent * d * r).collect()),
         }
     }
 

@@ -3,10 +3,11 @@
 //! What it is: above an onset speed thrust falls short of its square law by the factor (onset / rpm)^exponent, torque likewise
 //! with `torque_ratio` times the exponent.
 //! What can go wrong: an onset below the slowest speed of the run is a changed exponent (`reynolds_thrust`), not a bend.
-//! Units: rev/min, 1.
+//! Units: rev/min, 1; internally A/krpm3 for the lighter load.
 //! Reference: aeroelastic washout of light propellers, Brandt & Selig 2011 (AIAA 2011-1255), static data at high speed.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, present};
+use super::speed_channel::expected;
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, present, speeds};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -34,8 +35,7 @@ impl Effect for BladeFlex {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let channels = present(context, &["thrust_n", "torque_nm"]);
-        if channels.first() == Some(&"thrust_n") { vec![Instance::new(&channels, "")] } else { Vec::new() }
+        with_and_without_load(context)
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
@@ -43,22 +43,33 @@ impl Effect for BladeFlex {
             upper_speeds(context, 10),
             Shape { name: "exponent", unit: "1", range: (0.0, 3.0), starts: vec![0.03, 0.1, 0.4] },
         ];
-        if instance.channels.len() > 1 {
+        if instance.touches("torque_nm") {
             out.push(Shape { name: "torque_ratio", unit: "1", range: (-0.5, 3.0), starts: vec![0.3, 1.0] });
         }
         out
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        Vec::new()
+        vec![Amplitude { name: "current_loss", unit: "A/krpm3" }, Amplitude { name: "speed_gain", unit: "1" }]
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let [onset, exponent, rest @ ..] = shape else { return };
-        let exponent =
-            if design.relation == Relation::Torque { exponent * rest.first().copied().unwrap_or(1.0) } else { *exponent };
-        let factor: Vec<f64> = context.rpm.iter().map(|r| if r > onset { (onset / r).powf(exponent) } else { 1.0 }).collect();
-        design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
+        let ratio = rest.first().copied().unwrap_or(1.0);
+        let factor = |speed: f64, exponent: f64| if speed > *onset { (onset / speed).powf(exponent) } else { 1.0 };
+        match design.relation {
+            Relation::Thrust | Relation::Torque => {
+                let exponent = if design.relation == Relation::Torque { exponent * ratio } else { *exponent };
+                let factor: Vec<f64> = context.rpm.iter().map(|r| factor(*r, exponent)).collect();
+                design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
+            }
+            // a lighter load: less current, more speed
+            Relation::Current => {
+                let column = context.rpm.iter().map(|r| (r / 1000.0).powi(3) * (factor(*r, *exponent) - 1.0)).collect();
+                design.add(position, 0, column);
+            }
+            _ => design.add(position, 1, expected(context).iter().map(|r| r * (1.0 - factor(*r, *exponent))).collect()),
+        }
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
@@ -72,4 +83,19 @@ impl Effect for BladeFlex {
 pub(super) fn upper_speeds(context: &Context, count: usize) -> Shape {
     let top = context.rpm.iter().copied().fold(1.0, f64::max);
     Shape { name: "onset", unit: "rpm", range: (0.1 * top, 0.98 * top), starts: geometric(0.3 * top, 0.94 * top, count) }
+}
+
+/// Instances of an effect on the load: thrust and torque with current and speed, which follow the torque, and without them.
+pub(super) fn with_and_without_load(context: &Context) -> Vec<Instance> {
+    let blades = present(context, &["thrust_n", "torque_nm"]);
+    if blades.first() != Some(&"thrust_n") {
+        return Vec::new();
+    }
+    let mut all = present(context, &["thrust_n", "torque_nm", "current_a"]);
+    all.extend(speeds(context));
+    let mut out = vec![Instance::new(&blades, "")];
+    if blades.len() == 2 && all.len() > 2 {
+        out.push(Instance::new(&all, ""));
+    }
+    out
 }

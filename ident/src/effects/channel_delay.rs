@@ -6,7 +6,7 @@
 //! Reference: pure transport delay of a logger.
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -36,7 +36,8 @@ impl Effect for ChannelDelay {
         if context.time_is_row {
             return Vec::new();
         }
-        let mut sets: Vec<Vec<&str>> = present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
+        let mut sets: Vec<Vec<&str>> =
+            present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
         let both = present(context, &["thrust_n", "torque_nm"]);
         if both.len() == 2 {
             sets.push(both);

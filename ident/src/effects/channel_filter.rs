@@ -6,7 +6,7 @@
 //! Reference: boxcar and RC filters; RCbenchmark load cells average over about half a second.
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, operator, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -36,7 +36,8 @@ impl Effect for ChannelFilter {
         if context.time_is_row {
             return Vec::new();
         }
-        let mut sets: Vec<Vec<&str>> = present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
+        let mut sets: Vec<Vec<&str>> =
+            present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
         let both = present(context, &["thrust_n", "torque_nm"]);
         if both.len() == 2 {
             sets.push(both);
@@ -59,7 +60,11 @@ impl Effect for ChannelFilter {
         let [width] = shape else { return };
         let slow = instance.form == "first_order";
         design.map_columns(|column| {
-            *column = if slow { operator::first_order(&context.t, column, *width) } else { operator::moving_average(&context.t, column, *width) };
+            *column = if slow {
+                operator::first_order(&context.t, column, *width)
+            } else {
+                operator::moving_average(&context.t, column, *width)
+            };
         });
     }
 }

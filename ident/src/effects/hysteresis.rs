@@ -6,7 +6,7 @@
 //! Reference: OIML R 60 (load cells), hysteresis error.
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -35,7 +35,11 @@ impl Effect for Hysteresis {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let direction = direction(context);
         let (up, down) = (direction.iter().filter(|d| **d < 0.0).count(), direction.iter().filter(|d| **d > 0.0).count());
-        if present(context, &["thrust_n"]).is_empty() || up.min(down) * 20 < context.len() { Vec::new() } else { vec![Instance::new(&["thrust_n"], "")] }
+        if present(context, &["thrust_n"]).is_empty() || up.min(down) * 20 < context.len() {
+            Vec::new()
+        } else {
+            vec![Instance::new(&["thrust_n"], "")]
+        }
     }
 
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {

@@ -237,5 +237,8 @@ fn load_channels(context: &Context, with_thrust: bool) -> Vec<&'static str> {
 
 /// Throttle above the starting pulse, kus, 0 below it.
 fn throttle(context: &Context) -> Vec<f64> {
-    context.pulse.as_ref().map_or_else(|| vec![0.0; context.len()], |p| p.iter().map(|p| (p - context.start_pulse_us).max(0.0) / 1000.0).collect())
+    context
+        .pulse
+        .as_ref()
+        .map_or_else(|| vec![0.0; context.len()], |p| p.iter().map(|p| (p - context.start_pulse_us).max(0.0) / 1000.0).collect())
 }

@@ -6,7 +6,7 @@
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -56,13 +56,13 @@ impl Effect for SpinupLag {
         // which of the two constants holds is decided by the command alone, so that every column sees the same operator
         let mut state = pulse.first().copied().unwrap_or(0.0);
         let mut rising = Vec::with_capacity(pulse.len());
-        for i in 0..pulse.len() {
-            let up_now = pulse[i] >= state;
+        let mut last = context.t.first().copied().unwrap_or(0.0);
+        for (p, t) in pulse.iter().zip(&context.t) {
+            let up_now = *p >= state;
             rising.push(up_now);
-            if i > 0 {
-                let tau = if up_now { *up } else { *down };
-                state = pulse[i] + (state - pulse[i]) * (-(context.t[i] - context.t[i - 1]) / tau.max(1e-9)).exp();
-            }
+            let tau = if up_now { *up } else { *down };
+            state = p + (state - p) * (-(t - last) / tau.max(1e-9)).exp();
+            last = *t;
         }
         design.map_columns(|column| {
             // a pulse train acts from the row in which it is commanded: the input is a staircase, not a ramp between rows

@@ -6,7 +6,8 @@
 //! Reference: blade-element theory beyond the angle of greatest lift, Leishman 2006, *Principles of Helicopter Aerodynamics*, 7.1.
 
 use super::blade_flex::upper_speeds;
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
+use super::speed_channel::expected;
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -34,14 +35,7 @@ impl Effect for Stall {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let mut channels = present(context, &["thrust_n", "torque_nm", "current_a"]);
-        if channels.len() < 2 || channels[..2] != ["thrust_n", "torque_nm"] {
-            return Vec::new();
-        }
-        let with_current = Instance::new(&channels, "");
-        channels.retain(|c| *c != "current_a");
-        let without = Instance::new(&channels, "");
-        if with_current == without { vec![without] } else { vec![with_current, without] }
+        super::blade_flex::with_and_without_load(context).into_iter().filter(|i| i.touches("torque_nm")).collect()
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
@@ -53,17 +47,24 @@ impl Effect for Stall {
             Amplitude { name: "thrust_loss", unit: "N/krpm2" },
             Amplitude { name: "torque_rise", unit: "N.m/krpm2" },
             Amplitude { name: "current_rise", unit: "A/krpm2" },
+            Amplitude { name: "current_rise_loss", unit: "A/krpm3" },
+            Amplitude { name: "speed_loss", unit: "rev/min/krpm2" },
         ]
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let [onset] = shape else { return };
-        let amplitude = match design.relation {
-            Relation::Thrust => 0,
-            Relation::Torque => 1,
-            _ => 2,
-        };
-        design.add(position, amplitude, context.rpm.iter().map(|r| (r * r - onset * onset).max(0.0) * 1e-6).collect());
+        let beyond = |speed: &[f64]| -> Vec<f64> { speed.iter().map(|r| (r * r - onset * onset).max(0.0) * 1e-6).collect() };
+        match design.relation {
+            Relation::Thrust => design.add(position, 0, beyond(&context.rpm)),
+            Relation::Torque => design.add(position, 1, beyond(&context.rpm)),
+            Relation::Current => {
+                let column = beyond(&context.rpm);
+                design.add(position, 3, column.iter().zip(&context.rpm).map(|(v, r)| v * r / 1000.0).collect());
+                design.add(position, 2, column);
+            }
+            _ => design.add(position, 4, beyond(&expected(context)).iter().map(|v| -v).collect()),
+        }
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {

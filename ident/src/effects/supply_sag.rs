@@ -6,7 +6,7 @@
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -33,7 +33,11 @@ impl Effect for SupplySag {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.current.is_none() || present(context, &["voltage_v"]).is_empty() { Vec::new() } else { vec![Instance::new(&["voltage_v"], "")] }
+        if context.current.is_none() || present(context, &["voltage_v"]).is_empty() {
+            Vec::new()
+        } else {
+            vec![Instance::new(&["voltage_v"], "")]
+        }
     }
 
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {

@@ -6,7 +6,7 @@
 //! Reference: discrepancy modelling, Ebers et al. 2022 (arXiv 2203.05164).
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -93,7 +93,12 @@ pub(crate) fn variables(context: &Context) -> Vec<String> {
     if !context.rpm.is_empty() {
         out.push("rpm".to_owned());
     }
-    for (name, present) in [("pulse_us", context.pulse.is_some()), ("temp_c", context.temperature.is_some()), ("voltage_v", context.voltage.is_some()), ("current_a", context.current.is_some())] {
+    for (name, present) in [
+        ("pulse_us", context.pulse.is_some()),
+        ("temp_c", context.temperature.is_some()),
+        ("voltage_v", context.voltage.is_some()),
+        ("current_a", context.current.is_some()),
+    ] {
         if present {
             out.push(name.to_owned());
         }

@@ -6,7 +6,7 @@
 //! Reference: Beharie 2013, section 5.7.1 (drift of the strain channel).
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
-use crate::context::{Context};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -33,7 +33,11 @@ impl Effect for ZeroDrift {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.time_is_row || present(context, &["thrust_n"]).is_empty() { Vec::new() } else { vec![Instance::new(&["thrust_n"], "")] }
+        if context.time_is_row || present(context, &["thrust_n"]).is_empty() {
+            Vec::new()
+        } else {
+            vec![Instance::new(&["thrust_n"], "")]
+        }
     }
 
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {

@@ -18,7 +18,15 @@ pub(crate) enum Target {
     UnknownUnit(&'static str),
 }
 
-const DERIVED: [&str; 7] = ["electrical power", "mechanical power", "motor efficiency", "propeller mech. efficiency", "overall efficiency", "app message", "servo"];
+const DERIVED: [&str; 7] = [
+    "electrical power",
+    "mechanical power",
+    "motor efficiency",
+    "propeller mech. efficiency",
+    "overall efficiency",
+    "app message",
+    "servo",
+];
 
 /// Sorts one header cell.
 pub(crate) fn sort(header: &str) -> Target {
@@ -42,8 +50,13 @@ pub(crate) fn sort(header: &str) -> Target {
         n if TIDY.contains(&n) => Target::Keep(TIDY.iter().find(|t| **t == n).copied().unwrap_or("rpm"), 1.0),
         "time" => factor("t_s", &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("\u{b5}s", 1e-6)]),
         "esc signal" | "esc" | "throttle" => factor("pulse_us", &[("\u{b5}s", 1.0), ("\u{3bc}s", 1.0), ("us", 1.0), ("ms", 1e3)]),
-        "thrust" | "weight" => factor("thrust_n", &[("gf", 9.80665e-3), ("g", 9.80665e-3), ("kgf", 9.80665), ("n", 1.0), ("lbf", 4.448_221_6), ("ozf", 0.278_013_9)]),
-        "torque" => factor("torque_nm", &[("nm", 1.0), ("nmm", 1e-3), ("ncm", 1e-2), ("lbfin", 0.112_984_8), ("lbfft", 1.355_818)]),
+        "thrust" | "weight" => factor(
+            "thrust_n",
+            &[("gf", 9.80665e-3), ("g", 9.80665e-3), ("kgf", 9.80665), ("n", 1.0), ("lbf", 4.448_221_6), ("ozf", 0.278_013_9)],
+        ),
+        "torque" => {
+            factor("torque_nm", &[("nm", 1.0), ("nmm", 1e-3), ("ncm", 1e-2), ("lbfin", 0.112_984_8), ("lbfft", 1.355_818)])
+        }
         "voltage" | "vbat" => factor("voltage_v", &[("v", 1.0), ("mv", 1e-3)]),
         "current" => factor("current_a", &[("a", 1.0), ("ma", 1e-3)]),
         "motor electrical speed" | "motor optical speed" | "rotation speed" => {
@@ -60,8 +73,19 @@ pub(crate) fn sort(header: &str) -> Target {
 }
 
 /// Columns of the contract that are taken under their own name.
-const TIDY: [&str; 11] =
-    ["rpm", "rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder", "thrust_n", "torque_nm", "current_a", "voltage_v", "temp_c", "thrust_rms_n"];
+const TIDY: [&str; 11] = [
+    "rpm",
+    "rpm_beam",
+    "rpm_opto",
+    "rpm_hall",
+    "rpm_encoder",
+    "thrust_n",
+    "torque_nm",
+    "current_a",
+    "voltage_v",
+    "temp_c",
+    "thrust_rms_n",
+];
 
 fn split_unit(text: &str) -> (&str, Option<&str>) {
     for (open, close) in [('(', ')'), ('[', ']')] {

@@ -67,7 +67,13 @@ pub fn import_from(file: &str, source: impl BufRead, mappings: &[Mapping]) -> Re
     let mut report = Report::default();
     let header = loop {
         match lines.next_line()? {
-            None => return Err(lines.place().refuse(None, "the file is empty or ends before its header", "a CSV with one header line")),
+            None => {
+                return Err(lines.place().refuse(
+                    None,
+                    "the file is empty or ends before its header",
+                    "a CSV with one header line",
+                ));
+            }
             Some(line) if line.trim().is_empty() || line.starts_with('#') => {}
             Some(line) => break line,
         }
@@ -110,12 +116,20 @@ fn plan(header: &str, mappings: &[Mapping], place: &Place<'_>, report: &mut Repo
                     continue;
                 }
                 Target::UnknownUnit(name) => {
-                    return Err(place.refuse(Some(cell), format!("no known unit for {name}"), format!("a unit in parentheses that can be converted, or --map {name}={cell}*FACTOR")));
+                    return Err(place.refuse(
+                        Some(cell),
+                        format!("no known unit for {name}"),
+                        format!("a unit in parentheses that can be converted, or --map {name}={cell}*FACTOR"),
+                    ));
                 }
             },
         };
         if plan.names.contains(&name) {
-            return Err(place.refuse(Some(cell), format!("a second column for {name}"), "one column for each channel (choose with --map)"));
+            return Err(place.refuse(
+                Some(cell),
+                format!("a second column for {name}"),
+                "one column for each channel (choose with --map)",
+            ));
         }
         if factor != 1.0 {
             report.add(&name, format!("column '{cell}' converted, times {factor}"), 1);
@@ -127,7 +141,12 @@ fn plan(header: &str, mappings: &[Mapping], place: &Place<'_>, report: &mut Repo
     Ok(plan)
 }
 
-fn read_rows<R: BufRead>(lines: &mut Lines<'_, R>, header: &str, plan: &Plan, report: &mut Report) -> Result<Vec<Vec<f64>>, ReadError> {
+fn read_rows<R: BufRead>(
+    lines: &mut Lines<'_, R>,
+    header: &str,
+    plan: &Plan,
+    report: &mut Report,
+) -> Result<Vec<Vec<f64>>, ReadError> {
     let width = header.split(',').count();
     let cells: Vec<&str> = header.split(',').collect();
     let mut columns = vec![Vec::new(); plan.names.len()];
@@ -151,7 +170,13 @@ fn read_rows<R: BufRead>(lines: &mut Lines<'_, R>, header: &str, plan: &Plan, re
             let value = match text.parse::<f64>() {
                 _ if text.is_empty() => f64::NAN,
                 Ok(v) if v.is_finite() => v * factor,
-                _ => return Err(place.refuse(Some(cell), format!("'{}'", short(text)), "a finite decimal number or an empty field")),
+                _ => {
+                    return Err(place.refuse(
+                        Some(cell),
+                        format!("'{}'", short(text)),
+                        "a finite decimal number or an empty field",
+                    ));
+                }
             };
             columns[*index].push(value);
         }

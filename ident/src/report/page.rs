@@ -50,8 +50,14 @@ fn lead(closed: &Closed) -> String {
     let ids: Vec<String> = closed.verdict.effects.iter().map(|e| e.id.clone()).collect();
     match closed.verdict.verdict {
         Kind::Attributed => format!("Attributed: the declared model lacks {}.", ids.join(" and ")),
-        Kind::Ambiguous => format!("Ambiguous: {} explains the residual, and so do others. A next experiment is proposed below.", ids.join(" and ")),
-        Kind::Unattributed => format!("Unattributed: no known effect explains the residual. It depends on {}; an empirical correction was fitted.", closed.verdict.effects.iter().flat_map(|e| e.depends_on.iter().cloned()).collect::<Vec<_>>().join(", ")),
+        Kind::Ambiguous => format!(
+            "Ambiguous: {} explains the residual, and so do others. A next experiment is proposed below.",
+            ids.join(" and ")
+        ),
+        Kind::Unattributed => format!(
+            "Unattributed: no known effect explains the residual. It depends on {}; an empirical correction was fitted.",
+            closed.verdict.effects.iter().flat_map(|e| e.depends_on.iter().cloned()).collect::<Vec<_>>().join(", ")
+        ),
         Kind::None => "Nothing significant is left over.".to_owned(),
     }
 }
@@ -62,12 +68,22 @@ fn table(out: &mut String, closed: &Closed) {
         let _ = write!(
             out,
             "<tr><td>{name}</td><td>{}</td><td>{:.5}</td><td>{:.5}</td><td>{:.5}</td><td>{:.2}</td><td>{:.5}</td><td>{:.5}</td></tr>",
-            escape(&c.unit), c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms, c.before.heldout_rms / c.after.heldout_rms.max(1e-300), c.before.rms, c.after.rms
+            escape(&c.unit),
+            c.noise_floor_rms,
+            c.before.heldout_rms,
+            c.after.heldout_rms,
+            c.before.heldout_rms / c.after.heldout_rms.max(1e-300),
+            c.before.rms,
+            c.after.rms
         );
     }
     out.push_str("</table></div>\n");
     for val in &closed.verdict.validation {
-        let _ = write!(out, "<h2>On {}</h2><div class=\"wide\"><table><tr><th>channel</th><th>before</th><th>after</th></tr>", escape(&val.run));
+        let _ = write!(
+            out,
+            "<h2>On {}</h2><div class=\"wide\"><table><tr><th>channel</th><th>before</th><th>after</th></tr>",
+            escape(&val.run)
+        );
         for (name, b) in &val.channels {
             let _ = write!(out, "<tr><td>{name}</td><td>{:.5}</td><td>{:.5}</td></tr>", b.before, b.after);
         }
@@ -77,14 +93,30 @@ fn table(out: &mut String, closed: &Closed) {
 
 fn effects(out: &mut String, closed: &Closed) {
     for e in &closed.verdict.effects {
-        let _ = write!(out, "<h2>{} <small>(p = {:.2})</small></h2><p><code>{}</code></p><p>{}.</p><div class=\"wide\"><table><tr><th>parameter</th><th>value</th><th>95 % interval</th><th>unit</th></tr>", escape(&e.id), e.probability, escape(&e.equation), escape(&e.evidence));
+        let _ = write!(
+            out,
+            "<h2>{} <small>(p = {:.2})</small></h2><p><code>{}</code></p><p>{}.</p><div class=\"wide\"><table><tr><th>parameter</th><th>value</th><th>95 % interval</th><th>unit</th></tr>",
+            escape(&e.id),
+            e.probability,
+            escape(&e.equation),
+            escape(&e.evidence)
+        );
         for p in &e.parameters {
-            let _ = write!(out, "<tr><td>{}</td><td>{:.6}</td><td>{:.6} to {:.6}</td><td>{}</td></tr>", escape(&p.name), p.value, p.ci95[0], p.ci95[1], escape(&p.unit));
+            let _ = write!(
+                out,
+                "<tr><td>{}</td><td>{:.6}</td><td>{:.6} to {:.6}</td><td>{}</td></tr>",
+                escape(&p.name),
+                p.value,
+                p.ci95[0],
+                p.ci95[1],
+                escape(&p.unit)
+            );
         }
         out.push_str("</table></div>\n");
     }
     if !closed.verdict.alternatives.is_empty() {
-        let list: Vec<String> = closed.verdict.alternatives.iter().map(|a| format!("{} ({:.3})", a.ids.join(" + "), a.probability)).collect();
+        let list: Vec<String> =
+            closed.verdict.alternatives.iter().map(|a| format!("{} ({:.3})", a.ids.join(" + "), a.probability)).collect();
         let _ = writeln!(out, "<p>Alternatives: {}.</p>", escape(&list.join(", ")));
     }
     if let Some(next) = &closed.verdict.next_experiment {
@@ -102,17 +134,36 @@ fn figures(out: &mut String, closed: &Closed) {
         if !touched.is_empty() && !touched.contains(&target.name) {
             continue;
         }
-        let (Some(before), Some(after)) = (closed.declared.predict(context, target.name), closed.model.predict(context, target.name)) else { continue };
+        let (Some(before), Some(after)) =
+            (closed.declared.predict(context, target.name), closed.model.predict(context, target.name))
+        else {
+            continue;
+        };
         let at = |v: &[f64]| -> Vec<f64> { target.rows.iter().map(|i| v[*i]).collect() };
         let left = |p: &[f64]| -> Vec<f64> { target.rows.iter().zip(&target.y).map(|(i, y)| y - p[*i]).collect() };
         let (r0, r1, t) = (left(&before), left(&after), at(&context.t));
         let unit = unit_of(target.name);
         let pair = |x: &[f64], label: String, dots: bool| {
-            let series = vec![Series { name: "before", class: "b", x, y: &r0, dots }, Series { name: "after", class: "a", x, y: &r1, dots }];
-            Chart { title: format!("{}: residual over {label}", target.name), x_label: label, y_label: format!("measured - predicted, {unit}"), series, height: 240.0 }.svg()
+            let series = vec![
+                Series { name: "before", class: "b", x, y: &r0, dots },
+                Series { name: "after", class: "a", x, y: &r1, dots },
+            ];
+            Chart {
+                title: format!("{}: residual over {label}", target.name),
+                x_label: label,
+                y_label: format!("measured - predicted, {unit}"),
+                series,
+                height: 240.0,
+            }
+            .svg()
         };
         out.push_str(&pair(&t, time_label(context), false));
-        let variables = closed.verdict.effects.iter().filter(|e| e.channels.iter().any(|c| c == target.name)).flat_map(|e| e.depends_on.iter());
+        let variables = closed
+            .verdict
+            .effects
+            .iter()
+            .filter(|e| e.channels.iter().any(|c| c == target.name))
+            .flat_map(|e| e.depends_on.iter());
         let mut shown: Vec<&str> = vec!["t_s"];
         for name in variables {
             if shown.contains(&name.as_str()) {
@@ -130,7 +181,16 @@ fn figures(out: &mut String, closed: &Closed) {
             Series { name: "declared", class: "b", x: &t, y: &p0, dots: false },
             Series { name: "corrected", class: "a", x: &t, y: &p1, dots: false },
         ];
-        out.push_str(&Chart { title: format!("{} as measured and as predicted", target.name), x_label: time_label(context), y_label: axis(target.name), series, height: 240.0 }.svg());
+        out.push_str(
+            &Chart {
+                title: format!("{} as measured and as predicted", target.name),
+                x_label: time_label(context),
+                y_label: axis(target.name),
+                series,
+                height: 240.0,
+            }
+            .svg(),
+        );
     }
 }
 
@@ -139,8 +199,18 @@ fn overview(out: &mut String, log: &Log, closed: &Closed) {
     out.push_str("<h2>The run</h2>\n");
     let mut draw = |title: &str, names: &[&str]| {
         let classes = ["a", "b", "c", "d"];
-        let series: Vec<Series<'_>> =
-            names.iter().filter_map(|n| log.column(n).map(|y| (n, y))).zip(classes).map(|((n, y), class)| Series { name: n, class, x: &log.t, y, dots: y.iter().filter(|v| v.is_nan()).count() * 2 > y.len() }).collect();
+        let series: Vec<Series<'_>> = names
+            .iter()
+            .filter_map(|n| log.column(n).map(|y| (n, y)))
+            .zip(classes)
+            .map(|((n, y), class)| Series {
+                name: n,
+                class,
+                x: &log.t,
+                y,
+                dots: y.iter().filter(|v| v.is_nan()).count() * 2 > y.len(),
+            })
+            .collect();
         if let Some(first) = series.first() {
             let y_label = axis(first.name);
             out.push_str(&Chart { title: title.to_owned(), x_label: time_label(context), y_label, series, height: 200.0 }.svg());

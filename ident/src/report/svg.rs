@@ -63,23 +63,53 @@ impl Chart<'_> {
         );
         for v in ticks(x0, x1, 8) {
             let x = px(v);
-            let _ = write!(out, "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{:.1}\"/>", self.height - BOTTOM);
-            let _ = write!(out, "<text class=\"tick\" text-anchor=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>", self.height - BOTTOM + 14.0, label(v, x1 - x0));
+            let _ =
+                write!(out, "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{:.1}\"/>", self.height - BOTTOM);
+            let _ = write!(
+                out,
+                "<text class=\"tick\" text-anchor=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>",
+                self.height - BOTTOM + 14.0,
+                label(v, x1 - x0)
+            );
         }
         for v in ticks(y0, y1, 5) {
             let y = py(v);
             let _ = write!(out, "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>", WIDTH - RIGHT);
-            let _ = write!(out, "<text class=\"tick\" text-anchor=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>", LEFT - 5.0, y + 4.0, label(v, y1 - y0));
+            let _ = write!(
+                out,
+                "<text class=\"tick\" text-anchor=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                LEFT - 5.0,
+                y + 4.0,
+                label(v, y1 - y0)
+            );
         }
-        let _ = write!(out, "<text class=\"axis\" text-anchor=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text>", (LEFT + WIDTH - RIGHT) / 2.0, self.height - 6.0, escape(&self.x_label));
-        let _ = write!(out, "<text class=\"axis\" text-anchor=\"middle\" transform=\"translate(13 {:.1}) rotate(-90)\">{}</text>", (TOP + self.height - BOTTOM) / 2.0, escape(&self.y_label));
+        let _ = write!(
+            out,
+            "<text class=\"axis\" text-anchor=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            (LEFT + WIDTH - RIGHT) / 2.0,
+            self.height - 6.0,
+            escape(&self.x_label)
+        );
+        let _ = write!(
+            out,
+            "<text class=\"axis\" text-anchor=\"middle\" transform=\"translate(13 {:.1}) rotate(-90)\">{}</text>",
+            (TOP + self.height - BOTTOM) / 2.0,
+            escape(&self.y_label)
+        );
         for s in &self.series {
             if s.dots { dots(&mut out, s, &px, &py) } else { line(&mut out, s, (x0, x1), &px, &py) }
         }
         let mut at = WIDTH - RIGHT;
         for s in self.series.iter().rev().filter(|s| !s.name.is_empty()) {
             at -= 7.0 * s.name.chars().count() as f64 + 24.0;
-            let _ = write!(out, "<line class=\"{} key\" x1=\"{at:.1}\" x2=\"{:.1}\" y1=\"12\" y2=\"12\"/><text class=\"tick\" x=\"{:.1}\" y=\"16\">{}</text>", s.class, at + 16.0, at + 20.0, escape(s.name));
+            let _ = write!(
+                out,
+                "<line class=\"{} key\" x1=\"{at:.1}\" x2=\"{:.1}\" y1=\"12\" y2=\"12\"/><text class=\"tick\" x=\"{:.1}\" y=\"16\">{}</text>",
+                s.class,
+                at + 16.0,
+                at + 20.0,
+                escape(s.name)
+            );
         }
         out + "</svg>"
     }
@@ -167,7 +197,13 @@ mod tests {
     #[test]
     fn a_chart_is_balanced_markup_and_escapes() {
         let (x, y) = ([0.0, 1.0, 2.0], [1.0, f64::NAN, 3.0]);
-        let chart = Chart { title: "a<b".into(), x_label: "x".into(), y_label: "y".into(), series: vec![Series { name: "s", class: "a", x: &x, y: &y, dots: false }], height: 200.0 };
+        let chart = Chart {
+            title: "a<b".into(),
+            x_label: "x".into(),
+            y_label: "y".into(),
+            series: vec![Series { name: "s", class: "a", x: &x, y: &y, dots: false }],
+            height: 200.0,
+        };
         let svg = chart.svg();
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>") && svg.contains("a&lt;b"));
         assert_eq!(svg.matches('M').count(), 2, "a missing value lifts the pen: {svg}");
