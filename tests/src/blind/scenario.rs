@@ -129,7 +129,11 @@ impl Scenario {
         let other = (duration * k.between(0.6, 0.95)).max(110.0);
         let low = k.of(&[1050.0, 1100.0, 1100.0]);
         let high = k.of(&[1950.0, 2000.0, 2000.0]);
-        let shape = k.of(&Shape::ALL);
+        let shape = match k.of(&Shape::ALL) {
+            // what differs between up and down needs both
+            Shape::Stairs if hidden.ids().contains(&"spinup_lag") => Shape::UpDown,
+            s => s,
+        };
         let second = loop {
             let s = k.of(&Shape::ALL);
             if s != shape || s == Shape::Random {

@@ -174,7 +174,9 @@ impl Effect {
             }
             "alternating_period" => (1e-3, 20.0),
             "blade_twist" | "coupling_slip" => (1e-4, 0.4),
-            "channel_delay" | "channel_filter" => (0.7 * step, 6.0),
+            "channel_delay" => (0.7 * step, 6.0),
+            // a window below two samples is a delay to any reader
+            "channel_filter" => (if self.form == 0 { 2.2 * step } else { 0.8 * step }, 6.0),
             "sample_hold" => (1.6 * step, 8.0),
             "clock_drift" => (1e-5, 0.05),
             "glitch_rows" => (0.0015, 0.03),
