@@ -8,6 +8,7 @@
 
 use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
+use crate::solve::Normal;
 
 /// What a target channel is predicted from, and by which polynomial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -378,6 +379,20 @@ fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> Vec<(usize
     out
 }
 
+/// A channel less its declared polynomial in the measured speed; others as they are.
+fn less_speed(context: &Context, relation: Relation, rows: &[usize], y: &[f64]) -> Vec<f64> {
+    let follows = matches!(relation, Relation::Thrust | Relation::Torque | Relation::Current);
+    let Some(x) = context.regressor(relation).filter(|_| follows) else { return y.to_vec() };
+    let powers = |i: usize| -> Vec<f64> { (0..=relation.degree()).map(|k| x[i].powi(k as i32)).collect() };
+    let mut normal = Normal::new(relation.degree() + 1);
+    for (i, v) in rows.iter().zip(y) {
+        normal.add(&powers(*i), *v, 1.0);
+    }
+    let Some(solution) = normal.solve() else { return y.to_vec() };
+    let fitted = |i: usize| -> f64 { powers(i).iter().zip(&solution.coefficients).map(|(p, c)| p * c).sum() };
+    rows.iter().zip(y).map(|(i, v)| v - fitted(*i)).collect()
+}
+
 fn targets(log: &Log, context: &Context) -> Vec<Target> {
     let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
     let mut out = Vec::new();
@@ -391,7 +406,7 @@ fn targets(log: &Log, context: &Context) -> Vec<Target> {
             continue;
         }
         let y: Vec<f64> = rows.iter().map(|i| column[*i]).collect();
-        let noise = noise::estimate(&rows, &y, &context.rpm, &context.steady);
+        let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, &context.steady);
         let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
         out.push(Target { name, relation, rows, y, noise, weight });
     }
@@ -409,7 +424,7 @@ fn differences(log: &Log, context: &Context) -> Vec<Target> {
     let difference = |(name, column): (&'static str, &[f64])| {
         let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
         let y: Vec<f64> = rows.iter().map(|i| column[*i] - context.rpm[*i]).collect();
-        let noise = noise::estimate(&rows, &y, &context.rpm, &context.steady);
+        let noise = noise::estimate(&rows, &y, &y, &context.rpm, &context.steady);
         Target { name, relation: Relation::SpeedDifference, rows, y, noise, weight: 1.0 }
     };
     present.into_iter().map(difference).filter(|t| t.rows.len() > 8).collect()

@@ -126,16 +126,12 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         probability = p;
         errors = held;
     }
-    let is_unknown = is_unknown
-        || best.fit.placed.is_empty() && {
-            let forced = nameless(context, declared, &start, &best.fit);
-            let found = forced.is_some();
-            if let Some(candidate) = forced {
-                errors = heldout::errors(context, declared, &candidate.fit, &folds);
-                best = candidate;
-            }
-            found
-        };
+    let forced = if best.fit.placed.is_empty() { nameless(context, declared, &start, &best.fit, &folds, &heldout_before) } else { None };
+    let is_unknown = is_unknown || forced.is_some();
+    if let Some((candidate, held)) = forced {
+        best = candidate;
+        errors = held;
+    }
     let heldout_without = loop {
         let without: Vec<Vec<f64>> = (0..best.fit.placed.len())
             .map(|k| {
@@ -293,7 +289,7 @@ fn choose(
 ) -> Option<Chosen> {
     for (k, winner) in ranked.iter().enumerate().take_while(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
         let held = heldout::errors_after_newest(context, declared, &winner.fit, folds, errors);
-        if !worth_a_name(context, winner, &held, errors) {
+        if !worth_a_name(context, winner, winner.evidence - best.evidence, &held, errors) {
             continue;
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
@@ -339,7 +335,7 @@ fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
 }
 
 /// The newest effect must remove some of the held-out error on one of its channels, and spoil none.
-fn worth_a_name(context: &Context, candidate: &Candidate, held: &[f64], before: &[f64]) -> bool {
+fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[f64], before: &[f64]) -> bool {
     let Some(newest) = candidate.fit.placed.last() else { return false };
     let mut helps = false;
     for (i, target) in context.targets.iter().enumerate() {
@@ -353,7 +349,7 @@ fn worth_a_name(context: &Context, candidate: &Candidate, held: &[f64], before: 
         }
     }
     // extra scatter has no mean to predict: the evidence alone must carry it
-    helps || (newest.effect.scatters() && candidate.evidence > 4.0 * NEEDED_EVIDENCE)
+    helps || (newest.effect.scatters() && gain > 4.0 * NEEDED_EVIDENCE)
 }
 
 /// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.
@@ -372,8 +368,15 @@ fn is_idle(context: &Context, placed: &Placed, errors: &[f64], without: &[f64]) 
 const LEFT_OVER: (f64, f64) = (1.15, 1e-6);
 
 /// Where no name and no smooth function won although a residual is large and coloured, something is there all the same: the
-/// smooth function that takes most of it stands for it.
-fn nameless(context: &Context, declared: Declared<'_>, start: &Fit, best: &Fit) -> Option<Candidate> {
+/// smooth function that predicts held-out rows best stands for it, however little that is.
+fn nameless(
+    context: &Context,
+    declared: Declared<'_>,
+    start: &Fit,
+    best: &Fit,
+    folds: &[Vec<bool>],
+    before: &[f64],
+) -> Option<(Candidate, Vec<f64>)> {
     let residuals = heldout::residuals(context, declared, best);
     let (i, target) = context
         .targets
@@ -401,8 +404,11 @@ fn nameless(context: &Context, declared: Declared<'_>, start: &Fit, best: &Fit) 
             let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
             fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
         })
-        .map(|f| Candidate { evidence: f.targets[i].loglik.mean - start.targets[i].loglik.mean, fit: f })
-        .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+        .map(|f| {
+            let held = heldout::errors_after_newest(context, declared, &f, folds, before);
+            (Candidate { evidence: f.targets[i].loglik.mean - start.targets[i].loglik.mean, fit: f }, held)
+        })
+        .min_by(|a, b| a.1[i].total_cmp(&b.1[i]))
 }
 
 fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, k: usize, start: &Fit) -> Option<Fit> {

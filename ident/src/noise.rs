@@ -57,10 +57,11 @@ pub fn median(values: &mut [f64]) -> f64 {
     }
 }
 
-/// Estimates the noise of a channel given at `rows`.
+/// Estimates the noise of a channel given at `rows`: the scatter of `y`, which is the channel `reading` less what follows the
+/// measured speed (a gust moves speed and thrust together, and is no noise of the load cell).
 #[must_use]
-pub fn estimate(rows: &[usize], y: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Noise {
-    let quantum = quantum(y);
+pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Noise {
+    let quantum = quantum(reading);
     let floor = quantum * quantum / 12.0;
     let mut samples: Vec<(f64, f64)> = Vec::new(); // (speed/1000)^2, squared second difference scaled to a variance
     let (mut c0, mut c1, mut pairs) = (0.0, 0.0, 0usize);
@@ -96,6 +97,7 @@ pub fn estimate(rows: &[usize], y: &[f64], rpm: &[f64], steady: &[(usize, usize)
             .collect();
         trim(&mut samples);
     }
+    drop_glitches(&mut samples);
     let [a, b, c] = variance_curve(&samples);
     let a = a.max(floor).max(1e-30);
     let rho = if pairs > 30 && c0 > 0.0 { (c1 / c0).clamp(0.0, 0.98) } else { 0.0 };
@@ -133,6 +135,15 @@ fn detrended_covariance(z: &[f64]) -> (f64, f64) {
     // detrending biases the lag-one covariance by about -2 var/n a sample
     let c: f64 = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() + 2.0 * v / n;
     (v, c)
+}
+
+/// Drops isolated absurd rows: at most one in a hundred, a thousand standard deviations and more away.
+fn drop_glitches(samples: &mut Vec<(f64, f64)>) {
+    let limit = 1e5 * median(&mut samples.iter().map(|s| s.1).collect::<Vec<_>>());
+    let far = samples.iter().filter(|s| s.1 > limit).count();
+    if limit > 0.0 && far * 100 < samples.len() {
+        samples.retain(|s| s.1 <= limit);
+    }
 }
 
 /// Keeps the quieter nine tenths: what is left over from transients goes.
@@ -226,7 +237,7 @@ mod tests {
     fn a_known_level_is_found_through_drift() {
         let y: Vec<f64> = (0..4000).map(|i| 0.02 * hash_noise(i) + 1e-3 * i as f64).collect();
         let rows: Vec<usize> = (0..4000).collect();
-        let noise = estimate(&rows, &y, &[], &[(0, 2000), (2000, 4000)]);
+        let noise = estimate(&rows, &y, &y, &[], &[(0, 2000), (2000, 4000)]);
         assert!((noise.rms / 0.02 - 1.0).abs() < 0.06, "{noise:?}");
         assert!(noise.rho < 0.08);
     }
@@ -237,7 +248,7 @@ mod tests {
         let y: Vec<f64> = (0..12_000).map(|i| hash_noise(i) * (0.01 + 0.0004 * (rpm[i] / 1000.0).powi(2)).sqrt()).collect();
         let rows: Vec<usize> = (0..12_000).collect();
         let steady: Vec<(usize, usize)> = (0..6).map(|k| (2000 * k, 2000 * (k + 1))).collect();
-        let noise = estimate(&rows, &y, &rpm, &steady);
+        let noise = estimate(&rows, &y, &y, &rpm, &steady);
         for speed in [1000.0, 3000.0, 6000.0] {
             let truth = 0.01 + 0.0004 * (speed / 1000.0_f64).powi(2);
             assert!((noise.variance(speed) / truth - 1.0).abs() < 0.15, "{speed}: {noise:?}");
