@@ -9,6 +9,10 @@
 use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
 use crate::solve::Normal;
+use std::borrow::Cow;
+
+/// Efficiency of ESC and motor at work: 0.65 to 0.85 for motors of this size.
+const EFFICIENCY: f64 = 0.75;
 
 /// What a target channel is predicted from, and by which polynomial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -218,6 +222,22 @@ impl Context {
             Relation::SpeedAlone | Relation::Voltage => Some(vec![0.0; self.len()]),
             _ => (!self.rpm.is_empty()).then(|| self.rpm.iter().map(|v| v / 1000.0).collect()),
         }
+    }
+
+    /// Supply current on every row, A: as measured, or, where it was not, from the shaft power at three quarters efficiency.
+    /// The flag says that it was measured.
+    #[must_use]
+    pub fn draw(&self) -> Option<(Cow<'_, [f64]>, bool)> {
+        if let Some(current) = &self.current {
+            return Some((Cow::Borrowed(current), true));
+        }
+        let (torque, voltage) = (self.torque.as_ref()?, self.voltage.as_ref()?);
+        if self.rpm.is_empty() {
+            return None;
+        }
+        let omega = |rpm: f64| rpm * std::f64::consts::TAU / 60.0;
+        let estimate = (0..self.len()).map(|i| torque[i] * omega(self.rpm[i]) / (EFFICIENCY * voltage[i].max(1.0))).collect();
+        Some((Cow::Owned(estimate), false))
     }
 
     /// Median time step, s.

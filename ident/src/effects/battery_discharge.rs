@@ -40,7 +40,7 @@ impl Effect for BatteryDischarge {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.time_is_row || context.current.is_none() || present(context, &["voltage_v"]).is_empty() {
+        if context.time_is_row || context.draw().is_none() || present(context, &["voltage_v"]).is_empty() {
             return Vec::new();
         }
         let mut channels = vec!["voltage_v"];
@@ -94,7 +94,7 @@ impl Effect for BatteryDischarge {
 
 /// Charge drawn since the first row, Ah.
 pub(crate) fn charge(context: &Context) -> Vec<f64> {
-    let Some(current) = &context.current else { return vec![0.0; context.len()] };
+    let Some((current, _)) = context.draw() else { return vec![0.0; context.len()] };
     let mut sum = 0.0;
     let mut out = Vec::with_capacity(current.len());
     for i in 0..current.len() {

@@ -1,7 +1,8 @@
 //! `supply_sag`: the supply gives way under load.
 //!
 //! What it is: voltage_v -= resistance * current_a: leads, connectors, the source itself.
-//! What can go wrong: without a measured voltage or current it cannot be told from a lower KV, and is not offered.
+//! What can go wrong: without a measured voltage it cannot be told from a lower KV, and is not offered; without a measured
+//! current the resistance is as uncertain as the efficiency that the current is estimated with.
 //! Units: ohm.
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
 
@@ -33,7 +34,7 @@ impl Effect for SupplySag {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.current.is_none() || present(context, &["voltage_v"]).is_empty() {
+        if context.draw().is_none() || present(context, &["voltage_v"]).is_empty() {
             Vec::new()
         } else {
             vec![Instance::new(&["voltage_v"], "")]
@@ -49,8 +50,18 @@ impl Effect for SupplySag {
     }
 
     fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
-        let Some(current) = &context.current else { return };
+        let Some((current, _)) = context.draw() else { return };
         design.add(position, 0, current.iter().map(|i| -i).collect());
+    }
+
+    /// A current that was only estimated is known to a seventh.
+    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        if context.draw().is_some_and(|(_, measured)| !measured) {
+            for e in &mut fitted {
+                e.se = e.se.hypot(e.value / 7.0);
+            }
+        }
+        fitted
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
