@@ -3,7 +3,7 @@
 //! What it is: the true thrust over time in, the strain reading over time out.
 //! What can go wrong: the resonance's shaft phase must run on the fine grid, or its alias depends on the sampling of the generator.
 //! Units: N, s, Hz.
-//! Reference: creep as a first-order after-effect; hysteresis as dz/dx = -(z - z_branch)/L (Coleman and Hodgdon); a mode of one degree
+//! Reference: creep as a first-order after-effect; hysteresis as a sum of play elements (Prandtl and Ishlinskii) or as a lens; a mode of one degree
 //! of freedom under a rotating imbalance; amplifier that clips.
 
 use super::Effect;
@@ -17,21 +17,8 @@ pub fn level(e: &Effect, rig: &Rig) -> f64 {
     poly(&rig.thrust, rig.top / 1000.0) * (1.0 - e.strength)
 }
 
-/// Opening of the loop at mid range, down minus up, N: a full cycle walked through.
-#[must_use]
-pub fn width(e: &Effect) -> f64 {
-    let (mut z, mut up) = (0.0, 0.0);
-    let n = 400;
-    for lap in 0..3 {
-        for (dir, k) in (0..n).map(|k| (1.0, k)).chain((0..n).map(|k| (-1.0, k))) {
-            z += 1.0 / f64::from(n) / e.b * (-dir * 0.5 * e.signed() - z);
-            if k == n / 2 && lap == 2 {
-                if dir > 0.0 { up = z } else { return z - up }
-            }
-        }
-    }
-    0.0
-}
+/// Play elements of the hysteresis.
+const PLAYS: usize = 4;
 
 /// What the cell adds besides the reading itself.
 #[derive(Debug, Clone, Default)]
@@ -69,7 +56,7 @@ pub fn pass(rig: &Rig, effects: &[Effect], loads: &Loads<'_>, k: &mut Chance) ->
     for e in effects {
         let a = e.signed();
         let time = |i: usize| i as f64 * h;
-        let mut state = [0.0f64; 2];
+        let (mut state, mut plays) = ([0.0f64; 2], [0.0f64; PLAYS]);
         for i in 0..y.len() {
             match e.id {
                 "zero_drift" => y[i] += a * time(i),
@@ -82,13 +69,27 @@ pub fn pass(rig: &Rig, effects: &[Effect], loads: &Loads<'_>, k: &mut Chance) ->
                     state[0] += (y[i] - state[0]) * (1.0 - (-h / e.b).exp());
                     y[i] += a * state[0];
                 }
-                "hysteresis" => {
+                "hysteresis" if e.form == 0 => {
+                    // play elements lag behind the load by their slack: low on the way up, high on the way down
                     let x = y[i] / full;
-                    let d = x - state[1];
-                    state[1] = x;
-                    let target = -d.signum() * 0.5 * a;
-                    state[0] = target + (state[0] - target) * (-d.abs() / e.b).exp();
-                    y[i] += state[0];
+                    let mut lag = 0.0;
+                    for (k, p) in plays.iter_mut().enumerate() {
+                        let slack = e.b * (k + 1) as f64 / PLAYS as f64;
+                        *p = p.clamp(x - slack, x + slack);
+                        lag += *p - x;
+                    }
+                    let opening = e.b * (PLAYS + 1) as f64;
+                    y[i] += a * lag / opening;
+                }
+                "hysteresis" => {
+                    // a lens between rest and full load, on the side of the last move beyond the slack
+                    let x = y[i] / full;
+                    let before = plays[0];
+                    plays[0] = before.clamp(x - 0.01, x + 0.01);
+                    if plays[0] != before {
+                        state[0] = (plays[0] - before).signum();
+                    }
+                    y[i] -= 0.5 * a * state[0] * 4.0 * (x * (1.0 - x)).max(0.0);
                 }
                 "beam_resonance" => {
                     let per_rev = if e.form == 1 { 2.0 } else { 1.0 };

@@ -129,14 +129,17 @@ impl<'a> Train<'a> {
                 _ => {}
             }
         }
-        self.speed = match self.effects.iter().find(|e| e.id == "spinup_lag") {
+        // the lag shows the speed that was reached by now; without one the speed follows at once
+        let lag = self.effects.iter().find(|e| e.id == "spinup_lag");
+        let reached = if lag.is_some() { self.speed } else { wanted };
+        self.speed = match lag {
             Some(e) => {
                 let tau = if wanted > self.speed { e.strength } else { e.strength * e.b };
                 wanted + (self.speed - wanted) * (-h / tau.max(1e-4)).exp()
             }
             None => wanted,
         };
-        let n = self.speed * (1.0 + wander);
+        let n = reached * (1.0 + wander);
         self.current = rig.current_at(n, d);
         let full = poly(&rig.current, rig.top / 1000.0);
         let i2 = (self.current / full).powi(2);

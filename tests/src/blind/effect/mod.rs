@@ -114,7 +114,7 @@ impl Effect {
             "blade_flex" | "stall" | "blade_twist" | "coupling_slip" => e.b = k.between(0.45, 0.8) * rig.top,
             "blade_damage" => e.b = k.between(-0.5, 1.0),
             "creep" => e.b = k.log_between(4.0, 60.0),
-            "hysteresis" => e.b = k.between(0.06, 0.25),
+            "hysteresis" => e.b = k.between(0.03, 0.15),
             "gain_change" => e.b = f.duration,
             "beam_resonance" => {
                 e.b = k.between(0.45, 0.9) * rig.top / 60.0 * if e.form == 1 { 2.0 } else { 1.0 };
@@ -154,7 +154,7 @@ impl Effect {
             "current_limit" | "amplifier_saturation" => (0.002, 0.7),
             "thermal_derate" => (1e-3, 1.0),
             "throttle_quantisation" => (0.5, 60.0),
-            "spinup_lag" => (0.03, 3.0),
+            "spinup_lag" => (step.max(0.03), 3.0),
             "bearing_friction" | "encoder_drag" => (1e-6, 0.6 * poly(&rig.torque, rig.top / 1000.0)),
             "reynolds_thrust" => (0.01, 0.45),
             "air_density" => (0.3, 25.0),
@@ -223,11 +223,13 @@ impl Effect {
             "reynolds_thrust" => vec![("exponent", a)],
             "air_density" => vec![("exponent", 1.0)],
             "blade_damage" => vec![("thrust_change", -a), ("t0", self.t0)],
+            // the smooth form has no sharp onset
+            "blade_flex" if self.form == 1 => Vec::new(),
             "blade_flex" | "stall" | "blade_twist" | "coupling_slip" => vec![("onset", self.b)],
             "zero_drift" => vec![("rate", s)],
             "thermal_zero" => vec![("coefficient", s)],
             "creep" => vec![("amplitude", s), ("tau", self.b)],
-            "hysteresis" => vec![("width", cell::width(self))],
+            "hysteresis" => vec![("width", s)],
             "gain_change" if self.form == 0 => vec![("gain_change", s), ("t0", self.t0)],
             "gain_change" => vec![("rate", s / self.b)],
             // twice a turn at twice the frequency looks the same, so that only the damping is comparable then
