@@ -8,12 +8,12 @@
 //! Units: evidence in nats.
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
-use crate::context::{Context, Relation, Target};
-use crate::effects::unknown::{Unknown, variables};
+use crate::context::{Context, Relation};
 use crate::effects::{self, Effect, Instance};
 use crate::heldout;
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, refine, refine_newest, scan, scatters};
-use crate::residual::whiteness;
+use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, scatters};
+use crate::opponent::{nameless, opponent};
+use crate::search::{refine, refine_newest, scan};
 
 /// Most effects on one channel.
 const MOST_ON_A_CHANNEL: usize = 3;
@@ -21,9 +21,9 @@ const MOST_ON_A_CHANNEL: usize = 3;
 const MOST_EFFECTS: usize = 6;
 /// Net evidence, nats, that an effect must bring beyond its penalty: a library of about fifty instances then raises a false
 /// alarm in about one clean run of a hundred.
-const NEEDED_EVIDENCE: f64 = 7.0;
+pub(crate) const NEEDED_EVIDENCE: f64 = 7.0;
 /// Share of the held-out error on its first channel that an effect must remove to be worth a name.
-const NEEDED_REDUCTION: f64 = 0.05;
+pub(crate) const NEEDED_REDUCTION: f64 = 0.05;
 /// Share of the held-out error below which a further effect is named only if nothing else explains it as well.
 const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
@@ -126,7 +126,8 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         probability = p;
         errors = held;
     }
-    let forced = if best.fit.placed.is_empty() { nameless(context, declared, &start, &best.fit, &folds, &heldout_before) } else { None };
+    let forced =
+        if best.fit.placed.is_empty() { nameless(context, declared, &start, &best.fit, &folds, &heldout_before) } else { None };
     let is_unknown = is_unknown || forced.is_some();
     if let Some((candidate, held)) = forced {
         best = candidate;
@@ -171,7 +172,7 @@ struct Scanned {
 }
 
 /// Fewest samples of a channel on which an effect with shape parameters is tried; a bare amplitude needs fewer.
-const FEWEST_SAMPLES: (usize, usize) = (30, 10);
+pub(crate) const FEWEST_SAMPLES: (usize, usize) = (30, 10);
 
 /// Every instance of every effect that the log could hold.
 fn offers(context: &Context) -> Vec<Scanned> {
@@ -245,7 +246,7 @@ fn round_of(
 
 /// For each target the share of independent samples that the colour of the best fit's residual leaves: the same for every
 /// candidate of a round, so that none wins by leaving a larger but whiter residual.
-fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64> {
+pub(crate) fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64> {
     let mut best = vec![(f64::NEG_INFINITY, 1.0); context.targets.len()];
     for f in fits {
         for (b, t) in best.iter_mut().zip(&f.targets) {
@@ -258,7 +259,7 @@ fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64
 }
 
 /// Evidence, in nats, that the newest effect adds over a fit without it, its price paid.
-fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) -> f64 {
+pub(crate) fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) -> f64 {
     let parts = context.targets.iter().zip(&new.targets).zip(&old.targets).zip(shares);
     let gain: f64 = parts
         .map(|(((target, n), o), share)| {
@@ -364,134 +365,11 @@ fn is_idle(context: &Context, placed: &Placed, errors: &[f64], without: &[f64]) 
     most < 0.5 * NEEDED_REDUCTION && !placed.effect.scatters()
 }
 
-/// Residual over noise floor, and whiteness, beyond which something is there even if nothing that we try predicts it.
-const LEFT_OVER: (f64, f64) = (1.15, 1e-6);
-
-/// Where no name and no smooth function won although a residual is large and coloured, something is there all the same: the
-/// smooth function that predicts held-out rows best stands for it, however little that is.
-fn nameless(
-    context: &Context,
-    declared: Declared<'_>,
-    start: &Fit,
-    best: &Fit,
-    folds: &[Vec<bool>],
-    before: &[f64],
-) -> Option<(Candidate, Vec<f64>)> {
-    let residuals = heldout::residuals(context, declared, best);
-    let (i, target) = context
-        .targets
-        .iter()
-        .enumerate()
-        .filter(|(i, target)| {
-            let r = &residuals[*i];
-            let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
-            let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
-            let asked = !target.relation.is_evidence() && target.relation != Relation::SpeedAlone;
-            asked && r.len() >= FEWEST_SAMPLES.0 && rms > LEFT_OVER.0 * target.noise.rms && whiteness(&t, r) < LEFT_OVER.1
-        })
-        .max_by(|a, b| {
-            let excess = |i: usize| {
-                residuals[i].iter().map(|v| v * v).sum::<f64>()
-                    / (residuals[i].len() as f64 * context.targets[i].noise.rms.powi(2))
-            };
-            excess(a.0).total_cmp(&excess(b.0))
-        })?;
-    variables(context)
-        .into_iter()
-        .filter(|v| !is_load(context, target, v))
-        .filter_map(|variable| {
-            let instance = Instance::new(&[target.name], &variable);
-            let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
-            fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
-        })
-        .map(|f| {
-            let held = heldout::errors_after_newest(context, declared, &f, folds, before);
-            (Candidate { evidence: f.targets[i].loglik.mean - start.targets[i].loglik.mean, fit: f }, held)
-        })
-        .min_by(|a, b| a.1[i].total_cmp(&b.1[i]))
-}
-
 fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, k: usize, start: &Fit) -> Option<Fit> {
     let mut placed = fit_all.placed.clone();
     placed.remove(k);
     let placed = refine(context, declared, &placed, Rows::All, 60);
     fit(context, declared, &placed, Some(start), Rows::All)
-}
-
-/// The opponent without a name: a smooth function of one variable on one channel. It wins where it predicts held-out rows
-/// clearly better than whatever was named there, and significantly.
-fn opponent(
-    context: &Context,
-    declared: Declared<'_>,
-    start: &Fit,
-    folds: &[Vec<bool>],
-    before: &[f64],
-    best: &Candidate,
-    named: &[f64],
-) -> Option<(Candidate, Vec<f64>)> {
-    let mut champion: Option<(f64, Candidate, Vec<f64>)> = None;
-    for (i, target) in context.targets.iter().enumerate() {
-        if target.relation.is_evidence() || target.relation == Relation::SpeedAlone {
-            continue;
-        }
-        for variable in variables(context) {
-            if is_load(context, target, &variable) {
-                continue;
-            }
-            let instance = Instance::new(&[target.name], &variable);
-            let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
-            let Some(fitted) = fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
-            else {
-                continue;
-            };
-            let shares = shares(context, [&fitted, &best.fit].into_iter());
-            let candidate = Candidate { evidence: net_gain(context, &fitted, start, &shares), fit: fitted };
-            if candidate.evidence < 2.0 * NEEDED_EVIDENCE {
-                continue;
-            }
-            let held = heldout::errors_after_newest(context, declared, &candidate.fit, folds, before);
-            let gain = (before[i] / held[i]).ln();
-            let rival = (before[i] / named[i]).ln();
-            // a name that depends on the same variable has found the dependence; only its form may be rough
-            let same = best
-                .fit
-                .placed
-                .iter()
-                .any(|p| p.instance.touches(target.name) && p.effect.about().depends_on.contains(&variable.as_str()));
-            let margin = if same { std::f64::consts::LN_2 } else { 0.15 };
-            let clearly = gain > (1.0 / (1.0 - NEEDED_REDUCTION)).ln() && (best.fit.placed.is_empty() || gain > rival + margin);
-            if clearly && champion.as_ref().is_none_or(|c| gain > c.0) {
-                champion = Some((gain, candidate, held));
-            }
-        }
-    }
-    // names that explain more of the run as a whole stay
-    champion.filter(|(_, c, _)| c.evidence > best.evidence).map(|(_, c, h)| (c, h))
-}
-
-/// Whether a variable stands for the channel itself or for the load, which its relation holds already. (The departure of
-/// thrust from its polynomial in the speed is still a question; current and voltage follow the load with their own lags.)
-fn is_load(context: &Context, target: &Target, name: &str) -> bool {
-    let held = match target.relation {
-        Relation::Torque | Relation::Thrust | Relation::Current => ["pulse_us", "current_a", "voltage_v"].contains(&name),
-        _ => ["pulse_us", "current_a", "voltage_v", "rpm"].contains(&name),
-    };
-    held || twin(context, target, name)
-}
-
-/// Whether a column repeats the target in other units: squared correlation above 0.98 on its rows.
-fn twin(context: &Context, target: &Target, name: &str) -> bool {
-    let Some((_, values)) = context.covariates.iter().find(|c| c.0 == name) else { return false };
-    let n = target.rows.len() as f64;
-    let (mx, my) = (target.rows.iter().map(|i| values[*i]).sum::<f64>() / n, target.y.iter().sum::<f64>() / n);
-    let (mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0);
-    for (i, y) in target.rows.iter().zip(&target.y) {
-        let (dx, dy) = (values[*i] - mx, y - my);
-        sxx += dx * dx;
-        sxy += dx * dy;
-        syy += dy * dy;
-    }
-    sxy * sxy > 0.98 * sxx * syy
 }
 
 /// Softmax over the effects that could stand in the winner's place: those that share a channel with it, and nothing at all.

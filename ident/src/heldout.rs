@@ -6,7 +6,8 @@
 //! Reference: specification `formats.md` (`heldout_rms`); blocked cross-validation, Roberts et al. 2017, Ecography 40:913.
 
 use crate::context::Context;
-use crate::hypothesis::{Declared, Fit, Placed, Rows, connected, design, fit_target, refine, refine_newest};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, design, fit_target};
+use crate::search::{connected, refine, refine_newest};
 
 /// For each fold the rows that are left out.
 #[must_use]

@@ -24,6 +24,7 @@ mod dead_rotor_speed;
 mod double_pulses;
 mod encoder_drag;
 mod gain_change;
+mod glitch_rows;
 mod hysteresis;
 mod missed_pulses;
 mod operator;
@@ -194,6 +195,7 @@ pub fn library() -> &'static [&'static dyn Effect] {
         &sample_hold::SampleHold,
         &quantisation::Quantisation,
         &throttle_quantisation::ThrottleQuantisation,
+        &glitch_rows::GlitchRows,
         &blade_twist::BladeTwist,
         &coupling_slip::CouplingSlip,
         &missed_pulses::MissedPulses,

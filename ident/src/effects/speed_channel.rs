@@ -44,6 +44,11 @@ pub(super) fn speed(context: &Context, relation: Relation) -> Vec<f64> {
 
 /// Speed that the pulse alone makes one expect: a cubic above the starting pulse.
 pub(super) fn expected(context: &Context) -> Vec<f64> {
+    expected_at(context, 0.0)
+}
+
+/// The same at a pulse that is `more` us longer.
+pub(super) fn expected_at(context: &Context, more: f64) -> Vec<f64> {
     let u = super::throttle(context);
     let row = |u: f64| [1.0, u, u * u, u * u * u];
     let mut normal = Normal::new(4);
@@ -51,7 +56,8 @@ pub(super) fn expected(context: &Context) -> Vec<f64> {
         normal.add(&row(u[i]), context.rpm[i], 1.0);
     }
     let Some(solution) = normal.solve() else { return vec![0.0; u.len()] };
-    u.iter().map(|u| if *u > 0.0 { row(*u).iter().zip(&solution.coefficients).map(|(a, c)| a * c).sum() } else { 0.0 }).collect()
+    let at = |u: f64| row(u + more / 1000.0).iter().zip(&solution.coefficients).map(|(a, c)| a * c).sum();
+    u.iter().map(|u| if *u > 0.0 { at(*u) } else { 0.0 }).collect()
 }
 
 /// Adds `slope` and `bend` of a departure that grows from an onset speed up: (rpm - onset) and its square over the onset.

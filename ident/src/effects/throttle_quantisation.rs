@@ -5,7 +5,7 @@
 //! Units: us; offset in steps.
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*; timer resolution of speed controllers.
 
-use super::speed_channel::expected;
+use super::speed_channel::expected_at as curve;
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
 use crate::context::Context;
 use crate::design::TargetDesign;
@@ -39,9 +39,12 @@ impl Effect for ThrottleQuantisation {
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        // the saw-tooth has a likelihood with many narrow peaks: the search starts on the highest
+        let (step, offset, anchored) = best_tooth(&levels(context));
+        let free = if anchored { 0.0 } else { 0.3 };
         vec![
-            Shape { name: "step", unit: "us", range: (1.0, 80.0), starts: periods(context, 4) },
-            Shape { name: "offset", unit: "1", range: (-0.75, 0.75), starts: vec![-0.5, -0.25, 0.0, 0.25] },
+            Shape { name: "step", unit: "us", range: (0.985 * step, 1.015 * step), starts: vec![step] },
+            Shape { name: "offset", unit: "1", range: (offset - free, offset + free), starts: vec![offset] },
         ]
     }
 
@@ -51,17 +54,23 @@ impl Effect for ThrottleQuantisation {
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let ([step, offset], Some(pulse)) = (shape, &context.pulse) else { return };
-        // slope of the static curve, rev/min per us, from its value half a step to either side
-        let curve = slope(context);
-        let column = pulse
-            .iter()
-            .zip(curve)
-            .map(|(p, slope)| {
-                let at = (p - 1000.0) / step - offset;
-                slope * step * (at.round() - at)
-            })
-            .collect();
-        design.add(position, 0, column);
+        design.add(
+            position,
+            0,
+            pulse.iter().zip(slope(context)).map(|(p, slope)| slope * step * tooth(*p, *step, *offset)).collect(),
+        );
+    }
+
+    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        // an edge lies anywhere between two levels that the run visited
+        let levels = levels(context);
+        if let [first, .., last] = levels.as_slice() {
+            let gap = (last.0 - first.0) / (levels.len() as f64 - 1.0);
+            for e in fitted.iter_mut().filter(|e| e.name == "step") {
+                e.se = e.se.max(gap * e.value / (last.0 - first.0) / 12.0_f64.sqrt());
+            }
+        }
+        fitted
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
@@ -71,75 +80,122 @@ impl Effect for ThrottleQuantisation {
 
 /// Slope of the static speed curve at each row's pulse, rev/min per us; zero while the motor is off.
 fn slope(context: &Context) -> Vec<f64> {
-    let levels = levels(context);
-    let n = levels.len();
-    let Some(pulse) = &context.pulse else { return vec![0.0; context.len()] };
-    if n < 4 {
-        return vec![0.0; context.len()];
-    }
-    // straight line over a quarter of the levels about each one
-    let half = (n / 8).max(1);
-    let slopes: Vec<f64> = (0..n)
-        .map(|k| {
-            let (a, b) = (k.saturating_sub(half), (k + half).min(n - 1));
-            (levels[b].1 - levels[a].1) / (levels[b].0 - levels[a].0).max(1e-9)
-        })
-        .collect();
-    pulse
-        .iter()
-        .map(|p| {
-            if *p < context.start_pulse_us {
-                return 0.0;
-            }
-            let k = levels.partition_point(|l| l.0 < *p).min(n - 1);
-            slopes[k]
-        })
-        .collect()
+    let (expected, later) = (curve(context, 0.0), curve(context, 1.0));
+    expected.iter().zip(later).map(|(a, b)| if *a > 0.0 { b - a } else { 0.0 }).collect()
 }
 
-/// Pulse, expected speed, and mean departure from it, for each microsecond of pulse that the run visits.
+/// Pulse, slope of the static curve, and mean departure from it, for each microsecond of pulse that the run visits.
 fn levels(context: &Context) -> Vec<(f64, f64, f64)> {
     let Some(pulse) = &context.pulse else { return Vec::new() };
-    let expected = expected(context);
+    let (expected, slope) = (curve(context, 0.0), slope(context));
     let mut bins: std::collections::BTreeMap<i64, (f64, f64, f64, f64)> = std::collections::BTreeMap::new();
     for (i, p) in pulse.iter().enumerate() {
         let settled = i >= 8 && (pulse[i] - pulse[i - 8]).abs() < 5.0;
         if settled && *p > context.start_pulse_us && context.rpm.get(i).is_some_and(|r| *r > 0.0) {
             let bin = bins.entry((2.0 * p).round() as i64).or_default();
             bin.0 += p;
-            bin.1 += expected[i];
+            bin.1 += slope[i];
             bin.2 += context.rpm[i] - expected[i];
             bin.3 += 1.0;
         }
     }
-    bins.into_values().map(|(p, e, d, n)| (p / n, e / n, d / n)).collect()
+    // a pulse on the edge of a step must not fall off it by rounding
+    let exact = |p: f64| (p * 1e6).round() * 1e-6;
+    bins.into_values().map(|(p, e, d, n)| (exact(p / n), e / n, d / n)).collect()
 }
 
-/// Steps whose saw-tooth fits the departures best: the strongest lines of a periodogram over pulse.
-fn periods(context: &Context, count: usize) -> Vec<f64> {
-    let levels = levels(context);
+/// Largest departure of a pulse from the next step's, in steps: -0.5 to 0.5.
+fn tooth(pulse: f64, step: f64, offset: f64) -> f64 {
+    let at = (pulse - 1000.0) / step - offset;
+    at.round() - at
+}
+
+/// Step and offset of the saw-tooth that fits the departures best, and whether the offset is that of a plain counter: the strongest lines of a periodogram over pulse, then a fine
+/// scan about each.
+fn best_tooth(levels: &[(f64, f64, f64)]) -> (f64, f64, bool) {
     let span = levels.last().map_or(1.0, |l| l.0) - levels.first().map_or(0.0, |l| l.0);
-    // a saw-tooth's size grows with the slope of the curve: so do the departures
     let power = |step: f64| {
         let (mut s, mut c) = (0.0, 0.0);
-        for (p, _, d) in &levels {
+        for (p, _, d) in levels {
             let (sin, cos) = (std::f64::consts::TAU * (p - 1000.0) / step).sin_cos();
             s += d * sin;
             c += d * cos;
         }
         s * s + c * c
     };
-    // even in frequency, eight points a resolved line
-    let (low, high) = (1.0 / 80.0, 1.0 / 2.0);
-    let df = 0.15 / span.max(10.0);
-    let n = (((high - low) / df) as usize).min(4000);
+    // even in frequency, about six points a resolved line
+    let (low, high) = (1.0 / LONGEST, 1.0 / SHORTEST);
+    let df = (0.15 / span.max(10.0)).max((high - low) / 4000.0);
     let grid: Vec<(f64, f64)> =
-        (0..n).map(|k| 1.0 / (low + (high - low) * k as f64 / n as f64)).map(|step| (step, power(step))).collect();
+        (0..((high - low) / df) as usize).map(|k| low + df * k as f64).map(|f| (f, power(1.0 / f))).collect();
     let mut peaks: Vec<(f64, f64)> = grid.windows(3).filter(|w| w[1].1 > w[0].1 && w[1].1 >= w[2].1).map(|w| w[1]).collect();
     peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut out: Vec<f64> = peaks.into_iter().take(count).map(|p| p.0).collect();
-    if out.is_empty() {
-        out.push(10.0);
+    peaks.truncate(8);
+    let mut best = Tooth { score: f64::NEG_INFINITY, step: 10.0, offset: 0.0 };
+    let mut anchored = best;
+    for (f, _) in peaks {
+        for k in -6..=6 {
+            let step = 1.0 / (f + df * f64::from(k) / 6.0);
+            // cut off or rounded, counted from 1000 us or from 0; by round steps, or a round number of them over 1000 us
+            for step in [step, step.round(), 0.5 * (2.0 * step).round(), 1000.0 / (1000.0 / step).round()] {
+                let from_zero = -(1000.0 / step).fract();
+                for offset in [-0.5, 0.0, from_zero, from_zero + 0.5] {
+                    anchored.improve(levels, step, offset);
+                }
+            }
+            for m in 0..16 {
+                best.improve(levels, step, f64::from(m) / 16.0 - 0.5);
+            }
+        }
     }
-    out
+    // a counter of the controller starts somewhere sensible unless the data say otherwise
+    if anchored.score > ANCHORED * best.score { (anchored.step, anchored.offset, true) } else { (best.step, best.offset, false) }
+}
+
+/// Share of the best score at which a saw-tooth that is counted from 1000 us or from 0 is taken.
+const ANCHORED: f64 = 0.995;
+
+/// A saw-tooth and how much of the squared departures it explains.
+#[derive(Clone, Copy)]
+struct Tooth {
+    score: f64,
+    step: f64,
+    offset: f64,
+}
+
+impl Tooth {
+    /// Takes another step and offset where they explain more.
+    fn improve(&mut self, levels: &[(f64, f64, f64)], step: f64, offset: f64) {
+        let (mut dt, mut tt) = (0.0, 1e-12);
+        for (p, slope, d) in levels {
+            let x = slope * step * tooth(*p, step, offset);
+            dt += d * x;
+            tt += x * x;
+        }
+        // a pulse that is cut to steps has the tooth the right way up
+        if dt > 0.0 && dt * dt / tt > self.score {
+            *self = Self { score: dt * dt / tt, step, offset };
+        }
+    }
+}
+
+/// Steps that are searched, us.
+const SHORTEST: f64 = 3.0;
+/// See [`SHORTEST`].
+const LONGEST: f64 = 80.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_off_pulse_on_a_grid_gives_its_step_and_anchor() {
+        // departures of a straight line of 5 rev/min per us whose pulse is cut to steps of 13 us, about their mean
+        let levels: Vec<(f64, f64, f64)> = (0..150)
+            .map(|k| 1100.0 + 6.0 * f64::from(k))
+            .map(|p: f64| (p, 5.0, 5.0 * (13.0 * ((p - 1000.0) / 13.0).floor() - (p - 1000.0) + 6.0)))
+            .collect();
+        let (step, offset, anchored) = best_tooth(&levels);
+        assert!(anchored && (step - 13.0).abs() < 1e-9 && offset == -0.5, "{step} {offset} {anchored}");
+    }
 }

@@ -1,0 +1,105 @@
+//! `glitch_rows`: isolated rows hold absurd values.
+//!
+//! What it is: single readings, far outside the scatter, that leave their neighbours and come back: damaged telemetry, a spike.
+//! What can go wrong: such rows are recognised by their own reading, so that nothing is claimed about them: the correction sets
+//! them apart from the relation instead of predicting them.
+//! Units: rows; size in the channel's unit.
+//! Reference: running median as an outlier filter, Tukey 1977, *Exploratory Data Analysis*; Hampel identifier, Pearson 2002.
+
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use crate::context::{Context, Relation, Target};
+use crate::design::TargetDesign;
+use crate::noise::median;
+
+/// See the module.
+pub(crate) struct GlitchRows;
+
+/// Departure from the running median, in robust standard deviations, from which a row is absurd.
+const FAR: f64 = 15.0;
+/// The same as a share of the channel's span.
+const WIDE: f64 = 0.05;
+/// Readings of a speed within this share of its neighbours' are lost or doubled pulses, not glitches.
+const PULSES: (f64, f64) = (0.3, 2.5);
+
+impl Effect for GlitchRows {
+    fn id(&self) -> &'static str {
+        "glitch_rows"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Isolated rows hold absurd values",
+            equation: "reading = anything on `count` rows",
+            source: "Hampel identifier, Pearson 2002",
+            depends_on: &["row"],
+            signature: "single readings leave their neighbours by many times the scatter and come back",
+            look_alikes: &["missed_pulses", "double_pulses"],
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Term
+    }
+
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let few = |t: &&Target| {
+            let count = glitches(t).len();
+            !t.relation.is_evidence() && count >= 2 && count * 50 < t.rows.len()
+        };
+        context.targets.iter().filter(few).map(|t| Instance::new(&[t.name], "")).collect()
+    }
+
+    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
+        Vec::new()
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "depth", unit: "1" }]
+    }
+
+    fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+        let Some(target) = target(context, instance) else { return };
+        let mut column = vec![0.0; context.len()];
+        for (row, departure) in glitches(target) {
+            column[row] = departure;
+        }
+        design.add(position, 0, column);
+    }
+
+    fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        if let Some(target) = target(context, instance) {
+            let found = glitches(target);
+            let n = found.len().max(1) as f64;
+            let size = (found.iter().map(|g| g.1 * g.1).sum::<f64>() / n).sqrt();
+            fitted.insert(0, Estimate { name: "size".into(), unit: "channel".into(), value: size, se: size / n.sqrt() });
+            fitted.insert(0, Estimate { name: "count".into(), unit: "1".into(), value: found.len() as f64, se: 0.0 });
+        }
+        fitted
+    }
+}
+
+fn target<'c>(context: &'c Context, instance: &Instance) -> Option<&'c Target> {
+    context.targets.iter().find(|t| instance.touches(t.name))
+}
+
+/// Rows that hold a glitch, with their departure from the running median of five.
+fn glitches(target: &Target) -> Vec<(usize, f64)> {
+    let y = &target.y;
+    if y.len() < 50 {
+        return Vec::new();
+    }
+    let middle = |k: usize| median(&mut y[k - 2..=k + 2].to_vec());
+    let departures: Vec<f64> = (2..y.len() - 2).map(|k| y[k] - middle(k)).collect();
+    let mut sizes: Vec<f64> = departures.iter().map(|d| d.abs()).collect();
+    let scatter = 1.4826 * median(&mut sizes);
+    let mut sorted = y.clone();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let span = sorted[sorted.len() * 99 / 100] - sorted[sorted.len() / 100];
+    let least = (FAR * scatter).max(WIDE * span);
+    let speed = matches!(target.relation, Relation::SpeedFromPulse | Relation::SpeedAlone);
+    let absurd = |k: usize, d: f64| {
+        let share = y[k] / (y[k] - d);
+        d.abs() > least && !(speed && (PULSES.0..PULSES.1).contains(&share))
+    };
+    departures.iter().enumerate().filter(|(k, d)| absurd(k + 2, **d)).map(|(k, d)| (target.rows[k + 2], *d)).collect()
+}

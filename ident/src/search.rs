@@ -1,0 +1,205 @@
+//! The search for shape parameters: a scan of each candidate's grid, and a joint refinement.
+//!
+//! What it is: the profile likelihood over the shapes, maximised from the best point of a grid by Nelder-Mead.
+//! What can go wrong: a shape on its bound stays there; the diagnosis then disqualifies it.
+//! Units: log-likelihood in nats.
+//! Reference: Nelder & Mead 1965, Computer Journal 7:308.
+
+use crate::context::Context;
+use crate::effects::{Effect, Instance};
+use crate::hypothesis::{Declared, Placed, Rows, touched_loglik};
+
+/// The rows stride that keeps a scan of the longest target near `most` samples.
+fn scan_stride(context: &Context, most: usize) -> usize {
+    context.targets.iter().map(|t| t.rows.len()).max().unwrap_or(1).div_ceil(most).max(1)
+}
+
+/// Best start of one candidate added to a fixed set: a scan of its grid.
+#[must_use]
+pub fn scan(
+    context: &Context,
+    declared: Declared<'_>,
+    base: &[Placed],
+    effect: &'static dyn Effect,
+    instance: &Instance,
+) -> Option<(Vec<f64>, f64)> {
+    let shapes = effect.shapes(context, instance);
+    let moving: Vec<&str> = instance.channels.iter().map(String::as_str).collect();
+    let rows = Rows::Every(scan_stride(context, 4000));
+    let scattering = effect.scatters() || base.iter().any(|p| p.effect.scatters());
+    let before = touched_loglik(context, declared, base, &moving, rows, scattering);
+    let mut best: Option<(Vec<f64>, f64)> = None;
+    let total: usize = shapes.iter().map(|s| s.starts.len()).product();
+    for index in 0..total {
+        let mut rest = index;
+        let shape: Vec<f64> = shapes
+            .iter()
+            .map(|s| {
+                let v = s.starts[rest % s.starts.len()];
+                rest /= s.starts.len();
+                v
+            })
+            .collect();
+        let mut placed = base.to_vec();
+        placed.push(Placed { effect, instance: instance.clone(), shape: shape.clone() });
+        let gain = touched_loglik(context, declared, &placed, &moving, rows, scattering) - before;
+        if gain.is_finite() && best.as_ref().is_none_or(|b| gain > b.1) {
+            best = Some((shape, gain));
+        }
+    }
+    best
+}
+
+/// Improves the shapes of a hypothesis together (Nelder-Mead within the plausible ranges): those of its newest effect and of
+/// every effect that shares a channel with it, directly or through others. The rest is independent of them.
+#[must_use]
+pub fn refine_newest(
+    context: &Context,
+    declared: Declared<'_>,
+    placed: &[Placed],
+    rows: Rows<'_>,
+    evaluations: usize,
+) -> Vec<Placed> {
+    let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
+    refine_group(context, declared, placed, &connected(placed, newest), rows, evaluations)
+}
+
+/// Improves all shapes of a hypothesis, each group of effects that share channels on its own.
+#[must_use]
+pub fn refine(context: &Context, declared: Declared<'_>, placed: &[Placed], rows: Rows<'_>, evaluations: usize) -> Vec<Placed> {
+    let mut out = placed.to_vec();
+    let mut done = vec![false; placed.len()];
+    for k in 0..placed.len() {
+        if !done[k] {
+            let group = connected(placed, k);
+            out = refine_group(context, declared, &out, &group, rows, evaluations);
+            for g in group {
+                done[g] = true;
+            }
+        }
+    }
+    out
+}
+
+/// Positions that share channels with position `k`, directly or through others.
+pub(crate) fn connected(placed: &[Placed], k: usize) -> Vec<usize> {
+    let mut group = vec![k];
+    let mut at = 0;
+    while at < group.len() {
+        for (j, p) in placed.iter().enumerate() {
+            if !group.contains(&j) && p.instance.channels.iter().any(|c| placed[group[at]].instance.touches(c)) {
+                group.push(j);
+            }
+        }
+        at += 1;
+    }
+    group.sort_unstable();
+    group
+}
+
+fn refine_group(
+    context: &Context,
+    declared: Declared<'_>,
+    placed: &[Placed],
+    group: &[usize],
+    rows: Rows<'_>,
+    evaluations: usize,
+) -> Vec<Placed> {
+    let ranges: Vec<(f64, f64)> = placed.iter().flat_map(|p| p.effect.shapes(context, &p.instance)).map(|s| s.range).collect();
+    let start: Vec<f64> = placed.iter().flat_map(|p| p.shape.iter().copied()).collect();
+    let owner: Vec<usize> = placed.iter().enumerate().flat_map(|(k, p)| std::iter::repeat_n(k, p.shape.len())).collect();
+    let free: Vec<usize> = (0..start.len()).filter(|i| ranges[*i].1 > ranges[*i].0 && group.contains(&owner[*i])).collect();
+    if free.is_empty() {
+        return placed.to_vec();
+    }
+    let moving = touched_by_shapes(placed, group);
+    let scattering = placed.iter().any(|p| p.effect.scatters());
+    let cost = |x: &[f64]| -> f64 {
+        let mut full = start.clone();
+        for (i, v) in free.iter().zip(x) {
+            full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
+        }
+        // a soft wall keeps the simplex inside the plausible box
+        let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
+        -touched_loglik(context, declared, &with_shapes(placed, &full), &moving, rows, scattering) + 1e3 * wall
+    };
+    let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
+    let steps: Vec<f64> = free
+        .iter()
+        .map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0)))
+        .collect();
+    let best = nelder_mead(&cost, &x0, &steps, evaluations);
+    let mut full = start.clone();
+    for (i, v) in free.iter().zip(&best) {
+        full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
+    }
+    with_shapes(placed, &full)
+}
+
+fn touched_by_shapes<'p>(placed: &'p [Placed], group: &[usize]) -> Vec<&'p str> {
+    let moved = group.iter().map(|k| &placed[*k]).filter(|p| !p.shape.is_empty());
+    let mut out: Vec<&str> = moved.flat_map(|p| p.instance.channels.iter().map(String::as_str)).collect();
+    out.sort_unstable();
+    out.dedup();
+    out
+}
+
+fn with_shapes(placed: &[Placed], full: &[f64]) -> Vec<Placed> {
+    let mut at = 0;
+    placed
+        .iter()
+        .map(|p| {
+            let shape = full[at..at + p.shape.len()].to_vec();
+            at += p.shape.len();
+            Placed { shape, ..p.clone() }
+        })
+        .collect()
+}
+
+fn nelder_mead(cost: &dyn Fn(&[f64]) -> f64, x0: &[f64], steps: &[f64], evaluations: usize) -> Vec<f64> {
+    let n = x0.len();
+    let mut simplex: Vec<(Vec<f64>, f64)> = vec![(x0.to_vec(), cost(x0))];
+    for i in 0..n {
+        let mut x = x0.to_vec();
+        x[i] += steps[i];
+        let c = cost(&x);
+        simplex.push((x, c));
+    }
+    let mut used = n + 1;
+    while used < evaluations {
+        simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
+        if simplex[n].1 - simplex[0].1 < 1e-5 {
+            break;
+        }
+        let centre: Vec<f64> = (0..n).map(|j| simplex[..n].iter().map(|s| s.0[j]).sum::<f64>() / n as f64).collect();
+        let along = |k: f64| -> Vec<f64> { (0..n).map(|j| centre[j] + k * (simplex[n].0[j] - centre[j])).collect() };
+        let reflected = along(-1.0);
+        let c = cost(&reflected);
+        used += 1;
+        if c < simplex[0].1 {
+            let expanded = along(-2.0);
+            let e = cost(&expanded);
+            used += 1;
+            simplex[n] = if e < c { (expanded, e) } else { (reflected, c) };
+        } else if c < simplex[n - 1].1 {
+            simplex[n] = (reflected, c);
+        } else {
+            let inside = along(if c < simplex[n].1 { -0.5 } else { 0.5 });
+            let i = cost(&inside);
+            used += 1;
+            if i < simplex[n].1.min(c) {
+                simplex[n] = (inside, i);
+            } else {
+                let best = simplex[0].0.clone();
+                for s in simplex.iter_mut().skip(1) {
+                    for (v, b) in s.0.iter_mut().zip(&best) {
+                        *v = b + 0.5 * (*v - b);
+                    }
+                    s.1 = cost(&s.0);
+                    used += 1;
+                }
+            }
+        }
+    }
+    simplex.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(|| x0.to_vec(), |s| s.0)
+}
