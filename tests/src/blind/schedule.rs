@@ -19,7 +19,7 @@ pub enum Shape {
     Ramp,
     /// Random levels and holds.
     Random,
-    /// Few levels, visited again and again.
+    /// Some levels, visited again and again.
     Visits,
 }
 
@@ -84,7 +84,7 @@ impl Schedule {
                 }
             }
             Shape::Random | Shape::Visits => {
-                let few: Vec<f64> = (0..c.of(&[3usize, 5, 6])).map(|_| c.between(low, high).round()).collect();
+                let few: Vec<f64> = (0..c.of(&[6usize, 8, 10])).map(|_| c.between(low, high).round()).collect();
                 let mut left = vec![low, high];
                 let mut now = rest;
                 let mean = (span / c.between(15.0, 60.0)).clamp(3.0, 20.0);
