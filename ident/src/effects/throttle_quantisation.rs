@@ -153,7 +153,7 @@ fn best_tooth(levels: &[(f64, f64, f64)]) -> (f64, f64, bool) {
 }
 
 /// Share of the best score at which a saw-tooth that is counted from 1000 us or from 0 is taken.
-const ANCHORED: f64 = 0.995;
+const ANCHORED: f64 = 0.98;
 
 /// A saw-tooth and how much of the squared departures it explains.
 #[derive(Clone, Copy)]
@@ -166,12 +166,17 @@ struct Tooth {
 impl Tooth {
     /// Takes another step and offset where they explain more.
     fn improve(&mut self, levels: &[(f64, f64, f64)], step: f64, offset: f64) {
-        let (mut dt, mut tt) = (0.0, 1e-12);
+        // a shift of the whole pulse belongs to the static curve: it is projected out
+        let (mut dx, mut xx, mut ds, mut xs, mut ss) = (0.0, 1e-12, 0.0, 0.0, 1e-12);
         for (p, slope, d) in levels {
             let x = slope * step * tooth(*p, step, offset);
-            dt += d * x;
-            tt += x * x;
+            dx += d * x;
+            xx += x * x;
+            ds += d * slope;
+            xs += x * slope;
+            ss += slope * slope;
         }
+        let (dt, tt) = (dx - ds * xs / ss, xx - xs * xs / ss);
         // a pulse that is cut to steps has the tooth the right way up
         if dt > 0.0 && dt * dt / tt > self.score {
             *self = Self { score: dt * dt / tt, step, offset };
