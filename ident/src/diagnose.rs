@@ -24,6 +24,9 @@ const MOST_EFFECTS: usize = 6;
 pub(crate) const NEEDED_EVIDENCE: f64 = 7.0;
 /// Share of the held-out error on its first channel that an effect must remove to be worth a name.
 pub(crate) const NEEDED_REDUCTION: f64 = 0.05;
+/// Effects that are named with small errors removed; a further one must remove much, because small misfits of the declared
+/// polynomials look like anything.
+const EASILY_NAMED: usize = 3;
 /// Share of the held-out error below which a further effect is named only if nothing else explains it as well.
 const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
@@ -295,7 +298,9 @@ fn choose(
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
         let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL * probability);
-        if unclear && !best.fit.placed.is_empty() && largest_reduction(context, winner, &held, errors) < CLEAR_REDUCTION {
+        let named = best.fit.placed.len();
+        let small = largest_reduction(context, winner, &held, errors) < CLEAR_REDUCTION;
+        if small && (unclear && named > 0 || named >= EASILY_NAMED) {
             continue;
         }
         return Some(Chosen { winner: winner.clone(), held, probability, rivals });

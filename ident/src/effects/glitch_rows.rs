@@ -43,7 +43,7 @@ impl Effect for GlitchRows {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let few = |t: &&Target| {
-            let count = glitches(t).len();
+            let count = glitches(context, t).len();
             !t.relation.is_evidence() && count >= 2 && count * 50 < t.rows.len()
         };
         context.targets.iter().filter(few).map(|t| Instance::new(&[t.name], "")).collect()
@@ -60,7 +60,7 @@ impl Effect for GlitchRows {
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
         let Some(target) = target(context, instance) else { return };
         let mut column = vec![0.0; context.len()];
-        for (row, departure) in glitches(target) {
+        for (row, departure) in glitches(context, target) {
             column[row] = departure;
         }
         design.add(position, 0, column);
@@ -68,7 +68,7 @@ impl Effect for GlitchRows {
 
     fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
         if let Some(target) = target(context, instance) {
-            let found = glitches(target);
+            let found = glitches(context, target);
             let n = found.len().max(1) as f64;
             let size = (found.iter().map(|g| g.1 * g.1).sum::<f64>() / n).sqrt();
             fitted.insert(0, Estimate { name: "size".into(), unit: "channel".into(), value: size, se: size / n.sqrt() });
@@ -82,8 +82,21 @@ fn target<'c>(context: &'c Context, instance: &Instance) -> Option<&'c Target> {
     context.targets.iter().find(|t| instance.touches(t.name))
 }
 
+/// Whether the load stepped within a second of a row: a transient is no glitch.
+fn moving(context: &Context, row: usize) -> bool {
+    let near = |i: &usize| (context.t[*i] - context.t[row]).abs() <= 1.0;
+    let (from, to) =
+        ((0..row).rev().take_while(near).last().unwrap_or(row), (row..context.len()).take_while(near).last().unwrap_or(row));
+    let largest_step = |x: &[f64]| x.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+    match &context.pulse {
+        Some(pulse) => largest_step(&pulse[from..=to]) > 5.0,
+        None if context.rpm.is_empty() => false,
+        None => largest_step(&context.rpm[from..=to]) > 0.02 * context.rpm.iter().copied().fold(0.0, f64::max),
+    }
+}
+
 /// Rows that hold a glitch, with their departure from the running median of five.
-fn glitches(target: &Target) -> Vec<(usize, f64)> {
+fn glitches(context: &Context, target: &Target) -> Vec<(usize, f64)> {
     let y = &target.y;
     if y.len() < 50 {
         return Vec::new();
@@ -99,7 +112,7 @@ fn glitches(target: &Target) -> Vec<(usize, f64)> {
     let speed = matches!(target.relation, Relation::SpeedFromPulse | Relation::SpeedAlone);
     let absurd = |k: usize, d: f64| {
         let share = y[k] / (y[k] - d);
-        d.abs() > least && !(speed && (PULSES.0..PULSES.1).contains(&share))
+        d.abs() > least && !(speed && (PULSES.0..PULSES.1).contains(&share)) && !moving(context, target.rows[k])
     };
     departures.iter().enumerate().filter(|(k, d)| absurd(k + 2, **d)).map(|(k, d)| (target.rows[k + 2], *d)).collect()
 }
