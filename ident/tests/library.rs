@@ -221,11 +221,7 @@ fn truth(hidden: &[Hidden], pulse: &[f64]) -> Truth {
             // rotor and load follow within a row
             let late = |v: &[f64]| -> Vec<f64> {
                 let at = |i: usize| (i as f64) * (1.0 - rate);
-                (0..n)
-                    .map(|i| at(i))
-                    .map(|x| (x as usize, x.fract()))
-                    .map(|(k, u)| v[k] + u * (v[(k + 1).min(n - 1)] - v[k]))
-                    .collect()
+                (0..n).map(at).map(|x| (x as usize, x.fract())).map(|(k, u)| v[k] + u * (v[(k + 1).min(n - 1)] - v[k])).collect()
             };
             (out.thrust, out.torque) = (late(&out.thrust), late(&out.torque));
         }
@@ -490,6 +486,8 @@ fn sample_hold() {
         first(&closed, "sample_hold");
         assert_eq!(closed.verdict.effects[0].channels[0], channel);
         parameter(&closed, "sample_hold", "period", 0.4, 0.005);
+        let pulses = closed.verdict.effects.iter().any(|e| e.id.ends_with("_pulses"));
+        assert!(!pulses, "an old value is no lost pulse: {}", words(&closed));
     }
 }
 

@@ -118,8 +118,14 @@ fn winding(context: &Context) -> f64 {
     normal.solve().map_or(0.0, |s| s.coefficients[1].max(0.0))
 }
 
+/// Relative error of a torque that is inferred from the power balance: the winding's share is itself an estimate.
+const BALANCE: f64 = 0.02;
+
 /// Adds the share of the drag that the torque arm sees; where the current says nothing of its size, the arm does.
 pub(super) fn with_share(mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+    for e in fitted.iter_mut().filter(|e| e.name == "constant" || e.name == "viscous") {
+        e.se = e.se.hypot(BALANCE * e.value);
+    }
     let find = |name: &str| fitted.iter().find(|e| e.name == name).cloned();
     match (find("constant"), find("arm_constant")) {
         (Some(whole), Some(arm)) if whole.value != 0.0 => {

@@ -85,9 +85,14 @@ pub(super) fn hinge_at_top(context: &Context, fitted: &[Estimate]) -> f64 {
     (value("slope") * over + value("bend") * over * over / onset.max(1.0)) / top
 }
 
-/// Rows of a difference target on which the rotor turns, with the reading as a share of the consensus.
+/// Rows of a difference target on which the rotor turns at a speed that it has had for a while (a late reading is no lost
+/// pulse), with the reading as a share of the consensus.
 pub(super) fn shares<'c>(context: &'c Context, target: &'c Target) -> impl Iterator<Item = (usize, f64)> + 'c {
-    target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > STANDSTILL).map(|(i, d)| (*i, 1.0 + d / context.rpm[*i]))
+    let held = |i: usize| {
+        let now = context.rpm[i];
+        now > STANDSTILL && [3, 6, 12, 20].iter().all(|back| (context.rpm[i.saturating_sub(*back)] - now).abs() < 0.05 * now)
+    };
+    target.rows.iter().zip(&target.y).filter(move |(i, _)| held(**i)).map(|(i, d)| (*i, 1.0 + d / context.rpm[*i]))
 }
 
 /// Share by which a reading must be off to be counted as one pulse too few or too many.
