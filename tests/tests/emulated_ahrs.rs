@@ -1,6 +1,6 @@
 //! The flash image of the IMU board, run on the emulated STM32F405 with three sensor models on its bus.
 //!
-//! Build the image first: `cargo build -p firmware-ahrs --release --target thumbv7em-none-eabihf --target-dir target/fw`
+//! Build the image first: `cargo xtask image`
 #![cfg(feature = "emulated")]
 
 use frame::message::BoardId;
@@ -171,6 +171,6 @@ fn a_bus_that_stays_held_costs_the_sensors_and_not_the_board() {
 #[test]
 fn a_missing_image_says_how_to_build_it() {
     let error = hal_sim::emulated::firmware("firmware-none").unwrap_err().to_string();
-    assert!(error.contains("cargo build -p firmware-none --release --target thumbv7em-none-eabihf"), "{error}");
+    assert!(error.contains("firmware-none") && error.contains("cargo xtask image"), "{error}");
     assert_eq!(error.lines().count(), 1);
 }

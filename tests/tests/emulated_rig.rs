@@ -1,6 +1,6 @@
 //! The flash image of the motor rig, run on the emulated STM32F405 against the simulated bench.
 //!
-//! Build the image first: `cargo build -p firmware-rig --release --target thumbv7em-none-eabihf --target-dir target/fw`
+//! Build the image first: `cargo xtask image`
 #![cfg(feature = "emulated")]
 
 use frame::message::{BoardId, Command, Event, Message};

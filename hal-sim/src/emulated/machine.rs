@@ -47,10 +47,7 @@ const ADC_REFERENCE: u32 = 4095 * ADC_UNITS;
 #[non_exhaustive]
 pub enum EmulatedError {
     /// The ELF file is not there.
-    #[error(
-        "no firmware image at {path}: build it with \
-         `cargo build -p {package} --release --target thumbv7em-none-eabihf --target-dir target/fw` (or set QUADRIG_FW_DIR)"
-    )]
+    #[error("no image of {package} at {path}: build it with `cargo xtask image` (or set QUADRIG_FW_DIR)")]
     NoImage {
         /// Where it was expected.
         path: PathBuf,
