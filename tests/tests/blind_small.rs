@@ -3,6 +3,8 @@
 //! What it is: loose floors under the rates of the whole campaign (`cargo xtask blind`), so that a change that breaks the search
 //! is seen in every test run.
 //! What can go wrong: too few runs for a figure to publish; the floors only catch a collapse.
+//! Measured when the floors were set, on the short runs used here: true effect first in 8 of 18 at three noise floors and above,
+//! at most three false alarms in 12 clean runs; on the tuning half at large 33 of 41 and 1 of 46.
 //! Units: rates.
 //! Reference: specification `closing-the-loop.md`, "What counts as proof".
 
@@ -19,7 +21,7 @@ fn short(seed: u64) -> bool {
 fn clean_runs_are_called_clean() {
     let lines: Vec<_> = (0..200u64).map(|k| CLEAN + 2 * k).filter(|s| short(*s)).take(12).map(score).collect();
     let alarms: Vec<_> = lines.iter().filter(|l| l.verdict != "none").map(|l| (l.seed, l.named.clone())).collect();
-    assert!(alarms.len() <= 6, "{alarms:?}");
+    assert!(alarms.len() <= 3, "{alarms:?}");
 }
 
 #[test]
