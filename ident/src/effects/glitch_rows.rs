@@ -82,7 +82,7 @@ fn target<'c>(context: &'c Context, instance: &Instance) -> Option<&'c Target> {
     context.targets.iter().find(|t| instance.touches(t.name))
 }
 
-/// Whether the load stepped within a second of a row: a transient is no glitch.
+/// Whether the load stepped within a second of a row: what stays within the channel's span there may be a transient.
 fn moving(context: &Context, row: usize) -> bool {
     let near = |i: &usize| (context.t[*i] - context.t[row]).abs() <= 1.0;
     let (from, to) =
@@ -112,7 +112,9 @@ fn glitches(context: &Context, target: &Target) -> Vec<(usize, f64)> {
     let speed = matches!(target.relation, Relation::SpeedFromPulse | Relation::SpeedAlone);
     let absurd = |k: usize, d: f64| {
         let share = y[k] / (y[k] - d);
-        d.abs() > least && !(speed && (PULSES.0..PULSES.1).contains(&share)) && !moving(context, target.rows[k])
+        d.abs() > least
+            && !(speed && (PULSES.0..PULSES.1).contains(&share))
+            && (d.abs() > span || !moving(context, target.rows[k]))
     };
     departures.iter().enumerate().filter(|(k, d)| absurd(k + 2, **d)).map(|(k, d)| (target.rows[k + 2], *d)).collect()
 }
