@@ -344,13 +344,16 @@ fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
 fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[f64], before: &[f64]) -> bool {
     let Some(newest) = candidate.fit.placed.last() else { return false };
     let mut helps = false;
+    // a resonance that one level alone has met is not predicted by the others: when that level is left out, the height of its
+    // peak is a guess; overwhelming evidence of scatter and vibration stands all the same
+    let certain = newest.effect.scatters() && gain > 30.0 * NEEDED_EVIDENCE;
     for (i, target) in context.targets.iter().enumerate() {
         if !newest.instance.touches(target.name) {
             continue;
         }
         let share = 1.0 - held[i] / before[i];
         helps |= share > NEEDED_REDUCTION;
-        if share < -NEEDED_REDUCTION && !target.relation.is_evidence() {
+        if share < -NEEDED_REDUCTION && !target.relation.is_evidence() && !certain {
             return false;
         }
     }

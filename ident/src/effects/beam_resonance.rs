@@ -20,7 +20,7 @@ impl Effect for BeamResonance {
     fn about(&self) -> About {
         About {
             title: "Resonance of the load-cell beam",
-            equation: "thrust_n += bump * A^2 with scatter * A, thrust_rms_n += vibration * A, A = r^2 / sqrt((1 - r^2)^2 + (2 damping_ratio r)^2) over its peak, r = f_excitation / natural_frequency",
+            equation: "thrust_n += bump * A with scatter * A, thrust_rms_n += vibration * A, A = r^2 / sqrt((1 - r^2)^2 + (2 damping_ratio r)^2) over its peak, r = f_excitation / natural_frequency",
             source: "Den Hartog 1956, section 2.11; Beharie 2013, section 5.7.1",
             depends_on: &["rpm"],
             signature: "scatter, rms and a small bump of the thrust around one speed, whenever that speed is visited",
@@ -48,10 +48,10 @@ impl Effect for BeamResonance {
         let (lo, hi) = (0.1 * top, 0.92 * top);
         let noise = context.target("thrust_n").map_or(1e-3, |i| context.targets[i].noise.rms);
         vec![
-            Shape { name: "natural_frequency", unit: "Hz", range: (lo, hi), starts: geometric(lo, hi, 40) },
-            Shape { name: "damping_ratio", unit: "1", range: (0.003, 0.08), starts: vec![0.01, 0.03] },
+            Shape { name: "natural_frequency", unit: "Hz", range: (lo, hi), starts: geometric(lo, hi, 80) },
+            Shape { name: "damping_ratio", unit: "1", range: (0.003, 0.08), starts: vec![0.012, 0.035] },
             // the mean moves only where the beam swings: a bump without scatter is something else
-            Shape { name: "scatter", unit: "N", range: (0.3 * noise, 300.0 * noise), starts: vec![0.5 * noise, 5.0 * noise] },
+            Shape { name: "scatter", unit: "N", range: (0.3 * noise, 300.0 * noise), starts: vec![2.0 * noise] },
         ]
     }
 
@@ -75,7 +75,7 @@ impl Effect for BeamResonance {
             design.add(position, 1, a);
         } else {
             design.extra_variance = a.iter().map(|v| (scatter * v).powi(2)).collect();
-            design.add(position, 0, a.iter().map(|v| v * v).collect());
+            design.add(position, 0, a);
         }
     }
 
@@ -85,7 +85,7 @@ impl Effect for BeamResonance {
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or(0.0, |e| e.value);
-        // the bump is of second order in the motion that makes the scatter
+        // the bump follows the motion (an amplifier that falls slower than it rises) and is smaller than it
         value("vibration") > -1e-6 && value("bump").abs() < 10.0 * value("scatter").max(value("vibration"))
     }
 }

@@ -1,0 +1,90 @@
+//! The demonstration: what is hidden is found, whatever the seed.
+//!
+//! What it is: `quadrig demo` for each effect that it hides, its files, its repeatability, and the run that is simulated with the
+//! corrected model.
+//! What can go wrong: an effect is not named, the page needs a network, or two runs of one seed differ.
+//! Units: as printed.
+//! Reference: specification `formats.md`, `quadrig demo`.
+
+use quadrig_tests::call;
+use serde_json::Value;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// The effects that the demonstration hides.
+const HIDDEN: [&str; 6] = ["supply_sag", "battery_discharge", "thermal_zero", "zero_drift", "beam_resonance", "channel_filter"];
+/// Seeds that played no part while the thresholds were chosen.
+const SEEDS: [&str; 2] = ["1001", "1002"];
+/// Longest that the demonstration may take.
+const MOST: Duration = Duration::from_secs(20);
+
+fn demo(folder: &Path, words: &[&str]) -> String {
+    let begun = Instant::now();
+    let out = call(folder, &[&["demo", "-o", "out"], words].concat()).succeeded().out;
+    assert!(begun.elapsed() < MOST, "{words:?} took {:?}", begun.elapsed());
+    out
+}
+
+fn verdict(folder: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(folder.join("out/verdict.json")).expect("a verdict")).expect("JSON")
+}
+
+#[test]
+fn every_hidden_effect_is_named_and_its_error_falls() {
+    let mut missed = Vec::new();
+    for id in HIDDEN {
+        for seed in SEEDS {
+            let folder = TempDir::new().unwrap();
+            let out = demo(folder.path(), &["--seed", seed, "--effect", id]);
+            let verdict = verdict(folder.path());
+            let effects = verdict["effects"].as_array().expect("effects");
+            let Some(entry) = effects.iter().find(|e| e["id"] == id) else {
+                missed.push(format!("{id}, seed {seed}: {:?}", effects.iter().map(|e| e["id"].clone()).collect::<Vec<_>>()));
+                continue;
+            };
+            assert!(out.contains(": found"), "{out}");
+            let reduction = entry["heldout_error_reduction"].as_f64().expect("a reduction");
+            assert!(reduction > 0.2, "{id}, seed {seed}: held-out error falls by {reduction}");
+        }
+    }
+    assert!(missed.is_empty(), "{missed:#?}");
+}
+
+#[test]
+fn the_files_are_whole_and_the_page_needs_nothing() {
+    let folder = TempDir::new().unwrap();
+    let out = demo(folder.path(), &["--seed", "1003", "--effect", "zero_drift"]);
+    assert!(out.contains("seed 1003") && out.contains("held-out") && out.contains("the corrected model as the plant"), "{out}");
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).expect("a page");
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n") && page.contains("<svg"));
+    for outside in ["http://", "https://", "<script", "@import", "url("] {
+        assert!(!page.contains(outside), "the page holds {outside}");
+    }
+    let model = std::fs::read_to_string(folder.path().join("out/model.toml")).expect("a model");
+    assert!(model.contains("id = \"zero_drift\"") && model.contains("rate_n_per_s"), "{model}");
+}
+
+#[test]
+fn a_seed_is_a_run() {
+    let run = |seed: &str| {
+        let folder = TempDir::new().unwrap();
+        let out = demo(folder.path(), &["--seed", seed]);
+        let file = |name: &str| std::fs::read(folder.path().join("out").join(name)).expect("a file");
+        (out, file("run.csv"), file("verdict.json"), file("model.toml"), file("again.csv"))
+    };
+    let (first, second, other) = (run("1004"), run("1004"), run("1005"));
+    assert!(first == second, "the same seed gave other bytes");
+    assert!(first.1 != other.1, "another seed gave the same log");
+}
+
+/// The circle: simulated with the corrected model, the same schedule leaves on the load cell no more than its noise.
+#[test]
+fn the_corrected_model_leaves_noise() {
+    let folder = TempDir::new().unwrap();
+    let out = demo(folder.path(), &["--seed", "1006", "--effect", "thermal_zero"]);
+    let row = out.lines().skip_while(|l| !l.contains("as the plant")).find(|l| l.contains("thrust_n")).expect("a row for thrust");
+    let numbers: Vec<f64> = row.split([' ', ',']).filter_map(|w| w.parse().ok()).collect();
+    let [rms, floor] = numbers[..] else { panic!("{row}") };
+    assert!(rms < 2.0 * floor, "{row}");
+}
