@@ -365,12 +365,15 @@ fn wrong_unit(name: &str) -> Option<&'static str> {
 
 fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> Result<(), ReadError> {
     let fields = line.split(',').count();
-    if fields != header.len() {
+    if let Some(missing) = header.get(fields) {
         return Err(place.refuse(
-            None,
-            format!("{fields} fields"),
+            Some(missing),
+            format!("the row ends before it ({fields} fields)"),
             format!("{} as in the header (is the file truncated?)", header.len()),
         ));
+    }
+    if fields > header.len() {
+        return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header", header.len())));
     }
     for ((i, text), name) in line.split(',').enumerate().zip(header) {
         let text = text.trim();
@@ -464,7 +467,10 @@ mod tests {
             (String::new(), "run.csv:1: the file is empty"),
             ("t_s,a,b\n0,1,2\n".to_owned(), "run.csv:1: no format line"),
             (head.to_owned(), "run.csv:2: no data rows"),
-            (format!("{head}0,1000,0.1\n0.1,1000\n"), "run.csv:4: 2 fields; expected 3"),
+            (
+                format!("{head}0,1000,0.1\n0.1,1000\n"),
+                "run.csv:4: column thrust_n: the row ends before it (2 fields); expected 3",
+            ),
             (format!("{head}0,1000,NaN\n"), "run.csv:3: column thrust_n: 'NaN'; expected a finite number"),
             (format!("{head}0,1000,inf\n"), "column thrust_n: 'inf'"),
             (format!("{head}0,1000,x\n"), "run.csv:3: column thrust_n: 'x'; expected a decimal number"),

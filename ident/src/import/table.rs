@@ -162,7 +162,8 @@ fn read_rows<R: BufRead>(
                 cut += 1;
                 break;
             }
-            return Err(place.refuse(None, format!("{found} fields"), format!("{width} as in the header")));
+            let missing = cells.get(found).copied();
+            return Err(place.refuse(missing, format!("{found} fields"), format!("{width} as in the header")));
         }
         for ((text, route), cell) in line.split(',').zip(&plan.route).zip(&cells) {
             let Some((index, factor)) = route else { continue };
@@ -309,7 +310,7 @@ mod tests {
             ("t_s,thrust_n\n", "no data rows"),
             ("t_s,a\n0,1\n", "0 known channel(s)"),
             ("t_s,rpm,thrust_n\n0,1,zz\n", "x.csv:2: column thrust_n: 'zz'"),
-            ("t_s,rpm,thrust_n\n0,1\n1,2,3\n", "x.csv:2: 2 fields; expected 3"),
+            ("t_s,rpm,thrust_n\n0,1\n1,2,3\n", "x.csv:2: column thrust_n: 2 fields; expected 3"),
             ("t_s,rpm,Thrust (stone)\n0,1,2\n", "column Thrust (stone): no known unit"),
             ("t_s,rpm,thrust_n\n0,1,nan\n", "'nan'"),
         ] {
