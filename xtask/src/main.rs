@@ -28,6 +28,7 @@ usage: cargo xtask COMMAND
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
   test             everything: format, lints, images, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
+  blind [ARGS]     the blind campaign (docs/blind.md); ARGS go to it, --help lists them
   test --emulated  the images on emulated boards, nothing else
   test --verdicts  the verdict contract on recorded and simulated logs, nothing else
 ";
@@ -42,6 +43,10 @@ fn main() -> ExitCode {
         ["image", "--bless"] => image::image(&place, true),
         ["test"] => test::everything(&place),
         ["test", "--quick"] => test::quick(&place),
+        ["blind", rest @ ..] => {
+            let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "blind", "--"];
+            run::run(&mut run::cargo(&place, &[&head, rest].concat()))
+        }
         ["test", "--emulated"] => test::on_boards(&place),
         ["test", "--verdicts"] => test::on_logs(&place),
         ["help" | "--help" | "-h"] => {

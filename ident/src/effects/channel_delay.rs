@@ -5,7 +5,7 @@
 //! Units: s, positive is late.
 //! Reference: pure transport delay of a logger.
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, present};
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, meters, operator};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -33,16 +33,7 @@ impl Effect for ChannelDelay {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.time_is_row {
-            return Vec::new();
-        }
-        let mut sets: Vec<Vec<&str>> =
-            present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
-        let both = present(context, &["thrust_n", "torque_nm"]);
-        if both.len() == 2 {
-            sets.push(both);
-        }
-        sets.iter().map(|s| Instance::new(s, "")).collect()
+        meters(context).iter().map(|s| Instance::new(s, "")).collect()
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {

@@ -5,7 +5,7 @@
 //! Units: s.
 //! Reference: boxcar and RC filters; RCbenchmark load cells average over about half a second.
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, operator, present};
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, meters, operator};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -33,16 +33,7 @@ impl Effect for ChannelFilter {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.time_is_row {
-            return Vec::new();
-        }
-        let mut sets: Vec<Vec<&str>> =
-            present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
-        let both = present(context, &["thrust_n", "torque_nm"]);
-        if both.len() == 2 {
-            sets.push(both);
-        }
-        sets.iter().flat_map(|s| ["moving_average", "first_order"].map(|form| Instance::new(s, form))).collect()
+        meters(context).iter().flat_map(|s| ["moving_average", "first_order"].map(|form| Instance::new(s, form))).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {

@@ -5,7 +5,7 @@
 //! Units: 1, s.
 //! Reference: Hoffmann, *An Introduction to Stress Analysis using Strain Gauges*, section 3.3 (creep).
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, operator, present};
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, operator, thrust_over_time};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -33,11 +33,7 @@ impl Effect for Creep {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.time_is_row || present(context, &["thrust_n"]).is_empty() {
-            Vec::new()
-        } else {
-            vec![Instance::new(&["thrust_n"], "")]
-        }
+        thrust_over_time(context)
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {

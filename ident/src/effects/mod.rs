@@ -219,6 +219,29 @@ fn present<'a>(context: &Context, names: &[&'a str]) -> Vec<&'a str> {
     names.iter().copied().filter(|n| context.target(n).is_some()).collect()
 }
 
+/// The one instance of an effect of time on the thrust; none where there is no thrust or no time.
+fn thrust_over_time(context: &Context) -> Vec<Instance> {
+    if context.time_is_row || present(context, &["thrust_n"]).is_empty() {
+        Vec::new()
+    } else {
+        vec![Instance::new(&["thrust_n"], "")]
+    }
+}
+
+/// The sets of meters that may be slow or late together: each alone, and the two of the load cell.
+fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
+    if context.time_is_row {
+        return Vec::new();
+    }
+    let mut sets: Vec<Vec<&str>> =
+        present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
+    let both = present(context, &["thrust_n", "torque_nm"]);
+    if both.len() == 2 {
+        sets.push(both);
+    }
+    sets
+}
+
 /// Speed channels of the log.
 fn speeds(context: &Context) -> Vec<&'static str> {
     context.targets.iter().filter(|t| t.relation == crate::context::Relation::SpeedFromPulse).map(|t| t.name).collect()

@@ -5,7 +5,7 @@
 //! Units: N/s; time since the first row, s.
 //! Reference: Beharie 2013, section 5.7.1 (drift of the strain channel).
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, thrust_over_time};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -33,11 +33,7 @@ impl Effect for ZeroDrift {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.time_is_row || present(context, &["thrust_n"]).is_empty() {
-            Vec::new()
-        } else {
-            vec![Instance::new(&["thrust_n"], "")]
-        }
+        thrust_over_time(context)
     }
 
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
