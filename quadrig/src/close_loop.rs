@@ -10,6 +10,7 @@ use crate::progress::Bar;
 use ident::close::{Closed, close};
 use ident::log::{Log, write_whole};
 use ident::model::Model;
+use ident::report::number;
 use ident::verdict::{Kind, Verdict};
 use std::path::{Path, PathBuf};
 
@@ -115,9 +116,4 @@ fn sentence(verdict: &Verdict) -> String {
         Kind::Unattributed => "something is left over that no known effect explains".to_owned(),
         Kind::None => "nothing significant is left over".to_owned(),
     }
-}
-
-/// A number with five significant digits.
-pub(crate) fn number(v: f64) -> String {
-    if v != 0.0 && (v.abs() < 1e-3 || v.abs() >= 1e5) { format!("{v:.4e}") } else { format!("{v:.5}") }
 }

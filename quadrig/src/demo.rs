@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, `quadrig demo`.
 
 use crate::Failure;
-use crate::close_loop::{number, table, write_folder};
+use crate::close_loop::{table, write_folder};
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
 use hal_sim::Scenario;
@@ -14,6 +14,7 @@ use ident::close::close;
 use ident::context::Context;
 use ident::log::Log;
 use ident::plateau::plateaus;
+use ident::report::number;
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 

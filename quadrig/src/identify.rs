@@ -6,9 +6,9 @@
 //! Reference: specification `identification.md`.
 
 use crate::Failure;
-use crate::close_loop::number;
 use ident::identify::identify;
 use ident::log::{Log, write_whole};
+use ident::report::number;
 use std::path::PathBuf;
 
 /// Arguments.

@@ -5,6 +5,7 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
+use super::number;
 use super::svg::{Chart, Series, escape};
 use crate::close::Closed;
 use crate::context::unit_of;
@@ -104,11 +105,11 @@ fn effects(out: &mut String, closed: &Closed) {
         for p in &e.parameters {
             let _ = write!(
                 out,
-                "<tr><td>{}</td><td>{:.6}</td><td>{:.6} to {:.6}</td><td>{}</td></tr>",
+                "<tr><td>{}</td><td>{}</td><td>{} to {}</td><td>{}</td></tr>",
                 escape(&p.name),
-                p.value,
-                p.ci95[0],
-                p.ci95[1],
+                number(p.value),
+                number(p.ci95[0]),
+                number(p.ci95[1]),
                 escape(&p.unit)
             );
         }
