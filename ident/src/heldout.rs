@@ -112,15 +112,6 @@ fn pooled(
     sums.iter().map(|(s, n)| (*n > 0).then(|| (s / *n as f64).sqrt())).collect()
 }
 
-/// Root mean square error of each target over all its rows.
-#[must_use]
-pub fn insample(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<f64> {
-    residuals(context, declared, fit)
-        .iter()
-        .map(|r| (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt())
-        .collect()
-}
-
 /// Residual of each target on its own rows.
 #[must_use]
 pub fn residuals(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<Vec<f64>> {
