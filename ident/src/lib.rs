@@ -6,6 +6,7 @@
 //! Reference: specification `identification.md` and `closing-the-loop.md`.
 #![forbid(unsafe_code)]
 
+pub mod beam;
 pub mod close;
 pub mod context;
 pub mod design;
@@ -21,9 +22,11 @@ pub mod model;
 pub mod noise;
 mod opponent;
 pub mod plateau;
+pub mod quantity;
 pub mod report;
 pub mod residual;
 pub mod search;
+pub mod select;
 pub mod simulate;
 pub mod solve;
 pub mod verdict;

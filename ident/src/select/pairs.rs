@@ -1,0 +1,124 @@
+//! Where the pairs come from: the thesis' figures, a table of one's own, or a run.
+//!
+//! What it is: a small CSV reader (`motor,propeller,thrust_n,current_a`), and the maximum over the plateaus of a log.
+//! What can go wrong: a wrong header, a number that is none, a thrust without a current: refused with file, line and column.
+//! Units: N, A.
+//! Reference: `thesis.csv` beside this file; errata, "Table 9 agrees with itself".
+
+use super::{Maximum, Pair};
+use crate::log::{Lines, Log, Place, ReadError, short};
+use crate::plateau::Plateau;
+use crate::quantity::{Ampere, Newton};
+use std::io::BufRead;
+
+/// The header of a table of pairs.
+const HEADER: [&str; 4] = ["motor", "propeller", "thrust_n", "current_a"];
+
+/// The figures that the thesis states.
+///
+/// # Panics
+/// Never: the table is part of the program and read by a test.
+#[must_use]
+pub fn thesis() -> Vec<Pair> {
+    read_table("thesis.csv", include_str!("thesis.csv").as_bytes()).unwrap_or_default()
+}
+
+/// Reads a table of pairs; `file` is the name for messages.
+///
+/// # Errors
+/// [`ReadError`] with file, line and column.
+pub fn read_table(file: &str, source: impl BufRead) -> Result<Vec<Pair>, ReadError> {
+    let mut lines = Lines::new(file, source);
+    let mut header = false;
+    let mut out = Vec::new();
+    while let Some(line) = lines.next_line()? {
+        if line.trim().is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let place = lines.place();
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        if !header {
+            if cells != HEADER {
+                return Err(place.refuse(None, format!("header '{}'", short(&line)), format!("'{}'", HEADER.join(","))));
+            }
+            header = true;
+        } else if let [motor, propeller, thrust, current] = cells[..] {
+            out.push(Pair {
+                motor: motor.to_owned(),
+                propeller: propeller.to_owned(),
+                maximum: maximum(thrust, current, &place)?,
+                levels: Vec::new(),
+                source: file.to_owned(),
+            });
+        } else {
+            return Err(place.refuse(None, format!("{} fields", cells.len()), "4 as in the header"));
+        }
+    }
+    if out.is_empty() {
+        return Err(lines.place().refuse(None, "no pair", format!("'{}' and one line for each pair", HEADER.join(","))));
+    }
+    Ok(out)
+}
+
+fn maximum(thrust: &str, current: &str, place: &Place<'_>) -> Result<Option<Maximum>, ReadError> {
+    if thrust.is_empty() && current.is_empty() {
+        return Ok(None);
+    }
+    let positive = |text: &str, column: &str| match text.parse::<f64>() {
+        Ok(v) if v.is_finite() && v > 0.0 => Ok(v),
+        _ => Err(place.refuse(
+            Some(column),
+            format!("'{}'", short(text)),
+            "a positive number (both fields empty for a pair without a result)",
+        )),
+    };
+    Ok(Some(Maximum { thrust_n: Newton(positive(thrust, HEADER[2])?), current_a: Ampere(positive(current, HEADER[3])?) }))
+}
+
+/// The pair that a run measured: its plateaus, the one with most thrust, names from the log's metadata.
+#[must_use]
+pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
+    let named = |key: &str| log.meta.get(key).and_then(toml::Value::as_str).unwrap_or("?").to_owned();
+    let index = |name: &str| log.columns.iter().position(|c| c.name == name);
+    let levels: Vec<Maximum> = match (index("thrust_n"), index("current_a")) {
+        (Some(t), Some(i)) => plateaus
+            .iter()
+            .filter_map(|p| Some((p.means.get(t).copied().flatten()?.0, p.means.get(i).copied().flatten()?.0)))
+            .map(|(thrust, current)| Maximum { thrust_n: Newton(thrust), current_a: Ampere(current) })
+            .collect(),
+        _ => Vec::new(),
+    };
+    let maximum = levels.iter().copied().filter(|m| m.current_a.0 > 0.0 && m.thrust_n.0 > 0.0);
+    Pair {
+        motor: named("motor"),
+        propeller: named("propeller"),
+        maximum: maximum.max_by(|a, b| a.thrust_n.0.total_cmp(&b.thrust_n.0)),
+        levels,
+        source: log.name.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_thesis_table_reads() {
+        assert_eq!(thesis().len(), 9);
+    }
+
+    #[test]
+    fn faults_name_their_place() {
+        let head = "motor,propeller,thrust_n,current_a\n";
+        for (text, wanted) in [
+            (String::new(), "p.csv:1: no pair"),
+            ("a,b\n".to_owned(), "p.csv:1: header 'a,b'; expected 'motor,propeller,thrust_n,current_a'"),
+            (format!("{head}m,p,1\n"), "p.csv:2: 3 fields"),
+            (format!("{head}m,p,1,\n"), "p.csv:2: column current_a: ''; expected a positive number"),
+            (format!("{head}m,p,-1,2\n"), "p.csv:2: column thrust_n: '-1'"),
+        ] {
+            let message = read_table("p.csv", text.as_bytes()).unwrap_err().to_string();
+            assert!(message.contains(wanted), "{message:?} lacks {wanted:?}");
+        }
+    }
+}
