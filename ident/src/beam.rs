@@ -148,6 +148,8 @@ impl Beam {
         let mut met = self.resonances(blades);
         met.retain_mut(|c| {
             c.dwells = speeds.iter().copied().filter(|s| (s.0 / c.speed_rpm.0 - 1.0).abs() <= near).collect();
+            c.dwells.sort_by(|a, b| a.0.total_cmp(&b.0));
+            c.dwells.dedup_by(|a, b| (a.0 - b.0).abs() < 1.0);
             c.speed_rpm.0 <= top || !c.dwells.is_empty()
         });
         met

@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`, "Command line".
 #![forbid(unsafe_code)]
 
+mod beam;
 mod close_loop;
 mod demo;
 mod flash;
@@ -14,6 +15,7 @@ mod import;
 mod predict;
 mod progress;
 mod run_log;
+mod select;
 mod sim;
 
 use clap::{Parser, Subcommand};
@@ -42,6 +44,10 @@ enum Command {
     Identify(identify::Args),
     /// Residual, cause, corrected model, error before and after.
     CloseLoop(close_loop::Args),
+    /// Motor, propeller and battery choice.
+    Select(select::Args),
+    /// Design of the load cell's beam, with a warning of resonance.
+    Beam(beam::Args),
     /// Builds, flashes and attaches through probe-rs.
     Flash(flash::Args),
     /// A model's prediction of every measured channel, row for row.
@@ -59,6 +65,8 @@ fn main() -> ExitCode {
         Command::Import(args) => import::run(args, cli.quiet),
         Command::Identify(args) => identify::run(args, cli.quiet),
         Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
+        Command::Select(args) => select::run(args, cli.quiet),
+        Command::Beam(args) => beam::run(args, cli.quiet),
         Command::Flash(args) => flash::run(args),
         Command::Predict(args) => predict::run(args),
     };

@@ -5,10 +5,19 @@
 //! Units: on the axes.
 //! Reference: specification `identification.md`, item 5.
 
+mod beam;
+mod figure;
 mod page;
+mod selection;
+mod sheet;
+mod style;
 mod svg;
 
+pub use beam::{beam, figures as beam_figures, warning as beam_warning};
+pub use figure::{Figure, Layer, Mark};
 pub use page::closed_loop;
+pub use selection::selection;
+pub use sheet::{Sheet, write_figures};
 pub use svg::{Chart, Series};
 
 /// A number with five significant digits, as tables print it.

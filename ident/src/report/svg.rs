@@ -124,26 +124,31 @@ fn dots(out: &mut String, s: &Series<'_>, px: &dyn Fn(f64) -> f64, py: &dyn Fn(f
     out.push_str("\"/>");
 }
 
-fn line(out: &mut String, s: &Series<'_>, (x0, x1): (f64, f64), px: &dyn Fn(f64) -> f64, py: &dyn Fn(f64) -> f64) {
-    let _ = write!(out, "<path class=\"{}\" d=\"", s.class);
+fn line(out: &mut String, s: &Series<'_>, range: (f64, f64), px: &dyn Fn(f64) -> f64, py: &dyn Fn(f64) -> f64) {
+    let _ = write!(out, "<path class=\"{}\" d=\"{}\"/>", s.class, line_path(s.x, s.y, range, px, py));
+}
+
+/// The `d` of a line, thinned to columns of the drawing with the extremes of each kept.
+pub(crate) fn line_path(x: &[f64], y: &[f64], (x0, x1): (f64, f64), px: &dyn Fn(f64) -> f64, py: &dyn Fn(f64) -> f64) -> String {
+    let mut out = String::new();
     let mut pen_down = false;
     let mut i = 0;
-    while i < s.x.len() {
-        let bucket = |k: usize| ((s.x[k] - x0) / (x1 - x0) * BUCKETS as f64) as i64;
+    while i < x.len() {
+        let bucket = |k: usize| ((x[k] - x0) / (x1 - x0) * BUCKETS as f64) as i64;
         let mut j = i + 1;
-        while j < s.x.len() && bucket(j) == bucket(i) {
+        while j < x.len() && bucket(j) == bucket(i) {
             j += 1;
         }
         // first, extremes in their order, last: nothing that the eye would see is lost
         let mut keep = vec![i, j - 1];
-        let inside = (i..j).filter(|k| s.y[*k].is_finite());
-        keep.extend(inside.clone().min_by(|a, b| s.y[*a].total_cmp(&s.y[*b])));
-        keep.extend(inside.max_by(|a, b| s.y[*a].total_cmp(&s.y[*b])));
+        let inside = (i..j).filter(|k| y[*k].is_finite());
+        keep.extend(inside.clone().min_by(|a, b| y[*a].total_cmp(&y[*b])));
+        keep.extend(inside.max_by(|a, b| y[*a].total_cmp(&y[*b])));
         keep.sort_unstable();
         keep.dedup();
         for k in keep {
-            if s.y[k].is_finite() {
-                let _ = write!(out, "{}{:.1} {:.1}", if pen_down { 'L' } else { 'M' }, px(s.x[k]), py(s.y[k]));
+            if y[k].is_finite() {
+                let _ = write!(out, "{}{:.1} {:.1}", if pen_down { 'L' } else { 'M' }, px(x[k]), py(y[k]));
                 pen_down = true;
             } else {
                 pen_down = false;
@@ -151,10 +156,10 @@ fn line(out: &mut String, s: &Series<'_>, (x0, x1): (f64, f64), px: &dyn Fn(f64)
         }
         i = j;
     }
-    out.push_str("\"/>");
+    out
 }
 
-fn span<'v>(values: impl Iterator<Item = &'v f64>) -> (f64, f64) {
+pub(crate) fn span<'v>(values: impl Iterator<Item = &'v f64>) -> (f64, f64) {
     let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     if !lo.is_finite() {
         (0.0, 1.0)
@@ -165,7 +170,7 @@ fn span<'v>(values: impl Iterator<Item = &'v f64>) -> (f64, f64) {
     }
 }
 
-fn ticks(lo: f64, hi: f64, about: usize) -> Vec<f64> {
+pub(crate) fn ticks(lo: f64, hi: f64, about: usize) -> Vec<f64> {
     let raw = (hi - lo) / about as f64;
     let power = 10f64.powf(raw.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= raw).unwrap_or(10.0 * power);
@@ -173,7 +178,7 @@ fn ticks(lo: f64, hi: f64, about: usize) -> Vec<f64> {
     (first..).map(|k| k as f64 * step).take_while(|v| *v <= hi + 1e-9 * step).collect()
 }
 
-fn label(v: f64, span: f64) -> String {
+pub(crate) fn label(v: f64, span: f64) -> String {
     let digits = (2.0 - span.log10()).ceil().clamp(0.0, 6.0) as usize;
     format!("{:.digits$}", if v.abs() < 1e-9 * span { 0.0 } else { v })
 }

@@ -1,0 +1,217 @@
+//! `quadrig select`.
+//!
+//! What it is: motor, propeller and battery choice from the thesis' figures, from tables of pairs, from measured runs, or from the
+//! simulator's catalogue flown on the spot.
+//! What can go wrong: refused input; a simulated run that the firmware stops is a pair without a result.
+//! Units: N, A, kg, A.h, min.
+//! Reference: specification `identification.md`, item 4; Beharie 2013, section 6.1.
+
+use crate::Failure;
+use crate::progress::Bar;
+use crate::run_log::to_log;
+use hal_sim::Scenario;
+use hal_sim::plant::{Propeller, motor};
+use hal_sim::scenario::Schedule;
+use ident::context::Context;
+use ident::log::{FORMAT, Log, write_whole};
+use ident::plateau::plateaus;
+use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
+use ident::report::{selection, write_figures};
+use ident::select::{Airframe, Need, Pair, Row, choose, from_log, read_table, row, thesis};
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Rig logs, or tables `motor,propeller,thrust_n,current_a`; none: the figures that the thesis states.
+    files: Vec<PathBuf>,
+    /// Flies every pair of the simulator's catalogue.
+    #[arg(long, conflicts_with = "files")]
+    simulated: bool,
+    /// Only this motor.
+    #[arg(long)]
+    motor: Option<String>,
+    /// Least thrust of all four motors together, N.
+    #[arg(long, default_value_t = 19.62)]
+    thrust: f64,
+    /// Batteries on board.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=12))]
+    batteries: u32,
+    /// Least endurance at full throttle, min.
+    #[arg(long, default_value_t = 0.0)]
+    minutes: f64,
+    /// Least thrust above the weight, N.
+    #[arg(long, default_value_t = 0.0)]
+    resultant: f64,
+    /// Mass without a battery, kg.
+    #[arg(long, default_value_t = 0.774)]
+    bare: f64,
+    /// Mass of one battery, kg.
+    #[arg(long, default_value_t = 0.4)]
+    battery: f64,
+    /// Charge of one battery, A.h.
+    #[arg(long, default_value_t = 4.4)]
+    capacity: f64,
+    /// Writes the page with Tables 8 and 9 and the figures.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Writes each figure as a file into this folder.
+    #[arg(long)]
+    svg: Option<PathBuf>,
+    /// Rows and choice as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    for (name, value) in [("--bare", args.bare), ("--battery", args.battery), ("--capacity", args.capacity)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(format!("{name} {value}: expected a positive number").into());
+        }
+    }
+    let airframe =
+        Airframe { bare_kg: Kilogram(args.bare), battery_kg: Kilogram(args.battery), capacity_ah: AmpereHour(args.capacity) };
+    let need = Need {
+        total_thrust_n: Newton(args.thrust),
+        batteries: args.batteries,
+        full_throttle_min: Minute(args.minutes),
+        resultant_n: Newton(args.resultant),
+    };
+    let mut pairs = match (&args.files[..], args.simulated) {
+        ([], true) => fly_catalogue(quiet),
+        ([], false) => thesis(),
+        (files, _) => read(files)?,
+    };
+    if let Some(motor) = &args.motor {
+        pairs.retain(|p| p.motor == *motor);
+        if pairs.is_empty() {
+            return Err(format!("--motor {motor}: no pair has this motor").into());
+        }
+    }
+    let batteries = args.batteries.max(3);
+    let rows: Vec<Row> = pairs.iter().filter_map(|p| row(p, &airframe, batteries)).collect();
+    let chosen = choose(&rows, &need);
+    let sheet = selection(&pairs, &rows, &airframe, &need, batteries);
+    if let Some(path) = &args.output {
+        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    if let Some(folder) = &args.svg {
+        write_figures(folder, sheet.drawn()).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
+    }
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let names: Vec<String> = chosen.iter().map(|r| format!("{} {}", r.pair.motor, r.pair.propeller)).collect();
+        let json = serde_json::json!({"airframe": airframe, "need": need, "rows": rows, "chosen": names});
+        writeln!(out, "{}", serde_json::to_string_pretty(&json)?)?;
+    } else if !quiet {
+        write!(out, "{}", table(&pairs, &rows, &chosen, &need))?;
+    }
+    Ok(())
+}
+
+/// Logs and tables, told apart by their first line.
+fn read(files: &[PathBuf]) -> Result<Vec<Pair>, Failure> {
+    let mut pairs = Vec::new();
+    for path in files {
+        if is_log(path)? {
+            let log = Log::read(path)?;
+            let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
+            if pair.maximum.is_none() {
+                return Err(format!("{}: no plateau with thrust and current; expected a run with thrust_n and current_a on levels of at least 5 rows", path.display()).into());
+            }
+            pairs.push(pair);
+        } else {
+            let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+            pairs.extend(read_table(&path.display().to_string(), BufReader::new(file))?);
+        }
+    }
+    Ok(pairs)
+}
+
+fn is_log(path: &Path) -> Result<bool, Failure> {
+    let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let mut first = Vec::new();
+    std::io::Read::take(BufReader::new(file), 64).read_until(b'\n', &mut first)?;
+    Ok(String::from_utf8_lossy(&first).contains(FORMAT))
+}
+
+/// Every motor with every propeller that the simulator knows, on a short staircase.
+fn fly_catalogue(quiet: bool) -> Vec<Pair> {
+    let bar = Bar::new("flying", quiet);
+    let propellers: Vec<&str> = Propeller::names().collect();
+    let count = motor::MOTORS.len() * propellers.len();
+    let mut pairs = Vec::new();
+    for (kv, _) in motor::MOTORS {
+        for propeller in &propellers {
+            pairs.push(fly(&format!("{kv}KV"), propeller));
+            bar.set(pairs.len() as f64 / count as f64);
+        }
+    }
+    pairs
+}
+
+fn fly(motor: &str, propeller: &str) -> Pair {
+    let scenario = Scenario {
+        name: format!("{motor} {propeller}"),
+        motor: motor.to_owned(),
+        propeller: propeller.to_owned(),
+        schedule: Schedule::Staircase { step_us: 100.0, hold_s: 3.0, top_us: 2000.0 },
+        ..Scenario::default()
+    };
+    let nothing = Pair {
+        motor: motor.to_owned(),
+        propeller: propeller.to_owned(),
+        maximum: None,
+        levels: Vec::new(),
+        source: scenario.name.clone(),
+    };
+    match hal_sim::run(&scenario, None, &mut |_| {}) {
+        Ok(record) => {
+            let log = to_log(&scenario, &record, &scenario.name);
+            let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
+            // a run that a protection cut short says nothing of full throttle
+            let top = log.column("pulse_us").map_or(0.0, |p| p.iter().copied().fold(0.0, f64::max));
+            if top < 1999.0 { nothing } else { pair }
+        }
+        Err(_) => nothing,
+    }
+}
+
+fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
+    let mut out =
+        format!("{:<8} {:<9} {:>8} {:>8} {:>5} {:>7} {:>9}", "motor", "propeller", "thrust N", "A", "N/A", "hovers", "resultant");
+    let counts: Vec<u32> = rows.first().map_or_else(Vec::new, |r| r.with_batteries.iter().map(|w| w.batteries).collect());
+    for n in &counts {
+        out += &format!(" {:>7}", format!("min x{n}"));
+    }
+    out.push('\n');
+    for r in rows {
+        let mark = if chosen.iter().any(|c| std::ptr::eq(*c, r)) { "  meets the need" } else { "" };
+        let with = r.with_batteries.iter().find(|w| w.batteries == need.batteries);
+        out += &format!(
+            "{:<8} {:<9} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
+            r.pair.motor,
+            r.pair.propeller,
+            r.total_thrust_n.0 / 4.0,
+            r.pair.maximum.map_or(f64::NAN, |m| m.current_a.0),
+            r.efficiency_n_per_a,
+            r.hover_mass_kg.0,
+            with.map_or(f64::NAN, |w| w.resultant_n.0)
+        );
+        for w in &r.with_batteries {
+            out += &format!(" {:>7.1}", w.full_throttle_min.0);
+        }
+        out += mark;
+        out.push('\n');
+    }
+    for p in pairs.iter().filter(|p| p.maximum.is_none()) {
+        out += &format!("{:<8} {:<9} no result\n", p.motor, p.propeller);
+    }
+    match chosen.first() {
+        Some(best) => out += &format!("choice: {} with {}\n", best.pair.motor, best.pair.propeller),
+        None => out += &format!("choice: none gives {:.2} N in total under these needs\n", need.total_thrust_n.0),
+    }
+    out
+}

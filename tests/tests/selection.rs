@@ -1,0 +1,76 @@
+//! `quadrig select` and `quadrig beam` as a designer types them.
+//!
+//! What it is: Table 9's rows and choice, a measured run as a pair, the beam of Table 7 with its warnings, pages without network.
+//! What can go wrong: a figure of the errata that no longer comes out; a page that asks the network for something.
+//! Units: as printed.
+//! Reference: specification `identification.md`, item 4; errata, Table 9 and "beam (Table 7)".
+
+use quadrig_tests::{call, root};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A page or figure that loads nothing and runs nothing.
+fn stands_alone(text: &str) {
+    let linked = text.replace("http://www.w3.org/2000/svg", "");
+    for word in ["http:", "https:", "<script", "@import", "url(", "<link", "<img"] {
+        assert!(!linked.contains(word), "the page holds {word}");
+    }
+}
+
+#[test]
+fn the_thesis_choice_with_its_page() {
+    let folder = TempDir::new().unwrap();
+    let said = call(folder.path(), &["select", "--motor", "570KV", "--json", "-o", "page.html", "--svg", "figures"]).succeeded();
+    let json: Value = serde_json::from_str(&said.out).unwrap();
+    assert_eq!(json["chosen"][0], "570KV 11x4.7");
+    assert_eq!(json["chosen"].as_array().unwrap().len(), 3);
+    let row = json["rows"].as_array().unwrap().iter().find(|r| r["pair"]["propeller"] == "11x4.7").unwrap();
+    let resultant = row["with_batteries"][0]["resultant_n"].as_f64().unwrap();
+    assert_eq!(format!("{resultant:.1}"), "11.6");
+    stands_alone(&std::fs::read_to_string(folder.path().join("page.html")).unwrap());
+    for name in ["fig-6-2-thrust", "fig-6-3-current", "fig-6-4-efficiency", "model-mass", "endurance-570kv-3"] {
+        stands_alone(&std::fs::read_to_string(folder.path().join(format!("figures/{name}.svg"))).unwrap());
+    }
+}
+
+#[test]
+fn a_measured_run_is_a_pair_and_knows_its_hover() {
+    let folder = TempDir::new().unwrap();
+    let scenario = root().join("examples/sagging-lead.toml");
+    call(folder.path(), &["--quiet", "sim", scenario.to_str().unwrap(), "-o", "run.csv"]).succeeded();
+    let said = call(folder.path(), &["select", "run.csv", "--json"]).succeeded();
+    let json: Value = serde_json::from_str(&said.out).unwrap();
+    let row = &json["rows"][0];
+    assert_eq!(row["pair"]["motor"], "570KV");
+    let hover = row["with_batteries"][0]["hover_min"].as_f64().expect("the levels give the current in hover");
+    let full = row["with_batteries"][0]["full_throttle_min"].as_f64().unwrap();
+    assert!((15.0..35.0).contains(&hover) && hover > 1.5 * full, "{hover} {full}");
+    let said = call(folder.path(), &["beam", "--run", "run.csv"]).succeeded();
+    assert_eq!(said.err.lines().count(), 2, "{}", said.err);
+    assert!(said.err.contains("resonance at 2511 rev/min (unbalance") && said.err.contains("1255 rev/min (blade pass)"));
+}
+
+#[test]
+fn the_beam_of_table_7_and_a_wrong_one() {
+    let folder = TempDir::new().unwrap();
+    let said = call(folder.path(), &["beam", "--speeds", "600,1100", "--near", "5", "-o", "beam.html"]).succeeded();
+    assert_eq!(said.err, "", "no resonance below 1255 rev/min");
+    for figure in ["30.08 MPa", "150.4 microstrain", "3.633 mV", "0.442 mm", "478 mm", "41.8 Hz"] {
+        assert!(said.out.contains(figure), "{figure} in {}", said.out);
+    }
+    stands_alone(&std::fs::read_to_string(folder.path().join("beam.html")).unwrap());
+    let long = call(folder.path(), &["--quiet", "beam", "--length", "450", "--load", "1250"]).succeeded();
+    assert!(
+        long.err.contains("warning: the safety factor is 1.36; expected at least 2 (shorten to 306 mm or load at most 849 g)")
+    );
+    call(folder.path(), &["beam", "--height", "0"]).refused(&["--height 0: expected a positive number"]);
+}
+
+#[test]
+fn bad_pairs_are_refused_with_their_place() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("pairs.csv"), "motor,propeller,thrust_n,current_a\nA,10x5,3,\n").unwrap();
+    call(folder.path(), &["select", "pairs.csv", "-o", "page.html"]).refused(&["pairs.csv:2: column current_a: ''"]);
+    assert!(!folder.path().join("page.html").exists());
+    call(folder.path(), &["select", "--motor", "1KV"]).refused(&["--motor 1KV: no pair has this motor"]);
+}
