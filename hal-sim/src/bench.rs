@@ -22,13 +22,14 @@
 //! # let _ = (wake, strain_v, beep);
 //! ```
 
-use crate::effect::{EffectKind, Levers};
+use crate::effect::{Levers, Scheduled};
 use crate::noise::{Source, Stream};
 use crate::plant::beam::BeamMode;
 use crate::plant::bridge::BridgeState;
-use crate::plant::{Beam, Bridge, Esc, EscDialogue, EscState, Parts, PlantState, Powerplant, RigPlant};
+use crate::plant::mount::MountState;
+use crate::plant::{Beam, Bridge, Esc, EscDialogue, EscState, Mount, Parts, PlantState, Powerplant, RigPlant};
 use crate::scenario::Scenario;
-use crate::sensor::{AnalogFront, Converter, Edge, EdgeDetail, Geometry, Tachometers};
+use crate::sensor::{AnalogFront, Converter, Edge, EdgeDetail, Geometry, Logger, Tachometers};
 use core::f64::consts::TAU;
 use firmware_rig::AdcBlock;
 use frame::calibration::Calibration;
@@ -57,6 +58,8 @@ pub struct BenchParts {
     pub beam: Beam,
     /// Bridge and amplifier.
     pub bridge: Bridge,
+    /// Joints of motor and torque arm.
+    pub mount: Mount,
     /// Speed sensors.
     pub geometry: Geometry,
     /// Standard deviation of the mean over 0.1 s of each analogue channel, in its unit.
@@ -89,11 +92,17 @@ pub struct Millisecond {
 pub struct Bench {
     esc: EscDialogue,
     plant: Box<dyn Powerplant>,
-    effects: Vec<EffectKind>,
+    base: BenchParts,
+    effects: Vec<Scheduled>,
+    open: u128,
+    seed: u64,
     levers: Levers,
     beam: Beam,
     mode: BeamMode,
     bridge: BridgeState,
+    mount: Mount,
+    joints: MountState,
+    logger: Logger,
     front: AnalogFront,
     converter: Converter,
     geometry: Geometry,
@@ -103,7 +112,7 @@ pub struct Bench {
     angle_rev: f64,
     heavy_spot_rev: f64,
     strain_v: [f64; STEPS_PER_MS],
-    pins_v: [f64; ADC_CHANNELS],
+    torque_v: f64,
     output_us: f64,
     edges: VecDeque<Edge>,
     truth: Truth,
@@ -114,10 +123,10 @@ impl Bench {
     /// powerplant then have nothing to act on, those on the load cell and the sensors still do.
     #[must_use]
     pub fn new(scenario: &Scenario, plant: Option<Box<dyn Powerplant>>, detail: EdgeDetail) -> Self {
-        let mut parts = scenario.parts();
-        for effect in &scenario.effects {
-            effect.fit(&mut parts);
-        }
+        let base = scenario.parts();
+        let effects = scenario.effects.clone();
+        let open = open(&effects, -1.0);
+        let parts = fitted(&base, &effects, open);
         let seed = scenario.seed;
         let mut phase = Stream::new(seed, Source::Phase, 0);
         let angle_rev = phase.uniform();
@@ -127,11 +136,17 @@ impl Bench {
         Self {
             esc: EscDialogue::new(parts.esc, cells),
             plant,
-            effects: scenario.effects.clone(),
+            base,
+            effects,
+            open,
+            seed,
             levers: Levers::default(),
             mode: BeamMode::new(&parts.beam, STEP_S),
             beam: parts.beam,
             bridge: BridgeState::new(parts.bridge, STEP_S),
+            mount: parts.mount,
+            joints: MountState::default(),
+            logger: Logger::default(),
             converter: Converter::new(&front, parts.noise, seed),
             tachometers: Tachometers::new(&parts.geometry, detail, seed, angle_rev),
             geometry: parts.geometry,
@@ -140,12 +155,36 @@ impl Bench {
             angle_rev,
             heavy_spot_rev: phase.uniform(),
             strain_v: [front.zero_v[0]; STEPS_PER_MS],
-            pins_v: front.zero_v,
+            torque_v: front.zero_v[1],
             front,
             output_us: 1000.0,
             edges: VecDeque::new(),
             truth: Truth::default(),
         }
+    }
+
+    /// Puts the parts of the effects whose windows are open now in the place of those so far. All states go on.
+    fn refit(&mut self) {
+        let parts = fitted(&self.base, &self.effects, self.open);
+        self.esc.refit(parts.esc);
+        self.plant.refit(&parts.plant);
+        self.mode.refit(&parts.beam, STEP_S);
+        self.beam = parts.beam;
+        self.bridge.refit(parts.bridge, STEP_S);
+        self.mount = parts.mount;
+        self.tachometers.refit(&parts.geometry, self.angle_rev);
+        self.geometry = parts.geometry;
+    }
+
+    /// Voltages at the pins without noise.
+    fn pins_v(&self) -> [f64; ADC_CHANNELS] {
+        let strain_v = self.strain_v[((self.steps + STEPS_PER_MS as u64 - 1) % STEPS_PER_MS as u64) as usize];
+        let mut pins = self.front.pins(strain_v, &self.truth.plant);
+        pins[1] = self.torque_v;
+        for (pin, spike) in pins.iter_mut().zip(self.levers.spike_v) {
+            *pin += spike;
+        }
+        pins
     }
 
     /// The operator's switch: connects or cuts the ESC's power.
@@ -196,12 +235,14 @@ impl Bench {
     /// Voltages at the pins of strain, torque, current, voltage and temperature, noise of the wires included, V.
     #[must_use]
     pub fn voltages(&self) -> [f64; ADC_CHANNELS] {
-        core::array::from_fn(|i| self.pins_v[i] + self.converter.offset_v(i))
+        let pins = self.pins_v();
+        core::array::from_fn(|i| pins[i] + self.converter.offset_v(i))
     }
 
     /// One conversion of an ADC channel now, with its own noise, 12 bits. Each call draws new noise.
     pub fn convert(&mut self, channel: usize) -> u16 {
-        self.converter.convert(channel, self.pins_v[channel])
+        let pins = self.pins_v();
+        self.converter.convert(channel, pins[channel])
     }
 
     /// The next beep pattern that has ended, with the time of its end, ns.
@@ -242,7 +283,10 @@ impl Bench {
         }
         // Five channels at 480 cycles each and 21 MHz: 8.5 conversions of each in a millisecond.
         let count = 8 + ((self.steps / STEPS_PER_MS as u64) & 1) as u16;
-        let pins_v = self.pins_v;
+        let pins_v = self.pins_v();
+        if self.levers.spike_v[0] != 0.0 {
+            self.strain_v.iter_mut().for_each(|v| *v += self.levers.spike_v[0]);
+        }
         for (channel, block) in out.adc.iter_mut().enumerate() {
             *block = match channel {
                 0 => self.converter.block(0, count, &self.strain_v),
@@ -259,13 +303,21 @@ impl Bench {
             Some(start) => (self.steps - start) as f64 * STEP_S,
             None => -1.0,
         };
-        self.levers = Levers::default();
+        let open = open(&self.effects, run_s);
+        if open != self.open {
+            self.open = open;
+            self.refit();
+        }
+        self.levers = Levers { seed: self.seed, ..Levers::default() };
         self.levers.plant.run_s = run_s;
         if run_s >= 0.0 {
-            for effect in &self.effects {
-                effect.act(run_s, &mut self.levers);
+            for (i, effect) in self.effects.iter().enumerate() {
+                if open & (1 << i) != 0 {
+                    effect.act(run_s, &mut self.levers);
+                }
             }
         }
+        self.tachometers.couple(!self.levers.encoder_off);
         self.plant.adjust(&self.levers.plant);
         self.truth.run_s = run_s;
     }
@@ -288,7 +340,7 @@ impl Bench {
         let (start_ns, start_ticks) = (self.steps * STEP_NS, self.steps * STEP_TICKS);
         let edges = &mut self.edges;
         let before = edges.len();
-        self.tachometers.step(from, to, |channel, rising, fraction| {
+        self.tachometers.step(from, to, speed_rev_s, |channel, rising, fraction| {
             edges.push_back(Edge {
                 channel,
                 rising,
@@ -301,18 +353,69 @@ impl Bench {
         }
         self.angle_rev = to;
 
+        self.joints.shake(&self.mount, to - from);
+        let (lift_n, torque_nm) = self.joints.tilted(&self.mount, state.thrust_n, state.torque_nm, self.beam.length_m);
         let speed = speed_rev_s * TAU;
-        let mut force = state.thrust_n;
+        let mut force = lift_n;
         if speed > 0.0 {
             let turn = to + self.heavy_spot_rev;
-            force += self.beam.shaking_n(speed, libm::cos(TAU * (turn - turn.floor())));
+            let unbalance = Beam { unbalance_kgm: self.beam.unbalance_kgm + self.levers.unbalance_kgm, ..self.beam };
+            force += unbalance.shaking_n(speed, turn_cosine(turn));
         }
         let beam_n = self.mode.step(force);
-        let zero_n = self.levers.strain_zero_n + self.levers.torque_to_lift * state.torque_nm;
+        let zero_n = self.levers.strain_zero_n + self.levers.torque_to_lift * torque_nm;
         let strain_v = self.bridge.step(beam_n, zero_n, self.levers.strain_gain, state.temp_c);
-        self.pins_v = self.front.pins(strain_v, &state);
+        let torque_v = self.front.torque_v(self.joints.arm(&self.mount, torque_nm));
+        let [strain_v, torque_v] = self.logger.pass([strain_v, torque_v], self.levers.late_s, STEP_S);
+        self.torque_v = torque_v;
         self.strain_v[(self.steps % STEPS_PER_MS as u64) as usize] = strain_v;
         self.truth = Truth { run_s: self.truth.run_s, pulse_us: self.output_us, plant: state, beam_n };
         self.steps += 1;
+    }
+}
+
+/// Bits of the effects whose windows are open `run_s` into the run. A scenario holds at most 128 effects.
+fn open(effects: &[Scheduled], run_s: f64) -> u128 {
+    effects.iter().enumerate().filter(|(_, e)| e.is_open(run_s)).fold(0, |bits, (i, _)| bits | 1 << i)
+}
+
+/// The parts with the effects of `open` fitted.
+fn fitted(base: &BenchParts, effects: &[Scheduled], open: u128) -> BenchParts {
+    let mut parts = base.clone();
+    for (_, effect) in effects.iter().enumerate().filter(|(i, _)| open & (1 << i) != 0) {
+        effect.fit(&mut parts);
+    }
+    parts
+}
+
+/// cos(2 pi turn), to 1e-10: the Taylor series of the nearest half turn. `libm::cos` costs as much as the rest of a step.
+fn turn_cosine(turn: f64) -> f64 {
+    let part = turn - turn.floor();
+    let near = (part - 0.5).abs(); // 0.5 at the heavy spot, 0 opposite
+    let (distance, sign) = if near > 0.25 { (0.5 - near, 1.0) } else { (near, -1.0) };
+    let y = TAU * TAU * distance * distance;
+    const TERMS: [f64; 8] = [
+        1.0 / 20_922_789_888_000.0,
+        -1.0 / 87_178_291_200.0,
+        1.0 / 479_001_600.0,
+        -1.0 / 3_628_800.0,
+        1.0 / 40_320.0,
+        -1.0 / 720.0,
+        1.0 / 24.0,
+        -0.5,
+    ];
+    sign * (1.0 + y * TERMS.iter().fold(0.0, |sum, term| sum * y + term))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cosine_of_a_turn_is_that_of_the_library() {
+        for i in -3000..3000 {
+            let turn = f64::from(i) * 1.37e-3;
+            assert!((turn_cosine(turn) - libm::cos(TAU * turn)).abs() < 1e-10, "{turn}");
+        }
     }
 }

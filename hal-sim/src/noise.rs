@@ -28,6 +28,15 @@ pub enum Source {
     Phase = 60,
 }
 
+/// A uniform number in 0..1 that depends on `seed` and `slot` alone: for events at random instants (splitmix64).
+#[must_use]
+pub fn chance(seed: u64, slot: u64) -> f64 {
+    let mut z = seed.wrapping_mul(0xD129_0309_5FA5_1F4D).wrapping_add(slot.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((z ^ (z >> 31)) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
 /// One stream of random numbers.
 #[derive(Debug, Clone)]
 pub struct Stream {

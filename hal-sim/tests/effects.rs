@@ -11,7 +11,7 @@ fn sweep(seed: u64, effect: Option<&str>) -> Scenario {
     let schedule = Schedule::UpDown { step_us: 200.0, hold_s: 4.0, top_us: 2000.0 };
     let mut scenario = Scenario { seed, schedule, ..Scenario::default() };
     if let Some(id) = effect {
-        scenario.effects.push(find(id).unwrap().draw(seed, scenario.run_s()));
+        scenario.effects.push(find(id).unwrap().draw(seed, scenario.run_s()).into());
     }
     scenario
 }
@@ -71,7 +71,19 @@ fn expectation(id: &str) -> (&'static [&'static str], [bool; 5]) {
         "air_density" => (&["rpm", "thrust", "torque", "temp"], [false, false, false, true, false]),
         "blade_damage" | "blade_flex" => (&["rpm", "thrust", "torque"], [false, false, false, true, true]),
         "thermal_zero" => (&["thrust", "temp"], [false, true, true, true, false]),
-        "missed_pulses" => (&["reading"], [true; 5]),
+        "stall" => (&["rpm", "thrust", "current"], [false, false, false, true, true]),
+        "missed_pulses" | "double_pulses" | "alternating_period" | "blade_twist" | "coupling_slip" | "dead_rotor_speed" => {
+            (&["reading"], [true; 5])
+        }
+        "encoder_drag" => (&["reading", "rpm", "current"], [false, false, false, true, true]),
+        "clock_drift" => (&["thrust", "torque"], [false, false, true, true, true]),
+        "glitch_rows" => (&[], [false; 5]), // which channel is drawn: see the test of its own
+        "recirculation" => (&["thrust", "torque", "rpm"], [false, false, false, true, true]),
+        "magnet_heat" | "stator_saturation" | "esc_timing" => (&["rpm", "current"], [false, false, false, true, true]),
+        "blade_icing" => (&["rpm", "thrust", "torque"], [false, false, false, true, true]),
+        "loosening_mount" => (&["thrust", "torque"], [false, false, true, true, true]),
+        "desync" => (&["rpm", "current"], [false, false, false, true, true]),
+        "arm_friction" => (&["torque"], [true, false, true, true, true]),
         "zero_drift" | "tare_shift" | "gain_change" | "creep" | "hysteresis" | "beam_resonance" | "torque_crosstalk" => {
             (&["thrust"], load_cell)
         }
@@ -149,4 +161,63 @@ fn the_resonance_shows_in_the_scatter_at_its_own_speed() {
     };
     let (near, far) = (rms(39.0, 43.0), rms(70.0, 100.0));
     assert!(near > 4.0 * far, "{near} {far}");
+}
+
+/// Bursts spoil single rows of the drawn channel and leave the others alone.
+#[test]
+fn glitches_are_few_and_far_off() {
+    let scenario = sweep(4, Some("glitch_rows"));
+    let channel = scenario.effects[0].parameters()[0].1 as usize;
+    let (clean, with) = (fly(&sweep(4, None)), fly(&scenario));
+    let gain = f64::from(clean.calibration.adc[channel].gain).abs();
+    let off: Vec<f64> = clean
+        .samples
+        .iter()
+        .zip(&with.samples)
+        .map(|(a, b)| {
+            let mean = |c: frame::rig::AdcCode| f64::from(c.sum) / f64::from(c.count);
+            (gain * (mean(a.adc[channel]) - mean(b.adc[channel]))).abs()
+        })
+        .collect();
+    let far = off.iter().filter(|d| **d > 20.0 * NOISE[channel]).count();
+    let same = off.iter().filter(|d| **d == 0.0).count();
+    println!("{far} rows of {} spoilt, {same} equal", off.len());
+    assert!((1..off.len() / 20).contains(&far), "{far}");
+    assert!(far + same >= off.len() - 2 && clean.samples.iter().zip(&with.samples).all(|(a, b)| a.rpm == b.rpm));
+}
+
+/// Any effect can be confined to a window of the run: before it and, where nothing is left behind, after it the rig is healthy.
+#[test]
+fn every_effect_can_be_scheduled_in_time() {
+    let clean = fly(&sweep(6, None));
+    let (from, until) = (10.0, 34.0);
+    for entry in catalogue() {
+        let mut scenario = sweep(6, Some(entry.id));
+        scenario.effects[0].from_s = Some(from);
+        scenario.effects[0].until_s = Some(until);
+        let with = fly(&scenario);
+        let equal = |low: f64, high: f64| {
+            let inside = |i: &usize| (low..high).contains(&clean.truth[*i].run_s);
+            (0..clean.samples.len()).filter(inside).all(|i| clean.samples[i] == with.samples[i])
+        };
+        assert!(equal(0.0, from), "{}: nothing before the window", entry.id);
+        // a burst need not fall into the window
+        if entry.id != "glitch_rows" {
+            assert!(!equal(from, until + 2.0), "{}: something in the window", entry.id);
+        }
+        // two seconds before the rotor stops, on the last level of the way down
+        let last = clean.truth.iter().rposition(|t| t.plant.rpm > 500.0).unwrap() - 20;
+        let (a, b) = (clean.truth[last].plant, with.truth[last].plant);
+        assert!(clean.truth[last].run_s > until + 2.0);
+        assert!((b.rpm / a.rpm - 1.0).abs() < 0.02, "{}: {} rev/min after the window, {} without it", entry.id, b.rpm, a.rpm);
+    }
+}
+
+/// What only the simulator knows: at least six, and none of them in the list of the specification.
+#[test]
+fn some_effects_are_of_our_own_invention() {
+    assert!(hal_sim::effect::UNKNOWN.len() >= 6);
+    for id in hal_sim::effect::UNKNOWN {
+        assert!(find(id).is_some(), "{id}");
+    }
 }

@@ -1,7 +1,8 @@
 //! Hidden effects: what a rig does and its declared model does not say.
 //!
 //! What it is: one physical mechanism a file, described by its parameters; an effect either fits another part to the bench
-//! before the run or moves a parameter of a part as a function of the run's own time. The parts integrate it.
+//! or moves a parameter of a part as a function of the run's own time. The parts integrate it. Each acts throughout or in a
+//! window of the run ([`Scheduled`]).
 //! What can go wrong: effects on the powerplant do nothing when an identified model stands in for it.
 //! Units: each parameter carries its own in its name.
 //! Reference: specification `closing-the-loop.md`, "Effects that the library starts with" (ids and parameters).
@@ -11,7 +12,11 @@
 use crate::bench::BenchParts;
 use crate::noise::{Source, Stream};
 use crate::plant::PlantLevers;
+use frame::rig::ADC_CHANNELS;
 use serde::{Deserialize, Serialize};
+
+mod scheduled;
+pub use scheduled::Scheduled;
 
 /// Parameters that effects move during a run. The default is a healthy rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,11 +29,31 @@ pub struct Levers {
     pub strain_gain: f64,
     /// Lift read per torque on the arm, N/(N.m).
     pub torque_to_lift: f64,
+    /// Unbalance on top of the propeller's own, kg.m.
+    pub unbalance_kgm: f64,
+    /// The encoder is off the shaft.
+    pub encoder_off: bool,
+    /// How far the load cell's logger is behind, s.
+    pub late_s: f64,
+    /// What is coupled into the wires at the ADC pins, V.
+    pub spike_v: [f64; ADC_CHANNELS],
+    /// Seed of the run, for effects that happen at random instants.
+    pub seed: u64,
 }
 
 impl Default for Levers {
     fn default() -> Self {
-        Self { plant: PlantLevers::default(), strain_zero_n: 0.0, strain_gain: 1.0, torque_to_lift: 0.0 }
+        Self {
+            plant: PlantLevers::default(),
+            strain_zero_n: 0.0,
+            strain_gain: 1.0,
+            torque_to_lift: 0.0,
+            unbalance_kgm: 0.0,
+            encoder_off: false,
+            late_s: 0.0,
+            spike_v: [0.0; ADC_CHANNELS],
+            seed: 0,
+        }
     }
 }
 
@@ -152,7 +177,36 @@ effects! {
     channel_filter::ChannelFilter,
     sample_hold::SampleHold,
     quantisation::Quantisation,
+    stall::Stall,
+    double_pulses::DoublePulses,
+    alternating_period::AlternatingPeriod,
+    blade_twist::BladeTwist,
+    encoder_drag::EncoderDrag,
+    coupling_slip::CouplingSlip,
+    clock_drift::ClockDrift,
+    glitch_rows::GlitchRows,
+    dead_rotor_speed::DeadRotorSpeed,
+    recirculation::Recirculation,
+    magnet_heat::MagnetHeat,
+    blade_icing::BladeIcing,
+    loosening_mount::LooseningMount,
+    esc_timing::EscTiming,
+    stator_saturation::StatorSaturation,
+    desync::Desync,
+    arm_friction::ArmFriction,
 }
+
+/// Effects of ours that the library of the identification does not know.
+pub const UNKNOWN: [&str; 8] = [
+    "recirculation",
+    "magnet_heat",
+    "blade_icing",
+    "loosening_mount",
+    "esc_timing",
+    "stator_saturation",
+    "desync",
+    "arm_friction",
+];
 
 #[cfg(test)]
 mod tests {

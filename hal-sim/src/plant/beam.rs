@@ -76,6 +76,11 @@ impl BeamMode {
         Self { force_n: 0.0, rate: 0.0, a, b }
     }
 
+    /// Goes on from here with another beam.
+    pub fn refit(&mut self, beam: &Beam, dt_s: f64) {
+        *self = Self { force_n: self.force_n, rate: self.rate, ..Self::new(beam, dt_s) };
+    }
+
     /// One step under a tip force; gives the spring force that the gauges see, N.
     pub fn step(&mut self, force_n: f64) -> f64 {
         let (x, v) = (self.force_n, self.rate);

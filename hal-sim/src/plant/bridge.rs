@@ -125,6 +125,22 @@ impl BridgeState {
         }
     }
 
+    /// Goes on from here with another bridge; a meter is replaced only when it is another one.
+    pub fn refit(&mut self, bridge: Bridge, dt_s: f64) {
+        let fresh = Self::new(bridge, dt_s);
+        let meter =
+            if bridge.meter == self.bridge.meter { self.meter.clone() } else { MeterState::new(bridge.meter, self.pin_v, dt_s) };
+        *self = Self {
+            creep_n: self.creep_n,
+            lift_n: self.lift_n,
+            stuck_n: self.stuck_n,
+            output_v: self.output_v,
+            pin_v: self.pin_v,
+            meter,
+            ..fresh
+        };
+    }
+
     /// One step: `lift_n` on the beam, `zero_n` and `gain` of the moment, rig temperature; gives the pin voltage.
     pub fn step(&mut self, lift_n: f64, zero_n: f64, gain: f64, temperature_c: f64) -> f64 {
         let b = &self.bridge;

@@ -103,6 +103,12 @@ impl EscDialogue {
         (self.esc.range_min_ns, self.esc.range_max_ns)
     }
 
+    /// Goes on with another ESC's properties; the stored range stays.
+    pub fn refit(&mut self, esc: Esc) {
+        let (low, high) = self.range_ns();
+        self.esc = Esc { range_min_ns: low, range_max_ns: high, ..esc };
+    }
+
     /// Connects or cuts the power.
     pub fn set_power(&mut self, on: bool) {
         if on && self.state == EscState::Off {

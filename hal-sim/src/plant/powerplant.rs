@@ -8,9 +8,12 @@
 
 use super::air::Air;
 use super::blade::Blade;
+use super::commutation::{Commutation, CommutationState};
+use super::flux::{Flux, FluxState};
 use super::limiter::{Limiter, LimiterState};
 use super::motor::Motor;
 use super::propeller::Propeller;
+use super::room_air::{Draught, RoomAir};
 use super::supply::Supply;
 use super::thermal::{Thermal, ThermalState};
 use crate::noise::{Coloured, Source, Stream};
@@ -47,6 +50,18 @@ pub trait Powerplant: Send {
     fn adjust(&mut self, levers: &PlantLevers) {
         let _ = levers;
     }
+
+    /// Takes changed parts in the midst of a run; what turns, flows and glows goes on. A model that is not made of parts
+    /// ignores it.
+    fn refit(&mut self, parts: &Parts) {
+        let _ = parts;
+    }
+
+    /// Voltage between two windings at this instant, V, for the back-EMF meter; `None` of a model that has no windings.
+    fn line_to_line_v(&self, angle_rev: f64) -> Option<f64> {
+        let _ = angle_rev;
+        None
+    }
 }
 
 /// Parameters of the plant that effects move during a run. The default is a healthy rig.
@@ -66,6 +81,8 @@ pub struct PlantLevers {
     pub thrust_factor: f64,
     /// Factor on the torque coefficient.
     pub torque_factor: f64,
+    /// Inertia on top of rotor's and propeller's own, kg.m^2.
+    pub inertia_kgm2: f64,
 }
 
 impl Default for PlantLevers {
@@ -78,6 +95,7 @@ impl Default for PlantLevers {
             drag_share: 0.0,
             thrust_factor: 1.0,
             torque_factor: 1.0,
+            inertia_kgm2: 0.0,
         }
     }
 }
@@ -89,20 +107,49 @@ pub struct Parts {
     pub supply: Supply,
     /// Motor and ESC output stage.
     pub motor: Motor,
+    /// Magnets, iron and timing of the motor.
+    pub flux: Flux,
     /// Propeller.
     pub propeller: Propeller,
     /// Air.
     pub air: Air,
+    /// The room around the rotor.
+    pub room: RoomAir,
     /// Temperature node.
     pub thermal: Thermal,
     /// The density of the air follows the room temperature.
     pub air_follows_room: bool,
     /// ESC output stage.
     pub limiter: Limiter,
+    /// Loss of the rotor's angle.
+    pub commutation: Commutation,
     /// Departure of the blades from the square law.
     pub blade: Blade,
     /// Turbulence: relative standard deviation of the drag torque.
     pub gust: f64,
+}
+
+/// What is constant for a millisecond: everything that heats, drains, drifts or blows.
+#[derive(Debug, Clone, Copy, Default)]
+struct Slow {
+    open_v: f64,
+    line_ohm: f64,
+    kt: f64,
+    holding_nm: f64,
+    drag_nms: f64,
+    air_k: f64,
+    thrust_k: f64,
+    per_inertia: f64,
+    inertia: f64,
+    driven: bool,
+}
+
+/// Drive voltage and conductance of the winding at one duty cycle.
+#[derive(Debug, Clone, Copy, Default)]
+struct Drive {
+    duty: f64,
+    emf_free_v: f64,
+    per_ohm: f64,
 }
 
 /// The simulated powerplant.
@@ -111,71 +158,111 @@ pub struct RigPlant {
     parts: Parts,
     levers: PlantLevers,
     thermal: ThermalState,
+    flux: FluxState,
+    draught: Draught,
+    commutation: CommutationState,
     gusts: Coloured,
-    gust: f64,
-    blade: (f64, f64),
-    thinning: f64,
-    to_gust_s: f64,
-    speed: f64,
     limiter: LimiterState,
-    thrust_k: f64,
-    torque_k: f64,
-    inertia: f64,
-    kt: f64,
+    slow: Slow,
+    drive: Drive,
+    steps: u32,
+    elapsed_s: f64,
+    speed: f64,
+    motor_a: f64,
+    supply_a: f64,
+    charge_as: f64,
 }
 
 /// Interval and correlation time of the gusts, s.
 const GUST_INTERVAL_S: f64 = 1.0e-3;
 const GUST_TAU_S: f64 = 0.05;
+/// Steps of the fast integration in one of the slow.
+const SLOW_STEPS: u32 = 10;
 
 impl RigPlant {
     /// At rest.
     #[must_use]
     pub fn new(parts: Parts, seed: u64) -> Self {
-        let density = parts.air.density() / parts.propeller.reference_density;
         let gusts = Coloured::new(Stream::new(seed, Source::Gust, 0), parts.gust, GUST_TAU_S, GUST_INTERVAL_S);
         Self {
-            thrust_k: parts.propeller.thrust_coefficient * density,
-            torque_k: parts.propeller.torque_coefficient * density,
-            inertia: parts.propeller.inertia_kgm2 + parts.motor.inertia_kgm2,
-            kt: parts.motor.torque_constant(),
             thermal: ThermalState::new(parts.thermal),
+            flux: FluxState::default(),
+            draught: Draught::default(),
+            commutation: CommutationState::default(),
             levers: PlantLevers::default(),
             gusts,
-            gust: 1.0,
-            blade: (1.0, 1.0),
-            thinning: 1.0,
-            to_gust_s: 0.0,
-            speed: 0.0,
             limiter: LimiterState::default(),
+            slow: Slow::default(),
+            drive: Drive::default(),
+            steps: 0,
+            elapsed_s: 0.0,
+            speed: 0.0,
+            motor_a: 0.0,
+            supply_a: ESC_IDLE_A,
+            charge_as: 0.0,
             parts,
         }
     }
 
-    /// Motor current at rotor speed `w` and duty `duty`, A; none flows back.
-    fn motor_current(&self, w: f64, duty: f64) -> f64 {
-        if duty <= 0.0 {
-            return 0.0;
-        }
-        let line = self.parts.supply.resistance_ohm + self.levers.resistance_ohm;
-        let path = self.parts.motor.resistance_ohm + duty * duty * line;
-        ((duty * (self.parts.supply.open_circuit_v() - line * ESC_IDLE_A) - self.kt * w) / path).max(0.0)
+    /// Everything that moves in seconds, once a millisecond.
+    fn settle(&mut self, duty: f64) {
+        let (p, l, dt_s) = (&mut self.parts, &self.levers, self.elapsed_s);
+        p.supply.draw(self.charge_as, 1.0);
+        let run_s = l.run_s.max(0.0);
+        let loss_w = self.motor_a * self.motor_a * p.motor.resistance_ohm + p.motor.friction_nm() * self.speed;
+        self.thermal.step(loss_w, run_s, dt_s);
+        self.limiter.warm(&p.limiter, self.supply_a, dt_s);
+
+        let gust = 1.0 + self.gusts.next();
+        let thinning = if p.air_follows_room { p.thermal.thinning(run_s) } else { 1.0 };
+        let density = p.air.density() * thinning;
+        let relative = density / p.propeller.reference_density;
+        let rpm = self.speed * RPM_PER_RAD_S;
+        let blade = p.blade.factors(rpm);
+        let thrust_n = self.slow.thrust_k * self.speed * self.speed;
+        let inflow = self.draught.step(&p.room, thrust_n, self.speed, density, dt_s);
+        let flux = self.flux.step(&p.flux, rpm, loss_w, self.motor_a, p.thermal.room_c(run_s), dt_s);
+        let inertia = p.propeller.inertia_kgm2 + p.motor.inertia_kgm2 + l.inertia_kgm2;
+        self.slow = Slow {
+            open_v: p.supply.open_circuit_v(),
+            line_ohm: p.supply.resistance_ohm + l.resistance_ohm,
+            kt: p.motor.torque_constant() * flux,
+            holding_nm: p.motor.friction_nm() + l.drag_nm,
+            drag_nms: l.drag_nms,
+            air_k: p.propeller.torque_coefficient * relative * l.torque_factor * blade.1 * inflow.1 * gust,
+            thrust_k: p.propeller.thrust_coefficient * relative * l.thrust_factor * blade.0 * inflow.0,
+            per_inertia: 1.0 / inertia,
+            inertia,
+            driven: self.commutation.step(&p.commutation, self.motor_a, dt_s),
+        };
+        self.drive = self.driving(duty);
+        (self.steps, self.elapsed_s, self.charge_as) = (0, 0.0, 0.0);
     }
 
-    /// Sum of the torques that oppose the rotor at `w`, N.m: friction, extra drag, air.
-    fn opposing(&self, w: f64) -> (f64, f64, f64) {
-        let l = &self.levers;
-        let extra = l.drag_nm + l.drag_nms * w;
-        let air = self.torque_k * l.torque_factor * self.thinning * self.blade.1 * self.gust * w * w;
-        (self.parts.motor.friction_nm(), extra, air)
+    fn driving(&self, duty: f64) -> Drive {
+        if duty <= 0.0 || !self.slow.driven {
+            return Drive { duty, ..Drive::default() };
+        }
+        let s = &self.slow;
+        let per_ohm = 1.0 / (self.parts.motor.resistance_ohm + duty * duty * s.line_ohm);
+        Drive { duty, emf_free_v: duty * (s.open_v - s.line_ohm * ESC_IDLE_A), per_ohm }
+    }
+
+    /// Motor current at rotor speed `w`, A; none flows back.
+    fn motor_current(&self, w: f64) -> f64 {
+        ((self.drive.emf_free_v - self.slow.kt * w) * self.drive.per_ohm).max(0.0)
+    }
+
+    /// Torque of the air at `w`, N.m.
+    fn air_nm(&self, w: f64) -> f64 {
+        self.slow.air_k * w * w
     }
 
     /// Angular acceleration, rad/s^2; friction holds a resting rotor.
-    fn acceleration(&self, w: f64, duty: f64) -> f64 {
-        let (friction, extra, air) = self.opposing(w);
-        let drive = self.kt * self.motor_current(w, duty);
-        let net = drive - friction - extra - air;
-        if w <= 0.0 && net < 0.0 { 0.0 } else { net / self.inertia }
+    fn acceleration(&self, w: f64) -> f64 {
+        let s = &self.slow;
+        let net = s.kt * self.motor_current(w) - s.holding_nm - s.drag_nms * w - self.air_nm(w);
+        if w <= 0.0 && net < 0.0 { 0.0 } else { net * s.per_inertia }
     }
 }
 
@@ -184,46 +271,54 @@ impl Powerplant for RigPlant {
         self.levers = *levers;
     }
 
+    fn refit(&mut self, parts: &Parts) {
+        let drawn_as = self.parts.supply.drawn_as;
+        self.parts = parts.clone();
+        self.parts.supply.drawn_as = drawn_as;
+        self.thermal.refit(parts.thermal);
+    }
+
+    fn line_to_line_v(&self, angle_rev: f64) -> Option<f64> {
+        // Two windings a third of an electrical turn apart: the amplitude between them is the back-EMF constant times speed,
+        // as the ESC's six-step drive sees it.
+        let electrical = angle_rev * f64::from(self.parts.motor.pole_pairs);
+        Some(self.slow.kt * self.speed * libm::sin(TAU * (electrical - electrical.floor())))
+    }
+
+    #[inline]
     fn advance(&mut self, dt_s: f64, pulse_us: f64) -> PlantState {
-        self.to_gust_s -= dt_s;
-        if self.to_gust_s <= 0.0 {
-            self.to_gust_s += GUST_INTERVAL_S;
-            self.gust = 1.0 + self.gusts.next();
-            if self.parts.air_follows_room {
-                self.thinning = self.parts.thermal.thinning(self.levers.run_s.max(0.0));
-            }
-            self.blade = self.parts.blade.factors(self.speed * RPM_PER_RAD_S);
-        }
-        let line = self.parts.supply.resistance_ohm + self.levers.resistance_ohm;
-        let open_v = self.parts.supply.open_circuit_v();
         let asked = self.limiter.duty(&self.parts.limiter, pulse_us, dt_s);
-        let duty = self.parts.limiter.limited(asked, self.kt * self.speed, open_v, self.parts.motor.resistance_ohm, line);
+        let (resistance, kt) = (self.parts.motor.resistance_ohm, self.slow.kt);
+        let duty = self.parts.limiter.limited(asked, kt * self.speed, self.slow.open_v, resistance, self.slow.line_ohm);
+        if self.steps == 0 || self.steps >= SLOW_STEPS {
+            self.settle(duty);
+        } else if duty != self.drive.duty {
+            self.drive = self.driving(duty);
+        }
+        self.steps += 1;
+        self.elapsed_s += dt_s;
 
         // Heun's rule: two evaluations, second order; the rotor's own time constant is some 40 ms.
         let w = self.speed;
-        let first = self.acceleration(w, duty);
-        let guess = (w + first * dt_s).max(0.0);
-        let second = self.acceleration(guess, duty);
-        let next = (w + 0.5 * (first + second) * dt_s).max(0.0);
-        let acceleration = (next - w) / dt_s;
+        let first = self.acceleration(w);
+        let second = self.acceleration((w + first * dt_s).max(0.0));
+        let mean = 0.5 * (first + second);
+        let next = (w + mean * dt_s).max(0.0);
+        let acceleration = if next > 0.0 { mean } else { -w / dt_s };
         self.speed = next;
 
-        let current = self.motor_current(next, duty);
-        let supply_current = duty * current + ESC_IDLE_A;
-        let voltage = open_v - line * supply_current;
-        self.limiter.warm(&self.parts.limiter, supply_current, dt_s);
-        self.parts.supply.draw(supply_current, dt_s);
-        let (friction, extra, air) = self.opposing(next);
-        let loss = current * current * self.parts.motor.resistance_ohm + friction * next;
-        let temp_c = self.thermal.step(loss, self.levers.run_s.max(0.0), dt_s);
+        self.motor_a = self.motor_current(next);
+        self.supply_a = duty * self.motor_a + ESC_IDLE_A;
+        self.charge_as += self.supply_a * dt_s;
+        let extra = self.levers.drag_nm + self.levers.drag_nms * next;
         let seen_drag = if next > 0.0 { self.levers.drag_share * extra } else { 0.0 };
         PlantState {
             rpm: next * RPM_PER_RAD_S,
-            thrust_n: self.thrust_k * self.levers.thrust_factor * self.thinning * self.blade.0 * next * next,
-            torque_nm: air + seen_drag + self.inertia * acceleration,
-            current_a: supply_current,
-            voltage_v: voltage,
-            temp_c,
+            thrust_n: self.slow.thrust_k * next * next,
+            torque_nm: self.air_nm(next) + seen_drag + self.slow.inertia * acceleration,
+            current_a: self.supply_a,
+            voltage_v: self.slow.open_v - self.slow.line_ohm * self.supply_a,
+            temp_c: self.thermal.temperature_c,
         }
     }
 }
@@ -241,6 +336,9 @@ mod tests {
             air: Air::standard(0.0),
             thermal: Thermal::default(),
             air_follows_room: false,
+            flux: Flux::default(),
+            room: RoomAir::default(),
+            commutation: Commutation::default(),
             limiter: Limiter::default(),
             blade: Blade::default(),
             gust: 0.0,
@@ -299,7 +397,7 @@ mod tests {
             w = s.rpm / RPM_PER_RAD_S;
             given += 11.5 * s.current_a * dt;
             let motor_a = (s.current_a - ESC_IDLE_A) / duty;
-            let air = plant.opposing(w).2;
+            let air = plant.air_nm(w);
             let heat = motor_a * motor_a * p.motor.resistance_ohm + s.current_a * s.current_a * 0.1 + s.voltage_v * ESC_IDLE_A;
             spent += (heat + (p.motor.friction_nm() + air) * w) * dt;
         }

@@ -54,6 +54,11 @@ impl ThermalState {
         Self { node, temperature_c: node.ambient_c }
     }
 
+    /// Goes on with another node from the temperature reached.
+    pub fn refit(&mut self, node: Thermal) {
+        self.node = node;
+    }
+
     /// One step with `loss_w` of motor loss, `run_s` into the run.
     pub fn step(&mut self, loss_w: f64, run_s: f64, dt_s: f64) -> f64 {
         let n = &self.node;

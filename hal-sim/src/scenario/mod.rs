@@ -11,11 +11,14 @@ mod section;
 pub use section::{AirSection, LogSection, NoiseSection, Schedule, SensorSection, SpeedSensor, Step, SupplySection};
 
 use crate::bench::BenchParts;
-use crate::effect::{self, EffectKind};
-use crate::plant::{Air, Beam, Blade, Bridge, Esc, Limiter, Motor, Parts, Propeller, Supply, Thermal, supply};
+use crate::effect::{self, Scheduled};
+use crate::plant::{
+    Air, Beam, Blade, Bridge, Commutation, Esc, Flux, Limiter, Motor, Mount, Parts, Propeller, RoomAir, Supply, Thermal, supply,
+};
 use crate::sensor::Geometry;
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::PulseWidth;
+pub(crate) use section::not_negative;
 use section::positive;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use std::path::{Path, PathBuf};
@@ -84,7 +87,7 @@ pub struct Scenario {
     pub noise: NoiseSection,
     /// Hidden effects.
     #[serde(rename = "effect")]
-    pub effects: Vec<EffectKind>,
+    pub effects: Vec<Scheduled>,
 }
 
 impl Default for Scenario {
@@ -117,7 +120,7 @@ impl Scenario {
         if let Some(id) = effect {
             let entry = effect::find(id).ok_or_else(|| ScenarioError::UnknownEffect(id.to_owned()))?;
             scenario.name = format!("demonstration rig with {id}");
-            scenario.effects.push(entry.draw(seed, scenario.run_s()));
+            scenario.effects.push(entry.draw(seed, scenario.run_s()).into());
         }
         Ok(scenario)
     }
@@ -183,6 +186,9 @@ impl Scenario {
             plant: Parts {
                 supply,
                 motor,
+                flux: Flux::default(),
+                room: RoomAir::default(),
+                commutation: Commutation::default(),
                 propeller,
                 air: Air { temperature_c: self.air.temperature_c, pressure_pa: self.air.pressure_pa },
                 thermal: Thermal { ambient_c: self.air.temperature_c, ..Thermal::default() },
@@ -193,6 +199,7 @@ impl Scenario {
             },
             esc: Esc::default(),
             beam: Beam::default(),
+            mount: Mount::default(),
             bridge: Bridge { zero_temperature_c: self.air.temperature_c, ..Bridge::default() },
             noise: [n.thrust_n, n.torque_nm, n.current_a, n.voltage_v, n.temp_k],
         }

@@ -201,7 +201,7 @@ pub(super) fn positive<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error>
     checked(d, |v| v > 0.0 && v.is_finite(), "a number above 0")
 }
 
-fn not_negative<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+pub(crate) fn not_negative<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
     checked(d, |v| v >= 0.0 && v.is_finite(), "a number not below 0")
 }
 

@@ -30,6 +30,8 @@ pub struct AnalogFront {
     pub zero_v: [f64; ADC_CHANNELS],
     /// Channel's unit per volt at the pin.
     pub unit_per_volt: [f64; ADC_CHANNELS],
+    /// The same the other way round.
+    volt_per_unit: [f64; ADC_CHANNELS],
 }
 
 impl AnalogFront {
@@ -37,10 +39,8 @@ impl AnalogFront {
     /// 0.2 V; supply divided by 6; TMP36 (10 mV/K, 0.5 V at 0 degC).
     #[must_use]
     pub fn new(bridge: &Bridge) -> Self {
-        Self {
-            zero_v: [bridge.resting_v(), 1.65, 0.2, 0.0, 0.5],
-            unit_per_volt: [bridge.newton_per_volt(), 0.4, 20.0, 6.0, 100.0],
-        }
+        let unit_per_volt = [bridge.newton_per_volt(), 0.4, 20.0, 6.0, 100.0];
+        Self { zero_v: [bridge.resting_v(), 1.65, 0.2, 0.0, 0.5], unit_per_volt, volt_per_unit: unit_per_volt.map(|u| 1.0 / u) }
     }
 
     /// The scales that turn counts back into values.
@@ -57,9 +57,16 @@ impl AnalogFront {
     #[inline]
     pub fn pins(&self, strain_v: f64, state: &PlantState) -> [f64; ADC_CHANNELS] {
         let values = [0.0, state.torque_nm, state.current_a, state.voltage_v, state.temp_c];
-        let mut out = core::array::from_fn(|i| self.zero_v[i] + values[i] / self.unit_per_volt[i]);
+        let mut out = core::array::from_fn(|i| self.zero_v[i] + values[i] * self.volt_per_unit[i]);
         out[0] = strain_v;
         out
+    }
+
+    /// Voltage of the torque pin at `torque_nm`.
+    #[must_use]
+    #[inline]
+    pub fn torque_v(&self, torque_nm: f64) -> f64 {
+        self.zero_v[1] + torque_nm * self.volt_per_unit[1]
     }
 }
 

@@ -8,6 +8,7 @@
 
 use crate::noise::{Source, Stream};
 use frame::rig::CAPTURE_CHANNELS;
+use std::collections::VecDeque;
 
 /// Steps of the encoder disc (errata, "encoder").
 pub const ENCODER_STEPS: usize = 100;
@@ -51,6 +52,20 @@ pub struct Geometry {
     pub jitter_deg: [f64; CAPTURE_CHANNELS],
     /// Probability that a mark is not seen.
     pub miss: [f64; CAPTURE_CHANNELS],
+    /// Probability that a mark is seen twice.
+    pub double: [f64; CAPTURE_CHANNELS],
+    /// How far behind its mark a second edge stands, deg; less than the width of the narrowest mark (10.8 deg; encoder 1.8 deg).
+    pub ring_deg: f64,
+    /// Speed above which the twisting blade cuts the beam a second time, rev/min.
+    pub twist_onset_rpm: f64,
+    /// Probability of the second cut at twice that speed.
+    pub twist: f64,
+    /// Speed above which the encoder's coupling slips, rev/min.
+    pub slip_onset_rpm: f64,
+    /// Share of the excess of speed that the coupling does not pass on.
+    pub slip: f64,
+    /// Pulses that come out for each mark: 1; a whole fraction (1/2: one blade of two), 0 for none, or 2.
+    pub factor: [f64; CAPTURE_CHANNELS],
 }
 
 impl Default for Geometry {
@@ -61,6 +76,13 @@ impl Default for Geometry {
             magnet_error_deg: 0.0,
             jitter_deg: [0.12, 0.12, 0.12, 0.05],
             miss: [0.0; CAPTURE_CHANNELS],
+            double: [0.0; CAPTURE_CHANNELS],
+            ring_deg: 4.0,
+            twist_onset_rpm: f64::INFINITY,
+            twist: 0.0,
+            slip_onset_rpm: f64::INFINITY,
+            slip: 0.0,
+            factor: [1.0; CAPTURE_CHANNELS],
         }
     }
 }
@@ -75,7 +97,7 @@ impl Geometry {
 
     /// Rising angle and width of each mark of `channel`, revolutions, in the order of passing.
     fn marks_of(&self, channel: usize, seed: u64) -> Vec<(f64, f64)> {
-        match channel {
+        let marks: Vec<(f64, f64)> = match channel {
             0 => (0..self.blades).map(|i| (f64::from(i) / f64::from(self.blades), 0.03)).collect(),
             1 => vec![(0.11, 0.10)],
             2 => vec![(0.23, 0.08), (0.73 + self.magnet_error_deg / 360.0, 0.08)],
@@ -90,7 +112,13 @@ impl Geometry {
                     })
                     .collect()
             }
+        };
+        if self.factor[channel] < 2.0 {
+            return marks;
         }
+        // each mark a second time in the middle of the gap, half as wide
+        let half = 0.5 / marks.len() as f64;
+        marks.into_iter().flat_map(|(at, width)| [(at, 0.5 * width), (at + half, 0.5 * width)]).collect()
     }
 }
 
@@ -102,34 +130,120 @@ struct Channel {
     threshold: f64,
     jitter: f64,
     miss: f64,
+    double: f64,
+    ring: f64,
+    twist: (f64, f64),
+    every: u32,
+    count: u32,
     pins: bool,
     level: bool,
+    /// Edges of a second pulse that are still to come.
+    extra: VecDeque<(f64, bool)>,
     stream: Stream,
 }
 
 impl Channel {
+    /// Sensor `i` at `angle_rev`, which has made `level` so far.
+    fn new(i: usize, geometry: &Geometry, detail: EdgeDetail, seed: u64, angle_rev: f64, stream: Stream) -> Option<Self> {
+        if !geometry.fitted[i] || geometry.factor[i] <= 0.0 {
+            return None;
+        }
+        let mut marks: Vec<(f64, bool)> = Vec::new();
+        for (j, (at, width)) in geometry.marks_of(i, seed).into_iter().enumerate() {
+            match detail {
+                EdgeDetail::Captured if i == 3 && j % ENCODER_PRESCALER != 0 => {}
+                EdgeDetail::Captured => marks.push((at, true)),
+                EdgeDetail::Pins => marks.extend([(at, true), (at + width, false)]),
+            }
+        }
+        let whole = angle_rev.floor();
+        let part = angle_rev - whole;
+        let next = marks.iter().position(|m| m.0 > part).unwrap_or(0);
+        let turn = if marks[next].0 > part { whole } else { whole + 1.0 };
+        let twist = if i == 0 { (geometry.twist_onset_rpm / 60.0, geometry.twist) } else { (f64::INFINITY, 0.0) };
+        let mut channel = Self {
+            level: detail == EdgeDetail::Pins && !marks[next].1,
+            marks,
+            next,
+            turn,
+            threshold: angle_rev,
+            jitter: geometry.jitter_deg[i] / 360.0,
+            miss: geometry.miss[i],
+            double: geometry.double[i],
+            ring: (geometry.ring_deg / 360.0).min(if i == 3 { 0.004 } else { 0.028 }),
+            twist,
+            every: (1.0 / geometry.factor[i] + 0.5).max(1.0) as u32,
+            count: 0,
+            pins: detail == EdgeDetail::Pins,
+            extra: VecDeque::new(),
+            stream,
+        };
+        channel.schedule();
+        Some(channel)
+    }
+
     fn schedule(&mut self) {
         let (at, _) = self.marks[self.next];
         let wanted = self.turn + at + self.jitter * self.stream.normal();
         self.threshold = wanted.max(self.threshold + 1.0e-6);
     }
 
-    fn advance(&mut self) -> Option<bool> {
+    /// Probability that the mark at this speed gives a second pulse.
+    fn doubled(&self, rev_s: f64) -> f64 {
+        let (onset, at_twice) = self.twist;
+        if rev_s > onset { self.double + at_twice * (rev_s / onset - 1.0) } else { self.double }
+    }
+
+    fn advance(&mut self, rev_s: f64) -> Option<bool> {
         let rising = self.marks[self.next].1;
+        let at = self.threshold;
         self.next += 1;
         if self.next == self.marks.len() {
             self.next = 0;
             self.turn += 1.0;
         }
         self.schedule();
+        if rising && self.every > 1 {
+            self.count = (self.count + 1) % self.every;
+            if self.count != 0 {
+                return None;
+            }
+        }
         if rising && self.miss > 0.0 && self.stream.uniform() < self.miss {
             return None;
         }
         if self.pins && rising == self.level {
             return None; // the fall after a mark that was not seen
         }
+        let doubled = self.doubled(rev_s);
+        if rising && doubled > 0.0 && self.stream.uniform() < doubled {
+            if self.pins {
+                self.extra.push_back((at + 0.5 * self.ring, false));
+            }
+            self.extra.push_back((at + self.ring, true));
+        }
         self.level = rising;
         Some(rising)
+    }
+
+    /// The next edge at or before `to`, as (angle, rising); `None` inside where a mark gives no edge.
+    fn pass(&mut self, to: f64, rev_s: f64) -> Option<(f64, Option<bool>)> {
+        if let Some(&(at, rising)) = self.extra.front()
+            && at < self.threshold
+        {
+            if at > to {
+                return None;
+            }
+            self.extra.pop_front();
+            self.level = rising;
+            return Some((at, Some(rising)));
+        }
+        if self.threshold > to {
+            return None;
+        }
+        let at = self.threshold;
+        self.extra.clear(); // a second pulse does not outlast its mark
+        Some((at, self.advance(rev_s)))
     }
 }
 
@@ -137,6 +251,12 @@ impl Channel {
 #[derive(Debug, Clone)]
 pub struct Tachometers {
     channels: [Option<Channel>; CAPTURE_CHANNELS],
+    geometry: Geometry,
+    detail: EdgeDetail,
+    seed: u64,
+    /// Revolutions that the encoder has fallen behind the rotor.
+    behind: f64,
+    coupled: bool,
 }
 
 impl Tachometers {
@@ -144,34 +264,33 @@ impl Tachometers {
     #[must_use]
     pub fn new(geometry: &Geometry, detail: EdgeDetail, seed: u64, angle_rev: f64) -> Self {
         let channels = core::array::from_fn(|i| {
-            if !geometry.fitted[i] {
-                return None;
-            }
-            let mut marks: Vec<(f64, bool)> = Vec::new();
-            for (j, (at, width)) in geometry.marks_of(i, seed).into_iter().enumerate() {
-                match detail {
-                    EdgeDetail::Captured if i == 3 && j % ENCODER_PRESCALER != 0 => {}
-                    EdgeDetail::Captured => marks.push((at, true)),
-                    EdgeDetail::Pins => marks.extend([(at, true), (at + width, false)]),
+            Channel::new(i, geometry, detail, seed, angle_rev, Stream::new(seed, Source::Edge, i as u64))
+        });
+        Self { channels, geometry: *geometry, detail, seed, behind: 0.0, coupled: true }
+    }
+
+    /// Goes on with another geometry from rotor angle `angle_rev`; only the sensors that it changes notice.
+    pub fn refit(&mut self, geometry: &Geometry, angle_rev: f64) {
+        if *geometry == self.geometry {
+            return;
+        }
+        let fresh = Self::new(geometry, self.detail, self.seed, angle_rev);
+        for (i, (old, mut new)) in self.channels.iter_mut().zip(fresh.channels).enumerate() {
+            let behind = if i == 3 { self.behind } else { 0.0 };
+            if let (Some(old), Some(new)) = (old.as_ref(), new.as_mut()) {
+                let stream = old.stream.clone();
+                if let Some(rebuilt) = Channel::new(i, geometry, self.detail, self.seed, angle_rev - behind, stream) {
+                    *new = Channel { level: old.level, ..rebuilt };
                 }
             }
-            let next = marks.iter().position(|m| m.0 > angle_rev).unwrap_or(0);
-            let turn = if marks[next].0 > angle_rev { 0.0 } else { 1.0 };
-            let mut channel = Channel {
-                level: detail == EdgeDetail::Pins && !marks[next].1,
-                marks,
-                next,
-                turn,
-                threshold: angle_rev,
-                jitter: geometry.jitter_deg[i] / 360.0,
-                miss: geometry.miss[i],
-                pins: detail == EdgeDetail::Pins,
-                stream: Stream::new(seed, Source::Edge, i as u64),
-            };
-            channel.schedule();
-            Some(channel)
-        });
-        Self { channels }
+            *old = new;
+        }
+        self.geometry = *geometry;
+    }
+
+    /// Couples the encoder to the shaft or takes it off.
+    pub fn couple(&mut self, coupled: bool) {
+        self.coupled = coupled;
     }
 
     /// Level of a pin now (meaningful with [`EdgeDetail::Pins`]).
@@ -180,17 +299,34 @@ impl Tachometers {
         self.channels.get(channel).and_then(Option::as_ref).is_some_and(|c| c.level)
     }
 
-    /// The rotor moved from `from` to `to` revolutions in one step: calls `edge(channel, rising, fraction of the step)`.
+    /// Revolutions that the encoder falls behind in a step.
+    fn lost(&self, from: f64, to: f64, rev_s: f64) -> f64 {
+        if !self.coupled {
+            return to - from;
+        }
+        let onset = self.geometry.slip_onset_rpm / 60.0;
+        if rev_s > onset { (to - from) * self.geometry.slip * (1.0 - onset / rev_s) } else { 0.0 }
+    }
+
+    /// The rotor moved from `from` to `to` revolutions in one step at `rev_s` revolutions a second: calls `edge(channel, rising,
+    /// fraction of the step)`.
     #[inline]
-    pub fn step(&mut self, from: f64, to: f64, mut edge: impl FnMut(u8, bool, f64)) {
+    pub fn step(&mut self, from: f64, to: f64, rev_s: f64, mut edge: impl FnMut(u8, bool, f64)) {
         if to <= from {
             return;
         }
+        let lost = self.lost(from, to, rev_s);
         for (i, channel) in self.channels.iter_mut().enumerate() {
             let Some(channel) = channel else { continue };
-            while channel.threshold <= to {
-                let fraction = ((channel.threshold - from) / (to - from)).clamp(0.0, 1.0);
-                if let Some(rising) = channel.advance() {
+            let (mut start, mut end) = (from, to);
+            if i == 3 {
+                start -= self.behind;
+                self.behind += lost;
+                end -= self.behind;
+            }
+            while let Some((at, rising)) = channel.pass(end, rev_s) {
+                if let Some(rising) = rising {
+                    let fraction = if end > start { ((at - start) / (end - start)).clamp(0.0, 1.0) } else { 1.0 };
                     edge(i as u8, rising, fraction);
                 }
             }
@@ -206,10 +342,11 @@ mod tests {
     fn turn(geometry: &Geometry, detail: EdgeDetail, revolutions: f64) -> Vec<(u8, bool, f64)> {
         let mut t = Tachometers::new(geometry, detail, 9, 0.4);
         let step = 0.0071;
+        let speed = step / 1.0e-4; // 4260 rev/min
         let mut out = Vec::new();
         let mut at = 0.4;
         while at < 0.4 + revolutions {
-            t.step(at, at + step, |channel, rising, fraction| out.push((channel, rising, at + fraction * step)));
+            t.step(at, at + step, speed, |channel, rising, fraction| out.push((channel, rising, at + fraction * step)));
             at += step;
         }
         out
@@ -259,5 +396,68 @@ mod tests {
             let gap = hall[1] - hall[0];
             assert!((gap - 0.5).abs() > 0.02, "{gap}");
         }
+    }
+
+    #[test]
+    fn second_pulses_a_blind_blade_and_a_twisting_one() {
+        let quiet = Geometry { jitter_deg: [0.0; 4], ..Geometry::default() };
+        let count = |g: &Geometry, detail, channel: u8| turn(g, detail, 1000.0).iter().filter(|e| e.0 == channel && e.1).count();
+        for detail in [EdgeDetail::Captured, EdgeDetail::Pins] {
+            let ringing = Geometry { double: [0.1, 0.0, 0.0, 0.0], ..quiet };
+            assert!((2150..2250).contains(&count(&ringing, detail, 0)), "{}", count(&ringing, detail, 0));
+            // onset 3550 rev/min at 4260: 0.2 of the way to twice the onset
+            let twisting = Geometry { twist_onset_rpm: 3550.0, twist: 0.5, ..quiet };
+            assert!((2150..2250).contains(&count(&twisting, detail, 0)), "{}", count(&twisting, detail, 0));
+            for (factor, beam) in [(0.5, 1000), (0.0, 0), (2.0, 4000)] {
+                let odd = Geometry { factor: [factor, 1.0, 1.0, 1.0], ..quiet };
+                assert!(count(&odd, detail, 0).abs_diff(beam) <= 2, "{factor}: {}", count(&odd, detail, 0));
+                assert!(count(&odd, detail, 1).abs_diff(1000) <= 1);
+            }
+            let ringing: Vec<_> = turn(&ringing, detail, 300.0).into_iter().filter(|e| e.0 == 0).collect();
+            assert!(ringing.windows(2).all(|w| w[0].2 <= w[1].2), "in order");
+            assert!(detail == EdgeDetail::Captured || ringing.windows(2).all(|w| w[0].1 != w[1].1), "alternating");
+        }
+    }
+
+    #[test]
+    fn a_slipping_coupling_and_one_that_is_taken_off() {
+        let g = Geometry { slip_onset_rpm: 2130.0, slip: 0.1, ..Geometry::default() };
+        let encoder = |edges: &[(u8, bool, f64)]| edges.iter().filter(|e| e.0 == 3).count();
+        // half of the speed is above the onset, and a tenth of that is lost
+        let n = encoder(&turn(&g, EdgeDetail::Captured, 1000.0));
+        assert!(n.abs_diff(23_750) <= 2, "{n}");
+        let mut t = Tachometers::new(&Geometry::default(), EdgeDetail::Captured, 9, 0.0);
+        let mut counts = [0u32; 4];
+        t.couple(false);
+        for i in 0..100_000 {
+            let at = 0.001 * f64::from(i);
+            if i == 50_000 {
+                t.couple(true);
+            }
+            t.step(at, at + 0.001, 10.0, |channel, _, _| counts[usize::from(channel)] += 1);
+        }
+        assert!(counts[3].abs_diff(1250) <= 1 && counts[2].abs_diff(200) <= 1, "{counts:?}");
+    }
+
+    #[test]
+    fn a_change_in_the_midst_leaves_no_hole_and_no_jump() {
+        let mut t = Tachometers::new(&Geometry::default(), EdgeDetail::Pins, 9, 0.0);
+        let mut edges: [Vec<(bool, f64)>; 4] = Default::default();
+        for i in 0..100_000 {
+            let at = 0.001 * f64::from(i);
+            if i == 50_000 {
+                t.refit(&Geometry { magnet_error_deg: 12.0, ..Geometry::default() }, at);
+            }
+            t.step(at, at + 0.001, 10.0, |channel, rising, f| edges[usize::from(channel)].push((rising, at + 0.001 * f)));
+        }
+        for (channel, own) in edges.iter().enumerate() {
+            assert!(own.windows(2).all(|w| w[0].1 <= w[1].1), "{channel}");
+            let doubled = own.windows(2).filter(|w| w[0].0 == w[1].0).count();
+            assert_eq!(doubled, 0, "channel {channel}");
+        }
+        assert!(edges[1].len().abs_diff(200) <= 2);
+        let hall: Vec<f64> = edges[2].iter().filter(|e| e.0).map(|e| e.1).collect();
+        let gap = |i: usize| (hall[i + 1] - hall[i] - 0.5).abs();
+        assert!(gap(10) < 0.01 && gap(150) > 0.02, "{} {}", gap(10), gap(150));
     }
 }

@@ -7,6 +7,8 @@
 
 pub mod adc;
 pub mod edge;
+pub mod logger;
 
 pub use adc::{AnalogFront, Converter};
 pub use edge::{Edge, EdgeDetail, Geometry, Tachometers};
+pub use logger::Logger;
