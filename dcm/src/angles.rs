@@ -7,6 +7,7 @@
 //! Reference: Beharie 2013 Eq. 4.19-4.30 with errata (4.25 has the wrong sign, 4.28 and 4.30 need atan2); Shepperd 1978.
 
 use crate::{Mat3, Vec3, rotation::unit};
+use core::f32::consts::FRAC_PI_2;
 use libm::{atan2f, cosf, sinf, sqrtf};
 
 /// cos^2(pitch) below which roll and yaw are not told apart.
@@ -87,10 +88,30 @@ pub(crate) fn matrix_from(down: &Vec3, heading: &Vec3) -> Option<Mat3> {
     Some(Mat3::from_rows(&[north.transpose(), east.transpose(), down.transpose()]))
 }
 
+/// The rotation body to earth that has `down` (unit, body axes) downwards and `field` in the magnetic meridian, or where
+/// there is none or it is vertical, the heading of `present`. The flag says whether the heading comes from the field.
+pub(crate) fn start_attitude(down: &Vec3, field: Option<&Vec3>, declination: f32, present: &Mat3) -> Option<(Mat3, bool)> {
+    if let Some(matrix) = field.and_then(|field| matrix_from(down, field)) {
+        return Some((about_down(declination) * matrix, true));
+    }
+    // body x, or y where x is vertical, keeps its heading
+    let yaw = euler_of(present).yaw;
+    [Vec3::x(), Vec3::y()].iter().zip([yaw, yaw + FRAC_PI_2]).find_map(|(body, yaw)| {
+        let level = matrix_from(down, body)?;
+        Some((about_down(yaw) * level, false))
+    })
+}
+
+/// Rotation about earth z.
+fn about_down(angle: f32) -> Mat3 {
+    let (s, c) = (sinf(angle), cosf(angle));
+    Mat3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use core::f32::consts::{FRAC_PI_2, PI};
+    use core::f32::consts::PI;
     use proptest::prelude::*;
 
     #[test]

@@ -1,52 +1,116 @@
 //! Configuration of the filter.
 //!
-//! What it is: gains with their units, kept apart from the state.
-//! What can go wrong: gains per step instead of per second change their meaning with the sample rate; these are per second.
-//! Units: 1/s, 1/s^2, rad, rad/s, s.
-//! Reference: Razor AHRS v1.4.2 (gains per step at 50 Hz on counts, converted here).
+//! What it is: time constants, thresholds and ranges, each with its unit and, where it is a filter, its cut-off.
+//! What can go wrong: constants per sample would change their meaning with the sample rate; these are all in seconds.
+//! Units: s, rad, rad/s, m/s^2, uT.
+//! Reference: chosen on half of the shared BROAD trials, reported on the other half (`docs/ahrs.md`); the thresholds of rest
+//! and of the field are those of Laidig & Seel 2023.
 
-/// Proportional and integral gain of one correction loop.
+use crate::STANDARD_GRAVITY;
+
+/// One degree, rad.
+const DEGREE: f32 = core::f32::consts::PI / 180.0;
+
+/// When the body is said to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gains {
-    /// Correction rate for an error of one radian, 1/s.
-    pub kp: f32,
-    /// Growth of the bias estimate for an error of one radian, 1/s^2.
-    pub ki: f32,
+pub struct RestConfig {
+    /// Low-pass that readings are compared with, s; second order, cut-off sqrt(2)/(2 pi tau).
+    pub filter_tau: f32,
+    /// Time for which all readings must stay near it, s.
+    pub time: f32,
+    /// Largest distance of the rate, rad/s.
+    pub rate: f32,
+    /// Largest distance of the specific force, m/s^2.
+    pub force: f32,
+    /// Largest rate, after the bias found before, rad/s; holds once the bias is trusted.
+    pub known_rate: f32,
 }
 
-/// How the matrix is turned by one gyro sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Increment {
-    /// R (I + U), Beharie 2013 Eq. E.15 corrected.
-    FirstOrder,
-    /// R exp(U) by its series to the fifth order in the angle.
-    Exponential,
+/// How the gyro bias is estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BiasConfig {
+    /// Largest bias of an axis, rad/s; also the largest rate that rest may show while the bias is unknown.
+    pub limit: f32,
+    /// Time of rest that weighs as much as the ignorance at start, s.
+    pub rest_weight: f32,
+    /// Share of the tilt correction that goes to the bias in motion, 1/s.
+    pub tilt_gain: f32,
+    /// How much more of it goes there while nothing is known of the bias.
+    pub tilt_boost: f32,
+    /// Growth of the bias about the vertical for a heading error of one radian, 1/s^2.
+    pub heading_gain: f32,
+    /// How much more while nothing is known of the bias.
+    pub heading_boost: f32,
+    /// Time constant of the averaged attitude that corrections are turned into body axes with, s; cut-off 1/(2 pi tau).
+    pub lag: f32,
+    /// Time in which motion resolves the ignorance, s.
+    pub motion_tau: f32,
+    /// Growth of ignorance, 1/s.
+    pub forgetting: f32,
+    /// Ignorance (1 at start) below which the bias is trusted.
+    pub trusted: f32,
 }
 
-/// How far the accelerometer is believed while its norm is not that of gravity.
+/// When the field is believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum AccelWeight {
-    /// Always fully; the low gain averages the motion out.
-    Always,
-    /// 1 - 2 |1 - |a|/g|, not below 0, as in the Razor firmware.
-    RazorRamp,
+pub struct FieldConfig {
+    /// Smoothing of norm and dip, s.
+    pub smoothing: f32,
+    /// Largest deviation of the norm, as a share of the reference.
+    pub norm: f32,
+    /// Largest deviation of the dip angle, rad.
+    pub dip: f32,
+    /// Time for which the reference follows, s.
+    pub reference_tau: f32,
+    /// Undisturbed time before the field is believed again, s.
+    pub settle: f32,
+    /// Time for which a new field must hold, in motion, to become the reference, s.
+    pub new_time: f32,
+    /// The same for the first reference, s.
+    pub first_time: f32,
+    /// Rate above which time counts towards a new field, rad/s.
+    pub new_rate: f32,
+    /// Longest time for which the heading stays frozen, s.
+    pub longest_freeze: f32,
+    /// Factor on the correction after that, and on how fast the time of freezing is given back.
+    pub doubt: f32,
+    /// A reading beyond this is no reading, uT.
+    pub range: f32,
+}
+
+/// How the hard iron that travels with the sensor is estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IronConfig {
+    /// Time constant of the averages of attitude and field, s.
+    pub lag: f32,
+    /// Time in which evidence is forgotten, s.
+    pub memory: f32,
+    /// An offset shorter than this is not applied, and a longer one shortened by it, uT: below it soft iron and a field that
+    /// changes with place look the same.
+    pub dead_zone: f32,
+    /// Longest offset that is applied, uT.
+    pub limit: f32,
 }
 
 /// Everything that does not change while the filter runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// Loop from the accelerometer.
-    pub tilt: Gains,
-    /// Loop from the magnetometer.
-    pub yaw: Gains,
-    /// Order of the rotation update.
-    pub increment: Increment,
-    /// Weight of the accelerometer.
-    pub accel_weight: AccelWeight,
-    /// Largest bias the integrator may hold on each axis, rad/s.
-    pub bias_limit: f32,
+    /// Averaging of the specific force in the earth frame, s; second order, cut-off sqrt(2)/(2 pi tau) = 0.09 Hz.
+    pub tilt_tau: f32,
+    /// Averaging of the heading, s; first order, cut-off 1/(2 pi tau) = 0.013 Hz.
+    pub heading_tau: f32,
+    /// Rest.
+    pub rest: RestConfig,
+    /// Gyro bias.
+    pub bias: BiasConfig,
+    /// Magnetic field.
+    pub field: FieldConfig,
+    /// Hard iron.
+    pub iron: IronConfig,
+    /// End of the gyro's range, rad/s: a rate beyond it is cut to it and flagged.
+    pub gyro_range: f32,
+    /// End of the accelerometer's range, m/s^2: a reading at it is left out and flagged.
+    pub accel_range: f32,
     /// Magnetic declination, rad, east positive: 0 makes yaw a magnetic heading.
     pub declination: f32,
     /// A step longer than this is a gap: the tilt starts anew, s.
@@ -54,30 +118,46 @@ pub struct Config {
 }
 
 impl Config {
-    /// The Razor firmware's gains, converted: Kp 0.02 and Ki 2e-5 a step at 50 Hz on 256 counts per g; 1.2 and 2e-5 for yaw.
-    pub const RAZOR: Self = Self {
-        tilt: Gains { kp: 5.12, ki: 0.256 },
-        yaw: Gains { kp: 1.2, ki: 1.0e-3 },
-        increment: Increment::FirstOrder,
-        accel_weight: AccelWeight::RazorRamp,
-        bias_limit: 0.35,
+    /// The one default, for every sensor and motion.
+    pub const DEFAULT: Self = Self {
+        tilt_tau: 2.5,
+        heading_tau: 12.0,
+        rest: RestConfig { filter_tau: 0.5, time: 1.5, rate: 2.0 * DEGREE, force: 0.5, known_rate: 2.0 * DEGREE },
+        bias: BiasConfig {
+            limit: 10.0 * DEGREE,
+            rest_weight: 0.035,
+            tilt_gain: 0.03,
+            tilt_boost: 20.0,
+            heading_gain: 2e-4,
+            heading_boost: 100.0,
+            lag: 3.0,
+            motion_tau: 30.0,
+            forgetting: 1e-4,
+            trusted: 0.2,
+        },
+        field: FieldConfig {
+            smoothing: 0.05,
+            norm: 0.1,
+            dip: 10.0 * DEGREE,
+            reference_tau: 20.0,
+            settle: 0.5,
+            new_time: 20.0,
+            first_time: 5.0,
+            new_rate: 20.0 * DEGREE,
+            longest_freeze: 60.0,
+            doubt: 2.0,
+            range: 1000.0,
+        },
+        iron: IronConfig { lag: 3.0, memory: 120.0, dead_zone: 5.0, limit: 100.0 },
+        gyro_range: 2000.0 * DEGREE,
+        accel_range: 16.0 * STANDARD_GRAVITY,
         declination: 0.0,
         max_dt: 0.25,
-    };
-
-    /// The same algorithm with the best gains found for it on recorded motion: slow, and without the norm weighting. The
-    /// baseline that every change is measured against.
-    pub const TUNED: Self = Self {
-        tilt: Gains { kp: 0.49, ki: 8.0e-4 },
-        yaw: Gains { kp: 0.081, ki: 4.0e-3 },
-        accel_weight: AccelWeight::Always,
-        ..Self::RAZOR
     };
 }
 
 impl Default for Config {
-    /// [`Config::TUNED`] with the exact increment.
     fn default() -> Self {
-        Self { increment: Increment::Exponential, ..Self::TUNED }
+        Self::DEFAULT
     }
 }

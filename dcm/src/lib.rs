@@ -1,29 +1,39 @@
-//! Direction-cosine attitude filter.
+//! Direction-cosine attitude filter and calibration of its sensors.
 //!
-//! What it is: the classic direction-cosine-matrix filter. The state is the rotation from body to earth; the gyro turns
-//! it, accelerometer and magnetometer pull it back through a proportional-integral correction. [`Config`] chooses gains,
-//! increment and accelerometer weighting; [`Config::RAZOR`] is the published filter, [`Config::TUNED`] the baseline.
+//! What it is: [`Dcm`], a direction-cosine filter whose accelerometer is averaged in the earth frame, whose heading is
+//! decoupled and gated, and which estimates gyro bias (at rest and in motion) and hard iron as it goes; [`Classic`], the
+//! filter of the thesis, kept as the baseline.
 //!
-//! What can go wrong: NaN, zero and missing readings are ignored one by one and flagged in [`Step`]; a gap in time starts
-//! the tilt anew and keeps bias and heading; Euler angles are defined at the pole (roll 0, yaw takes the whole heading).
+//! What can go wrong: NaN, zero, saturated and missing readings are left out one by one and flagged in [`Step`]; a gap in
+//! time starts the tilt anew and keeps bias and heading; Euler angles are defined at the pole (roll 0, yaw takes the whole
+//! heading).
 //!
-//! Units: rad, rad/s, m/s^2 (any unit for the field, only its direction counts), seconds. Body FRD, earth NED.
+//! Units: rad, rad/s, m/s^2, uT, seconds. Any right-handed body axes; earth NED inside, [`Earth`] chooses what comes out.
 //!
 //! Reference: Premerlani & Bizard, *Direction Cosine Matrix IMU: Theory*, 2009; Beharie 2013 chapter 4 and Appendix E
-//! with the errata of 4.3, 4.19-4.25, 4.28-4.30 and E.15.
+//! with errata; Laidig & Seel, *VQF*, Information Fusion 91 (2023), for filtering accelerations in the earth frame.
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
 
 mod angles;
+mod classic;
 mod config;
+mod earth;
 mod filter;
+mod fresh;
+mod linear;
+mod measurement;
 mod rotation;
 
 pub use angles::{Euler, euler_of, matrix_of, quaternion_of};
-pub use config::{AccelWeight, Config, Gains, Increment};
-pub use filter::{Dcm, Measurement, Step};
-pub use rotation::{rotate, unit};
+pub use classic::{AccelWeight, Classic, ClassicConfig, Gains};
+pub use config::{BiasConfig, Config, FieldConfig, IronConfig, RestConfig};
+pub use earth::Earth;
+pub use filter::{Dcm, Flags, Quality, STATE_WORDS, StateError};
+pub use fresh::Fresh;
+pub use measurement::{Measurement, Step};
+pub use rotation::{Increment, rotate, unit};
 
 /// Column vector of three, single precision.
 pub type Vec3 = nalgebra::Vector3<f32>;

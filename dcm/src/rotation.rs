@@ -7,9 +7,18 @@
 //! Reference: Premerlani & Bizard 2009, Eq. 17-21; Beharie 2013 Eq. 4.21-4.24 and E.15 with errata (body-rate increments,
 //! element [0][2] is +t_y).
 
-use crate::config::Increment;
 use crate::{Mat3, Vec3};
 use micromath::F32Ext;
+
+/// How the matrix is turned by one gyro sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Increment {
+    /// R (I + U), Beharie 2013 Eq. E.15 corrected.
+    FirstOrder,
+    /// R exp(U) by its series to the fifth order in the angle.
+    Exponential,
+}
 
 /// 1/sqrt(x) for a normal positive number: the seed of micromath and Newton steps down to f32 rounding.
 fn inverse_sqrt(x: f32) -> f32 {
@@ -50,7 +59,7 @@ pub fn rotate(r: &Mat3, t: &Vec3, increment: Increment) -> Mat3 {
 
 /// Makes the rows unit vectors at right angles again; half of the error goes to each of the first two rows. That is good to
 /// first order; after an absurd step the second row takes the whole error exactly.
-fn renormalise(r: &Mat3) -> Mat3 {
+pub(crate) fn renormalise(r: &Mat3) -> Mat3 {
     let (x, y) = (scale(r.row(0).transpose()), scale(r.row(1).transpose()));
     let half = 0.5 * x.dot(&y);
     let (x, mut y) = (scale(x - y * half), scale(y - x * half));

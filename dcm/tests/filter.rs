@@ -1,13 +1,12 @@
 //! The filter against simulated bodies whose attitude is known.
 
-use dcm::{Config, Dcm, Euler, Increment, Mat3, Measurement, STANDARD_GRAVITY, Vec3, matrix_of, rotate};
+use dcm::{Config, Dcm, Earth, Euler, Increment, Mat3, Measurement, STANDARD_GRAVITY, StateError, Vec3, matrix_of, rotate};
 use proptest::prelude::*;
 
-/// Horizontal and vertical part of a field with a dip of 65 degrees, gauss.
-const FIELD: [f32; 3] = [0.2, 0.0, 0.43];
+/// North, east and down part of a field with a dip of 65 degrees, uT.
+const FIELD: [f32; 3] = [20.0, 0.0, 43.0];
 const DT: f32 = 1.0 / 200.0;
 
-/// What ideal sensors of a body at rest at `r` read.
 fn at_rest(r: &Mat3) -> Measurement {
     Measurement {
         gyro: Some(Vec3::zeros()),
@@ -31,111 +30,278 @@ fn attitude(roll: f32, pitch: f32, yaw: f32) -> Mat3 {
     matrix_of(&Euler { roll: roll.to_radians(), pitch: pitch.to_radians(), yaw: yaw.to_radians() })
 }
 
-#[test]
-fn starts_at_a_known_static_attitude_and_stays() {
-    let truth = attitude(25.0, -40.0, 130.0);
-    let mut dcm = Dcm::new(Config::TUNED);
-    let step = dcm.update(DT, &at_rest(&truth));
-    assert!(step.started && dcm.heading_is_absolute());
-    for _ in 0..2000 {
-        assert!(!dcm.update(DT, &at_rest(&truth)).bad_input);
+/// A body that turns about all axes.
+struct Tumble {
+    truth: Mat3,
+    t: f32,
+}
+
+impl Tumble {
+    fn new() -> Self {
+        Self { truth: attitude(10.0, 5.0, 30.0), t: 0.0 }
     }
-    assert!(between(dcm.matrix(), &truth) < 0.01, "{}", between(dcm.matrix(), &truth));
-    let e = dcm.euler();
-    assert!((e.pitch.to_degrees() + 40.0).abs() < 0.01 && (e.yaw.to_degrees() - 130.0).abs() < 0.01);
-}
 
-#[test]
-fn level_at_rest_is_zero_with_specific_force_up() {
-    // Beharie 2013 Eq. 4.3 corrected: FRD, level, at rest: f = (0, 0, -9.81); the printed sign would read as upside down.
-    let mut dcm = Dcm::new(Config::TUNED);
-    dcm.update(DT, &Measurement { accel: Some(Vec3::new(0.0, 0.0, -9.81)), ..Measurement::default() });
-    assert!(between(dcm.matrix(), &Mat3::identity()) < 1e-3);
-}
-
-/// From the most wrong attitudes (upside down, heading reversed) the Razor gains need a few seconds.
-#[test]
-fn converges_from_any_wrong_attitude() {
-    for wrong in [attitude(180.0, 0.0, 0.0), attitude(0.0, 0.0, 180.0), attitude(90.0, 60.0, -120.0), attitude(0.0, 180.0, 0.0)] {
-        let truth = attitude(0.0, 0.0, 0.0);
-        let mut dcm = Dcm::new(Config::RAZOR);
-        dcm.update(DT, &at_rest(&wrong));
-        for _ in 0..(8.0 / DT) as u32 {
-            dcm.update(DT, &at_rest(&truth));
-        }
-        // the integrators have learned a false bias on the way and give it back slowly
-        assert!(between(dcm.matrix(), &truth) < 12.0, "8 s: {}", between(dcm.matrix(), &truth));
-        for _ in 0..(120.0 / DT) as u32 {
-            dcm.update(DT, &at_rest(&truth));
-        }
-        assert!(between(dcm.matrix(), &truth) < 1.0, "{}", between(dcm.matrix(), &truth));
-    }
-}
-
-/// A body that turns about all axes; the true attitude is integrated in much finer steps than the filter's.
-fn follow(config: Config, bias: Vec3, mag_every: u32, seconds: f32) -> (f32, Dcm) {
-    let mut truth = attitude(10.0, 5.0, 30.0);
-    let mut dcm = Dcm::new(config);
-    dcm.update(DT, &at_rest(&truth));
-    let mut worst: f32 = 0.0;
-    for k in 1..=(seconds / DT) as u32 {
-        let t = k as f32 * DT;
-        let rate = Vec3::new((0.9 * t).sin(), 0.8 * (0.7 * t).cos(), 1.1 * (0.4 * t).sin());
+    /// One step; the true attitude is integrated in much finer ones.
+    fn step(&mut self) -> Measurement {
+        self.t += DT;
+        let rate = Vec3::new((0.9 * self.t).sin(), 0.8 * (0.7 * self.t).cos(), 1.1 * (0.4 * self.t).sin());
         for _ in 0..8 {
-            truth = rotate(&truth, &(rate * (DT / 8.0)), Increment::Exponential);
+            self.truth = rotate(&self.truth, &(rate * (DT / 8.0)), Increment::Exponential);
         }
-        let mut m = at_rest(&truth);
-        m.gyro = Some(rate + bias);
-        m.mag = m.mag.filter(|_| k.is_multiple_of(mag_every));
+        Measurement { gyro: Some(rate), ..at_rest(&self.truth) }
+    }
+}
+
+/// Runs for a while and returns the largest error of the second half, degrees.
+fn follow(dcm: &mut Dcm, body: &mut Tumble, seconds: f32, mut disturb: impl FnMut(f32, &mut Measurement)) -> f32 {
+    let n = (seconds / DT) as u32;
+    let mut worst: f32 = 0.0;
+    for k in 0..n {
+        let mut m = body.step();
+        disturb(k as f32 * DT, &mut m);
         dcm.update(DT, &m);
-        if t > seconds / 2.0 {
-            worst = worst.max(between(dcm.matrix(), &truth));
+        if k > n / 2 {
+            worst = worst.max(between(dcm.matrix(), &body.truth));
         }
     }
-    (worst, dcm)
+    worst
 }
 
-/// The classic first-order step is the largest single error: with ideal sensors it costs 0.2 degrees, the series 0.0005.
-#[test]
-fn follows_a_rotation() {
-    let (classic, _) = follow(Config::TUNED, Vec3::zeros(), 3, 60.0);
-    assert!((0.05..0.3).contains(&classic), "{classic}");
-    let (series, _) = follow(Config::default(), Vec3::zeros(), 3, 60.0);
-    assert!(series < 0.005, "{series}");
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    /// Start-up from any attitude: right at the first sample, no transient after it.
+    #[test]
+    fn starts_at_any_attitude_and_stays(roll in -180f32..180.0, pitch in -90f32..90.0, yaw in -180f32..180.0) {
+        let truth = attitude(roll, pitch, yaw);
+        let mut dcm = Dcm::new(Config::default());
+        prop_assert!(dcm.update(DT, &at_rest(&truth)).started);
+        for _ in 0..1000 {
+            dcm.update(DT, &at_rest(&truth));
+            prop_assert!(between(dcm.matrix(), &truth) < 0.05, "{}", between(dcm.matrix(), &truth));
+        }
+        prop_assert!(dcm.flags().rest && dcm.flags().heading_absolute && dcm.flags().bias_trusted);
+    }
 }
 
 #[test]
-fn finds_the_gyro_bias_in_motion() {
+fn follows_a_rotation_with_ideal_sensors() {
+    let (mut dcm, mut body) = (Dcm::new(Config::default()), Tumble::new());
+    let worst = follow(&mut dcm, &mut body, 60.0, |_, _| {});
+    assert!(worst < 0.1, "{worst}");
+}
+
+#[test]
+fn finds_the_gyro_bias_in_motion_and_at_rest() {
     let bias = Vec3::new(0.02, -0.03, 0.015);
-    let (worst, dcm) = follow(Config::RAZOR, bias, 3, 600.0);
-    assert!(length(&(dcm.bias() - bias)) < 2e-3, "{}", dcm.bias());
+    let (mut dcm, mut body) = (Dcm::new(Config::default()), Tumble::new());
+    let worst = follow(&mut dcm, &mut body, 300.0, |_, m| m.gyro = m.gyro.map(|w| w + bias));
+    println!("in motion: bias off by {:?}, attitude by {worst}", dcm.bias() - bias);
+    assert!(length(&(dcm.bias() - bias)) < 1e-3 && worst < 1.0);
+    assert!(dcm.flags().bias_trusted && !dcm.flags().rest);
+
+    let mut dcm = Dcm::new(Config::default());
+    let truth = attitude(20.0, 30.0, 40.0);
+    for _ in 0..600 {
+        dcm.update(DT, &Measurement { gyro: Some(bias), ..at_rest(&truth) });
+    }
+    assert!(length(&(dcm.bias() - bias)) < 2e-3, "three seconds of rest: {:?}", dcm.bias() - bias);
+}
+
+/// What a real ITG-3200 has: several degrees a second.
+#[test]
+fn a_large_offset_is_found_at_rest() {
+    let bias = Vec3::new(-0.051, 0.117, -0.023);
+    let mut dcm = Dcm::new(Config::default());
+    let truth = attitude(0.0, 0.0, 0.0);
+    for _ in 0..2000 {
+        dcm.update(DT, &Measurement { gyro: Some(bias), ..at_rest(&truth) });
+    }
+    assert!(length(&(dcm.bias() - bias)) < 1e-3, "{:?}", dcm.bias() - bias);
+    assert!(between(dcm.matrix(), &truth) < 2.0, "{}", between(dcm.matrix(), &truth));
+}
+
+/// A magnet that stays where it is: the heading is frozen while it disturbs and comes back after.
+#[test]
+fn a_magnetic_disturbance_is_rejected_and_recovered_from() {
+    let (mut dcm, mut body) = (Dcm::new(Config::default()), Tumble::new());
+    follow(&mut dcm, &mut body, 60.0, |_, _| {});
+    assert!(dcm.flags().field_known && !dcm.flags().field_disturbed);
+    let magnet = Vec3::new(15.0, 20.0, -10.0);
+    let mut worst: f32 = 0.0;
+    for _ in 0..3000 {
+        let m = body.step();
+        let mag = m.mag.map(|f| f + body.truth.transpose() * magnet);
+        dcm.update(DT, &Measurement { mag, ..m });
+        worst = worst.max(between(dcm.matrix(), &body.truth));
+    }
+    assert!(dcm.flags().field_disturbed && worst < 2.0, "{worst}");
+    let worst = follow(&mut dcm, &mut body, 60.0, |_, _| {});
+    assert!(!dcm.flags().field_disturbed && worst < 1.0, "{worst}");
+}
+
+/// A magnet that travels with the sensor is found while the body turns.
+#[test]
+fn hard_iron_is_found_in_motion() {
+    let iron = Vec3::new(3.0, -4.0, 20.0);
+    let (mut dcm, mut body) = (Dcm::new(Config::default()), Tumble::new());
+    follow(&mut dcm, &mut body, 120.0, |_, m| m.mag = m.mag.map(|f| f + iron));
+    assert!(length(&(dcm.iron() - iron)) < 1.0, "{:?}", dcm.iron());
+    let mut clean = Dcm::new(Config::default());
+    follow(&mut clean, &mut Tumble::new(), 120.0, |_, _| {});
+    assert!(length(&clean.iron()) < 0.5, "{:?}", clean.iron());
+}
+
+/// True accelerations average out in the earth frame: a swing of half a g at 1 Hz moves the tilt by less than a degree.
+#[test]
+fn translation_does_not_tilt() {
+    let (mut dcm, mut body) = (Dcm::new(Config::default()), Tumble::new());
+    follow(&mut dcm, &mut body, 20.0, |_, _| {});
+    let mut truth = body.truth;
+    let mut worst: f32 = 0.0;
+    for k in 0..12_000 {
+        let m = body.step();
+        truth.copy_from(&body.truth);
+        let push = 5.0 * (2.0 * core::f32::consts::PI * k as f32 * DT).cos(); // no net velocity
+        let accel = m.accel.map(|f| f + truth.transpose() * Vec3::new(push, 0.0, 0.0));
+        dcm.update(DT, &Measurement { accel, ..m });
+        worst = worst.max(between(dcm.matrix(), &truth));
+    }
     assert!(worst < 1.0, "{worst}");
 }
 
+/// Forced divergence, from the most wrong attitudes: times are printed, and stated in docs/ahrs.md.
 #[test]
-fn the_magnetometer_rate_does_not_change_the_gain() {
-    // the same heading error decays alike when the field comes at every step and at every tenth
-    let decay = |every: u32| {
-        let mut dcm = Dcm::new(Config { yaw: dcm::Gains { kp: 0.5, ki: 0.0 }, ..Config::TUNED });
-        dcm.update(DT, &at_rest(&attitude(0.0, 0.0, 20.0)));
-        for k in 1..=400u32 {
-            let mut m = at_rest(&attitude(0.0, 0.0, 0.0));
-            m.mag = m.mag.filter(|_| k.is_multiple_of(every));
-            dcm.update(DT, &m);
+fn recovers_from_a_forced_divergence() {
+    for wrong in [attitude(180.0, 0.0, 0.0), attitude(0.0, 0.0, 180.0), attitude(90.0, 60.0, -120.0)] {
+        let (mut dcm, mut body) = (Dcm::new(Config::default()), Tumble::new());
+        follow(&mut dcm, &mut body, 60.0, |_, _| {});
+        let mut words = dcm.save();
+        let turned = *dcm.matrix() * wrong;
+        for (word, value) in words.iter_mut().skip(1).zip(turned.iter()) {
+            *word = value.to_bits();
         }
-        dcm.euler().yaw.to_degrees()
-    };
-    let (every, tenth) = (decay(1), decay(10));
-    assert!((7.0..8.0).contains(&every), "20 deg e^-1 is 7.4: {every}");
-    assert!((every - tenth).abs() < 0.2, "{every} {tenth}");
+        dcm.restore(&words).unwrap();
+        assert!(between(dcm.matrix(), &body.truth) > 50.0);
+        let (mut tilt_s, mut all_s) = (0.0, 0.0);
+        for k in 0..40_000u32 {
+            dcm.update(DT, &body.step());
+            let tilt = dcm.gravity().dot(&body.truth.row(2).transpose()).clamp(-1.0, 1.0).acos().to_degrees();
+            if tilt > 5.0 {
+                tilt_s = k as f32 * DT;
+            }
+            if between(dcm.matrix(), &body.truth) > 5.0 {
+                all_s = k as f32 * DT;
+            }
+        }
+        println!("in motion: tilt within 5 degrees after {tilt_s:.1} s, attitude after {all_s:.1} s");
+        assert!(tilt_s < 20.0 && all_s < 100.0);
+    }
+    // at rest the tilt is set anew after 1.5 s
+    let truth = attitude(0.0, 0.0, 0.0);
+    let mut dcm = Dcm::new(Config::default());
+    dcm.update(DT, &at_rest(&attitude(120.0, 10.0, 90.0)));
+    for _ in 0..(3.0 / DT) as u32 {
+        dcm.update(DT, &at_rest(&truth));
+    }
+    assert!(between(dcm.matrix(), &truth) < 0.1, "{}", between(dcm.matrix(), &truth));
+}
+
+#[test]
+fn a_saved_state_continues_with_the_same_bits() {
+    let (mut one, mut body) = (Dcm::new(Config::default()), Tumble::new());
+    follow(&mut one, &mut body, 30.0, |_, m| m.gyro = m.gyro.map(|w| w + Vec3::repeat(0.01)));
+    let words = one.save();
+    let mut two = Dcm::new(Config::default());
+    two.restore(&words).unwrap();
+    assert_eq!(two.save(), words);
+    for _ in 0..2000 {
+        let m = body.step();
+        assert_eq!(one.update(DT, &m), two.update(DT, &m));
+        assert_eq!(one.save(), two.save());
+    }
+}
+
+#[test]
+fn words_that_are_no_state_are_refused() {
+    let mut dcm = Dcm::new(Config::default());
+    dcm.update(DT, &at_rest(&attitude(1.0, 2.0, 3.0)));
+    let (good, before) = (dcm.save(), dcm);
+    let mut words = good;
+    words[0] ^= 1;
+    assert_eq!(dcm.restore(&words), Err(StateError::Version(words[0])));
+    words = good;
+    words[7] = f32::NAN.to_bits();
+    assert_eq!(dcm.restore(&words), Err(StateError::NotFinite(7)));
+    words = good;
+    words[1] = 0.5f32.to_bits();
+    assert_eq!(dcm.restore(&words), Err(StateError::NoRotation));
+    assert_eq!(dcm, before);
+}
+
+#[test]
+fn sensors_with_rates_of_their_own_give_the_same_attitude() {
+    let (mut apart, mut body) = (Dcm::new(Config::default()), Tumble::new());
+    let mut worst: f32 = 0.0;
+    for k in 0..12_000u32 {
+        let m = body.step();
+        apart.update_gyro(DT, &m.gyro.unwrap());
+        if k.is_multiple_of(2) {
+            apart.update_accel(0.0, &m.accel.unwrap());
+        }
+        if k.is_multiple_of(13) {
+            apart.update_mag(0.0, &m.mag.unwrap());
+        }
+        worst = worst.max(if k > 6000 { between(apart.matrix(), &body.truth) } else { 0.0 });
+    }
+    assert!(worst < 0.2, "{worst}");
+}
+
+#[test]
+fn without_a_magnetometer_heading_is_relative_and_can_be_set() {
+    let truth = attitude(-20.0, 35.0, 77.0);
+    let mut dcm = Dcm::new(Config::default());
+    for _ in 0..2000 {
+        assert!(!dcm.update(DT, &Measurement { mag: None, ..at_rest(&truth) }).mag_used);
+    }
+    assert!(!dcm.heading_is_absolute() && dcm.euler().yaw.abs() < 1e-3);
+    dcm.set_heading(1.0);
+    for _ in 0..2000 {
+        dcm.update(DT, &Measurement { mag: None, ..at_rest(&truth) });
+    }
+    let e = dcm.euler();
+    assert!(
+        (e.yaw - 1.0).abs() < 1e-3 && (e.roll.to_degrees() + 20.0).abs() < 0.01 && (e.pitch.to_degrees() - 35.0).abs() < 0.01
+    );
+    assert!(dcm.update(DT, &at_rest(&truth)).started, "the first field sets the heading at once");
+    assert!((dcm.euler().yaw.to_degrees() - 77.0).abs() < 0.1);
+}
+
+#[test]
+fn accelerations_come_out_of_the_specific_force() {
+    let truth = attitude(30.0, -20.0, 110.0);
+    let mut dcm = Dcm::new(Config::default());
+    dcm.update(DT, &at_rest(&truth));
+    let push = Vec3::new(1.0, -2.0, 0.5);
+    let force = truth.transpose() * (push - Vec3::new(0.0, 0.0, STANDARD_GRAVITY));
+    assert!(length(&(dcm.earth_acceleration(&force, Earth::Ned) - push)) < 1e-3);
+    assert!(length(&(dcm.earth_acceleration(&force, Earth::Enu) - Vec3::new(-2.0, 1.0, -0.5))) < 1e-3);
+    assert!(length(&(dcm.linear_acceleration(&force) - truth.transpose() * push)) < 1e-3);
+}
+
+#[test]
+fn declination_turns_magnetic_into_true_heading() {
+    let mut dcm = Dcm::new(Config { declination: 10.0f32.to_radians(), ..Config::default() });
+    for _ in 0..1000 {
+        dcm.update(DT, &at_rest(&attitude(0.0, 0.0, 30.0))); // 30 degrees from magnetic north
+    }
+    assert!((dcm.euler().yaw.to_degrees() - 40.0).abs() < 0.01, "{}", dcm.euler().yaw.to_degrees());
 }
 
 #[test]
 fn irregular_steps_give_the_same_rotation() {
     let turn = |steps: &[f32]| {
-        let mut dcm = Dcm::new(Config { increment: Increment::Exponential, ..Config::TUNED });
-        let level = at_rest(&Mat3::identity());
-        dcm.update(DT, &level);
+        let mut dcm = Dcm::new(Config::default());
+        dcm.update(DT, &at_rest(&Mat3::identity()));
         for dt in steps {
             dcm.update(*dt, &Measurement { gyro: Some(Vec3::new(0.0, 0.0, 1.0)), ..Measurement::default() });
         }
@@ -148,62 +314,20 @@ fn irregular_steps_give_the_same_rotation() {
 }
 
 #[test]
-fn without_a_magnetometer_heading_is_relative_and_tilt_is_right() {
-    let truth = attitude(-20.0, 35.0, 77.0);
-    let mut dcm = Dcm::new(Config::TUNED);
-    for _ in 0..2000 {
-        let step = dcm.update(DT, &Measurement { mag: None, ..at_rest(&truth) });
-        assert!(!step.mag_used);
-    }
-    let e = dcm.euler();
-    assert!((e.roll.to_degrees() + 20.0).abs() < 0.01 && (e.pitch.to_degrees() - 35.0).abs() < 0.01);
-    assert!(!dcm.heading_is_absolute() && e.yaw.abs() < 1e-3);
-    assert!(dcm.update(DT, &at_rest(&truth)).started, "the first field sets the heading at once");
-    assert!((dcm.euler().yaw.to_degrees() - 77.0).abs() < 0.1 && dcm.heading_is_absolute());
-}
-
-#[test]
-fn declination_turns_magnetic_into_true_heading() {
-    let mut dcm = Dcm::new(Config { declination: 10.0f32.to_radians(), ..Config::TUNED });
-    for _ in 0..100 {
-        dcm.update(DT, &at_rest(&attitude(0.0, 0.0, 30.0))); // 30 degrees from magnetic north
-    }
-    assert!((dcm.euler().yaw.to_degrees() - 40.0).abs() < 0.01, "{}", dcm.euler().yaw.to_degrees());
-}
-
-#[test]
-fn through_the_pole_the_matrix_is_smooth() {
-    let mut truth = attitude(0.0, 80.0, 20.0);
-    let mut dcm = Dcm::new(Config::TUNED);
-    dcm.update(DT, &at_rest(&truth));
-    let rate = Vec3::new(0.0, 0.5, 0.0);
-    for _ in 0..(0.7 / DT) as u32 {
-        truth = rotate(&truth, &(rate * DT), Increment::Exponential);
-        let before = *dcm.matrix();
-        dcm.update(DT, &Measurement { gyro: Some(rate), ..at_rest(&truth) });
-        assert!(between(&before, dcm.matrix()) < 0.3);
-        assert!(between(dcm.matrix(), &truth) < 0.05);
-        let e = dcm.euler();
-        assert!(e.roll.is_finite() && e.pitch.is_finite() && e.yaw.is_finite());
-    }
-}
-
-#[test]
 fn a_gap_starts_the_tilt_anew_and_keeps_heading_and_bias() {
-    let mut dcm = Dcm::new(Config::TUNED);
+    let mut dcm = Dcm::new(Config::default());
     dcm.update(DT, &at_rest(&attitude(0.0, 0.0, 50.0)));
-    dcm.set_bias(Vec3::new(0.01, 0.02, 0.03));
+    dcm.set_bias(Vec3::new(0.01, 0.02, 0.03), 0.001);
     let now = attitude(30.0, 0.0, 50.0);
-    let step = dcm.update(2.0, &Measurement { mag: None, ..at_rest(&now) });
-    assert!(step.started);
+    assert!(dcm.update(2.0, &Measurement { mag: None, ..at_rest(&now) }).started);
     assert!(between(dcm.matrix(), &now) < 0.01);
     assert_eq!(dcm.bias(), Vec3::new(0.01, 0.02, 0.03));
 }
 
 #[test]
-fn bad_readings_are_flagged_and_change_nothing() {
+fn bad_and_saturated_readings_are_flagged_and_change_nothing() {
     let truth = attitude(5.0, 6.0, 7.0);
-    let mut dcm = Dcm::new(Config::TUNED);
+    let mut dcm = Dcm::new(Config::default());
     dcm.update(DT, &at_rest(&truth));
     let nan = Vec3::new(0.0, f32::NAN, 0.0);
     for bad in [
@@ -212,24 +336,29 @@ fn bad_readings_are_flagged_and_change_nothing() {
         Measurement { mag: Some(nan), ..Measurement::default() },
         Measurement { accel: Some(Vec3::zeros()), ..Measurement::default() },
         Measurement { mag: Some(Vec3::zeros()), ..Measurement::default() },
-        Measurement { gyro: Some(Vec3::repeat(f32::MAX)), ..Measurement::default() },
+        Measurement { accel: Some(Vec3::repeat(1e30)), ..Measurement::default() },
+        Measurement { accel: Some(Vec3::new(157.0, 0.0, -9.8)), ..Measurement::default() },
+        Measurement { mag: Some(Vec3::repeat(1e30)), ..Measurement::default() },
     ] {
         let before = *dcm.matrix();
-        assert!(dcm.update(DT, &bad).bad_input, "{bad:?}");
+        let step = dcm.update(DT, &bad);
+        assert!(step.bad_input || step.overrange, "{bad:?}");
         assert!(between(&before, dcm.matrix()) < 1e-3, "{bad:?}");
     }
+    let step = dcm.update(DT, &Measurement { gyro: Some(Vec3::repeat(f32::MAX)), ..Measurement::default() });
+    assert!(step.overrange, "a rate beyond the range is cut to it");
     for dt in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         assert!(dcm.update(dt, &at_rest(&truth)).bad_input);
     }
-    assert!(between(dcm.matrix(), &truth) < 0.01);
 }
 
 proptest! {
-    /// Whatever bits arrive, the state stays a rotation.
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    /// Whatever bits arrive, the state stays a rotation, and the filter comes back.
     #[test]
     fn no_input_poisons_the_state(words in proptest::collection::vec(any::<[u32; 10]>(), 1..40)) {
         let truth = attitude(5.0, 6.0, 7.0);
-        let mut dcm = Dcm::new(Config { bias_limit: 0.02, ..Config::RAZOR });
+        let mut dcm = Dcm::new(Config::default());
         dcm.update(DT, &at_rest(&truth));
         for w in words {
             let f = w.map(f32::from_bits);
@@ -237,13 +366,11 @@ proptest! {
             dcm.update(f[9], &Measurement { gyro: v(0), accel: v(3), mag: v(6) });
             let m = dcm.matrix();
             prop_assert!((m * m.transpose() - Mat3::identity()).abs().max() < 1e-3, "{m}");
-            prop_assert!(dcm.bias().iter().all(|b| b.abs() <= 0.02));
-            prop_assert!(dcm.quaternion().iter().all(|q| q.is_finite()));
+            prop_assert!(dcm.save().iter().skip(1).all(|w| f32::from_bits(*w).is_finite()));
         }
-        // and it comes back by itself, as far as the false bias that it may have learned lets it
-        for _ in 0..4_000 {
+        for _ in 0..8_000 {
             dcm.update(DT, &at_rest(&truth));
         }
-        prop_assert!(between(dcm.matrix(), &truth) < 3.0);
+        prop_assert!(between(dcm.matrix(), &truth) < 3.0, "{}", between(dcm.matrix(), &truth));
     }
 }

@@ -7,7 +7,7 @@
 //! missing; a saturated gyro or accelerometer is passed on, flagged in [`Outputs::saturated`], and not shown to the filter
 //! where it would mislead it (accelerometer).
 //!
-//! Units: counts and ticks in; counts, ticks and 2^-30 quaternion units out; rad/s, m/s^2, gauss towards the filter.
+//! Units: counts and ticks in; counts, ticks and 2^-30 quaternion units out; rad/s, m/s^2, uT towards the filter.
 //!
 //! Reference: specification `ahrs.md`, "Board"; Beharie 2013 Eq. 4.1-4.7 with errata.
 
@@ -119,7 +119,7 @@ impl Ahrs {
             Some(words) => {
                 sample.mag = self.config.mag.to_body(words);
                 sample.fresh |= MAG;
-                measured.mag = Some(scaled(&sample.mag, 1.0 / hmc5883l::LSB_PER_GAUSS));
+                measured.mag = Some(scaled(&sample.mag, UT_PER_GAUSS / hmc5883l::LSB_PER_GAUSS));
             }
             None => {}
         }
@@ -139,6 +139,8 @@ const NOMINAL: Ticks = Ticks::from_ms(1000 / TICK_HZ as u64);
 const Q30: f32 = 1_073_741_824.0;
 /// Gyro scale in rad/s per count.
 const RAD_S_PER_LSB: f32 = core::f32::consts::PI / 180.0 / itg3200::LSB_PER_DEG_S;
+/// Microtesla in a gauss.
+const UT_PER_GAUSS: f32 = 100.0;
 /// Version of this package.
 const FIRMWARE: [u8; 3] =
     [digits(env!("CARGO_PKG_VERSION_MAJOR")), digits(env!("CARGO_PKG_VERSION_MINOR")), digits(env!("CARGO_PKG_VERSION_PATCH"))];

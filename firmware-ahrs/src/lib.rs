@@ -7,7 +7,7 @@
 //! What can go wrong: a sensor is missing, is a look-alike, stops answering or saturates; each case has its own
 //! error or flag, none stops the tick, and no path panics.
 //!
-//! Units: sensor counts on the wire; rad/s, m/s^2 and gauss towards the filter; ticks of the capture timer.
+//! Units: sensor counts on the wire; rad/s, m/s^2 and uT towards the filter; ticks of the capture timer.
 //!
 //! Reference: specification `ahrs.md`; data sheets PS-ITG-3200A rev 1.4, ADXL345 rev E, HMC5883L.
 #![no_std]

@@ -10,6 +10,7 @@
 //! Reference: `budgets/`, `.cargo/image.toml`, `.ci/run`.
 #![forbid(unsafe_code)]
 
+mod ahrs_bench;
 mod image;
 mod place;
 mod run;
@@ -26,6 +27,7 @@ usage: cargo xtask COMMAND
   setup            Rust target of the boards, Python environment of the verdict checker
   image            build both flash images, print their sizes, compare with budgets/size.toml
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
+  ahrs-bench       the attitude filter on the shared BROAD trials and their stress variants, with its targets
   test             everything: format, lints, images, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
   blind [ARGS]     the blind campaign (docs/blind.md); ARGS go to it, --help lists them
@@ -47,6 +49,7 @@ fn main() -> ExitCode {
             let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "blind", "--"];
             run::run(&mut run::cargo(&place, &[&head, rest].concat()))
         }
+        ["ahrs-bench", rest @ ..] => ahrs_bench::bench(&place, rest),
         ["test", "--emulated"] => test::on_boards(&place),
         ["test", "--verdicts"] => test::on_logs(&place),
         ["help" | "--help" | "-h"] => {

@@ -1,0 +1,123 @@
+//! `cargo xtask ahrs-bench`: the attitude filter on measured motion with optical truth.
+//!
+//! What it is: the filter's one default over every shared BROAD trial and stress variant, beside the classic filter and the
+//! published figures of VQF, and a check of the targets.
+//! What can go wrong: a target that is missed is a failure; so is missing data.
+//! Units: degrees.
+//! Reference: specification `ahrs.md`; README of the data; `docs/ahrs.md`.
+
+pub(crate) mod score;
+pub(crate) mod trial;
+pub(crate) mod variant;
+
+use crate::place::Place;
+use crate::run::Failure;
+use dcm::{BiasConfig, Classic, ClassicConfig, Config, Dcm, FieldConfig, IronConfig};
+use score::{Score, run};
+use trial::Trial;
+use variant::Variant;
+
+/// Mean total error that the default must not exceed on the shared trials, degrees.
+const TOTAL: f64 = 2.0;
+/// Mean inclination error that it must not exceed, degrees.
+const INCLINATION: f64 = 0.70;
+
+/// Runs it all.
+pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
+    let folder = place.data().join("ahrs");
+    let trials = trial::trials(&folder.join("broad"))?;
+    if let ["--scan"] = words {
+        return scan(&trials);
+    }
+    let peers = folder.join("peers-shared.csv");
+    let mut missed = Vec::new();
+    println!(
+        "{:<9} {:>29} {:>29} {:>8} {:>8}",
+        "variant", "ours: total heading incl.", "VQF: total heading incl.", "half A", "half B"
+    );
+    for variant in Variant::ALL {
+        let ours: Vec<Score> = scores(&trials, variant, || Box::new(Dcm::new(Config::DEFAULT)));
+        let vqf: Vec<Score> = trial::peer(&peers, variant.name(), "vqf", "default")?
+            .iter()
+            .map(|(_, [total, heading, inclination])| Score { total: *total, heading: *heading, inclination: *inclination })
+            .collect();
+        let (mine, theirs) = (Score::mean(ours.iter()), Score::mean(vqf.iter()));
+        let half = |k: usize| Score::mean(ours.iter().skip(k).step_by(2)).total;
+        println!(
+            "{:<9} {:>13.2} {:>7.2} {:>7.2} {:>13.2} {:>7.2} {:>7.2} {:>8.2} {:>8.2}",
+            variant.name(),
+            mine.total,
+            mine.heading,
+            mine.inclination,
+            theirs.total,
+            theirs.heading,
+            theirs.inclination,
+            half(0),
+            half(1)
+        );
+        if variant == Variant::Base || words.contains(&variant.name()) {
+            for (t, s) in trials.iter().zip(&ours) {
+                println!("    {:<48} {:>6.2} {:>6.2} {:>6.2}", t.name, s.total, s.heading, s.inclination);
+            }
+        }
+        if variant == Variant::Base {
+            if mine.total > TOTAL || mine.inclination > INCLINATION {
+                missed.push(format!("base: {:.3} and {:.3}, targets {TOTAL} and {INCLINATION}", mine.total, mine.inclination));
+            }
+        } else if mine.total > theirs.total {
+            missed.push(format!("{}: {:.3}, VQF {:.3}", variant.name(), mine.total, theirs.total));
+        }
+    }
+    for (name, config) in [("classic, Razor gains", ClassicConfig::RAZOR), ("classic, tuned gains", ClassicConfig::TUNED)] {
+        let s = scores(&trials, Variant::Base, || Box::new(Classic::new(config)));
+        let s = Score::mean(s.iter());
+        println!("{name}: {:.2} {:.2} {:.2}", s.total, s.heading, s.inclination);
+    }
+    if missed.is_empty() { Ok(()) } else { Err(Failure(format!("targets missed: {}", missed.join("; ")))) }
+}
+
+fn scores(trials: &[Trial], variant: Variant, new: impl Fn() -> Box<dyn score::Filter> + Sync) -> Vec<Score> {
+    std::thread::scope(|scope| {
+        let handles: Vec<_> = trials.iter().map(|t| scope.spawn(|| run(new().as_mut(), &variant.of(t), |_| {}))).collect();
+        handles.into_iter().filter_map(|h| h.join().ok()).collect()
+    })
+}
+
+/// Every constant once lower and once higher: total and inclination of half A / half B. Constants are chosen on half A.
+fn scan(trials: &[Trial]) -> Result<(), Failure> {
+    let base = Config::DEFAULT;
+    let mut list: Vec<(String, Config)> = vec![("default".into(), base)];
+    for z in [2.0, 3.0] {
+        list.push((format!("tilt_tau {z} s"), Config { tilt_tau: z, ..base }));
+    }
+    for z in [9.0, 16.0] {
+        list.push((format!("heading_tau {z} s"), Config { heading_tau: z, ..base }));
+    }
+    for z in [0.0, 0.01, 0.1] {
+        list.push((format!("tilt_gain {z} 1/s"), Config { bias: BiasConfig { tilt_gain: z, ..base.bias }, ..base }));
+    }
+    for z in [0.0, 1e-4, 4e-4] {
+        list.push((format!("heading_gain {z} 1/s2"), Config { bias: BiasConfig { heading_gain: z, ..base.bias }, ..base }));
+    }
+    for z in [7.0f32, 15.0] {
+        list.push((format!("dip {z} deg"), Config { field: FieldConfig { dip: z.to_radians(), ..base.field }, ..base }));
+    }
+    for z in [0.07, 0.15] {
+        list.push((format!("norm {z}"), Config { field: FieldConfig { norm: z, ..base.field }, ..base }));
+    }
+    for z in [3.0, 8.0, 1000.0] {
+        list.push((format!("dead_zone {z} uT"), Config { iron: IronConfig { dead_zone: z, ..base.iron }, ..base }));
+    }
+    for (name, config) in list {
+        print!("{name:<24}");
+        for variant in [Variant::Base, Variant::Cold, Variant::Hardware] {
+            let s = scores(trials, variant, || Box::new(Dcm::new(config)));
+            let half = |k: usize| Score::mean(s.iter().skip(k).step_by(2));
+            let (a, b) = (half(0), half(1));
+            let name = variant.name();
+            print!("  {name} {:.2}/{:.2} {:.2}/{:.2}", a.total, b.total, a.inclination, b.inclination);
+        }
+        println!();
+    }
+    Ok(())
+}
