@@ -31,10 +31,12 @@ pub struct Limits {
     pub stall_ms: u32,
     /// How long speed must be exceeded, milliseconds.
     pub speed_ms: u32,
-    /// How long current, voltage and load limits must be exceeded, milliseconds.
+    /// How long current, voltage and load limits must be exceeded, or conversions be missing, milliseconds.
     pub analogue_ms: u32,
-    /// How long sensors must disagree or conversions be missing, milliseconds.
+    /// How long sensors must disagree, milliseconds.
     pub sensor_ms: u32,
+    /// How long a speed channel must be known as lost, milliseconds.
+    pub lost_ms: u32,
 }
 
 /// What the limits look at, one control tick.
@@ -52,8 +54,16 @@ pub struct Readings {
     pub load_saturated: bool,
     /// Channels that disagree with the others at this moment.
     pub disagreeing: u8,
-    /// No conversions came since the last tick.
+    /// Speed channels that are silent while the others see the rotor turn.
+    pub lost: u8,
+    /// No conversions came since the last tick, or a channel that must not is at an end of its range.
     pub adc_missing: bool,
+    /// Damaged frames of the host since the last tick.
+    pub damaged: u8,
+    /// Replayed frames of the host since the last tick.
+    pub replayed: u8,
+    /// The voltage detector sees the board's own supply too low.
+    pub brown_out: bool,
     /// Milliseconds since the host was heard.
     pub silence_ms: u32,
     /// Milliseconds since the last control tick.
@@ -69,7 +79,15 @@ pub struct Protection {
     load_ms: u32,
     disagree_ms: u32,
     adc_ms: u32,
+    lost_ms: u32,
+    damage: u32,
 }
+
+/// What one damaged frame adds to the account of damage, which sinks by one a millisecond: frames no more than 250 ms apart
+/// fill it with the third.
+const DAMAGE_OF_A_FRAME: u32 = 500;
+/// Account of damage at which the link counts as corrupt.
+const DAMAGE_LIMIT: u32 = 1000;
 
 /// Advances a timer while `exceeded`; says whether it has reached `limit`.
 fn lasted(timer: &mut u32, exceeded: bool, tick_ms: u32, limit: u32) -> bool {
@@ -93,7 +111,9 @@ impl Protection {
         let heavy = readings.load_saturated || readings.load.is_some_and(|v| v > limits.load || v < Newton(-limits.load.0));
         let load = lasted(&mut self.load_ms, live && heavy, tick, limits.analogue_ms);
         let disagree = lasted(&mut self.disagree_ms, live && readings.disagreeing > limits.disagreeing, tick, limits.sensor_ms);
-        let adc = lasted(&mut self.adc_ms, live && readings.adc_missing, tick, limits.sensor_ms);
+        let adc = lasted(&mut self.adc_ms, live && readings.adc_missing, tick, limits.analogue_ms);
+        let lost = lasted(&mut self.lost_ms, live && readings.lost > 0, tick, limits.lost_ms);
+        self.damage = self.damage.saturating_sub(tick).saturating_add(DAMAGE_OF_A_FRAME * u32::from(readings.damaged));
 
         [
             (Fault::Overspeed, speed),
@@ -102,6 +122,10 @@ impl Protection {
             (Fault::LoadCellOverload, load),
             (Fault::SensorDisagreement, disagree),
             (Fault::AdcLost, adc),
+            (Fault::SensorLost, lost),
+            (Fault::LinkCorrupt, linked && self.damage >= DAMAGE_LIMIT),
+            (Fault::CommandReplayed, linked && readings.replayed > 0),
+            (Fault::BrownOut, readings.brown_out),
             (Fault::LinkLost, linked && readings.silence_ms > limits.link_ms),
             (Fault::ControlStalled, readings.tick_ms > limits.stall_ms),
         ]
@@ -126,6 +150,7 @@ mod tests {
         speed_ms: 5,
         analogue_ms: 50,
         sensor_ms: 500,
+        lost_ms: 50,
     };
 
     fn good() -> Readings {
@@ -167,11 +192,31 @@ mod tests {
         assert_eq!(trips_after(Running, Readings { load_saturated: true, ..good() }, Fault::LoadCellOverload), Some(50));
         assert_eq!(trips_after(Running, Readings { disagreeing: 2, ..good() }, Fault::SensorDisagreement), Some(500));
         assert_eq!(trips_after(Running, Readings { disagreeing: 1, ..good() }, Fault::SensorDisagreement), None);
-        assert_eq!(trips_after(Running, Readings { adc_missing: true, ..good() }, Fault::AdcLost), Some(500));
+        assert_eq!(trips_after(Running, Readings { adc_missing: true, ..good() }, Fault::AdcLost), Some(50));
+        assert_eq!(trips_after(Running, Readings { lost: 1, ..good() }, Fault::SensorLost), Some(50));
+        assert_eq!(trips_after(Armed, Readings { lost: 1, ..good() }, Fault::SensorLost), None, "it coasts");
+        assert_eq!(trips_after(Running, Readings { replayed: 1, ..good() }, Fault::CommandReplayed), Some(1));
+        assert_eq!(trips_after(Disarmed, Readings { replayed: 1, ..good() }, Fault::CommandReplayed), None, "only refused");
+        assert_eq!(trips_after(Disarmed, Readings { brown_out: true, ..good() }, Fault::BrownOut), Some(1));
         let silent = Readings { silence_ms: 1001, ..good() };
         assert_eq!(trips_after(Armed, silent, Fault::LinkLost), Some(1));
         assert_eq!(trips_after(Disarmed, silent, Fault::LinkLost), None);
         assert_eq!(trips_after(Disarmed, Readings { tick_ms: 6, ..good() }, Fault::ControlStalled), Some(1));
+    }
+
+    #[test]
+    fn the_third_damaged_frame_in_half_a_second_trips_and_rare_ones_do_not() {
+        let trips = |apart: u32| {
+            let mut protection = Protection::default();
+            (0..60_000).find(|ms| {
+                let damaged = u8::from(ms % apart == 0);
+                let readings = Readings { damaged, ..good() };
+                protection.check(RigState::Running, &readings, &LIMITS).contains(Fault::LinkCorrupt)
+            })
+        };
+        assert_eq!(trips(1), Some(2));
+        assert_eq!(trips(250), Some(500));
+        assert_eq!(trips(500), None, "two a second are bad luck");
     }
 
     #[test]

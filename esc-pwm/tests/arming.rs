@@ -37,6 +37,29 @@ fn reachable() -> BTreeSet<u8> {
     seen
 }
 
+/// Every state with every event under every combination of objections, once.
+#[test]
+fn the_whole_table_is_visited() {
+    let (mut taken, mut refused, mut ignored) = (0u32, 0u32, 0u32);
+    for state in STATES {
+        for event in ArmingEvent::ALL {
+            for guard in objections() {
+                match step(state, event, guard) {
+                    Step::To(_) => taken += 1,
+                    Step::Refused(reasons) => {
+                        refused += 1;
+                        assert!(!reasons.is_empty() && event.is_command(), "{state:?} {event:?}");
+                    }
+                    Step::Ignored => ignored += 1,
+                }
+            }
+        }
+    }
+    let (states, rows) = (reachable().len(), TABLE.len());
+    println!("{states} states, {rows} rows; {taken} transitions taken, {refused} refused, {ignored} without effect");
+    assert_eq!(taken + refused + ignored, 10 * 15 * 512);
+}
+
 #[test]
 fn every_state_is_reachable_and_no_row_is_dead() {
     assert_eq!(reachable().len(), STATES.len());

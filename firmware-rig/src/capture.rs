@@ -169,6 +169,12 @@ impl CaptureChannel {
         self.revolution().filter(|r| *r > 0).map(|r| RevPerMin(60.0 * timer_hz as f32 / r as f32))
     }
 
+    /// Silent for more than three expected periods and the margin, when the others turn with (ticks a revolution, since when).
+    fn is_lost(&self, now: Ticks, (revolution, since): (u64, Ticks)) -> bool {
+        let silent = now.since(self.last.max(since)).0;
+        self.marks > 0 && silent > 3 * self.expected(revolution) + self.times.lost_margin.0
+    }
+
     /// What the channel reports, when the others turn with `others` = (ticks a revolution, since when), if they do.
     fn code(&self, now: Ticks, others: Option<(u64, Ticks)>) -> CaptureCode {
         let bare = |verdict| CaptureCode { edges: 0, span: 0, verdict };
@@ -187,9 +193,8 @@ impl CaptureChannel {
             return full(judge(self.marks, self.periods().take(edges)));
         }
         match others {
-            Some((revolution, since)) => {
-                let silent = now.since(self.last.max(since)).0;
-                if silent > 3 * self.expected(revolution) + self.times.lost_margin.0 {
+            Some(others) => {
+                if self.is_lost(now, others) {
                     bare(CaptureVerdict::Lost)
                 } else if self.reading.is_some() {
                     full(CaptureVerdict::Nominal)
@@ -259,10 +264,28 @@ impl CaptureBank {
         self.flagged
     }
 
+    /// Channels that are silent for longer than a turning rotor can explain, while others see it turn. Judged above
+    /// 300 rev/min only, and never while all of them fall silent together.
+    #[must_use]
+    pub fn lost(&self, now: Ticks) -> u8 {
+        let Some(others) = self.others(now).filter(|(revolution, _)| !self.is_slow(*revolution)) else { return 0 };
+        let lost = |c: &&CaptureChannel| c.is_lost(now, others);
+        self.channels.iter().filter(lost).count() as u8
+    }
+
+    /// Ticks a revolution of the channels that turn, and since when any did.
+    fn others(&self, now: Ticks) -> Option<(u64, Ticks)> {
+        let known = self.channels.each_ref().map(|c| c.revolution().filter(|_| c.is_turning(now)).map(|r| r as f32));
+        median(known).map(|r| r as u64).zip(self.turning_since)
+    }
+
+    fn is_slow(&self, revolution: u64) -> bool {
+        revolution > 60 * u64::from(self.timer_hz) / SLOWEST_JUDGED
+    }
+
     /// The codes of one sample.
     pub fn sample(&mut self, now: Ticks) -> [CaptureCode; CAPTURE_CHANNELS] {
-        let known = self.channels.each_ref().map(|c| c.revolution().filter(|_| c.is_turning(now)).map(|r| r as f32));
-        let others = median(known).map(|r| r as u64).zip(self.turning_since);
+        let others = self.others(now);
         let mut codes = self.channels.each_ref().map(|c| c.code(now, others));
         let hz = self.timer_hz;
         let healthy =
@@ -290,7 +313,7 @@ impl CaptureBank {
             CaptureVerdict::Lost => others.is_some(), // all together: the rotor stops
             _ => false,
         };
-        let slow = others.is_some_and(|(revolution, _)| revolution > 60 * u64::from(hz) / SLOWEST_JUDGED);
+        let slow = others.is_some_and(|(revolution, _)| self.is_slow(revolution));
         self.flagged = if slow { 0 } else { codes.iter().filter(bad).count() as u8 };
         codes
     }

@@ -93,6 +93,8 @@ pub struct Config {
     pub converter: Converter,
     /// Load cell.
     pub strain: StrainChannel,
+    /// Load-cell scale found with known masses, in place of the design's.
+    pub strain_scale: Option<AdcScale>,
     /// Torque arm.
     pub torque: TorqueChannel,
     /// Shunt.
@@ -131,6 +133,7 @@ impl Config {
             log_period: Ticks::from_ms(100),
             converter: Converter { reference: Volt(3.3), bits: 12 },
             strain,
+            strain_scale: None,
             torque: TorqueChannel { arm_m: 0.1, volts_per_newton: 0.25, zero: Volt(1.65) },
             current: CurrentChannel { shunt_ohm: 0.001, gain: 50.0, zero: Volt(0.2) },
             voltage_divider: Self::SUPPLY_DIVIDER,
@@ -149,6 +152,7 @@ impl Config {
                 speed_ms: 20,
                 analogue_ms: 100,
                 sensor_ms: 500,
+                lost_ms: 50,
             },
             times: ArmingTimes::default(),
             slew: Slew { ns_per_ms: 10_000 }, // full range in 0.1 s: a step stays a step to a motor of 50 ms
@@ -184,7 +188,7 @@ impl Config {
             timer_hz: self.timer_hz,
             marks: self.marks,
             adc: [
-                scale(s.zero.0 * s.divider, sign * s.volts_per_newton() * s.divider),
+                self.strain_scale.unwrap_or_else(|| scale(s.zero.0 * s.divider, sign * s.volts_per_newton() * s.divider)),
                 scale(self.torque.zero.0, self.torque.volts_per_newton / self.torque.arm_m),
                 scale(self.current.zero.0, self.current.shunt_ohm * self.current.gain),
                 scale(0.0, self.voltage_divider),

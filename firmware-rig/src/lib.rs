@@ -18,14 +18,19 @@ extern crate std;
 
 pub mod capture;
 pub mod config;
+pub mod line;
+pub mod mass;
 mod operator;
 pub mod pattern;
 pub mod queue;
 pub mod rig;
 pub mod sampling;
+pub mod settings;
 pub mod strain;
 
 pub use capture::CaptureChannel;
 pub use config::Config;
+pub use line::{CommandLine, LineNews};
 pub use rig::{Inputs, Outputs, Rig};
 pub use sampling::AdcBlock;
+pub use settings::Settings;

@@ -147,14 +147,17 @@ mod app {
         let counter = cx.shared.capture_timer.lock(|timer| timer.cnt().read().bits());
         let now = board.clock.now(counter);
         MILLIS.store(now.as_ms() as u32, Ordering::Relaxed);
-        let command = board.link.receive(board.dma);
+        let (command, line) = board.link.receive(board.dma);
         let inputs = Inputs {
             now,
             edges: board.edges.each_ref().map(|edges| edges.as_slice()),
             over_capture,
             adc: board.converter.drain(board.dma),
             command,
+            line,
             stop_input: board.stop.is_low(),
+            brown_out: false,
+            paused: false,
         };
         let outputs = board.rig.tick(&inputs);
         board.pulse.set(outputs.pulse);

@@ -6,8 +6,10 @@
 //! Reference: specification `rig.md`, "Acquisition".
 
 use crate::rig::Rig;
-use esc_pwm::{ArmingEvent, Schedule, ScheduleStep, Staircase, Step};
-use frame::message::{Command, Event};
+use crate::settings::Settings;
+use esc_pwm::{ArmingEvent, Chirp, Schedule, ScheduleStep, Staircase, Step};
+use frame::calibration::AdcScale;
+use frame::message::{Command, Event, Setting};
 use frame::rig::{AdcVerdict, Refusals, RigState};
 use frame::units::{PulseWidth, Ticks};
 
@@ -42,6 +44,26 @@ impl Rig {
             }
             Command::Tare => self.tare(),
             Command::ClearFaults => self.ask(now, ArmingEvent::Clear, Refusals::default()),
+            Command::RunVisits { step, hold_ms, top, down, visits } => {
+                self.run(now, Schedule::Staircase(Staircase { step, hold_ms, top, down, visits }))
+            }
+            Command::RunRamp { from, to, length_ms } => self.run(now, Schedule::Ramp { from, to, length_ms }),
+            Command::RunStep { before, after, hold_ms } => self.run(now, Schedule::Step { before, after, hold_ms }),
+            Command::RunChirp { centre, amplitude, from_mhz, to_mhz, length_ms } => {
+                self.run(now, Schedule::Chirp(Chirp { centre, amplitude, from_mhz, to_mhz, length_ms }))
+            }
+            Command::Configure(setting) => self.configure(&setting),
+            Command::SaveSettings => self.at_rest().map(|()| self.store = Some(self.settings)),
+            Command::MassPoint { mass_g } => self.take_mass(mass_g),
+            Command::MassFit => self.fit_masses(),
+            Command::MassForget => {
+                self.masses.forget();
+                Ok(())
+            }
+            Command::SelfTest { confirm, trial } => {
+                let missing = Refusals::default().and(Refusals::NOT_CONFIRMED, confirm != Command::SELF_TEST_CONFIRM);
+                if missing.is_empty() { Ok(self.trial = Some(trial)) } else { Err(missing) }
+            }
         };
         self.tell(match answer {
             Ok(()) => Event::Accepted,
@@ -63,6 +85,45 @@ impl Rig {
         self.ask(now, ArmingEvent::Run, schedule.check())?;
         self.schedule = schedule;
         self.started = now;
+        Ok(())
+    }
+
+    /// What changes the board itself needs the rig disarmed and the rotor at rest.
+    fn at_rest(&self) -> Result<(), Refusals> {
+        let refusals = Refusals::default()
+            .and(Refusals::WRONG_STATE, self.state != RigState::Disarmed)
+            .and(Refusals::ROTOR_TURNING, self.bank.is_turning());
+        if refusals.is_empty() { Ok(()) } else { Err(refusals) }
+    }
+
+    fn configure(&mut self, setting: &Setting) -> Result<(), Refusals> {
+        self.at_rest()?;
+        let factory = Settings::of(&self.factory);
+        let changed = self.settings.with(setting, &factory).map_err(|_| Refusals(Refusals::OUT_OF_RANGE))?;
+        self.put_in_force(changed);
+        Ok(())
+    }
+
+    /// The mean of the last whole log interval becomes the reading of a known mass.
+    fn take_mass(&mut self, mass_g: f32) -> Result<(), Refusals> {
+        self.at_rest()?;
+        let refused = Refusals(Refusals::OUT_OF_RANGE);
+        let [strain, ..] = &self.codes;
+        if strain.verdict != AdcVerdict::Nominal {
+            return Err(refused);
+        }
+        let counts = (f64::from(strain.sum) / f64::from(strain.count)) as f32;
+        let points = self.masses.take(mass_g, counts).map_err(|()| refused)?;
+        self.tell(Event::MassTaken { points, counts });
+        Ok(())
+    }
+
+    fn fit_masses(&mut self) -> Result<(), Refusals> {
+        self.at_rest()?;
+        let [design, ..] = self.factory.calibration().adc;
+        let fit = self.masses.fit(&design).map_err(|()| Refusals(Refusals::OUT_OF_RANGE))?;
+        self.put_in_force(Settings { strain: Some(AdcScale { zero: fit.zero, gain: fit.gain }), ..self.settings });
+        self.tell(Event::MassFitted(fit));
         Ok(())
     }
 

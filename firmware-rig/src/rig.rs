@@ -8,10 +8,13 @@
 
 use crate::capture::CaptureBank;
 use crate::config::Config;
+use crate::line::LineNews;
+use crate::mass::MassPoints;
 use crate::sampling::AdcBlock;
+use crate::settings::Settings;
 use esc_pwm::{ArmingEvent, Objections, Protection, Readings, Schedule, Step, Uploaded, pulse_for, step, time_out};
 use frame::calibration::Calibration;
-use frame::message::{BoardId, Command, Event, Hello};
+use frame::message::{BoardId, Command, Event, Hello, Trial};
 use frame::rig::{ADC_CHANNELS, AdcCode, AdcVerdict, CAPTURE_CHANNELS, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::units::{Ampere, Newton, PulseWidth, Ticks, Volt};
 use heapless::Deque;
@@ -29,8 +32,14 @@ pub struct Inputs<'a> {
     pub adc: [AdcBlock; ADC_CHANNELS],
     /// At most one decoded command of the host.
     pub command: Option<Command>,
+    /// What went wrong on the host's line since the last tick.
+    pub line: LineNews,
     /// The hardware stop line.
     pub stop_input: bool,
+    /// The voltage detector sees the board's own supply too low.
+    pub brown_out: bool,
+    /// The board itself held the tick up since the last one (it erased flash, which stops the processor): no stall.
+    pub paused: bool,
 }
 
 /// What the board has to do now.
@@ -42,6 +51,10 @@ pub struct Outputs {
     pub sample: Option<RigSample>,
     /// The oldest event that has not been told yet.
     pub event: Option<Event>,
+    /// The operator asks for these settings to be stored.
+    pub store: Option<Settings>,
+    /// The operator asks for this trial of the last resort.
+    pub trial: Option<Trial>,
 }
 
 /// The rig.
@@ -57,6 +70,11 @@ pub struct Rig {
     pub(crate) upload: Uploaded,
     pub(crate) bank: CaptureBank,
     pub(crate) codes: [AdcCode; ADC_CHANNELS],
+    pub(crate) factory: Config,
+    pub(crate) settings: Settings,
+    pub(crate) masses: MassPoints,
+    pub(crate) store: Option<Settings>,
+    pub(crate) trial: Option<Trial>,
     entered: Ticks,
     setting: PulseWidth,
     last_live: Option<Ticks>,
@@ -73,8 +91,20 @@ impl Rig {
     /// A rig after reset: disarmed, at minimum.
     #[must_use]
     pub fn new(config: Config) -> Self {
+        Self::with_settings(config.clone(), Settings::of(&config))
+    }
+
+    /// A rig after reset with `settings` in force in place of what `factory` says.
+    #[must_use]
+    pub fn with_settings(factory: Config, settings: Settings) -> Self {
+        let config = settings.apply(&factory);
         let untared = config.calibration();
         Self {
+            factory,
+            settings,
+            masses: MassPoints::new(),
+            store: None,
+            trial: None,
             bank: CaptureBank::new(&config),
             calibration: untared,
             untared,
@@ -116,6 +146,27 @@ impl Rig {
         self.calibration
     }
 
+    /// The settings in force, the load cell's scale included.
+    #[must_use]
+    pub fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// Puts `settings` in force. The tare is gone when the scale of the load cell changes.
+    pub(crate) fn put_in_force(&mut self, settings: Settings) {
+        let config = settings.apply(&self.factory);
+        if config.marks != self.config.marks {
+            self.bank = CaptureBank::new(&config);
+        }
+        let untared = config.calibration();
+        if untared != self.untared {
+            self.untared = untared;
+            self.calibration = untared;
+        }
+        self.settings = settings;
+        self.config = config;
+    }
+
     /// The configuration.
     #[must_use]
     pub fn config(&self) -> &Config {
@@ -133,14 +184,19 @@ impl Rig {
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let now = inputs.now;
         let tick_ms = self.advance(now);
+        // only a rig that is disarmed may be held up: it gives minimum pulses whatever happens
+        let tick_ms = if inputs.paused && self.state == RigState::Disarmed { 1 } else { tick_ms };
         if inputs.command.is_some() {
             self.heard = now;
+        }
+        if inputs.line.replayed > 0 {
+            self.tell(Event::Refused(Refusals(Refusals::REPLAYED)));
         }
         self.bank.take(now, &inputs.edges, &inputs.over_capture);
         for (whole, part) in self.blocks.iter_mut().zip(&inputs.adc) {
             whole.add(part);
         }
-        self.protect(now, tick_ms, &inputs.adc);
+        self.protect(now, tick_ms, inputs);
         if inputs.stop_input {
             self.stop(now);
         }
@@ -154,7 +210,8 @@ impl Rig {
         }
         let pulse = self.drive(now, tick_ms);
         let sample = (now >= self.next_sample).then(|| self.sample(now, pulse));
-        Outputs { pulse, sample, event: self.events.pop_front() }
+        let (store, trial) = (self.store.take(), self.trial.take());
+        Outputs { pulse, sample, event: self.events.pop_front(), store, trial }
     }
 
     /// Notes the tick; milliseconds since the one before, rounded.
@@ -179,9 +236,13 @@ impl Rig {
         Some((blocks.get(channel)?.mean()? - scale.zero) * scale.gain)
     }
 
-    fn protect(&mut self, now: Ticks, tick_ms: u32, adc: &[AdcBlock; ADC_CHANNELS]) {
-        let [strain, ..] = adc;
-        let end = strain.verdict(self.config.converter.top(), true);
+    fn protect(&mut self, now: Ticks, tick_ms: u32, inputs: &Inputs<'_>) {
+        let adc = &inputs.adc;
+        let [strain, rest @ ..] = adc;
+        let [_, live_zero @ ..] = &self.config.live_zero;
+        let top = self.config.converter.top();
+        let end = strain.verdict(top, true);
+        let stuck = rest.iter().zip(live_zero).any(|(block, live)| block.verdict(top, *live) == AdcVerdict::Stuck);
         let voltage = self.value(3, adc).map(Volt);
         self.supply = voltage.or(self.supply);
         let readings = Readings {
@@ -191,7 +252,11 @@ impl Rig {
             load: self.value(0, adc).map(Newton),
             load_saturated: end == AdcVerdict::Stuck,
             disagreeing: self.bank.flagged(),
-            adc_missing: end == AdcVerdict::Missing,
+            lost: self.bank.lost(now),
+            adc_missing: end == AdcVerdict::Missing || stuck,
+            damaged: inputs.line.damaged,
+            replayed: inputs.line.replayed,
+            brown_out: inputs.brown_out,
             silence_ms: u32::try_from(self.ms_since(now, self.heard)).unwrap_or(u32::MAX),
             tick_ms,
         };

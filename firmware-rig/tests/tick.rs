@@ -1,6 +1,6 @@
 //! The rig through its one door, `Rig::tick`, at 1 kHz with a host that answers.
 
-use firmware_rig::{AdcBlock, Config, Inputs, Outputs, Rig};
+use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Outputs, Rig};
 use frame::message::{Beep, Command, Event};
 use frame::rig::{AdcVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::units::{PulseWidth, Ticks};
@@ -52,7 +52,10 @@ impl Bench {
             over_capture: [false; 4],
             adc,
             command: command.or(keep_alive),
+            line: LineNews::default(),
             stop_input: self.stop_line,
+            brown_out: false,
+            paused: false,
         };
         let outputs = self.rig.tick(&inputs);
         self.pulse = outputs.pulse;

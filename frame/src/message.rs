@@ -38,7 +38,7 @@ pub struct Hello {
 }
 
 /// Something happened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Event {
     /// The arming machine changed its state.
@@ -66,6 +66,78 @@ pub enum Event {
         /// When.
         at: Ticks,
     },
+    /// A mass stands on the load cell and its reading was taken.
+    MassTaken {
+        /// Points so far.
+        points: u8,
+        /// Mean of the strain channel, counts.
+        counts: f32,
+    },
+    /// The load cell's scale was fitted to the masses.
+    MassFitted(MassFit),
+    /// What became of the settings in flash.
+    Settings(SettingsNews),
+    /// The program panicked before the last reset; told once after it.
+    Panicked {
+        /// Line of the source file.
+        line: u32,
+        /// End of the file's path, padded with zeros.
+        file: [u8; 24],
+    },
+}
+
+/// Outcome of a mass calibration (Beharie 2013, Eq. 5.34-5.35): newton = (counts - zero) * gain.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MassFit {
+    /// Newton a count.
+    pub gain: f32,
+    /// Counts without load.
+    pub zero: f32,
+    /// Root mean square of the residuals, N; zero for two points.
+    pub residual_n: f32,
+    /// Largest residual, N.
+    pub worst_n: f32,
+    /// Points used.
+    pub points: u8,
+}
+
+/// What became of the settings in flash.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SettingsNews {
+    /// Nothing was stored: factory settings are in force.
+    Absent,
+    /// Stored settings are in force.
+    Loaded,
+    /// What was stored is damaged or of another version: refused, factory settings are in force.
+    Damaged,
+    /// Written, and read back the same.
+    Saved,
+    /// Could not be written; the settings in force stay until the reset.
+    Failed,
+}
+
+/// How the board is, once a second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Health {
+    /// Most core cycles from one tick's entry to its end, since reset.
+    pub tick_cycles: u32,
+    /// Most core cycles of one capture interrupt, since reset.
+    pub capture_cycles: u32,
+    /// Bytes of stack that were never used, since reset.
+    pub stack_free: u32,
+    /// Bytes of stack in all.
+    pub stack_size: u32,
+    /// Shortest and longest time between two ticks in the last second, timer ticks: the sampling jitter.
+    pub tick_span: [u32; 2],
+    /// Command frames that were good, damaged and replayed, since reset.
+    pub frames: [u16; 3],
+    /// Encoder steps forwards and backwards in the last second, by channel B at the edge of A; both 0 when B is not wired.
+    pub steps: [u16; 2],
+    /// Index marks of the encoder since reset, modulo 65 536.
+    pub index: u16,
 }
 
 /// Board to host.
@@ -81,6 +153,8 @@ pub enum Message {
     Imu(ImuSample),
     /// Something happened.
     Event(Event),
+    /// How the board is.
+    Health(Health),
 }
 
 /// Most steps that one uploaded schedule may hold.
@@ -135,11 +209,112 @@ pub enum Command {
     Tare,
     /// The operator clears the latched faults.
     ClearFaults,
+    /// Run a staircase several times over (repeated visits).
+    RunVisits {
+        /// Step height.
+        step: PulseWidth,
+        /// Hold of each level, milliseconds.
+        hold_ms: u32,
+        /// Highest level.
+        top: PulseWidth,
+        /// Come down again by the same levels.
+        down: bool,
+        /// How often.
+        visits: u16,
+    },
+    /// Run a straight line from one pulse to another.
+    RunRamp {
+        /// Beginning.
+        from: PulseWidth,
+        /// End.
+        to: PulseWidth,
+        /// Duration, milliseconds.
+        length_ms: u32,
+    },
+    /// Run one level, then another.
+    RunStep {
+        /// Before the step.
+        before: PulseWidth,
+        /// After it.
+        after: PulseWidth,
+        /// Hold of each, milliseconds.
+        hold_ms: u32,
+    },
+    /// Run a swept sine.
+    RunChirp {
+        /// Middle.
+        centre: PulseWidth,
+        /// Amplitude.
+        amplitude: PulseWidth,
+        /// Frequency at the beginning, millihertz.
+        from_mhz: u32,
+        /// Frequency at the end, millihertz.
+        to_mhz: u32,
+        /// Duration, milliseconds.
+        length_ms: u32,
+    },
+    /// Change one setting; only while disarmed.
+    Configure(Setting),
+    /// Store the settings and the load cell's calibration in flash; only while disarmed.
+    SaveSettings,
+    /// A known mass hangs on the load cell: take the mean of the last whole log interval as its reading. Thrust is up, so a
+    /// mass that pulls the beam down as the motor's weight does is positive here and reads as negative thrust.
+    MassPoint {
+        /// The mass, gram.
+        mass_g: f32,
+    },
+    /// Fit the load cell's scale to the masses taken: two points exactly, more by least squares.
+    MassFit,
+    /// Forget the masses taken.
+    MassForget,
+    /// Try the last resort on purpose; `confirm` must be [`Command::SELF_TEST_CONFIRM`]. Ends in minimum throttle and a reset.
+    SelfTest {
+        /// Guards against a stray command.
+        confirm: u32,
+        /// What to try.
+        trial: Trial,
+    },
+}
+
+/// What the self-test provokes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Trial {
+    /// A panic outside the control loop.
+    Panic,
+    /// A program that hangs with interrupts off, for the watchdog.
+    Hang,
+}
+
+/// One setting of the board.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Setting {
+    /// Time between two samples, 10 to 1000 ms.
+    LogPeriodMs(u16),
+    /// Marks a revolution of the four capture channels after their prescalers; 0 where none is fitted.
+    Marks([u16; 4]),
+    /// Throttle curve by five points, or `None` for the straight line.
+    Curve(Option<[PulseWidth; 5]>),
+    /// Most change of pulse in a millisecond, nanoseconds.
+    SlewNsPerMs(u32),
+    /// Highest rotor speed, rev/min.
+    SpeedLimit(f32),
+    /// Highest current, A.
+    CurrentLimit(f32),
+    /// Lowest supply while armed, V.
+    VoltageLimit(f32),
+    /// Longest silence of the host while armed, 200 to 5000 ms.
+    LinkMs(u16),
+    /// Everything as it left the factory.
+    Factory,
 }
 
 impl Command {
     /// The word that confirms a range calibration ("CALI").
     pub const CALIBRATE_CONFIRM: u32 = 0x4341_4C49;
+    /// The word that confirms a self-test ("TEST").
+    pub const SELF_TEST_CONFIRM: u32 = 0x5445_5354;
 }
 
 /// ESC beep patterns as events (Beharie 2013, Appendix C).

@@ -72,6 +72,57 @@ pub enum Fault {
     EscSelfTest = 9,
     /// Conversion data missing or damaged.
     AdcLost = 10,
+    /// A speed channel fell silent, or its line is stuck, while the others see the rotor turn.
+    SensorLost = 11,
+    /// Damaged frames keep coming from the host.
+    LinkCorrupt = 12,
+    /// A command frame came a second time.
+    CommandReplayed = 13,
+    /// The board's own supply fell below the voltage detector's level.
+    BrownOut = 14,
+}
+
+impl Fault {
+    /// Every fault, in the order of its bit.
+    pub const ALL: [Self; 15] = [
+        Self::OperatorStop,
+        Self::LinkLost,
+        Self::Overspeed,
+        Self::OverCurrent,
+        Self::UnderVoltage,
+        Self::LoadCellOverload,
+        Self::SensorDisagreement,
+        Self::ControlStalled,
+        Self::ArmingTimeout,
+        Self::EscSelfTest,
+        Self::AdcLost,
+        Self::SensorLost,
+        Self::LinkCorrupt,
+        Self::CommandReplayed,
+        Self::BrownOut,
+    ];
+
+    /// The fault in words, for people.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::OperatorStop => "operator's stop",
+            Self::LinkLost => "link lost",
+            Self::Overspeed => "overspeed",
+            Self::OverCurrent => "over-current",
+            Self::UnderVoltage => "under-voltage",
+            Self::LoadCellOverload => "load cell overloaded",
+            Self::SensorDisagreement => "speed sensors disagree",
+            Self::ControlStalled => "control task stalled",
+            Self::ArmingTimeout => "ESC did not answer",
+            Self::EscSelfTest => "ESC self-test failed",
+            Self::AdcLost => "conversions lost",
+            Self::SensorLost => "speed sensor lost",
+            Self::LinkCorrupt => "link corrupt",
+            Self::CommandReplayed => "command replayed",
+            Self::BrownOut => "brown-out",
+        }
+    }
 }
 
 /// A set of latched [`Fault`]s.
@@ -100,6 +151,11 @@ impl FaultSet {
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
+
+    /// The faults in the set, in the order of their bits.
+    pub fn iter(self) -> impl Iterator<Item = Fault> {
+        Fault::ALL.into_iter().filter(move |fault| self.contains(*fault))
+    }
 }
 
 /// All reasons why a command was refused. Bits, so that a refusal lists every one of them.
@@ -126,6 +182,30 @@ impl Refusals {
     pub const EMPTY_SCHEDULE: u16 = 1 << 7;
     /// The rotor turns although it should stand.
     pub const ROTOR_TURNING: u16 = 1 << 8;
+    /// The frame is not newer than the last one of the host.
+    pub const REPLAYED: u16 = 1 << 9;
+    /// The settings could not be stored.
+    pub const NOT_STORED: u16 = 1 << 10;
+
+    /// Every reason and its words, for people.
+    pub const WORDS: [(u16, &'static str); 11] = [
+        (Self::WRONG_STATE, "not in this state"),
+        (Self::FAULT_LATCHED, "a fault is latched: clear it first"),
+        (Self::THROTTLE_NOT_LOW, "throttle is not at minimum"),
+        (Self::NO_LOW_INTERVAL, "no low-throttle interval since the last run"),
+        (Self::ESC_POWERED, "the ESC is powered"),
+        (Self::NOT_CONFIRMED, "confirmation is missing"),
+        (Self::OUT_OF_RANGE, "a value is out of range"),
+        (Self::EMPTY_SCHEDULE, "the schedule is empty"),
+        (Self::ROTOR_TURNING, "the rotor turns"),
+        (Self::REPLAYED, "the frame is not newer than the last one"),
+        (Self::NOT_STORED, "the settings could not be stored"),
+    ];
+
+    /// The reasons in words.
+    pub fn words(self) -> impl Iterator<Item = &'static str> {
+        Self::WORDS.into_iter().filter(move |(bit, _)| self.0 & bit != 0).map(|(_, words)| words)
+    }
 
     /// Nothing speaks against it.
     #[must_use]
@@ -164,6 +244,8 @@ pub enum CaptureVerdict {
     Disagrees,
     /// This channel is not fitted.
     Absent,
+    /// A twisted blade breaks the beam early: the time from blade to blade over-reads at high speed (Beharie 2013, Fig. 5.54).
+    BladeTwist,
 }
 
 /// Raw reading of one capture channel: `edges` equal marks passed in `span` timer ticks.

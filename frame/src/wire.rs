@@ -62,6 +62,29 @@ impl Encoder {
     }
 }
 
+/// Tells a new frame from one that came before.
+///
+/// A frame is new when its time of sending is later than that of the last new one, or the same with a sequence number ahead of it.
+/// Senders put a clock that never runs backwards into the time (a host: time since 1970 in ticks).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Freshness {
+    last: Option<(Ticks, u16)>,
+}
+
+impl Freshness {
+    /// Whether the frame is new; a new one is remembered.
+    pub fn is_new(&mut self, at: Ticks, sequence: u16) -> bool {
+        let new = self.last.is_none_or(|(then, number)| {
+            let ahead = sequence.wrapping_sub(number);
+            at > then || (at == then && ahead != 0 && ahead < 1 << 15)
+        });
+        if new {
+            self.last = Some((at, sequence));
+        }
+        new
+    }
+}
+
 /// What the decoder has seen so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

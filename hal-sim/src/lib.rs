@@ -16,6 +16,7 @@ pub mod bench;
 pub mod effect;
 #[cfg(feature = "emulated")]
 pub mod emulated;
+pub mod fault;
 pub mod native;
 pub mod noise;
 pub mod plant;

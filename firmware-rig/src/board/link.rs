@@ -1,16 +1,17 @@
 //! The telemetry link on USART1.
 //!
 //! What it is: frames queue up and leave by DMA2 stream 7; commands arrive by DMA2 stream 2 in a circle that the tick polls.
-//! What can go wrong: a full transmit queue drops a whole frame, which the host sees as a gap in the sequence; a damaged
-//! command is counted by the decoder and costs nothing else. A stop overtakes every command that still waits.
+//! What can go wrong: a full transmit queue drops a whole frame, which the host sees as a gap in the sequence; what can go
+//! wrong with a command stands in `firmware_rig::line`.
 //! Units: bytes at 921 600 baud.
 //! Reference: RM0090 section 30.3.13 (DMA), table 43; specification `formats.md`, "Telemetry".
 
 use core::sync::atomic::{AtomicU8, Ordering};
+use firmware_rig::{CommandLine, LineNews};
 use frame::message::{Command, Message};
 use frame::units::Ticks;
-use frame::wire::{Decoder, Encoder, MAX_WIRE};
-use heapless::{Deque, Vec};
+use frame::wire::{Encoder, MAX_WIRE};
+use heapless::Vec;
 use stm32f4xx_hal::pac::{DMA2, USART1};
 
 const BAUD: u32 = 921_600;
@@ -25,9 +26,8 @@ static RECEIVED: [AtomicU8; IN] = [const { AtomicU8::new(0) }; IN];
 pub(crate) struct Link {
     encoder: Encoder,
     waiting: Vec<u8, OUT>,
-    decoder: Decoder,
+    line: CommandLine,
     tail: usize,
-    commands: Deque<Command, 8>,
     _usart: USART1,
 }
 
@@ -51,14 +51,7 @@ impl Link {
         receive
             .cr()
             .write(|w| w.chsel().set(4).minc().incremented().circ().enabled().dir().peripheral_to_memory().en().enabled());
-        Self {
-            encoder: Encoder::default(),
-            waiting: Vec::new(),
-            decoder: Decoder::default(),
-            tail: 0,
-            commands: Deque::new(),
-            _usart: usart,
-        }
+        Self { encoder: Encoder::default(), waiting: Vec::new(), line: CommandLine::new(), tail: 0, _usart: usart }
     }
 
     /// Queues one message.
@@ -88,21 +81,14 @@ impl Link {
         self.waiting.clear();
     }
 
-    /// Decodes what arrived and gives the next command.
-    pub(crate) fn receive(&mut self, dma: &DMA2) -> Option<Command> {
+    /// Decodes what arrived and gives the next command, and what went wrong on the line.
+    pub(crate) fn receive(&mut self, dma: &DMA2) -> (Option<Command>, LineNews) {
         let left = usize::from(dma.st(2).ndtr().read().ndt().bits());
         let head = IN.saturating_sub(left) % IN;
         while self.tail != head {
-            let byte = RECEIVED.get(self.tail).map_or(0, |b| b.load(Ordering::Relaxed));
+            self.line.take(RECEIVED.get(self.tail).map_or(0, |b| b.load(Ordering::Relaxed)));
             self.tail = (self.tail + 1) % IN;
-            let Some(received) = self.decoder.push::<Command>(byte) else { continue };
-            if received.message == Command::Stop {
-                self.commands.clear();
-            }
-            if self.commands.push_back(received.message).is_err() {
-                defmt::warn!("command queue full");
-            }
         }
-        self.commands.pop_front()
+        self.line.next()
     }
 }

@@ -71,7 +71,7 @@ impl ArmAndRun {
                     _ => {}
                 }
             }
-            Message::Imu(_) => {}
+            Message::Imu(_) | Message::Health(_) => {}
         }
     }
 }

@@ -143,10 +143,10 @@ impl Host {
                         return Err(SimError::Faulted { faults, phase: self.phase.name(), at_s: at.as_s() });
                     }
                     Event::ScheduleDone { .. } if self.phase == Phase::Running => self.enter(Phase::RestAfter, ms),
-                    Event::ScheduleDone { .. } => {}
+                    _ => {} // the rest tells of settings and masses, which this host leaves alone
                 }
             }
-            Message::Imu(_) => {}
+            Message::Imu(_) | Message::Health(_) => {}
         }
         Ok(())
     }

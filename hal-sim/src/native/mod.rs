@@ -178,7 +178,10 @@ pub fn run(
             over_capture: [false; 4],
             adc: gathered.adc,
             command,
+            line: Default::default(),
             stop_input: false,
+            brown_out: false,
+            paused: false,
         });
         board.pulse = outputs.pulse;
         if let Some(Command::Identify) = command {

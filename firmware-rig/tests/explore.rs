@@ -1,0 +1,242 @@
+//! The whole rig, explored: from reset, every kind of input in every state that the rig can be brought into, until nothing new
+//! appears. Rules are checked on every tick of every walk.
+
+use esc_pwm::ArmingTimes;
+use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig};
+use frame::message::{Beep, Command};
+use frame::rig::{FaultSet, RigState};
+use frame::units::{PulseWidth, Ticks};
+use std::collections::{BTreeMap, VecDeque};
+
+const MS: u64 = 84_000;
+const LOW_MS: u64 = 60;
+
+/// Times shortened in proportion, so that every time-out is walked through.
+const TIMES: ArmingTimes = ArmingTimes {
+    hold_min_ms: 400,
+    cells_ms: 200,
+    ready_ms: 200,
+    armed_ms: 700,
+    hold_max_ms: 300,
+    calibrate_min_ms: 300,
+    low_interval_ms: LOW_MS as u32,
+};
+
+/// What may happen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Happening {
+    Say(Command),
+    StopKey,
+    Power(bool),
+    Rotor(bool),
+    OverCurrent,
+    SagOfSupply,
+    BrownOut,
+    Replay,
+    Damage,
+    LateTick,
+    Wait(u64),
+    Silence,
+}
+
+fn happenings() -> Vec<Happening> {
+    let us = PulseWidth::from_us;
+    let mut list: Vec<Happening> = [
+        Command::Ping,
+        Command::Arm,
+        Command::CalibrateRange { confirm: 0 },
+        Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM },
+        Command::ScheduleStep { index: 0, pulse: us(1400), hold_ms: 30, ramp: true },
+        Command::RunSchedule,
+        Command::RunStaircase { step: us(200), hold_ms: 10, top: us(1400), down: true },
+        Command::RunVisits { step: us(200), hold_ms: 10, top: us(1200), down: false, visits: 2 },
+        Command::RunRamp { from: us(1000), to: us(1500), length_ms: 30 },
+        Command::RunStep { before: us(1100), after: us(1300), hold_ms: 10 },
+        Command::RunChirp { centre: us(1300), amplitude: us(100), from_mhz: 1000, to_mhz: 5000, length_ms: 40 },
+        Command::SetPulse(us(1500)),
+        Command::SetPulse(us(1000)),
+        Command::SetPulse(us(2500)),
+        Command::Stop,
+        Command::Tare,
+        Command::ClearFaults,
+        Command::SaveSettings,
+        Command::MassPoint { mass_g: 100.0 },
+        Command::MassFit,
+    ]
+    .map(Happening::Say)
+    .into();
+    list.extend(
+        [Beep::Long, Beep::Cells(3), Beep::Ready, Beep::Double, Beep::Programming, Beep::NoSignal, Beep::SelfTestFailed]
+            .map(|beep| Happening::Say(Command::Beep(beep))),
+    );
+    list.extend([
+        Happening::StopKey,
+        Happening::Power(true),
+        Happening::Power(false),
+        Happening::Rotor(true),
+        Happening::Rotor(false),
+        Happening::OverCurrent,
+        Happening::SagOfSupply,
+        Happening::BrownOut,
+        Happening::Replay,
+        Happening::Damage,
+        Happening::LateTick,
+        Happening::Wait(LOW_MS / 2),
+        Happening::Wait(LOW_MS + 10),
+        Happening::Wait(800),
+        Happening::Silence,
+    ]);
+    list
+}
+
+/// A rig with the little world that its inputs come from.
+#[derive(Clone)]
+struct Walk {
+    rig: Rig,
+    ms: u64,
+    powered: bool,
+    turning: bool,
+    pulse: PulseWidth,
+    last_live: Option<u64>,
+    state: RigState,
+}
+
+/// What makes two walks the same for the machine.
+type Key = (u8, bool, bool, bool, bool, bool, bool);
+
+impl Walk {
+    fn new() -> Self {
+        let mut config = Config { times: TIMES, ..Config::thesis_570kv() };
+        config.limits.analogue_ms = 10;
+        config.limits.link_ms = 500;
+        config.limits.disagreeing = 4; // the one channel that turns here has no company
+        config.limits.lost_ms = 1_000_000;
+        let (pulse, state) = (PulseWidth::MIN, RigState::Disarmed);
+        Self { rig: Rig::new(config), ms: 0, powered: false, turning: false, pulse, last_live: None, state }
+    }
+
+    fn key(&self) -> Key {
+        let recent = self.last_live.is_some_and(|at| self.ms - at < LOW_MS);
+        let one = |set: FaultSet| !set.is_empty();
+        let live = self.pulse.is_live();
+        (self.state as u8, one(self.rig.faults()), live, recent, self.powered, self.turning, self.pulse == PulseWidth::MAX)
+    }
+
+    /// One tick, and the rules that hold on each.
+    fn tick(&mut self, command: Option<Command>, change: impl FnOnce(&mut Inputs<'_>, &mut [u16; 5])) {
+        self.ms += 1;
+        let edge = [(self.ms * MS) as u32];
+        let turn = self.turning && self.ms.is_multiple_of(10);
+        let mut counts = [1427, 2048, 248, if self.powered { 2379 } else { 0 }, 900];
+        let mut inputs = Inputs {
+            now: Ticks(self.ms * MS),
+            edges: [&[], if turn { &edge } else { &[] }, &[], &[]],
+            over_capture: [false; 4],
+            adc: [AdcBlock::default(); 5],
+            command,
+            line: LineNews::default(),
+            stop_input: false,
+            brown_out: false,
+            paused: false,
+        };
+        change(&mut inputs, &mut counts);
+        inputs.adc = counts.map(|code| {
+            let mut block = AdcBlock::default();
+            (0..4).for_each(|_| block.push(code));
+            block
+        });
+        let outputs = self.rig.tick(&inputs);
+        let (before, now) = (self.state, self.rig.state());
+        (self.state, self.pulse) = (now, outputs.pulse);
+        assert_eq!(outputs.pulse, outputs.pulse.clamped(), "pulses never cease and never leave their range");
+        if outputs.pulse.is_live() {
+            assert!(matches!(now, RigState::Running | RigState::CalibrateHoldMax), "{:?} in {now:?}", outputs.pulse);
+            assert!(self.rig.faults().is_empty(), "{:?} with {:?}", outputs.pulse, self.rig.faults());
+        }
+        if before == RigState::Disarmed && matches!(now, RigState::ArmHoldMin | RigState::CalibrateHoldMax) {
+            let rest = self.last_live.map_or(u64::MAX, |at| self.ms - at);
+            assert!(rest >= LOW_MS, "armed again {rest} ms after the last live pulse");
+            assert!(self.rig.faults().is_empty(), "armed over a latched fault");
+        }
+        if now == RigState::CalibrateHoldMax && before != now {
+            assert!(!self.powered && !self.turning, "maximum pulses towards a powered ESC");
+        }
+        if outputs.pulse.is_live() {
+            self.last_live = Some(self.ms);
+        }
+    }
+
+    fn rest(&mut self, ms: u64) {
+        (0..ms).for_each(|_| {
+            let ping = self.ms.is_multiple_of(40).then_some(Command::Ping);
+            self.tick(ping, |_, _| {});
+        });
+    }
+
+    fn meet(&mut self, happening: Happening) {
+        match happening {
+            Happening::Say(command) => self.tick(Some(command), |_, _| {}),
+            Happening::StopKey => self.tick(None, |inputs, _| inputs.stop_input = true),
+            Happening::Power(on) => self.powered = on,
+            Happening::Rotor(on) => self.turning = on,
+            Happening::OverCurrent => (0..12).for_each(|_| self.tick(None, |_, counts| counts[2] = 2500)),
+            Happening::SagOfSupply => (0..12).for_each(|_| self.tick(None, |_, counts| counts[3] = 1000)),
+            Happening::BrownOut => self.tick(None, |inputs, _| inputs.brown_out = true),
+            Happening::Replay => self.tick(None, |inputs, _| inputs.line.replayed = 1),
+            Happening::Damage => self.tick(None, |inputs, _| inputs.line.damaged = 3),
+            Happening::LateTick => {
+                self.ms += 7;
+                self.tick(None, |_, _| {});
+            }
+            Happening::Wait(ms) => self.rest(ms),
+            Happening::Silence => (0..520).for_each(|_| self.tick(None, |_, _| {})),
+        }
+        self.rest(2);
+        if matches!(happening, Happening::Rotor(_)) {
+            self.rest(300); // until the rotor is known to turn, or to stand
+        }
+    }
+
+    /// From here, one stop: minimum on that very tick, and on all that follow.
+    fn stops(&self) {
+        for key in [true, false] {
+            let mut copy = self.clone();
+            if key {
+                copy.tick(None, |inputs, _| inputs.stop_input = true);
+            } else {
+                copy.tick(Some(Command::Stop), |_, _| {});
+            }
+            assert_eq!(copy.pulse, PulseWidth::MIN, "{:?}", self.state);
+            for _ in 0..60 {
+                copy.tick(None, |_, _| {});
+                assert_eq!(copy.pulse, PulseWidth::MIN, "{:?}", self.state);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_state_and_event_of_the_whole_rig() {
+    let list = happenings();
+    let first = Walk::new();
+    let mut seen: BTreeMap<Key, usize> = BTreeMap::from([(first.key(), 0)]);
+    let mut open = VecDeque::from([first]);
+    let (mut transitions, mut states) = (0usize, std::collections::BTreeSet::new());
+    while let Some(walk) = open.pop_front() {
+        states.insert(walk.state as u8);
+        walk.stops();
+        for happening in &list {
+            let mut next = walk.clone();
+            next.meet(*happening);
+            transitions += 1;
+            let visits = seen.entry(next.key()).or_default();
+            *visits += 1;
+            if *visits <= 2 {
+                open.push_back(next); // twice: two walks with one key may still differ in what the key leaves out
+            }
+        }
+    }
+    println!("{} arming states, {} states of the rig, {transitions} transitions", states.len(), seen.len());
+    assert_eq!(states.len(), 10, "every state of the arming machine is reached");
+    assert!(seen.len() >= 40, "{} states", seen.len());
+}
