@@ -1,19 +1,32 @@
-//! Prints how many times faster than real time a native run is: `cargo run --release -p hal-sim --example speed`.
+//! Prints how many times faster than real time a native run is: `cargo run --release -p hal-sim --example speed [RUNS]`.
+//!
+//! The run is the thesis' own: 21 levels of 30 s, four speed sensors, five analogue channels, 1 kHz tick, plant at 10 kHz. The
+//! best of several runs is what the code can do; the others are what the machine was doing besides.
 
+use hal_sim::scenario::Schedule;
 use hal_sim::{Scenario, run};
 use std::time::Instant;
 
 fn main() {
+    let runs: u32 = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(5);
+    let schedule = Schedule::Staircase { step_us: 50.0, hold_s: 30.0, top_us: 2000.0 };
     for effect in [None, Some("beam_resonance"), Some("battery_discharge")] {
-        let scenario = Scenario::demo(1, effect).expect("the catalogue has this effect");
-        let begin = Instant::now();
-        match run(&scenario, None, &mut |_| ()) {
-            Ok(record) => {
-                let simulated = record.samples.last().map_or(0.0, |s| s.at.as_s());
-                let wall = begin.elapsed().as_secs_f64();
-                println!("{}: {simulated:.1} s in {wall:.3} s, {:.0} times real time", scenario.name, simulated / wall);
+        let scenario =
+            Scenario { schedule: schedule.clone(), ..Scenario::demo(1, effect).expect("the catalogue has this effect") };
+        let mut best = (0.0, 0.0, f64::INFINITY);
+        for _ in 0..runs {
+            let begin = Instant::now();
+            match run(&scenario, None, &mut |_| ()) {
+                Ok(record) => {
+                    let simulated = record.samples.last().map_or(0.0, |s| s.at.as_s());
+                    let wall = begin.elapsed().as_secs_f64();
+                    if wall < best.2 {
+                        best = (simulated, simulated / wall, wall);
+                    }
+                }
+                Err(error) => println!("{}: {error}", scenario.name),
             }
-            Err(error) => println!("{}: {error}", scenario.name),
         }
+        println!("{}: {:.1} s in {:.3} s at best of {runs}, {:.0} times real time", scenario.name, best.0, best.2, best.1);
     }
 }

@@ -297,6 +297,7 @@ impl Bench {
 
     fn each_millisecond(&mut self) {
         self.esc.advance_to(self.horizon_ns());
+        self.esc.feel(self.truth.plant.voltage_v, self.truth.plant.current_a, 1.0e-3);
         self.output_us = self.esc.output_us();
         self.converter.renew();
         let run_s = match self.run_start_steps {

@@ -1,12 +1,14 @@
 //! Electronic speed controller: start-up dialogue, throttle range, loss of signal.
 //!
 //! What it is: what the ESC of Appendix C does between power-on and "ready", its beeps as events, and the throttle that it
-//! passes on to the motor.
+//! passes on to the motor, limited by its protections.
 //! What can go wrong: no signal (it beeps without end), a throttle that is neither low nor high at power-on (the same), a
 //! failed self-test (twenty beeps), maximum throttle held for 6 s (programming mode until power is cut).
 //! Units: pulse width in ns, time in ns, throttle 0..1.
 //! Reference: Beharie 2013 Appendix C (start-up, throttle range, protections B and D) and Figure 3.10. Tone lengths are assumed.
 
+use super::esc_guard::{Guard, GuardState};
+use super::esc_program::{Menu, Outcome, Settings};
 use frame::message::Beep;
 use std::collections::VecDeque;
 
@@ -34,13 +36,15 @@ pub struct Esc {
     pub range_min_ns: u32,
     /// Stored pulse of full throttle, ns.
     pub range_max_ns: u32,
-    /// Fails its self-test.
+    /// Fails its self-test (protection D).
     pub self_test_fails: bool,
+    /// Protections A and C.
+    pub guard: Guard,
 }
 
 impl Default for Esc {
     fn default() -> Self {
-        Self { range_min_ns: 1_000_000, range_max_ns: 2_000_000, self_test_fails: false }
+        Self { range_min_ns: 1_000_000, range_max_ns: 2_000_000, self_test_fails: false, guard: Guard::default() }
     }
 }
 
@@ -82,13 +86,30 @@ pub struct EscDialogue {
     pulse_ns: u32,
     pulse_at: Option<u64>,
     beeps: VecDeque<(u64, Beep)>,
+    guard: GuardState,
+    allowed: f64,
+    settings: Settings,
+    menu: Menu,
 }
 
 impl EscDialogue {
     /// Unpowered, on a supply of `cells` cells.
     #[must_use]
     pub fn new(esc: Esc, cells: u8) -> Self {
-        Self { esc, cells, state: EscState::Off, since: 0, now: 0, pulse_ns: 0, pulse_at: None, beeps: VecDeque::new() }
+        Self {
+            guard: GuardState::new(&esc.guard),
+            allowed: 1.0,
+            settings: Settings::default(),
+            menu: Menu::default(),
+            esc,
+            cells,
+            state: EscState::Off,
+            since: 0,
+            now: 0,
+            pulse_ns: 0,
+            pulse_at: None,
+            beeps: VecDeque::new(),
+        }
     }
 
     /// Where it stands.
@@ -107,6 +128,32 @@ impl EscDialogue {
     pub fn refit(&mut self, esc: Esc) {
         let (low, high) = self.range_ns();
         self.esc = Esc { range_min_ns: low, range_max_ns: high, ..esc };
+    }
+
+    /// What the programming mode has stored; it survives a power cycle, as the range does.
+    #[must_use]
+    pub fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// Item and option of the programming mode that sound now.
+    #[must_use]
+    pub fn programming(&self) -> Option<(super::esc_program::Item, Option<u8>)> {
+        (self.state == EscState::Programming).then(|| self.menu.sounding())
+    }
+
+    /// Temperature of the ESC, degC.
+    #[must_use]
+    pub fn temperature_c(&self) -> f64 {
+        self.guard.temperature_c
+    }
+
+    /// What stands at the ESC's terminals for `dt_s`: protections A and C.
+    pub fn feel(&mut self, voltage_v: f64, current_a: f64, dt_s: f64) {
+        let closed = self.is_min();
+        let running = self.state == EscState::Running;
+        let volts = if running { voltage_v } else { f64::INFINITY };
+        self.allowed = self.guard.step(&self.esc.guard, self.cells, volts, current_a, closed, dt_s);
     }
 
     /// Connects or cuts the power.
@@ -157,7 +204,15 @@ impl EscDialogue {
         self.now = now_ns;
         let age = now_ns.saturating_sub(self.since);
         match self.state {
-            EscState::Off | EscState::Running | EscState::Programming => {}
+            EscState::Off | EscState::Running => {}
+            EscState::Programming => {
+                let (closed, open) = (self.is_min(), self.heard() && self.pulse_ns >= 1_900_000);
+                if self.menu.step(&mut self.settings, now_ns, closed, open) == Outcome::Leaves {
+                    self.enter(EscState::SelfTest);
+                }
+                self.esc.guard.cutoff = self.settings.cutoff();
+                self.esc.guard.cutoff_v_per_cell = self.settings.cutoff_v_per_cell();
+            }
             EscState::SelfTest if age >= SELF_TEST => {
                 if self.esc.self_test_fails {
                     self.enter(EscState::Failed);
@@ -202,6 +257,7 @@ impl EscDialogue {
                 } else if age >= PROGRAMMING {
                     self.sound(Beep::Programming);
                     self.enter(EscState::Programming);
+                    self.menu = Menu::open(now_ns);
                 }
             }
             EscState::Failed if age >= 20 * SHORT / 2 => {
@@ -226,7 +282,7 @@ impl EscDialogue {
             let (low, high) = (f64::from(self.esc.range_min_ns), f64::from(self.esc.range_max_ns));
             ((f64::from(self.pulse_ns) - low) / (high - low)).clamp(0.0, 1.0)
         };
-        1000.0 + 1000.0 * throttle
+        1000.0 + 1000.0 * throttle.min(self.allowed)
     }
 
     /// Whether power is connected.
@@ -308,5 +364,60 @@ mod tests {
         let beeps = run(&mut esc, 100, 6000, 1_000_000);
         assert!(!beeps.is_empty() && beeps.iter().all(|b| *b == Beep::SelfTestFailed));
         assert_eq!(esc.output_us(), 1000.0);
+    }
+
+    /// Up to "ready" with a pulse of minimum, on a supply that stands.
+    fn ready() -> EscDialogue {
+        let mut esc = EscDialogue::new(Esc::default(), 3);
+        run(&mut esc, 0, 100, 1_000_000);
+        esc.set_power(true);
+        run(&mut esc, 100, 5000, 1_000_000);
+        assert_eq!(esc.state(), EscState::Running);
+        esc
+    }
+
+    #[test]
+    fn low_voltage_and_heat_limit_the_output() {
+        let mut esc = ready();
+        run(&mut esc, 5100, 40, 2_000_000);
+        (0..3000).for_each(|_| esc.feel(8.0, 7.0, 1e-3));
+        assert_eq!(esc.output_us(), 1500.0, "protection A leaves half");
+        (0..100).for_each(|_| esc.feel(11.0, 7.0, 1e-3));
+        assert_eq!(esc.output_us(), 1500.0, "until the throttle is closed");
+        run(&mut esc, 5140, 40, 1_000_000);
+        esc.feel(11.0, 0.1, 1e-3);
+        run(&mut esc, 5180, 40, 2_000_000);
+        assert_eq!(esc.output_us(), 2000.0);
+        (0..300_000).for_each(|_| esc.feel(11.0, 30.0, 1e-3));
+        assert!(esc.temperature_c() > 200.0);
+        assert_eq!(esc.output_us(), 1350.0, "protection C leaves 35 %");
+        (0..300_000).for_each(|_| esc.feel(11.0, 3.0, 1e-3));
+        assert_eq!(esc.output_us(), 2000.0, "and gives it back");
+    }
+
+    #[test]
+    fn what_is_programmed_outlives_the_power() {
+        let mut esc = EscDialogue::new(Esc::default(), 3);
+        run(&mut esc, 0, 100, 2_000_000);
+        esc.set_power(true);
+        let beeps = run(&mut esc, 100, 9_000, 2_000_000);
+        assert_eq!(beeps, [Beep::Double, Beep::Programming]);
+        let mut at = 9_100;
+        // hold maximum until the cut-off mode sounds, close for its second option, open to store
+        while esc.programming().map(|p| p.0) != Some(super::super::esc_program::Item::CutOffMode) {
+            run(&mut esc, at, 100, 2_000_000);
+            at += 100;
+        }
+        run(&mut esc, at, 4_000, 1_000_000);
+        run(&mut esc, at + 4_000, 500, 2_000_000);
+        esc.set_power(false);
+        assert_eq!(esc.settings().cutoff(), super::super::esc_guard::CutOff::CutOff);
+        run(&mut esc, at + 4_500, 500, 1_000_000);
+        esc.set_power(true);
+        run(&mut esc, at + 5_000, 6_000, 1_000_000);
+        run(&mut esc, at + 11_000, 40, 1_800_000);
+        assert_eq!(esc.output_us(), 1800.0);
+        (0..5000).for_each(|_| esc.feel(8.0, 1.0, 1e-3));
+        assert_eq!(esc.output_us(), 1000.0, "it cuts off now");
     }
 }

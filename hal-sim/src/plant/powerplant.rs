@@ -176,6 +176,8 @@ pub struct RigPlant {
 /// Interval and correlation time of the gusts, s.
 const GUST_INTERVAL_S: f64 = 1.0e-3;
 const GUST_TAU_S: f64 = 0.05;
+/// Speed from which the back-EMF can be seen and the start is no longer blind, rev/min.
+const BLIND_RPM: f64 = 200.0;
 /// Steps of the fast integration in one of the slow.
 const SLOW_STEPS: u32 = 10;
 
@@ -233,7 +235,7 @@ impl RigPlant {
             thrust_k: p.propeller.thrust_coefficient * relative * l.thrust_factor * blade.0 * inflow.0,
             per_inertia: 1.0 / inertia,
             inertia,
-            driven: self.commutation.step(&p.commutation, self.motor_a, dt_s),
+            driven: self.commutation.step(&p.commutation, self.motor_a, dt_s) && (rpm > BLIND_RPM || p.motor.starts(inertia)),
         };
         self.drive = self.driving(duty);
         (self.steps, self.elapsed_s, self.charge_as) = (0, 0.0, 0.0);

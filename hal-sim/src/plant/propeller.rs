@@ -26,7 +26,8 @@ pub struct Propeller {
 
 /// Name, blades, full-throttle thrust N and current A on the 570 KV motor at 11.5 V (errata, Table 9), diameter m, mass kg (assumed).
 ///
-/// The 9x4.7 row is left out: less thrust at more current than 10x4.5 on the same motor cannot come from this law.
+/// The 9x4.7 row is left out: less thrust at more current than 10x4.5 on the same motor cannot come from this law. That propeller
+/// takes its coefficients from 171 g at 1.61 A on the 390 KV motor instead (errata, "extremes").
 const TABLE_9: [(&str, u32, f64, f64, f64, f64); 5] = [
     ("10x4.5", 2, 4.129, 5.24, 0.254, 0.011),
     ("11x4.5", 2, 5.679, 7.67, 0.2794, 0.014),
@@ -35,12 +36,25 @@ const TABLE_9: [(&str, u32, f64, f64, f64, f64); 5] = [
     ("9x4.5x3", 3, 4.004, 4.25, 0.2286, 0.013),
 ];
 
+/// The propeller whose row in Table 9 cannot be.
+const SMALLEST: &str = "9x4.7";
+
 impl Propeller {
-    /// A propeller of the thesis by its name ("11x4.7"), with coefficients from Table 9 and the 570 KV motor's own constants.
+    /// A propeller of the thesis by its name ("11x4.7"), with coefficients from one stated figure and the constants of the motor
+    /// that it was measured on.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
+        if name == SMALLEST {
+            return Self::fitted(name, 2, "390KV", (0.171 * 9.806_65, 1.61), (0.2286, 0.010));
+        }
         let &(name, blades, thrust, current, diameter, mass) = TABLE_9.iter().find(|row| row.0 == name)?;
-        let motor = super::motor::Motor::named("570KV")?;
+        Self::fitted(name, blades, "570KV", (thrust, current), (diameter, mass))
+    }
+
+    /// Coefficients from thrust and current at full throttle and 11.5 V.
+    fn fitted(name: &str, blades: u32, motor: &str, full: (f64, f64), size: (f64, f64)) -> Option<Self> {
+        let ((thrust, current), (diameter, mass)) = (full, size);
+        let motor = super::motor::Motor::named(motor)?;
         let k = motor.torque_constant();
         let speed = (11.5 - motor.resistance_ohm * current) / k;
         Some(Self {
@@ -56,7 +70,7 @@ impl Propeller {
 
     /// Names of the propellers that [`Propeller::named`] knows.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        TABLE_9.iter().map(|row| row.0)
+        TABLE_9.iter().map(|row| row.0).chain([SMALLEST])
     }
 }
 

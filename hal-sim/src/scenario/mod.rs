@@ -8,12 +8,13 @@
 
 mod section;
 
-pub use section::{AirSection, LogSection, NoiseSection, Schedule, SensorSection, SpeedSensor, Step, SupplySection};
+pub use section::{AirSection, EscSection, LogSection, NoiseSection, Schedule, SensorSection, SpeedSensor, Step, SupplySection};
 
 use crate::bench::BenchParts;
 use crate::effect::{self, Scheduled};
 use crate::plant::{
-    Air, Beam, Blade, Bridge, Commutation, Esc, Flux, Limiter, Motor, Mount, Parts, Propeller, RoomAir, Supply, Thermal, supply,
+    Air, Beam, Blade, Bridge, Commutation, Esc, Flux, Guard, Limiter, Motor, Mount, Parts, Propeller, RoomAir, Supply, Thermal,
+    supply,
 };
 use crate::sensor::Geometry;
 use frame::rig::CAPTURE_CHANNELS;
@@ -74,6 +75,8 @@ pub struct Scenario {
     pub supply: SupplySection,
     /// Air at the rig.
     pub air: AirSection,
+    /// The ESC.
+    pub esc: EscSection,
     /// What the throttle does.
     pub schedule: Schedule,
     /// Motor off before and after the schedule, s.
@@ -99,6 +102,7 @@ impl Default for Scenario {
             propeller: "11x4.7".to_owned(),
             supply: SupplySection::Bench { voltage_v: 11.5 },
             air: AirSection::default(),
+            esc: EscSection::default(),
             schedule: Schedule::UpDown { step_us: 50.0, hold_s: 8.0, top_us: 2000.0 },
             rest_s: 2.0,
             sensors: SensorSection::default(),
@@ -197,7 +201,18 @@ impl Scenario {
                 blade: Blade::default(),
                 gust: n.gust,
             },
-            esc: Esc::default(),
+            esc: Esc {
+                range_min_ns: pulse_width(self.esc.range_min_us).0,
+                range_max_ns: pulse_width(self.esc.range_max_us).0,
+                self_test_fails: self.esc.self_test_fails,
+                guard: Guard {
+                    cutoff_v_per_cell: self.esc.cutoff_v_per_cell,
+                    cutoff: self.esc.cutoff,
+                    ambient_c: self.air.temperature_c,
+                    rise_k_per_a2: self.esc.rise_k_per_a2,
+                    ..Guard::default()
+                },
+            },
             beam: Beam::default(),
             mount: Mount::default(),
             bridge: Bridge { zero_temperature_c: self.air.temperature_c, ..Bridge::default() },

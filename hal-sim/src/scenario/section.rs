@@ -5,6 +5,7 @@
 //! Units: each key carries its own.
 //! Reference: `docs/scenario.md`.
 
+use crate::plant::{CutOff, Guard};
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 /// What feeds the ESC.
@@ -124,6 +125,42 @@ pub struct LogSection {
     /// Samples a second, 1 to 100, a divisor of 1000.
     #[serde(deserialize_with = "log_rate")]
     pub rate_hz: u32,
+}
+
+/// The ESC: what it has stored and how it protects itself.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EscSection {
+    /// Stored pulse of zero throttle, us.
+    #[serde(deserialize_with = "pulse")]
+    pub range_min_us: f64,
+    /// Stored pulse of full throttle, us.
+    #[serde(deserialize_with = "pulse")]
+    pub range_max_us: f64,
+    /// Threshold of the low-voltage protection, V a cell; 0 for none.
+    #[serde(deserialize_with = "not_negative")]
+    pub cutoff_v_per_cell: f64,
+    /// What the low-voltage protection does.
+    pub cutoff: CutOff,
+    /// Rise of the ESC's temperature at a steady current, K/A^2; beyond 110 degC it reduces its output.
+    #[serde(deserialize_with = "not_negative")]
+    pub rise_k_per_a2: f64,
+    /// Its self-test fails.
+    pub self_test_fails: bool,
+}
+
+impl Default for EscSection {
+    fn default() -> Self {
+        let g = Guard::default();
+        Self {
+            range_min_us: 1000.0,
+            range_max_us: 2000.0,
+            cutoff_v_per_cell: g.cutoff_v_per_cell,
+            cutoff: g.cutoff,
+            rise_k_per_a2: g.rise_k_per_a2,
+            self_test_fails: false,
+        }
+    }
 }
 
 /// Noise: standard deviation of the mean over 0.1 s of the analogue channels, jitter of the edges, turbulence.
