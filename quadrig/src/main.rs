@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`, "Command line".
 #![forbid(unsafe_code)]
 
+mod ahrs;
 mod beam;
 mod close_loop;
 mod demo;
@@ -48,6 +49,8 @@ enum Command {
     Select(select::Args),
     /// Design of the load cell's beam, with a warning of resonance.
     Beam(beam::Args),
+    /// The firmware's attitude filter over a recorded file.
+    Ahrs(ahrs::Args),
     /// Builds, flashes and attaches through probe-rs.
     Flash(flash::Args),
     /// A model's prediction of every measured channel, row for row.
@@ -67,6 +70,7 @@ fn main() -> ExitCode {
         Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
         Command::Select(args) => select::run(args, cli.quiet),
         Command::Beam(args) => beam::run(args, cli.quiet),
+        Command::Ahrs(args) => ahrs::run(args, cli.quiet),
         Command::Flash(args) => flash::run(args),
         Command::Predict(args) => predict::run(args),
     };

@@ -1,0 +1,128 @@
+//! `quadrig ahrs`.
+//!
+//! What it is: the firmware's attitude filter over a recorded file.
+//! What can go wrong: refused input gives one line with file, line and column; nothing is written then. Rows before the first
+//! accelerometer reading have empty attitude fields.
+//! Units: rad/s, m/s^2, uT in; degrees and a unit quaternion out.
+//! Reference: specification `formats.md`, "Attitude log".
+
+pub(crate) mod imu_log;
+mod text;
+
+use crate::Failure;
+use dcm::{Classic, ClassicConfig, Config, Dcm, Earth, Fresh, Mat3, Measurement, euler_of, quaternion_of};
+use ident::log::write_whole;
+use imu_log::{ImuLog, Row};
+use std::path::PathBuf;
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// t_s,gx,gy,gz,ax,ay,az[,mx,my,mz], further columns ignored.
+    input: PathBuf,
+    /// t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg.
+    output: PathBuf,
+    /// Earth axes of the result.
+    #[arg(long, value_enum, default_value_t = Axes::Ned)]
+    earth: Axes,
+    /// The filter: the board's, or the thesis' with tuned or Razor gains.
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    preset: Preset,
+    /// Magnetic declination, degrees, east positive.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    declination: f32,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Axes {
+    Ned,
+    Enu,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Preset {
+    Default,
+    Classic,
+    Razor,
+}
+
+/// Either filter.
+enum Filter {
+    Ours(Box<Dcm>),
+    Classic(Classic),
+}
+
+impl Filter {
+    fn new(preset: Preset, declination: f32) -> Self {
+        let classic = |base| Self::Classic(Classic::new(ClassicConfig { declination, ..base }));
+        match preset {
+            Preset::Default => Self::Ours(Box::new(Dcm::new(Config { declination, ..Config::DEFAULT }))),
+            Preset::Classic => classic(ClassicConfig::TUNED),
+            Preset::Razor => classic(ClassicConfig::RAZOR),
+        }
+    }
+
+    /// The attitude after a step, once there is one.
+    fn step(&mut self, dt: f32, measured: &Measurement) -> Option<Mat3> {
+        match self {
+            Self::Ours(f) => {
+                f.update(dt, measured);
+                f.is_started().then(|| *f.matrix())
+            }
+            Self::Classic(f) => {
+                f.update(dt, measured);
+                f.is_started().then(|| *f.matrix())
+            }
+        }
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    if !(-180.0..=180.0).contains(&args.declination) {
+        return Err(format!("--declination {}: expected degrees from -180 to 180", args.declination).into());
+    }
+    let log = ImuLog::read(&args.input)?;
+    let bar = crate::progress::Bar::new("attitude", quiet || log.rows.len() < 1_000_000);
+    let earth = if args.earth == Axes::Enu { Earth::Enu } else { Earth::Ned };
+    let mut filter = Filter::new(args.preset, args.declination.to_radians());
+    let mut out = String::with_capacity(96 * log.rows.len() + 64);
+    out.push_str("t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg\n");
+    let mut fresh = Fresh::default();
+    for (n, (row, dt)) in log.steps().enumerate() {
+        let mag = fresh.take(dt, row.mag);
+        let attitude = filter.step(dt, &Measurement { gyro: row.gyro, accel: row.accel, mag });
+        line(&mut out, log.time_text(n), attitude.map(|m| earth.from_ned(&m)));
+        if n % 65_536 == 0 {
+            bar.set(n as f64 / log.rows.len() as f64);
+        }
+    }
+    write_whole(&args.output, |file| file.write_all(out.as_bytes())).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    if !quiet {
+        let has = |name: &str, of: fn(&Row) -> bool| if log.rows.iter().any(of) { "" } else { name }.to_owned();
+        let lacks = has(" without gyro", |r| r.gyro.is_some())
+            + &has(" without accelerometer", |r| r.accel.is_some())
+            + &has(" without magnetometer (heading relative)", |r| r.mag.is_some());
+        println!("{} samples{lacks}, {}", log.rows.len(), args.output.display());
+    }
+    Ok(())
+}
+
+fn line(out: &mut String, time: &str, attitude: Option<Mat3>) {
+    out.push_str(time);
+    match attitude {
+        None => out.push_str(",,,,,,,"),
+        Some(matrix) => {
+            let e = euler_of(&matrix);
+            for q in quaternion_of(&matrix) {
+                out.push(',');
+                text::fixed::<8>(out, f64::from(q));
+            }
+            for angle in [e.roll, e.pitch, e.yaw] {
+                out.push(',');
+                text::fixed::<5>(out, f64::from(angle).to_degrees());
+            }
+        }
+    }
+    out.push('\n');
+}

@@ -1,0 +1,58 @@
+//! Numbers as text, fast.
+//!
+//! What it is: fixed-point decimals; the general formatter takes most of the time of a long log.
+//! What can go wrong: beyond 9e9 the general formatter is used.
+//! Units: none.
+//! Reference: none.
+
+use std::fmt::Write;
+
+/// Appends `value` with `DIGITS` digits after the point, rounded half away from zero.
+pub(crate) fn fixed<const DIGITS: u32>(out: &mut String, value: f64) {
+    let scale = 10u64.pow(DIGITS);
+    let scaled = (value.abs() * scale as f64).round();
+    if !(scaled < 9e18) || value.abs() > 9e9 {
+        let _ = write!(out, "{value:.*}", DIGITS as usize);
+        return;
+    }
+    let scaled = scaled as u64;
+    if value < 0.0 && scaled != 0 {
+        out.push('-');
+    }
+    let mut digits = [b'0'; 24];
+    let mut at = digits.len();
+    let mut rest = scaled;
+    for place in 0.. {
+        if place == DIGITS {
+            at -= 1;
+            digits[at] = b'.';
+        }
+        if place > DIGITS && rest == 0 {
+            break;
+        }
+        at -= 1;
+        digits[at] = b'0' + (rest % 10) as u8;
+        rest /= 10;
+    }
+    out.push_str(std::str::from_utf8(&digits[at..]).unwrap_or_default());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_writes_what_the_general_formatter_writes() {
+        for value in
+            [0.0, -0.0, 1.0, -1.0, 0.5, 0.123_456_78, -179.999_994, 12_345.678_9, -0.000_001, 1e-12, 99.999_999_9, 8e9, 1e12]
+        {
+            let mut text = String::new();
+            fixed::<5>(&mut text, value);
+            let mut general = format!("{value:.5}");
+            if general.trim_matches(['-', '0', '.']).is_empty() {
+                general = general.trim_start_matches('-').to_owned();
+            }
+            assert_eq!(text, general, "{value}");
+        }
+    }
+}
