@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 pub mod beam;
+pub mod circle;
 pub mod close;
 pub mod context;
 pub mod design;
@@ -25,6 +26,7 @@ pub mod plateau;
 pub mod quantity;
 pub mod report;
 pub mod residual;
+pub mod runs;
 pub mod search;
 pub mod select;
 pub mod simulate;

@@ -1,13 +1,19 @@
 //! A run predicted from its command alone.
 //!
 //! What it is: rpm from the pulse, everything else from that rpm, voltage from that current, until they agree.
-//! What can go wrong: a model identified without a command predicts no speed from one.
+//! What can go wrong: a model identified without a command predicts no speed from one; a speed that answers to its own load
+//! more than one to one may not settle, and the last pass then stands.
 //! Units: as the channels.
 //! Reference: specification `formats.md`, `predict --from command`.
 
 use crate::context::{Context, Relation};
 use crate::log::{Column, Log, SPEED};
 use crate::model::Model;
+
+/// Most passes from speed to current and back.
+const MOST_PASSES: usize = 24;
+/// Change between two passes, as a share of a channel's largest value, at which they agree.
+const CONVERGED: f64 = 1.0e-6;
 
 /// Predicts every channel of the model along a command; `covariates` (temperature and others) are taken as given.
 #[must_use]
@@ -20,8 +26,11 @@ pub fn from_command(model: &Model, name: &str, t: &[f64], pulse_us: &[f64], cova
     log.columns.extend(
         covariates.iter().filter(|c| !model.polynomials.iter().any(|p| p.channel == c.name) && c.name != "pulse_us").cloned(),
     );
-    // speed, then what hangs on it, then what hangs on current, and speed again where it hangs on the charge
-    for _ in 0..3 {
+    // speed, then what hangs on it, then what hangs on current, and speed again where it hangs on the charge or on itself: until
+    // nothing moves; from the third pass on half the way only, where a speed that answers to its own load would swing
+    for pass in 0..MOST_PASSES {
+        let share = if pass < 2 { 1.0 } else { 0.5 };
+        let mut moved = 0.0_f64;
         for speed_pass in [true, false] {
             let context = Context::new(&log, Some(model.start_pulse_us));
             let names: Vec<&'static str> =
@@ -30,9 +39,16 @@ pub fn from_command(model: &Model, name: &str, t: &[f64], pulse_us: &[f64], cova
                 if let Some(values) = model.predict(&context, name)
                     && let Some(column) = log.columns.iter_mut().find(|c| c.name == name)
                 {
-                    column.values = values;
+                    let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs())).max(f64::MIN_POSITIVE);
+                    for (old, new) in column.values.iter_mut().zip(values) {
+                        moved = moved.max((new - *old).abs() / scale);
+                        *old += share * (new - *old);
+                    }
                 }
             }
+        }
+        if moved < CONVERGED {
+            break;
         }
     }
     log

@@ -8,6 +8,7 @@
 
 mod ahrs;
 mod beam;
+mod circle;
 mod close_loop;
 mod demo;
 mod flash;
@@ -51,6 +52,8 @@ enum Command {
     Beam(beam::Args),
     /// The firmware's attitude filter over a recorded file.
     Ahrs(ahrs::Args),
+    /// The whole circle in simulation; with --auto the tool flies its own next experiments.
+    Loop(circle::Args),
     /// Builds, flashes and attaches through probe-rs.
     Flash(flash::Args),
     /// A model's prediction of every measured channel, row for row.
@@ -71,6 +74,7 @@ fn main() -> ExitCode {
         Command::Select(args) => select::run(args, cli.quiet),
         Command::Beam(args) => beam::run(args, cli.quiet),
         Command::Ahrs(args) => ahrs::run(args, cli.quiet),
+        Command::Loop(args) => circle::run(args, cli.quiet),
         Command::Flash(args) => flash::run(args),
         Command::Predict(args) => predict::run(args),
     };

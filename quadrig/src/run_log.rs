@@ -36,11 +36,14 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str) -> Log
 }
 
 /// An identified model in the powerplant's place: it plays, for the command of one run, what it predicts from that command.
+#[derive(Clone)]
 pub(crate) struct IdentifiedPlant {
     run_s: f64,
     t: Vec<f64>,
     rows: Vec<PlantState>,
     at_rest: PlantState,
+    /// What each speed channel reads beyond the rotor's speed, by row: the model's own words on that sensor.
+    misread: Vec<Column>,
 }
 
 impl IdentifiedPlant {
@@ -54,7 +57,11 @@ impl IdentifiedPlant {
             .collect();
         let predicted = from_command(model, &log.name, &log.t, &pulse, &covariates);
         let column = |name: &str| predicted.column(name).map(<[f64]>::to_vec);
-        let speed = ident::log::SPEED.iter().find_map(|s| column(s))?;
+        // the speed that every other relation hangs on is the consensus of the channels
+        let speed = ident::context::Context::new(&predicted, Some(model.start_pulse_us)).rpm;
+        if speed.is_empty() {
+            return None;
+        }
         let zero = || vec![0.0; log.len()];
         let (thrust, torque) = (column("thrust_n").unwrap_or_else(zero), column("torque_nm").unwrap_or_else(zero));
         let (current, voltage) = (column("current_a").unwrap_or_else(zero), column("voltage_v").unwrap_or_else(zero));
@@ -69,8 +76,28 @@ impl IdentifiedPlant {
                 temp_c: temperature[i],
             })
             .collect();
+        let misread = predicted
+            .columns
+            .iter()
+            .filter(|c| ident::log::SPEED.contains(&c.name.as_str()))
+            .map(|c| Column { name: c.name.clone(), values: c.values.iter().zip(&speed).map(|(v, s)| v - s).collect() })
+            .collect();
         let at_rest = PlantState { rpm: 0.0, thrust_n: 0.0, torque_nm: 0.0, ..rows.first().copied()? };
-        Some(Self { run_s: -1.0, t: log.t.clone(), rows, at_rest })
+        Some(Self { run_s: -1.0, t: log.t.clone(), rows, at_rest, misread })
+    }
+
+    /// Lets the speed channels of a run read what the model says that they read: a plant has one rotor, and a model that found a
+    /// sensor at fault (or fitted each channel its own polynomial) says more than that.
+    pub(crate) fn misread(&self, log: &mut Log) {
+        for m in &self.misread {
+            let Some(column) = log.columns.iter_mut().find(|c| c.name == m.name) else { continue };
+            for (v, t) in column.values.iter_mut().zip(&log.t) {
+                let row = self.t.partition_point(|own| *own < t - 1e-6).min(self.t.len() - 1);
+                if *v > 0.0 {
+                    *v += m.values[row];
+                }
+            }
+        }
     }
 }
 

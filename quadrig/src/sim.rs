@@ -59,5 +59,7 @@ pub(crate) fn fly_model(scenario: &Scenario, model: &Model, like: &Log, name: &s
     let plant = IdentifiedPlant::new(model, like)
         .ok_or("the model predicts no speed from a command; expected one identified from a log with pulse_us")?;
     let healthy = Scenario { effects: Vec::new(), ..scenario.clone() };
-    fly(&healthy, Some(Box::new(plant)), name, "re-flying", quiet)
+    let mut log = fly(&healthy, Some(Box::new(plant.clone())), name, "re-flying", quiet)?;
+    plant.misread(&mut log);
+    Ok(log)
 }
