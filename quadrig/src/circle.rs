@@ -95,7 +95,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         "extra_runs": runs.len() - 1,
         "rounds": rounds.iter().map(round_json).collect::<Vec<_>>(),
         "circle": circle_json(&closes),
-        "hidden": scenario.effects.iter().map(hal_sim::effect::EffectKind::id).collect::<Vec<_>>(),
+        "hidden": scenario.effects.iter().map(|e| e.id()).collect::<Vec<_>>(),
     });
     if let Some(folder) = &args.output {
         for (k, run) in runs.iter().enumerate() {
@@ -208,7 +208,7 @@ fn conclusion(runs: &[Run], standing: &[Standing], scenario: &Scenario) -> Strin
         Kind::Unattributed => "something is left over that no known effect explains".to_owned(),
         Kind::None => "nothing significant is left over".to_owned(),
     };
-    let hidden: Vec<&str> = scenario.effects.iter().map(hal_sim::effect::EffectKind::id).collect();
+    let hidden: Vec<&str> = scenario.effects.iter().map(|e| e.id()).collect();
     let hidden = if hidden.is_empty() { "nothing".to_owned() } else { hidden.join(" + ") };
     format!("after {} extra runs: {word}\nhidden was {hidden}", runs.len() - 1)
 }
