@@ -252,7 +252,8 @@ impl Rig {
             load: self.value(0, adc).map(Newton),
             load_saturated: end == AdcVerdict::Stuck,
             disagreeing: self.bank.flagged(),
-            lost: self.bank.lost(now),
+            // a rotor that coasts to rest falls silent channel by channel: judged under throttle only
+            lost: if self.setting.is_live() { self.bank.lost(now) } else { 0 },
             adc_missing: end == AdcVerdict::Missing || stuck,
             damaged: inputs.line.damaged,
             replayed: inputs.line.replayed,

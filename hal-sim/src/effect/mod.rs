@@ -129,6 +129,11 @@ macro_rules! effects {
             pub fn act(&self, run_s: f64, levers: &mut Levers) {
                 match self { $(Self::$name(e) => e.act(run_s, levers),)* }
             }
+            /// Whether the operator takes a sensor off during the run, so that its silence is no fault.
+            #[must_use]
+            pub fn takes_a_sensor_off(&self) -> bool {
+                matches!(self, Self::EncoderDrag(_))
+            }
             /// Name, value and unit of each parameter.
             #[must_use]
             pub fn parameters(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -128,7 +128,11 @@ impl Board {
 #[must_use]
 pub fn firmware_config(scenario: &Scenario) -> Config {
     let period = Ticks::from_ms(1000 / u64::from(scenario.log.rate_hz));
-    Config { marks: scenario.parts().geometry.marks(), log_period: period, ..Config::thesis_570kv() }
+    let mut config = Config { marks: scenario.parts().geometry.marks(), log_period: period, ..Config::thesis_570kv() };
+    if scenario.effects.iter().any(|e| e.takes_a_sensor_off()) {
+        config.limits.lost_ms = u32::MAX; // the operator has announced it; otherwise the run would end there
+    }
+    config
 }
 
 /// Flies a scenario. `plant` takes the place of the scenario's own powerplant. `progress` hears the share that is done.

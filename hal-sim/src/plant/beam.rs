@@ -82,6 +82,7 @@ impl BeamMode {
     }
 
     /// One step under a tip force; gives the spring force that the gauges see, N.
+    #[inline]
     pub fn step(&mut self, force_n: f64) -> f64 {
         let (x, v) = (self.force_n, self.rate);
         self.force_n = self.a[0][0] * x + self.a[0][1] * v + self.b[0] * force_n;

@@ -98,6 +98,8 @@ pub struct BridgeState {
     fall: f64,
     filter: f64,
     creep: f64,
+    /// Amplifier output of the beam with nothing but the motor on it, V.
+    empty_v: f64,
 }
 
 /// Fraction of a first-order lag covered in one step; 1 when there is no lag.
@@ -122,6 +124,7 @@ impl BridgeState {
             fall: share(dt_s, bridge.fall_s),
             filter: share(dt_s, bridge.filter_s),
             creep: share(dt_s, bridge.creep_s),
+            empty_v: bridge.resting_v() / bridge.divider,
         }
     }
 
@@ -142,19 +145,27 @@ impl BridgeState {
     }
 
     /// One step: `lift_n` on the beam, `zero_n` and `gain` of the moment, rig temperature; gives the pin voltage.
+    #[inline]
     pub fn step(&mut self, lift_n: f64, zero_n: f64, gain: f64, temperature_c: f64) -> f64 {
         let b = &self.bridge;
-        self.creep_n += (b.creep_share * lift_n - self.creep_n) * self.creep;
-        let shift = zero_n + b.zero_n_per_k * (temperature_c - b.zero_temperature_c);
-        // A slider in the joint holds back a share of each change of load until it slips (Jenkins element).
-        let half = 0.5 * b.hysteresis_n;
-        self.stuck_n = (self.stuck_n + JOINT_SHARE * (lift_n - self.lift_n)).clamp(-half, half);
+        let mut seen_n = lift_n;
+        if b.creep_share != 0.0 || self.creep_n != 0.0 {
+            self.creep_n += (b.creep_share * lift_n - self.creep_n) * self.creep;
+            seen_n += self.creep_n;
+        }
+        if b.hysteresis_n != 0.0 || self.stuck_n != 0.0 {
+            // A slider in the joint holds back a share of each change of load until it slips (Jenkins element).
+            let half = 0.5 * b.hysteresis_n;
+            self.stuck_n = (self.stuck_n + JOINT_SHARE * (lift_n - self.lift_n)).clamp(-half, half);
+            seen_n -= self.stuck_n;
+        }
         self.lift_n = lift_n;
-        let seen_n = (lift_n + self.creep_n - self.stuck_n) * gain + shift;
-        let wanted = (b.zero_v + b.volt_per_newton * (b.tip_mass_kg * G - seen_n)).clamp(b.rails_v.0, b.rails_v.1);
+        let shift = zero_n + b.zero_n_per_k * (temperature_c - b.zero_temperature_c);
+        let wanted = (self.empty_v - b.volt_per_newton * (seen_n * gain + shift)).clamp(b.rails_v.0, b.rails_v.1);
         let error = wanted - self.output_v;
         self.output_v += error * if error > 0.0 { self.rise } else { self.fall };
-        self.pin_v += (b.divider * self.output_v - self.pin_v) * self.filter;
+        let pin_v = b.divider * self.output_v;
+        self.pin_v = if b.filter_s > 0.0 { self.pin_v + (pin_v - self.pin_v) * self.filter } else { pin_v };
         self.meter.step(self.pin_v)
     }
 }

@@ -47,6 +47,7 @@ pub struct LimiterState {
 
 impl LimiterState {
     /// Duty cycle after a pulse of `pulse_us`, before the current limit; 0 where the motor is not driven.
+    #[inline]
     pub fn duty(&mut self, limiter: &Limiter, pulse_us: f64, dt_s: f64) -> f64 {
         let mut above_us = pulse_us - 1000.0;
         if limiter.step_us > 0.0 {
@@ -73,6 +74,7 @@ impl Limiter {
     /// The highest duty up to `duty` that keeps duty x motor current within the limit, for a back-EMF, an open-circuit voltage,
     /// the phase resistance and the line resistance.
     #[must_use]
+    #[inline]
     pub fn limited(&self, duty: f64, emf_v: f64, open_v: f64, phase_ohm: f64, line_ohm: f64) -> f64 {
         if !self.current_a.is_finite() {
             return duty;

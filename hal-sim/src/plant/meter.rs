@@ -41,6 +41,7 @@ impl MeterState {
     }
 
     /// One step with `input_v`; gives the output.
+    #[inline]
     pub fn step(&mut self, input_v: f64) -> f64 {
         if self.wire {
             return input_v;

@@ -110,10 +110,15 @@ impl Converter {
     }
 
     /// One conversion of `channel` with `pin_v` (noise on the wire not included) at the pin.
-    #[inline]
     pub fn convert(&mut self, channel: usize, pin_v: f64) -> u16 {
-        let counts = (pin_v + self.offset_v[channel]) * (CODES / REFERENCE_V);
-        let noisy = counts + self.conversion_counts * self.conversion.quick_normal() + 0.5;
+        let [noise, _] = self.conversion.quick_normals();
+        self.code((pin_v + self.offset_v[channel]) * (CODES / REFERENCE_V), noise)
+    }
+
+    /// Code of a level of `counts` with `noise` standard deviations of the converter's own.
+    #[inline]
+    fn code(&self, counts: f64, noise: f64) -> u16 {
+        let noisy = counts + self.conversion_counts * noise + 0.5;
         // The cast truncates and saturates at 0; the ideal converter's thresholds lie half a count below each code.
         (noisy as u16).min(CODES as u16 - 1)
     }
@@ -121,15 +126,24 @@ impl Converter {
     /// `count` conversions of `channel`, spread over the voltages of one millisecond.
     pub fn block(&mut self, channel: usize, count: u16, pins_v: &[f64]) -> AdcBlock {
         let mut block = AdcBlock { min: u16::MAX, ..AdcBlock::default() };
+        let offset = self.offset_v[channel];
+        let mut spare = 0.0;
         for i in 0..count {
-            let pin = pins_v[usize::from(i) * pins_v.len() / usize::from(count.max(1))];
-            let code = self.convert(channel, pin);
+            let noise = if i & 1 == 0 {
+                let [now, next] = self.conversion.quick_normals();
+                spare = next;
+                now
+            } else {
+                spare
+            };
+            let pin = if pins_v.len() == 1 { pins_v[0] } else { pins_v[usize::from(i) * pins_v.len() / usize::from(count)] };
+            let code = self.code((pin + offset) * (CODES / REFERENCE_V), noise);
             block.sum += u32::from(code);
             block.sum_sq += u64::from(u32::from(code) * u32::from(code));
-            block.count += 1;
             block.min = block.min.min(code);
             block.max = block.max.max(code);
         }
+        block.count = count;
         block
     }
 }

@@ -226,6 +226,12 @@ impl Channel {
         Some(rising)
     }
 
+    /// Whether nothing happens up to `to`.
+    #[inline]
+    fn idle(&self, to: f64) -> bool {
+        self.threshold > to && self.extra.is_empty()
+    }
+
     /// The next edge at or before `to`, as (angle, rising); `None` inside where a mark gives no edge.
     fn pass(&mut self, to: f64, rev_s: f64) -> Option<(f64, Option<bool>)> {
         if let Some(&(at, rising)) = self.extra.front()
@@ -323,6 +329,9 @@ impl Tachometers {
                 start -= self.behind;
                 self.behind += lost;
                 end -= self.behind;
+            }
+            if channel.idle(end) {
+                continue;
             }
             while let Some((at, rising)) = channel.pass(end, rev_s) {
                 if let Some(rising) = rising {
