@@ -29,6 +29,7 @@ pub mod residual;
 pub mod runs;
 pub mod search;
 pub mod select;
+pub mod shift;
 pub mod simulate;
 pub mod solve;
 pub mod verdict;
