@@ -158,37 +158,64 @@ impl Context {
     /// Prepares a log. `start_pulse_us` is taken from a model where one is given.
     #[must_use]
     pub fn new(log: &Log, start_pulse_us: Option<f64>) -> Self {
+        let mut context = Self::bare(log, start_pulse_us);
         let bridged = |name: &str| log.column(name).filter(|c| c.iter().any(|v| v.is_finite())).map(|c| bridge(&log.t, c));
-        let pulse = bridged("pulse_us");
+        context.current = bridged("current_a");
+        context.voltage = bridged("voltage_v");
+        context.temperature = bridged("temp_c");
+        context.torque = bridged("torque_nm");
+        context.covariates = log
+            .columns
+            .iter()
+            .filter(|c| {
+                !MODELLED.contains(&c.name.as_str()) && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&c.name.as_str())
+            })
+            .filter(|c| c.values.iter().any(|v| v.is_finite()))
+            .map(|c| (c.name.clone(), bridge(&log.t, &c.values)))
+            .collect();
+        context.targets = targets(log, &context);
+        context
+    }
+
+    /// What every declared relation needs and no more: command, consensus speed, steady stretches. No targets; see [`Context::declared`].
+    #[must_use]
+    pub fn bare(log: &Log, start_pulse_us: Option<f64>) -> Self {
+        let pulse = log.column("pulse_us").filter(|c| c.iter().any(|v| v.is_finite())).map(|c| bridge(&log.t, c));
         let (rpm, consensus) = consensus(log);
         let steady = steady_stretches(&log.t, pulse.as_deref(), &rpm);
         let start = start_pulse_us.unwrap_or_else(|| start_pulse(pulse.as_deref(), &rpm));
-        let mut context = Self {
+        Self {
             name: log.name.clone(),
             t: log.t.clone(),
             time_is_row: log.time_is_row(),
-            current: bridged("current_a"),
-            voltage: bridged("voltage_v"),
-            temperature: bridged("temp_c"),
-            torque: bridged("torque_nm"),
-            covariates: log
-                .columns
-                .iter()
-                .filter(|c| {
-                    !MODELLED.contains(&c.name.as_str()) && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&c.name.as_str())
-                })
-                .filter(|c| c.values.iter().any(|v| v.is_finite()))
-                .map(|c| (c.name.clone(), bridge(&log.t, &c.values)))
-                .collect(),
             pulse,
             rpm,
             consensus,
+            current: None,
+            voltage: None,
+            temperature: None,
+            torque: None,
+            covariates: Vec::new(),
             start_pulse_us: start,
             targets: Vec::new(),
             steady,
-        };
-        context.targets = targets(log, &context);
-        context
+        }
+    }
+
+    /// Names of the targets that a log has, in order.
+    #[must_use]
+    pub fn declared_names(log: &Log) -> Vec<&'static str> {
+        let modelled = MODELLED.into_iter().chain(["thrust_rms_n"]).filter(|name| log.column(name).is_some());
+        modelled.chain(differing(log)).collect()
+    }
+
+    /// One target of a log; `None` where it has no sample or nothing to be predicted from.
+    #[must_use]
+    pub fn declared(&self, log: &Log, name: &'static str) -> Option<Target> {
+        match DIFFERENCES.iter().find(|d| d.1 == name) {
+            Some((channel, name)) => difference(self, name, log.column(channel)?),
+            None => target(log, self, name),
+        }
     }
 
     /// Number of rows.
@@ -414,38 +441,41 @@ fn less_speed(context: &Context, relation: Relation, rows: &[usize], y: &[f64]) 
 }
 
 fn targets(log: &Log, context: &Context) -> Vec<Target> {
-    let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
-    let mut out = Vec::new();
-    for name in MODELLED.into_iter().chain(["thrust_rms_n"]) {
-        let Some(column) = log.column(name) else { continue };
-        let Some(relation) = Relation::of(name, context.pulse.is_some()) else { continue };
-        let needs_rpm = matches!(relation, Relation::Thrust | Relation::Torque | Relation::Current | Relation::ThrustRms);
-        let relation = if needs_rpm && context.rpm.is_empty() { continue } else { relation };
-        let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
-        if rows.is_empty() {
-            continue;
-        }
-        let y: Vec<f64> = rows.iter().map(|i| column[*i]).collect();
-        let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, &context.steady);
-        let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
-        out.push(Target { name, relation, rows, y, noise, weight });
-    }
-    out.extend(differences(log, context));
-    out
+    Context::declared_names(log).into_iter().filter_map(|name| context.declared(log, name)).collect()
 }
 
-/// Each speed channel less the consensus: what all of them share (supply, load, lag) drops out. With fewer than three channels
-/// nobody can be outvoted, and there are none.
-fn differences(log: &Log, context: &Context) -> Vec<Target> {
-    let present: Vec<_> = DIFFERENCES.into_iter().filter_map(|(channel, name)| Some((name, log.column(channel)?))).collect();
-    if present.iter().filter(|(_, c)| c.iter().any(|v| v.is_finite())).count() < 3 {
-        return Vec::new();
+fn target(log: &Log, context: &Context, name: &'static str) -> Option<Target> {
+    let column = log.column(name)?;
+    let relation = Relation::of(name, context.pulse.is_some())?;
+    let needs_rpm = matches!(relation, Relation::Thrust | Relation::Torque | Relation::Current | Relation::ThrustRms);
+    if needs_rpm && context.rpm.is_empty() {
+        return None;
     }
-    let difference = |(name, column): (&'static str, &[f64])| {
-        let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
-        let y: Vec<f64> = rows.iter().map(|i| column[*i] - context.rpm[*i]).collect();
-        let noise = noise::estimate(&rows, &y, &y, &context.rpm, &context.steady);
-        Target { name, relation: Relation::SpeedDifference, rows, y, noise, weight: 1.0 }
-    };
-    present.into_iter().map(difference).filter(|t| t.rows.len() > 8).collect()
+    let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let y: Vec<f64> = rows.iter().map(|i| column[*i]).collect();
+    let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, &context.steady);
+    let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
+    let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
+    Some(Target { name, relation, rows, y, noise, weight })
+}
+
+/// Speed channels that can be compared with the consensus: what all of them share (supply, load, lag) drops out. With fewer than
+/// three channels nobody can be outvoted, and there are none.
+fn differing(log: &Log) -> Vec<&'static str> {
+    let measured = |channel: &str| log.column(channel).is_some_and(|c| c.iter().any(|v| v.is_finite()));
+    let present: Vec<&'static str> =
+        DIFFERENCES.into_iter().filter(|(c, _)| log.column(c).is_some()).map(|(_, name)| name).collect();
+    if DIFFERENCES.iter().filter(|(c, _)| measured(c)).count() < 3 { Vec::new() } else { present }
+}
+
+/// One speed channel less the consensus.
+fn difference(context: &Context, name: &'static str, column: &[f64]) -> Option<Target> {
+    let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
+    let y: Vec<f64> = rows.iter().map(|i| column[*i] - context.rpm[*i]).collect();
+    let noise = noise::estimate(&rows, &y, &y, &context.rpm, &context.steady);
+    let target = Target { name, relation: Relation::SpeedDifference, rows, y, noise, weight: 1.0 };
+    (target.rows.len() > 8).then_some(target)
 }

@@ -1,4 +1,4 @@
-//! Identification: plateaus, declared fits, physical constants, quality.
+//! Identification: plateaus, declared fits, curves with bands, physical constants, quality.
 //!
 //! What it is: the thesis' static powerplant with standard errors, and what a designer reads from it.
 //! What can go wrong: a log in which no channel can be predicted from another is refused.
@@ -6,13 +6,13 @@
 //! Reference: specification `identification.md`, items 1 to 3.
 
 use crate::close::CloseError;
-use crate::context::{Context, Relation, unit_of};
+use crate::context::{Context, unit_of};
+use crate::fit::{Curve, Estimate, Fitted, Spin, motor, relations, speeds, spin, square_law};
 use crate::heldout::residuals;
-use crate::hypothesis::{Declared, Rows, fit};
+use crate::hypothesis::{Declared, Fit, Rows, fit};
 use crate::log::Log;
 use crate::model::Model;
-use crate::plateau::{Plateau, plateaus};
-use crate::solve::Normal;
+use crate::plateau::{Plateau, detect};
 
 /// Quality of one fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,8 +38,16 @@ pub struct Constant {
     pub value: f64,
     /// Standard error.
     pub se: f64,
+    /// Half width of the 95 % interval.
+    pub half: f64,
     /// Unit.
     pub unit: &'static str,
+}
+
+impl Constant {
+    fn new(name: &'static str, e: Estimate, unit: &'static str) -> Self {
+        Self { name, value: e.value, se: e.se, half: e.half, unit }
+    }
 }
 
 /// What identification gives.
@@ -51,9 +59,15 @@ pub struct Identified {
     pub plateaus: Vec<Plateau>,
     /// Column names of their means.
     pub columns: Vec<String>,
-    /// Quality of each fit.
+    /// Consensus speed at each plateau and its error, rev/min.
+    pub speeds: Vec<Option<(f64, f64)>>,
+    /// Quality of each declared fit.
     pub quality: Vec<Quality>,
-    /// k_T, k_Q where they can be had.
+    /// Curves through the plateaus.
+    pub curves: Vec<Fitted>,
+    /// Thrust and torque as straight lines over omega^2 / 1e5.
+    pub square_laws: Vec<(&'static str, Curve)>,
+    /// k_T, k_Q, KV, R, I0, spin-up and spin-down time constants, where they can be had.
     pub constants: Vec<Constant>,
 }
 
@@ -62,53 +76,73 @@ pub struct Identified {
 /// # Errors
 /// [`CloseError::NoRelation`] where nothing can be fitted.
 pub fn identify(log: &Log) -> Result<Identified, CloseError> {
-    let context = Context::new(log, None);
-    let refused = || CloseError::NoRelation { run: log.name.clone() };
-    if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > 8) {
-        return Err(refused());
+    let mut context = Context::bare(log, None);
+    let (model, quality) = declared(log, &mut context).ok_or_else(|| CloseError::NoRelation { run: log.name.clone() })?;
+    let plateaus = detect(log, &context.rpm);
+    let speeds = speeds(log, &plateaus, &context.consensus.channels);
+    let curves = relations(log, &plateaus, &speeds);
+    let mut constants = Vec::new();
+    let mut square_laws = Vec::new();
+    for (name, channel, unit) in [("k_T", "thrust_n", "N.s2"), ("k_Q", "torque_nm", "N.m.s2")] {
+        if let Some((k, curve)) = square_law(log, &plateaus, &speeds, channel) {
+            constants.push(Constant::new(name, k, unit));
+            square_laws.push((name, curve));
+        }
     }
-    let fitted = fit(&context, Declared::default(), &[], None, Rows::All).ok_or_else(refused)?;
-    let model = Model::from_fit(&context, log, Declared::default(), &fitted);
-    let quality = context
-        .targets
-        .iter()
-        .zip(residuals(&context, Declared::default(), &fitted))
-        .map(|(t, r)| {
-            let n = r.len().max(1) as f64;
-            let mean = t.y.iter().sum::<f64>() / n;
-            let total: f64 = t.y.iter().map(|y| (y - mean).powi(2)).sum();
-            let left: f64 = r.iter().map(|v| v * v).sum();
-            Quality {
-                channel: t.name,
-                unit: unit_of(t.name),
-                rms: (left / n).sqrt(),
-                noise_floor: t.noise.rms,
-                r2: 1.0 - left / total.max(1e-300),
-            }
-        })
-        .collect();
-    let constants = [("k_T", Relation::Thrust, "N.s2"), ("k_Q", Relation::Torque, "N.m.s2")]
-        .into_iter()
-        .filter_map(|(name, relation, unit)| square_law(&context, relation).map(|(value, se)| Constant { name, value, se, unit }))
-        .collect();
+    if let Some(m) = motor(log, &plateaus, &speeds) {
+        constants.push(Constant::new("KV", m.kv, "rev/min/V"));
+        constants.push(Constant::new("R", m.resistance, "ohm"));
+        constants.push(Constant::new("I0", m.no_load, "A"));
+    }
+    let Spin { up, down } = spin(log, &plateaus, &context.rpm);
+    constants.extend(up.map(|e| Constant::new("tau_up", e, "s")));
+    constants.extend(down.map(|e| Constant::new("tau_down", e, "s")));
     Ok(Identified {
         model,
-        plateaus: plateaus(&context, log),
         columns: log.columns.iter().map(|c| c.name.clone()).collect(),
+        plateaus,
+        speeds,
         quality,
+        curves,
+        square_laws,
         constants,
     })
 }
 
-/// Coefficient of omega^2 with a free zero, and its standard error.
-fn square_law(context: &Context, relation: Relation) -> Option<(f64, f64)> {
-    let target = &context.targets[context.with_relation(relation).next()?];
-    let mut normal = Normal::new(2);
-    for (i, y) in target.rows.iter().zip(&target.y) {
-        let omega = context.rpm[*i] * std::f64::consts::TAU / 60.0;
-        normal.add(&[1.0, omega * omega], *y, 1.0);
+/// The declared relations over all rows, one channel at a time: a long log must not stand in memory once for each.
+fn declared(log: &Log, context: &mut Context) -> Option<(Model, Vec<Quality>)> {
+    let mut model: Option<Model> = None;
+    let mut quality = Vec::new();
+    let mut related = false;
+    for name in Context::declared_names(log) {
+        let Some(target) = context.declared(log, name) else { continue };
+        let predicts = target.relation.degree() > 0 && target.rows.len() > 8;
+        context.targets = vec![target];
+        let Some(fitted) = fit(context, Declared::default(), &[], None, Rows::All) else { continue };
+        related |= predicts;
+        quality.push(judged(context, &fitted));
+        let piece = Model::from_fit(context, log, Declared::default(), &fitted);
+        match &mut model {
+            Some(m) => m.polynomials.extend(piece.polynomials),
+            None => model = Some(piece),
+        }
     }
-    let s = normal.solve()?;
-    let variance = s.rss / (normal.count.saturating_sub(2)).max(1) as f64;
-    Some((s.coefficients[1], (s.inverse[(1, 1)] * variance).sqrt()))
+    context.targets.clear();
+    model.filter(|_| related).map(|m| (m, quality))
+}
+
+fn judged(context: &Context, fitted: &Fit) -> Quality {
+    let target = &context.targets[0];
+    let residual = residuals(context, Declared::default(), fitted).swap_remove(0);
+    let n = residual.len().max(1) as f64;
+    let mean = target.y.iter().sum::<f64>() / n;
+    let total: f64 = target.y.iter().map(|y| (y - mean).powi(2)).sum();
+    let left: f64 = residual.iter().map(|v| v * v).sum();
+    Quality {
+        channel: target.name,
+        unit: unit_of(target.name),
+        rms: (left / n).sqrt(),
+        noise_floor: target.noise.rms,
+        r2: 1.0 - left / total.max(1e-300),
+    }
 }

@@ -14,6 +14,7 @@ pub mod design;
 pub mod diagnose;
 pub mod effects;
 pub mod experiment;
+pub mod fit;
 pub mod heldout;
 pub mod hypothesis;
 pub mod identify;

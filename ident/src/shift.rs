@@ -70,7 +70,7 @@ pub fn filters(x: &[f64], settings: &Settings) -> Filters {
     let threshold = settings.threshold.unwrap_or_else(|| automatic_threshold(&one));
     // Eq. 5.61 asks whether the difference exceeds the threshold; beside a missing sample it does not, whatever lies there
     let two: Vec<bool> = match settings.form {
-        Form::Published => one.iter().map(|d| !(*d > threshold)).collect(),
+        Form::Published => one.iter().map(|d| d.is_nan() || *d <= threshold).collect(),
         Form::Mended => across_gaps(x).iter().map(|d| *d <= threshold).collect(),
     };
     let offset = settings.offset.unwrap_or_else(|| automatic_offset(&two));

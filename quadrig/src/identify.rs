@@ -6,9 +6,10 @@
 //! Reference: specification `identification.md`.
 
 use crate::Failure;
-use ident::identify::identify;
+use ident::identify::{Identified, identify};
 use ident::log::{Log, write_whole};
 use ident::report::number;
+use std::io::Write;
 use std::path::PathBuf;
 
 /// Arguments.
@@ -30,37 +31,72 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if quiet {
         return Ok(());
     }
-    println!("{} plateaus", found.plateaus.len());
-    println!(
-        "{:>9} {:>9} {:>6}  {}",
-        "from s",
-        "to s",
-        "rows",
-        found.columns.iter().map(|c| format!("{c:>22}")).collect::<String>()
-    );
+    let mut out = std::io::stdout().lock();
+    match write!(out, "{}", text(&found)) {
+        // a reader that has seen enough, such as `head`, is no failure
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
+    }
+}
+
+fn text(found: &Identified) -> String {
+    let mut out = format!("{} plateaus\n", found.plateaus.len());
+    let columns: String = found.columns.iter().map(|c| format!("{c:>22}")).collect();
+    out += &format!("{:>9} {:>9} {:>6} {:>8}  {columns}\n", "from s", "to s", "rows", "settle s");
     for p in &found.plateaus {
         let means: String = p
             .means
             .iter()
-            .map(|m| m.map_or_else(|| format!("{:>22}", "-"), |(v, se)| format!("{:>12.4} +- {:>6.4}", v, se)))
+            .map(|m| m.map_or_else(|| format!("{:>22}", "-"), |(v, se)| format!("{v:>12.4} +- {se:>6.4}")))
             .collect();
-        println!("{:>9.2} {:>9.2} {:>6}  {means}", p.from_s, p.to_s, p.rows);
+        out += &format!("{:>9.2} {:>9.2} {:>6} {:>8.2}  {means}\n", p.from_s, p.to_s, p.rows, p.settling_s);
     }
+    out += "\ndeclared relations over all rows\n";
     for p in &found.model.polynomials {
-        let terms: Vec<String> = p
-            .coefficients
-            .iter()
-            .zip(&p.errors)
-            .enumerate()
-            .map(|(k, (c, e))| format!("c{k} = {} +- {}", number(*c), number(*e)))
-            .collect();
-        println!("{:<12} {}", p.channel, terms.join(", "));
+        out += &format!("{:<20} {}\n", p.channel, terms(p.coefficients.iter().copied().zip(p.errors.iter().copied())));
     }
     for q in &found.quality {
-        println!("{:<12} rms {} {}, noise floor {}, R2 {:.6}", q.channel, number(q.rms), q.unit, number(q.noise_floor), q.r2);
+        out += &format!(
+            "{:<20} rms {} {}, noise floor {}, R2 {:.6}\n",
+            q.channel,
+            number(q.rms),
+            q.unit,
+            number(q.noise_floor),
+            q.r2
+        );
+    }
+    if !found.curves.is_empty() {
+        out += "\ncurves through the plateaus (95 % intervals)\n";
+    }
+    for f in &found.curves {
+        let chosen = f.orders.iter().find(|o| o.chosen).map_or_else(String::new, |o| format!(", order by AICc {}", o.degree));
+        let left_out =
+            if f.curve.outliers.is_empty() { String::new() } else { format!(", left out: plateaus {:?}", f.curve.outliers) };
+        let coefficients = (0..=f.degree).map(|k| f.curve.coefficient(k));
+        out += &format!(
+            "{:<14} {}; chi2 {:.2}{chosen}{left_out}\n",
+            f.name,
+            terms(coefficients.map(|c| (c.value, c.half))),
+            f.curve.chi2
+        );
+    }
+    if !found.constants.is_empty() {
+        out += "\nconstants\n";
     }
     for c in &found.constants {
-        println!("{:<12} {} +- {} {}", c.name, number(c.value), number(c.se), c.unit);
+        out += &format!(
+            "{:<9} {} +- {} {} (95 %: {} to {})\n",
+            c.name,
+            number(c.value),
+            number(c.se),
+            c.unit,
+            number(c.value - c.half),
+            number(c.value + c.half)
+        );
     }
-    Ok(())
+    out
+}
+
+fn terms(pairs: impl Iterator<Item = (f64, f64)>) -> String {
+    pairs.enumerate().map(|(k, (c, e))| format!("c{k} = {} +- {}", number(c), number(e))).collect::<Vec<_>>().join(", ")
 }

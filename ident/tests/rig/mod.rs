@@ -59,6 +59,8 @@ pub struct Trouble {
     pub up_down: bool,
     /// No command was logged.
     pub no_command: bool,
+    /// One level in twenty is spoilt: its thrust and torque are off by a quarter.
+    pub spoilt: bool,
 }
 
 /// A run with its truth.
@@ -68,6 +70,8 @@ pub struct Run {
     /// Settled, noiseless speed and thrust on every row.
     pub rpm: Vec<f64>,
     pub thrust: Vec<f64>,
+    /// Time constant of the rotor, s.
+    pub tau: f64,
 }
 
 /// Truth of the fits.
@@ -79,10 +83,30 @@ pub fn omega(rpm: f64) -> f64 {
     rpm * std::f64::consts::TAU / 60.0
 }
 
-/// Speed of the healthy rig, settled.
+/// Supply, V; motor's torque constant (570 KV), N.m/A; resistance, ohm; no-load current, A; the controller's own draw, W.
+pub const SUPPLY: f64 = 11.5;
+pub const KV: f64 = 570.0;
+pub const RESISTANCE: f64 = 0.178;
+pub const NO_LOAD: f64 = 0.3;
+const OWN_DRAW: f64 = 0.35;
+
+fn torque_constant() -> f64 {
+    60.0 / (std::f64::consts::TAU * KV)
+}
+
+/// Speed of the healthy rig, settled: d V = Kt w + R I with I = Q/Kt + I0.
 pub fn speed(pulse: f64) -> f64 {
-    let x = (pulse - 1000.0) / 1000.0;
-    if pulse < 1040.0 { 0.0 } else { 300.0 + 8300.0 * x - 3900.0 * x * x + 1100.0 * x * x * x }
+    let kt = torque_constant();
+    let a = RESISTANCE * K_TORQUE / kt;
+    let c = RESISTANCE * NO_LOAD - (pulse - 1000.0) / 1000.0 * SUPPLY;
+    if pulse < 1040.0 { 0.0 } else { (-kt + (kt * kt - 4.0 * a * c).sqrt()) / (2.0 * a) * 60.0 / std::f64::consts::TAU }
+}
+
+/// Supply current from the power balance.
+fn draw(omega: f64) -> f64 {
+    let kt = torque_constant();
+    let load = if omega > 0.1 { K_TORQUE * omega * omega + kt * NO_LOAD } else { 0.0 };
+    (omega * load + RESISTANCE / (kt * kt) * load * load + OWN_DRAW) / SUPPLY
 }
 
 fn schedule(trouble: Trouble, hold: usize, chance: &mut Chance) -> Vec<(f64, usize)> {
@@ -122,11 +146,12 @@ pub fn run(trouble: Trouble, hold: usize, seed: u64) -> Run {
     let mut measured: [Vec<f64>; 5] = std::array::from_fn(|_| Vec::with_capacity(n));
     for (k, truth) in truths.iter().enumerate() {
         let slope = if trouble.drift { 0.01 * (0.5 + chance.uniform()) * if k % 3 == 2 { 1.0 } else { -1.0 } } else { 0.0 };
-        for i in truth.from..truth.to {
+        let spoil = if trouble.spoilt && k == 13 { 1.25 } else { 1.0 };
+        for (i, command) in pulse.iter().enumerate().take(truth.to).skip(truth.from) {
             let share = (i - truth.from) as f64 / (truth.to - truth.from) as f64;
             let drifted = 1.0 + slope * share;
-            let settled = speed(pulse[i]) * drifted;
-            state += (speed(pulse[i]) - state) * (1.0 - (-STEP / tau).exp());
+            let settled = speed(*command) * drifted;
+            state += (speed(*command) - state) * (1.0 - (-STEP / tau).exp());
             let ring = if trouble.resonance { 30.0 * (-((state - 2510.0) / 180.0).powi(2)).exp() } else { 0.0 };
             let noise = 2.0 * white.next(chance) + if trouble.erratic { 8.0 * hunting.next(chance) } else { 0.0 };
             let turning = if state > 1.0 { 1.0 } else { 0.0 };
@@ -137,11 +162,10 @@ pub fn run(trouble: Trouble, hold: usize, seed: u64) -> Run {
             let w = omega(actual);
             let load_noise = load.next(chance);
             measured[0].push(actual + turning * ring * chance.normal());
-            measured[1].push(K_THRUST * w * w + zero + 0.007 * load_noise + 0.006 * ring * chance.normal());
-            measured[2].push(K_TORQUE * w * w + 3e-4 * chance.normal());
-            let torque = K_TORQUE * w * w;
-            measured[3].push(0.05 + (w * torque + 300.0 * torque * torque) / 11.5 + 0.03 * chance.normal());
-            measured[4].push(11.5 + 0.01 * chance.normal());
+            measured[1].push(spoil * K_THRUST * w * w + zero + 0.007 * load_noise + 0.006 * ring * chance.normal());
+            measured[2].push(spoil * K_TORQUE * w * w + 3e-4 * chance.normal());
+            measured[3].push(draw(w) + 0.03 * chance.normal());
+            measured[4].push(SUPPLY + 0.01 * chance.normal());
         }
     }
     let mut columns = vec![Column { name: "pulse_us".into(), values: pulse }];
@@ -155,7 +179,7 @@ pub fn run(trouble: Trouble, hold: usize, seed: u64) -> Run {
         columns.remove(0);
     }
     let t = (0..n).map(|i| i as f64 * STEP).collect();
-    Run { log: Log { name: format!("run-{seed}.csv"), t, columns, ..Log::default() }, truths, rpm, thrust }
+    Run { log: Log { name: format!("run-{seed}.csv"), t, columns, ..Log::default() }, truths, rpm, thrust, tau }
 }
 
 fn drop_samples(columns: &mut [Column], chance: &mut Chance) {

@@ -1,0 +1,142 @@
+//! Fits over plateaus: curves with bands, physical constants, time constants, each with an error that holds.
+//!
+//! What it is: the relations of section 5.7.3 through the means of the plateaus, weighted by their errors, robust to a plateau that
+//! does not belong, with covariance and order selection; k_T, k_Q, KV, R, I0; spin-up times from the steps.
+//! What can go wrong: too few plateaus or a missing channel leave a fit out; nothing is guessed.
+//! Units: krpm and kus as regressors of curves; SI in constants.
+//! Reference: specification `identification.md`, item 3; Beharie 2013, Figures 5.76 to 5.79.
+
+mod curve;
+mod motor;
+mod spin;
+
+pub use curve::{Curve, Order, Point};
+pub use motor::{Motor, motor};
+pub use spin::{Spin, spin};
+
+use crate::log::{Log, SPEED};
+use crate::plateau::Plateau;
+
+/// A value with its standard error and the half width of its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Standard error.
+    pub se: f64,
+    /// Half width of the 95 % interval, by Student's t where few plateaus speak.
+    pub half: f64,
+}
+
+impl Estimate {
+    /// Whether the 95 % interval holds a value.
+    #[must_use]
+    pub fn holds(&self, truth: f64) -> bool {
+        (self.value - truth).abs() <= self.half
+    }
+}
+
+/// A relation that the thesis fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fitted {
+    /// Short name, `thrust(rpm)`.
+    pub name: &'static str,
+    /// Column of the ordinate.
+    pub y: String,
+    /// Column of the abscissa: `rpm` for the consensus, or `pulse_us`.
+    pub x: &'static str,
+    /// Declared degree.
+    pub degree: usize,
+    /// The curve at that degree.
+    pub curve: Curve,
+    /// What other degrees would give.
+    pub orders: Vec<Order>,
+}
+
+/// Scale of an abscissa: krpm and kus.
+#[must_use]
+pub fn scaled(x: &str, value: f64) -> f64 {
+    if x == "pulse_us" { (value - 1000.0) / 1000.0 } else { value / 1000.0 }
+}
+
+/// Speed at each plateau, and its error: the mean over the speed channels that were measured, weighted by their errors.
+#[must_use]
+pub fn speeds(log: &Log, plateaus: &[Plateau], channels: &[String]) -> Vec<Option<(f64, f64)>> {
+    let used: Vec<usize> = log
+        .columns
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| SPEED.contains(&c.name.as_str()) && (channels.is_empty() || channels.contains(&c.name)))
+        .map(|(i, _)| i)
+        .collect();
+    plateaus
+        .iter()
+        .map(|p| {
+            let means: Vec<(f64, f64)> = used.iter().filter_map(|i| p.means[*i]).collect();
+            // channels of one rotor share its own fluctuation: the mean of the errors, not their combination
+            let n = means.len() as f64;
+            (n > 0.0).then(|| (means.iter().map(|m| m.0).sum::<f64>() / n, means.iter().map(|m| m.1).sum::<f64>() / n))
+        })
+        .collect()
+}
+
+/// The relations of section 5.7.3 that a log has.
+#[must_use]
+pub fn relations(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> Vec<Fitted> {
+    const WANTED: [(&str, &str, &str, usize); 6] = [
+        ("rpm(pulse)", "rpm", "pulse_us", 3),
+        ("thrust(rpm)", "thrust_n", "rpm", 2),
+        ("torque(rpm)", "torque_nm", "rpm", 2),
+        ("current(rpm)", "current_a", "rpm", 3),
+        ("thrust(pulse)", "thrust_n", "pulse_us", 3),
+        ("torque(pulse)", "torque_nm", "pulse_us", 3),
+    ];
+    WANTED
+        .iter()
+        .filter_map(|(name, y, x, degree)| {
+            let value = |channel: &str, k: usize| {
+                if channel == "rpm" { speed[k] } else { plateaus[k].of(log, channel) }
+            };
+            // a resting rotor says nothing of a curve over the command
+            let turning = |k: usize| *x != "pulse_us" || speed.get(k).copied().flatten().is_none_or(|(v, _)| v > 1.0);
+            let points: Vec<Point> = (0..plateaus.len())
+                .filter(|k| turning(*k))
+                .filter_map(|k| {
+                    let ((x_value, x_error), (y_value, y_error)) = (value(x, k)?, value(y, k)?);
+                    Some(Point { x: scaled(x, x_value), x_error: x_error / 1000.0, y: y_value, y_error })
+                })
+                .collect();
+            let curve = Curve::fit(&points, *degree)?;
+            let orders = Order::compare(&points, 4);
+            Some(Fitted { name, y: (*y).to_owned(), x, degree: *degree, curve, orders })
+        })
+        .collect()
+}
+
+/// Coefficient of omega^2 with a free zero: k_T for thrust, k_Q for torque.
+#[must_use]
+pub fn square_law(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>], channel: &str) -> Option<(Estimate, Curve)> {
+    let points: Vec<Point> = plateaus
+        .iter()
+        .zip(speed)
+        .filter_map(|(p, s)| {
+            let ((rpm, rpm_error), (y, y_error)) = ((*s)?, p.of(log, channel)?);
+            let omega = rpm * std::f64::consts::TAU / 60.0;
+            let error = 2.0 * omega * rpm_error * std::f64::consts::TAU / 60.0;
+            // in units of 1e5 rad^2/s^2, so that the numbers are of order one
+            Some(Point { x: omega * omega / 1e5, x_error: error / 1e5, y, y_error })
+        })
+        .collect();
+    let curve = Curve::fit(&points, 1)?;
+    let mut k = curve.coefficient(1);
+    for v in [&mut k.value, &mut k.se, &mut k.half] {
+        *v /= 1e5;
+    }
+    Some((k, curve))
+}
+
+/// Thrust coefficient C_T = T/(rho n^2 D^4) of a k_T, n in revolutions a second (UIUC's definition).
+#[must_use]
+pub fn thrust_coefficient(k_thrust: f64, diameter_m: f64, density: f64) -> f64 {
+    k_thrust * std::f64::consts::TAU.powi(2) / (density * diameter_m.powi(4))
+}
