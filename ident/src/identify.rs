@@ -77,8 +77,14 @@ pub struct Identified {
 /// [`CloseError::NoRelation`] where nothing can be fitted.
 pub fn identify(log: &Log) -> Result<Identified, CloseError> {
     let mut context = Context::bare(log, None);
-    let (model, quality) = declared(log, &mut context).ok_or_else(|| CloseError::NoRelation { run: log.name.clone() })?;
-    let plateaus = detect(log, &context.rpm);
+    let speed = context.rpm.clone();
+    // the fits over all rows and the plateaus need nothing of each other: one core each
+    let (declared, plateaus) = std::thread::scope(|scope| {
+        let found = scope.spawn(|| detect(log, &speed));
+        let declared = declared(log, &mut context);
+        (declared, found.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    });
+    let (model, quality) = declared.ok_or_else(|| CloseError::NoRelation { run: log.name.clone() })?;
     let speeds = speeds(log, &plateaus, &context.consensus.channels);
     let curves = relations(log, &plateaus, &speeds);
     let mut constants = Vec::new();

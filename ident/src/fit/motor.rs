@@ -6,7 +6,7 @@
 //! Units: SI; KV in rev/min per volt.
 //! Reference: Beharie 2013, Eq. 5.11 corrected (rpm = KV (V - I R)); errors by the delta method over the plateaus' means.
 
-use super::Estimate;
+use super::{Estimate, square_law};
 use crate::log::Log;
 use crate::noise::median;
 use crate::plateau::Plateau;
@@ -38,6 +38,8 @@ struct Level {
 /// Motor constants from plateaus; `None` where a channel or a full-throttle level is missing.
 #[must_use]
 pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> Option<Motor> {
+    // a torque arm that is not tared would pose as friction: what the square law leaves at rest is its zero
+    let zero = square_law(log, plateaus, speed, "torque_nm").map(|(_, curve)| curve.coefficient(0))?;
     let levels: Vec<Level> = plateaus
         .iter()
         .zip(speed)
@@ -49,8 +51,10 @@ pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> O
                 p.of(log, "current_a")?,
                 p.of(log, "voltage_v")?,
             ];
+            let mut values = of.map(|v| v.0);
+            values[1] -= zero.value;
             let full = p.of(log, "pulse_us").is_some_and(|(v, _)| v >= FULL_US);
-            Some(Level { values: of.map(|v| v.0), errors: of.map(|v| v.1), full })
+            Some(Level { values, errors: of.map(|v| v.1), full })
         })
         .collect();
     let levels = belonging(levels);
@@ -68,6 +72,13 @@ pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> O
                 *v += (a - b).powi(2);
             }
         }
+    }
+    // the zero moves every level together
+    let mut moved = levels.clone();
+    moved.iter_mut().for_each(|l| l.values[1] -= zero.se);
+    let there = constants(&moved)?;
+    for (v, (a, b)) in variance.iter_mut().zip(there.iter().zip(&centre)) {
+        *v += (a - b).powi(2);
     }
     let estimate = |i: usize| {
         let se = variance[i].sqrt();

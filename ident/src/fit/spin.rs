@@ -52,7 +52,8 @@ pub fn spin(log: &Log, plateaus: &[Plateau], speed: &[f64]) -> Spin {
         if before < 1.0 || after < 1.0 || height.abs() < 1e-3 * before.max(after) {
             continue;
         }
-        let to = (w[1].first + w[1].rows / 3).min(speed.len());
+        // three times the settling: further rows say nothing of the approach
+        let to = (changed + 3 * (w[1].first - changed) + 20).min(w[1].first + w[1].rows);
         let t: Vec<f64> = (changed..to).map(|i| log.t[i] - log.t[changed]).collect();
         let left = (changed..to).map(|i| (after - speed[i]) / height).collect();
         sides[usize::from(height < 0.0)].push(Step { t, left, weight: height * height });

@@ -23,12 +23,8 @@ pub(crate) struct Colour {
 impl Colour {
     /// Autocorrelation pooled over all stretches, summed while neighbouring pairs of lags stay positive.
     pub(crate) fn pooled(values: &[f64], ranges: &[(usize, usize)]) -> Self {
-        let longest = ranges.iter().map(|(a, b)| b - a).max().unwrap_or(0);
-        let lags = (longest / 4).clamp(1, 60);
-        let mut products = vec![0.0; lags + 1];
-        let mut short = vec![0.0; lags + 1];
-        let mut pairs = vec![0.0_f64; lags + 1];
         let mut quantum = f64::INFINITY;
+        let mut scaled: Vec<(Vec<f64>, f64)> = Vec::with_capacity(ranges.len());
         for (from, to) in ranges {
             let z = &values[*from..*to];
             for w in z.windows(2) {
@@ -37,40 +33,74 @@ impl Colour {
                     quantum = quantum.min(d);
                 }
             }
-            let Some(r) = residual(z) else { continue };
+            let Some(mut r) = residual(z) else { continue };
             let n = r.iter().filter(|v| v.is_finite()).count() as f64;
-            let scale = r.iter().filter(|v| v.is_finite()).map(|v| v * v).sum::<f64>() / n;
-            if scale <= 0.0 || n < 8.0 {
-                continue;
-            }
-            for lag in 0..=lags.min(r.len().saturating_sub(1) / 3) {
-                for (a, b) in r.iter().zip(&r[lag..]).filter(|(a, b)| a.is_finite() && b.is_finite()) {
-                    products[lag] += a * b / scale;
-                    short[lag] += 2.0 / n;
-                    pairs[lag] += 1.0;
-                }
+            let scale = (r.iter().filter(|v| v.is_finite()).map(|v| v * v).sum::<f64>() / n).sqrt();
+            if scale > 0.0 && n >= 8.0 {
+                // a missing sample takes no part in any product
+                r.iter_mut().for_each(|v| *v /= scale);
+                scaled.push((r, n));
             }
         }
-        // about its own line a stretch's covariance is short of the truth by two integrated variances over n: solved by iteration
-        let mut time = 1.0;
-        for _ in 0..4 {
-            let covariance = |lag: usize| (products[lag] + time * short[lag]) / pairs[lag];
-            let rho = |lag: usize| if pairs[lag] > 20.0 { covariance(lag) / covariance(0) } else { 0.0 };
-            time = integrated(rho, &pairs);
-        }
+        let longest = ranges.iter().map(|(a, b)| b - a).max().unwrap_or(0);
+        let time = Correlogram { stretches: &scaled, lags: Vec::new() }.time((longest / 4).clamp(1, 60));
         Self { time, quantum: if quantum.is_finite() { quantum } else { 0.0 } }
     }
 }
 
+/// Pooled products of scaled residuals, lag by lag, no more of them than are asked for.
+struct Correlogram<'r> {
+    stretches: &'r [(Vec<f64>, f64)],
+    /// Sum of products, what each is short of for being taken about a line (times two over n), number of pairs.
+    lags: Vec<(f64, f64, f64)>,
+}
+
+impl Correlogram<'_> {
+    fn lag(&mut self, lag: usize) -> (f64, f64, f64) {
+        while self.lags.len() <= lag {
+            let k = self.lags.len();
+            let mut sums = (0.0, 0.0, 0.0);
+            for (r, n) in self.stretches.iter().filter(|(r, _)| k * 3 < r.len()) {
+                let (mut sum, mut pairs) = (0.0, 0.0);
+                for (a, b) in r.iter().zip(&r[k..]) {
+                    let product = a * b;
+                    if product.is_finite() {
+                        sum += product;
+                        pairs += 1.0;
+                    }
+                }
+                sums = (sums.0 + sum, sums.1 + 2.0 * pairs / n, sums.2 + pairs);
+            }
+            self.lags.push(sums);
+        }
+        self.lags[lag]
+    }
+
+    /// About its own line a stretch's covariance is short of the truth by two integrated variances over n: solved by iteration.
+    fn time(&mut self, most: usize) -> f64 {
+        let mut time = 1.0;
+        for _ in 0..4 {
+            let (sum, short, pairs) = self.lag(0);
+            let whole = (sum + time * short) / pairs;
+            let guess = time;
+            time = integrated(most, |lag| {
+                let (sum, short, pairs) = self.lag(lag);
+                (if pairs > 20.0 { (sum + guess * short) / pairs / whole } else { 0.0 }, pairs)
+            });
+        }
+        time
+    }
+}
+
 /// Integrated autocorrelation time: pairs of lags are summed until a pair is no more than its own scatter.
-fn integrated(rho: impl Fn(usize) -> f64, pairs: &[f64]) -> f64 {
+fn integrated(most: usize, mut rho: impl FnMut(usize) -> (f64, f64)) -> f64 {
     let (mut time, mut lag) = (1.0, 1);
-    while lag + 1 < pairs.len() {
-        let pair = rho(lag) + rho(lag + 1);
-        if pair <= 2.0 * (2.0 / pairs[lag].max(1.0)).sqrt() {
+    while lag < most {
+        let ((a, pairs), (b, _)) = (rho(lag), rho(lag + 1));
+        if a + b <= 2.0 * (2.0 / pairs.max(1.0)).sqrt() {
             break;
         }
-        time += 2.0 * pair;
+        time += 2.0 * (a + b);
         lag += 2;
     }
     time
