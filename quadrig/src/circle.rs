@@ -32,6 +32,9 @@ pub(crate) struct Args {
     /// Most runs beyond the first.
     #[arg(long, default_value_t = 4)]
     extra_runs: usize,
+    /// Leaves out the last step, the flight of the corrected model.
+    #[arg(long)]
+    no_circle: bool,
     /// Folder for the runs, their reports, the corrected model and loop.json.
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -86,7 +89,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             break standing;
         }
     };
-    let closes = close_circle(&scenario, &runs, &standing, quiet)?;
+    let closes = if args.no_circle { None } else { Some(close_circle(&scenario, &runs, &standing, quiet)?) };
     let report = json!({
         "format": "quadrig-loop 1",
         "scenario": args.scenario.file_name().map(|n| n.to_string_lossy()),
@@ -94,7 +97,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         "effects": standing.first().map_or(&[][..], |s| &s.ids),
         "extra_runs": runs.len() - 1,
         "rounds": rounds.iter().map(round_json).collect::<Vec<_>>(),
-        "circle": circle_json(&closes),
+        "circle": closes.as_ref().map(circle_json),
         "hidden": scenario.effects.iter().map(|e| e.id()).collect::<Vec<_>>(),
     });
     if let Some(folder) = &args.output {
@@ -112,7 +115,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else {
-        say(circle_table(&closes));
+        closes.iter().for_each(|c| say(circle_table(c)));
         say(conclusion(&runs, &standing, &scenario));
     }
     Ok(())

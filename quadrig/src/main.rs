@@ -14,6 +14,7 @@ mod demo;
 mod flash;
 mod identify;
 mod import;
+mod measured;
 mod predict;
 mod progress;
 mod run_log;
@@ -56,6 +57,8 @@ enum Command {
     Loop(circle::Args),
     /// Builds, flashes and attaches through probe-rs.
     Flash(flash::Args),
+    /// The loop on every recorded set; writes the pages that say what came of it.
+    Measured(measured::Args),
     /// A model's prediction of every measured channel, row for row.
     Predict(predict::Args),
 }
@@ -76,6 +79,7 @@ fn main() -> ExitCode {
         Command::Ahrs(args) => ahrs::run(args, cli.quiet),
         Command::Loop(args) => circle::run(args, cli.quiet),
         Command::Flash(args) => flash::run(args),
+        Command::Measured(args) => measured::run(args, cli.quiet),
         Command::Predict(args) => predict::run(args),
     };
     match done {
