@@ -24,6 +24,8 @@ pub enum Source {
     EncoderDisc = 40,
     /// Sizes of drawn effects.
     Effect = 50,
+    /// Losses on the serial line.
+    Line = 80,
     /// Start angle of the rotor and phase of the imbalance.
     Phase = 60,
 }

@@ -72,9 +72,8 @@ fn expectation(id: &str) -> (&'static [&'static str], [bool; 5]) {
         "blade_damage" | "blade_flex" => (&["rpm", "thrust", "torque"], [false, false, false, true, true]),
         "thermal_zero" => (&["thrust", "temp"], [false, true, true, true, false]),
         "stall" => (&["rpm", "thrust", "current"], [false, false, false, true, true]),
-        "missed_pulses" | "double_pulses" | "alternating_period" | "blade_twist" | "coupling_slip" | "dead_rotor_speed" => {
-            (&["reading"], [true; 5])
-        }
+        "missed_pulses" | "double_pulses" | "alternating_period" | "blade_twist" | "coupling_slip" | "dead_rotor_speed"
+        | "noisy_edges" => (&["reading"], [true; 5]),
         "encoder_drag" => (&["reading", "rpm", "current"], [false, false, false, true, true]),
         "clock_drift" => (&["thrust", "torque"], [false, false, true, true, true]),
         "glitch_rows" => (&[], [false; 5]), // which channel is drawn: see the test of its own

@@ -14,10 +14,12 @@ mod demo;
 mod flash;
 mod identify;
 mod import;
+mod live;
 mod measured;
 mod predict;
 mod progress;
 mod run_log;
+mod runs;
 mod select;
 mod sim;
 
@@ -41,6 +43,8 @@ enum Command {
     Demo(demo::Args),
     /// Runs the firmware against a simulated rig described by a scenario file.
     Sim(sim::Args),
+    /// All thirty-six motor-propeller pairs of the thesis on all cores, a log each.
+    Runs(runs::Args),
     /// A thrust stand's export becomes a rig log; what was repaired is reported.
     Import(import::Args),
     /// Plateaus, fits and quality figures of a log.
@@ -71,6 +75,7 @@ fn main() -> ExitCode {
     let done = match &cli.command {
         Command::Demo(args) => demo::run(args, cli.quiet),
         Command::Sim(args) => sim::run(args, cli.quiet),
+        Command::Runs(args) => runs::run(args, cli.quiet),
         Command::Import(args) => import::run(args, cli.quiet),
         Command::Identify(args) => identify::run(args, cli.quiet),
         Command::CloseLoop(args) => close_loop::run(args, cli.quiet),

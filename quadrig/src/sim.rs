@@ -1,17 +1,21 @@
 //! `quadrig sim`.
 //!
-//! What it is: the portable firmware against a simulated rig; its telemetry, decoded, becomes the log.
+//! What it is: the portable firmware against a simulated rig; its telemetry, decoded, becomes the log. On request with the ground
+//! truth in a side file, the pins' traffic recorded or replayed, or live with pause, single steps and a speed factor.
 //! What can go wrong: a scenario that is refused, a firmware that stops; then no log is written.
 //! Units: the log's.
 //! Reference: docs/scenario.md; specification `formats.md`.
 
 use crate::Failure;
+use crate::live;
 use crate::progress::Bar;
 use crate::run_log::{IdentifiedPlant, to_log};
-use hal_sim::{Powerplant, Scenario};
-use ident::log::Log;
+use hal_sim::native::{PinRecord, Session};
+use hal_sim::{Powerplant, RunRecord, Scenario, Truth};
+use ident::log::{Log, write_whole};
 use ident::model::Model;
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(clap::Args)]
@@ -24,19 +28,89 @@ pub(crate) struct Args {
     /// An identified model takes the place of the scenario's powerplant.
     #[arg(long)]
     model: Option<PathBuf>,
+    /// Writes what was really there at each sample (CSV).
+    #[arg(long, conflicts_with = "replay")]
+    truth: Option<PathBuf>,
+    /// Records everything that reaches the board's pins.
+    #[arg(long, conflicts_with_all = ["model", "replay"])]
+    pins: Option<PathBuf>,
+    /// The firmware alone on recorded pins, without plant and ESC; the scenario gives its configuration.
+    #[arg(long, conflicts_with_all = ["model", "live"])]
+    replay: Option<PathBuf>,
+    /// Shows the run as it goes; lines on the standard input control it: p pauses, s steps 0.1 s, a number sets the speed, q ends.
+    #[arg(long, conflicts_with = "model")]
+    live: bool,
+    /// Times real time in the live view; 0 for as fast as it goes.
+    #[arg(long, default_value_t = 1.0, requires = "live")]
+    speed: f64,
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let scenario = Scenario::load(&args.scenario)?;
     let name = args.output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut log = fly(&scenario, None, &name, "flying", quiet)?;
+    if !(args.speed.is_finite() && args.speed >= 0.0) {
+        return Err(format!("--speed {}: expected a number not below 0", args.speed).into());
+    }
+    let record = match &args.replay {
+        Some(path) => replayed(&scenario, path, quiet)?,
+        None => flown(args, &scenario, quiet)?,
+    };
+    if let Some(path) = &args.truth {
+        write_whole(path, |out| write_truth(out, &record.truth)).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    let mut log = to_log(&scenario, &record, &name);
+    if log.is_empty() {
+        return Err("the run ended before its first sample; no log was written".into());
+    }
     if let Some(path) = &args.model {
         log = fly_model(&scenario, &Model::read(path)?, &log, &name, quiet)?;
     }
     log.write(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
     if !quiet {
         println!("{}: {} samples over {:.1} s", args.output.display(), log.len(), log.t[log.len() - 1]);
+    }
+    Ok(())
+}
+
+/// The run that the arguments ask for, with the record of its pins where one is wanted.
+fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Failure> {
+    let mut session = Session::new(scenario, None);
+    if args.pins.is_some() {
+        session.record_pins(scenario);
+    }
+    if args.live {
+        live::watch(&mut session, args.speed)?;
+    } else {
+        let bar = Bar::new("flying", quiet);
+        while session.step()? {
+            bar.set(session.share());
+        }
+    }
+    if let (Some(path), Some(pins)) = (&args.pins, session.pins()) {
+        write_whole(path, |mut out| pins.write(&mut out)).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    Ok(session.finish()?)
+}
+
+/// The firmware of `scenario` alone on the pins of `path`.
+fn replayed(scenario: &Scenario, path: &Path, quiet: bool) -> Result<RunRecord, Failure> {
+    let pins = PinRecord::read(path)?;
+    let bar = Bar::new("replaying", quiet);
+    let telemetry = pins.replay(scenario, &mut |share| bar.set(share))?;
+    Ok(RunRecord::from_telemetry(scenario, telemetry)?)
+}
+
+/// What was really there, a row a sample.
+fn write_truth(out: &mut dyn Write, truth: &[Truth]) -> std::io::Result<()> {
+    writeln!(out, "t_s,pulse_us,rpm,thrust_n,torque_nm,current_a,voltage_v,temp_c,beam_n")?;
+    for t in truth {
+        let p = t.plant;
+        writeln!(
+            out,
+            "{:.3},{:.3},{:.4},{:.6},{:.7},{:.5},{:.5},{:.4},{:.6}",
+            t.run_s, t.pulse_us, p.rpm, p.thrust_n, p.torque_nm, p.current_a, p.voltage_v, p.temp_c, t.beam_n
+        )?;
     }
     Ok(())
 }

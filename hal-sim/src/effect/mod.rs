@@ -199,10 +199,11 @@ effects! {
     stator_saturation::StatorSaturation,
     desync::Desync,
     arm_friction::ArmFriction,
+    noisy_edges::NoisyEdges,
 }
 
 /// Effects of ours that the library of the identification does not know.
-pub const UNKNOWN: [&str; 8] = [
+pub const UNKNOWN: [&str; 9] = [
     "recirculation",
     "magnet_heat",
     "blade_icing",
@@ -211,6 +212,7 @@ pub const UNKNOWN: [&str; 8] = [
     "stator_saturation",
     "desync",
     "arm_friction",
+    "noisy_edges",
 ];
 
 #[cfg(test)]

@@ -12,6 +12,7 @@
 //! Reference: RM0090 rev 22; crate rigless 0.4.
 
 pub mod ahrs;
+pub mod bus;
 mod machine;
 pub mod operator;
 mod part;

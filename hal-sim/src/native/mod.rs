@@ -7,12 +7,16 @@
 //! Reference: specification `rig.md`, "ESC pulse and arming" and "Acquisition"; `formats.md`, "Telemetry".
 
 mod host;
+mod pins;
+
+pub use pins::{PinRecord, PinsError};
 
 use crate::bench::{Bench, Millisecond, Truth};
+use crate::noise::{Source, Stream};
 use crate::plant::Powerplant;
-use crate::scenario::Scenario;
+use crate::scenario::{FaultKind, Scenario, ScheduledFault};
 use crate::sensor::EdgeDetail;
-use firmware_rig::{Config, Inputs, Rig};
+use firmware_rig::{AdcBlock, Config, Inputs, Rig};
 use frame::calibration::{Calibration, Converted};
 use frame::message::{Command, Event, Hello, Message};
 use frame::rig::{FaultSet, Refusals, RigSample, RigState};
@@ -81,6 +85,36 @@ pub struct RunRecord {
 }
 
 impl RunRecord {
+    /// What a host makes of a board's bytes alone, as of a replay: samples of the run, events, calibration; no truth.
+    ///
+    /// # Errors
+    /// [`SimError`] of a board that refused or latched something.
+    pub fn from_telemetry(scenario: &Scenario, telemetry: Vec<u8>) -> Result<Self, SimError> {
+        let mut decoder = Decoder::default();
+        let (mut hello, mut calibration) = (None, None);
+        let (mut samples, mut events) = (Vec::new(), Vec::new());
+        for byte in &telemetry {
+            match decoder.push::<Message>(*byte).map(|received| received.message) {
+                Some(Message::Hello(told)) => hello = Some(told),
+                Some(Message::Calibration(told)) => calibration = Some(told),
+                Some(Message::Rig(sample)) => samples.push(sample),
+                Some(Message::Event(event)) => events.push(event),
+                _ => {}
+            }
+        }
+        let stuck = SimError::Stuck { phase: "replaying", state: RigState::Disarmed, at_s: 0.0 };
+        let running = events.iter().find_map(|e| match e {
+            Event::State { to: RigState::Running, at, .. } => Some(*at),
+            _ => None,
+        });
+        // the host begins to record `rest_s` before the schedule
+        let rest = Ticks((scenario.rest_s * Ticks::HZ as f64) as u64);
+        let (Some(hello), Some(calibration), Some(running)) = (hello, calibration, running) else { return Err(stuck) };
+        samples.retain(|s: &RigSample| s.at.0 + rest.0 >= running.0);
+        let start = samples.first().map_or(running, |s| s.at);
+        Ok(Self { telemetry, hello, calibration, start, samples, events, link: decoder.stats(), truth: Vec::new() })
+    }
+
     /// Physical values of every sample, with time from the start of the run.
     pub fn converted(&self) -> impl Iterator<Item = Converted> + '_ {
         let start = self.start.as_s();
@@ -105,6 +139,50 @@ struct Board {
 }
 
 impl Board {
+    fn new(config: Config) -> Self {
+        Self {
+            rig: Rig::new(config),
+            encoder: Encoder::default(),
+            decoder: Decoder::default(),
+            pulse: PulseWidth::MIN,
+            sent: Vec::new(),
+        }
+    }
+
+    /// Starts again, as after a loss of its supply. The sequence of its frames begins anew as well.
+    fn reset(&mut self, config: Config) {
+        *self = Self::new(config);
+    }
+
+    /// One control tick with what the peripherals gathered; what it has to tell goes onto the line.
+    fn tick(&mut self, now: Ticks, gathered: &Millisecond, command: Option<Command>) -> Result<(), SimError> {
+        let outputs = self.rig.tick(&Inputs {
+            now,
+            edges: core::array::from_fn(|i| gathered.edges[i].as_slice()),
+            over_capture: [false; 4],
+            adc: gathered.adc,
+            command,
+            line: Default::default(),
+            stop_input: false,
+            brown_out: false,
+            paused: false,
+        });
+        self.pulse = outputs.pulse;
+        if let Some(Command::Identify) = command {
+            self.tell(now, &Message::Hello(self.rig.hello(0)))?;
+        }
+        if let Some(Command::Identify | Command::Tare) = command {
+            self.tell(now, &Message::Calibration(self.rig.calibration()))?;
+        }
+        if let Some(sample) = outputs.sample {
+            self.tell(now, &Message::Rig(sample))?;
+        }
+        if let Some(event) = outputs.event {
+            self.tell(now, &Message::Event(event))?;
+        }
+        Ok(())
+    }
+
     fn tell(&mut self, now: Ticks, message: &Message) -> Result<(), SimError> {
         let mut frame = [0; MAX_WIRE];
         let length = self.encoder.encode(now, message, &mut frame).map_err(|_| SimError::Codec)?;
@@ -144,100 +222,228 @@ pub fn run(
     plant: Option<Box<dyn Powerplant>>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<RunRecord, SimError> {
-    let mut bench = Bench::new(scenario, plant, EdgeDetail::Captured);
-    let mut host = Host::new(scenario);
-    let mut board = Board {
-        rig: Rig::new(firmware_config(scenario)),
-        encoder: Encoder::default(),
-        decoder: Decoder::default(),
-        pulse: PulseWidth::MIN,
-        sent: Vec::new(),
-    };
-    let mut gathered = Millisecond::default();
-    let mut telemetry = Vec::new();
-    let mut truth = Vec::new();
-    let mut frame_pulse = PulseWidth::MIN;
-    let limit_ms = (scenario.run_s() * 1000.0) as u64 + OVERHEAD_MS;
-
-    for ms in 1.. {
-        // The timer takes a new pulse at the start of a 20 ms frame; the pulse has ended 2 ms later at the latest.
-        match ms % 20 {
-            0 => frame_pulse = board.pulse,
-            2 => bench.pulse((ms - 2) * 1_000_000 + u64::from(frame_pulse.0), frame_pulse.0),
-            _ => {}
-        }
-        bench.millisecond(&mut gathered);
-        let now = Ticks::from_ms(ms);
-
-        host.step(ms, &mut bench);
-        let mut command = None;
-        if let Some(wanted) = host.send(ms) {
-            let mut frame = [0; MAX_WIRE];
-            let length = host.encoder.encode(now, &wanted, &mut frame).map_err(|_| SimError::Codec)?;
-            command = board.hear(&frame[..length]);
-        }
-        let outputs = board.rig.tick(&Inputs {
-            now,
-            edges: core::array::from_fn(|i| gathered.edges[i].as_slice()),
-            over_capture: [false; 4],
-            adc: gathered.adc,
-            command,
-            line: Default::default(),
-            stop_input: false,
-            brown_out: false,
-            paused: false,
-        });
-        board.pulse = outputs.pulse;
-        if let Some(Command::Identify) = command {
-            board.tell(now, &Message::Hello(board.rig.hello(0)))?;
-        }
-        if let Some(Command::Identify | Command::Tare) = command {
-            board.tell(now, &Message::Calibration(board.rig.calibration()))?;
-        }
-        if let Some(sample) = outputs.sample {
-            board.tell(now, &Message::Rig(sample))?;
-        }
-        if let Some(event) = outputs.event {
-            board.tell(now, &Message::Event(event))?;
-        }
-
-        let recorded = host.samples.len();
-        for byte in &board.sent {
-            if let Some(received) = host.decoder.push::<Message>(*byte) {
-                host.take(received.message, ms)?;
-            }
-        }
-        telemetry.append(&mut board.sent);
-        if host.samples.len() > recorded {
-            if recorded == 0 {
-                bench.start_run();
-            }
-            let run_s = (now.as_s() - host.start.unwrap_or(now).as_s()).max(0.0);
-            truth.push(Truth { run_s, ..bench.truth() });
-        }
-        if ms % 1000 == 0 {
-            let done = host.start.map_or(0.0, |s| (now.as_s() - s.as_s()) / scenario.run_s());
-            progress(done.min(1.0));
-        }
-        if host.phase == Phase::Done {
-            break;
-        }
-        if ms > limit_ms {
-            return Err(SimError::Stuck { phase: host.phase.name(), state: host.state, at_s: now.as_s() });
+    let mut session = Session::new(scenario, plant);
+    while session.step()? {
+        if session.ms.is_multiple_of(1000) {
+            progress(session.share());
         }
     }
-    let (Some(hello), Some(calibration), Some(start)) = (host.hello, host.calibration, host.start) else {
-        return Err(SimError::Stuck { phase: host.phase.name(), state: host.state, at_s: 0.0 });
-    };
+    let record = session.finish()?;
     progress(1.0);
-    Ok(RunRecord {
-        telemetry,
-        hello,
-        calibration,
-        start,
-        samples: host.samples,
-        events: host.events,
-        link: host.decoder.stats(),
-        truth,
-    })
+    Ok(record)
+}
+
+/// A native run that is taken a millisecond at a time: to pause, to single-step, to watch, to record its pins.
+pub struct Session {
+    bench: Bench,
+    host: Host,
+    board: Board,
+    config: Config,
+    gathered: Millisecond,
+    telemetry: Vec<u8>,
+    truth: Vec<Truth>,
+    frame_pulse: PulseWidth,
+    ms: u64,
+    run_s: f64,
+    limit_ms: u64,
+    faults: Vec<ScheduledFault>,
+    line: Stream,
+    dark: bool,
+    pins: Option<PinRecord>,
+}
+
+impl Session {
+    /// A rig, a board and a host, none of them switched on.
+    #[must_use]
+    pub fn new(scenario: &Scenario, plant: Option<Box<dyn Powerplant>>) -> Self {
+        let config = firmware_config(scenario);
+        Self {
+            bench: Bench::new(scenario, plant, EdgeDetail::Captured),
+            host: Host::new(scenario),
+            board: Board::new(config.clone()),
+            config,
+            gathered: Millisecond::default(),
+            telemetry: Vec::new(),
+            truth: Vec::new(),
+            frame_pulse: PulseWidth::MIN,
+            ms: 0,
+            run_s: scenario.run_s(),
+            limit_ms: (scenario.run_s() * 1000.0) as u64 + OVERHEAD_MS,
+            faults: scenario.faults.clone(),
+            line: Stream::new(scenario.seed, Source::Line, 0),
+            dark: false,
+            pins: None,
+        }
+    }
+
+    /// Keeps everything that reaches the board from here on.
+    pub fn record_pins(&mut self, scenario: &Scenario) {
+        self.pins = Some(PinRecord::new(scenario));
+    }
+
+    /// The record of the pins so far.
+    #[must_use]
+    pub fn pins(&self) -> Option<&PinRecord> {
+        self.pins.as_ref()
+    }
+
+    /// Simulated time since reset, s.
+    #[must_use]
+    pub fn now_s(&self) -> f64 {
+        self.ms as f64 * 1.0e-3
+    }
+
+    /// What the host is doing.
+    #[must_use]
+    pub fn phase(&self) -> &'static str {
+        self.host.phase.name()
+    }
+
+    /// What is really there.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        self.bench.truth()
+    }
+
+    /// The sample that arrived last.
+    #[must_use]
+    pub fn sample(&self) -> Option<RigSample> {
+        self.host.samples.last().copied()
+    }
+
+    /// Share of the logged run that is done.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        let now = Ticks::from_ms(self.ms).as_s();
+        self.host.start.map_or(0.0, |s| (now - s.as_s()) / self.run_s).min(1.0)
+    }
+
+    /// Time of the run, s; negative before it.
+    fn run_time(&self) -> f64 {
+        self.host.start.map_or(-1.0, |start| Ticks::from_ms(self.ms).as_s() - start.as_s())
+    }
+
+    fn on(&self, wanted: impl Fn(&FaultKind) -> bool) -> Option<FaultKind> {
+        let run_s = self.run_time();
+        self.faults.iter().find(|f| f.is_on(run_s) && wanted(&f.kind)).map(|f| f.kind)
+    }
+
+    /// One millisecond; `false` once the run is over.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn step(&mut self) -> Result<bool, SimError> {
+        if self.host.phase == Phase::Done {
+            return Ok(false);
+        }
+        self.ms += 1;
+        let ms = self.ms;
+        let dark = self.on(|k| matches!(k, FaultKind::BrownOut)).is_some();
+        if dark != self.dark {
+            self.bench.set_power(!dark);
+            self.dark = dark;
+        }
+        // The timer takes a new pulse at the start of a 20 ms frame; the pulse has ended 2 ms later at the latest.
+        match ms % 20 {
+            0 => self.frame_pulse = self.board.pulse,
+            2 if !dark => self.bench.pulse((ms - 2) * 1_000_000 + u64::from(self.frame_pulse.0), self.frame_pulse.0),
+            _ => {}
+        }
+        self.bench.millisecond(&mut self.gathered);
+        let run_s = self.run_time();
+        for fault in self.faults.iter().filter(|f| f.is_on(run_s)) {
+            if let FaultKind::AdcStuck { channel, high } = fault.kind
+                && let Some(block) = self.gathered.adc.get_mut(usize::from(channel))
+            {
+                *block = stuck(block.count, high);
+            }
+        }
+        let now = Ticks::from_ms(ms);
+        self.host.step(ms, &mut self.bench);
+        let mut command = None;
+        if let Some(wanted) = self.host.send(ms) {
+            let mut frame = [0; MAX_WIRE];
+            let length = self.host.encoder.encode(now, &wanted, &mut frame).map_err(|_| SimError::Codec)?;
+            if self.on(|k| matches!(k, FaultKind::LinkLost)).is_none() {
+                command = self.board.hear(&frame[..length]);
+            }
+        }
+        if dark {
+            self.board.reset(self.config.clone());
+        } else {
+            self.board.tick(now, &self.gathered, command)?;
+        }
+        if let Some(pins) = &mut self.pins {
+            pins.take(&self.gathered, command, dark);
+        }
+        self.deliver(now)?;
+        if self.host.phase != Phase::Done && ms > self.limit_ms {
+            return Err(SimError::Stuck { phase: self.host.phase.name(), state: self.host.state, at_s: now.as_s() });
+        }
+        self.host.give_up(ms, self.run_time() > self.run_s);
+        Ok(self.host.phase != Phase::Done)
+    }
+
+    /// The board's bytes reach the host, as far as the line lets them.
+    fn deliver(&mut self, now: Ticks) -> Result<(), SimError> {
+        let dropped = self.on(|k| matches!(k, FaultKind::TelemetryDropped { .. }));
+        let corrupted = self.on(|k| matches!(k, FaultKind::TelemetryCorrupted { .. }));
+        let mut sent = core::mem::take(&mut self.board.sent);
+        if let Some(FaultKind::TelemetryDropped { probability }) = dropped
+            && !sent.is_empty()
+            && self.line.uniform() < probability
+        {
+            sent.clear();
+        }
+        if let Some(FaultKind::TelemetryCorrupted { probability }) = corrupted {
+            for byte in &mut sent {
+                if self.line.uniform() < probability {
+                    *byte ^= 1 << ((self.line.uniform() * 8.0) as u32).min(7);
+                }
+            }
+        }
+        let recorded = self.host.samples.len();
+        for byte in &sent {
+            if let Some(received) = self.host.decoder.push::<Message>(*byte) {
+                self.host.take(received.message, self.ms)?;
+            }
+        }
+        self.telemetry.append(&mut sent);
+        if self.host.samples.len() > recorded {
+            if recorded == 0 {
+                self.bench.start_run();
+            }
+            let run_s = (now.as_s() - self.host.start.unwrap_or(now).as_s()).max(0.0);
+            self.truth.push(Truth { run_s, ..self.bench.truth() });
+        }
+        Ok(())
+    }
+
+    /// What the run leaves behind.
+    ///
+    /// # Errors
+    /// [`SimError::Stuck`] when nothing was recorded.
+    pub fn finish(self) -> Result<RunRecord, SimError> {
+        let host = self.host;
+        let (Some(hello), Some(calibration), Some(start)) = (host.hello, host.calibration, host.start) else {
+            return Err(SimError::Stuck { phase: host.phase.name(), state: host.state, at_s: 0.0 });
+        };
+        Ok(RunRecord {
+            telemetry: self.telemetry,
+            hello,
+            calibration,
+            start,
+            samples: host.samples,
+            events: host.events,
+            link: host.decoder.stats(),
+            truth: self.truth,
+        })
+    }
+}
+
+/// Conversions of a pin at an end of its range.
+fn stuck(count: u16, high: bool) -> AdcBlock {
+    let code = if high { 4095 } else { 0 };
+    let wide = u32::from(code);
+    AdcBlock { sum: wide * u32::from(count), sum_sq: u64::from(wide * wide) * u64::from(count), count, min: code, max: code }
 }

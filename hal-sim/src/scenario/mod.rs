@@ -6,8 +6,10 @@
 //! Units: each key carries its own.
 //! Reference: specification `rig.md`, "The simulator"; `docs/scenario.md` lists every key.
 
+mod fault;
 mod section;
 
+pub use fault::{FaultKind, ScheduledFault};
 pub use section::{AirSection, EscSection, LogSection, NoiseSection, Schedule, SensorSection, SpeedSensor, Step, SupplySection};
 
 use crate::bench::BenchParts;
@@ -91,6 +93,9 @@ pub struct Scenario {
     /// Hidden effects.
     #[serde(rename = "effect")]
     pub effects: Vec<Scheduled>,
+    /// Faults of line, supply and pins.
+    #[serde(rename = "fault")]
+    pub faults: Vec<ScheduledFault>,
 }
 
 impl Default for Scenario {
@@ -109,6 +114,7 @@ impl Default for Scenario {
             log: LogSection::default(),
             noise: NoiseSection::default(),
             effects: Vec::new(),
+            faults: Vec::new(),
         }
     }
 }

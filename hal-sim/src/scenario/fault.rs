@@ -1,0 +1,62 @@
+//! Faults of the line, the supply and the pins, at an instant of the run.
+//!
+//! What it is: what a scenario's `[[fault]]` tables hold. A run with faults is recorded to its end whatever the board does about them.
+//! What can go wrong: faults of the I2C bus concern the IMU board; in a run of the rig nothing is on that bus.
+//! Units: s of the run's own time; probability.
+//! Reference: specification `rig.md`, "The simulator" (faults at any time).
+
+use serde::{Deserialize, Serialize};
+
+/// A fault and its window.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ScheduledFault {
+    /// Begin, s.
+    pub from_s: f64,
+    /// End, s.
+    pub until_s: f64,
+    /// What happens.
+    #[serde(flatten)]
+    pub kind: FaultKind,
+}
+
+/// What goes wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "id", rename_all = "snake_case", deny_unknown_fields)]
+pub enum FaultKind {
+    /// The host's bytes do not reach the board.
+    LinkLost,
+    /// Frames of the board do not reach the host.
+    TelemetryDropped {
+        /// Probability of each frame.
+        probability: f64,
+    },
+    /// Bytes of the board arrive with a bit turned over.
+    TelemetryCorrupted {
+        /// Probability of each byte.
+        probability: f64,
+    },
+    /// Board and ESC have no supply; the board starts again at the end of the window.
+    BrownOut,
+    /// An ADC pin sits at an end of its range.
+    AdcStuck {
+        /// 0 thrust, 1 torque, 2 current, 3 voltage, 4 temperature.
+        channel: u8,
+        /// At the reference; otherwise at ground.
+        high: bool,
+    },
+    /// A chip of the IMU board does not answer.
+    I2cNack {
+        /// 0 gyro, 1 accelerometer, 2 magnetometer.
+        chip: u8,
+    },
+    /// A chip of the IMU board holds SDA low.
+    I2cStuck,
+}
+
+impl ScheduledFault {
+    /// Whether it happens `run_s` into the run (negative before it).
+    #[must_use]
+    pub fn is_on(&self, run_s: f64) -> bool {
+        (self.from_s..self.until_s).contains(&run_s)
+    }
+}

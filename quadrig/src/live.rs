@@ -1,0 +1,134 @@
+//! The live view of a simulated run.
+//!
+//! What it is: one line that is renewed ten times a simulated second, in step with the clock times a factor; lines on the
+//! standard input pause it, take single steps, change the speed or end it.
+//! What can go wrong: a machine that cannot keep up shows a lower factor than asked; nothing else changes, the bytes are the same.
+//! Units: s, rev/min, N, A.
+//! Reference: specification `rig.md`, "The simulator".
+
+use crate::Failure;
+use hal_sim::native::Session;
+use std::io::{BufRead, IsTerminal, Write};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
+use std::time::{Duration, Instant};
+
+/// Simulated milliseconds between two lines.
+const REFRESH_MS: u32 = 100;
+
+/// What the viewer asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Wish {
+    Pause,
+    Step,
+    Speed(f64),
+    Quit,
+}
+
+/// The wish of one input line.
+fn wish(line: &str) -> Option<Wish> {
+    match line.trim() {
+        "p" | "" => Some(Wish::Pause),
+        "s" => Some(Wish::Step),
+        "q" => Some(Wish::Quit),
+        number => number.parse().ok().filter(|f: &f64| f.is_finite() && *f >= 0.0).map(Wish::Speed),
+    }
+}
+
+fn wishes() -> Receiver<Wish> {
+    let (send, receive) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            match wish(&line) {
+                Some(wish) if send.send(wish).is_err() => return,
+                Some(_) => {}
+                None => eprintln!("expected p, s, q or a speed, found {line:?}"),
+            }
+        }
+    });
+    receive
+}
+
+/// Shows the run to its end or until the viewer has had enough.
+pub(crate) fn watch(session: &mut Session, mut speed: f64) -> Result<(), Failure> {
+    let wishes = wishes();
+    let mut paused = false;
+    let mut open = true;
+    let (mut from_s, mut begun) = (session.now_s(), Instant::now());
+    loop {
+        let asked = if paused && open {
+            match wishes.recv_timeout(Duration::from_millis(200)) {
+                Ok(wish) => Some(wish),
+                Err(RecvTimeoutError::Timeout) => continue,
+                Err(RecvTimeoutError::Disconnected) => None,
+            }
+        } else {
+            match wishes.try_recv() {
+                Ok(wish) => Some(wish),
+                Err(TryRecvError::Disconnected) => {
+                    open = false;
+                    None
+                }
+                Err(TryRecvError::Empty) => None,
+            }
+        };
+        match asked {
+            Some(Wish::Pause) => paused = !paused,
+            Some(Wish::Speed(factor)) => (speed, paused) = (factor, false),
+            Some(Wish::Quit) => break,
+            Some(Wish::Step) => paused = true,
+            None => paused &= open, // nobody is left who could go on
+        }
+        if asked.is_some() {
+            (from_s, begun) = (session.now_s(), Instant::now());
+        }
+        if paused && asked != Some(Wish::Step) {
+            continue;
+        }
+        for _ in 0..REFRESH_MS {
+            if !session.step()? {
+                show(session, speed, false);
+                println!();
+                return Ok(());
+            }
+        }
+        show(session, speed, paused);
+        if speed > 0.0 && !paused {
+            let due = Duration::from_secs_f64((session.now_s() - from_s) / speed);
+            std::thread::sleep(due.saturating_sub(begun.elapsed()));
+        }
+    }
+    println!();
+    Ok(())
+}
+
+fn show(session: &Session, speed: f64, paused: bool) {
+    let (truth, now) = (session.truth(), session.now_s());
+    let measured = session.sample().map_or("-".to_owned(), |s| format!("{:?}", s.state));
+    let mode = if paused { "paused".to_owned() } else { format!("x{speed}") };
+    let line = format!(
+        "{now:>8.1} s {mode:>7}  {:<26} {measured:<10} {:>6.0} us {:>6.0} rev/min {:>6.3} N {:>6.2} A {:>6.2} V {:>4.0} %",
+        session.phase(),
+        truth.pulse_us,
+        truth.plant.rpm,
+        truth.plant.thrust_n,
+        truth.plant.current_a,
+        truth.plant.voltage_v,
+        100.0 * session.share()
+    );
+    let mut out = std::io::stdout().lock();
+    let end = if out.is_terminal() { "\r" } else { "\n" };
+    let _ = write!(out, "{line}{end}").and_then(|()| out.flush()); // a closed view ends nothing
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_wishes() {
+        assert_eq!(wish("p"), Some(Wish::Pause));
+        assert_eq!(wish(" s "), Some(Wish::Step));
+        assert_eq!(wish("25"), Some(Wish::Speed(25.0)));
+        assert_eq!((wish("-1"), wish("fast"), wish("q")), (None, None, Some(Wish::Quit)));
+    }
+}

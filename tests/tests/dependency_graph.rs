@@ -1,0 +1,71 @@
+//! No inverse crime: the identification cannot import the simulator, nor the simulator the identification.
+//!
+//! What it is: the dependency graph as cargo resolves it, followed from both crates to everything that they reach, build and test
+//! dependencies included.
+//! What can go wrong: a path that is added anywhere in between shows here with its whole chain.
+//! Reference: specification `house.md`, "`ident` and `hal-sim` never see each other".
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+fn metadata() -> Value {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let out = std::process::Command::new(cargo)
+        .args(["metadata", "--format-version", "1", "--offline", "--manifest-path"])
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml"))
+        .output()
+        .expect("cargo runs");
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    serde_json::from_slice(&out.stdout).expect("JSON")
+}
+
+/// Everything that `from` reaches, with the crate through which it was first reached.
+fn reached(graph: &Value, from: &str) -> BTreeMap<String, String> {
+    let name = |id: &Value| -> String {
+        let package = graph["packages"].as_array().expect("packages").iter().find(|p| p["id"] == *id).expect("a package");
+        package["name"].as_str().expect("a name").to_owned()
+    };
+    let nodes = graph["resolve"]["nodes"].as_array().expect("nodes");
+    let direct: BTreeMap<String, Vec<String>> =
+        nodes.iter().map(|n| (name(&n["id"]), n["dependencies"].as_array().expect("ids").iter().map(name).collect())).collect();
+    let mut seen = BTreeMap::new();
+    let mut open = vec![from.to_owned()];
+    while let Some(at) = open.pop() {
+        for next in direct.get(&at).into_iter().flatten() {
+            if !seen.contains_key(next) {
+                seen.insert(next.clone(), at.clone());
+                open.push(next.clone());
+            }
+        }
+    }
+    seen
+}
+
+fn chain(seen: &BTreeMap<String, String>, to: &str) -> String {
+    let mut line = to.to_owned();
+    let mut at = to;
+    while let Some(before) = seen.get(at) {
+        line = format!("{before} -> {line}");
+        at = before;
+    }
+    line
+}
+
+#[test]
+fn neither_side_reaches_the_other() {
+    let graph = metadata();
+    for (from, forbidden) in
+        [("ident", ["hal-sim", "firmware-rig", "quadrig"]), ("hal-sim", ["ident", "quadrig", "quadrig-tests"])]
+    {
+        let seen = reached(&graph, from);
+        for other in forbidden {
+            assert!(!seen.contains_key(other), "{}", chain(&seen, other));
+        }
+        println!("{from} reaches {} crates, none of {forbidden:?}", seen.len());
+        assert!(seen.contains_key("serde"), "the graph was read");
+    }
+    // the test can see a path where there is one
+    let seen = reached(&graph, "quadrig");
+    assert!(seen.contains_key("ident") && seen.contains_key("hal-sim"));
+    assert_eq!(chain(&reached(&graph, "hal-sim"), "esc-pwm").split(" -> ").next(), Some("hal-sim"));
+}
