@@ -86,6 +86,7 @@ pub fn identify(log: &Log) -> Result<Identified, CloseError> {
     });
     let (model, quality) = declared.ok_or_else(|| CloseError::NoRelation { run: log.name.clone() })?;
     let speeds = speeds(log, &plateaus, &context.consensus.channels);
+    let (plateaus, speeds) = if plateaus.is_empty() { table_rows(log, &context) } else { (plateaus, speeds) };
     let curves = relations(log, &plateaus, &speeds);
     let mut constants = Vec::new();
     let mut square_laws = Vec::new();
@@ -100,7 +101,8 @@ pub fn identify(log: &Log) -> Result<Identified, CloseError> {
         constants.push(Constant::new("R", m.resistance, "ohm"));
         constants.push(Constant::new("I0", m.no_load, "A"));
     }
-    let Spin { up, down } = spin(log, &plateaus, &context.rpm);
+    // row numbers are no seconds
+    let Spin { up, down } = if log.time_is_row() { Spin::default() } else { spin(log, &plateaus, &context.rpm) };
     constants.extend(up.map(|e| Constant::new("tau_up", e, "s")));
     constants.extend(down.map(|e| Constant::new("tau_down", e, "s")));
     Ok(Identified {
@@ -113,6 +115,30 @@ pub fn identify(log: &Log) -> Result<Identified, CloseError> {
         square_laws,
         constants,
     })
+}
+
+/// Longest log whose rows may each be a level of their own.
+const TABLE: usize = 64;
+/// Error that a row of a table is given, as a share of its column's largest value; the scatter about a curve corrects it.
+const TABLE_ERROR: f64 = 0.01;
+
+/// A static table has one row for each level: every row is a point.
+fn table_rows(log: &Log, context: &Context) -> (Vec<Plateau>, Vec<Option<(f64, f64)>>) {
+    if log.len() > TABLE {
+        return (Vec::new(), Vec::new());
+    }
+    let top = |v: &[f64]| v.iter().copied().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+    let errors: Vec<f64> = log.columns.iter().map(|c| TABLE_ERROR * top(&c.values)).collect();
+    let rows = (0..log.len()).map(|i| Plateau {
+        from_s: log.t[i],
+        to_s: log.t[i],
+        first: i,
+        rows: 1,
+        settling_s: 0.0,
+        means: log.columns.iter().zip(&errors).map(|(c, e)| c.values[i].is_finite().then_some((c.values[i], *e))).collect(),
+    });
+    let speed = context.rpm.iter().map(|v| Some((*v, TABLE_ERROR * top(&context.rpm)))).collect::<Vec<_>>();
+    (rows.collect(), if speed.is_empty() { vec![None; log.len()] } else { speed })
 }
 
 /// The declared relations over all rows, one channel at a time: a long log must not stand in memory once for each.

@@ -20,6 +20,15 @@ pub(crate) struct Args {
     /// Where the model goes.
     #[arg(short, long)]
     output: PathBuf,
+    /// Writes the page with every figure of the run.
+    #[arg(long, value_name = "PAGE")]
+    report: Option<PathBuf>,
+    /// Writes each figure as a file into this folder.
+    #[arg(long, value_name = "FOLDER")]
+    svg: Option<PathBuf>,
+    /// A second run to lay beside it on the page.
+    #[arg(long, value_name = "LOG")]
+    beside: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -28,6 +37,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let found = identify(&log)?;
     write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes()))
         .map_err(|e| format!("{}: {e}", args.output.display()))?;
+    if args.report.is_some() || args.svg.is_some() {
+        draw(args, &log, &found)?;
+    }
     if quiet {
         return Ok(());
     }
@@ -37,6 +49,26 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => Ok(other?),
     }
+}
+
+/// The page and the figures.
+fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
+    let second = match &args.beside {
+        Some(path) => {
+            let log = Log::read(path)?;
+            let found = identify(&log)?;
+            Some((log, found))
+        }
+        None => None,
+    };
+    let sheet = ident::report::run(log, found, second.as_ref().map(|(log, found)| (log, found)));
+    if let Some(path) = &args.report {
+        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    if let Some(folder) = &args.svg {
+        ident::report::write_figures(folder, sheet.drawn()).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
+    }
+    Ok(())
 }
 
 fn text(found: &Identified) -> String {

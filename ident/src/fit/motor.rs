@@ -11,6 +11,7 @@ use crate::log::Log;
 use crate::noise::median;
 use crate::plateau::Plateau;
 use crate::solve::Normal;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::TAU;
 
 /// Shortest pulse that counts as full throttle, us.
@@ -80,9 +81,11 @@ pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> O
     for (v, (a, b)) in variance.iter_mut().zip(there.iter().zip(&centre)) {
         *v += (a - b).powi(2);
     }
+    // three constants from so many levels, each with an estimated error
+    let quantile = StudentsT::new(0.0, 1.0, (levels.len() - 3) as f64).map_or(1.96, |t| t.inverse_cdf(0.975));
     let estimate = |i: usize| {
         let se = variance[i].sqrt();
-        Estimate { value: centre[i], se, half: 1.96 * se }
+        Estimate { value: centre[i], se, half: quantile * se }
     };
     let physical = centre.iter().all(|v| v.is_finite()) && centre[0] > 0.0 && centre[1] > 0.0;
     physical.then(|| Motor { kv: estimate(0), resistance: estimate(1), no_load: estimate(2) })

@@ -14,6 +14,10 @@ pub(crate) enum Target {
     Covariate(String),
     /// Not numeric or derived from others: left out.
     Skip,
+    /// Date and time of day.
+    Stamp,
+    /// A command as a fraction of this full scale: 1000 us and 1000 us more at full scale.
+    Command(f64),
     /// A known quantity in a unit that we do not know.
     UnknownUnit(&'static str),
 }
@@ -46,6 +50,8 @@ pub(crate) fn sort(header: &str) -> Target {
     };
     match name.as_str() {
         "t_s" => Target::Keep("t_s", 1.0),
+        // a date and time of day becomes seconds since the first row
+        "timestamp" => Target::Stamp,
         "command_us" | "pulse_us" => Target::Keep("pulse_us", 1.0),
         n if TIDY.contains(&n) => Target::Keep(TIDY.iter().find(|t| **t == n).copied().unwrap_or("rpm"), 1.0),
         "time" => factor("t_s", &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("\u{b5}s", 1e-6)]),
@@ -57,6 +63,16 @@ pub(crate) fn sort(header: &str) -> Target {
         "torque" => {
             factor("torque_nm", &[("nm", 1.0), ("nmm", 1e-3), ("ncm", 1e-2), ("lbfin", 0.112_984_8), ("lbfft", 1.355_818)])
         }
+        // Crazyflie: 16 bits; ESC32: duty in per cent. Taken as linear over 1000 to 2000 us, as the tidy sets do
+        "pwm" if unit.is_none() => Target::Command(65535.0),
+        "duty" => Target::Command(100.0),
+        // the ESC32 log names its units by its words
+        "amps" => Target::Keep("current_a", 1.0),
+        n if n.starts_with("batt") && n.ends_with("volts") => Target::Keep("voltage_v", 1.0),
+        // the Crazyflie's power deck beside its own battery reading
+        "i" if unit == Some("a") => Target::Keep("current_a", 1.0),
+        "v" if unit == Some("v") => Target::Covariate("voltage_deck_v".to_owned()),
+        "p" if unit == Some("w") => Target::Covariate("power_deck_w".to_owned()),
         "voltage" | "vbat" => factor("voltage_v", &[("v", 1.0), ("mv", 1e-3)]),
         "current" => factor("current_a", &[("a", 1.0), ("ma", 1e-3)]),
         "motor electrical speed" | "motor optical speed" | "rotation speed" => {

@@ -5,6 +5,7 @@
 //! Units: converted to the contract's on the way in; the factor stands in the report.
 //! Reference: specification `formats.md`, `quadrig import`; RCbenchmark and Tyto CSV headers carry their units in parentheses.
 
+mod findings;
 mod header;
 mod table;
 

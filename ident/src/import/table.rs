@@ -22,27 +22,47 @@ pub struct Mapping {
     pub source: String,
     /// Multiplied in.
     pub factor: f64,
+    /// Added after that.
+    pub offset: f64,
 }
 
 impl std::str::FromStr for Mapping {
     type Err = String;
 
-    /// `target=source` or `target=source*factor`.
+    /// `target=source`, `target=source*factor` or `target=source*factor+offset`.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let wanted = "expected TARGET=SOURCE or TARGET=SOURCE*FACTOR, such as thrust_n=Load*0.00980665";
+        let wanted =
+            "expected TARGET=SOURCE, TARGET=SOURCE*FACTOR or TARGET=SOURCE*FACTOR+OFFSET, such as thrust_n=Load*0.00980665";
         let (target, rest) = text.split_once('=').ok_or(wanted)?;
+        let (rest, offset) = match rest.rsplit_once('+') {
+            Some((s, o)) if s.contains('*') => (s, o.trim().parse::<f64>().map_err(|_| wanted)?),
+            _ => (rest, 0.0),
+        };
         let (source, factor) = match rest.rsplit_once('*') {
             Some((s, f)) => (s, f.trim().parse::<f64>().map_err(|_| wanted)?),
             None => (rest, 1.0),
         };
-        Ok(Self { target: target.trim().to_owned(), source: source.trim().to_owned(), factor })
+        Ok(Self { target: target.trim().to_owned(), source: source.trim().to_owned(), factor, offset })
     }
 }
 
 struct Plan {
-    /// For each field of the file: destination in `names` and factor.
-    route: Vec<Option<(usize, f64)>>,
+    /// For each field of the file: destination in `names`, and how its text becomes a number.
+    route: Vec<Option<(usize, Reading)>>,
     names: Vec<String>,
+    /// What stands between the fields.
+    separator: char,
+    /// The first line already held numbers.
+    headless: bool,
+}
+
+/// How a field becomes a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Reading {
+    /// A decimal number times a factor plus an offset.
+    Number(f64, f64),
+    /// Date and time of day, to seconds.
+    Stamp,
 }
 
 /// Imports a file.
@@ -96,20 +116,42 @@ pub fn import_from(file: &str, source: impl BufRead, mappings: &[Mapping]) -> Re
 }
 
 fn plan(header: &str, mappings: &[Mapping], place: &Place<'_>, report: &mut Report) -> Result<Plan, ReadError> {
-    let cells: Vec<&str> = header.split(',').map(|c| c.trim().trim_start_matches('\u{feff}').trim_matches('"')).collect();
+    let separator = [',', '\t', ';'].into_iter().find(|s| header.contains(*s)).unwrap_or(',');
+    let numbers: Vec<String> = (1..=header.split(separator).count()).map(|k| k.to_string()).collect();
+    let mut cells: Vec<&str> =
+        header.split(separator).map(|c| c.trim().trim_start_matches('\u{feff}').trim_matches('"')).collect();
+    let headless = cells.iter().all(|c| c.parse::<f64>().is_ok());
+    if headless {
+        if mappings.is_empty() {
+            return Err(place.refuse(
+                None,
+                "numbers where a header should stand",
+                format!("a header line, or columns named by their position (1 to {}), such as --map rpm=5*65", cells.len()),
+            ));
+        }
+        report.add("(file)", "no header line: columns are called by their position; those without --map are left out", 1);
+        cells = numbers.iter().map(String::as_str).collect();
+    }
     for m in mappings {
         if !cells.contains(&m.source.as_str()) {
             return Err(place.refuse(Some(&m.source), "no such column in the file", format!("one of: {}", cells.join(", "))));
         }
     }
-    let mut plan = Plan { route: Vec::new(), names: Vec::new() };
+    let mut plan = Plan { route: Vec::new(), names: Vec::new(), separator, headless };
     let mut skipped = 0;
     for cell in &cells {
-        let (name, factor) = match mappings.iter().find(|m| m.source == *cell) {
-            Some(m) => (m.target.clone(), m.factor),
+        let (name, reading) = match mappings.iter().find(|m| m.source == *cell) {
+            Some(m) => (m.target.clone(), Reading::Number(m.factor, m.offset)),
+            None if headless => {
+                skipped += 1;
+                plan.route.push(None);
+                continue;
+            }
             None => match sort(cell) {
-                Target::Keep(name, factor) => (name.to_owned(), factor),
-                Target::Covariate(name) => (name, 1.0),
+                Target::Keep(name, factor) => (name.to_owned(), Reading::Number(factor, 0.0)),
+                Target::Covariate(name) => (name, Reading::Number(1.0, 0.0)),
+                Target::Stamp => ("t_s".to_owned(), Reading::Stamp),
+                Target::Command(full) => ("pulse_us".to_owned(), Reading::Number(1000.0 / full, 1000.0)),
                 Target::Skip => {
                     skipped += 1;
                     plan.route.push(None);
@@ -131,10 +173,19 @@ fn plan(header: &str, mappings: &[Mapping], place: &Place<'_>, report: &mut Repo
                 "one column for each channel (choose with --map)",
             ));
         }
-        if factor != 1.0 {
-            report.add(&name, format!("column '{cell}' converted, times {factor}"), 1);
+        match reading {
+            Reading::Stamp => {
+                report.add(&name, format!("column '{cell}': date and time of day, as seconds since the first row"), 1)
+            }
+            Reading::Number(factor, 0.0) if factor != 1.0 => {
+                report.add(&name, format!("column '{cell}' converted, times {factor}"), 1);
+            }
+            Reading::Number(factor, offset) if offset != 0.0 => {
+                report.add(&name, format!("column '{cell}' converted, times {factor:.6} plus {offset}"), 1);
+            }
+            Reading::Number(..) => {}
         }
-        plan.route.push(Some((plan.names.len(), factor)));
+        plan.route.push(Some((plan.names.len(), reading)));
         plan.names.push(name);
     }
     report.add("(file)", "columns left out: derived from others, or text", skipped);
@@ -147,16 +198,17 @@ fn read_rows<R: BufRead>(
     plan: &Plan,
     report: &mut Report,
 ) -> Result<Vec<Vec<f64>>, ReadError> {
-    let width = header.split(',').count();
-    let cells: Vec<&str> = header.split(',').collect();
+    let cells: Vec<&str> = header.split(plan.separator).collect();
+    let width = cells.len();
     let mut columns = vec![Vec::new(); plan.names.len()];
     let mut cut = 0;
-    while let Some(line) = lines.next_line()? {
+    let mut first = plan.headless.then(|| header.to_owned());
+    while let Some(line) = first.take().map_or_else(|| lines.next_line(), |line| Ok(Some(line)))? {
         if line.trim().is_empty() {
             continue;
         }
         let place = lines.place();
-        let found = line.split(',').count();
+        let found = line.split(plan.separator).count();
         if found != width {
             if lines.unterminated() {
                 cut += 1;
@@ -165,25 +217,39 @@ fn read_rows<R: BufRead>(
             let missing = cells.get(found).copied();
             return Err(place.refuse(missing, format!("{found} fields"), format!("{width} as in the header")));
         }
-        for ((text, route), cell) in line.split(',').zip(&plan.route).zip(&cells) {
-            let Some((index, factor)) = route else { continue };
+        for ((text, route), cell) in line.split(plan.separator).zip(&plan.route).zip(&cells) {
+            let Some((index, reading)) = route else { continue };
             let text = text.trim();
-            let value = match text.parse::<f64>() {
+            let value = match reading {
                 _ if text.is_empty() => f64::NAN,
-                Ok(v) if v.is_finite() => v * factor,
-                _ => {
-                    return Err(place.refuse(
-                        Some(cell),
-                        format!("'{}'", short(text)),
-                        "a finite decimal number or an empty field",
-                    ));
+                Reading::Number(factor, offset) => {
+                    text.parse::<f64>().ok().filter(|v| v.is_finite()).map(|v| v * factor + offset).ok_or_else(|| {
+                        place.refuse(Some(cell), format!("'{}'", short(text)), "a finite decimal number or an empty field")
+                    })?
                 }
+                Reading::Stamp => seconds(text).ok_or_else(|| {
+                    place.refuse(Some(cell), format!("'{}'", short(text)), "a date and time such as 2019-11-05 17:14:08.947")
+                })?,
             };
             columns[*index].push(value);
         }
     }
     report.add("(file)", "last line cut short without a line feed: dropped", cut);
     Ok(columns)
+}
+
+/// Seconds of a date and time of day, `YYYY-MM-DD HH:MM:SS` with a fraction after a point or a third colon.
+fn seconds(text: &str) -> Option<f64> {
+    let (date, time) = text.split_once([' ', 'T'])?;
+    let date: Vec<i64> = date.split('-').map(|p| p.parse().ok()).collect::<Option<_>>()?;
+    let &[year, month, day] = date.as_slice() else { return None };
+    let mut parts = time.trim_end_matches('Z').splitn(3, ':');
+    let (hour, minute) = (parts.next()?.parse::<i64>().ok()?, parts.next()?.parse::<i64>().ok()?);
+    let second: f64 = parts.next()?.replacen(':', ".", 1).parse().ok()?;
+    // days since 1 March of year 0 (Richards 1998)
+    let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    let days = 365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + day;
+    ((1..=12).contains(&month) && second.is_finite()).then(|| (days * 86_400 + hour * 3600 + minute * 60) as f64 + second)
 }
 
 fn assemble(mut names: Vec<String>, mut columns: Vec<Vec<f64>>, report: &mut Report) -> Log {
@@ -202,6 +268,9 @@ fn assemble(mut names: Vec<String>, mut columns: Vec<Vec<f64>>, report: &mut Rep
     };
     let keep = increasing(&t, report);
     log.t = keep.iter().map(|i| t[*i]).collect();
+    if let Some(first) = log.t.first().copied().filter(|t| *t > 1e9) {
+        log.t.iter_mut().for_each(|t| *t = ((*t - first) * 1e6).round() / 1e6);
+    }
     for (name, values) in names.into_iter().zip(columns) {
         let values: Vec<f64> = keep.iter().map(|i| values[*i]).collect();
         let blanks = values.iter().filter(|v| v.is_nan()).count();
@@ -217,8 +286,28 @@ fn assemble(mut names: Vec<String>, mut columns: Vec<Vec<f64>>, report: &mut Rep
         report.add(&name, "samples that repeat the one before (sample and hold, or coarse steps), kept", repeats(&values));
         log.columns.push(Column { name, values });
     }
+    one_speed(&mut log, report);
     orient(&mut log, report);
+    super::findings::inspect(&log, report);
     log
+}
+
+/// Four rotors of one machine and no speed of its own: the median of those that turn stands for it, as the tidy sets do.
+fn one_speed(log: &mut Log, report: &mut Report) {
+    let rotors: Vec<&Vec<f64>> =
+        (1..=8).filter_map(|k| log.columns.iter().find(|c| c.name == format!("rpm{k}"))).map(|c| &c.values).collect();
+    if rotors.len() < 2 || log.columns.iter().any(|c| SPEED.contains(&c.name.as_str())) {
+        return;
+    }
+    let count = rotors.len();
+    let values: Vec<f64> = (0..log.t.len())
+        .map(|i| {
+            let mut turning: Vec<f64> = rotors.iter().map(|r| r[i]).filter(|v| v.is_finite() && *v != 0.0).collect();
+            if turning.is_empty() { 0.0 } else { crate::noise::median(&mut turning) }
+        })
+        .collect();
+    log.columns.push(Column { name: "rpm".into(), values });
+    report.add("rpm", "rotors without a common speed: median of those that turn (thrust and current are of all together)", count);
 }
 
 /// Rows whose time moves on. A stamp that repeats or steps back loses its row.

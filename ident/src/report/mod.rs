@@ -8,6 +8,7 @@
 mod beam;
 mod figure;
 mod page;
+mod run;
 mod selection;
 mod sheet;
 mod style;
@@ -16,6 +17,7 @@ mod svg;
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
 pub use figure::{Figure, Layer, Mark};
 pub use page::closed_loop;
+pub use run::run;
 pub use selection::selection;
 pub use sheet::{Sheet, write_figures};
 pub use svg::{Chart, Series};

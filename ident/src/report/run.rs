@@ -1,0 +1,347 @@
+//! The page of an identified run: every figure that the thesis draws from one.
+//!
+//! What it is: channels over time with plateaus marked, channel differences, the first filter of the binary shift algorithm, the
+//! relations with fits and bands, two runs side by side, and the tables behind them.
+//! What can go wrong: a channel that the log lacks leaves its figures out.
+//! Units: on the axes.
+//! Reference: Beharie 2013, Figures 5.22 to 5.25, 5.56 to 5.79.
+
+use super::figure::{Figure, Layer, Mark};
+use super::number;
+use super::sheet::Sheet;
+use crate::context::unit_of;
+use crate::fit::Fitted;
+use crate::identify::Identified;
+use crate::log::{Log, SPEED};
+use crate::noise::median;
+use crate::plateau::Plateau;
+use crate::shift::{Settings, filters};
+
+/// The page of a run; `other` is a second run to be laid beside it (with and without the encoder, Figures 5.22 to 5.25).
+#[must_use]
+pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) -> Sheet {
+    let mut sheet = Sheet::new(&format!("Identification of {}", log.name));
+    sheet.say(&lead(log, found));
+    constants(&mut sheet, found);
+    sheet.section("The run, with its plateaus");
+    let time: Vec<Figure> =
+        ["thrust_n", "torque_nm", "current_a", "voltage_v"].iter().filter_map(|c| over_time(log, found, c)).collect();
+    let speed: Vec<Figure> = SPEED.iter().find_map(|c| over_time(log, found, c)).into_iter().collect();
+    sheet.figures([speed, time].concat());
+    sheet.section("How the channels and the plateaus come about");
+    sheet.figures([differences(log), first_filter(log, found)].into_iter().flatten().collect());
+    sheet.section("Relations, with 95 % bands");
+    if !found.curves.is_empty() {
+        sheet.say("Dark band: where the curve lies. Light band: where a further plateau would lie. Rings: plateau means with their 95 % intervals; point at one to read it.");
+    }
+    sheet.figures(found.curves.iter().map(relation).collect());
+    if let Some((log_b, found_b)) = other {
+        sheet.section(&format!("Beside {}", log_b.name));
+        sheet.figures(side_by_side((log, found), (log_b, found_b)));
+    }
+    sheet.section("Plateaus");
+    plateaus(&mut sheet, log, found);
+    sheet.section("Coefficients");
+    coefficients(&mut sheet, found);
+    sheet
+}
+
+fn lead(log: &Log, found: &Identified) -> String {
+    let text = |key: &str| log.meta.get(key).and_then(toml::Value::as_str);
+    let rig: Vec<String> = ["motor", "propeller", "supply"].iter().filter_map(|k| text(k).map(str::to_owned)).collect();
+    let rig = if rig.is_empty() { String::new() } else { format!("{}. ", rig.join(", ")) };
+    format!(
+        "{rig}{} rows over {:.1} {}, reduced to {} plateaus.",
+        log.len(),
+        log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0),
+        if log.time_is_row() { "rows" } else { "s" },
+        found.plateaus.len()
+    )
+}
+
+fn constants(sheet: &mut Sheet, found: &Identified) {
+    if found.constants.is_empty() {
+        return;
+    }
+    let rows: Vec<Vec<String>> = found
+        .constants
+        .iter()
+        .map(|c| {
+            let interval = format!("{} to {}", number(c.value - c.half), number(c.value + c.half));
+            vec![c.name.to_owned(), number(c.value), number(c.se), interval, c.unit.to_owned()]
+        })
+        .collect();
+    sheet.table(&["constant", "value", "standard error", "95 % interval", "unit"], &rows, |_| false);
+}
+
+fn label(channel: &str) -> String {
+    let unit = unit_of(channel);
+    if unit.is_empty() { channel.to_owned() } else { format!("{channel}, {unit}") }
+}
+
+fn time_label(log: &Log) -> String {
+    if log.time_is_row() { "row" } else { "time, s" }.to_owned()
+}
+
+/// Samples that are there; a long gap breaks the line.
+fn present(t: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let (mut x, mut out): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    let mut steps: Vec<f64> = Vec::new();
+    for (t, y) in t.iter().zip(y).filter(|p| p.1.is_finite()) {
+        if let Some(last) = x.last() {
+            steps.push(t - last);
+        }
+        x.push(*t);
+        out.push(*y);
+    }
+    let usual = if steps.is_empty() { 0.0 } else { median(&mut steps.clone()) };
+    let mut broken = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
+    for i in 0..x.len() {
+        if i > 0 && steps[i - 1] > 20.0 * usual {
+            broken.0.push(x[i]);
+            broken.1.push(f64::NAN);
+        }
+        broken.0.push(x[i]);
+        broken.1.push(out[i]);
+    }
+    broken
+}
+
+fn spans(plateaus: &[Plateau]) -> Layer {
+    Layer::Spans { name: "plateaus".into(), ranges: plateaus.iter().map(|p| (p.from_s, p.to_s)).collect() }
+}
+
+fn over_time(log: &Log, found: &Identified, channel: &str) -> Option<Figure> {
+    let (x, y) = present(&log.t, log.column(channel)?);
+    let unit = unit_of(channel);
+    let marks = found
+        .plateaus
+        .iter()
+        .enumerate()
+        .filter_map(|(k, p)| {
+            let (mean, se) = p.of(log, channel)?;
+            let text = format!("{}: {mean:.4} +- {:.4} {unit}, {} rows", k + 1, 1.96 * se, p.rows);
+            Some(Mark { x: 0.5 * (p.from_s + p.to_s), y: mean, error: 0.0, text })
+        })
+        .collect();
+    Some(Figure {
+        id: format!("time-{}", channel.replace('_', "-")),
+        title: format!("{channel} over time"),
+        x_label: time_label(log),
+        y_label: label(channel),
+        layers: vec![
+            spans(&found.plateaus),
+            Layer::Line { name: channel.to_owned(), class: "a", x, y },
+            Layer::Marks { name: "means".into(), class: "b", marks },
+        ],
+        ..Figure::default()
+    })
+}
+
+/// Every speed channel less the encoder, or the first that there is (Figures 5.59 and 5.63), in per cent.
+fn differences(log: &Log) -> Option<Figure> {
+    let present_channels: Vec<&str> = SPEED.into_iter().filter(|c| log.column(c).is_some()).collect();
+    let base = present_channels.iter().find(|c| **c == "rpm_encoder").or(present_channels.first())?;
+    let reference = log.column(base)?;
+    let top = reference.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let layers: Vec<Layer> = present_channels
+        .iter()
+        .filter(|c| *c != base)
+        .zip(["a", "b", "c", "e"])
+        .filter_map(|(channel, class)| {
+            let difference: Vec<f64> = log
+                .column(channel)?
+                .iter()
+                .zip(reference)
+                .map(|(v, r)| if *r > 0.05 * top { 100.0 * (v - r) / r } else { f64::NAN })
+                .collect();
+            let (x, y) = present(&log.t, &difference);
+            Some(Layer::Dots { name: (*channel).to_owned(), class, x, y })
+        })
+        .collect();
+    Some(Figure {
+        id: "channel-differences".into(),
+        title: format!("Speed channels less {base}"),
+        x_label: time_label(log),
+        y_label: "difference, %".into(),
+        layers,
+        ..Figure::default()
+    })
+}
+
+/// Filter 1 of the binary shift algorithm with its threshold, and the plateaus that were found (Figures 5.65 to 5.69).
+fn first_filter(log: &Log, found: &Identified) -> Option<Figure> {
+    let channel = SPEED.iter().find(|c| log.column(c).is_some())?;
+    let f = filters(log.column(channel)?, &Settings::default());
+    let (x, y) = present(&log.t, &f.one);
+    let stretches = f.stretches().len();
+    Some(Figure {
+        id: "binary-shift-filter-1".into(),
+        title: format!("Binary shift, Filter 1 of {channel}: {stretches} stretches at offset {}", f.offset),
+        x_label: time_label(log),
+        y_label: "rev/min per sample".into(),
+        layers: vec![
+            spans(&found.plateaus),
+            Layer::Line { name: "|x[n+1] - x[n]|".into(), class: "a", x, y },
+            Layer::Level { y: f.threshold, text: format!("threshold {:.2}", f.threshold) },
+        ],
+        ..Figure::default()
+    })
+}
+
+fn unscaled(x: &str, value: f64) -> f64 {
+    if x == "pulse_us" { 1000.0 + 1000.0 * value } else { 1000.0 * value }
+}
+
+fn relation(f: &Fitted) -> Figure {
+    let (low, high) = f.curve.range();
+    let grid: Vec<f64> = (0..=120).map(|k| low + (high - low) * f64::from(k) / 120.0).collect();
+    let x: Vec<f64> = grid.iter().map(|g| unscaled(f.x, *g)).collect();
+    let y: Vec<f64> = grid.iter().map(|g| f.curve.at(*g)).collect();
+    let band = |half: &dyn Fn(f64) -> f64| -> (Vec<f64>, Vec<f64>) {
+        grid.iter().zip(&y).map(|(g, y)| (y - half(*g), y + half(*g))).unzip()
+    };
+    let (curve_low, curve_high) = band(&|g| f.curve.band(g));
+    let (next_low, next_high) = band(&|g| f.curve.prediction(g));
+    let unit = unit_of(&f.y);
+    let marks = |outliers: bool| -> Vec<Mark> {
+        f.curve
+            .points
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| f.curve.outliers.contains(i) == outliers)
+            .map(|(_, p)| {
+                let at = unscaled(f.x, p.x);
+                Mark {
+                    x: at,
+                    y: p.y,
+                    error: 1.96 * p.y_error,
+                    text: format!("{at:.1} {}: {:.4} +- {:.4} {unit}", unit_of(f.x), p.y, 1.96 * p.y_error),
+                }
+            })
+            .collect()
+    };
+    let mut layers = vec![
+        Layer::Band { name: "further plateau".into(), class: "d", x: x.clone(), lower: next_low, upper: next_high },
+        Layer::Band { name: "curve".into(), class: "a", x: x.clone(), lower: curve_low, upper: curve_high },
+        Layer::Line { name: format!("order {}", f.degree), class: "a", x, y },
+        Layer::Marks { name: "plateaus".into(), class: "b", marks: marks(false) },
+    ];
+    if !f.curve.outliers.is_empty() {
+        layers.push(Layer::Marks { name: "left out".into(), class: "e", marks: marks(true) });
+    }
+    Figure {
+        id: f.name.replace(['(', ')'], "-").trim_end_matches('-').to_owned(),
+        title: format!("{}, order {} (R2 {:.5})", f.name, f.degree, f.curve.r2),
+        x_label: label(f.x),
+        y_label: label(&f.y),
+        layers,
+        ..Figure::default()
+    }
+}
+
+/// Both runs in one drawing: speed over time, and every relation that both have.
+fn side_by_side(a: (&Log, &Identified), b: (&Log, &Identified)) -> Vec<Figure> {
+    let mut out = Vec::new();
+    let speed = |log: &Log| SPEED.iter().find_map(|c| log.column(c)).map(|y| present(&log.t, y));
+    if let (Some((xa, ya)), Some((xb, yb))) = (speed(a.0), speed(b.0)) {
+        out.push(Figure {
+            id: "beside-speed".into(),
+            title: "Speed of both runs".into(),
+            x_label: time_label(a.0),
+            y_label: "rpm, rev/min".into(),
+            layers: vec![
+                Layer::Line { name: a.0.name.clone(), class: "a", x: xa, y: ya },
+                Layer::Line { name: b.0.name.clone(), class: "b", x: xb, y: yb },
+            ],
+            ..Figure::default()
+        });
+    }
+    for fa in &a.1.curves {
+        let Some(fb) = b.1.curves.iter().find(|f| f.name == fa.name) else { continue };
+        let mut layers = Vec::new();
+        for (f, class, name) in [(fa, "a", &a.0.name), (fb, "b", &b.0.name)] {
+            let (low, high) = f.curve.range();
+            let grid: Vec<f64> = (0..=120).map(|k| low + (high - low) * f64::from(k) / 120.0).collect();
+            layers.push(Layer::Band {
+                name: String::new(),
+                class,
+                x: grid.iter().map(|g| unscaled(f.x, *g)).collect(),
+                lower: grid.iter().map(|g| f.curve.at(*g) - f.curve.band(*g)).collect(),
+                upper: grid.iter().map(|g| f.curve.at(*g) + f.curve.band(*g)).collect(),
+            });
+            layers.push(Layer::Line {
+                name: name.clone(),
+                class,
+                x: grid.iter().map(|g| unscaled(f.x, *g)).collect(),
+                y: grid.iter().map(|g| f.curve.at(*g)).collect(),
+            });
+        }
+        // the difference where both were measured, as a read-out at the middle
+        let low = fa.curve.range().0.max(fb.curve.range().0);
+        let high = fa.curve.range().1.min(fb.curve.range().1);
+        let middle = 0.5 * (low + high);
+        let difference = fb.curve.at(middle) - fa.curve.at(middle);
+        let half = fa.curve.band(middle).hypot(fb.curve.band(middle));
+        layers.push(Layer::Marks {
+            name: String::new(),
+            class: "b",
+            marks: vec![Mark {
+                x: unscaled(fa.x, middle),
+                y: fb.curve.at(middle),
+                error: 0.0,
+                text: format!("second less first: {difference:.4} +- {half:.4} {}", unit_of(&fa.y)),
+            }],
+        });
+        out.push(Figure {
+            id: format!("beside-{}", fa.name.replace(['(', ')'], "-").trim_end_matches('-')),
+            title: format!("{} of both runs", fa.name),
+            x_label: label(fa.x),
+            y_label: label(&fa.y),
+            layers,
+            ..Figure::default()
+        });
+    }
+    out
+}
+
+fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
+    let mut header =
+        vec!["plateau".to_owned(), "from, s".to_owned(), "to, s".to_owned(), "settling, s".to_owned(), "rows".to_owned()];
+    header.extend(log.columns.iter().map(|c| label(&c.name)));
+    let rows: Vec<Vec<String>> = found
+        .plateaus
+        .iter()
+        .enumerate()
+        .map(|(k, p)| {
+            let mut row = vec![
+                (k + 1).to_string(),
+                format!("{:.2}", p.from_s),
+                format!("{:.2}", p.to_s),
+                format!("{:.2}", p.settling_s),
+                p.rows.to_string(),
+            ];
+            row.extend(p.means.iter().map(|m| m.map_or_else(|| "-".to_owned(), |(v, se)| format!("{v:.4} +- {se:.4}"))));
+            row
+        })
+        .collect();
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    sheet.table(&header, &rows, |_| false);
+}
+
+fn coefficients(sheet: &mut Sheet, found: &Identified) {
+    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. Half widths of 95 % intervals. Chi2 is the scatter of the plateaus about the curve over what their own errors promise: far above 1 the order does not suffice.");
+    let rows: Vec<Vec<String>> = found
+        .curves
+        .iter()
+        .flat_map(|f| {
+            let chosen = f.orders.iter().find(|o| o.chosen).map_or_else(|| "-".to_owned(), |o| o.degree.to_string());
+            (0..=f.degree).map(move |k| {
+                let c = f.curve.coefficient(k);
+                let (chi2, chosen) = if k == 0 { (format!("{:.2}", f.curve.chi2), chosen.clone()) } else { Default::default() };
+                vec![f.name.to_owned(), format!("c{k}"), number(c.value), number(c.half), chi2, chosen]
+            })
+        })
+        .collect();
+    sheet.table(&["relation", "coefficient", "value", "+-", "chi2", "order by AICc"], &rows, |_| false);
+}
