@@ -29,7 +29,7 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
     let speed: Vec<Figure> = SPEED.iter().find_map(|c| over_time(log, found, c)).into_iter().collect();
     sheet.figures([speed, time].concat());
     sheet.section("How the channels and the plateaus come about");
-    sheet.figures([differences(log), first_filter(log, found)].into_iter().flatten().collect());
+    sheet.figures([differences(log, &found.plateaus), first_filter(log, found)].into_iter().flatten().collect());
     sheet.section("Relations, with 95 % bands");
     if !found.curves.is_empty() {
         sheet.say("Dark band: where the curve lies. Light band: where a further plateau would lie. Rings: plateau means with their 95 % intervals; point at one to read it.");
@@ -138,12 +138,15 @@ fn over_time(log: &Log, found: &Identified, channel: &str) -> Option<Figure> {
     })
 }
 
-/// Every speed channel less the encoder, or the first that there is (Figures 5.59 and 5.63), in per cent.
-fn differences(log: &Log) -> Option<Figure> {
+/// Every speed channel less the encoder on the plateaus (on a step the channels' averages lie apart in time), or less the first that there is (Figures
+/// 5.59 and 5.63), in per cent.
+fn differences(log: &Log, plateaus: &[Plateau]) -> Option<Figure> {
     let present_channels: Vec<&str> = SPEED.into_iter().filter(|c| log.column(c).is_some()).collect();
     let base = present_channels.iter().find(|c| **c == "rpm_encoder").or(present_channels.first())?;
     let reference = log.column(base)?;
     let top = reference.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let mut settled = vec![false; log.len()];
+    plateaus.iter().for_each(|p| settled[p.first..p.first + p.rows].fill(true));
     let layers: Vec<Layer> = present_channels
         .iter()
         .filter(|c| *c != base)
@@ -153,7 +156,8 @@ fn differences(log: &Log) -> Option<Figure> {
                 .column(channel)?
                 .iter()
                 .zip(reference)
-                .map(|(v, r)| if *r > 0.05 * top { 100.0 * (v - r) / r } else { f64::NAN })
+                .zip(&settled)
+                .map(|((v, r), on)| if *on && *r > 0.05 * top { 100.0 * (v - r) / r } else { f64::NAN })
                 .collect();
             let (x, y) = present(&log.t, &difference);
             Some(Layer::Dots { name: (*channel).to_owned(), class, x, y })
