@@ -12,7 +12,7 @@ use std::fmt::Write;
 
 /// Width of the drawing in its own units: two figures side by side on a desk, one on a phone.
 const WIDTH: f64 = 560.0;
-const LEFT: f64 = 74.0;
+const LEFT: f64 = 80.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 48.0;
 const BOTTOM: f64 = 46.0;
@@ -314,7 +314,7 @@ impl Figure {
                 _ => write!(out, "<rect class=\"{class} patch\" x=\"{at:.1}\" y=\"28\" width=\"16\" height=\"11\"/>"),
             };
             let _ = write!(out, "<text class=\"tick\" x=\"{:.1}\" y=\"38\">{}</text>", at + 21.0, escape(name));
-            at += 21.0 + 7.6 * name.chars().count() as f64 + 14.0;
+            at += 21.0 + 8.8 * name.chars().count() as f64 + 12.0;
         }
     }
 }

@@ -181,7 +181,7 @@ fn first_filter(log: &Log, found: &Identified) -> Option<Figure> {
     let stretches = f.stretches().len();
     Some(Figure {
         id: "binary-shift-filter-1".into(),
-        title: format!("Binary shift, Filter 1 of {channel}: {stretches} stretches at offset {}", f.offset),
+        title: format!("Binary shift, Filter 1: {stretches} stretches, offset {}", f.offset),
         x_label: time_label(log),
         y_label: "rev/min per sample".into(),
         layers: vec![

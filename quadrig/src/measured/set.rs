@@ -154,10 +154,11 @@ fn short(message: &str) -> String {
 }
 
 fn flight(file: &Path, mass_kg: f64, command: &str) -> Result<(Log, usize), String> {
-    let mut mappings = vec![Mapping { target: "thrust_n".into(), source: "acc.z".into(), factor: 9.806_65 * mass_kg }];
+    let mut mappings =
+        vec![Mapping { target: "thrust_n".into(), source: "acc.z".into(), factor: 9.806_65 * mass_kg, offset: 0.0 }];
     let header = std::fs::read_to_string(file).map_err(|e| e.to_string())?.lines().next().unwrap_or_default().to_owned();
     let second = if header.contains("pm.vbatMV") { ("voltage_v", "pm.vbatMV", 1.0e-3) } else { ("pulse_us", "motor.m1", 1.0) };
-    mappings.push(Mapping { target: second.0.into(), source: second.1.into(), factor: second.2 });
+    mappings.push(Mapping { target: second.0.into(), source: second.1.into(), factor: second.2, offset: 0.0 });
     let (mut log, report) = import(file, &mappings).map_err(|e| short(&e.to_string()))?;
     let starting = |log: &Log, head: &str| -> Vec<Vec<f64>> {
         log.columns.iter().filter(|c| c.name.starts_with(head)).map(|c| c.values.clone()).collect()
