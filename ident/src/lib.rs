@@ -19,6 +19,7 @@ pub mod heldout;
 pub mod hypothesis;
 pub mod identify;
 pub mod import;
+pub mod inspect;
 pub mod log;
 pub mod model;
 pub mod noise;

@@ -22,6 +22,7 @@ mod run_log;
 mod runs;
 mod select;
 mod sim;
+mod step;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -63,6 +64,8 @@ enum Command {
     Flash(flash::Args),
     /// The loop on every recorded set; writes the pages that say what came of it.
     Measured(measured::Args),
+    /// One step of the loop on its own.
+    Step(step::Args),
     /// A model's prediction of every measured channel, row for row.
     Predict(predict::Args),
 }
@@ -85,6 +88,7 @@ fn main() -> ExitCode {
         Command::Loop(args) => circle::run(args, cli.quiet),
         Command::Flash(args) => flash::run(args),
         Command::Measured(args) => measured::run(args, cli.quiet),
+        Command::Step(args) => step::run(args, cli.quiet),
         Command::Predict(args) => predict::run(args),
     };
     match done {

@@ -325,7 +325,7 @@ fn common(out: &mut String, o: &Outcome) {
         .runs
         .iter()
         .flat_map(|r| r.closed.iter())
-        .flat_map(|c| c.verdict.effects.iter().map(|e| (e.id.clone(), e.channels.first().cloned().unwrap_or_default())))
+        .flat_map(|c| c.verdict.effects.iter().flat_map(|e| e.channels.iter().map(|channel| (e.id.clone(), channel.clone()))))
         .filter(|(id, _)| id != "unknown")
         .collect();
     keys.sort_unstable();
@@ -341,14 +341,8 @@ fn common(out: &mut String, o: &Outcome) {
             .runs
             .iter()
             .filter_map(|r| {
-                let entry = r
-                    .closed
-                    .as_ref()
-                    .ok()?
-                    .verdict
-                    .effects
-                    .iter()
-                    .find(|e| e.id == id && e.channels.first() == Some(&channel))?;
+                let entry =
+                    r.closed.as_ref().ok()?.verdict.effects.iter().find(|e| e.id == id && e.channels.contains(&channel))?;
                 let p = entry.parameters.first()?;
                 Some(format!("{} = {} {}", p.name, three(p.value), p.unit))
             })

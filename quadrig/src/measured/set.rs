@@ -124,6 +124,7 @@ impl Set {
     pub(crate) fn rig(&self, name: &str) -> String {
         match self.rig_letters {
             0 => name.to_owned(),
+            usize::MAX => self.folder.to_owned(),
             n => name.chars().take(n).collect::<String>().split('.').next().unwrap_or_default().to_owned(),
         }
     }
