@@ -4,12 +4,19 @@
 //! edges of the same mark over the shortest whole number of revolutions of at least 50 ms.
 //! What can go wrong: edges that were overwritten restart the history (`OverCapture`); silence is `Lost` while the rotor is
 //! known to turn and `Stopped` after the time-out; a channel 1 % off the median twice running is flagged `Disagrees`.
-//! Within a reading the pattern of the periods is judged as well ([`crate::pattern`]).
+//! Within a reading the pattern of the periods is judged as well ([`crate::pattern`]); a twisted blade
+//! shows as a pattern of the beam that changes with the speed (`BladeTwist`).
+//!
+//! Overflow: the counter has 32 bits and turns over every 51.1 s at 84 MHz. Edges are kept as raw captures and only ever
+//! subtracted, modulo 2^32, so a difference is right across the turn as long as the true time between the two edges is below one
+//! turn. That is held by `ceiling`: a channel forgets its edges after a silence of at most ten seconds or the range over its
+//! marks, whichever is less, so that no span that is reported can reach 2^32. The board's own time is extended to 64 bits by the
+//! tick, a thousand times a second.
 //! Units: ticks of the capture timer; all differences of raw captures wrap at 32 bits.
 //! Reference: specification `rig.md`, "Four RPM capture channels"; Beharie 2013, sections 5.4 and 5.7.2.
 
 use crate::config::{CaptureTimes, Config};
-use crate::pattern::judge;
+use crate::pattern::{judge, unevenness};
 use frame::rig::{CAPTURE_CHANNELS, CaptureCode, CaptureVerdict};
 use frame::units::{RevPerMin, Ticks};
 
@@ -19,6 +26,11 @@ const DEPTH: usize = 512;
 const LONGEST_S: u32 = 10;
 /// Deviation from the median that counts as disagreement at constant speed (specification: 1 % on hardware).
 const DISAGREEMENT: f32 = 0.01;
+
+/// Speed below which the blades count as straight, and are learnt as they are, rev/min.
+const STRAIGHT_BELOW: f32 = 4000.0;
+/// Change of the blades' unevenness from there that counts as twist: 3.6 degrees between two blades.
+const TWIST: f32 = 0.02;
 
 /// Speed below which channels are not judged against each other, rev/min: with one mark a revolution then takes nearly as
 /// long as the time-out to zero (0.25 s), so that channels read zero one after the other.
@@ -217,6 +229,8 @@ pub struct CaptureBank {
     /// Two earlier medians and their times, each at least a revolution and a half after the other.
     before: [Option<(Ticks, f32)>; 2],
     flagged: u8,
+    /// Unevenness of the blades at low speed.
+    straight: Option<f32>,
 }
 
 impl CaptureBank {
@@ -224,7 +238,7 @@ impl CaptureBank {
     #[must_use]
     pub fn new(config: &Config) -> Self {
         let channels = config.marks.map(|marks| CaptureChannel::new(marks, config.timer_hz, config.capture));
-        Self { channels, timer_hz: config.timer_hz, turning_since: None, before: [None; 2], flagged: 0 }
+        Self { channels, timer_hz: config.timer_hz, turning_since: None, before: [None; 2], flagged: 0, straight: None }
     }
 
     /// Takes the captures since the last tick.
@@ -288,6 +302,7 @@ impl CaptureBank {
         let others = self.others(now);
         let mut codes = self.channels.each_ref().map(|c| c.code(now, others));
         let hz = self.timer_hz;
+        self.watch_blades(&mut codes);
         let healthy =
             |c: &CaptureChannel, code: &CaptureCode| c.speed(hz).filter(|_| code.verdict == CaptureVerdict::Nominal).map(|v| v.0);
         let mut speeds = [None; CAPTURE_CHANNELS];
@@ -316,6 +331,23 @@ impl CaptureBank {
         let slow = others.is_some_and(|(revolution, _)| self.is_slow(revolution));
         self.flagged = if slow { 0 } else { codes.iter().filter(bad).count() as u8 };
         codes
+    }
+
+    /// Tells a blade that twists at speed from blades that were never opposite: by the change of the beam's pattern.
+    fn watch_blades(&mut self, codes: &mut [CaptureCode; CAPTURE_CHANNELS]) {
+        let ([beam, ..], [code, ..]) = (&self.channels, codes);
+        if !matches!(code.verdict, CaptureVerdict::Nominal | CaptureVerdict::Alternating) {
+            return;
+        }
+        let edges = usize::from(code.edges).max(4 * usize::from(beam.marks));
+        let Some(speed) = beam.speed(self.timer_hz) else { return };
+        let Some(uneven) = unevenness(beam.marks, beam.periods().take(edges)) else { return };
+        if speed.0 < STRAIGHT_BELOW {
+            let known = self.straight.unwrap_or(uneven);
+            self.straight = Some(known + 0.25 * (uneven - known));
+        } else if uneven - self.straight.unwrap_or(0.0) > TWIST {
+            code.verdict = CaptureVerdict::BladeTwist;
+        }
     }
 
     /// Relative deviation that is still agreement: 1 %, and what the speed changed lately, because the channels' spans begin

@@ -167,6 +167,13 @@ impl Config {
         Ticks(self.log_period.0.max(10 * ms).min(1000 * ms)) // not clamp(): it can panic
     }
 
+    /// Sampling time of the converter, cycles of its clock: short enough for 1024 conversions of each channel in a log period
+    /// with a margin (see `docs/rig.md`), long enough that a second's sum still fits.
+    #[must_use]
+    pub fn sampling_cycles(&self) -> u16 {
+        if self.log_period().0 < u64::from(self.ticks_per_ms()) * 40 { 15 } else { 56 }
+    }
+
     /// Ticks of the capture timer in a millisecond.
     #[must_use]
     pub const fn ticks_per_ms(&self) -> u32 {

@@ -26,6 +26,7 @@ pub mod queue;
 pub mod rig;
 pub mod sampling;
 pub mod settings;
+pub mod store;
 pub mod strain;
 
 pub use capture::CaptureChannel;

@@ -66,6 +66,12 @@ impl CommandLine {
         (self.waiting.pop_front(), news)
     }
 
+    /// A stop waits to be obeyed.
+    #[must_use]
+    pub fn stop_waits(&self) -> bool {
+        self.waiting.front() == Some(&Command::Stop)
+    }
+
     /// Counters of the decoder.
     #[must_use]
     pub fn stats(&self) -> LinkStats {

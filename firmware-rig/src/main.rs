@@ -18,18 +18,23 @@ fn main() {
 #[cfg(target_os = "none")]
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use crate::board::captures::{self, Clock, Edges};
+    use crate::board::captures::{self, Clock, Edges, EncoderB};
     use crate::board::converter::Converter;
+    use crate::board::flash::{self, SettingsFlash};
+    use crate::board::health::{self, Collector};
     use crate::board::link::Link;
+    use crate::board::panic::take_record;
     use crate::board::pulse::PulseOutput;
+    use crate::board::supply::SupplyWatch;
     use crate::board::watchdog::{Watchdog, take_reset_cause};
-    use core::sync::atomic::{AtomicU32, Ordering};
+    use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
-    use firmware_rig::{Config, Inputs, Rig};
+    use firmware_rig::{Config, Inputs, Rig, Settings, store};
     use frame::calibration::Calibration;
-    use frame::message::{Command, Event, Message};
+    use frame::message::{Command, Event, Message, SettingsNews, Trial};
+    use frame::units::PulseWidth;
     use stm32f4xx_hal::gpio::{Input, PB12};
-    use stm32f4xx_hal::pac::{ADC1, DMA2, TIM2, TIM3, TIM4, USART1};
+    use stm32f4xx_hal::pac::{ADC1, DMA2, PWR, TIM1, TIM2, TIM3, TIM4, USART1};
     use stm32f4xx_hal::prelude::*;
     use stm32f4xx_hal::rcc::{self, Enable, Reset};
 
@@ -37,9 +42,16 @@ mod app {
     static MILLIS: AtomicU32 = AtomicU32::new(0);
     defmt::timestamp!("{=u32:ms}", MILLIS.load(Ordering::Relaxed));
 
+    /// Trial of the last resort that the idle loop is to make: 0 none, 1 panic, 2 hang.
+    static TRIAL: AtomicU8 = AtomicU8::new(0);
+    /// Settings wait to be stored.
+    static STORE: AtomicBool = AtomicBool::new(false);
+
     #[shared]
     struct Shared {
         capture_timer: TIM2,
+        to_store: Option<Settings>,
+        stored: Option<SettingsNews>,
     }
 
     #[local]
@@ -56,13 +68,27 @@ mod app {
         rig: Rig,
         told: Calibration,
         reset_cause: u8,
+        encoder_b: EncoderB,
+        index: TIM1,
+        supply: SupplyWatch,
+        flash: SettingsFlash,
+        collector: Collector,
+        between: bool,
+        stop_seen: bool,
+        sampling: u16,
     }
 
     #[init]
     fn init(cx: init::Context) -> (Shared, Local) {
+        let mut core = cx.core;
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
         let device = cx.device;
         let reset_cause = take_reset_cause(&device.RCC);
         let mut rcc = device.RCC.freeze(rcc::Config::hse(8.MHz()).sysclk(168.MHz()));
+        PWR::enable(&mut rcc);
+        TIM1::enable(&mut rcc);
+        TIM1::reset(&mut rcc);
         TIM2::enable(&mut rcc);
         TIM2::reset(&mut rcc);
         TIM3::enable(&mut rcc);
@@ -82,26 +108,39 @@ mod app {
         let _ = a.pa6.into_alternate::<2>();
         let _ = (a.pa0.into_alternate::<1>(), a.pa1.into_alternate::<1>());
         let _ = (a.pa2.into_alternate::<1>(), a.pa3.into_alternate::<1>());
+        let encoder_b = a.pa7.into_pull_down_input();
+        let _ = a.pa8.into_alternate::<1>();
         let _ = (a.pa9.into_alternate::<7>(), a.pa10.into_alternate::<7>().internal_pull_up(true));
         let _ = (c.pc0.into_analog(), c.pc1.into_analog(), c.pc2.into_analog(), c.pc3.into_analog(), c.pc4.into_analog());
         let stop = b.pb12.into_pull_up_input();
 
         captures::start(&device.TIM2);
         let dma = device.DMA2;
-        let converter = Converter::start(device.ADC1, &device.ADC_COMMON, &dma);
+        device.TIM1.ccmr1_input().write(|w| w.cc1s().ti1());
+        device.TIM1.ccer().write(|w| w.cc1e().set_bit());
+        let mut flash = SettingsFlash(device.FLASH);
+        let (stored, news) = store::load(&mut flash, flash::RANGE);
+        let factory = Config::thesis_570kv();
+        let settings = stored.unwrap_or_else(|| Settings::of(&factory));
+        let rig = Rig::with_settings(factory, settings);
+        let sampling = rig.config().sampling_cycles();
+        let converter = Converter::start(device.ADC1, &device.ADC_COMMON, &dma, sampling);
         let mut link = Link::start(device.USART1, &dma);
 
-        let rig = Rig::new(Config::thesis_570kv());
         let told = rig.calibration();
         let mut clock = Clock::default();
         let now = clock.now(device.TIM2.cnt().read().bits());
         link.send(now, &Message::Hello(rig.hello(reset_cause)));
         link.send(now, &Message::Calibration(told));
+        link.send(now, &Message::Event(Event::Settings(news)));
+        if let Some(panicked) = take_record() {
+            link.send(now, &Message::Event(panicked));
+        }
         defmt::info!("rig board, reset cause {=u8:#x}", reset_cause);
 
         let tick_timer = device.TIM4;
         tick_timer.psc().write(|w| w.psc().set(83));
-        tick_timer.arr().write(|w| w.arr().set(999));
+        tick_timer.arr().write(|w| w.arr().set(499));
         tick_timer.egr().write(|w| w.ug().set_bit());
         tick_timer.sr().write(|w| w.uif().clear());
         tick_timer.dier().write(|w| w.uie().set_bit());
@@ -121,33 +160,78 @@ mod app {
             rig,
             told,
             reset_cause,
+            encoder_b,
+            index: device.TIM1,
+            supply: SupplyWatch::start(device.PWR),
+            flash,
+            collector: Collector::default(),
+            between: false,
+            stop_seen: false,
+            sampling,
         };
-        (Shared { capture_timer: device.TIM2 }, local)
+        (Shared { capture_timer: device.TIM2, to_store: None, stored: None }, local)
     }
 
-    #[idle]
-    fn idle(_: idle::Context) -> ! {
+    /// Everything that may take its time.
+    #[idle(shared = [to_store, stored], local = [flash])]
+    fn idle(mut cx: idle::Context) -> ! {
+        let mut second = u32::MAX;
         loop {
             cortex_m::asm::wfi();
+            match TRIAL.load(Ordering::Relaxed) {
+                0 => {}
+                1 => panic!("the self-test asked for it"),
+                _ => cortex_m::interrupt::free(|_| {
+                    loop {
+                        cortex_m::asm::nop();
+                    }
+                }),
+            }
+            let now = MILLIS.load(Ordering::Relaxed) / 1000;
+            if now != second {
+                second = now;
+                health::measure_stack();
+            }
+            if STORE.swap(false, Ordering::Acquire)
+                && let Some(settings) = cx.shared.to_store.lock(Option::take)
+            {
+                let news = store::save(cx.local.flash, flash::RANGE, &settings);
+                cx.shared.stored.lock(|stored| *stored = Some(news));
+            }
         }
     }
 
-    #[task(binds = TIM2, priority = 3, shared = [capture_timer])]
+    #[task(binds = TIM2, priority = 3, shared = [capture_timer], local = [encoder_b])]
     fn capture(mut cx: capture::Context) {
-        cx.shared.capture_timer.lock(|timer| captures::serve(timer));
+        let start = health::cycles();
+        let encoder_b = cx.local.encoder_b;
+        cx.shared.capture_timer.lock(|timer| captures::serve(timer, encoder_b));
+        health::capture_took(start);
     }
 
-    #[task(binds = TIM4, priority = 2, shared = [capture_timer], local = [
-        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, rig, told, reset_cause
+    #[task(binds = TIM4, priority = 2, shared = [capture_timer, to_store, stored], local = [
+        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, rig, told, reset_cause, index, supply, collector,
+        between, stop_seen, sampling
     ])]
     fn tick(mut cx: tick::Context) {
+        let start = health::cycles();
         let board = cx.local;
         board.tick_timer.sr().write(|w| w.uif().clear());
+        // A stop acts here already, twice a tick, so that it is in the timer less than a millisecond after it came; the rig
+        // latches it in its next tick and gives minimum from then on.
+        *board.stop_seen |= board.stop.is_low();
+        if board.link.listen(board.dma) || *board.stop_seen {
+            board.pulse.set(PulseWidth::MIN);
+        }
+        *board.between = !*board.between;
+        if *board.between {
+            return;
+        }
         let over_capture = captures::drain(board.edges);
         let counter = cx.shared.capture_timer.lock(|timer| timer.cnt().read().bits());
         let now = board.clock.now(counter);
         MILLIS.store(now.as_ms() as u32, Ordering::Relaxed);
-        let (command, line) = board.link.receive(board.dma);
+        let (command, line) = board.link.next();
         let inputs = Inputs {
             now,
             edges: board.edges.each_ref().map(|edges| edges.as_slice()),
@@ -155,13 +239,35 @@ mod app {
             adc: board.converter.drain(board.dma),
             command,
             line,
-            stop_input: board.stop.is_low(),
-            brown_out: false,
-            paused: false,
+            stop_input: core::mem::take(board.stop_seen),
+            brown_out: board.supply.is_low(),
+            paused: flash::PAUSED.swap(false, Ordering::Acquire),
         };
         let outputs = board.rig.tick(&inputs);
         board.pulse.set(outputs.pulse);
         board.watchdog.feed();
+        if board.index.sr().read().cc1if().bit() {
+            let _ = board.index.ccr1().read(); // reading takes the flag down
+            board.collector.index = board.collector.index.wrapping_add(1);
+        }
+        if let Some(trial) = outputs.trial {
+            TRIAL.store(if trial == Trial::Panic { 1 } else { 2 }, Ordering::Relaxed);
+        }
+        if let Some(settings) = outputs.store {
+            cx.shared.to_store.lock(|wanted| *wanted = Some(settings));
+            STORE.store(true, Ordering::Release);
+        }
+        if let Some(news) = cx.shared.stored.lock(Option::take) {
+            board.link.send(now, &Message::Event(Event::Settings(news)));
+        }
+        let sampling = board.rig.config().sampling_cycles();
+        if sampling != *board.sampling {
+            *board.sampling = sampling;
+            board.converter.set_sampling(sampling);
+        }
+        if let Some(health) = board.collector.tick(now, board.link.frames()) {
+            board.link.send(now, &Message::Health(health));
+        }
 
         if let Some(sample) = outputs.sample {
             board.link.send(now, &Message::Rig(sample));
@@ -182,5 +288,6 @@ mod app {
             board.link.send(now, &Message::Calibration(calibration));
         }
         board.link.flush(board.dma);
+        health::tick_took(start);
     }
 }

@@ -53,6 +53,42 @@ pub fn judge(marks: u16, periods: impl Iterator<Item = u32>) -> CaptureVerdict {
     if by_turns && uneven && seen >= ALTERNATING_PERIODS && seen.is_multiple_of(2) { CaptureVerdict::Alternating } else { found }
 }
 
+/// Unevenness of the marks: half the spread of the periods of one revolution about their neighbours' mean, relative. Two marks
+/// whose periods are long and short by turns give the difference of the two over their mean. A rotor that speeds up steadily
+/// gives none, because each period is compared with the mean of the two beside it.
+pub fn unevenness(marks: u16, periods: impl Iterator<Item = u32>) -> Option<f32> {
+    const MOST: usize = 4;
+    let marks = usize::from(marks);
+    if !(2..=MOST).contains(&marks) {
+        return None;
+    }
+    let mut sums = [(0.0f32, 0u16); MOST];
+    let mut window = [0.0f32; 3];
+    let (mut total, mut seen) = (0.0f32, 0usize);
+    for period in periods {
+        let [_, a, b] = window;
+        window = [a, b, period as f32];
+        total += period as f32;
+        seen += 1;
+        if seen >= 3 {
+            let [before, middle, after] = window;
+            if let Some((sum, n)) = sums.get_mut(seen % marks) {
+                *sum += middle - 0.5 * (before + after);
+                *n += 1;
+            }
+        }
+    }
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    for (sum, n) in sums.iter().take(marks) {
+        if *n == 0 {
+            return None;
+        }
+        let mean = sum / f32::from(*n);
+        (low, high) = (low.min(mean), high.max(mean));
+    }
+    Some(0.5 * (high - low) * seen as f32 / total)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,6 +110,17 @@ mod tests {
         assert_eq!(of(2, &[98, 102, 98, 102, 98, 102]), Nominal, "within the tolerance of a magnet glued by hand");
         assert_eq!(of(1, &[90, 110, 90, 110, 90, 110]), Nominal, "one mark cannot alternate by itself");
         assert_eq!(of(2, &[]), Nominal);
+    }
+
+    #[test]
+    fn unevenness_is_the_difference_of_two_and_none_of_a_ramp() {
+        let uneven = |marks, periods: &[u32]| unevenness(marks, periods.iter().copied());
+        assert!((uneven(2, &[950, 1050, 950, 1050, 950, 1050]).unwrap() - 0.1).abs() < 1e-6);
+        assert!(uneven(2, &[1000, 1020, 1040, 1060, 1080, 1100]).unwrap() < 1e-6);
+        assert!(uneven(3, &[950, 1050, 1000, 950, 1050, 1000, 950, 1050]).unwrap() > 0.05);
+        assert_eq!(uneven(1, &[1000; 9]), None);
+        assert_eq!(uneven(25, &[1000; 90]), None);
+        assert_eq!(uneven(2, &[1000; 3]), None, "one position was not seen");
     }
 
     proptest! {

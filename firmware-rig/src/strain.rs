@@ -31,6 +31,16 @@ impl Bridge {
     }
 }
 
+/// Trim resistance that balances a bridge of four gauges, ohm: products of opposite arms are equal,
+/// SG1 (SG3 + pot2) = SG4 (SG2 + pot1) (Beharie 2013, Eq. 5.28 and 5.31 as corrected in the errata). A positive value belongs in
+/// series with SG3 (pot2), a negative one, by its amount, in series with SG2 (pot1).
+#[must_use]
+pub fn balancing_trim(sg: [f32; 4]) -> f32 {
+    let [sg1, sg2, sg3, sg4] = sg;
+    let pot2 = sg4 * sg2 / sg1 - sg3;
+    if pot2 >= 0.0 { pot2 } else { -(sg1 * sg3 / sg4 - sg2) }
+}
+
 /// A cantilever of rectangular section, loaded at its tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
@@ -164,6 +174,26 @@ mod tests {
         close(Bridge::Full.ratio(2.0, 0.05), 0.1, 1e-6);
         close(Bridge::Quarter.ratio(2.0, 1e-6), 0.25 * 2.0 * 1e-6, 1e-4);
         assert!((Bridge::Half.ratio(2.0, 0.05) - 0.025).abs() > 0.02, "the printed E/4 for a half bridge is wrong by two");
+    }
+
+    /// Errata 5.31: products of opposite arms, not sums, must be equal.
+    #[test]
+    fn a_trimmed_bridge_is_balanced() {
+        for sg in [[120.0, 120.4, 119.8, 120.1], [120.3, 119.9, 120.2, 119.7], [350.0, 352.0, 349.0, 351.0]] {
+            let [sg1, sg2, sg3, sg4] = sg;
+            let trim = balancing_trim(sg);
+            let (pot1, pot2) = if trim >= 0.0 { (0.0, trim) } else { (-trim, 0.0) };
+            let (one, other) = (sg1 * (sg3 + pot2), sg4 * (sg2 + pot1));
+            assert!((one / other - 1.0).abs() < 1e-6, "{sg:?}: {trim}");
+            assert!(trim.abs() < 5.0, "{trim} ohm");
+        }
+        let (sg1, sg2, sg3, sg4) = (120.0f32, 130.0, 120.0, 120.0);
+        let by_sums = sg4 + sg2 - sg1 - sg3; // as printed
+        let error = (sg1 * (sg3 + by_sums) / (sg4 * sg2) - 1.0).abs();
+        assert!(error < 1e-6, "for equal arms both agree");
+        let (sg1, sg2, sg3, sg4) = (100.0f32, 130.0, 120.0, 110.0);
+        let by_sums = sg4 + sg2 - sg1 - sg3;
+        assert!((sg1 * (sg3 + by_sums) / (sg4 * sg2) - 1.0).abs() > 0.01, "the printed form leaves this one out of balance");
     }
 
     /// Errata, row "beam (Table 7)": 800 g at 115 mm.

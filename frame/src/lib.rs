@@ -15,6 +15,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
 
 pub mod calibration;
+pub mod consensus;
 pub mod imu;
 pub mod message;
 pub mod rig;
@@ -22,6 +23,7 @@ pub mod units;
 pub mod wire;
 
 pub use calibration::{AdcScale, Calibration, Converted};
+pub use consensus::Consensus;
 pub use imu::ImuSample;
 pub use message::{Command, Event, Hello, Message};
 pub use rig::{AdcCode, AdcVerdict, CaptureCode, CaptureVerdict, Fault, FaultSet, Refusals, RigSample, RigState};

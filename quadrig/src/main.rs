@@ -8,6 +8,7 @@
 
 mod ahrs;
 mod beam;
+mod board;
 mod circle;
 mod close_loop;
 mod demo;
@@ -18,10 +19,13 @@ mod live;
 mod measured;
 mod predict;
 mod progress;
+mod record;
+mod rig;
 mod run_log;
 mod runs;
 mod select;
 mod sim;
+mod spool;
 mod step;
 
 use clap::{Parser, Subcommand};
@@ -66,6 +70,10 @@ enum Command {
     Measured(measured::Args),
     /// One step of the loop on its own.
     Step(step::Args),
+    /// Records from the rig board, with a live view.
+    Log(record::Args),
+    /// Talks to the rig board: arm, run, set, stop, tare, clear, configure, calibrate.
+    Rig(rig::Args),
     /// A model's prediction of every measured channel, row for row.
     Predict(predict::Args),
 }
@@ -89,6 +97,8 @@ fn main() -> ExitCode {
         Command::Flash(args) => flash::run(args),
         Command::Measured(args) => measured::run(args, cli.quiet),
         Command::Step(args) => step::run(args, cli.quiet),
+        Command::Log(args) => record::run(args, cli.quiet),
+        Command::Rig(args) => rig::run(args, cli.quiet),
         Command::Predict(args) => predict::run(args),
     };
     match done {

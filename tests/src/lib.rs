@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 pub mod blind;
+pub mod desk;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

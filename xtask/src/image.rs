@@ -9,6 +9,7 @@
 //!
 //! Reference: STM32F405RG, RM0090 section 2.3: 1 MiB flash, 128 KiB SRAM, 64 KiB core-coupled RAM; `memory.x`.
 
+use crate::callgraph;
 use crate::place::{BOARD, Place};
 use crate::run::{Failure, cargo, run};
 use object::elf::SHF_ALLOC;
@@ -19,6 +20,7 @@ use std::path::Path;
 /// The packages whose binaries are flash images.
 pub(crate) const PACKAGES: [&str; 2] = ["firmware-rig", "firmware-ahrs"];
 const BUDGETS: &str = "budgets/size.toml";
+const RIG_BUDGET: &str = "budgets/rig.toml";
 /// 128 KiB SRAM and 64 KiB core-coupled RAM. RM0090 section 2.3.1.
 const RAM: [std::ops::Range<u64>; 2] = [0x2000_0000..0x2002_0000, 0x1000_0000..0x1001_0000];
 /// Flash of the STM32F405RG. RM0090 section 3.4.
@@ -53,7 +55,22 @@ pub(crate) fn image(place: &Place, bless: bool) -> Result<(), Failure> {
         .map_err(|error| Failure(format!("{BUDGETS}: {error}; `cargo xtask image --bless` writes it")))?;
     let limits = read_budget(&text)?;
     print!("{}", table(&sizes, &limits));
-    compare(&sizes, &limits)
+    compare(&sizes, &limits)?;
+    stack(place)
+}
+
+/// The rig board's control loop has no way to a panic, and its stack stays within its budget.
+fn stack(place: &Place) -> Result<(), Failure> {
+    let bound = callgraph::rig(&place.images().join("firmware-rig"))?;
+    let text = std::fs::read_to_string(place.root.join(RIG_BUDGET)).map_err(|error| Failure(format!("{RIG_BUDGET}: {error}")))?;
+    let table: toml::Table =
+        text.parse().map_err(|error: toml::de::Error| Failure(format!("{RIG_BUDGET}: {}", error.message())))?;
+    let most = table.get("stack_bytes").and_then(toml::Value::as_integer).and_then(|n| u32::try_from(n).ok());
+    let most = most.ok_or_else(|| Failure(format!("{RIG_BUDGET}: stack_bytes: expected a number of bytes")))?;
+    if bound > most {
+        return Err(Failure(format!("firmware-rig: its stack can reach {bound} bytes, the budget is {most} ({RIG_BUDGET})")));
+    }
+    Ok(())
 }
 
 /// The build command of both images.

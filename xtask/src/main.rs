@@ -11,11 +11,13 @@
 #![forbid(unsafe_code)]
 
 mod ahrs_bench;
+mod callgraph;
 mod image;
 mod place;
 mod run;
 mod setup;
 mod test;
+mod thumb;
 mod verdict;
 
 use place::Place;
@@ -25,7 +27,8 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   setup            Rust target of the boards, Python environment of the verdict checker
-  image            build both flash images, print their sizes, compare with budgets/size.toml
+  image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
+                   interrupts reach no panic, and its stack is bounded (budgets/rig.toml)
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
   ahrs-bench       the attitude filter on the shared BROAD trials and their stress variants, with its targets
   test             everything: format, lints, images, tests, emulated boards, verdicts

@@ -6,12 +6,17 @@
 //! Units: 84 MHz ticks.
 //! Reference: RM0090 section 18.3.5 (input capture), 18.4.5 (CCxIF clears on reading CCRx, CCxOF by writing 0).
 
+use crate::board::health;
 use core::sync::atomic::{AtomicU8, Ordering};
 use firmware_rig::queue::{CAPACITY, EdgeQueue};
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::Ticks;
 use heapless::Vec;
+use stm32f4xx_hal::gpio::{Input, PA7};
 use stm32f4xx_hal::pac::TIM2;
+
+/// Channel B of the encoder, read at the captured edges of A.
+pub(crate) type EncoderB = PA7<Input>;
 
 /// Captures since the last tick: the interrupt puts them in, the tick takes them out.
 static QUEUES: [EdgeQueue; CAPTURE_CHANNELS] = [const { EdgeQueue::new() }; CAPTURE_CHANNELS];
@@ -33,7 +38,7 @@ pub(crate) fn start(timer: &TIM2) {
 }
 
 /// The capture interrupt.
-pub(crate) fn serve(timer: &TIM2) {
+pub(crate) fn serve(timer: &TIM2, encoder_b: &EncoderB) {
     let status = timer.sr().read();
     let mut lost = 0;
     let [beam, opto, hall, encoder] = &QUEUES;
@@ -46,8 +51,11 @@ pub(crate) fn serve(timer: &TIM2) {
     if status.cc3if().bit() && !hall.put(timer.ccr3().read().bits()) {
         lost |= 4;
     }
-    if status.cc4if().bit() && !encoder.put(timer.ccr4().read().bits()) {
-        lost |= 8;
+    if status.cc4if().bit() {
+        if !encoder.put(timer.ccr4().read().bits()) {
+            lost |= 8;
+        }
+        health::step(encoder_b.is_high());
     }
     let over = (status.bits() >> 9) as u8 & 0xf; // CC4OF..CC1OF
     if over != 0 {

@@ -81,14 +81,25 @@ impl Link {
         self.waiting.clear();
     }
 
-    /// Decodes what arrived and gives the next command, and what went wrong on the line.
-    pub(crate) fn receive(&mut self, dma: &DMA2) -> (Option<Command>, LineNews) {
+    /// Decodes what arrived; whether a stop is among it.
+    pub(crate) fn listen(&mut self, dma: &DMA2) -> bool {
         let left = usize::from(dma.st(2).ndtr().read().ndt().bits());
         let head = IN.saturating_sub(left) % IN;
         while self.tail != head {
             self.line.take(RECEIVED.get(self.tail).map_or(0, |b| b.load(Ordering::Relaxed)));
             self.tail = (self.tail + 1) % IN;
         }
+        self.line.stop_waits()
+    }
+
+    /// The next command, and what went wrong on the line.
+    pub(crate) fn next(&mut self) -> (Option<Command>, LineNews) {
         self.line.next()
+    }
+
+    /// Frames heard: good, damaged, replayed.
+    pub(crate) fn frames(&self) -> [u16; 3] {
+        let stats = self.line.stats();
+        [stats.good as u16, stats.damaged as u16, self.line.replayed() as u16]
     }
 }

@@ -6,7 +6,7 @@
 //! Units: ns since power-up.
 //! Reference: crate rigless 0.4 (register models section by section of RM0090).
 
-use super::part::Part;
+use super::part::{ADC_UNITS, Part};
 use rigless::{
     chip::{Timeline, uart},
     device::Level,
@@ -20,10 +20,7 @@ use rigless::{
         st::tim::Channel as TimerChannel,
         stm32f427::{
             Stm32f427,
-            peripherals::{
-                adc::Channel as AdcChannel,
-                gpio::{Gpio, Pin},
-            },
+            peripherals::gpio::{Gpio, Pin},
         },
     },
     time::VirtualNanos,
@@ -37,8 +34,6 @@ const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
 const SYSTICK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).unwrap();
 const CRYSTAL_HZ: u64 = 8_000_000;
 const SUPPLY_MV: u32 = 3300;
-/// Units of a converter input in one count: the model answers input x 4095 / reference, rounded down.
-const ADC_UNITS: u32 = 1000;
 /// Reference in the same units, so that a code goes in and comes out unchanged.
 const ADC_REFERENCE: u32 = 4095 * ADC_UNITS;
 
@@ -230,11 +225,24 @@ impl Pins<'_> {
         Some(PulseTrain { high, width_ns: pulse.width.0, period_ns: pulse.period.0 })
     }
 
-    /// Lets ADC1 read `code` (12 bits) on `channel` from now on.
-    pub fn set_adc(&mut self, channel: u8, code: u16) {
-        if let Some(channel) = AdcChannel::new(channel) {
-            self.machine.mcu.chip.adc[0].set_input(channel, u32::from(code.min(4095)) * ADC_UNITS + ADC_UNITS / 2);
-        }
+    /// Level on `channel` of ADC1 from now on, counts of 12 bits with their fraction.
+    pub fn set_adc(&mut self, channel: u8, counts: f64) {
+        self.machine.mcu.adc1.set_level(channel, counts);
+    }
+
+    /// Noise of every single conversion, standard deviation in counts.
+    pub fn set_adc_noise(&mut self, counts: f64) {
+        self.machine.mcu.adc1.noise = counts;
+    }
+
+    /// Lets no conversion end any more, or again.
+    pub fn stop_adc(&mut self, stopped: bool) {
+        self.machine.mcu.adc1.stopped = stopped;
+    }
+
+    /// The board's own supply, mV.
+    pub fn set_supply(&mut self, millivolts: u32) {
+        self.machine.mcu.chip.set_supply(millivolts);
     }
 
     /// Presses the reset key. Levels that were driven from outside are gone afterwards: drive them again.

@@ -9,8 +9,10 @@
 
 use super::machine::{EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
 use crate::bench::{Bench, STEP_NS, Truth};
+use crate::fault::Mishap;
 use crate::scenario::Scenario;
 use crate::sensor::EdgeDetail;
+use crate::sensor::adc::{CODES, REFERENCE_V};
 use frame::message::{Beep, Command, Message};
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::units::Ticks;
@@ -26,6 +28,14 @@ const ADC_INPUTS: [u8; ADC_CHANNELS] = [10, 11, 12, 13, 14];
 const PULSE_PIN: (u8, u8) = (6, 2);
 /// Operator's stop key: pin of port B, active low.
 const STOP_PIN: u8 = 12;
+/// Encoder's channel B: pin of port A.
+const ENCODER_B_PIN: u8 = 7;
+/// The capture channel of the encoder.
+const ENCODER: u8 = 3;
+/// Noise of a conversion, counts rms (STM32F405 datasheet: total unadjusted error +-2 LSB typical).
+const CONVERSION_NOISE: f64 = 1.2;
+/// Board supply below the voltage detector's highest level and above the reset level, mV.
+const DIP_MV: u32 = 2600;
 const MS: u64 = 1_000_000;
 
 /// What an operator does.
@@ -41,6 +51,10 @@ pub enum Action {
     Reset,
     /// The run of the schedule begins: effects count their time from here.
     StartRun,
+    /// Something goes wrong at the pins, and stays so.
+    Mishap(Mishap),
+    /// The rotor turns the other way round, as channel B of the encoder shows it.
+    Backwards(bool),
 }
 
 /// What an operator learns in a millisecond.
@@ -84,6 +98,9 @@ pub struct RigWorld<O> {
     pulses: Vec<SeenPulse>,
     truth: Vec<(u64, Truth)>,
     messages: Vec<(Ticks, Message)>,
+    mishap: Option<Mishap>,
+    backwards: bool,
+    last_frame: Vec<u8>,
 }
 
 impl<O: Operator> RigWorld<O> {
@@ -102,6 +119,9 @@ impl<O: Operator> RigWorld<O> {
             pulses: Vec::new(),
             truth: Vec::new(),
             messages: Vec::new(),
+            mishap: None,
+            backwards: false,
+            last_frame: Vec::new(),
         }
     }
 
@@ -126,7 +146,11 @@ impl<O: Operator> RigWorld<O> {
     fn drive_edges(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
         while let Some(edge) = self.bench.edge_until(now_ns) {
             let (_, channel) = CAPTURE_PINS[usize::from(edge.channel)];
-            if self.connected {
+            let stuck = self.mishap == Some(Mishap::StuckLine { channel: edge.channel });
+            if self.connected && edge.channel == ENCODER {
+                pins.drive(Port::A, ENCODER_B_PIN, edge.rising == self.backwards); // B is 90 deg behind A, or ahead of it
+            }
+            if self.connected && !stuck {
                 pins.drive_timer(GeneralTimer::Tim2, channel, edge.rising);
             }
         }
@@ -163,7 +187,23 @@ impl<O: Operator> RigWorld<O> {
                 Action::Send(command) => {
                     let mut wire = [0; MAX_WIRE];
                     if let Ok(used) = self.encoder.encode(Ticks::from_ms(ms), &command, &mut wire) {
+                        match self.mishap {
+                            Some(Mishap::Silence) => continue,
+                            Some(Mishap::CorruptFrames) => wire[used / 2] ^= 0x5a,
+                            _ => {}
+                        }
+                        self.last_frame = wire[..used].to_vec();
                         pins.say(&wire[..used]);
+                    }
+                }
+                Action::Backwards(backwards) => self.backwards = backwards,
+                Action::Mishap(mishap) => {
+                    self.mishap = Some(mishap);
+                    match mishap {
+                        Mishap::NoConversions => pins.stop_adc(true),
+                        Mishap::SupplyDip => pins.set_supply(DIP_MV),
+                        Mishap::Replay => pins.say(&self.last_frame),
+                        _ => {}
                     }
                 }
                 Action::Power(on) => self.bench.set_power(on),
@@ -187,9 +227,15 @@ impl<O: Operator> World for RigWorld<O> {
         if now_ns >= self.bench.horizon_ns() {
             self.watch_pulse(now_ns, pins);
             for (n, input) in ADC_INPUTS.iter().enumerate() {
-                let code = self.bench.convert(n);
-                pins.set_adc(*input, code);
+                let counts = match self.mishap {
+                    Some(Mishap::Saturated { channel, high }) if usize::from(channel) == n => {
+                        f64::from(u8::from(high)) * 5000.0 - 400.0
+                    }
+                    _ => self.bench.voltages()[n] * (CODES / REFERENCE_V),
+                };
+                pins.set_adc(*input, counts);
             }
+            pins.set_adc_noise(CONVERSION_NOISE);
             if now_ns >= self.next_ms * MS {
                 if !self.strapped {
                     pins.drive(Port::B, STOP_PIN, true);

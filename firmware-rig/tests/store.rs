@@ -1,0 +1,156 @@
+//! Settings in flash: power cuts at every single operation, wear, damage.
+
+use embedded_storage_async::nor_flash::{
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use firmware_rig::store::{load, save};
+use firmware_rig::{Config, Settings};
+use frame::message::SettingsNews;
+
+const PAGE: usize = 1024;
+const RANGE: std::ops::Range<u32> = 0..2 * PAGE as u32;
+
+/// Flash as the part has it: erased to ones, programming clears bits a word at a time. The power can be cut after any number of
+/// words programmed or erased.
+#[derive(Clone)]
+struct Chip {
+    cells: Vec<u8>,
+    /// Operations until the cut.
+    left: Option<usize>,
+    operations: usize,
+    erases: [usize; 2],
+    dead: bool,
+}
+
+#[derive(Debug)]
+struct Gone;
+impl NorFlashError for Gone {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl Chip {
+    fn new() -> Self {
+        Self { cells: vec![0xff; 2 * PAGE], left: None, operations: 0, erases: [0; 2], dead: false }
+    }
+
+    /// One word's worth of work, if there is still power.
+    fn work(&mut self) -> Result<(), Gone> {
+        if self.dead || self.left == Some(0) {
+            self.left = Some(0);
+            return Err(Gone);
+        }
+        self.left = self.left.map(|n| n - 1);
+        self.operations += 1;
+        Ok(())
+    }
+}
+
+impl ErrorType for Chip {
+    type Error = Gone;
+}
+impl ReadNorFlash for Chip {
+    const READ_SIZE: usize = 1;
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Gone> {
+        if self.left == Some(0) {
+            return Err(Gone);
+        }
+        let at = offset as usize;
+        bytes.copy_from_slice(&self.cells[at..at + bytes.len()]);
+        Ok(())
+    }
+    fn capacity(&self) -> usize {
+        self.cells.len()
+    }
+}
+impl NorFlash for Chip {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = PAGE;
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Gone> {
+        for word in (from as usize..to as usize).step_by(4) {
+            self.work()?;
+            self.cells[word..word + 4].fill(0xff); // a cut leaves the page half erased
+        }
+        self.erases[from as usize / PAGE] += 1;
+        Ok(())
+    }
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Gone> {
+        for (i, word) in bytes.chunks(4).enumerate() {
+            self.work()?;
+            for (cell, byte) in self.cells[offset as usize + 4 * i..].iter_mut().zip(word) {
+                *cell &= byte;
+            }
+        }
+        Ok(())
+    }
+}
+impl MultiwriteNorFlash for Chip {}
+
+fn settings(n: u16) -> Settings {
+    Settings { log_period_ms: 10 + n % 900, link_ms: 200 + n % 4000, ..Settings::of(&Config::thesis_570kv()) }
+}
+
+#[test]
+fn what_is_saved_is_loaded() {
+    let mut chip = Chip::new();
+    assert_eq!(load(&mut chip, RANGE), (None, SettingsNews::Absent));
+    for n in 0..300 {
+        assert_eq!(save(&mut chip, RANGE, &settings(n)), SettingsNews::Saved, "save {n}");
+        assert_eq!(load(&mut chip, RANGE), (Some(settings(n)), SettingsNews::Loaded));
+    }
+    let [a, b] = chip.erases;
+    println!("300 saves: {a} and {b} erases");
+    assert!(a + b < 300 / 5 && a.abs_diff(b) <= 1, "wear is spread: {a} and {b}");
+}
+
+/// From every age of the store (page crossings included): cut the power after each operation of one save. What is there after
+/// the cut is the old settings or the new ones, and the next save works.
+#[test]
+fn a_power_cut_at_any_operation_loses_nothing() {
+    let mut chip = Chip::new();
+    let mut cuts = 0;
+    for n in 0..40 {
+        let before = chip.clone();
+        assert_eq!(save(&mut chip, RANGE, &settings(n)), SettingsNews::Saved);
+        let whole = chip.operations - before.operations;
+        for cut in 0..whole {
+            let mut broken = Chip { left: Some(cut), ..before.clone() };
+            let _ = save(&mut broken, RANGE, &settings(n));
+            broken.left = None; // the power comes back
+            let (found, news) = load(&mut broken, RANGE);
+            let old = (n > 0).then(|| settings(n - 1));
+            assert!(found == old || found == Some(settings(n)), "save {n}, cut after {cut} of {whole}: {news:?} {found:?}");
+            assert_eq!(save(&mut broken, RANGE, &settings(n + 500)), SettingsNews::Saved, "save {n}, cut after {cut}");
+            assert_eq!(load(&mut broken, RANGE).0, Some(settings(n + 500)));
+            cuts += 1;
+        }
+    }
+    println!("{cuts} power cuts");
+    assert!(cuts > 1000);
+}
+
+#[test]
+fn damage_is_never_taken_for_settings() {
+    let mut chip = Chip::new();
+    (0..3).for_each(|n| assert_eq!(save(&mut chip, RANGE, &settings(n)), SettingsNews::Saved));
+    let valid: Vec<Settings> = (0..3).map(settings).collect();
+    for at in 0..2 * PAGE {
+        for bit in [0, 5] {
+            let mut hurt = chip.clone();
+            hurt.cells[at] ^= 1 << bit;
+            let (found, _) = load(&mut hurt, RANGE);
+            assert!(found.is_none_or(|f| valid.contains(&f)), "byte {at}: {found:?}");
+        }
+    }
+    let mut garbage = chip.clone();
+    garbage.cells.fill(0);
+    assert_eq!(load(&mut garbage, RANGE).0, None);
+    assert_eq!(save(&mut garbage, RANGE, &settings(9)), SettingsNews::Saved, "erased once, then written");
+}
+
+#[test]
+fn a_flash_that_cannot_be_written_is_told() {
+    let mut chip = Chip { dead: true, ..Chip::new() };
+    assert_eq!(save(&mut chip, RANGE, &settings(1)), SettingsNews::Failed);
+}

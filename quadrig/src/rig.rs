@@ -1,0 +1,389 @@
+//! `quadrig rig`: talks to the rig board.
+//!
+//! What it is: one command a call (`identify`, `stop`, `tare`, `clear`, `set`, `configure`, `mass`, `save`), and two sessions that keep the
+//! link alive (`arm`, `calibrate`, `run`): there the operator types what the ESC beeps, and more commands.
+//! What can go wrong: a refused command names every reason; a session that ends, for whatever reason, stops the motor first.
+//! Units: us of pulse, s, g.
+//! Reference: specification `rig.md`, "Acquisition"; Beharie 2013, Fig. 3.10.
+
+use crate::Failure;
+use crate::board::{Board, Heard};
+use crate::record::Recorder;
+use clap::Subcommand;
+use frame::message::{Beep, Command, Event, Message, Setting, SettingsNews};
+use frame::rig::{Fault, RigState};
+use frame::units::PulseWidth;
+use std::io::BufRead;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, TryRecvError};
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Serial port of the board.
+    #[arg(long, global = true, default_value = "")]
+    port: String,
+    #[command(subcommand)]
+    order: Order,
+}
+
+#[derive(Subcommand)]
+enum Order {
+    /// Firmware, board, reset cause.
+    Identify,
+    /// Arms, then obeys typed lines: long, cells N, ready, set US, run, stop, tare, quit.
+    Arm,
+    /// Throttle-range calibration with the ESC unpowered; type double, long, cells N, ready as the ESC beeps.
+    Calibrate {
+        /// I have disconnected the ESC's battery and taken the propeller off.
+        #[arg(long)]
+        esc_is_unpowered: bool,
+    },
+    /// Arms, runs a staircase, and records it.
+    Run {
+        /// Height of a step, us.
+        #[arg(long, default_value_t = 50.0)]
+        step: f64,
+        /// Hold of each level, s.
+        #[arg(long, default_value_t = 30.0)]
+        hold: f64,
+        /// Highest level, us.
+        #[arg(long, default_value_t = 2000.0)]
+        top: f64,
+        /// Come down again.
+        #[arg(long)]
+        down: bool,
+        /// How often.
+        #[arg(long, default_value_t = 1)]
+        visits: u16,
+        /// Log to write.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
+    },
+    /// Sets the pulse of an armed rig and holds it for a while.
+    Set {
+        /// Pulse, us.
+        us: f64,
+        /// How long, s; then minimum again.
+        #[arg(long, default_value_t = 0.0)]
+        hold: f64,
+    },
+    /// Minimum throttle, now.
+    Stop,
+    /// Takes the present load as zero.
+    Tare,
+    /// Clears the latched faults.
+    Clear,
+    /// Changes one setting: log-ms, speed-limit, current-limit, voltage-limit, slew, link-ms, factory.
+    Configure {
+        /// Which.
+        key: String,
+        /// Its value (none for factory).
+        value: Option<f64>,
+    },
+    /// Takes a known mass on the load cell, or fits the scale to those taken.
+    Mass {
+        /// Mass in gram; without it, fit.
+        grams: Option<f32>,
+        /// Forget the masses taken before.
+        #[arg(long)]
+        forget: bool,
+    },
+    /// Stores settings and load-cell calibration in the board's flash.
+    Save,
+}
+
+/// Lines of standard input, from a thread of their own; disconnected at its end.
+pub(crate) fn lines() -> Receiver<String> {
+    let (sender, receiver) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    receiver
+}
+
+/// A pulse from its width; what an ESC does not understand is refused here already.
+fn pulse(us: f64) -> Result<PulseWidth, Failure> {
+    if (1000.0..=2000.0).contains(&us) {
+        Ok(PulseWidth((us * 1000.0).round() as u32))
+    } else {
+        Err(format!("{us} us: a pulse is 1000 to 2000 us").into())
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    if args.port.is_empty() {
+        return Err("--port is needed: the serial port of the board".into());
+    }
+    let mut board = Board::open(&args.port)?;
+    let silent = |_: &Message| {};
+    let done = |what: &str| {
+        if !quiet {
+            println!("{what}");
+        }
+    };
+    match &args.order {
+        Order::Identify => identify(&mut board),
+        Order::Stop => board.obey(Command::Stop, silent).map(|()| done("stopped: minimum throttle, latched until cleared")),
+        Order::Tare => board.obey(Command::Tare, silent).map(|()| done("tared")),
+        Order::Clear => board.obey(Command::ClearFaults, silent).map(|()| done("cleared")),
+        Order::Set { us, hold } => {
+            board.obey(Command::SetPulse(pulse(*us)?), silent)?;
+            let until = std::time::Instant::now() + std::time::Duration::from_secs_f64(hold.clamp(0.0, 3600.0));
+            let mut session = Session { recorder: None, quiet, state: RigState::Running, finished: false, faulted: None };
+            while std::time::Instant::now() < until && session.faulted.is_none() {
+                session.turn(&mut board)?;
+            }
+            session.verdict()?;
+            if *hold > 0.0 {
+                board.obey(Command::SetPulse(PulseWidth::MIN), silent)?;
+            }
+            done("set");
+            Ok(())
+        }
+        Order::Configure { key, value } => {
+            board.obey(Command::Configure(setting(key, *value)?), silent).map(|()| done("in force until the next reset; `save` keeps it"))
+        }
+        Order::Mass { forget: true, .. } => board.obey(Command::MassForget, silent).map(|()| done("forgotten")),
+        Order::Mass { grams: Some(grams), .. } => {
+            let taken = |m: &Message| match m {
+                Message::Event(Event::MassTaken { points, counts }) => Some((*points, *counts)),
+                _ => None,
+            };
+            let (points, counts) = board.ask(Command::MassPoint { mass_g: *grams }, silent, taken)?;
+            done(&format!("{grams} g gives {counts:.2} counts; {points} points"));
+            Ok(())
+        }
+        Order::Mass { grams: None, .. } => {
+            let fitted = |m: &Message| if let Message::Event(Event::MassFitted(fit)) = m { Some(*fit) } else { None };
+            let fit = board.ask(Command::MassFit, silent, fitted)?;
+            let grams = |n: f32| n / 9.806_65e-3;
+            done(&format!(
+                "{} points: {:.5} g a count, zero at {:.2} counts; residuals {:.2} g rms, {:.2} g at most",
+                fit.points,
+                grams(fit.gain.abs()),
+                fit.zero,
+                grams(fit.residual_n),
+                grams(fit.worst_n)
+            ));
+            Ok(())
+        }
+        Order::Save => {
+            let news = |m: &Message| match m {
+                Message::Event(Event::Settings(news @ (SettingsNews::Saved | SettingsNews::Failed))) => Some(*news),
+                _ => None,
+            };
+            match board.ask(Command::SaveSettings, silent, news)? {
+                SettingsNews::Saved => Ok(done("saved, and read back the same")),
+                _ => Err("the board could not store its settings; they stay in force until the next reset".into()),
+            }
+        }
+        Order::Arm => session(&mut board, Command::Arm, None, None, quiet),
+        Order::Calibrate { esc_is_unpowered: false } => {
+            Err("the board will give MAXIMUM pulses: disconnect the ESC's battery, take the propeller off, and say --esc-is-unpowered".into())
+        }
+        Order::Calibrate { .. } => {
+            session(&mut board, Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM }, None, None, quiet)
+        }
+        Order::Run { step, hold, top, down, visits, output } => {
+            let height = if *step > 0.0 && *step <= 1000.0 { PulseWidth((step * 1000.0).round() as u32) } else { return Err(format!("{step} us: a step is above 0 and up to 1000 us").into()) };
+            if !(*hold > 0.0 && *hold < 86_400.0) {
+                return Err(format!("{hold} s: a level is held for more than 0 and less than 86400 s").into());
+            }
+            let run = Command::RunVisits { step: height, hold_ms: (hold * 1000.0) as u32, top: pulse(*top)?, down: *down, visits: *visits };
+            let recorder = output.as_ref().map(|o| Recorder::new(o, Vec::new(), quiet)).transpose()?;
+            session(&mut board, Command::Arm, Some(run), recorder, quiet)
+        }
+    }
+}
+
+fn identify(board: &mut Board) -> Result<(), Failure> {
+    let hello = board.ask(Command::Identify, |_| {}, |m| if let Message::Hello(hello) = m { Some(*hello) } else { None })?;
+    let [major, minor, patch] = hello.firmware;
+    println!("{:?} board, firmware {major}.{minor}.{patch}, core {} MHz", hello.board, hello.core_hz / 1_000_000);
+    println!("last reset: {}", reset_cause(hello.reset_cause));
+    Ok(())
+}
+
+/// Bits 31..24 of RCC_CSR in words (RM0090 section 7.3.21); power-on and brown-out set further flags, so the rarest is told first.
+fn reset_cause(flags: u8) -> &'static str {
+    const NAMES: [(u8, &str); 7] = [
+        (0x80, "low-power management"),
+        (0x40, "window watchdog"),
+        (0x20, "watchdog: the control task hung"),
+        (0x10, "software: a panic, or a debugger"),
+        (0x08, "power-on"),
+        (0x02, "brown-out of the board's supply"),
+        (0x04, "reset key"),
+    ];
+    NAMES.iter().find(|(bit, _)| flags & bit != 0).map_or("unknown", |(_, name)| name)
+}
+
+fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
+    if key == "factory" {
+        return Ok(Setting::Factory);
+    }
+    let value = value.ok_or_else(|| format!("{key}: a value is needed"))?;
+    let whole = |most: f64| {
+        if value.fract() == 0.0 && (0.0..=most).contains(&value) {
+            Ok(value)
+        } else {
+            Err(format!("{key} = {value}: expected a whole number up to {most}"))
+        }
+    };
+    Ok(match key {
+        "log-ms" => Setting::LogPeriodMs(whole(65_535.0)? as u16),
+        "link-ms" => Setting::LinkMs(whole(65_535.0)? as u16),
+        "slew" => Setting::SlewNsPerMs(whole(f64::from(u32::MAX))? as u32),
+        "speed-limit" => Setting::SpeedLimit(value as f32),
+        "current-limit" => Setting::CurrentLimit(value as f32),
+        "voltage-limit" => Setting::VoltageLimit(value as f32),
+        _ => {
+            return Err(format!(
+                "{key}: no such setting; there are log-ms, link-ms, slew, speed-limit, current-limit, voltage-limit, factory"
+            )
+            .into());
+        }
+    })
+}
+
+/// A conversation that keeps the link alive.
+struct Session {
+    recorder: Option<Recorder>,
+    quiet: bool,
+    state: RigState,
+    finished: bool,
+    faulted: Option<String>,
+}
+
+impl Session {
+    fn take(&mut self, message: &Message) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.take(message);
+        }
+        match message {
+            Message::Event(Event::State { to, .. }) => {
+                self.state = *to;
+                if !self.quiet {
+                    println!("{}", esc_pwm::arming::message(*to));
+                }
+            }
+            Message::Event(Event::Faults { faults, .. }) => {
+                let words: Vec<&str> = faults.iter().filter(|f| *f != Fault::OperatorStop).map(Fault::words).collect();
+                if !words.is_empty() {
+                    self.faulted = Some(words.join(", "));
+                }
+            }
+            Message::Event(Event::ScheduleDone { .. }) => self.finished = true,
+            _ => {}
+        }
+    }
+
+    /// Hears what arrived and keeps the link alive.
+    fn turn(&mut self, board: &mut Board) -> Result<(), Failure> {
+        match board.hear() {
+            Heard::Messages(messages) => messages.iter().for_each(|m| self.take(&m.message)),
+            Heard::Gone => return Err("the port is gone; the board stops the motor by itself within its link time-out".into()),
+        }
+        board.keep_alive()
+    }
+
+    fn verdict(&self) -> Result<(), Failure> {
+        self.faulted.as_ref().map_or(Ok(()), |words| Err(format!("the rig stopped itself: {words}").into()))
+    }
+}
+
+/// What a typed line asks for; `None` for the end.
+fn typed(line: &str) -> Result<Option<Command>, Failure> {
+    let mut words = line.split_whitespace();
+    let (word, value) = (words.next().unwrap_or(""), words.next());
+    let number = || value.and_then(|v| v.parse::<f64>().ok()).ok_or_else(|| format!("{line:?}: a number is needed"));
+    Ok(Some(match word {
+        "" => Command::Ping,
+        "long" => Command::Beep(Beep::Long),
+        "cells" => Command::Beep(Beep::Cells(number()?.clamp(0.0, 255.0) as u8)),
+        "ready" => Command::Beep(Beep::Ready),
+        "double" => Command::Beep(Beep::Double),
+        "programming" => Command::Beep(Beep::Programming),
+        "nosignal" => Command::Beep(Beep::NoSignal),
+        "selftest" => Command::Beep(Beep::SelfTestFailed),
+        "set" => Command::SetPulse(pulse(number()?)?),
+        "run" => Command::RunSchedule,
+        "tare" => Command::Tare,
+        "stop" => Command::Stop,
+        "quit" => return Ok(None),
+        _ => {
+            return Err(format!(
+                "{word:?}: type long, cells N, ready, double, programming, nosignal, selftest, set US, run, tare, stop or quit"
+            )
+            .into());
+        }
+    }))
+}
+
+/// Starts with `first`, obeys typed lines, runs `schedule` once armed, and stops at the end.
+fn session(
+    board: &mut Board,
+    first: Command,
+    schedule: Option<Command>,
+    recorder: Option<Recorder>,
+    quiet: bool,
+) -> Result<(), Failure> {
+    let mut session = Session { recorder, quiet, state: RigState::Disarmed, finished: false, faulted: None };
+    // who it is and how its codes are meant, for the log
+    board.ask(
+        Command::Identify,
+        |_| {},
+        |m| {
+            session.take(m);
+            matches!(m, Message::Calibration(_)).then_some(())
+        },
+    )?;
+    board.obey(first, |m| session.take(m))?;
+    let input = lines();
+    let mut schedule = schedule;
+    let running = schedule.is_some();
+    let talk = (|| -> Result<(), Failure> {
+        loop {
+            session.turn(board)?;
+            if session.faulted.is_some() || (running && session.finished) {
+                return Ok(());
+            }
+            if session.state == RigState::Armed
+                && let Some(run) = schedule.take()
+            {
+                board.obey(run, |m| session.take(m))?;
+            }
+            match input.try_recv() {
+                Ok(line) => match typed(&line) {
+                    Ok(Some(command @ (Command::Beep(_) | Command::Ping))) => board.send(command)?,
+                    Ok(Some(Command::Stop)) => return Ok(()),
+                    Ok(Some(command)) => {
+                        if let Err(refusal) = board.obey(command, |m| session.take(m)) {
+                            eprintln!("{refusal}");
+                        }
+                    }
+                    Ok(None) => return Ok(()),
+                    Err(mistake) => eprintln!("{mistake}"),
+                },
+                Err(TryRecvError::Disconnected) if !running => return Ok(()),
+                Err(_) => {}
+            }
+        }
+    })();
+    // whatever ended the talk: the motor is stopped before anything else is done
+    let stopped = board.obey(Command::Stop, |m| session.take(m));
+    let Session { recorder, faulted, .. } = session;
+    let recorded = recorder.map_or(Ok(()), |r| r.finish(board, quiet));
+    talk?;
+    if let Some(words) = faulted {
+        return Err(format!("the rig stopped itself: {words}").into());
+    }
+    stopped?;
+    recorded
+}

@@ -1,0 +1,110 @@
+//! A log file that grows while it is recorded.
+//!
+//! What it is: whole lines go to `NAME.part` beside the target; at the end it is synced and renamed, so that the target is whole or
+//! not there.
+//! What can go wrong: a full disk. What was written stays, cut at a line's end; what comes after is kept in memory and tried again
+//! every second; what finds no room to the end goes to the folder for temporary files, and the message says where.
+//! Units: bytes.
+//! Reference: specification `formats.md` ("nothing half-written").
+
+use crate::Failure;
+use std::fs::{File, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Time between two attempts on a full disk.
+const AGAIN: Duration = Duration::from_secs(1);
+
+/// The file.
+pub(crate) struct Spool {
+    target: PathBuf,
+    part: PathBuf,
+    file: File,
+    /// Bytes of whole lines that are in the file.
+    written: u64,
+    waiting: Vec<u8>,
+    failed: Option<(Instant, std::io::Error)>,
+}
+
+impl Spool {
+    /// Creates the part beside `target`.
+    pub(crate) fn create(target: &Path) -> Result<Self, Failure> {
+        let mut name = target.file_name().ok_or("-o needs the name of a file")?.to_owned();
+        name.push(".part");
+        let part = target.with_file_name(name);
+        let file = OpenOptions::new().write(true).create(true).truncate(true).open(&part);
+        let file = file.map_err(|e| format!("{}: cannot be written ({e})", part.display()))?;
+        Ok(Self { target: target.to_owned(), part, file, written: 0, waiting: Vec::new(), failed: None })
+    }
+
+    /// Adds whole lines. Gives a warning when they cannot be written now, once.
+    pub(crate) fn add(&mut self, lines: &str) -> Option<String> {
+        self.waiting.extend_from_slice(lines.as_bytes());
+        if self.failed.as_ref().is_some_and(|(at, _)| at.elapsed() < AGAIN) {
+            return None;
+        }
+        let news = self.failed.is_none();
+        self.flush();
+        let (_, error) = self.failed.as_ref().filter(|_| news)?;
+        Some(format!("{}: cannot be written to ({error}); rows are kept in memory and tried again", self.part.display()))
+    }
+
+    /// Tries to write what waits.
+    fn flush(&mut self) {
+        let tried = (|| {
+            self.file.seek(SeekFrom::Start(self.written))?;
+            self.file.write_all(&self.waiting)
+        })();
+        match tried {
+            Ok(()) => {
+                self.written += self.waiting.len() as u64;
+                self.waiting.clear();
+                self.failed = None;
+            }
+            Err(error) => {
+                // what found room and is whole stays
+                let found = self.file.metadata().map_or(self.written, |m| m.len()).saturating_sub(self.written) as usize;
+                let kept = self.waiting[..found.min(self.waiting.len())].iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
+                self.written += kept as u64;
+                self.waiting.drain(..kept);
+                let _ = self.file.set_len(self.written);
+                self.failed = Some((Instant::now(), error));
+            }
+        }
+    }
+
+    /// Nothing worth keeping: the part goes.
+    pub(crate) fn discard(self) {
+        let _ = std::fs::remove_file(&self.part);
+    }
+
+    /// Syncs and renames. What found no room goes to the temporary folder.
+    pub(crate) fn finish(mut self) -> Result<(), Failure> {
+        self.flush();
+        let synced = self.file.sync_all();
+        synced.and_then(|()| std::fs::rename(&self.part, &self.target)).map_err(|e| {
+            format!("{}: cannot be renamed to {} ({e}); what was recorded is there", self.part.display(), self.target.display())
+        })?;
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        let rows = self.waiting.iter().filter(|b| **b == b'\n').count();
+        let why = self.failed.take().map_or_else(String::new, |(_, e)| e.to_string());
+        let rest = std::env::temp_dir().join(format!("quadrig-rest-{}.csv", std::process::id()));
+        match std::fs::write(&rest, &self.waiting) {
+            Ok(()) => Err(format!(
+                "{}: no room for the last {rows} rows ({why}); they are in {}, without the head",
+                self.target.display(),
+                rest.display()
+            )
+            .into()),
+            Err(e) => Err(format!(
+                "{}: no room for the last {rows} rows ({why}), nor in {} ({e})",
+                self.target.display(),
+                rest.display()
+            )
+            .into()),
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Effective bits of the strain channel on the emulated board: the flash image, five channels, a constant input, the converter's
+//! 12-bit quantisation, and noise drawn at every single conversion.
+#![cfg(feature = "emulated")]
+
+use frame::message::{Command, Message, Setting};
+use frame::rig::{ADC_NAMES, AdcVerdict, RigSample};
+use frame::units::Ticks;
+use frame::wire::{Decoder, Encoder, MAX_WIRE};
+use hal_sim::emulated::{Machine, Pins, Port, World, firmware, run};
+
+/// Levels of the five channels, counts, none of them on a code.
+const LEVELS: [f64; 5] = [1427.31, 2048.77, 248.05, 2379.5, 900.23];
+
+/// Constant levels, and one command at the beginning.
+struct Constant {
+    noise: f64,
+    command: Option<Command>,
+    next_ms: u64,
+    read: usize,
+    decoder: Decoder,
+    samples: Vec<RigSample>,
+}
+
+impl World for Constant {
+    fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
+        pins.set_adc_noise(self.noise);
+        for (n, level) in LEVELS.iter().enumerate() {
+            pins.set_adc(10 + n as u8, *level);
+        }
+        pins.drive(Port::B, 12, true);
+        if now_ns > 60_000_000
+            && let Some(command) = self.command.take()
+        {
+            let mut wire = [0; MAX_WIRE];
+            let used = Encoder::default().encode(Ticks(1), &command, &mut wire).expect("it fits");
+            pins.say(&wire[..used]);
+        }
+        let bytes = pins.heard();
+        for byte in &bytes[self.read..] {
+            if let Some(received) = self.decoder.push::<Message>(*byte)
+                && let Message::Rig(sample) = received.message
+            {
+                self.samples.push(sample);
+            }
+        }
+        self.read = bytes.len();
+        self.next_ms += 1;
+        self.next_ms * 1_000_000
+    }
+}
+
+fn measure(log_ms: u16, noise: f64, milliseconds: u64) -> Vec<RigSample> {
+    let elf = firmware("firmware-rig").unwrap_or_else(|e| panic!("{e}"));
+    let command = (log_ms != 100).then_some(Command::Configure(Setting::LogPeriodMs(log_ms)));
+    let world = Constant { noise, command, next_ms: 0, read: 0, decoder: Decoder::default(), samples: Vec::new() };
+    let machine = Machine::new().unwrap_or_else(|e| panic!("{e}"));
+    let (outcome, _) = run(&elf, machine, world, milliseconds * 1_000_000).unwrap_or_else(|e| panic!("{e}"));
+    let samples = outcome.world.samples;
+    // the first ones were taken at another rate
+    samples.into_iter().skip(6).collect()
+}
+
+/// Effective bits by the specification: log2(full scale / (rms of the means x sqrt 12)).
+fn bits(samples: &[RigSample], channel: usize) -> (f64, f64) {
+    let means: Vec<f64> = samples.iter().map(|s| f64::from(s.adc[channel].sum) / f64::from(s.adc[channel].count)).collect();
+    let n = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / n;
+    let rms = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    ((4096.0 / (rms * 12f64.sqrt())).log2(), mean)
+}
+
+fn check(log_ms: u16, noise: f64, milliseconds: u64) {
+    let samples = measure(log_ms, noise, milliseconds);
+    let spacing: Vec<u64> = samples.windows(2).map(|w| w[1].at.since(w[0].at).as_ms()).collect();
+    assert!(spacing.iter().all(|ms| *ms == u64::from(log_ms)), "{spacing:?}");
+    for (channel, name) in ADC_NAMES.iter().enumerate() {
+        let fewest = samples.iter().map(|s| s.adc[channel].count).min().unwrap_or(0);
+        let (bits, mean) = bits(&samples, channel);
+        let off = mean - LEVELS[channel];
+        println!(
+            "{log_ms} ms, {noise} LSB: {name:>9} {bits:.2} bits from {fewest} conversions, {} samples, mean off by {off:+.4} counts",
+            samples.len()
+        );
+        assert!(fewest >= 1024, "{name}: {fewest} conversions");
+        assert!(bits >= 16.0, "{name}: {bits} bits");
+        assert!(off.abs() < 0.02, "{name}: the mean is {off} counts off");
+        for sample in &samples {
+            assert_eq!(sample.adc[channel].verdict, AdcVerdict::Nominal);
+            let rms = f64::from(sample.adc[channel].rms_q8) / 256.0;
+            let truth = (noise * noise + 1.0 / 12.0).sqrt();
+            assert!((rms / truth - 1.0).abs() < 0.1, "{name}: rms {rms}, put in {truth}");
+        }
+    }
+}
+
+/// The default rate, with the noise of the simulated bench (1.2 LSB rms).
+#[test]
+fn sixteen_bits_at_ten_samples_a_second() {
+    check(100, 1.2, 6_600);
+}
+
+/// The highest rate, with the least noise that the specification asks for.
+#[test]
+fn sixteen_bits_at_a_hundred_samples_a_second() {
+    check(10, 0.5, 1_100);
+}

@@ -1,0 +1,179 @@
+//! A sample of the fault schedules on the flash image: one of each kind that the pins of the emulated board can show.
+#![cfg(feature = "emulated")]
+
+use frame::message::{Command, Event, Message, SettingsNews, Trial};
+use frame::rig::RigState;
+use frame::units::PulseWidth;
+use hal_sim::Scenario;
+use hal_sim::emulated::operator::ArmAndRun;
+use hal_sim::emulated::rig::{Action, Heard, Operator, RigRun, rig};
+use hal_sim::fault::{Mishap, REACTION_MS};
+
+/// Level of every run.
+const PULSE_US: u32 = 1450;
+/// From the accepted command to the mishap, ms.
+const AFTER_MS: u64 = 500;
+const MARKS: [u16; 4] = [2, 1, 2, 25];
+
+/// Arms, runs, and meets a mishap.
+#[derive(Debug)]
+struct Unlucky {
+    inner: ArmAndRun,
+    mishap: Mishap,
+    trial: Option<Trial>,
+    met: Option<u64>,
+}
+
+impl Operator for Unlucky {
+    fn millisecond(&mut self, ms: u64, heard: &[Heard], actions: &mut Vec<Action>) {
+        self.inner.millisecond(ms, heard, actions);
+        if self.met.is_none() && self.inner.started.is_some_and(|at| ms >= at + AFTER_MS) {
+            self.met = Some(ms);
+            match self.trial {
+                Some(trial) => actions.push(Action::Send(Command::SelfTest { confirm: Command::SELF_TEST_CONFIRM, trial })),
+                None => actions.extend([Action::Mishap(self.mishap), Action::Backwards(self.mishap == Mishap::Replay)]),
+            }
+        }
+    }
+}
+
+fn fly(mishap: Mishap, trial: Option<Trial>, watch_ms: u64) -> (RigRun<Unlucky>, u64) {
+    let level = Command::SetPulse(PulseWidth::from_us(PULSE_US));
+    let operator = Unlucky { inner: ArmAndRun::new([level], None), mishap, trial, met: None };
+    let run = rig(&Scenario::default(), operator, 4_200 + watch_ms).unwrap_or_else(|error| panic!("{error}"));
+    let met = run.operator.met.expect("the rig ran") * 1_000_000;
+    let live = |p: &&hal_sim::emulated::rig::SeenPulse| p.at_ns < met && p.width_ns == u64::from(PULSE_US) * 1000;
+    assert!(run.pulses.iter().filter(live).count() > 5, "{mishap:?}: the rotor was turning");
+    (run, met)
+}
+
+/// Start of the last pulse above minimum after the mishap, ms.
+fn last_live(run: &RigRun<Unlucky>, met: u64) -> f64 {
+    let live = run.pulses.iter().filter(|p| p.at_ns > met && p.width_ns > 1_000_000).map(|p| p.at_ns - met);
+    live.max().unwrap_or(0) as f64 * 1e-6
+}
+
+/// Minimum throttle in time, the fault latched and named in telemetry, and pulses that go on.
+fn survives(mishap: Mishap) {
+    let at = run_rpm();
+    let detection = mishap.detection(at, MARKS);
+    let (run, met) = fly(mishap, None, (detection.ms + REACTION_MS) as u64 + 250);
+    let last = last_live(&run, met);
+    println!(
+        "{}: last live pulse {last:.1} ms after it (detection within {:.0} ms: {})",
+        mishap.words(),
+        detection.ms,
+        detection.why
+    );
+    assert!(last <= detection.ms + REACTION_MS, "{mishap:?}: {last} ms");
+    let sample = run.operator.inner.samples.last().expect("samples");
+    let fault = mishap.fault().expect("a fault without a reset");
+    assert!(sample.faults.contains(fault), "{mishap:?}: telemetry names {:?}", sample.faults);
+    assert_eq!((sample.state, sample.pulse), (RigState::Faulted, PulseWidth::MIN), "{mishap:?}");
+    assert!(run.outcome.accesses.resets.is_empty(), "{:?}", run.outcome.accesses.resets);
+    let end = run.outcome.now_ns;
+    assert!(run.pulses.iter().any(|p| p.at_ns + 30_000_000 > end), "pulses go on to the end");
+}
+
+/// Speed of the level on the bench at which these runs are flown, at the least, rev/min.
+fn run_rpm() -> f64 {
+    2000.0
+}
+
+#[test]
+fn stuck_capture_lines() {
+    survives(Mishap::StuckLine { channel: 1 });
+    survives(Mishap::StuckLine { channel: 3 });
+}
+
+#[test]
+fn saturated_and_missing_conversions() {
+    survives(Mishap::Saturated { channel: 0, high: true });
+    survives(Mishap::Saturated { channel: 2, high: false });
+    survives(Mishap::NoConversions);
+}
+
+#[test]
+fn damaged_and_replayed_frames() {
+    survives(Mishap::CorruptFrames);
+    survives(Mishap::Replay);
+}
+
+#[test]
+fn a_dip_of_the_boards_supply() {
+    survives(Mishap::SupplyDip);
+}
+
+/// After the trial: a reset of the expected cause, disarmed, the train within 40 ms of it.
+fn resets(trial: Trial, most_ms: f64, cause: u8) -> RigRun<Unlucky> {
+    let (run, met) = fly(Mishap::Hang, Some(trial), 300);
+    let last = last_live(&run, met);
+    println!("{trial:?}: last live pulse {last:.1} ms after the command");
+    assert!(last <= most_ms, "{trial:?}: {last} ms");
+    let hello = run.operator.inner.hello.expect("a second Hello");
+    assert_eq!(hello.reset_cause & cause, cause, "{:#x}", hello.reset_cause);
+    let sample = run.operator.inner.samples.last().expect("samples");
+    assert_eq!((sample.state, sample.pulse), (RigState::Disarmed, PulseWidth::MIN));
+    // no gap in the train is longer than the watchdog's time, the reset's 40 ms and a frame
+    let gaps = run.pulses.windows(2).map(|w| w[1].at_ns - w[0].at_ns).max().unwrap_or(0);
+    assert!(gaps <= 60_000_000, "longest gap {} ms", gaps / 1_000_000);
+    assert_eq!(run.outcome.accesses.resets.len(), 1, "{:?}", run.outcome.accesses.resets);
+    run
+}
+
+#[test]
+fn a_panic_gives_minimum_resets_and_tells_its_place() {
+    let run = resets(Trial::Panic, 3.0, 0x10); // SFTRSTF: the handler's own reset
+    let told = run.messages.iter().find_map(|(_, m)| match m {
+        Message::Event(Event::Panicked { line, file }) => Some((*line, *file)),
+        _ => None,
+    });
+    let (line, file) = told.expect("the place of the panic");
+    let file = String::from_utf8_lossy(&file).trim_end_matches('\0').to_owned();
+    println!("panicked at {file}:{line}");
+    assert!(file.ends_with("firmware-rig/src/main.rs") && line > 0, "{file}:{line}");
+}
+
+#[test]
+fn a_hanging_program_is_reset_by_the_watchdog() {
+    let run = resets(Trial::Hang, 41.0, 0x20); // IWDGRSTF
+    let told = run.messages.iter().any(|(_, m)| matches!(m, Message::Event(Event::Panicked { .. })));
+    assert!(!told, "nothing panicked");
+}
+
+/// Reads the health reports of a whole run against the committed budgets.
+#[test]
+fn stack_cycles_and_jitter_stay_within_their_budgets() {
+    let (run, _) = fly(Mishap::Replay, None, 900);
+    let reports: Vec<_> =
+        run.messages.iter().filter_map(|(_, m)| if let Message::Health(h) = m { Some(*h) } else { None }).collect();
+    let last = reports.last().expect("health reports");
+    println!("{last:?}");
+    let text = std::fs::read_to_string(quadrig_tests::root().join("budgets/rig.toml")).expect("budgets/rig.toml");
+    let number = |key: &str| -> u32 {
+        let line = text.lines().find(|l| l.starts_with(&format!("{key} ="))).unwrap_or_else(|| panic!("no {key}"));
+        line.split('=').nth(1).and_then(|v| v.trim().parse().ok()).unwrap_or_else(|| panic!("{line}"))
+    };
+    let used = last.stack_size - last.stack_free;
+    println!(
+        "tick {} cycles, capture {} cycles, stack {used} of {} bytes",
+        last.tick_cycles, last.capture_cycles, last.stack_size
+    );
+    assert!(used > 100 && last.stack_free > 0, "measured at all: {last:?}");
+    assert!(last.tick_cycles > 1000 && last.tick_cycles <= number("tick_cycles"), "tick: {last:?}");
+    assert!(last.capture_cycles > 10 && last.capture_cycles <= number("capture_cycles"), "capture: {last:?}");
+    assert!(used <= number("stack_bytes"), "stack: {used}");
+    for report in &reports[1..] {
+        let [low, high] = report.tick_span.map(|ticks| f64::from(ticks) / 84_000.0);
+        assert!(low > 0.97 && high < 1.03, "ticks {low} to {high} ms apart");
+    }
+    let (forward, backward) = reports.iter().fold((0, 0), |(f, b), r| (f + r.steps[0], b + r.steps[1]));
+    // the encoder's channel B changes sides when the mishap comes, and the rotor coasts on
+    assert!(forward > 300 && backward > 50, "{forward} and {backward} encoder steps");
+    assert!(last.frames[0] > 5 && last.frames[1] == 0, "{:?}", last.frames);
+    let settings = run.messages.iter().find_map(|(_, m)| match m {
+        Message::Event(Event::Settings(news)) => Some(*news),
+        _ => None,
+    });
+    assert_eq!(settings, Some(SettingsNews::Absent), "an empty flash holds no settings");
+}
