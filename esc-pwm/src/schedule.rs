@@ -53,7 +53,7 @@ impl Staircase {
         if index >= levels * u64::from(self.visits.max(1)) {
             return None;
         }
-        let level = index % levels; // levels() is at least 1
+        let level = index.checked_rem(levels)?; // levels() is at least 1, which the compiler does not know: no panic path
         let up = u64::from(self.increments());
         let level = if level > up { 2 * up - level } else { level };
         Some(PulseWidth(PulseWidth::MIN.0 + self.step.0 * level as u32))

@@ -223,11 +223,12 @@ impl Rig {
             self.next_sample = Ticks(now.0 + self.config.log_period().0);
             return 1;
         };
-        u32::try_from((now.since(before).0 + per_ms / 2) / per_ms).unwrap_or(u32::MAX)
+        let passed = (now.since(before).0 + per_ms / 2).checked_div(per_ms).unwrap_or(u64::MAX);
+        u32::try_from(passed).unwrap_or(u32::MAX)
     }
 
     pub(crate) fn ms_since(&self, now: Ticks, then: Ticks) -> u64 {
-        now.since(then).0 / u64::from(self.config.ticks_per_ms())
+        now.since(then).0.checked_div(u64::from(self.config.ticks_per_ms())).unwrap_or(u64::MAX)
     }
 
     /// Value of an ADC channel over one tick, untared.
