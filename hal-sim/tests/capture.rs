@@ -79,7 +79,7 @@ fn samples(seed: u64, rpm: f64, wrong: Wrong) -> Vec<[CaptureCode; 4]> {
         let mut edges: [Vec<u32>; 4] = Default::default();
         for step in 0..10u64 {
             let next = angle + speed / 60.0 * 1e-4;
-            tachometers.step(angle, next, |channel, rising, fraction| {
+            tachometers.step(angle, next, speed / 60.0, |channel: u8, rising: bool, fraction: f64| {
                 if !rising {
                     return;
                 }
@@ -106,7 +106,7 @@ fn samples(seed: u64, rpm: f64, wrong: Wrong) -> Vec<[CaptureCode; 4]> {
             angle = next;
             if let Wrong::Slips(w) = wrong {
                 let next = other + speed / 60.0 * 1e-4 * if broken { 1.03 } else { 1.0 };
-                slipping.step(other, next, |channel, rising, fraction| {
+                slipping.step(other, next, speed / 60.0, |channel: u8, rising: bool, fraction: f64| {
                     if rising && usize::from(channel) == w {
                         edges[w].push(((((ms - 1) * 10 + step) as f64 + fraction) * (MS as f64 / 10.0)) as u64 as u32);
                     }

@@ -98,6 +98,7 @@ pub(super) struct NoisyAdc {
     /// No conversion ends any more.
     pub(super) stopped: bool,
     used: [bool; ADC_CHANNELS],
+    turn: usize,
     stream: Stream,
 }
 
@@ -109,6 +110,7 @@ impl NoisyAdc {
             noise: 0.0,
             stopped: false,
             used: [false; ADC_CHANNELS],
+            turn: 0,
             stream: Stream::new(1, Source::Adc, 99),
         }
     }
@@ -120,13 +122,16 @@ impl NoisyAdc {
         }
     }
 
-    /// Draws what each channel reads at this instant. The thresholds of an ideal converter lie half a count below each code.
+    /// Draws what one channel reads from this instant on, in turn, so that every conversion of a scan has noise of its own. The
+    /// thresholds of an ideal converter lie half a count below each code.
     fn draw(&mut self) {
-        for n in 0..ADC_CHANNELS {
-            if let (true, Some(channel)) = (self.used[n], Channel::new(n as u8)) {
-                let counts = self.level[n] + self.noise * self.stream.quick_normal() + 0.5;
+        for _ in 0..ADC_CHANNELS {
+            self.turn = (self.turn + 1) % ADC_CHANNELS;
+            if let (true, Some(channel)) = (self.used[self.turn], Channel::new(self.turn as u8)) {
+                let counts = self.level[self.turn] + self.noise * self.stream.quick_normal() + 0.5;
                 let code = (counts.max(0.0) as u32).min(4095);
                 self.inner.set_input(channel, code * ADC_UNITS + ADC_UNITS / 2);
+                return;
             }
         }
     }
