@@ -110,7 +110,7 @@ fn what_is_saved_is_loaded() {
 fn a_power_cut_at_any_operation_loses_nothing() {
     let mut chip = Chip::new();
     let mut cuts = 0;
-    for n in 0..40 {
+    for n in 0..80 {
         let before = chip.clone();
         assert_eq!(save(&mut chip, RANGE, &settings(n)), SettingsNews::Saved);
         let whole = chip.operations - before.operations;
