@@ -6,9 +6,10 @@
 //! Units: radians; roll and yaw in (-pi, pi], pitch in [-pi/2, pi/2].
 //! Reference: Beharie 2013 Eq. 4.19-4.30 with errata (4.25 has the wrong sign, 4.28 and 4.30 need atan2); Shepperd 1978.
 
-use crate::{Mat3, Vec3, rotation::unit};
-use core::f32::consts::FRAC_PI_2;
-use libm::{atan2f, cosf, sinf, sqrtf};
+use crate::rotation::unit;
+use crate::trig::{root, sin_cos};
+use crate::{Mat3, Vec3};
+use libm::atan2f;
 
 /// cos^2(pitch) below which roll and yaw are not told apart.
 const POLE: f32 = 1e-6;
@@ -30,7 +31,7 @@ pub struct Euler {
 pub fn euler_of(r: &Mat3) -> Euler {
     let (r11, r12, r21, r22) = (r.m11, r.m12, r.m21, r.m22);
     let cos2 = r11 * r11 + r21 * r21;
-    let pitch = atan2f(-r.m31, sqrtf(cos2));
+    let pitch = atan2f(-r.m31, root(cos2));
     if cos2 < POLE {
         return Euler { roll: 0.0, pitch, yaw: atan2f(-r12, r22) };
     }
@@ -40,9 +41,9 @@ pub fn euler_of(r: &Mat3) -> Euler {
 /// The rotation body to earth of three Euler angles.
 #[must_use]
 pub fn matrix_of(e: &Euler) -> Mat3 {
-    let (sf, cf) = (sinf(e.roll), cosf(e.roll));
-    let (st, ct) = (sinf(e.pitch), cosf(e.pitch));
-    let (sp, cp) = (sinf(e.yaw), cosf(e.yaw));
+    let (sf, cf) = sin_cos(e.roll);
+    let (st, ct) = sin_cos(e.pitch);
+    let (sp, cp) = sin_cos(e.yaw);
     Mat3::new(
         ct * cp,
         sf * st * cp - cf * sp,
@@ -76,7 +77,7 @@ pub fn quaternion_of(r: &Mat3) -> [f32; 4] {
     };
     let square: f32 = raw.iter().map(|q| q * q).sum();
     let sign = if raw.first().is_some_and(|w| *w < 0.0) { -1.0 } else { 1.0 };
-    let k = sign / sqrtf(square);
+    let k = sign / root(square);
     raw.map(|q| q * k)
 }
 
@@ -95,23 +96,30 @@ pub(crate) fn start_attitude(down: &Vec3, field: Option<&Vec3>, declination: f32
         return Some((about_down(declination) * matrix, true));
     }
     // body x, or y where x is vertical, keeps its heading
-    let yaw = euler_of(present).yaw;
-    [Vec3::x(), Vec3::y()].iter().zip([yaw, yaw + FRAC_PI_2]).find_map(|(body, yaw)| {
-        let level = matrix_from(down, body)?;
-        Some((about_down(yaw) * level, false))
+    [0, 1].iter().find_map(|axis| {
+        let body = if *axis == 0 { Vec3::x() } else { Vec3::y() };
+        let level = matrix_from(down, &body)?;
+        let (x, y) = (present.row(0).get(*axis).copied()?, present.row(1).get(*axis).copied()?);
+        let long = root(x * x + y * y);
+        let (c, s) = if long > 1e-3 { (x / long, y / long) } else { (1.0, 0.0) };
+        Some((turn_down(s, c) * level, false))
     })
 }
 
 /// Rotation about earth z.
-fn about_down(angle: f32) -> Mat3 {
-    let (s, c) = (sinf(angle), cosf(angle));
+pub(crate) fn about_down(angle: f32) -> Mat3 {
+    let (s, c) = sin_cos(angle);
+    turn_down(s, c)
+}
+
+fn turn_down(s: f32, c: f32) -> Mat3 {
     Mat3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use core::f32::consts::PI;
+    use core::f32::consts::{FRAC_PI_2, PI};
     use proptest::prelude::*;
 
     #[test]

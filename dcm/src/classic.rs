@@ -9,12 +9,13 @@
 
 mod config;
 
-use crate::angles::start_attitude;
+use crate::angles::{about_down, start_attitude};
 use crate::measurement::{Measurement, Step};
 use crate::rotation::{rotate, unit};
+use crate::trig::root;
 use crate::{Euler, Mat3, STANDARD_GRAVITY, Vec3, euler_of, quaternion_of};
 pub use config::{AccelWeight, ClassicConfig, Gains};
-use libm::{atan2f, cosf, sinf, sqrtf};
+use libm::atan2f;
 
 /// Longest time that one reading of a slow sensor may stand for, s.
 const LONGEST_HOLD: f32 = 0.2;
@@ -39,7 +40,7 @@ impl Classic {
     #[must_use]
     pub fn new(config: ClassicConfig) -> Self {
         Self {
-            north: Vec3::new(cosf(config.declination), sinf(config.declination), 0.0),
+            north: about_down(config.declination).column(0).clone_owned(),
             config,
             matrix: Mat3::identity(),
             bias: Vec3::zeros(),
@@ -128,7 +129,7 @@ impl Classic {
     fn weight(&self, f: &Vec3) -> f32 {
         match self.config.accel_weight {
             AccelWeight::Always => 1.0,
-            AccelWeight::RazorRamp => (1.0 - 2.0 * (1.0 - sqrtf(f.dot(f)) / STANDARD_GRAVITY).abs()).clamp(0.0, 1.0),
+            AccelWeight::RazorRamp => (1.0 - 2.0 * (1.0 - root(f.dot(f)) / STANDARD_GRAVITY).abs()).clamp(0.0, 1.0),
         }
     }
 

@@ -24,7 +24,7 @@ use crate::angles::start_attitude;
 use crate::config::Config;
 use crate::linear::square;
 use crate::measurement::{Measurement, Step};
-use crate::rotation::{Increment, renormalise, rotate, unit};
+use crate::rotation::{Increment, increment, product, renormalise, rotate, unit};
 use crate::{Mat3, STANDARD_GRAVITY, Vec3};
 use bias::Bias;
 use field::Field;
@@ -175,7 +175,7 @@ impl Dcm {
     /// The averaged specific force sets the tilt.
     fn accel(&mut self, force: &Vec3, field: Option<&Vec3>, step: &mut Step) {
         let dt = self.since_accel;
-        if !finite(force) || unit(force).is_none() {
+        if !usable(force) {
             step.bad_input = true;
             return;
         }
@@ -205,6 +205,8 @@ impl Dcm {
     }
 
     /// At rest: the first time, and whenever the tilt is off by more than doubt allows, the attitude is set anew.
+    #[cold]
+    #[inline(never)]
     fn settle(&mut self, step: &mut Step) -> bool {
         let Some(down) = unit(&-self.rest.force.x) else { return false };
         let predicted = self.matrix.row(2).transpose();
@@ -222,7 +224,7 @@ impl Dcm {
     fn mag(&mut self, field: &Vec3, step: &mut Step) {
         let dt = self.since_mag;
         let most = self.config.field.range;
-        if !finite(field) || unit(field).is_none() {
+        if !usable(field) {
             step.bad_input = true;
             return;
         }
@@ -235,11 +237,11 @@ impl Dcm {
         if !self.started || dt <= 0.0 {
             return;
         }
-        let config = self.config;
         if !self.heading_absolute {
             let down = self.matrix.row(2).transpose();
             self.start(&down, Some(field), step); // the first field of a filter that ran without one
         }
+        let config = &self.config;
         let turned = core::mem::replace(&mut self.turned, Vec3::zeros());
         self.iron.turned(&turned);
         if !self.tilt.starting(config.tilt_tau) {
@@ -270,15 +272,11 @@ impl Dcm {
     }
 
     /// Turns the earth under the filter, with everything that is remembered in earth axes.
+    #[inline(never)]
     fn turn_earth(&mut self, turn: &Vec3) {
         self.turned += turn;
         if square(turn) > 1e-4 {
-            let by = rotate(&Mat3::identity(), turn, Increment::Exponential);
-            self.matrix = renormalise(&(by * self.matrix));
-            self.bias.attitude = by * self.bias.attitude;
-            self.tilt.x = by * self.tilt.x;
-            self.tilt.v = by * self.tilt.v;
-            return;
+            return self.turn_earth_far(&increment(turn, Increment::Exponential));
         }
         turn_rows(&mut self.matrix, turn);
         turn_rows(&mut self.bias.attitude, turn);
@@ -286,7 +284,19 @@ impl Dcm {
         self.tilt.v += turn.cross(&self.tilt.v);
     }
 
+    /// The same for a large turn, which first order cannot express.
+    #[cold]
+    #[inline(never)]
+    fn turn_earth_far(&mut self, by: &Mat3) {
+        self.matrix = renormalise(&product(by, &self.matrix));
+        self.bias.attitude = product(by, &self.bias.attitude);
+        self.tilt.x = by * self.tilt.x;
+        self.tilt.v = by * self.tilt.v;
+    }
+
     /// Sets the tilt from `down` (body axes) and the heading from `field` where there is one, from the present one where not.
+    #[cold]
+    #[inline(never)]
     fn start(&mut self, down: &Vec3, field: Option<&Vec3>, step: &mut Step) {
         let field = field.filter(|m| finite(m) && m.iter().all(|m| m.abs() < self.config.field.range));
         let field = field.map(|m| m - self.iron.applied(&self.config.iron));
@@ -311,6 +321,12 @@ impl Dcm {
 
 fn finite(v: &Vec3) -> bool {
     v.iter().all(|c| c.is_finite())
+}
+
+/// Finite, and not zero: a dead sensor reads zero.
+fn usable(v: &Vec3) -> bool {
+    let square = square(v);
+    square > 1e-20 && square < f32::MAX
 }
 
 /// Into (-pi, pi].

@@ -26,6 +26,7 @@ mod fresh;
 mod linear;
 mod measurement;
 mod rotation;
+mod trig;
 
 pub use angles::{Euler, euler_of, matrix_of, quaternion_of};
 pub use classic::{AccelWeight, Classic, ClassicConfig, Gains};

@@ -21,7 +21,7 @@ pub enum Increment {
 }
 
 /// 1/sqrt(x) for a normal positive number: the seed of micromath and Newton steps down to f32 rounding.
-fn inverse_sqrt(x: f32) -> f32 {
+pub(crate) fn inverse_sqrt(x: f32) -> f32 {
     let mut y = x.invsqrt();
     for _ in 0..3 {
         y *= 1.5 - 0.5 * x * y * y;
@@ -31,49 +31,82 @@ fn inverse_sqrt(x: f32) -> f32 {
 
 /// Direction of a vector; `None` when it has none (zero, tiny, huge or not finite).
 #[must_use]
+#[inline(never)]
 pub fn unit(v: &Vec3) -> Option<Vec3> {
     let square = v.dot(v);
     (square.is_finite() && square > 1e-20).then(|| v * inverse_sqrt(square))
 }
 
-/// Skew-symmetric matrix of a cross product: `skew(a) b = a x b`.
-fn skew(t: &Vec3) -> Mat3 {
-    Mat3::new(0.0, -t.z, t.y, t.z, 0.0, -t.x, -t.y, t.x, 0.0)
+/// Product of two matrices: one copy of it in the image.
+#[inline(never)]
+pub(crate) fn product(a: &Mat3, b: &Mat3) -> Mat3 {
+    a * b
+}
+
+/// The rotation that a rotation vector `t` (rad) means.
+#[must_use]
+pub(crate) fn increment(t: &Vec3, order: Increment) -> Mat3 {
+    let (s, c, diagonal) = match order {
+        Increment::FirstOrder => (1.0, 0.0, 1.0),
+        Increment::Exponential => {
+            let square = t.dot(t);
+            let c = 0.5 - square * (1.0 / 24.0 - square / 720.0);
+            (1.0 - square * (1.0 / 6.0 - square / 120.0), c, 1.0 - square * c)
+        }
+    };
+    let (v, w) = (t * s, t * c);
+    let (xy, xz, yz) = (w.x * t.y, w.x * t.z, w.y * t.z);
+    Mat3::new(
+        diagonal + w.x * t.x,
+        xy - v.z,
+        xz + v.y,
+        xy + v.z,
+        diagonal + w.y * t.y,
+        yz - v.x,
+        xz - v.y,
+        yz + v.x,
+        diagonal + w.z * t.z,
+    )
 }
 
 /// Turns the body by the small rotation vector `t` (rad, body axes) and renormalises.
 #[must_use]
-pub fn rotate(r: &Mat3, t: &Vec3, increment: Increment) -> Mat3 {
-    let u = skew(t);
-    let turned = match increment {
-        Increment::FirstOrder => r + r * u,
-        Increment::Exponential => {
-            let square = t.dot(t);
-            let s = 1.0 - square / 6.0 + square * square / 120.0;
-            let c = 0.5 - square / 24.0 + square * square / 720.0;
-            r + r * (u * s + u * u * c)
-        }
-    };
-    renormalise(&turned)
+pub fn rotate(r: &Mat3, t: &Vec3, order: Increment) -> Mat3 {
+    renormalise(&product(r, &increment(t, order)))
 }
+
+/// Error of a length or an angle beyond which first order is not enough.
+const FIRST_ORDER: f32 = 0.01;
 
 /// Makes the rows unit vectors at right angles again; half of the error goes to each of the first two rows. That is good to
-/// first order; after an absurd step the second row takes the whole error exactly.
+/// first order; after an absurd step it is done exactly.
 pub(crate) fn renormalise(r: &Mat3) -> Mat3 {
-    let (x, y) = (scale(r.row(0).transpose()), scale(r.row(1).transpose()));
+    let (x, y) = (r.row(0).transpose(), r.row(1).transpose());
     let half = 0.5 * x.dot(&y);
-    let (x, mut y) = (scale(x - y * half), scale(y - x * half));
-    if half.abs() > 0.01 {
-        y = scale(y - x * x.dot(&y));
+    let (x, y) = (x - y * half, y - x * half);
+    let (long_x, long_y) = (x.dot(&x), y.dot(&y));
+    if half.abs() > FIRST_ORDER || (long_x - 1.0).abs() > FIRST_ORDER || (long_y - 1.0).abs() > FIRST_ORDER {
+        return renormalise_exactly(r);
     }
-    let z = x.cross(&y);
-    Mat3::from_rows(&[x.transpose(), y.transpose(), scale(z).transpose()])
+    let (x, y) = (x * (1.5 - 0.5 * long_x), y * (1.5 - 0.5 * long_y));
+    from_rows(&x, &y)
 }
 
-/// To unit length: first order near 1 (no root), exactly otherwise.
-fn scale(v: Vec3) -> Vec3 {
-    let square = v.dot(&v);
-    if (0.99..1.01).contains(&square) { v * (0.5 * (3.0 - square)) } else { v * inverse_sqrt(square) }
+/// The same by Gram and Schmidt.
+#[cold]
+#[inline(never)]
+fn renormalise_exactly(r: &Mat3) -> Mat3 {
+    let x = exactly(&r.row(0).transpose());
+    let y = r.row(1).transpose();
+    from_rows(&x, &exactly(&(y - x * x.dot(&y))))
+}
+
+fn exactly(v: &Vec3) -> Vec3 {
+    v * inverse_sqrt(v.dot(v))
+}
+
+fn from_rows(x: &Vec3, y: &Vec3) -> Mat3 {
+    Mat3::from_rows(&[x.transpose(), y.transpose(), x.cross(y).transpose()])
 }
 
 #[cfg(test)]

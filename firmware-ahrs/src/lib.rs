@@ -19,6 +19,7 @@ pub mod ahrs;
 pub mod error;
 pub mod hmc5883l;
 pub mod itg3200;
+pub mod lis3dh;
 pub mod mounting;
 pub mod sampler;
 

@@ -9,6 +9,7 @@
 mod ahrs;
 mod beam;
 mod board;
+mod calibrate;
 mod circle;
 mod close_loop;
 mod demo;
@@ -60,6 +61,8 @@ enum Command {
     Select(select::Args),
     /// Design of the load cell's beam, with a warning of resonance.
     Beam(beam::Args),
+    /// Sensor errors of the IMU board from a recording.
+    Calibrate(calibrate::Args),
     /// The firmware's attitude filter over a recorded file.
     Ahrs(ahrs::Args),
     /// The whole circle in simulation; with --auto the tool flies its own next experiments.
@@ -92,6 +95,7 @@ fn main() -> ExitCode {
         Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
         Command::Select(args) => select::run(args, cli.quiet),
         Command::Beam(args) => beam::run(args, cli.quiet),
+        Command::Calibrate(args) => calibrate::run(args, cli.quiet),
         Command::Ahrs(args) => ahrs::run(args, cli.quiet),
         Command::Loop(args) => circle::run(args, cli.quiet),
         Command::Flash(args) => flash::run(args),

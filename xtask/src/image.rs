@@ -69,6 +69,22 @@ fn stack(place: &Place) -> Result<(), Failure> {
     let most = most.ok_or_else(|| Failure(format!("{RIG_BUDGET}: stack_bytes: expected a number of bytes")))?;
     if bound > most {
         return Err(Failure(format!("firmware-rig: its stack can reach {bound} bytes, the budget is {most} ({RIG_BUDGET})")));
+    filters(place)
+}
+
+/// Flash of the attitude filters over the same image without one, against `budgets/ahrs.toml`.
+fn filters(place: &Place) -> Result<(), Failure> {
+    const FILE: &str = "budgets/ahrs.toml";
+    let text = std::fs::read_to_string(place.root.join(FILE)).map_err(|error| Failure(format!("{FILE}: {error}")))?;
+    let limits: toml::Table = text.parse().map_err(|error: toml::de::Error| Failure(format!("{FILE}: {}", error.message())))?;
+    let empty = measure(&place.images().join("cost-empty"))?.flash;
+    for filter in ["dcm", "classic"] {
+        let flash = measure(&place.images().join(format!("cost-{filter}")))?.flash - empty;
+        let limit = limits.get(filter).and_then(|t| t.get("flash")).and_then(toml::Value::as_integer).unwrap_or(0) as u64;
+        println!("filter {filter:<8} {flash:>7} bytes of flash over an empty image, budget {limit}");
+        if flash > limit {
+            return Err(Failure(format!("filter {filter}: {flash} bytes of flash, the budget is {limit} ({FILE})")));
+        }
     }
     Ok(())
 }

@@ -9,7 +9,8 @@
 use super::state::{Words, flag};
 use crate::Vec3;
 use crate::config::FieldConfig;
-use libm::{atan2f, sqrtf};
+use crate::trig::root;
+use libm::atan2f;
 
 /// Norm and dip of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -23,7 +24,7 @@ pub(super) struct Shape {
 impl Shape {
     fn of(earth: &Vec3) -> Self {
         let level = earth.x * earth.x + earth.y * earth.y;
-        Self { norm: sqrtf(level + earth.z * earth.z), dip: atan2f(earth.z, sqrtf(level)) }
+        Self { norm: root(level + earth.z * earth.z), dip: atan2f(earth.z, root(level)) }
     }
 
     fn follow(&mut self, other: &Self, k: f32) {

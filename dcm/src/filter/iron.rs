@@ -10,8 +10,8 @@
 use super::state::Words;
 use crate::config::IronConfig;
 use crate::linear::{inverse, square};
+use crate::trig::root;
 use crate::{Mat3, Vec3};
-use libm::sqrtf;
 
 /// Readings between two solutions.
 const SOLVE_EVERY: f32 = 64.0;
@@ -38,7 +38,7 @@ impl Iron {
         if square <= least * least {
             return Vec3::zeros();
         }
-        let long = sqrtf(square);
+        let long = root(square);
         self.found * ((long - least).min(config.limit) / long)
     }
 

@@ -21,6 +21,7 @@ pub(super) struct LowPass {
 
 impl LowPass {
     /// Takes one value that stands for `dt` seconds.
+    #[inline(never)]
     pub(super) fn step(&mut self, z: &Vec3, dt: f32, tau: f32) {
         let start = 2.0 * tau;
         if self.age < start {

@@ -7,11 +7,11 @@
 
 use super::state::Words;
 use super::{Dcm, StateError};
-use crate::angles::{euler_of, quaternion_of};
+use crate::angles::{about_down, euler_of, quaternion_of};
 use crate::linear::{determinant, square};
+use crate::trig::root;
 use crate::{Earth, Euler, Mat3, STANDARD_GRAVITY, Vec3};
 use core::f32::consts::PI;
-use libm::{cosf, sinf, sqrtf};
 
 /// Words of a saved state.
 pub const STATE_WORDS: usize = 102;
@@ -124,9 +124,7 @@ impl Dcm {
         if !yaw.is_finite() {
             return;
         }
-        let by = yaw - self.euler().yaw;
-        let (s, c) = (sinf(by), cosf(by));
-        let turn = Mat3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+        let turn = about_down(yaw - self.euler().yaw);
         self.matrix = turn * self.matrix;
         self.bias.attitude = turn * self.bias.attitude;
         self.tilt.x = turn * self.tilt.x;
@@ -174,10 +172,10 @@ impl Dcm {
             if self.field.known() { (now.norm / reference.norm - 1.0, now.dip - reference.dip) } else { (0.0, 0.0) };
         Quality {
             heading_error: self.heading_error,
-            bias_sigma: self.config.bias.limit * sqrtf(self.bias.ignorance),
+            bias_sigma: self.config.bias.limit * root(self.bias.ignorance),
             field_norm,
             field_dip,
-            iron: sqrtf(square(&self.iron.found)),
+            iron: root(square(&self.iron.found)),
         }
     }
 

@@ -13,6 +13,7 @@
 
 pub mod ahrs;
 pub mod bus;
+pub mod cost;
 mod machine;
 pub mod operator;
 mod part;

@@ -1,0 +1,36 @@
+//! What the cost images run: a rolling body's readings, at the board's rates.
+//!
+//! What it is: readings without any library function, so that the image without a filter holds nothing of the filter; the
+//! images differ in the filter alone, and so do their sizes and instruction counts.
+//! What can go wrong: an optimiser that sees through the inputs; hence the black boxes.
+//! Units: rad/s, m/s^2, uT, s.
+//! Reference: issue of the board's cost; `budgets/ahrs.toml`.
+
+use core::hint::black_box;
+use dcm::{Measurement, Vec3};
+
+/// Updates of a run.
+const UPDATES: u32 = 4000;
+/// Time between them, s.
+const DT: f32 = 1.0 / 200.0;
+/// Ticks of eight on which the magnetometer is fresh: 75 Hz of 200.
+const FRESH: [bool; 8] = [true, false, false, true, false, true, false, false];
+
+/// Runs `step` over the body's motion, then sleeps.
+pub(crate) fn run(mut step: impl FnMut(f32, &Measurement)) -> ! {
+    let (mut sine, mut cosine) = (0.0f32, 1.0f32);
+    for k in 0..UPDATES {
+        cosine -= sine * DT;
+        sine += cosine * DT;
+        let mag = FRESH.get(k as usize % 8).copied().unwrap_or(false);
+        let measured = Measurement {
+            gyro: Some(Vec3::new(1.0, 0.01, -0.02)),
+            accel: Some(Vec3::new(0.1, -9.8 * sine, -9.8 * cosine)),
+            mag: mag.then(|| Vec3::new(20.0, 43.0 * sine, 43.0 * cosine)),
+        };
+        step(black_box(DT), black_box(&measured));
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
