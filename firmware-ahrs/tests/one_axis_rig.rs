@@ -19,6 +19,8 @@ impl Noise {
     }
 }
 
+/// Rest before the shaft turns, s.
+const REST_S: f64 = 15.0;
 /// Distance of the chips from the shaft, m: they feel its acceleration.
 const ARM: f64 = 0.05;
 /// What the chips of the Razor board have: offset, deg/s (PS-ITG-3200A: up to 40; Razor's example: these).
@@ -26,12 +28,12 @@ const OFFSET_DPS: [f64; 3] = [-2.9, 6.7, -1.3];
 /// Noise of a reading: 0.38 deg/s rms (PS-ITG-3200A table 3.1, at 98 Hz), 1 count, 0.2 uT.
 const NOISE: [f64; 3] = [0.38, 1.0, 0.2];
 
-/// The shaft's angle, rate and acceleration, rad: five seconds of rest, then swings of 60 degrees.
+/// The shaft's angle, rate and acceleration, rad: fifteen seconds of rest (the averages fill in twelve), then swings of 60 degrees.
 fn shaft(t: f64) -> (f64, f64, f64) {
-    if t < 5.0 {
+    if t < REST_S {
         return (0.0, 0.0, 0.0);
     }
-    let (a, w, t) = (60f64.to_radians(), 1.3, t - 5.0);
+    let (a, w, t) = (60f64.to_radians(), 1.3, t - REST_S);
     // starts smoothly
     let grow = 1.0 - (-t).exp();
     let (s, c) = (w * t).sin_cos();
@@ -67,11 +69,11 @@ fn roll_follows_within_one_degree_and_pitch_and_yaw_stay_within_half() {
         let (mut ahrs, mut noise) = (Ahrs::new(AhrsConfig::default()), Noise(seed));
         let mut worst = [0.0f64; 3];
         let mut widest = 0.0f64;
-        for n in 0..200 * 125u32 {
+        for n in 0..200 * 135u32 {
             let t = f64::from(n) * 0.005;
             let inputs = Inputs { now: Ticks::from_ms(5 * u64::from(n)), readings: readings(t, n, &mut noise) };
             ahrs.tick(&inputs);
-            if t < 5.0 {
+            if t < REST_S {
                 continue; // the rest from which the offset is found
             }
             let e = ahrs.filter().euler();
