@@ -56,6 +56,7 @@ pub(crate) fn image(place: &Place, bless: bool) -> Result<(), Failure> {
     let limits = read_budget(&text)?;
     print!("{}", table(&sizes, &limits));
     compare(&sizes, &limits)?;
+    filters(place)?;
     stack(place)
 }
 
@@ -69,7 +70,8 @@ fn stack(place: &Place) -> Result<(), Failure> {
     let most = most.ok_or_else(|| Failure(format!("{RIG_BUDGET}: stack_bytes: expected a number of bytes")))?;
     if bound > most {
         return Err(Failure(format!("firmware-rig: its stack can reach {bound} bytes, the budget is {most} ({RIG_BUDGET})")));
-    filters(place)
+    }
+    Ok(())
 }
 
 /// Flash of the attitude filters over the same image without one, against `budgets/ahrs.toml`.
