@@ -6,6 +6,7 @@
 //! Reference: specification `identification.md` and `closing-the-loop.md`.
 #![forbid(unsafe_code)]
 
+pub mod almanac;
 pub mod beam;
 pub mod circle;
 pub mod close;

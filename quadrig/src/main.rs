@@ -13,6 +13,7 @@ mod calibrate;
 mod circle;
 mod close_loop;
 mod demo;
+mod effects;
 mod flash;
 mod identify;
 mod import;
@@ -77,6 +78,8 @@ enum Command {
     Log(record::Args),
     /// Talks to the rig board: arm, run, set, stop, tare, clear, configure, calibrate.
     Rig(rig::Args),
+    /// The library of effects as pages.
+    Effects(effects::Args),
     /// A model's prediction of every measured channel, row for row.
     Predict(predict::Args),
 }
@@ -103,6 +106,7 @@ fn main() -> ExitCode {
         Command::Step(args) => step::run(args, cli.quiet),
         Command::Log(args) => record::run(args, cli.quiet),
         Command::Rig(args) => rig::run(args, cli.quiet),
+        Command::Effects(args) => effects::run(args, cli.quiet),
         Command::Predict(args) => predict::run(args),
     };
     match done {

@@ -1,0 +1,40 @@
+//! `quadrig effects`: the library's pages.
+//!
+//! What it is: one page and one figure an effect, and the index, written from the library.
+//! What can go wrong: a folder that cannot be written.
+//! Units: on the pages.
+//! Reference: specification `closing-the-loop.md`, step 5.
+
+use crate::Failure;
+use ident::almanac::almanac;
+use ident::log::write_whole;
+use ident::report::write_figures;
+use std::path::PathBuf;
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the pages.
+    #[arg(short, long, default_value = "docs/effects")]
+    output: PathBuf,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let (pages, index) = almanac();
+    std::fs::create_dir_all(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    let write = |name: String, text: &str| {
+        let file = args.output.join(name);
+        write_whole(&file, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", file.display()))
+    };
+    for page in &pages {
+        write(format!("{}.md", page.id), &page.text)?;
+    }
+    write("README.md".to_owned(), &index)?;
+    let drawn: Vec<_> = pages.iter().map(|p| p.figure.clone()).filter(|f| !f.is_empty()).collect();
+    write_figures(&args.output, &drawn).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
+    if !quiet {
+        println!("{} pages in {}", pages.len(), args.output.display());
+    }
+    Ok(())
+}
