@@ -27,6 +27,9 @@ const LONGEST_S: u32 = 10;
 /// Deviation from the median that counts as disagreement at constant speed (specification: 1 % on hardware).
 const DISAGREEMENT: f32 = 0.01;
 
+/// Periods that are looked at for a pattern, at the least.
+const PATTERN: usize = 8;
+
 /// Speed below which the blades count as straight, and are learnt as they are, rev/min.
 const STRAIGHT_BELOW: f32 = 4000.0;
 /// Change of the blades' unevenness from there that counts as twist: 3.6 degrees between two blades.
@@ -201,7 +204,8 @@ impl CaptureChannel {
             return full(CaptureVerdict::OverCapture);
         }
         if self.is_turning(now) {
-            let edges = self.reading.map_or(0, |(edges, _)| usize::from(edges));
+            // a slow reading holds too few periods to show a pattern of two: the ones before it are looked at as well
+            let edges = self.reading.map_or(0, |(edges, _)| usize::from(edges)).max(PATTERN);
             return full(judge(self.marks, self.periods().take(edges)));
         }
         match others {

@@ -41,7 +41,6 @@ pub struct Desk {
     pulses: Arc<Mutex<Vec<PulseWidth>>>,
     thread: Option<JoinHandle<()>>,
     quit: Arc<AtomicBool>,
-    _slave: Option<TTYPort>,
 }
 
 impl Desk {
@@ -51,9 +50,9 @@ impl Desk {
     /// When the system gives no pseudo-terminal.
     #[must_use]
     pub fn new(line: Line) -> Self {
-        let (mut master, mut slave) = TTYPort::pair().expect("a pseudo-terminal");
-        slave.set_exclusive(false).expect("others may open it");
+        let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
         let port = slave.name().expect("a name");
+        drop(slave); // its lock would keep every other program out
         let flag = || Arc::new(AtomicBool::new(false));
         let (power, unplug, quit) = (flag(), flag(), flag());
         let pulses = Arc::new(Mutex::new(Vec::new()));
@@ -62,7 +61,7 @@ impl Desk {
             let (power, unplug, quit, pulses) = (power.clone(), unplug.clone(), quit.clone(), pulses.clone());
             move || play(&mut master, line, &power, &unplug, &quit, &pulses, &sender)
         });
-        Self { port, beeps, power, unplug, pulses, thread: Some(thread), quit, _slave: Some(slave) }
+        Self { port, beeps, power, unplug, pulses, thread: Some(thread), quit }
     }
 
     /// Connects the ESC's battery.
@@ -180,7 +179,7 @@ fn play(
             sent += 1;
             let damaged = line == Line::Noisy && sent.is_multiple_of(997);
             if master.write_all(&[if damaged { byte ^ 0x40 } else { byte }]).is_err() {
-                return; // nobody has the port open and its buffer is full
+                out.clear(); // nobody has the port open: what is sent is lost, as on a cable
             }
         }
     }
