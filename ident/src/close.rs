@@ -88,7 +88,7 @@ fn kind(diagnosis: &Diagnosis) -> Kind {
 }
 
 fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMap<String, Channel> {
-    let figures = |fit: &Fit, held: &[f64]| -> Vec<Figures> {
+    let figures = |fit: &Fit, held: &[heldout::Held]| -> Vec<Figures> {
         heldout::residuals(context, declared, fit)
             .iter()
             .zip(held)
@@ -96,7 +96,7 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
             .map(|((r, held), target)| {
                 let t: Vec<f64> = target.rows.iter().map(|i| context.t[*i]).collect();
                 let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
-                Figures { rms, heldout_rms: if held.is_finite() { *held } else { rms }, whiteness_p: whiteness(&t, r) }
+                Figures { rms, heldout_rms: if held.rms.is_finite() { held.rms } else { rms }, whiteness_p: whiteness(&t, r) }
             })
             .collect()
     };
@@ -165,7 +165,7 @@ fn quoted(context: &Context, d: &Diagnosis, k: usize) -> (String, f64) {
         .iter()
         .enumerate()
         .filter(|(_, t)| p.instance.touches(t.name) && !t.relation.is_evidence())
-        .map(|(i, t)| (t.name.to_owned(), 1.0 - d.heldout_after[i] / d.heldout_without[k][i]))
+        .map(|(i, t)| (t.name.to_owned(), 1.0 - d.heldout_after[i].rms / d.heldout_without[k][i].rms))
         .filter(|(_, r)| r.is_finite())
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .unwrap_or_else(|| (p.instance.channels.first().cloned().unwrap_or_default(), 0.0))

@@ -10,6 +10,7 @@ use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
 use crate::solve::Normal;
 use std::borrow::Cow;
+use std::sync::OnceLock;
 
 /// Efficiency of ESC and motor at work: 0.65 to 0.85 for motors of this size.
 const EFFICIENCY: f64 = 0.75;
@@ -108,6 +109,25 @@ pub struct Target {
     pub noise: Noise,
     /// Share of this target in a joint likelihood: four speed channels see one rotor.
     pub weight: f64,
+    /// For each sample its variance for the weights of the least squares (see [`Noise::weight_variance`]).
+    pub levelled: Vec<f64>,
+    /// For each sample its variance in the likelihood of the scatter.
+    pub floored: Vec<f64>,
+}
+
+/// Share of the mean variance in the weights of the least squares: a stretch with little noise must not outvote the others
+/// where a polynomial misfits.
+const LEVELLED: f64 = 0.5;
+/// Share of the mean variance in the likelihood: enough to keep a standing rotor's silence from counting without bound.
+const FLOORED: f64 = 0.05;
+
+impl Target {
+    fn new(context: &Context, name: &'static str, relation: Relation, rows: Vec<usize>, y: Vec<f64>, noise: Noise) -> Self {
+        let speed = |i: &usize| if context.rpm.is_empty() { 0.0 } else { context.rpm[*i] };
+        let levelled = rows.iter().map(|i| noise.weight_variance(speed(i), LEVELLED)).collect();
+        let floored = rows.iter().map(|i| noise.weight_variance(speed(i), FLOORED)).collect();
+        Self { name, relation, rows, y, noise, weight: 1.0, levelled, floored }
+    }
 }
 
 /// How the consensus speed is made; stands in `model.toml`.
@@ -152,6 +172,23 @@ pub struct Context {
     pub targets: Vec<Target>,
     /// Steady stretches as row ranges `[from, to)`.
     pub steady: Vec<(usize, usize)>,
+    /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
+    powers: [OnceLock<Vec<Vec<f64>>>; 2],
+    /// What effects ask again and again.
+    pub(crate) facts: Facts,
+}
+
+/// What effects read off a log once and ask for again and again.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Facts {
+    /// Step, offset and anchoring of the saw-tooth of the pulse that fits best.
+    pub(crate) tooth: OnceLock<(f64, f64, bool)>,
+    /// Speed that the pulse alone makes one expect on each row, rev/min.
+    pub(crate) expected: OnceLock<Vec<f64>>,
+    /// Whether speed and command change within single rows.
+    pub(crate) abrupt: OnceLock<bool>,
+    /// Slope of the static speed curve on each row, rev/min per us.
+    pub(crate) slope: OnceLock<Vec<f64>>,
 }
 
 impl Context {
@@ -199,6 +236,8 @@ impl Context {
             start_pulse_us: start,
             targets: Vec::new(),
             steady,
+            powers: Default::default(),
+            facts: Facts::default(),
         }
     }
 
@@ -216,6 +255,13 @@ impl Context {
             Some((channel, name)) => difference(self, name, log.column(channel)?),
             None => target(log, self, name),
         }
+    }
+
+    /// Columns of the declared polynomial of a relation, from order 0 up (at least as many as it has terms).
+    #[must_use]
+    pub fn powers(&self, relation: Relation) -> &[Vec<f64>] {
+        let kind = usize::from(relation != Relation::SpeedFromPulse);
+        self.powers[kind].get_or_init(|| powers_of(self, [Relation::SpeedFromPulse, Relation::Current][kind]))
     }
 
     /// Number of rows.
@@ -279,6 +325,17 @@ impl Context {
     pub fn duration(&self) -> f64 {
         self.t.last().unwrap_or(&0.0) - self.t.first().unwrap_or(&0.0)
     }
+}
+
+/// See [`Context::powers`]; a log without a command or a speed has columns of zeros beyond the constant.
+fn powers_of(context: &Context, relation: Relation) -> Vec<Vec<f64>> {
+    let n = context.len();
+    let x = context.regressor(relation).unwrap_or_else(|| vec![0.0; n]);
+    let live = |i: usize| match (&context.pulse, relation) {
+        (Some(p), Relation::SpeedFromPulse) => p[i] >= context.start_pulse_us,
+        _ => true,
+    };
+    (0..=3).map(|k| (0..n).map(|i| if live(i) { x[i].powi(k) } else { 0.0 }).collect()).collect()
 }
 
 /// Linear bridge over missing samples, constant at the ends.
@@ -459,7 +516,7 @@ fn target(log: &Log, context: &Context, name: &'static str) -> Option<Target> {
     let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, &context.steady);
     let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
     let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
-    Some(Target { name, relation, rows, y, noise, weight })
+    Some(Target { weight, ..Target::new(context, name, relation, rows, y, noise) })
 }
 
 /// Speed channels that can be compared with the consensus: what all of them share (supply, load, lag) drops out. With fewer than
@@ -476,6 +533,6 @@ fn difference(context: &Context, name: &'static str, column: &[f64]) -> Option<T
     let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
     let y: Vec<f64> = rows.iter().map(|i| column[*i] - context.rpm[*i]).collect();
     let noise = noise::estimate(&rows, &y, &y, &context.rpm, &context.steady);
-    let target = Target { name, relation: Relation::SpeedDifference, rows, y, noise, weight: 1.0 };
+    let target = Target::new(context, name, Relation::SpeedDifference, rows, y, noise);
     (target.rows.len() > 8).then_some(target)
 }

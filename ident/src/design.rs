@@ -49,24 +49,12 @@ impl TargetDesign {
     /// The declared baseline of a target.
     #[must_use]
     pub fn baseline(context: &Context, name: &'static str, relation: Relation) -> Self {
-        let n = context.len();
-        let x = context.regressor(relation).unwrap_or_else(|| vec![0.0; n]);
-        let live: Option<Vec<bool>> = match (relation, &context.pulse) {
-            (Relation::SpeedFromPulse, Some(p)) => Some(p.iter().map(|v| *v >= context.start_pulse_us).collect()),
-            _ => None,
-        };
-        let columns = (0..=relation.degree())
-            .map(|k| {
-                let mut values: Vec<f64> = x.iter().map(|v| v.powi(k as i32)).collect();
-                if let Some(live) = &live {
-                    for (v, on) in values.iter_mut().zip(live) {
-                        if !on {
-                            *v = 0.0;
-                        }
-                    }
-                }
-                Column { label: Label::Base(k), values }
-            })
+        let columns = context
+            .powers(relation)
+            .iter()
+            .take(relation.degree() + 1)
+            .enumerate()
+            .map(|(k, values)| Column { label: Label::Base(k), values: values.clone() })
             .collect();
         Self { name, relation, columns, fixed: Vec::new(), extra_variance: Vec::new() }
     }

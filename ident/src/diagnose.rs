@@ -10,7 +10,7 @@
 
 use crate::context::{Context, Relation};
 use crate::effects::{self, Effect, Instance};
-use crate::heldout;
+use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, scatters};
 use crate::opponent::{nameless, opponent};
 use crate::search::{refine, refine_newest, scan};
@@ -78,11 +78,11 @@ pub struct Diagnosis {
     /// The winner is the empirical correction.
     pub unknown: bool,
     /// Held-out errors of the declared model, by target.
-    pub heldout_before: Vec<f64>,
+    pub heldout_before: Vec<Held>,
     /// Held-out errors of the winner, by target.
-    pub heldout_after: Vec<f64>,
+    pub heldout_after: Vec<Held>,
     /// For each effect of the winner the held-out errors without it, by target.
-    pub heldout_without: Vec<Vec<f64>>,
+    pub heldout_without: Vec<Vec<Held>>,
     /// The folds.
     pub folds: Vec<Vec<bool>>,
 }
@@ -110,6 +110,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     for round in 0..MOST_EFFECTS {
         let ranked =
             round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
+        if std::env::var("QTRACE").is_ok() { for c in ranked.iter().take(10) { eprintln!("r{round} {:.1} {:?} held {:?}", c.evidence, c.fit.placed.last(), heldout::errors_after_newest(context, declared, &c.fit, &folds, &errors).iter().zip(&errors).map(|(a,b)| format!("{:.3}", 1.0-a.share_gone(b))).collect::<Vec<_>>()); } }
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else { break };
         best = chosen.winner;
         errors = chosen.held;
@@ -137,7 +138,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         errors = held;
     }
     let heldout_without = loop {
-        let without: Vec<Vec<f64>> = (0..best.fit.placed.len())
+        let without: Vec<Vec<Held>> = (0..best.fit.placed.len())
             .map(|k| {
                 without(context, declared, &best.fit, k, &start)
                     .map_or_else(|| heldout_before.clone(), |f| heldout::errors(context, declared, &f, &folds))
@@ -276,7 +277,7 @@ pub(crate) fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) 
 /// What one round chose.
 struct Chosen {
     winner: Candidate,
-    held: Vec<f64>,
+    held: Vec<Held>,
     probability: f64,
     rivals: Vec<(Candidate, f64)>,
 }
@@ -288,7 +289,7 @@ fn choose(
     declared: Declared<'_>,
     ranked: &[Candidate],
     best: &Candidate,
-    errors: &[f64],
+    errors: &[Held],
     folds: &[Vec<bool>],
 ) -> Option<Chosen> {
     for (k, winner) in ranked.iter().enumerate().take_while(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
@@ -309,14 +310,14 @@ fn choose(
 }
 
 /// Largest share of the held-out error that the newest effect removes from one of its channels.
-fn largest_reduction(context: &Context, candidate: &Candidate, held: &[f64], before: &[f64]) -> f64 {
+fn largest_reduction(context: &Context, candidate: &Candidate, held: &[Held], before: &[Held]) -> f64 {
     let Some(newest) = candidate.fit.placed.last() else { return 0.0 };
     context
         .targets
         .iter()
         .enumerate()
         .filter(|(_, t)| newest.instance.touches(t.name))
-        .map(|(i, _)| 1.0 - held[i] / before[i])
+        .map(|(i, _)| held[i].share_gone(&before[i]))
         .fold(0.0, f64::max)
 }
 
@@ -334,14 +335,14 @@ fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
     fit.placed.iter().enumerate().all(|(k, p)| {
         let inside = p.effect.shapes(context, &p.instance).iter().zip(&p.shape).all(|(s, v)| {
             let margin = 1e-3 * (s.range.1 - s.range.0);
-            s.range.1 <= s.range.0 || (*v > s.range.0 - margin && *v < s.range.1 - margin)
+            s.is_nuisance() || s.range.1 <= s.range.0 || (*v > s.range.0 - margin && *v < s.range.1 - margin)
         });
         inside && p.effect.plausible(context, &p.instance, &fit.estimates(context, declared, k))
     })
 }
 
 /// The newest effect must remove some of the held-out error on one of its channels, and spoil none.
-fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[f64], before: &[f64]) -> bool {
+fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[Held], before: &[Held]) -> bool {
     let Some(newest) = candidate.fit.placed.last() else { return false };
     let mut helps = false;
     // a resonance that one level alone has met is not predicted by the others: when that level is left out, the height of its
@@ -351,7 +352,7 @@ fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[f64
         if !newest.instance.touches(target.name) {
             continue;
         }
-        let share = 1.0 - held[i] / before[i];
+        let share = held[i].share_gone(&before[i]);
         helps |= share > NEEDED_REDUCTION;
         if share < -NEEDED_REDUCTION && !target.relation.is_evidence() && !certain {
             return false;
@@ -362,13 +363,13 @@ fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[f64
 }
 
 /// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.
-fn is_idle(context: &Context, placed: &Placed, errors: &[f64], without: &[f64]) -> bool {
+fn is_idle(context: &Context, placed: &Placed, errors: &[Held], without: &[Held]) -> bool {
     let most = context
         .targets
         .iter()
         .enumerate()
         .filter(|(_, t)| placed.instance.touches(t.name))
-        .map(|(i, _)| 1.0 - errors[i] / without[i])
+        .map(|(i, _)| errors[i].share_gone(&without[i]))
         .fold(0.0, f64::max);
     most < 0.5 * NEEDED_REDUCTION && !placed.effect.scatters()
 }

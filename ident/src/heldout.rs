@@ -51,13 +51,31 @@ fn levels(context: &Context) -> Vec<Option<usize>> {
     out
 }
 
-/// Held-out root mean square error of each target of the context under a hypothesis.
+/// Error of one target on rows that the fit did not see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// Root mean square.
+    pub rms: f64,
+    /// An error that a few grossly wrong rows cannot decide: the noise floor times sqrt(exp(mean ln(1 + (r / floor)^2)) - 1).
+    pub typical: f64,
+}
+
+impl Held {
+    /// Share of `before` that is gone, in the measure in which more is gone: rows right after a step, whose instant is known
+    /// only to a sample, may rule the one, and a resonance or a saturation that few rows show rules the other.
+    #[must_use]
+    pub fn share_gone(&self, before: &Self) -> f64 {
+        (1.0 - self.rms / before.rms).max(1.0 - self.typical / before.typical)
+    }
+}
+
+/// Held-out error of each target of the context under a hypothesis.
 #[must_use]
-pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec<bool>]) -> Vec<f64> {
+pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec<bool>]) -> Vec<Held> {
     let all = vec![true; context.targets.len()];
     pooled(context, declared, folds, &all, &|keep| refine(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS))
         .into_iter()
-        .map(|e| e.unwrap_or(f64::NAN))
+        .map(|e| e.unwrap_or(Held { rms: f64::NAN, typical: f64::NAN }))
         .collect()
 }
 
@@ -68,8 +86,8 @@ pub fn errors_after_newest(
     declared: Declared<'_>,
     fit: &Fit,
     folds: &[Vec<bool>],
-    previous: &[f64],
-) -> Vec<f64> {
+    previous: &[Held],
+) -> Vec<Held> {
     let Some(newest) = fit.placed.len().checked_sub(1) else { return previous.to_vec() };
     let group = connected(&fit.placed, newest);
     let moved: Vec<bool> =
@@ -92,24 +110,32 @@ fn pooled(
     folds: &[Vec<bool>],
     wanted: &[bool],
     refined: &dyn Fn(&[bool]) -> Vec<Placed>,
-) -> Vec<Option<f64>> {
-    let mut sums = vec![(0.0, 0usize); context.targets.len()];
+) -> Vec<Option<Held>> {
+    let mut sums = vec![(0.0, 0.0, 0usize); context.targets.len()];
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
         let placed = refined(&keep);
         for ((target, sum), _) in context.targets.iter().zip(&mut sums).zip(wanted).filter(|(_, w)| **w) {
             let design = design(context, declared, &placed, target);
-            let Some(fitted) = fit_target(context, target, &design, Rows::Where(&keep)) else { continue };
+            let Some(fitted) = fit_target(target, &design, Rows::Where(&keep)) else { continue };
             let prediction = design.predict(&fitted.coefficients, context.len());
             for (row, y) in target.rows.iter().zip(&target.y) {
                 if out[*row] {
-                    sum.0 += (y - prediction[*row]).powi(2);
-                    sum.1 += 1;
+                    let square = (y - prediction[*row]).powi(2);
+                    sum.0 += square;
+                    sum.1 += (square / target.noise.rms.powi(2)).ln_1p();
+                    sum.2 += 1;
                 }
             }
         }
     }
-    sums.iter().map(|(s, n)| (*n > 0).then(|| (s / *n as f64).sqrt())).collect()
+    sums.iter()
+        .zip(&context.targets)
+        .map(|((squares, logs, n), target)| {
+            let mean = |sum: f64| sum / *n as f64;
+            (*n > 0).then(|| Held { rms: mean(*squares).sqrt(), typical: target.noise.rms * mean(*logs).exp_m1().sqrt() })
+        })
+        .collect()
 }
 
 /// Residual of each target on its own rows.

@@ -117,91 +117,105 @@ pub enum Rows<'a> {
 ///
 /// The likelihood counts samples as independent; [`TargetFit::share`] says how many of them the colour of the residual leaves.
 #[must_use]
-pub fn fit_target(context: &Context, target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
-    let mut kept = Vec::with_capacity(target.rows.len());
-    let (solution, loglik) = solve_target(context, target, design, rows, Some(&mut kept))?;
-    let Solution { coefficients, inverse, rss } = solution;
-    let share = effective_share(design, &coefficients, &kept);
-    let covariance = inverse * ((rss / kept.len() as f64).max(0.01) / share);
+pub fn fit_target(target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
+    let (Solution { coefficients, inverse, .. }, loglik, kept) = solve_target(target, design, rows, true)?;
+    let mut residual = kept.residual(&coefficients);
+    residual.iter_mut().zip(&kept.floored).for_each(|(r, v)| *r /= v.sqrt());
+    let rss: f64 = residual.iter().map(|r| r * r).sum();
+    let share = effective_share(&residual);
+    let covariance = inverse * ((rss / residual.len() as f64).max(0.01) / share);
     Some(TargetFit { coefficients, labels: design.columns.iter().map(|c| c.label).collect(), covariance, loglik, share })
 }
 
-/// Row, sample and variance of what went into a fit.
-type Kept = (usize, f64, f64);
+/// What went into a fit: columns, samples less the known part, and their variances in the two views, each one value a sample.
+struct Kept {
+    columns: Vec<Vec<f64>>,
+    y: Vec<f64>,
+    floored: Vec<f64>,
+}
 
-/// Solves for the coefficients with levelled weights (see [`crate::noise::Noise::weight_variance`]) and counts both likelihoods.
+impl Kept {
+    /// Samples less the fitted columns.
+    fn residual(&self, coefficients: &[f64]) -> Vec<f64> {
+        let mut out = self.y.clone();
+        for (column, b) in self.columns.iter().zip(coefficients) {
+            out.iter_mut().zip(column).for_each(|(r, v)| *r -= v * b);
+        }
+        out
+    }
+}
+
+/// Solves for the coefficients with levelled weights (see [`crate::noise::Noise::weight_variance`]) and counts the likelihood
+/// of the mean, and that of the scatter too where `scattering` asks for it or an effect adds scatter.
 fn solve_target(
-    context: &Context,
     target: &Target,
     design: &TargetDesign,
     rows: Rows<'_>,
-    kept: Option<&mut Vec<Kept>>,
-) -> Option<(Solution, Likelihood)> {
-    let k = design.columns.len();
-    let mut normal = Normal::new(k);
-    let mut row = vec![0.0; k];
+    scattering: bool,
+) -> Option<(Solution, Likelihood, Kept)> {
     let stride = if let Rows::Every(n) = rows { n.max(1) } else { 1 };
-    let mut log_levelled = 0.0;
-    let mut samples: Vec<Kept> = Vec::with_capacity(target.rows.len() / stride + 1);
-    for (j, i) in target.rows.iter().enumerate().step_by(stride) {
-        if let Rows::Where(mask) = rows
-            && !mask[*i]
-        {
-            continue;
-        }
-        let speed = if context.rpm.is_empty() { 0.0 } else { context.rpm[*i] };
-        let extra = design.extra_variance.get(*i).copied().unwrap_or(0.0);
-        for (r, column) in row.iter_mut().zip(&design.columns) {
-            *r = column.values[*i];
-        }
-        let y = target.y[j] - design.fixed.get(*i).copied().unwrap_or(0.0);
-        let levelled = target.noise.weight_variance(speed, LEVELLED) + extra;
-        normal.add(&row, y, 1.0 / levelled);
-        log_levelled += 0.5 * levelled.ln();
-        samples.push((*i, y, target.noise.weight_variance(speed, FLOORED) + extra));
-    }
-    if normal.count < k + 3 {
+    let chosen: Vec<usize> = match rows {
+        Rows::Where(mask) => (0..target.rows.len()).filter(|j| mask[target.rows[*j]]).collect(),
+        _ => (0..target.rows.len()).step_by(stride).collect(),
+    };
+    if chosen.len() < design.columns.len() + 3 {
         return None;
     }
-    let solution = normal.solve()?;
-    let n = normal.count as f64;
-    let (mut rss, mut log_sigma) = (0.0, 0.0);
-    if kept.is_some() || !design.extra_variance.is_empty() {
-        for (i, y, variance) in &samples {
-            let fitted: f64 = design.columns.iter().zip(&solution.coefficients).map(|(c, b)| c.values[*i] * b).sum();
-            rss += (y - fitted).powi(2) / variance;
-            log_sigma += 0.5 * variance.ln();
+    let gather = |values: &[f64]| -> Vec<f64> {
+        if values.len() == chosen.len() {
+            return values.to_vec(); // no row of the log is missing
         }
+        chosen.iter().map(|j| values[target.rows[*j]]).collect()
+    };
+    let pick = |values: &[f64]| -> Vec<f64> { chosen.iter().map(|j| values[*j]).collect() };
+    let (mut y, mut levelled, mut floored) = (pick(&target.y), pick(&target.levelled), Vec::new());
+    if !design.fixed.is_empty() {
+        y.iter_mut().zip(gather(&design.fixed)).for_each(|(y, f)| *y -= f);
     }
+    let looks_at_scatter = scattering || !design.extra_variance.is_empty();
+    if looks_at_scatter {
+        floored = pick(&target.floored);
+    }
+    if !design.extra_variance.is_empty() {
+        let extra = gather(&design.extra_variance);
+        levelled.iter_mut().zip(&extra).for_each(|(v, e)| *v += e);
+        floored.iter_mut().zip(&extra).for_each(|(v, e)| *v += e);
+    }
+    let kept = Kept { columns: design.columns.iter().map(|c| gather(&c.values)).collect(), y, floored };
+    let weights: Vec<f64> = levelled.iter().map(|v| 1.0 / v).collect();
+    let solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
+    let n = chosen.len() as f64;
     // the scale of the noise is profiled, but never below a tenth of the floor's standard deviation
     let profile = |rss: f64, log_sigma: f64| {
         let scale = (rss / n).max(0.01);
         target.weight * stride as f64 * (-0.5 * n * scale.ln() - 0.5 * rss / scale - log_sigma)
     };
-    let loglik = Likelihood { mean: profile(solution.rss, log_levelled), scatter: profile(rss, log_sigma) };
-    if let Some(kept) = kept {
-        *kept = samples;
-    }
-    Some((solution, loglik))
+    let half_logs = |variances: &[f64]| 0.5 * log_product(variances);
+    let mean = profile(solution.rss, half_logs(&levelled));
+    let scatter = if looks_at_scatter {
+        let rss = kept.residual(&solution.coefficients).iter().zip(&kept.floored).map(|(r, v)| r * r / v).sum();
+        profile(rss, half_logs(&kept.floored))
+    } else {
+        mean
+    };
+    Some((solution, Likelihood { mean, scatter }, kept))
 }
 
-/// Share of the mean variance in the weights of the least squares: a stretch with little noise must not outvote the others
-/// where a polynomial misfits.
-const LEVELLED: f64 = 0.5;
-/// Share of the mean variance in the likelihood: enough to keep a standing rotor's silence from counting without bound.
-const FLOORED: f64 = 0.05;
+/// Sum of the logarithms of positive numbers, one logarithm for every eight of them.
+fn log_product(values: &[f64]) -> f64 {
+    values
+        .chunks(8)
+        .map(|chunk| {
+            let scale = chunk[0];
+            scale.ln() * chunk.len() as f64 + chunk.iter().map(|v| v / scale).product::<f64>().ln()
+        })
+        .sum()
+}
 
 /// One over the integrated autocorrelation time of the scaled residual, in samples: 1 when white.
 ///
 /// The autocorrelation is taken at lags 1, 2, 4, 8, ... and integrated in between until it falls below 0.05.
-fn effective_share(design: &TargetDesign, coefficients: &[f64], kept: &[Kept]) -> f64 {
-    let residual: Vec<f64> = kept
-        .iter()
-        .map(|(i, y, variance)| {
-            let fitted: f64 = design.columns.iter().zip(coefficients).map(|(c, b)| c.values[*i] * b).sum();
-            (y - fitted) / variance.sqrt()
-        })
-        .collect();
+fn effective_share(residual: &[f64]) -> f64 {
     let c0: f64 = residual.iter().map(|r| r * r).sum();
     let (mut time, mut last, mut lag) = (1.0, 1.0, 1usize);
     while c0 > 0.0 && lag < residual.len() / 4 {
@@ -225,7 +239,7 @@ pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: O
         let touched = placed.iter().any(|p| p.instance.touches(target.name));
         match rest {
             Some(rest) if !touched => targets.push(rest.targets[i].clone()),
-            _ => targets.push(fit_target(context, target, &design(context, declared, placed, target), rows)?),
+            _ => targets.push(fit_target(target, &design(context, declared, placed, target), rows)?),
         }
     }
     Some(Fit { placed: placed.to_vec(), targets })
@@ -243,9 +257,8 @@ pub(crate) fn touched_loglik(
     let mut sum = 0.0;
     for target in context.targets.iter().filter(|t| moving.contains(&t.name)) {
         let view = scattering && target.relation == Relation::Thrust;
-        let mut kept = Vec::new();
-        match solve_target(context, target, &design(context, declared, placed, target), rows, view.then_some(&mut kept)) {
-            Some((_, loglik)) => sum += loglik.of(view),
+        match solve_target(target, &design(context, declared, placed, target), rows, view) {
+            Some((_, loglik, _)) => sum += loglik.of(view),
             None => return f64::NEG_INFINITY,
         }
     }

@@ -64,7 +64,7 @@ pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], steady:
     let quantum = quantum(reading);
     let floor = quantum * quantum / 12.0;
     let mut samples: Vec<(f64, f64)> = Vec::new(); // (speed/1000)^2, squared second difference scaled to a variance
-    let (mut c0, mut c1, mut pairs) = (0.0, 0.0, 0usize);
+    let mut colour = Colour::default();
     for (from, to) in steady {
         // the first tenth of a stretch, and at least two rows, belong to settling
         let skip = from + 2 + (to - from) / 10;
@@ -80,10 +80,7 @@ pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], steady:
             let speed = if rpm.is_empty() { 0.0 } else { rpm[rows[lo + k + 1]] / 1000.0 };
             samples.push((speed * speed, d * d / 6.0));
         }
-        let (v, c) = detrended_covariance(z);
-        c0 += v;
-        c1 += c;
-        pairs += z.len();
+        colour.add(z);
     }
     if samples.len() < 20 {
         samples = y
@@ -100,7 +97,7 @@ pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], steady:
     drop_glitches(&mut samples);
     let [a, b, c] = variance_curve(&samples);
     let a = a.max(floor).max(1e-30);
-    let rho = if pairs > 30 && c0 > 0.0 { (c1 / c0).clamp(0.0, 0.98) } else { 0.0 };
+    let rho = colour.rho();
     // positive colour makes successive differences too small: gamma_d2 = var (6 - 8 rho + 2 rho^2) for an AR(1)
     let widen = 6.0 / (6.0 - 8.0 * rho + 2.0 * rho * rho).max(0.3);
     let mut noise = Noise { a: a * widen, b: b * widen, c: c * widen, rho, rms: 0.0 };
@@ -122,19 +119,48 @@ pub fn quantum(y: &[f64]) -> f64 {
     steps[steps.len() / 20]
 }
 
-/// Sums of lag-zero and lag-one products about a straight line.
-fn detrended_covariance(z: &[f64]) -> (f64, f64) {
-    let n = z.len() as f64;
-    let mean_x = (n - 1.0) / 2.0;
-    let mean_z = z.iter().sum::<f64>() / n;
-    let sxx: f64 = (0..z.len()).map(|i| (i as f64 - mean_x).powi(2)).sum();
-    let sxz: f64 = z.iter().enumerate().map(|(i, v)| (i as f64 - mean_x) * (v - mean_z)).sum();
-    let slope = sxz / sxx.max(1e-12);
-    let r: Vec<f64> = z.iter().enumerate().map(|(i, v)| v - mean_z - slope * (i as f64 - mean_x)).collect();
-    let v: f64 = r.iter().map(|v| v * v).sum();
-    // detrending biases the lag-one covariance by about -2 var/n a sample
-    let c: f64 = r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() + 2.0 * v / n;
-    (v, c)
+/// Products of second differences at lags 0 and 1: they tell the colour of the noise and are blind to whatever varies slowly,
+/// which is no noise but the very thing that is sought.
+#[derive(Default)]
+struct Colour {
+    same: f64,
+    next: f64,
+    pairs: usize,
+}
+
+impl Colour {
+    /// Largest lag-one autocorrelation that is called colour; what is slower is course.
+    const MOST: f64 = 0.8;
+
+    /// Adds an evenly sampled stretch.
+    fn add(&mut self, z: &[f64]) {
+        let d: Vec<f64> = z.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect();
+        for w in d.windows(2) {
+            self.same += 0.5 * (w[0] * w[0] + w[1] * w[1]);
+            self.next += w[0] * w[1];
+            self.pairs += 1;
+        }
+    }
+
+    /// Lag-one autocorrelation of an AR(1) whose second differences look like these; 0 where they could be white.
+    fn rho(&self) -> f64 {
+        if self.pairs < 30 || self.same <= 0.0 {
+            return 0.0;
+        }
+        // for AR(1): gamma_d2(1)/gamma_d2(0) = (-4 + 3 rho - rho^2) / (6 - 2 rho), from -2/3 when white to -1/2
+        let of = |rho: f64| (-4.0 + 3.0 * rho - rho * rho) / (6.0 - 2.0 * rho);
+        let seen = self.next / self.same;
+        let uncertain = 0.8 / (self.pairs as f64).sqrt();
+        if seen - uncertain < of(0.0) {
+            return 0.0;
+        }
+        let (mut lo, mut hi) = (0.0, Self::MOST);
+        for _ in 0..40 {
+            let mid = 0.5 * (lo + hi);
+            if of(mid) < seen { lo = mid } else { hi = mid }
+        }
+        0.5 * (lo + hi)
+    }
 }
 
 /// Drops isolated absurd rows: at most one in a hundred, a thousand standard deviations and more away.
@@ -240,6 +266,23 @@ mod tests {
         let noise = estimate(&rows, &y, &y, &[], &[(0, 2000), (2000, 4000)]);
         assert!((noise.rms / 0.02 - 1.0).abs() < 0.06, "{noise:?}");
         assert!(noise.rho < 0.08);
+    }
+
+    #[test]
+    fn a_slow_wave_is_no_noise_and_colour_is() {
+        let rows: Vec<usize> = (0..4000).collect();
+        let wave: Vec<f64> = (0..4000).map(|i| 0.02 * hash_noise(i) + 0.2 * (i as f64 * 0.02).sin()).collect();
+        let noise = estimate(&rows, &wave, &wave, &[], &[(0, 4000)]);
+        assert!((noise.rms / 0.02 - 1.0).abs() < 0.06, "{noise:?}");
+        let mut state = 0.0;
+        let coloured: Vec<f64> = (0..4000)
+            .map(|i| {
+                state = 0.5 * state + 0.75_f64.sqrt() * 0.02 * hash_noise(i);
+                state
+            })
+            .collect();
+        let noise = estimate(&rows, &coloured, &coloured, &[], &[(0, 4000)]);
+        assert!((noise.rms / 0.02 - 1.0).abs() < 0.12 && (noise.rho - 0.5).abs() < 0.15, "{noise:?}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::context::{Context, Relation, Target};
 use crate::diagnose::{Candidate, FEWEST_SAMPLES, NEEDED_EVIDENCE, NEEDED_REDUCTION, net_gain, shares};
 use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{Effect, Instance};
-use crate::heldout;
+use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::residual::whiteness;
 
@@ -21,11 +21,11 @@ pub(crate) fn opponent(
     declared: Declared<'_>,
     start: &Fit,
     folds: &[Vec<bool>],
-    before: &[f64],
+    before: &[Held],
     best: &Candidate,
-    named: &[f64],
-) -> Option<(Candidate, Vec<f64>)> {
-    let mut champion: Option<(f64, Candidate, Vec<f64>)> = None;
+    named: &[Held],
+) -> Option<(Candidate, Vec<Held>)> {
+    let mut champion: Option<(f64, Candidate, Vec<Held>)> = None;
     for (i, target) in context.targets.iter().enumerate() {
         if target.relation.is_evidence() || target.relation == Relation::SpeedAlone {
             continue;
@@ -46,8 +46,8 @@ pub(crate) fn opponent(
                 continue;
             }
             let held = heldout::errors_after_newest(context, declared, &candidate.fit, folds, before);
-            let gain = (before[i] / held[i]).ln();
-            let rival = (before[i] / named[i]).ln();
+            let gain = (before[i].rms / held[i].rms).ln();
+            let rival = (before[i].rms / named[i].rms).ln();
             // a name that depends on the same variable has found the dependence; only its form may be rough
             let same = best
                 .fit
@@ -101,8 +101,8 @@ pub(crate) fn nameless(
     start: &Fit,
     best: &Fit,
     folds: &[Vec<bool>],
-    before: &[f64],
-) -> Option<(Candidate, Vec<f64>)> {
+    before: &[Held],
+) -> Option<(Candidate, Vec<Held>)> {
     let residuals = heldout::residuals(context, declared, best);
     let (i, target) = context
         .targets
@@ -134,5 +134,5 @@ pub(crate) fn nameless(
             let held = heldout::errors_after_newest(context, declared, &f, folds, before);
             (Candidate { evidence: f.targets[i].loglik.mean - start.targets[i].loglik.mean, fit: f }, held)
         })
-        .min_by(|a, b| a.1[i].total_cmp(&b.1[i]))
+        .min_by(|a, b| a.1[i].rms.total_cmp(&b.1[i].rms))
 }

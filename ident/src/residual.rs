@@ -31,18 +31,17 @@ pub fn whiteness(t: &[f64], residual: &[f64]) -> f64 {
     ChiSquared::new(lags as f64).map_or(1.0, |d| d.sf(q)).clamp(0.0, 1.0)
 }
 
-/// Stretches of even sampling that hold at least 40 samples, or the longest one.
+/// Stretches of even sampling that hold at least 40 samples, or the longest one: a stretch ends where a step is more than
+/// half again as long as the median step (a missing sample), or shorter than half of it.
 fn even_stretches(t: &[f64]) -> Vec<(usize, usize)> {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    let usual = crate::noise::median(&mut steps);
     let mut out = Vec::new();
     let mut from = 0;
-    for i in 2..=t.len() {
-        let breaks = i == t.len() || {
-            let (a, b) = (t[i - 1] - t[i - 2], t[i] - t[i - 1]);
-            (a - b).abs() > 0.05 * a.max(b)
-        };
-        if breaks {
-            out.push((from, i.min(t.len())));
-            from = i - 1;
+    for i in 1..=t.len() {
+        if i == t.len() || !(0.5 * usual..=1.5 * usual).contains(&(t[i] - t[i - 1])) {
+            out.push((from, i));
+            from = i;
         }
     }
     let long: Vec<(usize, usize)> = out.iter().copied().filter(|(a, b)| b - a >= 40).collect();

@@ -48,6 +48,24 @@ impl Normal {
         self.count += 1;
     }
 
+    /// Whole columns at once, all of one length: `weights` beside the readings `y`.
+    #[must_use]
+    pub fn of_columns(columns: &[Vec<f64>], y: &[f64], weights: &[f64]) -> Self {
+        let mut normal = Self::new(columns.len());
+        let mut weighted: Vec<f64> = Vec::with_capacity(y.len());
+        for (j, column) in columns.iter().enumerate() {
+            weighted.clear();
+            weighted.extend(column.iter().zip(weights).map(|(a, w)| a * w));
+            for (k, other) in columns.iter().enumerate().take(j + 1) {
+                normal.gram[(j, k)] = dot(&weighted, other);
+            }
+            normal.rhs[j] = dot(&weighted, y);
+        }
+        normal.yy = y.iter().zip(weights).map(|(v, w)| w * v * v).sum();
+        normal.count = y.len();
+        normal
+    }
+
     /// Solves; `None` when the numbers are not finite.
     #[must_use]
     pub fn solve(&self) -> Option<Solution> {
@@ -83,6 +101,20 @@ impl Normal {
     }
 }
 
+/// Scalar product in eight independent sums, so that it does not wait for each addition; the order is fixed.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (head_a, tail_a) = a.as_chunks::<8>();
+    let (head_b, tail_b) = b.as_chunks::<8>();
+    for (x, y) in head_a.iter().zip(head_b) {
+        for (s, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *s += x * y;
+        }
+    }
+    let tail: f64 = tail_a.iter().zip(tail_b).map(|(x, y)| x * y).sum();
+    sums.iter().sum::<f64>() + tail
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,6 +129,20 @@ mod tests {
         let s = normal.solve().unwrap();
         assert!((s.coefficients[0] - 3.0).abs() < 1e-9 && (s.coefficients[1] + 2.0).abs() < 1e-9);
         assert!(s.rss < 1e-8);
+    }
+
+    #[test]
+    fn columns_give_what_rows_give() {
+        let columns: Vec<Vec<f64>> = (0..3).map(|k| (0..29).map(|i| f64::from(i * (k + 1) % 7) + 0.5).collect()).collect();
+        let y: Vec<f64> = (0..29).map(|i| f64::from(i % 5)).collect();
+        let weights: Vec<f64> = (0..29).map(|i| 1.0 + f64::from(i % 3)).collect();
+        let mut rows = Normal::new(3);
+        for i in 0..29 {
+            rows.add(&[columns[0][i], columns[1][i], columns[2][i]], y[i], weights[i]);
+        }
+        let (a, b) = (rows.solve().unwrap(), Normal::of_columns(&columns, &y, &weights).solve().unwrap());
+        assert!((a.rss - b.rss).abs() < 1e-9);
+        assert!(a.coefficients.iter().zip(&b.coefficients).all(|(p, q)| (p - q).abs() < 1e-9));
     }
 
     #[test]

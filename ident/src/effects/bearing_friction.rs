@@ -62,9 +62,26 @@ impl Effect for BearingFriction {
         with_share(fitted)
     }
 
-    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        brakes(fitted)
+    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        let t0 = fitted.iter().find(|e| e.name == "t0").map_or(0.0, |e| e.value);
+        let turned = context.t.iter().zip(&context.rpm).filter(|(t, r)| **t < t0 && **r > STANDSTILL).count();
+        // friction sets in on a rotor that has turned without it
+        brakes(fitted) && costs(context, fitted) && turned * 20 > context.len()
     }
+}
+
+/// Standard errors by which a torque must stand out where a meter sees it.
+const SEEN: f64 = 4.0;
+
+/// Drag is paid for: a measured current shows it. Where none was measured the torque arm, or a modest loss of speed, will do.
+pub(super) fn costs(context: &Context, fitted: &[Estimate]) -> bool {
+    let largest = |names: [&str; 2]| {
+        let of = |e: &Estimate| if e.se > 0.0 { e.value / e.se } else { 0.0 };
+        fitted.iter().filter(|e| names.contains(&e.name.as_str())).map(of).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let top = context.rpm.iter().copied().fold(0.0, f64::max);
+    let modest = fitted.iter().filter(|e| e.name == "speed_loss").all(|e| e.value < 0.5 * top);
+    modest && (context.current.is_none() || largest(["constant", "viscous"]) > SEEN)
 }
 
 /// Form of a drag that does not grow with speed.

@@ -5,7 +5,7 @@
 //! Units: s, positive is late.
 //! Reference: pure transport delay of a logger.
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, meters, operator};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, meters, operator, through_meter};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -33,21 +33,36 @@ impl Effect for ChannelDelay {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        meters(context).iter().map(|s| Instance::new(s, "")).collect()
+        meters(context)
+            .iter()
+            .flat_map(|s| operator::courses(context).iter().map(|jumps| Instance::new(s, if *jumps { operator::OF_STEPS } else { "" })))
+            .collect()
     }
 
-    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         let most = (15.0 * context.step()).max(2.0);
         let starts = (-6..=24).map(|k| most * f64::from(k) / 24.0).filter(|d| d.abs() > 1e-9).collect();
-        vec![Shape { name: "delay", unit: "s", range: (-0.5 * most, 1.2 * most), starts }]
+        let delay = Shape { name: "delay", unit: "s", range: (-0.5 * most, 1.2 * most), starts };
+        if instance.form == operator::OF_STEPS { vec![delay, operator::phase()] } else { vec![delay] }
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         Vec::new()
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
-        let [delay] = shape else { return };
-        design.map_columns(|column| *column = operator::delayed(&context.t, column, *delay));
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let [delay, phase @ ..] = shape else { return };
+        let course = operator::course(&instance.form, phase);
+        through_meter(context, design, |column| operator::delayed(&context.t, column, *delay, course));
+    }
+
+    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        // where the load jumps within rows, a delay is known to a row only: even over one interval
+        if operator::abrupt(context) {
+            for e in fitted.iter_mut().filter(|e| e.name == "delay") {
+                e.se = e.se.hypot(context.step() / 12.0_f64.sqrt());
+            }
+        }
+        fitted
     }
 }

@@ -5,12 +5,19 @@
 //! Units: s.
 //! Reference: boxcar and RC filters; RCbenchmark load cells average over about half a second.
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, meters, operator};
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, meters, operator, through_meter};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct ChannelFilter;
+
+/// Its forms; the last two where the load jumps within rows.
+const FORMS: [&str; 4] = ["moving_average", "first_order", "moving_average_of_steps", "first_order_of_steps"];
+
+fn is_lag(instance: &Instance) -> bool {
+    instance.form.starts_with("first_order")
+}
 
 impl Effect for ChannelFilter {
     fn id(&self) -> &'static str {
@@ -33,14 +40,16 @@ impl Effect for ChannelFilter {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        meters(context).iter().flat_map(|s| ["moving_average", "first_order"].map(|form| Instance::new(s, form))).collect()
+        let forms: &[&str] = if operator::abrupt(context) { &FORMS } else { &FORMS[..2] };
+        meters(context).iter().flat_map(|s| forms.iter().map(|form| Instance::new(s, form))).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         let dt = context.step();
         let (lo, hi) = (0.5 * dt, (60.0 * dt).max(4.0));
-        let name = if instance.form == "first_order" { "tau" } else { "window" };
-        vec![Shape { name, unit: "s", range: (0.1 * dt, 1.5 * hi), starts: geometric(lo, hi, 14) }]
+        let name = if is_lag(instance) { "tau" } else { "window" };
+        let width = Shape { name, unit: "s", range: (0.1 * dt, 1.5 * hi), starts: geometric(lo, hi, 14) };
+        if instance.form.ends_with(operator::OF_STEPS) { vec![width, operator::phase()] } else { vec![width] }
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
@@ -48,14 +57,15 @@ impl Effect for ChannelFilter {
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
-        let [width] = shape else { return };
-        let slow = instance.form == "first_order";
-        design.map_columns(|column| {
-            *column = if slow {
-                operator::first_order(&context.t, column, *width)
+        let [width, phase @ ..] = shape else { return };
+        let course = operator::course(&instance.form, phase);
+        let slow = is_lag(instance);
+        through_meter(context, design, |column| {
+            if slow {
+                operator::first_order(&context.t, column, *width, course)
             } else {
-                operator::moving_average(&context.t, column, *width)
-            };
+                operator::moving_average(&context.t, column, *width, course)
+            }
         });
     }
 }

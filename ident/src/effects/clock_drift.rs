@@ -56,6 +56,6 @@ impl Effect for ClockDrift {
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         let [rate] = shape else { return };
         let t0 = context.t.first().copied().unwrap_or(0.0);
-        design.map_columns(|column| *column = operator::delayed_varying(&context.t, column, |t| rate * (t - t0)));
+        design.map_columns(|column| *column = operator::delayed_varying(&context.t, column, operator::Course::Line, |t| rate * (t - t0)));
     }
 }

@@ -39,7 +39,7 @@ impl Effect for Creep {
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
         let (lo, hi) = ((5.0 * context.step()).max(1.0), (0.5 * context.duration()).max(2.0));
         vec![
-            Shape { name: "amplitude", unit: "1", range: (-0.3, 0.3), starts: vec![-0.03, 0.01, 0.04] },
+            Shape { name: "amplitude", unit: "1", range: (-0.5, 0.5), starts: vec![-0.1, -0.02, 0.02, 0.1] },
             Shape { name: "tau", unit: "s", range: (lo, hi), starts: geometric(lo, hi, 8) },
         ]
     }
@@ -51,7 +51,7 @@ impl Effect for Creep {
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         let [amplitude, tau] = shape else { return };
         design.map_columns(|column| {
-            let slow = operator::first_order(&context.t, column, *tau);
+            let slow = operator::first_order(&context.t, column, *tau, operator::Course::Line);
             column.iter_mut().zip(slow).for_each(|(v, s)| *v += amplitude * s);
         });
     }

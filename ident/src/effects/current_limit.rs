@@ -44,8 +44,8 @@ impl Effect for CurrentLimit {
         vec![Shape {
             name: "reached_at",
             unit: "us",
-            range: (at(0.1), at(0.99)),
-            starts: (0..20).map(|k| at(0.3 + 0.034 * f64::from(k))).collect(),
+            range: (at(0.1), at(0.998)),
+            starts: (0..22).map(|k| at(0.3 + 0.0328 * f64::from(k))).collect(),
         }]
     }
 
@@ -86,6 +86,6 @@ impl Effect for CurrentLimit {
         // the run must go well beyond, and the current must stand as still there as it does in steady stretches
         let reached = fitted.iter().find(|e| e.name == "reached_at").map_or(f64::INFINITY, |e| e.value);
         let top = context.pulse.as_ref().map_or(0.0, |p| p.iter().copied().fold(0.0, f64::max));
-        top > reached + 10.0
+        top > reached + 4.0
     }
 }

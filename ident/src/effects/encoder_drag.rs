@@ -6,7 +6,7 @@
 //! Units: N.m, 1; internally as `bearing_friction`.
 //! Reference: Beharie 2013, section 5.7.1 (the four speed sensors compared); power balance as `bearing_friction`.
 
-use super::bearing_friction::{AMPLITUDES, brakes, drag, with_share};
+use super::bearing_friction::{AMPLITUDES, costs, brakes, drag, with_share};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, load_channels};
 use crate::context::Context;
 use crate::design::TargetDesign;
@@ -40,7 +40,12 @@ impl Effect for EncoderDrag {
         channels.retain(|c| *c != "rpm_encoder");
         let coupled: f64 = coupled(context).iter().sum();
         let share = coupled / context.len().max(1) as f64;
-        if context.rpm.is_empty() || channels.is_empty() || !(0.05..=0.95).contains(&share) {
+        if share > 0.95 {
+            // never uncoupled: the static curve of the speed has the drag in it
+            channels.retain(|c| !c.starts_with("rpm"));
+        }
+        // an encoder that is coupled throughout still shows where the rotor stands: drag needs rotation
+        if context.rpm.is_empty() || channels.is_empty() || share < 0.05 {
             Vec::new()
         } else {
             vec![Instance::new(&channels, "")]
@@ -63,8 +68,8 @@ impl Effect for EncoderDrag {
         with_share(fitted)
     }
 
-    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        brakes(fitted)
+    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        brakes(fitted) && costs(context, fitted)
     }
 }
 

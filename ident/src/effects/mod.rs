@@ -44,7 +44,7 @@ mod torque_crosstalk;
 pub(crate) mod unknown;
 mod zero_drift;
 
-use crate::context::Context;
+use crate::context::{Context, DIFFERENCES, Relation};
 use crate::design::TargetDesign;
 
 /// Where in the causal chain an effect acts; effects are applied in this order.
@@ -109,6 +109,14 @@ pub struct Shape {
     pub range: (f64, f64),
     /// Values at which the search starts.
     pub starts: Vec<f64>,
+}
+
+impl Shape {
+    /// Whether it only places something within a row: it may lie on a bound without making the effect implausible.
+    #[must_use]
+    pub fn is_nuisance(&self) -> bool {
+        self.name == "phase"
+    }
 }
 
 /// A parameter that multiplies a column.
@@ -228,7 +236,8 @@ fn thrust_over_time(context: &Context) -> Vec<Instance> {
     }
 }
 
-/// The sets of meters that may be slow or late together: each alone, and the two of the load cell.
+/// The sets of meters that may be slow or late together: each alone, the two of the load cell, and each speed sensor beside
+/// its difference from the others (alone where there are only two; a single one cannot be told from the rotor itself).
 fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
     if context.time_is_row {
         return Vec::new();
@@ -239,12 +248,31 @@ fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
     if both.len() == 2 {
         sets.push(both);
     }
+    let speeds = speeds(context);
+    if speeds.len() > 1 {
+        for channel in speeds {
+            let difference = DIFFERENCES.iter().find(|d| d.0 == channel).map(|d| d.1).filter(|d| context.target(d).is_some());
+            sets.push(std::iter::once(channel).chain(difference).collect());
+        }
+    }
     sets
+}
+
+/// What a meter makes of its channel: every column passes through it. The difference of a speed channel from the consensus is
+/// what the meter changes of the consensus.
+fn through_meter(context: &Context, design: &mut TargetDesign, meter: impl Fn(&[f64]) -> Vec<f64>) {
+    if design.relation != Relation::SpeedDifference {
+        design.map_columns(|column| *column = meter(column));
+        return;
+    }
+    let changed = meter(&context.rpm);
+    design.fixed.resize(context.len(), 0.0);
+    design.fixed.iter_mut().zip(changed.iter().zip(&context.rpm)).for_each(|(f, (c, r))| *f += c - r);
 }
 
 /// Speed channels of the log.
 fn speeds(context: &Context) -> Vec<&'static str> {
-    context.targets.iter().filter(|t| t.relation == crate::context::Relation::SpeedFromPulse).map(|t| t.name).collect()
+    context.targets.iter().filter(|t| t.relation == Relation::SpeedFromPulse).map(|t| t.name).collect()
 }
 
 fn geometric(from: f64, to: f64, n: usize) -> Vec<f64> {

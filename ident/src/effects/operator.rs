@@ -5,8 +5,31 @@
 //! Units: seconds.
 //! Reference: moving averages through prefix integrals; first-order hold for the lag.
 
+use super::Shape;
+use crate::context::Context;
+
+/// What a signal does between two rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Course {
+    /// A straight line.
+    Line,
+    /// It holds the earlier value for this share of the interval, then the later one.
+    Jump(f64),
+}
+
+impl Course {
+    /// Value and integral from the earlier row at a share `u` of an interval of length 1 between `a` and `b`.
+    fn at(self, a: f64, b: f64, u: f64) -> (f64, f64) {
+        match self {
+            Self::Line => (a + u * (b - a), u * (a + 0.5 * u * (b - a))),
+            Self::Jump(phase) if u < phase => (a, u * a),
+            Self::Jump(phase) => (b, phase * a + (u - phase) * b),
+        }
+    }
+}
+
 /// Mean over the window that ends at each row.
-pub(crate) fn moving_average(t: &[f64], x: &[f64], window: f64) -> Vec<f64> {
+pub(crate) fn moving_average(t: &[f64], x: &[f64], window: f64, course: Course) -> Vec<f64> {
     if window <= 0.0 || t.len() < 2 {
         return x.to_vec();
     }
@@ -14,7 +37,7 @@ pub(crate) fn moving_average(t: &[f64], x: &[f64], window: f64) -> Vec<f64> {
     let mut sum = 0.0;
     integral.push(0.0);
     for i in 1..t.len() {
-        sum += 0.5 * (x[i] + x[i - 1]) * (t[i] - t[i - 1]);
+        sum += course.at(x[i - 1], x[i], 1.0).1 * (t[i] - t[i - 1]);
         integral.push(sum);
     }
     let mut j = 0;
@@ -27,49 +50,49 @@ pub(crate) fn moving_average(t: &[f64], x: &[f64], window: f64) -> Vec<f64> {
                 while j + 1 < t.len() && t[j + 1] <= start {
                     j += 1;
                 }
-                let h = start - t[j];
-                let slope = if j + 1 < t.len() { (x[j + 1] - x[j]) / (t[j + 1] - t[j]) } else { 0.0 };
-                integral[j] + x[j] * h + 0.5 * slope * h * h
+                let next = (j + 1).min(t.len() - 1);
+                let length = (t[next] - t[j]).max(1e-12);
+                integral[j] + course.at(x[j], x[next], (start - t[j]) / length).1 * length
             };
             (integral[i] - head) / window
         })
         .collect()
 }
 
-/// First-order lag with time constant `tau`, exact for a signal that is linear between rows.
-pub(crate) fn first_order(t: &[f64], x: &[f64], tau: f64) -> Vec<f64> {
-    first_order_varying(t, x, |_| tau)
-}
-
-/// First-order lag whose time constant may differ from row to row.
-pub(crate) fn first_order_varying(t: &[f64], x: &[f64], tau: impl Fn(usize) -> f64) -> Vec<f64> {
+/// First-order lag with time constant `tau`, exact for a signal of the given course.
+pub(crate) fn first_order(t: &[f64], x: &[f64], tau: f64, course: Course) -> Vec<f64> {
     let mut out = Vec::with_capacity(t.len());
     let mut state = x.first().copied().unwrap_or(0.0);
     for i in 0..t.len() {
-        if i > 0 {
-            let tau = tau(i);
-            if tau <= 1e-9 {
-                state = x[i];
-            } else {
-                let h = (t[i] - t[i - 1]) / tau;
-                let e = (-h).exp();
+        if i > 0 && tau <= 1e-9 {
+            state = x[i];
+        } else if i > 0 {
+            let h = (t[i] - t[i - 1]) / tau;
+            let e = (-h).exp();
+            state = match course {
                 // first-order hold: u(s) = x0 + (x1 - x0) s/h
-                let ramp = if h > 1e-6 { 1.0 - (1.0 - e) / h } else { h / 2.0 };
-                state = e * state + (1.0 - e) * x[i - 1] + ramp * (x[i] - x[i - 1]);
-            }
+                Course::Line => {
+                    let ramp = if h > 1e-6 { 1.0 - (1.0 - e) / h } else { h / 2.0 };
+                    e * state + (1.0 - e) * x[i - 1] + ramp * (x[i] - x[i - 1])
+                }
+                Course::Jump(phase) => {
+                    let late = if phase >= 1.0 { 0.0 } else { 1.0 - (-h * (1.0 - phase)).exp() };
+                    e * state + (1.0 - e) * x[i - 1] + late * (x[i] - x[i - 1])
+                }
+            };
         }
         out.push(state);
     }
     out
 }
 
-/// The signal `delay` seconds ago (ahead when negative), linear between rows.
-pub(crate) fn delayed(t: &[f64], x: &[f64], delay: f64) -> Vec<f64> {
-    delayed_varying(t, x, |_| delay)
+/// The signal `delay` seconds ago (ahead when negative).
+pub(crate) fn delayed(t: &[f64], x: &[f64], delay: f64, course: Course) -> Vec<f64> {
+    delayed_varying(t, x, course, |_| delay)
 }
 
 /// The signal as long ago as `delay` says at each instant.
-pub(crate) fn delayed_varying(t: &[f64], x: &[f64], delay: impl Fn(f64) -> f64) -> Vec<f64> {
+pub(crate) fn delayed_varying(t: &[f64], x: &[f64], course: Course, delay: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut j = 0;
     (0..t.len())
         .map(|i| {
@@ -86,10 +109,48 @@ pub(crate) fn delayed_varying(t: &[f64], x: &[f64], delay: impl Fn(f64) -> f64) 
             while j + 1 < t.len() && t[j + 1] <= at {
                 j += 1;
             }
-            let u = (at - t[j]) / (t[j + 1] - t[j]);
-            x[j] + u * (x[j + 1] - x[j])
+            course.at(x[j], x[j + 1], (at - t[j]) / (t[j + 1] - t[j])).0
         })
         .collect()
+}
+
+/// Whether the load changes within single rows: then the instant of a step is known to a row only.
+pub(crate) fn abrupt(context: &Context) -> bool {
+    *context.facts.abrupt.get_or_init(|| {
+        let signal: &[f64] = if context.rpm.is_empty() { context.pulse.as_deref().unwrap_or(&[]) } else { &context.rpm };
+        // of the squared change over three rows, the share that one row holds
+        let (mut single, mut triple) = (0.0, 0.0);
+        let large = 0.01 * signal.iter().copied().fold(0.0, f64::max);
+        for w in signal.windows(4) {
+            let (a, b, c) = (w[1] - w[0], w[2] - w[1], w[3] - w[2]);
+            if b.abs() > large && b.abs() >= a.abs() && b.abs() >= c.abs() {
+                single += b * b;
+                triple += (a + b + c).powi(2);
+            }
+        }
+        single > 0.9 * triple && single > 0.0
+    })
+}
+
+/// The courses between rows that a log asks for: straight lines, and where the load jumps, jumps.
+pub(crate) fn courses(context: &Context) -> &'static [bool] {
+    if abrupt(context) { &[false, true] } else { &[false] }
+}
+
+/// The shape parameter that says when within a row the load jumps.
+pub(crate) fn phase() -> Shape {
+    Shape { name: "phase", unit: "1", range: (0.0, 1.0), starts: vec![0.0, 0.5, 1.0] }
+}
+
+/// Ending of the name of a form in which the load jumps within rows.
+pub(crate) const OF_STEPS: &str = "of_steps";
+
+/// The course that a form and its shape parameters after the first stand for.
+pub(crate) fn course(form: &str, phase: &[f64]) -> Course {
+    match phase {
+        [phase] if form.ends_with(OF_STEPS) => Course::Jump(*phase),
+        _ => Course::Line,
+    }
 }
 
 #[cfg(test)]
@@ -106,18 +167,34 @@ mod tests {
     fn a_ramp_is_late_by_half_the_window_by_tau_and_by_the_delay() {
         let (t, x) = ramp();
         let i = 180;
-        assert!((moving_average(&t, &x, 0.8)[i] - 2.0 * (t[i] - 0.4)).abs() < 1e-9);
-        assert!((first_order(&t, &x, 0.3)[i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
-        assert!((delayed(&t, &x, 0.27)[i] - 2.0 * (t[i] - 0.27)).abs() < 1e-9);
-        assert!((delayed(&t, &x, -0.27)[100] - 2.0 * (t[100] + 0.27)).abs() < 1e-9);
+        assert!((moving_average(&t, &x, 0.8, Course::Line)[i] - 2.0 * (t[i] - 0.4)).abs() < 1e-9);
+        assert!((first_order(&t, &x, 0.3, Course::Line)[i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
+        assert!((delayed(&t, &x, 0.27, Course::Line)[i] - 2.0 * (t[i] - 0.27)).abs() < 1e-9);
+        assert!((delayed(&t, &x, -0.27, Course::Line)[100] - 2.0 * (t[100] + 0.27)).abs() < 1e-9);
     }
 
     #[test]
     fn a_constant_stays() {
         let (t, _) = ramp();
         let x = vec![3.5; t.len()];
-        for y in [moving_average(&t, &x, 1.3), first_order(&t, &x, 0.4), delayed(&t, &x, 0.9)] {
-            assert!(y.iter().all(|v| (v - 3.5).abs() < 1e-9));
+        for course in [Course::Line, Course::Jump(0.3)] {
+            for y in [moving_average(&t, &x, 1.3, course), first_order(&t, &x, 0.4, course), delayed(&t, &x, 0.9, course)] {
+                assert!(y.iter().all(|v| (v - 3.5).abs() < 1e-9));
+            }
         }
+    }
+
+    #[test]
+    fn a_jump_within_a_row_is_averaged_over_what_follows_it() {
+        let t: Vec<f64> = (0..6).map(f64::from).collect();
+        let x = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+        // the jump comes a quarter into the third interval
+        let y = moving_average(&t, &x, 2.0, Course::Jump(0.25));
+        assert!((y[3] - 0.375).abs() < 1e-12 && (y[4] - 0.875).abs() < 1e-12 && (y[5] - 1.0).abs() < 1e-12, "{y:?}");
+        let y = first_order(&t, &x, 0.5, Course::Jump(0.25));
+        assert!((y[3] - (1.0 - (-1.5_f64).exp())).abs() < 1e-12);
+        let y = delayed(&t, &x, 0.5, Course::Jump(0.25));
+        assert_eq!(y[3], 1.0);
+        assert_eq!(delayed(&t, &x, 0.9, Course::Jump(0.25))[3], 0.0);
     }
 }

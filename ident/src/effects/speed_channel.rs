@@ -37,14 +37,14 @@ pub(super) fn difference<'c>(context: &'c Context, instance: &Instance) -> Optio
 /// command makes of it, because the consensus holds the channel's own fluctuation.
 pub(super) fn speed(context: &Context, relation: Relation) -> Vec<f64> {
     match (&context.pulse, relation) {
-        (Some(_), Relation::SpeedFromPulse) => expected(context),
+        (Some(_), Relation::SpeedFromPulse) => expected(context).to_vec(),
         _ => context.rpm.clone(),
     }
 }
 
 /// Speed that the pulse alone makes one expect: a cubic above the starting pulse.
-pub(super) fn expected(context: &Context) -> Vec<f64> {
-    expected_at(context, 0.0)
+pub(super) fn expected(context: &Context) -> &[f64] {
+    context.facts.expected.get_or_init(|| expected_at(context, 0.0))
 }
 
 /// The same at a pulse that is `more` us longer.

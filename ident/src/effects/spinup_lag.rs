@@ -5,7 +5,7 @@
 //! Units: s.
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, speeds};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -44,6 +44,7 @@ impl Effect for SpinupLag {
         vec![
             Shape { name: "tau_up", unit: "s", range, starts: starts.clone() },
             Shape { name: "tau_down", unit: "s", range, starts },
+            operator::phase(),
         ]
     }
 
@@ -52,7 +53,7 @@ impl Effect for SpinupLag {
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
-        let ([up, down], Some(pulse)) = (shape, &context.pulse) else { return };
+        let ([up, down, phase], Some(pulse)) = (shape, &context.pulse) else { return };
         // which of the two constants holds is decided by the command alone, so that every column sees the same operator
         let mut state = pulse.first().copied().unwrap_or(0.0);
         let mut rising = Vec::with_capacity(pulse.len());
@@ -65,20 +66,20 @@ impl Effect for SpinupLag {
             last = *t;
         }
         design.map_columns(|column| {
-            // a pulse train acts from the row in which it is commanded: the input is a staircase, not a ramp between rows
+            // a command jumps somewhere between two rows: the input is a staircase, not a ramp
             let mut state = column.first().copied().unwrap_or(0.0);
+            let mut held = state;
             for i in 0..column.len() {
                 if i > 0 {
                     let tau = if rising[i] { *up } else { *down };
-                    let e = (-(context.t[i] - context.t[i - 1]) / tau.max(1e-9)).exp();
-                    state = column[i] + (state - column[i]) * e;
+                    let h = (context.t[i] - context.t[i - 1]) / tau.max(1e-9);
+                    let before = held + (state - held) * (-h * phase).exp();
+                    held = column[i];
+                    state = held + (before - held) * (-h * (1.0 - phase)).exp();
                 }
                 column[i] = state;
             }
         });
     }
 
-    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        fitted.iter().all(|e| e.value > 0.0)
-    }
 }

@@ -13,6 +13,12 @@ use crate::design::TargetDesign;
 /// See the module.
 pub(crate) struct ThermalDerate;
 
+/// Form in which the winding's resistance rises: the loss of speed is that of the drop over it, which grows with the torque.
+const WINDING: &str = "winding";
+
+/// Twice the drop over the winding as a share of the supply at full speed: about a quarter on motors of this size.
+const DROP: f64 = 0.5;
+
 impl Effect for ThermalDerate {
     fn id(&self) -> &'static str {
         "thermal_derate"
@@ -21,7 +27,7 @@ impl Effect for ThermalDerate {
     fn about(&self) -> About {
         About {
             title: "Speed falls as controller or winding heats up",
-            equation: "rpm(pulse) *= 1 - derate heat, tau d(heat)/dt = current_a^2 - heat",
+            equation: "rpm(pulse) *= 1 - derate heat (controller), or 1 - derate heat rpm/top (winding); tau d(heat)/dt = current_a^2 - heat",
             source: "first-order thermal model, Hanselman 2006",
             depends_on: &["heat"],
             signature: "after a step to high current the speed sags slowly, and recovers while the current is low; thrust(rpm) holds",
@@ -38,7 +44,7 @@ impl Effect for ThermalDerate {
         if context.time_is_row || channels.is_empty() || context.current.is_none() {
             Vec::new()
         } else {
-            vec![Instance::new(&channels, "")]
+            vec![Instance::new(&channels, "controller"), Instance::new(&channels, WINDING)]
         }
     }
 
@@ -51,10 +57,13 @@ impl Effect for ThermalDerate {
         vec![Amplitude { name: "derate", unit: "1/A2" }]
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let ([tau], Some(current)) = (shape, &context.current) else { return };
         let mut heat = 0.0;
-        let column = expected(context)
+        let expected = expected(context);
+        let top = expected.iter().copied().fold(1.0, f64::max);
+        let winding = instance.form == WINDING;
+        let column = expected
             .iter()
             .enumerate()
             .map(|(i, speed)| {
@@ -62,7 +71,8 @@ impl Effect for ThermalDerate {
                     let e = (-(context.t[i] - context.t[i - 1]) / tau).exp();
                     heat = e * heat + (1.0 - e) * current[i - 1] * current[i - 1];
                 }
-                -heat * speed
+                let share = speed / top;
+                -heat * speed * if winding { share / (1.0 + DROP * share) } else { 1.0 }
             })
             .collect();
         design.add(position, 0, column);

@@ -40,7 +40,7 @@ impl Effect for ThrottleQuantisation {
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
         // the saw-tooth has a likelihood with many narrow peaks: the search starts on the highest
-        let (step, offset, anchored) = best_tooth(&levels(context));
+        let (step, offset, anchored) = *context.facts.tooth.get_or_init(|| best_tooth(&levels(context)));
         let free = if anchored { 0.0 } else { 0.3 };
         vec![
             Shape { name: "step", unit: "us", range: (0.985 * step, 1.015 * step), starts: vec![step] },
@@ -57,7 +57,7 @@ impl Effect for ThrottleQuantisation {
         design.add(
             position,
             0,
-            pulse.iter().zip(slope(context)).map(|(p, slope)| slope * step * tooth(*p, *step, *offset)).collect(),
+            pulse.iter().zip(context.facts.slope.get_or_init(|| slope(context))).map(|(p, slope)| slope * step * tooth(*p, *step, *offset)).collect(),
         );
     }
 
@@ -87,7 +87,7 @@ fn slope(context: &Context) -> Vec<f64> {
 /// Pulse, slope of the static curve, and mean departure from it, for each microsecond of pulse that the run visits.
 fn levels(context: &Context) -> Vec<(f64, f64, f64)> {
     let Some(pulse) = &context.pulse else { return Vec::new() };
-    let (expected, slope) = (curve(context, 0.0), slope(context));
+    let (expected, slope) = (curve(context, 0.0), context.facts.slope.get_or_init(|| slope(context)));
     let mut bins: std::collections::BTreeMap<i64, (f64, f64, f64, f64)> = std::collections::BTreeMap::new();
     for (i, p) in pulse.iter().enumerate() {
         let settled = i >= 8 && (pulse[i] - pulse[i - 8]).abs() < 5.0;
@@ -110,41 +110,36 @@ fn tooth(pulse: f64, step: f64, offset: f64) -> f64 {
     at.round() - at
 }
 
-/// Step and offset of the saw-tooth that fits the departures best, and whether the offset is that of a plain counter: the strongest lines of a periodogram over pulse, then a fine
-/// scan about each.
+/// Step and offset of the saw-tooth that fits the departures best, and whether the offset is that of a plain counter: every
+/// step on a grid that is even in frequency, then a fine scan about the best ones.
 fn best_tooth(levels: &[(f64, f64, f64)]) -> (f64, f64, bool) {
     let span = levels.last().map_or(1.0, |l| l.0) - levels.first().map_or(0.0, |l| l.0);
-    let power = |step: f64| {
-        let (mut s, mut c) = (0.0, 0.0);
-        for (p, _, d) in levels {
-            let (sin, cos) = (std::f64::consts::TAU * (p - 1000.0) / step).sin_cos();
-            s += d * sin;
-            c += d * cos;
-        }
-        s * s + c * c
-    };
-    // even in frequency, about six points a resolved line
+    let departures = Departures::new(levels);
+    let df = 0.15 / span.max(10.0);
     let (low, high) = (1.0 / LONGEST, 1.0 / SHORTEST);
-    let df = (0.15 / span.max(10.0)).max((high - low) / 4000.0);
-    let grid: Vec<(f64, f64)> =
-        (0..((high - low) / df) as usize).map(|k| low + df * k as f64).map(|f| (f, power(1.0 / f))).collect();
-    let mut peaks: Vec<(f64, f64)> = grid.windows(3).filter(|w| w[1].1 > w[0].1 && w[1].1 >= w[2].1).map(|w| w[1]).collect();
-    peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
-    peaks.truncate(8);
+    let mut coarse: Vec<(f64, f64)> = (0..((high - low) / df) as usize)
+        .map(|k| low + df * k as f64)
+        .map(|f| {
+            let at = |offset: f64| departures.explained(1.0 / f, offset);
+            let free = (0..8).map(|m| at(f64::from(m) / 8.0 - 0.5));
+            (f, free.chain(anchors(1.0 / f).map(at)).fold(0.0, f64::max))
+        })
+        .collect();
+    coarse.sort_by(|a, b| b.1.total_cmp(&a.1));
+    coarse.truncate(16);
     let mut best = Tooth { score: f64::NEG_INFINITY, step: 10.0, offset: 0.0 };
     let mut anchored = best;
-    for (f, _) in peaks {
+    for (f, _) in coarse {
         for k in -6..=6 {
             let step = 1.0 / (f + df * f64::from(k) / 6.0);
-            // cut off or rounded, counted from 1000 us or from 0; by round steps, or a round number of them over 1000 us
+            // by round steps, or a round number of them over 1000 us
             for step in [step, step.round(), 0.5 * (2.0 * step).round(), 1000.0 / (1000.0 / step).round()] {
-                let from_zero = -(1000.0 / step).fract();
-                for offset in [-0.5, 0.0, from_zero, from_zero + 0.5] {
-                    anchored.improve(levels, step, offset);
+                for offset in anchors(step) {
+                    anchored.improve(&departures, step, offset);
                 }
             }
             for m in 0..16 {
-                best.improve(levels, step, f64::from(m) / 16.0 - 0.5);
+                best.improve(&departures, step, f64::from(m) / 16.0 - 0.5);
             }
         }
     }
@@ -152,8 +147,74 @@ fn best_tooth(levels: &[(f64, f64, f64)]) -> (f64, f64, bool) {
     if anchored.score > ANCHORED * best.score { (anchored.step, anchored.offset, true) } else { (best.step, best.offset, false) }
 }
 
+/// Offsets of a plain counter: cut off or rounded, counted from 1000 us or from 0.
+fn anchors(step: f64) -> [f64; 4] {
+    let from_zero = -(1000.0 / step).fract();
+    [-0.5, 0.0, from_zero, from_zero + 0.5]
+}
+
 /// Share of the best score at which a saw-tooth that is counted from 1000 us or from 0 is taken.
 const ANCHORED: f64 = 0.98;
+
+/// Depth of the tooth beside that of a pure rounding.
+const DEPTH: (f64, f64) = (0.7, 1.3);
+
+/// Departures of the levels from the static curve, less all that a cubic or a shift of the pulse explains.
+struct Departures<'l> {
+    levels: &'l [(f64, f64, f64)],
+    /// Orthonormal columns: powers of the pulse, slope of the curve.
+    nuisances: Vec<Vec<f64>>,
+    rest: Vec<f64>,
+}
+
+impl<'l> Departures<'l> {
+    fn new(levels: &'l [(f64, f64, f64)]) -> Self {
+        let mut out = Self { levels, nuisances: Vec::new(), rest: Vec::new() };
+        let middle = levels.get(levels.len() / 2).map_or(1500.0, |l| l.0);
+        for power in 0..=3 {
+            out.add_nuisance(levels.iter().map(|l| ((l.0 - middle) / 500.0).powi(power)).collect());
+        }
+        out.add_nuisance(levels.iter().map(|l| l.1).collect());
+        out.rest = levels.iter().map(|l| l.2).collect();
+        out.nuisances.iter().for_each(|q| remove(&mut out.rest, q));
+        out
+    }
+
+    fn add_nuisance(&mut self, mut column: Vec<f64>) {
+        let whole = norm(&column);
+        self.nuisances.iter().for_each(|q| remove(&mut column, q));
+        let left = norm(&column);
+        if left > 1e-6 * whole {
+            column.iter_mut().for_each(|v| *v /= left);
+            self.nuisances.push(column);
+        }
+    }
+
+    /// Squared departure that a saw-tooth of about the depth of a rounding takes away.
+    fn explained(&self, step: f64, offset: f64) -> f64 {
+        let x: Vec<f64> = self.levels.iter().map(|(p, slope, _)| slope * step * tooth(*p, step, offset)).collect();
+        let taken: f64 = self.nuisances.iter().map(|q| dot(&x, q).powi(2)).sum();
+        let (along, own) = (dot(&x, &self.rest), dot(&x, &x) - taken);
+        if own <= 1e-12 {
+            return 0.0;
+        }
+        let depth = (along / own).clamp(DEPTH.0, DEPTH.1);
+        depth * (2.0 * along - depth * own)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn remove(from: &mut [f64], unit: &[f64]) {
+    let along = dot(from, unit);
+    from.iter_mut().zip(unit).for_each(|(v, u)| *v -= along * u);
+}
 
 /// A saw-tooth and how much of the squared departures it explains.
 #[derive(Clone, Copy)]
@@ -165,27 +226,16 @@ struct Tooth {
 
 impl Tooth {
     /// Takes another step and offset where they explain more.
-    fn improve(&mut self, levels: &[(f64, f64, f64)], step: f64, offset: f64) {
-        // a shift of the whole pulse belongs to the static curve: it is projected out
-        let (mut dx, mut xx, mut ds, mut xs, mut ss) = (0.0, 1e-12, 0.0, 0.0, 1e-12);
-        for (p, slope, d) in levels {
-            let x = slope * step * tooth(*p, step, offset);
-            dx += d * x;
-            xx += x * x;
-            ds += d * slope;
-            xs += x * slope;
-            ss += slope * slope;
-        }
-        let (dt, tt) = (dx - ds * xs / ss, xx - xs * xs / ss);
-        // a pulse that is cut to steps has the tooth the right way up
-        if dt > 0.0 && dt * dt / tt > self.score {
-            *self = Self { score: dt * dt / tt, step, offset };
+    fn improve(&mut self, departures: &Departures<'_>, step: f64, offset: f64) {
+        let score = departures.explained(step, offset);
+        if score > self.score {
+            *self = Self { score, step, offset };
         }
     }
 }
 
 /// Steps that are searched, us.
-const SHORTEST: f64 = 3.0;
+const SHORTEST: f64 = 2.0;
 /// See [`SHORTEST`].
 const LONGEST: f64 = 80.0;
 
