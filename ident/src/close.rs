@@ -130,7 +130,7 @@ fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<Effe
                 channels.swap(0, at);
             }
             let mut depends_on: Vec<String> = about.depends_on.iter().map(|v| (*v).to_owned()).collect();
-            if d.unknown {
+            if p.effect.id() == "unknown" {
                 depends_on.push(p.instance.form.clone());
             }
             EffectEntry {

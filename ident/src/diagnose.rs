@@ -36,6 +36,9 @@ const TEMPERATURE: f64 = 4.0;
 /// Share of the winner's probability at which a second hypothesis makes the verdict ambiguous.
 const RIVAL: f64 = 0.5;
 
+/// Probability below which a verdict is ambiguous although no single rival comes close.
+const UNSURE: f64 = 0.6;
+
 /// A candidate hypothesis with its evidence.
 #[derive(Debug, Clone)]
 pub struct Candidate {
@@ -93,7 +96,10 @@ impl Diagnosis {
     pub fn ambiguous(&self) -> bool {
         !self.unknown
             && !self.best.fit.placed.is_empty()
-            && self.rivals.first().is_some_and(|r| r.probability >= RIVAL * self.probability)
+            && self
+                .rivals
+                .first()
+                .is_some_and(|r| r.probability >= RIVAL * self.probability || self.probability < UNSURE && r.probability > 0.05)
     }
 }
 
@@ -110,7 +116,20 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     for round in 0..MOST_EFFECTS {
         let ranked =
             round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
-        if std::env::var("QTRACE").is_ok() { for c in ranked.iter().take(10) { eprintln!("r{round} {:.1} {:?} held {:?}", c.evidence, c.fit.placed.last(), heldout::errors_after_newest(context, declared, &c.fit, &folds, &errors).iter().zip(&errors).map(|(a,b)| format!("{:.3}", 1.0-a.share_gone(b))).collect::<Vec<_>>()); } }
+        if std::env::var("QTRACE").is_ok() {
+            for c in ranked.iter().take(10) {
+                eprintln!(
+                    "r{round} {:.1} {:?} held {:?}",
+                    c.evidence,
+                    c.fit.placed.last(),
+                    heldout::errors_after_newest(context, declared, &c.fit, &folds, &errors)
+                        .iter()
+                        .zip(&errors)
+                        .map(|(a, b)| format!("{:.3}", 1.0 - a.share_gone(b)))
+                        .collect::<Vec<_>>()
+                );
+            }
+        }
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else { break };
         best = chosen.winner;
         errors = chosen.held;
@@ -130,8 +149,16 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         probability = p;
         errors = held;
     }
-    let forced =
-        if best.fit.placed.is_empty() { nameless(context, declared, &start, &best.fit, &folds, &heldout_before) } else { None };
+    let credible = best.fit.placed.is_empty() || is_unknown || explains(context, &best.fit, &heldout_before, &errors);
+    if !credible {
+        rivals.insert(0, Rival { ids: best.ids(), probability, fit: best.fit.clone() });
+    }
+    let forced = if best.fit.placed.is_empty() || !credible {
+        let left = if credible { &best.fit } else { &start };
+        nameless(context, declared, &start, left, &folds, &heldout_before)
+    } else {
+        None
+    };
     let is_unknown = is_unknown || forced.is_some();
     if let Some((candidate, held)) = forced {
         best = candidate;
@@ -360,6 +387,32 @@ fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[Hel
     }
     // extra scatter has no mean to predict: the evidence alone must carry it
     helps || (newest.effect.scatters() && gain > 4.0 * NEEDED_EVIDENCE)
+}
+
+/// Share of what a channel shows above its noise that the names must take away to be believed.
+const NEEDED_SHARE: f64 = 0.5;
+
+/// Whether the named effects are the cause of most of what they were named for: on one channel that they touch they take away at
+/// least half of the squared error above the noise. A small part of a large residual is what any flexible term can have.
+fn explains(context: &Context, fit: &Fit, before: &[Held], after: &[Held]) -> bool {
+    if fit.placed.iter().any(|p| p.effect.scatters()) {
+        return true;
+    }
+    let share = |floor: f64, before: f64, after: f64| {
+        let (b, a) = (before * before - floor * floor, after * after - floor * floor);
+        if b < 0.5 * floor * floor { 1.0 } else { 1.0 - a / b }
+    };
+    context
+        .targets
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| fit.placed.iter().any(|p| p.instance.touches(t.name)))
+        .map(|(i, t)| {
+            let floor = t.noise.rms;
+            share(floor, before[i].rms, after[i].rms).max(share(floor, before[i].typical, after[i].typical))
+        })
+        .fold(0.0, f64::max)
+        > NEEDED_SHARE
 }
 
 /// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.

@@ -14,8 +14,9 @@ use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::residual::whiteness;
 
-/// The opponent without a name: a smooth function of one variable on one channel. It wins where it predicts held-out rows
-/// clearly better than whatever was named there, and significantly.
+/// The opponent without a name: a smooth function of one variable on one channel, or on all speed channels alike. It wins where
+/// it predicts held-out rows clearly better than whatever was named there, significantly, and names elsewhere are not the
+/// larger part of what was found.
 pub(crate) fn opponent(
     context: &Context,
     declared: Declared<'_>,
@@ -26,23 +27,21 @@ pub(crate) fn opponent(
     named: &[Held],
 ) -> Option<(Candidate, Vec<Held>)> {
     let mut champion: Option<(f64, Candidate, Vec<Held>)> = None;
-    for (i, target) in context.targets.iter().enumerate() {
-        if target.relation.is_evidence() || target.relation == Relation::SpeedAlone {
-            continue;
-        }
+    for group in groups(context) {
+        let (i, target) = (group[0], &context.targets[group[0]]);
+        let on_group = |f: &Fit, shares: &[f64]| -> f64 {
+            group.iter().map(|k| shares[*k] * (f.targets[*k].loglik.mean - start.targets[*k].loglik.mean)).sum()
+        };
         for variable in variables(context) {
             if is_load(context, target, &variable) {
                 continue;
             }
-            let instance = Instance::new(&[target.name], &variable);
-            let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
-            let Some(fitted) = fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
-            else {
-                continue;
-            };
+            let Some(fitted) = correction(context, declared, start, &group, &variable) else { continue };
             let shares = shares(context, [&fitted, &best.fit].into_iter());
             let candidate = Candidate { evidence: net_gain(context, &fitted, start, &shares), fit: fitted };
-            if candidate.evidence < 2.0 * NEEDED_EVIDENCE {
+            let elsewhere = net_of_group(&best.fit, start, &shares, &group);
+            let better = on_group(&candidate.fit, &shares) - on_group(&best.fit, &shares);
+            if candidate.evidence < 2.0 * NEEDED_EVIDENCE || better < NEEDED_EVIDENCE || elsewhere > candidate.evidence {
                 continue;
             }
             let held = heldout::errors_after_newest(context, declared, &candidate.fit, folds, before);
@@ -61,8 +60,35 @@ pub(crate) fn opponent(
             }
         }
     }
-    // names that explain more of the run as a whole stay
-    champion.filter(|(_, c, _)| c.evidence > best.evidence).map(|(_, c, h)| (c, h))
+    champion.map(|(_, c, h)| (c, h))
+}
+
+/// Channels that a correction without a name is tried on: each alone, and the speed channels together, which see one rotor.
+fn groups(context: &Context) -> Vec<Vec<usize>> {
+    let asked = |k: &usize| {
+        let relation = context.targets[*k].relation;
+        !relation.is_evidence() && relation != Relation::SpeedAlone
+    };
+    let (speeds, mut out): (Vec<usize>, Vec<usize>) =
+        (0..context.targets.len()).filter(asked).partition(|k| context.targets[*k].relation == Relation::SpeedFromPulse);
+    out.sort_unstable();
+    std::iter::once(speeds).chain(out.into_iter().map(|k| vec![k])).filter(|g| !g.is_empty()).collect()
+}
+
+/// A smooth function of a variable added to the channels of a group.
+fn correction(context: &Context, declared: Declared<'_>, start: &Fit, group: &[usize], variable: &str) -> Option<Fit> {
+    let names: Vec<&str> = group.iter().map(|k| context.targets[*k].name).collect();
+    let instance = Instance::new(&names, variable);
+    let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
+    fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
+}
+
+/// Evidence of a fit over the start on the channels that are not of a group.
+fn net_of_group(best: &Fit, start: &Fit, shares: &[f64], group: &[usize]) -> f64 {
+    (0..shares.len())
+        .filter(|k| !group.contains(k))
+        .map(|k| shares[k] * (best.targets[k].loglik.mean - start.targets[k].loglik.mean))
+        .sum()
 }
 
 /// Whether a variable stands for the channel itself or for the load, which its relation holds already. (The departure of
@@ -104,32 +130,23 @@ pub(crate) fn nameless(
     before: &[Held],
 ) -> Option<(Candidate, Vec<Held>)> {
     let residuals = heldout::residuals(context, declared, best);
-    let (i, target) = context
-        .targets
-        .iter()
-        .enumerate()
-        .filter(|(i, target)| {
-            let r = &residuals[*i];
-            let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
-            let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
-            let asked = !target.relation.is_evidence() && target.relation != Relation::SpeedAlone;
-            asked && r.len() >= FEWEST_SAMPLES.0 && rms > LEFT_OVER.0 * target.noise.rms && whiteness(&t, r) < LEFT_OVER.1
-        })
-        .max_by(|a, b| {
-            let excess = |i: usize| {
-                residuals[i].iter().map(|v| v * v).sum::<f64>()
-                    / (residuals[i].len() as f64 * context.targets[i].noise.rms.powi(2))
-            };
-            excess(a.0).total_cmp(&excess(b.0))
-        })?;
+    let excess = |i: usize| {
+        residuals[i].iter().map(|v| v * v).sum::<f64>() / (residuals[i].len() as f64 * context.targets[i].noise.rms.powi(2))
+    };
+    let left_over = |i: usize| {
+        let (r, target) = (&residuals[i], &context.targets[i]);
+        let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
+        r.len() >= FEWEST_SAMPLES.0 && excess(i) > LEFT_OVER.0.powi(2) && whiteness(&t, r) < LEFT_OVER.1
+    };
+    let group = groups(context)
+        .into_iter()
+        .filter(|g| g.iter().any(|i| left_over(*i)))
+        .max_by(|a, b| excess(a[0]).total_cmp(&excess(b[0])))?;
+    let i = group[0];
     variables(context)
         .into_iter()
-        .filter(|v| !is_load(context, target, v))
-        .filter_map(|variable| {
-            let instance = Instance::new(&[target.name], &variable);
-            let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
-            fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
-        })
+        .filter(|v| !is_load(context, &context.targets[i], v))
+        .filter_map(|variable| correction(context, declared, start, &group, &variable))
         .map(|f| {
             let held = heldout::errors_after_newest(context, declared, &f, folds, before);
             (Candidate { evidence: f.targets[i].loglik.mean - start.targets[i].loglik.mean, fit: f }, held)

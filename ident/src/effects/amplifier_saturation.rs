@@ -64,7 +64,9 @@ impl Effect for AmplifierSaturation {
             target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > 1.005 * reached).map(|(_, y)| *y).collect();
         let n = above.len() as f64;
         let level = above.iter().sum::<f64>() / n;
-        let se = (above.iter().map(|v| (v - level).powi(2)).sum::<f64>()).sqrt() / n;
+        // a rail is hit exactly: what is left is the last digit of the log
+        let digit = crate::noise::quantum(&target.y) / 12.0_f64.sqrt();
+        let se = ((above.iter().map(|v| (v - level).powi(2)).sum::<f64>()).sqrt() / n).max(digit);
         if level.is_finite() {
             fitted.insert(0, Estimate { name: "level".into(), unit: "N".into(), value: level, se });
         }

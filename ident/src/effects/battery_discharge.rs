@@ -44,12 +44,13 @@ impl Effect for BatteryDischarge {
             return Vec::new();
         }
         let mut channels = vec!["voltage_v"];
+        channels.extend(present(context, &["current_a"]));
         channels.extend(speeds(context));
         vec![Instance::new(&channels, "")]
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
-        if instance.channels.len() < 2 {
+        if !instance.channels.iter().any(|c| c.starts_with("rpm")) {
             return Vec::new();
         }
         let total = charge(context).last().copied().unwrap_or(0.0).max(1e-6);
@@ -57,7 +58,11 @@ impl Effect for BatteryDischarge {
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "slope", unit: "V/Ah" }, Amplitude { name: "bend", unit: "V/Ah2" }]
+        vec![
+            Amplitude { name: "slope", unit: "V/Ah" },
+            Amplitude { name: "bend", unit: "V/Ah2" },
+            Amplitude { name: "current_rise", unit: "A/Ah.krpm3" },
+        ]
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
@@ -65,6 +70,9 @@ impl Effect for BatteryDischarge {
         if design.relation == Relation::Voltage {
             design.add(position, 0, charge.iter().map(|q| -q).collect());
             design.add(position, 1, charge.iter().map(|q| -q * q).collect());
+        } else if design.relation == Relation::Current {
+            // the same power from a lower voltage
+            design.add(position, 2, charge.iter().zip(&context.rpm).map(|(q, r)| q * (r / 1000.0).powi(3)).collect());
         } else if let [loss] = shape {
             design.map_columns(|column| column.iter_mut().zip(&charge).for_each(|(v, q)| *v *= 1.0 - loss * q));
         }

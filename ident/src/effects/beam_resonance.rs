@@ -83,11 +83,37 @@ impl Effect for BeamResonance {
         true
     }
 
-    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or(0.0, |e| e.value);
         // the bump follows the motion (an amplifier that falls slower than it rises) and is smaller than it
-        value("vibration") > -1e-6 && value("bump").abs() < 10.0 * value("scatter").max(value("vibration"))
+        let seen = fitted.iter().any(|e| e.name == "vibration" && e.value > 5.0 * e.se);
+        (seen || swings(context, value("natural_frequency"), value("damping_ratio"), order(instance)))
+            && value("vibration") > -1e-6
+            && value("bump").abs() < 10.0 * value("scatter").max(value("vibration"))
     }
+}
+
+/// Variance of second differences near the resonance over that of the noise elsewhere that counts as a swing.
+const SWING: f64 = 1.5;
+
+/// Whether successive samples scatter more near the resonance than elsewhere: a beam swings within a sample; a mean that is
+/// merely off there is something else.
+fn swings(context: &Context, frequency: f64, damping: f64, order: f64) -> bool {
+    let Some(target) = context.target("thrust_n").map(|k| &context.targets[k]) else { return false };
+    let (mut near, mut far) = ((0.0, 0.0), (0.0, 0.0));
+    for (rows, y) in target.rows.windows(3).zip(target.y.windows(3)) {
+        let speeds = [context.rpm[rows[0]], context.rpm[rows[1]], context.rpm[rows[2]]];
+        // a change of the load is no scatter
+        if (speeds[2] - speeds[0]).abs() > 0.01 * speeds[1] || speeds[1] < super::blade_damage::STANDSTILL {
+            continue;
+        }
+        let d = y[0] - 2.0 * y[1] + y[2];
+        let ratio = d * d / 6.0 / target.noise.variance(speeds[1]);
+        let off = (speeds[1] / 60.0 * order / frequency - 1.0).abs();
+        let bin = if off < 2.0 * damping.max(0.01) { &mut near } else { &mut far };
+        *bin = (bin.0 + ratio, bin.1 + 1.0);
+    }
+    near.1 >= 5.0 && near.0 / near.1 > SWING * (far.0 / f64::max(far.1, 1.0)).min(1.0)
 }
 
 fn order(instance: &Instance) -> f64 {

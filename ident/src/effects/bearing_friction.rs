@@ -138,7 +138,8 @@ fn winding(context: &Context) -> f64 {
 /// Relative error of a torque that is inferred from the power balance: the winding's share is itself an estimate.
 const BALANCE: f64 = 0.02;
 
-/// Adds the share of the drag that the torque arm sees; where the current says nothing of its size, the arm does.
+/// Adds the share of the drag that the torque arm sees. Where no current was measured only the arm's part is known: the drag
+/// itself is left out.
 pub(super) fn with_share(mut fitted: Vec<Estimate>) -> Vec<Estimate> {
     for e in fitted.iter_mut().filter(|e| e.name == "constant" || e.name == "viscous") {
         e.se = e.se.hypot(BALANCE * e.value);
@@ -149,11 +150,6 @@ pub(super) fn with_share(mut fitted: Vec<Estimate>) -> Vec<Estimate> {
             let share = arm.value / whole.value;
             let se = (arm.se / whole.value).hypot(share * whole.se / whole.value);
             fitted.push(Estimate { name: "share".into(), unit: "1".into(), value: share, se });
-        }
-        (None, Some(arm)) => {
-            let viscous = find("arm_viscous");
-            fitted.insert(0, Estimate { name: "constant".into(), ..arm });
-            fitted.extend(viscous.map(|v| Estimate { name: "viscous".into(), ..v }));
         }
         _ => {}
     }

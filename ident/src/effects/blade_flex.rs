@@ -35,7 +35,10 @@ impl Effect for BladeFlex {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        with_and_without_load(context)
+        let mut out = with_and_without_load(context);
+        let smooth: Vec<Instance> = out.iter().map(|i| Instance { form: SMOOTH.into(), ..i.clone() }).collect();
+        out.extend(smooth);
+        out
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
@@ -53,10 +56,16 @@ impl Effect for BladeFlex {
         vec![Amplitude { name: "current_loss", unit: "A/krpm3" }, Amplitude { name: "speed_gain", unit: "1" }]
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let [onset, exponent, rest @ ..] = shape else { return };
         let ratio = rest.first().copied().unwrap_or(1.0);
-        let factor = |speed: f64, exponent: f64| if speed > *onset { (onset / speed).powf(exponent) } else { 1.0 };
+        let smooth = instance.form == SMOOTH;
+        let factor = |speed: f64, exponent: f64| match speed / onset {
+            over if over <= 1.0 => 1.0,
+            // the same loss at twice the onset as that of the power, without its corner
+            over if smooth => 1.0 - (1.0 - 0.5_f64.powf(exponent)) * (over - 1.0).powi(2),
+            over => over.powf(-exponent),
+        };
         match design.relation {
             Relation::Thrust | Relation::Torque => {
                 let exponent = if design.relation == Relation::Torque { exponent * ratio } else { *exponent };
@@ -78,6 +87,9 @@ impl Effect for BladeFlex {
         ratio && fitted.iter().any(|e| e.name == "exponent" && e.value > 3.0 * e.se)
     }
 }
+
+/// Form that sets in without a corner.
+const SMOOTH: &str = "smooth";
 
 /// A speed above which something sets in: from a fifth of the top speed up, where rows above it are left to show it.
 pub(super) fn upper_speeds(context: &Context, count: usize) -> Shape {

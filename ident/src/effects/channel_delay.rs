@@ -35,7 +35,9 @@ impl Effect for ChannelDelay {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         meters(context)
             .iter()
-            .flat_map(|s| operator::courses(context).iter().map(|jumps| Instance::new(s, if *jumps { operator::OF_STEPS } else { "" })))
+            .flat_map(|s| {
+                operator::courses(context).iter().map(|jumps| Instance::new(s, if *jumps { operator::OF_STEPS } else { "" }))
+            })
             .collect()
     }
 

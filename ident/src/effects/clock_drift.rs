@@ -5,7 +5,7 @@
 //! Units: 1 (seconds late a second), positive falls behind.
 //! Reference: frequency tolerance of two free-running oscillators.
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, present};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, operator, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -34,28 +34,46 @@ impl Effect for ClockDrift {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = present(context, &["thrust_n", "torque_nm"]);
-        if context.time_is_row || channels.is_empty() { Vec::new() } else { vec![Instance::new(&channels, "")] }
+        if context.time_is_row || channels.is_empty() {
+            return Vec::new();
+        }
+        operator::courses(context)
+            .iter()
+            .map(|jumps| Instance::new(&channels, if *jumps { operator::OF_STEPS } else { "" }))
+            .collect()
     }
 
-    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         // lateness at the end of the run, in rows
         let rows: [f64; 17] = [0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0, 30.0, 45.0, 70.0, -1.0, -3.0, -8.0, -20.0];
         let unit = context.step() / context.duration().max(1e-9);
-        vec![Shape {
+        let rate = Shape {
             name: "rate",
             unit: "1",
             range: (-40.0 * unit, 150.0 * unit),
             starts: rows.iter().map(|r| r * unit).collect(),
-        }]
+        };
+        if instance.form == operator::OF_STEPS { vec![rate, operator::phase()] } else { vec![rate] }
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         Vec::new()
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
-        let [rate] = shape else { return };
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let [rate, phase @ ..] = shape else { return };
+        let course = operator::course(&instance.form, phase);
         let t0 = context.t.first().copied().unwrap_or(0.0);
-        design.map_columns(|column| *column = operator::delayed_varying(&context.t, column, operator::Course::Line, |t| rate * (t - t0)));
+        design.map_columns(|column| *column = operator::delayed_varying(&context.t, column, course, |t| rate * (t - t0)));
+    }
+
+    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        // where the load jumps within rows, lateness is known to a row only
+        if operator::abrupt(context) {
+            for e in fitted.iter_mut().filter(|e| e.name == "rate") {
+                e.se = e.se.hypot(context.step() / 12.0_f64.sqrt() / context.duration().max(1e-9));
+            }
+        }
+        fitted
     }
 }

@@ -6,7 +6,7 @@
 //! Units: N.m, 1; internally as `bearing_friction`.
 //! Reference: Beharie 2013, section 5.7.1 (the four speed sensors compared); power balance as `bearing_friction`.
 
-use super::bearing_friction::{AMPLITUDES, costs, brakes, drag, with_share};
+use super::bearing_friction::{AMPLITUDES, brakes, costs, drag, with_share};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, load_channels};
 use crate::context::Context;
 use crate::design::TargetDesign;

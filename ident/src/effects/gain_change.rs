@@ -47,11 +47,16 @@ impl Effect for GainChange {
                 name: "rate",
                 unit: "1/s",
                 range: (-most, most),
-                starts: [-0.3, -0.1, -0.03, -0.01, 0.01, 0.03, 0.1, 0.3].map(|k| k * most).to_vec(),
+                starts: [-0.3, -0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1, 0.3].map(|k| k * most).to_vec(),
             }]
         } else {
             vec![
-                Shape { name: "gain_change", unit: "1", range: (-0.5, 0.5), starts: vec![-0.1, -0.03, -0.01, 0.01, 0.03, 0.1] },
+                Shape {
+                    name: "gain_change",
+                    unit: "1",
+                    range: (-0.5, 0.5),
+                    starts: vec![-0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1],
+                },
                 super::tare_shift::coarse_onset(context),
             ]
         }

@@ -38,19 +38,27 @@ impl Effect for Hysteresis {
         if present(context, &["thrust_n"]).is_empty() || up.min(down) * 20 < context.len() {
             Vec::new()
         } else {
-            vec![Instance::new(&["thrust_n"], "")]
+            vec![Instance::new(&["thrust_n"], ""), Instance::new(&["thrust_n"], PLAY)]
         }
     }
 
-    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
-        Vec::new()
+    fn shapes(&self, _: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form == PLAY {
+            vec![Shape { name: "slack", unit: "1", range: (0.005, 0.4), starts: vec![0.02, 0.05, 0.1, 0.2] }]
+        } else {
+            Vec::new()
+        }
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         vec![Amplitude { name: "width", unit: "N" }]
     }
 
-    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        if let [slack] = shape {
+            design.add(position, 0, play(context, *slack));
+            return;
+        }
         let top = context.rpm.iter().copied().fold(1.0, f64::max);
         let values = direction(context)
             .iter()
@@ -62,6 +70,37 @@ impl Effect for Hysteresis {
             .collect();
         design.add(position, 0, values);
     }
+}
+
+/// Form in which the reading changes sides gradually: play elements in parallel.
+const PLAY: &str = "play";
+
+/// Elements of the play, with slacks of one to this many parts of the largest.
+const ELEMENTS: usize = 4;
+
+/// Half the sum of the lags of the play elements over their largest sum: -1/2 on the way up, 1/2 on the way down, and in
+/// between after a reversal. The load is taken as the square of the speed.
+fn play(context: &Context, slack: f64) -> Vec<f64> {
+    let top = context.rpm.iter().copied().fold(1.0, f64::max);
+    let slacks: Vec<f64> = (1..=ELEMENTS).map(|k| slack * k as f64 / ELEMENTS as f64).collect();
+    let opening = 2.0 * slacks.iter().sum::<f64>();
+    let mut elements = vec![0.0; ELEMENTS];
+    context
+        .rpm
+        .iter()
+        .map(|rpm| {
+            let load = (rpm / top).powi(2);
+            let lag: f64 = elements
+                .iter_mut()
+                .zip(&slacks)
+                .map(|(element, slack)| {
+                    *element = f64::clamp(*element, load - slack, load + slack);
+                    *element - load
+                })
+                .sum();
+            lag / opening
+        })
+        .collect()
 }
 
 /// -1 while the last step of the load went up, +1 while it went down, 0 before any.

@@ -59,8 +59,7 @@ impl Effect for ReynoldsThrust {
             .collect();
         for column in &mut design.columns {
             match column.label {
-                Label::Base(1) => column.values.fill(0.0),
-                Label::Base(2) => column.values.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f),
+                Label::Base(1 | 2) => column.values.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f),
                 _ => {}
             }
         }

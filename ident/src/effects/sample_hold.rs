@@ -105,5 +105,47 @@ fn period(context: &Context, target: &Target) -> Option<(f64, f64)> {
     let mean = near.iter().sum::<f64>() / near.len() as f64;
     let even = near.len() as f64 > 0.85 * gaps.len() as f64;
     // intervals between 1 and 2 rows show as ones and twos: nearly no interval may then be of another length
-    (even && mean > 1.4 * dt).then(|| (mean, dt / (near.len() as f64 * 3.0).sqrt()))
+    (even && mean > 1.4 * dt).then(|| slope(context, &rows, &live, mean))
+}
+
+/// Interval of updates that come at a rate of their own and show on the next row: slope of their times over their count, the
+/// count being the rounded number of intervals since the last one.
+fn slope(context: &Context, rows: &[usize], live: &dyn Fn(usize) -> bool, first: f64) -> (f64, f64) {
+    let dt = context.step();
+    let mut period = first;
+    let mut se = first;
+    for _ in 0..4 {
+        // each stretch without a stand-still is a line of its own, all with one slope
+        let (mut count, mut n) = (0.0, 0.0);
+        let (mut line, mut kk, mut kt): (Vec<(f64, f64)>, f64, f64) = (Vec::new(), 0.0, 0.0);
+        let mut close = |line: &mut Vec<(f64, f64)>| {
+            let m = line.len() as f64;
+            let (k, t) = (line.iter().map(|p| p.0).sum::<f64>() / m, line.iter().map(|p| p.1).sum::<f64>() / m);
+            kk += line.iter().map(|p| (p.0 - k).powi(2)).sum::<f64>();
+            kt += line.iter().map(|p| (p.0 - k) * (p.1 - t)).sum::<f64>();
+            n += m;
+            line.clear();
+        };
+        for w in rows.windows(2) {
+            let gap = context.t[w[1]] - context.t[w[0]];
+            if !live(w[0]) || !live(w[1]) || gap > 6.0 * first {
+                if line.len() > 4 {
+                    close(&mut line);
+                } else {
+                    line.clear();
+                }
+                continue;
+            }
+            count += (gap / period).round().max(1.0);
+            line.push((count, context.t[w[1]]));
+        }
+        if line.len() > 4 {
+            close(&mut line);
+        }
+        if kk <= 0.0 {
+            break;
+        }
+        (period, se) = (kt / kk, dt / (12.0 * kk).sqrt() * (1.0 + 10.0 / n));
+    }
+    (period, se)
 }

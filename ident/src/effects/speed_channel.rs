@@ -85,12 +85,12 @@ pub(super) fn hinge_at_top(context: &Context, fitted: &[Estimate]) -> f64 {
     (value("slope") * over + value("bend") * over * over / onset.max(1.0)) / top
 }
 
-/// Rows of a difference target on which the rotor turns at a speed that it has had for a while (a late reading is no lost
+/// Rows of a difference target on which the rotor turns at a speed that it has had for a few rows (a late reading is no lost
 /// pulse), with the reading as a share of the consensus.
 pub(super) fn shares<'c>(context: &'c Context, target: &'c Target) -> impl Iterator<Item = (usize, f64)> + 'c {
     let held = |i: usize| {
         let now = context.rpm[i];
-        now > STANDSTILL && [3, 6, 12, 20].iter().all(|back| (context.rpm[i.saturating_sub(*back)] - now).abs() < 0.05 * now)
+        now > STANDSTILL && (1..=4).all(|back| (context.rpm[i.saturating_sub(back)] - now).abs() < 0.05 * now)
     };
     target.rows.iter().zip(&target.y).filter(move |(i, _)| held(**i)).map(|(i, d)| (*i, 1.0 + d / context.rpm[*i]))
 }

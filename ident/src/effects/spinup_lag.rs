@@ -81,5 +81,4 @@ impl Effect for SpinupLag {
             }
         });
     }
-
 }

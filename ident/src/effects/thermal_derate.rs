@@ -6,8 +6,8 @@
 //! Reference: first-order thermal model of a winding, tau = R_th C_th; Hanselman 2006, *Brushless Permanent Magnet Motor Design*.
 
 use super::speed_channel::expected;
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, speeds};
-use crate::context::Context;
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, present, speeds};
+use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -41,11 +41,12 @@ impl Effect for ThermalDerate {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = speeds(context);
-        if context.time_is_row || channels.is_empty() || context.current.is_none() {
-            Vec::new()
-        } else {
-            vec![Instance::new(&channels, "controller"), Instance::new(&channels, WINDING)]
+        if context.time_is_row || channels.is_empty() || context.pulse.is_none() {
+            return Vec::new();
         }
+        // a warm winding costs current too
+        let with_current: Vec<&str> = channels.iter().copied().chain(present(context, &["current_a"])).collect();
+        vec![Instance::new(&channels, "controller"), Instance::new(&with_current, WINDING)]
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
@@ -54,23 +55,25 @@ impl Effect for ThermalDerate {
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "derate", unit: "1/A2" }]
+        vec![Amplitude { name: "derate", unit: "1/A2" }, Amplitude { name: "current_rise", unit: "1/A.krpm4" }]
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
-        let ([tau], Some(current)) = (shape, &context.current) else { return };
-        let mut heat = 0.0;
+        let [tau] = shape else { return };
+        let heat = heat(context, *tau);
+        if design.relation == Relation::Current {
+            // the drop over the winding grows by heat times the motor's current, and is paid by the supply once more
+            let column = heat.iter().zip(&context.rpm).map(|(h, r)| h * (r / 1000.0).powi(4)).collect();
+            design.add(position, 1, column);
+            return;
+        }
         let expected = expected(context);
         let top = expected.iter().copied().fold(1.0, f64::max);
         let winding = instance.form == WINDING;
         let column = expected
             .iter()
-            .enumerate()
-            .map(|(i, speed)| {
-                if i > 0 {
-                    let e = (-(context.t[i] - context.t[i - 1]) / tau).exp();
-                    heat = e * heat + (1.0 - e) * current[i - 1] * current[i - 1];
-                }
+            .zip(&heat)
+            .map(|(speed, heat)| {
                 let share = speed / top;
                 -heat * speed * if winding { share / (1.0 + DROP * share) } else { 1.0 }
             })
@@ -79,7 +82,34 @@ impl Effect for ThermalDerate {
     }
 
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        let top = context.current.as_ref().map_or(0.0, |c| c.iter().copied().fold(0.0, f64::max));
-        fitted.iter().any(|e| e.name == "derate" && e.value > 3.0 * e.se && e.value * top * top < 0.8)
+        let top = load(context).iter().copied().fold(0.0, f64::max);
+        let costs = fitted.iter().filter(|e| e.name == "current_rise").all(|e| e.value > -3.0 * e.se);
+        costs && fitted.iter().any(|e| e.name == "derate" && e.value > 3.0 * e.se && e.value * top * top < 0.8)
     }
+}
+
+/// Supply current, A; where it was not measured, the cube of the speed as a share of the top speed, so that the size of the
+/// effect is that at full load.
+fn load(context: &Context) -> Vec<f64> {
+    if let Some(current) = &context.current {
+        return current.clone();
+    }
+    let expected = expected(context);
+    let top = expected.iter().copied().fold(1.0, f64::max);
+    expected.iter().map(|n| (n / top).powi(3)).collect()
+}
+
+/// Heat: the square of the current through a first-order lag, from cold.
+fn heat(context: &Context, tau: f64) -> Vec<f64> {
+    let load = load(context);
+    let mut heat = 0.0;
+    (0..context.len())
+        .map(|i| {
+            if i > 0 {
+                let e = (-(context.t[i] - context.t[i - 1]) / tau).exp();
+                heat = e * heat + (1.0 - e) * load[i - 1] * load[i - 1];
+            }
+            heat
+        })
+        .collect()
 }

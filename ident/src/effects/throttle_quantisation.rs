@@ -57,7 +57,11 @@ impl Effect for ThrottleQuantisation {
         design.add(
             position,
             0,
-            pulse.iter().zip(context.facts.slope.get_or_init(|| slope(context))).map(|(p, slope)| slope * step * tooth(*p, *step, *offset)).collect(),
+            pulse
+                .iter()
+                .zip(context.facts.slope.get_or_init(|| slope(context)))
+                .map(|(p, slope)| slope * step * tooth(*p, *step, *offset))
+                .collect(),
         );
     }
 
