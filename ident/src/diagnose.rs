@@ -13,6 +13,7 @@ use crate::effects::{self, Effect, Instance};
 use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, scatters};
 use crate::opponent::{nameless, opponent};
+use crate::residual::whiteness;
 use crate::search::{refine, refine_newest, scan};
 
 /// Most effects on one channel.
@@ -117,7 +118,12 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let ranked =
             round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
         if std::env::var("QTRACE").is_ok() {
-            for c in ranked.iter().take(10) {
+            for c in ranked
+                .iter()
+                .enumerate()
+                .filter(|(k, c)| *k < 10 || std::env::var("QTRACE").is_ok_and(|v| v == c.fit.placed.last().unwrap().effect.id()))
+                .map(|c| c.1)
+            {
                 eprintln!(
                     "r{round} {:.1} {:?} held {:?}",
                     c.evidence,
@@ -237,6 +243,7 @@ fn round_of(
     let count = offers.len().max(1) as f64;
     let newest = best.fit.placed.last();
     let whole = vec![1.0; context.targets.len()];
+    let loud = loud(context, declared, &best.fit);
     let mut ranked: Vec<(f64, Vec<Placed>)> = Vec::new();
     for (k, offer) in offers.iter_mut().enumerate() {
         progress(0.7 * k as f64 / count);
@@ -245,7 +252,7 @@ fn round_of(
         }
         let stale = newest.is_some_and(|n| offer.instance.channels.iter().any(|c| n.instance.touches(c)));
         if stale || offer.found.is_none() {
-            offer.found = scan(context, declared, &best.fit.placed, offer.effect, &offer.instance);
+            offer.found = scan(context, declared, &best.fit.placed, offer.effect, &offer.instance, &loud);
         }
         if let Some((shape, gain)) = &offer.found {
             let added = Placed { effect: offer.effect, instance: offer.instance.clone(), shape: shape.clone() };
@@ -273,6 +280,22 @@ fn round_of(
     }
     out.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     out
+}
+
+/// Residual over noise floor, and whiteness, below and above which a channel has nothing left to explain.
+const QUIET: (f64, f64) = (1.08, 1e-3);
+
+/// Targets that something is left on: only they are worth the scan of a grid.
+fn loud(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<bool> {
+    heldout::residuals(context, declared, fit)
+        .iter()
+        .zip(&context.targets)
+        .map(|(r, target)| {
+            let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
+            let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
+            rms > QUIET.0 * target.noise.rms || whiteness(&t, r) < QUIET.1
+        })
+        .collect()
 }
 
 /// For each target the share of independent samples that the colour of the best fit's residual leaves: the same for every
@@ -390,17 +413,17 @@ fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[Hel
 }
 
 /// Share of what a channel shows above its noise that the names must take away to be believed.
-const NEEDED_SHARE: f64 = 0.5;
+const NEEDED_SHARE: f64 = 0.8;
 
 /// Whether the named effects are the cause of most of what they were named for: on one channel that they touch they take away at
-/// least half of the squared error above the noise. A small part of a large residual is what any flexible term can have.
+/// least four fifths of the squared error above the noise. A small part of a large residual is what any flexible term can have.
 fn explains(context: &Context, fit: &Fit, before: &[Held], after: &[Held]) -> bool {
     if fit.placed.iter().any(|p| p.effect.scatters()) {
         return true;
     }
     let share = |floor: f64, before: f64, after: f64| {
         let (b, a) = (before * before - floor * floor, after * after - floor * floor);
-        if b < 0.5 * floor * floor { 1.0 } else { 1.0 - a / b }
+        if b < 0.5 * floor * floor || after < 1.5 * floor { 1.0 } else { 1.0 - a / b }
     };
     context
         .targets

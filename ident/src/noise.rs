@@ -150,7 +150,7 @@ impl Colour {
         // for AR(1): gamma_d2(1)/gamma_d2(0) = (-4 + 3 rho - rho^2) / (6 - 2 rho), from -2/3 when white to -1/2
         let of = |rho: f64| (-4.0 + 3.0 * rho - rho * rho) / (6.0 - 2.0 * rho);
         let seen = self.next / self.same;
-        let uncertain = 0.8 / (self.pairs as f64).sqrt();
+        let uncertain = 1.2 / (self.pairs as f64).sqrt(); // two standard errors (Bartlett)
         if seen - uncertain < of(0.0) {
             return 0.0;
         }
@@ -246,14 +246,13 @@ mod tests {
     use super::*;
 
     fn hash_noise(i: usize) -> f64 {
-        // sum of twelve uniform numbers from a small mixing function: standard normal to a few per cent
-        let mut s = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        // sum of twelve uniform numbers from splitmix64 (Steele, Lea & Flood 2014): standard normal to a few per cent
         (0..12)
-            .map(|_| {
-                s ^= s >> 29;
-                s = s.wrapping_mul(0xBF58_476D_1CE4_E5B9);
-                s ^= s >> 32;
-                (s >> 11) as f64 / (1u64 << 53) as f64
+            .map(|k| {
+                let mut z = (12 * i as u64 + k + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+                z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+                z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+                ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
             })
             .sum::<f64>()
             - 6.0

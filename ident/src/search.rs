@@ -14,7 +14,11 @@ fn scan_stride(context: &Context, most: usize) -> usize {
     context.targets.iter().map(|t| t.rows.len()).max().unwrap_or(1).div_ceil(most).max(1)
 }
 
-/// Best start of one candidate added to a fixed set: a scan of its grid.
+/// Grid points from which on a scan looks at channels that have something left only.
+const LARGE_GRID: usize = 6;
+
+/// Best start of one candidate added to a fixed set: a scan of its grid. On the targets that are not `loud` nothing is left to
+/// gain; a large grid is not scanned on them, and nothing is found where all are quiet, unless the effect speaks of scatter.
 #[must_use]
 pub fn scan(
     context: &Context,
@@ -22,14 +26,21 @@ pub fn scan(
     base: &[Placed],
     effect: &'static dyn Effect,
     instance: &Instance,
+    loud: &[bool],
 ) -> Option<(Vec<f64>, f64)> {
     let shapes = effect.shapes(context, instance);
-    let moving: Vec<&str> = instance.channels.iter().map(String::as_str).collect();
+    let total: usize = shapes.iter().map(|s| s.starts.len()).product();
+    let mut moving: Vec<&str> = instance.channels.iter().map(String::as_str).collect();
+    if total >= LARGE_GRID && !effect.scatters() {
+        moving.retain(|c| context.target(c).is_some_and(|k| loud[k]));
+        if moving.is_empty() {
+            return None;
+        }
+    }
     let rows = Rows::Every(scan_stride(context, 4000));
     let scattering = effect.scatters() || base.iter().any(|p| p.effect.scatters());
     let before = touched_loglik(context, declared, base, &moving, rows, scattering);
     let mut best: Option<(Vec<f64>, f64)> = None;
-    let total: usize = shapes.iter().map(|s| s.starts.len()).product();
     for index in 0..total {
         let mut rest = index;
         let shape: Vec<f64> = shapes

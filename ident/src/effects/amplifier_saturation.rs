@@ -37,7 +37,10 @@ impl Effect for AmplifierSaturation {
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
-        let shape = super::blade_flex::upper_speeds(context, 24);
+        let mut shape = super::blade_flex::upper_speeds(context, 24);
+        let top = context.rpm.iter().copied().fold(1.0, f64::max);
+        shape.range.1 = 0.999 * top;
+        shape.starts.extend([0.965 * top, 0.99 * top]);
         vec![Shape { name: "reached_at", ..shape }]
     }
 
@@ -74,12 +77,22 @@ impl Effect for AmplifierSaturation {
     }
 
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        // some speeds above the rail, apart from each other: otherwise there is nothing to see
+        // some speeds above the rail, apart from each other, or a top reading that repeats to the last digit: otherwise there
+        // is nothing to see
         let reached = fitted.iter().find(|e| e.name == "reached_at").map_or(f64::INFINITY, |e| e.value);
         let above: Vec<f64> = context.rpm.iter().copied().filter(|r| *r > reached).collect();
         let top = above.iter().copied().fold(0.0, f64::max);
-        above.len() > 20 && top > 1.02 * reached
+        above.len() > 20 && (top > 1.02 * reached || stands_still(context, reached))
     }
+}
+
+/// Whether most readings above a speed are one and the same, the largest of the run.
+fn stands_still(context: &Context, reached: f64) -> bool {
+    let Some(target) = context.target("thrust_n").map(|k| &context.targets[k]) else { return false };
+    let top = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let above = || target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > reached);
+    let same = above().filter(|(_, y)| **y >= top - 1e-9 * top.abs()).count();
+    same > 20 && same * 2 > above().count()
 }
 
 /// Holds a known prediction at its value where the driving quantity reaches `reached`.

@@ -35,7 +35,8 @@ impl Effect for BeamResonance {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = present(context, &["thrust_n", "thrust_rms_n"]);
         if channels.first() == Some(&"thrust_n") {
-            vec![Instance::new(&channels, "once_per_rev"), Instance::new(&channels, "blade_pass")]
+            // blade pass at twice the frequency has the very same curve
+            vec![Instance::new(&channels, "once_per_rev")]
         } else {
             Vec::new()
         }

@@ -47,7 +47,7 @@ impl Effect for BladeFlex {
             Shape { name: "exponent", unit: "1", range: (0.0, 3.0), starts: vec![0.03, 0.1, 0.4] },
         ];
         if instance.touches("torque_nm") {
-            out.push(Shape { name: "torque_ratio", unit: "1", range: (-0.5, 3.0), starts: vec![0.3, 1.0] });
+            out.push(Shape { name: "torque_ratio", unit: "1", range: (-0.5, 3.0), starts: vec![0.7] });
         }
         out
     }

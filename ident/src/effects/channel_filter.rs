@@ -40,7 +40,7 @@ impl Effect for ChannelFilter {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let forms: &[&str] = if operator::abrupt(context) { &FORMS } else { &FORMS[..2] };
+        let forms: &[&str] = if operator::abrupt(context) { &FORMS[2..] } else { &FORMS[..2] };
         meters(context).iter().flat_map(|s| forms.iter().map(|form| Instance::new(s, form))).collect()
     }
 

@@ -139,7 +139,7 @@ pub(crate) fn courses(context: &Context) -> &'static [bool] {
 
 /// The shape parameter that says when within a row the load jumps.
 pub(crate) fn phase() -> Shape {
-    Shape { name: "phase", unit: "1", range: (0.0, 1.0), starts: vec![0.0, 0.5, 1.0] }
+    Shape { name: "phase", unit: "1", range: (0.0, 1.0), starts: vec![0.25, 0.75] }
 }
 
 /// Ending of the name of a form in which the load jumps within rows.
