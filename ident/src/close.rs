@@ -122,7 +122,7 @@ fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<Effe
         .enumerate()
         .map(|(k, p)| {
             let about = p.effect.about();
-            let estimates = p.effect.report(context, &p.instance, d.best.fit.estimates(context, declared, k));
+            let estimates = p.effect.report(context, &p.instance, d.best.fit.profiled_estimates(context, declared, k));
             let (first, reduction) = quoted(context, d, k);
             let mut channels: Vec<String> =
                 p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();

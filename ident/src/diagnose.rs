@@ -32,6 +32,8 @@ const EASILY_NAMED: usize = 3;
 const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
 const REFINED: usize = 7;
+/// Candidates of a round that are kept for those who want to look.
+const SHOWN: usize = 10;
 /// Softmax temperature from evidence to probability.
 const TEMPERATURE: f64 = 4.0;
 /// Share of the winner's probability at which a second hypothesis makes the verdict ambiguous.
@@ -89,6 +91,8 @@ pub struct Diagnosis {
     pub heldout_without: Vec<Vec<Held>>,
     /// The folds.
     pub folds: Vec<Vec<bool>>,
+    /// For each round of the search its best candidates, each what was found before and one effect more, best first.
+    pub candidates: Vec<Vec<Candidate>>,
 }
 
 impl Diagnosis {
@@ -113,29 +117,12 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let mut best = Candidate { fit: start.clone(), evidence: 0.0 };
     let mut rounds: Vec<(f64, Vec<(Candidate, f64)>)> = Vec::new();
     let mut errors = heldout_before.clone();
+    let mut candidates = Vec::new();
     let mut offers = offers(context);
     for round in 0..MOST_EFFECTS {
         let ranked =
             round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
-        if std::env::var("QTRACE").is_ok() {
-            for c in ranked
-                .iter()
-                .enumerate()
-                .filter(|(k, c)| *k < 10 || std::env::var("QTRACE").is_ok_and(|v| v == c.fit.placed.last().unwrap().effect.id()))
-                .map(|c| c.1)
-            {
-                eprintln!(
-                    "r{round} {:.1} {:?} held {:?}",
-                    c.evidence,
-                    c.fit.placed.last(),
-                    heldout::errors_after_newest(context, declared, &c.fit, &folds, &errors)
-                        .iter()
-                        .zip(&errors)
-                        .map(|(a, b)| format!("{:.3}", 1.0 - a.share_gone(b)))
-                        .collect::<Vec<_>>()
-                );
-            }
-        }
+        candidates.push(ranked.iter().take(SHOWN).cloned().collect());
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else { break };
         best = chosen.winner;
         errors = chosen.held;
@@ -155,7 +142,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         probability = p;
         errors = held;
     }
-    let credible = best.fit.placed.is_empty() || is_unknown || explains(context, &best.fit, &heldout_before, &errors);
+    let credible = best.fit.placed.is_empty() || is_unknown || explains(context, declared, &start, &best.fit);
     if !credible {
         rivals.insert(0, Rival { ids: best.ids(), probability, fit: best.fit.clone() });
     }
@@ -198,6 +185,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         heldout_after: errors,
         heldout_without,
         folds,
+        candidates,
     })
 }
 
@@ -413,29 +401,22 @@ fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[Hel
 }
 
 /// Share of what a channel shows above its noise that the names must take away to be believed.
-const NEEDED_SHARE: f64 = 0.8;
+const NEEDED_SHARE: f64 = 0.85;
 
-/// Whether the named effects are the cause of most of what they were named for: on one channel that they touch they take away at
-/// least four fifths of the squared error above the noise. A small part of a large residual is what any flexible term can have.
-fn explains(context: &Context, fit: &Fit, before: &[Held], after: &[Held]) -> bool {
+/// Whether the named effects are the cause of most of what they were named for: on one channel that they touch they take away
+/// most of the squared residual above the noise. A part of a large residual is what any flexible term can have.
+fn explains(context: &Context, declared: Declared<'_>, start: &Fit, fit: &Fit) -> bool {
     if fit.placed.iter().any(|p| p.effect.scatters()) {
         return true;
     }
-    let share = |floor: f64, before: f64, after: f64| {
-        let (b, a) = (before * before - floor * floor, after * after - floor * floor);
-        if b < 0.5 * floor * floor || after < 1.5 * floor { 1.0 } else { 1.0 - a / b }
-    };
-    context
-        .targets
-        .iter()
-        .enumerate()
-        .filter(|(_, t)| fit.placed.iter().any(|p| p.instance.touches(t.name)))
-        .map(|(i, t)| {
-            let floor = t.noise.rms;
-            share(floor, before[i].rms, after[i].rms).max(share(floor, before[i].typical, after[i].typical))
-        })
-        .fold(0.0, f64::max)
-        > NEEDED_SHARE
+    let square = |r: &[f64]| r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64;
+    let before = heldout::residuals(context, declared, start);
+    let after = heldout::residuals(context, declared, fit);
+    context.targets.iter().enumerate().filter(|(_, t)| fit.placed.iter().any(|p| p.instance.touches(t.name))).any(|(i, t)| {
+        let floor = t.noise.rms * t.noise.rms;
+        let (b, a) = (square(&before[i]), square(&after[i]));
+        b < 1.5 * floor || a < 2.25 * floor || (b - a) > NEEDED_SHARE * (b - floor)
+    })
 }
 
 /// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.

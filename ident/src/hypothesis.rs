@@ -267,12 +267,23 @@ pub(crate) fn touched_loglik(
 
 impl Fit {
     /// Fitted parameters of the effect at `position`: shapes with standard errors from the curvature of the profile
-    /// likelihood, then amplitudes with theirs.
+    /// likelihood, then amplitudes with theirs. Quick enough for every candidate of a search.
     #[must_use]
     pub fn estimates(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<Estimate> {
+        self.estimates_with(context, declared, position, false)
+    }
+
+    /// The same for a report: where the likelihood of a shape is not a parabola (an instant between two visits, an onset between
+    /// two levels), the error is at least half the width over which it falls by 1.92, over 1.96.
+    #[must_use]
+    pub fn profiled_estimates(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<Estimate> {
+        self.estimates_with(context, declared, position, true)
+    }
+
+    fn estimates_with(&self, context: &Context, declared: Declared<'_>, position: usize, profiled: bool) -> Vec<Estimate> {
         let p = &self.placed[position];
         let mut out = Vec::new();
-        let errors = self.shape_errors(context, declared, position);
+        let errors = self.shape_errors(context, declared, position, profiled);
         for ((shape, value), se) in p.effect.shapes(context, &p.instance).iter().zip(&p.shape).zip(errors) {
             out.push(Estimate { name: shape.name.into(), unit: shape.unit.into(), value: *value, se });
         }
@@ -295,7 +306,7 @@ impl Fit {
     }
 
     /// Standard errors of the shape parameters of one effect.
-    fn shape_errors(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<f64> {
+    fn shape_errors(&self, context: &Context, declared: Declared<'_>, position: usize, profiled: bool) -> Vec<f64> {
         let p = &self.placed[position];
         let shapes = p.effect.shapes(context, &p.instance);
         let n = p.shape.len();
@@ -339,12 +350,45 @@ impl Fit {
             .fold(1.0, f64::min);
         hessian *= share;
         let inverse = hessian.clone().try_inverse();
+        let curvature = |i: usize| match &inverse {
+            Some(v) if v[(i, i)] > 0.0 => v[(i, i)].sqrt(),
+            _ if hessian[(i, i)] > 0.0 => 1.0 / hessian[(i, i)].sqrt(),
+            _ => shapes[i].range.1 - shapes[i].range.0,
+        };
         (0..n)
-            .map(|i| match &inverse {
-                Some(v) if v[(i, i)] > 0.0 => v[(i, i)].sqrt(),
-                _ if hessian[(i, i)] > 0.0 => 1.0 / hessian[(i, i)].sqrt(),
-                _ => shapes[i].range.1 - shapes[i].range.0,
+            .map(|i| {
+                let quick = curvature(i);
+                if !profiled || shapes[i].is_nuisance() || shapes[i].range.1 <= shapes[i].range.0 {
+                    return quick;
+                }
+                let fall = |to: f64| {
+                    let mut x = p.shape.clone();
+                    x[i] = to;
+                    share * (centre - value(&x))
+                };
+                let reach = |sign: f64| {
+                    let bound = if sign > 0.0 { shapes[i].range.1 - p.shape[i] } else { p.shape[i] - shapes[i].range.0 };
+                    half_width(&|d| fall(p.shape[i] + sign * d), h[i], bound.max(0.0))
+                };
+                // a symmetric interval must hold the longer side
+                quick.max(reach(1.0).max(reach(-1.0)) / 1.96)
             })
             .collect()
     }
+}
+
+/// Distance at which a log-likelihood has fallen by 1.92, at most `bound`: doubled from a small step, then halved between.
+fn half_width(fall: &dyn Fn(f64) -> f64, step: f64, bound: f64) -> f64 {
+    const FALL: f64 = 1.92;
+    let mut outer = 0.05 * step;
+    while outer < bound && fall(outer) < FALL {
+        outer *= 2.0;
+    }
+    let mut inner = if outer <= 0.05 * step { 0.0 } else { 0.5 * outer };
+    outer = outer.min(bound);
+    for _ in 0..5 {
+        let mid = 0.5 * (inner + outer);
+        if fall(mid) < FALL { inner = mid } else { outer = mid }
+    }
+    outer
 }

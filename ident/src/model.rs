@@ -162,7 +162,7 @@ impl Model {
             model.effects.push(AddedEffect {
                 placed: placed.clone(),
                 amplitudes,
-                estimates: fit.estimates(context, declared, position),
+                estimates: fit.profiled_estimates(context, declared, position),
             });
         }
         model

@@ -27,7 +27,7 @@ impl Effect for BatteryDischarge {
     fn about(&self) -> About {
         About {
             title: "Battery discharges during the run",
-            equation: "voltage_v = V0 - slope q - bend q^2, rpm *= 1 - speed_loss q, q = charge drawn",
+            equation: "voltage_v = V0 - slope q - bend q^2, rpm *= 1 - speed_loss q, current_a += current_rise q rpm^3, q = charge drawn",
             source: "open-circuit voltage of lithium-polymer cells, Chen & Rincon-Mora 2006",
             depends_on: &["charge"],
             signature: "voltage and speed at the same pulse fall together, fastest at high current, and never come back",

@@ -22,7 +22,7 @@ impl Effect for BladeFlex {
     fn about(&self) -> About {
         About {
             title: "Blades flex at high speed",
-            equation: "thrust_n *= (onset / rpm)^exponent and torque_nm *= (onset / rpm)^(torque_ratio exponent) above onset",
+            equation: "thrust_n *= (onset / rpm)^exponent and torque_nm *= (onset / rpm)^(torque_ratio exponent) above onset; smooth: thrust_n *= 1 - (1 - 2^-exponent) (rpm / onset - 1)^2",
             source: "Brandt & Selig 2011, AIAA 2011-1255",
             depends_on: &["rpm"],
             signature: "thrust and torque fall short of the square law above one speed, whenever that speed is visited",

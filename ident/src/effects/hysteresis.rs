@@ -1,6 +1,7 @@
 //! `hysteresis`: the load cell reads differently on the way down.
 //!
-//! What it is: thrust_n += width * (direction / 2) * 4 f (1 - f), f the share of the full load, direction -1 going up and +1 coming down.
+//! What it is: thrust_n += width * (direction / 2) * 4 f (1 - f), f the share of the full load, direction -1 going up and +1 coming down; or a play whose
+//! elements change sides one after the other.
 //! What can go wrong: needs a schedule that comes back; drift over an up-down sweep looks alike.
 //! Units: N, at mid range.
 //! Reference: OIML R 60 (load cells), hysteresis error.
@@ -20,7 +21,7 @@ impl Effect for Hysteresis {
     fn about(&self) -> About {
         About {
             title: "Hysteresis of the load cell",
-            equation: "thrust_n += width * direction / 2 * 4 f (1 - f), f = (rpm / rpm_max)^2",
+            equation: "thrust_n += width * direction / 2 * 4 f (1 - f), f = (rpm / rpm_max)^2; or, as play: thrust_n += width * sum of the lags of play elements with slacks up to `slack` / their largest sum",
             source: "OIML R 60",
             depends_on: &["direction", "thrust_n"],
             signature: "the thrust residual of the way up and of the way down bend apart in the middle and meet at the ends",
@@ -84,7 +85,7 @@ fn play(context: &Context, slack: f64) -> Vec<f64> {
     let top = context.rpm.iter().copied().fold(1.0, f64::max);
     let slacks: Vec<f64> = (1..=ELEMENTS).map(|k| slack * k as f64 / ELEMENTS as f64).collect();
     let opening = 2.0 * slacks.iter().sum::<f64>();
-    let mut elements = vec![0.0; ELEMENTS];
+    let mut elements = [0.0; ELEMENTS];
     context
         .rpm
         .iter()

@@ -1,6 +1,6 @@
 //! `reynolds_thrust`: the thrust coefficient depends on the Reynolds number.
 //!
-//! What it is: thrust_n = zero + k rpm^(2 + exponent) in place of the quadratic polynomial: C_T ~ Re^exponent, Re ~ rpm.
+//! What it is: the declared quadratic times (rpm / 1000)^exponent, its zero aside: C_T ~ Re^exponent, Re ~ rpm.
 //! What can go wrong: over a narrow range of speeds the polynomial bends as well; the standard error then says so.
 //! Units: 1.
 //! Reference: Deters, Ananda & Selig 2014 (AIAA 2014-2151), Reynolds number effects on small propellers.
@@ -20,7 +20,7 @@ impl Effect for ReynoldsThrust {
     fn about(&self) -> About {
         About {
             title: "Thrust coefficient depends on the Reynolds number",
-            equation: "thrust_n = zero + k rpm^(2 + exponent)",
+            equation: "thrust_n = zero + (k1 rpm + k2 rpm^2) (rpm / 1000)^exponent",
             source: "Deters, Ananda & Selig 2014, AIAA 2014-2151",
             depends_on: &["rpm"],
             signature: "thrust(rpm) follows a power other than two from standstill to full speed; torque(rpm) holds",
@@ -58,9 +58,8 @@ impl Effect for ReynoldsThrust {
             .map(|f| if f.is_finite() { f } else { 0.0 })
             .collect();
         for column in &mut design.columns {
-            match column.label {
-                Label::Base(1 | 2) => column.values.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f),
-                _ => {}
+            if let Label::Base(1 | 2) = column.label {
+                column.values.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f);
             }
         }
         design.fixed.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f);

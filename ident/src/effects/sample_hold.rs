@@ -145,7 +145,8 @@ fn slope(context: &Context, rows: &[usize], live: &dyn Fn(usize) -> bool, first:
         if kk <= 0.0 {
             break;
         }
-        (period, se) = (kt / kk, dt / (12.0 * kk).sqrt() * (1.0 + 10.0 / n));
+        // and a count may have slipped by one
+        (period, se) = (kt / kk, (dt / (12.0 * kk).sqrt()).hypot(kt / kk / n.max(1.0)));
     }
     (period, se)
 }

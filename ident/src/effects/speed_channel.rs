@@ -92,7 +92,11 @@ pub(super) fn shares<'c>(context: &'c Context, target: &'c Target) -> impl Itera
         let now = context.rpm[i];
         now > STANDSTILL && (1..=4).all(|back| (context.rpm[i.saturating_sub(back)] - now).abs() < 0.05 * now)
     };
-    target.rows.iter().zip(&target.y).filter(move |(i, _)| held(**i)).map(|(i, d)| (*i, 1.0 + d / context.rpm[*i]))
+    // a reading that repeats the last one to the last digit is an old one
+    let reading = |k: usize| target.y[k] + context.rpm[target.rows[k]];
+    let fresh = move |k: usize| k == 0 || (reading(k) - reading(k - 1)).abs() > 1e-6;
+    let rows = target.rows.iter().zip(&target.y).enumerate();
+    rows.filter(move |(k, (i, _))| held(**i) && fresh(*k)).map(|(_, (i, d))| (*i, 1.0 + d / context.rpm[*i]))
 }
 
 /// Share by which a reading must be off to be counted as one pulse too few or too many.

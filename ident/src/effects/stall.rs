@@ -63,7 +63,7 @@ impl Effect for Stall {
                 design.add(position, 3, column.iter().zip(&context.rpm).map(|(v, r)| v * r / 1000.0).collect());
                 design.add(position, 2, column);
             }
-            _ => design.add(position, 4, beyond(&expected(context)).iter().map(|v| -v).collect()),
+            _ => design.add(position, 4, beyond(expected(context)).iter().map(|v| -v).collect()),
         }
     }
 

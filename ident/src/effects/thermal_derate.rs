@@ -27,7 +27,7 @@ impl Effect for ThermalDerate {
     fn about(&self) -> About {
         About {
             title: "Speed falls as controller or winding heats up",
-            equation: "rpm(pulse) *= 1 - derate heat (controller), or 1 - derate heat rpm/top (winding); tau d(heat)/dt = current_a^2 - heat",
+            equation: "rpm(pulse) *= 1 - derate heat (controller), or 1 - derate heat (rpm/top) / (1 + rpm/top / 2) with current_a += current_rise heat rpm^4 (winding); tau d(heat)/dt = current_a^2 - heat",
             source: "first-order thermal model, Hanselman 2006",
             depends_on: &["heat"],
             signature: "after a step to high current the speed sags slowly, and recovers while the current is low; thrust(rpm) holds",
