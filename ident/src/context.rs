@@ -172,6 +172,8 @@ pub struct Context {
     pub targets: Vec<Target>,
     /// Steady stretches as row ranges `[from, to)`.
     pub steady: Vec<(usize, usize)>,
+    /// Stretches without a jump of the load, ramps included: where the noise is read off.
+    pub calm: Vec<(usize, usize)>,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
     powers: [OnceLock<Vec<Vec<f64>>>; 2],
     /// What effects ask again and again.
@@ -219,7 +221,8 @@ impl Context {
     pub fn bare(log: &Log, start_pulse_us: Option<f64>) -> Self {
         let pulse = log.column("pulse_us").filter(|c| c.iter().any(|v| v.is_finite())).map(|c| bridge(&log.t, c));
         let (rpm, consensus) = consensus(log);
-        let steady = steady_stretches(&log.t, pulse.as_deref(), &rpm);
+        let steady = steady_stretches(&log.t, pulse.as_deref(), &rpm, STILL_US);
+        let calm = steady_stretches(&log.t, pulse.as_deref(), &rpm, CALM_US);
         let start = start_pulse_us.unwrap_or_else(|| start_pulse(pulse.as_deref(), &rpm));
         Self {
             name: log.name.clone(),
@@ -236,6 +239,7 @@ impl Context {
             start_pulse_us: start,
             targets: Vec::new(),
             steady,
+            calm,
             powers: Default::default(),
             facts: Facts::default(),
         }
@@ -459,11 +463,16 @@ fn start_pulse(pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
     if highest_off.is_finite() { 0.5 * (lowest_on + highest_off) } else { lowest_on - 0.5 }
 }
 
-/// Row ranges in which the command (or, without one, the speed) holds still.
-fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> Vec<(usize, usize)> {
+/// Change of the command from row to row, us, below which it holds still.
+const STILL_US: f64 = 0.5;
+/// Change of the command from row to row, us, below which it does not jump: a ramp from end to end in two seconds at 50 Hz.
+const CALM_US: f64 = 10.0;
+
+/// Row ranges in which the command changes by at most `most` us a row (or, without a command, the speed holds still).
+fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) -> Vec<(usize, usize)> {
     let n = t.len();
     let (signal, tolerance): (&[f64], f64) = match pulse {
-        Some(p) => (p, 0.5),
+        Some(p) => (p, most),
         None if !rpm.is_empty() => (rpm, 0.01 * rpm.iter().copied().fold(0.0, f64::max)),
         None => return vec![(0, n)],
     };
@@ -513,7 +522,7 @@ fn target(log: &Log, context: &Context, name: &'static str) -> Option<Target> {
         return None;
     }
     let y: Vec<f64> = rows.iter().map(|i| column[*i]).collect();
-    let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, &context.steady);
+    let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, &context.calm);
     let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
     let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
     Some(Target { weight, ..Target::new(context, name, relation, rows, y, noise) })
@@ -532,7 +541,7 @@ fn differing(log: &Log) -> Vec<&'static str> {
 fn difference(context: &Context, name: &'static str, column: &[f64]) -> Option<Target> {
     let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
     let y: Vec<f64> = rows.iter().map(|i| column[*i] - context.rpm[*i]).collect();
-    let noise = noise::estimate(&rows, &y, &y, &context.rpm, &context.steady);
+    let noise = noise::estimate(&rows, &y, &y, &context.rpm, &context.calm);
     let target = Target::new(context, name, Relation::SpeedDifference, rows, y, noise);
     (target.rows.len() > 8).then_some(target)
 }

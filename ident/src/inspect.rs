@@ -156,7 +156,7 @@ fn candidates(start: &Start, progress: &mut dyn FnMut(f64)) -> Content {
     let count = all.len().max(1) as f64;
     for (k, (effect, instance)) in all.into_iter().enumerate() {
         progress(k as f64 / count);
-        let found = scan(&start.context, Declared::default(), &[], effect, &instance);
+        let found = scan(&start.context, Declared::default(), &[], effect, &instance, &vec![true; start.context.targets.len()]);
         let shapes = effect.shapes(&start.context, &instance);
         let parameters: Vec<String> =
             shapes.iter().map(|s| format!("{} {}..{} {}", s.name, number(s.range.0), number(s.range.1), s.unit)).collect();

@@ -117,7 +117,7 @@ fn twin(context: &Context, target: &Target, name: &str) -> bool {
 }
 
 /// Residual over noise floor, and whiteness, beyond which something is there even if nothing that we try predicts it.
-const LEFT_OVER: (f64, f64) = (1.15, 1e-6);
+const LEFT_OVER: (f64, f64) = (1.3, 1e-6);
 
 /// Where no name and no smooth function won although a residual is large and coloured, something is there all the same: the
 /// smooth function that predicts held-out rows best stands for it, however little that is.

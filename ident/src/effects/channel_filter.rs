@@ -5,7 +5,7 @@
 //! Units: s.
 //! Reference: boxcar and RC filters; RCbenchmark load cells average over about half a second.
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, meters, operator, through_meter};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, meters, operator, through_meter};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -54,6 +54,12 @@ impl Effect for ChannelFilter {
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         Vec::new()
+    }
+
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        // within two rows of a jump an average cannot be told from a delay
+        let least = if is_lag(instance) { 0.6 } else { 2.0 } * context.step();
+        !operator::abrupt(context) || fitted.iter().any(|e| (e.name == "tau" || e.name == "window") && e.value > least)
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {

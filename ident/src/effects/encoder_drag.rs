@@ -6,7 +6,7 @@
 //! Units: N.m, 1; internally as `bearing_friction`.
 //! Reference: Beharie 2013, section 5.7.1 (the four speed sensors compared); power balance as `bearing_friction`.
 
-use super::bearing_friction::{AMPLITUDES, brakes, costs, drag, with_share};
+use super::bearing_friction::{AMPLITUDES, CONSTANT, brakes, costs, drag, with_share};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, load_channels};
 use crate::context::Context;
 use crate::design::TargetDesign;
@@ -22,7 +22,7 @@ impl Effect for EncoderDrag {
     fn about(&self) -> About {
         About {
             title: "The shaft encoder brakes the rotor",
-            equation: "while rpm_encoder reads: Q_f = constant; current_a += Q_f (omega + 2 rho Q) / V, torque_nm += share Q_f, rpm(pulse) falls",
+            equation: "while rpm_encoder reads: Q_f = constant + viscous omega; current_a += Q_f (omega + 2 rho Q) / V, torque_nm += share Q_f, rpm(pulse) falls",
             source: "Beharie 2013, section 5.7.1; Drela 2007, First-Order DC Electric Motor Model",
             depends_on: &["rpm_encoder", "rpm"],
             signature: "exactly while the encoder is coupled: more current and less speed at the same pulse; thrust(rpm) holds",
@@ -48,7 +48,7 @@ impl Effect for EncoderDrag {
         if context.rpm.is_empty() || channels.is_empty() || share < 0.05 {
             Vec::new()
         } else {
-            vec![Instance::new(&channels, "")]
+            vec![Instance::new(&channels, CONSTANT), Instance::new(&channels, "constant_and_viscous")]
         }
     }
 
@@ -56,12 +56,12 @@ impl Effect for EncoderDrag {
         Vec::new()
     }
 
-    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        AMPLITUDES[..3].to_vec()
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        if instance.form == CONSTANT { AMPLITUDES[..3].to_vec() } else { AMPLITUDES.to_vec() }
     }
 
-    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
-        drag(context, &coupled(context), false, position, design);
+    fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+        drag(context, &coupled(context), instance.form != CONSTANT, position, design);
     }
 
     fn report(&self, _: &Context, _: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {

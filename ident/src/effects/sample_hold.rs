@@ -5,8 +5,8 @@
 //! Units: s.
 //! Reference: zero-order hold; asynchronous telemetry of speed controllers.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
-use crate::context::{Context, Relation, Target};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, through_meter};
+use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::design::TargetDesign;
 use crate::noise::median;
 
@@ -38,7 +38,14 @@ impl Effect for SampleHold {
             return Vec::new();
         }
         let held = |t: &&Target| !t.relation.is_evidence() && t.relation != Relation::Voltage && period(context, t).is_some();
-        context.targets.iter().filter(held).map(|t| Instance::new(&[t.name], "")).collect()
+        let difference =
+            |channel: &str| DIFFERENCES.iter().find(|d| d.0 == channel && context.target(d.1).is_some()).map(|d| d.1);
+        context
+            .targets
+            .iter()
+            .filter(held)
+            .map(|t| Instance::new(&std::iter::once(t.name).chain(difference(t.name)).collect::<Vec<_>>(), ""))
+            .collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
@@ -57,14 +64,15 @@ impl Effect for SampleHold {
         for i in updates(target) {
             fresh[i] = true;
         }
-        design.map_columns(|column| {
+        through_meter(context, design, |column| {
             let mut value = column.first().copied().unwrap_or(0.0);
-            for (v, fresh) in column.iter_mut().zip(&fresh) {
+            let hold = |(v, fresh): (&f64, &bool)| {
                 if *fresh {
                     value = *v;
                 }
-                *v = value;
-            }
+                value
+            };
+            column.iter().zip(&fresh).map(hold).collect()
         });
     }
 

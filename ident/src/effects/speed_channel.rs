@@ -12,9 +12,9 @@ use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::design::TargetDesign;
 use crate::solve::Normal;
 
-/// Share of the speed below which a channel agrees with the others: a quarter of the 1 % within which healthy sensors on real
+/// Share of the speed below which a channel agrees with the others: a third of the 1 % within which healthy sensors on real
 /// rigs agree (specification `rig.md`).
-pub(super) const LEAST: f64 = 0.0025;
+pub(super) const LEAST: f64 = 0.0033;
 
 /// The instance that touches a speed channel and its difference from the consensus.
 pub(super) fn instance(context: &Context, channel: &str, form: &str) -> Option<Instance> {
