@@ -45,7 +45,7 @@ impl Effect for DoublePulses {
             let Some(target) = difference(context, &instance) else { continue };
             let (off, all) = shares(context, target)
                 .fold((0usize, 0usize), |(o, n), (_, s)| (o + usize::from(SIGN * (s - 1.0) > GROSS), n + 1));
-            if off >= 3 && off * 2 < all {
+            if off >= 2 && off * 2 < all {
                 out.retain(|i| i.channels != instance.channels);
                 out.push(instance);
             }

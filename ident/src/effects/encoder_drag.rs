@@ -2,7 +2,7 @@
 //!
 //! What it is: while rpm_encoder reads, the rotor carries an extra constant torque: more current, less speed at the same pulse,
 //! and the torque arm sees the share that is not carried by the arm itself.
-//! What can go wrong: an encoder that is coupled throughout belongs to the baseline, and nothing is offered.
+//! What can go wrong: an encoder that is coupled throughout shows only against the rotor at rest: drag needs rotation.
 //! Units: N.m, 1; internally as `bearing_friction`.
 //! Reference: Beharie 2013, section 5.7.1 (the four speed sensors compared); power balance as `bearing_friction`.
 

@@ -90,7 +90,7 @@ pub(super) fn hinge_at_top(context: &Context, fitted: &[Estimate]) -> f64 {
 pub(super) fn shares<'c>(context: &'c Context, target: &'c Target) -> impl Iterator<Item = (usize, f64)> + 'c {
     let held = |i: usize| {
         let now = context.rpm[i];
-        now > STANDSTILL && (1..=4).all(|back| (context.rpm[i.saturating_sub(back)] - now).abs() < 0.05 * now)
+        now > STANDSTILL && (1..=4).all(|back| (context.rpm[i.saturating_sub(back)] - now).abs() < 0.01 * now)
     };
     // a reading that repeats the last one to the last digit is an old one
     let reading = |k: usize| target.y[k] + context.rpm[target.rows[k]];
@@ -99,8 +99,9 @@ pub(super) fn shares<'c>(context: &'c Context, target: &'c Target) -> impl Itera
     rows.filter(move |(k, (i, _))| held(**i) && fresh(*k)).map(|(_, (i, d))| (*i, 1.0 + d / context.rpm[*i]))
 }
 
-/// Share by which a reading must be off to be counted as one pulse too few or too many.
-pub(super) const GROSS: f64 = 0.15;
+/// Share by which a reading must be off to be counted as one pulse too few or too many: three times what the speed itself may
+/// have changed by since the last row.
+pub(super) const GROSS: f64 = 0.03;
 
 /// 1 on rows that read grossly too low (`sign` -1) or too high (+1), 0 elsewhere.
 pub(super) fn gross(context: &Context, target: &Target, sign: f64) -> Vec<f64> {
