@@ -57,7 +57,7 @@ impl CommandLine {
     }
 
     /// The next command, and what went wrong on the line since the last call.
-    pub fn next(&mut self) -> (Option<Command>, LineNews) {
+    pub fn next_command(&mut self) -> (Option<Command>, LineNews) {
         let stats = self.decoder.stats();
         let bad = stats.damaged.wrapping_add(stats.foreign);
         let count = |now: u32, before: u32| u8::try_from(now.wrapping_sub(before)).unwrap_or(u8::MAX);
@@ -107,15 +107,15 @@ mod tests {
         let (mut line, mut host) = (CommandLine::new(), Encoder::default());
         let arm = framed(&mut host, 1, Command::Arm);
         feed(&mut line, &arm);
-        assert_eq!(line.next(), (Some(Command::Arm), LineNews::default()));
+        assert_eq!(line.next_command(), (Some(Command::Arm), LineNews::default()));
         feed(&mut line, &arm);
-        assert_eq!(line.next(), (None, LineNews { damaged: 0, replayed: 1 }));
-        assert_eq!(line.next(), (None, LineNews::default()), "told once");
+        assert_eq!(line.next_command(), (None, LineNews { damaged: 0, replayed: 1 }));
+        assert_eq!(line.next_command(), (None, LineNews::default()), "told once");
         let ping = framed(&mut host, 1, Command::Ping);
         feed(&mut line, &ping);
-        assert_eq!(line.next().0, Some(Command::Ping), "the same instant with the next number is new");
+        assert_eq!(line.next_command().0, Some(Command::Ping), "the same instant with the next number is new");
         feed(&mut line, &framed(&mut Encoder::default(), 2, Command::Ping));
-        assert_eq!(line.next().0, Some(Command::Ping), "a host that started anew numbers from 0 at a later time");
+        assert_eq!(line.next_command().0, Some(Command::Ping), "a host that started anew numbers from 0 at a later time");
     }
 
     #[test]
@@ -123,12 +123,12 @@ mod tests {
         let (mut line, mut host) = (CommandLine::new(), Encoder::default());
         let stop = framed(&mut host, 1, Command::Stop);
         feed(&mut line, &stop);
-        assert_eq!(line.next().0, Some(Command::Stop));
+        assert_eq!(line.next_command().0, Some(Command::Stop));
         feed(&mut line, &framed(&mut host, 2, Command::Arm));
         feed(&mut line, &framed(&mut host, 2, Command::RunSchedule));
         feed(&mut line, &stop);
-        assert_eq!(line.next(), (Some(Command::Stop), LineNews { damaged: 0, replayed: 1 }));
-        assert_eq!(line.next().0, None, "what waited before the stop is gone");
+        assert_eq!(line.next_command(), (Some(Command::Stop), LineNews { damaged: 0, replayed: 1 }));
+        assert_eq!(line.next_command().0, None, "what waited before the stop is gone");
     }
 
     #[test]
@@ -139,6 +139,6 @@ mod tests {
             bytes[3] ^= 0x55;
             feed(&mut line, &bytes);
         }
-        assert_eq!(line.next(), (None, LineNews { damaged: 3, replayed: 0 }));
+        assert_eq!(line.next_command(), (None, LineNews { damaged: 3, replayed: 0 }));
     }
 }

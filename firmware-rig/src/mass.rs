@@ -39,7 +39,7 @@ impl MassPoints {
     /// `()` when the mass is impossible or there is no room.
     #[allow(clippy::result_unit_err)] // the caller answers with its own reasons
     pub fn take(&mut self, mass_g: f32, counts: f32) -> Result<u8, ()> {
-        if !mass_g.is_finite() || mass_g < -HEAVIEST_G || mass_g > HEAVIEST_G || !counts.is_finite() {
+        if !mass_g.is_finite() || !(-HEAVIEST_G..=HEAVIEST_G).contains(&mass_g) || !counts.is_finite() {
             return Err(());
         }
         self.points.push((mass_g, counts)).map_err(|_| ())?;

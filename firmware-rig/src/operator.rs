@@ -62,7 +62,12 @@ impl Rig {
             }
             Command::SelfTest { confirm, trial } => {
                 let missing = Refusals::default().and(Refusals::NOT_CONFIRMED, confirm != Command::SELF_TEST_CONFIRM);
-                if missing.is_empty() { Ok(self.trial = Some(trial)) } else { Err(missing) }
+                if missing.is_empty() {
+                    self.trial = Some(trial);
+                    Ok(())
+                } else {
+                    Err(missing)
+                }
             }
         };
         self.tell(match answer {

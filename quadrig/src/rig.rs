@@ -179,7 +179,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
                 _ => None,
             };
             match board.ask(Command::SaveSettings, silent, news)? {
-                SettingsNews::Saved => Ok(done("saved, and read back the same")),
+                SettingsNews::Saved => {
+                    done("saved, and read back the same");
+                    Ok(())
+                }
                 _ => Err("the board could not store its settings; they stay in force until the next reset".into()),
             }
         }

@@ -144,7 +144,7 @@ fn play(
         {
             bytes[..n].iter().for_each(|b| commands.take(*b));
         }
-        let (command, news) = commands.next();
+        let (command, news) = commands.next_command();
         let now = Ticks::from_ms(ms);
         let before = rig.calibration();
         let outputs = rig.tick(&Inputs {

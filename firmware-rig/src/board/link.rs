@@ -94,7 +94,7 @@ impl Link {
 
     /// The next command, and what went wrong on the line.
     pub(crate) fn next(&mut self) -> (Option<Command>, LineNews) {
-        self.line.next()
+        self.line.next_command()
     }
 
     /// Frames heard: good, damaged, replayed.

@@ -247,7 +247,7 @@ impl Flight {
             Some(Mishap::NoConversions) => gathered.adc = Default::default(),
             _ => {}
         }
-        let (command, line): (Option<Command>, LineNews) = self.board.line.next();
+        let (command, line): (Option<Command>, LineNews) = self.board.line.next_command();
         let now = Ticks::from_ms(self.ms);
         let outputs = self.board.rig.tick(&Inputs {
             now,

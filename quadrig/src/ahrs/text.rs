@@ -11,7 +11,7 @@ use std::fmt::Write;
 pub(crate) fn fixed<const DIGITS: u32>(out: &mut String, value: f64) {
     let scale = 10u64.pow(DIGITS);
     let scaled = (value.abs() * scale as f64).round();
-    if !(scaled < 9e18) || value.abs() > 9e9 {
+    if value.is_nan() || scaled >= 9e18 || value.abs() > 9e9 {
         let _ = write!(out, "{value:.*}", DIGITS as usize);
         return;
     }
