@@ -286,8 +286,15 @@ impl CaptureBank {
     /// 300 rev/min only, and never while all of them fall silent together.
     #[must_use]
     pub fn lost(&self, now: Ticks) -> u8 {
-        let Some(others) = self.others(now).filter(|(revolution, _)| !self.is_slow(*revolution)) else { return 0 };
-        let lost = |c: &&CaptureChannel| c.is_lost(now, others);
+        let Some(since) = self.turning_since else { return 0 };
+        let lost = |channel: &&CaptureChannel| {
+            // a rotor that runs down is slower than the last period says: what has passed since the last edge counts too
+            let others = self.channels.iter().filter(|c| !core::ptr::eq(*c, *channel) && c.is_turning(now));
+            others
+                .filter_map(|c| Some(c.revolution()?.max(u64::from(c.marks).saturating_mul(now.since(c.last).0))))
+                .max()
+                .is_some_and(|revolution| !self.is_slow(revolution) && channel.is_lost(now, (revolution, since)))
+        };
         self.channels.iter().filter(lost).count() as u8
     }
 

@@ -38,15 +38,18 @@ impl Effect for EncoderDrag {
         let mut channels = load_channels(context, false);
         // the encoder's own channel has no sample with the encoder off: nothing changes on it
         channels.retain(|c| *c != "rpm_encoder");
-        let coupled: f64 = coupled(context).iter().sum();
-        let share = coupled / context.len().max(1) as f64;
-        if share > 0.95 {
-            // never uncoupled: the static curve of the speed has the drag in it
-            channels.retain(|c| !c.starts_with("rpm"));
+        if context.rpm.is_empty() {
+            return Vec::new();
         }
-        // an encoder that is coupled throughout still shows where the rotor stands: drag needs rotation
-        if context.rpm.is_empty() || channels.is_empty() || share < 0.05 {
+        let share = share_coupled(context);
+        if share > THROUGHOUT {
+            // the static curves of speed and current have the drag in them; the torque arm alone knows what no torque is
+            channels.retain(|c| *c == "torque_nm");
+        }
+        if channels.is_empty() || share < 0.05 {
             Vec::new()
+        } else if share > THROUGHOUT {
+            vec![Instance::new(&channels, CONSTANT)]
         } else {
             vec![Instance::new(&channels, CONSTANT), Instance::new(&channels, "constant_and_viscous")]
         }
@@ -69,8 +72,18 @@ impl Effect for EncoderDrag {
     }
 
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        if share_coupled(context) > THROUGHOUT {
+            return fitted.iter().any(|e| e.name == "arm_constant" && e.value > 8.0 * e.se);
+        }
         brakes(fitted) && costs(context, fitted)
     }
+}
+
+/// Share of the rows from which on the encoder counts as never uncoupled.
+const THROUGHOUT: f64 = 0.95;
+
+fn share_coupled(context: &Context) -> f64 {
+    coupled(context).iter().sum::<f64>() / context.len().max(1) as f64
 }
 
 /// Longest gap between two samples, s, over which the encoder counts as coupled.
