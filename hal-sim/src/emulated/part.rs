@@ -128,7 +128,8 @@ impl NoisyAdc {
         for _ in 0..ADC_CHANNELS {
             self.turn = (self.turn + 1) % ADC_CHANNELS;
             if let (true, Some(channel)) = (self.used[self.turn], Channel::new(self.turn as u8)) {
-                let counts = self.level[self.turn] + self.noise * self.stream.quick_normal() + 0.5;
+                let [noise, _] = self.stream.quick_normals();
+                let counts = self.level[self.turn] + self.noise * noise + 0.5;
                 let code = (counts.max(0.0) as u32).min(4095);
                 self.inner.set_input(channel, code * ADC_UNITS + ADC_UNITS / 2);
                 return;

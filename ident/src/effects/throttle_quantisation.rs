@@ -78,9 +78,12 @@ impl Effect for ThrottleQuantisation {
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        fitted.iter().any(|e| e.name == "depth" && (0.5..1.5).contains(&e.value))
+        fitted.iter().any(|e| e.name == "depth" && (0.5..1.5).contains(&e.value) && e.se < KNOWN * e.value)
     }
 }
+
+/// Share to which the depth must be known: on few levels a tooth of some step fits any misfit of the static curve.
+const KNOWN: f64 = 0.08;
 
 /// Slope of the static speed curve at each row's pulse, rev/min per us; zero while the motor is off.
 fn slope(context: &Context) -> Vec<f64> {
