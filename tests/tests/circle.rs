@@ -15,7 +15,7 @@ use tempfile::TempDir;
 /// falls below 0.025; one below a thousandth does not.
 const WHITE: f64 = 1.0e-3;
 
-/// A run of 250 s up and down with one effect, with seeds that no threshold has seen.
+/// A run of 250 s up and down with one effect, with seeds on which the rules of what is judged were settled: a regression test, no proof.
 fn scenario(seed: u32, effect: &str) -> String {
     format!("seed = {seed}\nschedule = {{ kind = \"up_down\", step_us = 50, hold_s = 6, top_us = 2000 }}\n[[effect]]\n{effect}\n")
 }
