@@ -495,15 +495,14 @@ fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) ->
 /// A channel less its declared polynomial in the measured speed; others as they are.
 fn less_speed(context: &Context, relation: Relation, rows: &[usize], y: &[f64]) -> Vec<f64> {
     let follows = matches!(relation, Relation::Thrust | Relation::Torque | Relation::Current);
-    let Some(x) = context.regressor(relation).filter(|_| follows) else { return y.to_vec() };
-    let powers = |i: usize| -> Vec<f64> { (0..=relation.degree()).map(|k| x[i].powi(k as i32)).collect() };
-    let mut normal = Normal::new(relation.degree() + 1);
-    for (i, v) in rows.iter().zip(y) {
-        normal.add(&powers(*i), *v, 1.0);
+    if !follows || context.rpm.is_empty() {
+        return y.to_vec();
     }
-    let Some(solution) = normal.solve() else { return y.to_vec() };
-    let fitted = |i: usize| -> f64 { powers(i).iter().zip(&solution.coefficients).map(|(p, c)| p * c).sum() };
-    rows.iter().zip(y).map(|(i, v)| v - fitted(*i)).collect()
+    let x = |row: usize| context.rpm[row] / 1000.0;
+    let points = rows.iter().zip(y).map(|(i, v)| (x(*i), *v, 1.0));
+    let Some(solution) = Normal::of_polynomial(relation.degree(), points).solve() else { return y.to_vec() };
+    let fitted = |x: f64| solution.coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
+    rows.iter().zip(y).map(|(i, v)| v - fitted(x(*i))).collect()
 }
 
 fn targets(log: &Log, context: &Context) -> Vec<Target> {

@@ -215,7 +215,7 @@ fn log_product(values: &[f64]) -> f64 {
 /// One over the integrated autocorrelation time of the scaled residual, in samples: 1 when white.
 ///
 /// The autocorrelation is taken at lags 1, 2, 4, 8, ... and integrated in between until it falls below 0.05.
-fn effective_share(residual: &[f64]) -> f64 {
+pub(crate) fn effective_share(residual: &[f64]) -> f64 {
     let c0: f64 = residual.iter().map(|r| r * r).sum();
     let (mut time, mut last, mut lag) = (1.0, 1.0, 1usize);
     while c0 > 0.0 && lag < residual.len() / 4 {

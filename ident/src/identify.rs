@@ -7,9 +7,7 @@
 
 use crate::close::CloseError;
 use crate::context::{Context, unit_of};
-use crate::fit::{Curve, Estimate, Fitted, Spin, motor, relations, speeds, spin, square_law};
-use crate::heldout::residuals;
-use crate::hypothesis::{Declared, Fit, Rows, fit};
+use crate::fit::{Curve, Estimate, Fitted, Spin, declared, motor, relations, speeds, spin, square_law};
 use crate::log::Log;
 use crate::model::Model;
 use crate::plateau::{Plateau, detect};
@@ -76,15 +74,14 @@ pub struct Identified {
 /// # Errors
 /// [`CloseError::NoRelation`] where nothing can be fitted.
 pub fn identify(log: &Log) -> Result<Identified, CloseError> {
-    let mut context = Context::bare(log, None);
-    let speed = context.rpm.clone();
+    let context = Context::bare(log, None);
     // the fits over all rows and the plateaus need nothing of each other: one core each
-    let (declared, plateaus) = std::thread::scope(|scope| {
-        let found = scope.spawn(|| detect(log, &speed));
-        let declared = declared(log, &mut context);
-        (declared, found.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    let (fitted, plateaus) = std::thread::scope(|scope| {
+        let found = scope.spawn(|| detect(log, &context.rpm));
+        let relations = all_rows(log, &context);
+        (relations, found.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     });
-    let (model, quality) = declared.ok_or_else(|| CloseError::NoRelation { run: log.name.clone() })?;
+    let (model, quality) = fitted.ok_or_else(|| CloseError::NoRelation { run: log.name.clone() })?;
     let speeds = speeds(log, &plateaus, &context.consensus.channels);
     let (plateaus, speeds) = if plateaus.is_empty() { table_rows(log, &context) } else { (plateaus, speeds) };
     let curves = relations(log, &plateaus, &speeds);
@@ -142,39 +139,21 @@ fn table_rows(log: &Log, context: &Context) -> (Vec<Plateau>, Vec<Option<(f64, f
 }
 
 /// The declared relations over all rows, one channel at a time: a long log must not stand in memory once for each.
-fn declared(log: &Log, context: &mut Context) -> Option<(Model, Vec<Quality>)> {
-    let mut model: Option<Model> = None;
-    let mut quality = Vec::new();
+fn all_rows(log: &Log, context: &Context) -> Option<(Model, Vec<Quality>)> {
+    let (mut polynomials, mut quality) = (Vec::new(), Vec::new());
     let mut related = false;
     for name in Context::declared_names(log) {
         let Some(target) = context.declared(log, name) else { continue };
-        let predicts = target.relation.degree() > 0 && target.rows.len() > 8;
-        context.targets = vec![target];
-        let Some(fitted) = fit(context, Declared::default(), &[], None, Rows::All) else { continue };
-        related |= predicts;
-        quality.push(judged(context, &fitted));
-        let piece = Model::from_fit(context, log, Declared::default(), &fitted);
-        match &mut model {
-            Some(m) => m.polynomials.extend(piece.polynomials),
-            None => model = Some(piece),
-        }
+        let Some(fitted) = declared(context, &target) else { continue };
+        related |= target.relation.degree() > 0 && target.rows.len() > 8;
+        polynomials.push(fitted.polynomial);
+        quality.push(Quality {
+            channel: target.name,
+            unit: unit_of(target.name),
+            rms: fitted.rms,
+            noise_floor: target.noise.rms,
+            r2: fitted.r2,
+        });
     }
-    context.targets.clear();
-    model.filter(|_| related).map(|m| (m, quality))
-}
-
-fn judged(context: &Context, fitted: &Fit) -> Quality {
-    let target = &context.targets[0];
-    let residual = residuals(context, Declared::default(), fitted).swap_remove(0);
-    let n = residual.len().max(1) as f64;
-    let mean = target.y.iter().sum::<f64>() / n;
-    let total: f64 = target.y.iter().map(|y| (y - mean).powi(2)).sum();
-    let left: f64 = residual.iter().map(|v| v * v).sum();
-    Quality {
-        channel: target.name,
-        unit: unit_of(target.name),
-        rms: (left / n).sqrt(),
-        noise_floor: target.noise.rms,
-        r2: 1.0 - left / total.max(1e-300),
-    }
+    related.then(|| (Model::of(context, log, polynomials), quality))
 }

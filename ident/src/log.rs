@@ -143,7 +143,8 @@ impl Log {
         for name in header.iter().skip(1) {
             log.columns.push(Column { name: name.clone(), values: Vec::new() });
         }
-        while let Some(line) = lines.next_line()? {
+        let mut line = String::new();
+        while lines.read_into(&mut line)? {
             if line.is_empty() || line.starts_with('#') {
                 continue;
             }
@@ -252,14 +253,22 @@ impl<'a, R: BufRead> Lines<'a, R> {
         self.unterminated
     }
 
+    /// The next line in a string of its own; `None` at the end.
     pub(crate) fn next_line(&mut self) -> Result<Option<String>, ReadError> {
-        let mut bytes = Vec::new();
+        let mut text = String::new();
+        Ok(self.read_into(&mut text)?.then_some(text))
+    }
+
+    /// The next line in place of what `text` held; false at the end.
+    fn read_into(&mut self, text: &mut String) -> Result<bool, ReadError> {
+        let mut bytes = std::mem::take(text).into_bytes();
+        bytes.clear();
         let n = (&mut self.source)
             .take(MAX_LINE as u64 + 1)
             .read_until(b'\n', &mut bytes)
             .map_err(|source| ReadError::Io { file: self.file.to_owned(), source })?;
         if n == 0 {
-            return Ok(None);
+            return Ok(false);
         }
         self.number += 1;
         if n > MAX_LINE {
@@ -276,9 +285,9 @@ impl<'a, R: BufRead> Lines<'a, R> {
         if self.number == 1 && bytes.starts_with(&[0xEF, 0xBB, 0xBF]) {
             bytes.drain(..3);
         }
-        String::from_utf8(bytes)
-            .map(Some)
-            .map_err(|_| self.place().refuse(None, "bytes that are not UTF-8", "a CSV text file in UTF-8"))
+        *text = String::from_utf8(bytes)
+            .map_err(|_| self.place().refuse(None, "bytes that are not UTF-8", "a CSV text file in UTF-8"))?;
+        Ok(true)
     }
 }
 

@@ -118,18 +118,25 @@ fn coefficient_key(channel: &str, order: usize) -> String {
 }
 
 impl Model {
+    /// The model of a log with these polynomials and no effect.
+    #[must_use]
+    pub fn of(context: &Context, log: &Log, polynomials: Vec<Polynomial>) -> Self {
+        Self {
+            source: log.name.clone(),
+            meta: log.meta.iter().map(|(k, v)| (k.clone(), v.clone())).collect(),
+            start_pulse_us: context.start_pulse_us,
+            consensus: context.consensus.channels.clone(),
+            polynomials,
+            ..Self::default()
+        }
+    }
+
     /// The model that a fitted hypothesis amounts to.
     #[must_use]
     pub fn from_fit(context: &Context, log: &Log, declared: Declared<'_>, fit: &Fit) -> Self {
         let mut model = match declared.model {
             Some(m) => m.clone(),
-            None => Self {
-                source: log.name.clone(),
-                meta: log.meta.iter().map(|(k, v)| (k.clone(), v.clone())).collect(),
-                start_pulse_us: context.start_pulse_us,
-                consensus: context.consensus.channels.clone(),
-                ..Self::default()
-            },
+            None => Self::of(context, log, Vec::new()),
         };
         if declared.model.is_none() {
             for (target, t) in context.targets.iter().zip(&fit.targets) {

@@ -66,6 +66,40 @@ impl Normal {
         normal
     }
 
+    /// A polynomial in x through points (x, y, weight), in blocks: a long log need not stand in memory as columns of powers.
+    #[must_use]
+    pub fn of_polynomial(degree: usize, points: impl Iterator<Item = (f64, f64, f64)>) -> Self {
+        const BLOCK: usize = 4096;
+        let mut whole = Self::new(degree + 1);
+        let mut columns = vec![Vec::with_capacity(BLOCK); degree + 1];
+        let (mut y, mut weights) = (Vec::with_capacity(BLOCK), Vec::with_capacity(BLOCK));
+        let mut points = points.peekable();
+        while points.peek().is_some() {
+            columns.iter_mut().for_each(Vec::clear);
+            y.clear();
+            weights.clear();
+            for (x, value, weight) in points.by_ref().take(BLOCK) {
+                let mut power = 1.0;
+                for column in &mut columns {
+                    column.push(power);
+                    power *= x;
+                }
+                y.push(value);
+                weights.push(weight);
+            }
+            whole.absorb(&Self::of_columns(&columns, &y, &weights));
+        }
+        whole
+    }
+
+    /// Adds what went into another of the same columns.
+    fn absorb(&mut self, other: &Self) {
+        self.gram += &other.gram;
+        self.rhs += &other.rhs;
+        self.yy += other.yy;
+        self.count += other.count;
+    }
+
     /// Solves; `None` when the numbers are not finite.
     #[must_use]
     pub fn solve(&self) -> Option<Solution> {
@@ -102,7 +136,9 @@ impl Normal {
 }
 
 /// Scalar product in eight independent sums, so that it does not wait for each addition; the order is fixed.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (a, b) = (&a[..n], &b[..n]);
     let mut sums = [0.0; 8];
     let (head_a, tail_a) = a.as_chunks::<8>();
     let (head_b, tail_b) = b.as_chunks::<8>();
@@ -143,6 +179,17 @@ mod tests {
         let (a, b) = (rows.solve().unwrap(), Normal::of_columns(&columns, &y, &weights).solve().unwrap());
         assert!((a.rss - b.rss).abs() < 1e-9);
         assert!(a.coefficients.iter().zip(&b.coefficients).all(|(p, q)| (p - q).abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_polynomial_in_blocks_comes_back() {
+        let points = (0..10_000).map(|i| f64::from(i) / 5000.0).map(|x| (x, 1.0 - 3.0 * x + 0.5 * x * x, 1.0 + x));
+        let normal = Normal::of_polynomial(2, points);
+        let s = normal.solve().unwrap();
+        assert_eq!(normal.count, 10_000);
+        for (c, truth) in s.coefficients.iter().zip([1.0, -3.0, 0.5]) {
+            assert!((c - truth).abs() < 1e-8, "{:?}", s.coefficients);
+        }
     }
 
     #[test]

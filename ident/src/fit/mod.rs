@@ -7,8 +7,11 @@
 //! Reference: specification `identification.md`, item 3; Beharie 2013, Figures 5.76 to 5.79.
 
 mod curve;
+mod declared;
 mod motor;
 mod spin;
+
+pub(crate) use declared::declared;
 
 pub use curve::{Curve, Order, Point};
 pub use motor::{Motor, motor};

@@ -261,14 +261,16 @@ fn despiked(guide: &[f64]) -> Vec<f64> {
         })
         .collect();
     let n = filled.len();
+    let mut w = [0.0; 5];
     (0..n)
         .map(|i| {
             let around = &filled[i.saturating_sub(2)..(i + 3).min(n)];
-            let mut w = around.to_vec();
-            let m = median(&mut w);
-            let mut off: Vec<f64> = around.iter().map(|v| (v - m).abs()).collect();
+            let w = &mut w[..around.len()];
+            w.copy_from_slice(around);
+            let m = median(w);
+            w.iter_mut().for_each(|v| *v = (*v - m).abs());
             // only what stands far out is replaced: a median of everything would colour the noise
-            if (filled[i] - m).abs() > 8.0 * median(&mut off).max(1e-9) { m } else { filled[i] }
+            if (filled[i] - m).abs() > 8.0 * median(w).max(1e-9) { m } else { filled[i] }
         })
         .collect()
 }

@@ -7,6 +7,7 @@
 //! Reference: Geyer 1992, "Practical Markov chain Monte Carlo" (initial positive sequence); Theil 1950.
 
 use crate::noise::median;
+use crate::solve::dot;
 
 /// Farthest that a sample may lie, in robust standard deviations.
 const FAR: f64 = 6.0;
@@ -21,36 +22,39 @@ pub(crate) struct Colour {
 }
 
 impl Colour {
-    /// Autocorrelation pooled over all stretches, summed while neighbouring pairs of lags stay positive.
-    pub(crate) fn pooled(values: &[f64], ranges: &[(usize, usize)]) -> Self {
+    /// Autocorrelation pooled over all stretches and their residuals, summed while neighbouring pairs of lags stay positive.
+    pub(crate) fn pooled(values: &[f64], ranges: &[(usize, usize)], residuals: &[Option<Residual>]) -> Self {
         let mut quantum = f64::INFINITY;
-        let mut scaled: Vec<(Vec<f64>, f64)> = Vec::with_capacity(ranges.len());
         for (from, to) in ranges {
-            let z = &values[*from..*to];
-            for w in z.windows(2) {
+            for w in values[*from..*to].windows(2) {
                 let d = (w[1] - w[0]).abs();
                 if d > 1e-12 {
                     quantum = quantum.min(d);
                 }
             }
-            let Some(mut r) = residual(z) else { continue };
-            let n = r.iter().filter(|v| v.is_finite()).count() as f64;
-            let scale = (r.iter().filter(|v| v.is_finite()).map(|v| v * v).sum::<f64>() / n).sqrt();
-            if scale > 0.0 && n >= 8.0 {
-                // a missing sample takes no part in any product
-                r.iter_mut().for_each(|v| *v /= scale);
-                scaled.push((r, n));
-            }
         }
+        let stretches = residuals.iter().flatten().filter(|r| r.squares > 0.0 && r.kept >= 8.0).collect();
         let longest = ranges.iter().map(|(a, b)| b - a).max().unwrap_or(0);
-        let time = Correlogram { stretches: &scaled, lags: Vec::new() }.time((longest / 4).clamp(1, 60));
+        let time = Correlogram { stretches, lags: Vec::new() }.time((longest / 4).clamp(1, 60));
         Self { time, quantum: if quantum.is_finite() { quantum } else { 0.0 } }
     }
 }
 
+/// What a stretch holds beside its own line.
+pub(crate) struct Residual {
+    /// One value a row, 0 for a glitch or a missing sample, which so takes no part in any product.
+    values: Vec<f64>,
+    /// Whether the row counts.
+    counts: Vec<bool>,
+    /// Rows that count.
+    kept: f64,
+    /// Sum of squares.
+    squares: f64,
+}
+
 /// Pooled products of scaled residuals, lag by lag, no more of them than are asked for.
 struct Correlogram<'r> {
-    stretches: &'r [(Vec<f64>, f64)],
+    stretches: Vec<&'r Residual>,
     /// Sum of products, what each is short of for being taken about a line (times two over n), number of pairs.
     lags: Vec<(f64, f64, f64)>,
 }
@@ -60,16 +64,11 @@ impl Correlogram<'_> {
         while self.lags.len() <= lag {
             let k = self.lags.len();
             let mut sums = (0.0, 0.0, 0.0);
-            for (r, n) in self.stretches.iter().filter(|(r, _)| k * 3 < r.len()) {
-                let (mut sum, mut pairs) = (0.0, 0.0);
-                for (a, b) in r.iter().zip(&r[k..]) {
-                    let product = a * b;
-                    if product.is_finite() {
-                        sum += product;
-                        pairs += 1.0;
-                    }
-                }
-                sums = (sums.0 + sum, sums.1 + 2.0 * pairs / n, sums.2 + pairs);
+            for r in self.stretches.iter().filter(|r| k * 3 < r.values.len()) {
+                let pairs = r.counts.iter().zip(&r.counts[k..]).filter(|(a, b)| **a && **b).count() as f64;
+                // scaled to a variance of one
+                let sum = dot(&r.values, &r.values[k..]) * r.kept / r.squares;
+                sums = (sums.0 + sum, sums.1 + 2.0 * pairs / r.kept, sums.2 + pairs);
             }
             self.lags.push(sums);
         }
@@ -106,20 +105,18 @@ fn integrated(most: usize, mut rho: impl FnMut(usize) -> (f64, f64)) -> f64 {
     time
 }
 
-/// Residual about the stretch's own line, glitches and missing samples as NaN; `None` for fewer than three samples.
-fn residual(z: &[f64]) -> Option<Vec<f64>> {
+/// Residual about the stretch's own line, glitches left out; `None` for fewer than three samples.
+pub(crate) fn residual(z: &[f64]) -> Option<Residual> {
     let (level, slope, spread) = line(z)?;
     let centre = (z.len() as f64 - 1.0) / 2.0;
-    let mut r: Vec<f64> = z
-        .iter()
-        .enumerate()
-        .map(|(i, v)| v - level - slope * (i as f64 - centre))
-        .map(|r| if r.abs() <= FAR * spread { r } else { f64::NAN })
-        .collect();
-    let kept = r.iter().filter(|v| v.is_finite()).count();
-    let mean = r.iter().filter(|v| v.is_finite()).sum::<f64>() / kept as f64;
-    r.iter_mut().for_each(|v| *v -= mean);
-    (kept >= 3).then_some(r)
+    let mut values: Vec<f64> = z.iter().enumerate().map(|(i, v)| v - level - slope * (i as f64 - centre)).collect();
+    // false for a missing sample too
+    let counts: Vec<bool> = values.iter().map(|r| r.abs() <= FAR * spread).collect();
+    let kept = counts.iter().filter(|c| **c).count() as f64;
+    let mean = values.iter().zip(&counts).map(|(v, c)| if *c { *v } else { 0.0 }).sum::<f64>() / kept;
+    values.iter_mut().zip(&counts).for_each(|(v, c)| *v = if *c { *v - mean } else { 0.0 });
+    let squares = dot(&values, &values);
+    (kept >= 3.0).then_some(Residual { values, counts, kept, squares })
 }
 
 /// Robust line through a stretch: level at its middle, slope a row, spread about it.
@@ -128,8 +125,7 @@ fn residual(z: &[f64]) -> Option<Vec<f64>> {
 pub(crate) fn line(z: &[f64]) -> Option<(f64, f64, f64)> {
     let third = z.len() / 3;
     let finite = |v: &[f64]| -> Vec<f64> { v.iter().copied().filter(|v| v.is_finite()).collect() };
-    let mut all = finite(z);
-    if all.len() < 3 {
+    if z.iter().filter(|v| v.is_finite()).take(3).count() < 3 {
         return None;
     }
     let slope = match (finite(&z[..third]), finite(&z[z.len() - third..])) {
@@ -142,25 +138,22 @@ pub(crate) fn line(z: &[f64]) -> Option<(f64, f64, f64)> {
     let level = median(&mut about);
     let mut off: Vec<f64> = about.iter().map(|v| (v - level).abs()).collect();
     let spread = 1.4826 * median(&mut off);
-    // more than half of the samples alike: the mean deviation still tells noise from glitches
-    all.sort_unstable_by(f64::total_cmp);
+    // more than half of the samples alike: the largest deviation still tells noise from glitches
     let coarse = off.iter().copied().fold(0.0, f64::max) / FAR;
     let spread = if spread > 0.0 { spread } else { coarse.max(1e-12 * level.abs()).max(1e-12) };
     Some((level, slope, spread))
 }
 
 /// Mean of a stretch and its standard error.
-pub(crate) fn mean_of(z: &[f64], colour: &Colour) -> Option<(f64, f64)> {
-    let r = residual(z)?;
-    let kept: Vec<usize> = (0..z.len()).filter(|i| r[*i].is_finite()).collect();
-    let n = kept.len() as f64;
-    let mean = kept.iter().map(|i| z[*i]).sum::<f64>() / n;
-    let variance = kept.iter().map(|i| r[*i] * r[*i]).sum::<f64>() / (n - 2.0 * colour.time).max(0.3 * n);
+pub(crate) fn mean_of(z: &[f64], r: &Residual, colour: &Colour) -> (f64, f64) {
+    let n = r.kept;
+    let mean = z.iter().zip(&r.counts).map(|(v, c)| if *c { *v } else { 0.0 }).sum::<f64>() / n;
+    let variance = r.squares / (n - 2.0 * colour.time).max(0.3 * n);
     let independent = (n / colour.time).max(1.0);
     let few = few(independent - 1.0);
     // what rounding hides does not average out
     let floor = colour.quantum * colour.quantum / 12.0 / independent;
-    Some((mean, few * (variance / independent + if variance <= 1e-24 { floor } else { 0.0 }).sqrt()))
+    (mean, few * (variance / independent + if variance <= 1e-24 { floor } else { 0.0 }).sqrt())
 }
 
 /// By how much a standard error that few independent samples gave must be widened so that 1.96 of it hold 95 %: the ratio of the
@@ -206,9 +199,7 @@ mod tests {
                     })
                     .collect();
                 let ranges: Vec<(usize, usize)> = (0..12).map(|k| (200 * k, 200 * k + 190)).collect();
-                let colour = Colour::pooled(&values, &ranges);
-                for (a, b) in ranges {
-                    let (mean, se) = mean_of(&values[a..b], &colour).unwrap();
+                for (mean, se) in super::super::means_over(&values, &ranges).into_iter().flatten() {
                     all += 1;
                     inside += usize::from(mean.abs() < 1.96 * se);
                     squares += (mean / se).powi(2);
@@ -226,7 +217,7 @@ mod tests {
         let mut z: Vec<f64> = (0..100).map(|_| 5.0 + 0.1 * noise(&mut seed)).collect();
         z[40] = 500.0;
         z[41] = f64::NAN;
-        let (mean, se) = mean_of(&z, &Colour { time: 1.0, quantum: 0.0 }).unwrap();
+        let (mean, se) = mean_of(&z, &residual(&z).unwrap(), &Colour { time: 1.0, quantum: 0.0 });
         assert!((mean - 5.0).abs() < 4.0 * se && se < 0.02, "{mean} {se}");
     }
 }

@@ -14,7 +14,7 @@ mod settle;
 
 use crate::context::Context;
 use crate::log::{Log, SPEED};
-use mean::{Colour, mean_of};
+use mean::{Colour, Residual, mean_of, residual};
 
 /// Fewest settled rows of a plateau.
 pub const SHORTEST: usize = 5;
@@ -93,8 +93,10 @@ pub fn detect(log: &Log, speed: &[f64]) -> Vec<Plateau> {
 /// Mean and standard error of a column over row ranges, the colour of its noise pooled over all of them.
 #[must_use]
 pub fn means_over(values: &[f64], ranges: &[(usize, usize)]) -> Vec<Option<(f64, f64)>> {
-    let colour = Colour::pooled(values, ranges);
-    ranges.iter().map(|(from, to)| mean_of(&values[*from..*to], &colour)).collect()
+    let residuals: Vec<Option<Residual>> = ranges.iter().map(|(from, to)| residual(&values[*from..*to])).collect();
+    let colour = Colour::pooled(values, ranges, &residuals);
+    let mean = |(from, to): &(usize, usize), r: &Option<Residual>| Some(mean_of(&values[*from..*to], r.as_ref()?, &colour));
+    ranges.iter().zip(&residuals).map(|(range, r)| mean(range, r)).collect()
 }
 
 /// What shows the steps: the speed, or where none was measured the first channel that follows the throttle.
