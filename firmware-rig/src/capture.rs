@@ -52,6 +52,8 @@ pub struct CaptureChannel {
     overwritten: bool,
     last: Ticks,
     reading: Option<(u16, u32)>,
+    /// Ticks a revolution of that reading, and the silence that a rotor of this speed can explain: asked for many times a tick.
+    turn: Option<(u64, u64)>,
     deviations: u8,
 }
 
@@ -71,6 +73,7 @@ impl CaptureChannel {
             overwritten: false,
             last: Ticks(0),
             reading: None,
+            turn: None,
             deviations: 0,
         }
     }
@@ -88,6 +91,7 @@ impl CaptureChannel {
     fn forget(&mut self) {
         self.held = 0;
         self.reading = None;
+        self.turn = None;
     }
 
     fn store(&mut self, edge: u32) {
@@ -128,6 +132,11 @@ impl CaptureChannel {
             let age = if age > u32::MAX / 2 { 0 } else { age }; // captured while `now` was read
             self.last = Ticks(now.0.saturating_sub(u64::from(age)));
             self.reading = self.measure();
+            let (marks, margin) = (self.marks, self.times.lost_margin.0);
+            self.turn = self.reading.and_then(|(edges, span)| {
+                let revolution = (u64::from(span) * u64::from(marks)).checked_div(u64::from(edges))?;
+                Some((revolution, 3 * self.expected(revolution) + margin))
+            });
         } else if self.held > 0 && now.since(self.last).0 > self.stop_after() {
             self.forget();
         }
@@ -152,8 +161,7 @@ impl CaptureChannel {
     /// Ticks of one revolution at the last reading.
     #[must_use]
     pub fn revolution(&self) -> Option<u64> {
-        let (edges, span) = self.reading?;
-        (u64::from(span) * u64::from(self.marks)).checked_div(u64::from(edges))
+        self.turn.map(|(revolution, _)| revolution)
     }
 
     fn expected(&self, revolution: u64) -> u64 {
@@ -162,7 +170,7 @@ impl CaptureChannel {
 
     /// Silence that a turning rotor can explain.
     fn patience(&self) -> Option<u64> {
-        self.revolution().map(|r| 3 * self.expected(r) + self.times.lost_margin.0)
+        self.turn.map(|(_, patience)| patience)
     }
 
     fn stop_after(&self) -> u64 {
@@ -287,15 +295,16 @@ impl CaptureBank {
     #[must_use]
     pub fn lost(&self, now: Ticks) -> u8 {
         let Some(since) = self.turning_since else { return 0 };
-        let lost = |channel: &&CaptureChannel| {
-            // a rotor that runs down is slower than the last period says: what has passed since the last edge counts too
-            let others = self.channels.iter().filter(|c| !core::ptr::eq(*c, *channel) && c.is_turning(now));
-            others
-                .filter_map(|c| Some(c.revolution()?.max(u64::from(c.marks).saturating_mul(now.since(c.last).0))))
-                .max()
-                .is_some_and(|revolution| !self.is_slow(revolution) && channel.is_lost(now, (revolution, since)))
+        // a rotor that runs down is slower than the last period says: what has passed since the last edge counts too
+        let told = self.channels.each_ref().map(|c| {
+            let revolution = c.revolution().filter(|_| c.is_turning(now))?;
+            Some(revolution.max(u64::from(c.marks).saturating_mul(now.since(c.last).0)))
+        });
+        let lost = |(n, channel): &(usize, &CaptureChannel)| {
+            let others = told.iter().enumerate().filter(|(other, _)| other != n).filter_map(|(_, revolution)| *revolution);
+            others.max().is_some_and(|revolution| !self.is_slow(revolution) && channel.is_lost(now, (revolution, since)))
         };
-        self.channels.iter().filter(lost).count() as u8
+        self.channels.iter().enumerate().filter(lost).count() as u8
     }
 
     /// Ticks a revolution of the channels that turn, and since when any did.

@@ -127,6 +127,7 @@ impl Ticks {
 
     /// Seconds, for logs.
     #[must_use]
+    #[inline]
     pub fn as_s(self) -> f64 {
         self.0 as f64 / f64::from(Self::HZ)
     }

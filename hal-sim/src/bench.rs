@@ -27,9 +27,11 @@ use crate::noise::{Source, Stream};
 use crate::plant::beam::BeamMode;
 use crate::plant::bridge::BridgeState;
 use crate::plant::mount::MountState;
-use crate::plant::{Beam, Bridge, Esc, EscDialogue, EscState, Mount, Parts, PlantState, Powerplant, RigPlant};
+use crate::plant::powerplant::STEPS_PER_MS;
+use crate::plant::{Beam, Bridge, Esc, EscDialogue, EscState, Mount, Parts, PlantBlock, PlantState, Powerplant, RigPlant};
 use crate::scenario::Scenario;
-use crate::sensor::{AnalogFront, Converter, Edge, EdgeDetail, Geometry, Logger, Tachometers};
+use crate::sensor::back_emf::BackEmfState;
+use crate::sensor::{AnalogFront, BackEmfMeter, Converter, Edge, EdgeDetail, Geometry, Logger, Tachometers};
 use core::f64::consts::TAU;
 use firmware_rig::AdcBlock;
 use frame::calibration::Calibration;
@@ -42,8 +44,8 @@ use std::collections::VecDeque;
 pub const STEP_NS: u64 = 100_000;
 /// Integration step, s.
 pub const STEP_S: f64 = 1.0e-4;
-/// Steps in a millisecond.
-const STEPS_PER_MS: usize = 10;
+/// Speeds that a powerplant may give, rev/min; with any other the rotor rests.
+const SPEEDS: core::ops::Range<f64> = 0.0..1.0e6;
 /// Ticks of 84 MHz in a step.
 const STEP_TICKS: u64 = 8_400;
 
@@ -77,6 +79,8 @@ pub struct Truth {
     pub plant: PlantState,
     /// Force that the gauges see, N.
     pub beam_n: f64,
+    /// What the back-EMF meter shows, rev/min; the rig's board is not wired to it.
+    pub back_emf_rpm: Option<f64>,
 }
 
 /// What the board's peripherals gathered in one millisecond.
@@ -110,6 +114,8 @@ pub struct Bench {
     converter: Converter,
     geometry: Geometry,
     tachometers: Tachometers,
+    meter: BackEmfState,
+    metered_rev: f64,
     steps: u64,
     run_start_steps: Option<u64>,
     angle_rev: f64,
@@ -156,6 +162,8 @@ impl Bench {
             converter: Converter::new(&front, parts.noise, seed),
             tachometers: Tachometers::new(&parts.geometry, detail, seed, angle_rev),
             geometry: parts.geometry,
+            meter: BackEmfState::new(BackEmfMeter::default()),
+            metered_rev: angle_rev,
             steps: 0,
             run_start_steps: None,
             angle_rev,
@@ -211,6 +219,9 @@ impl Bench {
     /// Integrates until [`Bench::horizon_ns`] is at least `at_ns`. The look-ahead is less than one step of 0.1 ms.
     pub fn advance_to(&mut self, at_ns: u64) {
         while self.horizon_ns() < at_ns {
+            if self.steps.is_multiple_of(STEPS_PER_MS as u64) {
+                self.each_millisecond();
+            }
             self.step();
         }
     }
@@ -276,15 +287,20 @@ impl Bench {
 
     /// One millisecond of a native run. Call it at whole milliseconds only, and not together with [`Bench::advance_to`].
     pub fn millisecond(&mut self, out: &mut Millisecond) {
-        for _ in 0..STEPS_PER_MS {
-            self.step();
-        }
         for edges in &mut out.edges {
             edges.clear();
         }
-        while let Some(edge) = self.edges.pop_front() {
-            if edge.rising {
-                out.edges[usize::from(edge.channel)].push(edge.at_ticks as u32);
+        self.each_millisecond();
+        if self.rigid && !self.recorded {
+            self.block(out);
+        } else {
+            for _ in 0..STEPS_PER_MS {
+                self.step();
+            }
+            while let Some(edge) = self.edges.pop_front() {
+                if edge.rising {
+                    out.edges[usize::from(edge.channel)].push(edge.at_ticks as u32);
+                }
             }
         }
         // Five channels at 480 cycles each and 21 MHz: 8.5 conversions of each in a millisecond.
@@ -332,15 +348,57 @@ impl Bench {
         self.recorded |= self.levers.late_s > 0.0;
         self.plant.adjust(&self.levers.plant);
         self.truth.run_s = run_s;
+        let turned = (self.metered_rev, self.angle_rev);
+        self.meter.pass(turned, self.plant.back_emf(), self.steps as f64 * STEP_S, 1.0e-3);
+        self.metered_rev = self.angle_rev;
+        self.truth.back_emf_rpm = self.meter.rpm();
     }
 
+    /// Ten steps at once, part by part instead of step by step: the same numbers, for what comes later in a step never acts on what
+    /// comes earlier in the next. Only for stiff joints and no logger.
+    fn block(&mut self, out: &mut Millisecond) {
+        let mut plant = PlantBlock::default();
+        self.plant.advance_block(STEP_S, self.output_us, &mut plant);
+        if !plant.rpm.iter().all(|rpm| SPEEDS.contains(rpm)) {
+            plant.rpm = plant.rpm.map(|rpm| if SPEEDS.contains(&rpm) { rpm } else { 0.0 });
+        }
+        plant.last.rpm = plant.rpm[STEPS_PER_MS - 1];
+        if !self.esc.powered() {
+            (plant.last.voltage_v, plant.last.current_a) = (0.0, 0.0);
+        }
+
+        let rev_s = plant.rpm.map(|rpm| rpm / 60.0);
+        let mut turned = [self.angle_rev; STEPS_PER_MS + 1];
+        for i in 0..STEPS_PER_MS {
+            turned[i + 1] = turned[i] + rev_s[i] * STEP_S;
+        }
+        let start_ticks = self.steps * STEP_TICKS;
+        self.tachometers.block(&turned, &rev_s, |channel, rising, step, fraction| {
+            if rising {
+                let ticks = start_ticks + step as u64 * STEP_TICKS + (fraction * STEP_TICKS as f64) as u64;
+                out.edges[usize::from(channel)].push(ticks as u32);
+            }
+        });
+        self.angle_rev = turned[STEPS_PER_MS];
+
+        let mut pin = plant.thrust_n;
+        shake(&mut pin, &rev_s, &turned[1..], self.shake_n, self.heavy_spot_rev);
+        self.mode.block(&mut pin);
+        let beam_n = pin[STEPS_PER_MS - 1];
+        let l = &self.levers;
+        let zero_n = plant.torque_nm.map(|torque_nm| l.strain_zero_n + l.torque_to_lift * torque_nm);
+        self.bridge.block(&mut pin, &zero_n, l.strain_gain, &plant.temp_c);
+        self.strain_v = pin;
+        self.torque_v = self.front.torque_v(plant.torque_nm[STEPS_PER_MS - 1]);
+        self.truth = Truth { pulse_us: self.output_us, plant: plant.last, beam_n, ..self.truth };
+        self.steps += STEPS_PER_MS as u64;
+    }
+
+    /// One step; [`Bench::each_millisecond`] comes before the first of each millisecond.
     fn step(&mut self) {
         let place = (self.steps % STEPS_PER_MS as u64) as usize;
-        if place == 0 {
-            self.each_millisecond();
-        }
         let mut state = self.plant.advance(STEP_S, self.output_us);
-        if !(state.rpm >= 0.0 && state.rpm < 1.0e6) {
+        if !SPEEDS.contains(&state.rpm) {
             state.rpm = 0.0;
         }
         if !self.esc.powered() {
@@ -384,7 +442,7 @@ impl Bench {
         }
         self.torque_v = torque_v;
         self.strain_v[place] = strain_v;
-        self.truth = Truth { run_s: self.truth.run_s, pulse_us: self.output_us, plant: state, beam_n };
+        self.truth = Truth { pulse_us: self.output_us, plant: state, beam_n, ..self.truth };
         self.steps += 1;
     }
 }
@@ -403,10 +461,23 @@ fn fitted(base: &BenchParts, effects: &[Scheduled], open: u128) -> BenchParts {
     parts
 }
 
+/// Adds the force of the unbalance to each of `force_n`. Slices of no fixed length, so that the steps go side by side.
+#[inline(never)]
+fn shake(force_n: &mut [f64], rev_s: &[f64], turned: &[f64], shake_n: f64, heavy_spot_rev: f64) {
+    for ((force, speed), turn) in force_n.iter_mut().zip(rev_s).zip(turned) {
+        *force += shake_n * speed * speed * turn_cosine(turn + heavy_spot_rev);
+    }
+}
+
+/// 2^52: a double of this size has no fraction.
+const ROUNDING: f64 = 4_503_599_627_370_496.0;
+
 /// cos(2 pi turn), to 1e-10: the Taylor series of the nearest half turn. `libm::cos` costs as much as the rest of a step.
 #[inline]
 fn turn_cosine(turn: f64) -> f64 {
-    let part = turn - (turn as i64) as f64; // angles are not negative: truncation is the floor, without a call
+    // angles are not negative and below 2^51: adding 2^52 leaves no fraction, so this is the floor, and it goes two at a time
+    let nearest = (turn + ROUNDING) - ROUNDING;
+    let part = turn - if nearest > turn { nearest - 1.0 } else { nearest };
     let near = (part - 0.5).abs(); // 0.5 at the heavy spot, 0 opposite
     let (distance, sign) = if near > 0.25 { (0.5 - near, 1.0) } else { (near, -1.0) };
     let y = TAU * TAU * distance * distance;
@@ -426,6 +497,44 @@ mod tests {
         for i in 0..6000 {
             let turn = f64::from(i) * 1.37e-3;
             assert!((turn_cosine(turn) - libm::cos(TAU * turn)).abs() < 1e-10, "{turn}");
+        }
+    }
+
+    /// The native run's millisecond at once gives what the emulated board's steps give.
+    #[test]
+    fn a_millisecond_at_once_is_its_ten_steps() {
+        for effect in
+            [None, Some("beam_resonance"), Some("spinup_lag"), Some("clock_drift"), Some("loosening_mount"), Some("encoder_drag")]
+        {
+            let scenario = Scenario::demo(3, effect).unwrap_or_else(|e| panic!("{e}"));
+            let bench = || {
+                let mut bench = Bench::new(&scenario, None, EdgeDetail::Captured);
+                bench.set_power(true);
+                bench
+            };
+            let (mut fast, mut slow) = (bench(), bench());
+            let mut out = Millisecond::default();
+            for ms in 0..12_000u64 {
+                let width = if ms < 5_000 { 1_000_000 } else { 1_700_000 };
+                for bench in [&mut fast, &mut slow] {
+                    if ms == 5_500 {
+                        bench.start_run();
+                    }
+                    if ms % 20 == 2 {
+                        bench.pulse(ms * 1_000_000, width);
+                    }
+                }
+                fast.millisecond(&mut out);
+                slow.advance_to((ms + 1) * 1_000_000);
+                let mut edges: [Vec<u32>; CAPTURE_CHANNELS] = Default::default();
+                while let Some(edge) = slow.edge_until(u64::MAX) {
+                    edges[usize::from(edge.channel)].push(edge.at_ticks as u32);
+                }
+                assert_eq!(out.edges, edges, "{effect:?} {ms} ms");
+                assert_eq!(fast.truth(), slow.truth(), "{effect:?} {ms} ms");
+                assert_eq!(fast.voltages(), slow.voltages(), "{effect:?} {ms} ms");
+            }
+            assert!(fast.truth().plant.rpm > 1000.0);
         }
     }
 }

@@ -14,10 +14,12 @@
 
 pub mod bench;
 pub mod catalogue;
+pub mod clock;
 pub mod effect;
 #[cfg(feature = "emulated")]
 pub mod emulated;
 pub mod fault;
+pub mod imu;
 pub mod native;
 pub mod noise;
 pub mod plant;

@@ -103,13 +103,22 @@ fn replayed(scenario: &Scenario, path: &Path, quiet: bool) -> Result<RunRecord, 
 
 /// What was really there, a row a sample.
 fn write_truth(out: &mut dyn Write, truth: &[Truth]) -> std::io::Result<()> {
-    writeln!(out, "t_s,pulse_us,rpm,thrust_n,torque_nm,current_a,voltage_v,temp_c,beam_n")?;
+    writeln!(out, "t_s,pulse_us,rpm,thrust_n,torque_nm,current_a,voltage_v,temp_c,beam_n,back_emf_rpm")?;
     for t in truth {
         let p = t.plant;
         writeln!(
             out,
-            "{:.3},{:.3},{:.4},{:.6},{:.7},{:.5},{:.5},{:.4},{:.6}",
-            t.run_s, t.pulse_us, p.rpm, p.thrust_n, p.torque_nm, p.current_a, p.voltage_v, p.temp_c, t.beam_n
+            "{:.3},{:.3},{:.4},{:.6},{:.7},{:.5},{:.5},{:.4},{:.6},{}",
+            t.run_s,
+            t.pulse_us,
+            p.rpm,
+            p.thrust_n,
+            p.torque_nm,
+            p.current_a,
+            p.voltage_v,
+            p.temp_c,
+            t.beam_n,
+            t.back_emf_rpm.map_or_else(String::new, |rpm| format!("{rpm:.3}"))
         )?;
     }
     Ok(())

@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 pub mod blind;
+pub mod budget;
 pub mod desk;
 
 use std::path::{Path, PathBuf};

@@ -9,7 +9,7 @@
 use super::part::{ADC_UNITS, Part};
 use rigless::{
     chip::{Timeline, uart},
-    device::Level,
+    device::{Device, Level},
     emulator::{self, Driver, Host, Settled, Start, Stop},
     image::Image,
     machine::{Board, Crystal, Target, armv7m},
@@ -20,6 +20,7 @@ use rigless::{
         st::tim::Channel as TimerChannel,
         stm32f427::{
             Stm32f427,
+            generated::tim2::Register as TimerRegister,
             peripherals::gpio::{Gpio, Pin},
         },
     },
@@ -214,6 +215,12 @@ impl Pins<'_> {
                 timer.drive_input(channel, level(high), registers, context);
             });
         }
+    }
+
+    /// What a timer's counter reads now.
+    pub fn counter(&mut self, timer: GeneralTimer) -> u32 {
+        let (timer, registers) = self.machine.mcu.chip.timer(timer as usize);
+        Device::peek(timer, TimerRegister::Cnt, registers, self.at).unwrap_or_default() as u32
     }
 
     /// Output of a timer channel in PWM mode; `None` while the timer does not drive it.

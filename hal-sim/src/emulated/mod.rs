@@ -12,7 +12,6 @@
 //! Reference: RM0090 rev 22; crate rigless 0.4.
 
 pub mod ahrs;
-pub mod bus;
 pub mod cost;
 mod machine;
 pub mod operator;

@@ -6,6 +6,7 @@
 //! Units: ms of simulated time in the loop; raw codes in the record.
 //! Reference: specification `rig.md`, "ESC pulse and arming" and "Acquisition"; `formats.md`, "Telemetry".
 
+pub mod ahrs;
 mod host;
 mod pins;
 
@@ -324,6 +325,9 @@ impl Session {
     }
 
     fn on(&self, wanted: impl Fn(&FaultKind) -> bool) -> Option<FaultKind> {
+        if self.faults.is_empty() {
+            return None;
+        }
         let run_s = self.run_time();
         self.faults.iter().find(|f| f.is_on(run_s) && wanted(&f.kind)).map(|f| f.kind)
     }
@@ -350,7 +354,7 @@ impl Session {
             _ => {}
         }
         self.bench.millisecond(&mut self.gathered);
-        let run_s = self.run_time();
+        let run_s = if self.faults.is_empty() { -1.0 } else { self.run_time() };
         for fault in self.faults.iter().filter(|f| f.is_on(run_s)) {
             if let FaultKind::AdcStuck { channel, high } = fault.kind
                 && let Some(block) = self.gathered.adc.get_mut(usize::from(channel))

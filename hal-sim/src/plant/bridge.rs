@@ -168,6 +168,31 @@ impl BridgeState {
         self.pin_v = if b.filter_s > 0.0 { self.pin_v + (pin_v - self.pin_v) * self.filter } else { pin_v };
         self.meter.step(self.pin_v)
     }
+
+    /// As many steps as `lift_n` has, with the same numbers: takes the lift and leaves the pin voltages in its place.
+    pub fn block(&mut self, lift_n: &mut [f64], zero_n: &[f64], gain: f64, temperature_c: &[f64]) {
+        let b = &self.bridge;
+        let creeps = b.creep_share != 0.0 || self.creep_n != 0.0;
+        let sticks = b.hysteresis_n != 0.0 || self.stuck_n != 0.0;
+        if creeps || sticks || b.filter_s > 0.0 || !self.meter.is_wire() {
+            for ((lift, zero), temperature) in lift_n.iter_mut().zip(zero_n).zip(temperature_c) {
+                *lift = self.step(*lift, *zero, gain, *temperature);
+            }
+            return;
+        }
+        // gauges, amplifier and divider alone
+        self.lift_n = lift_n.last().copied().unwrap_or(self.lift_n);
+        let mut output_v = self.output_v;
+        for ((lift, zero), temperature) in lift_n.iter_mut().zip(zero_n).zip(temperature_c) {
+            let shift = zero + b.zero_n_per_k * (temperature - b.zero_temperature_c);
+            let wanted = (self.empty_v - b.volt_per_newton * (*lift * gain + shift)).clamp(b.rails_v.0, b.rails_v.1);
+            let error = wanted - output_v;
+            output_v += error * if error > 0.0 { self.rise } else { self.fall };
+            *lift = b.divider * output_v;
+        }
+        self.output_v = output_v;
+        self.pin_v = lift_n.last().copied().unwrap_or(self.pin_v);
+    }
 }
 
 #[cfg(test)]
@@ -204,6 +229,30 @@ mod tests {
         assert!((run(2.0e-3, 0.0) - 1.0).abs() < 1e-9);
         assert!((run(0.4e-3, 0.5) - 1.0).abs() < 2e-3);
         assert!((run(2.0e-3, 0.5) - 1.0).abs() > 0.02);
+    }
+
+    #[test]
+    fn a_block_is_its_steps() {
+        let odd = [
+            Bridge::default(),
+            Bridge { fall_s: 2e-3, zero_n_per_k: 0.01, ..Bridge::default() },
+            Bridge { creep_share: 0.02, ..Bridge::default() },
+            Bridge { hysteresis_n: 0.05, ..Bridge::default() },
+            Bridge { filter_s: 0.02, ..Bridge::default() },
+            Bridge { meter: Meter { hold_s: 3e-3, step_v: 0.01, delay_s: 1e-3 }, ..Bridge::default() },
+        ];
+        for b in odd {
+            let (mut one, mut ten) = (BridgeState::new(b, 1e-4), BridgeState::new(b, 1e-4));
+            for ms in 0..400 {
+                let mut lift: [f64; 10] = core::array::from_fn(|i| 2.0 + 1.9 * libm::sin(0.3 * f64::from(ms) + i as f64));
+                let zero: [f64; 10] = core::array::from_fn(|i| 1e-3 * i as f64);
+                let warm = [23.0 + 0.01 * f64::from(ms); 10];
+                let want: [f64; 10] = core::array::from_fn(|i| one.step(lift[i], zero[i], 1.01, warm[i]));
+                ten.block(&mut lift, &zero, 1.01, &warm);
+                assert_eq!(lift, want, "{b:?}");
+                assert_eq!(one, ten);
+            }
+        }
     }
 
     #[test]

@@ -71,6 +71,12 @@ impl LimiterState {
 }
 
 impl Limiter {
+    /// Whether its duty stands still while the pulse does and no millisecond ends: no lag, no limit of the current.
+    #[must_use]
+    pub fn is_steady(&self) -> bool {
+        self.lag_s == (0.0, 0.0) && !self.current_a.is_finite()
+    }
+
     /// The highest duty up to `duty` that keeps duty x motor current within the limit, for a back-EMF, an open-circuit voltage,
     /// the phase resistance and the line resistance.
     #[must_use]

@@ -40,6 +40,12 @@ impl MeterState {
         Self { meter, wire, steps: 0, hold_steps: steps(meter.hold_s).max(1), held_v: start_v, line }
     }
 
+    /// Whether it passes on what it is given.
+    #[must_use]
+    pub fn is_wire(&self) -> bool {
+        self.wire
+    }
+
     /// One step with `input_v`; gives the output.
     #[inline]
     pub fn step(&mut self, input_v: f64) -> f64 {

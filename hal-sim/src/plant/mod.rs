@@ -36,7 +36,7 @@ pub use limiter::Limiter;
 pub use meter::Meter;
 pub use motor::Motor;
 pub use mount::Mount;
-pub use powerplant::{Parts, PlantLevers, PlantState, Powerplant, RigPlant};
+pub use powerplant::{Parts, PlantBlock, PlantLevers, PlantState, Powerplant, RigPlant};
 pub use propeller::Propeller;
 pub use room_air::RoomAir;
 pub use supply::Supply;

@@ -17,6 +17,7 @@ use super::room_air::{Draught, RoomAir};
 use super::supply::Supply;
 use super::thermal::{Thermal, ThermalState};
 use crate::noise::{Coloured, Source, Stream};
+use crate::sensor::BackEmf;
 use core::f64::consts::TAU;
 
 /// rev/min in one rad/s.
@@ -41,10 +42,35 @@ pub struct PlantState {
     pub temp_c: f64,
 }
 
+/// Steps of the bench in a millisecond.
+pub const STEPS_PER_MS: usize = 10;
+
+/// What the powerplant did in each step of one millisecond.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PlantBlock {
+    /// Rotor speed at the end of each step, rev/min.
+    pub rpm: [f64; STEPS_PER_MS],
+    /// Lift on the beam, N.
+    pub thrust_n: [f64; STEPS_PER_MS],
+    /// Torque on the arm, N.m.
+    pub torque_nm: [f64; STEPS_PER_MS],
+    /// Temperature of the rig, degC.
+    pub temp_c: [f64; STEPS_PER_MS],
+    /// Everything at the end of the last step.
+    pub last: PlantState,
+}
+
 /// What turns a pulse into motion, force and current.
 pub trait Powerplant: Send {
     /// Steps by `dt_s` with the ESC following a pulse of `pulse_us` (1000 is off).
     fn advance(&mut self, dt_s: f64, pulse_us: f64) -> PlantState;
+
+    /// Ten steps of `dt_s` at one pulse: the same numbers as ten times [`Powerplant::advance`].
+    fn advance_block(&mut self, dt_s: f64, pulse_us: f64, out: &mut PlantBlock) {
+        for i in 0..STEPS_PER_MS {
+            out.put(i, self.advance(dt_s, pulse_us));
+        }
+    }
 
     /// Takes what the effects make of the plant at this moment. A model that is not made of parts ignores it.
     fn adjust(&mut self, levers: &PlantLevers) {
@@ -57,10 +83,21 @@ pub trait Powerplant: Send {
         let _ = parts;
     }
 
-    /// Voltage between two windings at this instant, V, for the back-EMF meter; `None` of a model that has no windings.
-    fn line_to_line_v(&self, angle_rev: f64) -> Option<f64> {
-        let _ = angle_rev;
+    /// What a back-EMF meter finds at the windings now; `None` of a model that has no windings.
+    fn back_emf(&self) -> Option<BackEmf> {
         None
+    }
+}
+
+impl PlantBlock {
+    /// Puts the state after step `i` in its place.
+    #[inline]
+    pub fn put(&mut self, i: usize, state: PlantState) {
+        self.rpm[i] = state.rpm;
+        self.thrust_n[i] = state.thrust_n;
+        self.torque_nm[i] = state.torque_nm;
+        self.temp_c[i] = state.temp_c;
+        self.last = state;
     }
 }
 
@@ -179,7 +216,7 @@ const GUST_TAU_S: f64 = 0.05;
 /// Speed from which the back-EMF can be seen and the start is no longer blind, rev/min.
 const BLIND_RPM: f64 = 200.0;
 /// Steps of the fast integration in one of the slow.
-const SLOW_STEPS: u32 = 10;
+const SLOW_STEPS: u32 = STEPS_PER_MS as u32;
 
 impl RigPlant {
     /// At rest.
@@ -250,21 +287,94 @@ impl RigPlant {
         Drive { duty, emf_free_v: duty * (s.open_v - s.line_ohm * ESC_IDLE_A), per_ohm }
     }
 
+    /// What turns the rotor for the rest of this millisecond.
+    fn shaft(&self) -> Shaft {
+        let (s, d, l) = (&self.slow, &self.drive, &self.levers);
+        Shaft {
+            kt: s.kt,
+            emf_free_v: d.emf_free_v,
+            per_ohm: d.per_ohm,
+            holding_nm: s.holding_nm,
+            drag_nms: s.drag_nms,
+            air_k: s.air_k,
+            per_inertia: s.per_inertia,
+            inertia: s.inertia,
+            thrust_k: s.thrust_k,
+            extra_nm: l.drag_nm,
+            extra_nms: l.drag_nms,
+            seen_share: l.drag_share,
+        }
+    }
+
+    /// State of the outside at the speed, torque and currents of now.
+    fn state(&self, thrust_n: f64, torque_nm: f64) -> PlantState {
+        PlantState {
+            rpm: self.speed * RPM_PER_RAD_S,
+            thrust_n,
+            torque_nm,
+            current_a: self.supply_a,
+            voltage_v: self.slow.open_v - self.slow.line_ohm * self.supply_a,
+            temp_c: self.thermal.temperature_c,
+        }
+    }
+}
+
+/// Everything that acts on the shaft while duty and air stand still.
+#[derive(Debug, Clone, Copy)]
+struct Shaft {
+    kt: f64,
+    emf_free_v: f64,
+    per_ohm: f64,
+    holding_nm: f64,
+    drag_nms: f64,
+    air_k: f64,
+    per_inertia: f64,
+    inertia: f64,
+    thrust_k: f64,
+    extra_nm: f64,
+    extra_nms: f64,
+    seen_share: f64,
+}
+
+impl Shaft {
     /// Motor current at rotor speed `w`, A; none flows back.
+    #[inline]
     fn motor_current(&self, w: f64) -> f64 {
-        ((self.drive.emf_free_v - self.slow.kt * w) * self.drive.per_ohm).max(0.0)
+        or_zero((self.emf_free_v - self.kt * w) * self.per_ohm)
     }
 
     /// Torque of the air at `w`, N.m.
+    #[inline]
     fn air_nm(&self, w: f64) -> f64 {
-        self.slow.air_k * w * w
+        self.air_k * w * w
     }
 
     /// Angular acceleration, rad/s^2; friction holds a resting rotor.
+    #[inline]
     fn acceleration(&self, w: f64) -> f64 {
-        let s = &self.slow;
-        let net = s.kt * self.motor_current(w) - s.holding_nm - s.drag_nms * w - self.air_nm(w);
-        if w <= 0.0 && net < 0.0 { 0.0 } else { net * s.per_inertia }
+        let driven = self.kt * self.motor_current(w) - self.holding_nm;
+        let free = if self.drag_nms == 0.0 { driven } else { driven - self.drag_nms * w };
+        let net = free - self.air_nm(w);
+        if w <= 0.0 && net < 0.0 { 0.0 } else { net * self.per_inertia }
+    }
+
+    /// Speed after a step and the acceleration in it: Heun's rule, two evaluations, second order; the rotor's own time constant is
+    /// some 40 ms. Each step waits for the one before, so this chain is the run's longest.
+    #[inline]
+    fn turn(&self, w: f64, dt_s: f64) -> (f64, f64) {
+        let first = self.acceleration(w);
+        let second = self.acceleration(or_zero(w + first * dt_s));
+        let twice = first + second;
+        let next = or_zero(w + twice * (0.5 * dt_s)); // halving is exact
+        (next, if next > 0.0 { 0.5 * twice } else { -w / dt_s })
+    }
+
+    /// Lift and torque on the arm at `w` and its `acceleration`.
+    #[inline]
+    fn reaction(&self, w: f64, acceleration: f64) -> (f64, f64) {
+        let extra = self.extra_nm + self.extra_nms * w;
+        let seen_drag = if w > 0.0 { self.seen_share * extra } else { 0.0 };
+        (self.thrust_k * w * w, self.air_nm(w) + seen_drag + self.inertia * acceleration)
     }
 }
 
@@ -280,11 +390,9 @@ impl Powerplant for RigPlant {
         self.thermal.refit(parts.thermal);
     }
 
-    fn line_to_line_v(&self, angle_rev: f64) -> Option<f64> {
-        // Two windings a third of an electrical turn apart: the amplitude between them is the back-EMF constant times speed,
-        // as the ESC's six-step drive sees it.
-        let electrical = angle_rev * f64::from(self.parts.motor.pole_pairs);
-        Some(self.slow.kt * self.speed * libm::sin(TAU * (electrical - electrical.floor())))
+    fn back_emf(&self) -> Option<BackEmf> {
+        // as the ESC's six-step drive sees it: the constant that KV states, with the magnets as they are now
+        Some(BackEmf { amplitude_v: self.slow.kt * self.speed, pole_pairs: self.parts.motor.pole_pairs })
     }
 
     #[inline]
@@ -300,29 +408,58 @@ impl Powerplant for RigPlant {
         self.steps += 1;
         self.elapsed_s += dt_s;
 
-        // Heun's rule: two evaluations, second order; the rotor's own time constant is some 40 ms.
-        let w = self.speed;
-        let first = self.acceleration(w);
-        let second = self.acceleration((w + first * dt_s).max(0.0));
-        let mean = 0.5 * (first + second);
-        let next = (w + mean * dt_s).max(0.0);
-        let acceleration = if next > 0.0 { mean } else { -w / dt_s };
+        let shaft = self.shaft();
+        let (next, acceleration) = shaft.turn(self.speed, dt_s);
         self.speed = next;
-
-        self.motor_a = self.motor_current(next);
+        self.motor_a = shaft.motor_current(next);
         self.supply_a = duty * self.motor_a + ESC_IDLE_A;
         self.charge_as += self.supply_a * dt_s;
-        let extra = self.levers.drag_nm + self.levers.drag_nms * next;
-        let seen_drag = if next > 0.0 { self.levers.drag_share * extra } else { 0.0 };
-        PlantState {
-            rpm: next * RPM_PER_RAD_S,
-            thrust_n: self.slow.thrust_k * next * next,
-            torque_nm: self.air_nm(next) + seen_drag + self.slow.inertia * acceleration,
-            current_a: self.supply_a,
-            voltage_v: self.slow.open_v - self.slow.line_ohm * self.supply_a,
-            temp_c: self.thermal.temperature_c,
-        }
+        let (thrust_n, torque_nm) = shaft.reaction(next, acceleration);
+        self.state(thrust_n, torque_nm)
     }
+
+    fn advance_block(&mut self, dt_s: f64, pulse_us: f64, out: &mut PlantBlock) {
+        out.put(0, self.advance(dt_s, pulse_us));
+        if self.steps != 1 || !self.parts.limiter.is_steady() {
+            for i in 1..STEPS_PER_MS {
+                out.put(i, self.advance(dt_s, pulse_us));
+            }
+            return;
+        }
+        // From here to the end of the millisecond nothing but the shaft moves.
+        let duty = self.limiter.duty(&self.parts.limiter, pulse_us, dt_s);
+        if duty != self.drive.duty {
+            self.drive = self.driving(duty);
+        }
+        let shaft = self.shaft();
+        let (mut w, mut motor_a, mut supply_a, mut charge_as) = (self.speed, self.motor_a, self.supply_a, self.charge_as);
+        for i in 1..STEPS_PER_MS {
+            let (next, acceleration) = shaft.turn(w, dt_s);
+            w = next;
+            motor_a = shaft.motor_current(next);
+            supply_a = duty * motor_a + ESC_IDLE_A;
+            charge_as += supply_a * dt_s;
+            self.elapsed_s += dt_s;
+            out.rpm[i] = next * RPM_PER_RAD_S;
+            (out.thrust_n[i], out.torque_nm[i]) = shaft.reaction(next, acceleration);
+        }
+        (self.speed, self.motor_a, self.supply_a, self.charge_as) = (w, motor_a, supply_a, charge_as);
+        self.steps += STEPS_PER_MS as u32 - 1;
+        out.temp_c = [self.thermal.temperature_c; STEPS_PER_MS];
+        out.last = self.state(out.thrust_n[STEPS_PER_MS - 1], out.torque_nm[STEPS_PER_MS - 1]);
+    }
+}
+
+/// The larger of `x` and 0, as a branch that is foreseen: a maximum would be waited for in each step.
+#[inline]
+fn or_zero(x: f64) -> f64 {
+    if x > 0.0 { x } else { zero() }
+}
+
+#[cold]
+#[inline(never)]
+fn zero() -> f64 {
+    0.0
 }
 
 #[cfg(test)]
@@ -385,6 +522,37 @@ mod tests {
         assert!((hover.thrust_n / 2.879 - 1.0).abs() < 0.05, "{}", hover.thrust_n);
     }
 
+    /// A millisecond at once is ten steps, to the bit, with every part that could make it otherwise.
+    #[test]
+    fn a_block_is_ten_steps() {
+        let lagging = Limiter { lag_s: (0.05, 0.2), ..Limiter::default() };
+        let limited = Limiter { current_a: 4.0, ..Limiter::default() };
+        let hot = Limiter { derate_per_a2: 0.002, derate_tau_s: 0.5, ..Limiter::default() };
+        for limiter in [Limiter::default(), lagging, limited, hot] {
+            let p = Parts {
+                limiter,
+                gust: 0.01,
+                thermal: Thermal { rise_k_per_w: 0.3, tau_s: 1.0, ..Thermal::default() },
+                ..parts(0.1)
+            };
+            let (mut one, mut ten) = (RigPlant::new(p.clone(), 3), RigPlant::new(p, 3));
+            let levers = PlantLevers { drag_nm: 0.002, drag_nms: 1e-6, drag_share: 0.5, ..PlantLevers::default() };
+            let (mut block, mut want) = (PlantBlock::default(), PlantBlock::default());
+            for ms in 0..3000 {
+                let pulse = [1000.0, 1600.0, 2000.0, 1200.0, 1000.0][ms / 600];
+                if ms == 900 {
+                    one.adjust(&levers);
+                    ten.adjust(&levers);
+                }
+                for i in 0..STEPS_PER_MS {
+                    want.put(i, one.advance(1.0e-4, pulse));
+                }
+                ten.advance_block(1.0e-4, pulse, &mut block);
+                assert_eq!(block, want, "{limiter:?}, {ms} ms");
+            }
+        }
+    }
+
     /// What the supply gives is heat, friction, air and motion.
     #[test]
     fn energy_is_accounted_for() {
@@ -399,7 +567,7 @@ mod tests {
             w = s.rpm / RPM_PER_RAD_S;
             given += 11.5 * s.current_a * dt;
             let motor_a = (s.current_a - ESC_IDLE_A) / duty;
-            let air = plant.air_nm(w);
+            let air = plant.shaft().air_nm(w);
             let heat = motor_a * motor_a * p.motor.resistance_ohm + s.current_a * s.current_a * 0.1 + s.voltage_v * ESC_IDLE_A;
             spent += (heat + (p.motor.friction_nm() + air) * w) * dt;
         }

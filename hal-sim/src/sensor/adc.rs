@@ -125,26 +125,142 @@ impl Converter {
 
     /// `count` conversions of `channel`, spread over the voltages of one millisecond.
     pub fn block(&mut self, channel: usize, count: u16, pins_v: &[f64]) -> AdcBlock {
-        let mut block = AdcBlock { min: u16::MAX, ..AdcBlock::default() };
+        let mut sums = Sums::default();
         let offset = self.offset_v[channel];
-        let mut spare = 0.0;
-        for i in 0..count {
-            let noise = if i & 1 == 0 {
-                let [now, next] = self.conversion.quick_normals();
-                spare = next;
-                now
+        let mut pins = Spread { pins_v, count: usize::from(count), place: 0, rest: 0 };
+        for _ in 0..count / LANES as u16 {
+            // the readings in turn go to the first and to the second noise of each word
+            let (mut first, mut second) = ([0.0; LANES / 2], [0.0; LANES / 2]);
+            if let [pin] = pins_v {
+                first = [(pin + offset) * (CODES / REFERENCE_V); LANES / 2];
+                second = first;
             } else {
-                spare
-            };
-            let pin = if pins_v.len() == 1 { pins_v[0] } else { pins_v[usize::from(i) * pins_v.len() / usize::from(count)] };
-            let code = self.code((pin + offset) * (CODES / REFERENCE_V), noise);
-            block.sum += u32::from(code);
-            block.sum_sq += u64::from(u32::from(code) * u32::from(code));
-            block.min = block.min.min(code);
-            block.max = block.max.max(code);
+                for (first, second) in first.iter_mut().zip(&mut second) {
+                    *first = (pins.next() + offset) * (CODES / REFERENCE_V);
+                    *second = (pins.next() + offset) * (CODES / REFERENCE_V);
+                }
+            }
+            let levels = [first, second];
+            sums.take(&levels, &self.conversion.quick_normals_of_four(), self.conversion_counts);
         }
-        block.count = count;
-        block
+        let mut spare = None;
+        for _ in 0..count % LANES as u16 {
+            let noise = spare.take().unwrap_or_else(|| {
+                let [now, next] = self.conversion.quick_normals();
+                spare = Some(next);
+                now
+            });
+            let counts = (pins.next() + offset) * (CODES / REFERENCE_V);
+            sums.one(whole_code(counts + self.conversion_counts * noise + 0.5));
+        }
+        sums.block(count)
+    }
+}
+
+/// Conversions that are made side by side.
+const LANES: usize = 8;
+/// 2^52: a double of this size has no fraction.
+const ROUNDING: f64 = 4_503_599_627_370_496.0;
+
+/// Two numbers with two others, side by side.
+#[inline]
+fn side(a: [f64; 2], b: [f64; 2], join: impl Fn(f64, f64) -> f64) -> [f64; 2] {
+    [join(a[0], b[0]), join(a[1], b[1])]
+}
+
+/// The ideal converter's code for a level: truncated, at its ends clipped. As a float, so that eight go side by side; sums of codes and
+/// of their squares are exact in it.
+#[inline]
+fn whole_code(noisy: f64) -> f64 {
+    let inside = if noisy > 0.0 { noisy } else { 0.0 };
+    let inside = if inside < CODES - 1.0 { inside } else { CODES - 1.0 };
+    let nearest = (inside + ROUNDING) - ROUNDING;
+    nearest - if nearest > inside { 1.0 } else { 0.0 }
+}
+
+/// Sums over the conversions of a block.
+struct Sums {
+    sum: f64,
+    squares: f64,
+    min: f64,
+    max: f64,
+}
+
+impl Default for Sums {
+    fn default() -> Self {
+        Self { sum: 0.0, squares: 0.0, min: f64::from(u16::MAX), max: 0.0 }
+    }
+}
+
+fn lower(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+fn higher(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+impl Sums {
+    fn one(&mut self, code: f64) {
+        self.sum += code;
+        self.squares += code * code;
+        self.min = lower(code, self.min);
+        self.max = higher(code, self.max);
+    }
+
+    /// Takes eight conversions at these levels with this noise.
+    #[inline]
+    fn take(&mut self, levels: &[[f64; LANES / 2]; 2], noise: &[[f64; LANES / 2]; 2], noise_counts: f64) {
+        let code = |half: usize, pair: usize| {
+            let at = |lane| whole_code(levels[half][2 * pair + lane] + noise_counts * noise[half][2 * pair + lane] + 0.5);
+            [at(0), at(1)]
+        };
+        let [a, b, c, d] = [code(0, 0), code(0, 1), code(1, 0), code(1, 1)];
+        let sums = side(side(a, b, |x, y| x + y), side(c, d, |x, y| x + y), |x, y| x + y);
+        let square = |x: [f64; 2]| side(x, x, |x, y| x * y);
+        let squares = side(side(square(a), square(b), |x, y| x + y), side(square(c), square(d), |x, y| x + y), |x, y| x + y);
+        let lowest = side(side(a, b, lower), side(c, d, lower), lower);
+        let highest = side(side(a, b, higher), side(c, d, higher), higher);
+        self.sum += sums[0] + sums[1];
+        self.squares += squares[0] + squares[1];
+        self.min = lower(lower(lowest[0], lowest[1]), self.min);
+        self.max = higher(higher(highest[0], highest[1]), self.max);
+    }
+
+    fn block(&self, count: u16) -> AdcBlock {
+        // a whole number below 2^52 stands in the lowest bits of itself plus 2^52
+        let whole = |x: f64| (x + ROUNDING).to_bits() ^ ROUNDING.to_bits();
+        AdcBlock {
+            sum: whole(self.sum) as u32,
+            sum_sq: whole(self.squares),
+            count,
+            min: whole(self.min) as u16,
+            max: whole(self.max) as u16,
+        }
+    }
+}
+
+/// Gives the i-th of `count` readings the voltage at i x length / count, without a division for each.
+struct Spread<'a> {
+    pins_v: &'a [f64],
+    count: usize,
+    place: usize,
+    rest: usize,
+}
+
+impl Spread<'_> {
+    #[inline]
+    fn next(&mut self) -> f64 {
+        let [pin] = self.pins_v else {
+            let pin = self.pins_v.get(self.place).copied().unwrap_or_default();
+            self.rest += self.pins_v.len();
+            while self.rest >= self.count {
+                self.rest -= self.count;
+                self.place += 1;
+            }
+            return pin;
+        };
+        *pin
     }
 }
 
@@ -164,6 +280,37 @@ mod tests {
             assert!((mean - 1000.0 - fraction).abs() < 0.03, "{mean}");
             let rms = (b.sum_sq as f64 / f64::from(b.count) - mean * mean).sqrt();
             assert!((rms - (1.44f64 + 1.0 / 12.0).sqrt()).abs() < 0.05, "{rms}");
+        }
+    }
+
+    /// A block is its conversions one by one.
+    #[test]
+    fn a_block_is_its_conversions() {
+        let front = AnalogFront::new(&Bridge::default());
+        let mut c = Converter::new(&front, [0.01; 5], 4);
+        let pins: [f64; 10] = core::array::from_fn(|i| -0.001 + 0.0009 * i as f64);
+        let high: [f64; 10] = core::array::from_fn(|i| 3.2965 + 0.0009 * i as f64);
+        for round in 0..200u16 {
+            let (pins, count) = ([pins, high][usize::from(round % 2)], 7 + round % 4);
+            c.renew();
+            let mut stream = c.conversion.clone();
+            let mut want = AdcBlock { count, min: u16::MAX, ..AdcBlock::default() };
+            let mut spare = 0.0;
+            for i in 0..count {
+                let noise = if i % 2 == 0 {
+                    let [now, next] = stream.quick_normals();
+                    spare = next;
+                    now
+                } else {
+                    spare
+                };
+                let pin = pins[usize::from(i) * pins.len() / usize::from(count)];
+                let code = c.code((pin + c.offset_v(2)) * (CODES / REFERENCE_V), noise);
+                want.sum += u32::from(code);
+                want.sum_sq += u64::from(u32::from(code) * u32::from(code));
+                (want.min, want.max) = (want.min.min(code), want.max.max(code));
+            }
+            assert_eq!(c.block(2, count, &pins), want, "{count}");
         }
     }
 

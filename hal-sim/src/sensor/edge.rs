@@ -314,6 +314,46 @@ impl Tachometers {
         if rev_s > onset { (to - from) * self.geometry.slip * (1.0 - onset / rev_s) } else { 0.0 }
     }
 
+    /// Steps between the angles of `turned` (one more of them than of the speeds `rev_s`), channel by channel: calls
+    /// `edge(channel, rising, step, fraction of the step)` with the same numbers as [`Tachometers::step`].
+    pub fn block(&mut self, turned: &[f64], rev_s: &[f64], mut edge: impl FnMut(u8, bool, usize, f64)) {
+        let (Some(first), Some(last)) = (turned.first(), turned.last()) else { return };
+        if last <= first {
+            return;
+        }
+        let slips = !self.coupled || (self.geometry.slip != 0.0 && self.geometry.slip_onset_rpm.is_finite());
+        for i in 0..CAPTURE_CHANNELS {
+            let follows = i == 3 && slips;
+            let mut behind = if i == 3 { self.behind } else { 0.0 };
+            if !follows && self.channels[i].as_ref().is_none_or(|c| c.idle(last - behind)) {
+                continue;
+            }
+            for (step, (pair, speed)) in turned.windows(2).zip(rev_s).enumerate() {
+                let (from, to) = (pair[0], pair[1]);
+                if to <= from {
+                    continue;
+                }
+                let start = from - behind;
+                if follows {
+                    behind += self.lost(from, to, *speed);
+                }
+                let end = to - behind;
+                let Some(channel) = &mut self.channels[i] else { continue };
+                if channel.idle(end) {
+                    continue;
+                }
+                while let Some((at, rising)) = channel.pass(end, *speed) {
+                    if let Some(rising) = rising {
+                        edge(i as u8, rising, step, share_of_step(at, start, end));
+                    }
+                }
+            }
+            if follows {
+                self.behind = behind;
+            }
+        }
+    }
+
     /// The rotor moved from `from` to `to` revolutions in one step at `rev_s` revolutions a second: calls `edge(channel, rising,
     /// fraction of the step)`.
     #[inline]
@@ -335,17 +375,53 @@ impl Tachometers {
             }
             while let Some((at, rising)) = channel.pass(end, rev_s) {
                 if let Some(rising) = rising {
-                    let fraction = if end > start { ((at - start) / (end - start)).clamp(0.0, 1.0) } else { 1.0 };
-                    edge(i as u8, rising, fraction);
+                    edge(i as u8, rising, share_of_step(at, start, end));
                 }
             }
         }
     }
 }
 
+/// Where in a step from `start` to `end` the angle `at` was passed, 0..1.
+fn share_of_step(at: f64, start: f64, end: f64) -> f64 {
+    if end > start { ((at - start) / (end - start)).clamp(0.0, 1.0) } else { 1.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_block_is_its_steps() {
+        let slipping = Geometry { slip_onset_rpm: 500.0, slip: 0.1, ..Geometry::default() };
+        let ringing = Geometry { double: [0.2; 4], miss: [0.1; 4], ..Geometry::default() };
+        for (geometry, detail) in [
+            (Geometry::default(), EdgeDetail::Captured),
+            (Geometry::default(), EdgeDetail::Pins),
+            (slipping, EdgeDetail::Captured),
+            (ringing, EdgeDetail::Captured),
+        ] {
+            let (mut one, mut ten) = (Tachometers::new(&geometry, detail, 5, 0.3), Tachometers::new(&geometry, detail, 5, 0.3));
+            let mut at = 0.3;
+            for ms in 0..2000 {
+                let speed = [0.0, 3.0, 90.0, 20.0][ms / 500];
+                if ms == 1200 || ms == 1300 {
+                    one.couple(ms == 1300);
+                    ten.couple(ms == 1300);
+                }
+                let mut turned = [at; 11];
+                let mut want: [Vec<(bool, usize, f64)>; 4] = Default::default();
+                for step in 0..10 {
+                    turned[step + 1] = turned[step] + speed * 1e-4;
+                    one.step(turned[step], turned[step + 1], speed, |c, rising, f| want[usize::from(c)].push((rising, step, f)));
+                }
+                at = turned[10];
+                let mut got: [Vec<(bool, usize, f64)>; 4] = Default::default();
+                ten.block(&turned, &[speed; 10], |c, rising, step, f| got[usize::from(c)].push((rising, step, f)));
+                assert_eq!(got, want, "{ms} ms");
+            }
+        }
+    }
 
     /// Turns at a constant rate and gives every edge as (channel, rising, revolution).
     fn turn(geometry: &Geometry, detail: EdgeDetail, revolutions: f64) -> Vec<(u8, bool, f64)> {

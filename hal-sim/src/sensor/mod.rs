@@ -6,9 +6,11 @@
 //! Reference: specification `rig.md`, "Four RPM capture channels" and "Load cell".
 
 pub mod adc;
+pub mod back_emf;
 pub mod edge;
 pub mod logger;
 
 pub use adc::{AnalogFront, Converter};
+pub use back_emf::{BackEmf, BackEmfMeter};
 pub use edge::{Edge, EdgeDetail, Geometry, Tachometers};
 pub use logger::Logger;

@@ -1,0 +1,228 @@
+//! Register files of ITG-3200, ADXL345 and HMC5883L.
+//!
+//! What it is: identities, defaults, data order and pointer rules of the real chips as a bus sees them: start, bytes, stop. Each keeps
+//! a record of what it handed out, so that a test can demand equality word by word.
+//! What can go wrong: an unconfigured chip answers with zeros (asleep, idle, wrong range); a read that acknowledges its last byte is
+//! counted in [`SensorChip::unfinished`].
+//! Units: counts; ns since power-up.
+//! Reference: the data sheets named in the drivers of `firmware-ahrs`; addresses and defaults written down here again on purpose, not
+//! taken from them.
+
+use super::errors::{ChipErrors, Errors};
+use super::motion::Motion;
+use crate::noise::Stream;
+
+/// Body axes of FRD and chip axes of a board that lies flat, parts on top: y and z are opposite.
+fn to_chip(v: [f64; 3]) -> [f64; 3] {
+    [v[0], -v[1], -v[2]]
+}
+
+/// Which chip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ChipKind {
+    /// Gyro at 0x68.
+    Itg3200,
+    /// Accelerometer at 0x53.
+    Adxl345,
+    /// Magnetometer at 0x1E.
+    Hmc5883l,
+}
+
+impl ChipKind {
+    /// All three, in the order of the `present` bits.
+    pub const ALL: [Self; 3] = [Self::Itg3200, Self::Adxl345, Self::Hmc5883l];
+
+    const fn address(self) -> u8 {
+        match self {
+            Self::Itg3200 => 0x68,
+            Self::Adxl345 => 0x53,
+            Self::Hmc5883l => 0x1E,
+        }
+    }
+
+    /// First data register and number of data bytes.
+    const fn data(self) -> (u8, u8) {
+        match self {
+            Self::Itg3200 => (0x1B, 8),
+            Self::Adxl345 => (0x32, 6),
+            Self::Hmc5883l => (0x03, 6),
+        }
+    }
+
+    fn reset_registers(self) -> [u8; 64] {
+        let mut file = [0; 64];
+        match self {
+            Self::Itg3200 => file[0x00] = 0x69, // bit 0 reads 1 on some chips
+            Self::Adxl345 => {
+                file[0x00] = 0xE5;
+                file[0x2C] = 0x0A;
+            }
+            Self::Hmc5883l => {
+                file[..3].copy_from_slice(&[0x10, 0x20, 0x01]);
+                file[0x0A..0x0D].copy_from_slice(b"H43");
+            }
+        }
+        file
+    }
+}
+
+/// One reading that a chip handed out: when, and its three words in chip axes x, y, z.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Served {
+    /// Start of the burst, ns.
+    pub at_ns: u64,
+    /// Words x, y, z of the chip.
+    pub words: [i16; 3],
+}
+
+/// A sensor chip on the bus.
+#[derive(Debug, Clone)]
+pub struct SensorChip {
+    kind: ChipKind,
+    motion: Motion,
+    errors: Errors,
+    own: ChipErrors,
+    noise: Stream,
+    registers: [u8; 64],
+    pointer: u8,
+    pointer_comes: bool,
+    driving: bool,
+    /// Everything that it handed out.
+    pub served: Vec<Served>,
+    /// Reads whose last byte was acknowledged, so that the chip still drove the bus at their end.
+    pub unfinished: u32,
+}
+
+fn rounded(value: f64, limit: f64) -> i16 {
+    libm::round(value).clamp(-limit - 1.0, limit) as i16
+}
+
+impl SensorChip {
+    /// A chip after power-up on a body that moves as `motion`, with its share of `errors`.
+    #[must_use]
+    pub fn new(kind: ChipKind, motion: Motion, errors: &Errors) -> Self {
+        Self {
+            kind,
+            motion,
+            errors: *errors,
+            own: errors.of(kind),
+            noise: errors.stream(kind),
+            registers: kind.reset_registers(),
+            pointer: 0,
+            pointer_comes: false,
+            driving: false,
+            served: Vec::new(),
+            unfinished: 0,
+        }
+    }
+
+    /// Which chip it is.
+    #[must_use]
+    pub fn kind(&self) -> ChipKind {
+        self.kind
+    }
+
+    /// The words that the chip would measure now in the state that its registers put it into.
+    fn measure(&mut self, at_ns: u64) -> [i16; 3] {
+        let celsius = self.errors.celsius(at_ns);
+        let mut seen = |truth: [f64; 3]| self.own.seen(to_chip(truth), celsius, &mut self.noise);
+        let file = &self.registers;
+        match self.kind {
+            ChipKind::Itg3200 => {
+                if file[0x3E] & 0x40 != 0 || file[0x16] >> 3 & 3 != 3 {
+                    return [0; 3]; // asleep, or a full scale that the data sheet does not define
+                }
+                seen(self.motion.rate).map(|w| rounded(w.to_degrees() * 14.375, 32_767.0))
+            }
+            ChipKind::Adxl345 => {
+                if file[0x2D] & 0x08 == 0 {
+                    return [0; 3]; // standby
+                }
+                let range = file[0x31] & 3;
+                let full = file[0x31] & 8 != 0;
+                let (per_g, limit) =
+                    if full { (256.0, f64::from(512 << range) - 1.0) } else { (256.0 / f64::from(1 << range), 511.0) };
+                seen(self.motion.force(at_ns)).map(|f| rounded(f * per_g, limit))
+            }
+            ChipKind::Hmc5883l => {
+                if file[0x02] & 3 != 0 {
+                    return [0; 3]; // idle, or a single measurement that nobody asked for
+                }
+                let per_gauss = [1370.0, 1090.0, 820.0, 660.0, 440.0, 390.0, 330.0, 230.0][usize::from(file[0x01] >> 5)];
+                seen(self.motion.magnetic(at_ns)).map(|m| {
+                    let counts = libm::round(m * per_gauss);
+                    if (-2048.0..=2047.0).contains(&counts) { counts as i16 } else { -4096 }
+                })
+            }
+        }
+    }
+
+    /// Puts a new reading into the data registers.
+    fn latch(&mut self, at_ns: u64) {
+        let words = self.measure(at_ns);
+        let [x, y, z] = words;
+        let bytes: Vec<u8> = match self.kind {
+            ChipKind::Itg3200 => {
+                // -13 200 at 35 degC, 280 counts a kelvin
+                let warm = rounded((self.errors.celsius(at_ns) - 35.0) * 280.0 - 13_200.0, 32_767.0);
+                [warm, x, y, z].iter().flat_map(|w: &i16| w.to_be_bytes()).collect()
+            }
+            ChipKind::Adxl345 => words.iter().flat_map(|w| w.to_le_bytes()).collect(),
+            ChipKind::Hmc5883l => [x, z, y].iter().flat_map(|w| w.to_be_bytes()).collect(),
+        };
+        let (first, count) = self.kind.data();
+        self.registers[usize::from(first)..usize::from(first + count)].copy_from_slice(&bytes);
+        self.served.push(Served { at_ns, words });
+    }
+
+    /// A start or stop came: a chip whose last byte was acknowledged still drives SDA then, and the bus locks up.
+    fn interrupted(&mut self) {
+        self.unfinished += u32::from(self.driving);
+        self.driving = false;
+    }
+
+    fn advance_pointer(&mut self) {
+        self.pointer = match (self.kind, self.pointer) {
+            (ChipKind::Hmc5883l, 0x08) => 0x03, // data sheet, page 11
+            (_, last) if last >= 63 => 0,
+            (_, at) => at + 1,
+        };
+    }
+
+    /// A start with an address, for reading or writing; `true` where the chip acknowledges.
+    pub fn start(&mut self, address: u8, read: bool, at_ns: u64) -> bool {
+        self.interrupted();
+        if address != self.kind.address() {
+            return false;
+        }
+        self.pointer_comes = !read;
+        if read && self.pointer == self.kind.data().0 {
+            self.latch(at_ns);
+        }
+        true
+    }
+
+    /// A byte from the master: the register's number first, then what is written there.
+    pub fn write(&mut self, byte: u8) {
+        if self.pointer_comes {
+            self.pointer = byte & 63;
+            self.pointer_comes = false;
+        } else {
+            self.registers[usize::from(self.pointer)] = byte;
+            self.advance_pointer();
+        }
+    }
+
+    /// A byte for the master, which refuses the `last` one.
+    pub fn read(&mut self, last: bool) -> u8 {
+        self.driving = !last;
+        let byte = self.registers[usize::from(self.pointer)];
+        self.advance_pointer();
+        byte
+    }
+
+    /// A stop.
+    pub fn stop(&mut self) {
+        self.interrupted();
+    }
+}

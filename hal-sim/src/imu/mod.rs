@@ -1,0 +1,19 @@
+//! The IMU board's surroundings: a body that moves, three chips that sense it with all their faults, a bus between.
+//!
+//! What it is: [`Motion`] says where the body is at any instant; [`SensorChip`] is the register file of one chip, which measures
+//! that motion through its [`Errors`]; [`I2cBus`] carries the board's transfers to the chips. The native run ([`crate::native::ahrs`])
+//! and the emulated board use the same chips.
+//! What can go wrong: an unconfigured chip behaves like one (asleep, idle, wrong range), so a driver that skips its configuration is
+//! seen; a chip that is off the bus does not acknowledge; a held data line stops every transfer.
+//! Units: ns since power-up; rad, m, gauss, g; counts in the registers.
+//! Reference: specification `ahrs.md`, "Sensors"; data sheets PS-ITG-3200A rev 1.4, ADXL345 rev E, HMC5883L.
+
+mod bus;
+mod chip;
+mod errors;
+mod motion;
+
+pub use bus::{BusError, BusFault, I2cBus};
+pub use chip::{ChipKind, SensorChip, Served};
+pub use errors::{ChipErrors, Errors};
+pub use motion::Motion;

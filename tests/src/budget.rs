@@ -1,0 +1,23 @@
+//! Instructions a tick against `budgets/tick.toml`.
+//!
+//! What it is: the comparison that the emulated boards' tests share, with both numbers printed.
+//! What can go wrong: a budget that is far above the figure hides growth, and is refused like one that is exceeded.
+//! Units: instructions.
+//! Reference: house rule 8.
+
+/// Compares what was `measured` with the budget `key` of `[board]`; `available` is what the tick has.
+///
+/// # Panics
+/// When the budget is exceeded, slack, or not there.
+pub fn judge_tick(board: &str, key: &str, measured: f64, available: f64) {
+    let text = include_str!("../../budgets/tick.toml");
+    let table: toml::Table = text.parse().unwrap_or_else(|e| panic!("budgets/tick.toml: {e}"));
+    let budget = table.get(board).and_then(|t| t.get(key)).and_then(toml::Value::as_integer);
+    let budget = budget.unwrap_or_else(|| panic!("budgets/tick.toml: {board}.{key} is not a number")) as f64;
+    println!(
+        "{board}, {key}: {measured:.1} instructions a tick, budget {budget}, {:.1} % of the tick",
+        100.0 * measured / available
+    );
+    assert!(measured <= budget, "{board}, {key}: {measured:.1} instructions a tick exceed the {budget} of budgets/tick.toml");
+    assert!(measured > 0.7 * budget, "{board}, {key}: the budget {budget} is slack, write {measured:.0} plus 2 %");
+}
