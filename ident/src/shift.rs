@@ -3,7 +3,7 @@
 //! What it is: six filters over one channel, each of which can be looked at, and the stretches that they isolate; threshold and
 //! offset by hand or automatic.
 //! What can go wrong: the published form cuts three notches a step where the offset is wider than the ramp, sees erratic noise as
-//! ramps, and loses a plateau to a single missing sample; `docs/plateaus.md` shows each.
+//! ramps, and loses a plateau to a single missing sample; `docs/plateaus/README.md` shows each.
 //! Units: Filter 1 and the threshold in the channel's unit per sample; the offset in samples.
 //! Reference: Beharie 2013, Eq. 5.60 to 5.62 (5.61 with the absolute difference, errata) and section 5.7.4.
 

@@ -60,3 +60,25 @@ fn the_published_algorithm_fails_where_the_thesis_says() {
         assert!(ours.share() > published.share(), "{name}");
     }
 }
+
+/// The table of docs/identification.md, on seeds of its own; half a minute: by hand.
+#[test]
+#[ignore = "prints the table of docs/identification.md"]
+fn table() {
+    const SEEDS: std::ops::Range<u64> = 101..141;
+    println!(
+        "| trouble | levels | ours | wrong | published | wrong | mended | wrong |\n| --- | --- | --- | --- | --- | --- | --- | --- |"
+    );
+    for (name, trouble) in TROUBLES {
+        let cells = [Detector::Ours, Detector::Published, Detector::Mended].map(|who| {
+            let mut sums = [Score::default(); 2];
+            for seed in SEEDS {
+                let one = score(&run(trouble, HOLD, seed), who);
+                sums.iter_mut().zip(one).for_each(|(s, o)| s.add(o));
+            }
+            sums
+        });
+        let cell = |[rpm, thrust]: &[Score; 2]| format!("{:.4} / {:.4} | {}", rpm.share(), thrust.share(), rpm.wrong);
+        println!("| {name} | {} | {} |", cells[0][0].truths, cells.iter().map(cell).collect::<Vec<_>>().join(" | "));
+    }
+}

@@ -19,6 +19,7 @@ mod identify;
 mod import;
 mod live;
 mod measured;
+mod plateaus;
 mod predict;
 mod progress;
 mod record;
@@ -56,6 +57,8 @@ enum Command {
     Import(import::Args),
     /// Plateaus, fits and quality figures of a log.
     Identify(identify::Args),
+    /// Plateau detectors side by side: each filter of the binary shift algorithm, the threshold study, scores where a command was logged.
+    Plateaus(plateaus::Args),
     /// Residual, cause, corrected model, error before and after.
     CloseLoop(close_loop::Args),
     /// Motor, propeller and battery choice.
@@ -95,6 +98,7 @@ fn main() -> ExitCode {
         Command::Runs(args) => runs::run(args, cli.quiet),
         Command::Import(args) => import::run(args, cli.quiet),
         Command::Identify(args) => identify::run(args, cli.quiet),
+        Command::Plateaus(args) => plateaus::run(args, cli.quiet),
         Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
         Command::Select(args) => select::run(args, cli.quiet),
         Command::Beam(args) => beam::run(args, cli.quiet),

@@ -84,6 +84,17 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         ([], false) => thesis(),
         (files, _) => read(files)?,
     };
+    // 390KV before 1000KV
+    let number =
+        |name: &str| name.chars().take_while(char::is_ascii_digit).collect::<String>().parse::<u32>().unwrap_or(u32::MAX);
+    pairs.sort_by(|a, b| {
+        (number(&a.motor), &a.motor, number(&a.propeller), &a.propeller).cmp(&(
+            number(&b.motor),
+            &b.motor,
+            number(&b.propeller),
+            &b.propeller,
+        ))
+    });
     if let Some(motor) = &args.motor {
         pairs.retain(|p| p.motor == *motor);
         if pairs.is_empty() {
@@ -164,6 +175,7 @@ fn fly(motor: &str, propeller: &str) -> Pair {
         motor: motor.to_owned(),
         propeller: propeller.to_owned(),
         maximum: None,
+        clipped: false,
         levels: Vec::new(),
         source: scenario.name.clone(),
     };
@@ -189,6 +201,7 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
     out.push('\n');
     for r in rows {
         let mark = if chosen.iter().any(|c| std::ptr::eq(*c, r)) { "  meets the need" } else { "" };
+        let clipped = if r.pair.clipped { "  thrust reading clipped: a lower bound" } else { "" };
         let with = r.with_batteries.iter().find(|w| w.batteries == need.batteries);
         out += &format!(
             "{:<8} {:<9} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
@@ -204,6 +217,7 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
             out += &format!(" {:>7.1}", w.full_throttle_min.0);
         }
         out += mark;
+        out += clipped;
         out.push('\n');
     }
     for p in pairs.iter().filter(|p| p.maximum.is_none()) {

@@ -17,19 +17,35 @@ const SHORTEST: usize = 6;
 /// Longest series that is partitioned as it is; longer ones in blocks.
 const MOST: usize = 4000;
 /// Largest change inside a plateau, as a share of the highest value: more is a ramp.
-const DRIFT: f64 = 0.02;
+pub(super) const DRIFT: f64 = 0.02;
 
-/// Row ranges `[from, to)` in which the rig is held at one level, settling included.
-pub(crate) fn stretches(command: Option<&[f64]>, guide: &[f64]) -> Vec<(usize, usize)> {
+/// A stretch in which the rig is held at one level, settling included: rows `[from, to)`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Stretch {
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    /// A piece of one held command, cut where the data jump: it is a level only if it stands still.
+    pub(crate) piece: bool,
+}
+
+/// The stretches of a run.
+pub(crate) fn stretches(command: Option<&[f64]>, guide: &[f64]) -> Vec<Stretch> {
     let top = guide.iter().copied().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
     match command.filter(|c| c.iter().any(|v| v.is_finite())) {
-        Some(command) => held(command).into_iter().flat_map(|(a, b)| jumps(guide, a, b, top)).collect(),
-        None => partition(guide, top),
+        Some(command) => held(command)
+            .into_iter()
+            .flat_map(|(a, b)| {
+                let pieces = jumps(guide, a, b, top);
+                let piece = pieces.len() > 1;
+                pieces.into_iter().map(move |(from, to)| Stretch { from, to, piece })
+            })
+            .collect(),
+        None => partition(guide, top).into_iter().map(|(from, to)| Stretch { from, to, piece: false }).collect(),
     }
 }
 
 /// Stretches of one command value. Missing commands between two equal ones belong to them; between two values, to neither.
-fn held(command: &[f64]) -> Vec<(usize, usize)> {
+pub(super) fn held(command: &[f64]) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
     let mut run: Option<(usize, usize, f64)> = None;
     for (i, v) in command.iter().enumerate().filter(|(_, v)| v.is_finite()) {
@@ -291,8 +307,9 @@ mod tests {
     #[test]
     fn a_jump_without_a_command_is_cut() {
         let guide: Vec<f64> = (0..300).map(|i| if i < 180 { 3000.0 } else { 2700.0 } + (f64::from(i) * 1.7).sin()).collect();
-        assert_eq!(stretches(Some(&[1500.0; 300]), &guide), [(0, 180), (180, 300)]);
+        let at = |from, to, piece| Stretch { from, to, piece };
+        assert_eq!(stretches(Some(&[1500.0; 300]), &guide), [at(0, 180, true), at(180, 300, true)]);
         let drifting: Vec<f64> = (0..300).map(|i| 3000.0 - 0.3 * f64::from(i) + (f64::from(i) * 1.7).sin()).collect();
-        assert_eq!(stretches(Some(&[1500.0; 300]), &drifting), [(0, 300)]);
+        assert_eq!(stretches(Some(&[1500.0; 300]), &drifting), [at(0, 300, false)]);
     }
 }

@@ -138,9 +138,14 @@ pub(crate) fn line(z: &[f64]) -> Option<(f64, f64, f64)> {
     let level = median(&mut about);
     let mut off: Vec<f64> = about.iter().map(|v| (v - level).abs()).collect();
     let spread = 1.4826 * median(&mut off);
-    // more than half of the samples alike: the largest deviation still tells noise from glitches
-    let coarse = off.iter().copied().fold(0.0, f64::max) / FAR;
-    let spread = if spread > 0.0 { spread } else { coarse.max(1e-12 * level.abs()).max(1e-12) };
+    // more than half of the samples alike: what nine tenths keep to; beyond that a coarse channel has glitches and no noise
+    let spread = if spread > 0.0 {
+        spread
+    } else {
+        let rank = off.len() * 9 / 10;
+        *off.select_nth_unstable_by(rank, f64::total_cmp).1
+    };
+    let spread = spread.max(1e-12 * level.abs()).max(1e-12);
     Some((level, slope, spread))
 }
 
@@ -209,6 +214,21 @@ mod tests {
             assert!((0.92..0.98).contains(&share), "rho {rho}: {share}");
             assert!((0.8..1.25).contains(&(squares / f64::from(all))), "rho {rho}: {}", squares / f64::from(all));
         }
+    }
+
+    /// A speed in steps of 65 rev/min stands still but for a few wild readings.
+    #[test]
+    fn glitches_of_a_coarse_channel_do_not_move_its_mean() {
+        let mut z = vec![1040.0; 140];
+        for (at, v) in [(20, 18_000.0), (61, 16_640.0), (62, 0.0)] {
+            z[at] = v;
+        }
+        let (mean, _) = mean_of(&z, &residual(&z).unwrap(), &Colour { time: 1.0, quantum: 65.0 });
+        assert_eq!(mean, 1040.0);
+        // steps between two codes are no glitches
+        let z: Vec<f64> = (0..140).map(|i| if i % 4 == 0 { 1105.0 } else { 1040.0 }).collect();
+        let (mean, _) = mean_of(&z, &residual(&z).unwrap(), &Colour { time: 1.0, quantum: 65.0 });
+        assert!((mean - 1056.25).abs() < 1e-9, "{mean}");
     }
 
     #[test]

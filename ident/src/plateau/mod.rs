@@ -11,6 +11,7 @@ mod change;
 mod mean;
 pub mod score;
 mod settle;
+pub mod study;
 
 use crate::context::Context;
 use crate::log::{Log, SPEED};
@@ -60,15 +61,21 @@ pub fn detect(log: &Log, speed: &[f64]) -> Vec<Plateau> {
         return Vec::new();
     }
     let stretches = change::stretches(log.column("pulse_us"), guide);
+    let top = guide.iter().copied().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+    // a piece that still climbs after its settling was cut off (a motor that started late) is no level
+    let flat = |from: usize, to: usize| {
+        mean::line(&guide[from..to]).is_none_or(|(_, slope, _)| (slope * (to - from) as f64).abs() <= change::DRIFT * top)
+    };
     let followers: Vec<&[f64]> = FOLLOWERS.iter().filter_map(|n| log.column(n)).collect();
     let settled: Vec<(usize, usize, usize)> = stretches
         .iter()
-        .map(|(from, to)| {
+        .map(|change::Stretch { from, to, piece }| {
             let rows = settle::rows(&log.t, guide, *from, *to);
             let rows = followers.iter().map(|f| settle::rows(&log.t, f, *from, *to)).fold(rows, usize::max);
-            (*from, from + rows, *to)
+            (*from, from + rows, *to, *piece)
         })
-        .filter(|(_, start, to)| to - start >= SHORTEST)
+        .filter(|(_, start, to, piece)| to - start >= SHORTEST && (!piece || flat(*start, *to)))
+        .map(|(from, start, to, _)| (from, start, to))
         .collect();
     let ranges: Vec<(usize, usize)> = settled.iter().map(|(_, start, to)| (*start, *to)).collect();
     let mut plateaus: Vec<Plateau> = settled

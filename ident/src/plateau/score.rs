@@ -6,10 +6,13 @@
 //! Reference: specification `identification.md`, items 1 and 2.
 
 /// A true plateau: its rows, settling included, and the settled value of every row of the scored channel.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Truth {
     /// First row at this level.
     pub from: usize,
+    /// First row that has certainly settled: what a detector must cover is counted from here. A simulator's truth, whose settling is
+    /// short, counts every row.
+    pub settled: usize,
     /// Row after the last.
     pub to: usize,
 }
@@ -32,7 +35,7 @@ pub struct Found {
 pub struct Score {
     /// True plateaus.
     pub truths: usize,
-    /// Those of them that one found plateau covers by at least a third, without reaching into another level.
+    /// Those of them that one found plateau covers by at least a third of the settled rows, without reaching into another level.
     pub found: usize,
     /// Found with a mean within three standard errors of the truth.
     pub within: usize,
@@ -52,7 +55,11 @@ impl Score {
             // the rows of a step itself, one on either side, belong to nobody
             let inside = truths.iter().position(|t| f.from + 1 >= t.from && f.to <= t.to + 1);
             match inside {
-                Some(k) if !taken[k] && 3 * (f.to - f.from) >= truths[k].to - truths[k].from => {
+                Some(k)
+                    if !taken[k]
+                        && 3 * (f.to.min(truths[k].to).saturating_sub(f.from.max(truths[k].settled)))
+                            >= truths[k].to - truths[k].settled =>
+                {
                     taken[k] = true;
                     score.found += 1;
                     let rows = &level[f.from..f.to];
@@ -94,7 +101,7 @@ mod tests {
 
     #[test]
     fn pieces_and_bridges_are_wrong() {
-        let truths = [Truth { from: 0, to: 100 }, Truth { from: 100, to: 200 }];
+        let truths = [Truth { from: 0, settled: 0, to: 100 }, Truth { from: 100, settled: 100, to: 200 }];
         let level: Vec<f64> = (0..200).map(|i| if i < 100 { 1.0 } else { 2.0 }).collect();
         let at = |from, to, mean| Found { from, to, mean, se: 0.01 };
         let s = Score::of(&truths, &level, &[at(5, 60, 1.0), at(62, 99, 1.0), at(90, 150, 1.5), at(110, 200, 2.1)]);

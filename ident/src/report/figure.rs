@@ -15,6 +15,8 @@ const WIDTH: f64 = 560.0;
 const LEFT: f64 = 80.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 48.0;
+/// Height of a further row of the legend.
+const ROW: f64 = 17.0;
 const BOTTOM: f64 = 46.0;
 
 /// One layer, first drawn at the bottom.
@@ -133,6 +135,8 @@ pub struct Figure {
 struct Frame {
     x: (f64, f64),
     y: (f64, f64),
+    /// Upper edge of the axes, under the legend's rows.
+    top: f64,
     height: f64,
 }
 
@@ -142,7 +146,7 @@ impl Frame {
     }
 
     fn py(&self, y: f64) -> f64 {
-        self.height - BOTTOM - (y - self.y.0) / (self.y.1 - self.y.0) * (self.height - TOP - BOTTOM)
+        self.height - BOTTOM - (y - self.y.0) / (self.y.1 - self.y.0) * (self.height - self.top - BOTTOM)
     }
 }
 
@@ -217,7 +221,8 @@ impl Figure {
         let margin = 0.05 * (y.1 - y.0);
         let height = if self.height > 0.0 { self.height } else { 330.0 };
         let low = if self.categories.is_empty() { y.0 - margin } else { y.0 };
-        Frame { x, y: (low, y.1 + margin), height }
+        let rows = self.entries().last().map_or(0, |e| e.row);
+        Frame { x, y: (low, y.1 + margin), top: TOP + ROW * rows as f64, height: height + ROW * rows as f64 }
     }
 
     fn draw(&self, head: &str) -> String {
@@ -267,7 +272,8 @@ impl Figure {
             let x = f.px(v);
             let _ = write!(
                 out,
-                "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{floor:.1}\"/><text class=\"tick\" text-anchor=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>",
+                "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{floor:.1}\"/><text class=\"tick\" text-anchor=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>",
+                f.top,
                 floor + 16.0,
                 label(v, f.x.1 - f.x.0)
             );
@@ -288,13 +294,15 @@ impl Figure {
             (LEFT + right) / 2.0,
             f.height - 8.0,
             escape(&self.x_label),
-            (TOP + floor) / 2.0,
+            (f.top + floor) / 2.0,
             escape(&self.y_label)
         );
     }
 
-    fn legend(&self, out: &mut String) {
-        let mut at = LEFT;
+    /// The legend's entries, laid out in as many rows as they need.
+    fn entries(&self) -> Vec<Entry<'_>> {
+        let mut out: Vec<Entry<'_>> = Vec::new();
+        let (mut at, mut row) = (LEFT, 0);
         for layer in &self.layers {
             let (name, class, key) = match layer {
                 Layer::Line { name, class, .. } => (name, *class, "key"),
@@ -307,16 +315,47 @@ impl Figure {
             if name.is_empty() {
                 continue;
             }
+            // wide enough for the larger letters of a phone
+            let wide = 21.0 + 8.8 * name.chars().count() as f64;
+            if at > LEFT && at + wide > WIDTH {
+                (at, row) = (LEFT, row + 1);
+            }
+            out.push(Entry { name, class, key, at, row });
+            at += wide + 12.0;
+        }
+        out
+    }
+
+    fn legend(&self, out: &mut String) {
+        for Entry { name, class, key, at, row } in self.entries() {
+            let y = 34.0 + ROW * row as f64;
             let _ = match key {
-                "key" => write!(out, "<line class=\"{class} key\" x1=\"{at:.1}\" x2=\"{:.1}\" y1=\"34\" y2=\"34\"/>", at + 16.0),
-                "spot" => write!(out, "<circle class=\"{class} spot\" cx=\"{:.1}\" cy=\"34\" r=\"4\"/>", at + 8.0),
-                "col" => write!(out, "<rect class=\"{class} col\" x=\"{:.1}\" y=\"28\" width=\"11\" height=\"11\"/>", at + 4.0),
-                _ => write!(out, "<rect class=\"{class} patch\" x=\"{at:.1}\" y=\"28\" width=\"16\" height=\"11\"/>"),
+                "key" => {
+                    write!(out, "<line class=\"{class} key\" x1=\"{at:.1}\" x2=\"{:.1}\" y1=\"{y}\" y2=\"{y}\"/>", at + 16.0)
+                }
+                "spot" => write!(out, "<circle class=\"{class} spot\" cx=\"{:.1}\" cy=\"{y}\" r=\"4\"/>", at + 8.0),
+                "col" => {
+                    write!(
+                        out,
+                        "<rect class=\"{class} col\" x=\"{:.1}\" y=\"{}\" width=\"11\" height=\"11\"/>",
+                        at + 4.0,
+                        y - 6.0
+                    )
+                }
+                _ => write!(out, "<rect class=\"{class} patch\" x=\"{at:.1}\" y=\"{}\" width=\"16\" height=\"11\"/>", y - 6.0),
             };
-            let _ = write!(out, "<text class=\"tick\" x=\"{:.1}\" y=\"38\">{}</text>", at + 21.0, escape(name));
-            at += 21.0 + 8.8 * name.chars().count() as f64 + 12.0;
+            let _ = write!(out, "<text class=\"tick\" x=\"{:.1}\" y=\"{}\">{}</text>", at + 21.0, y + 4.0, escape(name));
         }
     }
+}
+
+/// One entry of the legend.
+struct Entry<'f> {
+    name: &'f str,
+    class: &'static str,
+    key: &'static str,
+    at: f64,
+    row: usize,
 }
 
 fn draw_layer(out: &mut String, layer: &Layer, f: &Frame) {
@@ -346,9 +385,10 @@ fn draw_layer(out: &mut String, layer: &Layer, f: &Frame) {
                 let (a, b) = (px(*from), px(*to));
                 let _ = write!(
                     out,
-                    "<rect class=\"span\" x=\"{a:.1}\" y=\"{TOP}\" width=\"{:.1}\" height=\"{:.1}\"/>",
+                    "<rect class=\"span\" x=\"{a:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>",
+                    f.top,
                     (b - a).max(0.5),
-                    f.height - TOP - BOTTOM
+                    f.height - f.top - BOTTOM
                 );
             }
         }
@@ -356,7 +396,8 @@ fn draw_layer(out: &mut String, layer: &Layer, f: &Frame) {
             let at = px(*x);
             let _ = write!(
                 out,
-                "<line class=\"rule\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{TOP}\" y2=\"{:.1}\"/><text class=\"tick\" transform=\"translate({:.1} {:.1}) rotate(-90)\">{}</text>",
+                "<line class=\"rule\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/><text class=\"tick\" transform=\"translate({:.1} {:.1}) rotate(-90)\">{}</text>",
+                f.top,
                 f.height - BOTTOM,
                 at - 4.0,
                 f.height - BOTTOM - 6.0,
@@ -387,11 +428,25 @@ fn draw_layer(out: &mut String, layer: &Layer, f: &Frame) {
                 );
             }
         }
-        Layer::Rule { .. } | Layer::Marks { .. } => {}
+        Layer::Marks { class, marks, .. } => {
+            for m in marks.iter().filter(|m| m.x.is_finite() && m.y.is_finite()) {
+                let (x, y) = (px(m.x), py(m.y));
+                if m.error > 0.0 {
+                    let _ = write!(
+                        out,
+                        "<line class=\"{class} bar\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/>",
+                        py(m.y - m.error),
+                        py(m.y + m.error)
+                    );
+                }
+                let _ = write!(out, "<circle class=\"{class} ring\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.6\"/>");
+            }
+        }
+        Layer::Rule { .. } => {}
     }
 }
 
-/// Ring, error bar and read-out. The read-out keeps inside the drawing.
+/// What a pointer meets: an unseen disc, a bold ring and the read-out, which keeps inside the drawing. It stands above every ring.
 fn mark(out: &mut String, class: &str, m: &Mark, f: &Frame) {
     let (x, y) = (f.px(m.x), f.py(m.y));
     let text = escape(&m.text);
@@ -399,14 +454,6 @@ fn mark(out: &mut String, class: &str, m: &Mark, f: &Frame) {
     let left = (x - width / 2.0).clamp(2.0, (WIDTH - width - 2.0).max(2.0));
     let top = if y - 34.0 > TOP - 20.0 { y - 34.0 } else { y + 12.0 };
     let _ = write!(out, "<g class=\"pt {class}\" tabindex=\"0\"><title>{text}</title>");
-    if m.error > 0.0 {
-        let _ = write!(
-            out,
-            "<line class=\"bar\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/>",
-            f.py(m.y - m.error),
-            f.py(m.y + m.error)
-        );
-    }
     let _ = write!(
         out,
         "<circle class=\"hit\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"12\"/><circle class=\"ring\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.6\"/><g class=\"tip\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"23\" rx=\"4\"/><text x=\"{:.1}\" y=\"{:.1}\">{text}</text></g></g>",
@@ -462,7 +509,7 @@ mod tests {
     #[test]
     fn read_outs_stay_inside() {
         let mut out = String::new();
-        let f = Frame { x: (0.0, 1.0), y: (0.0, 1.0), height: 330.0 };
+        let f = Frame { x: (0.0, 1.0), y: (0.0, 1.0), top: TOP, height: 330.0 };
         mark(&mut out, "a", &Mark { x: 1.0, y: 1.0, error: 0.0, text: "a read-out of forty characters, about so".into() }, &f);
         let number = |key: &str| -> f64 {
             out.split("class=\"tip\"").nth(1).unwrap().split(key).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()

@@ -11,6 +11,7 @@ mod page;
 mod run;
 mod selection;
 mod sheet;
+mod shift;
 mod style;
 mod svg;
 
@@ -20,6 +21,7 @@ pub use page::closed_loop;
 pub use run::run;
 pub use selection::selection;
 pub use sheet::{Sheet, write_figures};
+pub use shift::{filter_figures, study_figures};
 pub use svg::{Chart, Series};
 
 /// A number with five significant digits, as tables print it.

@@ -9,6 +9,7 @@
 use super::figure::{Figure, Layer, Mark};
 use super::number;
 use super::sheet::Sheet;
+use super::shift::filter_figures;
 use crate::context::unit_of;
 use crate::fit::Fitted;
 use crate::identify::Identified;
@@ -16,6 +17,9 @@ use crate::log::{Log, SPEED};
 use crate::noise::median;
 use crate::plateau::Plateau;
 use crate::shift::{Settings, filters};
+
+/// Colours of the speed channels.
+const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];
 
 /// The page of a run; `other` is a second run to be laid beside it (with and without the encoder, Figures 5.22 to 5.25).
 #[must_use]
@@ -26,10 +30,12 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
     sheet.section("The run, with its plateaus");
     let time: Vec<Figure> =
         ["thrust_n", "torque_nm", "current_a", "voltage_v"].iter().filter_map(|c| over_time(log, found, c)).collect();
-    let speed: Vec<Figure> = SPEED.iter().find_map(|c| over_time(log, found, c)).into_iter().collect();
+    let speed: Vec<Figure> = SPEED.iter().filter_map(|c| over_time(log, found, c)).collect();
     sheet.figures([speed, time].concat());
+    sheet.figures([overlaid(log), over_current(log, found)].into_iter().flatten().collect());
     sheet.section("How the channels and the plateaus come about");
-    sheet.figures([differences(log, &found.plateaus), first_filter(log, found)].into_iter().flatten().collect());
+    let differences = differences(log, &found.plateaus);
+    sheet.figures(differences.into_iter().chain(binary_shift(log, found)).collect());
     sheet.section("Relations, with 95 % bands");
     if !found.curves.is_empty() {
         sheet.say("Dark band: where the curve lies. Light band: where a further plateau would lie. Rings: plateau means with their 95 % intervals; point at one to read it.");
@@ -138,6 +144,49 @@ fn over_time(log: &Log, found: &Identified, channel: &str) -> Option<Figure> {
     })
 }
 
+/// Every speed channel in one drawing (Figure 5.62); `None` with fewer than two.
+fn overlaid(log: &Log) -> Option<Figure> {
+    let channels: Vec<(&str, &[f64])> = SPEED.into_iter().filter_map(|c| Some((c, log.column(c)?))).collect();
+    let layers = channels.iter().zip(CLASSES).map(|((name, values), class)| {
+        let (x, y) = present(&log.t, values);
+        Layer::Line { name: (*name).to_owned(), class, x, y }
+    });
+    (channels.len() > 1).then(|| Figure {
+        id: "time-speeds".into(),
+        title: "Speed channels over time".into(),
+        x_label: time_label(log),
+        y_label: "rev/min".into(),
+        layers: layers.collect(),
+        ..Figure::default()
+    })
+}
+
+/// The plateau means of every speed channel over the current (Figure 5.61).
+fn over_current(log: &Log, found: &Identified) -> Option<Figure> {
+    log.column("current_a")?;
+    let layers: Vec<Layer> = SPEED
+        .into_iter()
+        .filter(|c| log.column(c).is_some())
+        .zip(CLASSES)
+        .map(|(channel, class)| {
+            let mark = |p: &Plateau| {
+                let ((current, _), (rpm, se)) = (p.of(log, "current_a")?, p.of(log, channel)?);
+                let text = format!("{channel}: {rpm:.1} +- {:.1} rev/min at {current:.3} A", 1.96 * se);
+                Some(Mark { x: current, y: rpm, error: 1.96 * se, text })
+            };
+            Layer::Marks { name: channel.to_owned(), class, marks: found.plateaus.iter().filter_map(mark).collect() }
+        })
+        .collect();
+    (!layers.is_empty()).then(|| Figure {
+        id: "speed-current".into(),
+        title: "Speed over current, plateau means".into(),
+        x_label: "current_a, A".into(),
+        y_label: "rev/min".into(),
+        layers,
+        ..Figure::default()
+    })
+}
+
 /// Every speed channel less the encoder on the plateaus (on a step the channels' averages lie apart in time), or less the first that there is (Figures
 /// 5.59 and 5.63), in per cent.
 fn differences(log: &Log, plateaus: &[Plateau]) -> Option<Figure> {
@@ -173,24 +222,21 @@ fn differences(log: &Log, plateaus: &[Plateau]) -> Option<Figure> {
     })
 }
 
-/// Filter 1 of the binary shift algorithm with its threshold, and the plateaus that were found (Figures 5.65 to 5.69).
-fn first_filter(log: &Log, found: &Identified) -> Option<Figure> {
-    let channel = SPEED.iter().find(|c| log.column(c).is_some())?;
-    let f = filters(log.column(channel)?, &Settings::default());
-    let (x, y) = present(&log.t, &f.one);
-    let stretches = f.stretches().len();
-    Some(Figure {
-        id: "binary-shift-filter-1".into(),
-        title: format!("Binary shift, Filter 1: {stretches} stretches, offset {}", f.offset),
-        x_label: time_label(log),
-        y_label: "rev/min per sample".into(),
-        layers: vec![
-            spans(&found.plateaus),
-            Layer::Line { name: "|x[n+1] - x[n]|".into(), class: "a", x, y },
-            Layer::Level { y: f.threshold, text: format!("threshold {:.2}", f.threshold) },
-        ],
-        ..Figure::default()
-    })
+/// The filters of the binary shift algorithm, Filter 1 over the plateaus that were found (Figures 5.65 to 5.71).
+fn binary_shift(log: &Log, found: &Identified) -> Vec<Figure> {
+    let Some((channel, values)) = SPEED.iter().find_map(|c| Some((*c, log.column(c)?))) else { return Vec::new() };
+    let f = filters(values, &Settings::default());
+    let mut figures = filter_figures(&log.t, &f, channel);
+    for figure in &mut figures {
+        figure.id = format!("binary-shift-{}", figure.id);
+        figure.x_label = time_label(log);
+        if let Some(Layer::Line { x, y, .. }) = figure.layers.first_mut().filter(|_| figure.id.ends_with("filter-1")) {
+            (*x, *y) = present(&log.t[..y.len()], y);
+            figure.title = format!("Binary shift, Filter 1: {} stretches, offset {}", f.stretches().len(), f.offset);
+            figure.layers.insert(0, spans(&found.plateaus));
+        }
+    }
+    figures
 }
 
 fn unscaled(x: &str, value: f64) -> f64 {
@@ -247,13 +293,18 @@ fn relation(f: &Fitted) -> Figure {
 /// Both runs in one drawing: speed over time, and every relation that both have.
 fn side_by_side(a: (&Log, &Identified), b: (&Log, &Identified)) -> Vec<Figure> {
     let mut out = Vec::new();
-    let speed = |log: &Log| SPEED.iter().find_map(|c| log.column(c)).map(|y| present(&log.t, y));
-    if let (Some((xa, ya)), Some((xb, yb))) = (speed(a.0), speed(b.0)) {
+    let first_speed = |log: &Log| SPEED.into_iter().find(|c| log.column(c).is_some());
+    for (id, title, channels) in [
+        ("beside-speed", "Speed of both runs", [first_speed(a.0), first_speed(b.0)]),
+        ("beside-current", "Current of both runs", [Some("current_a"); 2]),
+    ] {
+        let drawn = |log: &Log, channel: Option<&str>| Some(present(&log.t, log.column(channel?)?));
+        let (Some((xa, ya)), Some((xb, yb))) = (drawn(a.0, channels[0]), drawn(b.0, channels[1])) else { continue };
         out.push(Figure {
-            id: "beside-speed".into(),
-            title: "Speed of both runs".into(),
+            id: id.into(),
+            title: title.into(),
             x_label: time_label(a.0),
-            y_label: "rpm, rev/min".into(),
+            y_label: channels[0].map(label).unwrap_or_default(),
             layers: vec![
                 Layer::Line { name: a.0.name.clone(), class: "a", x: xa, y: ya },
                 Layer::Line { name: b.0.name.clone(), class: "b", x: xb, y: yb },

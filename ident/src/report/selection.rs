@@ -49,6 +49,13 @@ pub fn selection(pairs: &[Pair], rows: &[Row], airframe: &Airframe, need: &Need,
     if !missing.is_empty() {
         sheet.say(&format!("No result: {}.", missing.join(", ")));
     }
+    let clipped: Vec<String> = pairs.iter().filter(|p| p.clipped).map(|p| format!("{} with {}", p.motor, p.propeller)).collect();
+    if !clipped.is_empty() {
+        sheet.warn(&format!(
+            "The thrust reading stopped following the speed (a clipped load cell, or a stall); its maximum is a lower bound: {}.",
+            clipped.join(", ")
+        ));
+    }
     sheet.section("All pairs (Figures 6.2 to 6.4)");
     sheet.figures(vec![
         columns(rows, "fig-6-2-thrust", "Thrust at full throttle", "thrust of one motor, N", |r| r.total_thrust_n.0 / 4.0),
@@ -76,7 +83,7 @@ fn table(sheet: &mut Sheet, rows: &[Row], chosen: &[&Row], batteries: u32) {
             let mut row = vec![
                 r.pair.motor.clone(),
                 r.pair.propeller.clone(),
-                format!("{:.3}", r.total_thrust_n.0 / 4.0),
+                format!("{}{:.3}", if r.pair.clipped { ">= " } else { "" }, r.total_thrust_n.0 / 4.0),
                 r.pair.maximum.map_or_else(String::new, |m| format!("{:.2}", m.current_a.0)),
                 format!("{:.2}", r.efficiency_n_per_a),
                 format!("{:.2}", r.hover_mass_kg.0),

@@ -27,7 +27,7 @@ svg.fig{display:block;width:100%;height:auto;background:var(--bg);break-inside:a
 .fig .ring,.fig .spot{fill:var(--bg);stroke-width:1.8}.fig .bar{stroke-width:1.3}.fig .hit{fill:transparent;stroke:none}
 .fig .col{stroke:none}.fig .a.col{fill:var(--a)}.fig .b.col{fill:var(--b)}.fig .c.col{fill:var(--c)}.fig .d.col{fill:var(--d)}.fig .e.col{fill:var(--e)}.fig .f.col{fill:var(--f)}
 .fig .tip{visibility:hidden;pointer-events:none}.fig .tip rect{fill:var(--fg);stroke:none}.fig .tip text{fill:var(--bg);stroke:none;font-size:13px}
-.fig .over .ring{visibility:hidden}.fig .pt{outline:none;cursor:pointer}.fig .pt:hover .tip,.fig .pt:focus .tip{visibility:visible}.fig .pt:hover .ring,.fig .pt:focus .ring{stroke-width:3.4}
+.fig .pt .ring{visibility:hidden;stroke-width:3.4}.fig .pt{outline:none;cursor:pointer}.fig .pt:hover .tip,.fig .pt:focus .tip,.fig .pt:hover .ring,.fig .pt:focus .ring{visibility:visible}.fig .over .ring{display:none}
 @media print{.fig .tip{display:none}}
 ";
 
@@ -35,10 +35,10 @@ svg.fig{display:block;width:100%;height:auto;background:var(--bg);break-inside:a
 pub(crate) const PAGE: &str = "
 *{box-sizing:border-box}body{font:16px/1.5 system-ui,-apple-system,'Segoe UI',sans-serif;color:var(--fg);background:var(--bg);max-width:76rem;margin:0 auto;padding:1rem}
 h1{font-size:1.6rem;line-height:1.25;overflow-wrap:anywhere}h2{font-size:1.2rem;margin:2.2rem 0 .6rem}.lead{font-size:1.1rem}p{max-width:48rem}.soft{color:var(--soft)}
-.figs{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,29rem),1fr));gap:1.2rem}figure{margin:0;min-width:0}
+.figs{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,29rem),1fr));gap:1.2rem}figure{margin:0;min-width:0}
 .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}th,td{padding:.25rem .7rem;text-align:right;border-bottom:1px solid var(--grid);white-space:nowrap}th:first-child,td:first-child{text-align:left}td.text,th.text{text-align:left;white-space:normal;min-width:14rem}
 tr.chosen{background:var(--span);font-weight:600}.warn{border-left:4px solid var(--b);padding:.4rem .8rem;background:var(--card)}
 code{font-size:.92em}
 @media(max-width:600px){body{font-size:15px;padding:.7rem}h1{font-size:1.3rem}.fig text{font-size:16px}.fig .title{font-size:18px}.fig .tick{font-size:15px}.fig .tip text{font-size:13px}th,td{padding:.25rem .45rem}}
-@media print{body{font-size:10.5pt;max-width:none;padding:0}.figs{grid-template-columns:1fr 1fr;gap:.5rem}h2{break-after:avoid}.wide{overflow:visible}table{font-size:8.5pt}th,td{padding:.1rem .35rem}@page{margin:14mm}}
+@media print{body{font-size:10.5pt;max-width:none;padding:0}.figs{grid-template-columns:1fr 1fr;gap:.5rem}h2{break-after:avoid}.wide{overflow:visible}table{font-size:7.5pt}th,td{padding:.1rem .3rem;white-space:normal}tr{break-inside:avoid}thead{display:table-header-group}@page{margin:14mm}}
 ";

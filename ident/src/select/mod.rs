@@ -26,6 +26,9 @@ pub struct Pair {
     pub propeller: String,
     /// Thrust and current at full throttle; `None` for a pair that gave no result.
     pub maximum: Option<Maximum>,
+    /// The thrust reading stopped following the speed before full throttle (a clipped load cell, or a stall): the maximum is a lower
+    /// bound.
+    pub clipped: bool,
     /// Thrust and current at each level of the run, where one was measured: the endurance in hover comes from it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<Maximum>,

@@ -6,7 +6,7 @@
 //! Reference: `thesis.csv` beside this file; errata, "Table 9 agrees with itself".
 
 use super::{Maximum, Pair};
-use crate::log::{Lines, Log, Place, ReadError, short};
+use crate::log::{Lines, Log, Place, ReadError, SPEED, short};
 use crate::plateau::Plateau;
 use crate::quantity::{Ampere, Newton};
 use std::io::BufRead;
@@ -47,6 +47,7 @@ pub fn read_table(file: &str, source: impl BufRead) -> Result<Vec<Pair>, ReadErr
                 motor: motor.to_owned(),
                 propeller: propeller.to_owned(),
                 maximum: maximum(thrust, current, &place)?,
+                clipped: false,
                 levels: Vec::new(),
                 source: file.to_owned(),
             });
@@ -92,19 +93,67 @@ pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
     Pair {
         motor: named("motor"),
         propeller: named("propeller"),
+        clipped: clipped(log, plateaus),
         maximum: maximum.max_by(|a, b| a.thrust_n.0.total_cmp(&b.thrust_n.0)),
         levels,
         source: log.name.clone(),
     }
 }
 
+/// Share of the rise that the square of the speed asks for, below which a thrust reading no longer follows.
+const FOLLOWS: f64 = 0.5;
+
+/// Whether thrust rises from the last but one speed level to the last by less than half of what the square of the speed asks for, three
+/// standard errors aside.
+fn clipped(log: &Log, plateaus: &[Plateau]) -> bool {
+    let Some(speed) = SPEED.into_iter().find(|s| log.column(s).is_some()) else { return false };
+    let mut levels: Vec<[(f64, f64); 2]> =
+        plateaus.iter().filter_map(|p| Some([p.of(log, speed)?, p.of(log, "thrust_n")?])).collect();
+    levels.sort_by(|a, b| a[0].0.total_cmp(&b[0].0));
+    let [.., [(slow, _), (before, before_se)], [(fast, _), (after, after_se)]] = levels[..] else { return false };
+    let asked = before * ((fast / slow).powi(2) - 1.0);
+    let unsure = 3.0 * before_se.hypot(after_se);
+    before > 0.0 && asked > 2.0 * unsure && after - before + unsure < FOLLOWS * asked
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::Column;
 
     #[test]
     fn the_thesis_table_reads() {
         assert_eq!(thesis().len(), 9);
+    }
+
+    /// A load cell that ends at 4 N is seen; one that does not, and one whose last two levels hardly differ in speed, are not.
+    #[test]
+    fn a_clipped_load_cell_is_seen() {
+        let names = ["rpm", "thrust_n", "current_a"];
+        let log = |speeds: &[f64], end: f64| -> (Log, Vec<Plateau>) {
+            let columns = names.iter().map(|n| Column { name: (*n).into(), values: vec![0.0] }).collect();
+            let plateau = |rpm: &f64| {
+                let thrust = (1e-7 * rpm * rpm).min(end);
+                Plateau {
+                    from_s: 0.0,
+                    to_s: 1.0,
+                    first: 0,
+                    rows: 1,
+                    settling_s: 0.0,
+                    means: vec![Some((*rpm, 1.0)), Some((thrust, 0.002)), Some((rpm / 1000.0, 0.01))],
+                }
+            };
+            (Log { columns, ..Log::default() }, speeds.iter().map(plateau).collect())
+        };
+        for (speeds, end, wanted) in [
+            (&[5000.0, 6000.0, 6800.0, 7500.0][..], 4.0, true),
+            (&[5000.0, 6000.0, 6300.0, 6600.0][..], 4.0, true),
+            (&[5000.0, 6000.0, 6800.0, 7500.0][..], 9.0, false),
+            (&[5000.0, 6000.0, 6005.0][..], 3.6, false),
+        ] {
+            let (log, plateaus) = log(speeds, end);
+            assert_eq!(from_log(&log, &plateaus).clipped, wanted, "{speeds:?} {end}");
+        }
     }
 
     #[test]

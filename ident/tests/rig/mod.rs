@@ -134,7 +134,7 @@ pub fn run(trouble: Trouble, hold: usize, seed: u64) -> Run {
     let levels = schedule(trouble, hold, chance);
     let (mut truths, mut pulse) = (Vec::new(), Vec::new());
     for (p, n) in &levels {
-        truths.push(Truth { from: pulse.len(), to: pulse.len() + n });
+        truths.push(Truth { from: pulse.len(), settled: pulse.len(), to: pulse.len() + n });
         pulse.extend(std::iter::repeat_n(*p, *n));
     }
     let n = pulse.len();
