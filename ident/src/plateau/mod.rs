@@ -15,10 +15,13 @@ pub mod study;
 
 use crate::context::Context;
 use crate::log::{Log, SPEED};
+use crate::noise::median;
 use mean::{Colour, Residual, mean_of, residual};
 
 /// Fewest settled rows of a plateau.
 pub const SHORTEST: usize = 5;
+/// Largest change within a held command after its settling, as a share of the highest value.
+const MOVING: f64 = 0.05;
 /// Channels that must have settled, the speeds apart: what a fit takes from a plateau.
 const FOLLOWERS: [&str; 3] = ["thrust_n", "torque_nm", "current_a"];
 
@@ -62,10 +65,9 @@ pub fn detect(log: &Log, speed: &[f64]) -> Vec<Plateau> {
     }
     let stretches = change::stretches(log.column("pulse_us"), guide);
     let top = guide.iter().copied().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
-    // a piece that still climbs after its settling was cut off (a motor that started late) is no level
-    let flat = |from: usize, to: usize| {
-        mean::line(&guide[from..to]).is_none_or(|(_, slope, _)| (slope * (to - from) as f64).abs() <= change::DRIFT * top)
-    };
+    // what still moves after its settling was cut off (a motor that started late, a rotor that coasts) is no level
+    let stands =
+        |from: usize, to: usize, piece: bool| drift(&guide[from..to]).abs() <= top * if piece { change::DRIFT } else { MOVING };
     let followers: Vec<&[f64]> = FOLLOWERS.iter().filter_map(|n| log.column(n)).collect();
     let settled: Vec<(usize, usize, usize)> = stretches
         .iter()
@@ -74,7 +76,7 @@ pub fn detect(log: &Log, speed: &[f64]) -> Vec<Plateau> {
             let rows = followers.iter().map(|f| settle::rows(&log.t, f, *from, *to)).fold(rows, usize::max);
             (*from, from + rows, *to, *piece)
         })
-        .filter(|(_, start, to, piece)| to - start >= SHORTEST && (!piece || flat(*start, *to)))
+        .filter(|(_, start, to, piece)| to - start >= SHORTEST && stands(*start, *to, *piece))
         .map(|(from, start, to, _)| (from, start, to))
         .collect();
     let ranges: Vec<(usize, usize)> = settled.iter().map(|(_, start, to)| (*start, *to)).collect();
@@ -104,6 +106,17 @@ pub fn means_over(values: &[f64], ranges: &[(usize, usize)]) -> Vec<Option<(f64,
     let colour = Colour::pooled(values, ranges, &residuals);
     let mean = |(from, to): &(usize, usize), r: &Option<Residual>| Some(mean_of(&values[*from..*to], r.as_ref()?, &colour));
     ranges.iter().zip(&residuals).map(|(range, r)| mean(range, r)).collect()
+}
+
+/// Change from the first third of a stretch to the last; 0 where either is missing.
+fn drift(z: &[f64]) -> f64 {
+    let middle = |z: &[f64]| {
+        let mut there: Vec<f64> = z.iter().copied().filter(|v| v.is_finite()).collect();
+        median(&mut there)
+    };
+    let third = z.len().div_ceil(3);
+    let change = middle(&z[z.len() - third..]) - middle(&z[..third]);
+    if change.is_finite() { change } else { 0.0 }
 }
 
 /// What shows the steps: the speed, or where none was measured the first channel that follows the throttle.
@@ -148,6 +161,16 @@ mod tests {
                 assert!(p.rows > 100);
             }
         }
+    }
+
+    /// The command falls to its end for a second or two, and the rotor coasts.
+    #[test]
+    fn a_rotor_that_coasts_is_no_level() {
+        let mut log = staircase(true);
+        log.t.extend((0..20).map(|i| 120.0 + 0.1 * f64::from(i)));
+        log.columns[0].values.extend((0..20).map(|i| 1000.0 * (-0.15 * f64::from(i)).exp()));
+        log.columns[1].values.extend([1000.0; 20]);
+        assert_eq!(plateaus(&Context::new(&log, None), &log).len(), 6);
     }
 
     #[test]
