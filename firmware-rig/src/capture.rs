@@ -2,7 +2,8 @@
 //!
 //! What it is: one state for each of the four channels, and the bank that compares them. A reading is the time between two
 //! edges of the same mark over the shortest whole number of revolutions of at least 50 ms.
-//! What can go wrong: edges that were overwritten restart the history (`OverCapture`); silence is `Lost` while the rotor is
+//! What can go wrong: an edge that no rotor can give so soon after the one before (a spike, a ringing comparator) is rejected and
+//! counted; edges that were overwritten restart the history (`OverCapture`); silence is `Lost` while the rotor is
 //! known to turn and `Stopped` after the time-out; a channel 1 % off the median twice running is flagged `Disagrees`.
 //! Within a reading the pattern of the periods is judged as well ([`crate::pattern`]); a twisted blade
 //! shows as a pattern of the beam that changes with the speed (`BladeTwist`).
@@ -27,6 +28,12 @@ const LONGEST_S: u32 = 10;
 /// Deviation from the median that counts as disagreement at constant speed (specification: 1 % on hardware).
 const DISAGREEMENT: f32 = 0.01;
 
+/// Speed beyond which no rotor of this rig turns, rev/min: twice the encoder's limit.
+const FASTEST: u64 = 20_000;
+/// An edge closer to the one before than this part of a period at that speed comes from no mark (a Schmitt trigger in time). Marks that
+/// are seen twice further apart than that are told as such (`Doubled`).
+const SPIKE: u64 = 16;
+
 /// Periods that are looked at for a pattern, at the least.
 const PATTERN: usize = 8;
 
@@ -45,6 +52,8 @@ pub struct CaptureChannel {
     marks: u16,
     times: CaptureTimes,
     ceiling: u64,
+    floor: u64,
+    rejected: u32,
     ring: [u32; DEPTH],
     next: usize,
     held: usize,
@@ -66,6 +75,8 @@ impl CaptureChannel {
             marks,
             times,
             ceiling: u64::from(ceiling),
+            floor: (60 * u64::from(timer_hz) / FASTEST / SPIKE).checked_div(u64::from(marks)).unwrap_or(0),
+            rejected: 0,
             ring: [0; DEPTH],
             next: 0,
             held: 0,
@@ -120,15 +131,21 @@ impl CaptureChannel {
             self.last = now;
             edges = edges.last().map_or(&[][..], core::slice::from_ref);
         }
+        let mut newest = None;
         for edge in edges {
-            let gap = self.edge(0).map_or(0, |before| edge.wrapping_sub(before));
-            if self.patience().is_some_and(|most| u64::from(gap) > most) {
+            let gap = self.edge(0).map_or(u32::MAX, |before| edge.wrapping_sub(before));
+            if u64::from(gap) < self.floor {
+                self.rejected = self.rejected.wrapping_add(1);
+                continue;
+            }
+            newest = Some(*edge);
+            if self.held > 0 && self.patience().is_some_and(|most| u64::from(gap) > most) {
                 self.forget();
             }
             self.store(*edge);
         }
-        if let Some(edge) = edges.last() {
-            let age = (now.0 as u32).wrapping_sub(*edge);
+        if let Some(edge) = newest {
+            let age = (now.0 as u32).wrapping_sub(edge);
             let age = if age > u32::MAX / 2 { 0 } else { age }; // captured while `now` was read
             self.last = Ticks(now.0.saturating_sub(u64::from(age)));
             self.reading = self.measure();
@@ -156,6 +173,12 @@ impl CaptureChannel {
             count = count.checked_add(self.marks)?;
         }
         if self.held == DEPTH { best } else { None }
+    }
+
+    /// Edges that were rejected since the channel began.
+    #[must_use]
+    pub fn rejected(&self) -> u32 {
+        self.rejected
     }
 
     /// Ticks of one revolution at the last reading.

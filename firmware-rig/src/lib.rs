@@ -26,6 +26,7 @@ pub mod queue;
 pub mod rig;
 pub mod sampling;
 pub mod settings;
+pub mod stop;
 pub mod store;
 pub mod strain;
 
@@ -35,3 +36,4 @@ pub use line::{CommandLine, LineNews};
 pub use rig::{Inputs, Outputs, Rig};
 pub use sampling::AdcBlock;
 pub use settings::Settings;
+pub use stop::StopWatch;

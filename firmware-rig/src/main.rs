@@ -29,7 +29,7 @@ mod app {
     use crate::board::watchdog::{Watchdog, take_reset_cause};
     use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
-    use firmware_rig::{Config, Inputs, Rig, Settings, store};
+    use firmware_rig::{Config, Inputs, Rig, Settings, StopWatch, store};
     use frame::calibration::Calibration;
     use frame::message::{Command, Event, Message, SettingsNews, Trial};
     use frame::units::PulseWidth;
@@ -42,8 +42,10 @@ mod app {
     static MILLIS: AtomicU32 = AtomicU32::new(0);
     defmt::timestamp!("{=u32:ms}", MILLIS.load(Ordering::Relaxed));
 
-    /// Trial of the last resort that the idle loop is to make: 0 none, 1 panic, 2 hang.
+    /// Trial of the last resort that the idle loop is to make: 0 none, 1 panic, 2 hang, 3 late tick.
     static TRIAL: AtomicU8 = AtomicU8::new(0);
+    /// Core cycles of the late tick's trial: 8 ms at 168 MHz.
+    const LATE_CYCLES: u32 = 8 * 168_000;
     /// Settings wait to be stored.
     static STORE: AtomicBool = AtomicBool::new(false);
 
@@ -73,8 +75,7 @@ mod app {
         supply: SupplyWatch,
         flash: SettingsFlash,
         collector: Collector,
-        between: bool,
-        stop_seen: bool,
+        stops: StopWatch,
         sampling: u16,
     }
 
@@ -165,8 +166,7 @@ mod app {
             supply: SupplyWatch::start(device.PWR),
             flash,
             collector: Collector::default(),
-            between: false,
-            stop_seen: false,
+            stops: StopWatch::default(),
             sampling,
         };
         (Shared { capture_timer: device.TIM2, to_store: None, stored: None }, local)
@@ -181,6 +181,10 @@ mod app {
             match TRIAL.load(Ordering::Relaxed) {
                 0 => {}
                 1 => panic!("the self-test asked for it"),
+                3 => {
+                    TRIAL.store(0, Ordering::Relaxed);
+                    cortex_m::interrupt::free(|_| cortex_m::asm::delay(LATE_CYCLES));
+                }
                 _ => cortex_m::interrupt::free(|_| {
                     loop {
                         cortex_m::asm::nop();
@@ -211,20 +215,18 @@ mod app {
 
     #[task(binds = TIM4, priority = 2, shared = [capture_timer, to_store, stored], local = [
         edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, rig, told, reset_cause, index, supply, collector,
-        between, stop_seen, sampling
+        stops, sampling
     ])]
     fn tick(mut cx: tick::Context) {
         let start = health::cycles();
         let board = cx.local;
         board.tick_timer.sr().write(|w| w.uif().clear());
-        // A stop acts here already, twice a tick, so that it is in the timer less than a millisecond after it came; the rig
-        // latches it in its next tick and gives minimum from then on.
-        *board.stop_seen |= board.stop.is_low();
-        if board.link.listen(board.dma) || *board.stop_seen {
+        // a stop acts here already; the rig latches it in its next tick and gives minimum from then on
+        let half = board.stops.half(board.stop.is_low(), board.link.listen(board.dma));
+        if half.minimum {
             board.pulse.set(PulseWidth::MIN);
         }
-        *board.between = !*board.between;
-        if *board.between {
+        if !half.tick {
             return;
         }
         let over_capture = captures::drain(board.edges);
@@ -239,7 +241,7 @@ mod app {
             adc: board.converter.drain(board.dma),
             command,
             line,
-            stop_input: core::mem::take(board.stop_seen),
+            stop_input: board.stops.take(),
             brown_out: board.supply.is_low(),
             paused: flash::PAUSED.swap(false, Ordering::Acquire),
         };
@@ -251,7 +253,12 @@ mod app {
             board.collector.index = board.collector.index.wrapping_add(1);
         }
         if let Some(trial) = outputs.trial {
-            TRIAL.store(if trial == Trial::Panic { 1 } else { 2 }, Ordering::Relaxed);
+            let number = match trial {
+                Trial::Panic => 1,
+                Trial::Hang => 2,
+                Trial::Late => 3,
+            };
+            TRIAL.store(number, Ordering::Relaxed);
         }
         if let Some(settings) = outputs.store {
             cx.shared.to_store.lock(|wanted| *wanted = Some(settings));

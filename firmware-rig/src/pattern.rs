@@ -1,8 +1,8 @@
 //! What the pattern of one channel's periods says of its sensor.
 //!
-//! What it is: a window of four periods moves over the edges of a reading and looks for a period that is too long between two
-//! short ones (a mark was missed), two that share the time of one (a mark was seen twice), and, for two marks, periods
-//! that are long and short by turns.
+//! What it is: a window of up to eight periods moves over the edges of a reading and looks for a period that is too long between two
+//! short ones (a mark was missed), pairs that share the time of one (marks were seen twice, up to three in a row), and, for two marks,
+//! periods that are long and short by turns.
 //! What can go wrong: a rotor that speeds up changes all periods the same way and matches none of these; the newest period has
 //! one neighbour only and is judged in the next reading.
 //! Units: ticks; ratios.
@@ -18,39 +18,85 @@ const DOUBLED_TENTHS: u64 = 13;
 /// Difference between even and odd periods, in per cent of their mean, that counts as alternating.
 const ALTERNATING_PERCENT: u64 = 10;
 /// Fewest periods that show a pattern of two.
-const ALTERNATING_PERIODS: u32 = 6;
+const ALTERNATING_PERIODS: usize = 6;
+
+/// Periods whose spread is less than this part of their mean, in per cent, are even.
+const EVEN_PERCENT: u64 = 30;
+/// Marks in a row that are each seen twice, at the most, between two that are seen once.
+const CLUSTER: usize = 3;
+/// Periods kept: those of the longest cluster and the two beside it, and a power of two.
+const KEPT: usize = 8;
+const _: () = assert!(2 * CLUSTER + 2 <= KEPT && KEPT.is_power_of_two());
+
+/// The periods looked at last.
+#[derive(Default)]
+struct Window {
+    ring: [u32; KEPT],
+    seen: usize,
+}
+
+impl Window {
+    fn put(&mut self, period: u32) {
+        if let Some(slot) = self.ring.get_mut(self.seen % KEPT) {
+            *slot = period;
+        }
+        self.seen += 1;
+    }
+
+    /// The period `back` places before the last one.
+    fn at(&self, back: usize) -> u64 {
+        let place = self.seen.wrapping_sub(back + 1) % KEPT;
+        self.ring.get(place).map_or(0, |period| u64::from(*period))
+    }
+
+    /// Whether marks that were seen twice end here, between two periods of marks that were seen once.
+    fn doubled(&self) -> bool {
+        let after = self.at(0);
+        let (mut shortest, mut longest, mut together) = (u64::MAX, 0, 0);
+        for marks in 1..=CLUSTER {
+            let (first, second) = (self.at(2 * marks), self.at(2 * marks - 1));
+            let share = first + second;
+            // two periods of one mark against the marks beside it; nearly always the answer is here
+            if self.seen < 2 * marks + 2 || 10 * share >= DOUBLED_TENTHS * after {
+                return false;
+            }
+            (shortest, longest) = (shortest.min(first.min(second)), longest.max(first.max(second)));
+            together += share;
+            // even periods in a row between two long ones are marks beside two that were missed
+            let even = 200 * marks as u64 * (longest - shortest) < EVEN_PERCENT * together;
+            if 10 * share < DOUBLED_TENTHS * self.at(2 * marks + 1) && (marks == 1 || !even) {
+                return true;
+            }
+        }
+        false
+    }
+}
 
 /// Judges `periods`, the latest first, of a channel with `marks` marks a revolution.
 pub fn judge(marks: u16, periods: impl Iterator<Item = u32>) -> CaptureVerdict {
-    let mut window = [0u64; 4];
-    let mut seen = 0u32;
+    let mut window = Window::default();
     let mut by_turns = marks == 2;
     let mut sums = [0u64; 2];
     let mut found = CaptureVerdict::Nominal;
     for period in periods {
-        let period = u64::from(period);
-        let [_, a, b, c] = window;
-        window = [a, b, c, period];
-        seen += 1;
+        window.put(period);
         let [even, odd] = &mut sums;
-        *(if seen.is_multiple_of(2) { even } else { odd }) += period;
-        if seen >= 3 {
-            let [_, before, middle, after] = window;
+        *(if window.seen.is_multiple_of(2) { even } else { odd }) += u64::from(period);
+        if window.seen >= 3 {
+            let (before, middle, after) = (window.at(2), window.at(1), window.at(0));
             by_turns &= (before < middle) == (after < middle);
             if 10 * middle > MISSED_TENTHS * before.max(after) {
                 found = CaptureVerdict::Missed;
             }
-        }
-        if seen >= 4 {
-            let [before, first, second, after] = window;
-            if 10 * (first + second) < DOUBLED_TENTHS * before.min(after) {
+            if window.doubled() {
                 found = CaptureVerdict::Doubled;
             }
         }
     }
     let [even, odd] = sums;
     let uneven = 100 * even.abs_diff(odd) > ALTERNATING_PERCENT * (even + odd) / 2;
-    if by_turns && uneven && seen >= ALTERNATING_PERIODS && seen.is_multiple_of(2) { CaptureVerdict::Alternating } else { found }
+    let enough = window.seen >= ALTERNATING_PERIODS && window.seen.is_multiple_of(2);
+    if by_turns && uneven && enough { CaptureVerdict::Alternating } else { found }
 }
 
 /// Unevenness of the marks: half the spread of the periods of one revolution about their neighbours' mean, relative. Two marks
@@ -105,6 +151,9 @@ mod tests {
         assert_eq!(of(2, &[100; 10]), Nominal);
         assert_eq!(of(25, &[100, 100, 200, 100, 100]), Missed);
         assert_eq!(of(1, &[100, 100, 30, 70, 100, 100]), Doubled);
+        assert_eq!(of(1, &[100, 30, 70, 55, 45, 100]), Doubled, "two marks in a row");
+        assert_eq!(of(25, &[100, 100, 200, 100, 100, 100, 100, 200, 100, 100]), Missed, "two marks, five apart");
+        assert_eq!(of(1, &[100, 30, 70, 55, 45, 80, 20, 100]), Doubled, "three marks in a row");
         assert_eq!(of(2, &[90, 110, 90, 110, 90, 110]), Alternating);
         assert_eq!(of(2, &[35, 65, 35, 65, 35, 65]), Alternating, "two marks far from opposite, and no missed ones");
         assert_eq!(of(2, &[98, 102, 98, 102, 98, 102]), Nominal, "within the tolerance of a magnet glued by hand");

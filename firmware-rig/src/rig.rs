@@ -243,7 +243,7 @@ impl Rig {
         let [_, live_zero @ ..] = &self.config.live_zero;
         let top = self.config.converter.top();
         let end = strain.verdict(top, true);
-        let stuck = rest.iter().zip(live_zero).any(|(block, live)| block.verdict(top, *live) == AdcVerdict::Stuck);
+        let stuck = rest.iter().zip(live_zero).any(|(block, live)| block.verdict(top, *live).is_stuck());
         let voltage = self.value(3, adc).map(Volt);
         self.supply = voltage.or(self.supply);
         let readings = Readings {
@@ -251,7 +251,7 @@ impl Rig {
             current: self.value(2, adc).map(Ampere),
             voltage,
             load: self.value(0, adc).map(Newton),
-            load_saturated: end == AdcVerdict::Stuck,
+            load_saturated: end.is_stuck(),
             disagreeing: self.bank.flagged(),
             // a rotor that coasts to rest falls silent channel by channel: judged under throttle only
             lost: if self.setting.is_live() { self.bank.lost(now) } else { 0 },

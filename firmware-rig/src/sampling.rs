@@ -1,7 +1,7 @@
 //! Boxcar averages of the converter's five channels.
 //!
 //! What it is: adds what the DMA delivered each tick into one block a logging interval, and gives mean, rms and verdict.
-//! What can go wrong: no conversion is `Missing`; all of them at one end is `Stuck` (open wire or short); any of them there
+//! What can go wrong: no conversion is `Missing`; all of them at the low end is `Open`, at the high end `Short`; any of them there
 //! is `Saturated`. A block that would overflow its counters keeps what it has.
 //! Units: counts; rms in 1/256 count. Scale: `count` reaches 65 535 and `sum` 65 535 x 4095 = 2.7e8, so a second at the
 //! board's 61.8 kconv/s a channel still fits.
@@ -77,8 +77,10 @@ impl AdcBlock {
     pub fn verdict(&self, top: u16, live_zero: bool) -> AdcVerdict {
         if self.count == 0 {
             AdcVerdict::Missing
-        } else if (self.max == 0 && live_zero) || self.min >= top {
-            AdcVerdict::Stuck
+        } else if self.max == 0 && live_zero {
+            AdcVerdict::Open
+        } else if self.min >= top {
+            AdcVerdict::Short
         } else if (self.min == 0 && live_zero) || self.max >= top {
             AdcVerdict::Saturated
         } else {
@@ -108,9 +110,10 @@ mod tests {
     #[test]
     fn verdicts() {
         assert_eq!(block(&[]).verdict(4095, true), AdcVerdict::Missing);
-        assert_eq!(block(&[0, 0]).verdict(4095, true), AdcVerdict::Stuck);
+        assert_eq!(block(&[0, 0]).verdict(4095, true), AdcVerdict::Open);
+        assert_eq!(block(&[0, 1]).verdict(4095, true), AdcVerdict::Saturated);
         assert_eq!(block(&[0, 0]).verdict(4095, false), AdcVerdict::Nominal, "an unpowered supply reads zero");
-        assert_eq!(block(&[4095, 4095]).verdict(4095, false), AdcVerdict::Stuck);
+        assert_eq!(block(&[4095, 4095]).verdict(4095, false), AdcVerdict::Short);
         assert_eq!(block(&[4000, 4095]).verdict(4095, true), AdcVerdict::Saturated);
         assert_eq!(block(&[1, 4094]).verdict(4095, true), AdcVerdict::Nominal);
     }

@@ -111,6 +111,78 @@ fn a_constant_speed_is_read_by_all_four() {
     }
 }
 
+/// The turn of the 32-bit counter, edge by edge: one mark a revolution, the last edge before the turn, on it and after it at every
+/// place near the turn, and the span of each reading against 64-bit time.
+#[test]
+fn the_turn_of_the_counter_edge_by_edge() {
+    const TURN: u64 = 1 << 32;
+    let period = 60 * MS; // longer than the 50 ms of a reading: each edge gives one of a single period
+    for shift in [0, 1, 2, 63, 64, period / 2, period - 2, period - 1] {
+        let mut bank = CaptureBank::new(&Config::thesis_570kv());
+        let first = TURN - 4 * period + shift;
+        bank.take(Ticks(first - MS), &[&[], &[(first - MS) as u32], &[], &[]], &[false; 4]); // the first capture is dropped
+        for n in 0..9 {
+            let at = first + n * period;
+            // the tick comes at once or a little later; the counter may turn between edge and tick
+            for late in [0, 1, MS / 2] {
+                let mut copy = bank.clone();
+                copy.take(Ticks(at + late), &[&[], &[at as u32], &[], &[]], &[false; 4]);
+                let code = copy.sample(Ticks(at + late))[1];
+                if n == 0 {
+                    assert_eq!(code.verdict, CaptureVerdict::Stopped, "one edge is no speed");
+                    continue;
+                }
+                assert_eq!((code.edges, code.span), (1, period as u32), "edge {n} at turn {:+}", at as i64 - TURN as i64);
+                assert_eq!(code.verdict, CaptureVerdict::Nominal);
+                assert!(copy.channels()[1].is_turning(Ticks(at + late)));
+            }
+            bank.take(Ticks(at), &[&[], &[at as u32], &[], &[]], &[false; 4]);
+        }
+    }
+}
+
+/// A silence of a whole turn of the counter and a little more is not taken for that little.
+#[test]
+fn a_silence_longer_than_the_counter_is_no_short_period() {
+    let mut bank = CaptureBank::new(&Config::thesis_570kv());
+    let period = 60 * MS;
+    let opto = |bank: &mut CaptureBank, at: u64| bank.take(Ticks(at), &[&[], &[at as u32], &[], &[]], &[false; 4]);
+    for n in 1..6 {
+        opto(&mut bank, n * period);
+    }
+    let silent_until = 5 * period + (1 << 32) + period;
+    for ms in (5 * period / MS)..(silent_until / MS) {
+        bank.take(Ticks(ms * MS), &[&[]; 4], &[false; 4]);
+    }
+    assert_eq!(bank.sample(Ticks(silent_until))[1].verdict, CaptureVerdict::Stopped);
+    opto(&mut bank, silent_until);
+    let code = bank.sample(Ticks(silent_until))[1];
+    assert_eq!((code.verdict, code.edges), (CaptureVerdict::Stopped, 0), "one edge after a long silence is no speed");
+    opto(&mut bank, silent_until + 2 * period);
+    assert_eq!(bank.sample(Ticks(silent_until + 2 * period))[1].span, 2 * period as u32);
+}
+
+/// Spikes right behind an edge are rejected, the reading is that of the marks, and the number of spikes is known. What comes so far behind
+/// that a mark could be there is no spike and is told.
+#[test]
+fn edges_that_no_rotor_can_give_are_rejected() {
+    let run = |behind: u64| {
+        let mut bank = CaptureBank::new(&Config::thesis_570kv());
+        let period = 60 * MS / 4; // 4000 rev/min, one mark
+        for n in 1..40u64 {
+            let at = n * period;
+            let edges = [at as u32, (at + behind) as u32];
+            bank.take(Ticks(at + MS), &[&[], if n % 3 == 0 { &edges } else { &edges[..1] }, &[], &[]], &[false; 4]);
+        }
+        let code = bank.sample(Ticks(39 * period + MS))[1];
+        (code, bank.channels()[1].rejected(), Config::thesis_570kv().calibration().speed(1, &code))
+    };
+    let (code, rejected, rpm) = run(MS / 10);
+    assert_eq!((code.verdict, rejected, rpm), (CaptureVerdict::Nominal, 13, Some(4000.0)));
+    let (code, rejected, _) = run(MS);
+    assert_eq!((code.verdict, rejected), (CaptureVerdict::Doubled, 0));
+}
+
 #[test]
 fn the_first_capture_is_dropped() {
     let config = Config::thesis_570kv();

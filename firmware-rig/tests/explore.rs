@@ -2,7 +2,7 @@
 //! appears. Rules are checked on every tick of every walk.
 
 use esc_pwm::ArmingTimes;
-use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig};
+use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig, StopWatch};
 use frame::message::{Beep, Command};
 use frame::rig::{FaultSet, RigState};
 use frame::units::{PulseWidth, Ticks};
@@ -10,6 +10,10 @@ use std::collections::{BTreeMap, VecDeque};
 
 const MS: u64 = 84_000;
 const LOW_MS: u64 = 60;
+/// Longest time from the beginning of a tick to its pulse in the timer, us: the tick's whole budget of 40 000 cycles at 168 MHz.
+const TICK_US: u64 = 239;
+/// Steps of the phase at which a stop comes, us.
+const PHASE_US: usize = 50;
 
 /// Times shortened in proportion, so that every time-out is walked through.
 const TIMES: ArmingTimes = ArmingTimes {
@@ -197,21 +201,60 @@ impl Walk {
         }
     }
 
-    /// From here, one stop: minimum on that very tick, and on all that follow.
-    fn stops(&self) {
-        for key in [true, false] {
-            let mut copy = self.clone();
-            if key {
-                copy.tick(None, |inputs, _| inputs.stop_input = true);
-            } else {
-                copy.tick(Some(Command::Stop), |_, _| {});
-            }
-            assert_eq!(copy.pulse, PulseWidth::MIN, "{:?}", self.state);
-            for _ in 0..60 {
-                copy.tick(None, |_, _| {});
-                assert_eq!(copy.pulse, PulseWidth::MIN, "{:?}", self.state);
+    /// From here, one stop at every phase of the tick, by key and by command: when the timer last held anything but minimum,
+    /// us after the stop. Whatever starts after that instant is a minimum pulse, because the timer takes its compare value when
+    /// a pulse starts.
+    fn stops(&self) -> u64 {
+        let mut worst = 0;
+        for (key, late) in [(true, 0), (true, TICK_US), (false, 0), (false, TICK_US)] {
+            for event in (0..1000).step_by(PHASE_US) {
+                worst = worst.max(self.stop(key, late, event as u64));
             }
         }
+        worst
+    }
+
+    /// One stop `event` us after a tick that began just before; each tick writes its pulse `late` us after its beginning.
+    fn stop(&self, key: bool, late: u64, event: u64) -> u64 {
+        let mut copy = self.clone();
+        let mut watch = StopWatch::default();
+        assert!(!watch.half(false, false).tick, "the half before the tick");
+        let (mut live_until, mut taken) = (0, false);
+        // what the compare register holds, from when: the pulse of the tick before the stop first
+        let mut register = vec![(0, copy.pulse)];
+        for half in 0u64.. {
+            let at = half * 500;
+            let stopped = at > event;
+            // the key is let go again after one look, and a command is heard once
+            let news = stopped && at <= event + 500;
+            let waits = !key && stopped && !taken;
+            let due = watch.half(key && news, waits);
+            if due.minimum {
+                register.push((at, PulseWidth::MIN));
+            }
+            if due.tick {
+                // at half 0 the tick that the stop has just missed
+                let pressed = watch.take();
+                copy.tick(waits.then_some(Command::Stop), |inputs, _| inputs.stop_input = pressed);
+                taken |= waits;
+                register.push((at + late, copy.pulse));
+            }
+            if half > 80 {
+                break;
+            }
+        }
+        for pair in register.windows(2) {
+            if pair[0].1.is_live() {
+                live_until = live_until.max(pair[1].0.saturating_sub(event));
+            }
+        }
+        assert!(!register.last().is_some_and(|(_, pulse)| pulse.is_live()), "{:?} is not stopped for good", self.state);
+        assert!(
+            live_until <= 1000,
+            "{:?}, key {key}, stop {event} us after a tick: live until {live_until} us after it",
+            self.state
+        );
+        live_until
     }
 }
 
@@ -221,10 +264,10 @@ fn every_state_and_event_of_the_whole_rig() {
     let first = Walk::new();
     let mut seen: BTreeMap<Key, usize> = BTreeMap::from([(first.key(), 0)]);
     let mut open = VecDeque::from([first]);
-    let (mut transitions, mut states) = (0usize, std::collections::BTreeSet::new());
+    let (mut transitions, mut states, mut worst_stop) = (0usize, std::collections::BTreeSet::new(), 0);
     while let Some(walk) = open.pop_front() {
         states.insert(walk.state as u8);
-        walk.stops();
+        worst_stop = worst_stop.max(walk.stops());
         for happening in &list {
             let mut next = walk.clone();
             next.meet(*happening);
@@ -237,6 +280,8 @@ fn every_state_and_event_of_the_whole_rig() {
         }
     }
     println!("{} arming states, {} states of the rig, {transitions} transitions", states.len(), seen.len());
+    println!("a stop is in the pulse timer {worst_stop} us after it came, at most");
+    assert!((400..=1000).contains(&worst_stop), "some state was live, and none for longer than a millisecond: {worst_stop}");
     assert_eq!(states.len(), 10, "every state of the arming machine is reached");
     assert!(seen.len() >= 40, "{} states", seen.len());
 }

@@ -284,6 +284,8 @@ pub enum Trial {
     Panic,
     /// A program that hangs with interrupts off, for the watchdog.
     Hang,
+    /// Interrupts off for 8 ms: the next control tick comes late.
+    Late,
 }
 
 /// One setting of the board.

@@ -269,11 +269,21 @@ pub enum AdcVerdict {
     Nominal,
     /// Some conversion touched either end of the range.
     Saturated,
-    /// Every conversion sat at one end: open wire or short.
-    Stuck,
+    /// Every conversion sat at the low end of a channel whose zero is alive: the wire is open (inputs are pulled down) or lies on ground.
+    Open,
     /// No conversion in this interval.
     #[default]
     Missing,
+    /// Every conversion sat at the high end: a short to the supply, or an amplifier that its wire drives there.
+    Short,
+}
+
+impl AdcVerdict {
+    /// Every conversion sat at one end: the channel reads nothing.
+    #[must_use]
+    pub const fn is_stuck(self) -> bool {
+        matches!(self, Self::Open | Self::Short)
+    }
 }
 
 /// Raw reading of one ADC channel over one logging interval.

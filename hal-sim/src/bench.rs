@@ -303,7 +303,8 @@ impl Bench {
                 }
             }
         }
-        // Five channels at 480 cycles each and 21 MHz: 8.5 conversions of each in a millisecond.
+        // The board makes 61.8 conversions of each channel in a millisecond, a run here 8.5 for the sake of its speed: the noise of
+        // its means is 2.7 times the board's (docs/rig.md, "Analogue channels").
         let count = 8 + ((self.steps / STEPS_PER_MS as u64) & 1) as u16;
         let pins_v = self.pins_v();
         if self.levers.spike_v[0] != 0.0 {

@@ -13,6 +13,8 @@ const MS: u64 = 84_000;
 const SEEDS: u64 = 100;
 /// Log period, ms.
 const LOG_MS: u64 = 100;
+/// When the sensor breaks; every sample after it counts, ms.
+const BROKEN_MS: u64 = 1000;
 
 /// What is wrong with one channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +77,7 @@ fn samples(seed: u64, rpm: f64, wrong: Wrong) -> Vec<[CaptureCode; 4]> {
     let mut other = angle;
     for ms in 1..=2400u64 {
         let speed = rpm * (ms as f64 / 600.0).min(1.0);
-        let broken = ms > 1000;
+        let broken = ms > BROKEN_MS;
         let mut edges: [Vec<u32>; 4] = Default::default();
         for step in 0..10u64 {
             let next = angle + speed / 60.0 * 1e-4;
@@ -117,7 +119,7 @@ fn samples(seed: u64, rpm: f64, wrong: Wrong) -> Vec<[CaptureCode; 4]> {
         bank.take(Ticks(ms * MS), &edges.each_ref().map(Vec::as_slice), &[false; 4]);
         if ms % LOG_MS == 0 {
             let codes = bank.sample(Ticks(ms * MS));
-            if ms >= 1600 {
+            if ms > BROKEN_MS {
                 kept.push(codes);
             }
         }
@@ -177,6 +179,12 @@ fn the_faulty_channel_is_the_one_that_is_flagged() {
             let own = after.iter().any(|s| wrong.verdicts().contains(&s[faulty].verdict));
             let foreign = after.iter().any(|s| (0..4).any(|c| c != faulty && s[c].verdict != CaptureVerdict::Nominal));
             let any = after.iter().any(|s| s[faulty].verdict != CaptureVerdict::Nominal);
+            if !any || foreign {
+                println!(
+                    "{wrong:?}, seed {seed}, {rpm:.0} rev/min: {:?}",
+                    after.iter().map(|s| s[faulty].verdict).collect::<Vec<_>>()
+                );
+            }
             flagged += usize::from(any && !foreign);
             named += usize::from(own && !foreign);
             others += usize::from(foreign);
@@ -189,10 +197,7 @@ fn the_faulty_channel_is_the_one_that_is_flagged() {
             "{wrong:?}: it alone flagged in {flagged} of {SEEDS}, by its own verdict in {named}, another blamed in {others}, consensus within {:.3} %; {seen:?}",
             worst * 100.0
         );
-        // The one shortfall: a tab of one mark a revolution that is seen twice now and then gives too few periods in a second of
-        // a slow rotor: 97 of 100.
-        let wanted = if wrong == Wrong::Doubles(1) { 97 } else { 99 };
-        assert!(flagged >= wanted, "{wrong:?}: {flagged}");
+        assert!(flagged >= 99, "{wrong:?}: {flagged}");
         assert!(named >= 95, "{wrong:?}: {named}");
         assert!(worst < 1e-3, "{wrong:?}: consensus off by {worst}");
     }

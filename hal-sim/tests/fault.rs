@@ -1,6 +1,6 @@
 //! A thousand seeded faults at the pins, flown natively.
 
-use hal_sim::fault::campaign::{Survived, fly};
+use hal_sim::fault::campaign::{Failure, Survived, fly, fly_defenceless};
 use hal_sim::fault::{Mishap, Plan, REACTION_MS};
 use std::collections::BTreeMap;
 
@@ -34,4 +34,19 @@ fn every_fault_ends_in_minimum_throttle_latched_and_named() {
         assert_eq!(runs.len() as u64, RUNS / Mishap::all().len() as u64);
     }
     println!("{RUNS} schedules, reaction within {REACTION_MS} ms of detection in every one");
+}
+
+/// The campaign can fail: without the one protection that answers it, every kind of mishap is found out, and not because the
+/// rig never ran.
+#[test]
+fn without_its_protection_no_kind_of_fault_passes() {
+    for seed in 0..Mishap::all().len() as u64 {
+        let plan = Plan::of(seed);
+        fly(plan).unwrap_or_else(|failure| panic!("with its protection it passes: {failure}"));
+        match fly_defenceless(plan) {
+            Ok(survived) => panic!("nobody missed the protection: {survived:?}"),
+            Err(Failure::NeverRan { .. }) => panic!("{plan:?} never ran"),
+            Err(failure) => println!("{}: {failure}", plan.mishap.words()),
+        }
+    }
 }

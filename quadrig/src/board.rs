@@ -54,7 +54,11 @@ impl Board {
     /// Opens the same port again after it went away; the counters go on.
     pub(crate) fn reopen(&mut self) -> bool {
         let opened = serialport::new(&self.name, BAUD).timeout(READ_TIME).open();
-        opened.map(|port| self.port = port).is_ok()
+        let open = opened.map(|port| self.port = port).is_ok();
+        if open {
+            let _ = self.decoder.push::<Message>(0); // the frame that the loss cut short ends here, not in the next one
+        }
+        open
     }
 
     /// Counters of the line.

@@ -87,6 +87,11 @@ impl Recorder {
         })
     }
 
+    /// Nothing worth keeping was heard: no file is left behind.
+    pub(crate) fn discard(self) {
+        self.spool.discard();
+    }
+
     /// The board has told how its codes are meant.
     pub(crate) fn knows_its_board(&self) -> bool {
         self.calibration.is_some()
@@ -251,6 +256,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
                 if !back {
                     break Err(format!("{}: the port is gone", args.port));
                 }
+                let _ = board.send(Command::Identify); // the board may be another one, or tared anew
             }
         }
         if !recorder.knows_its_board() && begun.elapsed() > CALIBRATION_TIME {

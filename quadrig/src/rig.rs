@@ -339,15 +339,20 @@ fn session(
 ) -> Result<(), Failure> {
     let mut session = Session { recorder, quiet, state: RigState::Disarmed, finished: false, faulted: None };
     // who it is and how its codes are meant, for the log
-    board.ask(
+    let known = board.ask(
         Command::Identify,
         |_| {},
         |m| {
             session.take(m);
             matches!(m, Message::Calibration(_)).then_some(())
         },
-    )?;
-    board.obey(first, |m| session.take(m))?;
+    );
+    if let Err(refusal) = known.and_then(|()| board.obey(first, |m| session.take(m))) {
+        if let Some(recorder) = session.recorder {
+            recorder.discard();
+        }
+        return Err(refusal);
+    }
     let input = lines();
     let mut schedule = schedule;
     let running = schedule.is_some();

@@ -1,8 +1,9 @@
 //! A rig board on a pseudo-terminal: the portable firmware against the bench, in real time.
 //!
 //! What it is: one thread that plays board and rig behind the master side of a pseudo-terminal; programs open the other side as
-//! their serial port.
-//! What can go wrong: a machine that is stopped for longer than the link time-out latches faults, here as on the bench.
+//! their serial port. The cable can be pulled and put back under the same name, with the board switched on all the while.
+//! What can go wrong: a machine that is stopped for longer than the link time-out latches faults, here as on the bench; the
+//! board's time stands still while its own thread is kept waiting.
 //! Units: ms of real time.
 //! Reference: specification `rig.md`; `formats.md`, "Telemetry".
 
@@ -12,9 +13,13 @@ use frame::units::{PulseWidth, Ticks};
 use frame::wire::{Encoder, MAX_WIRE};
 use hal_sim::native::firmware_config;
 use hal_sim::{Bench, EdgeDetail, Millisecond, Scenario};
-use serialport::{SerialPort, TTYPort};
-use std::collections::VecDeque;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+use std::fs::File;
 use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -27,8 +32,62 @@ pub enum Line {
     /// Nothing.
     #[default]
     Clean,
-    /// Garbage between the frames, and every twentieth byte damaged.
+    /// Garbage before a third of the frames, and one byte in [`DAMAGED`] damaged.
     Noisy,
+}
+
+/// A noisy line damages one byte in so many.
+const DAMAGED: u64 = 397;
+
+/// The master side of a pseudo-terminal. No program that is started inherits it (it is opened close-on-exec): a port whose master
+/// some child still holds never goes away.
+#[derive(Debug)]
+pub struct Cable {
+    master: File,
+}
+
+impl Cable {
+    /// A new pseudo-terminal in raw mode and the name of its other side.
+    ///
+    /// # Errors
+    /// When the system gives none.
+    pub fn new() -> std::io::Result<(Self, String)> {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+        grantpt(&master)?;
+        unlockpt(&master)?;
+        let name = ptsname(&master, Vec::new())?.to_string_lossy().into_owned();
+        let slave = open(name.as_str(), OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
+        let mut terminal = tcgetattr(&slave)?;
+        terminal.make_raw(); // or the line would echo what the board says before a program has opened it
+        tcsetattr(&slave, OptionalActions::Now, &terminal)?;
+        fcntl_setfl(&master, fcntl_getfl(&master)? | OFlags::NONBLOCK)?;
+        Ok((Self { master: master.into() }, name))
+    }
+
+    /// Some program has the port open.
+    fn is_open(&self) -> bool {
+        let mut asked = [PollFd::new(&self.master, PollFlags::IN)];
+        poll(&mut asked, Some(&Timespec::default())).is_ok() && !asked[0].revents().contains(PollFlags::HUP)
+    }
+
+    /// What the other side has sent.
+    pub fn hear(&mut self, bytes: &mut [u8]) -> usize {
+        self.master.read(bytes).unwrap_or(0) // nothing there, or nobody: both are silence
+    }
+
+    /// Sends bytes; `false` when they were lost, as on a cable to which nobody listens.
+    pub fn say(&mut self, bytes: &[u8]) -> bool {
+        self.is_open() && self.master.write_all(bytes).is_ok()
+    }
+}
+
+/// What the board has done so far.
+#[derive(Debug, Default)]
+struct Done {
+    /// Pulses, one a millisecond.
+    pulses: Vec<PulseWidth>,
+    /// Samples that left the board whole while a program listened, by the board's time.
+    whole: Vec<Ticks>,
 }
 
 /// A board behind a port.
@@ -37,10 +96,18 @@ pub struct Desk {
     pub port: String,
     beeps: Receiver<Beep>,
     power: Arc<AtomicBool>,
-    unplug: Arc<AtomicBool>,
-    pulses: Arc<Mutex<Vec<PulseWidth>>>,
+    cable: Arc<Mutex<Option<Cable>>>,
+    done: Arc<Mutex<Done>>,
     thread: Option<JoinHandle<()>>,
     quit: Arc<AtomicBool>,
+    /// The name is a link that is ours to move.
+    link: Option<PathBuf>,
+}
+
+/// Lets `link` name the port `name`.
+fn name_it(link: &Path, name: &str) {
+    let _ = std::fs::remove_file(link);
+    std::os::unix::fs::symlink(name, link).expect("a link in the test's own folder");
 }
 
 impl Desk {
@@ -50,18 +117,29 @@ impl Desk {
     /// When the system gives no pseudo-terminal.
     #[must_use]
     pub fn new(line: Line) -> Self {
-        let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
-        let port = slave.name().expect("a name");
-        drop(slave); // its lock would keep every other program out
+        let (cable, port) = Cable::new().expect("a pseudo-terminal");
         let flag = || Arc::new(AtomicBool::new(false));
-        let (power, unplug, quit) = (flag(), flag(), flag());
-        let pulses = Arc::new(Mutex::new(Vec::new()));
+        let (power, quit) = (flag(), flag());
+        let (cable, done) = (Arc::new(Mutex::new(Some(cable))), Arc::new(Mutex::new(Done::default())));
         let (sender, beeps) = channel();
         let thread = std::thread::spawn({
-            let (power, unplug, quit, pulses) = (power.clone(), unplug.clone(), quit.clone(), pulses.clone());
-            move || play(&mut master, line, &power, &unplug, &quit, &pulses, &sender)
+            let (power, quit, cable, done) = (power.clone(), quit.clone(), cable.clone(), done.clone());
+            move || play(line, &cable, &power, &quit, &done, &sender)
         });
-        Self { port, beeps, power, unplug, pulses, thread: Some(thread), quit }
+        Self { port, beeps, power, cable, done, thread: Some(thread), quit, link: None }
+    }
+
+    /// Switches a board on whose port has a name that stays: `link`, as udev makes them.
+    ///
+    /// # Panics
+    /// When the system gives no pseudo-terminal.
+    #[must_use]
+    pub fn named(line: Line, link: &Path) -> Self {
+        let mut desk = Self::new(line);
+        name_it(link, &desk.port);
+        desk.port = link.to_string_lossy().into_owned();
+        desk.link = Some(link.to_owned());
+        desk
     }
 
     /// Connects the ESC's battery.
@@ -69,11 +147,26 @@ impl Desk {
         self.power.store(true, Ordering::Relaxed);
     }
 
-    /// Pulls the cable: the port goes away.
-    pub fn unplug(mut self) {
-        self.unplug.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
+    /// Pulls the cable: the port goes away, the board stays on.
+    ///
+    /// # Panics
+    /// When the board's thread has panicked.
+    pub fn unplug(&self) {
+        *self.cable.lock().expect("the board lives") = None;
+        if let Some(link) = &self.link {
+            let _ = std::fs::remove_file(link);
+        }
+    }
+
+    /// Puts the cable back. The port has its old name if it was made by [`Desk::named`].
+    ///
+    /// # Panics
+    /// When the system gives no pseudo-terminal, or the board's thread has panicked.
+    pub fn plug(&self) {
+        let (cable, name) = Cable::new().expect("a pseudo-terminal");
+        *self.cable.lock().expect("the board lives") = Some(cable);
+        if let Some(link) = &self.link {
+            name_it(link, &name);
         }
     }
 
@@ -89,7 +182,16 @@ impl Desk {
     /// When the board's thread has panicked.
     #[must_use]
     pub fn pulses(&self) -> Vec<PulseWidth> {
-        self.pulses.lock().expect("the board lives").clone()
+        self.done.lock().expect("the board lives").pulses.clone()
+    }
+
+    /// Times on the board's clock of the samples that left it whole while a program had the port open.
+    ///
+    /// # Panics
+    /// When the board's thread has panicked.
+    #[must_use]
+    pub fn whole(&self) -> Vec<Ticks> {
+        self.done.lock().expect("the board lives").whole.clone()
     }
 }
 
@@ -102,31 +204,46 @@ impl Drop for Desk {
     }
 }
 
+/// Paces a board's milliseconds by the clock; a machine that is late makes the board late, not hurried.
+struct Pace {
+    begun: Instant,
+}
+
+/// How far the board may lag behind the clock before its time stands still.
+const LAG: Duration = Duration::from_millis(20);
+
+impl Pace {
+    fn wait(&mut self, ms: u64) {
+        let due = Duration::from_millis(ms);
+        let passed = self.begun.elapsed();
+        if passed > due + LAG {
+            self.begun += passed - due;
+        }
+        std::thread::sleep(due.saturating_sub(passed));
+    }
+}
+
 fn play(
-    master: &mut TTYPort,
     line: Line,
+    cable: &Mutex<Option<Cable>>,
     power: &AtomicBool,
-    unplug: &AtomicBool,
     quit: &AtomicBool,
-    pulses: &Mutex<Vec<PulseWidth>>,
+    done: &Mutex<Done>,
     beeps: &Sender<Beep>,
 ) {
     let scenario = Scenario::default();
     let mut bench = Bench::new(&scenario, None, EdgeDetail::Captured);
     let mut rig = Rig::new(firmware_config(&scenario));
     let (mut commands, mut encoder, mut gathered) = (CommandLine::new(), Encoder::default(), Millisecond::default());
-    let mut out: VecDeque<u8> = VecDeque::new();
-    let mut sent = 0u64;
+    let mut spoiler = Spoiler { line, sent: 0, runs_on: false };
     let mut pulse = PulseWidth::MIN;
     let mut frame = PulseWidth::MIN;
-    let begun = Instant::now();
-    master.set_timeout(Duration::from_millis(1)).expect("a timeout");
+    let mut pace = Pace { begun: Instant::now() };
     for ms in 1u64.. {
-        if quit.load(Ordering::Relaxed) || unplug.load(Ordering::Relaxed) {
+        if quit.load(Ordering::Relaxed) {
             return;
         }
-        let due = Duration::from_millis(ms);
-        std::thread::sleep(due.saturating_sub(begun.elapsed()));
+        pace.wait(ms);
         match ms % 20 {
             0 => frame = pulse,
             2 => bench.pulse((ms - 2) * 1_000_000 + u64::from(frame.0), frame.0),
@@ -138,12 +255,9 @@ fn play(
             let _ = beeps.send(beep);
         }
         let mut bytes = [0; 512];
-        let waiting = master.bytes_to_read().unwrap_or(0);
-        if waiting > 0
-            && let Ok(n) = master.read(&mut bytes)
-        {
-            bytes[..n].iter().for_each(|b| commands.take(*b));
-        }
+        let mut plugged = cable.lock().expect("nobody panics with it");
+        let heard = plugged.as_mut().map_or(0, |cable| cable.hear(&mut bytes));
+        bytes[..heard].iter().for_each(|b| commands.take(*b));
         let (command, news) = commands.next_command();
         let now = Ticks::from_ms(ms);
         let before = rig.calibration();
@@ -159,7 +273,7 @@ fn play(
             paused: false,
         });
         pulse = outputs.pulse;
-        pulses.lock().expect("nobody panics with it").push(pulse);
+        done.lock().expect("nobody panics with it").pulses.push(pulse);
         let identify = command == Some(Command::Identify);
         let told = [
             identify.then(|| Message::Hello(rig.hello(0x08))),
@@ -170,17 +284,40 @@ fn play(
         for message in told.into_iter().flatten() {
             let mut wire = [0; MAX_WIRE];
             let used = encoder.encode(now, &message, &mut wire).expect("it fits");
-            if line == Line::Noisy && ms % 3 == 0 {
-                out.extend([0x55, 0xaa, (ms % 251) as u8, 7]); // runs into the next frame and costs it
-            }
-            out.extend(&wire[..used]);
-        }
-        while let Some(byte) = out.pop_front() {
-            sent += 1;
-            let damaged = line == Line::Noisy && sent.is_multiple_of(997);
-            if master.write_all(&[if damaged { byte ^ 0x40 } else { byte }]).is_err() {
-                out.clear(); // nobody has the port open: what is sent is lost, as on a cable
+            let (bytes, whole) = spoiler.spoil(&wire[..used], ms);
+            let arrived = plugged.as_mut().is_some_and(|cable| cable.say(&bytes));
+            if let (true, true, Message::Rig(sample)) = (arrived, whole, message) {
+                done.lock().expect("nobody panics with it").whole.push(sample.at);
             }
         }
+    }
+}
+
+/// What a bad line does.
+struct Spoiler {
+    line: Line,
+    sent: u64,
+    /// The end of the last frame was damaged: it runs into the next one.
+    runs_on: bool,
+}
+
+impl Spoiler {
+    /// The bytes of a frame as they come out of the line, and whether the frame in them is whole.
+    fn spoil(&mut self, frame: &[u8], ms: u64) -> (Vec<u8>, bool) {
+        if self.line == Line::Clean {
+            return (frame.to_vec(), true);
+        }
+        let garbage = ms.is_multiple_of(3); // runs into the frame after it and costs it
+        let mut bytes = if garbage { vec![0x55, 0xaa, (ms % 251) as u8, 7] } else { Vec::new() };
+        let mut whole = !garbage && !self.runs_on;
+        self.runs_on = false;
+        for byte in frame {
+            self.sent += 1;
+            let damaged = self.sent.is_multiple_of(DAMAGED);
+            whole &= !damaged;
+            self.runs_on = damaged;
+            bytes.push(if damaged { byte ^ 0x40 } else { *byte });
+        }
+        (bytes, whole)
     }
 }

@@ -57,7 +57,8 @@ fn last_live(run: &RigRun<Unlucky>, met: u64) -> f64 {
 fn survives(mishap: Mishap) {
     let at = run_rpm();
     let detection = mishap.detection(at, MARKS);
-    let (run, met) = fly(mishap, None, (detection.ms + REACTION_MS) as u64 + 250);
+    let trial = matches!(mishap, Mishap::LateTick { .. }).then_some(Trial::Late);
+    let (run, met) = fly(mishap, trial, (detection.ms + REACTION_MS) as u64 + 250);
     let last = last_live(&run, met);
     println!(
         "{}: last live pulse {last:.1} ms after it (detection within {:.0} ms: {})",
@@ -97,6 +98,12 @@ fn saturated_and_missing_conversions() {
 fn damaged_and_replayed_frames() {
     survives(Mishap::CorruptFrames);
     survives(Mishap::Replay);
+}
+
+/// The idle loop keeps interrupts off for 8 ms: the tick after that knows it.
+#[test]
+fn a_late_tick() {
+    survives(Mishap::LateTick { ms: 10 });
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! `quadrig log` and `quadrig rig` against a board behind a pseudo-terminal.
 
 use frame::message::Beep;
-use quadrig_tests::desk::{Desk, Line};
+use frame::units::Ticks;
+use quadrig_tests::desk::{Cable, Desk, Line};
 use quadrig_tests::{Said, call, quadrig};
 use std::io::Write;
 use std::path::Path;
@@ -21,6 +22,16 @@ fn rows(log: &Path) -> Vec<Vec<f64>> {
     rows
 }
 
+/// Every sample that left the board whole up to the last row is in the log, at its own time and nothing else is: `rows` against
+/// `whole`, both from the first on. Gives how many samples came after the last row.
+fn holds_all(rows: &[Vec<f64>], whole: &[Ticks]) -> usize {
+    let first = whole.first().expect("samples").as_s();
+    for (row, at) in rows.iter().zip(whole) {
+        assert!((row[0] - (at.as_s() - first)).abs() < 1.0e-3, "a row at {} s, a sample at {} s", row[0], at.as_s() - first);
+    }
+    whole.len().checked_sub(rows.len()).expect("no row without a sample")
+}
+
 fn start(folder: &Path, words: &[&str]) -> Child {
     let piped = |c: &mut Command| c.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     piped(Command::new(quadrig()).args(words).current_dir(folder)).expect("quadrig starts")
@@ -31,7 +42,6 @@ fn end(words: &[&str], child: Child) -> Said {
 }
 
 #[test]
-#[ignore = "the pseudo-terminal harness was mended last and this one has not been seen to pass since"]
 fn one_command_each() {
     let folder = tempfile::tempdir().expect("a folder");
     let desk = Desk::new(Line::Clean);
@@ -59,7 +69,6 @@ fn one_command_each() {
 
 /// The whole session of an operator: arm by the beeps, run a staircase, record it; and the log is one that `identify` takes.
 #[test]
-#[ignore = "the pseudo-terminal harness was mended last and this one has not been seen to pass since"]
 fn arm_run_and_record() {
     let folder = tempfile::tempdir().expect("a folder");
     let desk = Desk::new(Line::Clean);
@@ -95,7 +104,6 @@ fn arm_run_and_record() {
 
 /// A session that dies takes the motor with it: the operator's program is killed while the rotor turns.
 #[test]
-#[ignore = "the pseudo-terminal harness was mended last and this one has not been seen to pass since"]
 fn a_killed_session_stops_the_motor() {
     let folder = tempfile::tempdir().expect("a folder");
     let desk = Desk::new(Line::Clean);
@@ -119,40 +127,88 @@ fn a_killed_session_stops_the_motor() {
 }
 
 #[test]
-#[ignore = "the pseudo-terminal harness was mended last and this one has not been seen to pass since"]
 fn a_log_of_a_noisy_line_keeps_every_whole_frame() {
     let folder = tempfile::tempdir().expect("a folder");
     let desk = Desk::new(Line::Noisy);
-    let words = ["log", "--port", &desk.port, "-o", "noisy.csv", "--seconds", "2.5", "--motor", "570KV"];
+    let words = ["log", "--port", &desk.port, "-o", "noisy.csv", "--seconds", "4", "--motor", "570KV"];
     let said = call(folder.path(), &words).succeeded();
     let rows = rows(&folder.path().join("noisy.csv"));
-    println!("{}", said.err);
-    assert!((8..=26).contains(&rows.len()), "{} rows of 2.5 s on a noisy line", rows.len());
+    println!("{} rows; {}", rows.len(), said.err);
+    assert!((12..=35).contains(&rows.len()), "{} rows of 4 s on a line that spoils more than a third", rows.len());
+    assert!(holds_all(&rows, &desk.whole()) <= 3, "it ended 4 s after it began");
     let damaged = said.err.split(" damaged").next().and_then(|s| s.rsplit(' ').next()).and_then(|n| n.parse::<u32>().ok());
-    assert!(damaged.is_some_and(|n| n >= 2), "the damage is counted: {}", said.err);
+    assert!(damaged.is_some_and(|n| n >= 5), "the damage is counted: {}", said.err);
     assert!(std::fs::read_to_string(folder.path().join("noisy.csv")).expect("a log").contains("# motor = \"570KV\""));
 }
 
+/// Waits until so many samples were heard, and until the last of them has had time to be read.
+fn samples(desk: &Desk, n: usize) {
+    while desk.whole().len() < n {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(50));
+}
+
 #[test]
-#[ignore = "the pseudo-terminal harness was mended last and this one has not been seen to pass since"]
 fn an_unplugged_port_costs_nothing_that_arrived() {
     let folder = tempfile::tempdir().expect("a folder");
-    let desk = Desk::new(Line::Clean);
-    let words = ["log", "--port", &desk.port.clone(), "-o", "run.csv", "--wait", "0.3"];
+    let desk = Desk::named(Line::Clean, &folder.path().join("tty"));
+    let words = ["log", "--port", &desk.port, "-o", "run.csv", "--wait", "0.3"];
     let child = start(folder.path(), &words);
-    std::thread::sleep(Duration::from_millis(2000));
+    samples(&desk, 15);
     desk.unplug();
     let said = end(&words, child);
     assert_eq!(said.status, Some(1), "{}", said.err);
     assert!(said.err.contains("the port is gone") && said.err.contains("run.csv"), "{}", said.err);
     let rows = rows(&folder.path().join("run.csv"));
-    assert!(rows.len() >= 12, "{} rows of some 2 s", rows.len());
+    assert!(holds_all(&rows, &desk.whole()) <= 1, "{} rows", rows.len()); // the last may have been under way
     assert!(!folder.path().join("run.csv.part").exists());
+}
+
+/// The cable is pulled and comes back: the log goes on, and the board's clock tells the gap.
+#[test]
+fn a_port_that_comes_back_goes_on_in_the_same_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let desk = Desk::named(Line::Clean, &folder.path().join("tty"));
+    let words = ["log", "--port", &desk.port, "-o", "run.csv", "--wait", "20", "--seconds", "3.5"];
+    let child = start(folder.path(), &words);
+    samples(&desk, 12);
+    desk.unplug();
+    let before = desk.whole();
+    std::thread::sleep(Duration::from_millis(700));
+    desk.plug();
+    end(&words, child).succeeded();
+    let rows = rows(&folder.path().join("run.csv"));
+    let gap = rows.windows(2).position(|w| w[1][0] - w[0][0] > 0.5).expect("a gap") + 1;
+    assert!(holds_all(&rows[..gap], &before) <= 1, "{gap} rows before the gap");
+    let whole = desk.whole();
+    let from = rows[gap][0] - rows[0][0];
+    let after: Vec<f64> = whole[before.len()..].iter().map(|at| at.as_s() - whole[0].as_s()).collect();
+    assert!((after[0] - from).abs() < 1.0e-3, "the first sample after the gap at {} s, the first row at {from} s", after[0]);
+    assert!(rows[gap..].iter().zip(&after).all(|(row, at)| (row[0] - at).abs() < 1.0e-3), "and every one after it");
+    assert!(rows.len() - gap >= 10 && after.len() - (rows.len() - gap) <= 3, "{} of {}", rows.len() - gap, after.len());
+}
+
+/// The board itself loses its supply: its clock begins anew, the log's goes on.
+#[test]
+fn a_board_that_starts_again_goes_on_in_the_same_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let link = folder.path().join("tty");
+    let desk = Desk::named(Line::Clean, &link);
+    let words = ["log", "--port", &desk.port.clone(), "-o", "run.csv", "--wait", "20", "--seconds", "2.5"];
+    let child = start(folder.path(), &words);
+    samples(&desk, 12);
+    desk.unplug();
+    drop(desk);
+    let again = Desk::named(Line::Clean, &link);
+    let said = end(&words, child).succeeded();
+    assert!(said.err.contains("the board was reset"), "{}", said.err);
+    let rows = rows(&folder.path().join("run.csv"));
+    assert!(rows.len() >= 11 + 8 && again.whole().len() >= 8, "{} rows", rows.len());
 }
 
 /// A file that may not grow further behaves as a full disk does: what fits stays whole, the rest lies elsewhere, both are named.
 #[test]
-#[ignore = "the pseudo-terminal harness was mended last and this one has not been seen to pass since"]
 fn a_full_disk_costs_nothing_that_arrived() {
     let folder = tempfile::tempdir().expect("a folder");
     let desk = Desk::new(Line::Clean);
@@ -184,10 +240,10 @@ fn a_full_disk_costs_nothing_that_arrived() {
 #[test]
 fn a_silent_port_is_no_board() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (_master, slave) = serialport::TTYPort::pair().expect("a pseudo-terminal");
-    let port = serialport::SerialPort::name(&slave).expect("a name");
-    drop(slave); // its lock would keep every other program out
+    let (_cable, port) = Cable::new().expect("a pseudo-terminal");
     call(folder.path(), &["log", "--port", &port, "-o", "none.csv"]).refused(&["no calibration", "921600"]);
     assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing is left behind");
     call(folder.path(), &["rig", "--port", &port, "identify"]).refused(&["no answer"]);
+    call(folder.path(), &["rig", "--port", &port, "run", "-o", "none.csv"]).refused(&["no answer"]);
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing is left behind");
 }

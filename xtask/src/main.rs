@@ -12,6 +12,7 @@
 
 mod ahrs_bench;
 mod callgraph;
+mod emulator;
 mod image;
 mod place;
 mod run;

@@ -8,6 +8,7 @@
 //!
 //! Reference: `.ci/run` calls exactly this.
 
+use crate::emulator;
 use crate::image;
 use crate::place::{BOARD, Place};
 use crate::run::{Failure, Tally, cargo, run, tests};
@@ -135,7 +136,8 @@ fn emulated(place: &Place, tally: &mut Tally) -> Result<(), Failure> {
         return Err(Failure("tests/tests holds no emulated_*.rs".to_owned()));
     }
     const FEATURE: [&str; 5] = ["--release", "--workspace", "--features", "quadrig-tests/emulated", "--ignore-rust-version"];
-    let mut command = cargo(place, &["test"]);
+    let mut command = cargo(place, &["test", "--config", &emulator::with_flash(place)?]);
     command.args(FEATURE).args(files.iter().flat_map(|f| ["--test", f])).env("QUADRIG_FW_DIR", place.images());
+    command.env("QUADRIG_EMULATOR_KEEPS_FLASH", "1");
     tests(&mut command, tally)
 }

@@ -16,7 +16,7 @@
 //! | capture: encoder A, every fourth rising edge (prescaler 4) | PA3, AF1 | TIM2 CH4 | TIM2 interrupt |
 //! | encoder B, its level at the captured edges of A gives the direction, pull-down | PA7 | GPIO, read in the TIM2 interrupt | none |
 //! | encoder index N, rising edge, counted | PA8, AF1 | TIM1 CH1, polled each tick | none |
-//! | strain | PC0 | ADC1 IN10, first of the scan | DMA2 stream 0 channel 0, circular, 16 bit |
+//! | strain (as the four below: 1 MOhm to ground outside, so that an open wire reads 0) | PC0 | ADC1 IN10, first of the scan | DMA2 stream 0 channel 0, circular, 16 bit |
 //! | torque | PC1 | ADC1 IN11 | same |
 //! | current | PC2 | ADC1 IN12 | same |
 //! | supply voltage / 6 | PC3 | ADC1 IN13 | same |

@@ -6,6 +6,7 @@
 //! Units: ns since power-up.
 //! Reference: crate rigless 0.4 (register models section by section of RM0090).
 
+use super::flash::ProgrammableFlash;
 use super::part::{ADC_UNITS, Part};
 use rigless::{
     chip::{Timeline, uart},
@@ -145,6 +146,12 @@ impl Machine {
         Ok(Self { mcu: Part::new(chip).map_err(EmulatedError::emulator)? })
     }
 
+    /// Whether the flash of this emulator can be programmed: `cargo xtask test` builds one that can.
+    #[must_use]
+    pub fn keeps_settings(&self) -> bool {
+        ProgrammableFlash::is_there(self.mcu.bus())
+    }
+
     fn far_end(&mut self) -> Option<&mut FarEnd> {
         self.mcu.chip.usart[0].chip_mut::<FarEnd>()
     }
@@ -250,6 +257,19 @@ impl Pins<'_> {
     /// The board's own supply, mV.
     pub fn set_supply(&mut self, millivolts: u32) {
         self.machine.mcu.chip.set_supply(millivolts);
+    }
+
+    /// Lets the supply fail at the `nth` store to the settings' flash from now on: that word stays half programmed, and nothing
+    /// reaches the flash afterwards until a reset.
+    pub fn fail_at_store(&mut self, nth: u32) {
+        let flash = &mut self.machine.mcu.flash;
+        flash.fails_at = Some(flash.stores + nth);
+    }
+
+    /// The supply has failed in the midst of a store; press the reset key.
+    #[must_use]
+    pub fn has_failed(&self) -> bool {
+        self.machine.mcu.flash.failed
     }
 
     /// Presses the reset key. Levels that were driven from outside are gone afterwards: drive them again.

@@ -13,6 +13,7 @@
 
 pub mod ahrs;
 pub mod cost;
+mod flash;
 mod machine;
 pub mod operator;
 mod part;

@@ -1,11 +1,13 @@
 //! The microcontroller with faults that the emulator's own models do not have.
 //!
-//! What it is: the part as published, with two wrappers. I2C1 can be held: SDA is kept low by a chip, BUSY stays set and no start
-//! condition is taken. ADC1 draws noise at the instant of every single conversion, and can stop converting.
+//! What it is: the part as published, with three wrappers. I2C1 can be held: SDA is kept low by a chip, BUSY stays set and no start
+//! condition is taken. ADC1 draws noise at the instant of every single conversion, and can stop converting. The flash can be
+//! programmed ([`super::flash`]).
 //! What can go wrong: a reset rebuilds the part; the wrapper carries the chips over.
 //! Units: none.
 //! Reference: RM0090 sections 27.3.3 and 27.6.7 (BUSY); crate rigless 0.4, "what the model leaves out".
 
+use super::flash::ProgrammableFlash;
 use crate::noise::{Source, Stream};
 use rigless::{
     device::{Device, DeviceContext, ErasedDevice, RegisterFile, RequestChange, ResetCause},
@@ -17,6 +19,7 @@ use rigless::{
             generated::{adc1::Register as AdcRegister, i2c3::Register},
             peripherals::{
                 adc::{Adc, Channel},
+                flash::Flash,
                 i2c::I2c,
             },
         },
@@ -29,6 +32,32 @@ const RESET_CLOCK_HZ: u64 = 16_000_000;
 /// START in CR1 and BUSY in SR2.
 const START: u64 = 1 << 8;
 const BUSY: u64 = 1 << 1;
+
+/// What a wrapped model does as the one inside it.
+macro_rules! pass_on_the_rest {
+    () => {
+        fn peek(&self, register: Self::Register, file: &RegisterFile, now: VirtualNanos) -> Option<u64> {
+            Device::peek(&self.inner, register, file, now)
+        }
+
+        fn on_request(&mut self, request: RequestChange, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+            Device::on_request(&mut self.inner, request, file, context);
+        }
+
+        fn on_clock(&mut self, hz: u64, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+            Device::on_clock(&mut self.inner, hz, file, context);
+        }
+
+        fn reset(&mut self) {
+            Device::reset(&mut self.inner);
+        }
+
+        fn reset_line(&mut self, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+            Device::reset_line(&mut self.inner, file, context);
+        }
+    };
+}
+pub(super) use pass_on_the_rest;
 
 /// I2C1 that can be held.
 #[derive(Debug)]
@@ -48,10 +77,6 @@ impl Device for HeldI2c {
         value
     }
 
-    fn peek(&self, register: Register, file: &RegisterFile, now: VirtualNanos) -> Option<u64> {
-        Device::peek(&self.inner, register, file, now)
-    }
-
     fn write(&mut self, register: Register, value: u64, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if self.held && register == Register::Cr1 && value & START != 0 {
             return; // the request stays pending: the bus never looks free
@@ -63,21 +88,7 @@ impl Device for HeldI2c {
         Device::on_event(&mut self.inner, event, file, context);
     }
 
-    fn on_request(&mut self, request: RequestChange, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        Device::on_request(&mut self.inner, request, file, context);
-    }
-
-    fn on_clock(&mut self, hz: u64, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        Device::on_clock(&mut self.inner, hz, file, context);
-    }
-
-    fn reset(&mut self) {
-        Device::reset(&mut self.inner);
-    }
-
-    fn reset_line(&mut self, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        Device::reset_line(&mut self.inner, file, context);
-    }
+    pass_on_the_rest!();
 }
 
 /// Clock of the converter until the clock tree says otherwise.
@@ -145,10 +156,6 @@ impl Device for NoisyAdc {
         Device::read(&mut self.inner, register, file, context)
     }
 
-    fn peek(&self, register: AdcRegister, file: &RegisterFile, now: VirtualNanos) -> Option<u64> {
-        Device::peek(&self.inner, register, file, now)
-    }
-
     fn write(&mut self, register: AdcRegister, value: u64, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         Device::write(&mut self.inner, register, value, file, context);
     }
@@ -160,21 +167,7 @@ impl Device for NoisyAdc {
         }
     }
 
-    fn on_request(&mut self, request: RequestChange, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        Device::on_request(&mut self.inner, request, file, context);
-    }
-
-    fn on_clock(&mut self, hz: u64, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        Device::on_clock(&mut self.inner, hz, file, context);
-    }
-
-    fn reset(&mut self) {
-        Device::reset(&mut self.inner);
-    }
-
-    fn reset_line(&mut self, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        Device::reset_line(&mut self.inner, file, context);
-    }
+    pass_on_the_rest!();
 }
 
 /// The part and its wrapped models.
@@ -185,6 +178,8 @@ pub(super) struct Part {
     adc1_slot: usize,
     pub(super) i2c1: HeldI2c,
     i2c1_slot: usize,
+    pub(super) flash: ProgrammableFlash,
+    flash_slot: usize,
 }
 
 impl Part {
@@ -193,7 +188,9 @@ impl Part {
         let inner = std::mem::replace(&mut chip.i2c[0], I2c::with_clock(RESET_CLOCK_HZ));
         let adc1_slot = chip.bus().slot("ADC1")?;
         let adc1 = NoisyAdc::new(std::mem::replace(&mut chip.adc[0], Adc::with_clock(ADC_RESET_CLOCK_HZ)));
-        Ok(Self { chip, adc1, adc1_slot, i2c1: HeldI2c { inner, held: false }, i2c1_slot })
+        let flash_slot = chip.bus().slot("FLASH")?;
+        let flash = ProgrammableFlash::new(std::mem::replace(&mut chip.flash, Flash::with_clock(RESET_CLOCK_HZ)));
+        Ok(Self { chip, adc1, adc1_slot, i2c1: HeldI2c { inner, held: false }, i2c1_slot, flash, flash_slot })
     }
 }
 
@@ -213,6 +210,9 @@ impl Mcu for Part {
         if slot == self.adc1_slot {
             return (self.chip.bus_mut(), Some(&mut self.adc1));
         }
+        if slot == self.flash_slot {
+            return (self.chip.bus_mut(), Some(&mut self.flash));
+        }
         self.chip.split(slot)
     }
 
@@ -224,6 +224,7 @@ impl Mcu for Part {
         self.adc1.inner = fresh_adc;
         fresh.inherit(&mut self.i2c1.inner);
         self.i2c1.inner = fresh;
+        self.flash.restart();
     }
 
     fn poll(&mut self, now: VirtualNanos) {

@@ -2,8 +2,8 @@
 //!
 //! What it is: a [`World`] in which the image's pulses drive the bench's ESC, the bench's sensors drive the capture pins at
 //! exact instants and set the ADC codes, and an [`Operator`] talks to the board over its serial line.
-//! What can go wrong: a pin that is not switched to its timer carries nothing, here as on the board. A pulse is noticed at
-//! most 0.1 ms after its edge (the bench's step); its width is exact.
+//! What can go wrong: a pin that is not switched to its timer carries nothing, here as on the board. The first two pulses of a
+//! train are noticed at most 0.1 ms after their edge (the bench's step), the others within a microsecond; every width is exact.
 //! Units: ns since power-up of the board; counts; ns of pulse.
 //! Reference: pin table in `firmware-rig/src/board/mod.rs`, written down here again on purpose.
 
@@ -36,6 +36,8 @@ const ENCODER: u8 = 3;
 const CONVERSION_NOISE: f64 = 1.2;
 /// Board supply below the voltage detector's highest level and above the reset level, mV.
 const DIP_MV: u32 = 2600;
+/// How finely the start of a pulse is looked for, ns.
+const LOOK_NS: u64 = 1000;
 const MS: u64 = 1_000_000;
 
 /// What an operator does.
@@ -47,8 +49,17 @@ pub enum Action {
     Power(bool),
     /// Presses (or lets go) the stop key.
     StopKey(bool),
+    /// A stop by key or by command so many nanoseconds before a pulse starts: the next pulse that is far enough away.
+    StopBeforePulse {
+        /// By key; otherwise a command whose first bit leaves the host at that instant.
+        key: bool,
+        /// Time before the start of the pulse, ns.
+        ns: u64,
+    },
     /// Presses the board's reset key.
     Reset,
+    /// The board's supply fails at so many stores to its flash from now, and comes back a little later: a reset.
+    FailAtStore(u32),
     /// The run of the schedule begins: effects count their time from here.
     StartRun,
     /// Something goes wrong at the pins, and stays so.
@@ -70,6 +81,9 @@ pub enum Heard {
 pub trait Operator: Send {
     /// Called every millisecond; does something by pushing onto `actions`.
     fn millisecond(&mut self, ms: u64, heard: &[Heard], actions: &mut Vec<Action>);
+
+    /// Called every millisecond with the bytes that the board has sent since; what is pushed onto `say` goes to the board as it is.
+    fn line(&mut self, _heard: &[u8], _say: &mut Vec<u8>) {}
 }
 
 /// One pulse seen on the ESC pin.
@@ -101,6 +115,13 @@ pub struct RigWorld<O> {
     mishap: Option<Mishap>,
     backwards: bool,
     last_frame: Vec<u8>,
+    /// When the start of a pulse is looked for next, apart from the bench's steps.
+    rise_at: u64,
+    /// Pulses of this train so far.
+    train: u32,
+    /// A stop to come: when, and by key or by these bytes.
+    stop_at: Option<(u64, Option<Vec<u8>>)>,
+    stops: Vec<u64>,
 }
 
 impl<O: Operator> RigWorld<O> {
@@ -122,6 +143,10 @@ impl<O: Operator> RigWorld<O> {
             mishap: None,
             backwards: false,
             last_frame: Vec::new(),
+            rise_at: u64::MAX,
+            train: 0,
+            stop_at: None,
+            stops: Vec::new(),
         }
     }
 
@@ -133,6 +158,10 @@ impl<O: Operator> RigWorld<O> {
             (Some(train), None) => {
                 self.running_pulse = Some(train);
                 self.pulses.push(SeenPulse { at_ns: now_ns, width_ns: train.width_ns, period_ns: train.period_ns });
+                self.train += 1;
+                // the first was noticed by the bench's step: look for the next from a step before it is due
+                let early = if self.train < 3 { STEP_NS } else { LOOK_NS };
+                self.rise_at = now_ns + train.period_ns - early;
             }
             (None, Some(train)) => {
                 self.running_pulse = None;
@@ -140,6 +169,31 @@ impl<O: Operator> RigWorld<O> {
             }
             _ => {}
         }
+    }
+
+    /// Looks for the start of a pulse every microsecond from just before it is due; gives up where none comes.
+    fn await_pulse(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
+        if now_ns < self.rise_at || self.running_pulse.is_some() {
+            return;
+        }
+        let due = self.rise_at;
+        self.watch_pulse(now_ns, pins);
+        if self.running_pulse.is_none() {
+            let last = self.pulses.last().map_or(0, |p| p.at_ns + p.period_ns);
+            (self.rise_at, self.train) = if now_ns > last + STEP_NS { (u64::MAX, 0) } else { (due + LOOK_NS, self.train) };
+        }
+    }
+
+    /// A stop that was ordered for this instant.
+    fn stop_when_due(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
+        if self.stop_at.as_ref().is_none_or(|(at, _)| now_ns < *at) {
+            return;
+        }
+        match self.stop_at.take() {
+            Some((_, Some(bytes))) => pins.say(&bytes),
+            _ => pins.drive(Port::B, STOP_PIN, false),
+        }
+        self.stops.push(now_ns);
     }
 
     /// Drives every edge that is due.
@@ -154,6 +208,14 @@ impl<O: Operator> RigWorld<O> {
                 pins.drive_timer(GeneralTimer::Tim2, channel, edge.rising);
             }
         }
+    }
+
+    fn reset(&mut self, ms: u64, pins: &mut Pins<'_>) {
+        pins.press_reset();
+        self.connected = false;
+        self.strapped = false;
+        self.running_pulse = None;
+        self.resets.push(ms * MS);
     }
 
     /// Once the image has switched its capture pins to the timer, their levels reach it.
@@ -176,7 +238,10 @@ impl<O: Operator> RigWorld<O> {
                 heard.push(Heard::Board(received.message));
             }
         }
+        let mut say = Vec::new();
+        self.operator.line(&bytes[self.read.min(bytes.len())..], &mut say);
         self.read = bytes.len();
+        pins.say(&say);
         while let Some((_, beep)) = self.bench.beep() {
             heard.push(Heard::Esc(beep));
         }
@@ -208,13 +273,19 @@ impl<O: Operator> RigWorld<O> {
                 }
                 Action::Power(on) => self.bench.set_power(on),
                 Action::StopKey(pressed) => pins.drive(Port::B, STOP_PIN, !pressed),
-                Action::Reset => {
-                    pins.press_reset();
-                    self.connected = false;
-                    self.strapped = false;
-                    self.running_pulse = None;
-                    self.resets.push(ms * MS);
+                Action::StopBeforePulse { key, ns } => {
+                    let mut wire = [0; MAX_WIRE];
+                    let used = self.encoder.encode(Ticks::from_ms(ms), &Command::Stop, &mut wire).unwrap_or(0);
+                    let bytes = (!key).then(|| wire[..used].to_vec());
+                    let (last, period) = self.pulses.last().map_or((ms * MS, 20 * MS), |p| (p.at_ns, p.period_ns));
+                    let mut start = last + period;
+                    while start < ns + (ms + 1) * MS {
+                        start += period;
+                    }
+                    self.stop_at = Some((start - ns, bytes));
                 }
+                Action::FailAtStore(nth) => pins.fail_at_store(nth),
+                Action::Reset => self.reset(ms, pins),
                 Action::StartRun => self.bench.start_run(),
             }
         }
@@ -224,6 +295,8 @@ impl<O: Operator> RigWorld<O> {
 impl<O: Operator> World for RigWorld<O> {
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
         self.drive_edges(now_ns, pins);
+        self.stop_when_due(now_ns, pins);
+        self.await_pulse(now_ns, pins);
         if now_ns >= self.bench.horizon_ns() {
             self.watch_pulse(now_ns, pins);
             for (n, input) in ADC_INPUTS.iter().enumerate() {
@@ -243,12 +316,18 @@ impl<O: Operator> World for RigWorld<O> {
                 }
                 self.connect(pins);
                 self.converse(self.next_ms, pins);
+                if pins.has_failed() {
+                    self.reset(self.next_ms, pins);
+                }
                 self.truth.push((now_ns, self.bench.truth()));
                 self.next_ms += 1;
             }
             self.bench.advance_to(now_ns + STEP_NS);
         }
-        self.bench.next_edge_ns().map_or(self.bench.horizon_ns(), |edge| edge.min(self.bench.horizon_ns()))
+        let rise = if self.running_pulse.is_none() { self.rise_at } else { u64::MAX };
+        let stop = self.stop_at.as_ref().map_or(u64::MAX, |(at, _)| *at);
+        let edge = self.bench.next_edge_ns().unwrap_or(u64::MAX);
+        self.bench.horizon_ns().min(edge).min(rise).min(stop)
     }
 }
 
@@ -265,8 +344,12 @@ pub struct RigRun<O> {
     pub resets: Vec<u64>,
     /// Every pulse on the ESC pin.
     pub pulses: Vec<SeenPulse>,
+    /// When the stops of [`Action::StopBeforePulse`] came, ns.
+    pub stops: Vec<u64>,
     /// What was really there, every millisecond.
     pub truth: Vec<(u64, Truth)>,
+    /// Stores to the settings' flash.
+    pub stores: u32,
     /// The run itself.
     pub outcome: Outcome<()>,
 }
@@ -277,7 +360,7 @@ pub struct RigRun<O> {
 /// [`EmulatedError`] when there is no image or the emulator gives up.
 pub fn rig<O: Operator + 'static>(scenario: &Scenario, operator: O, milliseconds: u64) -> Result<RigRun<O>, EmulatedError> {
     let elf = firmware("firmware-rig")?;
-    let (outcome, _) = run(&elf, Machine::new()?, RigWorld::new(scenario, operator), milliseconds * MS)?;
+    let (outcome, machine) = run(&elf, Machine::new()?, RigWorld::new(scenario, operator), milliseconds * MS)?;
     let Outcome { world, telemetry, now_ns, instructions, accesses } = outcome;
     Ok(RigRun {
         operator: world.operator,
@@ -285,7 +368,9 @@ pub fn rig<O: Operator + 'static>(scenario: &Scenario, operator: O, milliseconds
         link: world.decoder.stats(),
         resets: world.resets,
         pulses: world.pulses,
+        stops: world.stops,
         truth: world.truth,
+        stores: machine.mcu.flash.stores,
         outcome: Outcome { world: (), telemetry, now_ns, instructions, accesses },
     })
 }

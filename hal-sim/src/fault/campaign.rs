@@ -11,7 +11,7 @@ use crate::bench::{Bench, Millisecond};
 use crate::native::firmware_config;
 use crate::scenario::Scenario;
 use crate::sensor::EdgeDetail;
-use firmware_rig::{AdcBlock, CommandLine, Inputs, LineNews, Rig};
+use firmware_rig::{AdcBlock, CommandLine, Config, Inputs, LineNews, Rig};
 use frame::message::{Command, Event, Message};
 use frame::rig::{FaultSet, RigState};
 use frame::units::{PulseWidth, Ticks};
@@ -21,6 +21,8 @@ use frame::wire::{Decoder, Encoder, MAX_WIRE};
 const FRAME_MS: u64 = 20;
 /// From the end of a reset to the first pulse, ms: clock start and set-up take less than 10 on the board.
 const BOOT_MS: u64 = 10;
+/// The same of a board that takes too long, ms.
+const SLOW_BOOT_MS: u64 = 60;
 /// Watchdog at the nominal oscillator, ms.
 const WATCHDOG_MS: u64 = 20;
 /// Supply gone for so long, ms.
@@ -99,13 +101,8 @@ struct Board {
 }
 
 impl Board {
-    fn new(scenario: &Scenario) -> Self {
-        Self {
-            rig: Rig::new(firmware_config(scenario)),
-            line: CommandLine::new(),
-            encoder: Encoder::default(),
-            register: Some(PulseWidth::MIN),
-        }
+    fn new(config: Config) -> Self {
+        Self { rig: Rig::new(config), line: CommandLine::new(), encoder: Encoder::default(), register: Some(PulseWidth::MIN) }
     }
 }
 
@@ -145,10 +142,27 @@ impl Host {
     }
 }
 
+/// The configuration of a plan's board; without the protection that answers the plan's mishap, where it hangs on a limit.
+fn config(plan: &Plan, scenario: &Scenario, defenceless: bool) -> Config {
+    let mut config = firmware_config(scenario);
+    let limits = &mut config.limits;
+    match plan.mishap {
+        _ if !defenceless => {}
+        Mishap::StuckLine { .. } => limits.lost_ms = u32::MAX,
+        Mishap::Saturated { .. } | Mishap::NoConversions => limits.analogue_ms = u32::MAX,
+        Mishap::Silence => limits.link_ms = u32::MAX,
+        Mishap::LateTick { .. } => limits.stall_ms = u32::MAX,
+        _ => {} // not limits: see where the tick's inputs are gathered, and the reset
+    }
+    config
+}
+
 /// The whole run.
 struct Flight {
     plan: Plan,
     scenario: Scenario,
+    /// The protection that answers the mishap is taken away.
+    defenceless: bool,
     bench: Bench,
     board: Board,
     host: Host,
@@ -162,6 +176,8 @@ struct Flight {
     pulse: Option<(u64, PulseWidth)>,
     /// The board is in reset, or hangs, until then.
     away: Option<Away>,
+    /// When the cause of the last reset was over, ms.
+    back: u64,
     skip_ticks: u64,
 }
 
@@ -173,13 +189,14 @@ enum Away {
 }
 
 impl Flight {
-    fn new(plan: Plan) -> Self {
+    fn new(plan: Plan, defenceless: bool) -> Self {
         let scenario = Scenario { seed: plan.seed, ..Scenario::default() };
         Self {
             bench: Bench::new(&scenario, None, EdgeDetail::Captured),
-            board: Board::new(&scenario),
+            board: Board::new(config(&plan, &scenario, defenceless)),
             scenario,
             plan,
+            defenceless,
             host: Host::default(),
             ms: 0,
             live: Vec::new(),
@@ -187,6 +204,7 @@ impl Flight {
             next_frame: 1,
             pulse: None,
             away: None,
+            back: 0,
             skip_ticks: 0,
         }
     }
@@ -220,7 +238,7 @@ impl Flight {
             Some(Away::Hangs { until }) if self.ms >= until => self.reset(self.ms),
             Some(Away::Resets { until }) if self.ms >= until => {
                 self.away = None;
-                self.board = Board::new(&self.scenario);
+                self.board = Board::new(config(&self.plan, &self.scenario, self.defenceless));
                 self.next_frame = self.ms;
                 self.train = None;
                 self.pulses();
@@ -247,7 +265,10 @@ impl Flight {
             Some(Mishap::NoConversions) => gathered.adc = Default::default(),
             _ => {}
         }
-        let (command, line): (Option<Command>, LineNews) = self.board.line.next_command();
+        let (command, mut line): (Option<Command>, LineNews) = self.board.line.next_command();
+        if self.defenceless {
+            line = LineNews::default();
+        }
         let now = Ticks::from_ms(self.ms);
         let outputs = self.board.rig.tick(&Inputs {
             now,
@@ -257,7 +278,7 @@ impl Flight {
             command,
             line,
             stop_input: false,
-            brown_out: mishap == Some(Mishap::SupplyDip),
+            brown_out: mishap == Some(Mishap::SupplyDip) && !self.defenceless,
             paused: false,
         });
         self.board.register = Some(outputs.pulse);
@@ -272,7 +293,9 @@ impl Flight {
 
     /// The pin goes low at once; the program starts anew a little later.
     fn reset(&mut self, from: u64) {
-        self.away = Some(Away::Resets { until: from + BOOT_MS });
+        let boot = if self.defenceless { SLOW_BOOT_MS } else { BOOT_MS };
+        self.away = Some(Away::Resets { until: from + boot });
+        self.back = from;
         self.board.register = None;
         self.train = None;
         self.pulse = None;
@@ -312,6 +335,7 @@ impl Flight {
                 self.reset(self.ms + OUTAGE_MS);
             }
             Mishap::LateTick { ms } => self.skip_ticks = u64::from(ms) - 1,
+            Mishap::Hang if self.defenceless => self.away = Some(Away::Hangs { until: u64::MAX }),
             Mishap::Hang => self.away = Some(Away::Hangs { until: self.ms + WATCHDOG_MS }),
             _ => {}
         }
@@ -340,7 +364,20 @@ impl Flight {
 /// # Errors
 /// What is wrong with the run.
 pub fn fly(plan: Plan) -> Result<Survived, Failure> {
-    let mut flight = Flight::new(plan);
+    flown(Flight::new(plan, false))
+}
+
+/// Flies a plan with a board that lacks the one protection that answers the plan's mishap (for a power loss: one that starts too
+/// slowly). It shows that [`fly`] can fail.
+///
+/// # Errors
+/// What is wrong with the run; `Ok` would mean that the campaign judges nothing.
+pub fn fly_defenceless(plan: Plan) -> Result<Survived, Failure> {
+    flown(Flight::new(plan, true))
+}
+
+fn flown(mut flight: Flight) -> Result<Survived, Failure> {
+    let plan = flight.plan;
     let mut gathered = Millisecond::default();
     let mut running_since = None;
     loop {
@@ -365,19 +402,14 @@ pub fn fly(plan: Plan) -> Result<Survived, Failure> {
     let bytes = flight.strike();
     flight.millisecond(&mut gathered, &bytes, Some(plan.mishap));
     let end = struck + (detection + REACTION_MS).ceil() as u64 + WATCH_MS;
-    let mut reset_over = None;
     while flight.ms < end {
         let bytes = flight.under_mishap();
-        let was_away = matches!(flight.away, Some(Away::Resets { .. }));
         flight.millisecond(&mut gathered, &bytes, Some(plan.mishap));
-        if was_away && flight.away.is_none() {
-            reset_over = Some(flight.ms);
-        }
     }
-    judge(&flight, struck, rpm, detection, reset_over)
+    judge(&flight, struck, rpm, detection)
 }
 
-fn judge(flight: &Flight, struck: u64, rpm: f64, detection: f64, reset_over: Option<u64>) -> Result<Survived, Failure> {
+fn judge(flight: &Flight, struck: u64, rpm: f64, detection: f64) -> Result<Survived, Failure> {
     let plan = flight.plan;
     let last_live_ms = flight.live.last().map_or(0, |at| at.saturating_sub(struck)) as f64;
     let late_ms = last_live_ms - detection - REACTION_MS;
@@ -396,7 +428,7 @@ fn judge(flight: &Flight, struck: u64, rpm: f64, detection: f64, reset_over: Opt
             return Err(Failure::NotLatched { plan, state });
         }
         None => {
-            let after_ms = reset_over.zip(flight.train).map(|(over, train)| train + BOOT_MS - over.min(train));
+            let after_ms = flight.train.map(|train| train.saturating_sub(flight.back));
             if after_ms.is_none_or(|ms| ms > REACTION_MS as u64) {
                 return Err(Failure::LateTrain { plan, after_ms });
             }
