@@ -318,6 +318,10 @@ impl CaptureBank {
     #[must_use]
     pub fn lost(&self, now: Ticks) -> u8 {
         let Some(since) = self.turning_since else { return 0 };
+        // nobody is silent for longer than the margin alone: the usual case, and the cheap one
+        if self.channels.iter().all(|c| now.since(c.last.max(since)).0 <= c.times.lost_margin.0) {
+            return 0;
+        }
         // a rotor that runs down is slower than the last period says: what has passed since the last edge counts too
         let told = self.channels.each_ref().map(|c| {
             let revolution = c.revolution().filter(|_| c.is_turning(now))?;

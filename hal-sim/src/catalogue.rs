@@ -123,7 +123,7 @@ pub fn powerplant_figures() -> Vec<Figure> {
     let w = full.rpm * core::f64::consts::TAU / 60.0;
     say("k_T of 11x4.7".into(), 1.56e-5, full.thrust_n / (w * w), "N.s^2", None);
     let slope = (duty(8.46).thrust_n - duty(8.26).thrust_n) / 0.2;
-    let climb = "belongs to the climb's fitted Cd S; a parabola through 0, hover and full throttle has 1.47";
+    let climb = "contradicts thrust, k_T and KV: with each 5 % off they give 1.444 at least (docs/scenario.md)";
     say("dT/dduty at hover".into(), 1.36, slope, "N/%", Some(climb));
 
     let grams = |s: PlantState| s.thrust_n * 1000.0 / 9.806_65;

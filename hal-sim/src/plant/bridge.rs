@@ -182,13 +182,15 @@ impl BridgeState {
         }
         // gauges, amplifier and divider alone
         self.lift_n = lift_n.last().copied().unwrap_or(self.lift_n);
-        let mut output_v = self.output_v;
         for ((lift, zero), temperature) in lift_n.iter_mut().zip(zero_n).zip(temperature_c) {
             let shift = zero + b.zero_n_per_k * (temperature - b.zero_temperature_c);
-            let wanted = (self.empty_v - b.volt_per_newton * (*lift * gain + shift)).clamp(b.rails_v.0, b.rails_v.1);
-            let error = wanted - output_v;
-            output_v += error * if error > 0.0 { self.rise } else { self.fall };
-            *lift = b.divider * output_v;
+            *lift = (self.empty_v - b.volt_per_newton * (*lift * gain + shift)).clamp(b.rails_v.0, b.rails_v.1);
+        }
+        let mut output_v = self.output_v;
+        for wanted in lift_n.iter_mut() {
+            let error = *wanted - output_v;
+            output_v += error * if self.rise == self.fall || error > 0.0 { self.rise } else { self.fall };
+            *wanted = b.divider * output_v;
         }
         self.output_v = output_v;
         self.pin_v = lift_n.last().copied().unwrap_or(self.pin_v);

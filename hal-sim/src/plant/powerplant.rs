@@ -306,6 +306,23 @@ impl RigPlant {
         }
     }
 
+    /// The nine steps that are left of a millisecond at a steady duty.
+    fn rest_of_block<const DRAGS: bool>(&mut self, dt_s: f64, duty: f64, out: &mut PlantBlock) {
+        let shaft = self.shaft();
+        let (mut w, mut motor_a, mut supply_a, mut charge_as) = (self.speed, self.motor_a, self.supply_a, self.charge_as);
+        for i in 1..STEPS_PER_MS {
+            let (next, acceleration) = shaft.turn::<DRAGS>(w, dt_s);
+            w = next;
+            motor_a = shaft.motor_current(next);
+            supply_a = duty * motor_a + ESC_IDLE_A;
+            charge_as += supply_a * dt_s;
+            self.elapsed_s += dt_s;
+            out.rpm[i] = next * RPM_PER_RAD_S;
+            (out.thrust_n[i], out.torque_nm[i]) = shaft.reaction(next, acceleration);
+        }
+        (self.speed, self.motor_a, self.supply_a, self.charge_as) = (w, motor_a, supply_a, charge_as);
+    }
+
     /// State of the outside at the speed, torque and currents of now.
     fn state(&self, thrust_n: f64, torque_nm: f64) -> PlantState {
         PlantState {
@@ -349,24 +366,26 @@ impl Shaft {
         self.air_k * w * w
     }
 
-    /// Angular acceleration, rad/s^2; friction holds a resting rotor.
+    /// Angular acceleration, rad/s^2; friction holds a resting rotor. `DRAGS`: something brakes in proportion to the speed.
     #[inline]
-    fn acceleration(&self, w: f64) -> f64 {
-        let driven = self.kt * self.motor_current(w) - self.holding_nm;
-        let free = if self.drag_nms == 0.0 { driven } else { driven - self.drag_nms * w };
-        let net = free - self.air_nm(w);
-        if w <= 0.0 && net < 0.0 { 0.0 } else { net * self.per_inertia }
+    fn acceleration<const DRAGS: bool>(&self, w: f64) -> f64 {
+        let mut net = self.kt * self.motor_current(w) - self.holding_nm;
+        if DRAGS {
+            net -= self.drag_nms * w;
+        }
+        net -= self.air_nm(w);
+        if w > 0.0 || net >= 0.0 { net * self.per_inertia } else { zero() }
     }
 
     /// Speed after a step and the acceleration in it: Heun's rule, two evaluations, second order; the rotor's own time constant is
     /// some 40 ms. Each step waits for the one before, so this chain is the run's longest.
     #[inline]
-    fn turn(&self, w: f64, dt_s: f64) -> (f64, f64) {
-        let first = self.acceleration(w);
-        let second = self.acceleration(or_zero(w + first * dt_s));
+    fn turn<const DRAGS: bool>(&self, w: f64, dt_s: f64) -> (f64, f64) {
+        let first = self.acceleration::<DRAGS>(w);
+        let second = self.acceleration::<DRAGS>(or_zero(w + first * dt_s));
         let twice = first + second;
         let next = or_zero(w + twice * (0.5 * dt_s)); // halving is exact
-        (next, if next > 0.0 { 0.5 * twice } else { -w / dt_s })
+        (next, if next > 0.0 { 0.5 * twice } else { stopped(w, dt_s) })
     }
 
     /// Lift and torque on the arm at `w` and its `acceleration`.
@@ -409,7 +428,7 @@ impl Powerplant for RigPlant {
         self.elapsed_s += dt_s;
 
         let shaft = self.shaft();
-        let (next, acceleration) = shaft.turn(self.speed, dt_s);
+        let (next, acceleration) = shaft.turn::<true>(self.speed, dt_s);
         self.speed = next;
         self.motor_a = shaft.motor_current(next);
         self.supply_a = duty * self.motor_a + ESC_IDLE_A;
@@ -431,19 +450,11 @@ impl Powerplant for RigPlant {
         if duty != self.drive.duty {
             self.drive = self.driving(duty);
         }
-        let shaft = self.shaft();
-        let (mut w, mut motor_a, mut supply_a, mut charge_as) = (self.speed, self.motor_a, self.supply_a, self.charge_as);
-        for i in 1..STEPS_PER_MS {
-            let (next, acceleration) = shaft.turn(w, dt_s);
-            w = next;
-            motor_a = shaft.motor_current(next);
-            supply_a = duty * motor_a + ESC_IDLE_A;
-            charge_as += supply_a * dt_s;
-            self.elapsed_s += dt_s;
-            out.rpm[i] = next * RPM_PER_RAD_S;
-            (out.thrust_n[i], out.torque_nm[i]) = shaft.reaction(next, acceleration);
+        if self.levers.drag_nms == 0.0 {
+            self.rest_of_block::<false>(dt_s, duty, out);
+        } else {
+            self.rest_of_block::<true>(dt_s, duty, out);
         }
-        (self.speed, self.motor_a, self.supply_a, self.charge_as) = (w, motor_a, supply_a, charge_as);
         self.steps += STEPS_PER_MS as u32 - 1;
         out.temp_c = [self.thermal.temperature_c; STEPS_PER_MS];
         out.last = self.state(out.thrust_n[STEPS_PER_MS - 1], out.torque_nm[STEPS_PER_MS - 1]);
@@ -460,6 +471,13 @@ fn or_zero(x: f64) -> f64 {
 #[inline(never)]
 fn zero() -> f64 {
     0.0
+}
+
+/// Deceleration that stops a rotor of speed `w` within a step.
+#[cold]
+#[inline(never)]
+fn stopped(w: f64, dt_s: f64) -> f64 {
+    -w / dt_s
 }
 
 #[cfg(test)]

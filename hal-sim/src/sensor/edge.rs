@@ -347,6 +347,9 @@ impl Tachometers {
                         edge(i as u8, rising, step, share_of_step(at, start, end));
                     }
                 }
+                if !follows && channel.idle(last - behind) {
+                    break;
+                }
             }
             if follows {
                 self.behind = behind;
