@@ -6,10 +6,12 @@
 //! Units: rad/s, m/s^2, uT in; degrees and a unit quaternion out.
 //! Reference: specification `formats.md`, "Attitude log".
 
+mod calibration;
 pub(crate) mod imu_log;
 mod text;
 
 use crate::Failure;
+use dcm::calibration::Calibration;
 use dcm::{Classic, ClassicConfig, Config, Dcm, Earth, Fresh, Mat3, Measurement, euler_of, quaternion_of};
 use ident::log::write_whole;
 use imu_log::{ImuLog, Row};
@@ -28,6 +30,9 @@ pub(crate) struct Args {
     /// The filter: the board's, or the thesis' with tuned or Razor gains.
     #[arg(long, value_enum, default_value_t = Preset::Default)]
     preset: Preset,
+    /// Corrects every reading first, with a file that `quadrig calibrate` wrote.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Magnetic declination, degrees, east positive.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     declination: f32,
@@ -82,6 +87,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if !(-180.0..=180.0).contains(&args.declination) {
         return Err(format!("--declination {}: expected degrees from -180 to 180", args.declination).into());
     }
+    let calibration = match &args.calibration {
+        Some(path) => calibration::read(path)?,
+        None => Calibration::default(),
+    };
     let log = ImuLog::read(&args.input)?;
     let bar = crate::progress::Bar::new("attitude", quiet || log.rows.len() < 1_000_000);
     let earth = if args.earth == Axes::Enu { Earth::Enu } else { Earth::Ned };
@@ -91,7 +100,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut fresh = Fresh::default();
     for (n, (row, dt)) in log.steps().enumerate() {
         let mag = fresh.take(dt, row.mag);
-        let attitude = filter.step(dt, &Measurement { gyro: row.gyro, accel: row.accel, mag });
+        let measured = Measurement {
+            gyro: row.gyro.map(|w| calibration.gyro(&w)),
+            accel: row.accel.map(|f| calibration.accel(&f)),
+            mag: mag.map(|m| calibration.mag(&m)),
+        };
+        let attitude = filter.step(dt, &measured);
         line(&mut out, log.time_text(n), attitude.map(|m| earth.from_ned(&m)));
         if n % 65_536 == 0 {
             bar.set(n as f64 / log.rows.len() as f64);

@@ -82,6 +82,40 @@ fn known_errors_come_back_from_a_recording() {
     }
 }
 
+/// With +x up the vertical lies along -x of the body: how far the attitude is off that, degrees, at the end of the three seconds.
+fn off_the_vertical(out: &str) -> f64 {
+    let q: Vec<f64> = out.lines().nth(290).unwrap().split(',').map(|w| w.parse().unwrap()).collect();
+    let (y, z) = (2.0 * (q[3] * q[4] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]));
+    let x = 2.0 * (q[2] * q[4] - q[1] * q[3]);
+    y.hypot(z).atan2(-x).to_degrees()
+}
+
+#[test]
+fn a_calibration_mends_the_attitude() {
+    let bench = tempfile::tempdir().unwrap();
+    std::fs::write(bench.path().join("rec.csv"), recording(6)).unwrap();
+    assert!(call(&["calibrate", "gyro", "accel", "mag", "-i", "rec.csv", "-o", "cal.toml"], bench.path()).status.success());
+    assert!(call(&["ahrs", "rec.csv", "raw.csv"], bench.path()).status.success());
+    let done = call(&["ahrs", "rec.csv", "right.csv", "--calibration", "cal.toml"], bench.path());
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let [raw, right] =
+        ["raw.csv", "right.csv"].map(|f| off_the_vertical(&std::fs::read_to_string(bench.path().join(f)).unwrap()));
+    // offsets of -0.3 and 0.5 m/s^2 across the vertical are 3.3 degrees
+    assert!((2.5..4.0).contains(&raw) && right < 0.1, "{raw} {right}");
+    let done = call(&["ahrs", "rec.csv", "no.csv", "--calibration", "rec.csv"], bench.path());
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.code() == Some(1) && said.contains("rec.csv: not a calibration"), "{said}");
+    assert!(!bench.path().join("no.csv").exists());
+}
+
+/// Processor time of finished children so far, ms (to 10 ms); `None` where the system does not say.
+fn children_ms() -> Option<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let fields: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
+    let ticks = |k: usize| fields.get(k)?.parse::<f64>().ok();
+    Some(10.0 * (ticks(13)? + ticks(14)?))
+}
+
 #[test]
 fn what_a_recording_does_not_show_is_refused_and_nothing_written() {
     let bench = tempfile::tempdir().unwrap();
@@ -104,10 +138,16 @@ fn attitude_of_sixty_thousand_rows_and_refusals() {
         let _ = writeln!(text, "{:.4},0.001,0,0,0,0,9.81,10,20,-40", f64::from(n) * 0.0035);
     }
     std::fs::write(bench.path().join("in.csv"), text).unwrap();
-    let start = std::time::Instant::now();
-    let done = call(&["ahrs", "in.csv", "out.csv", "--earth", "enu"], bench.path());
-    println!("60 000 rows in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
-    assert!(done.status.success());
+    // 100 ms are the aim; processor time swells where others fight for the caches, and other tests have children too: the least of a
+    // few, with half as much again
+    let mut least = f64::INFINITY;
+    for _ in 0..5 {
+        let before = children_ms();
+        assert!(call(&["ahrs", "in.csv", "out.csv", "--earth", "enu"], bench.path()).status.success());
+        least = before.zip(children_ms()).map_or(least, |(a, b)| least.min(b - a));
+    }
+    println!("60 000 rows in {least:.0} ms of processor time");
+    assert!(cfg!(debug_assertions) || least <= 150.0 || least.is_infinite(), "{least:.0} ms");
     let out = std::fs::read_to_string(bench.path().join("out.csv")).unwrap();
     let mut lines = out.lines();
     assert_eq!(lines.next(), Some("t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg"));
