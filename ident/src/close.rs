@@ -6,11 +6,12 @@
 //! Reference: specification `closing-the-loop.md`, steps 1 to 8.
 
 use crate::context::{Context, DIFFERENCES, unit_of};
-use crate::diagnose::{Diagnosis, diagnose};
+use crate::diagnose::Diagnosis;
 use crate::effects::Estimate;
 use crate::heldout;
 use crate::hypothesis::{Declared, Fit};
 use crate::log::Log;
+use crate::long::diagnose_any;
 use crate::model::Model;
 use crate::residual::whiteness;
 use crate::verdict::{Alternative, BeforeAfter, Channel, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict};
@@ -56,21 +57,25 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > 8) {
         return Err(refused());
     }
-    let diagnosis = diagnose(&context, declared, progress).ok_or_else(refused)?;
+    let found = diagnose_any(log, &context, declared, progress).ok_or_else(refused)?;
+    let diagnosis = found.diagnosis;
+    let fit = &diagnosis.best.fit;
+    let estimates =
+        found.estimates.unwrap_or_else(|| (0..fit.placed.len()).map(|k| fit.profiled_estimates(&context, declared, k)).collect());
     let before_model = Model::from_fit(&context, log, declared, &diagnosis.declared);
-    let after_model = Model::from_fit(&context, log, declared, &diagnosis.best.fit);
+    let after_model = Model::of_estimates(&context, log, declared, fit, estimates.clone());
     let mut verdict = Verdict {
         format: FORMAT,
         run: log.name.clone(),
         verdict: kind(&diagnosis),
         channels: channels(&context, declared, &diagnosis),
-        effects: entries(&context, declared, &diagnosis),
+        effects: entries(&context, &diagnosis, estimates),
         alternatives: diagnosis.rivals.iter().map(|r| Alternative { ids: r.ids.clone(), probability: r.probability }).collect(),
         next_experiment: None,
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
     };
     if verdict.verdict == Kind::Ambiguous {
-        verdict.next_experiment = crate::experiment::next(&context, &after_model, &diagnosis);
+        verdict.next_experiment = crate::experiment::next(found.searched.as_ref().unwrap_or(&context), &after_model, &diagnosis);
     }
     Ok(Closed { context, diagnosis, declared: before_model, model: after_model, verdict })
 }
@@ -94,9 +99,12 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
             .zip(held)
             .zip(&context.targets)
             .map(|((r, held), target)| {
-                let t: Vec<f64> = target.rows.iter().map(|i| context.t[*i]).collect();
+                let judged = |k: &usize| target.claims(target.rows[*k]);
+                let r: Vec<f64> = (0..r.len()).filter(judged).map(|k| r[k]).collect();
+                let t: Vec<f64> = target.rows.iter().filter(|i| target.claims(**i)).map(|i| context.t[*i]).collect();
                 let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
-                Figures { rms, heldout_rms: if held.rms.is_finite() { held.rms } else { rms }, whiteness_p: whiteness(&t, r) }
+                let heldout_rms = if held.claimed.is_finite() { held.claimed } else { rms };
+                Figures { rms, heldout_rms, whiteness_p: whiteness(&t, &r) }
             })
             .collect()
     };
@@ -113,16 +121,17 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
 }
 
 /// One entry an effect, the one that helps most first.
-fn entries(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Vec<EffectEntry> {
+fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> Vec<EffectEntry> {
     let mut out: Vec<EffectEntry> = d
         .best
         .fit
         .placed
         .iter()
+        .zip(estimates)
         .enumerate()
-        .map(|(k, p)| {
+        .map(|(k, (p, estimates))| {
             let about = p.effect.about();
-            let estimates = p.effect.report(context, &p.instance, d.best.fit.profiled_estimates(context, declared, k));
+            let estimates = p.effect.report(context, &p.instance, estimates);
             let (first, reduction) = quoted(context, d, k);
             let mut channels: Vec<String> =
                 p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();
@@ -182,8 +191,9 @@ fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
     let error = |model: &Model, name: &'static str| -> Option<f64> {
         let prediction = model.predict(&context, name)?;
         let target = &context.targets[context.target(name)?];
-        let sum: f64 = target.rows.iter().zip(&target.y).map(|(i, y)| (y - prediction[*i]).powi(2)).sum();
-        Some((sum / target.rows.len() as f64).sqrt())
+        let judged = target.rows.iter().zip(&target.y).filter(|(i, _)| target.claims(**i));
+        let (sum, n) = judged.fold((0.0, 0.0), |(s, n), (i, y)| (s + (y - prediction[*i]).powi(2), n + 1.0));
+        Some((sum / n).sqrt())
     };
     let channels = context
         .targets

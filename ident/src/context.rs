@@ -6,6 +6,7 @@
 //! Units: SI, rev/min, us; regressors of the polynomials are rpm/1000 and (pulse - 1000)/1000.
 //! Reference: specification `formats.md` (primary relations), `closing-the-loop.md` step 2.
 
+use crate::effects::glitch_rows;
 use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
 use crate::solve::Normal;
@@ -113,6 +114,8 @@ pub struct Target {
     pub levelled: Vec<f64>,
     /// For each sample its variance in the likelihood of the scatter.
     pub floored: Vec<f64>,
+    /// Rows about which no prediction makes a claim, in order: the channel's glitches. The log alone decides which.
+    pub unclaimed: Vec<usize>,
 }
 
 /// Share of the mean variance in the weights of the least squares: a stretch with little noise must not outvote the others
@@ -126,7 +129,21 @@ impl Target {
         let speed = |i: &usize| if context.rpm.is_empty() { 0.0 } else { context.rpm[*i] };
         let levelled = rows.iter().map(|i| noise.weight_variance(speed(i), LEVELLED)).collect();
         let floored = rows.iter().map(|i| noise.weight_variance(speed(i), FLOORED)).collect();
-        Self { name, relation, rows, y, noise, weight: 1.0, levelled, floored }
+        Self { name, relation, rows, y, noise, weight: 1.0, levelled, floored, unclaimed: Vec::new() }
+    }
+
+    /// Whether predictions of a row are to be judged.
+    #[must_use]
+    pub fn claims(&self, row: usize) -> bool {
+        self.unclaimed.binary_search(&row).is_err()
+    }
+
+    /// Takes the noise of single rows for samples that are means of `sizes[row]` rows each.
+    pub(crate) fn weigh(&mut self, noise: Noise, rpm: &[f64], sizes: &[f64]) {
+        let variance = |i: &usize, share| noise.weight_variance(rpm.get(*i).copied().unwrap_or(0.0), share) / sizes[*i];
+        self.levelled = self.rows.iter().map(|i| variance(i, LEVELLED)).collect();
+        self.floored = self.rows.iter().map(|i| variance(i, FLOORED)).collect();
+        self.noise = noise;
     }
 }
 
@@ -213,6 +230,8 @@ impl Context {
             .map(|c| (c.name.clone(), bridge(&log.t, &c.values)))
             .collect();
         context.targets = targets(log, &context);
+        let unclaimed: Vec<Vec<usize>> = context.targets.iter().map(|t| glitch_rows::unclaimed(&context, t)).collect();
+        context.targets.iter_mut().zip(unclaimed).for_each(|(target, rows)| target.unclaimed = rows);
         context
     }
 

@@ -190,9 +190,9 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
 }
 
 /// What a scan of one instance gave; it stays valid until an effect is added on one of its channels.
-struct Scanned {
-    effect: &'static dyn Effect,
-    instance: Instance,
+pub(crate) struct Scanned {
+    pub(crate) effect: &'static dyn Effect,
+    pub(crate) instance: Instance,
     found: Option<(Vec<f64>, f64)>,
 }
 
@@ -200,7 +200,7 @@ struct Scanned {
 pub(crate) const FEWEST_SAMPLES: (usize, usize) = (30, 10);
 
 /// Every instance of every effect that the log could hold.
-fn offers(context: &Context) -> Vec<Scanned> {
+pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
     let enough = |e: &dyn Effect, instance: &Instance| {
         let fewest = if e.shapes(context, instance).is_empty() { FEWEST_SAMPLES.1 } else { FEWEST_SAMPLES.0 };
         context.targets.iter().filter(|t| instance.touches(t.name)).all(|t| t.rows.len() >= fewest)
@@ -213,7 +213,7 @@ fn offers(context: &Context) -> Vec<Scanned> {
 }
 
 /// Whether an instance may join: not twice the same effect on a channel, not too many effects on one channel.
-fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
+pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
     instance.channels.iter().all(|c| {
         let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
         there.len() < MOST_ON_A_CHANNEL && there.iter().all(|p| p.effect.id() != effect.id())
@@ -369,7 +369,7 @@ fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
     0.5 * (shapes.len() + amplitudes) as f64 * n.max(2.0).ln() + (grid as f64).ln().max(0.0) * 0.5
 }
 
-fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
+pub(crate) fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
     fit.placed.iter().enumerate().all(|(k, p)| {
         let inside = p.effect.shapes(context, &p.instance).iter().zip(&p.shape).all(|(s, v)| {
             let margin = 1e-3 * (s.range.1 - s.range.0);
@@ -380,7 +380,7 @@ fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
 }
 
 /// The newest effect must remove some of the held-out error on one of its channels, and spoil none.
-fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[Held], before: &[Held]) -> bool {
+pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[Held], before: &[Held]) -> bool {
     let Some(newest) = candidate.fit.placed.last() else { return false };
     let mut helps = false;
     // a resonance that one level alone has met is not predicted by the others: when that level is left out, the height of its
@@ -431,7 +431,7 @@ fn is_idle(context: &Context, placed: &Placed, errors: &[Held], without: &[Held]
     most < 0.5 * NEEDED_REDUCTION && !placed.effect.scatters()
 }
 
-fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, k: usize, start: &Fit) -> Option<Fit> {
+pub(crate) fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, k: usize, start: &Fit) -> Option<Fit> {
     let mut placed = fit_all.placed.clone();
     placed.remove(k);
     let placed = refine(context, declared, &placed, Rows::All, 60);

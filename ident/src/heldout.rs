@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md` (`heldout_rms`); blocked cross-validation, Roberts et al. 2017, Ecography 40:913.
 
 use crate::context::Context;
-use crate::hypothesis::{Declared, Fit, Placed, Rows, design, fit_target};
+use crate::hypothesis::{Declared, Designs, Fit, Placed, Rows, fit_target};
 use crate::search::{connected, refine, refine_newest};
 
 /// For each fold the rows that are left out.
@@ -58,6 +58,8 @@ pub struct Held {
     pub rms: f64,
     /// An error that a few grossly wrong rows cannot decide: the noise floor times sqrt(exp(mean ln(1 + (r / floor)^2)) - 1).
     pub typical: f64,
+    /// Root mean square over the rows about which a claim is made: the figure of a verdict.
+    pub claimed: f64,
 }
 
 impl Held {
@@ -75,7 +77,7 @@ pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec
     let all = vec![true; context.targets.len()];
     pooled(context, declared, folds, &all, &|keep| refine(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS))
         .into_iter()
-        .map(|e| e.unwrap_or(Held { rms: f64::NAN, typical: f64::NAN }))
+        .map(|e| e.unwrap_or(Held { rms: f64::NAN, typical: f64::NAN, claimed: f64::NAN }))
         .collect()
 }
 
@@ -102,22 +104,24 @@ pub fn errors_after_newest(
 }
 
 /// Evaluations that each fold may spend on its shapes, starting from those of all rows.
-const EVALUATIONS: usize = 40;
+pub(crate) const EVALUATIONS: usize = 40;
 
-fn pooled(
+/// Held-out errors of the wanted targets, the effects of each fold as `refined` gives them for the rows that it may see.
+pub(crate) fn pooled(
     context: &Context,
     declared: Declared<'_>,
     folds: &[Vec<bool>],
     wanted: &[bool],
     refined: &dyn Fn(&[bool]) -> Vec<Placed>,
 ) -> Vec<Option<Held>> {
-    let mut sums = vec![(0.0, 0.0, 0usize); context.targets.len()];
+    let mut sums = vec![(0.0, 0.0, 0usize, 0.0, 0usize); context.targets.len()];
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
         let placed = refined(&keep);
+        let mut designs = Designs::new(context, declared, &placed);
         for ((target, sum), _) in context.targets.iter().zip(&mut sums).zip(wanted).filter(|(_, w)| **w) {
-            let design = design(context, declared, &placed, target);
-            let Some(fitted) = fit_target(target, &design, Rows::Where(&keep)) else { continue };
+            let design = designs.of(target);
+            let Some(fitted) = fit_target(target, design, Rows::Where(&keep)) else { continue };
             let prediction = design.predict(&fitted.coefficients, context.len());
             for (row, y) in target.rows.iter().zip(&target.y) {
                 if out[*row] {
@@ -125,15 +129,23 @@ fn pooled(
                     sum.0 += square;
                     sum.1 += (square / target.noise.rms.powi(2)).ln_1p();
                     sum.2 += 1;
+                    if target.claims(*row) {
+                        sum.3 += square;
+                        sum.4 += 1;
+                    }
                 }
             }
         }
     }
     sums.iter()
         .zip(&context.targets)
-        .map(|((squares, logs, n), target)| {
+        .map(|((squares, logs, n, claimed, k), target)| {
             let mean = |sum: f64| sum / *n as f64;
-            (*n > 0).then(|| Held { rms: mean(*squares).sqrt(), typical: target.noise.rms * mean(*logs).exp_m1().sqrt() })
+            (*n > 0).then(|| Held {
+                rms: mean(*squares).sqrt(),
+                typical: target.noise.rms * mean(*logs).exp_m1().sqrt(),
+                claimed: (claimed / *k as f64).sqrt(),
+            })
         })
         .collect()
 }
@@ -141,12 +153,13 @@ fn pooled(
 /// Residual of each target on its own rows.
 #[must_use]
 pub fn residuals(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<Vec<f64>> {
+    let mut designs = Designs::new(context, declared, &fit.placed);
     context
         .targets
         .iter()
         .zip(&fit.targets)
         .map(|(target, f)| {
-            let prediction = design(context, declared, &fit.placed, target).predict(&f.coefficients, context.len());
+            let prediction = designs.of(target).predict(&f.coefficients, context.len());
             target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).collect()
         })
         .collect()

@@ -102,6 +102,35 @@ pub fn design(context: &Context, declared: Declared<'_>, placed: &[Placed], targ
     design
 }
 
+/// Designs of one hypothesis, target after target: the speed channels see one rotor, and where the same effects touch them their
+/// design is made once.
+pub(crate) struct Designs<'a> {
+    context: &'a Context,
+    declared: Declared<'a>,
+    placed: &'a [Placed],
+    last: Option<(Vec<bool>, TargetDesign)>,
+}
+
+impl<'a> Designs<'a> {
+    pub(crate) fn new(context: &'a Context, declared: Declared<'a>, placed: &'a [Placed]) -> Self {
+        Self { context, declared, placed, last: None }
+    }
+
+    /// The design of a target.
+    pub(crate) fn of(&mut self, target: &Target) -> &TargetDesign {
+        let touching: Vec<bool> = self.placed.iter().map(|p| p.instance.touches(target.name)).collect();
+        let alike = |last: &(Vec<bool>, TargetDesign)| {
+            last.1.relation == Relation::SpeedFromPulse
+                && target.relation == Relation::SpeedFromPulse
+                && self.declared.model.is_none()
+                && last.0 == touching
+        };
+        let kept = self.last.take().filter(alike).map(|(_, design)| TargetDesign { name: target.name, ..design });
+        let made = kept.unwrap_or_else(|| design(self.context, self.declared, self.placed, target));
+        &self.last.insert((touching, made)).1
+    }
+}
+
 /// Which rows may teach: all, or those that a mask leaves in.
 #[derive(Debug, Clone, Copy)]
 pub enum Rows<'a> {
@@ -235,11 +264,12 @@ pub(crate) fn effective_share(residual: &[f64]) -> f64 {
 #[must_use]
 pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: Option<&Fit>, rows: Rows<'_>) -> Option<Fit> {
     let mut targets = Vec::with_capacity(context.targets.len());
+    let mut designs = Designs::new(context, declared, placed);
     for (i, target) in context.targets.iter().enumerate() {
         let touched = placed.iter().any(|p| p.instance.touches(target.name));
         match rest {
             Some(rest) if !touched => targets.push(rest.targets[i].clone()),
-            _ => targets.push(fit_target(target, &design(context, declared, placed, target), rows)?),
+            _ => targets.push(fit_target(target, designs.of(target), rows)?),
         }
     }
     Some(Fit { placed: placed.to_vec(), targets })
@@ -255,9 +285,10 @@ pub(crate) fn touched_loglik(
     scattering: bool,
 ) -> f64 {
     let mut sum = 0.0;
+    let mut designs = Designs::new(context, declared, placed);
     for target in context.targets.iter().filter(|t| moving.contains(&t.name)) {
         let view = scattering && target.relation == Relation::Thrust;
-        match solve_target(target, &design(context, declared, placed, target), rows, view) {
+        match solve_target(target, designs.of(target), rows, view) {
             Some((_, loglik, _)) => sum += loglik.of(view),
             None => return f64::NEG_INFINITY,
         }
@@ -281,9 +312,13 @@ impl Fit {
     }
 
     fn estimates_with(&self, context: &Context, declared: Declared<'_>, position: usize, profiled: bool) -> Vec<Estimate> {
+        self.estimates_given(context, position, self.shape_errors(context, declared, position, profiled))
+    }
+
+    /// The same with the standard errors of the shapes known.
+    pub(crate) fn estimates_given(&self, context: &Context, position: usize, errors: Vec<f64>) -> Vec<Estimate> {
         let p = &self.placed[position];
         let mut out = Vec::new();
-        let errors = self.shape_errors(context, declared, position, profiled);
         for ((shape, value), se) in p.effect.shapes(context, &p.instance).iter().zip(&p.shape).zip(errors) {
             out.push(Estimate { name: shape.name.into(), unit: shape.unit.into(), value: *value, se });
         }
@@ -306,7 +341,7 @@ impl Fit {
     }
 
     /// Standard errors of the shape parameters of one effect.
-    fn shape_errors(&self, context: &Context, declared: Declared<'_>, position: usize, profiled: bool) -> Vec<f64> {
+    pub(crate) fn shape_errors(&self, context: &Context, declared: Declared<'_>, position: usize, profiled: bool) -> Vec<f64> {
         let p = &self.placed[position];
         let shapes = p.effect.shapes(context, &p.instance);
         let n = p.shape.len();

@@ -8,6 +8,7 @@
 
 mod depends;
 mod left;
+mod orders;
 
 use crate::close::{Closed, close};
 use crate::context::{Context, Relation, unit_of};
@@ -24,7 +25,10 @@ use crate::simulate::from_command;
 pub const STEPS: [(&str, &str); 9] = [
     ("declare", "the declared model: polynomials with standard errors"),
     ("residual", "what it leaves over, from the command alone and from the other channels"),
-    ("anything", "is anything left: whiteness, size over the noise floor, runs, strongest period"),
+    (
+        "anything",
+        "is anything left: whiteness, size over the noise floor, runs, strongest period, lines that turn with the rotor",
+    ),
     ("depends", "what the residual depends on, and which of these variables this schedule confounds"),
     ("candidates", "every effect that the log could hold, with its parameters and what it gains alone"),
     ("choose", "the hypotheses with their probabilities"),
@@ -54,6 +58,8 @@ pub(crate) struct Start {
     pub(crate) fit: Fit,
     /// Residual of each target.
     pub(crate) residuals: Vec<Vec<f64>>,
+    /// Blades of the propeller as the log states them, else two.
+    pub(crate) blades: f64,
 }
 
 impl Start {
@@ -61,7 +67,8 @@ impl Start {
         let context = Context::new(log, None);
         let fit = fit(&context, Declared::default(), &[], None, Rows::All)?;
         let residuals = heldout::residuals(&context, Declared::default(), &fit);
-        Some(Self { context, fit, residuals })
+        let stated = log.meta.get("blades").and_then(|v| v.as_integer()).filter(|b| (1..=12).contains(b));
+        Some(Self { context, fit, residuals, blades: stated.map_or(2.0, |b| b as f64) })
     }
 }
 

@@ -22,6 +22,7 @@ pub mod identify;
 pub mod import;
 pub mod inspect;
 pub mod log;
+pub mod long;
 pub mod model;
 pub mod noise;
 mod opponent;

@@ -134,6 +134,18 @@ impl Model {
     /// The model that a fitted hypothesis amounts to.
     #[must_use]
     pub fn from_fit(context: &Context, log: &Log, declared: Declared<'_>, fit: &Fit) -> Self {
+        let estimates = (0..fit.placed.len()).map(|k| fit.profiled_estimates(context, declared, k)).collect();
+        Self::of_estimates(context, log, declared, fit, estimates)
+    }
+
+    /// The same with the parameters of each effect and their errors known.
+    pub(crate) fn of_estimates(
+        context: &Context,
+        log: &Log,
+        declared: Declared<'_>,
+        fit: &Fit,
+        estimates: Vec<Vec<Estimate>>,
+    ) -> Self {
         let mut model = match declared.model {
             Some(m) => m.clone(),
             None => Self::of(context, log, Vec::new()),
@@ -150,7 +162,7 @@ impl Model {
                 });
             }
         }
-        for (position, placed) in fit.placed.iter().enumerate() {
+        for (position, (placed, estimates)) in fit.placed.iter().zip(estimates).enumerate() {
             let count = placed.effect.amplitudes(&placed.instance).len();
             let mut amplitudes = Vec::new();
             for (target, t) in context.targets.iter().zip(&fit.targets) {
@@ -166,11 +178,7 @@ impl Model {
                     amplitudes.push((target.name.to_owned(), values));
                 }
             }
-            model.effects.push(AddedEffect {
-                placed: placed.clone(),
-                amplitudes,
-                estimates: fit.profiled_estimates(context, declared, position),
-            });
+            model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates });
         }
         model
     }

@@ -1,7 +1,7 @@
 //! `quadrig predict`.
 //!
 //! What it is: a model's prediction of every measured channel of a log, one line for each row of the log.
-//! What can go wrong: a model that knows none of the log's channels is refused.
+//! What can go wrong: a model that knows none of the log's channels is refused. Glitch rows, which the log alone decides, stay empty.
 //! Units: the log's.
 //! Reference: specification `formats.md`.
 
@@ -70,7 +70,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
     let context = Context::new(log, Some(model.start_pulse_us));
-    log.measured().filter_map(|name| Some(Column { name: name.to_owned(), values: model.predict(&context, name)? })).collect()
+    let claim = |name: &'static str| {
+        let mut values = model.predict(&context, name)?;
+        for row in &context.targets[context.target(name)?].unclaimed {
+            values[*row] = f64::NAN; // an empty field
+        }
+        Some(Column { name: name.to_owned(), values })
+    };
+    log.measured().filter_map(claim).collect()
 }
 
 fn by_command(model: &Model, log: &Log) -> Result<Vec<Column>, Failure> {

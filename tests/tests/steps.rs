@@ -41,7 +41,7 @@ fn nine_steps_say_each_its_own() {
     let residual = table("residual");
     assert!(number(&row(&residual, &["voltage_v"])[4]) > 10.0 && number(&row(&residual, &["thrust_n"])[4]) < 3.0);
     let anything = table("anything");
-    assert_eq!(row(&anything, &["voltage_v"])[6], "something");
+    assert_eq!(row(&anything, &["voltage_v"]).last().expect("a verdict"), "something");
     let depends = table("depends");
     let share = row(&depends, &["voltage_v", "current_a"]);
     assert!(number(&share[2]) > 0.95 && number(&share[3]) <= 0.01, "{share:?}");

@@ -2,7 +2,7 @@
 //!
 //! What it is: single readings, far outside the scatter, that leave their neighbours and come back: damaged telemetry, a spike.
 //! What can go wrong: such rows are recognised by their own reading, so that nothing is claimed about them: the correction sets
-//! them apart from the relation instead of predicting them.
+//! them apart from the relation, and a prediction leaves them empty ([`unclaimed`]).
 //! Units: rows; size in the channel's unit.
 //! Reference: running median as an outlier filter, Tukey 1977, *Exploratory Data Analysis*; Hampel identifier, Pearson 2002.
 
@@ -42,11 +42,7 @@ impl Effect for GlitchRows {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let few = |t: &&Target| {
-            let count = glitches(context, t).len();
-            !t.relation.is_evidence() && count >= 2 && count * 50 < t.rows.len()
-        };
-        context.targets.iter().filter(few).map(|t| Instance::new(&[t.name], "")).collect()
+        context.targets.iter().filter(|t| !t.unclaimed.is_empty()).map(|t| Instance::new(&[t.name], "")).collect()
     }
 
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
@@ -76,6 +72,14 @@ impl Effect for GlitchRows {
         }
         fitted
     }
+}
+
+/// Rows of a channel about which nothing is claimed: its glitches, where they are two at the least and fewer than one in fifty.
+/// The log alone decides, so that they are the same before and after, whatever is named.
+pub(crate) fn unclaimed(context: &Context, target: &Target) -> Vec<usize> {
+    let found = glitches(context, target);
+    let few = !target.relation.is_evidence() && found.len() >= 2 && found.len() * 50 < target.rows.len();
+    if few { found.into_iter().map(|g| g.0).collect() } else { Vec::new() }
 }
 
 fn target<'c>(context: &'c Context, instance: &Instance) -> Option<&'c Target> {

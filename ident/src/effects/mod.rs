@@ -24,7 +24,7 @@ mod dead_rotor_speed;
 mod double_pulses;
 mod encoder_drag;
 mod gain_change;
-mod glitch_rows;
+pub(crate) mod glitch_rows;
 mod hysteresis;
 mod missed_pulses;
 mod operator;

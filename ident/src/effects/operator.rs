@@ -59,16 +59,39 @@ pub(crate) fn moving_average(t: &[f64], x: &[f64], window: f64, course: Course) 
         .collect()
 }
 
+/// exp(-h) for a series of steps that are nearly all of one or two lengths: the last two answers are kept.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Decay([(f64, f64); 2]);
+
+impl Decay {
+    pub(crate) fn new() -> Self {
+        Self([(0.0, 1.0); 2])
+    }
+
+    /// exp(-h); time stamps are rounded, so steps that agree to a billionth are one.
+    pub(crate) fn of(&mut self, h: f64) -> f64 {
+        let near = |known: f64| (h - known).abs() <= 1e-9 * h.abs();
+        if !near(self.0[0].0) {
+            self.0.swap(0, 1);
+            if !near(self.0[0].0) {
+                self.0[0] = (h, (-h).exp());
+            }
+        }
+        self.0[0].1
+    }
+}
+
 /// First-order lag with time constant `tau`, exact for a signal of the given course.
 pub(crate) fn first_order(t: &[f64], x: &[f64], tau: f64, course: Course) -> Vec<f64> {
     let mut out = Vec::with_capacity(t.len());
     let mut state = x.first().copied().unwrap_or(0.0);
+    let (mut whole, mut part) = (Decay::new(), Decay::new());
     for i in 0..t.len() {
         if i > 0 && tau <= 1e-9 {
             state = x[i];
         } else if i > 0 {
             let h = (t[i] - t[i - 1]) / tau;
-            let e = (-h).exp();
+            let e = whole.of(h);
             state = match course {
                 // first-order hold: u(s) = x0 + (x1 - x0) s/h
                 Course::Line => {
@@ -76,7 +99,7 @@ pub(crate) fn first_order(t: &[f64], x: &[f64], tau: f64, course: Course) -> Vec
                     e * state + (1.0 - e) * x[i - 1] + ramp * (x[i] - x[i - 1])
                 }
                 Course::Jump(phase) => {
-                    let late = if phase >= 1.0 { 0.0 } else { 1.0 - (-h * (1.0 - phase)).exp() };
+                    let late = if phase >= 1.0 { 0.0 } else { 1.0 - part.of(h * (1.0 - phase)) };
                     e * state + (1.0 - e) * x[i - 1] + late * (x[i] - x[i - 1])
                 }
             };
@@ -171,6 +194,14 @@ mod tests {
         assert!((first_order(&t, &x, 0.3, Course::Line)[i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
         assert!((delayed(&t, &x, 0.27, Course::Line)[i] - 2.0 * (t[i] - 0.27)).abs() < 1e-9);
         assert!((delayed(&t, &x, -0.27, Course::Line)[100] - 2.0 * (t[100] + 0.27)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn kept_answers_are_those_of_the_exponential() {
+        let mut decay = Decay::new();
+        for h in [0.1, 0.1, 0.3, 0.1, 0.3, 0.1 + 1e-12, 2.0, 0.0, 0.1, 2.0] {
+            assert!((decay.of(h) - (-h).exp()).abs() < 1e-9, "{h}");
+        }
     }
 
     #[test]

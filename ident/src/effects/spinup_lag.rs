@@ -58,24 +58,26 @@ impl Effect for SpinupLag {
         let mut state = pulse.first().copied().unwrap_or(0.0);
         let mut rising = Vec::with_capacity(pulse.len());
         let mut last = context.t.first().copied().unwrap_or(0.0);
+        let tau = |up_now: bool| if up_now { up.max(1e-9) } else { down.max(1e-9) };
+        let mut decays = [operator::Decay::new(); 2];
         for (p, t) in pulse.iter().zip(&context.t) {
             let up_now = *p >= state;
             rising.push(up_now);
-            let tau = if up_now { *up } else { *down };
-            state = p + (state - p) * (-(t - last) / tau.max(1e-9)).exp();
+            state = p + (state - p) * decays[usize::from(up_now)].of((t - last) / tau(up_now));
             last = *t;
         }
         design.map_columns(|column| {
             // a command jumps somewhere between two rows: the input is a staircase, not a ramp
             let mut state = column.first().copied().unwrap_or(0.0);
             let mut held = state;
+            let mut decays = [[operator::Decay::new(); 2]; 2];
             for i in 0..column.len() {
                 if i > 0 {
-                    let tau = if rising[i] { *up } else { *down };
-                    let h = (context.t[i] - context.t[i - 1]) / tau.max(1e-9);
-                    let before = held + (state - held) * (-h * phase).exp();
+                    let h = (context.t[i] - context.t[i - 1]) / tau(rising[i]);
+                    let [early, late] = &mut decays[usize::from(rising[i])];
+                    let before = held + (state - held) * early.of(h * phase);
                     held = column[i];
-                    state = held + (before - held) * (-h * (1.0 - phase)).exp();
+                    state = held + (before - held) * late.of(h * (1.0 - phase));
                 }
                 column[i] = state;
             }

@@ -1,10 +1,12 @@
 //! Step 3: is there anything?
 //!
-//! What it is: four tests of each channel's residual, with the family-wise rate of false alarms held by Bonferroni's bound.
-//! What can go wrong: short channels pass; periods shorter than two samples are not seen (the rms channel is the witness there).
+//! What it is: tests of each channel's residual, lines that turn with the rotor among them, with the family-wise rate of false
+//! alarms held by Bonferroni's bound.
+//! What can go wrong: short channels pass; a period shorter than two samples is seen only where it belongs to an order of the rotor.
 //! Units: p-values; s for the period.
 //! Reference: Ljung & Box 1978; Wald & Wolfowitz 1940 (runs); Fisher 1929 (largest peak of a periodogram).
 
+use super::orders::order_p;
 use super::{Content, Start, rms};
 use crate::report::number;
 use crate::residual::whiteness;
@@ -13,7 +15,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// Family-wise rate of false alarms.
 const FAMILY: f64 = 0.01;
 /// Tests of a channel that give a p-value.
-const TESTS: f64 = 3.0;
+const TESTS: f64 = 5.0;
 /// Samples of the longest even stretch that the periodogram takes.
 const MOST: usize = 2048;
 
@@ -21,10 +23,13 @@ const MOST: usize = 2048;
 pub(super) fn anything(start: &Start) -> Content {
     let targets = &start.context.targets;
     let level = FAMILY / (TESTS * targets.len().max(1) as f64);
-    let rows = targets.iter().zip(&start.residuals).map(|(target, r)| {
+    let rows = targets.iter().zip(&start.residuals).enumerate().map(|(k, (target, r))| {
         let t: Vec<f64> = target.rows.iter().map(|i| start.context.t[*i]).collect();
         let (white, runs, (period, peak)) = (whiteness(&t, r), runs(r), strongest(&t, r));
-        let verdict = if white.min(runs).min(peak) < level { "something" } else { "nothing" };
+        let orders = [1.0, start.blades].map(|order| order_p(start, k, order));
+        let lines = orders.iter().flatten().copied().fold(1.0, f64::min);
+        let [once, blade] = orders.map(|p| p.map_or_else(|| "-".to_owned(), |p| format!("{p:.2e}")));
+        let verdict = if white.min(runs).min(peak).min(lines) < level { "something" } else { "nothing" };
         vec![
             target.name.to_owned(),
             format!("{:.2}", rms(r.iter().copied()) / target.noise.rms),
@@ -32,12 +37,27 @@ pub(super) fn anything(start: &Start) -> Content {
             format!("{runs:.2e}"),
             number(period),
             format!("{peak:.2e}"),
+            once,
+            blade,
             verdict.to_owned(),
         ]
     });
-    let note =
-        format!("a channel holds something where one of its p-values is below {level:.1e}: {FAMILY} for all tests together");
-    (vec!["channel", "over the floor", "whiteness p", "runs p", "strongest period, s", "its p", "verdict"], rows.collect(), note)
+    let note = format!(
+        "a channel holds something where one of its p-values is below {level:.1e}: {FAMILY} for all tests together; 1/rev and blade pass ({} blades): at the frequency of the measured speed on each hold, folded at the log's rate, all holds together; - where no hold can show it",
+        start.blades
+    );
+    let columns = vec![
+        "channel",
+        "over the floor",
+        "whiteness p",
+        "runs p",
+        "strongest period, s",
+        "its p",
+        "1/rev p",
+        "blade pass p",
+        "verdict",
+    ];
+    (columns, rows.collect(), note)
 }
 
 /// Two-sided p-value of the number of runs about the median.
