@@ -14,7 +14,8 @@ use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, scatters};
 use crate::opponent::{nameless, opponent};
 use crate::residual::whiteness;
-use crate::search::{refine, refine_newest, scan};
+use crate::revise::revise;
+use crate::search::{connected, refine, refine_newest, scan, stride};
 
 /// Most effects on one channel.
 const MOST_ON_A_CHANNEL: usize = 3;
@@ -32,6 +33,10 @@ const EASILY_NAMED: usize = 3;
 const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
 const REFINED: usize = 7;
+/// Of these, those whose shapes are refined on all rows in the end.
+const POLISHED: usize = 3;
+/// Samples of a channel that the refinement of every candidate looks at.
+const SKETCH: usize = 2700;
 /// Candidates of a round that are kept for those who want to look.
 const SHOWN: usize = 10;
 /// Softmax temperature from evidence to probability.
@@ -118,7 +123,8 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let mut rounds: Vec<(f64, Vec<(Candidate, f64)>)> = Vec::new();
     let mut errors = heldout_before.clone();
     let mut candidates = Vec::new();
-    let mut offers = offers(context);
+    let mut all = offers(context);
+    let mut offers: Vec<&mut Scanned> = all.iter_mut().collect();
     for round in 0..MOST_EFFECTS {
         let ranked =
             round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
@@ -127,6 +133,10 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         best = chosen.winner;
         errors = chosen.held;
         rounds.push((chosen.probability, chosen.rivals));
+    }
+    if rounds.len() > 1 {
+        revise(context, declared, &start, &folds, &mut best, &mut rounds);
+        errors = heldout::errors(context, declared, &best.fit, &folds);
     }
     let mut probability: f64 = rounds.iter().map(|r| r.0).product();
     let mut rivals = rivals_of(&best, rounds);
@@ -193,7 +203,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
 pub(crate) struct Scanned {
     pub(crate) effect: &'static dyn Effect,
     pub(crate) instance: Instance,
-    found: Option<(Vec<f64>, f64)>,
+    pub(crate) found: Option<(Vec<f64>, f64)>,
 }
 
 /// Fewest samples of a channel on which an effect with shape parameters is tried; a bare amplitude needs fewer.
@@ -221,11 +231,11 @@ pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instan
 }
 
 /// Every instance added to `best`, refined where promising, best first.
-fn round_of(
+pub(crate) fn round_of(
     context: &Context,
     declared: Declared<'_>,
     best: &Candidate,
-    offers: &mut [Scanned],
+    offers: &mut [&mut Scanned],
     progress: &mut dyn FnMut(f64),
 ) -> Vec<Candidate> {
     let count = offers.len().max(1) as f64;
@@ -249,25 +259,40 @@ fn round_of(
         }
     }
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let sketch = Rows::Every(stride(context, SKETCH));
     let mut out: Vec<Candidate> = Vec::new();
     for (k, (gain, placed)) in ranked.into_iter().enumerate() {
         progress(0.7 + 0.3 * (k as f64 / count));
         if gain < -20.0 {
             break;
         }
-        let placed = if k < REFINED { refine_newest(context, declared, &placed, Rows::All, 120) } else { placed };
+        let placed = if k < REFINED { refine_newest(context, declared, &placed, sketch, 120) } else { placed };
         if let Some(fitted) =
             fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
         {
             out.push(Candidate { fit: fitted, evidence: 0.0 });
         }
     }
-    let shares = shares(context, out.iter().map(|c| &c.fit));
-    for c in &mut out {
+    weigh(context, best, &mut out);
+    for c in out.iter_mut().take(if matches!(sketch, Rows::Every(1)) { 0 } else { POLISHED }) {
+        let placed = refine_newest(context, declared, &c.fit.placed, Rows::All, 50);
+        if let Some(fitted) =
+            fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
+        {
+            c.fit = fitted;
+        }
+    }
+    weigh(context, best, &mut out);
+    out
+}
+
+/// Evidence of each candidate beyond what it was added to, best first.
+fn weigh(context: &Context, best: &Candidate, candidates: &mut [Candidate]) {
+    let shares = shares(context, candidates.iter().map(|c| &c.fit));
+    for c in candidates.iter_mut() {
         c.evidence = best.evidence + net_gain(context, &c.fit, &best.fit, &shares);
     }
-    out.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    out
+    candidates.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
 }
 
 /// Residual over noise floor, and whiteness, below and above which a channel has nothing left to explain.
@@ -312,6 +337,13 @@ pub(crate) fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) 
     gain - new.placed.last().map_or(0.0, |p| penalty(context, p, shares))
 }
 
+/// Evidence, in nats, that all effects of a fit together add over the declared model, their price paid.
+pub(crate) fn evidence_over(context: &Context, new: &Fit, start: &Fit) -> f64 {
+    let shares = shares(context, std::iter::once(new));
+    let earlier = &new.placed[..new.placed.len().saturating_sub(1)];
+    net_gain(context, new, start, &shares) - earlier.iter().map(|p| penalty(context, p, &shares)).sum::<f64>()
+}
+
 /// What one round chose.
 struct Chosen {
     winner: Candidate,
@@ -331,15 +363,17 @@ fn choose(
     folds: &[Vec<bool>],
 ) -> Option<Chosen> {
     for (k, winner) in ranked.iter().enumerate().take_while(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
-        let held = heldout::errors_after_newest(context, declared, &winner.fit, folds, errors);
-        if !worth_a_name(context, winner, winner.evidence - best.evidence, &held, errors) {
+        let (without, held) = heldout::errors_around_newest(context, declared, &winner.fit, folds, errors);
+        if !worth_a_name(context, winner, winner.evidence - best.evidence, &held, &without) {
             continue;
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
         let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL * probability);
         let named = best.fit.placed.len();
-        let small = largest_reduction(context, winner, &held, errors) < CLEAR_REDUCTION;
-        if small && (unclear && named > 0 || named >= EASILY_NAMED) {
+        let small = largest_reduction(context, winner, &held, &without) < CLEAR_REDUCTION;
+        // what an earlier effect's rough form leaves of itself looks like a further small one
+        let beside = connected(&winner.fit.placed, named).len() > 1;
+        if small && (beside || unclear && named > 0 || named >= EASILY_NAMED) {
             continue;
         }
         return Some(Chosen { winner: winner.clone(), held, probability, rivals });
@@ -439,7 +473,7 @@ pub(crate) fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, 
 }
 
 /// Softmax over the effects that could stand in the winner's place: those that share a channel with it, and nothing at all.
-fn probabilities(winner: &Candidate, followers: &[Candidate], nothing: f64) -> (f64, Vec<(Candidate, f64)>) {
+pub(crate) fn probabilities(winner: &Candidate, followers: &[Candidate], nothing: f64) -> (f64, Vec<(Candidate, f64)>) {
     let Some(newest) = winner.fit.placed.last() else { return (1.0, Vec::new()) };
     let mut seen = vec![newest.effect.id()];
     let mut kept: Vec<&Candidate> = Vec::new();

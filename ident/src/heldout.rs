@@ -7,7 +7,7 @@
 
 use crate::context::Context;
 use crate::hypothesis::{Declared, Designs, Fit, Placed, Rows, fit_target};
-use crate::search::{connected, refine, refine_newest};
+use crate::search::{refine, refine_last};
 
 /// For each fold the rows that are left out.
 #[must_use]
@@ -81,26 +81,30 @@ pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec
         .collect()
 }
 
-/// The same after an effect was added: targets that no effect of its group touches keep their `previous` error.
+/// What the newest effect does to the held-out errors: without it, and with it. The shapes of the other effects stay as all rows
+/// gave them, in both: an instant that lies in a fold is unknown to the rest, and what is guessed for it must not decide about
+/// the newcomer. Targets that the newcomer does not reach keep their `previous` error.
 #[must_use]
-pub fn errors_after_newest(
+pub fn errors_around_newest(
     context: &Context,
     declared: Declared<'_>,
     fit: &Fit,
     folds: &[Vec<bool>],
     previous: &[Held],
-) -> Vec<Held> {
-    let Some(newest) = fit.placed.len().checked_sub(1) else { return previous.to_vec() };
-    let group = connected(&fit.placed, newest);
-    let moved: Vec<bool> =
-        context.targets.iter().map(|t| group.iter().any(|k| fit.placed[*k].instance.touches(t.name))).collect();
-    pooled(context, declared, folds, &moved, &|keep| {
-        refine_newest(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS)
-    })
-    .into_iter()
-    .zip(previous)
-    .map(|(e, p)| e.unwrap_or(*p))
-    .collect()
+) -> (Vec<Held>, Vec<Held>) {
+    let Some((newest, others)) = fit.placed.split_last() else { return (previous.to_vec(), previous.to_vec()) };
+    let moved: Vec<bool> = context.targets.iter().map(|t| newest.instance.touches(t.name)).collect();
+    let or_previous =
+        |found: Vec<Option<Held>>| -> Vec<Held> { found.into_iter().zip(previous).map(|(e, p)| e.unwrap_or(*p)).collect() };
+    let without = if others.is_empty() {
+        previous.to_vec()
+    } else {
+        or_previous(pooled(context, declared, folds, &moved, &|_| others.to_vec()))
+    };
+    let with = pooled(context, declared, folds, &moved, &|keep| {
+        refine_last(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS)
+    });
+    (without, or_previous(with))
 }
 
 /// Evaluations that each fold may spend on its shapes, starting from those of all rows.

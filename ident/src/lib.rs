@@ -30,6 +30,7 @@ pub mod plateau;
 pub mod quantity;
 pub mod report;
 pub mod residual;
+mod revise;
 pub mod runs;
 pub mod search;
 pub mod select;

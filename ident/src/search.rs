@@ -9,8 +9,8 @@ use crate::context::Context;
 use crate::effects::{Effect, Instance};
 use crate::hypothesis::{Declared, Placed, Rows, touched_loglik};
 
-/// The rows stride that keeps a scan of the longest target near `most` samples.
-fn scan_stride(context: &Context, most: usize) -> usize {
+/// The stride over rows that keeps the longest target near `most` samples.
+pub(crate) fn stride(context: &Context, most: usize) -> usize {
     context.targets.iter().map(|t| t.rows.len()).max().unwrap_or(1).div_ceil(most).max(1)
 }
 
@@ -37,7 +37,7 @@ pub fn scan(
             return None;
         }
     }
-    let rows = Rows::Every(scan_stride(context, 4000));
+    let rows = Rows::Every(stride(context, 4000));
     let scattering = effect.scatters() || base.iter().any(|p| p.effect.scatters());
     let before = touched_loglik(context, declared, base, &moving, rows, scattering);
     let mut best: Option<(Vec<f64>, f64)> = None;
@@ -73,6 +73,19 @@ pub fn refine_newest(
 ) -> Vec<Placed> {
     let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
     refine_group(context, declared, placed, &connected(placed, newest), rows, evaluations)
+}
+
+/// Improves the shapes of the newest effect alone, the others as they are.
+#[must_use]
+pub fn refine_last(
+    context: &Context,
+    declared: Declared<'_>,
+    placed: &[Placed],
+    rows: Rows<'_>,
+    evaluations: usize,
+) -> Vec<Placed> {
+    let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
+    refine_group(context, declared, placed, &[newest], rows, evaluations)
 }
 
 /// Improves all shapes of a hypothesis, each group of effects that share channels on its own.

@@ -35,6 +35,9 @@ use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Rig controller, simulator, identification: from a motor command to a named effect on measured data.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 #[derive(Parser)]
 #[command(version, about, arg_required_else_help = true)]
 struct Cli {

@@ -54,7 +54,12 @@ impl Effect for BatteryDischarge {
             return Vec::new();
         }
         let total = charge(context).last().copied().unwrap_or(0.0).max(1e-6);
-        vec![Shape { name: "speed_loss", unit: "1/Ah", range: (-0.02 / total, 0.5 / total), starts: vec![0.02 / total] }]
+        vec![Shape {
+            name: "speed_loss",
+            unit: "1/Ah",
+            range: (-0.02 / total, 0.5 / total),
+            starts: [0.001, 0.004, 0.015, 0.06].map(|k| k / total).to_vec(),
+        }]
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
@@ -92,13 +97,15 @@ impl Effect for BatteryDischarge {
         fitted
     }
 
-    /// A run that takes less than a hundredth of the charge shows a supply that drifts, not a battery.
+    /// A slope that belongs to a battery larger than any rig carries is a supply that drifts.
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
-        let drawn = charge(context).last().copied().unwrap_or(0.0);
         let reported = self.report(context, instance, fitted.to_vec());
-        reported.iter().any(|e| e.name == "capacity" && e.value < 100.0 * drawn)
+        reported.iter().any(|e| e.name == "capacity" && e.value < LARGEST_BATTERY)
     }
 }
+
+/// The largest battery that a motor rig is fed from, Ah.
+const LARGEST_BATTERY: f64 = 40.0;
 
 /// Charge drawn since the first row, Ah.
 pub(crate) fn charge(context: &Context) -> Vec<f64> {

@@ -50,7 +50,7 @@ impl Effect for BeamResonance {
         let noise = context.target("thrust_n").map_or(1e-3, |i| context.targets[i].noise.rms);
         vec![
             Shape { name: "natural_frequency", unit: "Hz", range: (lo, hi), starts: geometric(lo, hi, 80) },
-            Shape { name: "damping_ratio", unit: "1", range: (0.003, 0.08), starts: vec![0.012, 0.035] },
+            Shape { name: "damping_ratio", unit: "1", range: DAMPING, starts: vec![0.012, 0.035] },
             // the mean moves only where the beam swings: a bump without scatter is something else
             Shape { name: "scatter", unit: "N", range: (0.3 * noise, 300.0 * noise), starts: vec![2.0 * noise] },
         ]
@@ -89,10 +89,15 @@ impl Effect for BeamResonance {
         // the bump follows the motion (an amplifier that falls slower than it rises) and is smaller than it
         let seen = fitted.iter().any(|e| e.name == "vibration" && e.value > 5.0 * e.se);
         (seen || swings(context, value("natural_frequency"), value("damping_ratio"), order(instance)))
+            // a peak sharper than any structure is a handful of rows, not a beam
+            && value("damping_ratio") > 1.02 * DAMPING.0
             && value("vibration") > -1e-6
             && value("bump").abs() < 10.0 * value("scatter").max(value("vibration"))
     }
 }
+
+/// Damping ratios of beams with their clamping.
+const DAMPING: (f64, f64) = (0.003, 0.08);
 
 /// Variance of second differences near the resonance over that of the noise elsewhere that counts as a swing.
 const SWING: f64 = 1.5;

@@ -43,7 +43,10 @@ impl Effect for ChannelDelay {
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         let most = (15.0 * context.step()).max(2.0);
-        let starts = (-6..=24).map(|k| most * f64::from(k) / 24.0).filter(|d| d.abs() > 1e-9).collect();
+        // fractions of a row move single samples only: no point of a coarse grid sees them
+        let rows = [-2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.5].map(|k| k * context.step());
+        let coarse = (-6..=24).map(|k| most * f64::from(k) / 24.0).filter(|d| d.abs() > 4.0 * context.step());
+        let starts = rows.into_iter().chain(coarse).collect();
         let delay = Shape { name: "delay", unit: "s", range: (-0.5 * most, 1.2 * most), starts };
         if instance.form == operator::OF_STEPS { vec![delay, operator::phase()] } else { vec![delay] }
     }

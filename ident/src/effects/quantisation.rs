@@ -54,15 +54,7 @@ impl Effect for Quantisation {
         if *step <= 0.0 {
             return;
         }
-        // the truth as the relation's own columns give it: errors of the fit are far below a step
-        let mut normal = Normal::new(design.columns.len());
-        let mut row = vec![0.0; design.columns.len()];
-        for (i, y) in target.rows.iter().zip(&target.y) {
-            row.iter_mut().zip(&design.columns).for_each(|(r, c)| *r = c.values[*i]);
-            normal.add(&row, y - design.fixed.get(*i).copied().unwrap_or(0.0), 1.0);
-        }
-        let Some(solution) = normal.solve() else { return };
-        let truth = design.predict(&solution.coefficients, context.len());
+        let Some(truth) = within_steps(context, target, design, *step) else { return };
         design.add(position, 0, truth.iter().map(|v| step * (v / step).round() - v).collect());
     }
 
@@ -71,15 +63,76 @@ impl Effect for Quantisation {
     }
 }
 
+/// The truth as the relation's own columns give it, moved until each reading is its rounding wherever they can: the readings
+/// are replaced by what is nearest to the fit within half a step of them, and the fit is made again.
+///
+/// Reference: projections onto convex sets, Combettes 1993, Proceedings of the IEEE 81:182.
+fn within_steps(context: &Context, target: &Target, design: &TargetDesign, step: f64) -> Option<Vec<f64>> {
+    let known = |i: usize| design.fixed.get(i).copied().unwrap_or(0.0);
+    let mut nearest = target.y.clone();
+    let mut truth = Vec::new();
+    for _ in 0..PROJECTIONS {
+        let mut normal = Normal::new(design.columns.len());
+        let mut row = vec![0.0; design.columns.len()];
+        for (i, y) in target.rows.iter().zip(&nearest) {
+            row.iter_mut().zip(&design.columns).for_each(|(r, c)| *r = c.values[*i]);
+            normal.add(&row, y - known(*i), 1.0);
+        }
+        truth = design.predict(&normal.solve()?.coefficients, context.len());
+        let mut moved = 0.0_f64;
+        for ((i, y), z) in target.rows.iter().zip(&target.y).zip(&mut nearest) {
+            let next = truth[*i].clamp(y - 0.5 * step, y + 0.5 * step);
+            moved = moved.max((next - *z).abs());
+            *z = next;
+        }
+        if moved < 1e-3 * step {
+            break;
+        }
+    }
+    Some(truth)
+}
+
+/// Most rounds of moving the truth into the steps.
+const PROJECTIONS: usize = 30;
+
 /// The step of a channel whose readings all lie on a coarse grid: at least as large as the scatter between rows.
 fn step(target: &Target) -> Option<f64> {
     let mut values = target.y.clone();
     values.sort_unstable_by(f64::total_cmp);
     let span = values.last()? - values.first()?;
     let gaps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1e-9 * span).collect();
-    let step = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    let step = grid(&values, gaps.iter().copied().fold(f64::INFINITY, f64::min));
     let mean = values.iter().map(|v| (v / step - (v / step).round()).abs()).sum::<f64>() / values.len() as f64;
     // few distinct values, on a grid, and most successive readings in steady stretches repeat
     let repeats = target.y.windows(2).filter(|w| (w[0] - w[1]).abs() < 0.5 * step).count() as f64 / target.y.len() as f64;
     (step.is_finite() && span / step < 2000.0 && mean < 0.05 && repeats > 0.35).then_some(step)
+}
+
+/// The step of the grid through zero that sorted values lie on: read off the smallest gap, then off ever larger values, because
+/// a log that rounds its readings a second time leaves each of them slightly off the grid.
+fn grid(sorted: &[f64], smallest_gap: f64) -> f64 {
+    let mut step = smallest_gap;
+    let (mut cross, mut square) = (0.0, 0.0);
+    let mut by_size: Vec<f64> = sorted.iter().map(|v| v.abs()).filter(|v| *v > 0.5 * step).collect();
+    by_size.sort_unstable_by(f64::total_cmp);
+    by_size.dedup();
+    for v in by_size {
+        let n = (v / step).round();
+        cross += n * v;
+        square += n * n;
+        step = cross / square;
+    }
+    step
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_that_was_rounded_again_is_found() {
+        let readings: Vec<f64> = [1.0, 2.0, 3.0, 8.0, 30.0].iter().map(|n: &f64| (n * 0.5748 * 100.0).round() / 100.0).collect();
+        let gap = readings[1] - readings[0];
+        assert!((grid(&readings, gap) - 0.5748).abs() < 0.001, "{}", grid(&readings, gap));
+    }
 }

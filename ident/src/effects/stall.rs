@@ -22,7 +22,7 @@ impl Effect for Stall {
     fn about(&self) -> About {
         About {
             title: "Blades stall at high speed",
-            equation: "thrust_n += thrust_loss (rpm^2 - onset^2), torque_nm += torque_rise (rpm^2 - onset^2), current_a likewise, above onset",
+            equation: "thrust_n += thrust_loss (rpm^2 - onset^2), torque_nm += torque_rise (rpm^2 - onset^2), current_a likewise, above onset; form whole_blade: rpm^2 (1 - exp(-(rpm - onset) / spread))",
             source: "Leishman 2006, Principles of Helicopter Aerodynamics, section 7.1",
             depends_on: &["rpm"],
             signature: "above one speed thrust stops growing while torque grows faster",
@@ -35,11 +35,19 @@ impl Effect for Stall {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        super::blade_flex::with_and_without_load(context).into_iter().filter(|i| i.touches("torque_nm")).collect()
+        let mut out = super::blade_flex::with_and_without_load(context);
+        let whole: Vec<Instance> = out.iter().map(|i| Instance { form: WHOLE_BLADE.into(), ..i.clone() }).collect();
+        out.extend(whole);
+        out
     }
 
-    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
-        vec![upper_speeds(context, 20)]
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form != WHOLE_BLADE {
+            return vec![upper_speeds(context, 20)];
+        }
+        let top = context.rpm.iter().copied().fold(1.0, f64::max);
+        let spread = Shape { name: "spread", unit: "rpm", range: (0.005 * top, 0.4 * top), starts: vec![0.03 * top, 0.12 * top] };
+        vec![upper_speeds(context, 14), spread]
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
@@ -53,8 +61,12 @@ impl Effect for Stall {
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
-        let [onset] = shape else { return };
-        let beyond = |speed: &[f64]| -> Vec<f64> { speed.iter().map(|r| (r * r - onset * onset).max(0.0) * 1e-6).collect() };
+        let [onset, spread @ ..] = shape else { return };
+        let stalled = |r: f64| match spread {
+            [spread] => r * r * (1.0 - (-(r - onset).max(0.0) / spread).exp()),
+            _ => (r * r - onset * onset).max(0.0),
+        };
+        let beyond = |speed: &[f64]| -> Vec<f64> { speed.iter().map(|r| stalled(*r) * 1e-6).collect() };
         match design.relation {
             Relation::Thrust => design.add(position, 0, beyond(&context.rpm)),
             Relation::Torque => design.add(position, 1, beyond(&context.rpm)),
@@ -67,8 +79,12 @@ impl Effect for Stall {
         }
     }
 
-    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, _: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         let beyond = |name: &str, sign: f64| fitted.iter().any(|e| e.name == name && sign * e.value > 3.0 * e.se);
-        beyond("thrust_loss", -1.0) && beyond("torque_rise", 1.0)
+        // without a torque arm only the shape tells it from a blade that gives way
+        beyond("thrust_loss", -1.0) && (!instance.touches("torque_nm") || beyond("torque_rise", 1.0))
     }
 }
+
+/// Form in which the stall runs over the blade within a few hundred revolutions and then takes a constant share of the lift.
+const WHOLE_BLADE: &str = "whole_blade";

@@ -17,18 +17,23 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--seed-from S] [--out FILE.csv] [--threads T] [--failures] | blind --dump SEED DIR | blind --plan N";
+const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--failures] | blind --dump SEED DIR | blind --plan N";
 
 struct Options {
     runs: usize,
     clean: usize,
     odd: bool,
     effect: Option<String>,
+    kind: Option<String>,
+    seeds: Vec<u64>,
     from: u64,
     out: PathBuf,
     threads: usize,
     failures: bool,
 }
+
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -70,6 +75,8 @@ fn options(words: &[String]) -> Result<Options, String> {
         clean: 1000,
         odd: true,
         effect: None,
+        kind: None,
+        seeds: Vec::new(),
         from: 0,
         out: PathBuf::from("blind.csv"),
         threads: 2,
@@ -94,6 +101,8 @@ fn options(words: &[String]) -> Result<Options, String> {
                 }
             }
             "--effect" => o.effect = Some(value.clone()),
+            "--kind" => o.kind = Some(value.clone()),
+            "--seeds" => o.seeds = value.split(',').map(|s| s.parse().map_err(|_| USAGE)).collect::<Result<_, _>>()?,
             "--seed-from" => o.from = number()?,
             "--out" => o.out = PathBuf::from(value),
             "--threads" => o.threads = (number()? as usize).max(1),
@@ -105,9 +114,16 @@ fn options(words: &[String]) -> Result<Options, String> {
 
 /// The seeds of a campaign: even ones tune, odd ones judge.
 fn seeds(o: &Options) -> Vec<u64> {
+    if !o.seeds.is_empty() {
+        return o.seeds.clone();
+    }
     let half = u64::from(o.odd);
     let first = o.from / 2 * 2 + half;
-    let wanted = |s: &u64| o.effect.as_ref().is_none_or(|id| Hidden::of(*s).ids().contains(&id.as_str()));
+    let wanted = |s: &u64| {
+        let hidden = Hidden::of(*s);
+        o.effect.as_ref().is_none_or(|id| hidden.ids().contains(&id.as_str()))
+            && o.kind.as_ref().is_none_or(|k| hidden.name() == k)
+    };
     let mut all: Vec<u64> = (0..).map(|k| first + 2 * k).take_while(|s| *s < CLEAN).filter(wanted).take(o.runs).collect();
     // a clean run after every few others, so that an interrupted campaign has both
     let clean: Vec<u64> = (0..o.clean as u64).map(|k| CLEAN + first + 2 * k).collect();
