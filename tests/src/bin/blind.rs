@@ -8,7 +8,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 use quadrig_tests::blind::scenario::{CLEAN, Hidden, Scenario};
 use quadrig_tests::blind::score::{HEADER, Line, score};
-use quadrig_tests::blind::{tally, write};
+use quadrig_tests::blind::{simulated, tally, write};
 use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
 use std::io::{IsTerminal, Write};
@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--failures] | blind --dump SEED DIR | blind --plan N";
+const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated] [--failures] | blind --dump SEED DIR | blind --plan N";
 
 struct Options {
     runs: usize,
@@ -30,6 +30,7 @@ struct Options {
     out: PathBuf,
     threads: usize,
     failures: bool,
+    simulated: bool,
 }
 
 #[global_allocator]
@@ -81,11 +82,16 @@ fn options(words: &[String]) -> Result<Options, String> {
         out: PathBuf::from("blind.csv"),
         threads: 2,
         failures: false,
+        simulated: false,
     };
     let mut i = words.iter();
     while let Some(flag) = i.next() {
         if flag == "--failures" {
             o.failures = true;
+            continue;
+        }
+        if flag == "--simulated" {
+            o.simulated = true;
             continue;
         }
         let value = i.next().ok_or(USAGE)?;
@@ -159,7 +165,7 @@ fn campaign(o: &Options) -> Result<(), String> {
         for _ in 0..o.threads {
             scope.spawn(|| {
                 while let Some(seed) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let line = score(*seed);
+                    let line = if o.simulated { simulated::score(*seed) } else { score(*seed) };
                     let Ok(mut sink) = sink.lock() else { return };
                     let _ = writeln!(sink.0, "{}", line.csv()).and_then(|()| sink.0.flush());
                     sink.1.push(line);

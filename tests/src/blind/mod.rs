@@ -13,6 +13,7 @@ pub mod run;
 pub mod scenario;
 pub mod schedule;
 pub mod score;
+pub mod simulated;
 pub mod tally;
 pub mod unknown;
 pub mod write;

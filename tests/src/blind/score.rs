@@ -60,6 +60,33 @@ pub struct Line {
 }
 
 impl Line {
+    /// A run of which nothing is known yet.
+    #[must_use]
+    pub fn empty() -> Self {
+        Self {
+            seed: 0,
+            kind: String::new(),
+            truth: String::new(),
+            size: 0.0,
+            sizes: String::new(),
+            shown: String::new(),
+            schedule: String::new(),
+            hz: 0.0,
+            rows: 0,
+            verdict: String::new(),
+            named: String::new(),
+            probability: f64::NAN,
+            first: false,
+            top3: false,
+            exact: false,
+            after_ratio: f64::NAN,
+            before_ratio: f64::NAN,
+            coverage: String::new(),
+            alternatives: String::new(),
+            seconds: 0.0,
+        }
+    }
+
     /// As a line of the file.
     #[must_use]
     pub fn csv(&self) -> String {
@@ -147,17 +174,8 @@ pub fn score(seed: u64) -> Line {
         schedule: s.schedules[0].shape.name().to_owned(),
         hz: s.rig.hz,
         rows: run.t.len(),
-        verdict: String::new(),
-        named: String::new(),
-        probability: f64::NAN,
-        first: false,
-        top3: false,
-        exact: false,
-        after_ratio: f64::NAN,
-        before_ratio: f64::NAN,
-        coverage: String::new(),
-        alternatives: String::new(),
         seconds,
+        ..Line::empty()
     };
     match outcome {
         Ok(Ok(v)) => judge(&s, &v, &other, &mut line),

@@ -1,0 +1,152 @@
+//! Scenarios from the simulator's truth side: the real firmware, first-principles effects, edges of real sensors.
+//!
+//! What it is: seed -> a rig of the catalogue, a schedule, an effect of the simulator (or none, or one that the library does not
+//! know). A healthy run of the same rig gives the declared model, as a lab that asks what changed since would declare it; the
+//! second run hides the effect. Both go through `quadrig sim`; only their logs reach the tool.
+//! What can go wrong: a run that the firmware stops (a protection, a fault) is recorded as `stopped`.
+//! Units: sizes in noise floors: what the declared model leaves over beyond the noise, on the channel that shows most.
+//! Reference: specification `closing-the-loop.md`, "Blind trials"; step 1, `--model`.
+
+use super::chance::Chance;
+use super::scenario::CLEAN;
+use super::score::Line;
+use crate::quadrig;
+use hal_sim::Scenario;
+use hal_sim::effect::{self, UNKNOWN};
+use hal_sim::scenario::{Schedule, Step};
+use ident::log::Log;
+use ident::verdict::{Kind, Verdict};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Rigs: motor, propeller, supply that the pair stays within.
+const RIGS: [(&str, &str); 4] = [("570KV", "11x4.7"), ("690KV", "10x4.5"), ("490KV", "11x4.5"), ("390KV", "12x4.5")];
+
+/// What a seed hides: an effect of the simulator's catalogue, or nothing.
+#[must_use]
+pub fn hidden(seed: u64) -> Option<&'static str> {
+    let catalogue = effect::catalogue();
+    (seed < CLEAN).then(|| catalogue[(seed / 2) as usize % catalogue.len()].id)
+}
+
+/// The rig and its schedule, healthy.
+fn healthy(seed: u64) -> Scenario {
+    let mut k = Chance::new(seed, 700);
+    let (motor, propeller) = k.of(&RIGS);
+    let (low, high) = (1100.0, k.of(&[1850.0, 2000.0]));
+    let schedule = match k.of(&[0u8, 1, 2]) {
+        0 => Schedule::UpDown { step_us: k.of(&[50.0, 100.0]), hold_s: k.between(3.0, 6.0), top_us: high },
+        1 => Schedule::Staircase { step_us: 50.0, hold_s: k.between(5.0, 10.0), top_us: high },
+        _ => {
+            let mut steps =
+                vec![Step { pulse_us: low, hold_s: 5.0, ramp: false }, Step { pulse_us: high, hold_s: 5.0, ramp: false }];
+            for _ in 0..k.of(&[25, 35, 45]) {
+                let pulse_us = k.between(low, high).round();
+                steps.push(Step { pulse_us, hold_s: k.log_between(2.0, 9.0), ramp: k.happens(0.15) });
+            }
+            Schedule::Steps { steps }
+        }
+    };
+    let mut rig = Scenario { seed, motor: motor.into(), propeller: propeller.into(), schedule, ..Scenario::default() };
+    rig.log.rate_hz = k.of(&[10, 20, 20, 50]);
+    rig
+}
+
+/// Flies a scenario through the command line.
+fn fly(rig: &Scenario, folder: &Path, name: &str) -> Result<Log, String> {
+    let (scenario, log) = (folder.join(format!("{name}.toml")), folder.join(format!("{name}.csv")));
+    std::fs::write(&scenario, toml::to_string(rig).map_err(|e| e.to_string())?).map_err(|e| e.to_string())?;
+    let out = Command::new(quadrig())
+        .args(["--quiet", "sim"])
+        .arg(&scenario)
+        .arg("-o")
+        .arg(&log)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|e| e.to_string())?;
+    if !out.status.success() {
+        return Err(String::from_utf8_lossy(&out.stderr).trim().replace([',', '\n'], ";"));
+    }
+    let bytes = std::fs::read(&log).map_err(|e| e.to_string())?;
+    Log::parse(name, &bytes[..]).map_err(|e| e.to_string())
+}
+
+/// Runs the tool on a seed.
+///
+/// # Panics
+/// When the system gives no temporary folder.
+#[must_use]
+pub fn score(seed: u64) -> Line {
+    let id = hidden(seed);
+    let first = healthy(seed);
+    let mut second = Scenario { seed: seed.wrapping_add(7_919), ..first.clone() };
+    if let Some(entry) = id.and_then(effect::find) {
+        second.effects.push(entry.draw(seed, second.run_s()).into());
+    }
+    let kind = match id {
+        None => "clean",
+        Some(id) if UNKNOWN.contains(&id) => "unknown",
+        Some(_) => "one",
+    };
+    let shape = match first.schedule {
+        Schedule::Staircase { .. } => "stairs",
+        Schedule::UpDown { .. } => "up-down",
+        Schedule::Steps { .. } => "random",
+    };
+    let mut line = Line {
+        seed,
+        kind: kind.to_owned(),
+        truth: id.unwrap_or_default().to_owned(),
+        schedule: shape.to_owned(),
+        hz: f64::from(first.log.rate_hz),
+        ..Line::empty()
+    };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let logs = fly(&first, folder.path(), "healthy").and_then(|a| Ok((a, fly(&second, folder.path(), "run")?)));
+    let (before, log) = match logs {
+        Ok(logs) => logs,
+        Err(why) => {
+            line.verdict = "stopped".into();
+            line.named = why;
+            return line;
+        }
+    };
+    line.rows = log.t.len();
+    let started = std::time::Instant::now();
+    let outcome = std::panic::catch_unwind(|| -> Result<Verdict, String> {
+        let declared = ident::close::close(&before, None, &[], &mut |_| {}).map_err(|e| e.to_string())?.model;
+        Ok(ident::close::close(&log, Some(&declared), &[], &mut |_| {}).map_err(|e| e.to_string())?.verdict)
+    });
+    line.seconds = 0.5 * started.elapsed().as_secs_f64();
+    match outcome {
+        Ok(Ok(v)) => judge(id, kind, &v, &mut line),
+        Ok(Err(why)) => {
+            line.verdict = "refused".into();
+            line.named = why.replace([',', '\n'], ";");
+        }
+        Err(_) => line.verdict = "panic".into(),
+    }
+    line
+}
+
+fn judge(id: Option<&str>, kind: &str, v: &Verdict, line: &mut Line) {
+    let excess = |c: &ident::verdict::Channel| ((c.before.rms / c.noise_floor_rms).powi(2) - 1.0).max(0.0).sqrt();
+    let most = v.channels.iter().map(|(name, c)| (excess(c), name)).max_by(|a, b| a.0.total_cmp(&b.0));
+    if let (Some((size, channel)), true) = (most, kind != "clean") {
+        (line.size, line.sizes, line.shown) = (size, format!("{size:.2}"), channel.clone());
+    }
+    let named: Vec<&str> = v.effects.iter().map(|e| e.id.as_str()).collect();
+    line.verdict = format!("{:?}", v.verdict).to_lowercase();
+    line.named = named.join("+");
+    line.probability = v.effects.first().map_or(f64::NAN, |e| e.probability);
+    line.alternatives = v.alternatives.iter().map(|a| a.ids.join("+")).collect::<Vec<_>>().join("|");
+    let third = |id: &str| named.contains(&id) || v.alternatives.iter().take(2).any(|a| a.ids.iter().any(|i| i == id));
+    (line.first, line.top3, line.exact) = match (kind, id) {
+        ("one", Some(id)) => (named.first() == Some(&id), third(id), named == [id]),
+        ("unknown", _) => {
+            let recognised = matches!(v.verdict, Kind::Unattributed | Kind::Ambiguous);
+            (recognised, recognised, false)
+        }
+        _ => (v.verdict == Kind::None, v.verdict == Kind::None, v.verdict == Kind::None),
+    };
+}
