@@ -116,6 +116,8 @@ pub struct Target {
     pub floored: Vec<f64>,
     /// Rows about which no prediction makes a claim, in order: the channel's glitches. The log alone decides which.
     pub unclaimed: Vec<usize>,
+    /// For each sample whether the load has just jumped; empty where too few have, or too few have not, to tell the two apart.
+    pub unsettled: Vec<bool>,
 }
 
 /// Share of the mean variance in the weights of the least squares: a stretch with little noise must not outvote the others
@@ -124,12 +126,22 @@ const LEVELLED: f64 = 0.5;
 /// Share of the mean variance in the likelihood: enough to keep a standing rotor's silence from counting without bound.
 const FLOORED: f64 = 0.05;
 
+/// Fewest samples after jumps, and between them, that show how well either is predicted.
+const FEWEST_OF_A_KIND: usize = 10;
+
 impl Target {
     fn new(context: &Context, name: &'static str, relation: Relation, rows: Vec<usize>, y: Vec<f64>, noise: Noise) -> Self {
         let speed = |i: &usize| if context.rpm.is_empty() { 0.0 } else { context.rpm[*i] };
         let levelled = rows.iter().map(|i| noise.weight_variance(speed(i), LEVELLED)).collect();
         let floored = rows.iter().map(|i| noise.weight_variance(speed(i), FLOORED)).collect();
-        Self { name, relation, rows, y, noise, weight: 1.0, levelled, floored, unclaimed: Vec::new() }
+        let mut calm = vec![false; context.t.len()];
+        context.calm.iter().for_each(|(a, b)| calm[*a..*b].fill(true));
+        let mut unsettled: Vec<bool> = rows.iter().map(|i| !calm[*i]).collect();
+        let jumps = unsettled.iter().filter(|u| **u).count();
+        if jumps < FEWEST_OF_A_KIND || unsettled.len() - jumps < FEWEST_OF_A_KIND.max(unsettled.len() / 4) {
+            unsettled.clear();
+        }
+        Self { name, relation, rows, y, noise, weight: 1.0, levelled, floored, unclaimed: Vec::new(), unsettled }
     }
 
     /// Whether predictions of a row are to be judged.

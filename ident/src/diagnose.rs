@@ -443,14 +443,23 @@ fn explains(context: &Context, declared: Declared<'_>, start: &Fit, fit: &Fit) -
     if fit.placed.iter().any(|p| p.effect.scatters()) {
         return true;
     }
-    let square = |r: &[f64]| r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64;
     let before = heldout::residuals(context, declared, start);
     let after = heldout::residuals(context, declared, fit);
-    context.targets.iter().enumerate().filter(|(_, t)| fit.placed.iter().any(|p| p.instance.touches(t.name))).any(|(i, t)| {
-        let floor = t.noise.rms * t.noise.rms;
+    let touched = || context.targets.iter().enumerate().filter(|(_, t)| fit.placed.iter().any(|p| p.instance.touches(t.name)));
+    let enough = |i: usize, calm_only: bool| {
+        let target = &context.targets[i];
+        let counts = |j: usize| !calm_only || !target.unsettled[j];
+        let square = |r: &[f64]| {
+            let (sum, n) =
+                r.iter().enumerate().filter(|(j, _)| counts(*j)).fold((0.0, 0.0), |s, (_, v)| (s.0 + v * v, s.1 + 1.0));
+            sum / f64::max(n, 1.0)
+        };
+        let floor = target.noise.rms * target.noise.rms;
         let (b, a) = (square(&before[i]), square(&after[i]));
-        b < 1.5 * floor || a < 2.25 * floor || (b - a) > NEEDED_SHARE * (b - floor)
-    })
+        // between jumps only what stood out there can have been explained there
+        !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > NEEDED_SHARE * (b - floor)
+    };
+    touched().any(|(i, t)| enough(i, false) || !t.unsettled.is_empty() && enough(i, true))
 }
 
 /// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.

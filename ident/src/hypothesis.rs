@@ -150,6 +150,9 @@ pub fn fit_target(target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Opt
     let (Solution { coefficients, inverse, .. }, loglik, kept) = solve_target(target, design, rows, true)?;
     let mut residual = kept.residual(&coefficients);
     residual.iter_mut().zip(&kept.floored).for_each(|(r, v)| *r /= v.sqrt());
+    if let Some((unsettled, excess)) = &kept.jumps {
+        residual.iter_mut().zip(unsettled).filter(|(_, u)| **u).for_each(|(r, _)| *r /= excess.sqrt());
+    }
     let rss: f64 = residual.iter().map(|r| r * r).sum();
     let share = effective_share(&residual);
     let covariance = inverse * ((rss / residual.len() as f64).max(0.01) / share);
@@ -161,6 +164,8 @@ struct Kept {
     columns: Vec<Vec<f64>>,
     y: Vec<f64>,
     floored: Vec<f64>,
+    /// Which samples follow a jump of the load, and by how much worse their variance is than that of the others.
+    jumps: Option<(Vec<bool>, f64)>,
 }
 
 impl Kept {
@@ -210,17 +215,52 @@ fn solve_target(
         levelled.iter_mut().zip(&extra).for_each(|(v, e)| *v += e);
         floored.iter_mut().zip(&extra).for_each(|(v, e)| *v += e);
     }
-    let kept = Kept { columns: design.columns.iter().map(|c| gather(&c.values)).collect(), y, floored };
-    let weights: Vec<f64> = levelled.iter().map(|v| 1.0 / v).collect();
-    let solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
+    let columns: Vec<Vec<f64>> = design.columns.iter().map(|c| gather(&c.values)).collect();
+    let mut kept = Kept { columns, y, floored, jumps: None };
+    let mut weights: Vec<f64> = levelled.iter().map(|v| 1.0 / v).collect();
+    let mut solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
     let n = chosen.len() as f64;
+    let weight = target.weight * stride as f64;
     // the scale of the noise is profiled, but never below a tenth of the floor's standard deviation
-    let profile = |rss: f64, log_sigma: f64| {
+    let part = |rss: f64, n: f64| {
         let scale = (rss / n).max(0.01);
-        target.weight * stride as f64 * (-0.5 * n * scale.ln() - 0.5 * rss / scale - log_sigma)
+        weight * (-0.5 * n * scale.ln() - 0.5 * rss / scale)
     };
+    let profile = |rss: f64, log_sigma: f64| part(rss, n) - weight * log_sigma;
     let half_logs = |variances: &[f64]| 0.5 * log_product(variances);
-    let mean = profile(solution.rss, half_logs(&levelled));
+    // after a jump of the load a static relation is off by more than the noise: those samples have a scale of their own, so that
+    // they neither rule the coefficients nor drown what the others say
+    let mut mean = profile(solution.rss, half_logs(&levelled));
+    if !target.unsettled.is_empty() {
+        let unsettled: Vec<bool> = chosen.iter().map(|j| target.unsettled[*j]).collect();
+        let late = unsettled.iter().filter(|u| **u).count() as f64;
+        let sums = |solution: &Solution| {
+            let mut sums = (0.0, 0.0);
+            for ((r, v), u) in kept.residual(&solution.coefficients).iter().zip(&levelled).zip(&unsettled) {
+                *(if *u { &mut sums.1 } else { &mut sums.0 }) += r * r / v;
+            }
+            sums
+        };
+        let scales = |(calm, after): (f64, f64)| (after / late.max(1.0)).max(0.01) / (calm / (n - late).max(1.0)).max(0.01);
+        let mut found = sums(&solution);
+        if late >= 3.0 && n - late > kept.columns.len() as f64 + 3.0 {
+            let mut excess = scales(found).max(1.0);
+            if excess > WORSE {
+                for _ in 0..2 {
+                    weights
+                        .iter_mut()
+                        .zip(&levelled)
+                        .zip(&unsettled)
+                        .for_each(|((w, v), u)| *w = 1.0 / (v * if *u { excess } else { 1.0 }));
+                    solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
+                    found = sums(&solution);
+                    excess = scales(found).max(1.0);
+                }
+            }
+            mean = part(found.0, n - late) + part(found.1, late) - weight * half_logs(&levelled);
+            kept.jumps = Some((unsettled, excess));
+        }
+    }
     let scatter = if looks_at_scatter {
         let rss = kept.residual(&solution.coefficients).iter().zip(&kept.floored).map(|(r, v)| r * r / v).sum();
         profile(rss, half_logs(&kept.floored))
@@ -229,6 +269,9 @@ fn solve_target(
     };
     Some((solution, Likelihood { mean, scatter }, kept))
 }
+
+/// How much worse the variance after jumps must be for those samples to weigh less.
+const WORSE: f64 = 1.5;
 
 /// Sum of the logarithms of positive numbers, one logarithm for every eight of them.
 fn log_product(values: &[f64]) -> f64 {

@@ -69,18 +69,19 @@ impl Effect for Quantisation {
 /// Reference: projections onto convex sets, Combettes 1993, Proceedings of the IEEE 81:182.
 fn within_steps(context: &Context, target: &Target, design: &TargetDesign, step: f64) -> Option<Vec<f64>> {
     let known = |i: usize| design.fixed.get(i).copied().unwrap_or(0.0);
+    let stride = target.y.len().div_ceil(SAMPLES).max(1);
     let mut nearest = target.y.clone();
     let mut truth = Vec::new();
     for _ in 0..PROJECTIONS {
         let mut normal = Normal::new(design.columns.len());
         let mut row = vec![0.0; design.columns.len()];
-        for (i, y) in target.rows.iter().zip(&nearest) {
+        for (i, y) in target.rows.iter().zip(&nearest).step_by(stride) {
             row.iter_mut().zip(&design.columns).for_each(|(r, c)| *r = c.values[*i]);
             normal.add(&row, y - known(*i), 1.0);
         }
         truth = design.predict(&normal.solve()?.coefficients, context.len());
         let mut moved = 0.0_f64;
-        for ((i, y), z) in target.rows.iter().zip(&target.y).zip(&mut nearest) {
+        for ((i, y), z) in target.rows.iter().zip(&target.y).zip(&mut nearest).step_by(stride) {
             let next = truth[*i].clamp(y - 0.5 * step, y + 0.5 * step);
             moved = moved.max((next - *z).abs());
             *z = next;
@@ -92,6 +93,8 @@ fn within_steps(context: &Context, target: &Target, design: &TargetDesign, step:
     Some(truth)
 }
 
+/// Samples that say where the truth lies.
+const SAMPLES: usize = 1000;
 /// Most rounds of moving the truth into the steps.
 const PROJECTIONS: usize = 30;
 

@@ -1,11 +1,12 @@
 //! Scenarios from the simulator's truth side: the real firmware, first-principles effects, edges of real sensors.
 //!
 //! What it is: seed -> a rig of the catalogue, a schedule, an effect of the simulator (or none, or one that the library does not
-//! know). A healthy run of the same rig gives the declared model, as a lab that asks what changed since would declare it; the
-//! second run hides the effect. Both go through `quadrig sim`; only their logs reach the tool.
+//! know). The simulated rig has dynamics of its own (its rotor, its meters), which the static baseline lacks: what the tool names on
+//! a healthy run of the same rig is known to whoever owns it, and is not counted on the run that hides the effect. Both go through
+//! `quadrig sim`; only their logs reach the tool.
 //! What can go wrong: a run that the firmware stops (a protection, a fault) is recorded as `stopped`.
-//! Units: sizes in noise floors: what the declared model leaves over beyond the noise, on the channel that shows most.
-//! Reference: specification `closing-the-loop.md`, "Blind trials"; step 1, `--model`.
+//! Units: sizes in noise floors: the residual beside that of the healthy run, on the channel where most is added.
+//! Reference: specification `closing-the-loop.md`, "Blind trials".
 
 use super::chance::Chance;
 use super::scenario::CLEAN;
@@ -113,13 +114,11 @@ pub fn score(seed: u64) -> Line {
     };
     line.rows = log.t.len();
     let started = std::time::Instant::now();
-    let outcome = std::panic::catch_unwind(|| -> Result<Verdict, String> {
-        let declared = ident::close::close(&before, None, &[], &mut |_| {}).map_err(|e| e.to_string())?.model;
-        Ok(ident::close::close(&log, Some(&declared), &[], &mut |_| {}).map_err(|e| e.to_string())?.verdict)
-    });
+    let verdict = |log: &Log| ident::close::close(log, None, &[], &mut |_| {}).map(|c| c.verdict).map_err(|e| e.to_string());
+    let outcome = std::panic::catch_unwind(|| -> Result<(Verdict, Verdict), String> { Ok((verdict(&before)?, verdict(&log)?)) });
     line.seconds = 0.5 * started.elapsed().as_secs_f64();
     match outcome {
-        Ok(Ok(v)) => judge(id, kind, &v, &mut line),
+        Ok(Ok((own, v))) => judge(id, kind, &own, &v, &mut line),
         Ok(Err(why)) => {
             line.verdict = "refused".into();
             line.named = why.replace([',', '\n'], ";");
@@ -129,24 +128,37 @@ pub fn score(seed: u64) -> Line {
     line
 }
 
-fn judge(id: Option<&str>, kind: &str, v: &Verdict, line: &mut Line) {
-    let excess = |c: &ident::verdict::Channel| ((c.before.rms / c.noise_floor_rms).powi(2) - 1.0).max(0.0).sqrt();
-    let most = v.channels.iter().map(|(name, c)| (excess(c), name)).max_by(|a, b| a.0.total_cmp(&b.0));
+fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Line) {
+    let added = |(name, c): (&String, &ident::verdict::Channel)| {
+        let healthy = own.channels.get(name).map_or(c.noise_floor_rms, |h| h.before.rms);
+        (((c.before.rms.powi(2) - healthy.powi(2)).max(0.0)).sqrt() / c.noise_floor_rms, name.clone())
+    };
+    let most = v.channels.iter().map(added).max_by(|a, b| a.0.total_cmp(&b.0));
     if let (Some((size, channel)), true) = (most, kind != "clean") {
-        (line.size, line.sizes, line.shown) = (size, format!("{size:.2}"), channel.clone());
+        (line.size, line.sizes, line.shown) = (size, format!("{size:.2}"), channel);
     }
-    let named: Vec<&str> = v.effects.iter().map(|e| e.id.as_str()).collect();
+    let standing: Vec<&str> = own.effects.iter().map(|e| e.id.as_str()).collect();
+    let beyond = |ids: Vec<&str>| -> Vec<String> {
+        ids.into_iter().filter(|i| !standing.contains(i) || Some(*i) == id).map(str::to_owned).collect()
+    };
+    let named = beyond(v.effects.iter().map(|e| e.id.as_str()).collect());
+    let others: Vec<Vec<String>> =
+        v.alternatives.iter().map(|a| beyond(a.ids.iter().map(String::as_str).collect())).take(2).collect();
     line.verdict = format!("{:?}", v.verdict).to_lowercase();
     line.named = named.join("+");
     line.probability = v.effects.first().map_or(f64::NAN, |e| e.probability);
-    line.alternatives = v.alternatives.iter().map(|a| a.ids.join("+")).collect::<Vec<_>>().join("|");
-    let third = |id: &str| named.contains(&id) || v.alternatives.iter().take(2).any(|a| a.ids.iter().any(|i| i == id));
-    (line.first, line.top3, line.exact) = match (kind, id) {
-        ("one", Some(id)) => (named.first() == Some(&id), third(id), named == [id]),
-        ("unknown", _) => {
+    line.alternatives = format!("healthy:{}", standing.join("+"));
+    let hit = |ids: &[String]| id.is_some_and(|id| ids.iter().any(|i| i == id));
+    let silent = named.is_empty() && (v.verdict != Kind::Unattributed || own.verdict == Kind::Unattributed);
+    (line.first, line.top3, line.exact) = match kind {
+        "one" => {
+            let first = named.first().is_some_and(|n| Some(n.as_str()) == id);
+            (first, hit(&named) || others.iter().any(|o| hit(o)), first && named.len() == 1)
+        }
+        "unknown" => {
             let recognised = matches!(v.verdict, Kind::Unattributed | Kind::Ambiguous);
             (recognised, recognised, false)
         }
-        _ => (v.verdict == Kind::None, v.verdict == Kind::None, v.verdict == Kind::None),
+        _ => (silent, silent, silent),
     };
 }
