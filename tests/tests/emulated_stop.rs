@@ -5,13 +5,13 @@ use frame::message::Command;
 use hal_sim::Scenario;
 use hal_sim::emulated::rig::{Action, Heard, Operator, rig};
 
-/// Time from one calibration to the next: the low-throttle interval of 2 s, and what lies between, ms.
-const CYCLE_MS: u64 = 2_300;
-/// When maximum pulses are asked for in a cycle, the stop ordered, the key let go and the fault cleared, ms.
-const ASK: u64 = 20;
-const STOP: u64 = 120;
-const LET_GO: u64 = 220;
-const CLEAR: u64 = 240;
+/// Time from one reset to the next, ms: it is the reset that ends a stop, as clearing it would cost 2 s of minimum pulses before the
+/// next calibration.
+const CYCLE_MS: u64 = 300;
+/// When maximum pulses are asked for in a cycle, the stop ordered, and the reset key pressed, ms.
+const ASK: u64 = 60;
+const STOP: u64 = 180;
+const RESET: u64 = 290;
 
 /// How long before a pulse each stop comes, ns: from just above 1 ms over a whole half tick (the board looks twice a
 /// millisecond, so half a millisecond holds every phase), and two that come from further away.
@@ -40,9 +40,7 @@ impl Operator for Sweep {
         match ms % CYCLE_MS {
             ASK => actions.push(Action::Send(Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM })),
             STOP => actions.push(Action::StopBeforePulse { key, ns }),
-            LET_GO => actions.push(Action::StopKey(false)),
-            CLEAR => actions.push(Action::Send(Command::ClearFaults)),
-            at if at.is_multiple_of(150) => actions.push(Action::Send(Command::Ping)),
+            RESET => actions.push(Action::Reset), // and lets the key go
             _ => {}
         }
     }
@@ -59,6 +57,7 @@ fn the_first_pulse_that_starts_a_millisecond_after_a_stop_is_minimum() {
         let pulses = run.pulses.iter().filter(|p| inside(p.at_ns));
         let live = pulses.clone().filter(|p| p.at_ns < *stop && p.width_ns == 2_000_000).count();
         assert!(live >= 4, "{live} maximum pulses before the stop");
+        assert!(pulses.clone().filter(|p| p.at_ns > stop + 1_000_000).count() >= 3, "the train goes on");
         let next = pulses.clone().find(|p| p.at_ns > *stop).expect("pulses never cease");
         let after = next.at_ns - stop;
         println!(

@@ -320,6 +320,11 @@ pub trait World: Send {
     fn watches(&self) -> bool {
         false
     }
+
+    /// Whether the run ends now, before its time.
+    fn is_over(&self) -> bool {
+        false
+    }
 }
 
 /// Accesses that a correct image does not make, as text for a test's message, and the resets of the run.
@@ -382,7 +387,7 @@ impl<W: World> Driver<Machine> for Clockwork<W> {
 
     fn on_stop(&mut self, session: &mut Session<Machine>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         let now = stop.at.0;
-        if now >= self.end_ns {
+        if now >= self.end_ns || self.world.is_over() {
             return None;
         }
         let mut pins = Pins { machine: session.board_mut(), at: stop.at, reset: false };

@@ -84,6 +84,11 @@ pub trait Operator: Send {
 
     /// Called every millisecond with the bytes that the board has sent since; what is pushed onto `say` goes to the board as it is.
     fn line(&mut self, _heard: &[u8], _say: &mut Vec<u8>) {}
+
+    /// Whether the board is switched off now, before its time.
+    fn is_over(&self) -> bool {
+        false
+    }
 }
 
 /// One pulse seen on the ESC pin.
@@ -328,6 +333,10 @@ impl<O: Operator> World for RigWorld<O> {
         let stop = self.stop_at.as_ref().map_or(u64::MAX, |(at, _)| *at);
         let edge = self.bench.next_edge_ns().unwrap_or(u64::MAX);
         self.bench.horizon_ns().min(edge).min(rise).min(stop)
+    }
+
+    fn is_over(&self) -> bool {
+        self.operator.is_over()
     }
 }
 
