@@ -8,10 +8,10 @@ use hal_sim::emulated::Machine;
 use hal_sim::emulated::rig::{Action, Heard, Operator, RigRun, rig};
 
 /// From one reset to the next, ms; and in it: a new log period is put in force, saved, and the reset comes unless the supply failed.
-const CYCLE_MS: u64 = 400;
-const CONFIGURE: u64 = 150;
-const SAVE: u64 = 170;
-const RESET: u64 = 390;
+const CYCLE_MS: u64 = 200;
+const CONFIGURE: u64 = 110;
+const SAVE: u64 = 120;
+const RESET: u64 = 190;
 
 /// In each cycle another log period is saved; the supply fails at the store that the plan says, or the reset key is pressed at the end.
 struct Saver {
@@ -56,7 +56,7 @@ impl Operator for Saver {
 fn save_again_and_again(plan: Vec<Option<u32>>) -> RigRun<Saver> {
     let cycles = plan.len() as u64 + 1;
     let operator = Saver { plan, news: Vec::new(), samples: Vec::new() };
-    rig(&Scenario::default(), operator, cycles * CYCLE_MS - 20).unwrap_or_else(|error| panic!("{error}"))
+    rig(&Scenario::default(), operator, cycles * CYCLE_MS - 10).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Spacing of the samples of a cycle, ms.
