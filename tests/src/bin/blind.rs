@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated] [--failures] | blind --dump SEED DIR | blind --plan N";
+const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated] [--failures] [--table] | blind --dump SEED DIR | blind --plan N";
 
 struct Options {
     runs: usize,
@@ -31,6 +31,7 @@ struct Options {
     threads: usize,
     failures: bool,
     simulated: bool,
+    table: bool,
 }
 
 #[global_allocator]
@@ -83,6 +84,7 @@ fn options(words: &[String]) -> Result<Options, String> {
         threads: 2,
         failures: false,
         simulated: false,
+        table: false,
     };
     let mut i = words.iter();
     while let Some(flag) = i.next() {
@@ -92,6 +94,10 @@ fn options(words: &[String]) -> Result<Options, String> {
         }
         if flag == "--simulated" {
             o.simulated = true;
+            continue;
+        }
+        if flag == "--table" {
+            o.table = true;
             continue;
         }
         let value = i.next().ok_or(USAGE)?;
@@ -148,6 +154,12 @@ fn campaign(o: &Options) -> Result<(), String> {
     let done: BTreeSet<u64> = lines.iter().map(|l| l.seed).collect();
     let wanted = seeds(o);
     let left: Vec<u64> = wanted.iter().copied().filter(|s| !done.contains(s)).collect();
+    if o.table {
+        // what an interrupted campaign has so far
+        lines.retain(|l| wanted.contains(&l.seed));
+        println!("{} of {} runs\n\n{}", lines.len(), wanted.len(), tally::markdown(&lines));
+        return Ok(());
+    }
     let mut file = OpenOptions::new().create(true).append(true).open(&o.out).map_err(fault)?;
     if known.is_empty() {
         writeln!(file, "{HEADER}").map_err(fault)?;
