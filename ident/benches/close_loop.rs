@@ -17,6 +17,10 @@ use ident::log::Log;
 use std::path::Path;
 use std::time::Instant;
 
+/// The allocator of the command line, so that what is measured is what users run.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Drift over the run: about five times the thrust's noise at its end, N.
 const DRIFT_N: f64 = 0.06;
 

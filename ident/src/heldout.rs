@@ -7,7 +7,7 @@
 
 use crate::context::Context;
 use crate::hypothesis::{Declared, Designs, Fit, Placed, Rows, fit_target};
-use crate::search::{refine, refine_last};
+use crate::search::{refine, refine_group};
 
 /// For each fold the rows that are left out.
 #[must_use]
@@ -102,7 +102,7 @@ pub fn errors_around_newest(
         or_previous(pooled(context, declared, folds, &moved, &|_| others.to_vec()))
     };
     let with = pooled(context, declared, folds, &moved, &|keep| {
-        refine_last(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS)
+        refine_group(context, declared, &fit.placed, &[others.len()], Rows::Where(keep), EVALUATIONS)
     });
     (without, or_previous(with))
 }

@@ -75,19 +75,6 @@ pub fn refine_newest(
     refine_group(context, declared, placed, &connected(placed, newest), rows, evaluations)
 }
 
-/// Improves the shapes of the newest effect alone, the others as they are.
-#[must_use]
-pub fn refine_last(
-    context: &Context,
-    declared: Declared<'_>,
-    placed: &[Placed],
-    rows: Rows<'_>,
-    evaluations: usize,
-) -> Vec<Placed> {
-    let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
-    refine_group(context, declared, placed, &[newest], rows, evaluations)
-}
-
 /// Improves all shapes of a hypothesis, each group of effects that share channels on its own.
 #[must_use]
 pub fn refine(context: &Context, declared: Declared<'_>, placed: &[Placed], rows: Rows<'_>, evaluations: usize) -> Vec<Placed> {
@@ -121,7 +108,8 @@ pub(crate) fn connected(placed: &[Placed], k: usize) -> Vec<usize> {
     group
 }
 
-fn refine_group(
+/// Improves the shapes of the effects at the positions of `group` together, the others as they are.
+pub(crate) fn refine_group(
     context: &Context,
     declared: Declared<'_>,
     placed: &[Placed],
