@@ -19,6 +19,7 @@ pub mod effect;
 #[cfg(feature = "emulated")]
 pub mod emulated;
 pub mod fault;
+pub mod hal;
 pub mod imu;
 pub mod native;
 pub mod noise;

@@ -10,12 +10,8 @@
 
 use super::errors::{ChipErrors, Errors};
 use super::motion::Motion;
+use super::to_chip;
 use crate::noise::Stream;
-
-/// Body axes of FRD and chip axes of a board that lies flat, parts on top: y and z are opposite.
-fn to_chip(v: [f64; 3]) -> [f64; 3] {
-    [v[0], -v[1], -v[2]]
-}
 
 /// Which chip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
