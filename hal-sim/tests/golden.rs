@@ -1,9 +1,11 @@
 //! The same seed gives the same bytes, in debug and in release, on any machine.
 //!
-//! The digest covers every edge, conversion and beep of a scripted session on the bench, without the firmware. When it changes,
-//! the physics changed: say so in the commit that changes `golden.txt`.
+//! The first digests cover every edge, conversion and beep of a scripted session on the bench, without the firmware. When one changes,
+//! the physics changed. The last covers every value of the log of a whole run: firmware, codec and conversion. Say what changed in the
+//! commit that changes `golden.txt`.
 
-use hal_sim::{Bench, EdgeDetail, Millisecond, Scenario};
+use hal_sim::scenario::Schedule;
+use hal_sim::{Bench, EdgeDetail, Millisecond, Scenario, run};
 
 /// FNV-1a, 64 bits.
 struct Digest(u64);
@@ -47,10 +49,26 @@ fn session(effect: &str) -> u64 {
     digest.0
 }
 
+/// A run with its firmware: rest, 1000, 1500 and 2000 us, rest.
+fn flight() -> u64 {
+    let schedule = Schedule::Staircase { step_us: 500.0, hold_s: 1.0, top_us: 2000.0 };
+    let scenario = Scenario { schedule, rest_s: 0.5, ..Scenario::demo(12, Some("creep")).unwrap() };
+    let record = run(&scenario, None, &mut |_| ()).unwrap_or_else(|e| panic!("{e}"));
+    let mut digest = Digest(0xcbf2_9ce4_8422_2325);
+    for row in record.converted() {
+        digest.word(row.t_s.to_bits());
+        digest.word(row.pulse_us.to_bits());
+        row.rpm.iter().chain(&row.adc).chain([&row.thrust_rms_n]).for_each(|v| digest.word(v.map_or(0, f64::to_bits)));
+    }
+    assert!(record.samples.len() > 35, "{} samples", record.samples.len());
+    digest.0
+}
+
 #[test]
 fn the_digest_is_the_committed_one() {
-    let got: String =
+    let mut got: String =
         ["zero_drift", "beam_resonance", "battery_discharge"].iter().map(|e| format!("{e} {:016x}\n", session(e))).collect();
+    got += &format!("flight {:016x}\n", flight());
     assert_eq!(got, include_str!("golden.txt"), "got:\n{got}");
 }
 

@@ -148,14 +148,68 @@ fn progress_grows_to_one() {
     assert_eq!(heard.last(), Some(&1.0));
 }
 
-/// The reference page is true: its example reads, and it names every effect.
+/// The reference page is true: its examples read, and it names every effect and every key.
 #[test]
 fn the_reference_page_covers_the_catalogue() {
     let page = include_str!("../../docs/scenario.md");
-    let example = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("the page has an example");
-    let scenario = Scenario::parse(example, std::path::Path::new("scenario.md")).unwrap();
+    let mut examples = page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let file = std::path::Path::new("scenario.md");
+    let scenario = Scenario::parse(examples.next().expect("an example of a run"), file).unwrap();
     assert_eq!(scenario.effects.len(), 1);
+    assert_eq!(Scenario::parse(examples.next().expect("an example of a fault"), file).unwrap().faults.len(), 1);
     for entry in hal_sim::effect::catalogue() {
         assert!(page.contains(&format!("| `{}`", entry.id)), "{} is not on the page", entry.id);
+    }
+    // every key with a default of its own, as the file would write it
+    let written = toml::Table::try_from(Scenario::default()).unwrap();
+    let mut keys = Vec::new();
+    for (name, value) in &written {
+        match (name.as_str(), value) {
+            ("effect" | "fault" | "supply" | "schedule", _) => keys.push(name.clone()),
+            (_, toml::Value::Table(section)) => keys.extend(section.keys().map(|key| format!("{name}.{key}"))),
+            _ => keys.push(name.clone()),
+        }
+    }
+    assert!(keys.len() > 20, "{keys:?}");
+    for key in keys {
+        let short = key.split_once('.').map_or(key.as_str(), |(_, own)| own);
+        let told = [format!("`{key}`"), format!("`.{short}`"), format!("[[{key}]]")];
+        assert!(told.iter().any(|t| page.contains(t.as_str())), "{key} is not on the page");
+    }
+}
+
+/// The same of the IMU board's part of the page.
+#[test]
+fn the_reference_page_covers_the_imu_board() {
+    let page = include_str!("../../docs/scenario.md");
+    let (_, part) = page.split_once("## The IMU board").expect("a part of its own");
+    let example = part.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+    let folder = std::env::temp_dir().join(format!("scenario-page-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("imu.toml");
+    std::fs::write(&file, example).unwrap();
+    let read = hal_sim::scenario::AnyScenario::load(&file);
+    std::fs::remove_dir_all(&folder).unwrap();
+    let hal_sim::scenario::AnyScenario::Imu(scenario) = read.unwrap() else { panic!("not a run of the IMU board") };
+    let mut scenario = *scenario;
+    let chip = hal_sim::scenario::ChipSection {
+        matrix: Some([[1.0; 3]; 3]),
+        bias: Some([0.0; 3]),
+        bias_per_k: Some([0.0; 3]),
+        noise: Some(0.0),
+    };
+    (scenario.imu.gyro, scenario.imu.accelerometer, scenario.imu.magnetometer) = (chip, chip, chip);
+    (scenario.imu.start_c, scenario.imu.end_c) = (Some(20.0), Some(30.0));
+    let mut keys = Vec::new();
+    for (name, value) in toml::Table::try_from(&scenario.imu).unwrap() {
+        match value {
+            toml::Value::Table(section) => keys.extend(section.keys().map(|key| (format!("imu.{name}.{key}"), key.clone()))),
+            _ => keys.push((format!("imu.{name}"), name)),
+        }
+    }
+    assert!(keys.len() >= 25, "{keys:?}");
+    for (key, own) in keys {
+        let told = [format!("`{key}`"), format!("`.{own}`")];
+        assert!(told.iter().any(|t| part.contains(t.as_str())), "{key} is not on the page");
     }
 }

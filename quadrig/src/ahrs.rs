@@ -122,7 +122,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-fn line(out: &mut String, time: &str, attitude: Option<Mat3>) {
+/// One row of an attitude log; empty fields where there is no attitude yet.
+pub(crate) fn line(out: &mut String, time: &str, attitude: Option<Mat3>) {
     out.push_str(time);
     match attitude {
         None => out.push_str(",,,,,,,"),

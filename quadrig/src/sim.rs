@@ -1,16 +1,20 @@
 //! `quadrig sim`.
 //!
 //! What it is: the portable firmware against a simulated rig; its telemetry, decoded, becomes the log. On request with the ground
-//! truth in a side file, the pins' traffic recorded or replayed, or live with pause, single steps and a speed factor.
+//! truth in a side file, the pins' traffic recorded or replayed, or live with pause, single steps and a speed factor. A scenario
+//! with a table `[imu]` is a run of the IMU board ([`imu`]).
 //! What can go wrong: a scenario that is refused, a firmware that stops; then no log is written.
 //! Units: the log's.
 //! Reference: docs/scenario.md; specification `formats.md`.
+
+mod imu;
 
 use crate::Failure;
 use crate::live;
 use crate::progress::Bar;
 use crate::run_log::{IdentifiedPlant, to_log};
 use hal_sim::native::{PinRecord, Session};
+use hal_sim::scenario::AnyScenario;
 use hal_sim::{Powerplant, RunRecord, Scenario, Truth};
 use ident::log::{Log, write_whole};
 use ident::model::Model;
@@ -31,6 +35,9 @@ pub(crate) struct Args {
     /// Writes what was really there at each sample (CSV).
     #[arg(long, conflicts_with = "replay")]
     truth: Option<PathBuf>,
+    /// Writes what the sensors of the IMU board gave, as `quadrig ahrs` reads it (CSV).
+    #[arg(long)]
+    readings: Option<PathBuf>,
     /// Records everything that reaches the board's pins.
     #[arg(long, conflicts_with_all = ["model", "replay"])]
     pins: Option<PathBuf>,
@@ -47,7 +54,13 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let scenario = Scenario::load(&args.scenario)?;
+    let scenario = match AnyScenario::load(&args.scenario)? {
+        AnyScenario::Rig(scenario) => *scenario,
+        AnyScenario::Imu(scenario) => return imu::run(args, &scenario, quiet),
+    };
+    if args.readings.is_some() {
+        return Err(format!("{}: describes the rig; --readings is for the IMU board", args.scenario.display()).into());
+    }
     let name = args.output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     if !(args.speed.is_finite() && args.speed >= 0.0) {
         return Err(format!("--speed {}: expected a number not below 0", args.speed).into());

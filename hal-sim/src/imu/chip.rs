@@ -128,7 +128,7 @@ impl SensorChip {
                 if file[0x3E] & 0x40 != 0 || file[0x16] >> 3 & 3 != 3 {
                     return [0; 3]; // asleep, or a full scale that the data sheet does not define
                 }
-                seen(self.motion.rate).map(|w| rounded(w.to_degrees() * 14.375, 32_767.0))
+                seen(self.motion.rate(at_ns)).map(|w| rounded(w.to_degrees() * 14.375, 32_767.0))
             }
             ChipKind::Adxl345 => {
                 if file[0x2D] & 0x08 == 0 {

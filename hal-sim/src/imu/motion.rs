@@ -1,7 +1,7 @@
-//! A body that turns at a constant rate while it is shaken along a line.
+//! A body that turns at a constant rate, rocks about an axis of its own and is shaken along a line.
 //!
-//! What it is: attitude, specific force and magnetic field in body axes at any instant, in closed form.
-//! What can go wrong: nothing here fails; the rate is constant in body axes, so nothing integrates and nothing drifts.
+//! What it is: attitude, rate, specific force and magnetic field in body axes at any instant, in closed form.
+//! What can go wrong: nothing here fails; attitudes are products of rotations of known angles, so nothing integrates and nothing drifts.
 //! Units: rad, rad/s, m, Hz, gauss; g (9.80665 m/s^2) for specific force; ns since power-up; earth frame NED, body frame FRD.
 //! Reference: Rodrigues' rotation formula; errata 4.3 (specific force f = a - g); rigid-body acceleration
 //! a_p = a_0 + w x (w x r) (Goldstein, *Classical Mechanics*, section 4.10).
@@ -16,8 +16,12 @@ const G: f64 = 9.806_65;
 pub struct Motion {
     /// Roll, pitch and yaw at time 0, rad; the body turns from there.
     pub start: [f64; 3],
-    /// Constant rate in body axes, rad/s.
+    /// Constant rate about axes that rock along, rad/s.
     pub rate: [f64; 3],
+    /// Axis and amplitude of the rocking, body axes, rad.
+    pub rock: [f64; 3],
+    /// Its frequency, Hz.
+    pub rock_hz: f64,
     /// Magnetic field, earth NED, gauss.
     pub field: [f64; 3],
     /// Amplitude of the shaking, earth NED, m.
@@ -34,35 +38,76 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     core::array::from_fn(|i| core::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
+/// Rotation by `angle` about the unit vector `axis`.
+fn turn([x, y, z]: [f64; 3], angle: f64) -> Matrix {
+    let (s, c) = libm::sincos(angle);
+    let u: Matrix = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    let uu = product(&u, &u);
+    core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j)) + s * u[i][j] + (1.0 - c) * uu[i][j]))
+}
+
+/// Length of a vector, and the vector at length one; `None` of one that has none.
+fn length_and_axis(v: [f64; 3]) -> Option<(f64, [f64; 3])> {
+    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    (length > 0.0).then(|| (length, v.map(|x| x / length)))
+}
+
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 impl Motion {
     /// Level, at rest, body x to magnetic north, in the field of central Europe.
-    pub const LEVEL: Self =
-        Self { start: [0.0; 3], rate: [0.0; 3], field: [0.2, 0.0, 0.44], shake_m: [0.0; 3], shake_hz: 0.0, lever_m: [0.0; 3] };
+    pub const LEVEL: Self = Self {
+        start: [0.0; 3],
+        rate: [0.0; 3],
+        rock: [0.0; 3],
+        rock_hz: 0.0,
+        field: [0.2, 0.0, 0.44],
+        shake_m: [0.0; 3],
+        shake_hz: 0.0,
+        lever_m: [0.0; 3],
+    };
 
-    /// Rotation body to earth at a time, R = Rz Ry Rx exp(rate t).
+    /// Rotation body to earth at a time, R = Rz Ry Rx exp(rate t) exp(rock sin(2 pi f t)).
     #[must_use]
     pub fn attitude(&self, at_ns: u64) -> [[f64; 3]; 3] {
         let [(sf, cf), (st, ct), (sp, cp)] = self.start.map(libm::sincos);
-        let first = [
+        let mut attitude = [
             [ct * cp, sf * st * cp - cf * sp, cf * st * cp + sf * sp],
             [ct * sp, sf * st * sp + cf * cp, cf * st * sp - sf * cp],
             [-st, sf * ct, cf * ct],
         ];
-        let speed = self.rate.iter().map(|w| w * w).sum::<f64>().sqrt();
-        if speed == 0.0 {
-            return first;
+        if let Some((speed, axis)) = length_and_axis(self.rate) {
+            attitude = product(&attitude, &turn(axis, speed * at_ns as f64 * 1e-9));
         }
-        let [x, y, z] = self.rate.map(|w| w / speed);
-        let (s, c) = libm::sincos(speed * at_ns as f64 * 1e-9);
-        let u: Matrix = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-        let uu = product(&u, &u);
-        let turn =
-            core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j)) + s * u[i][j] + (1.0 - c) * uu[i][j]));
-        product(&first, &turn)
+        if let Some((_, rocked)) = self.rocked(at_ns) {
+            attitude = product(&attitude, &rocked);
+        }
+        attitude
+    }
+
+    /// Phase of the rocking, rad, and the rotation by which it has turned the body.
+    fn rocked(&self, at_ns: u64) -> Option<(f64, Matrix)> {
+        let (amplitude, axis) = length_and_axis(self.rock)?;
+        let phase = TAU * self.rock_hz * at_ns as f64 * 1e-9;
+        Some((phase, turn(axis, amplitude * libm::sin(phase))))
+    }
+
+    /// The constant rate as seen in body axes, the rate of the rocking and its change, rad/s and rad/s^2.
+    fn rates(&self, at_ns: u64) -> [[f64; 3]; 3] {
+        let Some((phase, rocked)) = self.rocked(at_ns) else { return [self.rate, [0.0; 3], [0.0; 3]] };
+        let w = TAU * self.rock_hz;
+        let steady = core::array::from_fn(|j| (0..3).map(|i| rocked[i][j] * self.rate[i]).sum());
+        let (s, c) = libm::sincos(phase);
+        [steady, self.rock.map(|a| a * w * c), self.rock.map(|a| -a * w * w * s)]
+    }
+
+    /// Rate of the body, body axes, rad/s.
+    #[must_use]
+    pub fn rate(&self, at_ns: u64) -> [f64; 3] {
+        let [steady, rocking, _] = self.rates(at_ns);
+        core::array::from_fn(|i| steady[i] + rocking[i])
     }
 
     fn to_body(self, at_ns: u64, earth: [f64; 3]) -> [f64; 3] {
@@ -77,8 +122,12 @@ impl Motion {
         let swing = -w * w * libm::sin(w * at_ns as f64 * 1e-9) / G;
         let [x, y, z] = self.shake_m.map(|m| m * swing);
         let body = self.to_body(at_ns, [x, y, z - 1.0]);
-        let inward = cross(self.rate, cross(self.rate, self.lever_m));
-        core::array::from_fn(|i| body[i] + inward[i] / G)
+        let [steady, rocking, change] = self.rates(at_ns);
+        let rate: [f64; 3] = core::array::from_fn(|i| steady[i] + rocking[i]);
+        let carried = cross(steady, rocking); // the steady rate's own change in axes that rock
+        let angular: [f64; 3] = core::array::from_fn(|i| change[i] + carried[i]);
+        let (inward, along) = (cross(rate, cross(rate, self.lever_m)), cross(angular, self.lever_m));
+        core::array::from_fn(|i| body[i] + (inward[i] + along[i]) / G)
     }
 
     /// Field in body axes, gauss.
@@ -92,14 +141,15 @@ impl Motion {
 mod tests {
     use super::*;
 
-    const OBLIQUE: Motion = Motion { start: [0.3, -0.4, 1.9], rate: [0.35, -0.2, 0.33], ..Motion::LEVEL };
+    const OBLIQUE: Motion =
+        Motion { start: [0.3, -0.4, 1.9], rate: [0.35, -0.2, 0.33], rock: [0.2, 0.5, -0.1], rock_hz: 0.8, ..Motion::LEVEL };
 
     /// The rate is what turns the attitude: (R(t+h) - R(t-h))/2h = R [w]x, and R stays a rotation.
     #[test]
     fn the_attitude_turns_at_the_rate() {
-        let (at, h) = (1_700_000_000u64, 1_000_000u64);
+        let (at, h) = (1_700_000_000u64, 10_000u64);
         let (before, now, after) = (OBLIQUE.attitude(at - h), OBLIQUE.attitude(at), OBLIQUE.attitude(at + h));
-        let [x, y, z] = OBLIQUE.rate;
+        let [x, y, z] = OBLIQUE.rate(at);
         let turned = product(&now, &[[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]);
         for i in 0..3 {
             for j in 0..3 {

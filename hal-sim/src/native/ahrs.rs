@@ -59,8 +59,16 @@ pub struct ImuRun {
 /// # Errors
 /// [`wire::EncodeError`] where a message does not fit its frame.
 pub fn run(rig: &ImuRig, milliseconds: u64) -> Result<ImuRun, wire::EncodeError> {
+    fly(rig, milliseconds, &mut |_| ())
+}
+
+/// The same; `progress` hears the share that is done.
+///
+/// # Errors
+/// [`wire::EncodeError`] where a message does not fit its frame.
+pub fn fly(rig: &ImuRig, milliseconds: u64, progress: &mut dyn FnMut(f64)) -> Result<ImuRun, wire::EncodeError> {
     let ticks: Vec<u64> = (1..).map(|k| k * TICK_NS).take_while(|at| *at < milliseconds * 1_000_000).collect();
-    run_at(rig, &ticks)
+    ticked(rig, &ticks, progress)
 }
 
 /// The same with ticks at given instants, ns since power-up.
@@ -68,6 +76,10 @@ pub fn run(rig: &ImuRig, milliseconds: u64) -> Result<ImuRun, wire::EncodeError>
 /// # Errors
 /// [`wire::EncodeError`] where a message does not fit its frame.
 pub fn run_at(rig: &ImuRig, ticks: &[u64]) -> Result<ImuRun, wire::EncodeError> {
+    ticked(rig, ticks, &mut |_| ())
+}
+
+fn ticked(rig: &ImuRig, ticks: &[u64], progress: &mut dyn FnMut(f64)) -> Result<ImuRun, wire::EncodeError> {
     let clock = VirtualClock::default();
     let bus = I2cBus::new(clock.clone(), &rig.fitted, rig.motion, &rig.errors, rig.fault);
     let mut sampler = Sampler::new(bus);
@@ -76,7 +88,10 @@ pub fn run_at(rig: &ImuRig, ticks: &[u64]) -> Result<ImuRun, wire::EncodeError> 
     let mut line = Line::default();
     line.tell(clock.ticks(), &Message::Hello(hello))?;
     let mut samples = Vec::new();
-    for at in ticks {
+    for (n, at) in ticks.iter().enumerate() {
+        if n % 1000 == 0 {
+            progress(n as f64 / ticks.len() as f64);
+        }
         clock.advance_to(*at);
         let now = clock.ticks();
         let readings = sampler.read();

@@ -7,201 +7,29 @@
 //! Reference: specification `rig.md`, "ESC pulse and arming" and "Acquisition"; `formats.md`, "Telemetry".
 
 pub mod ahrs;
+mod board;
 mod host;
 mod pins;
+mod record;
 
 pub use pins::{PinRecord, PinsError};
+pub use record::{RunRecord, SimError};
 
 use crate::bench::{Bench, Millisecond, Truth};
 use crate::noise::{Source, Stream};
 use crate::plant::Powerplant;
 use crate::scenario::{FaultKind, Scenario, ScheduledFault};
 use crate::sensor::EdgeDetail;
-use firmware_rig::{AdcBlock, Config, Inputs, Rig};
-use frame::calibration::{Calibration, Converted};
-use frame::message::{Command, Event, Hello, Message};
-use frame::rig::{FaultSet, Refusals, RigSample, RigState};
+use board::Board;
+use firmware_rig::{AdcBlock, Config};
+use frame::message::Message;
+use frame::rig::RigSample;
 use frame::units::{PulseWidth, Ticks};
-use frame::wire::{Decoder, Encoder, LinkStats, MAX_WIRE};
+use frame::wire::MAX_WIRE;
 use host::{Host, Phase};
-
-/// Why a run did not come to its end.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimError {
-    /// The firmware refused a command of the host.
-    #[error("the rig refused {command:?} while it was {phase}: reasons {reasons:?}")]
-    Refused {
-        /// What was asked.
-        command: Command,
-        /// What the host was doing.
-        phase: &'static str,
-        /// Why not.
-        reasons: Refusals,
-    },
-    /// Faults latched.
-    #[error("the rig latched faults {faults:?} while it was {phase}, {at_s:.3} s after reset")]
-    Faulted {
-        /// Which.
-        faults: FaultSet,
-        /// What the host was doing.
-        phase: &'static str,
-        /// When, s since reset.
-        at_s: f64,
-    },
-    /// A phase lasted longer than it can.
-    #[error("the rig was still {phase} (state {state:?}) {at_s:.0} s after reset")]
-    Stuck {
-        /// What the host was doing.
-        phase: &'static str,
-        /// State of the arming machine.
-        state: RigState,
-        /// When, s since reset.
-        at_s: f64,
-    },
-    /// A message did not fit its frame.
-    #[error("a message did not fit its frame")]
-    Codec,
-}
-
-/// What a run leaves behind.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RunRecord {
-    /// Every byte that the board sent, from reset on.
-    pub telemetry: Vec<u8>,
-    /// Who spoke.
-    pub hello: Hello,
-    /// Calibration in force during the run, tare included.
-    pub calibration: Calibration,
-    /// Time of the first sample; the log's time counts from here.
-    pub start: Ticks,
-    /// Decoded samples of the run.
-    pub samples: Vec<RigSample>,
-    /// Decoded events, from reset on.
-    pub events: Vec<Event>,
-    /// Counters of the host's decoder.
-    pub link: LinkStats,
-    /// What was really there at each sample.
-    pub truth: Vec<Truth>,
-}
-
-impl RunRecord {
-    /// What a host makes of a board's bytes alone, as of a replay: samples of the run, events, calibration; no truth.
-    ///
-    /// # Errors
-    /// [`SimError`] of a board that refused or latched something.
-    pub fn from_telemetry(scenario: &Scenario, telemetry: Vec<u8>) -> Result<Self, SimError> {
-        let mut decoder = Decoder::default();
-        let (mut hello, mut calibration) = (None, None);
-        let (mut samples, mut events) = (Vec::new(), Vec::new());
-        for byte in &telemetry {
-            match decoder.push::<Message>(*byte).map(|received| received.message) {
-                Some(Message::Hello(told)) => hello = Some(told),
-                Some(Message::Calibration(told)) => calibration = Some(told),
-                Some(Message::Rig(sample)) => samples.push(sample),
-                Some(Message::Event(event)) => events.push(event),
-                _ => {}
-            }
-        }
-        let stuck = SimError::Stuck { phase: "replaying", state: RigState::Disarmed, at_s: 0.0 };
-        let running = events.iter().find_map(|e| match e {
-            Event::State { to: RigState::Running, at, .. } => Some(*at),
-            _ => None,
-        });
-        // the host begins to record `rest_s` before the schedule
-        let rest = Ticks((scenario.rest_s * Ticks::HZ as f64) as u64);
-        let (Some(hello), Some(calibration), Some(running)) = (hello, calibration, running) else { return Err(stuck) };
-        samples.retain(|s: &RigSample| s.at.0 + rest.0 >= running.0);
-        let start = samples.first().map_or(running, |s| s.at);
-        Ok(Self { telemetry, hello, calibration, start, samples, events, link: decoder.stats(), truth: Vec::new() })
-    }
-
-    /// Physical values of every sample, with time from the start of the run.
-    pub fn converted(&self) -> impl Iterator<Item = Converted> + '_ {
-        let start = self.start.as_s();
-        self.samples.iter().map(move |s| {
-            let mut row = self.calibration.convert(s);
-            row.t_s -= start;
-            row
-        })
-    }
-}
 
 /// Time beyond the run itself after which a session counts as stuck, ms.
 const OVERHEAD_MS: u64 = 90_000;
-
-/// The board's side: firmware, codec and the timer that makes the pulses.
-struct Board {
-    rig: Rig,
-    encoder: Encoder,
-    decoder: Decoder,
-    pulse: PulseWidth,
-    sent: Vec<u8>,
-}
-
-impl Board {
-    fn new(config: Config) -> Self {
-        Self {
-            rig: Rig::new(config),
-            encoder: Encoder::default(),
-            decoder: Decoder::default(),
-            pulse: PulseWidth::MIN,
-            sent: Vec::new(),
-        }
-    }
-
-    /// Starts again, as after a loss of its supply. The sequence of its frames begins anew as well.
-    fn reset(&mut self, config: Config) {
-        *self = Self::new(config);
-    }
-
-    /// One control tick with what the peripherals gathered; what it has to tell goes onto the line.
-    fn tick(&mut self, now: Ticks, gathered: &Millisecond, command: Option<Command>) -> Result<(), SimError> {
-        let outputs = self.rig.tick(&Inputs {
-            now,
-            edges: core::array::from_fn(|i| gathered.edges[i].as_slice()),
-            over_capture: [false; 4],
-            adc: gathered.adc,
-            command,
-            line: Default::default(),
-            stop_input: false,
-            brown_out: false,
-            paused: false,
-        });
-        self.pulse = outputs.pulse;
-        if let Some(Command::Identify) = command {
-            self.tell(now, &Message::Hello(self.rig.hello(0)))?;
-        }
-        if let Some(Command::Identify | Command::Tare) = command {
-            self.tell(now, &Message::Calibration(self.rig.calibration()))?;
-        }
-        if let Some(sample) = outputs.sample {
-            self.tell(now, &Message::Rig(sample))?;
-        }
-        if let Some(event) = outputs.event {
-            self.tell(now, &Message::Event(event))?;
-        }
-        Ok(())
-    }
-
-    fn tell(&mut self, now: Ticks, message: &Message) -> Result<(), SimError> {
-        let mut frame = [0; MAX_WIRE];
-        let length = self.encoder.encode(now, message, &mut frame).map_err(|_| SimError::Codec)?;
-        self.sent.extend_from_slice(&frame[..length]);
-        Ok(())
-    }
-
-    /// Takes the bytes that the host sent; at most one command is in them.
-    fn hear(&mut self, bytes: &[u8]) -> Option<Command> {
-        let mut command = None;
-        for byte in bytes {
-            if let Some(received) = self.decoder.push(*byte) {
-                command = Some(received.message);
-            }
-        }
-        command
-    }
-}
 
 /// Configuration of the firmware for a scenario.
 #[must_use]

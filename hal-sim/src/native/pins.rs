@@ -7,7 +7,8 @@
 //! Units: ticks of 84 MHz modulo 2^32; 12-bit codes.
 //! Reference: postcard wire format 1.0; house rule 1 (ticks without I/O).
 
-use super::{Board, SimError, firmware_config};
+use super::board::Board;
+use super::{SimError, firmware_config};
 use crate::bench::Millisecond;
 use crate::scenario::Scenario;
 use firmware_rig::AdcBlock;

@@ -7,9 +7,11 @@
 //! Reference: specification `rig.md`, "The simulator"; `docs/scenario.md` lists every key.
 
 mod fault;
+mod imu;
 mod section;
 
 pub use fault::{FaultKind, ScheduledFault};
+pub use imu::{BodySection, ChipSection, Field, ImuScenario, ImuSection};
 pub use section::{AirSection, EscSection, LogSection, NoiseSection, Schedule, SensorSection, SpeedSensor, Step, SupplySection};
 
 use crate::bench::BenchParts;
@@ -23,7 +25,7 @@ use frame::rig::CAPTURE_CHANNELS;
 use frame::units::PulseWidth;
 pub(crate) use section::not_negative;
 use section::positive;
-use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned, de::Error};
 use std::path::{Path, PathBuf};
 
 /// Why a scenario was refused.
@@ -140,8 +142,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Unreadable`], or [`ScenarioError::Refused`] with line and column.
     pub fn load(file: &Path) -> Result<Self, ScenarioError> {
-        let text = std::fs::read_to_string(file).map_err(|source| ScenarioError::Unreadable { file: file.to_owned(), source })?;
-        Self::parse(&text, file)
+        Self::parse(&text_of(file)?, file)
     }
 
     /// Reads a scenario from `text`; `file` names it in errors.
@@ -149,14 +150,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Refused`] with line and column.
     pub fn parse(text: &str, file: &Path) -> Result<Self, ScenarioError> {
-        toml::from_str(text).map_err(|error| {
-            let at = error.span().map_or(0, |s| s.start).min(text.len());
-            let before = text.get(..at).unwrap_or(text);
-            let line = before.matches('\n').count() + 1;
-            let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
-            let reason = error.message().replace('\n', " ");
-            ScenarioError::Refused { file: file.to_owned(), line, column, reason }
-        })
+        parsed(text, file)
     }
 
     /// Length of the logged run, s.
@@ -225,6 +219,46 @@ impl Scenario {
             noise: [n.thrust_n, n.torque_nm, n.current_a, n.voltage_v, n.temp_k],
         }
     }
+}
+
+/// A scenario of either board.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnyScenario {
+    /// A run of the rig.
+    Rig(Box<Scenario>),
+    /// A run of the IMU board: the file has a table `[imu]`.
+    Imu(Box<ImuScenario>),
+}
+
+impl AnyScenario {
+    /// Reads a scenario file of either kind.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Unreadable`], or [`ScenarioError::Refused`] with line and column.
+    pub fn load(file: &Path) -> Result<Self, ScenarioError> {
+        let text = text_of(file)?;
+        let of_the_imu = text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("imu"));
+        if of_the_imu {
+            return parsed(&text, file).map(|s| Self::Imu(Box::new(s)));
+        }
+        parsed(&text, file).map(|s| Self::Rig(Box::new(s)))
+    }
+}
+
+fn text_of(file: &Path) -> Result<String, ScenarioError> {
+    std::fs::read_to_string(file).map_err(|source| ScenarioError::Unreadable { file: file.to_owned(), source })
+}
+
+/// What `text` describes, or where it does not.
+fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ScenarioError> {
+    toml::from_str(text).map_err(|error| {
+        let at = error.span().map_or(0, |s| s.start).min(text.len());
+        let before = text.get(..at).unwrap_or(text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        let reason = error.message().replace('\n', " ");
+        ScenarioError::Refused { file: file.to_owned(), line, column, reason }
+    })
 }
 
 fn motor_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {

@@ -7,10 +7,13 @@
 
 pub mod adc;
 pub mod back_emf;
+mod channel;
 pub mod edge;
 pub mod logger;
+pub mod tachometers;
 
 pub use adc::{AnalogFront, Converter};
 pub use back_emf::{BackEmf, BackEmfMeter};
-pub use edge::{Edge, EdgeDetail, Geometry, Tachometers};
+pub use edge::{Edge, EdgeDetail, Geometry};
 pub use logger::Logger;
+pub use tachometers::Tachometers;

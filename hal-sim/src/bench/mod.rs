@@ -1,0 +1,288 @@
+//! The bench: ESC, powerplant, beam and sensors on one clock.
+//!
+//! What it is: the rig as its board meets it. Pulses go in with the time of their end; edges, pin voltages and beeps come out.
+//! The native run takes it a millisecond at a time ([`Bench::millisecond`]); an emulated board takes it to any instant
+//! ([`Bench::advance_to`]) and asks for edges and voltages.
+//! What can go wrong: nothing here fails; a powerplant that gives a NaN or a negative speed is taken as a resting rotor.
+//! Units: ns since power-up of the board for every time; V at the pins.
+//! Reference: specification `rig.md`, "The simulator"; house rule 7 (the simulator owns the only clock).
+//!
+//! For a driver with its own clock:
+//!
+//! ```
+//! use hal_sim::{Bench, EdgeDetail, Scenario};
+//! let mut bench = Bench::new(&Scenario::demo(1, None).unwrap(), None, EdgeDetail::Pins);
+//! bench.set_power(true);
+//! bench.pulse(1_000_000, 1_000_000); // a pulse of 1 ms ended at t = 1 ms
+//! bench.advance_to(5_000_000);
+//! while let Some(edge) = bench.edge_until(5_000_000) { /* drive the pin at edge.at_ns */ }
+//! let wake = bench.next_edge_ns().unwrap_or(bench.horizon_ns()); // the next instant worth stopping at
+//! let strain_v = bench.voltages()[0];
+//! let beep = bench.beep();
+//! # let _ = (wake, strain_v, beep);
+//! ```
+
+mod imbalance;
+mod parts;
+mod steps;
+
+pub use parts::{BenchParts, Millisecond, Truth};
+
+use crate::effect::{Levers, Scheduled};
+use crate::noise::{Source, Stream};
+use crate::plant::beam::BeamMode;
+use crate::plant::bridge::BridgeState;
+use crate::plant::mount::MountState;
+use crate::plant::powerplant::STEPS_PER_MS;
+use crate::plant::{Beam, EscDialogue, EscState, Mount, Powerplant, RigPlant};
+use crate::scenario::Scenario;
+use crate::sensor::back_emf::BackEmfState;
+use crate::sensor::{AnalogFront, BackEmfMeter, Converter, Edge, EdgeDetail, Geometry, Logger, Tachometers};
+use frame::calibration::Calibration;
+use frame::message::Beep;
+use frame::rig::ADC_CHANNELS;
+use frame::units::Ticks;
+use parts::{fitted, open};
+use std::collections::VecDeque;
+
+/// Integration step, ns.
+pub const STEP_NS: u64 = 100_000;
+/// Integration step, s.
+pub const STEP_S: f64 = 1.0e-4;
+/// The rig.
+pub struct Bench {
+    esc: EscDialogue,
+    plant: Box<dyn Powerplant>,
+    base: BenchParts,
+    effects: Vec<Scheduled>,
+    open: u128,
+    seed: u64,
+    levers: Levers,
+    beam: Beam,
+    mode: BeamMode,
+    bridge: BridgeState,
+    mount: Mount,
+    joints: MountState,
+    rigid: bool,
+    shake_n: f64,
+    logger: Logger,
+    recorded: bool,
+    front: AnalogFront,
+    converter: Converter,
+    geometry: Geometry,
+    tachometers: Tachometers,
+    meter: BackEmfState,
+    metered_rev: f64,
+    steps: u64,
+    run_start_steps: Option<u64>,
+    angle_rev: f64,
+    heavy_spot_rev: f64,
+    strain_v: [f64; STEPS_PER_MS],
+    torque_v: f64,
+    output_us: f64,
+    edges: VecDeque<Edge>,
+    truth: Truth,
+}
+
+impl Bench {
+    /// A bench at rest without ESC power. `plant` takes the place of the scenario's own powerplant; effects on the
+    /// powerplant then have nothing to act on, those on the load cell and the sensors still do.
+    #[must_use]
+    pub fn new(scenario: &Scenario, plant: Option<Box<dyn Powerplant>>, detail: EdgeDetail) -> Self {
+        let base = scenario.parts();
+        let effects = scenario.effects.clone();
+        let open = open(&effects, -1.0);
+        let parts = fitted(&base, &effects, open);
+        let seed = scenario.seed;
+        let mut phase = Stream::new(seed, Source::Phase, 0);
+        let angle_rev = phase.uniform();
+        let cells = parts.plant.supply.cells();
+        let front = AnalogFront::new(&parts.bridge);
+        let plant = plant.unwrap_or_else(|| Box::new(RigPlant::new(parts.plant, seed)));
+        Self {
+            esc: EscDialogue::new(parts.esc, cells),
+            plant,
+            base,
+            effects,
+            open,
+            seed,
+            levers: Levers::default(),
+            mode: BeamMode::new(&parts.beam, STEP_S),
+            beam: parts.beam,
+            bridge: BridgeState::new(parts.bridge, STEP_S),
+            mount: parts.mount,
+            joints: MountState::default(),
+            rigid: true,
+            shake_n: 0.0,
+            logger: Logger::default(),
+            recorded: false,
+            converter: Converter::new(&front, parts.noise, seed),
+            tachometers: Tachometers::new(&parts.geometry, detail, seed, angle_rev),
+            geometry: parts.geometry,
+            meter: BackEmfState::new(BackEmfMeter::default()),
+            metered_rev: angle_rev,
+            steps: 0,
+            run_start_steps: None,
+            angle_rev,
+            heavy_spot_rev: phase.uniform(),
+            strain_v: [front.zero_v[0]; STEPS_PER_MS],
+            torque_v: front.zero_v[1],
+            front,
+            output_us: 1000.0,
+            edges: VecDeque::new(),
+            truth: Truth::default(),
+        }
+    }
+
+    /// Puts the parts of the effects whose windows are open now in the place of those so far. All states go on.
+    fn refit(&mut self) {
+        let parts = fitted(&self.base, &self.effects, self.open);
+        self.esc.refit(parts.esc);
+        self.plant.refit(&parts.plant);
+        self.mode.refit(&parts.beam, STEP_S);
+        self.beam = parts.beam;
+        self.bridge.refit(parts.bridge, STEP_S);
+        self.mount = parts.mount;
+        self.tachometers.refit(&parts.geometry, self.angle_rev);
+        self.geometry = parts.geometry;
+    }
+
+    /// Voltages at the pins without noise.
+    fn pins_v(&self) -> [f64; ADC_CHANNELS] {
+        let strain_v = self.strain_v[((self.steps + STEPS_PER_MS as u64 - 1) % STEPS_PER_MS as u64) as usize];
+        let mut pins = self.front.pins(strain_v, &self.truth.plant);
+        pins[1] = self.torque_v;
+        for (pin, spike) in pins.iter_mut().zip(self.levers.spike_v) {
+            *pin += spike;
+        }
+        pins
+    }
+
+    /// The operator's switch: connects or cuts the ESC's power.
+    pub fn set_power(&mut self, on: bool) {
+        self.esc.set_power(on);
+    }
+
+    /// The run starts now: from here the effects count their time.
+    pub fn start_run(&mut self) {
+        self.run_start_steps = Some(self.steps);
+    }
+
+    /// A pulse of `width_ns` on the ESC pin ended at `at_ns`.
+    pub fn pulse(&mut self, at_ns: u64, width_ns: u32) {
+        self.esc.pulse(at_ns, width_ns);
+    }
+
+    /// Integrates until [`Bench::horizon_ns`] is at least `at_ns`. The look-ahead is less than one step of 0.1 ms.
+    pub fn advance_to(&mut self, at_ns: u64) {
+        while self.horizon_ns() < at_ns {
+            if self.steps.is_multiple_of(STEPS_PER_MS as u64) {
+                self.each_millisecond();
+            }
+            self.step();
+        }
+    }
+
+    /// Time up to which everything is integrated, ns.
+    #[must_use]
+    pub fn horizon_ns(&self) -> u64 {
+        self.steps * STEP_NS
+    }
+
+    /// Time of the earliest edge that was not fetched yet; `None` when there is none before [`Bench::horizon_ns`].
+    #[must_use]
+    pub fn next_edge_ns(&self) -> Option<u64> {
+        self.edges.front().map(|e| e.at_ns)
+    }
+
+    /// Fetches the earliest edge if it is due at or before `at_ns`.
+    pub fn edge_until(&mut self, at_ns: u64) -> Option<Edge> {
+        if self.next_edge_ns()? <= at_ns { self.edges.pop_front() } else { None }
+    }
+
+    /// Level of a capture pin after the edges made so far (with [`EdgeDetail::Pins`]); for set-up after a reset.
+    #[must_use]
+    pub fn level(&self, channel: usize) -> bool {
+        self.tachometers.level(channel)
+    }
+
+    /// Voltages at the pins of strain, torque, current, voltage and temperature, noise of the wires included, V.
+    #[must_use]
+    pub fn voltages(&self) -> [f64; ADC_CHANNELS] {
+        let pins = self.pins_v();
+        core::array::from_fn(|i| pins[i] + self.converter.offset_v(i))
+    }
+
+    /// One conversion of an ADC channel now, with its own noise, 12 bits. Each call draws new noise.
+    pub fn convert(&mut self, channel: usize) -> u16 {
+        let pins = self.pins_v();
+        self.converter.convert(channel, pins[channel])
+    }
+
+    /// The next beep pattern that has ended, with the time of its end, ns.
+    pub fn beep(&mut self) -> Option<(u64, Beep)> {
+        self.esc.beep()
+    }
+
+    /// Where the ESC stands.
+    #[must_use]
+    pub fn esc_state(&self) -> EscState {
+        self.esc.state()
+    }
+
+    /// What is really there now.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        self.truth
+    }
+
+    /// The calibration that fits this bench exactly.
+    #[must_use]
+    pub fn calibration(&self) -> Calibration {
+        Calibration { timer_hz: Ticks::HZ, marks: self.geometry.marks(), adc: self.front.scales() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use frame::rig::CAPTURE_CHANNELS;
+
+    /// The native run's millisecond at once gives what the emulated board's steps give.
+    #[test]
+    fn a_millisecond_at_once_is_its_ten_steps() {
+        for effect in
+            [None, Some("beam_resonance"), Some("spinup_lag"), Some("clock_drift"), Some("loosening_mount"), Some("encoder_drag")]
+        {
+            let scenario = Scenario::demo(3, effect).unwrap_or_else(|e| panic!("{e}"));
+            let bench = || {
+                let mut bench = Bench::new(&scenario, None, EdgeDetail::Captured);
+                bench.set_power(true);
+                bench
+            };
+            let (mut fast, mut slow) = (bench(), bench());
+            let mut out = Millisecond::default();
+            for ms in 0..12_000u64 {
+                let width = if ms < 5_000 { 1_000_000 } else { 1_700_000 };
+                for bench in [&mut fast, &mut slow] {
+                    if ms == 5_500 {
+                        bench.start_run();
+                    }
+                    if ms % 20 == 2 {
+                        bench.pulse(ms * 1_000_000, width);
+                    }
+                }
+                fast.millisecond(&mut out);
+                slow.advance_to((ms + 1) * 1_000_000);
+                let mut edges: [Vec<u32>; CAPTURE_CHANNELS] = Default::default();
+                while let Some(edge) = slow.edge_until(u64::MAX) {
+                    edges[usize::from(edge.channel)].push(edge.at_ticks as u32);
+                }
+                assert_eq!(out.edges, edges, "{effect:?} {ms} ms");
+                assert_eq!(fast.truth(), slow.truth(), "{effect:?} {ms} ms");
+                assert_eq!(fast.voltages(), slow.voltages(), "{effect:?} {ms} ms");
+            }
+            assert!(fast.truth().plant.rpm > 1000.0);
+        }
+    }
+}
