@@ -20,6 +20,7 @@ pub mod heldout;
 pub mod hypothesis;
 pub mod identify;
 pub mod import;
+pub mod inertial;
 pub mod inspect;
 pub mod log;
 pub mod long;

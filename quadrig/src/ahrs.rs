@@ -8,6 +8,7 @@
 
 mod calibration;
 pub(crate) mod imu_log;
+mod number;
 mod text;
 
 use crate::Failure;

@@ -1,9 +1,12 @@
 //! `quadrig close-loop`.
 //!
-//! What it is: the verdict on a log, as a table or as JSON, and the folder with model, verdict and report.
+//! What it is: the verdict on a log, as a table or as JSON, and the folder with model, verdict and report. An attitude log, known by
+//! its columns, gets the verdict on the inertial unit instead.
 //! What can go wrong: refused input; the folder's files appear whole or not at all.
 //! Units: as the channels state.
 //! Reference: specification `formats.md`.
+
+mod inertial;
 
 use crate::Failure;
 use crate::progress::Bar;
@@ -35,6 +38,9 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    if inertial::is_attitude_log(&args.log) {
+        return inertial::run(args, quiet);
+    }
     let log = Log::read(&args.log)?;
     let model = args.model.as_deref().map(Model::read).transpose()?;
     let others = args.validate.iter().map(|p| Log::read(p)).collect::<Result<Vec<_>, _>>()?;

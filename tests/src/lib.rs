@@ -10,6 +10,7 @@
 pub mod blind;
 pub mod budget;
 pub mod desk;
+pub mod inertial;
 pub mod probe;
 
 use std::path::{Path, PathBuf};

@@ -138,8 +138,7 @@ fn attitude_of_sixty_thousand_rows_and_refusals() {
         let _ = writeln!(text, "{:.4},0.001,0,0,0,0,9.81,10,20,-40", f64::from(n) * 0.0035);
     }
     std::fs::write(bench.path().join("in.csv"), text).unwrap();
-    // 100 ms are the aim; processor time swells where others fight for the caches, and other tests have children too: the least of a
-    // few, with half as much again
+    // processor time, because others may run beside; it swells where they fight for the caches: the least of a few
     let mut least = f64::INFINITY;
     for _ in 0..5 {
         let before = children_ms();
@@ -147,7 +146,7 @@ fn attitude_of_sixty_thousand_rows_and_refusals() {
         least = before.zip(children_ms()).map_or(least, |(a, b)| least.min(b - a));
     }
     println!("60 000 rows in {least:.0} ms of processor time");
-    assert!(cfg!(debug_assertions) || least <= 150.0 || least.is_infinite(), "{least:.0} ms");
+    assert!(cfg!(debug_assertions) || least <= 100.0 || least.is_infinite(), "{least:.0} ms");
     let out = std::fs::read_to_string(bench.path().join("out.csv")).unwrap();
     let mut lines = out.lines();
     assert_eq!(lines.next(), Some("t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg"));

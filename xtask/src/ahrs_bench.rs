@@ -6,6 +6,7 @@
 //! Units: degrees.
 //! Reference: specification `ahrs.md`; README of the data; `docs/ahrs.md`.
 
+mod plots;
 pub(crate) mod score;
 pub(crate) mod trial;
 pub(crate) mod variant;
@@ -28,6 +29,9 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
     let trials = trial::trials(&folder.join("broad"))?;
     if let ["--scan"] = words {
         return scan(&trials);
+    }
+    if let ["--plots", target] = words {
+        return plots::plots(std::path::Path::new(target), &trials);
     }
     let peers = folder.join("peers-shared.csv");
     let mut missed = Vec::new();

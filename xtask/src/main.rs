@@ -32,6 +32,8 @@ usage: cargo xtask COMMAND
                    interrupts reach no panic, and its stack is bounded (budgets/rig.toml)
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
   ahrs-bench       the attitude filter on the shared BROAD trials and their stress variants, with its targets
+  ahrs-bench --plots DIR  the error over time in each trial, as a page and figures
+  ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)
   test             everything: format, lints, images, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
   blind [ARGS]     the blind campaign (docs/blind.md); ARGS go to it, --help lists them
@@ -54,6 +56,10 @@ fn main() -> ExitCode {
             run::run(&mut run::cargo(&place, &[&head, rest].concat()))
         }
         ["ahrs-bench", rest @ ..] => ahrs_bench::bench(&place, rest),
+        ["ahrs-causes", rest @ ..] => {
+            let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "causes", "--"];
+            run::run(&mut run::cargo(&place, &[&head, rest].concat()))
+        }
         ["test", "--emulated"] => test::on_boards(&place),
         ["test", "--verdicts"] => test::on_logs(&place),
         ["help" | "--help" | "-h"] => {

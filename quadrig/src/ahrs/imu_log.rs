@@ -6,6 +6,7 @@
 //! Units: s, rad/s, m/s^2, uT.
 //! Reference: specification `formats.md`, "Attitude log".
 
+use super::number;
 use crate::Failure;
 use dcm::Vec3;
 use std::path::Path;
@@ -75,6 +76,13 @@ impl ImuLog {
         Ok(Self { text, times, rows })
     }
 
+    /// A further column by its name, where the log has it; an empty field is not a number.
+    pub(crate) fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let mut lines = self.text.lines().filter(|l| !l.starts_with('#') && !l.trim().is_empty());
+        let place = lines.next()?.split(',').position(|n| n.trim() == name)?;
+        Some(lines.map(|l| l.split(',').nth(place).and_then(|w| w.trim().parse().ok()).unwrap_or(f64::NAN)).collect())
+    }
+
     /// Rows with the time since the row before; the first takes the second's.
     pub(crate) fn steps(&self) -> impl Iterator<Item = (&Row, f32)> {
         let first = match self.rows.as_slice() {
@@ -103,31 +111,31 @@ fn parse(text: &str) -> Result<Parsed, (usize, String)> {
     let columns = Columns::of(header).map_err(|what| (n + 1, what))?;
     let estimate = text.len() / header.len().max(40);
     let (mut times, mut rows) = (Vec::with_capacity(estimate), Vec::<Row>::with_capacity(estimate));
-    let mut fields: Vec<&str> = Vec::new();
+    let mut fields = vec![(0usize, 0usize); columns.last + 1];
     for (n, line) in lines {
-        fields.clear();
-        fields.extend(line.split(',').take(columns.last + 1).map(str::trim));
         let fail = |what: String| (n + 1, what);
-        if fields.len() <= columns.last {
-            return Err(fail(format!("{} fields, expected at least {}", fields.len(), columns.last + 1)));
+        let count = split(line.as_bytes(), &mut fields);
+        if count < fields.len() {
+            return Err(fail(format!("{count} fields, expected at least {}", fields.len())));
         }
-        let word = fields[columns.time];
-        let t: f64 =
-            word.parse().ok().filter(|t: &f64| t.is_finite()).ok_or_else(|| fail(format!("column t_s: {word:?} is no time")))?;
+        let word = |at: usize| line[fields[at].0..fields[at].1].trim();
+        let time = word(columns.time);
+        let t = number::parse(time.as_bytes()).filter(|t| t.is_finite());
+        let t = t.ok_or_else(|| fail(format!("column t_s: {time:?} is no time")))?;
         if let Some(before) = rows.last().filter(|r| r.t >= t) {
-            return Err(fail(format!("column t_s: {word} does not come after {}; time must increase", before.t)));
+            return Err(fail(format!("column t_s: {time} does not come after {}; time must increase", before.t)));
         }
         let mut sensors = [None; 3];
         for ((slot, place), names) in sensors.iter_mut().zip(columns.sensors).zip(SENSORS) {
             let Some(place) = place else { continue };
             let mut v = [0.0f32; 3];
             for ((v, at), name) in v.iter_mut().zip(place).zip(names) {
-                *v = number(fields[at]).ok_or_else(|| fail(format!("column {name}: {:?} is no number", fields[at])))?;
+                *v = reading(word(at)).ok_or_else(|| fail(format!("column {name}: {:?} is no number", word(at))))?;
             }
             *slot = v.iter().all(|c| c.is_finite()).then(|| Vec3::from(v));
         }
-        let from = word.as_ptr() as usize - text.as_ptr() as usize;
-        times.push((from as u32, (from + word.len()) as u32));
+        let from = time.as_ptr() as usize - text.as_ptr() as usize;
+        times.push((from as u32, (from + time.len()) as u32));
         let [gyro, accel, mag] = sensors;
         rows.push(Row { t, gyro, accel, mag });
     }
@@ -137,12 +145,28 @@ fn parse(text: &str) -> Result<Parsed, (usize, String)> {
     Ok((times, rows))
 }
 
-/// A number; empty and `nan` are a missing one, infinity is none.
-fn number(field: &str) -> Option<f32> {
+/// Where the first fields of a line lie, from and to; gives how many there are, at most as many as asked for.
+fn split(line: &[u8], fields: &mut [(usize, usize)]) -> usize {
+    let (mut from, mut count) = (0, 0);
+    for (at, byte) in line.iter().enumerate() {
+        if *byte == b',' {
+            fields[count] = (from, at);
+            (from, count) = (at + 1, count + 1);
+            if count == fields.len() {
+                return count;
+            }
+        }
+    }
+    fields[count] = (from, line.len());
+    count + 1
+}
+
+/// A reading; empty and `nan` are a missing one, infinity is none.
+fn reading(field: &str) -> Option<f32> {
     if field.is_empty() {
         return Some(f32::NAN);
     }
-    field.parse::<f32>().ok().filter(|v| !v.is_infinite())
+    number::parse(field.as_bytes()).map(|v| v as f32).filter(|v| !v.is_infinite())
 }
 
 #[cfg(test)]

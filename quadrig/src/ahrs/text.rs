@@ -10,7 +10,7 @@ use std::fmt::Write;
 /// Appends `value` with `DIGITS` digits after the point, rounded half away from zero.
 pub(crate) fn fixed<const DIGITS: u32>(out: &mut String, value: f64) {
     let scale = 10u64.pow(DIGITS);
-    let scaled = (value.abs() * scale as f64).round();
+    let scaled = value.abs() * scale as f64 + 0.5;
     if value.is_nan() || scaled >= 9e18 || value.abs() > 9e9 {
         let _ = write!(out, "{value:.*}", DIGITS as usize);
         return;
@@ -21,21 +21,41 @@ pub(crate) fn fixed<const DIGITS: u32>(out: &mut String, value: f64) {
     }
     let mut digits = [b'0'; 24];
     let mut at = digits.len();
-    let mut rest = scaled;
-    for place in 0.. {
-        if place == DIGITS {
-            at -= 1;
-            digits[at] = b'.';
-        }
-        if place > DIGITS && rest == 0 {
-            break;
-        }
+    let (mut whole, mut rest) = (scaled / scale, scaled % scale);
+    // two digits a division
+    let mut place = DIGITS;
+    while place >= 2 {
+        at -= 2;
+        digits[at..at + 2].copy_from_slice(&PAIRS[rest as usize % 100]);
+        (rest, place) = (rest / 100, place - 2);
+    }
+    if place == 1 {
         at -= 1;
         digits[at] = b'0' + (rest % 10) as u8;
-        rest /= 10;
+    }
+    at -= 1;
+    digits[at] = b'.';
+    loop {
+        at -= 1;
+        digits[at] = b'0' + (whole % 10) as u8;
+        whole /= 10;
+        if whole == 0 {
+            break;
+        }
     }
     out.push_str(std::str::from_utf8(&digits[at..]).unwrap_or_default());
 }
+
+/// 00 to 99.
+const PAIRS: [[u8; 2]; 100] = {
+    let mut pairs = [[0; 2]; 100];
+    let mut k = 0;
+    while k < 100 {
+        pairs[k] = [b'0' + (k / 10) as u8, b'0' + (k % 10) as u8];
+        k += 1;
+    }
+    pairs
+};
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,165 @@
+//! What the three sensors' traces come to: one verdict.
+//!
+//! What it is: predictions of every channel before and after, figures by channel, the effects with their parameters, and the word
+//! for it all.
+//! What can go wrong: a channel with no usable row is left out.
+//! Units: those of the channels.
+//! Reference: specification `formats.md`, "Verdict".
+
+use super::Recording;
+use super::least::Readings;
+use crate::residual::whiteness;
+use crate::verdict::{Alternative, Channel, EffectEntry, FORMAT, Figures, Kind, NextExperiment, ScheduleStep, Verdict};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+/// One sensor's trace.
+#[derive(Debug, Clone)]
+pub struct Sensor {
+    /// Its three columns.
+    pub channels: [&'static str; 3],
+    /// Their unit.
+    pub unit: &'static str,
+    /// What the declared model predicts, row by row; not a number where it makes no claim.
+    pub declared: Vec<Vector3<f64>>,
+    /// The same with everything that was found.
+    pub corrected: Vec<Vector3<f64>>,
+    /// Noise of a reading, by axis.
+    pub floor: [f64; 3],
+    pub(crate) heldout_before: [f64; 3],
+    pub(crate) heldout_after: [f64; 3],
+    pub(crate) effects: Vec<EffectEntry>,
+    pub(crate) alternatives: Vec<Alternative>,
+    pub(crate) kind: Kind,
+    /// What is left over, in noise floors, before and after.
+    pub(crate) excess: [f64; 2],
+}
+
+/// A closed loop.
+#[derive(Debug, Clone)]
+pub struct Closed {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The traces, of the sensors that could be predicted.
+    pub sensors: Vec<Sensor>,
+}
+
+/// Below this share of the excess a name explains too little.
+const EXPLAINED: f64 = 0.5;
+/// Residual over noise and doubt from which something is there.
+const SOMETHING: f64 = 1.5;
+/// Below this probability the others count as equal.
+const SURE: f64 = 0.8;
+
+/// The word for one sensor, from mean squares held out before and after, what noise and doubt explain, and the best probability.
+pub(crate) fn judge(before: f64, after: f64, explained: f64, named: bool, probability: f64) -> Kind {
+    let excess = (before - explained).max(0.0);
+    let taken = if excess > 0.0 { (before - after) / excess } else { 1.0 };
+    let left = after > SOMETHING * SOMETHING * explained;
+    match named {
+        false if before > SOMETHING * SOMETHING * explained => Kind::Unattributed,
+        false => Kind::None,
+        true if left && taken < EXPLAINED => Kind::Unattributed,
+        true if probability < SURE => Kind::Ambiguous,
+        true => Kind::Attributed,
+    }
+}
+
+/// Root mean squares by axis of a residual that runs x, y, z, x, y, z, ...
+pub(crate) fn by_axis(residual: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|k| {
+        let own: Vec<f64> = residual.iter().skip(k).step_by(3).copied().collect();
+        (Readings::square(&own) / own.len().max(1) as f64).sqrt()
+    })
+}
+
+pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed {
+    let mut channels = BTreeMap::new();
+    for s in &sensors {
+        for k in 0..3 {
+            if let Some(c) = channel(recording, s, k) {
+                channels.insert(s.channels[k].to_owned(), c);
+            }
+        }
+    }
+    // the sensor with the most left over speaks first
+    sensors.sort_by(|a, b| b.excess[0].total_cmp(&a.excess[0]));
+    let named = sensors.iter().filter(|s| matches!(s.kind, Kind::Attributed | Kind::Ambiguous));
+    let unknown = sensors.iter().find(|s| s.kind == Kind::Unattributed);
+    let worst = named.clone().map(|s| s.excess[0]).fold(0.0, f64::max);
+    let (verdict, effects): (Kind, Vec<EffectEntry>) = match unknown {
+        Some(u) if u.excess[1] >= worst || named.clone().next().is_none() => (Kind::Unattributed, u.effects.clone()),
+        _ => {
+            let effects: Vec<EffectEntry> = named.clone().flat_map(|s| s.effects.clone()).collect();
+            let unsure = named.clone().any(|s| s.kind == Kind::Ambiguous);
+            match (effects.is_empty(), unsure) {
+                (true, _) => (Kind::None, effects),
+                (_, true) => (Kind::Ambiguous, effects),
+                _ => (Kind::Attributed, effects),
+            }
+        }
+    };
+    let mut alternatives: Vec<Alternative> = sensors.iter().flat_map(|s| s.alternatives.clone()).collect();
+    alternatives.retain(|a| a.probability >= 1e-3);
+    alternatives.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let next_experiment = (verdict == Kind::Ambiguous).then(next);
+    let verdict = Verdict {
+        format: FORMAT,
+        run: recording.name.clone(),
+        verdict,
+        channels,
+        effects,
+        alternatives,
+        next_experiment,
+        validation: Vec::new(),
+    };
+    Closed { verdict, sensors }
+}
+
+/// The motion that tells causes of an inertial unit apart. The schedule has the rig's form: the motors stay off.
+fn next() -> NextExperiment {
+    NextExperiment {
+        why: "motors off (1000 us): rest 10 s, turn slowly about each axis for 20 s at one place, rest 10 s, do the same a metre away, rest \
+              10 s: what travels with the sensor turns with it at both places, what belongs to the room does not"
+            .to_owned(),
+        schedule: [10.0, 20.0, 10.0, 20.0, 10.0].map(|hold_s| ScheduleStep { pulse_us: 1000.0, hold_s }).to_vec(),
+    }
+}
+
+fn channel(recording: &Recording, sensor: &Sensor, axis: usize) -> Option<Channel> {
+    let measured = sensor.measured(recording);
+    let left = |predicted: &[Vector3<f64>]| -> (Vec<f64>, Vec<f64>) {
+        let rows = recording.t.iter().zip(measured.iter().zip(predicted));
+        rows.map(|(t, (m, p))| (*t, m[axis] - p[axis])).filter(|(_, r)| r.is_finite()).unzip()
+    };
+    let figures = |predicted: &[Vector3<f64>], heldout: f64| {
+        let (t, r) = left(predicted);
+        let rms = (Readings::square(&r) / r.len().max(1) as f64).sqrt();
+        let p = whiteness(&t, &r);
+        (!r.is_empty()).then_some(Figures { rms, heldout_rms: heldout, whiteness_p: if p.is_finite() { p } else { 1.0 } })
+    };
+    Some(Channel {
+        unit: sensor.unit.to_owned(),
+        noise_floor_rms: sensor.floor[axis],
+        before: figures(&sensor.declared, sensor.heldout_before[axis])?,
+        after: figures(&sensor.corrected, sensor.heldout_after[axis])?,
+    })
+}
+
+impl Sensor {
+    /// The readings that it is about.
+    #[must_use]
+    pub fn measured<'r>(&self, recording: &'r Recording) -> &'r [Vector3<f64>] {
+        match self.channels[0] {
+            "gx" => &recording.gyro,
+            "ax" => &recording.accel,
+            _ => &recording.mag,
+        }
+    }
+
+    /// What came of it, and how much was left over before and after, in noise floors (the attitude's own error counts as noise).
+    #[must_use]
+    pub fn summary(&self) -> (Kind, [f64; 2], Vec<&str>) {
+        (self.kind, self.excess, self.effects.iter().map(|e| e.id.as_str()).collect())
+    }
+}

@@ -1,0 +1,145 @@
+//! The magnetic field.
+//!
+//! What it is: declared is a field that is constant in earth axes. The attitude knows no north, so its heading starts anywhere and
+//! drifts slowly: that drift is a curve with knots far apart, fitted beside the field and beside every cause.
+//! What can go wrong: a sensor that repeats old readings is heard only when it changes.
+//! Units: uT, s.
+//! Reference: specification `closing-the-loop.md`, "Inertial".
+
+use super::account::Sensor;
+use super::least::{Column, Readings, Term};
+use super::noise::{axis_level, floor, levels};
+use super::search::Scene;
+use super::trace::{Setting, trace};
+use super::{Attitude, Recording, effects};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+/// Block, left-out stretch and cluster, s.
+const CUTS: (f64, f64, f64) = (0.05, 0.4, 4.0);
+/// Knots of the heading's drift, s.
+const KNOT_S: f64 = 20.0;
+/// Error of the predicted direction, rad, one axis (0.35 degrees; the filter's inclination is good to 0.7, `docs/ahrs.md`).
+const DOUBT: f64 = 0.006;
+/// Turns of the Gauss-Newton method for the heading's drift.
+const TURNS: usize = 4;
+/// Fewest blocks.
+const LEAST_BLOCKS: usize = 200;
+
+/// Heading over time: a value at each knot.
+struct Heading {
+    from: f64,
+    knots: Vec<f64>,
+}
+
+impl Heading {
+    fn at(&self, t: f64) -> f64 {
+        let x = ((t - self.from) / KNOT_S).clamp(0.0, (self.knots.len() - 1) as f64);
+        let k = (x as usize).min(self.knots.len() - 2);
+        self.knots[k] + (self.knots[k + 1] - self.knots[k]) * (x - k as f64)
+    }
+}
+
+/// The trace; nothing without a magnetometer or with too little of it.
+pub(crate) fn trace_field(recording: &Recording, attitude: &Attitude) -> Option<Sensor> {
+    let t = &recording.t;
+    let known = |i: usize| recording.mag[i].iter().all(|c| c.is_finite()) && attitude.to_earth[i].m11.is_finite();
+    if recording.mag.is_empty() {
+        return None;
+    }
+    let claimed: Vec<bool> = (0..t.len()).map(known).collect();
+    let mut used = claimed.clone();
+    for i in 1..t.len() {
+        used[i] &= recording.mag[i] != recording.mag[i - 1];
+    }
+    let readings = Readings::new(t, &recording.mag, used.clone(), CUTS.0, CUTS.1, CUTS.2);
+    if readings.blocks.len() < LEAST_BLOCKS {
+        return None;
+    }
+    let fresh: Vec<Vector3<f64>> = (0..t.len()).filter(|i| used[*i]).map(|i| recording.mag[i]).collect();
+    let noise = floor(&levels(&fresh, 50)) / (fresh.len() as f64 / readings.blocks.len() as f64).sqrt();
+    let (to_earth, earth) = north(recording, attitude, &readings, noise)?;
+    let predicted: Vec<Vector3<f64>> = to_earth.iter().map(|r| r.tr_mul(&earth)).collect();
+    let heard = (readings.blocks[0].t, readings.blocks.last()?.t);
+    let scene = Scene { recording, to_earth: &to_earth, predicted: &predicted, turning: &[], heard };
+    let setting = Setting {
+        channels: ["mx", "my", "mz"],
+        unit: "uT",
+        floor: std::array::from_fn(|k| axis_level(&fresh, k)),
+        noise,
+        doubt: DOUBT * earth.norm(),
+    };
+    let base = declared(t, &to_earth, earth, heard);
+    Some(trace(&setting, &readings, &base, &effects::field(), &scene, &claimed)?.sensor)
+}
+
+/// The declared model's terms: a constant field in earth axes, and a heading that drifts slowly.
+fn declared<'a>(t: &'a [f64], to_earth: &'a [Matrix3<f64>], earth: Vector3<f64>, heard: (f64, f64)) -> Vec<Term<'a>> {
+    let axis = |k: usize, name: &str| Term::new(name, "uT", move |i: usize| to_earth[i].row(k).transpose());
+    let mut terms = vec![axis(0, "north"), axis(2, "down")];
+    let sideways = Vector3::z().cross(&earth);
+    let count = ((heard.1 - heard.0) / KNOT_S).ceil() as usize + 1;
+    for knot in 0..count {
+        let centre = heard.0 + knot as f64 * KNOT_S;
+        let value = move |i: usize| {
+            let share = (1.0 - (t[i] - centre).abs() / KNOT_S).max(0.0);
+            share * to_earth[i].tr_mul(&sideways)
+        };
+        let support = (centre - KNOT_S, centre + KNOT_S);
+        terms.push(Term { support, prior: 0.5, ..Term::new("", "rad", value) });
+    }
+    terms
+}
+
+/// The attitude turned to the field's north all along, and the field in earth axes.
+fn north(
+    recording: &Recording,
+    attitude: &Attitude,
+    readings: &Readings,
+    noise: f64,
+) -> Option<(Vec<Matrix3<f64>>, Vector3<f64>)> {
+    let t = &recording.t;
+    let heard = (readings.blocks.first()?.t, readings.blocks.last()?.t);
+    let mut heading = first_guess(recording, attitude, readings, heard);
+    let turned = |heading: &Heading| -> Vec<Matrix3<f64>> {
+        let about =
+            |i: usize| Rotation3::from_axis_angle(&Vector3::z_axis(), -heading.at(t[i])).into_inner() * attitude.to_earth[i];
+        (0..t.len()).map(about).collect()
+    };
+    let mut earth = Vector3::new(20.0, 0.0, 40.0);
+    let mut to_earth = turned(&heading);
+    for turn in 0..=TURNS {
+        let base = declared(t, &to_earth, earth, heard);
+        let used = if turn == 0 { &base[..2] } else { &base[..] };
+        let columns: Vec<Column> = used.iter().map(|t| readings.column(t)).collect();
+        let solved = readings.solve(&columns.iter().collect::<Vec<_>>(), noise)?;
+        let c = solved.coefficients;
+        drop(base);
+        earth = Vector3::new(c[0], 0.0, c[1]);
+        if turn > 0 {
+            // the field seen in earth axes is turned by the coefficient: turn the body back
+            for (k, d) in heading.knots.iter_mut().zip(&c[2..]) {
+                *k += d.clamp(-0.5, 0.5);
+            }
+            to_earth = turned(&heading);
+        }
+    }
+    Some((to_earth, earth))
+}
+
+/// Heading of the mean field about each knot.
+fn first_guess(recording: &Recording, attitude: &Attitude, readings: &Readings, heard: (f64, f64)) -> Heading {
+    let count = (((heard.1 - heard.0) / KNOT_S).ceil() as usize + 1).max(2);
+    let mut sums = vec![Vector3::zeros(); count];
+    for (i, t) in recording.t.iter().enumerate().filter(|(i, _)| readings.used[*i]) {
+        let k = ((t - heard.0) / KNOT_S).round().clamp(0.0, (count - 1) as f64) as usize;
+        sums[k] += attitude.to_earth[i] * recording.mag[i];
+    }
+    let mut knots: Vec<f64> = Vec::with_capacity(count);
+    for s in sums {
+        let before = knots.last().copied().unwrap_or(0.0);
+        let seen = if s.xy().norm() > 0.0 { s.y.atan2(s.x) } else { before };
+        let turns = ((before - seen) / std::f64::consts::TAU).round();
+        knots.push(seen + turns * std::f64::consts::TAU);
+    }
+    Heading { from: heard.0, knots }
+}

@@ -1,0 +1,301 @@
+//! Which causes a sensor's residual has.
+//!
+//! What it is: causes join one at a time; each must predict left-out stretches better than without it, by more than the attitude is
+//! in doubt, and a rigid cause (a few constants) goes before a flexible one (a curve) that explains hardly more. Once all have
+//! joined, each is asked again beside the others.
+//! What can go wrong: a motion that shows nothing lets no cause join; two causes that predict alike are both reported, with their
+//! probabilities.
+//! Units: evidence in nats.
+//! Reference: specification `closing-the-loop.md`, step 6.
+
+use super::Recording;
+use super::least::{Column, Readings, Solved, Term};
+use crate::verdict::Parameter;
+use nalgebra::{Matrix3, Vector3};
+
+/// What causes are made from.
+#[derive(Clone, Copy)]
+pub(crate) struct Scene<'a> {
+    pub(crate) recording: &'a Recording,
+    /// Body to earth.
+    pub(crate) to_earth: &'a [Matrix3<f64>],
+    /// What the declared model predicts of the sensor, body axes.
+    pub(crate) predicted: &'a [Vector3<f64>],
+    /// Rate of change of the rate, rad/s^2; empty where no cause asks.
+    pub(crate) turning: &'a [Vector3<f64>],
+    /// Times at which the sensor was heard first and last, s.
+    pub(crate) heard: (f64, f64),
+}
+
+/// Parameters from coefficients and their standard errors.
+pub(crate) type Summary<'a> = Box<dyn Fn(&[f64], &[f64]) -> Vec<Parameter> + 'a>;
+
+/// A cause with its shape fixed: linear in its terms.
+pub(crate) struct Instance<'a> {
+    pub(crate) id: &'static str,
+    pub(crate) depends_on: Vec<&'static str>,
+    pub(crate) equation: &'static str,
+    pub(crate) terms: Vec<Term<'a>>,
+    /// Name and unit of its shape parameter.
+    pub(crate) shape: Option<(&'static str, &'static str, f64)>,
+    /// A curve rather than a few constants.
+    pub(crate) flexible: bool,
+    /// Where the coefficients themselves are not what a reader wants.
+    pub(crate) summary: Option<Summary<'a>>,
+}
+
+/// A known cause.
+pub(crate) trait Cause {
+    /// Its name in the verdict.
+    fn id(&self) -> &'static str;
+    /// Shapes to try; not a number for a cause without shape. Empty where the log cannot hold it.
+    fn shapes(&self, scene: &Scene<'_>) -> Vec<f64>;
+    /// Resolution to which the best shape is refined; 0 for none.
+    fn resolution(&self) -> f64 {
+        0.0
+    }
+    /// With a shape.
+    fn instance<'a>(&self, scene: &Scene<'a>, shape: f64) -> Instance<'a>;
+}
+
+/// A cause that was found.
+pub(crate) struct Found<'a> {
+    pub(crate) instance: Instance<'a>,
+    /// 95 % interval of the shape.
+    pub(crate) shape_ci: [f64; 2],
+    /// 1 - (held-out error with all)/(without this one).
+    pub(crate) reduction: f64,
+    /// Evidence for it beside the others.
+    pub(crate) evidence: f64,
+}
+
+/// What came of a search.
+pub(crate) struct Outcome<'a> {
+    pub(crate) found: Vec<Found<'a>>,
+    /// The declared model.
+    pub(crate) before: Solved,
+    /// With everything that was found; base terms first, then each cause's in order.
+    pub(crate) after: Solved,
+    pub(crate) probability: f64,
+    /// Others for the last cause, or for none.
+    pub(crate) alternatives: Vec<(Vec<&'static str>, f64)>,
+}
+
+/// Evidence that a cause needs, nats: a thousand to one after a dozen were asked.
+const NAMED: f64 = 9.0;
+/// Share of the held-out sum of squares that it must take away.
+const LEAST_GAIN: f64 = 0.05;
+/// A rigid cause with this share of a flexible one's evidence goes first.
+const RIGID_FIRST: f64 = 0.6;
+/// Residual over noise and doubt below which nothing is asked.
+const THERE: f64 = 1.25;
+/// Causes beside each other.
+const MOST: usize = 3;
+
+/// Shapes that were tried, each with what it leaves.
+type Scan = Vec<(f64, f64)>;
+
+struct Try<'a> {
+    instance: Instance<'a>,
+    columns: Vec<Column>,
+    solved: Solved,
+    scanned: Scan,
+    evidence: f64,
+    gain: f64,
+}
+
+/// Searches; `noise` is a block's own standard deviation, `doubt` what the attitude's error makes of it.
+pub(crate) fn search<'a>(
+    readings: &Readings,
+    base: &[Term<'a>],
+    causes: &[Box<dyn Cause>],
+    scene: &Scene<'a>,
+    noise: f64,
+    doubt: f64,
+) -> Option<Outcome<'a>> {
+    let base: Vec<Column> = base.iter().map(|t| readings.column(t)).collect();
+    let before = readings.solve(&base.iter().collect::<Vec<_>>(), noise)?;
+    let slack = before.heldout.len() as f64 * doubt * doubt;
+    let mut chosen: Vec<Try<'a>> = Vec::new();
+    let mut rivals: Vec<(Vec<&'static str>, f64)> = Vec::new();
+    let mut shapes: Vec<(&'static str, Scan)> = Vec::new();
+    // below noise and doubt there is nothing to explain
+    let nothing = THERE * THERE * before.heldout.len() as f64 * (noise * noise + doubt * doubt);
+    while chosen.len() < MOST {
+        let curve = chosen.iter().any(|c| c.instance.flexible);
+        let fixed: Vec<&Column> = base.iter().chain(chosen.iter().flat_map(|c| &c.columns)).collect();
+        let now = Readings::square(chosen.last().map_or(&before, |c| &c.solved).heldout.as_slice());
+        if now <= nothing {
+            break;
+        }
+        let mut tries: Vec<Try<'a>> = causes
+            .iter()
+            .filter(|c| chosen.iter().all(|k| k.instance.id != c.id()))
+            .filter_map(|c| {
+                // beside a curve with its hundreds of columns a shape stays as it was found before
+                let known = shapes.iter().rev().find(|s| s.0 == c.id()).filter(|_| curve).map(|s| s.1.clone());
+                attempt(readings, &fixed, c.as_ref(), known, scene, noise, now, slack)
+            })
+            .collect();
+        shapes.extend(tries.iter().map(|t| (t.instance.id, t.scanned.clone())));
+        tries.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        let Some(top) = tries.first().map(|t| t.evidence) else { break };
+        let rigid = tries.iter().position(|t| !t.instance.flexible && t.evidence >= RIGID_FIRST * top && named(t));
+        let best = rigid.unwrap_or(0);
+        if !named(&tries[best]) {
+            if chosen.is_empty() {
+                rivals = tries.iter().map(|t| (vec![t.instance.id], t.evidence)).collect();
+            }
+            break;
+        }
+        let kept: Vec<&'static str> = chosen.iter().map(|c| c.instance.id).collect();
+        let won = tries.remove(best);
+        let bonus = won.evidence.max(top);
+        rivals = tries
+            .iter()
+            .map(|t| (kept.iter().copied().chain([t.instance.id]).collect(), t.evidence - bonus))
+            .chain([(kept.clone(), -won.evidence)])
+            .filter(|(ids, _): &(Vec<_>, f64)| !ids.is_empty())
+            .collect();
+        chosen.push(won);
+    }
+    prune(readings, &base, &mut chosen, noise, slack);
+    Some(conclude(readings, &base, chosen, before, rivals, noise, slack))
+}
+
+fn named(t: &Try<'_>) -> bool {
+    t.evidence >= NAMED && t.gain >= LEAST_GAIN
+}
+
+/// Evidence of a fall of the held-out sum of squares.
+pub(crate) fn evidence(looks: f64, before: f64, after: f64, slack: f64) -> f64 {
+    0.5 * looks * ((before + slack).max(1e-300) / (after + slack).max(1e-300)).ln()
+}
+
+fn attempt<'a>(
+    readings: &Readings,
+    fixed: &[&Column],
+    cause: &dyn Cause,
+    known: Option<Scan>,
+    scene: &Scene<'a>,
+    noise: f64,
+    now: f64,
+    slack: f64,
+) -> Option<Try<'a>> {
+    let columns = |shape: f64| -> Vec<Column> { cause.instance(scene, shape).terms.iter().map(|t| readings.column(t)).collect() };
+    let with = |own: &[Column]| -> f64 {
+        let all: Vec<&Column> = fixed.iter().copied().chain(own).collect();
+        readings.quick(&all, noise)
+    };
+    let mut shapes = if known.is_none() { cause.shapes(scene) } else { Vec::new() };
+    let mut scanned: Scan = known.unwrap_or_default();
+    let lone = shapes.len() == 1;
+    let mut step = shapes.windows(2).map(|w| w[1] - w[0]).filter(|d| d.is_finite()).fold(0.0, f64::max);
+    while !shapes.is_empty() {
+        scanned.extend(shapes.iter().map(|s| (*s, if lone { 0.0 } else { with(&columns(*s)) })));
+        let best = scanned.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        shapes.clear();
+        if cause.resolution() > 0.0 && best.is_finite() && step > cause.resolution() {
+            step /= 4.0;
+            let inside = |s: &f64| *s > scene.heard.0 && *s < scene.heard.1;
+            shapes = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0].map(|k| best + k * step).into_iter().filter(inside).collect();
+        }
+    }
+    let best = scanned.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
+    let instance = cause.instance(scene, best);
+    let own = columns(best);
+    let all: Vec<&Column> = fixed.iter().copied().chain(&own).collect();
+    let solved = readings.solve(&all, noise)?;
+    let after = Readings::square(&solved.heldout);
+    let evidence = evidence(readings.looks(), now, after, slack);
+    scanned.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Some(Try { instance, columns: own, solved, scanned, evidence, gain: 1.0 - after / now.max(1e-300) })
+}
+
+/// Drops what the others have made superfluous.
+fn prune(readings: &Readings, base: &[Column], chosen: &mut Vec<Try<'_>>, noise: f64, slack: f64) {
+    let mut k = 0;
+    while chosen.len() > 1 && k < chosen.len() {
+        let Some(full) = chosen.last().map(|c| Readings::square(&c.solved.heldout)) else { return };
+        let others = || chosen.iter().enumerate().filter(|(i, _)| *i != k).flat_map(|(_, c)| &c.columns);
+        let Some(without) = readings.solve(&base.iter().chain(others()).collect::<Vec<_>>(), noise) else { return };
+        let left = Readings::square(&without.heldout);
+        let lost = evidence(readings.looks(), left, full, slack);
+        if lost < NAMED || 1.0 - full / left < LEAST_GAIN {
+            chosen.remove(k);
+            if let Some(last) = chosen.last_mut() {
+                last.solved = without;
+            }
+            k = 0;
+        } else {
+            k += 1;
+        }
+    }
+}
+
+fn conclude<'a>(
+    readings: &Readings,
+    base: &[Column],
+    chosen: Vec<Try<'a>>,
+    before: Solved,
+    rivals: Vec<(Vec<&'static str>, f64)>,
+    noise: f64,
+    slack: f64,
+) -> Outcome<'a> {
+    let after = chosen.last().map_or_else(|| before.clone(), |c| c.solved.clone());
+    let full = Readings::square(&after.heldout);
+    let looks = readings.looks();
+    let weights: f64 = rivals.iter().map(|(_, e)| e.min(0.0).exp()).sum();
+    let probability = if chosen.is_empty() { 0.0 } else { 1.0 / (1.0 + weights) };
+    let alternatives = rivals.into_iter().map(|(ids, e)| (ids, e.min(0.0).exp() / (1.0 + weights))).collect();
+    let count = chosen.len();
+    let mut found = Vec::with_capacity(count);
+    let lost: Vec<f64> = (0..count)
+        .map(|k| {
+            let others = chosen.iter().enumerate().filter(|(i, _)| *i != k).flat_map(|(_, c)| &c.columns);
+            let without = readings.solve(&base.iter().chain(others).collect::<Vec<_>>(), noise);
+            without.map_or(full, |s| Readings::square(&s.heldout))
+        })
+        .collect();
+    for (t, left) in chosen.into_iter().zip(lost) {
+        let least = t.scanned.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
+        let near = |s: &&(f64, f64)| 0.5 * looks * (s.1 / least.max(1e-300)).ln() < 1.92;
+        let ends = t.scanned.iter().filter(near).map(|s| s.0);
+        let shape_ci = [ends.clone().fold(f64::INFINITY, f64::min), ends.fold(f64::NEG_INFINITY, f64::max)];
+        found.push(Found {
+            instance: t.instance,
+            shape_ci,
+            reduction: 1.0 - (full / left.max(1e-300)).sqrt(),
+            evidence: evidence(looks, left, full, slack),
+        });
+    }
+    Outcome { found, before, after, probability, alternatives }
+}
+
+/// Sum of terms at a row, with coefficients from `from` on.
+pub(crate) fn predict(terms: &[Term<'_>], coefficients: &[f64], t: f64, row: usize) -> Vector3<f64> {
+    let active = terms.iter().zip(coefficients).filter(|(term, _)| term.support.0 <= t && t <= term.support.1);
+    active.fold(Vector3::zeros(), |sum, (term, c)| sum + *c * (term.value)(row))
+}
+
+/// The parameters of a found cause.
+pub(crate) fn parameters(found: &Found<'_>, coefficients: &[f64], sigma: &[f64]) -> Vec<Parameter> {
+    let i = &found.instance;
+    let mut out = match &i.summary {
+        Some(summary) => summary(coefficients, sigma),
+        None => {
+            i.terms.iter().zip(coefficients.iter().zip(sigma)).map(|(t, (c, s))| parameter(&t.name, *c, t.unit, *s)).collect()
+        }
+    };
+    if let Some((name, unit, value)) = i.shape.filter(|s| s.2.is_finite()) {
+        let [lo, hi] = found.shape_ci;
+        out.push(Parameter { name: name.to_owned(), value, unit: unit.to_owned(), ci95: [lo.min(value), hi.max(value)] });
+    }
+    out
+}
+
+/// A parameter with the interval of a normal error.
+pub(crate) fn parameter(name: &str, value: f64, unit: &str, sigma: f64) -> Parameter {
+    let half = 1.96 * sigma;
+    Parameter { name: name.to_owned(), value, unit: unit.to_owned(), ci95: [value - half, value + half] }
+}

@@ -1,0 +1,142 @@
+//! From a search to a sensor's trace.
+//!
+//! What it is: the predictions of every row, the figures and the entries of the verdict, for a sensor whose causes are linear.
+//! What can go wrong: where the names leave more than half of the excess, the unnamed correction takes their place.
+//! Units: those of the channels.
+//! Reference: specification `formats.md`, "Verdict".
+
+use super::account::{Sensor, by_axis, judge};
+use super::least::{Readings, Term};
+use super::search::{Cause, Found, Outcome, Scene, parameters, predict, search};
+use super::unknown::correct;
+use crate::verdict::{Alternative, EffectEntry, Kind};
+use nalgebra::Vector3;
+
+/// What a sensor is and how well it can be predicted at best.
+pub(crate) struct Setting {
+    pub(crate) channels: [&'static str; 3],
+    pub(crate) unit: &'static str,
+    /// Noise of a reading, by axis.
+    pub(crate) floor: [f64; 3],
+    /// Noise of a block's mean.
+    pub(crate) noise: f64,
+    /// What the attitude's own error makes of it, one axis.
+    pub(crate) doubt: f64,
+}
+
+/// A trace and, for whoever needs it, what was found alone: its contribution at each row.
+pub(crate) struct Traced {
+    pub(crate) sensor: Sensor,
+    pub(crate) effect: Vec<Vector3<f64>>,
+    /// What was found, whatever the word for it all is, and the predictions with it.
+    pub(crate) named: (Vec<EffectEntry>, Vec<Vector3<f64>>),
+}
+
+/// Searches and reports; `claimed` rows are predicted.
+pub(crate) fn trace<'a>(
+    setting: &Setting,
+    readings: &Readings,
+    base: &[Term<'a>],
+    causes: &[Box<dyn Cause>],
+    scene: &Scene<'a>,
+    claimed: &[bool],
+) -> Option<Traced> {
+    let Setting { noise, doubt, .. } = *setting;
+    let outcome = search(readings, base, causes, scene, noise, doubt)?;
+    let n = outcome.before.heldout.len() as f64;
+    let explained = noise * noise + doubt * doubt;
+    let mean = |r: &[f64]| Readings::square(r) / n;
+    let (before, after) = (mean(&outcome.before.heldout), mean(&outcome.after.heldout));
+    let kind = judge(before, after, explained, !outcome.found.is_empty(), outcome.probability);
+    let t = &scene.recording.t;
+    let rows = |value: &dyn Fn(usize) -> Vector3<f64>| -> Vec<Vector3<f64>> {
+        (0..t.len()).map(|i| if claimed[i] { value(i) } else { Vector3::repeat(f64::NAN) }).collect()
+    };
+    let declared = rows(&|i| predict(base, &outcome.before.coefficients, t[i], i));
+    let over = |mean: f64| (mean / explained).sqrt();
+    let mut sensor = Sensor {
+        channels: setting.channels,
+        unit: setting.unit,
+        corrected: declared.clone(),
+        declared,
+        floor: setting.floor,
+        heldout_before: by_axis(&outcome.before.heldout),
+        heldout_after: by_axis(&outcome.before.heldout),
+        effects: Vec::new(),
+        alternatives: Vec::new(),
+        kind,
+        excess: [over(before), over(before)],
+    };
+    let mut effect = vec![Vector3::zeros(); t.len()];
+    let with = rows(&|i| predict(base, &outcome.after.coefficients, t[i], i) + contribution(&outcome, base.len(), t[i], i));
+    let named = (entries(&outcome, base.len(), setting), with);
+    match kind {
+        Kind::None => {}
+        Kind::Unattributed => {
+            if let Some(c) = correct(readings, base, scene, setting.channels, noise) {
+                sensor.corrected = rows(&|i| c.predict(base, t[i], i));
+                sensor.heldout_after = by_axis(&c.solved.heldout);
+                sensor.excess[1] = over(mean(&c.solved.heldout));
+                sensor.effects = vec![c.entry];
+            }
+        }
+        Kind::Attributed | Kind::Ambiguous => {
+            sensor.corrected.clone_from(&named.1);
+            sensor.heldout_after = by_axis(&outcome.after.heldout);
+            sensor.excess[1] = over(after);
+            sensor.effects.clone_from(&named.0);
+            for (i, e) in effect.iter_mut().enumerate() {
+                *e = contribution(&outcome, base.len(), t[i], i);
+            }
+        }
+    }
+    if matches!(kind, Kind::None | Kind::Unattributed) {
+        return Some(Traced { sensor, effect, named });
+    }
+    sensor.alternatives = outcome
+        .alternatives
+        .iter()
+        .filter(|(ids, _)| !ids.is_empty())
+        .map(|(ids, p)| Alternative { ids: ids.iter().map(|i| (*i).to_owned()).collect(), probability: *p })
+        .collect();
+    Some(Traced { sensor, effect, named })
+}
+
+/// What the found causes add at a row.
+fn contribution(outcome: &Outcome<'_>, base: usize, t: f64, row: usize) -> Vector3<f64> {
+    let mut at = base;
+    let mut sum = Vector3::zeros();
+    for f in &outcome.found {
+        sum += predict(&f.instance.terms, &outcome.after.coefficients[at..], t, row);
+        at += f.instance.terms.len();
+    }
+    sum
+}
+
+fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectEntry> {
+    let mut at = base;
+    let entry = |f: &Found<'_>, at: usize| {
+        let count = f.instance.terms.len();
+        let (c, s) = (&outcome.after.coefficients[at..at + count], &outcome.after.sigma[at..at + count]);
+        EffectEntry {
+            id: f.instance.id.to_owned(),
+            channels: setting.channels.map(str::to_owned).to_vec(),
+            depends_on: f.instance.depends_on.iter().map(|d| (*d).to_owned()).collect(),
+            equation: f.instance.equation.to_owned(),
+            probability: outcome.probability,
+            parameters: parameters(f, c, s),
+            heldout_error_reduction: f.reduction,
+            evidence: format!(
+                "without it left-out stretches are predicted {:.1} % worse ({:.0} nats)",
+                100.0 * (1.0 / (1.0 - f.reduction).max(1e-9) - 1.0),
+                f.evidence
+            ),
+        }
+    };
+    let mut out = Vec::new();
+    for f in &outcome.found {
+        out.push(entry(f, at));
+        at += f.instance.terms.len();
+    }
+    out
+}

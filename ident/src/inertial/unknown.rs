@@ -1,0 +1,97 @@
+//! What is left when no name fits.
+//!
+//! What it is: the linear function of rate, specific force or time that predicts left-out stretches best, with the variables that
+//! it stands on; a correction, not a cause.
+//! What can go wrong: nothing helps; the correction is then empty and says so.
+//! Units: those of the channel per unit of the variable.
+//! Reference: specification `closing-the-loop.md`, step 7.
+
+use super::least::{Column, Readings, Solved, Term};
+use super::search::{Scene, parameter, predict};
+use crate::verdict::EffectEntry;
+use nalgebra::Vector3;
+
+/// An empirical correction.
+pub(crate) struct Correction<'a> {
+    /// Base terms first, then its own.
+    pub(crate) solved: Solved,
+    pub(crate) terms: Vec<Term<'a>>,
+    pub(crate) entry: EffectEntry,
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The best correction on top of the declared model.
+pub(crate) fn correct<'a>(
+    readings: &Readings,
+    base: &[Term<'a>],
+    scene: &Scene<'a>,
+    channels: [&'static str; 3],
+    noise: f64,
+) -> Option<Correction<'a>> {
+    let fixed: Vec<Column> = base.iter().map(|t| readings.column(t)).collect();
+    let before = Readings::square(&readings.solve(&fixed.iter().collect::<Vec<_>>(), noise)?.heldout);
+    let recording = scene.recording;
+    let known = |v: Vector3<f64>| if v.iter().all(|c| c.is_finite()) { v } else { Vector3::zeros() };
+    let mut variables: Vec<(&str, Box<dyn Fn(usize) -> Vector3<f64> + 'a>)> = vec![
+        ("g", Box::new(move |i| known(recording.gyro[i]))),
+        ("a", Box::new(move |i| known(recording.accel[i]))),
+        ("t", Box::new(move |i| Vector3::new(recording.t[i], 0.0, 0.0))),
+    ];
+    variables.retain(|(name, _)| !channels[0].starts_with(name)); // a channel does not explain itself
+    let mut best: Option<(f64, &str, Vec<Term<'a>>, Solved)> = None;
+    for (name, value) in variables {
+        let value = std::rc::Rc::new(value);
+        let axes = if name == "t" { 1 } else { 3 };
+        let mut terms = Vec::new();
+        for i in 0..3 {
+            for j in 0..axes {
+                let value = std::rc::Rc::clone(&value);
+                let label = if name == "t" { format!("{}_t", channels[i]) } else { format!("{}_{name}{}", channels[i], AXES[j]) };
+                terms.push(Term { prior: 1e3, ..Term::new(&label, "1", move |row| Vector3::ith(i, value(row)[j])) });
+            }
+        }
+        let own: Vec<Column> = terms.iter().map(|t| readings.column(t)).collect();
+        let Some(solved) = readings.solve(&fixed.iter().chain(&own).collect::<Vec<_>>(), noise) else { continue };
+        let left = Readings::square(&solved.heldout);
+        if best.as_ref().is_none_or(|b| left < b.0) {
+            best = Some((left, name, terms, solved));
+        }
+    }
+    let (left, name, terms, solved) = best?;
+    let depends_on: Vec<String> = match name {
+        "g" => vec!["gx", "gy", "gz"],
+        "a" => vec!["ax", "ay", "az"],
+        _ => vec!["t_s"],
+    }
+    .into_iter()
+    .map(str::to_owned)
+    .collect();
+    let parameters = terms
+        .iter()
+        .zip(solved.coefficients.iter().zip(&solved.sigma).skip(base.len()))
+        .map(|(t, (c, s))| parameter(&t.name, *c, t.unit, *s))
+        .collect();
+    let entry = EffectEntry {
+        id: "unknown".to_owned(),
+        channels: channels.map(str::to_owned).to_vec(),
+        evidence: format!(
+            "no known cause takes away half of what is over; linear in {} predicts left-out stretches best",
+            depends_on.join(", ")
+        ),
+        depends_on,
+        equation: format!("{} += A {name}", &channels[0][..1]),
+        probability: 1.0,
+        parameters,
+        heldout_error_reduction: 1.0 - (left / before.max(1e-300)).sqrt(),
+    };
+    Some(Correction { solved, terms, entry })
+}
+
+impl Correction<'_> {
+    /// The declared model and the correction at a row.
+    pub(crate) fn predict(&self, base: &[Term<'_>], t: f64, row: usize) -> Vector3<f64> {
+        let c = &self.solved.coefficients;
+        predict(base, c, t, row) + predict(&self.terms, &c[base.len()..], t, row)
+    }
+}

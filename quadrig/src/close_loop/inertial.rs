@@ -1,0 +1,105 @@
+//! `quadrig close-loop` on an attitude log.
+//!
+//! What it is: runs the board's filter over gyro and accelerometer (not over the field, which is to be predicted), hands its attitude
+//! to `ident::inertial`, and writes verdict, predictions and report.
+//! What can go wrong: refused input; `--model` and `--validate`, which are the rig's; the folder's files appear whole or not at all.
+//! Units: rad/s, m/s^2, uT.
+//! Reference: specification `formats.md`, "Attitude log" and "Verdict".
+
+use super::{Args, table};
+use crate::Failure;
+use crate::ahrs::imu_log::{ImuLog, Row};
+use crate::progress::Bar;
+use dcm::{Config, Dcm, Measurement, Vec3};
+use ident::inertial::{Attitude, Closed, Recording, close, page};
+use ident::log::write_whole;
+use nalgebra::{Matrix3, Vector3};
+use std::fmt::Write;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// Whether the first line that is no comment names a gyro's three axes.
+pub(super) fn is_attitude_log(path: &Path) -> bool {
+    let Ok(file) = std::fs::File::open(path) else { return false };
+    let header = BufReader::new(file).lines().map_while(Result::ok).find(|l| !l.starts_with('#') && !l.trim().is_empty());
+    let header = header.unwrap_or_default();
+    let names: Vec<&str> = header.split(',').map(str::trim).collect();
+    ["gx", "gy", "gz"].iter().all(|n| names.contains(n))
+}
+
+/// Runs the command.
+pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    if args.model.is_some() || !args.validate.is_empty() {
+        return Err(format!("{}: an attitude log; --model and --validate are for rig logs", args.log.display()).into());
+    }
+    let log = ImuLog::read(&args.log)?;
+    let recording = recording(&log, &args.log);
+    let closed = {
+        let bar = Bar::new("searching", quiet);
+        close(&recording, &|rates| attitude(&log, rates), &mut |share| bar.set(share))?
+    };
+    let json = serde_json::to_string_pretty(&closed.verdict)?;
+    if let Some(folder) = &args.output {
+        let say = |e: std::io::Error| format!("{}: {e}", folder.display());
+        std::fs::create_dir_all(folder).map_err(say)?;
+        write_whole(&folder.join("verdict.json"), |out| writeln!(out, "{json}")).map_err(say)?;
+        write_whole(&folder.join("pred.csv"), |out| out.write_all(predictions(&log, &closed).as_bytes())).map_err(say)?;
+        write_whole(&folder.join("report.html"), |out| out.write_all(page(&recording, &closed).as_bytes())).map_err(say)?;
+    }
+    if args.json {
+        println!("{json}");
+    } else if !quiet {
+        print!("{}", table(&closed.verdict));
+    }
+    Ok(())
+}
+
+fn recording(log: &ImuLog, path: &Path) -> Recording {
+    let wide = |v: Option<Vec3>| v.map_or_else(|| Vector3::repeat(f64::NAN), |v| v.map(f64::from));
+    let column = |of: fn(&Row) -> Option<Vec3>| -> Vec<Vector3<f64>> { log.rows.iter().map(|r| wide(of(r))).collect() };
+    let heard = log.rows.iter().any(|r| r.mag.is_some());
+    Recording {
+        name: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+        t: log.rows.iter().map(|r| r.t).collect(),
+        gyro: column(|r| r.gyro),
+        accel: column(|r| r.accel),
+        mag: if heard { column(|r| r.mag) } else { Vec::new() },
+        temperature: log.column("temp_c").unwrap_or_default(),
+        current: log.column("current_a").unwrap_or_default(),
+    }
+}
+
+/// The board's filter without its magnetometer: north is wherever it starts.
+fn attitude(log: &ImuLog, rates: &[Vector3<f64>]) -> Attitude {
+    let mut filter = Dcm::new(Config::DEFAULT);
+    let mut out = Attitude::default();
+    for ((row, dt), rate) in log.steps().zip(rates) {
+        let gyro = row.gyro.map(|_| rate.map(|w| w as f32));
+        filter.update(dt, &Measurement { gyro, accel: row.accel, mag: None });
+        let known = filter.is_started();
+        out.to_earth.push(if known { filter.matrix().map(f64::from) } else { Matrix3::repeat(f64::NAN) });
+        out.rest.push(filter.flags().rest);
+    }
+    out
+}
+
+/// The corrected model's prediction of every channel, row for row; empty where it makes no claim.
+fn predictions(log: &ImuLog, closed: &Closed) -> String {
+    let mut out = String::from("t_s");
+    for s in &closed.sensors {
+        for c in s.channels {
+            let _ = write!(out, ",{c}");
+        }
+    }
+    out.push('\n');
+    for row in 0..log.rows.len() {
+        out.push_str(log.time_text(row));
+        for s in &closed.sensors {
+            for v in s.corrected[row].iter() {
+                let _ = if v.is_finite() { write!(out, ",{v:.8}") } else { write!(out, ",") };
+            }
+        }
+        out.push('\n');
+    }
+    out
+}

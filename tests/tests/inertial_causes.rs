@@ -1,0 +1,76 @@
+//! The loop closed on an inertial unit: a hidden cause in a simulated log is named, its size comes back, and the figures are true.
+
+use quadrig_tests::inertial::{Answer, CAUSES, Cause, JUDGING, ask, judged, simulate};
+
+fn judge(answer: &Answer, cause: Cause) -> bool {
+    judged(cause, &answer.verdict, &answer.ids.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+/// Large causes on judging seeds: the published shares are 95 % and more, so at most two of the sixteen may be missed.
+#[test]
+fn hidden_causes_are_named_and_clean_logs_are_not_accused() {
+    let bench = tempfile::tempdir().unwrap();
+    let mut missed = Vec::new();
+    for cause in CAUSES {
+        for seed in JUDGING..JUDGING + 2 {
+            let answer = ask(bench.path(), "run", &simulate(cause, 3, seed).csv, None);
+            if !judge(&answer, cause) {
+                missed.push(format!("{cause:?} {seed}: {} {:?}", answer.verdict, answer.ids));
+            }
+        }
+    }
+    assert!(missed.len() <= 2, "{missed:?}");
+    for seed in JUDGING..JUDGING + 4 {
+        let answer = ask(bench.path(), "run", &simulate(Cause::Clean, 1, seed).csv, None);
+        assert!(judge(&answer, Cause::Clean), "{seed}: {:?}", answer.ids);
+    }
+}
+
+/// The verdict's figures are those of `pred.csv`, row for row.
+#[test]
+fn figures_can_be_recomputed_from_the_predictions() {
+    let bench = tempfile::tempdir().unwrap();
+    let log = simulate(Cause::HardIron, 3, JUDGING).csv;
+    let answer = ask(bench.path(), "run", &log, Some("out"));
+    let predicted = std::fs::read_to_string(bench.path().join("out/pred.csv")).unwrap();
+    let column = |text: &str, name: &str| -> Vec<f64> {
+        let place = text.lines().next().unwrap().split(',').position(|n| n == name).unwrap();
+        text.lines().skip(1).map(|l| l.split(',').nth(place).unwrap().parse().unwrap_or(f64::NAN)).collect()
+    };
+    for name in ["ax", "ay", "az", "mx", "my", "mz"] {
+        let (m, p) = (column(&log, name), column(&predicted, name));
+        assert_eq!(m.len(), p.len());
+        let left: Vec<f64> = m.iter().zip(&p).map(|(m, p)| m - p).filter(|r| r.is_finite()).collect();
+        assert!(left.len() * 10 >= m.len() * 9, "{name}: {} of {} rows", left.len(), m.len());
+        let rms = (left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64).sqrt();
+        let claimed = answer.json["channels"][name]["after"]["rms"].as_f64().unwrap();
+        assert!((rms / claimed - 1.0).abs() < 0.01, "{name}: {rms} {claimed}");
+        let before = answer.json["channels"][name]["before"]["rms"].as_f64().unwrap();
+        assert!(claimed <= before * 1.001, "{name}: {before} {claimed}");
+    }
+    // 6 uT were hidden
+    let size: f64 = ["offset_x", "offset_y", "offset_z"]
+        .iter()
+        .map(|n| answer.parameter("hard_iron", n).unwrap().0.powi(2))
+        .sum::<f64>()
+        .sqrt();
+    assert!((5.0..7.0).contains(&size), "{size}");
+    let page = std::fs::read_to_string(bench.path().join("out/report.html")).unwrap();
+    assert!(page.contains("hard_iron") && page.contains("residual-mx") && !page.contains("NaN"), "a page with its figures");
+    assert_eq!(answer.json["format"], "quadrig-verdict 1");
+}
+
+#[test]
+fn what_cannot_be_traced_is_refused_with_its_reason() {
+    let bench = tempfile::tempdir().unwrap();
+    let log: String = simulate(Cause::Clean, 1, 5).csv.lines().take(2_000).map(|l| format!("{l}\n")).collect();
+    std::fs::write(bench.path().join("short.csv"), log).unwrap();
+    let done = std::process::Command::new(quadrig_tests::quadrig())
+        .args(["close-loop", "short.csv", "-o", "out"])
+        .current_dir(bench.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.code() == Some(1) && said.contains("short.csv: 10.0 s long; at least 20"), "{said}");
+    assert!(!bench.path().join("out").exists());
+}
