@@ -21,7 +21,9 @@ const KNOT_S: f64 = 20.0;
 /// Error of the predicted direction, rad, one axis (0.35 degrees; the filter's inclination is good to 0.7, `docs/ahrs.md`).
 const DOUBT: f64 = 0.006;
 /// Turns of the Gauss-Newton method for the heading's drift.
-const TURNS: usize = 4;
+const TURNS: usize = 6;
+/// Iron on the sensor that the heading must not take for north, uT.
+const IRON_UT: f64 = 20.0;
 /// Fewest blocks.
 const LEAST_BLOCKS: usize = 200;
 
@@ -108,22 +110,38 @@ fn north(
     let mut earth = Vector3::new(20.0, 0.0, 40.0);
     let mut to_earth = turned(&heading);
     for turn in 0..=TURNS {
-        let base = declared(t, &to_earth, earth, heard);
-        let used = if turn == 0 { &base[..2] } else { &base[..] };
-        let columns: Vec<Column> = used.iter().map(|t| readings.column(t)).collect();
-        let solved = readings.solve(&columns.iter().collect::<Vec<_>>(), noise)?;
-        let c = solved.coefficients;
-        drop(base);
-        earth = Vector3::new(c[0], 0.0, c[1]);
+        let found = once(t, &to_earth, earth, heard, readings, noise, turn > 0)?;
+        earth = Vector3::new(found[0], 0.0, found[1]);
         if turn > 0 {
             // the field seen in earth axes is turned by the coefficient: turn the body back
-            for (k, d) in heading.knots.iter_mut().zip(&c[2..]) {
+            for (k, d) in heading.knots.iter_mut().zip(&found[2..]) {
                 *k += d.clamp(-0.5, 0.5);
             }
             to_earth = turned(&heading);
         }
     }
     Some((to_earth, earth))
+}
+
+/// North and down of the field and, where asked for, the turn of each knot, from one linear fit.
+fn once(
+    t: &[f64],
+    to_earth: &[Matrix3<f64>],
+    earth: Vector3<f64>,
+    heard: (f64, f64),
+    readings: &Readings,
+    noise: f64,
+    turning: bool,
+) -> Option<Vec<f64>> {
+    let base = declared(t, to_earth, earth, heard);
+    let own = if turning { base.len() } else { 2 };
+    // a constant in body axes beside the field, or iron on the sensor would pull the heading after it
+    let iron = (0..3).map(|k| Term { prior: IRON_UT, ..Term::new("", "uT", move |_| Vector3::ith(k, 1.0)) });
+    let terms: Vec<Term<'_>> = base.into_iter().take(own).chain(iron).collect();
+    let columns: Vec<Column> = terms.iter().map(|c| readings.column(c)).collect();
+    let mut found = readings.solve(&columns.iter().collect::<Vec<_>>(), noise)?.coefficients;
+    found.truncate(own);
+    Some(found)
 }
 
 /// Heading of the mean field about each knot.

@@ -87,6 +87,8 @@ const NAMED: f64 = 9.0;
 const LEAST_GAIN: f64 = 0.05;
 /// A rigid cause with this share of a flexible one's evidence goes first.
 const RIGID_FIRST: f64 = 0.6;
+/// Evidence that an instant of setting in needs, nats.
+const SHAPE: f64 = 5.0;
 /// Residual over noise and doubt below which nothing is asked.
 const THERE: f64 = 1.25;
 /// Causes beside each other.
@@ -202,6 +204,11 @@ fn attempt<'a>(
         }
     }
     let best = scanned.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
+    // from the beginning rather than from an instant that predicts hardly better
+    let whole = scanned.iter().find(|s| s.0.is_nan()).map(|s| s.1);
+    let least = scanned.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
+    let simpler = whole.is_some_and(|w| evidence(readings.looks(), w, least, slack) < SHAPE);
+    let best = if simpler { f64::NAN } else { best };
     let instance = cause.instance(scene, best);
     let own = columns(best);
     let all: Vec<&Column> = fixed.iter().copied().chain(&own).collect();

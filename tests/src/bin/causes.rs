@@ -105,7 +105,7 @@ fn named(answer: &Answer) -> String {
     let one = |id: &String| {
         let size = match id.as_str() {
             "channel_delay" => number(id, "delay", "ms", 1e3),
-            "stationary_magnet" => number(id, "peak", "uT", 1.0),
+            "stationary_magnet" => number(id, "rms", "uT rms", 1.0),
             "hard_iron" => norm(id, ["offset_x", "offset_y", "offset_z"], "uT", 1.0),
             "lever_arm" => norm(id, ["arm_x", "arm_y", "arm_z"], "cm", 100.0),
             "linear_acceleration" => norm(id, ["rms_north", "rms_east", "rms_down"], "m/s^2", 1.0),

@@ -9,7 +9,7 @@
 
 use super::super::least::Term;
 use super::super::search::{Cause, Instance, Scene, parameter};
-use nalgebra::Vector3;
+use crate::verdict::Parameter;
 
 /// Distances of the knots, s.
 const KNOTS: [f64; 3] = [1.0, 2.0, 4.0];
@@ -55,13 +55,24 @@ impl Cause for StationaryMagnet {
             terms,
             shape: Some(("knots", "s", spacing)),
             flexible: true,
-            summary: Some(Box::new(move |c, s| {
-                let size = |k: usize| Vector3::new(c[3 * k], c[3 * k + 1], c[3 * k + 2]).norm();
-                let Some(top) = (0..c.len() / 3).max_by(|a, b| size(*a).total_cmp(&size(*b))) else { return Vec::new() };
-                let sigma = s[3 * top..3 * top + 3].iter().map(|s| s * s).sum::<f64>().sqrt();
-                let at = from + top as f64 * spacing;
-                vec![parameter("peak", size(top), "uT", sigma), parameter("peak_time", at, "s", spacing / 1.96)]
-            })),
+            summary: Some(Box::new(move |c, s| summary(c, s, from, spacing))),
         }
     }
+}
+
+/// How large the change is. Its part to the east is one with a slow drift of the heading and is left out.
+fn summary(c: &[f64], s: &[f64], from: f64, spacing: f64) -> Vec<Parameter> {
+    let count = c.len() / 3;
+    let mean = |k: usize| c.iter().skip(k).step_by(3).sum::<f64>() / count.max(1) as f64;
+    let (north, down) = (mean(0), mean(2));
+    let size = |k: usize| (c[3 * k] - north).hypot(c[3 * k + 2] - down);
+    let sigma = |k: usize| s[3 * k].hypot(s[3 * k + 2]);
+    let Some(top) = (0..count).max_by(|a, b| size(*a).total_cmp(&size(*b))) else { return Vec::new() };
+    let rms = ((0..count).map(|k| size(k).powi(2)).sum::<f64>() / count as f64).sqrt();
+    let spread = ((0..count).map(|k| sigma(k).powi(2)).sum::<f64>()).sqrt() / count as f64;
+    vec![
+        parameter("rms", rms, "uT", spread),
+        parameter("peak", size(top), "uT", sigma(top)),
+        parameter("peak_time", from + top as f64 * spacing, "s", spacing / 1.96),
+    ]
 }
