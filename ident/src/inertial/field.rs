@@ -50,8 +50,8 @@ pub(crate) fn trace_field(recording: &Recording, attitude: &Attitude) -> Option<
     }
     let claimed: Vec<bool> = (0..t.len()).map(known).collect();
     let mut used = claimed.clone();
-    for i in 1..t.len() {
-        used[i] &= recording.mag[i] != recording.mag[i - 1];
+    for (used, pair) in used.iter_mut().skip(1).zip(recording.mag.windows(2)) {
+        *used &= pair[1] != pair[0];
     }
     let readings = Readings::new(t, &recording.mag, used.clone(), CUTS.0, CUTS.1, CUTS.2);
     if readings.blocks.len() < LEAST_BLOCKS {

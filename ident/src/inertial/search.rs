@@ -136,7 +136,7 @@ pub(crate) fn search<'a>(
             .filter_map(|c| {
                 // beside a curve with its hundreds of columns a shape stays as it was found before
                 let known = shapes.iter().rev().find(|s| s.0 == c.id()).filter(|_| curve).map(|s| s.1.clone());
-                attempt(readings, &fixed, c.as_ref(), known, scene, noise, now, slack)
+                attempt(readings, &fixed, c.as_ref(), known, scene, noise, (now, slack))
             })
             .collect();
         shapes.extend(tries.iter().map(|t| (t.instance.id, t.scanned.clone())));
@@ -181,8 +181,7 @@ fn attempt<'a>(
     known: Option<Scan>,
     scene: &Scene<'a>,
     noise: f64,
-    now: f64,
-    slack: f64,
+    (now, slack): (f64, f64),
 ) -> Option<Try<'a>> {
     let columns = |shape: f64| -> Vec<Column> { cause.instance(scene, shape).terms.iter().map(|t| readings.column(t)).collect() };
     let with = |own: &[Column]| -> f64 {

@@ -21,6 +21,9 @@ pub(crate) struct Correction<'a> {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
+/// A variable and its value at a row.
+type Variable<'a> = (&'static str, Box<dyn Fn(usize) -> Vector3<f64> + 'a>);
+
 /// The best correction on top of the declared model.
 pub(crate) fn correct<'a>(
     readings: &Readings,
@@ -33,7 +36,7 @@ pub(crate) fn correct<'a>(
     let before = Readings::square(&readings.solve(&fixed.iter().collect::<Vec<_>>(), noise)?.heldout);
     let recording = scene.recording;
     let known = |v: Vector3<f64>| if v.iter().all(|c| c.is_finite()) { v } else { Vector3::zeros() };
-    let mut variables: Vec<(&str, Box<dyn Fn(usize) -> Vector3<f64> + 'a>)> = vec![
+    let mut variables: Vec<Variable<'a>> = vec![
         ("g", Box::new(move |i| known(recording.gyro[i]))),
         ("a", Box::new(move |i| known(recording.accel[i]))),
         ("t", Box::new(move |i| Vector3::new(recording.t[i], 0.0, 0.0))),
@@ -44,10 +47,10 @@ pub(crate) fn correct<'a>(
         let value = std::rc::Rc::new(value);
         let axes = if name == "t" { 1 } else { 3 };
         let mut terms = Vec::new();
-        for i in 0..3 {
-            for j in 0..axes {
+        for (i, channel) in channels.iter().enumerate() {
+            for (j, axis) in AXES.iter().enumerate().take(axes) {
                 let value = std::rc::Rc::clone(&value);
-                let label = if name == "t" { format!("{}_t", channels[i]) } else { format!("{}_{name}{}", channels[i], AXES[j]) };
+                let label = if name == "t" { format!("{channel}_t") } else { format!("{channel}_{name}{axis}") };
                 terms.push(Term { prior: 1e3, ..Term::new(&label, "1", move |row| Vector3::ith(i, value(row)[j])) });
             }
         }

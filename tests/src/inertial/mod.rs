@@ -69,8 +69,8 @@ pub fn simulate(cause: Cause, size: usize, seed: u64) -> Simulated {
         };
         let mut seen = fault.seen(&truth);
         let mut normal = || -> f64 { (0..12).map(|_| chance.random_range(-0.5..0.5)).sum() };
-        for k in 0..3 {
-            seen.gyro[k] += gyro_offset[k] + 0.0015 * normal();
+        for (k, offset) in gyro_offset.iter().enumerate() {
+            seen.gyro[k] += offset + 0.0015 * normal();
             seen.accel[k] += 0.04 * normal();
             seen.mag[k] += 0.25 * normal();
         }

@@ -28,9 +28,9 @@ impl Cause for GSensitivity {
         let accel = &scene.recording.accel;
         let force = move |row: usize, j: usize| Some(accel[row][j]).filter(|f| f.is_finite()).unwrap_or(0.0);
         let mut terms = Vec::with_capacity(9);
-        for i in 0..3 {
-            for j in 0..3 {
-                let name = format!("g_{}{}", AXES[i], AXES[j]);
+        for (i, to) in AXES.iter().enumerate() {
+            for (j, of) in AXES.iter().enumerate() {
+                let name = format!("g_{to}{of}");
                 terms.push(Term { prior: PRIOR, ..Term::new(&name, "rad/s/(m/s^2)", move |row| Vector3::ith(i, force(row, j))) });
             }
         }
