@@ -36,6 +36,7 @@ usage: cargo xtask COMMAND
   ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)
   test             everything: format, lints, images, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
+  test --lints     format and lints, those of the code behind the emulator included (its crates take 140 s of processor time once)
   blind [ARGS]     the blind campaign (docs/blind.md); ARGS go to it, --help lists them
   test --emulated  the images on emulated boards, nothing else
   test --verdicts  the verdict contract on recorded and simulated logs, nothing else
@@ -51,6 +52,7 @@ fn main() -> ExitCode {
         ["image", "--bless"] => image::image(&place, true),
         ["test"] => test::everything(&place),
         ["test", "--quick"] => test::quick(&place),
+        ["test", "--lints"] => test::lints(&place),
         ["blind", rest @ ..] => {
             let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "blind", "--"];
             run::run(&mut run::cargo(&place, &[&head, rest].concat()))

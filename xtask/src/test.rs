@@ -78,6 +78,18 @@ pub(crate) fn quick(place: &Place) -> Result<(), Failure> {
     steps.finish(done)
 }
 
+/// Format and lints, those of the emulated boards included.
+pub(crate) fn lints(place: &Place) -> Result<(), Failure> {
+    let mut steps = Steps::default();
+    let done = host_lints(place, &mut steps).and_then(|()| {
+        steps.step("lints of the emulated boards", |_| {
+            let mut clippy = cargo(place, &["clippy"]);
+            run(clippy.args(FEATURE).args(["--all-targets", "--", "-D", "warnings"]))
+        })
+    });
+    steps.finish(done)
+}
+
 /// The flash images in the emulator.
 pub(crate) fn on_boards(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
@@ -126,6 +138,9 @@ fn host_tests(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
     })
 }
 
+/// Everything with the emulator; see [`emulated`].
+const FEATURE: [&str; 5] = ["--release", "--workspace", "--features", "quadrig-tests/emulated", "--ignore-rust-version"];
+
 /// The tests that load the flash images into the emulator. It declares a newer Rust than the pinned one and compiles on it.
 fn emulated(place: &Place, tally: &mut Tally) -> Result<(), Failure> {
     let mut files = Vec::new();
@@ -139,7 +154,6 @@ fn emulated(place: &Place, tally: &mut Tally) -> Result<(), Failure> {
     if files.is_empty() {
         return Err(Failure("tests/tests holds no emulated_*.rs".to_owned()));
     }
-    const FEATURE: [&str; 5] = ["--release", "--workspace", "--features", "quadrig-tests/emulated", "--ignore-rust-version"];
     let mut command = cargo(place, &["test", "--config", &emulator::with_flash(place)?]);
     command.args(FEATURE).args(files.iter().flat_map(|f| ["--test", f])).env("QUADRIG_FW_DIR", place.images());
     command.env("QUADRIG_EMULATOR_KEEPS_FLASH", "1");

@@ -34,7 +34,7 @@ use crate::plant::beam::BeamMode;
 use crate::plant::bridge::BridgeState;
 use crate::plant::mount::MountState;
 use crate::plant::powerplant::STEPS_PER_MS;
-use crate::plant::{Beam, EscDialogue, EscState, Mount, Powerplant, RigPlant};
+use crate::plant::{Beam, EscDialogue, EscState, Mount, PlantBlock, Powerplant, RigPlant};
 use crate::scenario::Scenario;
 use crate::sensor::back_emf::BackEmfState;
 use crate::sensor::{AnalogFront, BackEmfMeter, Converter, Edge, EdgeDetail, Geometry, Logger, Tachometers};
@@ -77,6 +77,8 @@ pub struct Bench {
     run_start_steps: Option<u64>,
     angle_rev: f64,
     heavy_spot_rev: f64,
+    /// What the plant did in the last millisecond at once; its place is kept, for clearing it costs as much as a step.
+    turned: PlantBlock,
     strain_v: [f64; STEPS_PER_MS],
     torque_v: f64,
     output_us: f64,
@@ -125,6 +127,7 @@ impl Bench {
             run_start_steps: None,
             angle_rev,
             heavy_spot_rev: phase.uniform(),
+            turned: PlantBlock::default(),
             strain_v: [front.zero_v[0]; STEPS_PER_MS],
             torque_v: front.zero_v[1],
             front,
@@ -178,6 +181,7 @@ impl Bench {
         while self.horizon_ns() < at_ns {
             if self.steps.is_multiple_of(STEPS_PER_MS as u64) {
                 self.each_millisecond();
+                self.converter.renew();
             }
             self.step();
         }

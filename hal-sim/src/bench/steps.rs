@@ -10,7 +10,7 @@ use super::parts::open;
 use super::{Bench, Millisecond, STEP_NS, STEP_S, Truth};
 use crate::effect::Levers;
 use crate::plant::powerplant::STEPS_PER_MS;
-use crate::plant::{Beam, Mount, PlantBlock};
+use crate::plant::{Beam, Mount};
 use crate::sensor::Edge;
 use core::f64::consts::TAU;
 
@@ -26,9 +26,13 @@ impl Bench {
             edges.clear();
         }
         self.each_millisecond();
+        // The board makes 61.8 conversions of each channel in a millisecond, a run here 8.5 for the sake of its speed: the noise of
+        // its means is 2.7 times the board's (docs/rig.md, "Analogue channels").
+        let count = 9 - ((self.steps / STEPS_PER_MS as u64) & 1) as u16;
         if self.rigid && !self.recorded {
-            self.block(out);
+            self.block(out, count);
         } else {
+            self.converter.draw_ahead(count);
             for _ in 0..STEPS_PER_MS {
                 self.step();
             }
@@ -38,26 +42,17 @@ impl Bench {
                 }
             }
         }
-        // The board makes 61.8 conversions of each channel in a millisecond, a run here 8.5 for the sake of its speed: the noise of
-        // its means is 2.7 times the board's (docs/rig.md, "Analogue channels").
-        let count = 8 + ((self.steps / STEPS_PER_MS as u64) & 1) as u16;
         let pins_v = self.pins_v();
         if self.levers.spike_v[0] != 0.0 {
             self.strain_v.iter_mut().for_each(|v| *v += self.levers.spike_v[0]);
         }
-        for (channel, block) in out.adc.iter_mut().enumerate() {
-            *block = match channel {
-                0 => self.converter.block(0, count, &self.strain_v),
-                _ => self.converter.block(channel, count, &pins_v[channel..=channel]),
-            };
-        }
+        self.converter.blocks(count, &self.strain_v, &pins_v, &mut out.adc);
     }
 
     pub(super) fn each_millisecond(&mut self) {
         self.esc.advance_to(self.horizon_ns());
         self.esc.feel(self.truth.plant.voltage_v, self.truth.plant.current_a, 1.0e-3);
         self.output_us = self.esc.output_us();
-        self.converter.renew();
         let run_s = match self.run_start_steps {
             Some(start) => (self.steps - start) as f64 * STEP_S,
             None => -1.0,
@@ -92,9 +87,11 @@ impl Bench {
 
     /// Ten steps at once, part by part instead of step by step: the same numbers, for what comes later in a step never acts on what
     /// comes earlier in the next. Only for stiff joints and no logger.
-    fn block(&mut self, out: &mut Millisecond) {
-        let mut plant = PlantBlock::default();
-        self.plant.advance_block(STEP_S, self.output_us, &mut plant);
+    fn block(&mut self, out: &mut Millisecond, count: u16) {
+        let plant = &mut self.turned;
+        self.plant.advance_block(STEP_S, self.output_us, plant);
+        // each step of the rotor waits for the one before; what needs no rotor runs beside the last of them
+        self.converter.draw_ahead(count);
         if !plant.rpm.iter().all(|rpm| SPEEDS.contains(rpm)) {
             plant.rpm = plant.rpm.map(|rpm| if SPEEDS.contains(&rpm) { rpm } else { 0.0 });
         }

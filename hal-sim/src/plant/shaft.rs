@@ -48,7 +48,7 @@ impl Shaft {
 
     /// Speed after a step and the acceleration in it: Heun's rule, two evaluations, second order; the rotor's own time constant is
     /// some 40 ms. Each step waits for the one before, so this chain is the run's longest.
-    #[inline]
+    #[inline(always)] // in the loop of steps, or its state goes through memory
     pub(super) fn turn<const DRAGS: bool>(&self, w: f64, dt_s: f64) -> (f64, f64) {
         let first = self.acceleration::<DRAGS>(w);
         let second = self.acceleration::<DRAGS>(or_zero(w + first * dt_s));

@@ -77,6 +77,15 @@ pub struct Converter {
     offset_v: [f64; ADC_CHANNELS],
     conversion: Stream,
     conversion_counts: f64,
+    ahead: [Drawn; ADC_CHANNELS],
+}
+
+/// Noise of one channel's conversions, drawn before their levels are known.
+#[derive(Debug, Clone, Copy, Default)]
+struct Drawn {
+    eight: [[f64; LANES / 2]; 2],
+    /// Of a ninth conversion.
+    spare: Option<f64>,
 }
 
 impl Converter {
@@ -93,6 +102,18 @@ impl Converter {
             offset_v: [0.0; ADC_CHANNELS],
             conversion: Stream::new(seed, Source::Adc, 0),
             conversion_counts: 1.2, // rms, STM32F405 datasheet: total unadjusted error +-2 LSB typical
+            ahead: [Drawn::default(); ADC_CHANNELS],
+        }
+    }
+
+    /// Draws the noise of the next millisecond with `count` conversions of each channel (8 or 9), in the order in which
+    /// [`Converter::renew`] and one conversion after the other would: work that needs no level, for whoever waits for one.
+    pub fn draw_ahead(&mut self, count: u16) {
+        self.renew();
+        for drawn in &mut self.ahead {
+            let eight = self.conversion.quick_normals_of_four();
+            let spare = (usize::from(count) > LANES).then(|| self.conversion.quick_normals()[0]);
+            *drawn = Drawn { eight, spare };
         }
     }
 
@@ -123,38 +144,34 @@ impl Converter {
         (noisy as u16).min(CODES as u16 - 1)
     }
 
-    /// `count` conversions of `channel`, spread over the voltages of one millisecond.
-    pub fn block(&mut self, channel: usize, count: u16, pins_v: &[f64]) -> AdcBlock {
-        let mut sums = Sums::default();
-        let offset = self.offset_v[channel];
-        let mut pins = Spread { pins_v, count: usize::from(count), place: 0, rest: 0 };
-        for _ in 0..count / LANES as u16 {
-            // the readings in turn go to the first and to the second noise of each word
-            let (mut first, mut second) = ([0.0; LANES / 2], [0.0; LANES / 2]);
-            if let [pin] = pins_v {
-                first = [(pin + offset) * (CODES / REFERENCE_V); LANES / 2];
-                second = first;
-            } else {
-                for (first, second) in first.iter_mut().zip(&mut second) {
-                    *first = (pins.next() + offset) * (CODES / REFERENCE_V);
-                    *second = (pins.next() + offset) * (CODES / REFERENCE_V);
-                }
+    /// The conversions of every channel, of which the noise has been drawn ahead: strain at the voltages of one millisecond, the others at one.
+    pub fn blocks(&self, count: u16, strain_v: &[f64], pins_v: &[f64; ADC_CHANNELS], out: &mut [AdcBlock; ADC_CHANNELS]) {
+        for (channel, block) in out.iter_mut().enumerate() {
+            let pins_v = if channel == 0 { strain_v } else { &pins_v[channel..=channel] };
+            let mut sums = Sums::default();
+            let mut pins = Spread { pins_v, count: usize::from(count), place: 0, rest: 0 };
+            let (offset, drawn) = (self.offset_v[channel], self.ahead[channel]);
+            sums.take(&levels(&mut pins, offset), &drawn.eight, self.conversion_counts);
+            if let Some(noise) = drawn.spare {
+                sums.one(whole_code((pins.next() + offset) * (CODES / REFERENCE_V) + self.conversion_counts * noise + 0.5));
             }
-            let levels = [first, second];
-            sums.take(&levels, &self.conversion.quick_normals_of_four(), self.conversion_counts);
+            *block = sums.block(count);
         }
-        let mut spare = None;
-        for _ in 0..count % LANES as u16 {
-            let noise = spare.take().unwrap_or_else(|| {
-                let [now, next] = self.conversion.quick_normals();
-                spare = Some(next);
-                now
-            });
-            let counts = (pins.next() + offset) * (CODES / REFERENCE_V);
-            sums.one(whole_code(counts + self.conversion_counts * noise + 0.5));
-        }
-        sums.block(count)
     }
+}
+
+/// Levels of eight conversions, counts; in turn they go to the first and to the second noise of each word.
+#[inline(always)]
+fn levels(pins: &mut Spread<'_>, offset: f64) -> [[f64; LANES / 2]; 2] {
+    if let [pin] = pins.pins_v {
+        return [[(pin + offset) * (CODES / REFERENCE_V); LANES / 2]; 2];
+    }
+    let (mut first, mut second) = ([0.0; LANES / 2], [0.0; LANES / 2]);
+    for (first, second) in first.iter_mut().zip(&mut second) {
+        *first = (pins.next() + offset) * (CODES / REFERENCE_V);
+        *second = (pins.next() + offset) * (CODES / REFERENCE_V);
+    }
+    [first, second]
 }
 
 /// Conversions that are made side by side.
@@ -209,7 +226,7 @@ impl Sums {
     }
 
     /// Takes eight conversions at these levels with this noise.
-    #[inline]
+    #[inline(always)] // a call would pass all sixteen through memory
     fn take(&mut self, levels: &[[f64; LANES / 2]; 2], noise: &[[f64; LANES / 2]; 2], noise_counts: f64) {
         let code = |half: usize, pair: usize| {
             let at = |lane| whole_code(levels[half][2 * pair + lane] + noise_counts * noise[half][2 * pair + lane] + 0.5);
@@ -268,6 +285,14 @@ impl Spread<'_> {
 mod tests {
     use super::*;
 
+    /// The conversions of one millisecond.
+    fn millisecond(c: &mut Converter, count: u16, strain_v: &[f64], pins_v: &[f64; ADC_CHANNELS]) -> [AdcBlock; ADC_CHANNELS] {
+        let mut blocks = [AdcBlock::default(); ADC_CHANNELS];
+        c.draw_ahead(count);
+        c.blocks(count, strain_v, pins_v, &mut blocks);
+        blocks
+    }
+
     #[test]
     fn the_mean_of_many_conversions_finds_the_pin_between_two_codes() {
         let front = AnalogFront::new(&Bridge::default());
@@ -275,7 +300,10 @@ mod tests {
         let lsb = REFERENCE_V / CODES;
         for fraction in [0.0, 0.25, 0.5, 0.75] {
             let pin = (1000.0 + fraction) * lsb;
-            let b = c.block(0, 20_000, &[pin]);
+            let mut b = AdcBlock::default();
+            for ms in 0..2_500 {
+                b.add(&millisecond(&mut c, 8 + ms % 2, &[pin; 10], &[pin; ADC_CHANNELS])[usize::from(ms % 5)]);
+            }
             let mean = f64::from(b.sum) / f64::from(b.count);
             assert!((mean - 1000.0 - fraction).abs() < 0.03, "{mean}");
             let rms = (b.sum_sq as f64 / f64::from(b.count) - mean * mean).sqrt();
@@ -288,29 +316,33 @@ mod tests {
     fn a_block_is_its_conversions() {
         let front = AnalogFront::new(&Bridge::default());
         let mut c = Converter::new(&front, [0.01; 5], 4);
-        let pins: [f64; 10] = core::array::from_fn(|i| -0.001 + 0.0009 * i as f64);
+        let low: [f64; 10] = core::array::from_fn(|i| -0.001 + 0.0009 * i as f64);
         let high: [f64; 10] = core::array::from_fn(|i| 3.2965 + 0.0009 * i as f64);
         for round in 0..200u16 {
-            let (pins, count) = ([pins, high][usize::from(round % 2)], 7 + round % 4);
-            c.renew();
+            let (strain, count) = ([low, high][usize::from(round % 2)], 8 + round / 2 % 2);
+            let pins: [f64; ADC_CHANNELS] = core::array::from_fn(|i| strain[2 * i]);
             let mut stream = c.conversion.clone();
-            let mut want = AdcBlock { count, min: u16::MAX, ..AdcBlock::default() };
-            let mut spare = 0.0;
-            for i in 0..count {
-                let noise = if i % 2 == 0 {
-                    let [now, next] = stream.quick_normals();
-                    spare = next;
-                    now
-                } else {
-                    spare
-                };
-                let pin = pins[usize::from(i) * pins.len() / usize::from(count)];
-                let code = c.code((pin + c.offset_v(2)) * (CODES / REFERENCE_V), noise);
-                want.sum += u32::from(code);
-                want.sum_sq += u64::from(u32::from(code) * u32::from(code));
-                (want.min, want.max) = (want.min.min(code), want.max.max(code));
+            let blocks = millisecond(&mut c, count, &strain, &pins);
+            for (channel, got) in blocks.iter().enumerate() {
+                let mut want = AdcBlock { count, min: u16::MAX, ..AdcBlock::default() };
+                let mut spare = 0.0;
+                for i in 0..count {
+                    let noise = if i % 2 == 0 {
+                        let [now, next] = stream.quick_normals();
+                        spare = next;
+                        now
+                    } else {
+                        spare
+                    };
+                    let pin =
+                        if channel == 0 { strain[usize::from(i) * strain.len() / usize::from(count)] } else { pins[channel] };
+                    let code = c.code((pin + c.offset_v(channel)) * (CODES / REFERENCE_V), noise);
+                    want.sum += u32::from(code);
+                    want.sum_sq += u64::from(u32::from(code) * u32::from(code));
+                    (want.min, want.max) = (want.min.min(code), want.max.max(code));
+                }
+                assert_eq!(*got, want, "channel {channel}, {count}");
             }
-            assert_eq!(c.block(2, count, &pins), want, "{count}");
         }
     }
 
@@ -318,8 +350,9 @@ mod tests {
     fn the_ends_saturate() {
         let front = AnalogFront::new(&Bridge::default());
         let mut c = Converter::new(&front, [0.0; 5], 1);
-        assert_eq!(c.block(0, 9, &[-0.5]).max, 0);
-        assert_eq!(c.block(0, 9, &[4.0]).min, 4095);
+        let blocks = millisecond(&mut c, 9, &[-0.5; 10], &[4.0; ADC_CHANNELS]);
+        assert_eq!(blocks[0].max, 0);
+        assert!(blocks[1..].iter().all(|b| b.min == 4095));
     }
 
     #[test]
