@@ -374,3 +374,11 @@ proptest! {
         prop_assert!(between(dcm.matrix(), &truth) < 3.0, "{}", between(dcm.matrix(), &truth));
     }
 }
+
+/// The states hold no pointer: they take the same on the board.
+#[test]
+fn the_states_take_little_memory() {
+    let [ours, classic] = [size_of::<dcm::Dcm>(), size_of::<dcm::Classic>()];
+    println!("state: ours {ours} bytes, the thesis' {classic}");
+    assert!(ours <= 544 && classic <= 112, "{ours} {classic}");
+}

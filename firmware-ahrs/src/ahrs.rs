@@ -1,7 +1,8 @@
 //! One tick of the IMU board.
 //!
-//! What it is: readings and a timestamp in, a telemetry sample with raw words and attitude out. It reads no clock and no
-//! register; the RTIC task, the tests and the emulated board call it alike.
+//! What it is: readings and a timestamp in, a telemetry sample with raw words and attitude out, and the physical values before
+//! and after the calibration, which the filter runs on. It reads no clock and no register; the RTIC task, the tests and the
+//! emulated board call it alike.
 //!
 //! What can go wrong: a missing reading repeats the last word and clears its `fresh` bit; a magnetometer overflow counts as
 //! missing; a saturated gyro or accelerometer is passed on, flagged in [`Outputs::saturated`], and not shown to the filter
@@ -13,6 +14,7 @@
 
 use crate::sampler::Readings;
 use crate::{ACCEL, GYRO, MAG, Mounting, TICK_HZ, adxl345, hmc5883l, itg3200};
+use dcm::calibration::Calibration;
 use dcm::{Dcm, Measurement, STANDARD_GRAVITY, Step, Vec3};
 use frame::message::BoardId;
 use frame::{Hello, ImuSample, Ticks};
@@ -47,11 +49,14 @@ pub struct Inputs {
 }
 
 /// What a tick gives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outputs {
-    /// To be sent; `None` while no sensor lives, because there is nothing to say.
+    /// To be sent; `None` while none of the three sensors lives, because there is nothing to say.
     pub sample: Option<ImuSample>,
+    /// Physical values as read, body axes.
+    pub read: Measurement,
+    /// The same calibrated: what the filter took.
+    pub calibrated: Measurement,
     /// Sensors at the end of their range: bits as in [`ImuSample::fresh`].
     pub saturated: u8,
     /// What the filter used of this tick.
@@ -63,6 +68,7 @@ pub struct Outputs {
 pub struct Ahrs {
     config: AhrsConfig,
     filter: Dcm,
+    calibration: Calibration,
     last: ImuSample,
     before: Option<Ticks>,
 }
@@ -71,7 +77,28 @@ impl Ahrs {
     /// A board that has seen nothing yet.
     #[must_use]
     pub fn new(config: AhrsConfig) -> Self {
-        Self { config, filter: Dcm::new(config.filter), last: ImuSample::default(), before: None }
+        let calibration = Calibration::default();
+        Self { config, filter: Dcm::new(config.filter), calibration, last: ImuSample::default(), before: None }
+    }
+
+    /// The calibration in force.
+    #[must_use]
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Puts another calibration in force. The filter's bias moves with the gyro's zero, and what it knew of the field goes where
+    /// the magnetometer's part changed.
+    pub fn calibrate(&mut self, calibration: &Calibration) {
+        let before = core::mem::replace(&mut self.calibration, *calibration);
+        let moved = calibration.gyro_offset - before.gyro_offset;
+        if moved != Vec3::zeros() {
+            let sigma = self.filter.quality().bias_sigma;
+            self.filter.set_bias(self.filter.bias() - moved, sigma);
+        }
+        if (calibration.mag_offset, calibration.mag_matrix) != (before.mag_offset, before.mag_matrix) {
+            self.filter.forget_field();
+        }
     }
 
     /// The first message after reset and the answer to `Identify`. `present` as found by the sampler.
@@ -88,7 +115,7 @@ impl Ahrs {
 
     /// Takes one instant.
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
-        let Readings { gyro, accel, mag, alive } = inputs.readings;
+        let Readings { gyro, accel, mag, alive, .. } = inputs.readings;
         let mut saturated = 0;
         let mut measured = Measurement::default();
         let sample = &mut self.last;
@@ -111,7 +138,7 @@ impl Ahrs {
             if adxl345::saturated(&words) {
                 saturated |= ACCEL;
             } else {
-                measured.accel = Some(scaled(&sample.accel, STANDARD_GRAVITY / adxl345::LSB_PER_G));
+                measured.accel = Some(scaled(&sample.accel, M_S2_PER_LSB));
             }
         }
         match mag {
@@ -126,10 +153,16 @@ impl Ahrs {
 
         let since = self.before.map_or(NOMINAL, |before| inputs.now.since(before));
         self.before = Some(inputs.now);
-        let filter = self.filter.update(since.as_s() as f32, &measured);
+        let calibrated = Measurement {
+            gyro: measured.gyro.map(|w| self.calibration.gyro(&w)),
+            accel: measured.accel.map(|f| self.calibration.accel(&f)),
+            mag: measured.mag.map(|m| self.calibration.mag(&m)),
+        };
+        let filter = self.filter.update(since.as_s() as f32, &calibrated);
         sample.quaternion_q30 =
             if self.filter.is_started() { self.filter.quaternion().map(|q| (q * Q30) as i32) } else { [0; 4] };
-        Outputs { sample: (alive != 0).then_some(*sample), saturated, filter }
+        let lives = alive & (GYRO | ACCEL | MAG) != 0;
+        Outputs { sample: lives.then_some(*sample), read: measured, calibrated, saturated, filter }
     }
 }
 
@@ -138,7 +171,9 @@ const NOMINAL: Ticks = Ticks::from_ms(1000 / TICK_HZ as u64);
 /// 2^30, the scale of the quaternion on the wire.
 const Q30: f32 = 1_073_741_824.0;
 /// Gyro scale in rad/s per count.
-const RAD_S_PER_LSB: f32 = core::f32::consts::PI / 180.0 / itg3200::LSB_PER_DEG_S;
+pub(crate) const RAD_S_PER_LSB: f32 = core::f32::consts::PI / 180.0 / itg3200::LSB_PER_DEG_S;
+/// Accelerometer scale in m/s^2 per count.
+pub(crate) const M_S2_PER_LSB: f32 = STANDARD_GRAVITY / adxl345::LSB_PER_G;
 /// Microtesla in a gauss.
 const UT_PER_GAUSS: f32 = 100.0;
 /// Version of this package.
@@ -174,6 +209,7 @@ mod tests {
             accel: Some([0, 0, 256]),
             mag: Some([218, 0, -470]),
             alive: ALL,
+            ..Readings::default()
         };
         Inputs { now, readings }
     }
@@ -236,5 +272,17 @@ mod tests {
         assert_eq!(digits("0"), 0);
         assert_eq!(digits("117"), 117);
         assert_eq!(Ahrs::hello(168_000_000, 4, ALL).firmware, [0, 1, 0]);
+    }
+
+    #[test]
+    fn the_filter_runs_on_calibrated_values_and_the_words_stay_raw() {
+        let mut ahrs = Ahrs::new(AhrsConfig::default());
+        let mut calibration = Calibration { gyro_offset: Vec3::new(0.1, 0.0, 0.0), ..Calibration::default() };
+        calibration.mag_matrix.m11 = 2.0;
+        ahrs.calibrate(&calibration);
+        let out = ahrs.tick(&level(Ticks(0)));
+        assert_eq!((out.read.gyro, out.calibrated.gyro), (Some(Vec3::zeros()), Some(Vec3::new(-0.1, 0.0, 0.0))));
+        assert_eq!(out.calibrated.mag.unwrap().x, 2.0 * out.read.mag.unwrap().x);
+        assert_eq!(out.sample.unwrap().mag, [218, 0, 470]);
     }
 }

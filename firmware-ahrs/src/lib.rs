@@ -1,8 +1,8 @@
 //! The IMU board, portable half.
 //!
-//! What it is: drivers of the three sensors over the embedded-hal I2C trait, the sampler that reads them on
-//! a fixed tick, and [`Ahrs::tick`], which turns readings and a timestamp into an attitude and a telemetry sample.
-//! The RTIC application, the tests and the emulated board call the same functions.
+//! What it is: drivers of the sensors over the embedded-hal I2C trait, the sampler that reads them on a fixed tick,
+//! [`Ahrs::tick`], which turns readings and a timestamp into an attitude and a telemetry sample, and [`Console`], which does what
+//! the user asks for. The RTIC application, the tests and the emulated board call the same functions.
 //!
 //! What can go wrong: a sensor is missing, is a look-alike, stops answering or saturates; each case has its own
 //! error or flag, none stops the tick, and no path panics.
@@ -16,17 +16,28 @@
 
 pub mod adxl345;
 pub mod ahrs;
+pub mod calibrator;
+pub mod console;
 pub mod error;
 pub mod hmc5883l;
 pub mod itg3200;
+pub mod job;
+pub mod line;
 pub mod lis3dh;
 pub mod mounting;
 pub mod sampler;
+pub mod settings;
+mod still;
+pub mod text;
 
 pub use ahrs::{Ahrs, AhrsConfig, Inputs, Outputs};
+pub use console::Console;
 pub use error::SensorError;
+pub use job::{Done, Job};
+pub use line::{CommandLine, Heard};
 pub use mounting::{Axis, Mounting};
 pub use sampler::{Readings, Sampler};
+pub use settings::Settings;
 
 /// Sample rate of the board, Hz (specification `ahrs.md`, "Board": at least 200).
 pub const TICK_HZ: u32 = 200;
@@ -37,3 +48,5 @@ pub const GYRO: u8 = 1;
 pub const ACCEL: u8 = 2;
 /// Bit of the magnetometer in those masks.
 pub const MAG: u8 = 4;
+/// Bit of the optional test accelerometer in those masks.
+pub const TEST_ACCEL: u8 = 8;

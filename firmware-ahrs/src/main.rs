@@ -1,7 +1,7 @@
 //! The flash image of the IMU board. On the host this is an empty program: build the image with `cargo xtask image`.
 //!
-//! What it is: the RTIC application: set-up, the 200 Hz sampling task and the serial interrupt. Pins and peripherals are
-//! listed in `board/mod.rs`; everything that decides something is in the library.
+//! What it is: the RTIC application: set-up, the 200 Hz sampling task, the serial interrupt, and the idle loop, which fits and
+//! stores. Pins and peripherals are listed in `board/mod.rs`; everything that decides something is in the library.
 //!
 //! What can go wrong: a panic resets the board; a stalled task lets the watchdog reset it.
 //!
@@ -31,11 +31,15 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use super::board::{BAUD, CORE_HZ, CRYSTAL_HZ, INCOMING, OUTGOING, bus::Bus, clock::Clock};
+    use core::sync::atomic::{AtomicBool, Ordering};
+    use cortex_m::peripheral::DWT;
     use defmt_rtt as _;
-    use firmware_ahrs::{Ahrs, AhrsConfig, Inputs, Sampler, TICK_HZ};
-    use frame::wire::{Decoder, Encoder, MAX_WIRE};
-    use frame::{Command, Hello, Message};
+    use firmware_ahrs::console::Asked;
+    use firmware_ahrs::{Ahrs, AhrsConfig, CommandLine, Console, Done, Inputs, Job, Sampler, TICK_HZ, text};
+    use frame::wire::{Encoder, MAX_WIRE};
+    use frame::{ImuFormat, Message};
     use heapless::spsc::{Consumer, Producer, Queue};
+    use settings_store::stm32f4::{RANGE, SettingsFlash};
     use stm32f4xx_hal::{
         ClearFlags, Listen,
         i2c::I2c,
@@ -51,34 +55,61 @@ mod app {
     pub struct Link {
         encoder: Encoder,
         bytes: Producer<'static, u8>,
+        /// What went before is no whole frame (text, or one that a reset cut short): a zero ends it for the receiver.
+        ragged: bool,
     }
 
     impl Link {
-        fn send(&mut self, at: frame::Ticks, message: &Message) {
-            let mut out = [0; MAX_WIRE];
-            let Ok(used) = self.encoder.encode(at, message, &mut out) else { return };
-            if self.bytes.capacity() - self.bytes.len() < used {
+        fn send(&mut self, at: frame::Ticks, format: ImuFormat, message: &Message) {
+            match format {
+                ImuFormat::Binary => {
+                    if core::mem::take(&mut self.ragged) {
+                        self.queue(&[0]);
+                    }
+                    let mut out = [0; MAX_WIRE];
+                    if let Ok(used) = self.encoder.encode(at, message, &mut out) {
+                        self.queue(out.get(..used).unwrap_or(&[]));
+                    }
+                }
+                ImuFormat::Text => {
+                    self.ragged = true;
+                    if let Some(line) = text::line(message) {
+                        self.queue(line.as_bytes());
+                    }
+                }
+            }
+        }
+
+        fn queue(&mut self, bytes: &[u8]) {
+            if self.bytes.capacity() - self.bytes.len() < bytes.len() {
                 return; // the receiver sees the gap in the sequence
             }
-            for byte in out.iter().take(used) {
+            for byte in bytes {
                 let _ = self.bytes.enqueue(*byte);
             }
             rtic::pend(Interrupt::USART1);
         }
     }
 
+    /// Work waits for the idle loop.
+    static WORK: AtomicBool = AtomicBool::new(false);
+
     #[shared]
-    struct Shared {}
+    struct Shared {
+        job: Option<Job>,
+        done: Option<Done>,
+    }
 
     #[local]
     struct Local {
-        ahrs: Ahrs,
+        console: Console,
         sampler: Sampler<Bus>,
         clock: Clock,
         link: Link,
-        hello: Hello,
         commands: Consumer<'static, u8>,
-        decoder: Decoder,
+        line: CommandLine,
+        cycles: u32,
+        flash: SettingsFlash,
         tick: CounterHz<TIM4>,
         watchdog: IndependentWatchdog,
         tx: Tx<USART1>,
@@ -107,6 +138,9 @@ mod app {
         let sampler = Sampler::new(bus);
         let hello = Ahrs::hello(CORE_HZ, reset_cause, sampler.alive());
         defmt::info!("boot: {}", hello);
+        let mut flash = SettingsFlash(ctx.device.FLASH);
+        let (found, news) = settings_store::load(&mut flash, RANGE);
+        let console = Console::new(AhrsConfig::default(), hello, found);
 
         let line = Line::default().baudrate(BAUD.bps());
         let serial: Serial<USART1> = match Serial::new(ctx.device.USART1, (gpioa.pa9, gpioa.pa10), line, &mut rcc) {
@@ -117,8 +151,9 @@ mod app {
         rx.listen();
         let (producer, outgoing) = ctx.local.out.split();
         let (incoming, commands) = ctx.local.inn.split();
-        let mut link = Link { encoder: Encoder::default(), bytes: producer };
-        link.send(clock.now(), &Message::Hello(hello));
+        let mut link = Link { encoder: Encoder::default(), bytes: producer, ragged: true };
+        let now = clock.now();
+        console.greet(news, &mut |format, message| link.send(now, format, message));
 
         let mut tick = ctx.device.TIM4.counter_hz(&mut rcc);
         if tick.start(TICK_HZ.Hz()).is_err() {
@@ -126,39 +161,46 @@ mod app {
         }
         tick.listen(Event::Update);
 
-        let ahrs = Ahrs::new(AhrsConfig::default());
-        let decoder = Decoder::default();
-        let local = Local { ahrs, sampler, clock, link, hello, commands, decoder, tick, watchdog, tx, rx, outgoing, incoming };
-        (Shared {}, local)
+        let (line, cycles) = (CommandLine::new(), 0);
+        let local =
+            Local { console, sampler, clock, link, commands, line, cycles, flash, tick, watchdog, tx, rx, outgoing, incoming };
+        (Shared { job: None, done: None }, local)
     }
 
-    #[idle]
-    fn idle(_: idle::Context) -> ! {
+    /// Fits and stores, while the tick goes on.
+    #[idle(shared = [job, done], local = [flash])]
+    fn idle(mut ctx: idle::Context) -> ! {
         loop {
             cortex_m::asm::wfi();
+            if WORK.swap(false, Ordering::Acquire)
+                && let Some(job) = ctx.shared.job.lock(Option::take)
+            {
+                let outcome = job.run(ctx.local.flash, RANGE);
+                ctx.shared.done.lock(|done| *done = Some(outcome));
+            }
         }
     }
 
-    /// Reads the sensors, runs the filter, sends the sample, answers commands, feeds the watchdog.
-    #[task(binds = TIM4, priority = 1, local = [ahrs, sampler, clock, link, hello, commands, decoder, tick, watchdog])]
-    fn sample(ctx: sample::Context) {
-        let sample::LocalResources { ahrs, sampler, clock, link, hello, commands, decoder, tick, watchdog, .. } = ctx.local;
+    /// Reads the sensors, runs the board's tick, sends what it says, feeds the watchdog.
+    #[task(binds = TIM4, priority = 1, shared = [job, done], local = [console, sampler, clock, link, commands, line, cycles, tick, watchdog])]
+    fn sample(mut ctx: sample::Context) {
+        let begun = DWT::cycle_count();
+        let sample::LocalResources { console, sampler, clock, link, commands, line, cycles, tick, watchdog, .. } = ctx.local;
         tick.clear_flags(Flag::Update);
         let now = clock.now();
         let readings = sampler.read();
-        let outputs = ahrs.tick(&Inputs { now, readings });
-        if let Some(sample) = outputs.sample {
-            link.send(now, &Message::Imu(sample));
-        }
         while let Some(byte) = commands.dequeue() {
-            if let Some(received) = decoder.push::<Command>(byte)
-                && received.message == Command::Identify
-            {
-                hello.present = sampler.alive();
-                link.send(now, &Message::Hello(*hello));
-            }
+            line.take(byte);
+        }
+        let done = ctx.shared.done.lock(Option::take);
+        let asked = Asked { heard: line.next_heard(), done, damaged: line.damaged(), cycles: *cycles };
+        let job = console.tick(&Inputs { now, readings }, &asked, &mut |format, message| link.send(now, format, message));
+        if job.is_some() {
+            ctx.shared.job.lock(|waiting| *waiting = job);
+            WORK.store(true, Ordering::Release);
         }
         watchdog.feed();
+        *cycles = DWT::cycle_count().wrapping_sub(begun);
     }
 
     /// Moves bytes between the line and the queues.

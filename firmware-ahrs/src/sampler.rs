@@ -1,18 +1,18 @@
-//! Reads the three sensors once a tick.
+//! Reads the sensors once a tick.
 //!
 //! What it is: the only code of the portable half that touches the bus. It keeps one small state a sensor: absent or
 //! alive, and since when it fails.
 //!
 //! What can go wrong: a sensor that fails [`MISSES_ALLOWED`] reads in a row counts as dead; an absent or dead sensor is
 //! identified and configured again every [`RETRY_EVERY`] ticks, one sensor a tick, so that a loose plug heals itself and a
-//! missing sensor costs almost no bus time.
+//! missing sensor costs almost no bus time. The test accelerometer is optional: where none is fitted its bit stays down.
 //!
 //! Units: sensor counts in chip axes; ticks of the sampling clock.
 //!
 //! Reference: specification `ahrs.md`, "Sensors".
 
 use crate::itg3200::GyroReading;
-use crate::{ACCEL, GYRO, MAG, TICK_HZ, adxl345, hmc5883l, itg3200};
+use crate::{ACCEL, GYRO, MAG, TEST_ACCEL, TICK_HZ, adxl345, hmc5883l, itg3200, lis3dh};
 use embedded_hal::i2c::I2c;
 
 /// Failed reads in a row after which a sensor counts as dead: 25 ms.
@@ -32,8 +32,12 @@ pub struct Readings {
     pub accel: Option<[i16; 3]>,
     /// Magnetometer.
     pub mag: Option<[i16; 3]>,
+    /// Test accelerometer.
+    pub test: Option<[i16; 3]>,
     /// Which sensors are alive: bits as in [`frame::ImuSample::alive`].
     pub alive: u8,
+    /// Whose read failed in this tick: the same bits.
+    pub lost: u8,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -76,17 +80,20 @@ pub struct Sampler<B> {
     gyro: Health,
     accel: Health,
     mag: Health,
+    test: Health,
     tick: u32,
 }
 
 impl<B: I2c> Sampler<B> {
     /// Identifies and configures what is there; [`Sampler::alive`] says what was found.
     pub fn new(bus: B) -> Self {
-        let mut sampler = Self { bus, gyro: Health::Absent, accel: Health::Absent, mag: Health::Absent, tick: 0 };
+        let absent = Health::Absent;
+        let mut sampler = Self { bus, gyro: absent, accel: absent, mag: absent, test: absent, tick: 0 };
         let bus = &mut sampler.bus;
         sampler.gyro.book(itg3200::configure(bus));
         sampler.accel.book(adxl345::configure(bus));
         sampler.mag.book(hmc5883l::configure(bus));
+        sampler.test.book(lis3dh::configure(bus));
         sampler
     }
 
@@ -94,7 +101,7 @@ impl<B: I2c> Sampler<B> {
     #[must_use]
     pub fn alive(&self) -> u8 {
         let bit = |health: Health, bit| if health.is_alive() { bit } else { 0 };
-        bit(self.gyro, GYRO) | bit(self.accel, ACCEL) | bit(self.mag, MAG)
+        bit(self.gyro, GYRO) | bit(self.accel, ACCEL) | bit(self.mag, MAG) | bit(self.test, TEST_ACCEL)
     }
 
     /// Reads whatever is due on this tick.
@@ -106,17 +113,26 @@ impl<B: I2c> Sampler<B> {
             50 if !self.gyro.is_alive() => drop(self.gyro.book(itg3200::configure(bus))),
             100 if !self.accel.is_alive() => drop(self.accel.book(adxl345::configure(bus))),
             150 if !self.mag.is_alive() => drop(self.mag.book(hmc5883l::configure(bus))),
+            0 if tick > 0 && !self.test.is_alive() => drop(self.test.book(lis3dh::configure(bus))),
             _ => {}
         }
         let mut readings = Readings::default();
+        let mut lost = |bit, missing| readings.lost |= if missing { bit } else { 0 };
         if self.gyro.is_alive() {
             readings.gyro = self.gyro.book(itg3200::read(bus));
+            lost(GYRO, readings.gyro.is_none());
         }
         if self.accel.is_alive() {
             readings.accel = self.accel.book(adxl345::read(bus));
+            lost(ACCEL, readings.accel.is_none());
         }
         if self.mag.is_alive() && tick.is_multiple_of(MAG_EVERY) {
             readings.mag = self.mag.book(hmc5883l::read(bus));
+            lost(MAG, readings.mag.is_none());
+        }
+        if self.test.is_alive() && tick % MAG_EVERY == 1 {
+            readings.test = self.test.book(lis3dh::read(bus));
+            lost(TEST_ACCEL, readings.test.is_none());
         }
         readings.alive = self.alive();
         readings
@@ -131,13 +147,14 @@ impl<B: I2c> Sampler<B> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    extern crate std;
     use embedded_hal::i2c::{Error, ErrorKind, ErrorType, NoAcknowledgeSource, Operation};
 
-    /// A bus with three register files of 64 bytes; each sensor can be pulled out.
+    /// A bus with four register files; each sensor can be pulled out.
     struct Bench {
-        fitted: [bool; 3],
-        files: [[u8; 64]; 3],
-        accesses: [u32; 3],
+        fitted: [bool; 4],
+        files: [[u8; 64]; 4],
+        accesses: [u32; 4],
     }
 
     #[derive(Debug)]
@@ -152,7 +169,7 @@ mod tests {
     }
     impl I2c for Bench {
         fn transaction(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result<(), Nack> {
-            let n = [0x68, 0x53, 0x1E].iter().position(|a| *a == address).ok_or(Nack)?;
+            let n = [0x68, 0x53, 0x1E, 0x18].iter().position(|a| *a == address).ok_or(Nack)?;
             self.accesses[n] += 1;
             if !self.fitted[n] {
                 return Err(Nack);
@@ -161,7 +178,7 @@ mod tests {
             for operation in operations {
                 match operation {
                     Operation::Write(bytes) => {
-                        pointer = bytes[0].into();
+                        pointer = usize::from(bytes[0] & 0x3F); // the LIS3DH's bit for many bytes is not part of it
                         self.files[n][pointer..pointer + bytes.len() - 1].copy_from_slice(&bytes[1..]);
                     }
                     Operation::Read(into) => {
@@ -175,11 +192,12 @@ mod tests {
     }
 
     fn bench() -> Bench {
-        let mut files = [[0; 64]; 3];
+        let mut files = [[0; 64]; 4];
         files[0][0] = 0x69;
         files[1][0] = 0xE5;
         files[2][10..13].copy_from_slice(b"H43");
-        Bench { fitted: [true; 3], files, accesses: [0; 3] }
+        files[3][0x0F] = 0x33;
+        Bench { fitted: [true, true, true, false], files, accesses: [0; 4] }
     }
 
     #[test]
@@ -211,10 +229,10 @@ mod tests {
     #[test]
     fn a_sensor_that_was_plugged_in_late_comes_alive_within_a_second() {
         let mut bus = bench();
-        bus.fitted = [false; 3];
+        bus.fitted = [false; 4];
         let mut sampler = Sampler::new(bus);
         assert_eq!(sampler.alive(), 0);
-        sampler.bus.fitted = [true; 3];
+        sampler.bus.fitted = [true, true, true, false];
         let alive = (0..RETRY_EVERY).map(|_| sampler.read().alive).last();
         assert_eq!(alive, Some(GYRO | ACCEL | MAG));
         assert_eq!(sampler.bus.files[0][0x16], 0x1A, "configured again, not only read");
@@ -229,5 +247,22 @@ mod tests {
             assert_eq!(sampler.read().alive, GYRO | ACCEL);
         }
         assert_eq!(sampler.bus.accesses[2], 1 + 10);
+    }
+
+    #[test]
+    fn the_test_accelerometer_is_optional_and_read_between_the_magnetometer_s_ticks() {
+        let mut sampler = Sampler::new(bench());
+        assert_eq!(sampler.alive() & TEST_ACCEL, 0, "none is fitted, and that is no fault");
+        sampler.bus.fitted[3] = true;
+        let found = (0..=RETRY_EVERY).position(|_| sampler.read().alive & TEST_ACCEL != 0);
+        assert_eq!(found, Some(RETRY_EVERY as usize));
+        sampler.bus.files[3][0x28..0x2E].copy_from_slice(&[0x30, 0x12, 0xF0, 0xFF, 0x00, 0x80]);
+        let read = [0; 6].map(|_| sampler.read());
+        assert!(read.iter().all(|r| r.test.is_none() || r.mag.is_none()), "never in the same tick");
+        assert_eq!(read.iter().filter_map(|r| r.test).collect::<std::vec::Vec<_>>(), [[0x123, -1, -2048]; 2]);
+        assert!(read.iter().all(|r| r.lost == 0));
+        sampler.bus.fitted[3] = false;
+        let lost: u32 = (0..3).map(|_| u32::from(sampler.read().lost & TEST_ACCEL != 0)).sum();
+        assert_eq!(lost, 1);
     }
 }

@@ -60,6 +60,7 @@ fn readings(t: f64, n: u32, noise: &mut Noise) -> Readings {
         accel: Some(accel),
         mag: n.is_multiple_of(3).then_some(mag),
         alive: 7,
+        ..Readings::default()
     }
 }
 

@@ -27,7 +27,6 @@ pub mod rig;
 pub mod sampling;
 pub mod settings;
 pub mod stop;
-pub mod store;
 pub mod strain;
 
 pub use capture::CaptureChannel;

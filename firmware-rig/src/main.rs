@@ -20,7 +20,6 @@ fn main() {
 mod app {
     use crate::board::captures::{self, Clock, Edges, EncoderB};
     use crate::board::converter::Converter;
-    use crate::board::flash::{self, SettingsFlash};
     use crate::board::health::{self, Collector};
     use crate::board::link::Link;
     use crate::board::panic::take_record;
@@ -29,10 +28,11 @@ mod app {
     use crate::board::watchdog::{Watchdog, take_reset_cause};
     use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
-    use firmware_rig::{Config, Inputs, Rig, Settings, StopWatch, store};
+    use firmware_rig::{Config, Inputs, Rig, Settings, StopWatch};
     use frame::calibration::Calibration;
     use frame::message::{Command, Event, Message, SettingsNews, Trial};
     use frame::units::PulseWidth;
+    use settings_store::stm32f4::{self as flash, SettingsFlash};
     use stm32f4xx_hal::gpio::{Input, PB12};
     use stm32f4xx_hal::pac::{ADC1, DMA2, PWR, TIM1, TIM2, TIM3, TIM4, USART1};
     use stm32f4xx_hal::prelude::*;
@@ -120,7 +120,7 @@ mod app {
         device.TIM1.ccmr1_input().write(|w| w.cc1s().ti1());
         device.TIM1.ccer().write(|w| w.cc1e().set_bit());
         let mut flash = SettingsFlash(device.FLASH);
-        let (stored, news) = store::load(&mut flash, flash::RANGE);
+        let (stored, news) = settings_store::load(&mut flash, flash::RANGE);
         let factory = Config::thesis_570kv();
         let settings = stored.unwrap_or_else(|| Settings::of(&factory));
         let rig = Rig::with_settings(factory, settings);
@@ -199,7 +199,7 @@ mod app {
             if STORE.swap(false, Ordering::Acquire)
                 && let Some(settings) = cx.shared.to_store.lock(Option::take)
             {
-                let news = store::save(cx.local.flash, flash::RANGE, &settings);
+                let news = settings_store::save(cx.local.flash, flash::RANGE, &settings);
                 cx.shared.stored.lock(|stored| *stored = Some(news));
             }
         }

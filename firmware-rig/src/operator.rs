@@ -55,6 +55,7 @@ impl Rig {
             Command::Configure(setting) => self.configure(&setting),
             Command::SaveSettings => self.at_rest().map(|()| self.store = Some(self.settings)),
             Command::MassPoint { mass_g } => self.take_mass(mass_g),
+            Command::Imu(_) => Err(Refusals(Refusals::WRONG_STATE)), // meant for the other board
             Command::MassFit => self.fit_masses(),
             Command::MassForget => {
                 self.masses.forget();

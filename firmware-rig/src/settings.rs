@@ -1,6 +1,6 @@
 //! What the operator may change and the board remembers.
 //!
-//! What it is: the settings, how each changes the [`Config`], and their form in flash: version, postcard, CRC-32.
+//! What it is: the settings, how each changes the [`Config`], and their form in flash (postcard, sealed by `settings-store`).
 //! What can go wrong: a setting out of its range is refused and changes nothing; a stored form of another version, length or
 //! checksum is refused as damaged, and factory settings stay in force.
 //! Units: on each field.
@@ -13,13 +13,7 @@ use frame::message::Setting;
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::{Ampere, PulseWidth, RevPerMin, Ticks, Volt};
 use serde::{Deserialize, Serialize};
-
-/// Version of the stored form.
-pub const VERSION: u8 = 1;
-/// Longest stored form, bytes.
-pub const MAX_STORED: usize = 96;
-const TRAILER: usize = 4;
-const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+use settings_store::Stored;
 
 /// A setting out of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,31 +115,17 @@ impl Settings {
         config.strain_scale = self.strain;
         config
     }
+}
 
-    /// The stored form: version, settings, CRC-32 of both. `None` when it does not fit.
-    #[must_use]
-    pub fn to_stored<'a>(&self, buffer: &'a mut [u8; MAX_STORED]) -> Option<&'a [u8]> {
-        let (head, rest) = buffer.split_first_mut()?;
-        *head = VERSION;
-        let room = rest.len().checked_sub(TRAILER)?;
-        let used = 1 + postcard::to_slice(self, rest.get_mut(..room)?).ok()?.len();
-        let crc = CRC.checksum(buffer.get(..used)?).to_le_bytes();
-        buffer.get_mut(used..used + TRAILER)?.copy_from_slice(&crc);
-        buffer.get(..used + TRAILER)
+impl Stored for Settings {
+    const VERSION: u8 = 1;
+
+    fn write(&self, content: &mut [u8]) -> Option<usize> {
+        Some(postcard::to_slice(self, content).ok()?.len())
     }
 
-    /// Settings from their stored form; `None` for another version, a wrong checksum or an impossible setting.
-    #[must_use]
-    pub fn from_stored(stored: &[u8]) -> Option<Self> {
-        let (content, crc) = stored.split_at_checked(stored.len().checked_sub(TRAILER)?)?;
-        if CRC.checksum(content).to_le_bytes() != *crc {
-            return None;
-        }
-        let (version, body) = content.split_first()?;
-        if *version != VERSION {
-            return None;
-        }
-        postcard::from_bytes::<Self>(body).ok().filter(Self::in_range)
+    fn read(content: &[u8]) -> Option<Self> {
+        postcard::from_bytes::<Self>(content).ok().filter(Self::in_range)
     }
 }
 
@@ -153,6 +133,7 @@ impl Settings {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use settings_store::{MAX_STORED, open, seal};
 
     fn factory() -> Settings {
         Settings::of(&Config::thesis_570kv())
@@ -172,20 +153,9 @@ mod tests {
         };
         for settings in [factory(), fullest] {
             let mut buffer = [0; MAX_STORED];
-            let stored = settings.to_stored(&mut buffer).expect("it fits");
-            assert_eq!(Settings::from_stored(stored), Some(settings));
+            let stored = seal(&settings, &mut buffer).expect("it fits");
+            assert_eq!(open(stored), Some(settings));
         }
-    }
-
-    #[test]
-    fn another_version_is_refused() {
-        let mut buffer = [0; MAX_STORED];
-        let mut stored = factory().to_stored(&mut buffer).unwrap().to_vec();
-        stored[0] = VERSION + 1;
-        let n = stored.len() - 4;
-        let crc = CRC.checksum(&stored[..n]).to_le_bytes();
-        stored[n..].copy_from_slice(&crc);
-        assert_eq!(Settings::from_stored(&stored), None);
     }
 
     #[test]
@@ -218,11 +188,11 @@ mod tests {
         #[test]
         fn damage_is_refused(at in 0usize..96, flip in 1u8..=255, cut in 0usize..96) {
             let mut buffer = [0; MAX_STORED];
-            let stored = factory().to_stored(&mut buffer).unwrap().to_vec();
+            let stored = seal(&factory(), &mut buffer).unwrap().to_vec();
             let mut broken = stored.clone();
             broken[at % stored.len()] ^= flip;
-            prop_assert_eq!(Settings::from_stored(&broken), None);
-            prop_assert_eq!(Settings::from_stored(&stored[..cut % stored.len()]), None);
+            prop_assert_eq!(open::<Settings>(&broken), None);
+            prop_assert_eq!(open::<Settings>(&stored[..cut % stored.len()]), None);
         }
     }
 }

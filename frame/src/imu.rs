@@ -24,7 +24,7 @@ pub struct ImuSample {
     pub temperature: i16,
     /// Bit 0 gyro, bit 1 accelerometer, bit 2 magnetometer: fresh in this sample.
     pub fresh: u8,
-    /// Same bits: the sensor answered its identity check and is alive.
+    /// Same bits, and bit 3 for the test accelerometer: the sensor answered its identity check and is alive.
     pub alive: u8,
     /// Attitude, body to earth, Hamilton, scalar first, each component times 2^30; all zero before start-up.
     pub quaternion_q30: [i32; 4],

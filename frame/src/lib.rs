@@ -17,6 +17,7 @@
 pub mod calibration;
 pub mod consensus;
 pub mod imu;
+pub mod imu_command;
 pub mod message;
 pub mod rig;
 pub mod units;
@@ -25,6 +26,9 @@ pub mod wire;
 pub use calibration::{AdcScale, Calibration, Converted};
 pub use consensus::Consensus;
 pub use imu::ImuSample;
+pub use imu_command::{
+    ImuCalibrated, ImuCommand, ImuContent, ImuErrors, ImuFormat, ImuRefusal, ImuReport, ImuSensor, ImuValues, TestAccel,
+};
 pub use message::{Command, Event, Hello, Message};
 pub use rig::{AdcCode, AdcVerdict, CaptureCode, CaptureVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 pub use units::*;

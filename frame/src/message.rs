@@ -7,6 +7,7 @@
 
 use crate::calibration::Calibration;
 use crate::imu::ImuSample;
+use crate::imu_command::{ImuCommand, ImuReport, ImuValues, TestAccel};
 use crate::rig::{FaultSet, Refusals, RigSample, RigState};
 use crate::units::{PulseWidth, Ticks};
 use serde::{Deserialize, Serialize};
@@ -33,7 +34,7 @@ pub struct Hello {
     pub core_hz: u32,
     /// Reset cause: bits 31..24 of RCC_CSR (RM0090 section 7.3.21), shifted down.
     pub reset_cause: u8,
-    /// IMU board: bit 0 gyro, 1 accelerometer, 2 magnetometer identified. Rig board: bit mask of fitted capture channels.
+    /// IMU board: bit 0 gyro, 1 accelerometer, 2 magnetometer, 3 test accelerometer identified. Rig board: bit mask of fitted capture channels.
     pub present: u8,
 }
 
@@ -155,6 +156,12 @@ pub enum Message {
     Event(Event),
     /// How the board is.
     Health(Health),
+    /// Calibrated values of the IMU board.
+    ImuValues(ImuValues),
+    /// Its test accelerometer.
+    TestAccel(TestAccel),
+    /// What became of its calibration, and its errors.
+    ImuReport(ImuReport),
 }
 
 /// Most steps that one uploaded schedule may hold.
@@ -274,6 +281,8 @@ pub enum Command {
         /// What to try.
         trial: Trial,
     },
+    /// A user command of the IMU board.
+    Imu(ImuCommand),
 }
 
 /// What the self-test provokes.

@@ -2,7 +2,7 @@
 //!
 //! What it is: the port, the codec in both directions, and a question with its answer.
 //! What can go wrong: no such port, a port that goes away, a board that does not answer, a command that is refused: one line each.
-//! Units: bytes at 921 600 baud; ms.
+//! Units: bytes; baud; ms.
 //! Reference: specification `formats.md`, "Telemetry".
 
 use crate::Failure;
@@ -13,7 +13,7 @@ use serialport::SerialPort;
 use std::io::ErrorKind;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Speed of the line (pin table of the boards).
+/// Speed of the rig's line (pin table of the board).
 const BAUD: u32 = 921_600;
 /// Longest wait in one read.
 const READ_TIME: Duration = Duration::from_millis(20);
@@ -33,6 +33,7 @@ pub(crate) enum Heard {
 /// The board.
 pub(crate) struct Board {
     name: String,
+    baud: u32,
     port: Box<dyn SerialPort>,
     encoder: Encoder,
     decoder: Decoder,
@@ -40,20 +41,32 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    /// Opens a port by its name.
+    /// Opens the rig board's port by its name.
     pub(crate) fn open(name: &str) -> Result<Self, Failure> {
-        let port = serialport::new(name, BAUD).timeout(READ_TIME).open().map_err(|e| {
+        Self::open_at(name, BAUD)
+    }
+
+    /// Opens a port of another speed.
+    pub(crate) fn open_at(name: &str, baud: u32) -> Result<Self, Failure> {
+        let port = serialport::new(name, baud).timeout(READ_TIME).open().map_err(|e| {
             let known: Vec<String> = serialport::available_ports().unwrap_or_default().into_iter().map(|p| p.port_name).collect();
             let known =
                 if known.is_empty() { "no serial port is there".to_owned() } else { format!("there are {}", known.join(", ")) };
             format!("{name}: cannot be opened ({e}); {known}")
         })?;
-        Ok(Self { name: name.to_owned(), port, encoder: Encoder::default(), decoder: Decoder::default(), sent: Instant::now() })
+        Ok(Self {
+            name: name.to_owned(),
+            baud,
+            port,
+            encoder: Encoder::default(),
+            decoder: Decoder::default(),
+            sent: Instant::now(),
+        })
     }
 
     /// Opens the same port again after it went away; the counters go on.
     pub(crate) fn reopen(&mut self) -> bool {
-        let opened = serialport::new(&self.name, BAUD).timeout(READ_TIME).open();
+        let opened = serialport::new(&self.name, self.baud).timeout(READ_TIME).open();
         let open = opened.map(|port| self.port = port).is_ok();
         if open {
             let _ = self.decoder.push::<Message>(0); // the frame that the loss cut short ends here, not in the next one

@@ -17,6 +17,7 @@ mod effects;
 mod flash;
 mod identify;
 mod import;
+mod imu;
 mod live;
 mod measured;
 mod plateaus;
@@ -84,6 +85,8 @@ enum Command {
     Log(record::Args),
     /// Talks to the rig board: arm, run, set, stop, tare, clear, configure, calibrate.
     Rig(rig::Args),
+    /// Talks to the IMU board: its user commands, calibration included.
+    Imu(imu::Args),
     /// The library of effects as pages.
     Effects(effects::Args),
     /// A model's prediction of every measured channel, row for row.
@@ -113,6 +116,7 @@ fn main() -> ExitCode {
         Command::Step(args) => step::run(args, cli.quiet),
         Command::Log(args) => record::run(args, cli.quiet),
         Command::Rig(args) => rig::run(args, cli.quiet),
+        Command::Imu(args) => imu::run(args, cli.quiet),
         Command::Effects(args) => effects::run(args, cli.quiet),
         Command::Predict(args) => predict::run(args),
     };

@@ -5,7 +5,7 @@
 
 use frame::message::BoardId;
 use frame::wire::{Decoder, LinkStats};
-use frame::{Hello, ImuSample, Message, Ticks};
+use frame::{Hello, ImuSample, Message, TestAccel, Ticks};
 use hal_sim::emulated::ahrs::{AhrsRun, BusFault, ChipKind, Motion, Served, ahrs};
 
 /// Registers that the emulator stores without a model and that the image is known to touch.
@@ -116,11 +116,33 @@ fn a_missing_sensor_is_absent_in_hello_and_the_rest_streams() {
     }
 }
 
+/// Oblique, so that every word has its own value; none of the tests above fits the test accelerometer, and that is no fault there.
+#[test]
+fn the_test_accelerometer_is_found_and_its_words_arrive() {
+    let fitted: Vec<ChipKind> = ChipKind::ALL.into_iter().chain([ChipKind::Lis3dh]).collect();
+    let run = run(OBLIQUE, &fitted, 600);
+    let (hello, samples, link) = decoded(&run);
+    assert_eq!((hello.present, link.damaged, link.missing), (0b1111, 0, 0));
+    assert!(samples.iter().all(|s| s.alive == 0b1111));
+    words_match(&samples, &run.served);
+    let mut decoder = Decoder::default();
+    let messages = run.outcome.telemetry.iter().filter_map(|b| decoder.push::<Message>(*b)).map(|r| r.message);
+    let told: Vec<TestAccel> = messages.filter_map(|m| if let Message::TestAccel(t) = m { Some(t) } else { None }).collect();
+    assert!((38..=40).contains(&told.len()), "every third tick of 600 ms: {}", told.len());
+    // the chip's twelve bits sit left justified in its registers
+    let handed: Vec<[i16; 3]> = run.test_served.iter().take(told.len()).map(|s| body(s).map(|w| w >> 4)).collect();
+    assert_eq!(told.iter().map(|t| t.words).collect::<Vec<_>>(), handed);
+    let length = |w: [i16; 3]| w.iter().map(|w| f64::from(*w).powi(2)).sum::<f64>().sqrt() * 0.012;
+    assert!(told.iter().all(|t| (length(t.words) - 1.0).abs() < 0.01), "1 g at 12 mg a digit");
+    let distinct: std::collections::BTreeSet<_> = told.iter().map(|t| t.words).collect();
+    assert!(distinct.len() > 10, "the body turns, so the words change: {}", distinct.len());
+}
+
 #[test]
 fn with_no_sensor_at_all_the_board_says_hello_and_stays_alive() {
     let run = run(Motion::LEVEL, &[], 300);
     let (hello, samples, link) = decoded(&run);
-    assert_eq!((hello.present, samples.len(), link.good), (0, 0, 1));
+    assert_eq!((hello.present, samples.len(), link.good), (0, 0, 2), "the greeting, and that no settings are stored");
 }
 
 #[test]

@@ -61,7 +61,7 @@ fn the_portable_tick_makes_the_image_s_telemetry_of_the_same_words() {
             if sample.fresh & 1 << chip != 0 { served[chip].next().map(|s| s.words) } else { None }
         };
         let gyro = next(0).map(|rate| GyroReading { temperature: sample.temperature, rate });
-        let readings = Readings { gyro, accel: next(1), mag: next(2), alive: sample.alive };
+        let readings = Readings { gyro, accel: next(1), mag: next(2), alive: sample.alive, ..Readings::default() };
         let told = ahrs.tick(&Inputs { now: sample.at, readings }).sample.expect("sensors live");
         equal += usize::from(told == *sample);
         let apart = told.quaternion_q30.iter().zip(sample.quaternion_q30).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0);
@@ -102,9 +102,14 @@ fn the_native_bus_gives_what_the_emulated_one_gives() {
         let apart = a.quaternion_q30.iter().zip(b.quaternion_q30).map(|(a, b)| f64::from(*a) - f64::from(b));
         (2.0 * apart.map(|d| d * d).sum::<f64>().sqrt() / 2f64.powi(30)).to_degrees()
     };
-    let worst = samples.iter().zip(&native.samples).map(angle).fold(0.0, f64::max);
-    println!("attitudes apart by {worst:.6} deg at most");
-    assert!(worst < 0.01, "{worst}");
+    // up to the first word that rounds the other way the runs are one; such a word of the first samples then weighs 1/n in the start,
+    // and a step of the accelerometer is 0.22 degrees
+    let same = |(a, b): (&ImuSample, &ImuSample)| (a.gyro, a.accel, a.mag) == (b.gyro, b.accel, b.mag);
+    let first = samples.iter().zip(&native.samples).position(|pair| !same(pair)).unwrap_or(samples.len());
+    let worst = |from: usize, to: usize| samples[from..to].iter().zip(&native.samples[from..to]).map(angle).fold(0.0, f64::max);
+    let (before, after) = (worst(0, first), worst(first, samples.len()));
+    println!("attitudes apart by {before:.6} deg at most before the first word differs (sample {first}), {after:.6} after it");
+    assert!(before < 0.001 && after < 0.05, "{before} {after}");
 }
 
 /// A scenario file's bus faults reach both boards, and both tell the same of them.

@@ -11,11 +11,12 @@
 //! | Commands in | PA10, AF7 | USART1 RX | one interrupt a byte |
 //! | Timestamp | - | TIM2 | 84 MHz, 32 bits, free running, extended to 64 bits |
 //! | Sampling tick | - | TIM4 | 200 Hz update interrupt |
+//! | Settings | - | FLASH | sectors 10 and 11, from the idle loop; an erase (1 to 2 s) stops everything |
 //! | Watchdog | - | IWDG | 100 ms, fed by the sampling tick |
 //! | Log | SWD | RTT | defmt; never on the telemetry line |
 //!
-//! The line carries 200 samples of at most 71 bytes a second, a third of its capacity, so an interrupt a byte (under one
-//! per cent of the core) is preferred to DMA: it needs neither static buffers nor unsafe code.
+//! The line carries 200 samples of at most 71 bytes a second, a third of its capacity (raw and calibrated as text: three quarters),
+//! so an interrupt a byte (a few per cent of the core at most) is preferred to DMA: it needs neither static buffers nor unsafe code.
 //!
 //! What can go wrong: a stuck bus ends in [`bus::BusError::Timeout`] after [`bus::PATIENCE_US`] instead of for ever; a tick
 //! that never ends, a lock-up or a fault handler ends in a watchdog reset; a full queue drops whole frames, which the

@@ -36,7 +36,6 @@
 
 pub(crate) mod captures;
 pub(crate) mod converter;
-pub(crate) mod flash;
 pub(crate) mod health;
 pub(crate) mod link;
 pub(crate) mod panic;

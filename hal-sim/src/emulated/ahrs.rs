@@ -1,6 +1,7 @@
-//! The IMU board on the emulator: three chips on the I2C bus, fed by a body whose motion is known.
+//! The IMU board on the emulator: its chips on the I2C bus, fed by a body whose motion is known, and a user at the line.
 //!
-//! What it is: the chips of [`crate::imu`] as peers of the emulated I2C1, and the board's surroundings that let a chip go or hold the bus.
+//! What it is: the chips of [`crate::imu`] as peers of the emulated I2C1, and the board's surroundings that let a chip go or hold the bus,
+//! say what a user says, press the reset key and cut the supply in the midst of a store.
 //! What can go wrong: see [`crate::imu`]; a chip whose reading ends in an acknowledged byte is counted in [`AhrsRun::unfinished`].
 //! Units: counts; ns since power-up.
 //! Reference: RM0090 section 27; crate rigless 0.4.
@@ -11,6 +12,7 @@ use rigless::{
     chip::{Timeline, i2c},
     snapshot::Store,
 };
+use std::collections::VecDeque;
 
 /// A chip of ours as a peer of the emulated bus.
 #[derive(Debug)]
@@ -37,10 +39,25 @@ impl i2c::Peer for Peer {
     }
 }
 
+/// What is done to the board.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Act {
+    /// Says these bytes on the line.
+    Say(Vec<u8>),
+    /// Presses the reset key.
+    Reset,
+    /// Lets the supply fail at the store of this number from now on; the board is reset then.
+    FailAtStore(u32),
+}
+
 /// What happens around the IMU board.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ImuWorld {
     fault: BusFault,
+    /// What is done, by time, ns.
+    script: VecDeque<(u64, Act)>,
+    /// The supply may fail: look often.
+    failing: bool,
     pulled_up: bool,
     held: bool,
     clock_high: bool,
@@ -59,7 +76,33 @@ impl ImuWorld {
         pins.hold_i2c(held);
         pins.drive(Port::B, SDA, !held);
     }
+
+    /// Does what is due; gives the time of what comes next.
+    fn act(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
+        let mut reset = self.failing && pins.has_failed();
+        while let Some((_, act)) = self.script.pop_front_if(|(at, _)| *at <= now_ns) {
+            match act {
+                Act::Say(bytes) => pins.say(&bytes),
+                Act::Reset => reset = true,
+                Act::FailAtStore(nth) => {
+                    pins.fail_at_store(nth);
+                    self.failing = true;
+                }
+            }
+        }
+        if reset {
+            pins.press_reset();
+            self.pulled_up = false; // levels from outside are to be driven again
+            self.failing = false;
+            return now_ns + LOOK_NS;
+        }
+        let look = if self.failing { now_ns + LOOK_NS } else { u64::MAX };
+        self.script.front().map_or(look, |(at, _)| look.min(*at))
+    }
 }
+
+/// Time between two looks at a supply that may fail, ns.
+const LOOK_NS: u64 = 100_000;
 
 impl World for ImuWorld {
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
@@ -68,7 +111,8 @@ impl World for ImuWorld {
             pins.drive(Port::B, SDA, true);
             self.pulled_up = true;
         }
-        match self.fault {
+        let next = self.act(now_ns, pins);
+        next.min(match self.fault {
             BusFault::None => u64::MAX,
             BusFault::LoosePlug { nth, off_ns, back_ns } => {
                 pins.unplug(nth, (off_ns..back_ns).contains(&now_ns));
@@ -79,7 +123,7 @@ impl World for ImuWorld {
                 self.hold(true, pins);
                 u64::MAX
             }
-        }
+        })
     }
 
     fn watches(&self) -> bool {
@@ -103,6 +147,10 @@ pub struct AhrsRun {
     pub outcome: Outcome<ImuWorld>,
     /// What each chip handed out, in the order of [`ChipKind::ALL`]; empty for a chip that was not fitted.
     pub served: [Vec<Served>; 3],
+    /// What the test accelerometer handed out; empty where none was fitted.
+    pub test_served: Vec<Served>,
+    /// Stores to the settings' flash.
+    pub stores: u32,
     /// Reads whose last byte was acknowledged, so that the chip still drove the bus at their end.
     pub unfinished: u32,
 }
@@ -126,20 +174,49 @@ pub fn ahrs_with(
     fault: BusFault,
     milliseconds: u64,
 ) -> Result<AhrsRun, EmulatedError> {
+    let world = ImuWorld { fault, ..ImuWorld::default() };
+    ahrs_in(world, motion, fitted, errors, milliseconds)
+}
+
+/// Runs the image on a body that moves as `motion`, with a `script` of what is done to the board, by ms since power-up.
+///
+/// # Errors
+/// [`EmulatedError`] when there is no image or the emulator gives up.
+pub fn ahrs_by_script(
+    motion: Motion,
+    fitted: &[ChipKind],
+    errors: &Errors,
+    script: &[(u64, Act)],
+    milliseconds: u64,
+) -> Result<AhrsRun, EmulatedError> {
+    let script = script.iter().map(|(ms, act)| (ms * 1_000_000, act.clone())).collect();
+    ahrs_in(ImuWorld { script, ..ImuWorld::default() }, motion, fitted, errors, milliseconds)
+}
+
+fn ahrs_in(
+    world: ImuWorld,
+    motion: Motion,
+    fitted: &[ChipKind],
+    errors: &Errors,
+    milliseconds: u64,
+) -> Result<AhrsRun, EmulatedError> {
     let elf = firmware("firmware-ahrs")?;
     let mut machine = Machine::new()?;
     for kind in fitted {
         machine.mcu.i2c1.inner.attach(Peer(SensorChip::new(*kind, motion, errors)));
     }
-    let (outcome, mut machine) = run(&elf, machine, ImuWorld { fault, ..ImuWorld::default() }, milliseconds * 1_000_000)?;
+    let (outcome, mut machine) = run(&elf, machine, world, milliseconds * 1_000_000)?;
     let mut unfinished = 0;
-    let served = ChipKind::ALL.map(|kind| {
+    let mut record = |kind: ChipKind| {
         let place = fitted.iter().position(|f| *f == kind);
         let chip = place.and_then(|n| machine.mcu.i2c1.inner.chip_mut::<Peer>(n));
         chip.map_or_else(Vec::new, |chip| {
             unfinished += chip.0.unfinished;
             std::mem::take(&mut chip.0.served)
         })
-    });
-    Ok(AhrsRun { outcome, served, unfinished })
+    };
+    let served = ChipKind::ALL.map(&mut record);
+    let test_served = record(ChipKind::Lis3dh);
+    let stores = machine.mcu.flash.stores;
+    Ok(AhrsRun { outcome, served, test_served, stores, unfinished })
 }

@@ -71,7 +71,7 @@ impl ArmAndRun {
                     _ => {}
                 }
             }
-            Message::Imu(_) | Message::Health(_) => {}
+            _ => {} // of the IMU board, or its own health
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Register files of ITG-3200, ADXL345 and HMC5883L.
+//! Register files of ITG-3200, ADXL345, HMC5883L and, optional on the board, LIS3DH.
 //!
 //! What it is: identities, defaults, data order and pointer rules of the real chips as a bus sees them: start, bytes, stop. Each keeps
 //! a record of what it handed out, so that a test can demand equality word by word.
@@ -22,10 +22,12 @@ pub enum ChipKind {
     Adxl345,
     /// Magnetometer at 0x1E.
     Hmc5883l,
+    /// Test accelerometer at 0x18.
+    Lis3dh,
 }
 
 impl ChipKind {
-    /// All three, in the order of the `present` bits.
+    /// The three of the board, in the order of the `present` bits; the test accelerometer is fitted apart.
     pub const ALL: [Self; 3] = [Self::Itg3200, Self::Adxl345, Self::Hmc5883l];
 
     const fn address(self) -> u8 {
@@ -33,6 +35,7 @@ impl ChipKind {
             Self::Itg3200 => 0x68,
             Self::Adxl345 => 0x53,
             Self::Hmc5883l => 0x1E,
+            Self::Lis3dh => 0x18,
         }
     }
 
@@ -42,6 +45,7 @@ impl ChipKind {
             Self::Itg3200 => (0x1B, 8),
             Self::Adxl345 => (0x32, 6),
             Self::Hmc5883l => (0x03, 6),
+            Self::Lis3dh => (0x28, 6),
         }
     }
 
@@ -56,6 +60,10 @@ impl ChipKind {
             Self::Hmc5883l => {
                 file[..3].copy_from_slice(&[0x10, 0x20, 0x01]);
                 file[0x0A..0x0D].copy_from_slice(b"H43");
+            }
+            Self::Lis3dh => {
+                file[0x0F] = 0x33;
+                file[0x20] = 0x07;
             }
         }
         file
@@ -81,6 +89,8 @@ pub struct SensorChip {
     noise: Stream,
     registers: [u8; 64],
     pointer: u8,
+    /// Bit 7 of the register's number: the LIS3DH counts on only with it.
+    multiple: bool,
     pointer_comes: bool,
     driving: bool,
     /// Everything that it handed out.
@@ -105,6 +115,7 @@ impl SensorChip {
             noise: errors.stream(kind),
             registers: kind.reset_registers(),
             pointer: 0,
+            multiple: false,
             pointer_comes: false,
             driving: false,
             served: Vec::new(),
@@ -150,6 +161,15 @@ impl SensorChip {
                     if (-2048.0..=2047.0).contains(&counts) { counts as i16 } else { -4096 }
                 })
             }
+            ChipKind::Lis3dh => {
+                let (control, form) = (file[0x20], file[0x23]);
+                if control >> 4 == 0 || control & 0x08 != 0 || control & 7 != 7 || form & 0x08 == 0 {
+                    return [0; 3]; // powered down, or not the high resolution of all axes
+                }
+                let mg_per_digit = [1.0, 2.0, 4.0, 12.0][usize::from(form >> 4 & 3)];
+                // twelve bits, left justified
+                seen(self.motion.force(at_ns)).map(|f| rounded(f * 1000.0 / mg_per_digit, 2047.0) << 4)
+            }
         }
     }
 
@@ -163,7 +183,7 @@ impl SensorChip {
                 let warm = rounded((self.errors.celsius(at_ns) - 35.0) * 280.0 - 13_200.0, 32_767.0);
                 [warm, x, y, z].iter().flat_map(|w: &i16| w.to_be_bytes()).collect()
             }
-            ChipKind::Adxl345 => words.iter().flat_map(|w| w.to_le_bytes()).collect(),
+            ChipKind::Adxl345 | ChipKind::Lis3dh => words.iter().flat_map(|w| w.to_le_bytes()).collect(),
             ChipKind::Hmc5883l => [x, z, y].iter().flat_map(|w| w.to_be_bytes()).collect(),
         };
         let (first, count) = self.kind.data();
@@ -179,7 +199,8 @@ impl SensorChip {
 
     fn advance_pointer(&mut self) {
         self.pointer = match (self.kind, self.pointer) {
-            (ChipKind::Hmc5883l, 0x08) => 0x03, // data sheet, page 11
+            (ChipKind::Hmc5883l, 0x08) => 0x03,             // data sheet, page 11
+            (ChipKind::Lis3dh, at) if !self.multiple => at, // data sheet, section 6.1.1
             (_, last) if last >= 63 => 0,
             (_, at) => at + 1,
         };
@@ -202,6 +223,7 @@ impl SensorChip {
     pub fn write(&mut self, byte: u8) {
         if self.pointer_comes {
             self.pointer = byte & 63;
+            self.multiple = byte & 0x80 != 0;
             self.pointer_comes = false;
         } else {
             self.registers[usize::from(self.pointer)] = byte;

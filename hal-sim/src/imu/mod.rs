@@ -2,7 +2,7 @@
 //!
 //! What it is: [`Motion`] says where the body is at any instant; [`SensorChip`] is the register file of one chip, which measures
 //! that motion through its [`Errors`]; [`I2cBus`] carries the board's transfers to the chips. [`Lis3dh`], the test
-//! accelerometer, is on SPI ([`crate::hal`]). The native run ([`crate::native::ahrs`])
+//! accelerometer, is on SPI ([`crate::hal`]), and on I2C as one of the chips. The native run ([`crate::native::ahrs`])
 //! and the emulated board use the same chips.
 //! What can go wrong: an unconfigured chip behaves like one (asleep, idle, wrong range), so a driver that skips its configuration is
 //! seen; a chip that is off the bus does not acknowledge; a held data line stops every transfer.

@@ -152,7 +152,7 @@ impl Host {
                     _ => {} // the rest tells of settings and masses, which this host leaves alone
                 }
             }
-            Message::Imu(_) | Message::Health(_) => {}
+            _ => {} // of the IMU board, or its own health
         }
         Ok(())
     }

@@ -1,11 +1,13 @@
-//! Settings in flash: power cuts at every single operation, wear, damage.
+//! Settings of both boards in flash: power cuts at every single operation, wear, damage.
 
 use embedded_storage_async::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
-use firmware_rig::store::{load, save};
+use firmware_ahrs::Settings as ImuSettings;
 use firmware_rig::{Config, Settings};
 use frame::message::SettingsNews;
+use settings_store::{Stored, load, save};
+use std::fmt::Debug;
 
 const PAGE: usize = 1024;
 const RANGE: std::ops::Range<u32> = 0..2 * PAGE as u32;
@@ -87,17 +89,38 @@ impl NorFlash for Chip {
 }
 impl MultiwriteNorFlash for Chip {}
 
-fn settings(n: u16) -> Settings {
-    Settings { log_period_ms: 10 + n % 900, link_ms: 200 + n % 4000, ..Settings::of(&Config::thesis_570kv()) }
+/// Settings that differ by a number.
+trait Numbered: Stored + Debug + Clone {
+    fn number(n: u16) -> Self;
+}
+
+impl Numbered for Settings {
+    fn number(n: u16) -> Self {
+        Self { log_period_ms: 10 + n % 900, link_ms: 200 + n % 4000, ..Self::of(&Config::thesis_570kv()) }
+    }
+}
+
+impl Numbered for ImuSettings {
+    fn number(n: u16) -> Self {
+        let mut settings = Self::default();
+        settings.calibration.gyro_offset.x = f32::from(n) * 1e-4;
+        settings.calibration.mag_matrix.m33 = 1.0 + f32::from(n);
+        settings
+    }
 }
 
 #[test]
 fn what_is_saved_is_loaded() {
+    saved_and_loaded::<Settings>();
+    saved_and_loaded::<ImuSettings>();
+}
+
+fn saved_and_loaded<T: Numbered>() {
     let mut chip = Chip::new();
-    assert_eq!(load(&mut chip, RANGE), (None, SettingsNews::Absent));
+    assert_eq!(load::<T, _>(&mut chip, RANGE), (None, SettingsNews::Absent));
     for n in 0..300 {
-        assert_eq!(save(&mut chip, RANGE, &settings(n)), SettingsNews::Saved, "save {n}");
-        assert_eq!(load(&mut chip, RANGE), (Some(settings(n)), SettingsNews::Loaded));
+        assert_eq!(save(&mut chip, RANGE, &T::number(n)), SettingsNews::Saved, "save {n}");
+        assert_eq!(load(&mut chip, RANGE), (Some(T::number(n)), SettingsNews::Loaded));
     }
     let [a, b] = chip.erases;
     println!("300 saves: {a} and {b} erases");
@@ -108,21 +131,26 @@ fn what_is_saved_is_loaded() {
 /// the cut is the old settings or the new ones, and the next save works.
 #[test]
 fn a_power_cut_at_any_operation_loses_nothing() {
+    cut_everywhere::<Settings>();
+    cut_everywhere::<ImuSettings>();
+}
+
+fn cut_everywhere<T: Numbered>() {
     let mut chip = Chip::new();
     let mut cuts = 0;
     for n in 0..80 {
         let before = chip.clone();
-        assert_eq!(save(&mut chip, RANGE, &settings(n)), SettingsNews::Saved);
+        assert_eq!(save(&mut chip, RANGE, &T::number(n)), SettingsNews::Saved);
         let whole = chip.operations - before.operations;
         for cut in 0..whole {
             let mut broken = Chip { left: Some(cut), ..before.clone() };
-            let _ = save(&mut broken, RANGE, &settings(n));
+            let _ = save(&mut broken, RANGE, &T::number(n));
             broken.left = None; // the power comes back
             let (found, news) = load(&mut broken, RANGE);
-            let old = (n > 0).then(|| settings(n - 1));
-            assert!(found == old || found == Some(settings(n)), "save {n}, cut after {cut} of {whole}: {news:?} {found:?}");
-            assert_eq!(save(&mut broken, RANGE, &settings(n + 500)), SettingsNews::Saved, "save {n}, cut after {cut}");
-            assert_eq!(load(&mut broken, RANGE).0, Some(settings(n + 500)));
+            let old = (n > 0).then(|| T::number(n - 1));
+            assert!(found == old || found == Some(T::number(n)), "save {n}, cut after {cut} of {whole}: {news:?} {found:?}");
+            assert_eq!(save(&mut broken, RANGE, &T::number(n + 500)), SettingsNews::Saved, "save {n}, cut after {cut}");
+            assert_eq!(load(&mut broken, RANGE).0, Some(T::number(n + 500)));
             cuts += 1;
         }
     }
@@ -132,25 +160,30 @@ fn a_power_cut_at_any_operation_loses_nothing() {
 
 #[test]
 fn damage_is_never_taken_for_settings() {
+    damaged::<Settings>();
+    damaged::<ImuSettings>();
+}
+
+fn damaged<T: Numbered>() {
     let mut chip = Chip::new();
-    (0..3).for_each(|n| assert_eq!(save(&mut chip, RANGE, &settings(n)), SettingsNews::Saved));
-    let valid: Vec<Settings> = (0..3).map(settings).collect();
+    (0..3).for_each(|n| assert_eq!(save(&mut chip, RANGE, &T::number(n)), SettingsNews::Saved));
+    let valid: Vec<T> = (0..3).map(T::number).collect();
     for at in 0..2 * PAGE {
         for bit in [0, 5] {
             let mut hurt = chip.clone();
             hurt.cells[at] ^= 1 << bit;
-            let (found, _) = load(&mut hurt, RANGE);
-            assert!(found.is_none_or(|f| valid.contains(&f)), "byte {at}: {found:?}");
+            let (found, _) = load::<T, _>(&mut hurt, RANGE);
+            assert!(found.as_ref().is_none_or(|f| valid.contains(f)), "byte {at}: {found:?}");
         }
     }
     let mut garbage = chip.clone();
     garbage.cells.fill(0);
-    assert_eq!(load(&mut garbage, RANGE).0, None);
-    assert_eq!(save(&mut garbage, RANGE, &settings(9)), SettingsNews::Saved, "erased once, then written");
+    assert_eq!(load::<T, _>(&mut garbage, RANGE).0, None);
+    assert_eq!(save(&mut garbage, RANGE, &T::number(9)), SettingsNews::Saved, "erased once, then written");
 }
 
 #[test]
 fn a_flash_that_cannot_be_written_is_told() {
     let mut chip = Chip { dead: true, ..Chip::new() };
-    assert_eq!(save(&mut chip, RANGE, &settings(1)), SettingsNews::Failed);
+    assert_eq!(save(&mut chip, RANGE, &Settings::number(1)), SettingsNews::Failed);
 }

@@ -6,7 +6,7 @@
 //! Units: bytes; addresses as the flash counts them.
 //! Reference: RM0090 section 3.5-3.6 (sectors, programming); crate sequential-storage 8.
 
-use crate::settings::{MAX_STORED, Settings};
+use crate::seal::{MAX_STORED, Stored, open, seal};
 use core::future::Future;
 use core::ops::Range;
 use core::pin::pin;
@@ -30,13 +30,13 @@ fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
 }
 
 /// What is stored in `range` of `flash`.
-pub fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> (Option<Settings>, SettingsNews) {
+pub fn load<T: Stored, F: NorFlash>(flash: &mut F, range: Range<u32>) -> (Option<T>, SettingsNews) {
     let Ok(config) = MapConfig::try_new(range) else { return (None, SettingsNews::Damaged) };
     let mut storage = MapStorage::<u8, _, _>::new(flash, config, Cache::new_uncached());
     let mut buffer = [0; BUFFER];
     match at_once(storage.fetch_item::<&[u8]>(&mut buffer, &KEY)) {
         Some(Ok(None)) => (None, SettingsNews::Absent),
-        Some(Ok(Some(stored))) => match Settings::from_stored(stored) {
+        Some(Ok(Some(stored))) => match open(stored) {
             Some(settings) => (Some(settings), SettingsNews::Loaded),
             None => (None, SettingsNews::Damaged),
         },
@@ -45,9 +45,9 @@ pub fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> (Option<Settings>,
 }
 
 /// Stores `settings` in `range` of `flash` and reads them back. Damaged content is erased once.
-pub fn save<F: NorFlash>(flash: &mut F, range: Range<u32>, settings: &Settings) -> SettingsNews {
+pub fn save<T: Stored, F: NorFlash>(flash: &mut F, range: Range<u32>, settings: &T) -> SettingsNews {
     let mut form = [0; MAX_STORED];
-    let Some(stored) = settings.to_stored(&mut form) else { return SettingsNews::Failed };
+    let Some(stored) = seal(settings, &mut form) else { return SettingsNews::Failed };
     for attempt in 0..2 {
         let Ok(config) = MapConfig::try_new(range.clone()) else { return SettingsNews::Failed };
         let mut storage = MapStorage::<u8, _, _>::new(&mut *flash, config, Cache::new_uncached());
@@ -59,8 +59,8 @@ pub fn save<F: NorFlash>(flash: &mut F, range: Range<u32>, settings: &Settings) 
             break;
         }
     }
-    match load(flash, range) {
-        (Some(read), SettingsNews::Loaded) if read == *settings => SettingsNews::Saved,
+    match load::<T, F>(flash, range) {
+        (Some(read), SettingsNews::Loaded) if &read == settings => SettingsNews::Saved,
         _ => SettingsNews::Failed,
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! What it is: sectors 10 and 11 of 128 KiB behind the `embedded-storage` traits, programmed a word at a time.
 //! What can go wrong: an erase holds the processor for 1 to 2 s, because the program runs from the same flash: the wait runs from
-//! RAM and feeds the watchdog, pulses go on by the timer alone, and the tick is told by [`PAUSED`]. Only a disarmed rig saves.
+//! RAM and feeds the watchdog, pulses go on by the timer alone, and the tick is told by [`PAUSED`]. Only a disarmed rig saves; the IMU board misses its ticks.
 //! Units: bytes, absolute addresses.
 //! Reference: RM0090 section 3.6 (keys, PSIZE, SER, SNB), table 5 (sectors); datasheet table 40 (erase times).
 
@@ -13,7 +13,7 @@ use embedded_storage_async::nor_flash::{
 use stm32f4xx_hal::pac::{FLASH, IWDG};
 
 /// Where the settings live; `memory.x` keeps the program out of it.
-pub(crate) const RANGE: core::ops::Range<u32> = 0x080C_0000..0x0810_0000;
+pub const RANGE: core::ops::Range<u32> = 0x080C_0000..0x0810_0000;
 const SECTOR: u32 = 128 * 1024;
 const FIRST_SECTOR: u32 = 10;
 
@@ -28,14 +28,15 @@ const ERRORS: u32 = 0xf2;
 const BUSY: u32 = 1 << 16;
 
 /// Set while an erase held up everything; the tick takes it down.
-pub(crate) static PAUSED: AtomicBool = AtomicBool::new(false);
+pub static PAUSED: AtomicBool = AtomicBool::new(false);
 
 /// The settings' sectors.
-pub(crate) struct SettingsFlash(pub(crate) FLASH);
+#[allow(missing_debug_implementations)] // the register block has none
+pub struct SettingsFlash(pub FLASH);
 
 /// The flash refused.
 #[derive(Debug)]
-pub(crate) struct Refused;
+pub struct Refused;
 
 impl NorFlashError for Refused {
     fn kind(&self) -> NorFlashErrorKind {

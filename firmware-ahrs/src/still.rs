@@ -1,0 +1,165 @@
+//! A second of rest, or of motion.
+//!
+//! What it is: means of rate, specific force and field over a second, with the scatter of the readings, and whether the second half
+//! says the same as the first.
+//! What can go wrong: a slow steady turn scatters no more than rest does; about a level axis the force gives it away, about the
+//! vertical the field does from some 6 deg/s on, and slower ones without a field are not seen.
+//! Units: rad/s, m/s^2, uT; readings.
+//! Reference: Laidig & Seel 2023, section 3.4, for the limit of the rate; a converter's step has a standard deviation of step/sqrt(12).
+
+use crate::ahrs::{M_S2_PER_LSB, RAD_S_PER_LSB};
+use dcm::calibration::{CalibrationError, GyroZero};
+use dcm::{Measurement, Vec3};
+use libm::sqrtf;
+
+/// Readings of a half: half a second.
+const HALF: u32 = 100;
+/// Largest standard deviation of a gyro at rest, rad/s: 1 deg/s.
+const GYRO_NOISE: f32 = 0.0175;
+/// Largest standard deviation of an accelerometer at rest, m/s^2.
+const ACCEL_NOISE: f32 = 0.25;
+/// Largest change of the force between the halves, m/s^2: 0.3 degrees of tilt.
+const FORCE_MOVED: f32 = 0.05;
+/// Largest change of the field between the halves, uT.
+const FIELD_MOVED: f32 = 1.0;
+/// Standard deviation of what a converter's step hides, in steps: 1/sqrt(12).
+const STEP: f32 = 0.288_675;
+
+/// Means over a second of rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Still {
+    /// Rate, rad/s.
+    pub(crate) rate: Vec3,
+    /// Its standard error.
+    pub(crate) rate_sigma: Vec3,
+    /// Standard deviation of a rate, the largest axis.
+    pub(crate) rate_noise: f32,
+    /// Specific force, m/s^2.
+    pub(crate) force: Vec3,
+    /// Its standard error, the largest axis.
+    pub(crate) force_sigma: f32,
+    /// Field, uT; `None` without a magnetometer.
+    pub(crate) field: Option<Vec3>,
+    /// Rates in the mean.
+    pub(crate) readings: u32,
+}
+
+/// What a second showed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Second {
+    /// Rest.
+    Rest(Still),
+    /// Motion, with the scatter of the rate, rad/s.
+    Motion(f32),
+}
+
+/// Collects a second.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Watch {
+    rate: GyroZero,
+    force: [GyroZero; 2],
+    field: [(Vec3, u32); 2],
+}
+
+impl Watch {
+    /// Takes one instant; gives the second when it is full, and begins anew.
+    pub(crate) fn take(&mut self, read: &Measurement) -> Option<Second> {
+        let [first, second] = &mut self.force;
+        let half = usize::from(first.count() >= HALF);
+        if let Some(rate) = &read.gyro {
+            self.rate.add(rate);
+        }
+        if let Some(force) = &read.accel {
+            if half == 0 { first.add(force) } else { second.add(force) }
+        }
+        if let (Some(field), Some((sum, count))) = (&read.mag, self.field.get_mut(half)) {
+            *sum += field;
+            *count += 1;
+        }
+        if self.rate.count() < 2 * HALF || second.count() < HALF {
+            return None;
+        }
+        Some(core::mem::take(self).judge())
+    }
+
+    /// Rates so far.
+    pub(crate) fn readings(&self) -> u32 {
+        self.rate.count()
+    }
+
+    fn judge(&self) -> Second {
+        let (rate, sigma) = match self.rate.finish(GYRO_NOISE) {
+            Ok(found) => found,
+            Err(CalibrationError::Moving { scatter }) => return Second::Motion(scatter),
+            Err(_) => return Second::Motion(0.0),
+        };
+        let noise = sigma.max() * sqrtf(self.rate.count() as f32);
+        let [Ok((a, a_sigma)), Ok((b, b_sigma))] = self.force.map(|half| half.finish(ACCEL_NOISE)) else {
+            return Second::Motion(noise);
+        };
+        let means = self.field.map(|(sum, count)| (count > 0).then(|| sum / count as f32));
+        let field = match means {
+            [Some(a), Some(b)] if (a - b).abs().max() > FIELD_MOVED => return Second::Motion(noise),
+            [Some(a), Some(b)] => Some((a + b) / 2.0),
+            _ => None,
+        };
+        if (a - b).abs().max() > FORCE_MOVED {
+            return Second::Motion(noise);
+        }
+        let readings = self.rate.count();
+        let half = a_sigma.max().max(b_sigma.max()) * sqrtf(HALF as f32);
+        Second::Rest(Still {
+            rate,
+            rate_sigma: sigma.map(|s| error_of_mean(s * sqrtf(readings as f32), readings, RAD_S_PER_LSB)),
+            rate_noise: noise,
+            force: (a + b) / 2.0,
+            force_sigma: error_of_mean(half, 2 * HALF, M_S2_PER_LSB),
+            field,
+            readings,
+        })
+    }
+}
+
+/// Standard error of a mean of readings with a converter's step: noise below half a step averages nothing out.
+fn error_of_mean(deviation: f32, readings: u32, step: f32) -> f32 {
+    if deviation < step / 2.0 { STEP * step } else { deviation / sqrtf(readings as f32) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn second(rate: impl Fn(u32) -> f32, force: impl Fn(u32) -> f32, field: impl Fn(u32) -> f32) -> Second {
+        let mut watch = Watch::default();
+        for k in 0..200 {
+            let read = Measurement {
+                gyro: Some(Vec3::new(rate(k), 0.0, 0.0)),
+                accel: Some(Vec3::new(0.0, force(k), -9.8)),
+                mag: (k % 3 == 0).then(|| Vec3::new(20.0, 0.0, field(k))),
+            };
+            if let Some(second) = watch.take(&read) {
+                assert_eq!((k, watch), (199, Watch::default()));
+                return second;
+            }
+        }
+        panic!("no second in 200 readings")
+    }
+
+    #[test]
+    fn rest_is_rest_with_any_offset() {
+        let Second::Rest(still) = second(|k| 0.5 + if k.is_multiple_of(2) { 0.01 } else { -0.01 }, |_| 0.3, |_| 43.0) else {
+            panic!()
+        };
+        assert!((still.rate.x - 0.5).abs() < 1e-6 && (still.rate_sigma.x - 0.01 / 200f32.sqrt()).abs() < 1e-5);
+        assert!((still.rate_sigma.y - 0.288_675 * RAD_S_PER_LSB).abs() < 1e-8, "no noise, no average: {}", still.rate_sigma.y);
+        assert_eq!(still.field.map(|f| f.z), Some(43.0));
+    }
+
+    #[test]
+    fn every_kind_of_motion_is_seen() {
+        let shaken = |k: u32| if k.is_multiple_of(2) { 0.03 } else { -0.03 };
+        assert!(matches!(second(shaken, |_| 0.0, |_| 43.0), Second::Motion(s) if s > 0.02));
+        assert!(matches!(second(|_| 0.0, |k| k as f32 * 1e-3, |_| 43.0), Second::Motion(_)), "a slow tilt");
+        assert!(matches!(second(|_| 0.0, |_| 0.0, |k| k as f32 * 0.02), Second::Motion(_)), "a slow turn about the vertical");
+    }
+}

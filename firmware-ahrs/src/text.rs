@@ -1,0 +1,228 @@
+//! Messages as lines of text, for a person at a terminal.
+//!
+//! What it is: one line for each message of the board. Samples: `raw` or `cal`, time in s, three rates, three forces, three fields
+//! (words, or rad/s, m/s^2, uT; `-` where there is no new reading), roll, pitch and yaw in degrees.
+//! What can go wrong: a line that does not fit is left out; a number too large for its digits rests at its end.
+//! Units: said at each line.
+//! Reference: specification `ahrs.md`, "Board": output mode text or binary.
+
+use core::fmt::{self, Display, Formatter, Write};
+use dcm::{Mat3, euler_of};
+use frame::message::SettingsNews;
+use frame::{Event, ImuReport, ImuSensor, Message, Ticks};
+use heapless::String;
+
+/// Longest line, bytes.
+pub const LINE: usize = 240;
+
+/// A number with so many digits after the point. Formatting floats with the core library would cost 10 KB.
+struct Number(f32, usize);
+
+impl Display for Number {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self(value, digits) = *self;
+        if value.is_nan() {
+            return f.write_str("-");
+        }
+        let scale = (0..digits).fold(1u32, |scale, _| scale * 10);
+        let n = (value.abs() * scale as f32 + 0.5) as u32;
+        let sign = if value < 0.0 && n > 0 { "-" } else { "" };
+        write!(f, "{sign}{}.{:0digits$}", n / scale, n % scale)
+    }
+}
+
+/// Three of them.
+struct Three<'a>(&'a [f32; 3], usize);
+
+impl Display for Three<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.0.map(|v| Number(v, self.1));
+        write!(f, "{x},{y},{z}")
+    }
+}
+
+/// Three words, or a dash where they are old.
+struct Words(Option<[i16; 3]>);
+
+impl Display for Words {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some([x, y, z]) => write!(f, "{x},{y},{z}"),
+            None => f.write_str("-,-,-"),
+        }
+    }
+}
+
+/// Seconds with three digits.
+struct Seconds(Ticks);
+
+impl Display for Seconds {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let ms = self.0.as_ms() as u32; // for 49 days
+        write!(f, "{}.{:03}", ms / 1000, ms % 1000)
+    }
+}
+
+/// Roll, pitch and yaw of a quaternion, degrees; dashes before the filter has started.
+struct Angles([i32; 4]);
+
+impl Display for Angles {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if self.0 == [0; 4] {
+            return f.write_str("-,-,-");
+        }
+        let [w, x, y, z] = self.0.map(|q| q as f32 / 1_073_741_824.0);
+        let m = Mat3::new(
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+            2.0 * (x * y + w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z - w * x),
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        );
+        let e = euler_of(&m);
+        Three(&[e.roll, e.pitch, e.yaw].map(f32::to_degrees), 2).fmt(f)
+    }
+}
+
+fn name(sensor: ImuSensor) -> &'static str {
+    match sensor {
+        ImuSensor::Gyro => "gyro",
+        ImuSensor::Accel => "accel",
+        ImuSensor::Mag => "mag",
+        ImuSensor::Alignment => "align",
+    }
+}
+
+/// The line of a message, its end included; `None` for a message that this board does not send or that does not fit.
+#[must_use]
+pub fn line(message: &Message) -> Option<String<LINE>> {
+    let mut out = String::new();
+    write_line(&mut out, message).ok()?;
+    out.push('\n').ok()?;
+    Some(out)
+}
+
+fn write_line(out: &mut String<LINE>, message: &Message) -> fmt::Result {
+    match message {
+        Message::Hello(hello) => {
+            let [major, minor, patch] = hello.firmware;
+            write!(out, "imu board, firmware {major}.{minor}.{patch}, sensors")?;
+            let names = ["gyro", "accel", "mag", "test"];
+            names.iter().enumerate().filter(|(bit, _)| hello.present >> bit & 1 != 0).try_for_each(|(_, n)| write!(out, " {n}"))
+        }
+        Message::Imu(s) => {
+            let of = |bit: u8, words| Words((s.fresh & bit != 0).then_some(words));
+            let (gyro, accel, mag) = (of(crate::GYRO, s.gyro), of(crate::ACCEL, s.accel), of(crate::MAG, s.mag));
+            write!(out, "raw,{},{gyro},{accel},{mag},{}", Seconds(s.at), Angles(s.quaternion_q30))
+        }
+        Message::ImuValues(v) => {
+            let (gyro, accel, mag) = (Three(&v.gyro, 4), Three(&v.accel, 3), Three(&v.mag, 2));
+            write!(out, "cal,{},{gyro},{accel},{mag},{}", Seconds(v.at), Angles(v.quaternion_q30))
+        }
+        Message::TestAccel(t) => write!(out, "test,{},{}", Seconds(t.at), Words(Some(t.words))),
+        Message::Event(Event::Accepted) => out.write_str("ok"),
+        Message::Event(Event::Refused(reasons)) => {
+            out.write_str("refused:")?;
+            reasons.words().try_for_each(|word| write!(out, " {word};"))
+        }
+        Message::Event(Event::Settings(news)) => out.write_str(match news {
+            SettingsNews::Absent => "settings: none stored, as from the factory",
+            SettingsNews::Loaded => "settings: loaded",
+            SettingsNews::Damaged => "settings: stored ones are damaged or stale, as from the factory",
+            SettingsNews::Saved => "settings: saved",
+            SettingsNews::Failed => "settings: could not be saved",
+        }),
+        Message::ImuReport(report) => write_report(out, report),
+        _ => Err(fmt::Error),
+    }
+}
+
+fn write_report(out: &mut String<LINE>, report: &ImuReport) -> fmt::Result {
+    match report {
+        ImuReport::Taken { sensor, index, count } => write!(out, "{}: taken {index}, {count} so far", name(*sensor)),
+        ImuReport::Calibrated(c) => {
+            write!(out, "{}: offset {} +- {}", name(c.sensor), Three(&c.offset, 5), Three(&c.sigma, 5))?;
+            write!(out, ", gain {}, residual {}", Three(&c.gain, 4), Number(c.residual, 5))?;
+            write!(out, ", coverage {}, readings {}", Number(c.coverage, 2), c.readings)
+        }
+        ImuReport::Refused { sensor, why } => {
+            use frame::ImuRefusal as R;
+            write!(out, "{}: refused, ", name(*sensor))?;
+            match why {
+                R::TooFew { found, needed } => write!(out, "{found} readings, {needed} are needed"),
+                R::Moving { scatter } => write!(out, "it moves, scatter {} rad/s", Number(*scatter, 4)),
+                R::Coverage { found } => write!(out, "coverage {}: turn it into every direction", Number(*found, 2)),
+                R::Position { index } => write!(out, "no rest in position {index} of +x -x +y -y +z -z up, from 0"),
+                R::NoFit => out.write_str("no fit"),
+            }
+        }
+        ImuReport::Errors(e) => {
+            let ([g, a, m, t], [sg, sa, sm], [low, high]) = (e.lost, e.saturated, e.tick_span);
+            write!(out, "errors: alive {}, lost {g},{a},{m},{t}, saturated {sg},{sa},{sm}, unusable {}", e.alive, e.unusable)?;
+            write!(out, ", damaged {}, unknown {}, tick span {low},{high}, tick cycles {}", e.damaged, e.unknown, e.tick_cycles)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use frame::{ImuErrors, ImuSample, ImuValues};
+    extern crate std;
+    use std::string::ToString;
+
+    #[test]
+    fn numbers_have_their_digits_and_their_sign() {
+        let text = [(1.0, 3), (-0.0004, 3), (-0.0006, 3), (12.3456, 2), (f32::NAN, 2), (-7.0, 1), (1e20, 2)];
+        let text = text.map(|(v, d)| Number(v, d).to_string());
+        assert_eq!(text, ["1.000", "0.000", "-0.001", "12.35", "-", "-7.0", "42949672.95"]);
+    }
+
+    #[test]
+    fn a_sample_is_one_line() {
+        let half = (0.5f32.sqrt() * 1_073_741_824.0) as i32;
+        let sample = ImuSample {
+            at: Ticks::from_ms(12_034),
+            gyro: [1, -2, 3],
+            accel: [0, 0, -256],
+            fresh: 3,
+            quaternion_q30: [half, 0, 0, half],
+            ..ImuSample::default()
+        };
+        assert_eq!(line(&Message::Imu(sample)).unwrap(), "raw,12.034,1,-2,3,0,0,-256,-,-,-,0.00,0.00,90.00\n");
+        let values = ImuValues { gyro: [0.1, 0.0, -0.25], accel: [f32::NAN; 3], mag: [20.0, 0.0, 43.5], ..ImuValues::default() };
+        let wanted = "cal,0.000,0.1000,0.0000,-0.2500,-,-,-,20.00,0.00,43.50,-,-,-\n";
+        assert_eq!(line(&Message::ImuValues(values)).unwrap(), wanted);
+    }
+
+    #[test]
+    fn the_longest_lines_fit() {
+        let errors = ImuErrors {
+            alive: 255,
+            lost: [u16::MAX; 4],
+            saturated: [u16::MAX; 3],
+            unusable: u16::MAX,
+            damaged: u16::MAX,
+            unknown: u16::MAX,
+            tick_span: [u32::MAX; 2],
+            tick_cycles: u32::MAX,
+        };
+        assert!(line(&Message::ImuReport(ImuReport::Errors(errors))).is_some());
+        let all = frame::ImuCalibrated {
+            sensor: ImuSensor::Alignment,
+            offset: [-1000.0; 3],
+            sigma: [1000.0; 3],
+            gain: [-100.0; 3],
+            residual: 1000.0,
+            coverage: 1.0,
+            readings: u16::MAX,
+        };
+        assert!(line(&Message::ImuReport(ImuReport::Calibrated(all))).is_some());
+        assert!(line(&Message::Event(Event::Refused(frame::Refusals(u16::MAX)))).is_none_or(|l| l.len() <= LINE));
+        assert_eq!(line(&Message::Health(frame::message::Health::default())), None);
+    }
+}

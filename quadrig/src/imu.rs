@@ -1,0 +1,104 @@
+//! `quadrig imu`: says one user command to the IMU board and prints its answers.
+//!
+//! What it is: the words that a person types at the board (`docs/ahrs.md`, "At the board"), sent as a frame; a calibration that ends by
+//! itself is followed to its end.
+//! What can go wrong: words that are no command, a board that does not answer, a refusal: one line each, exit status 1.
+//! Units: as the board prints them.
+//! Reference: specification `ahrs.md`, "Board".
+
+use crate::Failure;
+use crate::board::{Board, Heard};
+use firmware_ahrs::{line, text};
+use frame::{Command, Event, ImuCommand, ImuFormat, ImuReport, ImuSensor, Message};
+use std::time::{Duration, Instant};
+
+/// Speed of the IMU board's line (pin table of the board).
+const BAUD: u32 = 460_800;
+/// How long an answer may take: the longest waits for the erase of a flash sector.
+const ANSWER: Duration = Duration::from_secs(5);
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Serial port of the board.
+    #[arg(long)]
+    port: String,
+    /// Longest calibration that is followed, s.
+    #[arg(long, default_value_t = 300.0)]
+    patience: f64,
+    /// identify; format text|binary; send raw|calibrated|both; stream on|off; once; calibrate gyro|accel|mag|align; finish; cancel; save;
+    /// load; reset; errors.
+    #[arg(required = true)]
+    words: Vec<String>,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let typed = args.words.join(" ");
+    let command = line::command(&typed)
+        .ok_or_else(|| format!("{typed:?} is no command of the IMU board; `quadrig imu --help` lists them"))?;
+    if !(args.patience.is_finite() && args.patience > 0.0) {
+        return Err(format!("--patience {}: expected seconds above 0", args.patience).into());
+    }
+    let mut board = Board::open_at(&args.port, BAUD)?;
+    let text_wanted = command == Command::Imu(ImuCommand::Format(ImuFormat::Text));
+    if !text_wanted {
+        // whatever mode it is in: its answers are to be frames; the answer to this is not waited for
+        board.send(Command::Imu(ImuCommand::Format(ImuFormat::Binary)))?;
+        listen(&mut board, ANSWER, |m| matches!(m, Message::Event(Event::Accepted)))?;
+    }
+    board.send(command)?;
+    if text_wanted {
+        return Ok(()); // it answers in text
+    }
+    let mut refusal = None;
+    let mut show = |message: &Message| {
+        let sample = matches!(message, Message::Imu(_) | Message::ImuValues(_) | Message::TestAccel(_));
+        if let (false, Some(line)) = (quiet || (sample && command != Command::Imu(ImuCommand::Once)), text::line(message)) {
+            print!("{line}");
+        }
+        if let Message::Event(Event::Refused(_)) | Message::ImuReport(ImuReport::Refused { .. }) = message {
+            refusal = text::line(message);
+        }
+    };
+    let ended = listen(&mut board, ANSWER, |m| {
+        show(m);
+        answers(&command, m)
+    })?;
+    let follows = matches!(command, Command::Imu(ImuCommand::Calibrate(ImuSensor::Gyro | ImuSensor::Accel)));
+    if follows && ended {
+        listen(&mut board, Duration::from_secs_f64(args.patience), |m| {
+            show(m);
+            matches!(m, Message::ImuReport(ImuReport::Calibrated(_) | ImuReport::Refused { .. }))
+        })?;
+    }
+    refusal.map_or(Ok(()), |line| Err(format!("the board says {}", line.trim_end()).into()))
+}
+
+/// Whether a message ends the answer to a command.
+fn answers(command: &Command, message: &Message) -> bool {
+    match (command, message) {
+        (_, Message::Event(Event::Refused(_))) => true,
+        (Command::Identify, m) => matches!(m, Message::Hello(_)),
+        (Command::Imu(ImuCommand::Once), m) => matches!(m, Message::Imu(_) | Message::ImuValues(_)),
+        (Command::Imu(ImuCommand::Save | ImuCommand::Load), m) => matches!(m, Message::Event(Event::Settings(_))),
+        (Command::Imu(ImuCommand::Errors | ImuCommand::Finish), m) => matches!(m, Message::ImuReport(_)),
+        (_, m) => matches!(m, Message::Event(Event::Accepted)),
+    }
+}
+
+/// Hears messages until one is the last.
+fn listen(board: &mut Board, patience: Duration, mut last: impl FnMut(&Message) -> bool) -> Result<bool, Failure> {
+    let begun = Instant::now();
+    while begun.elapsed() < patience {
+        match board.hear() {
+            Heard::Gone => return Err("the port is gone".into()),
+            Heard::Messages(messages) => {
+                if messages.iter().any(|received| last(&received.message)) {
+                    return Ok(true);
+                }
+            }
+        }
+    }
+    Err(format!("no answer from the board in {} s; is it powered, and an IMU board?", patience.as_secs_f64()).into())
+}
