@@ -218,6 +218,8 @@ pub(crate) struct Facts {
     pub(crate) expected: OnceLock<Vec<f64>>,
     /// Whether speed and command change within single rows.
     pub(crate) abrupt: OnceLock<bool>,
+    /// The torque that acted on the rig on each row, N.m, less what is the torque sensor's own noise.
+    pub(crate) torque: OnceLock<Option<Vec<f64>>>,
     /// Slope of the static speed curve on each row, rev/min per us.
     pub(crate) slope: OnceLock<Vec<f64>>,
 }

@@ -2,13 +2,17 @@
 //!
 //! What it is: thrust_n += coefficient * torque_nm: beam and arm are not quite at right angles.
 //! What can go wrong: torque is itself nearly quadratic in the speed, and the thrust polynomial takes that part: only torque's
-//! departures from it (spin-up, damage, friction on the arm) show, so that the standard error is large on a quiet run.
+//! departures from it (gusts, spin-up, damage, friction on the arm) show, so that the standard error is large on a quiet run. The
+//! torque's own sensor noise never reached the thrust cell: left in the column it would make the coefficient too small, so the
+//! measured departures are first shrunk by the share of them that is real.
 //! Units: N/(N.m).
-//! Reference: cross-axis sensitivity of multi-component balances, Barlow, Rae & Pope 1999, *Low-Speed Wind Tunnel Testing*, ch. 7.
+//! Reference: cross-axis sensitivity of multi-component balances, Barlow, Rae & Pope 1999, *Low-Speed Wind Tunnel Testing*, ch. 7;
+//! regression calibration, Carroll et al. 2006, *Measurement Error in Nonlinear Models*, ch. 4.
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
-use crate::context::Context;
+use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;
+use crate::solve::Normal;
 
 /// See the module.
 pub(crate) struct TorqueCrosstalk;
@@ -46,15 +50,85 @@ impl Effect for TorqueCrosstalk {
     }
 
     fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
-        let Some(torque) = &context.torque else { return };
+        let Some(torque) = context.facts.torque.get_or_init(|| acting_torque(context)) else { return };
         design.add(position, 0, torque.clone());
     }
 
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        // a badly aligned cell reads some of the torque: a third of the thrust itself is something else (a wake that shakes both)
         let top =
             |name: &str| context.target(name).map_or(0.0, |k| context.targets[k].y.iter().fold(0.0, |a: f64, v| a.max(v.abs())));
-        let most = 0.3 * top("thrust_n") / top("torque_nm").max(1e-9);
-        fitted.iter().all(|e| e.value.abs() > 4.0 * e.se && e.value.abs() < most)
+        let ratio = top("thrust_n") / top("torque_nm").max(1e-9);
+        // a wake or an error of the speed shakes both in the ratio of the readings themselves; and a cell that reads more of
+        // the torque than of the thrust is another instrument
+        let credible = |c: f64| c.abs() < MOST_OF_THE_THRUST * (ratio - c);
+        fitted.iter().all(|e| e.value.abs() > 4.0 * e.se && credible(e.value))
     }
+}
+
+/// Largest torque share for the thrust that is left once it is taken away.
+const MOST_OF_THE_THRUST: f64 = 2.0;
+/// Bands of speed in which the scatter of torque and thrust is compared.
+const BANDS: usize = 12;
+/// Fewest samples of a band.
+const FEWEST: usize = 20;
+/// Share of the torque's scatter that must be found in the thrust before the rest is called the sensor's own.
+const NEEDED_AGREEMENT: f64 = 0.3;
+
+/// The torque that acted, as far as it can be told: its course with the speed, and of its departures the share that is real.
+///
+/// With departures q of the torque that are real, thrust scatters by c q beside its own noise, and torque by q beside its sensor's:
+/// the covariance is c var(q), and what the thrust scatters beyond its noise at rest is c^2 var(q). The two give c and, in each band of
+/// speed, var(q) over the torque's variance.
+fn acting_torque(context: &Context) -> Option<Vec<f64>> {
+    let torque = context.torque.as_ref()?;
+    let [thrust_target, target] = ["thrust_n", "torque_nm"].map(|name| context.target(name).map(|k| &context.targets[k]));
+    let (thrust_target, target) = (thrust_target?, target?);
+    let powers = context.powers(Relation::Torque).get(..=Relation::Torque.degree())?;
+    let columns: Vec<Vec<f64>> = powers.iter().map(|p| target.rows.iter().map(|i| p[*i]).collect()).collect();
+    let course = Normal::of_columns(&columns, &target.y, &vec![1.0; target.y.len()]).solve()?.coefficients;
+    let expected: Vec<f64> = (0..context.len()).map(|i| powers.iter().zip(&course).map(|(p, c)| p[i] * c).sum()).collect();
+    let fastest = context.rpm.iter().fold(1e-9, |a: f64, v| a.max(*v));
+    let band = |i: usize| ((context.rpm[i] / fastest * BANDS as f64).max(0.0) as usize).min(BANDS - 1);
+    let scatter = scatter(context, thrust_target, target, band);
+    let sum = |f: &dyn Fn(&Scatter) -> f64| scatter.iter().map(f).sum::<f64>();
+    let excess = sum(&|s| s.thrust - thrust_target.noise.a * s.samples);
+    let (both, own) = (sum(&|s| s.both), sum(&|s| s.torque));
+    if both * both < NEEDED_AGREEMENT * excess * own || both == 0.0 {
+        return Some(torque.clone());
+    }
+    let coefficient = excess / both;
+    let real = |s: &Scatter| if s.samples < FEWEST as f64 { 1.0 } else { (s.both / (coefficient * s.torque)).clamp(0.0, 1.0) };
+    let real: Vec<f64> = scatter.iter().map(real).collect();
+    Some((0..context.len()).map(|i| expected[i] + real[band(i)] * (torque[i] - expected[i])).collect())
+}
+
+/// Sums of squared second differences, a sixth of them each: variances times samples.
+#[derive(Debug, Clone, Copy, Default)]
+struct Scatter {
+    thrust: f64,
+    torque: f64,
+    both: f64,
+    samples: f64,
+}
+
+/// How thrust and torque scatter about their own course, alone and together, in each band of speed.
+fn scatter(context: &Context, thrust: &Target, torque: &Target, band: impl Fn(usize) -> usize) -> [Scatter; BANDS] {
+    let mut rows = vec![[f64::NAN; 2]; context.len()];
+    for (k, target) in [thrust, torque].into_iter().enumerate() {
+        target.rows.iter().zip(&target.y).for_each(|(i, y)| rows[*i][k] = *y);
+    }
+    let mut out = [Scatter::default(); BANDS];
+    for (from, to) in &context.calm {
+        for (k, w) in rows[*from..*to].windows(3).enumerate() {
+            let [t, q] = [0, 1].map(|c| w[0][c] - 2.0 * w[1][c] + w[2][c]);
+            if t.is_finite() && q.is_finite() {
+                let s = &mut out[band(from + k + 1)];
+                s.thrust += t * t / 6.0;
+                s.torque += q * q / 6.0;
+                s.both += t * q / 6.0;
+                s.samples += 1.0;
+            }
+        }
+    }
+    out
 }
