@@ -226,7 +226,12 @@ pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
 pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
     instance.channels.iter().all(|c| {
         let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
-        there.len() < MOST_ON_A_CHANNEL && there.iter().all(|p| p.effect.id() != effect.id())
+        let apart = |p: &&Placed| {
+            p.effect.id() != effect.id()
+                && !p.effect.never_beside().contains(&effect.id())
+                && !effect.never_beside().contains(&p.effect.id())
+        };
+        there.len() < MOST_ON_A_CHANNEL && there.iter().all(apart)
     })
 }
 

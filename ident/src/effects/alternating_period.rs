@@ -6,7 +6,7 @@
 //! Units: deg, deviation from 180.
 //! Reference: Beharie 2013, section 5.7.1 (Hall sensor with two magnets).
 
-use super::speed_channel::{LEAST, difference, instances, shares};
+use super::speed_channel::{difference, instances, shares};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
@@ -16,6 +16,9 @@ pub(crate) struct AlternatingPeriod;
 
 /// Kurtosis of the difference below which it has two values: 1 for two points, 1.8 for a uniform, 3 for a normal distribution.
 const TWO_VALUED: f64 = 1.7;
+
+/// Smallest angle worth a name, deg: magnets are not glued on better. Two values tell it from sensors that merely disagree.
+const LEAST: f64 = 0.1;
 
 impl Effect for AlternatingPeriod {
     fn id(&self) -> &'static str {
@@ -65,7 +68,7 @@ impl Effect for AlternatingPeriod {
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        fitted.iter().all(|e| e.value > 180.0 * LEAST && e.value < 60.0)
+        fitted.iter().all(|e| e.value > LEAST && e.value < 60.0)
     }
 }
 

@@ -45,6 +45,11 @@ impl Effect for GlitchRows {
         context.targets.iter().filter(|t| !t.unclaimed.is_empty()).map(|t| Instance::new(&[t.name], "")).collect()
     }
 
+    fn never_beside(&self) -> &'static [&'static str] {
+        // two pulses lost within one sample look absurd
+        &["missed_pulses", "double_pulses"]
+    }
+
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
         Vec::new()
     }

@@ -1,12 +1,13 @@
 //! `missed_pulses`: a speed channel misses pulses.
 //!
 //! What it is: the channel reads a share `probability` too low on the whole (counting over many pulses), or grossly too low in
-//! scattered samples (timing single pulses), in which case the share of such samples is the probability.
+//! scattered samples, in which case the probability of a pulse is what is lost on average (pulses counted over a window), or the share of
+//! such samples (single periods timed).
 //! What can go wrong: scattered samples are recognised by their own reading; the primary relation makes no claim about them.
 //! Units: 1.
 //! Reference: Beharie 2013, section 5.7.1 (blade that the beam does not see).
 
-use super::speed_channel::{GROSS, LEAST, difference, gross, instances, shares};
+use super::speed_channel::{GROSS, LEAST, difference, gross, instances, pulse_probability, shares};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
@@ -71,18 +72,7 @@ impl Effect for MissedPulses {
 
     fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
         if let Some(target) = difference(context, instance).filter(|_| instance.form == SCATTERED) {
-            let (off, all) =
-                shares(context, target).fold((0.0, 0.0), |(o, n), (_, s)| (o + f64::from(SIGN * (s - 1.0) > GROSS), n + 1.0));
-            let p: f64 = off / f64::max(all, 1.0);
-            fitted.insert(
-                0,
-                Estimate {
-                    name: "probability".into(),
-                    unit: "1".into(),
-                    value: p,
-                    se: (p * (1.0 - p) / f64::max(all, 1.0)).sqrt(),
-                },
-            );
+            fitted.insert(0, pulse_probability(context, target, SIGN));
         }
         fitted
     }

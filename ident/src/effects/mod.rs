@@ -161,6 +161,10 @@ pub trait Effect: Sync {
     fn report(&self, _context: &Context, _instance: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
         fitted
     }
+    /// Effects that strike the same single rows of a channel, so that one of them must answer for all.
+    fn never_beside(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Whether it says something of the scatter of the thrust, not only of its mean.
     fn scatters(&self) -> bool {
         false

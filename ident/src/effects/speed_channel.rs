@@ -10,6 +10,7 @@ use super::blade_damage::STANDSTILL;
 use super::{Amplitude, Estimate, Instance};
 use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::design::TargetDesign;
+use crate::noise::median;
 use crate::solve::Normal;
 
 /// Share of the speed below which a channel agrees with the others: a third of the 1 % within which healthy sensors on real
@@ -112,4 +113,27 @@ pub(super) fn gross(context: &Context, target: &Target, sign: f64) -> Vec<f64> {
         }
     }
     out
+}
+
+/// Loss of a reading that times one period and loses the pulse in its middle, and how near to it a loss must be.
+const HALVED: (f64, f64) = (0.5, 0.05);
+
+/// Standard deviations of a sensor's scatter, and the share of the speed, beyond which a reading holds a lost or doubled pulse.
+const STRUCK: f64 = 6.0;
+const STRUCK_LEAST: f64 = 0.002;
+
+/// Probability of a lost (`sign` -1) or doubled (+1) pulse, from the readings that are grossly off: the mean share that is lost or won, which
+/// is that of a pulse whether a window holds many or one; where each loss halves the reading at every speed single periods are timed,
+/// and the share of such readings is the probability.
+pub(super) fn pulse_probability(context: &Context, target: &Target, sign: f64) -> Estimate {
+    let departures: Vec<f64> = shares(context, target).map(|(_, share)| sign * (share - 1.0)).collect();
+    let mut sizes: Vec<f64> = departures.iter().map(|d| d.abs()).collect();
+    // one pulse among many is less than a gross error, and still far outside of the scatter
+    let least = (STRUCK * 1.4826 * median(&mut sizes)).clamp(STRUCK_LEAST, GROSS);
+    let struck: Vec<f64> = departures.iter().copied().filter(|d| *d > least).collect();
+    let halved = |d: &&f64| (*d - HALVED.0).abs() < HALVED.1;
+    let timed = sign < 0.0 && struck.iter().filter(halved).count() * 10 > struck.len() * 9;
+    let whole = if timed { struck.len() as f64 } else { struck.iter().sum() };
+    let value = whole / departures.len().max(1) as f64;
+    Estimate { name: "probability".into(), unit: "1".into(), value, se: value / (struck.len().max(1) as f64).sqrt() }
 }

@@ -57,17 +57,50 @@ impl Effect for ThermalZero {
     }
 }
 
-/// Centred mean of 21 rows: a housing is slow, a thermometer is noisy.
+/// A slow quantity without its meter's noise: a housing is slow, a thermometer is noisy. A straight line through the rows around each
+/// one, whose number doubles from 21 up while the wider line differs from the narrower by no more than the noise explains (Lepski's
+/// rule); at the ends the window stays as wide and lies to one side.
 pub(super) fn smoothed(x: &[f64]) -> Vec<f64> {
-    let mut prefix = Vec::with_capacity(x.len() + 1);
-    prefix.push(0.0);
-    for v in x {
-        prefix.push(prefix[prefix.len() - 1] + v);
+    let noise = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2)).sum::<f64>() / (6 * x.len().max(1)) as f64;
+    let mut half = NARROW;
+    let mut best = through_lines(x, half);
+    while 2 * half < x.len() {
+        let wider = through_lines(x, 2 * half);
+        let square = best.iter().zip(&wider).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / x.len() as f64;
+        // the two windows share half their rows: their difference has half the variance of the narrower one
+        if square > ALLOWED * noise / (2.0 * (2 * half + 1) as f64) {
+            break;
+        }
+        (half, best) = (2 * half, wider);
     }
+    best
+}
+
+/// For each row the value there of the straight line through the window of `2 half + 1` rows around it.
+fn through_lines(x: &[f64], half: usize) -> Vec<f64> {
+    let sums = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+        std::iter::once(0.0)
+            .chain(x.iter().enumerate().scan(0.0, |s, (i, v)| {
+                *s += f(i, *v);
+                Some(*s)
+            }))
+            .collect()
+    };
+    let (zeroth, first) = (sums(&|_, v| v), sums(&|i, v| i as f64 * v));
+    let width = (2 * half + 1).min(x.len());
+    let m = width as f64;
     (0..x.len())
         .map(|i| {
-            let half = 10.min(i).min(x.len() - 1 - i);
-            (prefix[i + half + 1] - prefix[i - half]) / (2 * half + 1) as f64
+            let from = i.saturating_sub(half).min(x.len() - width);
+            let (sum, moment) = (zeroth[from + width] - zeroth[from], first[from + width] - first[from]);
+            let centre = from as f64 + 0.5 * (m - 1.0);
+            let slope = if width < 3 { 0.0 } else { (moment - centre * sum) / (m * (m * m - 1.0) / 12.0) };
+            sum / m + slope * (i as f64 - centre)
         })
         .collect()
 }
+
+/// Half-width of the narrowest window, rows.
+const NARROW: usize = 10;
+/// Excess of the variance between two widths over what noise makes of it, from which on the wider one is too wide.
+const ALLOWED: f64 = 1.5;
