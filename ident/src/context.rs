@@ -256,7 +256,7 @@ impl Context {
         let (rpm, consensus) = consensus(log);
         let steady = steady_stretches(&log.t, pulse.as_deref(), &rpm, STILL_US);
         let calm = steady_stretches(&log.t, pulse.as_deref(), &rpm, CALM_US);
-        let start = start_pulse_us.unwrap_or_else(|| start_pulse(pulse.as_deref(), &rpm));
+        let start = start_pulse_us.unwrap_or_else(|| start_pulse(&log.t, pulse.as_deref(), &rpm));
         Self {
             name: log.name.clone(),
             t: log.t.clone(),
@@ -476,30 +476,56 @@ fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
     removed
 }
 
-fn start_pulse(pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
-    let Some(pulse) = pulse else { return 1000.0 };
-    if rpm.is_empty() {
-        return 1000.0;
-    }
+/// Time after a jump of the command, s, and rows, for which the rotor may still stand or coast.
+const COASTS: (f64, usize) = (1.0, 5);
+
+/// Pulse that parts standing from turning with the fewest exceptions, us: midway between the pulses on its two sides. Rows right
+/// after a jump of the command do not count, where enough others do: the rotor comes later than the command.
+fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
+    let Some(pulse) = pulse.filter(|_| !rpm.is_empty()) else { return 1000.0 };
     let top = rpm.iter().copied().fold(0.0, f64::max);
-    let turning = |v: f64| v > 0.01 * top;
-    let lowest_on = pulse.iter().zip(rpm).filter(|(_, r)| turning(**r)).map(|(p, _)| *p).fold(f64::INFINITY, f64::min);
-    let highest_off = pulse
-        .iter()
-        .zip(rpm)
-        .filter(|(p, r)| !turning(**r) && **p < lowest_on)
-        .map(|(p, _)| *p)
-        .fold(f64::NEG_INFINITY, f64::max);
-    if !lowest_on.is_finite() {
+    let mut since = (f64::NEG_INFINITY, 0);
+    let settled: Vec<bool> = (0..pulse.len())
+        .map(|i| {
+            if i > 0 && (pulse[i] - pulse[i - 1]).abs() > CALM_US {
+                since = (t[i], i);
+            }
+            t[i] - since.0 > COASTS.0 && i >= since.1 + COASTS.1
+        })
+        .collect();
+    let rows = |only_settled: bool| -> Vec<(f64, bool)> {
+        let chosen = (0..pulse.len()).filter(|i| !only_settled || settled[*i]);
+        chosen.map(|i| (pulse[i], rpm[i] > 0.01 * top)).collect()
+    };
+    let mut sorted = rows(true);
+    let turn = sorted.iter().filter(|r| r.1).count();
+    if turn < FEWEST_OF_A_KIND || sorted.len() - turn < FEWEST_OF_A_KIND {
+        sorted = rows(false);
+    }
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all_standing = sorted.iter().filter(|r| !r.1).count();
+    if all_standing == sorted.len() {
         return 2500.0;
     }
-    if highest_off.is_finite() { 0.5 * (lowest_on + highest_off) } else { lowest_on - 0.5 }
+    // a cut before row k calls what turns below it, and what stands from it on, an exception
+    let (mut turning, mut standing, mut best) = (0, 0, (all_standing, 0));
+    for k in 0..sorted.len() {
+        let exceptions = turning + all_standing - standing;
+        if (k == 0 || sorted[k].0 > sorted[k - 1].0) && exceptions < best.0 {
+            best = (exceptions, k);
+        }
+        if sorted[k].1 { turning += 1 } else { standing += 1 }
+    }
+    match best.1 {
+        0 => sorted[0].0 - 0.5,
+        k => 0.5 * (sorted[k - 1].0 + sorted[k].0),
+    }
 }
 
 /// Change of the command from row to row, us, below which it holds still.
 const STILL_US: f64 = 0.5;
 /// Change of the command from row to row, us, below which it does not jump: a ramp from end to end in two seconds at 50 Hz.
-const CALM_US: f64 = 10.0;
+pub(crate) const CALM_US: f64 = 10.0;
 
 /// Row ranges in which the command changes by at most `most` us a row (or, without a command, the speed holds still).
 fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) -> Vec<(usize, usize)> {

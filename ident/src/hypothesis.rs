@@ -344,18 +344,41 @@ impl Fit {
     /// likelihood, then amplitudes with theirs. Quick enough for every candidate of a search.
     #[must_use]
     pub fn estimates(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<Estimate> {
-        self.estimates_with(context, declared, position, false)
+        self.estimates_given(context, position, self.shape_errors(context, declared, position, false))
     }
 
-    /// The same for a report: where the likelihood of a shape is not a parabola (an instant between two visits, an onset between
-    /// two levels), the error is at least half the width over which it falls by 1.92, over 1.96.
+    /// The same for a report. Where the likelihood of a shape is not a parabola (an instant between two visits, an onset between
+    /// two levels), its error is at least half the width over which it falls by 1.92, over 1.96. The error of an amplitude
+    /// holds what the errors of the shapes make of it, and every parameter an allowance for its form.
     #[must_use]
     pub fn profiled_estimates(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<Estimate> {
-        self.estimates_with(context, declared, position, true)
+        let errors = self.shape_errors(context, declared, position, true);
+        let mut out = self.estimates_given(context, position, errors.clone());
+        for (i, error) in errors.iter().enumerate() {
+            for (e, moved) in out[errors.len()..].iter_mut().zip(self.amplitudes_moved(context, declared, position, i, *error)) {
+                e.se = e.se.hypot(moved);
+            }
+        }
+        allow_for_the_form(context, &mut out);
+        out
     }
 
-    fn estimates_with(&self, context: &Context, declared: Declared<'_>, position: usize, profiled: bool) -> Vec<Estimate> {
-        self.estimates_given(context, position, self.shape_errors(context, declared, position, profiled))
+    /// By how much the amplitudes of an effect move, in the order of [`Self::estimates`], when one of its shapes moves by its standard error.
+    fn amplitudes_moved(&self, context: &Context, declared: Declared<'_>, position: usize, shape: usize, error: f64) -> Vec<f64> {
+        let placed = &self.placed[position];
+        let Some(range) = placed.effect.shapes(context, &placed.instance).get(shape).map(|s| s.range) else { return Vec::new() };
+        let amplitudes = |sign: f64| -> Option<Vec<f64>> {
+            let mut moved = self.placed.clone();
+            let to = &mut moved[position].shape[shape];
+            *to = (*to + sign * error).clamp(range.0, range.1);
+            let fit = fit(context, declared, &moved, Some(self), Rows::All)?;
+            let all = fit.estimates_given(context, position, vec![0.0; placed.shape.len()]);
+            Some(all[placed.shape.len()..].iter().map(|e| e.value).collect())
+        };
+        match (amplitudes(1.0), amplitudes(-1.0)) {
+            (Some(up), Some(down)) => up.iter().zip(&down).map(|(u, d)| 0.5 * (u - d).abs()).collect(),
+            _ => Vec::new(),
+        }
     }
 
     /// The same with the standard errors of the shapes known.
@@ -452,6 +475,26 @@ impl Fit {
                 quick.max(reach(1.0).max(reach(-1.0)) / 1.96)
             })
             .collect()
+    }
+}
+
+/// Standard error, as a share of a parameter, that stands for the forms themselves: a quadratic load curve, a lag of first order, a
+/// moving average that starts with a row are true to some half a per cent, and no number of samples makes them truer.
+const FORM: f64 = 0.005;
+
+/// Share of a row by which every delay, window and time constant is uncertain: what a signal does between two rows is a guess.
+const BETWEEN_ROWS: f64 = 0.1;
+
+/// Adds what the forms leave open to the standard errors of parameters. An instant has no form, and lies anywhere between two rows.
+pub(crate) fn allow_for_the_form(context: &Context, estimates: &mut [Estimate]) {
+    let row = context.duration() / context.len().max(2) as f64;
+    for e in estimates {
+        let form = match (e.name.as_str(), e.unit.as_str()) {
+            ("t0", _) => row / 12.0_f64.sqrt(),
+            (_, "s") => (FORM * e.value).hypot(BETWEEN_ROWS * row),
+            _ => FORM * e.value,
+        };
+        e.se = e.se.hypot(form);
     }
 }
 

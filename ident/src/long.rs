@@ -14,7 +14,7 @@ use crate::diagnose::{
 };
 use crate::effects::Estimate;
 use crate::heldout::{self, Held};
-use crate::hypothesis::{Declared, Placed, Rows, fit};
+use crate::hypothesis::{Declared, Placed, Rows, allow_for_the_form, fit};
 use crate::log::{Column, Log};
 use crate::search::refine;
 
@@ -178,7 +178,11 @@ impl AllRows<'_> {
             .collect();
         progress(0.9);
         let estimates = (0..placed.len())
-            .map(|k| best.fit.estimates_given(context, k, found.shape_errors(self.means, declared, k, true)))
+            .map(|k| {
+                let mut estimates = best.fit.estimates_given(context, k, found.shape_errors(self.means, declared, k, true));
+                allow_for_the_form(context, &mut estimates);
+                estimates
+            })
             .collect();
         (d.declared, d.best) = (start, best);
         Some(estimates)

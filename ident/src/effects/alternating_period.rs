@@ -6,7 +6,7 @@
 //! Units: deg, deviation from 180.
 //! Reference: Beharie 2013, section 5.7.1 (Hall sensor with two magnets).
 
-use super::speed_channel::{difference, instances, shares};
+use super::speed_channel::{against_the_others, difference, instances, shares};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
@@ -65,6 +65,15 @@ impl Effect for AlternatingPeriod {
             column[i] = (share - 1.0).signum() * context.rpm[i] / 180.0;
         }
         design.add(position, 0, column);
+    }
+
+    fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        if let (Some(target), Some(angle)) = (difference(context, instance), fitted.first_mut()) {
+            let departures = against_the_others(context, target);
+            let mean = departures.iter().map(|d| d.abs()).sum::<f64>() / departures.len().max(1) as f64;
+            angle.value = 180.0 * mean;
+        }
+        fitted
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {

@@ -67,8 +67,8 @@ impl Effect for EncoderDrag {
         drag(context, &coupled(context), instance.form != CONSTANT, position, design);
     }
 
-    fn report(&self, _: &Context, _: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
-        with_share(fitted)
+    fn report(&self, context: &Context, _: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
+        with_share(context, fitted)
     }
 
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {

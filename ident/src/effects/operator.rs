@@ -93,11 +93,7 @@ pub(crate) fn first_order(t: &[f64], x: &[f64], tau: f64, course: Course) -> Vec
             let h = (t[i] - t[i - 1]) / tau;
             let e = whole.of(h);
             state = match course {
-                // first-order hold: u(s) = x0 + (x1 - x0) s/h
-                Course::Line => {
-                    let ramp = if h > 1e-6 { 1.0 - (1.0 - e) / h } else { h / 2.0 };
-                    e * state + (1.0 - e) * x[i - 1] + ramp * (x[i] - x[i - 1])
-                }
+                Course::Line => along_a_line(x[i - 1], x[i], state, h, e),
                 Course::Jump(phase) => {
                     let late = if phase >= 1.0 { 0.0 } else { 1.0 - part.of(h * (1.0 - phase)) };
                     e * state + (1.0 - e) * x[i - 1] + late * (x[i] - x[i - 1])
@@ -107,6 +103,13 @@ pub(crate) fn first_order(t: &[f64], x: &[f64], tau: f64, course: Course) -> Vec
         out.push(state);
     }
     out
+}
+
+/// A first-order lag's state after an interval of `h` time constants, `decay` = exp(-h), over which its input goes from `from` to `to` in a
+/// straight line: u(s) = from + (to - from) s/h.
+pub(crate) fn along_a_line(from: f64, to: f64, state: f64, h: f64, decay: f64) -> f64 {
+    let ramp = if h > 1e-6 { 1.0 - (1.0 - decay) / h } else { h / 2.0 };
+    decay * state + (1.0 - decay) * from + ramp * (to - from)
 }
 
 /// The signal `delay` seconds ago (ahead when negative).

@@ -126,7 +126,7 @@ const STRUCK_LEAST: f64 = 0.002;
 /// is that of a pulse whether a window holds many or one; where each loss halves the reading at every speed single periods are timed,
 /// and the share of such readings is the probability.
 pub(super) fn pulse_probability(context: &Context, target: &Target, sign: f64) -> Estimate {
-    let departures: Vec<f64> = shares(context, target).map(|(_, share)| sign * (share - 1.0)).collect();
+    let departures: Vec<f64> = against_the_others(context, target).into_iter().map(|d| sign * d).collect();
     let mut sizes: Vec<f64> = departures.iter().map(|d| d.abs()).collect();
     // one pulse among many is less than a gross error, and still far outside of the scatter
     let least = (STRUCK * 1.4826 * median(&mut sizes)).clamp(STRUCK_LEAST, GROSS);
@@ -136,4 +136,23 @@ pub(super) fn pulse_probability(context: &Context, target: &Target, sign: f64) -
     let whole = if timed { struck.len() as f64 } else { struck.iter().sum() };
     let value = whole / departures.len().max(1) as f64;
     Estimate { name: "probability".into(), unit: "1".into(), value, se: value / (struck.len().max(1) as f64).sqrt() }
+}
+
+/// What a channel departs from the mean of the other channels by, as a share of it, on the rows of [`shares`]: the consensus holds
+/// the channel itself.
+pub(super) fn against_the_others(context: &Context, target: &Target) -> Vec<f64> {
+    let own = DIFFERENCES.iter().find(|d| d.1 == target.name).map_or("", |d| d.0);
+    let speeds = context.targets.iter().filter(|t| matches!(t.relation, Relation::SpeedFromPulse | Relation::SpeedAlone));
+    let mut sums = vec![(0.0, 0.0); context.len()];
+    for other in speeds.filter(|t| t.name != own) {
+        for (i, y) in other.rows.iter().zip(&other.y) {
+            sums[*i].0 += y;
+            sums[*i].1 += 1.0;
+        }
+    }
+    let of = |(i, share): (usize, f64)| {
+        let (sum, n) = sums[i];
+        if n > 0.0 && sum > 0.0 { share * context.rpm[i] * n / sum - 1.0 } else { share - 1.0 }
+    };
+    shares(context, target).map(of).collect()
 }

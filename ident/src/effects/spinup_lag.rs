@@ -6,7 +6,7 @@
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
 
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, speeds};
-use crate::context::Context;
+use crate::context::{CALM_US, Context};
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -67,7 +67,6 @@ impl Effect for SpinupLag {
             last = *t;
         }
         design.map_columns(|column| {
-            // a command jumps somewhere between two rows: the input is a staircase, not a ramp
             let mut state = column.first().copied().unwrap_or(0.0);
             let mut held = state;
             let mut decays = [[operator::Decay::new(); 2]; 2];
@@ -75,9 +74,14 @@ impl Effect for SpinupLag {
                 if i > 0 {
                     let h = (context.t[i] - context.t[i - 1]) / tau(rising[i]);
                     let [early, late] = &mut decays[usize::from(rising[i])];
-                    let before = held + (state - held) * early.of(h * phase);
+                    if (pulse[i] - pulse[i - 1]).abs() > CALM_US {
+                        // a command jumps somewhere between two rows
+                        let before = held + (state - held) * early.of(h * phase);
+                        state = column[i] + (before - column[i]) * late.of(h * (1.0 - phase));
+                    } else {
+                        state = operator::along_a_line(held, column[i], state, h, late.of(h));
+                    }
                     held = column[i];
-                    state = held + (before - held) * late.of(h * (1.0 - phase));
                 }
                 column[i] = state;
             }
