@@ -16,6 +16,7 @@ use crate::opponent::{nameless, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::search::{connected, refine, refine_newest, scan, stride};
+use crate::together::choose_pair;
 
 /// Most effects on one channel.
 const MOST_ON_A_CHANNEL: usize = 3;
@@ -129,7 +130,16 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let ranked =
             round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
         candidates.push(ranked.iter().take(SHOWN).cloned().collect());
-        let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else { break };
+        let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else {
+            let room = best.fit.placed.len() + 2 <= MOST_EFFECTS;
+            let pair = if room { choose_pair(context, declared, &start, &best, &ranked, &mut offers, &folds) } else { None };
+            if let Some((pair, held)) = pair {
+                best = pair;
+                errors = held;
+                rounds.extend(vec![(1.0, Vec::new()); 2]);
+            }
+            break;
+        };
         best = chosen.winner;
         errors = chosen.held;
         rounds.push((chosen.probability, chosen.rivals));
@@ -304,7 +314,7 @@ fn weigh(context: &Context, best: &Candidate, candidates: &mut [Candidate]) {
 const QUIET: (f64, f64) = (1.08, 1e-3);
 
 /// Targets that something is left on: only they are worth the scan of a grid.
-fn loud(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<bool> {
+pub(crate) fn loud(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<bool> {
     heldout::residuals(context, declared, fit)
         .iter()
         .zip(&context.targets)

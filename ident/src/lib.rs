@@ -38,4 +38,5 @@ pub mod select;
 pub mod shift;
 pub mod simulate;
 pub mod solve;
+mod together;
 pub mod verdict;

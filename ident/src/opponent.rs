@@ -53,6 +53,9 @@ pub(crate) fn opponent(
                 .placed
                 .iter()
                 .any(|p| p.instance.touches(target.name) && p.effect.about().depends_on.contains(&variable.as_str()));
+            if same && best.evidence > candidate.evidence {
+                continue;
+            }
             let margin = if same { std::f64::consts::LN_2 } else { 0.15 };
             let clearly = gain > (1.0 / (1.0 - NEEDED_REDUCTION)).ln() && (best.fit.placed.is_empty() || gain > rival + margin);
             if clearly && champion.as_ref().is_none_or(|c| gain > c.0) {

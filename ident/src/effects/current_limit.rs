@@ -34,7 +34,7 @@ impl Effect for CurrentLimit {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = speeds(context);
-        if channels.is_empty() || context.current.is_none() { Vec::new() } else { vec![Instance::new(&channels, "")] }
+        if channels.is_empty() { Vec::new() } else { vec![Instance::new(&channels, "")] }
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {

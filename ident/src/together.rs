@@ -1,0 +1,81 @@
+//! Two effects that show only together.
+//!
+//! What it is: where one effect alone leaves most of the residual as coloured as it was, few of its samples count as independent and no
+//! single name brings enough evidence. Here the most promising ones each get a second effect beside them, and the pair is judged
+//! as one.
+//! What can go wrong: a pair has many parameters and fits much; it must predict held-out rows clearly better, each of the two must
+//! be needed, and the nameless function still stands against it.
+//! Units: evidence in nats.
+//! Reference: forward selection misses jointly significant sets, Miller 2002, Subset Selection in Regression, section 3.2.
+
+use crate::context::{Context, Relation};
+use crate::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, loud, round_of, without};
+use crate::heldout::{self, Held};
+use crate::hypothesis::{Declared, Fit, scatters};
+
+/// Firsts of a pair that are tried.
+const FIRSTS: usize = 3;
+/// Share of the held-out error on one of its channels that each of the two must remove.
+const NEEDED_OF_EACH: f64 = 0.2;
+
+/// The best pair that stands up beside what was found already, with its held-out errors.
+pub(crate) fn choose_pair(
+    context: &Context,
+    declared: Declared<'_>,
+    start: &Fit,
+    best: &Candidate,
+    singles: &[Candidate],
+    offers: &mut [&mut Scanned],
+    folds: &[Vec<bool>],
+) -> Option<(Candidate, Vec<Held>)> {
+    let left = loud(context, declared, &best.fit);
+    let is_loud = |c: &Candidate| {
+        let newest = c.fit.placed.last();
+        context
+            .targets
+            .iter()
+            .zip(&left)
+            .any(|(t, l)| *l && !t.relation.is_evidence() && newest.is_some_and(|n| n.instance.touches(t.name)))
+    };
+    let mut firsts: Vec<&Candidate> = singles.iter().filter(|c| is_loud(c)).collect();
+    firsts.sort_by(|a, b| gain(context, &b.fit, &best.fit).total_cmp(&gain(context, &a.fit, &best.fit)));
+    let mut seen: Vec<&str> = Vec::new();
+    firsts.retain(|c| {
+        let id = c.fit.placed.last().map_or("", |p| p.effect.id());
+        let new = !seen.contains(&id);
+        seen.push(id);
+        new
+    });
+    let mut pairs: Vec<Candidate> = Vec::new();
+    for first in firsts.into_iter().take(FIRSTS) {
+        for found in round_of(context, declared, first, offers, &mut |_| {}).into_iter().take(2) {
+            pairs.push(Candidate { evidence: evidence_over(context, &found.fit, start), ..found });
+        }
+    }
+    offers.iter_mut().for_each(|o| o.found = None);
+    let needed = 2.0 * NEEDED_EVIDENCE + if best.fit.placed.is_empty() { 0.0 } else { evidence_over(context, &best.fit, start) };
+    let pair = pairs.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence)).filter(|p| p.evidence > needed)?;
+    let held = heldout::errors(context, declared, &pair.fit, folds);
+    let before = heldout::errors(context, declared, &best.fit, folds);
+    let helps = |less: &[Held], position: usize| {
+        let touched = context.targets.iter().enumerate().filter(|(_, t)| pair.fit.placed[position].instance.touches(t.name));
+        touched.map(|(i, _)| held[i].share_gone(&less[i])).fold(0.0, f64::max) > NEEDED_OF_EACH
+    };
+    let both = best.fit.placed.len()..pair.fit.placed.len();
+    let stands = both.into_iter().all(|k| {
+        without(context, declared, &pair.fit, k, start)
+            .is_some_and(|f| helps(&heldout::errors(context, declared, &f, folds), k) && helps(&before, k))
+    });
+    stands.then_some((pair, held))
+}
+
+/// Gain in likelihood over the declared model, each sample counted as independent.
+fn gain(context: &Context, fit: &Fit, start: &Fit) -> f64 {
+    let targets = context.targets.iter().zip(fit.targets.iter().zip(&start.targets));
+    targets
+        .map(|(t, (new, old))| {
+            let scattering = t.relation == Relation::Thrust && scatters(&fit.placed, t.name);
+            new.loglik.of(scattering) - old.loglik.of(scattering)
+        })
+        .sum()
+}
