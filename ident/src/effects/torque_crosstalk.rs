@@ -61,7 +61,7 @@ impl Effect for TorqueCrosstalk {
         // a wake or an error of the speed shakes both in the ratio of the readings themselves; and a cell that reads more of
         // the torque than of the thrust is another instrument
         let credible = |c: f64| c.abs() < MOST_OF_THE_THRUST * (ratio - c);
-        fitted.iter().all(|e| e.value.abs() > 4.0 * e.se && credible(e.value))
+        fitted.iter().all(|e| e.value.abs() > 4.0 * e.se && credible(e.value) && is_seen_between_jumps(context, e.value))
     }
 }
 
@@ -93,13 +93,50 @@ fn acting_torque(context: &Context) -> Option<Vec<f64>> {
     let sum = |f: &dyn Fn(&Scatter) -> f64| scatter.iter().map(f).sum::<f64>();
     let excess = sum(&|s| s.thrust - thrust_target.noise.a * s.samples);
     let (both, own) = (sum(&|s| s.both), sum(&|s| s.torque));
-    if both * both < NEEDED_AGREEMENT * excess * own || both == 0.0 {
+    if excess <= 0.0 || both * both <= NEEDED_AGREEMENT * excess * own {
         return Some(torque.clone());
     }
     let coefficient = excess / both;
     let real = |s: &Scatter| if s.samples < FEWEST as f64 { 1.0 } else { (s.both / (coefficient * s.torque)).clamp(0.0, 1.0) };
     let real: Vec<f64> = scatter.iter().map(real).collect();
     Some((0..context.len()).map(|i| expected[i] + real[band(i)] * (torque[i] - expected[i])).collect())
+}
+
+/// Standard errors by which the coefficient must show where the load holds still, and the share of itself that must.
+const SEEN: (f64, f64) = (4.0, 0.3);
+
+/// Whether thrust follows torque also where the load holds still: right after a jump each meter has a lag of its own, and torque holds what
+/// turns the rotor faster. Either sample by sample or, for departures that last, beside the course of time.
+fn is_seen_between_jumps(context: &Context, coefficient: f64) -> bool {
+    let [Some(thrust), Some(torque)] = ["thrust_n", "torque_nm"].map(|name| context.target(name).map(|k| &context.targets[k]))
+    else {
+        return false;
+    };
+    let seen = |value: f64, se: f64| value / coefficient > SEEN.1 && value.abs() > SEEN.0 * se;
+    let all = scatter(context, thrust, torque, |_| 0)[0];
+    if all.torque > 0.0 && seen(all.both / all.torque, 1.5 * (all.thrust / all.torque / all.samples.max(1.0)).sqrt()) {
+        return true;
+    }
+    let Some(readings) = &context.torque else { return false };
+    let mut settled = vec![false; context.len()];
+    context.calm.iter().for_each(|stretch| settled[settled_rows(stretch)].fill(true));
+    let span = context.duration().max(1e-9);
+    let mut normal = Normal::new(6);
+    let mut rows = 0.0;
+    for (i, y) in thrust.rows.iter().zip(&thrust.y).filter(|(i, _)| settled[**i]) {
+        let (n, t) = (context.rpm[*i] / 1000.0, context.t[*i] / span);
+        normal.add(&[readings[*i], 1.0, n, n * n, t, t * t], *y, 1.0);
+        rows += 1.0;
+    }
+    let freedom = rows - 6.0;
+    normal
+        .solve()
+        .is_some_and(|s| freedom > 10.0 && seen(s.coefficients[0], (s.inverse[(0, 0)] * s.rss / freedom).max(0.0).sqrt()))
+}
+
+/// Rows of a stretch without the part that belongs to settling.
+fn settled_rows((from, to): &(usize, usize)) -> std::ops::Range<usize> {
+    (from + 2 + (to - from) / 10).min(*to)..*to
 }
 
 /// Sums of squared second differences, a sixth of them each: variances times samples.
@@ -118,8 +155,10 @@ fn scatter(context: &Context, thrust: &Target, torque: &Target, band: impl Fn(us
         target.rows.iter().zip(&target.y).for_each(|(i, y)| rows[*i][k] = *y);
     }
     let mut out = [Scatter::default(); BANDS];
-    for (from, to) in &context.calm {
-        for (k, w) in rows[*from..*to].windows(3).enumerate() {
+    for stretch in &context.calm {
+        let settled = settled_rows(stretch);
+        let from = settled.start;
+        for (k, w) in rows[settled].windows(3).enumerate() {
             let [t, q] = [0, 1].map(|c| w[0][c] - 2.0 * w[1][c] + w[2][c]);
             if t.is_finite() && q.is_finite() {
                 let s = &mut out[band(from + k + 1)];
