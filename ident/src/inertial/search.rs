@@ -82,7 +82,7 @@ pub(crate) struct Outcome<'a> {
 }
 
 /// Evidence that a cause needs, nats: a thousand to one after a dozen were asked.
-const NAMED: f64 = 9.0;
+pub(super) const NAMED: f64 = 9.0;
 /// Share of the held-out sum of squares that it must take away.
 const LEAST_GAIN: f64 = 0.05;
 /// A rigid cause with this share of a flexible one's evidence goes first.

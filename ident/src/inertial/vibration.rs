@@ -11,7 +11,7 @@
 use super::Recording;
 use super::account::Sensor;
 use super::noise::{levels, quantile};
-use super::search::parameter;
+use super::search::{NAMED, parameter};
 use super::trace::Setting;
 use crate::verdict::EffectEntry;
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -66,6 +66,7 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
     if has_line {
         parameters.push(parameter("frequency", frequency, "Hz", rate / SPECTRUM as f64 / 3.92));
     }
+    let nats = if has_line { nats_of_line(ratio, left.len() / SPECTRUM) } else { nats_of_levels(&level) };
     let line_says = if has_line {
         format!("a line at {frequency:.1} Hz stands {ratio:.0} times over the spectrum")
     } else {
@@ -81,7 +82,7 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
             "f += noise of the strength rms"
         }
         .to_owned(),
-        probability: 0.999,
+        probability: 1.0 / (1.0 + (NAMED - nats).exp()),
         parameters,
         heldout_error_reduction: if predicted { reduction } else { 0.0 },
         evidence: format!(
@@ -90,6 +91,21 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
             loud.sqrt()
         ),
     })
+}
+
+/// Evidence for a line, nats: that of a bin whose power, summed over three axes of two quadratures in each window, has another mean than
+/// its neighbours', less the choice among all bins.
+fn nats_of_line(ratio: f64, windows: usize) -> f64 {
+    3.0 * windows as f64 * (ratio - 1.0 - ratio.ln()) - ((SPECTRUM / 2) as f64).ln()
+}
+
+/// Evidence for a strength that changes from window to window, nats: a variance for each against one for all, at Schwarz's price.
+/// Second differences of neighbours share rows: a third of them counts.
+fn nats_of_levels(level: &[f64]) -> f64 {
+    let squares: Vec<f64> = level.iter().map(|l| (l * l).max(1e-300)).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+    let gain: f64 = squares.iter().map(|s| 0.5 * LEVEL as f64 * (mean / s).ln()).sum();
+    gain - 0.5 * level.len() as f64 * (LEVEL as f64).ln()
 }
 
 /// The strongest line above [`LOWEST_HZ`] and how far it stands over the median there.

@@ -72,7 +72,7 @@ fn recorded(folder: &Path) {
     let mut files: Vec<_> = std::fs::read_dir(&trials).into_iter().flatten().filter_map(|e| Some(e.ok()?.path())).collect();
     files.sort();
     println!(
-        "\n## Recorded: BROAD\n\nHalf A (every second trial from the first) was in view while the tracer was made, half B was not."
+        "\n## Recorded: BROAD\n\nHalf A (every second trial from the first) was in view while the tracer was made. Half B is not quite blind: trial 33 was looked at once, and the field's statistics of all trials were read."
     );
     println!("Held-out error, root mean square over the three axes.\n");
     println!(
