@@ -1,10 +1,9 @@
 //! A small seeded part of the blind campaign, from the tuning half.
 //!
-//! What it is: loose floors under the rates of the whole campaign (`cargo xtask blind`), so that a change that breaks the search
-//! is seen in every test run.
-//! What can go wrong: too few runs for a figure to publish; the floors only catch a collapse.
-//! Measured when the floors were set, on the short runs used here: true effect first in 8 of 18 at three noise floors and above,
-//! at most three false alarms in 12 clean runs; on the tuning half at large 33 of 41 and 1 of 46.
+//! What it is: floors under the rates of the whole campaign (`cargo xtask blind`), so that a change that spoils the search is seen in
+//! every test run.
+//! What can go wrong: too few runs for a figure to publish. The floors lie where a search as good as the published one falls in one
+//! of fifty draws: 80 % first at a rate of 95 %, one false alarm in twelve at a rate of 2 %.
 //! Units: rates.
 //! Reference: specification `closing-the-loop.md`, "What counts as proof".
 
@@ -21,7 +20,7 @@ fn short(seed: u64) -> bool {
 fn clean_runs_are_called_clean() {
     let lines: Vec<_> = (0..200u64).map(|k| CLEAN + 2 * k).filter(|s| short(*s)).take(12).map(score).collect();
     let alarms: Vec<_> = lines.iter().filter(|l| l.verdict != "none").map(|l| (l.seed, l.named.clone())).collect();
-    assert!(alarms.len() <= 3, "{alarms:?}");
+    assert!(alarms.len() <= 1, "{alarms:?}");
 }
 
 #[test]
@@ -32,5 +31,7 @@ fn hidden_effects_are_found() {
     let first = lines.iter().filter(|l| l.first).count();
     let missed: Vec<_> = lines.iter().filter(|l| !l.first).map(|l| (l.seed, l.truth.clone(), l.named.clone())).collect();
     assert!(lines.iter().all(|l| l.verdict != "panic" && l.verdict != "refused"));
-    assert!(first * 10 >= lines.len() * 3, "{first} of {}: {missed:?}", lines.len());
+    println!("{first} of {} first; missed: {missed:?}", lines.len());
+    assert!(lines.len() >= 15, "{} runs at three noise floors and above prove nothing", lines.len());
+    assert!(first * 10 >= lines.len() * 8, "{first} of {}: {missed:?}", lines.len());
 }
