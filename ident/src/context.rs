@@ -220,6 +220,10 @@ pub(crate) struct Facts {
     pub(crate) abrupt: OnceLock<bool>,
     /// The torque that acted on the rig on each row, N.m, less what is the torque sensor's own noise.
     pub(crate) torque: OnceLock<Option<Vec<f64>>>,
+    /// Temperature on each row less its meter's noise, degC.
+    pub(crate) warmth: OnceLock<Option<Vec<f64>>>,
+    /// Logarithm of the air's density over that of standard air on each row.
+    pub(crate) density: OnceLock<Vec<f64>>,
     /// Slope of the static speed curve on each row, rev/min per us.
     pub(crate) slope: OnceLock<Vec<f64>>,
 }

@@ -38,7 +38,7 @@ impl Effect for AirDensity {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let density = log_density(context);
+        let density = context.facts.density.get_or_init(|| log_density(context));
         let (lo, hi) = density.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         if hi - lo < LEAST_SPREAD { Vec::new() } else { super::blade_flex::with_and_without_load(context) }
     }
@@ -53,10 +53,11 @@ impl Effect for AirDensity {
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let [exponent] = shape else { return };
-        let density = log_density(context);
+        let density = context.facts.density.get_or_init(|| log_density(context));
         match design.relation {
             Relation::Thrust | Relation::Torque => {
-                design.map_columns(|column| column.iter_mut().zip(&density).for_each(|(v, d)| *v *= (exponent * d).exp()));
+                let factor: Vec<f64> = density.iter().map(|d| (exponent * d).exp()).collect();
+                design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
             }
             Relation::Current => {
                 design.add(
@@ -80,12 +81,12 @@ fn log_density(context: &Context) -> Vec<f64> {
         let column = &context.covariates.iter().find(|c| c.0 == *name)?.1;
         Some(column.iter().map(|p| (p / standard).max(0.1)).collect::<Vec<f64>>())
     });
-    let temperature = context.temperature.as_ref().map(|t| super::thermal_zero::smoothed(t));
+    let temperature = super::thermal_zero::warmth(context);
     let pressure = pressure.map(|p| super::thermal_zero::smoothed(&p));
     (0..context.len())
         .map(|i| {
             let p = pressure.as_ref().map_or(0.0, |p| p[i].ln());
-            p - temperature.as_ref().map_or(0.0, |t| ((t[i] + 273.15) / 293.15).max(0.1).ln())
+            p - temperature.map_or(0.0, |t| ((t[i] + 273.15) / 293.15).max(0.1).ln())
         })
         .collect()
 }

@@ -52,9 +52,14 @@ impl Effect for ThermalZero {
     }
 
     fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
-        let Some(temperature) = &context.temperature else { return };
-        design.add(position, 0, smoothed(temperature).iter().map(|t| t - REFERENCE).collect());
+        let Some(temperature) = warmth(context) else { return };
+        design.add(position, 0, temperature.iter().map(|t| t - REFERENCE).collect());
     }
+}
+
+/// The temperature of a log without its meter's noise.
+pub(super) fn warmth(context: &Context) -> Option<&[f64]> {
+    context.facts.warmth.get_or_init(|| context.temperature.as_ref().map(|t| smoothed(t))).as_deref()
 }
 
 /// A slow quantity without its meter's noise: a housing is slow, a thermometer is noisy. A straight line through the rows around each
