@@ -10,6 +10,7 @@ use crate::effects::glitch_rows;
 use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
 use crate::solve::Normal;
+use crate::start::start_pulse;
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
@@ -127,7 +128,7 @@ const LEVELLED: f64 = 0.5;
 const FLOORED: f64 = 0.05;
 
 /// Fewest samples after jumps, and between them, that show how well either is predicted.
-const FEWEST_OF_A_KIND: usize = 10;
+pub(crate) const FEWEST_OF_A_KIND: usize = 10;
 
 impl Target {
     fn new(context: &Context, name: &'static str, relation: Relation, rows: Vec<usize>, y: Vec<f64>, noise: Noise) -> Self {
@@ -224,6 +225,8 @@ pub(crate) struct Facts {
     pub(crate) warmth: OnceLock<Option<Vec<f64>>>,
     /// Logarithm of the air's density over that of standard air on each row.
     pub(crate) density: OnceLock<Vec<f64>>,
+    /// R/Kt^2 of the winding, W/(N.m)^2.
+    pub(crate) winding: OnceLock<f64>,
     /// Slope of the static speed curve on each row, rev/min per us.
     pub(crate) slope: OnceLock<Vec<f64>>,
 }
@@ -478,52 +481,6 @@ fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
         k += 1;
     }
     removed
-}
-
-/// Time after a jump of the command, s, and rows, for which the rotor may still stand or coast.
-const COASTS: (f64, usize) = (1.0, 5);
-
-/// Pulse that parts standing from turning with the fewest exceptions, us: midway between the pulses on its two sides. Rows right
-/// after a jump of the command do not count, where enough others do: the rotor comes later than the command.
-fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
-    let Some(pulse) = pulse.filter(|_| !rpm.is_empty()) else { return 1000.0 };
-    let top = rpm.iter().copied().fold(0.0, f64::max);
-    let mut since = (f64::NEG_INFINITY, 0);
-    let settled: Vec<bool> = (0..pulse.len())
-        .map(|i| {
-            if i > 0 && (pulse[i] - pulse[i - 1]).abs() > CALM_US {
-                since = (t[i], i);
-            }
-            t[i] - since.0 > COASTS.0 && i >= since.1 + COASTS.1
-        })
-        .collect();
-    let rows = |only_settled: bool| -> Vec<(f64, bool)> {
-        let chosen = (0..pulse.len()).filter(|i| !only_settled || settled[*i]);
-        chosen.map(|i| (pulse[i], rpm[i] > 0.01 * top)).collect()
-    };
-    let mut sorted = rows(true);
-    let turn = sorted.iter().filter(|r| r.1).count();
-    if turn < FEWEST_OF_A_KIND || sorted.len() - turn < FEWEST_OF_A_KIND {
-        sorted = rows(false);
-    }
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let all_standing = sorted.iter().filter(|r| !r.1).count();
-    if all_standing == sorted.len() {
-        return 2500.0;
-    }
-    // a cut before row k calls what turns below it, and what stands from it on, an exception
-    let (mut turning, mut standing, mut best) = (0, 0, (all_standing, 0));
-    for k in 0..sorted.len() {
-        let exceptions = turning + all_standing - standing;
-        if (k == 0 || sorted[k].0 > sorted[k - 1].0) && exceptions < best.0 {
-            best = (exceptions, k);
-        }
-        if sorted[k].1 { turning += 1 } else { standing += 1 }
-    }
-    match best.1 {
-        0 => sorted[0].0 - 0.5,
-        k => 0.5 * (sorted[k - 1].0 + sorted[k].0),
-    }
 }
 
 /// Change of the command from row to row, us, below which it holds still.

@@ -38,5 +38,6 @@ pub mod select;
 pub mod shift;
 pub mod simulate;
 pub mod solve;
+mod start;
 mod together;
 pub mod verdict;

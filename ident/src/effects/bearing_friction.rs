@@ -99,7 +99,7 @@ pub(super) const AMPLITUDES: [Amplitude; 6] = [
 
 /// Adds the columns of an extra torque on the rotor that acts where `on` is 1.
 pub(super) fn drag(context: &Context, on: &[f64], viscous: bool, position: usize, design: &mut TargetDesign) {
-    let rho = winding(context);
+    let rho = *context.facts.winding.get_or_init(|| winding(context));
     let load = |i: usize| context.torque.as_ref().map_or(0.0, |q| q[i].max(0.0));
     let volts = |i: usize| volts(context, i);
     let omega = |i: usize| context.rpm[i] * OMEGA;

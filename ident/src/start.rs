@@ -1,0 +1,89 @@
+//! The pulse at which the motor starts.
+//!
+//! What it is: the declared speed curve is a cubic above this pulse and zero below it; where the boundary lies is read off the log.
+//! What can go wrong: a log whose motor never stands, or never turns, has its boundary just below the lowest pulse, or out of reach.
+//! Units: us.
+//! Reference: specification `formats.md`, "Verdict" (declared baseline).
+
+use crate::context::{CALM_US, FEWEST_OF_A_KIND};
+
+/// Time after a jump of the command, s, and rows, for which the rotor may still stand or coast.
+const COASTS: (f64, usize) = (1.0, 5);
+
+/// Pulse that parts standing from turning with the fewest exceptions, us: midway between the pulses on its two sides. Rows right
+/// after a jump of the command do not count, where enough others do: the rotor comes later than the command.
+pub(crate) fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
+    let Some(pulse) = pulse.filter(|_| !rpm.is_empty()) else { return 1000.0 };
+    let top = rpm.iter().copied().fold(0.0, f64::max);
+    let mut since = (f64::NEG_INFINITY, 0);
+    let settled: Vec<bool> = (0..pulse.len())
+        .map(|i| {
+            if i > 0 && (pulse[i] - pulse[i - 1]).abs() > CALM_US {
+                since = (t[i], i);
+            }
+            t[i] - since.0 > COASTS.0 && i >= since.1 + COASTS.1
+        })
+        .collect();
+    let rows = |only_settled: bool| -> Vec<(f64, bool)> {
+        let chosen = (0..pulse.len()).filter(|i| !only_settled || settled[*i]);
+        chosen.map(|i| (pulse[i], rpm[i] > 0.01 * top)).collect()
+    };
+    let mut sorted = rows(true);
+    let turn = sorted.iter().filter(|r| r.1).count();
+    if turn < FEWEST_OF_A_KIND || sorted.len() - turn < FEWEST_OF_A_KIND {
+        sorted = rows(false);
+    }
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all_standing = sorted.iter().filter(|r| !r.1).count();
+    if all_standing == sorted.len() {
+        return 2500.0;
+    }
+    // a cut before row k calls what turns below it, and what stands from it on, an exception
+    let (mut turning, mut standing, mut best) = (0, 0, (all_standing, 0));
+    for k in 0..sorted.len() {
+        let exceptions = turning + all_standing - standing;
+        if (k == 0 || sorted[k].0 > sorted[k - 1].0) && exceptions < best.0 {
+            best = (exceptions, k);
+        }
+        if sorted[k].1 { turning += 1 } else { standing += 1 }
+    }
+    match best.1 {
+        0 => sorted[0].0 - 0.5,
+        k => 0.5 * (sorted[k - 1].0 + sorted[k].0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rotor that comes a second late and coasts as long after the command has gone.
+    fn late(levels: &[(f64, f64)]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let pulse: Vec<f64> = levels.iter().flat_map(|(p, seconds)| vec![*p; (seconds * 10.0) as usize]).collect();
+        let t = (0..pulse.len()).map(|i| i as f64 * 0.1).collect();
+        let mut n = 0.0;
+        let rpm = pulse
+            .iter()
+            .map(|p| {
+                let wanted: f64 = if *p > 1080.0 { 8.0 * (p - 1000.0) } else { 0.0 };
+                n += 0.3 * (wanted - n);
+                if n < 1.0 { 0.0 } else { n }
+            })
+            .collect();
+        (t, pulse, rpm)
+    }
+
+    #[test]
+    fn a_rotor_that_coasts_does_not_move_the_start() {
+        let (t, pulse, rpm) = late(&[(1000.0, 6.0), (1100.0, 6.0), (1400.0, 6.0), (1000.0, 6.0)]);
+        assert!(rpm[190] > 0.01 * 3200.0 && pulse[190] == 1000.0, "the rotor coasts at the lowest pulse");
+        assert_eq!(start_pulse(&t, Some(&pulse), &rpm), 1050.0);
+    }
+
+    #[test]
+    fn a_motor_that_never_turns_or_never_stands_has_no_start_between() {
+        let (t, pulse) = ((0..40).map(f64::from).collect::<Vec<_>>(), vec![1200.0; 40]);
+        assert_eq!(start_pulse(&t, Some(&pulse), &[0.0; 40]), 2500.0);
+        assert_eq!(start_pulse(&t, Some(&pulse), &[900.0; 40]), 1199.5);
+    }
+}
