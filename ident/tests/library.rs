@@ -6,30 +6,12 @@
 //! Units: SI, rev/min, us, as the columns say.
 //! Reference: specification `closing-the-loop.md`, "What counts as proof".
 
+mod rig;
+
 use ident::close::{Closed, close};
 use ident::log::{Column, Log};
 use ident::verdict::Kind;
-
-/// Small generator of uniform and normal numbers (xorshift64*, Marsaglia 2003; Box & Muller 1958).
-struct Chance(u64);
-
-impl Chance {
-    fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0xD1B5_4A32_D192_ED03)
-    }
-
-    fn uniform(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let (u, v) = (self.uniform().max(1e-300), self.uniform());
-        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-    }
-}
+use rig::Chance;
 
 /// What is hidden in the rig.
 #[derive(Clone, Copy, Debug)]
