@@ -229,6 +229,8 @@ pub(crate) struct Facts {
     pub(crate) winding: OnceLock<f64>,
     /// Slope of the static speed curve on each row, rev/min per us.
     pub(crate) slope: OnceLock<Vec<f64>>,
+    /// See [`Context::step`].
+    pub(crate) step: OnceLock<f64>,
 }
 
 impl Context {
@@ -360,8 +362,10 @@ impl Context {
     /// Median time step, s.
     #[must_use]
     pub fn step(&self) -> f64 {
-        let mut d: Vec<f64> = self.t.windows(2).map(|w| w[1] - w[0]).collect();
-        if d.is_empty() { 1.0 } else { noise::median(&mut d) }
+        *self.facts.step.get_or_init(|| {
+            let mut d: Vec<f64> = self.t.windows(2).map(|w| w[1] - w[0]).collect();
+            if d.is_empty() { 1.0 } else { noise::median(&mut d) }
+        })
     }
 
     /// Length of the run, s.

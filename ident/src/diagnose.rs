@@ -11,11 +11,11 @@
 use crate::context::{Context, Relation};
 use crate::effects::{self, Effect, Instance};
 use crate::heldout::{self, Held};
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, scatters};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
 use crate::opponent::{nameless, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
-use crate::search::{connected, refine, refine_newest, scan, stride};
+use crate::search::{base, connected, refine, refine_newest, scan, stride};
 use crate::together::choose_pair;
 
 /// Most effects on one channel.
@@ -257,6 +257,7 @@ pub(crate) fn round_of(
     let newest = best.fit.placed.last();
     let whole = vec![1.0; context.targets.len()];
     let loud = loud(context, declared, &best.fit);
+    let base = base(context, declared, &best.fit.placed);
     let mut ranked: Vec<(f64, Vec<Placed>)> = Vec::new();
     for (k, offer) in offers.iter_mut().enumerate() {
         progress(0.7 * k as f64 / count);
@@ -265,7 +266,7 @@ pub(crate) fn round_of(
         }
         let stale = newest.is_some_and(|n| offer.instance.channels.iter().any(|c| n.instance.touches(c)));
         if stale || offer.found.is_none() {
-            offer.found = scan(context, declared, &best.fit.placed, offer.effect, &offer.instance, &loud);
+            offer.found = scan(context, &base, offer.effect, &offer.instance, &loud);
         }
         if let Some((shape, gain)) = &offer.found {
             let added = Placed { effect: offer.effect, instance: offer.instance.clone(), shape: shape.clone() };
@@ -416,16 +417,6 @@ fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
     let grid: usize = shapes.iter().map(|s| s.starts.len()).product();
     let amplitudes = placed.effect.amplitudes(&placed.instance).len().min(placed.instance.channels.len().max(1));
     0.5 * (shapes.len() + amplitudes) as f64 * n.max(2.0).ln() + (grid as f64).ln().max(0.0) * 0.5
-}
-
-pub(crate) fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
-    fit.placed.iter().enumerate().all(|(k, p)| {
-        let inside = p.effect.shapes(context, &p.instance).iter().zip(&p.shape).all(|(s, v)| {
-            let margin = 1e-3 * (s.range.1 - s.range.0);
-            s.is_nuisance() || s.range.1 <= s.range.0 || (*v > s.range.0 - margin && *v < s.range.1 - margin)
-        });
-        inside && p.effect.plausible(context, &p.instance, &fit.estimates(context, declared, k))
-    })
 }
 
 /// The newest effect must remove some of the held-out error on one of its channels, and spoil none.

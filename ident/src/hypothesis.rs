@@ -10,7 +10,8 @@ use crate::context::{Context, Relation, Target};
 use crate::design::{Label, TargetDesign};
 use crate::effects::{Effect, Estimate, Instance};
 use crate::model::Model;
-use crate::solve::{Normal, Solution};
+use crate::samples::{Samples, Taught};
+use crate::solve::Solution;
 use nalgebra::DMatrix;
 
 /// An effect placed in a hypothesis.
@@ -147,141 +148,18 @@ pub enum Rows<'a> {
 /// The likelihood counts samples as independent; [`TargetFit::share`] says how many of them the colour of the residual leaves.
 #[must_use]
 pub fn fit_target(target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
-    let (Solution { coefficients, inverse, .. }, loglik, kept) = solve_target(target, design, rows, true)?;
+    let log_rows = design.columns.first().map_or(design.fixed.len(), |c| c.values.len());
+    let samples = Samples::new(target, rows, log_rows);
+    let (Solution { coefficients, inverse, .. }, loglik, kept) = samples.solve(design, true)?;
     let mut residual = kept.residual(&coefficients);
     residual.iter_mut().zip(&kept.floored).for_each(|(r, v)| *r /= v.sqrt());
     if let Some((unsettled, excess)) = &kept.jumps {
-        residual.iter_mut().zip(unsettled).filter(|(_, u)| **u).for_each(|(r, _)| *r /= excess.sqrt());
+        residual.iter_mut().zip(unsettled.iter()).filter(|(_, u)| **u).for_each(|(r, _)| *r /= excess.sqrt());
     }
     let rss: f64 = residual.iter().map(|r| r * r).sum();
     let share = effective_share(&residual);
     let covariance = inverse * ((rss / residual.len() as f64).max(0.01) / share);
     Some(TargetFit { coefficients, labels: design.columns.iter().map(|c| c.label).collect(), covariance, loglik, share })
-}
-
-/// What went into a fit: columns, samples less the known part, and their variances in the two views, each one value a sample.
-struct Kept {
-    columns: Vec<Vec<f64>>,
-    y: Vec<f64>,
-    floored: Vec<f64>,
-    /// Which samples follow a jump of the load, and by how much worse their variance is than that of the others.
-    jumps: Option<(Vec<bool>, f64)>,
-}
-
-impl Kept {
-    /// Samples less the fitted columns.
-    fn residual(&self, coefficients: &[f64]) -> Vec<f64> {
-        let mut out = self.y.clone();
-        for (column, b) in self.columns.iter().zip(coefficients) {
-            out.iter_mut().zip(column).for_each(|(r, v)| *r -= v * b);
-        }
-        out
-    }
-}
-
-/// Solves for the coefficients with levelled weights (see [`crate::noise::Noise::weight_variance`]) and counts the likelihood
-/// of the mean, and that of the scatter too where `scattering` asks for it or an effect adds scatter.
-fn solve_target(
-    target: &Target,
-    design: &TargetDesign,
-    rows: Rows<'_>,
-    scattering: bool,
-) -> Option<(Solution, Likelihood, Kept)> {
-    let stride = if let Rows::Every(n) = rows { n.max(1) } else { 1 };
-    let chosen: Vec<usize> = match rows {
-        Rows::Where(mask) => (0..target.rows.len()).filter(|j| mask[target.rows[*j]]).collect(),
-        _ => (0..target.rows.len()).step_by(stride).collect(),
-    };
-    if chosen.len() < design.columns.len() + 3 {
-        return None;
-    }
-    let gather = |values: &[f64]| -> Vec<f64> {
-        if values.len() == chosen.len() {
-            return values.to_vec(); // no row of the log is missing
-        }
-        chosen.iter().map(|j| values[target.rows[*j]]).collect()
-    };
-    let pick = |values: &[f64]| -> Vec<f64> { chosen.iter().map(|j| values[*j]).collect() };
-    let (mut y, mut levelled, mut floored) = (pick(&target.y), pick(&target.levelled), Vec::new());
-    if !design.fixed.is_empty() {
-        y.iter_mut().zip(gather(&design.fixed)).for_each(|(y, f)| *y -= f);
-    }
-    let looks_at_scatter = scattering || !design.extra_variance.is_empty();
-    if looks_at_scatter {
-        floored = pick(&target.floored);
-    }
-    if !design.extra_variance.is_empty() {
-        let extra = gather(&design.extra_variance);
-        levelled.iter_mut().zip(&extra).for_each(|(v, e)| *v += e);
-        floored.iter_mut().zip(&extra).for_each(|(v, e)| *v += e);
-    }
-    let columns: Vec<Vec<f64>> = design.columns.iter().map(|c| gather(&c.values)).collect();
-    let mut kept = Kept { columns, y, floored, jumps: None };
-    let mut weights: Vec<f64> = levelled.iter().map(|v| 1.0 / v).collect();
-    let mut solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
-    let n = chosen.len() as f64;
-    let weight = target.weight * stride as f64;
-    // the scale of the noise is profiled, but never below a tenth of the floor's standard deviation
-    let part = |rss: f64, n: f64| {
-        let scale = (rss / n).max(0.01);
-        weight * (-0.5 * n * scale.ln() - 0.5 * rss / scale)
-    };
-    let profile = |rss: f64, log_sigma: f64| part(rss, n) - weight * log_sigma;
-    let half_logs = |variances: &[f64]| 0.5 * log_product(variances);
-    // after a jump of the load a static relation is off by more than the noise: those samples have a scale of their own, so that
-    // they neither rule the coefficients nor drown what the others say
-    let mut mean = profile(solution.rss, half_logs(&levelled));
-    if !target.unsettled.is_empty() {
-        let unsettled: Vec<bool> = chosen.iter().map(|j| target.unsettled[*j]).collect();
-        let late = unsettled.iter().filter(|u| **u).count() as f64;
-        let sums = |solution: &Solution| {
-            let mut sums = (0.0, 0.0);
-            for ((r, v), u) in kept.residual(&solution.coefficients).iter().zip(&levelled).zip(&unsettled) {
-                *(if *u { &mut sums.1 } else { &mut sums.0 }) += r * r / v;
-            }
-            sums
-        };
-        let scales = |(calm, after): (f64, f64)| (after / late.max(1.0)).max(0.01) / (calm / (n - late).max(1.0)).max(0.01);
-        let mut found = sums(&solution);
-        if late >= 3.0 && n - late > kept.columns.len() as f64 + 3.0 {
-            let mut excess = scales(found).max(1.0);
-            if excess > WORSE {
-                for _ in 0..2 {
-                    weights
-                        .iter_mut()
-                        .zip(&levelled)
-                        .zip(&unsettled)
-                        .for_each(|((w, v), u)| *w = 1.0 / (v * if *u { excess } else { 1.0 }));
-                    solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
-                    found = sums(&solution);
-                    excess = scales(found).max(1.0);
-                }
-            }
-            mean = part(found.0, n - late) + part(found.1, late) - weight * half_logs(&levelled);
-            kept.jumps = Some((unsettled, excess));
-        }
-    }
-    let scatter = if looks_at_scatter {
-        let rss = kept.residual(&solution.coefficients).iter().zip(&kept.floored).map(|(r, v)| r * r / v).sum();
-        profile(rss, half_logs(&kept.floored))
-    } else {
-        mean
-    };
-    Some((solution, Likelihood { mean, scatter }, kept))
-}
-
-/// How much worse the variance after jumps must be for those samples to weigh less.
-const WORSE: f64 = 1.5;
-
-/// Sum of the logarithms of positive numbers, one logarithm for every eight of them.
-fn log_product(values: &[f64]) -> f64 {
-    values
-        .chunks(8)
-        .map(|chunk| {
-            let scale = chunk[0];
-            scale.ln() * chunk.len() as f64 + chunk.iter().map(|v| v / scale).product::<f64>().ln()
-        })
-        .sum()
 }
 
 /// One over the integrated autocorrelation time of the scaled residual, in samples: 1 when white.
@@ -318,25 +196,22 @@ pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: O
     Some(Fit { placed: placed.to_vec(), targets })
 }
 
-/// Log-likelihood of the touched targets only: what a search compares.
-pub(crate) fn touched_loglik(
-    context: &Context,
-    declared: Declared<'_>,
-    placed: &[Placed],
-    moving: &[&str],
-    rows: Rows<'_>,
-    scattering: bool,
-) -> f64 {
-    let mut sum = 0.0;
-    let mut designs = Designs::new(context, declared, placed);
-    for target in context.targets.iter().filter(|t| moving.contains(&t.name)) {
-        let view = scattering && target.relation == Relation::Thrust;
-        match solve_target(target, designs.of(target), rows, view) {
-            Some((_, loglik, _)) => sum += loglik.of(view),
-            None => return f64::NEG_INFINITY,
-        }
-    }
-    sum
+/// Whether every shape lies within its range, and every effect makes physical sense.
+pub(crate) fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
+    fit.placed.iter().enumerate().all(|(k, p)| {
+        let inside = p.effect.shapes(context, &p.instance).iter().zip(&p.shape).all(|(s, v)| {
+            let margin = 1e-3 * (s.range.1 - s.range.0);
+            s.is_nuisance() || s.range.1 <= s.range.0 || (*v > s.range.0 - margin && *v < s.range.1 - margin)
+        });
+        let errors = || {
+            if p.effect.judges_shape_errors() {
+                fit.shape_errors(context, declared, k, false)
+            } else {
+                vec![f64::NAN; p.shape.len()]
+            }
+        };
+        inside && p.effect.plausible(context, &p.instance, &fit.estimates_given(context, k, errors()))
+    })
 }
 
 impl Fit {
@@ -416,10 +291,11 @@ impl Fit {
         }
         let moving: Vec<&str> = p.instance.channels.iter().map(String::as_str).collect();
         let scattering = self.placed.iter().any(|p| p.effect.scatters());
+        let taught = Taught::new(context, declared, Rows::All);
         let value = |x: &[f64]| {
             let mut placed = self.placed.clone();
             placed[position].shape = x.to_vec();
-            touched_loglik(context, declared, &placed, &moving, Rows::All, scattering)
+            taught.loglik(&placed, &moving, scattering)
         };
         let h: Vec<f64> =
             shapes.iter().zip(&p.shape).map(|(s, v)| (0.02 * v.abs()).max(1e-4 * (s.range.1 - s.range.0)).max(1e-9)).collect();

@@ -18,7 +18,7 @@ use crate::hypothesis::{Declared, Fit, Rows, fit};
 use crate::log::Log;
 use crate::model::Model;
 use crate::report::number;
-use crate::search::scan;
+use crate::search::{base, scan};
 use crate::simulate::from_command;
 
 /// The steps in their order, with what each answers.
@@ -161,9 +161,10 @@ fn candidates(start: &Start, progress: &mut dyn FnMut(f64)) -> Content {
     let mut rows: Vec<(f64, Vec<String>)> = Vec::new();
     let all: Vec<_> = library().iter().flat_map(|e| e.instances(&start.context).into_iter().map(move |i| (*e, i))).collect();
     let count = all.len().max(1) as f64;
+    let base = base(&start.context, Declared::default(), &[]);
     for (k, (effect, instance)) in all.into_iter().enumerate() {
         progress(k as f64 / count);
-        let found = scan(&start.context, Declared::default(), &[], effect, &instance, &vec![true; start.context.targets.len()]);
+        let found = scan(&start.context, &base, effect, &instance, &vec![true; start.context.targets.len()]);
         let shapes = effect.shapes(&start.context, &instance);
         let parameters: Vec<String> =
             shapes.iter().map(|s| format!("{} {}..{} {}", s.name, number(s.range.0), number(s.range.1), s.unit)).collect();

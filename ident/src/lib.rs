@@ -33,6 +33,7 @@ pub mod report;
 pub mod residual;
 mod revise;
 pub mod runs;
+mod samples;
 pub mod search;
 pub mod select;
 pub mod shift;

@@ -10,11 +10,11 @@
 
 use crate::context::{Context, Target};
 use crate::diagnose::{
-    Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, may_join, net_gain, offers, plausible, shares, without, worth_a_name,
+    Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, may_join, net_gain, offers, shares, without, worth_a_name,
 };
 use crate::effects::Estimate;
 use crate::heldout::{self, Held};
-use crate::hypothesis::{Declared, Placed, Rows, allow_for_the_form, fit};
+use crate::hypothesis::{Declared, Placed, Rows, allow_for_the_form, fit, plausible};
 use crate::log::{Column, Log};
 use crate::search::refine;
 

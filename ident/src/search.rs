@@ -7,12 +7,21 @@
 
 use crate::context::Context;
 use crate::effects::{Effect, Instance};
-use crate::hypothesis::{Declared, Placed, Rows, touched_loglik};
+use crate::hypothesis::{Declared, Placed, Rows};
+use crate::samples::{Base, Taught};
 
 /// The stride over rows that keeps the longest target near `most` samples.
 pub(crate) fn stride(context: &Context, most: usize) -> usize {
     context.targets.iter().map(|t| t.rows.len()).max().unwrap_or(1).div_ceil(most).max(1)
 }
+
+/// What scans add candidates to: each second, third, ... row of a long log will do.
+pub(crate) fn base<'c>(context: &'c Context, declared: Declared<'c>, placed: &'c [Placed]) -> Base<'c> {
+    Base::new(Taught::new(context, declared, Rows::Every(stride(context, SCANNED))), placed)
+}
+
+/// Samples of a channel that a scan looks at.
+const SCANNED: usize = 4000;
 
 /// Grid points from which on a scan looks at channels that have something left only.
 const LARGE_GRID: usize = 6;
@@ -20,10 +29,9 @@ const LARGE_GRID: usize = 6;
 /// Best start of one candidate added to a fixed set: a scan of its grid. On the targets that are not `loud` nothing is left to
 /// gain; a large grid is not scanned on them, and nothing is found where all are quiet, unless the effect speaks of scatter.
 #[must_use]
-pub fn scan(
+pub(crate) fn scan(
     context: &Context,
-    declared: Declared<'_>,
-    base: &[Placed],
+    base: &Base<'_>,
     effect: &'static dyn Effect,
     instance: &Instance,
     loud: &[bool],
@@ -37,9 +45,8 @@ pub fn scan(
             return None;
         }
     }
-    let rows = Rows::Every(stride(context, 4000));
-    let scattering = effect.scatters() || base.iter().any(|p| p.effect.scatters());
-    let before = touched_loglik(context, declared, base, &moving, rows, scattering);
+    let scattering = effect.scatters() || base.placed.iter().any(|p| p.effect.scatters());
+    let before = base.loglik(&moving, scattering);
     let mut best: Option<(Vec<f64>, f64)> = None;
     for index in 0..total {
         let mut rest = index;
@@ -51,9 +58,9 @@ pub fn scan(
                 v
             })
             .collect();
-        let mut placed = base.to_vec();
+        let mut placed = base.placed.to_vec();
         placed.push(Placed { effect, instance: instance.clone(), shape: shape.clone() });
-        let gain = touched_loglik(context, declared, &placed, &moving, rows, scattering) - before;
+        let gain = base.taught.loglik(&placed, &moving, scattering) - before;
         if gain.is_finite() && best.as_ref().is_none_or(|b| gain > b.1) {
             best = Some((shape, gain));
         }
@@ -126,6 +133,7 @@ pub(crate) fn refine_group(
     }
     let moving = touched_by_shapes(placed, group);
     let scattering = placed.iter().any(|p| p.effect.scatters());
+    let taught = Taught::new(context, declared, rows);
     let cost = |x: &[f64]| -> f64 {
         let mut full = start.clone();
         for (i, v) in free.iter().zip(x) {
@@ -133,7 +141,7 @@ pub(crate) fn refine_group(
         }
         // a soft wall keeps the simplex inside the plausible box
         let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
-        -touched_loglik(context, declared, &with_shapes(placed, &full), &moving, rows, scattering) + 1e3 * wall
+        -taught.loglik(&with_shapes(placed, &full), &moving, scattering) + 1e3 * wall
     };
     let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
     let steps: Vec<f64> = free

@@ -5,7 +5,7 @@
 //! Units: those of the columns.
 //! Reference: Bjorck, *Numerical Methods for Least Squares Problems*, 1996, section 2.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Accumulated normal equations of one target.
 #[derive(Debug, Clone)]
@@ -50,14 +50,14 @@ impl Normal {
 
     /// Whole columns at once, all of one length: `weights` beside the readings `y`.
     #[must_use]
-    pub fn of_columns(columns: &[Vec<f64>], y: &[f64], weights: &[f64]) -> Self {
+    pub fn of_columns(columns: &[impl AsRef<[f64]>], y: &[f64], weights: &[f64]) -> Self {
         let mut normal = Self::new(columns.len());
         let mut weighted: Vec<f64> = Vec::with_capacity(y.len());
         for (j, column) in columns.iter().enumerate() {
             weighted.clear();
-            weighted.extend(column.iter().zip(weights).map(|(a, w)| a * w));
+            weighted.extend(column.as_ref().iter().zip(weights).map(|(a, w)| a * w));
             for (k, other) in columns.iter().enumerate().take(j + 1) {
-                normal.gram[(j, k)] = dot(&weighted, other);
+                normal.gram[(j, k)] = dot(&weighted, other.as_ref());
             }
             normal.rhs[j] = dot(&weighted, y);
         }
@@ -107,6 +107,24 @@ impl Normal {
         if k == 0 {
             return Some(Solution { coefficients: Vec::new(), inverse: DMatrix::zeros(0, 0), rss: self.yy });
         }
+        let Factor { cholesky, scale } = self.factor()?;
+        let b = DVector::from_iterator(k, (0..k).map(|j| self.rhs[j] / scale[j]));
+        let x = cholesky.solve(&b);
+        let mut inverse = cholesky.inverse();
+        for j in 0..k {
+            for l in 0..k {
+                inverse[(j, l)] /= scale[j] * scale[l];
+            }
+        }
+        let coefficients: Vec<f64> = (0..k).map(|j| x[j] / scale[j]).collect();
+        let rss = (self.yy - b.dot(&x)).max(0.0);
+        (rss.is_finite() && coefficients.iter().all(|c| c.is_finite())).then_some(Solution { coefficients, inverse, rss })
+    }
+
+    /// The factors of the columns alone, for many readings; `None` when the numbers are not finite.
+    #[must_use]
+    pub fn factor(&self) -> Option<Factor> {
+        let k = self.rhs.len();
         let scale: Vec<f64> = (0..k).map(|j| self.gram[(j, j)].sqrt()).map(|s| if s > 1e-150 { s } else { 1.0 }).collect();
         let mut a = DMatrix::zeros(k, k);
         for j in 0..k {
@@ -120,18 +138,25 @@ impl Normal {
                 a[(j, j)] = 1.0;
             }
         }
-        let b = DVector::from_iterator(k, (0..k).map(|j| self.rhs[j] / scale[j]));
-        let cholesky = a.cholesky()?;
-        let x = cholesky.solve(&b);
-        let mut inverse = cholesky.inverse();
-        for j in 0..k {
-            for l in 0..k {
-                inverse[(j, l)] /= scale[j] * scale[l];
-            }
-        }
-        let coefficients: Vec<f64> = (0..k).map(|j| x[j] / scale[j]).collect();
-        let rss = (self.yy - b.dot(&x)).max(0.0);
-        (rss.is_finite() && coefficients.iter().all(|c| c.is_finite())).then_some(Solution { coefficients, inverse, rss })
+        Some(Factor { cholesky: a.cholesky()?, scale })
+    }
+}
+
+/// Normal equations whose columns are factored.
+#[derive(Debug, Clone)]
+pub struct Factor {
+    cholesky: Cholesky<f64, Dyn>,
+    scale: Vec<f64>,
+}
+
+impl Factor {
+    /// Coefficients for weighted sums of the readings with each column; `None` when they are not finite.
+    #[must_use]
+    pub fn solve(&self, sums: &[f64]) -> Option<Vec<f64>> {
+        let scaled = DVector::from_iterator(sums.len(), sums.iter().zip(&self.scale).map(|(s, scale)| s / scale));
+        let x = self.cholesky.solve(&scaled);
+        let coefficients: Vec<f64> = x.iter().zip(&self.scale).map(|(x, scale)| x / scale).collect();
+        coefficients.iter().all(|c| c.is_finite()).then_some(coefficients)
     }
 }
 

@@ -70,6 +70,10 @@ impl Effect for AirDensity {
         }
     }
 
+    fn judges_shape_errors(&self) -> bool {
+        true
+    }
+
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         fitted.iter().any(|e| e.name == "exponent" && e.value > 3.0 * e.se)
     }

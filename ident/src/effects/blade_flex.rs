@@ -81,6 +81,10 @@ impl Effect for BladeFlex {
         }
     }
 
+    fn judges_shape_errors(&self) -> bool {
+        true
+    }
+
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         // both fall short: a torque that grows where thrust falls is a stall
         let ratio = fitted.iter().find(|e| e.name == "torque_ratio").is_none_or(|e| e.value > 2.0 * e.se);

@@ -58,7 +58,8 @@ impl Effect for ChannelDelay {
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         let [delay, phase @ ..] = shape else { return };
         let course = operator::course(&instance.form, phase);
-        through_meter(context, design, |column| operator::delayed(&context.t, column, *delay, course));
+        let late = operator::Late::new(&context.t, course, |_| *delay);
+        through_meter(context, design, |column| late.of(column));
     }
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {

@@ -65,13 +65,11 @@ impl Effect for ChannelFilter {
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         let [width, phase @ ..] = shape else { return };
         let course = operator::course(&instance.form, phase);
-        let slow = is_lag(instance);
-        through_meter(context, design, |column| {
-            if slow {
-                operator::first_order(&context.t, column, *width, course)
-            } else {
-                operator::moving_average(&context.t, column, *width, course)
-            }
-        });
+        if is_lag(instance) {
+            let lag = operator::Lag::new(&context.t, *width, course);
+            through_meter(context, design, |column| lag.of(column));
+        } else {
+            through_meter(context, design, |column| operator::moving_average(&context.t, column, *width, course));
+        }
     }
 }

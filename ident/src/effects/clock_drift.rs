@@ -64,7 +64,8 @@ impl Effect for ClockDrift {
         let [rate, phase @ ..] = shape else { return };
         let course = operator::course(&instance.form, phase);
         let t0 = context.t.first().copied().unwrap_or(0.0);
-        design.map_columns(|column| *column = operator::delayed_varying(&context.t, column, course, |t| rate * (t - t0)));
+        let late = operator::Late::new(&context.t, course, |t| rate * (t - t0));
+        design.map_columns(|column| *column = late.of(column));
     }
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {

@@ -50,8 +50,9 @@ impl Effect for Creep {
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         let [amplitude, tau] = shape else { return };
+        let lag = operator::Lag::new(&context.t, *tau, operator::Course::Line);
         design.map_columns(|column| {
-            let slow = operator::first_order(&context.t, column, *tau, operator::Course::Line);
+            let slow = lag.of(column);
             column.iter_mut().zip(slow).for_each(|(v, s)| *v += amplitude * s);
         });
     }

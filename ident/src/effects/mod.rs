@@ -169,6 +169,11 @@ pub trait Effect: Sync {
     fn scatters(&self) -> bool {
         false
     }
+    /// Whether [`Self::plausible`] asks for the standard errors of the shapes: they cost several fits, and are not a number where
+    /// nobody asks.
+    fn judges_shape_errors(&self) -> bool {
+        false
+    }
     /// Whether the estimate makes physical sense (a negative resistance does not).
     fn plausible(&self, _context: &Context, _instance: &Instance, _fitted: &[Estimate]) -> bool {
         true

@@ -81,53 +81,77 @@ impl Decay {
     }
 }
 
-/// First-order lag with time constant `tau`, exact for a signal of the given course.
-pub(crate) fn first_order(t: &[f64], x: &[f64], tau: f64, course: Course) -> Vec<f64> {
-    let mut out = Vec::with_capacity(t.len());
-    let mut state = x.first().copied().unwrap_or(0.0);
-    let (mut whole, mut part) = (Decay::new(), Decay::new());
-    for i in 0..t.len() {
-        if i > 0 && tau <= 1e-9 {
-            state = x[i];
-        } else if i > 0 {
-            let h = (t[i] - t[i - 1]) / tau;
-            let e = whole.of(h);
-            state = match course {
-                Course::Line => along_a_line(x[i - 1], x[i], state, h, e),
-                Course::Jump(phase) => {
-                    let late = if phase >= 1.0 { 0.0 } else { 1.0 - part.of(h * (1.0 - phase)) };
-                    e * state + (1.0 - e) * x[i - 1] + late * (x[i] - x[i - 1])
-                }
-            };
+/// First-order lag, exact for a signal of a given course: what it does over each interval is worked out once for all columns.
+#[derive(Debug, Clone)]
+pub(crate) struct Lag {
+    /// Before each row but the first: what is left of the state, and the weight of the change over the interval; none where the lag
+    /// is too short to be one.
+    intervals: Vec<(f64, f64)>,
+}
+
+impl Lag {
+    /// A lag with time constant `tau`.
+    pub(crate) fn new(t: &[f64], tau: f64, course: Course) -> Self {
+        if tau <= 1e-9 {
+            return Self { intervals: Vec::new() };
         }
-        out.push(state);
+        let (mut whole, mut part) = (Decay::new(), Decay::new());
+        let interval = |w: &[f64]| {
+            let h = (w[1] - w[0]) / tau;
+            let e = whole.of(h);
+            match course {
+                Course::Line => (e, weight_of_ramp(h, e)),
+                Course::Jump(phase) if phase >= 1.0 => (e, 0.0),
+                Course::Jump(phase) => (e, 1.0 - part.of(h * (1.0 - phase))),
+            }
+        };
+        Self { intervals: t.windows(2).map(interval).collect() }
     }
-    out
+
+    /// What the lag makes of a signal.
+    pub(crate) fn of(&self, x: &[f64]) -> Vec<f64> {
+        if self.intervals.is_empty() {
+            return x.to_vec();
+        }
+        let mut state = x[0];
+        let mut out = Vec::with_capacity(x.len());
+        out.push(state);
+        out.extend(x.windows(2).zip(&self.intervals).map(|(w, (left, change))| {
+            state = left * state + (1.0 - left) * w[0] + change * (w[1] - w[0]);
+            state
+        }));
+        out
+    }
 }
 
 /// A first-order lag's state after an interval of `h` time constants, `decay` = exp(-h), over which its input goes from `from` to `to` in a
 /// straight line: u(s) = from + (to - from) s/h.
 pub(crate) fn along_a_line(from: f64, to: f64, state: f64, h: f64, decay: f64) -> f64 {
-    let ramp = if h > 1e-6 { 1.0 - (1.0 - decay) / h } else { h / 2.0 };
-    decay * state + (1.0 - decay) * from + ramp * (to - from)
+    decay * state + (1.0 - decay) * from + weight_of_ramp(h, decay) * (to - from)
 }
 
-/// The signal `delay` seconds ago (ahead when negative).
-pub(crate) fn delayed(t: &[f64], x: &[f64], delay: f64, course: Course) -> Vec<f64> {
-    delayed_varying(t, x, course, |_| delay)
+/// Weight of the change of the input in [`along_a_line`].
+fn weight_of_ramp(h: f64, decay: f64) -> f64 {
+    if h > 1e-6 { 1.0 - (1.0 - decay) / h } else { h / 2.0 }
 }
 
-/// The signal as long ago as `delay` says at each instant.
-pub(crate) fn delayed_varying(t: &[f64], x: &[f64], course: Course, delay: impl Fn(f64) -> f64) -> Vec<f64> {
-    let mut j = 0;
-    (0..t.len())
-        .map(|i| {
-            let at = t[i] - delay(t[i]);
+/// Where a late signal is read, worked out once for all columns: for each row two rows and the share of the way between them.
+#[derive(Debug, Clone)]
+pub(crate) struct Late(Vec<(u32, u32, f64)>);
+
+impl Late {
+    /// As late as `delay` says at each instant, s (early when negative).
+    pub(crate) fn new(t: &[f64], course: Course, delay: impl Fn(f64) -> f64) -> Self {
+        let last = t.len() - 1;
+        let at_row = |i: usize| (i as u32, i as u32, 0.0);
+        let mut j = 0;
+        let place = |now: &f64| {
+            let at = now - delay(*now);
             if at <= t[0] {
-                return x[0];
+                return at_row(0);
             }
-            if at >= t[t.len() - 1] {
-                return x[x.len() - 1];
+            if at >= t[last] {
+                return at_row(last);
             }
             if t[j] > at {
                 j = 0;
@@ -135,9 +159,23 @@ pub(crate) fn delayed_varying(t: &[f64], x: &[f64], course: Course, delay: impl 
             while j + 1 < t.len() && t[j + 1] <= at {
                 j += 1;
             }
-            course.at(x[j], x[j + 1], (at - t[j]) / (t[j + 1] - t[j])).0
-        })
-        .collect()
+            let share = (at - t[j]) / (t[j + 1] - t[j]);
+            match course {
+                Course::Line => (j as u32, j as u32 + 1, share),
+                Course::Jump(phase) => at_row(if share < phase { j } else { j + 1 }),
+            }
+        };
+        Self(t.iter().map(place).collect())
+    }
+
+    /// The late signal.
+    pub(crate) fn of(&self, x: &[f64]) -> Vec<f64> {
+        let read = |(a, b, share): &(u32, u32, f64)| {
+            let (a, b) = (x[*a as usize], x[*b as usize]);
+            a + share * (b - a)
+        };
+        self.0.iter().map(read).collect()
+    }
 }
 
 /// Whether the load changes within single rows: then the instant of a step is known to a row only.
@@ -194,9 +232,9 @@ mod tests {
         let (t, x) = ramp();
         let i = 180;
         assert!((moving_average(&t, &x, 0.8, Course::Line)[i] - 2.0 * (t[i] - 0.4)).abs() < 1e-9);
-        assert!((first_order(&t, &x, 0.3, Course::Line)[i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
-        assert!((delayed(&t, &x, 0.27, Course::Line)[i] - 2.0 * (t[i] - 0.27)).abs() < 1e-9);
-        assert!((delayed(&t, &x, -0.27, Course::Line)[100] - 2.0 * (t[100] + 0.27)).abs() < 1e-9);
+        assert!((Lag::new(&t, 0.3, Course::Line).of(&x)[i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
+        assert!((Late::new(&t, Course::Line, |_| 0.27).of(&x)[i] - 2.0 * (t[i] - 0.27)).abs() < 1e-9);
+        assert!((Late::new(&t, Course::Line, |_| -0.27).of(&x)[100] - 2.0 * (t[100] + 0.27)).abs() < 1e-9);
     }
 
     #[test]
@@ -212,7 +250,9 @@ mod tests {
         let (t, _) = ramp();
         let x = vec![3.5; t.len()];
         for course in [Course::Line, Course::Jump(0.3)] {
-            for y in [moving_average(&t, &x, 1.3, course), first_order(&t, &x, 0.4, course), delayed(&t, &x, 0.9, course)] {
+            for y in
+                [moving_average(&t, &x, 1.3, course), Lag::new(&t, 0.4, course).of(&x), Late::new(&t, course, |_| 0.9).of(&x)]
+            {
                 assert!(y.iter().all(|v| (v - 3.5).abs() < 1e-9));
             }
         }
@@ -225,10 +265,10 @@ mod tests {
         // the jump comes a quarter into the third interval
         let y = moving_average(&t, &x, 2.0, Course::Jump(0.25));
         assert!((y[3] - 0.375).abs() < 1e-12 && (y[4] - 0.875).abs() < 1e-12 && (y[5] - 1.0).abs() < 1e-12, "{y:?}");
-        let y = first_order(&t, &x, 0.5, Course::Jump(0.25));
+        let y = Lag::new(&t, 0.5, Course::Jump(0.25)).of(&x);
         assert!((y[3] - (1.0 - (-1.5_f64).exp())).abs() < 1e-12);
-        let y = delayed(&t, &x, 0.5, Course::Jump(0.25));
+        let y = Late::new(&t, Course::Jump(0.25), |_| 0.5).of(&x);
         assert_eq!(y[3], 1.0);
-        assert_eq!(delayed(&t, &x, 0.9, Course::Jump(0.25))[3], 0.0);
+        assert_eq!(Late::new(&t, Course::Jump(0.25), |_| 0.9).of(&x)[3], 0.0);
     }
 }

@@ -68,21 +68,32 @@ impl Effect for Quantisation {
 ///
 /// Reference: projections onto convex sets, Combettes 1993, Proceedings of the IEEE 81:182.
 fn within_steps(context: &Context, target: &Target, design: &TargetDesign, step: f64) -> Option<Vec<f64>> {
-    let known = |i: usize| design.fixed.get(i).copied().unwrap_or(0.0);
+    let width = design.columns.len();
+    if width == 0 {
+        return Some(design.predict(&[], context.len()));
+    }
     let stride = target.y.len().div_ceil(SAMPLES).max(1);
-    let mut nearest = target.y.clone();
-    let mut truth = Vec::new();
+    let sampled = || target.rows.iter().step_by(stride);
+    let readings: Vec<f64> = target.y.iter().copied().step_by(stride).collect();
+    let known: Vec<f64> = sampled().map(|i| design.fixed.get(*i).copied().unwrap_or(0.0)).collect();
+    // the columns of all samples one after the other, sample by sample: the rounds differ in the readings only
+    let rows: Vec<f64> = sampled().flat_map(|i| design.columns.iter().map(|c| c.values[*i])).collect();
+    let mut normal = Normal::new(width);
+    rows.chunks_exact(width).for_each(|row| normal.add(row, 0.0, 1.0));
+    let factor = normal.factor()?;
+    let mut nearest = readings.clone();
+    let mut coefficients = Vec::new();
+    let mut projections = vec![0.0; width];
     for _ in 0..PROJECTIONS {
-        let mut normal = Normal::new(design.columns.len());
-        let mut row = vec![0.0; design.columns.len()];
-        for (i, y) in target.rows.iter().zip(&nearest).step_by(stride) {
-            row.iter_mut().zip(&design.columns).for_each(|(r, c)| *r = c.values[*i]);
-            normal.add(&row, y - known(*i), 1.0);
+        projections.fill(0.0);
+        for (row, (y, known)) in rows.chunks_exact(width).zip(nearest.iter().zip(&known)) {
+            projections.iter_mut().zip(row).for_each(|(p, v)| *p += v * (y - known));
         }
-        truth = design.predict(&normal.solve()?.coefficients, context.len());
+        coefficients = factor.solve(&projections)?;
         let mut moved = 0.0_f64;
-        for ((i, y), z) in target.rows.iter().zip(&target.y).zip(&mut nearest).step_by(stride) {
-            let next = truth[*i].clamp(y - 0.5 * step, y + 0.5 * step);
+        for ((row, known), (y, z)) in rows.chunks_exact(width).zip(&known).zip(readings.iter().zip(&mut nearest)) {
+            let truth = row.iter().zip(&coefficients).fold(0.0, |sum, (v, c)| sum + c * v) + known;
+            let next = truth.clamp(y - 0.5 * step, y + 0.5 * step);
             moved = moved.max((next - *z).abs());
             *z = next;
         }
@@ -90,7 +101,7 @@ fn within_steps(context: &Context, target: &Target, design: &TargetDesign, step:
             break;
         }
     }
-    Some(truth)
+    Some(design.predict(&coefficients, context.len()))
 }
 
 /// Samples that say where the truth lies.

@@ -65,6 +65,10 @@ impl Effect for ReynoldsThrust {
         design.fixed.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f);
     }
 
+    fn judges_shape_errors(&self) -> bool {
+        true
+    }
+
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         fitted.iter().all(|e| e.value.abs() > 3.0 * e.se)
     }
