@@ -112,7 +112,7 @@ fn signature(context: &Context, effect: &'static dyn Effect, instance: Instance)
         let mut change = through;
         for column in with.columns.iter().filter(|c| matches!(c.label, Label::Effect { .. })) {
             let size = norm(&column.values).max(f64::MIN_POSITIVE);
-            change.iter_mut().zip(&column.values).for_each(|(c, v)| *c += SIZE * target.noise.rms * v / size);
+            change.iter_mut().zip(column.values.iter()).for_each(|(c, v)| *c += SIZE * target.noise.rms * v / size);
         }
         change.iter_mut().for_each(|c| *c /= target.noise.rms);
         let rows: Vec<usize> = (0..context.len()).collect();

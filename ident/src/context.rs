@@ -6,6 +6,7 @@
 //! Units: SI, rev/min, us; regressors of the polynomials are rpm/1000 and (pulse - 1000)/1000.
 //! Reference: specification `formats.md` (primary relations), `closing-the-loop.md` step 2.
 
+use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
 use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
@@ -205,7 +206,7 @@ pub struct Context {
     /// Stretches without a jump of the load, ramps included: where the noise is read off.
     pub calm: Vec<(usize, usize)>,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
-    powers: [OnceLock<Vec<Vec<f64>>>; 2],
+    powers: [OnceLock<Vec<Values>>; 2],
     /// What effects ask again and again.
     pub(crate) facts: Facts,
 }
@@ -305,7 +306,7 @@ impl Context {
 
     /// Columns of the declared polynomial of a relation, from order 0 up (at least as many as it has terms).
     #[must_use]
-    pub fn powers(&self, relation: Relation) -> &[Vec<f64>] {
+    pub fn powers(&self, relation: Relation) -> &[Values] {
         let kind = usize::from(relation != Relation::SpeedFromPulse);
         self.powers[kind].get_or_init(|| powers_of(self, [Relation::SpeedFromPulse, Relation::Current][kind]))
     }
@@ -373,17 +374,6 @@ impl Context {
     pub fn duration(&self) -> f64 {
         self.t.last().unwrap_or(&0.0) - self.t.first().unwrap_or(&0.0)
     }
-}
-
-/// See [`Context::powers`]; a log without a command or a speed has columns of zeros beyond the constant.
-fn powers_of(context: &Context, relation: Relation) -> Vec<Vec<f64>> {
-    let n = context.len();
-    let x = context.regressor(relation).unwrap_or_else(|| vec![0.0; n]);
-    let live = |i: usize| match (&context.pulse, relation) {
-        (Some(p), Relation::SpeedFromPulse) => p[i] >= context.start_pulse_us,
-        _ => true,
-    };
-    (0..=3).map(|k| (0..n).map(|i| if live(i) { x[i].powi(k) } else { 0.0 }).collect()).collect()
 }
 
 /// Linear bridge over missing samples, constant at the ends.

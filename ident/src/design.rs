@@ -6,6 +6,7 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use crate::context::{Context, Relation};
+use std::sync::Arc;
 
 /// What a column's coefficient means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,13 +22,16 @@ pub enum Label {
     },
 }
 
+/// One value a row of the log, in one piece of memory for all who hold it unchanged.
+pub type Values = Arc<Vec<f64>>;
+
 /// One column over all rows of the log.
 #[derive(Debug, Clone)]
 pub struct Column {
     /// What its coefficient means.
     pub label: Label,
-    /// One value a row.
-    pub values: Vec<f64>,
+    /// One value a row; columns that no effect has changed are one piece of memory in all designs.
+    pub values: Values,
 }
 
 /// Columns of one target.
@@ -43,6 +47,8 @@ pub struct TargetDesign {
     pub fixed: Vec<f64>,
     /// Variance that an effect adds to the noise, one value a row; empty when there is none.
     pub extra_variance: Vec<f64>,
+    /// What [`Self::map_columns`] has made of which column, for the effect that is being applied: before and after.
+    pub(crate) mapped: Vec<(Values, Values)>,
 }
 
 impl TargetDesign {
@@ -56,7 +62,7 @@ impl TargetDesign {
             .enumerate()
             .map(|(k, values)| Column { label: Label::Base(k), values: values.clone() })
             .collect();
-        Self { name, relation, columns, fixed: Vec::new(), extra_variance: Vec::new() }
+        Self { name, relation, columns, fixed: Vec::new(), extra_variance: Vec::new(), mapped: Vec::new() }
     }
 
     /// The same target with its baseline coefficients held at given values.
@@ -67,10 +73,16 @@ impl TargetDesign {
         self
     }
 
-    /// Lets `change` act on every column and on the known part: for gains and output operators.
+    /// Lets `change` act on every column and on the known part: for gains and output operators. At most once an effect, because what
+    /// came of a column is kept: the same effect with the same shapes makes the same of it.
     pub fn map_columns(&mut self, change: impl Fn(&mut Vec<f64>)) {
         for column in &mut self.columns {
-            change(&mut column.values);
+            let before = column.values.clone();
+            match self.mapped.iter().find(|(known, _)| Arc::ptr_eq(known, &before)) {
+                Some((_, after)) => column.values = after.clone(),
+                None => change(Arc::make_mut(&mut column.values)),
+            }
+            self.mapped.push((before, column.values.clone()));
         }
         if !self.fixed.is_empty() {
             change(&mut self.fixed);
@@ -79,7 +91,7 @@ impl TargetDesign {
 
     /// Adds a column for an effect's amplitude.
     pub fn add(&mut self, effect: usize, amplitude: usize, values: Vec<f64>) {
-        self.columns.push(Column { label: Label::Effect { effect, amplitude }, values });
+        self.columns.push(Column { label: Label::Effect { effect, amplitude }, values: Arc::new(values) });
     }
 
     /// The prediction on every row.
@@ -93,10 +105,21 @@ impl TargetDesign {
     }
 }
 
+/// See [`Context::powers`]; a log without a command or a speed has columns of zeros beyond the constant.
+pub(crate) fn powers_of(context: &Context, relation: Relation) -> Vec<Values> {
+    let n = context.len();
+    let x = context.regressor(relation).unwrap_or_else(|| vec![0.0; n]);
+    let live = |i: usize| match (&context.pulse, relation) {
+        (Some(p), Relation::SpeedFromPulse) => p[i] >= context.start_pulse_us,
+        _ => true,
+    };
+    (0..=3).map(|k| Arc::new((0..n).map(|i| if live(i) { x[i].powi(k) } else { 0.0 }).collect())).collect()
+}
+
 fn weighted_sum(columns: &[Column], coefficients: &[f64], n: usize) -> Vec<f64> {
     let mut out = vec![0.0; n];
     for (column, c) in columns.iter().zip(coefficients) {
-        for (o, v) in out.iter_mut().zip(&column.values) {
+        for (o, v) in out.iter_mut().zip(column.values.iter()) {
             *o += c * v;
         }
     }

@@ -12,6 +12,7 @@ use crate::effects::{Effect, Estimate, Instance};
 use crate::model::Model;
 use crate::samples::{Samples, Taught};
 use crate::solve::Solution;
+use crate::steps::Steps;
 use nalgebra::DMatrix;
 
 /// An effect placed in a hypothesis.
@@ -88,19 +89,15 @@ pub fn scatters(placed: &[Placed], channel: &str) -> bool {
 /// Builds the design of one target under a hypothesis.
 #[must_use]
 pub fn design(context: &Context, declared: Declared<'_>, placed: &[Placed], target: &Target) -> TargetDesign {
-    let mut design = match declared.model {
+    Steps::default().apply(context, placed, plain(context, declared, target))
+}
+
+/// The design of one target without effects.
+pub(crate) fn plain(context: &Context, declared: Declared<'_>, target: &Target) -> TargetDesign {
+    match declared.model {
         None => TargetDesign::baseline(context, target.name, target.relation),
         Some(model) => model.pinned(context, target),
-    };
-    let mut order: Vec<usize> = (0..placed.len()).collect();
-    order.sort_by_key(|i| placed[*i].effect.stage());
-    for i in order {
-        let p = &placed[i];
-        if p.instance.touches(target.name) {
-            p.effect.apply(context, &p.instance, &p.shape, i, &mut design);
-        }
     }
-    design
 }
 
 /// Designs of one hypothesis, target after target: the speed channels see one rotor, and where the same effects touch them their
@@ -119,6 +116,11 @@ impl<'a> Designs<'a> {
 
     /// The design of a target.
     pub(crate) fn of(&mut self, target: &Target) -> &TargetDesign {
+        self.after(target, &mut Steps::default())
+    }
+
+    /// The same, made from what the target's last design went through.
+    pub(crate) fn after(&mut self, target: &Target, steps: &mut Steps) -> &TargetDesign {
         let touching: Vec<bool> = self.placed.iter().map(|p| p.instance.touches(target.name)).collect();
         let alike = |last: &(Vec<bool>, TargetDesign)| {
             last.1.relation == Relation::SpeedFromPulse
@@ -127,7 +129,7 @@ impl<'a> Designs<'a> {
                 && last.0 == touching
         };
         let kept = self.last.take().filter(alike).map(|(_, design)| TargetDesign { name: target.name, ..design });
-        let made = kept.unwrap_or_else(|| design(self.context, self.declared, self.placed, target));
+        let made = kept.unwrap_or_else(|| steps.apply(self.context, self.placed, plain(self.context, self.declared, target)));
         &self.last.insert((touching, made)).1
     }
 }

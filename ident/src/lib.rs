@@ -40,5 +40,6 @@ pub mod shift;
 pub mod simulate;
 pub mod solve;
 mod start;
+mod steps;
 mod together;
 pub mod verdict;

@@ -7,11 +7,13 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use crate::context::{Context, Relation, Target};
-use crate::design::TargetDesign;
+use crate::design::{TargetDesign, Values};
 use crate::hypothesis::{Declared, Designs, Likelihood, Placed, Rows};
-use crate::solve::{Normal, Solution};
+use crate::solve::{Normal, Solution, dot};
+use crate::steps::Steps;
 use std::borrow::Cow;
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
+use std::sync::Arc;
 
 /// How much worse the variance after jumps must be for those samples to weigh less.
 const WORSE: f64 = 1.5;
@@ -23,7 +25,7 @@ pub(crate) struct Samples<'c> {
     stride: usize,
     /// Their positions among the target's samples.
     chosen: Vec<usize>,
-    /// Whether they are all rows of the log, so that columns can be used as they stand.
+    /// Whether every row of the log holds a sample and may teach, so that a column of the log is one of samples.
     whole: bool,
     y: Cow<'c, [f64]>,
     levelled: Cow<'c, [f64]>,
@@ -31,13 +33,28 @@ pub(crate) struct Samples<'c> {
     weights: Vec<f64>,
     /// Half the sum of the logarithms of `levelled`.
     half_logs: f64,
+    /// Sum of the weighted squares of `y`.
+    squares: f64,
     /// Which of them follow a jump of the load; empty where the target does not tell.
     unsettled: Vec<bool>,
+    /// The columns of the last design: most of the next one's are the same.
+    known: RefCell<Vec<Known>>,
+}
+
+/// A column on the samples, and its weighted products.
+struct Known {
+    /// The column on all rows of the log.
+    column: Values,
+    values: Values,
+    weighted: Vec<f64>,
+    with_y: f64,
+    /// With itself and with those before it in the last design.
+    with_others: Vec<(Values, f64)>,
 }
 
 /// What went into a fit: columns, samples less the known part, and their variances in the two views, each one value a sample.
 pub(crate) struct Kept<'d> {
-    columns: Vec<Cow<'d, [f64]>>,
+    columns: Vec<Values>,
     y: Cow<'d, [f64]>,
     pub(crate) floored: Vec<f64>,
     /// Which samples follow a jump of the load, and by how much worse their variance is than that of the others.
@@ -68,24 +85,64 @@ impl<'c> Samples<'c> {
             if all { Cow::Borrowed(values) } else { chosen.iter().map(|j| values[*j]).collect() }
         };
         let levelled = pick(&target.levelled);
+        let (y, weights) = (pick(&target.y), levelled.iter().map(|v| 1.0 / v).collect::<Vec<f64>>());
         let unsettled =
             if target.unsettled.is_empty() { Vec::new() } else { chosen.iter().map(|j| target.unsettled[*j]).collect() };
         Self {
             target,
             stride,
-            y: pick(&target.y),
-            weights: levelled.iter().map(|v| 1.0 / v).collect(),
+            squares: y.iter().zip(&weights).map(|(v, w)| w * v * v).sum(),
+            y,
+            weights,
             half_logs: 0.5 * log_product(&levelled),
             levelled,
             unsettled,
-            whole: all && chosen.len() == log_rows,
+            known: RefCell::default(),
+            whole: target.rows.len() == log_rows && !matches!(rows, Rows::Where(_)),
             chosen,
         }
     }
 
     /// Of one value a row of the log those of the samples.
     fn gather<'d>(&self, values: &'d [f64]) -> Cow<'d, [f64]> {
-        if self.whole { Cow::Borrowed(values) } else { self.chosen.iter().map(|j| values[self.target.rows[*j]]).collect() }
+        match self.stride {
+            1 if self.whole => Cow::Borrowed(values),
+            n if self.whole => values.iter().copied().step_by(n).collect(),
+            _ => self.chosen.iter().map(|j| values[self.target.rows[*j]]).collect(),
+        }
+    }
+
+    /// The columns of a design on the samples and the normal equations of all of them with `y`. Columns that stood in the last design
+    /// bring their products along.
+    fn equations(&self, design: &TargetDesign) -> (Vec<Values>, Normal) {
+        let mut known = self.known.borrow_mut();
+        let mut last = std::mem::take(&mut *known);
+        for column in &design.columns {
+            let old = last.iter().position(|k| Arc::ptr_eq(&k.column, &column.values)).map(|k| last.swap_remove(k));
+            let mut own = old.unwrap_or_else(|| {
+                let values = self.of_samples(&column.values);
+                let weighted: Vec<f64> = values.iter().zip(&self.weights).map(|(a, w)| a * w).collect();
+                let with_y = dot(&weighted, &self.y);
+                Known { column: column.values.clone(), values, weighted, with_y, with_others: Vec::new() }
+            });
+            let product = |other: &Known| {
+                let old = own.with_others.iter().find(|(of, _)| Arc::ptr_eq(of, &other.column));
+                (other.column.clone(), old.map_or_else(|| dot(&own.weighted, &other.values), |o| o.1))
+            };
+            own.with_others = known.iter().chain([&own]).map(product).collect();
+            known.push(own);
+        }
+        let products = known.iter().map(|k| (k.with_others.iter().map(|o| o.1), k.with_y));
+        let normal = Normal::of_products(products, self.squares, self.y.len());
+        (known.iter().map(|k| k.values.clone()).collect(), normal)
+    }
+
+    /// A column on the samples.
+    fn of_samples(&self, column: &Values) -> Values {
+        match self.gather(column) {
+            Cow::Borrowed(_) => column.clone(),
+            Cow::Owned(values) => Arc::new(values),
+        }
     }
 
     /// Solves for the coefficients with levelled weights (see [`crate::noise::Noise::weight_variance`]) and counts the likelihood
@@ -110,9 +167,15 @@ impl<'c> Samples<'c> {
             weights = levelled.iter().map(|v| 1.0 / v).collect();
             half_logs = 0.5 * log_product(&levelled);
         }
-        let columns: Vec<Cow<'d, [f64]>> = design.columns.iter().map(|c| self.gather(&c.values)).collect();
+        let (columns, normal) = if design.fixed.is_empty() && design.extra_variance.is_empty() {
+            self.equations(design)
+        } else {
+            let columns: Vec<_> = design.columns.iter().map(|c| self.of_samples(&c.values)).collect();
+            let normal = Normal::of_columns(&columns, &y, &weights);
+            (columns, normal)
+        };
         let mut kept = Kept { columns, y, floored, jumps: None };
-        let mut solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
+        let mut solution = normal.solve()?;
         let n = self.chosen.len() as f64;
         let weight = self.target.weight * self.stride as f64;
         // the scale of the noise is profiled, but never below a tenth of the floor's standard deviation
@@ -171,12 +234,16 @@ pub(crate) struct Taught<'c> {
     declared: Declared<'c>,
     rows: Rows<'c>,
     samples: Vec<OnceCell<Samples<'c>>>,
+    /// For each target how its last design came about.
+    steps: RefCell<Vec<Steps>>,
 }
 
 impl<'c> Taught<'c> {
     /// Those of the rows that may teach.
     pub(crate) fn new(context: &'c Context, declared: Declared<'c>, rows: Rows<'c>) -> Self {
-        Self { context, declared, rows, samples: context.targets.iter().map(|_| OnceCell::new()).collect() }
+        let samples: Vec<_> = context.targets.iter().map(|_| OnceCell::new()).collect();
+        let steps = RefCell::new(samples.iter().map(|_| Steps::default()).collect());
+        Self { context, declared, rows, samples, steps }
     }
 
     /// Log-likelihood of the `moving` targets only: what a search compares.
@@ -197,7 +264,8 @@ impl<'c> Taught<'c> {
         let target = &self.context.targets[k];
         let view = scattering && target.relation == Relation::Thrust;
         let samples = self.samples[k].get_or_init(|| Samples::new(target, self.rows, self.context.len()));
-        samples.solve(designs.of(target), view).map(|(_, loglik, _)| loglik.of(view))
+        let design = designs.after(target, &mut self.steps.borrow_mut()[k]);
+        samples.solve(design, view).map(|(_, loglik, _)| loglik.of(view))
     }
 }
 

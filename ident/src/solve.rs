@@ -50,19 +50,34 @@ impl Normal {
 
     /// Whole columns at once, all of one length: `weights` beside the readings `y`.
     #[must_use]
-    pub fn of_columns(columns: &[impl AsRef<[f64]>], y: &[f64], weights: &[f64]) -> Self {
+    pub fn of_columns(columns: &[impl std::borrow::Borrow<Vec<f64>>], y: &[f64], weights: &[f64]) -> Self {
         let mut normal = Self::new(columns.len());
         let mut weighted: Vec<f64> = Vec::with_capacity(y.len());
         for (j, column) in columns.iter().enumerate() {
             weighted.clear();
-            weighted.extend(column.as_ref().iter().zip(weights).map(|(a, w)| a * w));
+            weighted.extend(column.borrow().iter().zip(weights).map(|(a, w)| a * w));
             for (k, other) in columns.iter().enumerate().take(j + 1) {
-                normal.gram[(j, k)] = dot(&weighted, other.as_ref());
+                normal.gram[(j, k)] = dot(&weighted, other.borrow());
             }
             normal.rhs[j] = dot(&weighted, y);
         }
         normal.yy = y.iter().zip(weights).map(|(v, w)| w * v * v).sum();
         normal.count = y.len();
+        normal
+    }
+
+    /// From products that are known: for each column those with the columns up to itself, and with the readings; the readings' own square
+    /// sum, all weighted; and the number of rows.
+    pub(crate) fn of_products(
+        columns: impl ExactSizeIterator<Item = (impl Iterator<Item = f64>, f64)>,
+        squares: f64,
+        count: usize,
+    ) -> Self {
+        let mut normal = Self { yy: squares, count, ..Self::new(columns.len()) };
+        for (j, (products, with_y)) in columns.enumerate() {
+            products.enumerate().for_each(|(k, v)| normal.gram[(j, k)] = v);
+            normal.rhs[j] = with_y;
+        }
         normal
     }
 

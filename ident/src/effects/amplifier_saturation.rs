@@ -8,6 +8,7 @@
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::{Label, TargetDesign};
+use std::sync::Arc;
 
 /// See the module.
 pub(crate) struct AmplifierSaturation;
@@ -54,7 +55,11 @@ impl Effect for AmplifierSaturation {
         for column in &mut design.columns {
             if let Label::Base(power) = column.label {
                 let at = (reached / 1000.0).powi(power as i32);
-                column.values.iter_mut().zip(&context.rpm).filter(|(_, r)| *r > reached).for_each(|(v, _)| *v = at);
+                Arc::make_mut(&mut column.values)
+                    .iter_mut()
+                    .zip(&context.rpm)
+                    .filter(|(_, r)| *r > reached)
+                    .for_each(|(v, _)| *v = at);
             }
         }
     }

@@ -60,24 +60,25 @@ impl Effect for BladeFlex {
         let [onset, exponent, rest @ ..] = shape else { return };
         let ratio = rest.first().copied().unwrap_or(1.0);
         let smooth = instance.form == SMOOTH;
-        let factor = |speed: f64, exponent: f64| match speed / onset {
+        let exponent = if design.relation == Relation::Torque { exponent * ratio } else { *exponent };
+        // the same loss at twice the onset as that of the power, without its corner
+        let loss = 1.0 - 0.5_f64.powf(exponent);
+        let factor = |speed: f64| match speed / onset {
             over if over <= 1.0 => 1.0,
-            // the same loss at twice the onset as that of the power, without its corner
-            over if smooth => 1.0 - (1.0 - 0.5_f64.powf(exponent)) * (over - 1.0).powi(2),
+            over if smooth => 1.0 - loss * (over - 1.0).powi(2),
             over => over.powf(-exponent),
         };
         match design.relation {
             Relation::Thrust | Relation::Torque => {
-                let exponent = if design.relation == Relation::Torque { exponent * ratio } else { *exponent };
-                let factor: Vec<f64> = context.rpm.iter().map(|r| factor(*r, exponent)).collect();
+                let factor: Vec<f64> = context.rpm.iter().map(|r| factor(*r)).collect();
                 design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
             }
             // a lighter load: less current, more speed
             Relation::Current => {
-                let column = context.rpm.iter().map(|r| (r / 1000.0).powi(3) * (factor(*r, *exponent) - 1.0)).collect();
+                let column = context.rpm.iter().map(|r| (r / 1000.0).powi(3) * (factor(*r) - 1.0)).collect();
                 design.add(position, 0, column);
             }
-            _ => design.add(position, 1, expected(context).iter().map(|r| r * (1.0 - factor(*r, *exponent))).collect()),
+            _ => design.add(position, 1, expected(context).iter().map(|r| r * (1.0 - factor(*r))).collect()),
         }
     }
 

@@ -8,6 +8,7 @@
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
 use crate::context::Context;
 use crate::design::{Label, TargetDesign};
+use std::sync::Arc;
 
 /// See the module.
 pub(crate) struct CurrentLimit;
@@ -59,7 +60,7 @@ impl Effect for CurrentLimit {
         for column in &mut design.columns {
             if let Label::Base(power) = column.label {
                 let at = ((reached - 1000.0) / 1000.0).powi(power as i32);
-                column.values.iter_mut().zip(pulse).filter(|(_, p)| *p > reached).for_each(|(v, _)| *v = at);
+                Arc::make_mut(&mut column.values).iter_mut().zip(pulse).filter(|(_, p)| *p > reached).for_each(|(v, _)| *v = at);
             }
         }
     }

@@ -8,6 +8,7 @@
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::{Label, TargetDesign};
+use std::sync::Arc;
 
 /// See the module.
 pub(crate) struct ReynoldsThrust;
@@ -59,7 +60,7 @@ impl Effect for ReynoldsThrust {
             .collect();
         for column in &mut design.columns {
             if let Label::Base(1 | 2) = column.label {
-                column.values.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f);
+                Arc::make_mut(&mut column.values).iter_mut().zip(&factor).for_each(|(v, f)| *v *= f);
             }
         }
         design.fixed.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f);

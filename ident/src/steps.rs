@@ -1,0 +1,69 @@
+//! Designs made again and again with little changed between them.
+//!
+//! What it is: how a target's design came about the last time, effect by effect. An effect that stands as it stood, on columns that
+//! stand as they stood, is not asked again; where only some columns are new, its operator acts on those alone.
+//! What can go wrong: nothing that a design made afresh would not show: columns are the same only when they are one piece of memory.
+//! Units: those of the columns.
+//! Reference: memoisation, Michie 1968, Nature 218:19.
+
+use crate::context::Context;
+use crate::design::TargetDesign;
+use crate::hypothesis::Placed;
+use std::sync::Arc;
+
+/// How one target's design came about.
+#[derive(Default)]
+pub(crate) struct Steps(Vec<Step>);
+
+struct Step {
+    position: usize,
+    placed: Placed,
+    before: TargetDesign,
+    after: TargetDesign,
+}
+
+impl Step {
+    fn is_of(&self, position: usize, placed: &Placed) -> bool {
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        self.position == position
+            && self.placed.effect.id() == placed.effect.id()
+            && self.placed.instance == placed.instance
+            && self.placed.shape.len() == placed.shape.len()
+            && self.placed.shape.iter().zip(&placed.shape).all(same)
+    }
+}
+
+impl Steps {
+    /// The effects of a hypothesis that touch the design's target, applied in causal order.
+    pub(crate) fn apply(&mut self, context: &Context, placed: &[Placed], mut design: TargetDesign) -> TargetDesign {
+        let mut order: Vec<usize> = (0..placed.len()).filter(|i| placed[*i].instance.touches(design.name)).collect();
+        order.sort_by_key(|i| placed[*i].effect.stage());
+        let mut last = std::mem::take(&mut self.0);
+        for i in order {
+            let p = &placed[i];
+            let known = last.iter().position(|s| s.is_of(i, p)).map(|k| last.swap_remove(k));
+            if let Some(step) = known.as_ref().filter(|s| stands(&s.before, &design)) {
+                design = step.after.clone();
+                design.mapped.clear();
+                self.0.extend(known);
+                continue;
+            }
+            let before = design.clone();
+            design.mapped = known.map_or_else(Vec::new, |s| s.after.mapped);
+            let of_before = design.mapped.len();
+            p.effect.apply(context, &p.instance, &p.shape, i, &mut design);
+            design.mapped.drain(..of_before);
+            self.0.push(Step { position: i, placed: p.clone(), before, after: design.clone() });
+            design.mapped.clear();
+        }
+        design
+    }
+}
+
+/// Whether two designs are one.
+fn stands(a: &TargetDesign, b: &TargetDesign) -> bool {
+    a.columns.len() == b.columns.len()
+        && a.columns.iter().zip(&b.columns).all(|(a, b)| a.label == b.label && Arc::ptr_eq(&a.values, &b.values))
+        && a.fixed == b.fixed
+        && a.extra_variance == b.extra_variance
+}
