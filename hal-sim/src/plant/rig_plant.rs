@@ -12,7 +12,7 @@ use super::limiter::LimiterState;
 use super::parts::Parts;
 use super::powerplant::{PlantBlock, PlantLevers, PlantState, Powerplant, STEPS_PER_MS};
 use super::room_air::Draught;
-use super::shaft::Shaft;
+use super::shaft::{Acting, Shaft};
 use super::thermal::ThermalState;
 use crate::noise::{Coloured, Source, Stream};
 use crate::sensor::BackEmf;
@@ -145,9 +145,9 @@ impl RigPlant {
     }
 
     /// What turns the rotor for the rest of this millisecond.
-    fn shaft(&self) -> Shaft {
+    fn shaft(&self, dt_s: f64) -> Shaft {
         let (s, d, l) = (&self.slow, &self.drive, &self.levers);
-        Shaft {
+        let acting = Acting {
             kt: s.kt,
             emf_free_v: d.emf_free_v,
             per_ohm: d.per_ohm,
@@ -160,24 +160,27 @@ impl RigPlant {
             extra_nm: l.drag_nm,
             extra_nms: l.drag_nms,
             seen_share: l.drag_share,
-        }
+        };
+        Shaft::new(acting, dt_s)
     }
 
     /// The nine steps that are left of a millisecond at a steady duty.
-    fn rest_of_block<const DRAGS: bool>(&mut self, dt_s: f64, duty: f64, out: &mut PlantBlock) {
-        let shaft = self.shaft();
+    fn rest_of_block(&mut self, dt_s: f64, duty: f64, out: &mut PlantBlock) {
+        let shaft = self.shaft(dt_s);
         let (mut w, mut motor_a, mut supply_a, mut charge_as) = (self.speed, self.motor_a, self.supply_a, self.charge_as);
+        let mut elapsed_s = self.elapsed_s;
         for i in 1..STEPS_PER_MS {
-            let (next, acceleration) = shaft.turn::<DRAGS>(w, dt_s);
+            let (next, gained) = shaft.turn(w);
             w = next;
             motor_a = shaft.motor_current(next);
             supply_a = duty * motor_a + ESC_IDLE_A;
             charge_as += supply_a * dt_s;
-            self.elapsed_s += dt_s;
+            elapsed_s += dt_s;
             out.rpm[i] = next * RPM_PER_RAD_S;
-            (out.thrust_n[i], out.torque_nm[i]) = shaft.reaction(next, acceleration);
+            (out.thrust_n[i], out.torque_nm[i]) = shaft.reaction(next, gained);
         }
         (self.speed, self.motor_a, self.supply_a, self.charge_as) = (w, motor_a, supply_a, charge_as);
+        self.elapsed_s = elapsed_s;
     }
 
     /// State of the outside at the speed, torque and currents of now.
@@ -223,13 +226,13 @@ impl Powerplant for RigPlant {
         self.steps += 1;
         self.elapsed_s += dt_s;
 
-        let shaft = self.shaft();
-        let (next, acceleration) = shaft.turn::<true>(self.speed, dt_s);
+        let shaft = self.shaft(dt_s);
+        let (next, gained) = shaft.turn(self.speed);
         self.speed = next;
         self.motor_a = shaft.motor_current(next);
         self.supply_a = duty * self.motor_a + ESC_IDLE_A;
         self.charge_as += self.supply_a * dt_s;
-        let (thrust_n, torque_nm) = shaft.reaction(next, acceleration);
+        let (thrust_n, torque_nm) = shaft.reaction(next, gained);
         self.state(thrust_n, torque_nm)
     }
 
@@ -246,11 +249,7 @@ impl Powerplant for RigPlant {
         if duty != self.drive.duty {
             self.drive = self.driving(duty);
         }
-        if self.levers.drag_nms == 0.0 {
-            self.rest_of_block::<false>(dt_s, duty, out);
-        } else {
-            self.rest_of_block::<true>(dt_s, duty, out);
-        }
+        self.rest_of_block(dt_s, duty, out);
         self.steps += STEPS_PER_MS as u32 - 1;
         out.temp_c = [self.thermal.temperature_c; STEPS_PER_MS];
         out.last = self.state(out.thrust_n[STEPS_PER_MS - 1], out.torque_nm[STEPS_PER_MS - 1]);
@@ -363,7 +362,7 @@ mod tests {
             w = s.rpm / RPM_PER_RAD_S;
             given += 11.5 * s.current_a * dt;
             let motor_a = (s.current_a - ESC_IDLE_A) / duty;
-            let air = plant.shaft().air_nm(w);
+            let air = plant.shaft(dt).air_nm(w);
             let heat = motor_a * motor_a * p.motor.resistance_ohm + s.current_a * s.current_a * 0.1 + s.voltage_v * ESC_IDLE_A;
             spent += (heat + (p.motor.friction_nm() + air) * w) * dt;
         }

@@ -5,9 +5,31 @@
 //! Units: SI.
 //! Reference: Beharie 2013 Eq. 5.11 corrected; errata 2.22-2.24 (the frame feels inertia and drag, not friction).
 
-/// Everything that acts on the shaft while duty and air stand still.
+/// What a rotor of speed w gains in a step, rad/s: s - d w - a w^2.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shaft {
+struct Gain {
+    standing: f64,
+    damping: f64,
+    air: f64,
+}
+
+impl Gain {
+    /// Gain at `w`; friction holds a resting rotor. The air's part is the longest way and the last to come in.
+    #[inline(always)]
+    fn at(&self, w: f64) -> f64 {
+        let gain = (self.standing - self.damping * w) - self.air * w * w;
+        if w > 0.0 || gain >= 0.0 { gain } else { zero() }
+    }
+
+    /// Gain of half a step: exact halves.
+    fn half(&self) -> Self {
+        Self { standing: 0.5 * self.standing, damping: 0.5 * self.damping, air: 0.5 * self.air }
+    }
+}
+
+/// What acts on the shaft, before it is brought into the form of its steps.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Acting {
     pub(super) kt: f64,
     pub(super) emf_free_v: f64,
     pub(super) per_ohm: f64,
@@ -22,47 +44,72 @@ pub(super) struct Shaft {
     pub(super) seen_share: f64,
 }
 
+/// The shaft while duty and air stand still.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shaft {
+    acting: Acting,
+    per_step_s: f64,
+    /// While current flows, over a step and over half of one.
+    driven: (Gain, Gain),
+    /// While none does.
+    coasting: (Gain, Gain),
+}
+
 impl Shaft {
+    /// For steps of `dt_s`. The winding's brake is linear in the speed, the air's square: two products a step instead of the whole
+    /// way through the current, for each step of the run waits for the one before.
+    #[inline]
+    pub(super) fn new(acting: Acting, dt_s: f64) -> Self {
+        let per_torque = acting.per_inertia * dt_s;
+        let coupling = acting.kt * acting.per_ohm;
+        let air = acting.air_k * per_torque;
+        let gain = |torque_nm: f64, brake_nms: f64| {
+            let whole = Gain { standing: torque_nm * per_torque, damping: brake_nms * per_torque, air };
+            (whole, whole.half())
+        };
+        Self {
+            acting,
+            per_step_s: 1.0 / dt_s,
+            driven: gain(coupling * acting.emf_free_v - acting.holding_nm, coupling * acting.kt + acting.drag_nms),
+            coasting: gain(-acting.holding_nm, acting.drag_nms),
+        }
+    }
+
     /// Motor current at rotor speed `w`, A; none flows back.
     #[inline]
     pub(super) fn motor_current(&self, w: f64) -> f64 {
-        or_zero((self.emf_free_v - self.kt * w) * self.per_ohm)
+        or_zero((self.acting.emf_free_v - self.acting.kt * w) * self.acting.per_ohm)
     }
 
     /// Torque of the air at `w`, N.m.
     #[inline]
     pub(super) fn air_nm(&self, w: f64) -> f64 {
-        self.air_k * w * w
+        self.acting.air_k * w * w
     }
 
-    /// Angular acceleration, rad/s^2; friction holds a resting rotor. `DRAGS`: something brakes in proportion to the speed.
-    #[inline]
-    fn acceleration<const DRAGS: bool>(&self, w: f64) -> f64 {
-        let mut net = self.kt * self.motor_current(w) - self.holding_nm;
-        if DRAGS {
-            net -= self.drag_nms * w;
-        }
-        net -= self.air_nm(w);
-        if w > 0.0 || net >= 0.0 { net * self.per_inertia } else { zero() }
+    #[inline(always)]
+    fn is_driven(&self, w: f64) -> bool {
+        self.acting.kt * w < self.acting.emf_free_v
     }
 
-    /// Speed after a step and the acceleration in it: Heun's rule, two evaluations, second order; the rotor's own time constant is
-    /// some 40 ms. Each step waits for the one before, so this chain is the run's longest.
+    /// Speed after a step and what was gained in it, rad/s: Heun's rule, two evaluations, second order; the rotor's own time constant
+    /// is some 40 ms. Each step waits for the one before, so this chain is the run's longest.
     #[inline(always)] // in the loop of steps, or its state goes through memory
-    pub(super) fn turn<const DRAGS: bool>(&self, w: f64, dt_s: f64) -> (f64, f64) {
-        let first = self.acceleration::<DRAGS>(w);
-        let second = self.acceleration::<DRAGS>(or_zero(w + first * dt_s));
-        let twice = first + second;
-        let next = or_zero(w + twice * (0.5 * dt_s)); // halving is exact
-        (next, if next > 0.0 { 0.5 * twice } else { stopped(w, dt_s) })
+    pub(super) fn turn(&self, w: f64) -> (f64, f64) {
+        let first = if self.is_driven(w) { self.driven.0.at(w) } else { coast(&self.coasting.0, w) };
+        let ahead = or_zero(w + first);
+        let half = if self.is_driven(ahead) { self.driven.1.at(ahead) } else { coast(&self.coasting.1, ahead) };
+        let next = or_zero((w + 0.5 * first) + half);
+        (next, if next > 0.0 { 0.5 * first + half } else { stopped(w) })
     }
 
-    /// Lift and torque on the arm at `w` and its `acceleration`.
+    /// Lift and torque on the arm at `w` after a step that `gained` so much.
     #[inline]
-    pub(super) fn reaction(&self, w: f64, acceleration: f64) -> (f64, f64) {
-        let extra = self.extra_nm + self.extra_nms * w;
-        let seen_drag = if w > 0.0 { self.seen_share * extra } else { 0.0 };
-        (self.thrust_k * w * w, self.air_nm(w) + seen_drag + self.inertia * acceleration)
+    pub(super) fn reaction(&self, w: f64, gained: f64) -> (f64, f64) {
+        let a = &self.acting;
+        let extra = a.extra_nm + a.extra_nms * w;
+        let seen_drag = if w > 0.0 { a.seen_share * extra } else { 0.0 };
+        (a.thrust_k * w * w, self.air_nm(w) + seen_drag + a.inertia * (gained * self.per_step_s))
     }
 }
 
@@ -78,9 +125,64 @@ fn zero() -> f64 {
     0.0
 }
 
-/// Deceleration that stops a rotor of speed `w` within a step.
+/// Gain of a rotor that no current turns: a branch that is foreseen as well.
 #[cold]
 #[inline(never)]
-fn stopped(w: f64, dt_s: f64) -> f64 {
-    -w / dt_s
+fn coast(gain: &Gain, w: f64) -> f64 {
+    gain.at(w)
+}
+
+/// What a rotor of speed `w` that comes to rest within a step gains.
+#[cold]
+#[inline(never)]
+fn stopped(w: f64) -> f64 {
+    -w
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RIG: Acting = Acting {
+        kt: 0.0165,
+        emf_free_v: 7.0,
+        per_ohm: 5.0,
+        holding_nm: 0.008,
+        drag_nms: 1.0e-6,
+        air_k: 3.0e-7,
+        per_inertia: 1.0e4,
+        inertia: 1.0e-4,
+        thrust_k: 2.0e-5,
+        extra_nm: 0.0,
+        extra_nms: 0.0,
+        seen_share: 0.0,
+    };
+
+    /// The torques one by one, as the equation of motion states them.
+    fn acceleration(a: &Acting, w: f64) -> f64 {
+        let current = ((a.emf_free_v - a.kt * w) * a.per_ohm).max(0.0);
+        let net = a.kt * current - a.holding_nm - a.drag_nms * w - a.air_k * w * w;
+        if w > 0.0 || net >= 0.0 { net * a.per_inertia } else { 0.0 }
+    }
+
+    /// Steps by gains are Heun's steps of the equation of motion: driven, coasting, across the two and to rest.
+    #[test]
+    fn a_step_is_that_of_the_equation_of_motion() {
+        let dt = 1.0e-4;
+        for (emf_free_v, from) in [(7.0, 0.0), (7.0, 300.0), (7.0, 800.0), (7.0, 424.3), (0.0, 600.0), (0.0, 3.0), (0.0, 0.0)] {
+            let acting = Acting { emf_free_v, ..RIG };
+            let shaft = Shaft::new(acting, dt);
+            let (mut w, mut want) = (from, from);
+            for step in 0..3000 {
+                let first = acceleration(&acting, want);
+                let second = acceleration(&acting, (want + first * dt).max(0.0));
+                let next = (want + 0.5 * (first + second) * dt).max(0.0);
+                let (got, gained) = shaft.turn(w);
+                assert!((got - next).abs() < 1e-9, "{emf_free_v} V, step {step}: {got} {next}");
+                assert!((w + gained - got).abs() < 1e-9, "{emf_free_v} V, step {step}: {gained}");
+                (w, want) = (got, next);
+            }
+            assert!(if emf_free_v > 0.0 { w > 250.0 } else { w < 500.0 }, "{emf_free_v} V: {w}");
+        }
+    }
 }
