@@ -75,18 +75,20 @@ impl TargetDesign {
 
     /// Lets `change` act on every column and on the known part: for gains and output operators. At most once an effect, because what
     /// came of a column is kept: the same effect with the same shapes makes the same of it.
-    pub fn map_columns(&mut self, change: impl Fn(&mut Vec<f64>)) {
+    pub fn map_columns(&mut self, change: impl Fn(&[f64]) -> Vec<f64>) {
         for column in &mut self.columns {
-            let before = column.values.clone();
-            match self.mapped.iter().find(|(known, _)| Arc::ptr_eq(known, &before)) {
-                Some((_, after)) => column.values = after.clone(),
-                None => change(Arc::make_mut(&mut column.values)),
-            }
-            self.mapped.push((before, column.values.clone()));
+            let known = self.mapped.iter().find(|(before, _)| Arc::ptr_eq(before, &column.values));
+            let after = known.map_or_else(|| Arc::new(change(&column.values)), |(_, after)| after.clone());
+            self.mapped.push((std::mem::replace(&mut column.values, after.clone()), after));
         }
         if !self.fixed.is_empty() {
-            change(&mut self.fixed);
+            self.fixed = change(&self.fixed);
         }
+    }
+
+    /// [`Self::map_columns`] for a factor on each row.
+    pub fn scale(&mut self, factor: &[f64]) {
+        self.map_columns(|column| column.iter().zip(factor).map(|(v, f)| v * f).collect());
     }
 
     /// Adds a column for an effect's amplitude.

@@ -107,7 +107,7 @@ impl<'c> Samples<'c> {
     fn gather<'d>(&self, values: &'d [f64]) -> Cow<'d, [f64]> {
         match self.stride {
             1 if self.whole => Cow::Borrowed(values),
-            n if self.whole => values.iter().copied().step_by(n).collect(),
+            n if self.whole => values.chunks(n).map(|chunk| chunk[0]).collect(),
             _ => self.chosen.iter().map(|j| values[self.target.rows[*j]]).collect(),
         }
     }

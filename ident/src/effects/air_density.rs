@@ -57,7 +57,7 @@ impl Effect for AirDensity {
         match design.relation {
             Relation::Thrust | Relation::Torque => {
                 let factor: Vec<f64> = density.iter().map(|d| (exponent * d).exp()).collect();
-                design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
+                design.scale(&factor);
             }
             Relation::Current => {
                 design.add(

@@ -79,7 +79,7 @@ impl Effect for BatteryDischarge {
             // the same power from a lower voltage
             design.add(position, 2, charge.iter().zip(&context.rpm).map(|(q, r)| q * (r / 1000.0).powi(3)).collect());
         } else if let [loss] = shape {
-            design.map_columns(|column| column.iter_mut().zip(&charge).for_each(|(v, q)| *v *= 1.0 - loss * q));
+            design.map_columns(|column| column.iter().zip(&charge).map(|(v, q)| v * (1.0 - loss * q)).collect());
         }
     }
 

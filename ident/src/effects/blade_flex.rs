@@ -71,7 +71,7 @@ impl Effect for BladeFlex {
         match design.relation {
             Relation::Thrust | Relation::Torque => {
                 let factor: Vec<f64> = context.rpm.iter().map(|r| factor(*r)).collect();
-                design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
+                design.scale(&factor);
             }
             // a lighter load: less current, more speed
             Relation::Current => {

@@ -69,7 +69,8 @@ impl Effect for ChannelFilter {
             let lag = operator::Lag::new(&context.t, *width, course);
             through_meter(context, design, |column| lag.of(column));
         } else {
-            through_meter(context, design, |column| operator::moving_average(&context.t, column, *width, course));
+            let average = operator::Average::new(&context.t, *width, course);
+            through_meter(context, design, |column| average.of(column));
         }
     }
 }

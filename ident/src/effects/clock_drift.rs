@@ -65,7 +65,7 @@ impl Effect for ClockDrift {
         let course = operator::course(&instance.form, phase);
         let t0 = context.t.first().copied().unwrap_or(0.0);
         let late = operator::Late::new(&context.t, course, |t| rate * (t - t0));
-        design.map_columns(|column| *column = late.of(column));
+        design.map_columns(|column| late.of(column));
     }
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {

@@ -52,8 +52,9 @@ impl Effect for Creep {
         let [amplitude, tau] = shape else { return };
         let lag = operator::Lag::new(&context.t, *tau, operator::Course::Line);
         design.map_columns(|column| {
-            let slow = lag.of(column);
-            column.iter_mut().zip(slow).for_each(|(v, s)| *v += amplitude * s);
+            let mut out = lag.of(column);
+            out.iter_mut().zip(column).for_each(|(s, v)| *s = v + amplitude * *s);
+            out
         });
     }
 }

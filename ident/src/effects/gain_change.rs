@@ -75,6 +75,6 @@ impl Effect for GainChange {
             (_, [change, t0]) => super::tare_shift::step(context, *t0).iter().map(|s| 1.0 + change * s).collect(),
             _ => return,
         };
-        design.map_columns(|column| column.iter_mut().zip(&factor).for_each(|(v, f)| *v *= f));
+        design.scale(&factor);
     }
 }

@@ -271,7 +271,7 @@ fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
 /// what the meter changes of the consensus.
 fn through_meter(context: &Context, design: &mut TargetDesign, meter: impl Fn(&[f64]) -> Vec<f64>) {
     if design.relation != Relation::SpeedDifference {
-        design.map_columns(|column| *column = meter(column));
+        design.map_columns(meter);
         return;
     }
     let changed = meter(&context.rpm);

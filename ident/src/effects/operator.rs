@@ -28,35 +28,58 @@ impl Course {
     }
 }
 
-/// Mean over the window that ends at each row.
-pub(crate) fn moving_average(t: &[f64], x: &[f64], window: f64, course: Course) -> Vec<f64> {
-    if window <= 0.0 || t.len() < 2 {
-        return x.to_vec();
+/// Mean over the window that ends at each row: where each window begins is worked out once for all columns.
+#[derive(Debug, Clone)]
+pub(crate) struct Average<'t> {
+    t: &'t [f64],
+    window: f64,
+    course: Course,
+    /// For each row the row before its window begins, the share of the interval after it, and that interval's length; none where the
+    /// window begins before the log.
+    begins: Vec<Option<(u32, f64, f64)>>,
+}
+
+impl<'t> Average<'t> {
+    /// Over windows of this length, s.
+    pub(crate) fn new(t: &'t [f64], window: f64, course: Course) -> Self {
+        let mut j = 0;
+        let begin = |now: &f64| {
+            let start = now - window;
+            if start < t[0] {
+                return None;
+            }
+            while j + 1 < t.len() && t[j + 1] <= start {
+                j += 1;
+            }
+            let length = (t[(j + 1).min(t.len() - 1)] - t[j]).max(1e-12);
+            Some((j as u32, (start - t[j]) / length, length))
+        };
+        let begins = if window <= 0.0 || t.len() < 2 { Vec::new() } else { t.iter().map(begin).collect() };
+        Self { t, window, course, begins }
     }
-    let mut integral = Vec::with_capacity(t.len());
-    let mut sum = 0.0;
-    integral.push(0.0);
-    for i in 1..t.len() {
-        sum += course.at(x[i - 1], x[i], 1.0).1 * (t[i] - t[i - 1]);
+
+    /// The mean of a signal.
+    pub(crate) fn of(&self, x: &[f64]) -> Vec<f64> {
+        let (t, course) = (self.t, self.course);
+        if self.begins.is_empty() {
+            return x.to_vec();
+        }
+        let mut integral = Vec::with_capacity(t.len());
+        let mut sum = 0.0;
         integral.push(sum);
+        integral.extend(t.windows(2).zip(x.windows(2)).map(|(t, x)| {
+            sum += course.at(x[0], x[1], 1.0).1 * (t[1] - t[0]);
+            sum
+        }));
+        let head = |begin: &Option<(u32, f64, f64)>, now: f64| match *begin {
+            None => x[0] * (now - self.window - t[0]),
+            Some((j, share, length)) => {
+                let j = j as usize;
+                integral[j] + course.at(x[j], x[(j + 1).min(x.len() - 1)], share).1 * length
+            }
+        };
+        integral.iter().zip(t).zip(&self.begins).map(|((i, now), begin)| (i - head(begin, *now)) / self.window).collect()
     }
-    let mut j = 0;
-    (0..t.len())
-        .map(|i| {
-            let start = t[i] - window;
-            let head = if start < t[0] {
-                x[0] * (start - t[0])
-            } else {
-                while j + 1 < t.len() && t[j + 1] <= start {
-                    j += 1;
-                }
-                let next = (j + 1).min(t.len() - 1);
-                let length = (t[next] - t[j]).max(1e-12);
-                integral[j] + course.at(x[j], x[next], (start - t[j]) / length).1 * length
-            };
-            (integral[i] - head) / window
-        })
-        .collect()
 }
 
 /// exp(-h) for a series of steps that are nearly all of one or two lengths: the last two answers are kept.
@@ -231,7 +254,7 @@ mod tests {
     fn a_ramp_is_late_by_half_the_window_by_tau_and_by_the_delay() {
         let (t, x) = ramp();
         let i = 180;
-        assert!((moving_average(&t, &x, 0.8, Course::Line)[i] - 2.0 * (t[i] - 0.4)).abs() < 1e-9);
+        assert!((Average::new(&t, 0.8, Course::Line).of(&x)[i] - 2.0 * (t[i] - 0.4)).abs() < 1e-9);
         assert!((Lag::new(&t, 0.3, Course::Line).of(&x)[i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
         assert!((Late::new(&t, Course::Line, |_| 0.27).of(&x)[i] - 2.0 * (t[i] - 0.27)).abs() < 1e-9);
         assert!((Late::new(&t, Course::Line, |_| -0.27).of(&x)[100] - 2.0 * (t[100] + 0.27)).abs() < 1e-9);
@@ -251,7 +274,7 @@ mod tests {
         let x = vec![3.5; t.len()];
         for course in [Course::Line, Course::Jump(0.3)] {
             for y in
-                [moving_average(&t, &x, 1.3, course), Lag::new(&t, 0.4, course).of(&x), Late::new(&t, course, |_| 0.9).of(&x)]
+                [Average::new(&t, 1.3, course).of(&x), Lag::new(&t, 0.4, course).of(&x), Late::new(&t, course, |_| 0.9).of(&x)]
             {
                 assert!(y.iter().all(|v| (v - 3.5).abs() < 1e-9));
             }
@@ -263,7 +286,7 @@ mod tests {
         let t: Vec<f64> = (0..6).map(f64::from).collect();
         let x = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
         // the jump comes a quarter into the third interval
-        let y = moving_average(&t, &x, 2.0, Course::Jump(0.25));
+        let y = Average::new(&t, 2.0, Course::Jump(0.25)).of(&x);
         assert!((y[3] - 0.375).abs() < 1e-12 && (y[4] - 0.875).abs() < 1e-12 && (y[5] - 1.0).abs() < 1e-12, "{y:?}");
         let y = Lag::new(&t, 0.5, Course::Jump(0.25)).of(&x);
         assert!((y[3] - (1.0 - (-1.5_f64).exp())).abs() < 1e-12);

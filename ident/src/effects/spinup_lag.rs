@@ -70,6 +70,7 @@ impl Effect for SpinupLag {
             let mut state = column.first().copied().unwrap_or(0.0);
             let mut held = state;
             let mut decays = [[operator::Decay::new(); 2]; 2];
+            let mut out = Vec::with_capacity(column.len());
             for i in 0..column.len() {
                 if i > 0 {
                     let h = (context.t[i] - context.t[i - 1]) / tau(rising[i]);
@@ -83,8 +84,9 @@ impl Effect for SpinupLag {
                     }
                     held = column[i];
                 }
-                column[i] = state;
+                out.push(state);
             }
+            out
         });
     }
 }

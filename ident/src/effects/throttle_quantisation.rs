@@ -166,42 +166,57 @@ const ANCHORED: f64 = 0.98;
 /// Depth of the tooth beside that of a pure rounding.
 const DEPTH: (f64, f64) = (0.7, 1.3);
 
-/// Departures of the levels from the static curve, less all that a cubic or a shift of the pulse explains.
-struct Departures<'l> {
-    levels: &'l [(f64, f64, f64)],
-    /// Orthonormal columns: powers of the pulse, slope of the curve.
-    nuisances: Vec<Vec<f64>>,
-    rest: Vec<f64>,
+/// Most nuisances: four powers of the pulse, and the slope of the curve.
+const NUISANCES: usize = 5;
+
+/// Departures of the levels from the static curve, less all that a cubic or a shift of the pulse explains. Thousands of saw-teeth are
+/// held against them, so what each level has to say stands together.
+struct Departures(Vec<Level>);
+
+struct Level {
+    pulse: f64,
+    slope: f64,
+    /// Orthonormal columns, zero beyond their number.
+    nuisances: [f64; NUISANCES],
+    rest: f64,
 }
 
-impl<'l> Departures<'l> {
-    fn new(levels: &'l [(f64, f64, f64)]) -> Self {
-        let mut out = Self { levels, nuisances: Vec::new(), rest: Vec::new() };
+impl Departures {
+    fn new(levels: &[(f64, f64, f64)]) -> Self {
         let middle = levels.get(levels.len() / 2).map_or(1500.0, |l| l.0);
-        for power in 0..=3 {
-            out.add_nuisance(levels.iter().map(|l| ((l.0 - middle) / 500.0).powi(power)).collect());
+        let power = |k: i32| levels.iter().map(|l| ((l.0 - middle) / 500.0).powi(k)).collect::<Vec<f64>>();
+        let mut nuisances: Vec<Vec<f64>> = Vec::new();
+        for mut column in (0..=3).map(power).chain([levels.iter().map(|l| l.1).collect()]) {
+            let whole = norm(&column);
+            nuisances.iter().for_each(|q| remove(&mut column, q));
+            let left = norm(&column);
+            if left > 1e-6 * whole {
+                column.iter_mut().for_each(|v| *v /= left);
+                nuisances.push(column);
+            }
         }
-        out.add_nuisance(levels.iter().map(|l| l.1).collect());
-        out.rest = levels.iter().map(|l| l.2).collect();
-        out.nuisances.iter().for_each(|q| remove(&mut out.rest, q));
-        out
-    }
-
-    fn add_nuisance(&mut self, mut column: Vec<f64>) {
-        let whole = norm(&column);
-        self.nuisances.iter().for_each(|q| remove(&mut column, q));
-        let left = norm(&column);
-        if left > 1e-6 * whole {
-            column.iter_mut().for_each(|v| *v /= left);
-            self.nuisances.push(column);
-        }
+        let mut rest: Vec<f64> = levels.iter().map(|l| l.2).collect();
+        nuisances.iter().for_each(|q| remove(&mut rest, q));
+        let at = |i: usize| std::array::from_fn(|k| nuisances.get(k).map_or(0.0, |q| q[i]));
+        let level = |(i, (pulse, slope, _)): (usize, &(f64, f64, f64))| Level {
+            pulse: *pulse,
+            slope: *slope,
+            nuisances: at(i),
+            rest: rest[i],
+        };
+        Self(levels.iter().enumerate().map(level).collect())
     }
 
     /// Squared departure that a saw-tooth of about the depth of a rounding takes away.
     fn explained(&self, step: f64, offset: f64) -> f64 {
-        let x: Vec<f64> = self.levels.iter().map(|(p, slope, _)| slope * step * tooth(*p, step, offset)).collect();
-        let taken: f64 = self.nuisances.iter().map(|q| dot(&x, q).powi(2)).sum();
-        let (along, own) = (dot(&x, &self.rest), dot(&x, &x) - taken);
+        let (mut with_nuisances, mut along, mut square) = ([0.0; NUISANCES], 0.0, 0.0);
+        for level in &self.0 {
+            let x = level.slope * step * tooth(level.pulse, step, offset);
+            with_nuisances.iter_mut().zip(&level.nuisances).for_each(|(sum, q)| *sum += x * q);
+            along += x * level.rest;
+            square += x * x;
+        }
+        let own = square - with_nuisances.iter().map(|s| s * s).sum::<f64>();
         if own <= 1e-12 {
             return 0.0;
         }
@@ -233,7 +248,7 @@ struct Tooth {
 
 impl Tooth {
     /// Takes another step and offset where they explain more.
-    fn improve(&mut self, departures: &Departures<'_>, step: f64, offset: f64) {
+    fn improve(&mut self, departures: &Departures, step: f64, offset: f64) {
         let score = departures.explained(step, offset);
         if score > self.score {
             *self = Self { score, step, offset };
