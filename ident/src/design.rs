@@ -76,13 +76,28 @@ impl TargetDesign {
     /// Lets `change` act on every column and on the known part: for gains and output operators. At most once an effect, because what
     /// came of a column is kept: the same effect with the same shapes makes the same of it.
     pub fn map_columns(&mut self, change: impl Fn(&[f64]) -> Vec<f64>) {
-        for column in &mut self.columns {
-            let known = self.mapped.iter().find(|(before, _)| Arc::ptr_eq(before, &column.values));
-            let after = known.map_or_else(|| Arc::new(change(&column.values)), |(_, after)| after.clone());
-            self.mapped.push((std::mem::replace(&mut column.values, after.clone()), after));
+        self.map_together(|columns| columns.iter().map(|c| change(c)).collect());
+    }
+
+    /// The same for an operator that is quicker on many columns than on one after the other.
+    pub fn map_together(&mut self, change: impl Fn(&[&[f64]]) -> Vec<Vec<f64>>) {
+        let is_known = |column: &Column| self.mapped.iter().any(|(before, _)| Arc::ptr_eq(before, &column.values));
+        let new: Vec<Values> = self.columns.iter().filter(|c| !is_known(c)).map(|c| c.values.clone()).collect();
+        let known_part = (!self.fixed.is_empty()).then_some(self.fixed.as_slice());
+        let mut changed = change(&new.iter().map(|v| v.as_slice()).chain(known_part).collect::<Vec<&[f64]>>());
+        if known_part.is_some() {
+            self.fixed = changed.pop().unwrap_or_default();
         }
-        if !self.fixed.is_empty() {
-            self.fixed = change(&self.fixed);
+        let old = self.mapped.len();
+        self.mapped.extend(new.into_iter().zip(changed.into_iter().map(Arc::new)));
+        for column in &mut self.columns {
+            if let Some(k) = self.mapped.iter().position(|(before, _)| Arc::ptr_eq(before, &column.values)) {
+                let pair = self.mapped[k].clone();
+                column.values = pair.1.clone();
+                if k < old {
+                    self.mapped.push(pair); // what was known stays known
+                }
+            }
         }
     }
 

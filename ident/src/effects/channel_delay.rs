@@ -59,7 +59,7 @@ impl Effect for ChannelDelay {
         let [delay, phase @ ..] = shape else { return };
         let course = operator::course(&instance.form, phase);
         let late = operator::Late::new(&context.t, course, |_| *delay);
-        through_meter(context, design, |column| late.of(column));
+        through_meter(context, design, |columns| columns.iter().map(|c| late.of(c)).collect());
     }
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {

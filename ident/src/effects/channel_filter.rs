@@ -67,10 +67,10 @@ impl Effect for ChannelFilter {
         let course = operator::course(&instance.form, phase);
         if is_lag(instance) {
             let lag = operator::Lag::new(&context.t, *width, course);
-            through_meter(context, design, |column| lag.of(column));
+            through_meter(context, design, |columns| lag.of(columns));
         } else {
             let average = operator::Average::new(&context.t, *width, course);
-            through_meter(context, design, |column| average.of(column));
+            through_meter(context, design, |columns| columns.iter().map(|c| average.of(c)).collect());
         }
     }
 }

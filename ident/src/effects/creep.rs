@@ -51,9 +51,11 @@ impl Effect for Creep {
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         let [amplitude, tau] = shape else { return };
         let lag = operator::Lag::new(&context.t, *tau, operator::Course::Line);
-        design.map_columns(|column| {
-            let mut out = lag.of(column);
-            out.iter_mut().zip(column).for_each(|(s, v)| *s = v + amplitude * *s);
+        design.map_together(|columns| {
+            let mut out = lag.of(columns);
+            out.iter_mut().zip(columns).for_each(|(slow, column)| {
+                slow.iter_mut().zip(column.iter()).for_each(|(s, v)| *s = v + amplitude * *s);
+            });
             out
         });
     }

@@ -269,12 +269,12 @@ fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
 
 /// What a meter makes of its channel: every column passes through it. The difference of a speed channel from the consensus is
 /// what the meter changes of the consensus.
-fn through_meter(context: &Context, design: &mut TargetDesign, meter: impl Fn(&[f64]) -> Vec<f64>) {
+fn through_meter(context: &Context, design: &mut TargetDesign, meter: impl Fn(&[&[f64]]) -> Vec<Vec<f64>>) {
     if design.relation != Relation::SpeedDifference {
-        design.map_columns(meter);
+        design.map_together(meter);
         return;
     }
-    let changed = meter(&context.rpm);
+    let changed = meter(&[&context.rpm]).concat();
     design.fixed.resize(context.len(), 0.0);
     design.fixed.iter_mut().zip(changed.iter().zip(&context.rpm)).for_each(|(f, (c, r))| *f += c - r);
 }

@@ -104,16 +104,37 @@ impl Decay {
     }
 }
 
-/// First-order lag, exact for a signal of a given course: what it does over each interval is worked out once for all columns.
+/// What a first-order lag does from one row to the next.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Interval {
+    /// Its input runs straight, or jumps at a known instant: what is left of the state, and the weight of the change of the input.
+    Change(f64, f64),
+    /// Its input jumps at once: what is left of the state's distance from the input at the jump, and of that after it.
+    Jump(f64, f64),
+}
+
+impl Interval {
+    /// The state after an interval over which the input goes from one value to another.
+    fn next(self, state: f64, from: f64, to: f64) -> f64 {
+        match self {
+            Self::Change(left, change) => left * state + (1.0 - left) * from + change * (to - from),
+            Self::Jump(early, late) => {
+                let before = from + (state - from) * early;
+                to + (before - to) * late
+            }
+        }
+    }
+}
+
+/// A lag whose intervals are worked out once for all signals.
 #[derive(Debug, Clone)]
 pub(crate) struct Lag {
-    /// Before each row but the first: what is left of the state, and the weight of the change over the interval; none where the lag
-    /// is too short to be one.
-    intervals: Vec<(f64, f64)>,
+    /// From each row to the next; none where the lag is too short to be one.
+    intervals: Vec<Interval>,
 }
 
 impl Lag {
-    /// A lag with time constant `tau`.
+    /// A lag with time constant `tau`, exact for a signal of the given course.
     pub(crate) fn new(t: &[f64], tau: f64, course: Course) -> Self {
         if tau <= 1e-9 {
             return Self { intervals: Vec::new() };
@@ -122,39 +143,54 @@ impl Lag {
         let interval = |w: &[f64]| {
             let h = (w[1] - w[0]) / tau;
             let e = whole.of(h);
-            match course {
-                Course::Line => (e, weight_of_ramp(h, e)),
-                Course::Jump(phase) if phase >= 1.0 => (e, 0.0),
-                Course::Jump(phase) => (e, 1.0 - part.of(h * (1.0 - phase))),
-            }
+            let change = match course {
+                Course::Line => weight_of_ramp(h, e),
+                Course::Jump(phase) if phase >= 1.0 => 0.0,
+                Course::Jump(phase) => 1.0 - part.of(h * (1.0 - phase)),
+            };
+            Interval::Change(e, change)
         };
         Self { intervals: t.windows(2).map(interval).collect() }
     }
 
-    /// What the lag makes of a signal.
-    pub(crate) fn of(&self, x: &[f64]) -> Vec<f64> {
+    /// A lag that does this from each row to the next.
+    pub(crate) fn of_intervals(intervals: Vec<Interval>) -> Self {
+        Self { intervals }
+    }
+
+    /// What the lag makes of signals: four at a time, because each state waits for the one before it.
+    pub(crate) fn of(&self, signals: &[&[f64]]) -> Vec<Vec<f64>> {
         if self.intervals.is_empty() {
-            return x.to_vec();
+            return signals.iter().map(|x| x.to_vec()).collect();
         }
-        let mut state = x[0];
-        let mut out = Vec::with_capacity(x.len());
-        out.push(state);
-        out.extend(x.windows(2).zip(&self.intervals).map(|(w, (left, change))| {
-            state = left * state + (1.0 - left) * w[0] + change * (w[1] - w[0]);
-            state
-        }));
+        let some = |four: &[&[f64]]| match *four {
+            [a] => self.side_by_side([a]).to_vec(),
+            [a, b] => self.side_by_side([a, b]).to_vec(),
+            [a, b, c] => self.side_by_side([a, b, c]).to_vec(),
+            [a, b, c, d] => self.side_by_side([a, b, c, d]).to_vec(),
+            _ => Vec::new(),
+        };
+        signals.chunks(4).flat_map(some).collect()
+    }
+
+    fn side_by_side<const N: usize>(&self, signals: [&[f64]; N]) -> [Vec<f64>; N] {
+        let signals = signals.map(|x| &x[..=self.intervals.len()]);
+        let mut out = signals.map(|x| Vec::with_capacity(x.len()));
+        let mut states = signals.map(|x| x[0]);
+        out.iter_mut().zip(states).for_each(|(out, state)| out.push(state));
+        for (i, interval) in self.intervals.iter().enumerate() {
+            for k in 0..N {
+                states[k] = interval.next(states[k], signals[k][i], signals[k][i + 1]);
+                out[k].push(states[k]);
+            }
+        }
         out
     }
 }
 
-/// A first-order lag's state after an interval of `h` time constants, `decay` = exp(-h), over which its input goes from `from` to `to` in a
-/// straight line: u(s) = from + (to - from) s/h.
-pub(crate) fn along_a_line(from: f64, to: f64, state: f64, h: f64, decay: f64) -> f64 {
-    decay * state + (1.0 - decay) * from + weight_of_ramp(h, decay) * (to - from)
-}
-
-/// Weight of the change of the input in [`along_a_line`].
-fn weight_of_ramp(h: f64, decay: f64) -> f64 {
+/// Weight of the change of a lag's input over an interval of `h` time constants, `decay` = exp(-h), over which the input goes in a straight
+/// line: u(s) = from + (to - from) s/h.
+pub(crate) fn weight_of_ramp(h: f64, decay: f64) -> f64 {
     if h > 1e-6 { 1.0 - (1.0 - decay) / h } else { h / 2.0 }
 }
 
@@ -255,9 +291,21 @@ mod tests {
         let (t, x) = ramp();
         let i = 180;
         assert!((Average::new(&t, 0.8, Course::Line).of(&x)[i] - 2.0 * (t[i] - 0.4)).abs() < 1e-9);
-        assert!((Lag::new(&t, 0.3, Course::Line).of(&x)[i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
+        assert!((Lag::new(&t, 0.3, Course::Line).of(&[&x])[0][i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
         assert!((Late::new(&t, Course::Line, |_| 0.27).of(&x)[i] - 2.0 * (t[i] - 0.27)).abs() < 1e-9);
         assert!((Late::new(&t, Course::Line, |_| -0.27).of(&x)[100] - 2.0 * (t[100] + 0.27)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn signals_side_by_side_are_what_each_is_alone() {
+        let (t, x) = ramp();
+        let signals: Vec<Vec<f64>> = (0..6).map(|k| x.iter().map(|v| (v * f64::from(k)).sin()).collect()).collect();
+        let all: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();
+        let lag = Lag::new(&t, 0.3, Course::Line);
+        let alone: Vec<Vec<f64>> = all.iter().flat_map(|x| lag.of(&[x])).collect();
+        for n in 0..=6 {
+            assert_eq!(lag.of(&all[..n]), alone[..n], "{n}");
+        }
     }
 
     #[test]
@@ -273,9 +321,11 @@ mod tests {
         let (t, _) = ramp();
         let x = vec![3.5; t.len()];
         for course in [Course::Line, Course::Jump(0.3)] {
-            for y in
-                [Average::new(&t, 1.3, course).of(&x), Lag::new(&t, 0.4, course).of(&x), Late::new(&t, course, |_| 0.9).of(&x)]
-            {
+            for y in [
+                Average::new(&t, 1.3, course).of(&x),
+                Lag::new(&t, 0.4, course).of(&[&x]).remove(0),
+                Late::new(&t, course, |_| 0.9).of(&x),
+            ] {
                 assert!(y.iter().all(|v| (v - 3.5).abs() < 1e-9));
             }
         }
@@ -288,7 +338,7 @@ mod tests {
         // the jump comes a quarter into the third interval
         let y = Average::new(&t, 2.0, Course::Jump(0.25)).of(&x);
         assert!((y[3] - 0.375).abs() < 1e-12 && (y[4] - 0.875).abs() < 1e-12 && (y[5] - 1.0).abs() < 1e-12, "{y:?}");
-        let y = Lag::new(&t, 0.5, Course::Jump(0.25)).of(&x);
+        let y = Lag::new(&t, 0.5, Course::Jump(0.25)).of(&[&x]).remove(0);
         assert!((y[3] - (1.0 - (-1.5_f64).exp())).abs() < 1e-12);
         let y = Late::new(&t, Course::Jump(0.25), |_| 0.5).of(&x);
         assert_eq!(y[3], 1.0);

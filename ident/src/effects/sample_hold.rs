@@ -64,7 +64,7 @@ impl Effect for SampleHold {
         for i in updates(target) {
             fresh[i] = true;
         }
-        through_meter(context, design, |column| {
+        let held = |column: &&[f64]| -> Vec<f64> {
             let mut value = column.first().copied().unwrap_or(0.0);
             let hold = |(v, fresh): (&f64, &bool)| {
                 if *fresh {
@@ -73,7 +73,8 @@ impl Effect for SampleHold {
                 value
             };
             column.iter().zip(&fresh).map(hold).collect()
-        });
+        };
+        through_meter(context, design, |columns| columns.iter().map(held).collect());
     }
 
     fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {

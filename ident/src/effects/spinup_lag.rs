@@ -66,27 +66,19 @@ impl Effect for SpinupLag {
             state = p + (state - p) * decays[usize::from(up_now)].of((t - last) / tau(up_now));
             last = *t;
         }
-        design.map_columns(|column| {
-            let mut state = column.first().copied().unwrap_or(0.0);
-            let mut held = state;
-            let mut decays = [[operator::Decay::new(); 2]; 2];
-            let mut out = Vec::with_capacity(column.len());
-            for i in 0..column.len() {
-                if i > 0 {
-                    let h = (context.t[i] - context.t[i - 1]) / tau(rising[i]);
-                    let [early, late] = &mut decays[usize::from(rising[i])];
-                    if (pulse[i] - pulse[i - 1]).abs() > CALM_US {
-                        // a command jumps somewhere between two rows
-                        let before = held + (state - held) * early.of(h * phase);
-                        state = column[i] + (before - column[i]) * late.of(h * (1.0 - phase));
-                    } else {
-                        state = operator::along_a_line(held, column[i], state, h, late.of(h));
-                    }
-                    held = column[i];
-                }
-                out.push(state);
+        let mut decays = [[operator::Decay::new(); 2]; 2];
+        let interval = |i: usize| {
+            let h = (context.t[i] - context.t[i - 1]) / tau(rising[i]);
+            let [early, late] = &mut decays[usize::from(rising[i])];
+            if (pulse[i] - pulse[i - 1]).abs() > CALM_US {
+                // a command jumps somewhere between two rows
+                operator::Interval::Jump(early.of(h * phase), late.of(h * (1.0 - phase)))
+            } else {
+                let left = late.of(h);
+                operator::Interval::Change(left, operator::weight_of_ramp(h, left))
             }
-            out
-        });
+        };
+        let lag = operator::Lag::of_intervals((1..context.len()).map(interval).collect());
+        design.map_together(|columns| lag.of(columns));
     }
 }
