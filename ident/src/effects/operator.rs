@@ -163,12 +163,14 @@ impl Lag {
         if self.intervals.is_empty() {
             return signals.iter().map(|x| x.to_vec()).collect();
         }
-        let some = |four: &[&[f64]]| match *four {
-            [a] => self.side_by_side([a]).to_vec(),
-            [a, b] => self.side_by_side([a, b]).to_vec(),
-            [a, b, c] => self.side_by_side([a, b, c]).to_vec(),
-            [a, b, c, d] => self.side_by_side([a, b, c, d]).to_vec(),
-            _ => Vec::new(),
+        let some = |four: &[&[f64]]| -> Vec<Vec<f64>> {
+            match *four {
+                [a] => self.side_by_side([a]).into(),
+                [a, b] => self.side_by_side([a, b]).into(),
+                [a, b, c] => self.side_by_side([a, b, c]).into(),
+                [a, b, c, d] => self.side_by_side([a, b, c, d]).into(),
+                _ => Vec::new(),
+            }
         };
         signals.chunks(4).flat_map(some).collect()
     }
