@@ -6,7 +6,7 @@
 //! Units: deg, deviation from 180.
 //! Reference: Beharie 2013, section 5.7.1 (Hall sensor with two magnets).
 
-use super::speed_channel::{against_the_others, difference, instances, shares};
+use super::speed_channel::{HELD, against_the_others, difference, held, instances};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
@@ -44,8 +44,7 @@ impl Effect for AlternatingPeriod {
         instances(context, "")
             .into_iter()
             .filter(|i| {
-                difference(context, i)
-                    .is_some_and(|t| kurtosis(&shares(context, t).map(|s| s.1).collect::<Vec<_>>()) < TWO_VALUED)
+                difference(context, i).is_some_and(|t| kurtosis(&held(context, t).map(|s| s.1).collect::<Vec<_>>()) < TWO_VALUED)
             })
             .collect()
     }
@@ -61,7 +60,7 @@ impl Effect for AlternatingPeriod {
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
         let (Relation::SpeedDifference, Some(target)) = (design.relation, difference(context, instance)) else { return };
         let mut column = vec![0.0; context.len()];
-        for (i, share) in shares(context, target) {
+        for (i, share) in held(context, target) {
             column[i] = (share - 1.0).signum() * context.rpm[i] / 180.0;
         }
         design.add(position, 0, column);
@@ -69,8 +68,8 @@ impl Effect for AlternatingPeriod {
 
     fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
         if let (Some(target), Some(angle)) = (difference(context, instance), fitted.first_mut()) {
-            let departures = against_the_others(context, target);
-            let mean = departures.iter().map(|d| d.abs()).sum::<f64>() / departures.len().max(1) as f64;
+            let departures = against_the_others(context, target, HELD);
+            let mean = departures.iter().map(|d| d.0.abs()).sum::<f64>() / departures.len().max(1) as f64;
             angle.value = 180.0 * mean;
         }
         fitted

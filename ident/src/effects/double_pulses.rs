@@ -7,7 +7,7 @@
 //! Units: 1.
 //! Reference: Beharie 2013, section 5.7.1 (edges that ring).
 
-use super::speed_channel::{GROSS, LEAST, difference, gross, instances, pulse_probability, shares};
+use super::speed_channel::{LEAST, difference, gross, instances, is_scattered, pulse_probability};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
@@ -44,9 +44,7 @@ impl Effect for DoublePulses {
         let mut out = instances(context, "");
         for instance in instances(context, SCATTERED) {
             let Some(target) = difference(context, &instance) else { continue };
-            let (off, all) = shares(context, target)
-                .fold((0usize, 0usize), |(o, n), (_, s)| (o + usize::from(SIGN * (s - 1.0) > GROSS), n + 1));
-            if off >= 2 && off * 2 < all {
+            if is_scattered(context, target, SIGN) {
                 out.retain(|i| i.channels != instance.channels);
                 out.push(instance);
             }

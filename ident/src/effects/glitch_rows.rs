@@ -17,7 +17,7 @@ pub(crate) struct GlitchRows;
 /// Departure from the running median, in robust standard deviations, from which a row is absurd.
 const FAR: f64 = 15.0;
 /// The same as a share of the channel's span.
-const WIDE: f64 = 0.05;
+const WIDE: f64 = 0.02;
 /// Readings of a speed within this share of its neighbours' are lost or doubled pulses, not glitches.
 const PULSES: (f64, f64) = (0.3, 2.5);
 
@@ -79,11 +79,11 @@ impl Effect for GlitchRows {
     }
 }
 
-/// Rows of a channel about which nothing is claimed: its glitches, where they are two at the least and fewer than one in fifty.
+/// Rows of a channel about which nothing is claimed: its glitches, where they are two at the least and fewer than one in twenty.
 /// The log alone decides, so that they are the same before and after, whatever is named.
 pub(crate) fn unclaimed(context: &Context, target: &Target) -> Vec<usize> {
     let found = glitches(context, target);
-    let few = !target.relation.is_evidence() && found.len() >= 2 && found.len() * 50 < target.rows.len();
+    let few = !target.relation.is_evidence() && found.len() >= 2 && found.len() * 20 < target.rows.len();
     if few { found.into_iter().map(|g| g.0).collect() } else { Vec::new() }
 }
 

@@ -86,31 +86,69 @@ pub(super) fn hinge_at_top(context: &Context, fitted: &[Estimate]) -> f64 {
     (value("slope") * over + value("bend") * over * over / onset.max(1.0)) / top
 }
 
-/// Rows of a difference target on which the rotor turns at a speed that it has had for a few rows (a late reading is no lost
-/// pulse), with the reading as a share of the consensus.
-pub(super) fn shares<'c>(context: &'c Context, target: &'c Target) -> impl Iterator<Item = (usize, f64)> + 'c {
-    let held = |i: usize| {
+/// A speed channel's reading on one row, beside the consensus.
+#[derive(Debug, Clone, Copy)]
+struct Reading {
+    /// Row of the log.
+    row: usize,
+    /// Reading over the consensus.
+    share: f64,
+    /// Share of its speed by which the rotor changed within the last rows: a late reading is off by no more.
+    change: f64,
+}
+
+impl Reading {
+    /// Whether the reading is grossly too low (`sign` -1) or too high (+1): three times what lateness could explain.
+    fn is_gross(&self, sign: f64) -> bool {
+        sign * (self.share - 1.0) > GROSS.max(LATE * self.change)
+    }
+}
+
+/// Rows of a difference target on which the rotor turns and has not changed its speed by more than [`STEADY`] within a few rows.
+fn readings<'c>(context: &'c Context, target: &'c Target) -> impl Iterator<Item = Reading> + 'c {
+    let change = |i: usize| {
         let now = context.rpm[i];
-        now > STANDSTILL && (1..=4).all(|back| (context.rpm[i.saturating_sub(back)] - now).abs() < 0.01 * now)
+        (1..=4).map(|back| (context.rpm[i.saturating_sub(back)] - now).abs()).fold(0.0, f64::max) / now.max(1.0)
     };
     // a reading that repeats the last one to the last digit is an old one
     let reading = |k: usize| target.y[k] + context.rpm[target.rows[k]];
     let fresh = move |k: usize| k == 0 || (reading(k) - reading(k - 1)).abs() > 1e-6;
     let rows = target.rows.iter().zip(&target.y).enumerate();
-    rows.filter(move |(k, (i, _))| held(**i) && fresh(*k)).map(|(_, (i, d))| (*i, 1.0 + d / context.rpm[*i]))
+    let turning = rows.filter(move |(k, (i, _))| context.rpm[**i] > STANDSTILL && fresh(*k));
+    turning
+        .map(move |(_, (i, d))| Reading { row: *i, share: 1.0 + d / context.rpm[*i], change: change(*i) })
+        .filter(|r| r.change < STEADY)
 }
 
-/// Share by which a reading must be off to be counted as one pulse too few or too many: three times what the speed itself may
-/// have changed by since the last row.
-pub(super) const GROSS: f64 = 0.03;
+/// Those of them on which the speed has changed by less than a hundredth: row, and reading over the consensus.
+pub(super) fn held<'c>(context: &'c Context, target: &'c Target) -> impl Iterator<Item = (usize, f64)> + 'c {
+    readings(context, target).filter(|r| r.change < HELD).map(|r| (r.row, r.share))
+}
+
+/// Change within a few rows below which the speed counts as held.
+pub(super) const HELD: f64 = 0.01;
+
+/// Largest change of the speed within a few rows at which a channel is compared with the others.
+const STEADY: f64 = 0.1;
+
+/// Times that change by which a reading must be off: a late one is off by the change itself.
+const LATE: f64 = 3.0;
+
+/// Share by which a reading must be off at least to be counted as one pulse too few or too many.
+const GROSS: f64 = 0.03;
+
+/// Whether single readings, two at the least and fewer than half, are grossly too low (`sign` -1) or too high (+1).
+pub(super) fn is_scattered(context: &Context, target: &Target, sign: f64) -> bool {
+    let count = |(off, all), r: Reading| (off + usize::from(r.is_gross(sign)), all + 1);
+    let (off, all) = readings(context, target).fold((0usize, 0usize), count);
+    off >= 2 && off * 2 < all
+}
 
 /// 1 on rows that read grossly too low (`sign` -1) or too high (+1), 0 elsewhere.
 pub(super) fn gross(context: &Context, target: &Target, sign: f64) -> Vec<f64> {
     let mut out = vec![0.0; context.len()];
-    for (i, share) in shares(context, target) {
-        if sign * (share - 1.0) > GROSS {
-            out[i] = 1.0;
-        }
+    for reading in readings(context, target).filter(|r| r.is_gross(sign)) {
+        out[reading.row] = 1.0;
     }
     out
 }
@@ -126,21 +164,25 @@ const STRUCK_LEAST: f64 = 0.002;
 /// is that of a pulse whether a window holds many or one; where each loss halves the reading at every speed single periods are timed,
 /// and the share of such readings is the probability.
 pub(super) fn pulse_probability(context: &Context, target: &Target, sign: f64) -> Estimate {
-    let departures: Vec<f64> = against_the_others(context, target).into_iter().map(|d| sign * d).collect();
-    let mut sizes: Vec<f64> = departures.iter().map(|d| d.abs()).collect();
+    let departures: Vec<(f64, f64)> =
+        against_the_others(context, target, STEADY).into_iter().map(|(d, late)| (sign * d, late)).collect();
+    let mut sizes: Vec<f64> = departures.iter().map(|d| d.0.abs()).collect();
     // one pulse among many is less than a gross error, and still far outside of the scatter
     let least = (STRUCK * 1.4826 * median(&mut sizes)).clamp(STRUCK_LEAST, GROSS);
-    let struck: Vec<f64> = departures.iter().copied().filter(|d| *d > least).collect();
+    let mut struck: Vec<f64> = departures.iter().filter(|d| d.0 > least.max(d.1)).map(|d| d.0).collect();
     let halved = |d: &&f64| (*d - HALVED.0).abs() < HALVED.1;
     let timed = sign < 0.0 && struck.iter().filter(halved).count() * 10 > struck.len() * 9;
     let whole = if timed { struck.len() as f64 } else { struck.iter().sum() };
-    let value = whole / departures.len().max(1) as f64;
+    // rows on which one of the usual size would have been seen
+    let usual = median(&mut struck);
+    let seen = departures.iter().filter(|d| d.1 < usual).count();
+    let value = whole / seen.max(1) as f64;
     Estimate { name: "probability".into(), unit: "1".into(), value, se: value / (struck.len().max(1) as f64).sqrt() }
 }
 
-/// What a channel departs from the mean of the other channels by, as a share of it, on the rows of [`shares`]: the consensus holds
-/// the channel itself.
-pub(super) fn against_the_others(context: &Context, target: &Target) -> Vec<f64> {
+/// What a channel departs from the mean of the other channels by, as a share of it, on the rows of [`readings`] whose speed changed by less
+/// than a share, and what lateness could explain: the consensus holds the channel itself.
+pub(super) fn against_the_others(context: &Context, target: &Target, limit: f64) -> Vec<(f64, f64)> {
     let own = DIFFERENCES.iter().find(|d| d.1 == target.name).map_or("", |d| d.0);
     let speeds = context.targets.iter().filter(|t| matches!(t.relation, Relation::SpeedFromPulse | Relation::SpeedAlone));
     let mut sums = vec![(0.0, 0.0); context.len()];
@@ -150,9 +192,10 @@ pub(super) fn against_the_others(context: &Context, target: &Target) -> Vec<f64>
             sums[*i].1 += 1.0;
         }
     }
-    let of = |(i, share): (usize, f64)| {
-        let (sum, n) = sums[i];
-        if n > 0.0 && sum > 0.0 { share * context.rpm[i] * n / sum - 1.0 } else { share - 1.0 }
+    let of = |r: Reading| {
+        let (sum, n) = sums[r.row];
+        let departure = if n > 0.0 && sum > 0.0 { r.share * context.rpm[r.row] * n / sum - 1.0 } else { r.share - 1.0 };
+        (departure, LATE * r.change)
     };
-    shares(context, target).map(of).collect()
+    readings(context, target).filter(|r| r.change < limit).map(of).collect()
 }
