@@ -186,7 +186,7 @@ fn parameter(e: &Estimate) -> Parameter {
 }
 
 /// Both models on another run of the same rig, as they stand.
-fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
+pub(crate) fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
     let context = Context::new(other, Some(after.start_pulse_us));
     let error = |model: &Model, name: &'static str| -> Option<f64> {
         let prediction = model.predict(&context, name)?;

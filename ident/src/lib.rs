@@ -42,4 +42,5 @@ pub mod solve;
 mod start;
 mod steps;
 mod together;
+pub mod told;
 pub mod verdict;

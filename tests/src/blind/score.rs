@@ -12,7 +12,7 @@ use ident::log::Log;
 use ident::verdict::{Kind, Verdict};
 
 /// Header of the file of results.
-pub const HEADER: &str = "seed,kind,truth,size,sizes,shown,schedule,hz,rows,verdict,named,probability,first,top3,exact,after_ratio,before_ratio,coverage,alternatives,seconds";
+pub const HEADER: &str = "seed,kind,truth,size,sizes,shown,schedule,hz,rows,verdict,named,probability,first,top3,exact,after_ratio,before_ratio,told_ratio,coverage,alternatives,seconds";
 
 /// The figures of one run.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +51,8 @@ pub struct Line {
     pub after_ratio: f64,
     /// The same before.
     pub before_ratio: f64,
+    /// Error after on the other run over that of a fit that was told which effects act; worst affected channel; NaN as above.
+    pub told_ratio: f64,
     /// `name:1` or `name:0` for every shared parameter, joined by `+`.
     pub coverage: String,
     /// The other hypotheses, joined by `|`.
@@ -81,6 +83,7 @@ impl Line {
             exact: false,
             after_ratio: f64::NAN,
             before_ratio: f64::NAN,
+            told_ratio: f64::NAN,
             coverage: String::new(),
             alternatives: String::new(),
             seconds: 0.0,
@@ -92,7 +95,7 @@ impl Line {
     pub fn csv(&self) -> String {
         let b = u8::from;
         format!(
-            "{},{},{},{:.3},{},{},{},{},{},{},{},{:.4},{},{},{},{:.4},{:.4},{},{},{:.2}",
+            "{},{},{},{:.3},{},{},{},{},{},{},{},{:.4},{},{},{},{:.4},{:.4},{:.4},{},{},{:.2}",
             self.seed,
             self.kind,
             self.truth,
@@ -110,6 +113,7 @@ impl Line {
             b(self.exact),
             self.after_ratio,
             self.before_ratio,
+            self.told_ratio,
             self.coverage,
             self.alternatives,
             self.seconds
@@ -142,9 +146,10 @@ impl Line {
             exact: f[14] == "1",
             after_ratio: f[15].parse().ok()?,
             before_ratio: f[16].parse().ok()?,
-            coverage: s(17),
-            alternatives: s(18),
-            seconds: f[19].parse().ok()?,
+            told_ratio: f[17].parse().ok()?,
+            coverage: s(18),
+            alternatives: s(19),
+            seconds: f[20].parse().ok()?,
         })
     }
 }
@@ -178,7 +183,10 @@ pub fn score(seed: u64) -> Line {
         ..Line::empty()
     };
     match outcome {
-        Ok(Ok(v)) => judge(&s, &v, &other, &mut line),
+        Ok(Ok(v)) => {
+            judge(&s, &v, &other, &mut line);
+            line.told_ratio = over_told(&s, &v, &texts);
+        }
         Ok(Err(why)) => {
             line.verdict = "refused".into();
             line.named = why.replace([',', '\n'], ";");
@@ -231,17 +239,31 @@ fn judge(s: &Scenario, v: &Verdict, other: &Run, line: &mut Line) {
     }
     let floor = realised(&s.rig, other);
     let Some(validation) = v.validation.first() else { return };
-    let mut worst = (f64::NAN, f64::NAN);
-    for (channel, noise) in floor {
-        let shown = s.shown.contains(&channel)
-            || s.effects.is_empty()
-            || (s.shown.iter().any(|c| c.starts_with("rpm")) && channel.starts_with("rpm"));
-        let Some(c) = validation.channels.get(channel) else { continue };
-        if shown && (worst.0.is_nan() || c.after / noise > worst.0) {
-            worst = (c.after / noise, c.before / noise);
-        }
+    let shown = floor.iter().filter(|(channel, _)| shows(s, channel));
+    let ratios =
+        shown.filter_map(|(channel, noise)| validation.channels.get(*channel).map(|c| (c.after / noise, c.before / noise)));
+    (line.after_ratio, line.before_ratio) = ratios.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::NAN, f64::NAN));
+}
+
+/// Whether a channel is one of those that the effects act on most.
+fn shows(s: &Scenario, channel: &str) -> bool {
+    s.shown.contains(&channel)
+        || s.effects.is_empty()
+        || (channel.starts_with("rpm") && s.shown.iter().any(|c| c.starts_with("rpm")))
+}
+
+/// Error after on the other run over that of a fit that was told the true effects: what was lost by not knowing them.
+fn over_told(s: &Scenario, v: &Verdict, texts: &[String; 2]) -> f64 {
+    let known = matches!(s.hidden, Hidden::One(_) | Hidden::Two(..));
+    if !known || s.effects.iter().any(super::effect::Effect::by_chance) {
+        return f64::NAN;
     }
-    (line.after_ratio, line.before_ratio) = worst;
+    let logs = [0, 1].map(|k| Log::parse("run.csv", texts[k].as_bytes()).ok());
+    let ([Some(log), Some(other)], Some(found)) = (&logs, v.validation.first()) else { return f64::NAN };
+    let Some(told) = ident::told::told(log, &s.hidden.ids(), other) else { return f64::NAN };
+    let shown = found.channels.iter().filter(|(name, _)| shows(s, name));
+    let ratios = shown.filter_map(|(name, c)| told.channels.get(name).map(|t| c.after / t.after));
+    ratios.max_by(f64::total_cmp).unwrap_or(f64::NAN)
 }
 
 /// Rms of the noise that was really added to each channel's primary relation.

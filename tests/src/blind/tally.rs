@@ -96,17 +96,18 @@ pub fn markdown(lines: &[Line]) -> String {
     let _ = writeln!(out, "### Clean runs\n\nFalse alarms: {}\n", Rate::over(clean(), |l| l.verdict != "none").text());
     let _ = writeln!(
         out,
-        "### One effect, against its size in noise floors\n\n| size | first | exact set | among three | after/noise at most 1.15 | median after/noise | intervals that cover | calibration error |\n| --- | --- | --- | --- | --- | --- | --- | --- |"
+        "### One effect, against its size in noise floors\n\n| size | first | exact set | among three | after/told at most 1.15 | after/noise at most 1.15 | median after/noise | intervals that cover | calibration error |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     );
     for bin in BINS {
         let ratio = || of("one", bin).filter(|l| l.after_ratio.is_finite());
         let _ = writeln!(
             out,
-            "| {} | {} | {} | {} | {} | {:.3} | {} | {:.3} |",
+            "| {} | {} | {} | {} | {} | {} | {:.3} | {} | {:.3} |",
             bin_name(bin),
             Rate::over(of("one", bin), |l| l.first).text(),
             Rate::over(of("one", bin), |l| l.exact).text(),
             Rate::over(of("one", bin), |l| l.top3).text(),
+            Rate::over(of("one", bin).filter(|l| l.told_ratio.is_finite()), |l| l.told_ratio <= 1.15).text(),
             Rate::over(ratio(), |l| l.after_ratio <= 1.15).text(),
             median(ratio().map(|l| l.after_ratio).collect()),
             coverage(of("one", bin).filter(|l| l.exact)).text(),
@@ -131,7 +132,7 @@ pub fn markdown(lines: &[Line]) -> String {
     }
     let _ = writeln!(
         out,
-        "\n### Each effect alone at three noise floors and above\n\n| true | first | exact | among three | cover | after/noise | named instead |\n| --- | --- | --- | --- | --- | --- | --- |"
+        "\n### Each effect alone at three noise floors and above\n\n| true | first | exact | among three | cover | after/noise | after/told | named instead |\n| --- | --- | --- | --- | --- | --- | --- | --- |"
     );
     let mut truths: BTreeMap<&str, Vec<&Line>> = BTreeMap::new();
     for l in lines.iter().filter(|l| (l.kind == "one" || l.kind == "unknown") && l.size >= 3.0) {
@@ -146,13 +147,14 @@ pub fn markdown(lines: &[Line]) -> String {
         let c = coverage(runs.iter().copied().filter(|l| l.exact));
         let _ = writeln!(
             out,
-            "| {truth} | {} | {} | {} | {}/{} | {:.2} | {} |",
+            "| {truth} | {} | {} | {} | {}/{} | {:.2} | {:.2} | {} |",
             share(|l| l.first),
             share(|l| l.exact),
             share(|l| l.top3),
             c.hits,
             c.of,
             median(runs.iter().map(|l| l.after_ratio).collect()),
+            median(runs.iter().map(|l| l.told_ratio).collect()),
             instead.iter().map(|(k, n)| format!("{k} {n}")).collect::<Vec<_>>().join(", ")
         );
     }
