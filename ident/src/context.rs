@@ -360,6 +360,11 @@ impl Context {
         Some((Cow::Owned(estimate), false))
     }
 
+    /// Where the noise is read off.
+    fn stretches(&self) -> noise::Stretches<'_> {
+        noise::Stretches { calm: &self.calm, held: &self.steady }
+    }
+
     /// Median time step, s.
     #[must_use]
     pub fn step(&self) -> f64 {
@@ -535,7 +540,7 @@ fn target(log: &Log, context: &Context, name: &'static str) -> Option<Target> {
         return None;
     }
     let y: Vec<f64> = rows.iter().map(|i| column[*i]).collect();
-    let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, &context.calm);
+    let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, context.stretches());
     let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
     let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
     Some(Target { weight, ..Target::new(context, name, relation, rows, y, noise) })
@@ -554,7 +559,7 @@ fn differing(log: &Log) -> Vec<&'static str> {
 fn difference(context: &Context, name: &'static str, column: &[f64]) -> Option<Target> {
     let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
     let y: Vec<f64> = rows.iter().map(|i| column[*i] - context.rpm[*i]).collect();
-    let noise = noise::estimate(&rows, &y, &y, &context.rpm, &context.calm);
+    let noise = noise::estimate(&rows, &y, &y, &context.rpm, context.stretches());
     let target = Target::new(context, name, Relation::SpeedDifference, rows, y, noise);
     (target.rows.len() > 8).then_some(target)
 }

@@ -57,15 +57,31 @@ pub fn median(values: &mut [f64]) -> f64 {
     }
 }
 
+/// Where the noise is read off.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretches<'a> {
+    /// Row ranges `[from, to)` without a jump of the load, ramps included.
+    pub calm: &'a [(usize, usize)],
+    /// Row ranges in which the load is held.
+    pub held: &'a [(usize, usize)],
+}
+
+impl Stretches<'_> {
+    /// Whether a range is a ramp: no part of it is held.
+    fn is_ramp(&self, from: usize, to: usize) -> bool {
+        self.held.iter().all(|(a, b)| *b <= from || to <= *a)
+    }
+}
+
 /// Estimates the noise of a channel given at `rows`: the scatter of `y`, which is the channel `reading` less what follows the
 /// measured speed (a gust moves speed and thrust together, and is no noise of the load cell).
 #[must_use]
-pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Noise {
+pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], stretches: Stretches<'_>) -> Noise {
     let quantum = quantum(reading);
     let floor = quantum * quantum / 12.0;
     let mut samples: Vec<(f64, f64)> = Vec::new(); // (speed/1000)^2, squared second difference scaled to a variance
     let mut colour = Colour::default();
-    for (from, to) in steady {
+    for (from, to) in stretches.calm {
         // the first tenth of a stretch, and at least two rows, belong to settling
         let skip = from + 2 + (to - from) / 10;
         let lo = rows.partition_point(|r| *r < skip);
@@ -73,14 +89,19 @@ pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], steady:
         if hi < lo + 4 {
             continue;
         }
-        let z = &y[lo..hi];
-        for (k, w) in z.windows(3).enumerate() {
-            // the second difference of white noise has six times its variance, and a slope drops out
-            let d = w[0] - 2.0 * w[1] + w[2];
+        // the second difference of white noise has six times its variance, and a slope drops out
+        let mut second: Vec<f64> = y[lo..hi].windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect();
+        for (k, block) in second.chunks_mut(BLOCK).enumerate() {
+            let first = lo + k * BLOCK;
+            if stretches.is_ramp(rows[first], rows[first + block.len()] + 1) {
+                drop_jumps(block);
+            }
+        }
+        for (k, d) in second.iter().enumerate().filter(|(_, d)| d.is_finite()) {
             let speed = if rpm.is_empty() { 0.0 } else { rpm[rows[lo + k + 1]] / 1000.0 };
             samples.push((speed * speed, d * d / 6.0));
         }
-        colour.add(z);
+        second.split(|d| !d.is_finite()).for_each(|d| colour.add(d));
     }
     if samples.len() < 20 {
         samples = y
@@ -132,10 +153,9 @@ impl Colour {
     /// Largest lag-one autocorrelation that is called colour; what is slower is course.
     const MOST: f64 = 0.8;
 
-    /// Adds an evenly sampled stretch.
-    fn add(&mut self, z: &[f64]) {
-        let d: Vec<f64> = z.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect();
-        for w in d.windows(2) {
+    /// Adds the second differences of an evenly sampled stretch.
+    fn add(&mut self, second: &[f64]) {
+        for w in second.windows(2) {
             self.same += 0.5 * (w[0] * w[0] + w[1] * w[1]);
             self.next += w[0] * w[1];
             self.pairs += 1;
@@ -160,6 +180,21 @@ impl Colour {
             if of(mid) < seen { lo = mid } else { hi = mid }
         }
         0.5 * (lo + hi)
+    }
+}
+
+/// Second differences that are compared with one another, so that noise that grows along a ramp is none of theirs.
+const BLOCK: usize = 128;
+
+/// Standard deviations, from the median, beyond which a second difference on a ramp holds a jump.
+const JUMP: f64 = 4.5;
+
+/// Takes out what jumps on a ramp: a command in coarse steps moves a few rows and leaves the scatter of the others as it is.
+fn drop_jumps(second: &mut [f64]) {
+    let limit = JUMP * 1.4826 * median(&mut second.iter().map(|d| d.abs()).collect::<Vec<_>>());
+    let far = second.iter().filter(|d| d.abs() > limit).count();
+    if limit > 0.0 && far * 3 < second.len() {
+        second.iter_mut().filter(|d| d.abs() > limit).for_each(|d| *d = f64::NAN);
     }
 }
 
@@ -245,6 +280,20 @@ fn non_negative(points: &[(f64, f64, f64)]) -> [f64; 3] {
 mod tests {
     use super::*;
 
+    fn held(ranges: &[(usize, usize)]) -> Stretches<'_> {
+        Stretches { calm: ranges, held: ranges }
+    }
+
+    #[test]
+    fn a_command_in_coarse_steps_is_no_noise_of_a_ramp() {
+        let rows: Vec<usize> = (0..4000).collect();
+        let y: Vec<f64> = rows.iter().map(|i| 40.0 * (*i as f64 / 32.0).floor() + 2.0 * hash_noise(*i)).collect();
+        let noise = estimate(&rows, &y, &y, &[], Stretches { calm: &[(0, 4000)], held: &[] });
+        assert!((noise.rms - 2.0).abs() < 0.1 && noise.rho == 0.0, "{noise:?}");
+        // what jumps while the load is held is not explained by the command
+        assert!(estimate(&rows, &y, &y, &[], held(&[(0, 4000)])).rms > 5.0);
+    }
+
     fn hash_noise(i: usize) -> f64 {
         // sum of twelve uniform numbers from splitmix64 (Steele, Lea & Flood 2014): standard normal to a few per cent
         (0..12)
@@ -262,7 +311,7 @@ mod tests {
     fn a_known_level_is_found_through_drift() {
         let y: Vec<f64> = (0..4000).map(|i| 0.02 * hash_noise(i) + 1e-3 * i as f64).collect();
         let rows: Vec<usize> = (0..4000).collect();
-        let noise = estimate(&rows, &y, &y, &[], &[(0, 2000), (2000, 4000)]);
+        let noise = estimate(&rows, &y, &y, &[], held(&[(0, 2000), (2000, 4000)]));
         assert!((noise.rms / 0.02 - 1.0).abs() < 0.06, "{noise:?}");
         assert!(noise.rho < 0.08);
     }
@@ -271,7 +320,7 @@ mod tests {
     fn a_slow_wave_is_no_noise_and_colour_is() {
         let rows: Vec<usize> = (0..4000).collect();
         let wave: Vec<f64> = (0..4000).map(|i| 0.02 * hash_noise(i) + 0.2 * (i as f64 * 0.02).sin()).collect();
-        let noise = estimate(&rows, &wave, &wave, &[], &[(0, 4000)]);
+        let noise = estimate(&rows, &wave, &wave, &[], held(&[(0, 4000)]));
         assert!((noise.rms / 0.02 - 1.0).abs() < 0.06, "{noise:?}");
         let mut state = 0.0;
         let coloured: Vec<f64> = (0..4000)
@@ -280,7 +329,7 @@ mod tests {
                 state
             })
             .collect();
-        let noise = estimate(&rows, &coloured, &coloured, &[], &[(0, 4000)]);
+        let noise = estimate(&rows, &coloured, &coloured, &[], held(&[(0, 4000)]));
         assert!((noise.rms / 0.02 - 1.0).abs() < 0.12 && (noise.rho - 0.5).abs() < 0.15, "{noise:?}");
     }
 
@@ -290,7 +339,7 @@ mod tests {
         let y: Vec<f64> = (0..12_000).map(|i| hash_noise(i) * (0.01 + 0.0004 * (rpm[i] / 1000.0).powi(2)).sqrt()).collect();
         let rows: Vec<usize> = (0..12_000).collect();
         let steady: Vec<(usize, usize)> = (0..6).map(|k| (2000 * k, 2000 * (k + 1))).collect();
-        let noise = estimate(&rows, &y, &y, &rpm, &steady);
+        let noise = estimate(&rows, &y, &y, &rpm, held(&steady));
         for speed in [1000.0, 3000.0, 6000.0] {
             let truth = 0.01 + 0.0004 * (speed / 1000.0_f64).powi(2);
             assert!((noise.variance(speed) / truth - 1.0).abs() < 0.15, "{speed}: {noise:?}");

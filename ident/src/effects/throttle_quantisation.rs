@@ -97,7 +97,8 @@ fn levels(context: &Context) -> Vec<(f64, f64, f64)> {
     let (expected, slope) = (curve(context, 0.0), context.facts.slope.get_or_init(|| slope(context)));
     let mut bins: std::collections::BTreeMap<i64, (f64, f64, f64, f64)> = std::collections::BTreeMap::new();
     for (i, p) in pulse.iter().enumerate() {
-        let settled = i >= 8 && (pulse[i] - pulse[i - 8]).abs() < 5.0;
+        // the command has been held, or has moved evenly, for a while
+        let settled = i >= 8 && (i - 7..=i).all(|k| (pulse[k] - pulse[k - 1]).abs() < EVEN_US);
         if settled && *p > context.start_pulse_us && context.rpm.get(i).is_some_and(|r| *r > 0.0) {
             let bin = bins.entry((2.0 * p).round() as i64).or_default();
             bin.0 += p;
@@ -110,6 +111,9 @@ fn levels(context: &Context) -> Vec<(f64, f64, f64)> {
     let exact = |p: f64| (p * 1e6).round() * 1e-6;
     bins.into_values().map(|(p, e, d, n)| (exact(p / n), e / n, d / n)).collect()
 }
+
+/// Change of the command from row to row below which the rotor keeps up with it, us.
+const EVEN_US: f64 = 5.0;
 
 /// Largest departure of a pulse from the next step's, in steps: -0.5 to 0.5.
 fn tooth(pulse: f64, step: f64, offset: f64) -> f64 {
