@@ -12,7 +12,7 @@ use crate::effects;
 use crate::hypothesis::{Declared, Placed, Rows, fit};
 use crate::log::Log;
 use crate::model::Model;
-use crate::search::{refine, scan};
+use crate::search::{base, refine, scan};
 use crate::verdict::Validation;
 
 /// Steps of the refinement.
@@ -41,8 +41,9 @@ pub fn told(log: &Log, names: &[&str], other: &Log) -> Option<Validation> {
 fn best(context: &Context, declared: Declared<'_>, placed: &[Placed], name: &str) -> Option<Placed> {
     let effect = *effects::library().iter().find(|e| e.id() == name)?;
     let loud = vec![true; context.targets.len()];
+    let beside = base(context, declared, placed);
     let tried = effect.instances(context).into_iter().filter_map(|instance| {
-        let (shape, gain) = scan(context, declared, placed, effect, &instance, &loud)?;
+        let (shape, gain) = scan(context, &beside, effect, &instance, &loud)?;
         Some((gain, Placed { effect, instance, shape }))
     });
     tried.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, placed)| placed)

@@ -7,9 +7,9 @@
 //! Units: 1.
 //! Reference: Beharie 2013, section 5.7.1 (edges that ring).
 
-use super::speed_channel::{LEAST, difference, gross, instances, is_scattered, pulse_probability};
+use super::speed_channel::{apply_pulses, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
-use crate::context::{Context, Relation};
+use crate::context::Context;
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -17,8 +17,6 @@ pub(crate) struct DoublePulses;
 
 /// Direction of the error.
 const SIGN: f64 = 1.0;
-/// Form in which single samples are off.
-const SCATTERED: &str = "scattered";
 
 impl Effect for DoublePulses {
     fn id(&self) -> &'static str {
@@ -41,15 +39,7 @@ impl Effect for DoublePulses {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let mut out = instances(context, "");
-        for instance in instances(context, SCATTERED) {
-            let Some(target) = difference(context, &instance) else { continue };
-            if is_scattered(context, target, SIGN) {
-                out.retain(|i| i.channels != instance.channels);
-                out.push(instance);
-            }
-        }
-        out
+        pulse_instances(context, SIGN)
     }
 
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
@@ -57,26 +47,18 @@ impl Effect for DoublePulses {
     }
 
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
-        let name = if instance.form == SCATTERED { "depth" } else { "probability" };
-        vec![Amplitude { name, unit: "1" }]
+        pulse_amplitudes(instance)
     }
 
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
-        // the channel's own polynomial takes a constant share
-        let (Relation::SpeedDifference, Some(target)) = (design.relation, difference(context, instance)) else { return };
-        let on = if instance.form == SCATTERED { gross(context, target, SIGN) } else { vec![1.0; context.len()] };
-        design.add(position, 0, on.iter().zip(&context.rpm).map(|(s, r)| SIGN * s * r).collect());
+        apply_pulses(context, instance, SIGN, position, design);
     }
 
-    fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
-        if let Some(target) = difference(context, instance).filter(|_| instance.form == SCATTERED) {
-            fitted.insert(0, pulse_probability(context, target, SIGN));
-        }
-        fitted
+    fn report(&self, context: &Context, instance: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
+        report_pulses(context, instance, SIGN, fitted)
     }
 
     fn plausible(&self, _: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
-        let most = if instance.form == SCATTERED { 3.0 } else { 0.3 };
-        fitted.iter().all(|e| e.value > LEAST && e.value < most)
+        plausible_pulses(instance, fitted)
     }
 }

@@ -6,6 +6,7 @@
 //! Units: rows; size in the channel's unit.
 //! Reference: running median as an outlier filter, Tukey 1977, *Exploratory Data Analysis*; Hampel identifier, Pearson 2002.
 
+use super::speed_channel::PULSES;
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;
@@ -18,8 +19,6 @@ pub(crate) struct GlitchRows;
 const FAR: f64 = 15.0;
 /// The same as a share of the channel's span.
 const WIDE: f64 = 0.02;
-/// Readings of a speed within this share of its neighbours' are lost or doubled pulses, not glitches.
-const PULSES: (f64, f64) = (0.3, 2.5);
 
 impl Effect for GlitchRows {
     fn id(&self) -> &'static str {
@@ -121,9 +120,7 @@ fn glitches(context: &Context, target: &Target) -> Vec<(usize, f64)> {
     let speed = matches!(target.relation, Relation::SpeedFromPulse | Relation::SpeedAlone);
     let absurd = |k: usize, d: f64| {
         let share = y[k] / (y[k] - d);
-        d.abs() > least
-            && !(speed && (PULSES.0..PULSES.1).contains(&share))
-            && (d.abs() > span || !moving(context, target.rows[k]))
+        d.abs() > least && !(speed && PULSES.contains(&share)) && (d.abs() > span || !moving(context, target.rows[k]))
     };
     departures.iter().enumerate().filter(|(k, d)| absurd(k + 2, **d)).map(|(k, d)| (target.rows[k + 2], *d)).collect()
 }

@@ -137,15 +137,80 @@ const LATE: f64 = 3.0;
 /// Share by which a reading must be off at least to be counted as one pulse too few or too many.
 const GROSS: f64 = 0.03;
 
-/// Whether single readings, two at the least and fewer than half, are grossly too low (`sign` -1) or too high (+1).
-pub(super) fn is_scattered(context: &Context, target: &Target, sign: f64) -> bool {
-    let count = |(off, all), r: Reading| (off + usize::from(r.is_gross(sign)), all + 1);
-    let (off, all) = readings(context, target).fold((0usize, 0usize), count);
-    off >= 2 && off * 2 < all
+/// Form in which single samples are off.
+pub(super) const SCATTERED: &str = "scattered";
+/// Form in which one sample of the whole run is off: its own reading is all that is known of it.
+pub(super) const ONCE: &str = "once";
+
+/// Standard deviations of the scatter by which a reading that is the only one must be off.
+const ALONE: f64 = 20.0;
+
+/// The form in which a channel reads grossly too low (`sign` -1) or too high (+1): on a share of less than half of its rows, on one, on none.
+fn form(context: &Context, target: &Target, sign: f64) -> Option<&'static str> {
+    let departures: Vec<f64> = readings(context, target).map(|r| r.share - 1.0).collect();
+    let off: Vec<f64> = readings(context, target).filter(|r| r.is_gross(sign)).map(|r| r.share - 1.0).collect();
+    let alone = |d: f64| d.abs() > ALONE * 1.4826 * median(&mut departures.iter().map(|d| d.abs()).collect::<Vec<_>>());
+    match off.as_slice() {
+        [one] if departures.len() > 100 && alone(*one) && PULSES.contains(&(1.0 + one)) => Some(ONCE),
+        [_, _, ..] if off.len() * 2 < departures.len() => Some(SCATTERED),
+        _ => None,
+    }
+}
+
+/// Readings beyond these shares of the speed are absurd: no pulse too few or too many.
+pub(super) const PULSES: std::ops::Range<f64> = 0.3..2.5;
+
+/// Instances of pulses too few (`sign` -1) or too many (+1) for every speed channel that can be compared: in single samples where some
+/// are seen, on the whole where none is.
+pub(super) fn pulse_instances(context: &Context, sign: f64) -> Vec<Instance> {
+    let seen = |i: &Instance| difference(context, i).and_then(|t| form(context, t, sign));
+    let with_form = |mut i: Instance| {
+        i.form = seen(&i).unwrap_or_default().to_owned();
+        i
+    };
+    instances(context, "").into_iter().map(with_form).collect()
+}
+
+/// What pulses too few (`sign` -1) or too many (+1) do to the difference from the others; the channel's own polynomial takes a constant share,
+/// and about readings that are off nothing is claimed there.
+pub(super) fn apply_pulses(context: &Context, instance: &Instance, sign: f64, position: usize, design: &mut TargetDesign) {
+    let (Relation::SpeedDifference, Some(target)) = (design.relation, difference(context, instance)) else { return };
+    let on = if instance.form.is_empty() { vec![1.0; context.len()] } else { gross(context, target, sign) };
+    if instance.form == ONCE {
+        design.fixed.resize(context.len(), 0.0);
+        for (row, departure) in target.rows.iter().zip(&target.y) {
+            design.fixed[*row] += on[*row] * departure;
+        }
+    } else {
+        design.add(position, 0, on.iter().zip(&context.rpm).map(|(s, r)| sign * s * r).collect());
+    }
+}
+
+/// Amplitude of such an instance.
+pub(super) fn pulse_amplitudes(instance: &Instance) -> Vec<Amplitude> {
+    match instance.form.as_str() {
+        ONCE => Vec::new(),
+        SCATTERED => vec![Amplitude { name: "depth", unit: "1" }],
+        _ => vec![Amplitude { name: "probability", unit: "1" }],
+    }
+}
+
+/// Adds the probability of a pulse to what was fitted to single samples.
+pub(super) fn report_pulses(context: &Context, instance: &Instance, sign: f64, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+    if let Some(target) = difference(context, instance).filter(|_| !instance.form.is_empty()) {
+        fitted.insert(0, pulse_probability(context, target, sign));
+    }
+    fitted
+}
+
+/// Whether what was fitted can be pulses.
+pub(super) fn plausible_pulses(instance: &Instance, fitted: &[Estimate]) -> bool {
+    let most = if instance.form == SCATTERED { 3.0 } else { 0.3 };
+    fitted.iter().all(|e| e.value > LEAST && e.value < most)
 }
 
 /// 1 on rows that read grossly too low (`sign` -1) or too high (+1), 0 elsewhere.
-pub(super) fn gross(context: &Context, target: &Target, sign: f64) -> Vec<f64> {
+fn gross(context: &Context, target: &Target, sign: f64) -> Vec<f64> {
     let mut out = vec![0.0; context.len()];
     for reading in readings(context, target).filter(|r| r.is_gross(sign)) {
         out[reading.row] = 1.0;
@@ -163,7 +228,7 @@ const STRUCK_LEAST: f64 = 0.002;
 /// Probability of a lost (`sign` -1) or doubled (+1) pulse, from the readings that are grossly off: the mean share that is lost or won, which
 /// is that of a pulse whether a window holds many or one; where each loss halves the reading at every speed single periods are timed,
 /// and the share of such readings is the probability.
-pub(super) fn pulse_probability(context: &Context, target: &Target, sign: f64) -> Estimate {
+fn pulse_probability(context: &Context, target: &Target, sign: f64) -> Estimate {
     let departures: Vec<(f64, f64)> =
         against_the_others(context, target, STEADY).into_iter().map(|(d, late)| (sign * d, late)).collect();
     let mut sizes: Vec<f64> = departures.iter().map(|d| d.0.abs()).collect();
