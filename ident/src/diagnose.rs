@@ -194,6 +194,9 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         best.fit = fit(context, declared, &refine(context, declared, &placed, Rows::All, 60), Some(&start), Rows::All)?;
         errors = heldout::errors(context, declared, &best.fit, &folds);
     };
+    // a rival that differed by what was dropped is the winner itself
+    let same = |ids: &[String]| ids.len() == best.fit.placed.len() && best.ids().iter().all(|id| ids.contains(id));
+    rivals.retain(|r| is_unknown || !same(&r.ids));
     progress(1.0);
     Some(Diagnosis {
         declared: start,
