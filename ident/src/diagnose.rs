@@ -280,15 +280,19 @@ pub(crate) fn round_of(
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     let sketch = Rows::Every(stride(context, SKETCH));
     let mut out: Vec<Candidate> = Vec::new();
+    let mut most = f64::NEG_INFINITY;
     for (k, (gain, placed)) in ranked.into_iter().enumerate() {
         progress(0.7 + 0.3 * (k as f64 / count));
         if gain < -20.0 {
             break;
         }
-        let placed = if k < REFINED { refine_newest(context, declared, &placed, sketch, 120) } else { placed };
+        // what its grid alone puts above all that came out so far is worth a refinement, whatever stands before it
+        let promising = k < REFINED || k < 3 * REFINED && gain > most;
+        let placed = if promising { refine_newest(context, declared, &placed, sketch, 120) } else { placed };
         if let Some(fitted) =
             fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
         {
+            most = most.max(net_gain(context, &fitted, &best.fit, &whole));
             out.push(Candidate { fit: fitted, evidence: 0.0 });
         }
     }
