@@ -17,6 +17,8 @@ pub(crate) struct GlitchRows;
 
 /// Departure from the running median, in robust standard deviations, from which a row is absurd.
 const FAR: f64 = 15.0;
+/// Rows before and after, whose scatter counts too.
+const AROUND: usize = 10;
 /// The same as a share of the channel's span.
 const WIDE: f64 = 0.02;
 
@@ -118,9 +120,18 @@ fn glitches(context: &Context, target: &Target) -> Vec<(usize, f64)> {
     let span = sorted[sorted.len() * 99 / 100] - sorted[sorted.len() / 100];
     let least = (FAR * scatter).max(WIDE * span);
     let speed = matches!(target.relation, Relation::SpeedFromPulse | Relation::SpeedAlone);
+    // where its neighbours scatter as well, as in a resonance, a reading is not isolated
+    let around = |k: usize| &departures[(k - 2).saturating_sub(AROUND)..(k - 1 + AROUND).min(departures.len())];
+    let isolated = |k: usize, d: f64| {
+        let mut near: Vec<f64> = around(k).iter().map(|d| d.abs()).collect();
+        d.abs() > FAR * 1.4826 * median(&mut near)
+    };
     let absurd = |k: usize, d: f64| {
         let share = y[k] / (y[k] - d);
-        d.abs() > least && !(speed && PULSES.contains(&share)) && (d.abs() > span || !moving(context, target.rows[k]))
+        d.abs() > least
+            && isolated(k, d)
+            && !(speed && PULSES.contains(&share))
+            && (d.abs() > span || !moving(context, target.rows[k]))
     };
     departures.iter().enumerate().filter(|(k, d)| absurd(k + 2, **d)).map(|(k, d)| (target.rows[k + 2], *d)).collect()
 }

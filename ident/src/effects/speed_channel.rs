@@ -242,7 +242,15 @@ fn pulse_probability(context: &Context, target: &Target, sign: f64) -> Estimate 
     let usual = median(&mut struck);
     let seen = departures.iter().filter(|d| d.1 < usual).count();
     let value = whole / seen.max(1) as f64;
-    Estimate { name: "probability".into(), unit: "1".into(), value, se: value / (struck.len().max(1) as f64).sqrt() }
+    Estimate { name: "probability".into(), unit: "1".into(), value, se: value * relative_error_of_a_count(struck.len().max(1)) }
+}
+
+/// Standard error of a count, as a share of it, by which 1.96 of them reach the upper end of its exact 95 % interval: of a few events
+/// many more may have been due (Garwood 1936, by the cube root of Wilson and Hilferty 1931).
+fn relative_error_of_a_count(count: usize) -> f64 {
+    let next = count as f64 + 1.0;
+    let upper = next * (1.0 - 1.0 / (9.0 * next) + 1.96 / (3.0 * next.sqrt())).powi(3);
+    (upper - count as f64) / 1.96 / count as f64
 }
 
 /// What a channel departs from the mean of the other channels by, as a share of it, on the rows of [`readings`] whose speed changed by less
@@ -263,4 +271,18 @@ pub(super) fn against_the_others(context: &Context, target: &Target, limit: f64)
         (departure, LATE * r.change)
     };
     readings(context, target).filter(|r| r.change < limit).map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_few_events_may_be_many_more() {
+        // exact upper ends: 5.572 of one event, 7.225 of two, 18.39 of ten
+        for (count, upper) in [(1, 5.572), (2, 7.225), (10, 18.39)] {
+            let n = count as f64;
+            assert!((n * (1.0 + 1.96 * relative_error_of_a_count(count)) - upper).abs() < 0.02, "{count}");
+        }
+    }
 }
