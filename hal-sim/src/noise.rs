@@ -87,33 +87,27 @@ impl Stream {
     /// Two coarser and faster ones than [`Stream::normal`]: four 8-bit uniforms each, 148 levels a standard deviation.
     #[inline]
     pub fn quick_normals(&mut self) -> [f64; 2] {
-        let [low, high] = quick([self.rng.next_u64()]);
-        [low[0], high[0]]
+        quick(self.word())
     }
 
-    /// Four times [`Stream::quick_normals`]: the first ones of each, and the second ones.
-    #[inline(always)] // a call would pass all eight through memory
-    pub fn quick_normals_of_four(&mut self) -> [[f64; 4]; 2] {
-        quick([self.rng.next_u64(), self.rng.next_u64(), self.rng.next_u64(), self.rng.next_u64()])
+    /// The word of which [`Stream::quick_normals`] makes its two, for whoever makes many at once.
+    #[inline]
+    pub(crate) fn word(&mut self) -> u64 {
+        self.rng.next_u64()
     }
 }
 
-/// Two nearly normal numbers of each word.
+/// Two nearly normal numbers of a word.
 #[inline]
-fn quick<const N: usize>(words: [u64; N]) -> [[f64; N]; 2] {
+pub(crate) fn quick(word: u64) -> [f64; 2] {
     const PAIRS: u64 = 0x00ff_00ff_00ff_00ff;
     /// 2^52, whose lowest bits count ones: a small whole number becomes a double without a conversion.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
     let scaled = |sum: u64| (f64::from_bits(WHOLE.to_bits() | (sum & 0xffff)) - (WHOLE + 510.0)) * (1.0 / 147.800_541_3);
-    let (mut low, mut high) = ([0.0; N], [0.0; N]);
-    for i in 0..N {
-        // two sums of two bytes in each half, then one of four
-        let twos = (words[i] & PAIRS) + (words[i] >> 8 & PAIRS);
-        let fours = twos + (twos >> 16);
-        low[i] = scaled(fours);
-        high[i] = scaled(fours >> 32);
-    }
-    [low, high]
+    // two sums of two bytes in each half, then one of four
+    let twos = (word & PAIRS) + (word >> 8 & PAIRS);
+    let fours = twos + (twos >> 16);
+    [scaled(fours), scaled(fours >> 32)]
 }
 
 /// Coloured noise: an Ornstein-Uhlenbeck process sampled at a fixed interval.

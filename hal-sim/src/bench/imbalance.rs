@@ -6,12 +6,17 @@
 //! Reference: F = m r w^2 along the beam's axis, Beharie 2013 section 5.7.1.
 
 use core::f64::consts::TAU;
+use multiversion::multiversion;
 
-/// Adds the force of the unbalance to each of `force_n`. Slices of no fixed length, so that the steps go side by side.
-#[inline(never)]
+/// Steps that go side by side: three vectors of four.
+pub(super) const TOGETHER: usize = 12;
+
+/// The force of the unbalance in each step. Slices of no fixed length, so that the steps go side by side, in vectors as wide as the
+/// processor has them: chosen as it runs, with the same numbers for all.
+#[multiversion(targets("x86_64+avx2"))]
 pub(super) fn shake(force_n: &mut [f64], rev_s: &[f64], turned: &[f64], shake_n: f64, heavy_spot_rev: f64) {
     for ((force, speed), turn) in force_n.iter_mut().zip(rev_s).zip(turned) {
-        *force += shake_n * speed * speed * turn_cosine(turn + heavy_spot_rev);
+        *force = shake_n * speed * speed * turn_cosine(turn + heavy_spot_rev);
     }
 }
 

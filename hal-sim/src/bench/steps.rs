@@ -5,7 +5,7 @@
 //! Units: ns and steps since power-up; V at the pins.
 //! Reference: house rule 7; `docs/speed.md`, for what is computed part by part.
 
-use super::imbalance::{shake, turn_cosine};
+use super::imbalance::{TOGETHER, shake, turn_cosine};
 use super::parts::open;
 use super::{Bench, Millisecond, STEP_NS, STEP_S, Truth};
 use crate::effect::Levers;
@@ -100,13 +100,14 @@ impl Bench {
             (plant.last.voltage_v, plant.last.current_a) = (0.0, 0.0);
         }
 
-        let rev_s = plant.rpm.map(|rpm| rpm / 60.0);
-        let mut turned = [self.angle_rev; STEPS_PER_MS + 1];
+        // what is beyond the ten steps fills the last vector and is left there
+        let (mut rev_s, mut turned) = ([0.0; TOGETHER], [self.angle_rev; TOGETHER + 1]);
+        rev_s.iter_mut().zip(&plant.rpm).for_each(|(rev_s, rpm)| *rev_s = rpm / 60.0);
         for i in 0..STEPS_PER_MS {
             turned[i + 1] = turned[i] + rev_s[i] * STEP_S;
         }
         let start_ticks = self.steps * STEP_TICKS;
-        self.tachometers.block(&turned, &rev_s, |channel, rising, step, fraction| {
+        self.tachometers.block(&turned[..=STEPS_PER_MS], &rev_s[..STEPS_PER_MS], |channel, rising, step, fraction| {
             if rising {
                 let ticks = start_ticks + step as u64 * STEP_TICKS + (fraction * STEP_TICKS as f64) as u64;
                 out.edges[usize::from(channel)].push(ticks as u32);
@@ -114,8 +115,9 @@ impl Bench {
         });
         self.angle_rev = turned[STEPS_PER_MS];
 
-        let mut pin = plant.thrust_n;
-        shake(&mut pin, &rev_s, &turned[1..], self.shake_n, self.heavy_spot_rev);
+        let (mut pin, mut shaking) = (plant.thrust_n, [0.0; TOGETHER]);
+        shake(&mut shaking, &rev_s, &turned[1..], self.shake_n, self.heavy_spot_rev);
+        pin.iter_mut().zip(shaking).for_each(|(pin, shaking)| *pin += shaking);
         self.mode.block(&mut pin);
         let beam_n = pin[STEPS_PER_MS - 1];
         let l = &self.levers;

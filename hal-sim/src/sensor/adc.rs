@@ -6,6 +6,7 @@
 //! Units: V at the pin, counts of 3.3 V / 4096.
 //! Reference: STM32F405 ADC, RM0090 section 13; Beharie 2013 Eq. 5.57-5.58 and errata 5.59 (shunt: I = V/(R_s G)).
 
+use super::conversions::{EIGHT, Pairs, whole_code};
 use crate::noise::{Coloured, Source, Stream};
 use crate::plant::{Bridge, PlantState};
 use firmware_rig::AdcBlock;
@@ -77,15 +78,9 @@ pub struct Converter {
     offset_v: [f64; ADC_CHANNELS],
     conversion: Stream,
     conversion_counts: f64,
-    ahead: [Drawn; ADC_CHANNELS],
-}
-
-/// Noise of one channel's conversions, drawn before their levels are known.
-#[derive(Debug, Clone, Copy, Default)]
-struct Drawn {
-    eight: [[f64; LANES / 2]; 2],
-    /// Of a ninth conversion.
-    spare: Option<f64>,
+    eight: Pairs,
+    /// Noise of a ninth conversion of each channel.
+    ninth: [f64; ADC_CHANNELS],
 }
 
 impl Converter {
@@ -102,7 +97,8 @@ impl Converter {
             offset_v: [0.0; ADC_CHANNELS],
             conversion: Stream::new(seed, Source::Adc, 0),
             conversion_counts: 1.2, // rms, STM32F405 datasheet: total unadjusted error +-2 LSB typical
-            ahead: [Drawn::default(); ADC_CHANNELS],
+            eight: Pairs::default(),
+            ninth: [0.0; ADC_CHANNELS],
         }
     }
 
@@ -110,10 +106,13 @@ impl Converter {
     /// [`Converter::renew`] and one conversion after the other would: work that needs no level, for whoever waits for one.
     pub fn draw_ahead(&mut self, count: u16) {
         self.renew();
-        for drawn in &mut self.ahead {
-            let eight = self.conversion.quick_normals_of_four();
-            let spare = (usize::from(count) > LANES).then(|| self.conversion.quick_normals()[0]);
-            *drawn = Drawn { eight, spare };
+        for (channel, ninth) in self.ninth.iter_mut().enumerate() {
+            for word in self.eight.words(channel) {
+                *word = self.conversion.word();
+            }
+            if usize::from(count) > EIGHT {
+                *ninth = self.conversion.quick_normals()[0];
+            }
         }
     }
 
@@ -145,114 +144,26 @@ impl Converter {
     }
 
     /// The conversions of every channel, of which the noise has been drawn ahead: strain at the voltages of one millisecond, the others at one.
-    pub fn blocks(&self, count: u16, strain_v: &[f64], pins_v: &[f64; ADC_CHANNELS], out: &mut [AdcBlock; ADC_CHANNELS]) {
+    pub fn blocks(&mut self, count: u16, strain_v: &[f64], pins_v: &[f64; ADC_CHANNELS], out: &mut [AdcBlock; ADC_CHANNELS]) {
+        let counts = |pin_v: f64, offset_v: f64| (pin_v + offset_v) * (CODES / REFERENCE_V);
+        let mut strain = Spread { pins_v: strain_v, count: usize::from(count), place: 0, rest: 0 };
+        for (first, second) in self.eight.levels(0) {
+            *first = counts(strain.next(), self.offset_v[0]);
+            *second = counts(strain.next(), self.offset_v[0]);
+        }
+        for (channel, (pin_v, offset_v)) in pins_v.iter().zip(&self.offset_v).enumerate().skip(1) {
+            let level = counts(*pin_v, *offset_v);
+            self.eight.levels(channel).for_each(|(first, second)| (*first, *second) = (level, level));
+        }
+        self.eight.convert(self.conversion_counts);
         for (channel, block) in out.iter_mut().enumerate() {
-            let pins_v = if channel == 0 { strain_v } else { &pins_v[channel..=channel] };
-            let mut sums = Sums::default();
-            let mut pins = Spread { pins_v, count: usize::from(count), place: 0, rest: 0 };
-            let (offset, drawn) = (self.offset_v[channel], self.ahead[channel]);
-            sums.take(&levels(&mut pins, offset), &drawn.eight, self.conversion_counts);
-            if let Some(noise) = drawn.spare {
-                sums.one(whole_code((pins.next() + offset) * (CODES / REFERENCE_V) + self.conversion_counts * noise + 0.5));
+            let mut sums = self.eight.sums(channel);
+            if usize::from(count) > EIGHT {
+                let pin_v = if channel == 0 { strain.next() } else { pins_v[channel] };
+                let level = counts(pin_v, self.offset_v[channel]);
+                sums.one(whole_code(level + self.conversion_counts * self.ninth[channel] + 0.5));
             }
             *block = sums.block(count);
-        }
-    }
-}
-
-/// Levels of eight conversions, counts; in turn they go to the first and to the second noise of each word.
-#[inline(always)]
-fn levels(pins: &mut Spread<'_>, offset: f64) -> [[f64; LANES / 2]; 2] {
-    if let [pin] = pins.pins_v {
-        return [[(pin + offset) * (CODES / REFERENCE_V); LANES / 2]; 2];
-    }
-    let (mut first, mut second) = ([0.0; LANES / 2], [0.0; LANES / 2]);
-    for (first, second) in first.iter_mut().zip(&mut second) {
-        *first = (pins.next() + offset) * (CODES / REFERENCE_V);
-        *second = (pins.next() + offset) * (CODES / REFERENCE_V);
-    }
-    [first, second]
-}
-
-/// Conversions that are made side by side.
-const LANES: usize = 8;
-/// 2^52: a double of this size has no fraction.
-const ROUNDING: f64 = 4_503_599_627_370_496.0;
-
-/// Two numbers with two others, side by side.
-#[inline]
-fn side(a: [f64; 2], b: [f64; 2], join: impl Fn(f64, f64) -> f64) -> [f64; 2] {
-    [join(a[0], b[0]), join(a[1], b[1])]
-}
-
-/// The ideal converter's code for a level: truncated, at its ends clipped. As a float, so that eight go side by side; sums of codes and
-/// of their squares are exact in it.
-#[inline]
-fn whole_code(noisy: f64) -> f64 {
-    let inside = if noisy > 0.0 { noisy } else { 0.0 };
-    let inside = if inside < CODES - 1.0 { inside } else { CODES - 1.0 };
-    let nearest = (inside + ROUNDING) - ROUNDING;
-    nearest - if nearest > inside { 1.0 } else { 0.0 }
-}
-
-/// Sums over the conversions of a block.
-struct Sums {
-    sum: f64,
-    squares: f64,
-    min: f64,
-    max: f64,
-}
-
-impl Default for Sums {
-    fn default() -> Self {
-        Self { sum: 0.0, squares: 0.0, min: f64::from(u16::MAX), max: 0.0 }
-    }
-}
-
-fn lower(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-fn higher(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-impl Sums {
-    fn one(&mut self, code: f64) {
-        self.sum += code;
-        self.squares += code * code;
-        self.min = lower(code, self.min);
-        self.max = higher(code, self.max);
-    }
-
-    /// Takes eight conversions at these levels with this noise.
-    #[inline(always)] // a call would pass all sixteen through memory
-    fn take(&mut self, levels: &[[f64; LANES / 2]; 2], noise: &[[f64; LANES / 2]; 2], noise_counts: f64) {
-        let code = |half: usize, pair: usize| {
-            let at = |lane| whole_code(levels[half][2 * pair + lane] + noise_counts * noise[half][2 * pair + lane] + 0.5);
-            [at(0), at(1)]
-        };
-        let [a, b, c, d] = [code(0, 0), code(0, 1), code(1, 0), code(1, 1)];
-        let sums = side(side(a, b, |x, y| x + y), side(c, d, |x, y| x + y), |x, y| x + y);
-        let square = |x: [f64; 2]| side(x, x, |x, y| x * y);
-        let squares = side(side(square(a), square(b), |x, y| x + y), side(square(c), square(d), |x, y| x + y), |x, y| x + y);
-        let lowest = side(side(a, b, lower), side(c, d, lower), lower);
-        let highest = side(side(a, b, higher), side(c, d, higher), higher);
-        self.sum += sums[0] + sums[1];
-        self.squares += squares[0] + squares[1];
-        self.min = lower(lower(lowest[0], lowest[1]), self.min);
-        self.max = higher(higher(highest[0], highest[1]), self.max);
-    }
-
-    fn block(&self, count: u16) -> AdcBlock {
-        // a whole number below 2^52 stands in the lowest bits of itself plus 2^52
-        let whole = |x: f64| (x + ROUNDING).to_bits() ^ ROUNDING.to_bits();
-        AdcBlock {
-            sum: whole(self.sum) as u32,
-            sum_sq: whole(self.squares),
-            count,
-            min: whole(self.min) as u16,
-            max: whole(self.max) as u16,
         }
     }
 }
@@ -268,16 +179,13 @@ struct Spread<'a> {
 impl Spread<'_> {
     #[inline]
     fn next(&mut self) -> f64 {
-        let [pin] = self.pins_v else {
-            let pin = self.pins_v.get(self.place).copied().unwrap_or_default();
-            self.rest += self.pins_v.len();
-            while self.rest >= self.count {
-                self.rest -= self.count;
-                self.place += 1;
-            }
-            return pin;
-        };
-        *pin
+        let pin = self.pins_v.get(self.place).copied().unwrap_or_default();
+        self.rest += self.pins_v.len();
+        while self.rest >= self.count {
+            self.rest -= self.count;
+            self.place += 1;
+        }
+        pin
     }
 }
 

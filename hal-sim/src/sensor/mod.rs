@@ -8,6 +8,7 @@
 pub mod adc;
 pub mod back_emf;
 mod channel;
+mod conversions;
 pub mod edge;
 pub mod logger;
 pub mod tachometers;
