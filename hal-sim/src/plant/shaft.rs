@@ -56,7 +56,7 @@ pub(super) struct Shaft {
 }
 
 impl Shaft {
-    /// For steps of `dt_s`. The winding's brake is linear in the speed, the air's square: two products a step instead of the whole
+    /// For steps of `dt_s`. The winding's brake is linear in the speed, the air's square: two products one after the other instead of the whole
     /// way through the current, for each step of the run waits for the one before.
     #[inline]
     pub(super) fn new(acting: Acting, dt_s: f64) -> Self {
