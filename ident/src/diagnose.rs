@@ -16,7 +16,7 @@ use crate::opponent::{nameless, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::search::{base, connected, refine, refine_newest, scan, stride};
-use crate::together::choose_pair;
+use crate::together::{Ground, choose_pair};
 
 /// Most effects on one channel.
 const MOST_ON_A_CHANNEL: usize = 3;
@@ -132,7 +132,10 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         candidates.push(ranked.iter().take(SHOWN).cloned().collect());
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else {
             let room = best.fit.placed.len() + 2 <= MOST_EFFECTS;
-            let pair = if room { choose_pair(context, declared, &start, &best, &ranked, &mut offers, &folds) } else { None };
+            let done = (round as f64 + 1.0) / (MOST_EFFECTS as f64 + 1.0);
+            let mut heard = |p: f64| progress(done + 0.9 * p * (1.0 - done));
+            let ground = Ground { context, declared, start: &start, folds: &folds };
+            let pair = if room { choose_pair(ground, &best, &ranked, &mut offers, &mut heard) } else { None };
             if let Some((pair, held)) = pair {
                 best = pair;
                 errors = held;

@@ -18,16 +18,26 @@ const FIRSTS: usize = 3;
 /// Share of the held-out error on one of its channels that each of the two must remove.
 const NEEDED_OF_EACH: f64 = 0.2;
 
+/// What a search stands on.
+#[derive(Clone, Copy)]
+pub(crate) struct Ground<'g> {
+    pub context: &'g Context,
+    pub declared: Declared<'g>,
+    /// The declared model as it fits.
+    pub start: &'g Fit,
+    /// Rows that are left out together.
+    pub folds: &'g [Vec<bool>],
+}
+
 /// The best pair that stands up beside what was found already, with its held-out errors.
 pub(crate) fn choose_pair(
-    context: &Context,
-    declared: Declared<'_>,
-    start: &Fit,
+    ground: Ground<'_>,
     best: &Candidate,
     singles: &[Candidate],
     offers: &mut [&mut Scanned],
-    folds: &[Vec<bool>],
+    progress: &mut dyn FnMut(f64),
 ) -> Option<(Candidate, Vec<Held>)> {
+    let Ground { context, declared, start, folds } = ground;
     let left = loud(context, declared, &best.fit);
     let is_loud = |c: &Candidate| {
         let newest = c.fit.placed.last();
@@ -47,10 +57,13 @@ pub(crate) fn choose_pair(
         new
     });
     let mut pairs: Vec<Candidate> = Vec::new();
-    for first in firsts.into_iter().take(FIRSTS) {
-        for found in round_of(context, declared, first, offers, &mut |_| {}).into_iter().take(2) {
-            pairs.push(Candidate { evidence: evidence_over(context, &found.fit, start), ..found });
-        }
+    for (k, first) in firsts.into_iter().take(FIRSTS).enumerate() {
+        let ranked = round_of(context, declared, first, offers, &mut |p| progress((k as f64 + p) / FIRSTS as f64));
+        pairs.extend(ranked.into_iter().take(2).map(|c| Candidate { evidence: evidence_over(context, &c.fit, start), ..c }));
+        // what was scanned beside this first says nothing beside the next
+        let newest = first.fit.placed.last();
+        let beside = |o: &Scanned| newest.is_some_and(|n| o.instance.channels.iter().any(|c| n.instance.touches(c)));
+        offers.iter_mut().filter(|o| beside(o)).for_each(|o| o.found = None);
     }
     offers.iter_mut().for_each(|o| o.found = None);
     let needed = 2.0 * NEEDED_EVIDENCE + if best.fit.placed.is_empty() { 0.0 } else { evidence_over(context, &best.fit, start) };

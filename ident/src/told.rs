@@ -17,6 +17,8 @@ use crate::verdict::Validation;
 
 /// Steps of the refinement.
 const EVALUATIONS: usize = 200;
+/// Instances of an effect that are refined.
+const PROMISING: usize = 4;
 
 /// Errors on another run of the same rig, before, and after a fit of the effects that were told.
 ///
@@ -28,8 +30,7 @@ pub fn told(log: &Log, names: &[&str], other: &Log) -> Option<Validation> {
     let start = fit(&context, declared, &[], None, Rows::All)?;
     let mut placed = Vec::new();
     for name in names {
-        placed.push(best(&context, declared, &placed, name)?);
-        placed = refine(&context, declared, &placed, Rows::All, EVALUATIONS);
+        placed = with_best(&context, declared, &placed, name)?;
     }
     let fitted = fit(&context, declared, &placed, Some(&start), Rows::All)?;
     let before = Model::from_fit(&context, log, declared, &start);
@@ -37,14 +38,23 @@ pub fn told(log: &Log, names: &[&str], other: &Log) -> Option<Validation> {
     Some(validation(other, &before, &after))
 }
 
-/// The instance of an effect that explains most beside what is placed.
-fn best(context: &Context, declared: Declared<'_>, placed: &[Placed], name: &str) -> Option<Placed> {
+/// What is placed, with the instance of an effect that explains most beside it.
+fn with_best(context: &Context, declared: Declared<'_>, placed: &[Placed], name: &str) -> Option<Vec<Placed>> {
     let effect = *effects::library().iter().find(|e| e.id() == name)?;
     let loud = vec![true; context.targets.len()];
     let beside = base(context, declared, placed);
-    let tried = effect.instances(context).into_iter().filter_map(|instance| {
+    let scanned = effect.instances(context).into_iter().filter_map(|instance| {
         let (shape, gain) = scan(context, &beside, effect, &instance, &loud)?;
         Some((gain, Placed { effect, instance, shape }))
     });
-    tried.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, placed)| placed)
+    let mut promising: Vec<(f64, Placed)> = scanned.collect();
+    promising.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // a rough grid misplaces sharp effects: the first few are worked out
+    let refined = promising.into_iter().take(PROMISING).filter_map(|(_, new)| {
+        let all: Vec<Placed> = placed.iter().cloned().chain([new]).collect();
+        let all = refine(context, declared, &all, Rows::All, EVALUATIONS);
+        let fitted = fit(context, declared, &all, None, Rows::All)?;
+        Some((fitted.targets.iter().map(|t| t.loglik.mean).sum::<f64>(), all))
+    });
+    refined.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, all)| all)
 }
