@@ -215,7 +215,7 @@ pub struct Context {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Facts {
     /// Step, offset and anchoring of the saw-tooth of the pulse that fits best.
-    pub(crate) tooth: OnceLock<(f64, f64, bool)>,
+    pub(crate) tooth: OnceLock<crate::effects::SawTooth>,
     /// Speed that the pulse alone makes one expect on each row, rev/min.
     pub(crate) expected: OnceLock<Vec<f64>>,
     /// Whether speed and command change within single rows.

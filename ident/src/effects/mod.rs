@@ -46,6 +46,7 @@ mod zero_drift;
 
 use crate::context::{Context, DIFFERENCES, Relation};
 use crate::design::TargetDesign;
+pub(crate) use throttle_quantisation::Best as SawTooth;
 
 /// Where in the causal chain an effect acts; effects are applied in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

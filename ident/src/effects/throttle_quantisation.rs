@@ -40,7 +40,7 @@ impl Effect for ThrottleQuantisation {
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
         // the saw-tooth has a likelihood with many narrow peaks: the search starts on the highest
-        let (step, offset, anchored) = *context.facts.tooth.get_or_init(|| best_tooth(&levels(context)));
+        let Best { step, offset, anchored, .. } = *context.facts.tooth.get_or_init(|| best_tooth(&levels(context)));
         let free = if anchored { 0.0 } else { 0.3 };
         vec![
             Shape { name: "step", unit: "us", range: (0.985 * step, 1.015 * step), starts: vec![step] },
@@ -70,8 +70,10 @@ impl Effect for ThrottleQuantisation {
         let levels = levels(context);
         if let [first, .., last] = levels.as_slice() {
             let gap = (last.0 - first.0) / (levels.len() as f64 - 1.0);
+            let others = context.facts.tooth.get_or_init(|| best_tooth(&levels)).others;
             for e in fitted.iter_mut().filter(|e| e.name == "step") {
-                e.se = e.se.max(gap * e.value / (last.0 - first.0) / 12.0_f64.sqrt());
+                let between = gap * e.value / (last.0 - first.0) / 12.0_f64.sqrt();
+                e.se = e.se.max(between).max((others.1 - e.value).max(e.value - others.0) / 1.96);
             }
         }
         fitted
@@ -121,9 +123,22 @@ fn tooth(pulse: f64, step: f64, offset: f64) -> f64 {
     at.round() - at
 }
 
-/// Step and offset of the saw-tooth that fits the departures best, and whether the offset is that of a plain counter: every
-/// step on a grid that is even in frequency, then a fine scan about the best ones.
-fn best_tooth(levels: &[(f64, f64, f64)]) -> (f64, f64, bool) {
+/// The saw-tooth that fits the departures best.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Best {
+    step: f64,
+    offset: f64,
+    /// The offset is that of a plain counter.
+    anchored: bool,
+    /// Shortest and longest step that explain nearly as much: on few levels one tooth passes for another.
+    others: (f64, f64),
+}
+
+/// Share of the best score from which on another step could as well be the true one.
+const ALIAS: f64 = 0.8;
+
+/// The best saw-tooth: every step on a grid that is even in frequency, then a fine scan about the best ones.
+fn best_tooth(levels: &[(f64, f64, f64)]) -> Best {
     let span = levels.last().map_or(1.0, |l| l.0) - levels.first().map_or(0.0, |l| l.0);
     let departures = Departures::new(levels);
     let df = 0.15 / span.max(10.0);
@@ -138,9 +153,11 @@ fn best_tooth(levels: &[(f64, f64, f64)]) -> (f64, f64, bool) {
         .collect();
     coarse.sort_by(|a, b| b.1.total_cmp(&a.1));
     coarse.truncate(16);
-    let mut best = Tooth { score: f64::NEG_INFINITY, step: 10.0, offset: 0.0 };
-    let mut anchored = best;
+    let none = Tooth { score: f64::NEG_INFINITY, step: 10.0, offset: 0.0 };
+    let (mut best, mut anchored) = (none, none);
+    let mut peaks = Vec::new();
     for (f, _) in coarse {
+        let mut peak = none;
         for k in -6..=6 {
             let step = 1.0 / (f + df * f64::from(k) / 6.0);
             // by round steps, or a round number of them over 1000 us
@@ -150,12 +167,20 @@ fn best_tooth(levels: &[(f64, f64, f64)]) -> (f64, f64, bool) {
                 }
             }
             for m in 0..16 {
-                best.improve(&departures, step, f64::from(m) / 16.0 - 0.5);
+                peak.improve(&departures, step, f64::from(m) / 16.0 - 0.5);
             }
+        }
+        peaks.push(peak);
+        if peak.score > best.score {
+            best = peak;
         }
     }
     // a counter of the controller starts somewhere sensible unless the data say otherwise
-    if anchored.score > ANCHORED * best.score { (anchored.step, anchored.offset, true) } else { (best.step, best.offset, false) }
+    let is_anchored = anchored.score > ANCHORED * best.score;
+    let Tooth { step, offset, .. } = if is_anchored { anchored } else { best };
+    let alike = peaks.iter().filter(|p| p.score > ALIAS * best.score).map(|p| p.step);
+    let others = alike.fold((step, step), |(low, high), s| (low.min(s), high.max(s)));
+    Best { step, offset, anchored: is_anchored, others }
 }
 
 /// Offsets of a plain counter: cut off or rounded, counted from 1000 us or from 0.
@@ -276,7 +301,8 @@ mod tests {
             .map(|k| 1100.0 + 6.0 * f64::from(k))
             .map(|p: f64| (p, 5.0, 5.0 * (13.0 * ((p - 1000.0) / 13.0).floor() - (p - 1000.0) + 6.0)))
             .collect();
-        let (step, offset, anchored) = best_tooth(&levels);
+        let Best { step, offset, anchored, others } = best_tooth(&levels);
         assert!(anchored && (step - 13.0).abs() < 1e-9 && offset == -0.5, "{step} {offset} {anchored}");
+        assert!(others.0 > 12.8 && others.1 < 13.2, "{others:?}");
     }
 }

@@ -54,6 +54,14 @@ impl Effect for TorqueCrosstalk {
         design.add(position, 0, torque.clone());
     }
 
+    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        for e in fitted.iter_mut().filter(|e| e.name == "coefficient") {
+            let farthest = bounds(context).map_or(0.0, |b| b.map(|b| (e.value - b).abs()).into_iter().fold(0.0, f64::max));
+            e.se += farthest / 1.96;
+        }
+        fitted
+    }
+
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         let top =
             |name: &str| context.target(name).map_or(0.0, |k| context.targets[k].y.iter().fold(0.0, |a: f64, v| a.max(v.abs())));
@@ -100,6 +108,18 @@ fn acting_torque(context: &Context) -> Option<Vec<f64>> {
     let real = |s: &Scatter| if s.samples < FEWEST as f64 { 1.0 } else { (s.both / (coefficient * s.torque)).clamp(0.0, 1.0) };
     let real: Vec<f64> = scatter.iter().map(real).collect();
     Some((0..context.len()).map(|i| expected[i] + real[band(i)] * (torque[i] - expected[i])).collect())
+}
+
+/// The bounds of the coefficient by the scatter alone: as if the torque sensor had the noise that it has at rest, and as if the load cell
+/// had. Which of the two grows noisier as the rotor turns cannot be told, so the coefficient is somewhere between (Frisch 1934, Statistical
+/// Confluence Analysis).
+fn bounds(context: &Context) -> Option<[f64; 2]> {
+    let [thrust, torque] = ["thrust_n", "torque_nm"].map(|name| context.target(name).map(|k| &context.targets[k]));
+    let (thrust, torque) = (thrust?, torque?);
+    let all = scatter(context, thrust, torque, |_| 0)[0];
+    let direct = all.both / (all.torque - torque.noise.a * all.samples);
+    let reverse = (all.thrust - thrust.noise.a * all.samples) / all.both;
+    (direct.is_finite() && reverse.is_finite() && direct * reverse > 0.0).then_some([direct, reverse])
 }
 
 /// Standard errors by which the coefficient must show where the load holds still, and the share of itself that must.
