@@ -289,8 +289,8 @@ pub(crate) fn round_of(
         if gain < -20.0 {
             break;
         }
-        // what its grid alone puts above all that came out so far is worth a refinement, whatever stands before it
-        let promising = k < REFINED || k < 3 * REFINED && gain > most;
+        // what explains on its grid alone twice as much as all that came out so far is worth a refinement, whatever stands before it
+        let promising = k < REFINED || k < 3 * REFINED && gain > 2.0 * most;
         let placed = if promising { refine_newest(context, declared, &placed, sketch, 120) } else { placed };
         if let Some(fitted) =
             fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
