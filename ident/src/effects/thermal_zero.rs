@@ -109,3 +109,30 @@ fn through_lines(x: &[f64], half: usize) -> Vec<f64> {
 const NARROW: usize = 10;
 /// Excess of the variance between two widths over what noise makes of it, from which on the wider one is too wide.
 const ALLOWED: f64 = 1.5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A thermometer with noise of 0.1 on a course.
+    fn thermometer(course: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>) {
+        let truth: Vec<f64> = (0..4000).map(|i| course(f64::from(i) / 4000.0)).collect();
+        // differences of a low-discrepancy sequence: as white as second differences can tell
+        let noise = |i: usize| 0.1 * 12.0_f64.sqrt() * (((i * i) as f64 * 0.618_033_988_749_895).fract() - 0.5);
+        let reading = truth.iter().enumerate().map(|(i, v)| v + noise(i)).collect();
+        (truth, reading)
+    }
+
+    fn error(course: impl Fn(f64) -> f64) -> f64 {
+        let (truth, reading) = thermometer(course);
+        let square = smoothed(&reading).iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        (square / truth.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn a_straight_warming_is_told_from_its_noise_and_a_fast_one_is_followed() {
+        let (line, waves) = (error(|u| 20.0 + 5.0 * u), error(|u| 20.0 + (40.0 * u).sin()));
+        assert!(line < 0.01, "the widest window leaves a tenth of the noise: {line}");
+        assert!(waves < 0.05, "{waves}");
+    }
+}
