@@ -6,7 +6,8 @@
 //! Units: deg, deviation from 180.
 //! Reference: Beharie 2013, section 5.7.1 (Hall sensor with two magnets).
 
-use super::speed_channel::{HELD, against_the_others, difference, held, instances};
+use super::pulses::{HELD, against_the_others, held};
+use super::speed_channel::{difference, instances};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;

@@ -6,7 +6,7 @@
 //! Units: rows; size in the channel's unit.
 //! Reference: running median as an outlier filter, Tukey 1977, *Exploratory Data Analysis*; Hampel identifier, Pearson 2002.
 
-use super::speed_channel::PULSES;
+use super::pulses::PULSES;
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;

@@ -7,7 +7,7 @@
 //! Units: 1.
 //! Reference: Beharie 2013, section 5.7.1 (blade that the beam does not see).
 
-use super::speed_channel::{apply_pulses, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
+use super::pulses::{apply_pulses, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;

@@ -28,6 +28,7 @@ pub(crate) mod glitch_rows;
 mod hysteresis;
 mod missed_pulses;
 mod operator;
+mod pulses;
 mod quantisation;
 mod reynolds_thrust;
 mod rotor_inertia;
