@@ -6,9 +6,10 @@
 //! Units: radians; roll and yaw in (-pi, pi], pitch in [-pi/2, pi/2].
 //! Reference: Beharie 2013 Eq. 4.19-4.30 with errata (4.25 has the wrong sign, 4.28 and 4.30 need atan2); Shepperd 1978.
 
-use crate::rotation::unit;
+use crate::Mat3;
+use crate::columns::{Column, ZERO, cross, plus};
+use crate::rotation::direction;
 use crate::trig::{root, sin_cos};
-use crate::{Mat3, Vec3};
 use libm::atan2f;
 
 /// cos^2(pitch) below which roll and yaw are not told apart.
@@ -81,44 +82,46 @@ pub fn quaternion_of(r: &Mat3) -> [f32; 4] {
     raw.map(|q| q * k)
 }
 
-/// The rotation body to earth whose down axis is `down` (unit, body axes) and whose heading is that of `heading` (body axes,
-/// any length, points to where earth x lies); `None` when the two are parallel.
-pub(crate) fn matrix_from(down: &Vec3, heading: &Vec3) -> Option<Mat3> {
-    let east = unit(&down.cross(heading))?;
-    let north = east.cross(down);
-    Some(Mat3::from_rows(&[north.transpose(), east.transpose(), down.transpose()]))
+/// Sets the columns of the rotation body to earth whose up axis is `up` (unit, body axes) and whose heading is that of `heading`
+/// (body axes, any length, points to where earth x lies); `false` when the two are parallel.
+#[inline(never)]
+fn set_from(attitude: &mut [Column; 3], up: &Column, heading: &Column) -> bool {
+    let Some(east) = direction(&cross(heading, up)) else { return false };
+    let north = cross(up, &east);
+    for (((column, n), e), u) in attitude.iter_mut().zip(north).zip(east).zip(up) {
+        *column = [n, e, -u];
+    }
+    true
 }
 
-/// The rotation body to earth that has `down` (unit, body axes) downwards and `field` in the magnetic meridian, or where
-/// there is none or it is vertical, the heading of `present`. The flag says whether the heading comes from the field.
-pub(crate) fn start_attitude(down: &Vec3, field: Option<&Vec3>, declination: f32, present: &Mat3) -> Option<(Mat3, bool)> {
-    if let Some(matrix) = field.and_then(|field| matrix_from(down, field)) {
-        return Some((about_down(declination) * matrix, true));
+/// Turns the rotation body to earth so that `up` (unit, body axes) is upwards and `field` in the magnetic meridian, earth x; where
+/// there is none or it is vertical, the heading stays. Says whether the heading comes from the field.
+pub(crate) fn start_attitude(attitude: &mut [Column; 3], up: &Column, field: Option<&Column>) -> bool {
+    if field.is_some_and(|field| set_from(attitude, up, field)) {
+        return true;
     }
-    // body x, or y where x is vertical, keeps its heading
-    [0, 1].iter().find_map(|axis| {
-        let body = if *axis == 0 { Vec3::x() } else { Vec3::y() };
-        let level = matrix_from(down, &body)?;
-        let (x, y) = (present.row(0).get(*axis).copied()?, present.row(1).get(*axis).copied()?);
-        let long = root(x * x + y * y);
-        let (c, s) = if long > 1e-3 { (x / long, y / long) } else { (1.0, 0.0) };
-        Some((turn_down(s, c) * level, false))
-    })
+    // the first body axis that is not vertical, now or before, keeps its heading (c, s)
+    let mut axis = [1.0, 0.0, 0.0];
+    for k in 0..3 {
+        let Some([c, s, _]) = attitude.get(k).copied() else { continue };
+        if set_from(attitude, up, &plus(&plus(&ZERO, &axis, c), &cross(&axis, up), -s)) {
+            break;
+        }
+        axis.rotate_right(1);
+    }
+    false
 }
 
 /// Rotation about earth z.
 pub(crate) fn about_down(angle: f32) -> Mat3 {
     let (s, c) = sin_cos(angle);
-    turn_down(s, c)
-}
-
-fn turn_down(s: f32, c: f32) -> Mat3 {
     Mat3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Vec3;
     use core::f32::consts::{FRAC_PI_2, PI};
     use proptest::prelude::*;
 
@@ -143,10 +146,12 @@ mod tests {
     #[test]
     fn down_and_heading_make_the_matrix() {
         let r = matrix_of(&Euler { roll: -0.3, pitch: 0.9, yaw: -2.0 });
-        let down = r.row(2).transpose();
-        let field = r.transpose() * Vec3::new(0.4, 0.0, 0.8);
-        assert!((matrix_from(&down, &field).unwrap() - r).abs().max() < 1e-6);
-        assert_eq!(matrix_from(&Vec3::z(), &(Vec3::z() * 3.0)), None);
+        let up = [-r.m31, -r.m32, -r.m33];
+        let [[x, y, z]] = (r.transpose() * Vec3::new(0.4, 0.0, 0.8)).data.0;
+        let mut found = [ZERO; 3];
+        assert!(set_from(&mut found, &up, &[x, y, z]));
+        assert!((Mat3::from(found) - r).abs().max() < 1e-6);
+        assert!(!set_from(&mut found, &[0.0, 0.0, 1.0], &[0.0, 0.0, 3.0]));
     }
 
     proptest! {

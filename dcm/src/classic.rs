@@ -145,8 +145,11 @@ impl Classic {
 
     /// Sets the tilt from `down`, the heading from `field` where there is one and from the present matrix where not.
     fn start(&mut self, down: &Vec3, field: Option<&Vec3>) -> bool {
-        let Some((matrix, from_field)) = start_attitude(down, field, self.config.declination, &self.matrix) else { return false };
-        self.matrix = matrix;
+        let (up, field) = ([-down.x, -down.y, -down.z], field.map(|m| [m.x, m.y, m.z]));
+        let from_field = start_attitude(&mut self.matrix.data.0, &up, field.as_ref());
+        if from_field {
+            self.matrix = about_down(self.config.declination) * self.matrix;
+        }
         self.tilt_known = true;
         self.yaw_known |= from_field;
         self.since_accel = 0.0;

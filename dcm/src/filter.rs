@@ -21,19 +21,24 @@ pub use output::{Flags, Quality, STATE_WORDS};
 pub use state::StateError;
 
 use crate::angles::start_attitude;
+use crate::columns::{Column, ZERO, cross, cut_all, dot, least, plus, square, turn};
 use crate::config::Config;
-use crate::linear::square;
 use crate::measurement::{Measurement, Step};
-use crate::rotation::{Increment, increment, product, renormalise, rotate, unit};
+use crate::rotation::{direction, exponential, inverse_sqrt, turn_body};
+use crate::trig::{angle, root};
 use crate::{Mat3, STANDARD_GRAVITY, Vec3};
 use bias::Bias;
-use field::Field;
+use field::{Field, Shape};
 use iron::Iron;
-use libm::atan2f;
 use lowpass::LowPass;
 use rest::Rest;
 use state::{Words, flag};
 
+/// Time over which the specific force is summed in earth axes before it is used, s (five readings of 200 Hz, one of 48): its average
+/// is one of seconds.
+const ENOUGH: f32 = 0.0205;
+/// Shortest time between two fields that are used, s (every third reading of 75 Hz, every second of 48).
+const ENOUGH_MAG: f32 = 0.035;
 /// Longest time that one accelerometer reading may stand for, s.
 const LONGEST_ACCEL: f32 = 0.25;
 /// Longest time that one magnetometer reading may stand for, s (the slowest sensor that is of use gives 1 Hz).
@@ -44,13 +49,18 @@ const CONING: f32 = 1.0 / 12.0;
 const LARGEST_TURN: f32 = 1.0;
 /// Horizontal part of the field below which it has no heading, as a share of the whole.
 const LEAST_LEVEL: f32 = 0.02;
-/// At rest the measured vertical is beyond doubt: a tilt that is off by more (sine) is set anew.
-const TILT_BEYOND_DOUBT: f32 = 0.17;
+/// At rest the measured vertical is beyond doubt: a tilt that is off by more than ten degrees (cosine) is set anew.
+const TILT_BEYOND_DOUBT: f32 = 0.985;
 
 /// The direction-cosine filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dcm {
-    config: Config,
+    tilt_tau: f32,
+    heading_tau: f32,
+    gyro_range: f32,
+    accel_range: f32,
+    declination: f32,
+    max_dt: f32,
     matrix: Mat3,
     started: bool,
     heading_absolute: bool,
@@ -64,46 +74,54 @@ pub struct Dcm {
     since_gyro: f32,
     since_accel: f32,
     since_mag: f32,
-    last_mag: Vec3,
-    last_angle: Vec3,
-    turned: Vec3,
+    last_angle: Column,
+    sum: Column,
+    summed: f32,
 }
 
 impl Dcm {
     /// A filter that knows nothing yet: identity, zero bias.
     #[must_use]
+    #[inline(never)]
     pub fn new(config: Config) -> Self {
+        let Config { tilt_tau, heading_tau, gyro_range, accel_range, declination, max_dt, .. } = config;
         Self {
-            config,
-            matrix: Mat3::identity(),
+            tilt_tau,
+            heading_tau,
+            gyro_range,
+            accel_range,
+            declination,
+            max_dt,
+            matrix: const { Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) },
             started: false,
             heading_absolute: false,
             tilt: LowPass::default(),
-            rest: Rest::default(),
-            bias: Bias::new(Vec3::zeros()),
-            field: Field::default(),
-            iron: Iron::default(),
+            rest: Rest::new(config.rest),
+            bias: Bias::new(config.bias),
+            field: Field::new(config.field),
+            iron: Iron::new(config.iron),
             heading_age: 0.0,
             heading_error: 0.0,
             since_gyro: 0.0,
             since_accel: 0.0,
             since_mag: 0.0,
-            last_mag: Vec3::zeros(),
-            last_angle: Vec3::zeros(),
-            turned: Vec3::zeros(),
+            last_angle: ZERO,
+            sum: ZERO,
+            summed: 0.0,
         }
     }
 
     /// Takes the readings that arrived `dt` seconds after the last call. Missing sensors are `None`.
+    #[inline(never)]
     pub fn update(&mut self, dt: f32, measured: &Measurement) -> Step {
         let mut step = self.pass(dt);
-        if let Some(rate) = &measured.gyro {
+        if let Some(rate) = column(&measured.gyro) {
             self.gyro(rate, &mut step);
         }
-        if let Some(force) = &measured.accel {
-            self.accel(force, measured.mag.as_ref(), &mut step);
+        if let Some(force) = column(&measured.accel) {
+            self.accel(force, &mut step);
         }
-        if let Some(field) = &measured.mag {
+        if let Some(field) = column(&measured.mag) {
             self.mag(field, &mut step);
         }
         step
@@ -126,207 +144,214 @@ impl Dcm {
 
     /// Time passes for all three sensors.
     fn pass(&mut self, dt: f32) -> Step {
-        let good = dt.is_finite() && dt > 0.0;
+        let good = dt > 0.0 && dt < f32::MAX;
         let dt = if good { dt } else { 0.0 };
-        if dt > self.config.max_dt && self.started {
+        if dt > self.max_dt && self.started {
             self.started = false; // the body may have turned by any angle meanwhile
-            self.tilt = LowPass::default();
-            self.rest = Rest { ever: self.rest.ever, ..Rest::default() };
+            self.tilt.age = 0.0;
+            self.rest.restart();
         }
         self.since_gyro += dt;
-        self.since_accel = (self.since_accel + dt).min(LONGEST_ACCEL);
-        self.since_mag = (self.since_mag + dt).min(LONGEST_MAG);
+        self.since_accel = least(self.since_accel + dt, LONGEST_ACCEL);
+        self.since_mag = least(self.since_mag + dt, LONGEST_MAG);
         Step { bad_input: !good, ..Step::default() }
     }
 
     /// The gyro turns the matrix.
-    fn gyro(&mut self, rate: &Vec3, step: &mut Step) {
-        let dt = core::mem::take(&mut self.since_gyro).min(self.config.max_dt);
-        if !finite(rate) {
-            step.bad_input = true;
+    #[inline(never)]
+    fn gyro(&mut self, rate: &Column, step: &mut Step) {
+        let mut rate = *rate;
+        let dt = least(core::mem::take(&mut self.since_gyro), self.max_dt);
+        for w in &mut rate {
+            step.bad_input |= !w.is_finite();
+            step.overrange |= w.abs() >= self.gyro_range;
+        }
+        if step.bad_input {
             return;
         }
-        let most = self.config.gyro_range;
-        let cut = rate.map(|w| w.clamp(-most, most));
-        step.overrange |= rate.iter().any(|w| w.abs() >= most);
-        let config = &self.config;
-        let trusted = self.bias.trusted(&config.bias).then_some(&self.bias.value);
-        self.rest.rate(&cut, dt, &config.rest, &config.bias, trusted);
+        cut_all(&mut rate, self.gyro_range);
+        self.rest.rate(&rate, dt, &self.bias);
         if !self.started {
             return;
         }
-        let angle = (cut - self.bias.value) * dt;
+        let rate = plus(&rate, &self.bias.value, -1.0);
+        let angle = plus(&ZERO, &rate, dt);
         if square(&angle) > LARGEST_TURN * LARGEST_TURN {
             step.bad_input = true;
             return;
         }
         // the axis of turning moves within the step: the second-order term of the rotation vector
-        let coned = angle + self.last_angle.cross(&angle) * CONING;
+        let coned = plus(&angle, &cross(&self.last_angle, &angle), CONING);
         self.last_angle = angle;
-        self.matrix = rotate(&self.matrix, &coned, Increment::Exponential);
-        self.bias.follow(&self.matrix, dt, &config.bias);
-        self.bias.age(dt, !self.rest.now, &config.bias);
-        if self.rest.now {
-            self.bias.at_rest(&self.rest.rate.x, dt, &config.bias);
-        }
+        turn_body(&mut self.matrix.data.0, &coned);
         step.gyro_used = true;
     }
 
     /// The averaged specific force sets the tilt.
-    fn accel(&mut self, force: &Vec3, field: Option<&Vec3>, step: &mut Step) {
-        let dt = self.since_accel;
-        if !usable(force) {
-            step.bad_input = true;
+    #[inline(never)]
+    fn accel(&mut self, force: &Column, step: &mut Step) {
+        if !taken(force, self.accel_range, step) {
             return;
         }
-        if force.iter().any(|f| f.abs() >= self.config.accel_range) {
-            step.overrange = true;
-            return;
-        }
-        self.since_accel = 0.0;
-        self.rest.force(force, dt, &self.config.rest);
+        let dt = core::mem::take(&mut self.since_accel);
         if !self.started {
-            self.start(&-force, field, step);
+            self.start(force, None, step);
             return;
-        }
-        if self.rest.now && self.settle(step) {
-            return;
-        }
-        let down = self.matrix * -force;
-        self.tilt.step(&down, dt, self.config.tilt_tau);
-        let Some(seen) = unit(&self.tilt.x).filter(|_| square(&self.tilt.x) > 1.0) else { return };
-        let level = Vec3::new(seen.y, -seen.x, 0.0);
-        let turn = if seen.z >= 0.0 { level } else { unit(&level).unwrap_or_else(Vec3::x) };
-        self.turn_earth(&turn);
-        if !self.rest.now && !self.tilt.starting(self.config.tilt_tau) {
-            self.bias.take_tilt(&turn, dt, &self.config.bias);
         }
         step.accel_used = true;
+        let mut up = *force;
+        turn(&self.matrix.data.0, core::slice::from_mut(&mut up));
+        self.sum = plus(&self.sum, &up, dt);
+        self.summed += dt;
+        let dt = self.summed;
+        if dt < ENOUGH {
+            return;
+        }
+        let up = plus(&ZERO, &self.sum, 1.0 / dt);
+        self.sum = ZERO;
+        self.summed = 0.0;
+        self.rest.force(force, dt);
+        self.bias.follow(&self.matrix.data.0, dt);
+        self.bias.age(dt, !self.rest.now);
+        if self.rest.now {
+            self.bias.at_rest(self.rest.rate.value(), dt);
+            if self.settle(step) {
+                return;
+            }
+        }
+        self.tilt.step(&up, dt, self.tilt_tau);
+        let mean = self.tilt.value();
+        let long = square(mean);
+        if long < 1.0 {
+            return;
+        }
+        let ([x, y, z], k) = (*mean, inverse_sqrt(long));
+        // beyond 90 degrees the sine shrinks again: any turn leads out
+        let by = if z < 0.0 { [-y * k, x * k, 0.0] } else { [0.5, 0.0, 0.0] };
+        if !self.rest.now && !self.tilt.starting(self.tilt_tau) {
+            self.bias.take_tilt(&by, dt);
+        }
+        self.turn_earth(&by);
+    }
+
+    /// Up in body axes.
+    fn up(&self) -> Column {
+        let [[.., x], [.., y], [.., z]] = self.matrix.data.0;
+        [-x, -y, -z]
     }
 
     /// At rest: the first time, and whenever the tilt is off by more than doubt allows, the attitude is set anew.
-    #[cold]
-    #[inline(never)]
     fn settle(&mut self, step: &mut Step) -> bool {
-        let Some(down) = unit(&-self.rest.force.x) else { return false };
-        let predicted = self.matrix.row(2).transpose();
-        let off = square(&down.cross(&predicted)) > TILT_BEYOND_DOUBT * TILT_BEYOND_DOUBT || down.dot(&predicted) < 0.0;
-        if self.rest.ever && !off {
+        let Some(up) = direction(self.rest.force.value()) else { return false };
+        if self.rest.ever && dot(&up, &self.up()) > TILT_BEYOND_DOUBT {
             return false;
         }
         self.rest.ever = true;
-        let field = (self.heading_absolute && self.since_mag < LONGEST_MAG).then_some(self.last_mag);
-        self.start(&down, field.as_ref(), step);
+        self.start(&up, None, step);
         step.started
     }
 
     /// The field turns the matrix about the vertical.
-    fn mag(&mut self, field: &Vec3, step: &mut Step) {
-        let dt = self.since_mag;
-        let most = self.config.field.range;
-        if !usable(field) {
-            step.bad_input = true;
+    #[inline(never)]
+    fn mag(&mut self, field: &Column, step: &mut Step) {
+        if !taken(field, self.field.config.range, step) || self.heading_absolute && self.since_mag < ENOUGH_MAG {
             return;
         }
-        if field.iter().any(|m| m.abs() >= most) {
-            step.overrange = true;
-            return;
-        }
-        self.since_mag = 0.0;
-        self.last_mag = *field;
+        let dt = core::mem::take(&mut self.since_mag);
         if !self.started || dt <= 0.0 {
             return;
         }
         if !self.heading_absolute {
-            let down = self.matrix.row(2).transpose();
-            self.start(&down, Some(field), step); // the first field of a filter that ran without one
+            self.start(&self.up(), Some(field), step); // the first field after a start
         }
-        let config = &self.config;
-        let turned = core::mem::replace(&mut self.turned, Vec3::zeros());
-        self.iron.turned(&turned);
-        if !self.tilt.starting(config.tilt_tau) {
-            self.iron.take(&self.matrix, field, dt, &config.iron);
+        let settled = !self.tilt.starting(self.tilt_tau);
+        let mut seen = [self.iron.taken_from(field), *field];
+        turn(&self.matrix.data.0, &mut seen);
+        let [[x, y, down], whole] = &seen;
+        if settled {
+            self.iron.take(&self.matrix.data.0, whole, dt);
         }
-        let earth = self.matrix * (field - self.iron.applied(&config.iron));
-        let spin = self.rest.rate.x - self.bias.value;
-        let turning = square(&spin) > config.field.new_rate * config.field.new_rate;
-        self.field.take(&earth, dt, turning, &config.field);
-        let level = earth.x * earth.x + earth.y * earth.y;
-        if level < LEAST_LEVEL * LEAST_LEVEL * square(&earth) {
+        let level = root(x * x + y * y);
+        let spin = plus(self.rest.rate.value(), &self.bias.value, -1.0);
+        let turning = square(&spin) > self.field.config.new_rate * self.field.config.new_rate;
+        self.field.take(&Shape { level, down: *down }, dt, turning);
+        if level < LEAST_LEVEL * down.abs() {
             return;
         }
-        let error = wrapped(config.declination - atan2f(earth.y, earth.x));
+        let error = wrapped(self.declination - angle(*y, *x, level));
         self.heading_error = error;
-        if !self.rest.now && !self.tilt.starting(config.tilt_tau) {
-            self.bias.take_heading(error, dt, &config.bias);
+        if !self.rest.now && settled {
+            self.bias.take_heading(error, dt);
         }
-        self.heading_age = (self.heading_age + dt).min(config.heading_tau);
+        self.heading_age = least(self.heading_age + dt, self.heading_tau);
         // an unknown bias does more harm than an unknown field, and the first seconds are the average that the heading starts from
-        let hold = self.bias.trusted(&config.bias) && self.heading_age >= config.heading_tau;
-        let belief = self.field.belief(dt, hold, &config.field);
-        let gain = (dt / self.heading_age).min(1.0);
+        let hold = self.bias.trusted() && self.heading_age >= self.heading_tau;
+        let belief = self.field.belief(dt, hold);
+        let gain = least(dt / self.heading_age, 1.0);
         if belief > 0.0 {
-            self.turn_earth(&Vec3::new(0.0, 0.0, error * gain * belief));
+            self.turn_earth(&[0.0, 0.0, error * gain * belief]);
             step.mag_used = true;
         }
     }
 
     /// Turns the earth under the filter, with everything that is remembered in earth axes.
     #[inline(never)]
-    fn turn_earth(&mut self, turn: &Vec3) {
-        self.turned += turn;
-        if square(turn) > 1e-4 {
-            return self.turn_earth_far(&increment(turn, Increment::Exponential));
+    fn turn_earth(&mut self, angle: &Column) {
+        // a large turn in pieces that the series can express
+        let pieces = if square(angle) > 0.1 { 10 } else { 1 };
+        let by = exponential(&plus(&ZERO, angle, 1.0 / pieces as f32));
+        for _ in 0..pieces {
+            for columns in [&mut self.matrix.data.0[..], &mut self.bias.attitude, &mut self.iron.average, &mut self.tilt.state] {
+                turn(&by, columns);
+            }
         }
-        turn_rows(&mut self.matrix, turn);
-        turn_rows(&mut self.bias.attitude, turn);
-        self.tilt.x += turn.cross(&self.tilt.x);
-        self.tilt.v += turn.cross(&self.tilt.v);
     }
 
-    /// The same for a large turn, which first order cannot express.
+    /// Sets the tilt from `up` (body axes) and the heading from `field` where there is one, from the present one where not.
     #[cold]
     #[inline(never)]
-    fn turn_earth_far(&mut self, by: &Mat3) {
-        self.matrix = renormalise(&product(by, &self.matrix));
-        self.bias.attitude = product(by, &self.bias.attitude);
-        self.tilt.x = by * self.tilt.x;
-        self.tilt.v = by * self.tilt.v;
-    }
-
-    /// Sets the tilt from `down` (body axes) and the heading from `field` where there is one, from the present one where not.
-    #[cold]
-    #[inline(never)]
-    fn start(&mut self, down: &Vec3, field: Option<&Vec3>, step: &mut Step) {
-        let field = field.filter(|m| finite(m) && m.iter().all(|m| m.abs() < self.config.field.range));
-        let field = field.map(|m| m - self.iron.applied(&self.config.iron));
-        let Some(down) = unit(down) else { return };
-        let Some((matrix, from_field)) = start_attitude(&down, field.as_ref(), self.config.declination, &self.matrix) else {
-            return;
-        };
-        self.matrix = matrix;
-        self.bias.attitude = matrix;
-        self.tilt = LowPass::default();
-        self.tilt.step(&Vec3::new(0.0, 0.0, STANDARD_GRAVITY), 1e-3, self.config.tilt_tau);
-        self.turned = Vec3::zeros();
+    fn start(&mut self, up: &Column, field: Option<&Column>, step: &mut Step) {
+        let field = field.map(|m| self.iron.taken_from(m));
+        let Some(up) = direction(up) else { return };
+        let from_field = start_attitude(&mut self.matrix.data.0, &up, field.as_ref());
+        self.bias.attitude = self.matrix.data.0;
+        self.tilt = LowPass::at(&[0.0, 0.0, -STANDARD_GRAVITY]);
+        self.sum = ZERO;
+        self.summed = 0.0;
         self.iron.clear(); // what it saw of the attitude before is void
         self.started = true;
+        self.heading_absolute = from_field;
         if from_field {
-            self.heading_absolute = true;
+            self.turn_earth(&[0.0, 0.0, self.declination]);
             self.heading_age = 0.0;
         }
         step.started = true;
     }
 }
 
-fn finite(v: &Vec3) -> bool {
-    v.iter().all(|c| c.is_finite())
+/// A reading as a column.
+fn column(reading: &Option<Vec3>) -> Option<&Column> {
+    reading.as_ref().map(|v| {
+        let [column] = &v.data.0;
+        column
+    })
 }
 
-/// Finite, and not zero: a dead sensor reads zero.
-fn usable(v: &Vec3) -> bool {
-    let square = square(v);
-    square > 1e-20 && square < f32::MAX
+/// Whether a reading can be used: finite, not zero (a dead sensor reads zero), within its range. Says in `step` what it is not.
+#[inline(never)]
+fn taken(reading: &Column, range: f32, step: &mut Step) -> bool {
+    let square = square(reading);
+    if square < 1e-20 || square.is_nan() || square >= f32::MAX {
+        step.bad_input = true;
+        return false;
+    }
+    for c in reading {
+        if c.abs() >= range {
+            step.overrange = true;
+            return false;
+        }
+    }
+    true
 }
 
 /// Into (-pi, pi].
@@ -338,14 +363,6 @@ fn wrapped(angle: f32) -> f32 {
         angle + 2.0 * PI
     } else {
         angle
-    }
-}
-
-/// (I + [turn]x) M.
-fn turn_rows(m: &mut Mat3, turn: &Vec3) {
-    for mut column in m.column_iter_mut() {
-        let c = column.clone_owned();
-        column += turn.cross(&c);
     }
 }
 
@@ -364,8 +381,8 @@ impl Words for Dcm {
         visit(&mut self.since_gyro);
         visit(&mut self.since_accel);
         visit(&mut self.since_mag);
-        self.last_mag.words(visit);
         self.last_angle.words(visit);
-        self.turned.words(visit);
+        self.sum.words(visit);
+        visit(&mut self.summed);
     }
 }

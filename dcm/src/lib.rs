@@ -19,6 +19,7 @@
 mod angles;
 pub mod calibration;
 mod classic;
+mod columns;
 mod config;
 mod earth;
 mod filter;

@@ -24,9 +24,9 @@ pub struct Measurement {
 pub struct Step {
     /// The gyro turned the matrix.
     pub gyro_used: bool,
-    /// The accelerometer corrected it.
+    /// The accelerometer's reading was taken: added to what corrects the tilt.
     pub accel_used: bool,
-    /// The magnetometer corrected it.
+    /// The magnetometer corrected it; of a fast one not every reading does.
     pub mag_used: bool,
     /// The attitude was set from accelerometer (and magnetometer) instead of being corrected.
     pub started: bool,

@@ -7,6 +7,7 @@
 //! Reference: Premerlani & Bizard 2009, Eq. 17-21; Beharie 2013 Eq. 4.21-4.24 and E.15 with errata (body-rate increments,
 //! element [0][2] is +t_y).
 
+use crate::columns::{Column, ZERO, cross, dot, plus, square, turn};
 use crate::{Mat3, Vec3};
 use micromath::F32Ext;
 
@@ -21,6 +22,7 @@ pub enum Increment {
 }
 
 /// 1/sqrt(x) for a normal positive number: the seed of micromath and Newton steps down to f32 rounding.
+#[inline(never)]
 pub(crate) fn inverse_sqrt(x: f32) -> f32 {
     let mut y = x.invsqrt();
     for _ in 0..3 {
@@ -31,48 +33,31 @@ pub(crate) fn inverse_sqrt(x: f32) -> f32 {
 
 /// Direction of a vector; `None` when it has none (zero, tiny, huge or not finite).
 #[must_use]
-#[inline(never)]
 pub fn unit(v: &Vec3) -> Option<Vec3> {
-    let square = v.dot(v);
-    (square.is_finite() && square > 1e-20).then(|| v * inverse_sqrt(square))
+    let [v] = &v.data.0;
+    direction(v).map(Vec3::from)
 }
 
-/// Product of two matrices: one copy of it in the image.
+/// The same of a column.
 #[inline(never)]
-pub(crate) fn product(a: &Mat3, b: &Mat3) -> Mat3 {
-    a * b
+pub(crate) fn direction(v: &Column) -> Option<Column> {
+    let square = square(v);
+    (square < f32::MAX && square > 1e-20).then(|| plus(&ZERO, v, inverse_sqrt(square)))
 }
 
 /// The rotation that a rotation vector `t` (rad) means.
 #[must_use]
-pub(crate) fn increment(t: &Vec3, order: Increment) -> Mat3 {
-    let (s, c, diagonal) = match order {
-        Increment::FirstOrder => (1.0, 0.0, 1.0),
-        Increment::Exponential => {
-            let square = t.dot(t);
-            let c = 0.5 - square * (1.0 / 24.0 - square / 720.0);
-            (1.0 - square * (1.0 / 6.0 - square / 120.0), c, 1.0 - square * c)
-        }
-    };
-    let (v, w) = (t * s, t * c);
-    let (xy, xz, yz) = (w.x * t.y, w.x * t.z, w.y * t.z);
-    Mat3::new(
-        diagonal + w.x * t.x,
-        xy - v.z,
-        xz + v.y,
-        xy + v.z,
-        diagonal + w.y * t.y,
-        yz - v.x,
-        xz - v.y,
-        yz + v.x,
-        diagonal + w.z * t.z,
-    )
+fn increment(t: &Vec3, order: Increment) -> Mat3 {
+    match order {
+        Increment::FirstOrder => Mat3::identity() + t.cross_matrix(),
+        Increment::Exponential => Mat3::from(exponential(&[t.x, t.y, t.z])),
+    }
 }
 
 /// Turns the body by the small rotation vector `t` (rad, body axes) and renormalises.
 #[must_use]
 pub fn rotate(r: &Mat3, t: &Vec3, order: Increment) -> Mat3 {
-    renormalise(&product(r, &increment(t, order)))
+    renormalise(&(r * increment(t, order)))
 }
 
 /// Error of a length or an angle beyond which first order is not enough.
@@ -80,7 +65,7 @@ const FIRST_ORDER: f32 = 0.01;
 
 /// Makes the rows unit vectors at right angles again; half of the error goes to each of the first two rows. That is good to
 /// first order; after an absurd step it is done exactly.
-pub(crate) fn renormalise(r: &Mat3) -> Mat3 {
+fn renormalise(r: &Mat3) -> Mat3 {
     let (x, y) = (r.row(0).transpose(), r.row(1).transpose());
     let half = 0.5 * x.dot(&y);
     let (x, y) = (x - y * half, y - x * half);
@@ -90,6 +75,32 @@ pub(crate) fn renormalise(r: &Mat3) -> Mat3 {
     }
     let (x, y) = (x * (1.5 - 0.5 * long_x), y * (1.5 - 0.5 * long_y));
     from_rows(&x, &y)
+}
+
+/// Turns the body by a rotation vector of at most one radian, whose matrix is so near to a rotation that first order is enough.
+pub(crate) fn turn_body(r: &mut [Column; 3], t: &Column) {
+    let mut next = exponential(t);
+    turn(r, &mut next);
+    let [x, y, _] = &next;
+    let half = -0.5 * dot(x, y);
+    let (x, y) = (plus(x, y, half), plus(y, x, half));
+    let length = |v: &Column| plus(v, v, 0.5 - 0.5 * square(v));
+    let (x, y) = (length(&x), length(&y));
+    *r = [x, y, cross(&x, &y)];
+}
+
+/// The rotation that a rotation vector means, to the fifth order in the angle.
+#[inline(never)]
+pub(crate) fn exponential(t: &Column) -> [Column; 3] {
+    let square = square(t);
+    let c = 0.5 - square * (1.0 / 24.0 - square / 720.0);
+    let s = 1.0 - square * (1.0 / 6.0 - square / 120.0);
+    let diagonal = 1.0 - square * c;
+    let [x, y, z] = t;
+    let (sx, sy, sz) = (x * s, y * s, z * s);
+    let (cx, cy, cz) = (x * c, y * c, z * c);
+    let (xy, xz, yz) = (cx * y, cx * z, cy * z);
+    [[diagonal + cx * x, xy + sz, xz - sy], [xy - sz, diagonal + cy * y, yz + sx], [xz + sy, yz - sx, diagonal + cz * z]]
 }
 
 /// The same by Gram and Schmidt.

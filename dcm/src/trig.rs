@@ -13,6 +13,23 @@ pub(crate) fn root(x: f32) -> f32 {
     if x < f32::MIN_POSITIVE { 0.0 } else { x * inverse_sqrt(x) }
 }
 
+/// Angle of the direction (`x`, `y`) whose length is `long`, rad in [-pi, pi]; good to 5e-6.
+pub(crate) fn angle(y: f32, x: f32, long: f32) -> f32 {
+    // the half angle lies within 45 degrees of zero or of 90
+    let t = y / (long + x.abs());
+    let z = t * t;
+    let series =
+        ((((-0.011_719_11 * z + 0.052_647_28) * z - 0.116_426_42) * z + 0.193_540_35) * z - 0.332_622_82) * z + 0.999_977_22;
+    let half = 2.0 * t * series;
+    if x >= 0.0 {
+        half
+    } else if y >= 0.0 {
+        core::f32::consts::PI - half
+    } else {
+        -core::f32::consts::PI - half
+    }
+}
+
 /// Sine and cosine.
 #[inline(never)]
 pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
@@ -44,6 +61,15 @@ mod tests {
             assert!((s - libm::sinf(a)).abs() < 3e-7 && (c - libm::cosf(a)).abs() < 3e-7, "{a}: {s} {c}");
         }
         assert!(sin_cos(f32::NAN).0.is_nan());
+    }
+
+    #[test]
+    fn angles_agree_with_the_library() {
+        for k in -3141..=3141 {
+            let a = k as f32 * 0.001;
+            let found = angle(3.0 * libm::sinf(a), 3.0 * libm::cosf(a), 3.0);
+            assert!((found - a).abs() < 5e-6, "{a}: {found}");
+        }
     }
 
     #[test]

@@ -8,70 +8,77 @@
 //! Reference: Laidig & Seel 2023, section 3.3, with scalar gains in the place of a Kalman filter.
 
 use super::state::Words;
+use crate::columns::{Column, cut_all, dot, follow, least};
 use crate::config::BiasConfig;
-use crate::{Mat3, Vec3};
 
 /// The state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bias {
+    pub(super) config: BiasConfig,
     /// The bias, rad/s.
-    pub(super) value: Vec3,
+    pub(super) value: Column,
     /// 1 at the start.
     pub(super) ignorance: f32,
     /// Averaged rotation body to earth.
-    pub(super) attitude: Mat3,
+    pub(super) attitude: [Column; 3],
 }
 
 impl Bias {
-    pub(super) fn new(value: Vec3) -> Self {
-        Self { value, ignorance: 1.0, attitude: Mat3::identity() }
+    #[inline(never)]
+    pub(super) fn new(config: BiasConfig) -> Self {
+        Self { config, value: [0.0; 3], ignorance: 1.0, attitude: const { [[0.0; 3]; 3] } }
     }
 
     /// Whether rest or motion has shown it.
-    pub(super) fn trusted(&self, config: &BiasConfig) -> bool {
-        self.ignorance < config.trusted
+    pub(super) fn trusted(&self) -> bool {
+        self.ignorance < self.config.trusted
     }
 
     /// Takes the filtered rate of a body at rest.
-    pub(super) fn at_rest(&mut self, rate: &Vec3, dt: f32, config: &BiasConfig) {
+    pub(super) fn at_rest(&mut self, rate: &Column, dt: f32) {
         let weight = self.ignorance * dt;
-        let k = weight / (weight + config.rest_weight);
-        self.value += (rate - self.value) * k;
+        let k = weight / (weight + self.config.rest_weight);
+        follow(core::slice::from_mut(&mut self.value), core::slice::from_mut(&mut rate.clone()), k);
         self.ignorance *= 1.0 - k;
-        self.limit(config);
+        cut_all(&mut self.value, self.config.limit);
     }
 
     /// Time passes.
-    pub(super) fn age(&mut self, dt: f32, moving: bool, config: &BiasConfig) {
+    pub(super) fn age(&mut self, dt: f32, moving: bool) {
         if moving {
-            self.ignorance *= 1.0 - dt / config.motion_tau;
+            self.ignorance *= 1.0 - dt / self.config.motion_tau;
         }
-        self.ignorance = (self.ignorance + config.forgetting * dt).min(1.0);
+        self.ignorance = least(self.ignorance + self.config.forgetting * dt, 1.0);
     }
 
     /// The averaged attitude follows.
-    pub(super) fn follow(&mut self, attitude: &Mat3, dt: f32, config: &BiasConfig) {
-        self.attitude += (attitude - self.attitude) * (dt / config.lag).min(1.0);
+    pub(super) fn follow(&mut self, attitude: &[Column; 3], dt: f32) {
+        follow(&mut self.attitude, &mut attitude.clone(), least(dt / self.config.lag, 1.0));
     }
 
     /// Takes the turn about the earth's horizontal axes that corrected the tilt over `dt`, in motion.
-    pub(super) fn take_tilt(&mut self, turn: &Vec3, dt: f32, config: &BiasConfig) {
-        let most = config.limit * dt;
+    pub(super) fn take_tilt(&mut self, turn: &Column, dt: f32) {
+        let config = &self.config;
         let gain = config.tilt_gain * (1.0 + config.tilt_boost * self.ignorance);
-        let (x, y) = (turn.x.clamp(-most, most) * gain, turn.y.clamp(-most, most) * gain);
-        self.value -= self.attitude.row(0).transpose() * x + self.attitude.row(1).transpose() * y;
-        self.limit(config);
+        self.correct(turn, config.limit * dt, gain);
     }
 
     /// Takes the heading error that was found over `dt`, in motion.
-    pub(super) fn take_heading(&mut self, error: f32, dt: f32, config: &BiasConfig) {
+    pub(super) fn take_heading(&mut self, error: f32, dt: f32) {
+        let config = &self.config;
         let gain = config.heading_gain * (1.0 + config.heading_boost * self.ignorance);
-        self.value -= self.attitude.row(2).transpose() * (error.clamp(-0.2, 0.2) * gain * dt);
-        self.limit(config);
+        self.correct(&[0.0, 0.0, error], 0.2, gain * dt);
     }
 
-    fn limit(&mut self, config: &BiasConfig) {
-        self.value = self.value.map(|b| b.clamp(-config.limit, config.limit));
+    /// Takes off what has caused a turn in earth axes, of which `most` counts about an axis.
+    #[inline(never)]
+    fn correct(&mut self, turn: &Column, most: f32, gain: f32) {
+        let mut turn = *turn;
+        cut_all(&mut turn, most);
+        for (value, axis) in self.value.iter_mut().zip(&self.attitude) {
+            *value -= gain * dot(axis, &turn);
+        }
+        cut_all(&mut self.value, self.config.limit);
     }
 }
 

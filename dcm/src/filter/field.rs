@@ -7,49 +7,55 @@
 //! Reference: Laidig & Seel 2023, section 3.5.
 
 use super::state::{Words, flag};
-use crate::Vec3;
+use crate::columns::least;
 use crate::config::FieldConfig;
-use crate::trig::root;
-use libm::atan2f;
+use crate::trig::{angle, root};
 
-/// Norm and dip of a field.
+/// A field in the plane of its meridian.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Shape {
-    /// Norm, uT.
-    pub(super) norm: f32,
-    /// Dip, rad, positive downwards.
-    pub(super) dip: f32,
+    /// Horizontal part, uT.
+    pub(super) level: f32,
+    /// Vertical part, uT, positive downwards.
+    pub(super) down: f32,
 }
 
 impl Shape {
-    fn of(earth: &Vec3) -> Self {
-        let level = earth.x * earth.x + earth.y * earth.y;
-        Self { norm: root(level + earth.z * earth.z), dip: atan2f(earth.z, root(level)) }
+    /// Square of the norm, uT^2.
+    pub(super) fn square(&self) -> f32 {
+        self.level * self.level + self.down * self.down
     }
 
+    #[inline(never)]
     fn follow(&mut self, other: &Self, k: f32) {
-        self.norm += k * (other.norm - self.norm);
-        self.dip += k * (other.dip - self.dip);
+        self.level += k * (other.level - self.level);
+        self.down += k * (other.down - self.down);
     }
 
+    /// Whether norm and dip agree: the sine of the angle between the two from their cross product.
+    #[inline(never)]
     fn is_near(&self, reference: &Self, config: &FieldConfig) -> bool {
-        (self.norm - reference.norm).abs() < config.norm * reference.norm && (self.dip - reference.dip).abs() < config.dip
+        let (own, wanted) = (self.square(), reference.square());
+        let (low, high) = (1.0 - config.norm, 1.0 + config.norm);
+        let cross = self.level * reference.down - self.down * reference.level;
+        own > low * low * wanted && own < high * high * wanted && cross * cross < config.dip * config.dip * own * wanted
     }
 }
 
 impl Words for Shape {
     fn words(&mut self, visit: &mut dyn FnMut(&mut f32)) {
-        visit(&mut self.norm);
-        visit(&mut self.dip);
+        visit(&mut self.level);
+        visit(&mut self.down);
     }
 }
 
 /// The state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Field {
+    pub(super) config: FieldConfig,
     /// Smoothed, as it is now.
     pub(super) now: Shape,
-    /// What it should be; norm 0 while it is not known.
+    /// What it should be; zero while it is not known.
     pub(super) reference: Shape,
     candidate: Shape,
     candidate_time: f32,
@@ -60,29 +66,39 @@ pub(super) struct Field {
     pub(super) disturbed: bool,
 }
 
-impl Default for Field {
-    fn default() -> Self {
-        let none = Shape::default();
-        Self { now: none, reference: none, candidate: none, candidate_time: 0.0, good_time: 0.0, frozen: 0.0, disturbed: true }
-    }
-}
-
 impl Field {
+    /// Nothing known.
+    #[inline(never)]
+    pub(super) fn new(config: FieldConfig) -> Self {
+        let none = Shape::default();
+        let (candidate_time, good_time, frozen) = (0.0, 0.0, 0.0);
+        Self { config, now: none, reference: none, candidate: none, candidate_time, good_time, frozen, disturbed: true }
+    }
+
     /// Whether a reference was found.
     pub(super) fn known(&self) -> bool {
-        self.reference.norm > 0.0
+        self.reference.square() > 0.0
     }
 
-    /// Takes a field in earth axes that stands for `dt` seconds; `turning` says that the body turns fast.
-    pub(super) fn take(&mut self, earth: &Vec3, dt: f32, turning: bool, config: &FieldConfig) {
-        let shape = Shape::of(earth);
-        let smooth = if self.now.norm > 0.0 { dt / (dt + config.smoothing) } else { 1.0 };
-        self.now.follow(&shape, smooth);
-        let slow = dt / config.reference_tau;
+    /// Norm, as a share, and dip, rad, against the reference; 0 while none is known.
+    pub(super) fn against(&self) -> (f32, f32) {
+        if !self.known() {
+            return (0.0, 0.0);
+        }
+        let (now, reference) = (root(self.now.square()), root(self.reference.square()));
+        let dip = |shape: &Shape, norm| angle(shape.down, shape.level, norm);
+        (now / reference - 1.0, dip(&self.now, now) - dip(&self.reference, reference))
+    }
 
-        if self.now.is_near(&self.reference, config) {
+    /// Takes a field that stands for `dt` seconds; `turning` says that the body turns fast.
+    pub(super) fn take(&mut self, shape: &Shape, dt: f32, turning: bool) {
+        let smooth = if self.now.square() > 0.0 { dt / (dt + self.config.smoothing) } else { 1.0 };
+        self.now.follow(shape, smooth);
+        let slow = dt / self.config.reference_tau;
+
+        if self.now.is_near(&self.reference, &self.config) {
             self.good_time += dt;
-            if self.good_time >= config.settle {
+            if self.good_time >= self.config.settle {
                 self.disturbed = false;
                 self.reference.follow(&self.now, slow);
             }
@@ -91,7 +107,7 @@ impl Field {
             self.disturbed = true;
         }
 
-        if !self.now.is_near(&self.candidate, config) {
+        if !self.now.is_near(&self.candidate, &self.config) {
             self.candidate_time = 0.0;
             self.candidate = self.now;
             return;
@@ -100,29 +116,29 @@ impl Field {
         if turning {
             self.candidate_time += dt;
         }
-        let wait = if self.known() { config.new_time } else { config.first_time };
+        let wait = if self.known() { self.config.new_time } else { self.config.first_time };
         if self.disturbed && self.candidate_time >= wait {
             self.reference = self.candidate;
             self.disturbed = false;
-            self.good_time = config.settle;
+            self.good_time = self.config.settle;
         }
     }
 
     /// Factor on the heading correction: 1 believed, 0 frozen, less than 1 after a long time of freezing. `hold` allows to freeze
     /// while there is no reference.
-    pub(super) fn belief(&mut self, dt: f32, hold: bool, config: &FieldConfig) -> f32 {
+    pub(super) fn belief(&mut self, dt: f32, hold: bool) -> f32 {
         if !self.disturbed {
-            self.frozen = (self.frozen - config.doubt * dt).max(0.0);
+            self.frozen = -least(self.config.doubt * dt - self.frozen, 0.0);
             return 1.0;
         }
         if !self.known() && !hold {
             return 1.0;
         }
-        if self.frozen <= config.longest_freeze {
+        if self.frozen <= self.config.longest_freeze {
             self.frozen += dt;
             return 0.0;
         }
-        1.0 / config.doubt
+        1.0 / self.config.doubt
     }
 }
 

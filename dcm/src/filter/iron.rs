@@ -1,96 +1,86 @@
 //! Hard iron, found while the body turns.
 //!
 //! What it is: m = C^T m_E + h with m_E constant gives C m - mean(C m) = (C - mean(C)) h; three normal equations with
-//! forgetting are solved for h.
+//! forgetting are solved for h, one sweep of Gauss and Seidel a reading.
 //! What can go wrong: without turning nothing is learnt and nothing changes; a field that changes with place looks like hard
 //! iron for a while, hence the dead zone.
 //! Units: uT, s.
 //! Reference: the same idea from rates: Troni & Whitcomb, IEEE/ASME T. Mechatronics 24(4), 2019.
 
 use super::state::Words;
+use crate::columns::{Column, dot, follow, least, plus, square};
 use crate::config::IronConfig;
-use crate::linear::{inverse, square};
 use crate::trig::root;
-use crate::{Mat3, Vec3};
-
-/// Readings between two solutions.
-const SOLVE_EVERY: f32 = 64.0;
 
 /// The state.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Iron {
-    attitude: Mat3,
-    field: Vec3,
+    config: IronConfig,
+    /// Averages in earth axes: the three columns of the attitude, and the field.
+    pub(super) average: [Column; 4],
     age: f32,
-    /// Information, s: upper triangle xx, xy, xz, yy, yz, zz.
-    information: Mat3,
-    evidence: Vec3,
-    count: f32,
+    /// Normal equations of each component: three of information, s, and one of evidence, uT s.
+    equations: [[f32; 4]; 3],
     /// The estimate, uT, body axes.
-    pub(super) found: Vec3,
+    pub(super) found: Column,
 }
 
 impl Iron {
-    /// What is taken from the readings, uT.
-    pub(super) fn applied(&self, config: &IronConfig) -> Vec3 {
-        let square = square(&self.found);
-        let least = config.dead_zone;
-        if square <= least * least {
-            return Vec3::zeros();
-        }
-        let long = root(square);
-        self.found * ((long - least).min(config.limit) / long)
+    /// Nothing known.
+    #[inline(never)]
+    pub(super) fn new(config: IronConfig) -> Self {
+        Self { config, average: const { [[0.0; 3]; 4] }, age: 0.0, equations: const { [[0.0; 4]; 3] }, found: [0.0; 3] }
     }
 
-    /// The earth frame turned by `turn` since the last reading.
-    pub(super) fn turned(&mut self, turn: &Vec3) {
-        for mut column in self.attitude.column_iter_mut() {
-            let c = column.clone_owned();
-            column += turn.cross(&c);
-        }
-        self.field += turn.cross(&self.field);
+    /// A reading without what was found, uT.
+    #[inline(never)]
+    pub(super) fn taken_from(&self, reading: &Column) -> Column {
+        let long = root(square(&self.found));
+        let excess = long - self.config.dead_zone;
+        let share = if excess > 0.0 { least(excess, self.config.limit) / long } else { 0.0 };
+        plus(reading, &self.found, -share)
     }
 
-    /// Takes a reading in body axes that stands for `dt` seconds, with the attitude of its time.
-    pub(super) fn take(&mut self, attitude: &Mat3, reading: &Vec3, dt: f32, config: &IronConfig) {
-        self.age = (self.age + dt).min(config.lag);
-        let k = (dt / self.age).min(1.0);
-        let seen = attitude * reading;
-        self.attitude += (attitude - self.attitude) * k;
-        self.field += (seen - self.field) * k;
+    /// Takes a reading in earth axes that stands for `dt` seconds, with the attitude of its time.
+    pub(super) fn take(&mut self, attitude: &[Column; 3], seen: &Column, dt: f32) {
+        let keep = if self.age > 0.0 { 1.0 - least(dt / self.config.memory, 1.0) } else { 0.0 };
+        self.age = least(self.age + dt, self.config.lag);
+        let k = least(dt / self.age, 1.0);
+        let [a, b, c] = *attitude;
+        let mut change = [a, b, c, *seen];
+        follow(&mut self.average, &mut change, k);
 
-        let turned = attitude - self.attitude;
-        let change = seen - self.field;
-        let keep = (1.0 - dt / config.memory).max(0.0);
-        let (a, b, c) = (turned.column(0), turned.column(1), turned.column(2));
-        let (xy, xz, yz) = (a.dot(&b) * dt, a.dot(&c) * dt, b.dot(&c) * dt);
-        let new = Mat3::new(a.dot(&a) * dt, xy, xz, xy, b.dot(&b) * dt, yz, xz, yz, c.dot(&c) * dt);
-        self.information = self.information * keep + new;
-        self.evidence = self.evidence * keep + Vec3::new(a.dot(&change), b.dot(&change), c.dot(&change)) * dt;
-
-        self.count += 1.0;
-        if self.count >= SOLVE_EVERY {
-            self.count = 0.0;
-            if let Some(inverse) = inverse(&(self.information + Mat3::identity())) {
-                self.found = inverse * self.evidence;
+        // what differs from the average before differs 1 - k times as much from the one after
+        let weight = dt * (1.0 - k) * (1.0 - k);
+        for (equation, one) in self.equations.iter_mut().zip(&change) {
+            for (sum, other) in equation.iter_mut().zip(&change) {
+                *sum = *sum * keep + weight * dot(one, other);
             }
         }
+        self.solve();
+    }
+
+    /// One step towards the solution.
+    fn solve(&mut self) {
+        let [[xx, xy, xz, x], [_, yy, yz, y], [_, _, zz, z]] = &self.equations;
+        let [fx, fy, fz] = &mut self.found;
+        *fx = (x - xy * *fy - xz * *fz) / (xx + 1.0);
+        *fy = (y - xy * *fx - yz * *fz) / (yy + 1.0);
+        *fz = (z - xz * *fx - yz * *fy) / (zz + 1.0);
     }
 
     /// Forgets everything, for instance after a new calibration.
     pub(super) fn clear(&mut self) {
-        *self = Self::default();
+        self.age = 0.0;
+        self.found = [0.0; 3];
     }
 }
 
 impl Words for Iron {
     fn words(&mut self, visit: &mut dyn FnMut(&mut f32)) {
-        self.attitude.words(visit);
-        self.field.words(visit);
+        self.average.words(visit);
         visit(&mut self.age);
-        self.information.words(visit);
-        self.evidence.words(visit);
-        visit(&mut self.count);
+        self.equations.words(visit);
         self.found.words(visit);
     }
 }

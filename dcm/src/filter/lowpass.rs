@@ -7,40 +7,49 @@
 //! Reference: x'' tau^2 + 2 x' tau + 2 x = 2 z, cut-off sqrt(2)/(2 pi tau), damping 1/sqrt(2).
 
 use super::state::Words;
-use crate::Vec3;
+use crate::columns::{Column, least};
 
 /// The state.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct LowPass {
-    /// Filtered value.
-    pub(super) x: Vec3,
-    /// Its rate times tau; while it starts, the first of two running means.
-    pub(super) v: Vec3,
-    age: f32,
+    /// Filtered value, and its rate times tau; while it starts, half the distance to the first of two running means.
+    pub(super) state: [Column; 2],
+    pub(super) age: f32,
 }
 
 impl LowPass {
+    /// At `x` since an instant.
+    pub(super) fn at(x: &Column) -> Self {
+        Self { state: [*x, [0.0; 3]], age: 1e-3 }
+    }
+
+    /// Filtered value.
+    pub(super) fn value(&self) -> &Column {
+        let [x, _] = &self.state;
+        x
+    }
+
     /// Takes one value that stands for `dt` seconds.
     #[inline(never)]
-    pub(super) fn step(&mut self, z: &Vec3, dt: f32, tau: f32) {
-        let start = 2.0 * tau;
-        if self.age < start {
+    pub(super) fn step(&mut self, z: &Column, dt: f32, tau: f32) {
+        // running means, z - x - 2v the distance to the first; then x' tau = v, v' tau = 2 (z - x - v)
+        let (lag, gain, keep, k) = if self.starting(tau) {
             self.age += dt;
-            let k = (dt / self.age).min(1.0);
-            self.v += (z - self.v) * k;
-            self.x += (self.v - self.x) * k;
-            if self.age >= start {
-                self.v = (self.v - self.x) * 0.5; // x' = (mean - x)/age, times tau
-            }
+            let k = least(dt / self.age, 1.0);
+            (2.0, k, 0.5 - 0.5 * k, k)
         } else {
-            let k = (dt / tau).min(1.0);
-            self.v += (z - self.x - self.v) * (2.0 * k);
-            self.x += self.v * k;
+            let k = least(dt / tau, 1.0);
+            (1.0, 2.0 * k, 1.0, k)
+        };
+        let [x, v] = &mut self.state;
+        for ((x, v), z) in x.iter_mut().zip(v).zip(z) {
+            let slope = lag * *v;
+            let next = slope + gain * (z - *x - slope);
+            *x += k * next;
+            *v = keep * next;
         }
     }
-}
 
-impl LowPass {
     /// Whether the first averages still fill.
     pub(super) fn starting(&self, tau: f32) -> bool {
         self.age < 2.0 * tau
@@ -49,8 +58,7 @@ impl LowPass {
 
 impl Words for LowPass {
     fn words(&mut self, visit: &mut dyn FnMut(&mut f32)) {
-        self.x.words(visit);
-        self.v.words(visit);
+        self.state.words(visit);
         visit(&mut self.age);
     }
 }
@@ -63,15 +71,15 @@ mod tests {
     fn it_starts_at_the_mean_and_then_has_its_time_constant() {
         let (dt, tau) = (0.0035, 3.0);
         let mut filter = LowPass::default();
-        filter.step(&Vec3::x(), dt, tau);
-        assert!((filter.x.x - 1.0).abs() < 1e-6, "the first value at once");
+        filter.step(&[1.0, 0.0, 0.0], dt, tau);
+        assert!((filter.value()[0] - 1.0).abs() < 1e-6, "the first value at once");
         for _ in 0..4000 {
-            filter.step(&Vec3::x(), dt, tau);
+            filter.step(&[1.0, 0.0, 0.0], dt, tau);
         }
         // step response at t = tau of the damped pair: 1 - e^-1 (cos 1 + sin 1) = 0.4917
         for _ in 0..(tau / dt) as u32 {
-            filter.step(&Vec3::zeros(), dt, tau);
+            filter.step(&[0.0; 3], dt, tau);
         }
-        assert!((filter.x.x - 0.5083).abs() < 2e-3, "{}", filter.x.x);
+        assert!((filter.value()[0] - 0.5083).abs() < 2e-3, "{}", filter.value()[0]);
     }
 }

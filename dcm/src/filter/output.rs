@@ -7,16 +7,17 @@
 
 use super::state::Words;
 use super::{Dcm, StateError};
-use crate::angles::{about_down, euler_of, quaternion_of};
-use crate::linear::{determinant, square};
+use crate::angles::{euler_of, quaternion_of};
+use crate::columns::square;
+use crate::linear::determinant;
 use crate::trig::root;
 use crate::{Earth, Euler, Mat3, STANDARD_GRAVITY, Vec3};
 use core::f32::consts::PI;
 
 /// Words of a saved state.
-pub const STATE_WORDS: usize = 102;
+pub const STATE_WORDS: usize = 99;
 /// First word of a saved state: changes whenever the list of fields does.
-const STATE_VERSION: u32 = 0x4443_4D01;
+const STATE_VERSION: u32 = 0x4443_4D02;
 
 /// What holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -94,14 +95,14 @@ impl Dcm {
     /// Estimated gyro bias, rad/s: what is subtracted from the gyro.
     #[must_use]
     pub fn bias(&self) -> Vec3 {
-        self.bias.value
+        Vec3::from(self.bias.value)
     }
 
     /// Sets the bias, for instance from a stored calibration, with its standard deviation, rad/s (0: exact). What is not
     /// finite or beyond the limit is cut.
     pub fn set_bias(&mut self, bias: Vec3, sigma: f32) {
-        let limit = self.config.bias.limit;
-        self.bias.value = bias.map(|b| if b.is_finite() { b.clamp(-limit, limit) } else { 0.0 });
+        let limit = self.bias.config.limit;
+        self.bias.value = [bias.x, bias.y, bias.z].map(|b| if b.is_finite() { b.clamp(-limit, limit) } else { 0.0 });
         let share = if sigma.is_finite() { sigma / limit } else { 1.0 };
         self.bias.ignorance = (share * share).clamp(0.0, 1.0);
     }
@@ -109,13 +110,13 @@ impl Dcm {
     /// Hard iron that was found, uT, body axes: what a calibration has not taken out.
     #[must_use]
     pub fn iron(&self) -> Vec3 {
-        self.iron.found
+        Vec3::from(self.iron.found)
     }
 
     /// Forgets hard iron and field reference: after a new magnetometer calibration.
     pub fn forget_field(&mut self) {
         self.iron.clear();
-        self.field = super::Field::default();
+        self.field = super::Field::new(self.field.config);
         self.heading_age = 0.0;
     }
 
@@ -124,12 +125,7 @@ impl Dcm {
         if !yaw.is_finite() {
             return;
         }
-        let turn = about_down(yaw - self.euler().yaw);
-        self.matrix = turn * self.matrix;
-        self.bias.attitude = turn * self.bias.attitude;
-        self.tilt.x = turn * self.tilt.x;
-        self.tilt.v = turn * self.tilt.v;
-        self.iron.clear();
+        self.turn_earth(&[0.0, 0.0, yaw - self.euler().yaw]);
     }
 
     /// What is left of a specific force without gravity, body axes, m/s^2.
@@ -155,24 +151,22 @@ impl Dcm {
     pub fn flags(&self) -> Flags {
         Flags {
             started: self.started,
-            startup: self.tilt.starting(self.config.tilt_tau) || self.heading_age < self.config.heading_tau,
+            startup: self.tilt.starting(self.tilt_tau) || self.heading_age < self.heading_tau,
             rest: self.rest.now,
             heading_absolute: self.heading_absolute,
             field_known: self.field.known(),
             field_disturbed: self.heading_absolute && self.field.disturbed && self.field.known(),
-            bias_trusted: self.bias.trusted(&self.config.bias),
+            bias_trusted: self.bias.trusted(),
         }
     }
 
     /// How good it is.
     #[must_use]
     pub fn quality(&self) -> Quality {
-        let (now, reference) = (&self.field.now, &self.field.reference);
-        let (field_norm, field_dip) =
-            if self.field.known() { (now.norm / reference.norm - 1.0, now.dip - reference.dip) } else { (0.0, 0.0) };
+        let (field_norm, field_dip) = self.field.against();
         Quality {
             heading_error: self.heading_error,
-            bias_sigma: self.config.bias.limit * root(self.bias.ignorance),
+            bias_sigma: self.bias.config.limit * root(self.bias.ignorance),
             field_norm,
             field_dip,
             iron: root(square(&self.iron.found)),

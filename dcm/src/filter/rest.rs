@@ -6,15 +6,16 @@
 //! Units: rad/s, m/s^2, s.
 //! Reference: Laidig & Seel 2023, section 3.4; dlaidig/vqf pull request 23 for the offset of cheap gyros.
 
+use super::bias::Bias;
 use super::lowpass::LowPass;
 use super::state::{Words, flag};
-use crate::Vec3;
-use crate::config::{BiasConfig, RestConfig};
-use crate::linear::square;
+use crate::columns::{Column, plus, square};
+use crate::config::RestConfig;
 
 /// The state.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rest {
+    config: RestConfig,
     /// Filtered rate, rad/s, the bias still in it.
     pub(super) rate: LowPass,
     /// Filtered specific force, body axes, m/s^2.
@@ -27,29 +28,44 @@ pub(super) struct Rest {
 }
 
 impl Rest {
-    /// Takes a rate; `trusted` is the bias where it is.
-    pub(super) fn rate(&mut self, rate: &Vec3, dt: f32, config: &RestConfig, bias: &BiasConfig, trusted: Option<&Vec3>) {
-        self.rate.step(rate, dt, config.filter_tau);
-        let away = rate - self.rate.x;
-        let slow = match trusted {
-            Some(bias) => square(&(self.rate.x - bias)) < config.known_rate * config.known_rate,
-            None => self.rate.x.iter().all(|w| w.abs() < bias.limit),
+    /// Nothing known.
+    #[inline(never)]
+    pub(super) fn new(config: RestConfig) -> Self {
+        Self { config, rate: LowPass::default(), force: LowPass::default(), quiet: 0.0, now: false, ever: false }
+    }
+
+    /// Begins anew.
+    pub(super) fn restart(&mut self) {
+        self.rate.age = 0.0;
+        self.force.age = 0.0;
+        self.moved();
+    }
+
+    /// Takes a rate.
+    pub(super) fn rate(&mut self, rate: &Column, dt: f32, bias: &Bias) {
+        self.rate.step(rate, dt, self.config.filter_tau);
+        let mean = self.rate.value();
+        let away = plus(rate, mean, -1.0);
+        let slow = if bias.trusted() {
+            square(&plus(mean, &bias.value, -1.0)) < self.config.known_rate * self.config.known_rate
+        } else {
+            mean.iter().all(|w| w.abs() < bias.config.limit)
         };
-        if square(&away) > config.rate * config.rate || !slow {
+        if square(&away) > self.config.rate * self.config.rate || !slow {
             self.moved();
         }
     }
 
     /// Takes a specific force; rest is counted here.
-    pub(super) fn force(&mut self, force: &Vec3, dt: f32, config: &RestConfig) {
-        self.force.step(force, dt, config.filter_tau);
-        if square(&(force - self.force.x)) > config.force * config.force {
+    pub(super) fn force(&mut self, force: &Column, dt: f32) {
+        self.force.step(force, dt, self.config.filter_tau);
+        if square(&plus(force, self.force.value(), -1.0)) > self.config.force * self.config.force {
             self.moved();
             return;
         }
         self.quiet += dt;
-        if self.quiet >= config.time {
-            self.quiet = config.time;
+        if self.quiet >= self.config.time {
+            self.quiet = self.config.time;
             self.now = true;
         }
     }

@@ -7,7 +7,8 @@
 //! Units: bits.
 //! Reference: IEEE 754 single precision.
 
-use crate::{Mat3, Vec3};
+use crate::Mat3;
+use crate::columns::Column;
 
 /// Anything that is a list of single-precision numbers.
 pub(super) trait Words {
@@ -15,7 +16,13 @@ pub(super) trait Words {
     fn words(&mut self, visit: &mut dyn FnMut(&mut f32));
 }
 
-impl Words for Vec3 {
+impl<const N: usize, const M: usize> Words for [[f32; N]; M] {
+    fn words(&mut self, visit: &mut dyn FnMut(&mut f32)) {
+        self.as_flattened_mut().iter_mut().for_each(visit);
+    }
+}
+
+impl Words for Column {
     fn words(&mut self, visit: &mut dyn FnMut(&mut f32)) {
         self.iter_mut().for_each(visit);
     }
