@@ -37,7 +37,7 @@ use state::{Words, flag};
 /// Time over which the specific force is summed in earth axes before it is used, s (five readings of 200 Hz, one of 48): its average
 /// is one of seconds.
 const ENOUGH: f32 = 0.0205;
-/// Shortest time between two fields that are used, s (every third reading of 75 Hz, every second of 48).
+/// Time over which fields are summed in earth axes before their average is used, s.
 const ENOUGH_MAG: f32 = 0.035;
 /// Longest time that one accelerometer reading may stand for, s.
 const LONGEST_ACCEL: f32 = 0.25;
@@ -77,6 +77,8 @@ pub struct Dcm {
     last_angle: Column,
     sum: Column,
     summed: f32,
+    field_sum: Column,
+    fields: f32,
 }
 
 impl Dcm {
@@ -108,6 +110,8 @@ impl Dcm {
             last_angle: ZERO,
             sum: ZERO,
             summed: 0.0,
+            field_sum: ZERO,
+            fields: 0.0,
         }
     }
 
@@ -121,8 +125,12 @@ impl Dcm {
         if let Some(force) = column(&measured.accel) {
             self.accel(force, &mut step);
         }
+        let mut due = self.since_mag > ENOUGH_MAG;
         if let Some(field) = column(&measured.mag) {
-            self.mag(field, &mut step);
+            due |= self.mag(field, &mut step);
+        }
+        if due && self.fields > 0.0 {
+            self.heading(&mut step);
         }
         step
     }
@@ -251,23 +259,38 @@ impl Dcm {
         step.started
     }
 
-    /// The field turns the matrix about the vertical.
+    /// A field is summed in earth axes. Says whether it is the first after a start, which is used at once.
+    fn mag(&mut self, field: &Column, step: &mut Step) -> bool {
+        if !taken(field, self.field.config.range, step) || self.since_mag <= 0.0 {
+            return false;
+        }
+        if !self.started {
+            self.since_mag = 0.0;
+            return false;
+        }
+        let first = !self.heading_absolute;
+        if first {
+            self.start(&self.up(), Some(field), step);
+        }
+        let mut seen = *field;
+        turn(&self.matrix.data.0, core::slice::from_mut(&mut seen));
+        self.field_sum = plus(&self.field_sum, &seen, 1.0);
+        self.fields += 1.0;
+        first
+    }
+
+    /// The averaged field turns the matrix about the vertical. Its time comes whether or not there is a reading in this step, so that
+    /// one that is missing changes no other.
     #[inline(never)]
-    fn mag(&mut self, field: &Column, step: &mut Step) {
-        if !taken(field, self.field.config.range, step) || self.heading_absolute && self.since_mag < ENOUGH_MAG {
-            return;
-        }
+    fn heading(&mut self, step: &mut Step) {
         let dt = core::mem::take(&mut self.since_mag);
-        if !self.started || dt <= 0.0 {
-            return;
-        }
-        if !self.heading_absolute {
-            self.start(&self.up(), Some(field), step); // the first field after a start
-        }
         let settled = !self.tilt.starting(self.tilt_tau);
-        let mut seen = [self.iron.taken_from(field), *field];
-        turn(&self.matrix.data.0, &mut seen);
-        let [[x, y, down], whole] = &seen;
+        let whole = &plus(&ZERO, &self.field_sum, 1.0 / self.fields);
+        self.field_sum = ZERO;
+        self.fields = 0.0;
+        let mut free = self.iron.taken_from(&ZERO);
+        turn(&self.matrix.data.0, core::slice::from_mut(&mut free));
+        let [x, y, down] = &plus(whole, &free, 1.0);
         if settled {
             self.iron.take(&self.matrix.data.0, whole, dt);
         }
@@ -318,6 +341,8 @@ impl Dcm {
         self.tilt = LowPass::at(&[0.0, 0.0, -STANDARD_GRAVITY]);
         self.sum = ZERO;
         self.summed = 0.0;
+        self.field_sum = ZERO;
+        self.fields = 0.0;
         self.iron.clear(); // what it saw of the attitude before is void
         self.started = true;
         self.heading_absolute = from_field;
@@ -384,5 +409,7 @@ impl Words for Dcm {
         self.last_angle.words(visit);
         self.sum.words(visit);
         visit(&mut self.summed);
+        self.field_sum.words(visit);
+        visit(&mut self.fields);
     }
 }

@@ -380,5 +380,5 @@ proptest! {
 fn the_states_take_little_memory() {
     let [ours, classic] = [size_of::<dcm::Dcm>(), size_of::<dcm::Classic>()];
     println!("state: ours {ours} bytes, the thesis' {classic}");
-    assert!(ours <= 528 && classic <= 112, "{ours} {classic}");
+    assert!(ours <= 544 && classic <= 112, "{ours} {classic}");
 }

@@ -15,9 +15,9 @@ use crate::{Earth, Euler, Mat3, STANDARD_GRAVITY, Vec3};
 use core::f32::consts::PI;
 
 /// Words of a saved state.
-pub const STATE_WORDS: usize = 99;
+pub const STATE_WORDS: usize = 103;
 /// First word of a saved state: changes whenever the list of fields does.
-const STATE_VERSION: u32 = 0x4443_4D02;
+const STATE_VERSION: u32 = 0x4443_4D03;
 
 /// What holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
