@@ -7,7 +7,7 @@
 //! Reference: Beharie 2013 Eq. 4.19-4.30 with errata (4.25 has the wrong sign, 4.28 and 4.30 need atan2); Shepperd 1978.
 
 use crate::Mat3;
-use crate::columns::{Column, ZERO, cross, plus};
+use crate::columns::{Column, cross};
 use crate::rotation::direction;
 use crate::trig::{root, sin_cos};
 use libm::atan2f;
@@ -94,20 +94,24 @@ fn set_from(attitude: &mut [Column; 3], up: &Column, heading: &Column) -> bool {
     true
 }
 
+/// Up in body axes.
+#[inline(never)]
+pub(crate) fn up([[.., x], [.., y], [.., z]]: &[Column; 3]) -> Column {
+    [-x, -y, -z]
+}
+
 /// Turns the rotation body to earth so that `up` (unit, body axes) is upwards and `field` in the magnetic meridian, earth x; where
 /// there is none or it is vertical, the heading stays. Says whether the heading comes from the field.
 pub(crate) fn start_attitude(attitude: &mut [Column; 3], up: &Column, field: Option<&Column>) -> bool {
     if field.is_some_and(|field| set_from(attitude, up, field)) {
         return true;
     }
-    // the first body axis that is not vertical, now or before, keeps its heading (c, s)
-    let mut axis = [1.0, 0.0, 0.0];
-    for k in 0..3 {
-        let Some([c, s, _]) = attitude.get(k).copied() else { continue };
-        if set_from(attitude, up, &plus(&plus(&ZERO, &axis, c), &cross(&axis, up), -s)) {
+    // the first body axis that is not vertical, now or before, keeps its heading
+    let ([x, y, z], [[ax, ay, _], [bx, by, _], [cx, cy, _]]) = (up, *attitude);
+    for north in [[ax, ay * z, -ay * y], [-by * z, bx, by * x], [cy * y, -cy * x, cx]] {
+        if set_from(attitude, up, &north) {
             break;
         }
-        axis.rotate_right(1);
     }
     false
 }
@@ -148,7 +152,7 @@ mod tests {
         let r = matrix_of(&Euler { roll: -0.3, pitch: 0.9, yaw: -2.0 });
         let up = [-r.m31, -r.m32, -r.m33];
         let [[x, y, z]] = (r.transpose() * Vec3::new(0.4, 0.0, 0.8)).data.0;
-        let mut found = [ZERO; 3];
+        let mut found = [[0.0; 3]; 3];
         assert!(set_from(&mut found, &up, &[x, y, z]));
         assert!((Mat3::from(found) - r).abs().max() < 1e-6);
         assert!(!set_from(&mut found, &[0.0, 0.0, 1.0], &[0.0, 0.0, 3.0]));

@@ -18,6 +18,12 @@ pub(crate) fn plus(a: &Column, b: &Column, k: f32) -> Column {
     [ax + k * bx, ay + k * by, az + k * bz]
 }
 
+/// k a.
+#[inline(never)]
+pub(crate) fn scaled([x, y, z]: &Column, k: f32) -> Column {
+    [x * k, y * k, z * k]
+}
+
 /// Scalar product.
 #[inline(never)]
 pub(crate) fn dot(a: &Column, b: &Column) -> f32 {
@@ -46,12 +52,13 @@ pub(crate) fn turn(by: &[Column; 3], columns: &mut [Column]) {
     }
 }
 
-/// The averages take the share `k` of what differs; the difference is left in `now`.
+/// The averages take the share `k` of what differs; what differs from them afterwards is left in `now`.
 #[inline(never)]
 pub(crate) fn follow(average: &mut [Column], now: &mut [Column], k: f32) {
     for (average, now) in average.as_flattened_mut().iter_mut().zip(now.as_flattened_mut()) {
-        *now -= *average;
-        *average += *now * k;
+        let away = *now - *average;
+        *average += away * k;
+        *now = away - away * k;
     }
 }
 
@@ -61,21 +68,15 @@ pub(crate) fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Cut to `most` on both sides of zero.
-pub(crate) fn cut(x: f32, most: f32) -> f32 {
-    if x > most {
-        most
-    } else if x < -most {
-        -most
-    } else {
-        x
-    }
-}
-
-/// Cuts every component.
+/// Cuts every component to `most` on both sides of zero; says whether one was there or beyond.
 #[inline(never)]
-pub(crate) fn cut_all(v: &mut Column, most: f32) {
+pub(crate) fn cut<const N: usize>(v: &mut [f32; N], most: f32) -> bool {
+    let mut reached = false;
     for x in v {
-        *x = cut(*x, most);
+        if x.abs() >= most {
+            *x = most.copysign(*x);
+            reached = true;
+        }
     }
+    reached
 }

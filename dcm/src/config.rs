@@ -7,6 +7,7 @@
 //! and of the field are those of Laidig & Seel 2023.
 
 use crate::STANDARD_GRAVITY;
+use core::borrow::Borrow;
 
 /// One degree, rad.
 const DEGREE: f32 = core::f32::consts::PI / 180.0;
@@ -154,6 +155,29 @@ impl Config {
         declination: 0.0,
         max_dt: 0.25,
     };
+}
+
+/// [`Config::DEFAULT`] as a type: the compiler knows every number, and a filter with it keeps none of them in RAM.
+///
+/// A board that needs another configuration at this price writes a type like it:
+/// ```
+/// # use dcm::{Config, Dcm};
+/// #[derive(Clone)]
+/// struct AtHome;
+/// impl core::borrow::Borrow<Config> for AtHome {
+///     fn borrow(&self) -> &Config {
+///         &const { Config { declination: 0.07, ..Config::DEFAULT } }
+///     }
+/// }
+/// assert!(size_of_val(&Dcm::new(AtHome)) < size_of::<Dcm>());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Standard;
+
+impl Borrow<Config> for Standard {
+    fn borrow(&self) -> &Config {
+        &Config::DEFAULT
+    }
 }
 
 impl Default for Config {

@@ -31,7 +31,7 @@ mod trig;
 
 pub use angles::{Euler, euler_of, matrix_of, quaternion_of};
 pub use classic::{AccelWeight, Classic, ClassicConfig, Gains};
-pub use config::{BiasConfig, Config, FieldConfig, IronConfig, RestConfig};
+pub use config::{BiasConfig, Config, FieldConfig, IronConfig, RestConfig, Standard};
 pub use earth::Earth;
 pub use filter::{Dcm, Flags, Quality, STATE_WORDS, StateError};
 pub use fresh::Fresh;

@@ -7,7 +7,7 @@
 //! Reference: Premerlani & Bizard 2009, Eq. 17-21; Beharie 2013 Eq. 4.21-4.24 and E.15 with errata (body-rate increments,
 //! element [0][2] is +t_y).
 
-use crate::columns::{Column, ZERO, cross, dot, plus, square, turn};
+use crate::columns::{Column, cross, dot, plus, scaled, square};
 use crate::{Mat3, Vec3};
 use micromath::F32Ext;
 
@@ -42,7 +42,7 @@ pub fn unit(v: &Vec3) -> Option<Vec3> {
 #[inline(never)]
 pub(crate) fn direction(v: &Column) -> Option<Column> {
     let square = square(v);
-    (square < f32::MAX && square > 1e-20).then(|| plus(&ZERO, v, inverse_sqrt(square)))
+    (square < f32::MAX && square > 1e-20).then(|| scaled(v, inverse_sqrt(square)))
 }
 
 /// The rotation that a rotation vector `t` (rad) means.
@@ -77,11 +77,10 @@ fn renormalise(r: &Mat3) -> Mat3 {
     from_rows(&x, &y)
 }
 
-/// Turns the body by a rotation vector of at most one radian, whose matrix is so near to a rotation that first order is enough.
-pub(crate) fn turn_body(r: &mut [Column; 3], t: &Column) {
-    let mut next = exponential(t);
-    turn(r, &mut next);
-    let [x, y, _] = &next;
+/// Makes a matrix that is so near to a rotation that first order is enough one again.
+#[inline(never)]
+pub(crate) fn orthonormalise(r: &mut [Column; 3]) {
+    let [x, y, _] = &*r;
     let half = -0.5 * dot(x, y);
     let (x, y) = (plus(x, y, half), plus(y, x, half));
     let length = |v: &Column| plus(v, v, 0.5 - 0.5 * square(v));

@@ -9,6 +9,7 @@
 use crate::rotation::inverse_sqrt;
 
 /// Square root of a number that is not negative; zero below the smallest normal number.
+#[inline(never)]
 pub(crate) fn root(x: f32) -> f32 {
     if x < f32::MIN_POSITIVE { 0.0 } else { x * inverse_sqrt(x) }
 }
@@ -21,13 +22,7 @@ pub(crate) fn angle(y: f32, x: f32, long: f32) -> f32 {
     let series =
         ((((-0.011_719_11 * z + 0.052_647_28) * z - 0.116_426_42) * z + 0.193_540_35) * z - 0.332_622_82) * z + 0.999_977_22;
     let half = 2.0 * t * series;
-    if x >= 0.0 {
-        half
-    } else if y >= 0.0 {
-        core::f32::consts::PI - half
-    } else {
-        -core::f32::consts::PI - half
-    }
+    if x >= 0.0 { half } else { core::f32::consts::PI.copysign(y) - half }
 }
 
 /// Sine and cosine.

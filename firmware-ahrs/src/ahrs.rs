@@ -15,7 +15,7 @@
 use crate::sampler::Readings;
 use crate::{ACCEL, GYRO, MAG, Mounting, TICK_HZ, adxl345, hmc5883l, itg3200};
 use dcm::calibration::Calibration;
-use dcm::{Dcm, Measurement, STANDARD_GRAVITY, Step, Vec3};
+use dcm::{Dcm, Measurement, STANDARD_GRAVITY, Standard, Step, Vec3};
 use frame::message::BoardId;
 use frame::{Hello, ImuSample, Ticks};
 
@@ -28,13 +28,11 @@ pub struct AhrsConfig {
     pub accel: Mounting,
     /// How the magnetometer sits on the body.
     pub mag: Mounting,
-    /// The attitude filter.
-    pub filter: dcm::Config,
 }
 
 impl Default for AhrsConfig {
     fn default() -> Self {
-        Self { gyro: Mounting::FLAT, accel: Mounting::FLAT, mag: Mounting::FLAT, filter: dcm::Config::default() }
+        Self { gyro: Mounting::FLAT, accel: Mounting::FLAT, mag: Mounting::FLAT }
     }
 }
 
@@ -67,7 +65,7 @@ pub struct Outputs {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ahrs {
     config: AhrsConfig,
-    filter: Dcm,
+    filter: Dcm<Standard>,
     calibration: Calibration,
     last: ImuSample,
     before: Option<Ticks>,
@@ -78,7 +76,7 @@ impl Ahrs {
     #[must_use]
     pub fn new(config: AhrsConfig) -> Self {
         let calibration = Calibration::default();
-        Self { config, filter: Dcm::new(config.filter), calibration, last: ImuSample::default(), before: None }
+        Self { config, filter: Dcm::new(Standard), calibration, last: ImuSample::default(), before: None }
     }
 
     /// The calibration in force.
@@ -109,7 +107,7 @@ impl Ahrs {
 
     /// The attitude filter, for reading.
     #[must_use]
-    pub fn filter(&self) -> &Dcm {
+    pub fn filter(&self) -> &Dcm<Standard> {
         &self.filter
     }
 

@@ -32,7 +32,6 @@ pub mod quantity;
 pub mod report;
 pub mod residual;
 mod revise;
-pub mod rivals;
 pub mod runs;
 mod samples;
 pub mod search;

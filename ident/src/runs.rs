@@ -9,12 +9,11 @@
 
 use crate::close::Closed;
 use crate::context::Context;
-use crate::diagnose::{Candidate, Diagnosis};
+use crate::diagnose::{Candidate, Diagnosis, Rival};
 use crate::experiment;
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::log::Log;
 use crate::model::Model;
-use crate::rivals::Rival;
 use crate::search::refine;
 use crate::verdict::NextExperiment;
 

@@ -8,13 +8,12 @@
 //! Reference: Laidig & Seel 2023, section 3.3, with scalar gains in the place of a Kalman filter.
 
 use super::state::Words;
-use crate::columns::{Column, cut_all, dot, follow, least};
+use crate::columns::{Column, ZERO, cut, dot, follow, least};
 use crate::config::BiasConfig;
 
 /// The state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bias {
-    pub(super) config: BiasConfig,
     /// The bias, rad/s.
     pub(super) value: Column,
     /// 1 at the start.
@@ -24,61 +23,65 @@ pub(super) struct Bias {
 }
 
 impl Bias {
-    #[inline(never)]
-    pub(super) fn new(config: BiasConfig) -> Self {
-        Self { config, value: [0.0; 3], ignorance: 1.0, attitude: const { [[0.0; 3]; 3] } }
+    /// Nothing known.
+    #[inline]
+    pub(super) fn new() -> Self {
+        Self { value: ZERO, ignorance: 1.0, attitude: [[0.0; 3]; 3] }
     }
 
     /// Whether rest or motion has shown it.
-    pub(super) fn trusted(&self) -> bool {
-        self.ignorance < self.config.trusted
+    pub(super) fn trusted(&self, config: &BiasConfig) -> bool {
+        self.ignorance < config.trusted
     }
 
     /// Takes the filtered rate of a body at rest.
-    pub(super) fn at_rest(&mut self, rate: &Column, dt: f32) {
+    #[inline]
+    pub(super) fn at_rest(&mut self, config: &BiasConfig, rate: &Column, dt: f32) {
         let weight = self.ignorance * dt;
-        let k = weight / (weight + self.config.rest_weight);
+        let k = weight / (weight + config.rest_weight);
         follow(core::slice::from_mut(&mut self.value), core::slice::from_mut(&mut rate.clone()), k);
         self.ignorance *= 1.0 - k;
-        cut_all(&mut self.value, self.config.limit);
+        cut(&mut self.value, config.limit);
     }
 
     /// Time passes.
-    pub(super) fn age(&mut self, dt: f32, moving: bool) {
+    #[inline]
+    pub(super) fn age(&mut self, config: &BiasConfig, dt: f32, moving: bool) {
         if moving {
-            self.ignorance *= 1.0 - dt / self.config.motion_tau;
+            self.ignorance *= 1.0 - dt / config.motion_tau;
         }
-        self.ignorance = least(self.ignorance + self.config.forgetting * dt, 1.0);
+        self.ignorance = least(self.ignorance + config.forgetting * dt, 1.0);
     }
 
     /// The averaged attitude follows.
-    pub(super) fn follow(&mut self, attitude: &[Column; 3], dt: f32) {
-        follow(&mut self.attitude, &mut attitude.clone(), least(dt / self.config.lag, 1.0));
+    #[inline]
+    pub(super) fn follow(&mut self, config: &BiasConfig, attitude: &[Column; 3], dt: f32) {
+        follow(&mut self.attitude, &mut attitude.clone(), least(dt / config.lag, 1.0));
     }
 
     /// Takes the turn about the earth's horizontal axes that corrected the tilt over `dt`, in motion.
-    pub(super) fn take_tilt(&mut self, turn: &Column, dt: f32) {
-        let config = &self.config;
+    #[inline]
+    pub(super) fn take_tilt(&mut self, config: &BiasConfig, turn: &Column, dt: f32) {
         let gain = config.tilt_gain * (1.0 + config.tilt_boost * self.ignorance);
-        self.correct(turn, config.limit * dt, gain);
+        self.correct(turn, config.limit * dt, gain, config.limit);
     }
 
     /// Takes the heading error that was found over `dt`, in motion.
-    pub(super) fn take_heading(&mut self, error: f32, dt: f32) {
-        let config = &self.config;
+    #[inline]
+    pub(super) fn take_heading(&mut self, config: &BiasConfig, error: f32, dt: f32) {
         let gain = config.heading_gain * (1.0 + config.heading_boost * self.ignorance);
-        self.correct(&[0.0, 0.0, error], 0.2, gain * dt);
+        self.correct(&[0.0, 0.0, error], 0.2, gain * dt, config.limit);
     }
 
     /// Takes off what has caused a turn in earth axes, of which `most` counts about an axis.
     #[inline(never)]
-    fn correct(&mut self, turn: &Column, most: f32, gain: f32) {
+    fn correct(&mut self, turn: &Column, most: f32, gain: f32, limit: f32) {
         let mut turn = *turn;
-        cut_all(&mut turn, most);
+        cut(&mut turn, most);
         for (value, axis) in self.value.iter_mut().zip(&self.attitude) {
             *value -= gain * dot(axis, &turn);
         }
-        cut_all(&mut self.value, self.config.limit);
+        cut(&mut self.value, limit);
     }
 }
 

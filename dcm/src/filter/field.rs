@@ -34,11 +34,11 @@ impl Shape {
 
     /// Whether norm and dip agree: the sine of the angle between the two from their cross product.
     #[inline(never)]
-    fn is_near(&self, reference: &Self, config: &FieldConfig) -> bool {
+    fn is_near(&self, reference: &Self, norm: f32, dip: f32) -> bool {
         let (own, wanted) = (self.square(), reference.square());
-        let (low, high) = (1.0 - config.norm, 1.0 + config.norm);
+        let (low, high) = (1.0 - norm, 1.0 + norm);
         let cross = self.level * reference.down - self.down * reference.level;
-        own > low * low * wanted && own < high * high * wanted && cross * cross < config.dip * config.dip * own * wanted
+        own > low * low * wanted && own < high * high * wanted && cross * cross < dip * dip * own * wanted
     }
 }
 
@@ -52,7 +52,6 @@ impl Words for Shape {
 /// The state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Field {
-    pub(super) config: FieldConfig,
     /// Smoothed, as it is now.
     pub(super) now: Shape,
     /// What it should be; zero while it is not known.
@@ -68,16 +67,16 @@ pub(super) struct Field {
 
 impl Field {
     /// Nothing known.
-    #[inline(never)]
-    pub(super) fn new(config: FieldConfig) -> Self {
+    #[inline]
+    pub(super) fn new() -> Self {
         let none = Shape::default();
         let (candidate_time, good_time, frozen) = (0.0, 0.0, 0.0);
-        Self { config, now: none, reference: none, candidate: none, candidate_time, good_time, frozen, disturbed: true }
+        Self { now: none, reference: none, candidate: none, candidate_time, good_time, frozen, disturbed: true }
     }
 
-    /// Whether a reference was found.
+    /// Whether a reference was found. (One without a horizontal part would be of no use.)
     pub(super) fn known(&self) -> bool {
-        self.reference.square() > 0.0
+        self.reference.level > 0.0
     }
 
     /// Norm, as a share, and dip, rad, against the reference; 0 while none is known.
@@ -91,14 +90,15 @@ impl Field {
     }
 
     /// Takes a field that stands for `dt` seconds; `turning` says that the body turns fast.
-    pub(super) fn take(&mut self, shape: &Shape, dt: f32, turning: bool) {
-        let smooth = if self.now.square() > 0.0 { dt / (dt + self.config.smoothing) } else { 1.0 };
+    #[inline]
+    pub(super) fn take(&mut self, config: &FieldConfig, shape: &Shape, dt: f32, turning: bool) {
+        let smooth = if self.now.level > 0.0 { dt / (dt + config.smoothing) } else { 1.0 };
         self.now.follow(shape, smooth);
-        let slow = dt / self.config.reference_tau;
+        let slow = dt / config.reference_tau;
 
-        if self.now.is_near(&self.reference, &self.config) {
+        if self.now.is_near(&self.reference, config.norm, config.dip) {
             self.good_time += dt;
-            if self.good_time >= self.config.settle {
+            if self.good_time >= config.settle {
                 self.disturbed = false;
                 self.reference.follow(&self.now, slow);
             }
@@ -107,7 +107,7 @@ impl Field {
             self.disturbed = true;
         }
 
-        if !self.now.is_near(&self.candidate, &self.config) {
+        if !self.now.is_near(&self.candidate, config.norm, config.dip) {
             self.candidate_time = 0.0;
             self.candidate = self.now;
             return;
@@ -116,29 +116,30 @@ impl Field {
         if turning {
             self.candidate_time += dt;
         }
-        let wait = if self.known() { self.config.new_time } else { self.config.first_time };
+        let wait = if self.known() { config.new_time } else { config.first_time };
         if self.disturbed && self.candidate_time >= wait {
             self.reference = self.candidate;
             self.disturbed = false;
-            self.good_time = self.config.settle;
+            self.good_time = config.settle;
         }
     }
 
     /// Factor on the heading correction: 1 believed, 0 frozen, less than 1 after a long time of freezing. `hold` allows to freeze
     /// while there is no reference.
-    pub(super) fn belief(&mut self, dt: f32, hold: bool) -> f32 {
+    #[inline]
+    pub(super) fn belief(&mut self, config: &FieldConfig, dt: f32, hold: bool) -> f32 {
         if !self.disturbed {
-            self.frozen = -least(self.config.doubt * dt - self.frozen, 0.0);
+            self.frozen = -least(config.doubt * dt - self.frozen, 0.0);
             return 1.0;
         }
         if !self.known() && !hold {
             return 1.0;
         }
-        if self.frozen <= self.config.longest_freeze {
+        if self.frozen <= config.longest_freeze {
             self.frozen += dt;
             return 0.0;
         }
-        1.0 / self.config.doubt
+        1.0 / config.doubt
     }
 }
 

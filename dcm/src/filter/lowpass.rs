@@ -7,31 +7,39 @@
 //! Reference: x'' tau^2 + 2 x' tau + 2 x = 2 z, cut-off sqrt(2)/(2 pi tau), damping 1/sqrt(2).
 
 use super::state::Words;
-use crate::columns::{Column, least};
+use crate::columns::least;
 
 /// The state.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct LowPass {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LowPass<const N: usize> {
     /// Filtered value, and its rate times tau; while it starts, half the distance to the first of two running means.
-    pub(super) state: [Column; 2],
+    pub(super) state: [[f32; N]; 2],
     pub(super) age: f32,
 }
 
-impl LowPass {
-    /// At `x` since an instant.
-    pub(super) fn at(x: &Column) -> Self {
-        Self { state: [*x, [0.0; 3]], age: 1e-3 }
+impl<const N: usize> LowPass<N> {
+    /// Nothing known.
+    #[inline]
+    pub(super) fn new() -> Self {
+        Self { state: [[0.0; N]; 2], age: 0.0 }
+    }
+
+    /// Begins anew, as if it had been at `x` for an instant.
+    #[inline]
+    pub(super) fn restart(&mut self, x: [f32; N]) {
+        self.state = [x, [0.0; N]];
+        self.age = 1e-3;
     }
 
     /// Filtered value.
-    pub(super) fn value(&self) -> &Column {
+    pub(super) fn value(&self) -> &[f32; N] {
         let [x, _] = &self.state;
         x
     }
 
-    /// Takes one value that stands for `dt` seconds.
+    /// Takes one value that stands for `dt` seconds; the square of its distance to the filtered one.
     #[inline(never)]
-    pub(super) fn step(&mut self, z: &Column, dt: f32, tau: f32) {
+    pub(super) fn step(&mut self, z: &[f32; N], dt: f32, tau: f32) -> f32 {
         // running means, z - x - 2v the distance to the first; then x' tau = v, v' tau = 2 (z - x - v)
         let (lag, gain, keep, k) = if self.starting(tau) {
             self.age += dt;
@@ -42,12 +50,15 @@ impl LowPass {
             (1.0, 2.0 * k, 1.0, k)
         };
         let [x, v] = &mut self.state;
+        let mut square = 0.0;
         for ((x, v), z) in x.iter_mut().zip(v).zip(z) {
             let slope = lag * *v;
             let next = slope + gain * (z - *x - slope);
             *x += k * next;
             *v = keep * next;
+            square += (z - *x) * (z - *x);
         }
+        square
     }
 
     /// Whether the first averages still fill.
@@ -56,7 +67,7 @@ impl LowPass {
     }
 }
 
-impl Words for LowPass {
+impl<const N: usize> Words for LowPass<N> {
     fn words(&mut self, visit: &mut dyn FnMut(&mut f32)) {
         self.state.words(visit);
         visit(&mut self.age);
@@ -70,7 +81,7 @@ mod tests {
     #[test]
     fn it_starts_at_the_mean_and_then_has_its_time_constant() {
         let (dt, tau) = (0.0035, 3.0);
-        let mut filter = LowPass::default();
+        let mut filter = LowPass::new();
         filter.step(&[1.0, 0.0, 0.0], dt, tau);
         assert!((filter.value()[0] - 1.0).abs() < 1e-6, "the first value at once");
         for _ in 0..4000 {

@@ -11,13 +11,14 @@ use crate::angles::{euler_of, quaternion_of};
 use crate::columns::square;
 use crate::linear::determinant;
 use crate::trig::root;
-use crate::{Earth, Euler, Mat3, STANDARD_GRAVITY, Vec3};
+use crate::{Config, Earth, Euler, Mat3, STANDARD_GRAVITY, Vec3};
+use core::borrow::Borrow;
 use core::f32::consts::PI;
 
 /// Words of a saved state.
 pub const STATE_WORDS: usize = 103;
 /// First word of a saved state: changes whenever the list of fields does.
-const STATE_VERSION: u32 = 0x4443_4D03;
+const STATE_VERSION: u32 = 0x4443_4D04;
 
 /// What holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -55,7 +56,7 @@ pub struct Quality {
     pub iron: f32,
 }
 
-impl Dcm {
+impl<C: Borrow<Config> + Clone> Dcm<C> {
     /// Rotation body to earth (NED).
     #[must_use]
     pub fn matrix(&self) -> &Mat3 {
@@ -101,7 +102,7 @@ impl Dcm {
     /// Sets the bias, for instance from a stored calibration, with its standard deviation, rad/s (0: exact). What is not
     /// finite or beyond the limit is cut.
     pub fn set_bias(&mut self, bias: Vec3, sigma: f32) {
-        let limit = self.bias.config.limit;
+        let limit = self.config.borrow().bias.limit;
         self.bias.value = [bias.x, bias.y, bias.z].map(|b| if b.is_finite() { b.clamp(-limit, limit) } else { 0.0 });
         let share = if sigma.is_finite() { sigma / limit } else { 1.0 };
         self.bias.ignorance = (share * share).clamp(0.0, 1.0);
@@ -116,7 +117,7 @@ impl Dcm {
     /// Forgets hard iron and field reference: after a new magnetometer calibration.
     pub fn forget_field(&mut self) {
         self.iron.clear();
-        self.field = super::Field::new(self.field.config);
+        self.field = super::Field::new();
         self.heading_age = 0.0;
     }
 
@@ -149,14 +150,15 @@ impl Dcm {
     /// What holds now.
     #[must_use]
     pub fn flags(&self) -> Flags {
+        let config = self.config.borrow();
         Flags {
             started: self.started,
-            startup: self.tilt.starting(self.tilt_tau) || self.heading_age < self.heading_tau,
+            startup: self.tilt.starting(config.tilt_tau) || self.heading_age < config.heading_tau,
             rest: self.rest.now,
             heading_absolute: self.heading_absolute,
             field_known: self.field.known(),
             field_disturbed: self.heading_absolute && self.field.disturbed && self.field.known(),
-            bias_trusted: self.bias.trusted(),
+            bias_trusted: self.bias.trusted(&config.bias),
         }
     }
 
@@ -166,7 +168,7 @@ impl Dcm {
         let (field_norm, field_dip) = self.field.against();
         Quality {
             heading_error: self.heading_error,
-            bias_sigma: self.bias.config.limit * root(self.bias.ignorance),
+            bias_sigma: self.config.borrow().bias.limit * root(self.bias.ignorance),
             field_norm,
             field_dip,
             iron: root(square(&self.iron.found)),
@@ -181,7 +183,7 @@ impl Dcm {
         if let Some(slot) = slots.next() {
             *slot = STATE_VERSION;
         }
-        let mut copy = *self;
+        let mut copy = self.clone();
         copy.words(&mut |word| {
             if let Some(slot) = slots.next() {
                 *slot = word.to_bits();
@@ -202,7 +204,7 @@ impl Dcm {
         if let Some(at) = rest.iter().position(|w| !f32::from_bits(*w).is_finite()) {
             return Err(StateError::NotFinite(at + 1));
         }
-        let mut next = *self;
+        let mut next = self.clone();
         let mut from = rest.iter();
         next.words(&mut |word| {
             if let Some(bits) = from.next() {
@@ -230,7 +232,6 @@ impl Dcm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Config;
 
     #[test]
     fn the_number_of_words_is_the_number_of_fields() {

@@ -9,17 +9,16 @@
 use super::bias::Bias;
 use super::lowpass::LowPass;
 use super::state::{Words, flag};
-use crate::columns::{Column, plus, square};
-use crate::config::RestConfig;
+use crate::columns::{Column, cut, plus, square};
+use crate::config::{Config, RestConfig};
 
 /// The state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rest {
-    config: RestConfig,
     /// Filtered rate, rad/s, the bias still in it.
-    pub(super) rate: LowPass,
+    pub(super) rate: LowPass<3>,
     /// Filtered specific force, body axes, m/s^2.
-    pub(super) force: LowPass,
+    pub(super) force: LowPass<3>,
     pub(super) quiet: f32,
     /// The body rests.
     pub(super) now: bool,
@@ -29,9 +28,9 @@ pub(super) struct Rest {
 
 impl Rest {
     /// Nothing known.
-    #[inline(never)]
-    pub(super) fn new(config: RestConfig) -> Self {
-        Self { config, rate: LowPass::default(), force: LowPass::default(), quiet: 0.0, now: false, ever: false }
+    #[inline]
+    pub(super) fn new() -> Self {
+        Self { rate: LowPass::new(), force: LowPass::new(), quiet: 0.0, now: false, ever: false }
     }
 
     /// Begins anew.
@@ -42,30 +41,31 @@ impl Rest {
     }
 
     /// Takes a rate.
-    pub(super) fn rate(&mut self, rate: &Column, dt: f32, bias: &Bias) {
-        self.rate.step(rate, dt, self.config.filter_tau);
-        let mean = self.rate.value();
-        let away = plus(rate, mean, -1.0);
-        let slow = if bias.trusted() {
-            square(&plus(mean, &bias.value, -1.0)) < self.config.known_rate * self.config.known_rate
+    #[inline]
+    pub(super) fn rate(&mut self, config: &Config, rate: &Column, dt: f32, bias: &Bias) {
+        let away = self.rate.step(rate, dt, config.rest.filter_tau);
+        let mut mean = *self.rate.value();
+        let fast = if bias.trusted(&config.bias) {
+            square(&plus(&mean, &bias.value, -1.0)) >= config.rest.known_rate * config.rest.known_rate
         } else {
-            mean.iter().all(|w| w.abs() < bias.config.limit)
+            cut(&mut mean, config.bias.limit)
         };
-        if square(&away) > self.config.rate * self.config.rate || !slow {
+        if away > config.rest.rate * config.rest.rate || fast {
             self.moved();
         }
     }
 
     /// Takes a specific force; rest is counted here.
-    pub(super) fn force(&mut self, force: &Column, dt: f32) {
-        self.force.step(force, dt, self.config.filter_tau);
-        if square(&plus(force, self.force.value(), -1.0)) > self.config.force * self.config.force {
+    #[inline]
+    pub(super) fn force(&mut self, config: &RestConfig, force: &Column, dt: f32) {
+        let away = self.force.step(force, dt, config.filter_tau);
+        if away > config.force * config.force {
             self.moved();
             return;
         }
         self.quiet += dt;
-        if self.quiet >= self.config.time {
-            self.quiet = self.config.time;
+        if self.quiet >= config.time {
+            self.quiet = config.time;
             self.now = true;
         }
     }

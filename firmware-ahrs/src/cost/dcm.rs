@@ -21,7 +21,7 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let mut filter = dcm::Dcm::new(dcm::Config::DEFAULT);
+    let mut filter = dcm::Dcm::new(dcm::Standard);
     body::run(|dt, measured| {
         filter.update(dt, measured);
         core::hint::black_box(filter.matrix());

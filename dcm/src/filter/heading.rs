@@ -1,0 +1,85 @@
+//! Magnetometer: the heading.
+//!
+//! What it is: fields are averaged in earth axes over a short time, the hard iron that was found is taken off, and the matrix turns
+//! about the vertical by a share of what is left, while the field is believed.
+//! What can go wrong: a vertical field has no heading and changes nothing; one beyond the range is left out.
+//! Units: uT, rad, s.
+//! Reference: Laidig & Seel 2023, sections 3.2 and 3.5.
+
+use super::field::Shape;
+use super::{DEAD, Dcm, taken};
+use crate::Config;
+use crate::angles::up;
+use crate::columns::{Column, ZERO, least, plus, scaled, square, turn};
+use crate::measurement::Step;
+use crate::trig::{angle, root};
+use core::borrow::Borrow;
+
+/// Time over which fields are summed in earth axes before their average is used, s.
+pub(super) const ENOUGH_MAG: f32 = 0.035;
+/// Horizontal part of the field below which it has no heading, as a share of the whole.
+const LEAST_LEVEL: f32 = 0.02;
+
+impl<C: Borrow<Config>> Dcm<C> {
+    /// A field is summed in earth axes. Says whether it is the first after a start, which is used at once.
+    pub(super) fn mag(&mut self, field: &Column, step: &mut Step) -> bool {
+        let mut seen = *field;
+        if !taken(&mut seen, DEAD, self.config.borrow().field.range, step) || !self.started {
+            return false;
+        }
+        let first = !self.heading_absolute;
+        if first {
+            self.start(&up(&self.matrix.data.0), Some(field), step);
+        }
+        turn(&self.matrix.data.0, core::slice::from_mut(&mut seen));
+        self.field_sum = plus(&self.field_sum, &seen, 1.0);
+        self.fields += 1.0;
+        first
+    }
+
+    /// The averaged field turns the matrix about the vertical. Its time comes whether or not there is a reading in this step, so that
+    /// one that is missing changes no other.
+    #[inline(never)]
+    pub(super) fn heading(&mut self, step: &mut Step) {
+        let config = self.config.borrow();
+        let dt = core::mem::take(&mut self.since_mag);
+        let settled = !self.tilt.starting(config.tilt_tau);
+        let whole = &scaled(&self.field_sum, 1.0 / self.fields);
+        self.field_sum = ZERO;
+        self.fields = 0.0;
+        let mut free = self.iron.taken_from(&ZERO, config.iron.dead_zone, config.iron.limit);
+        turn(&self.matrix.data.0, core::slice::from_mut(&mut free));
+        let [x, y, down] = &plus(whole, &free, 1.0);
+        if settled {
+            self.iron.take(&config.iron, &self.matrix.data.0, whole, dt);
+        }
+        let level = root(x * x + y * y);
+        let spin = plus(self.rest.rate.value(), &self.bias.value, -1.0);
+        let turning = square(&spin) > config.field.new_rate * config.field.new_rate;
+        self.field.take(&config.field, &Shape { level, down: *down }, dt, turning);
+        if level < LEAST_LEVEL * down.abs() {
+            return;
+        }
+        let error = wrapped(config.declination, angle(*y, *x, level));
+        self.heading_error = error;
+        if !self.rest.now && settled {
+            self.bias.take_heading(&config.bias, error, dt);
+        }
+        self.heading_age = least(self.heading_age + dt, config.heading_tau);
+        // an unknown bias does more harm than an unknown field, and the first seconds are the average that the heading starts from
+        let hold = self.bias.trusted(&config.bias) && self.heading_age >= config.heading_tau;
+        let belief = self.field.belief(&config.field, dt, hold);
+        let gain = least(dt / self.heading_age, 1.0);
+        if belief > 0.0 {
+            self.turn_earth(&[0.0, 0.0, error * gain * belief]);
+            step.mag_used = true;
+        }
+    }
+}
+
+/// Difference of an angle to the one that is wanted, into [-pi, pi].
+fn wrapped(wanted: f32, angle: f32) -> f32 {
+    use core::f32::consts::{PI, TAU};
+    let error = wanted - angle;
+    if wanted != 0.0 && error.abs() > PI { error - TAU.copysign(error) } else { error }
+}

@@ -1,0 +1,125 @@
+//! Gyro and accelerometer: the attitude's course and its tilt.
+//!
+//! What it is: the gyro turns the matrix by the exponential's series with a coning term; the specific force, summed and averaged in
+//! earth axes, sets the tilt, and at rest the attitude is set anew when the tilt is far off.
+//! What can go wrong: a rate beyond the range is cut and flagged, a force beyond it is left out; a turn of more than a radian in one
+//! step is none.
+//! Units: rad/s, m/s^2, s.
+//! Reference: Premerlani & Bizard 2009, Eq. 17-21; Savage 1998, Eq. 47; Laidig & Seel 2023, section 3.2.
+
+use super::{DEAD, Dcm, taken};
+use crate::Config;
+use crate::angles::up;
+use crate::columns::{Column, ZERO, cross, dot, least, plus, scaled, square, turn};
+use crate::measurement::Step;
+use crate::rotation::{exponential, inverse_sqrt, orthonormalise};
+use core::borrow::Borrow;
+
+/// Time over which the specific force is summed in earth axes before it is used, s (five readings of 200 Hz, one of 48): its average
+/// is one of seconds.
+const ENOUGH: f32 = 0.0205;
+/// Weight of the turn of the axis between two steps (Savage 1998, Eq. 47, one sample before).
+const CONING: f32 = 1.0 / 12.0;
+/// Largest turn in one step that the increment can express, rad. (2000 deg/s at 48 Hz is 0.73.)
+const LARGEST_TURN: f32 = 1.0;
+/// At rest the measured vertical is beyond doubt: a tilt that is off by more than ten degrees (cosine) is set anew.
+const TILT_BEYOND_DOUBT: f32 = 0.985;
+
+impl<C: Borrow<Config>> Dcm<C> {
+    /// The gyro turns the matrix.
+    #[inline(never)]
+    pub(super) fn gyro(&mut self, rate: &Column, step: &mut Step) {
+        let config = self.config.borrow();
+        let mut rate = *rate;
+        let dt = least(core::mem::take(&mut self.since_gyro), config.max_dt);
+        taken(&mut rate, 0.0, config.gyro_range, step);
+        if step.bad_input {
+            return;
+        }
+        self.rest.rate(config, &rate, dt, &self.bias);
+        if !self.started {
+            return;
+        }
+        let rate = plus(&rate, &self.bias.value, -1.0);
+        let angle = scaled(&rate, dt);
+        if square(&angle) > LARGEST_TURN * LARGEST_TURN {
+            step.bad_input = true;
+            return;
+        }
+        // the axis of turning moves within the step: the second-order term of the rotation vector
+        let coned = plus(&angle, &cross(&self.last_angle, &angle), CONING);
+        self.last_angle = angle;
+        let mut next = exponential(&coned);
+        turn(&self.matrix.data.0, &mut next);
+        self.matrix.data.0 = next;
+        // rounding needs it once in many steps: after each use of the force, and in every step without one
+        if self.summed < self.since_accel {
+            orthonormalise(&mut self.matrix.data.0);
+        }
+        step.gyro_used = true;
+    }
+
+    /// The averaged specific force sets the tilt.
+    #[inline(never)]
+    pub(super) fn accel(&mut self, force: &Column, step: &mut Step) {
+        let mut up = *force;
+        if !taken(&mut up, DEAD, self.config.borrow().accel_range, step) {
+            return;
+        }
+        let dt = core::mem::take(&mut self.since_accel);
+        if !self.started {
+            self.start(force, None, step);
+            return;
+        }
+        step.accel_used = true;
+        turn(&self.matrix.data.0, core::slice::from_mut(&mut up));
+        self.sum = plus(&self.sum, &up, dt);
+        self.summed += dt;
+        if self.summed >= ENOUGH {
+            self.level(force, step);
+        }
+    }
+
+    /// The sum of specific forces is used.
+    fn level(&mut self, force: &Column, step: &mut Step) {
+        let config = self.config.borrow();
+        let dt = core::mem::take(&mut self.summed);
+        let mean = scaled(&self.sum, 1.0 / dt);
+        self.sum = ZERO;
+        self.rest.force(&config.rest, force, dt);
+        self.bias.follow(&config.bias, &self.matrix.data.0, dt);
+        self.bias.age(&config.bias, dt, !self.rest.now);
+        if self.rest.now {
+            self.bias.at_rest(&config.bias, self.rest.rate.value(), dt);
+            if self.settle(step) {
+                return;
+            }
+        }
+        let config = self.config.borrow();
+        self.tilt.step(&mean, dt, config.tilt_tau);
+        let mean = self.tilt.value();
+        let long = square(mean);
+        if long < 1.0 {
+            return;
+        }
+        let ([x, y, z], k) = (*mean, inverse_sqrt(long));
+        // beyond 90 degrees the sine shrinks again: any turn leads out
+        let by = if z < 0.0 { [-y * k, x * k, 0.0] } else { [0.5, 0.0, 0.0] };
+        if !self.rest.now && !self.tilt.starting(config.tilt_tau) {
+            self.bias.take_tilt(&config.bias, &by, dt);
+        }
+        self.turn_earth(&by);
+    }
+
+    /// At rest: the first time, and whenever the tilt is off by more than doubt allows, the attitude is set anew.
+    fn settle(&mut self, step: &mut Step) -> bool {
+        let force = *self.rest.force.value();
+        let along = dot(&force, &up(&self.matrix.data.0));
+        if self.rest.ever && along * along.abs() > TILT_BEYOND_DOUBT * TILT_BEYOND_DOUBT * square(&force) {
+            return false;
+        }
+        self.start(&force, None, step);
+        self.rest.ever |= step.started;
+        step.started
+    }
+}
