@@ -9,12 +9,13 @@
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
 use crate::context::{Context, Relation};
-use crate::effects::{self, Effect, Instance};
+use crate::effects::{self, Effect, Instance, quantisation};
 use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
 use crate::opponent::{nameless, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
+use crate::rivals::{Rival, UNEXPLAINED, list_nearest, probabilities, rivals_of};
 use crate::search::{base, connected, refine, refine_newest, scan, stride};
 use crate::together::{Ground, choose_pair};
 
@@ -40,8 +41,6 @@ const POLISHED: usize = 3;
 const SKETCH: usize = 2700;
 /// Candidates of a round that are kept for those who want to look.
 const SHOWN: usize = 10;
-/// Softmax temperature from evidence to probability.
-const TEMPERATURE: f64 = 4.0;
 /// Share of the winner's probability at which a second hypothesis makes the verdict ambiguous.
 const RIVAL: f64 = 0.5;
 
@@ -63,17 +62,6 @@ impl Candidate {
     pub fn ids(&self) -> Vec<String> {
         self.fit.placed.iter().map(|p| p.effect.id().to_owned()).collect()
     }
-}
-
-/// Another hypothesis: one effect of the winner replaced.
-#[derive(Debug, Clone)]
-pub struct Rival {
-    /// Its effects.
-    pub ids: Vec<String>,
-    /// Its probability.
-    pub probability: f64,
-    /// Its fit in the round in which it lost.
-    pub fit: Fit,
 }
 
 /// What the search found.
@@ -135,7 +123,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
             let done = (round as f64 + 1.0) / (MOST_EFFECTS as f64 + 1.0);
             let mut heard = |p: f64| progress(done + 0.9 * p * (1.0 - done));
             let ground = Ground { context, declared, start: &start, folds: &folds };
-            let pair = if room { choose_pair(ground, &best, &ranked, &mut offers, &mut heard) } else { None };
+            let pair = if room { choose_pair(ground, (&best, &errors), &ranked, &mut offers, &mut heard) } else { None };
             if let Some((pair, held)) = pair {
                 best = pair;
                 errors = held;
@@ -157,12 +145,10 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let is_unknown = unknown.is_some();
     if let Some((candidate, held)) = unknown {
         let named = std::mem::replace(&mut best, candidate);
-        let p = 1.0 / (1.0 + ((named.evidence - best.evidence) / TEMPERATURE).exp());
         rivals.clear();
         if !named.fit.placed.is_empty() {
-            rivals.push(Rival { ids: named.ids(), probability: 1.0 - p, fit: named.fit });
+            rivals.push(Rival { ids: named.ids(), probability, fit: named.fit });
         }
-        probability = p;
         errors = held;
     }
     let credible = best.fit.placed.is_empty() || is_unknown || explains(context, declared, &start, &best.fit);
@@ -179,6 +165,10 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     if let Some((candidate, held)) = forced {
         best = candidate;
         errors = held;
+    }
+    if is_unknown {
+        probability = UNEXPLAINED;
+        list_nearest(&mut rivals, candidates.first().map_or(&[], Vec::as_slice), probability);
     }
     let heldout_without = loop {
         let without: Vec<Vec<Held>> = (0..best.fit.placed.len())
@@ -276,7 +266,7 @@ pub(crate) fn round_of(
         }
         if let Some((shape, gain)) = &offer.found {
             let added = Placed { effect: offer.effect, instance: offer.instance.clone(), shape: shape.clone() };
-            let net = gain - penalty(context, &added, &whole);
+            let net = gain + added.effect.seen(context, &added.instance) - penalty(context, &added, &whole);
             ranked.push((net, best.fit.placed.iter().cloned().chain([added]).collect()));
         }
     }
@@ -290,7 +280,7 @@ pub(crate) fn round_of(
             break;
         }
         // what explains on its grid alone twice as much as all that came out so far is worth a refinement, whatever stands before it
-        let promising = k < REFINED || k < 3 * REFINED && gain > 2.0 * most;
+        let promising = k < REFINED || k < 3 * REFINED && gain > (2.0 * most).max(0.0);
         let placed = if promising { refine_newest(context, declared, &placed, sketch, 120) } else { placed };
         if let Some(fitted) =
             fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
@@ -360,14 +350,15 @@ pub(crate) fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) 
             share * (n.loglik.of(scattering) - o.loglik.of(scattering))
         })
         .sum();
-    gain - new.placed.last().map_or(0.0, |p| penalty(context, p, shares))
+    gain + new.placed.last().map_or(0.0, |p| p.effect.seen(context, &p.instance) - penalty(context, p, shares))
 }
 
 /// Evidence, in nats, that all effects of a fit together add over the declared model, their price paid.
 pub(crate) fn evidence_over(context: &Context, new: &Fit, start: &Fit) -> f64 {
     let shares = shares(context, std::iter::once(new));
     let earlier = &new.placed[..new.placed.len().saturating_sub(1)];
-    net_gain(context, new, start, &shares) - earlier.iter().map(|p| penalty(context, p, &shares)).sum::<f64>()
+    let price = |p: &Placed| penalty(context, p, &shares) - p.effect.seen(context, &p.instance);
+    net_gain(context, new, start, &shares) - earlier.iter().map(price).sum::<f64>()
 }
 
 /// What one round chose.
@@ -470,7 +461,9 @@ fn explains(context: &Context, declared: Declared<'_>, start: &Fit, fit: &Fit) -
                 r.iter().enumerate().filter(|(j, _)| counts(*j)).fold((0.0, 0.0), |s, (_, v)| (s.0 + v * v, s.1 + 1.0));
             sum / f64::max(n, 1.0)
         };
-        let floor = target.noise.rms * target.noise.rms;
+        // rounding to coarse steps cannot be taken away whole
+        let rounding = quantisation::step(target).map_or(0.0, |step| step * step / 12.0);
+        let floor = (target.noise.rms * target.noise.rms).max(rounding);
         let (b, a) = (square(&before[i]), square(&after[i]));
         // between jumps only what stood out there can have been explained there
         !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > NEEDED_SHARE * (b - floor)
@@ -495,41 +488,4 @@ pub(crate) fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, 
     placed.remove(k);
     let placed = refine(context, declared, &placed, Rows::All, 60);
     fit(context, declared, &placed, Some(start), Rows::All)
-}
-
-/// Softmax over the effects that could stand in the winner's place: those that share a channel with it, and nothing at all.
-pub(crate) fn probabilities(winner: &Candidate, followers: &[Candidate], nothing: f64) -> (f64, Vec<(Candidate, f64)>) {
-    let Some(newest) = winner.fit.placed.last() else { return (1.0, Vec::new()) };
-    let mut seen = vec![newest.effect.id()];
-    let mut kept: Vec<&Candidate> = Vec::new();
-    for c in followers {
-        let Some(other) = c.fit.placed.last() else { continue };
-        if !seen.contains(&other.effect.id()) && other.instance.channels.iter().any(|ch| newest.instance.touches(ch)) {
-            seen.push(other.effect.id());
-            kept.push(c);
-        }
-    }
-    let weight = |e: f64| ((e - winner.evidence) / TEMPERATURE).exp();
-    let total: f64 = 1.0 + kept.iter().map(|c| weight(c.evidence)).sum::<f64>() + weight(nothing + NEEDED_EVIDENCE);
-    (1.0 / total, kept.into_iter().map(|c| (c.clone(), weight(c.evidence) / total)).collect())
-}
-
-/// The winner with one of its effects replaced by what came close to it in its round.
-fn rivals_of(best: &Candidate, rounds: Vec<(f64, Vec<(Candidate, f64)>)>) -> Vec<Rival> {
-    let product: f64 = rounds.iter().map(|r| r.0).product();
-    let ids = best.ids();
-    let mut out: Vec<Rival> = Vec::new();
-    for (k, (own, rivals)) in rounds.into_iter().enumerate() {
-        for (candidate, p) in rivals {
-            let mut other = ids.clone();
-            if let (Some(slot), Some(placed)) = (other.get_mut(k), candidate.fit.placed.last()) {
-                *slot = placed.effect.id().to_owned();
-            }
-            out.push(Rival { ids: other, probability: product / own * p, fit: candidate.fit });
-        }
-    }
-    out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    out.truncate(6);
-    out.retain(|r| r.probability > 1e-4);
-    out
 }

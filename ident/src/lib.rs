@@ -32,6 +32,7 @@ pub mod quantity;
 pub mod report;
 pub mod residual;
 mod revise;
+pub mod rivals;
 pub mod runs;
 mod samples;
 pub mod search;

@@ -8,9 +8,10 @@
 //! Reference: stepwise regression with exchange, Miller 2002, Subset Selection in Regression, section 3.6.
 
 use crate::context::Context;
-use crate::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, may_join, offers, probabilities, round_of};
+use crate::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, may_join, offers, round_of};
 use crate::heldout;
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
+use crate::rivals::probabilities;
 use crate::search::{connected, refine};
 
 /// Looks at most so many times at all names.

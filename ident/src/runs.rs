@@ -9,11 +9,12 @@
 
 use crate::close::Closed;
 use crate::context::Context;
-use crate::diagnose::{Candidate, Diagnosis, Rival};
+use crate::diagnose::{Candidate, Diagnosis};
 use crate::experiment;
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::log::Log;
 use crate::model::Model;
+use crate::rivals::Rival;
 use crate::search::refine;
 use crate::verdict::NextExperiment;
 

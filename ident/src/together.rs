@@ -17,6 +17,9 @@ use crate::hypothesis::{Declared, Fit, scatters};
 const FIRSTS: usize = 3;
 /// Share of the held-out error on one of its channels that each of the two must remove.
 const NEEDED_OF_EACH: f64 = 0.2;
+/// Held-out error over the noise floor, root mean square and typical, below which no pair can take so much away: bare noise leaves
+/// 1.00 and 0.84, which would have to be four fifths of what there is; a tenth is allowed for a floor that was estimated too high.
+const ROOM: (f64, f64) = (1.12, 0.94);
 
 /// What a search stands on.
 #[derive(Clone, Copy)]
@@ -29,25 +32,30 @@ pub(crate) struct Ground<'g> {
     pub folds: &'g [Vec<bool>],
 }
 
-/// The best pair that stands up beside what was found already, with its held-out errors.
+/// The best pair that stands up beside what was found already (with its held-out errors), and its own held-out errors.
 pub(crate) fn choose_pair(
     ground: Ground<'_>,
-    best: &Candidate,
+    (best, before): (&Candidate, &[Held]),
     singles: &[Candidate],
     offers: &mut [&mut Scanned],
     progress: &mut dyn FnMut(f64),
 ) -> Option<(Candidate, Vec<Held>)> {
     let Ground { context, declared, start, folds } = ground;
     let left = loud(context, declared, &best.fit);
-    let is_loud = |c: &Candidate| {
+    let has_room: Vec<bool> = context
+        .targets
+        .iter()
+        .zip(left.iter().zip(before))
+        .map(|(t, (loud, held))| {
+            let bare = held.rms <= ROOM.0 * t.noise.rms && held.typical <= ROOM.1 * t.noise.rms;
+            *loud && !bare && !t.relation.is_evidence()
+        })
+        .collect();
+    let could_help = |c: &Candidate| {
         let newest = c.fit.placed.last();
-        context
-            .targets
-            .iter()
-            .zip(&left)
-            .any(|(t, l)| *l && !t.relation.is_evidence() && newest.is_some_and(|n| n.instance.touches(t.name)))
+        context.targets.iter().zip(&has_room).any(|(t, room)| *room && newest.is_some_and(|n| n.instance.touches(t.name)))
     };
-    let mut firsts: Vec<&Candidate> = singles.iter().filter(|c| is_loud(c)).collect();
+    let mut firsts: Vec<&Candidate> = singles.iter().filter(|c| could_help(c)).collect();
     firsts.sort_by(|a, b| gain(context, &b.fit, &best.fit).total_cmp(&gain(context, &a.fit, &best.fit)));
     let mut seen: Vec<&str> = Vec::new();
     firsts.retain(|c| {
@@ -69,7 +77,6 @@ pub(crate) fn choose_pair(
     let needed = 2.0 * NEEDED_EVIDENCE + if best.fit.placed.is_empty() { 0.0 } else { evidence_over(context, &best.fit, start) };
     let pair = pairs.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence)).filter(|p| p.evidence > needed)?;
     let held = heldout::errors(context, declared, &pair.fit, folds);
-    let before = heldout::errors(context, declared, &best.fit, folds);
     let helps = |less: &[Held], position: usize| {
         let touched = context.targets.iter().enumerate().filter(|(_, t)| pair.fit.placed[position].instance.touches(t.name));
         touched.map(|(i, _)| held[i].share_gone(&less[i])).fold(0.0, f64::max) > NEEDED_OF_EACH
@@ -77,7 +84,7 @@ pub(crate) fn choose_pair(
     let both = best.fit.placed.len()..pair.fit.placed.len();
     let stands = both.into_iter().all(|k| {
         without(context, declared, &pair.fit, k, start)
-            .is_some_and(|f| helps(&heldout::errors(context, declared, &f, folds), k) && helps(&before, k))
+            .is_some_and(|f| helps(&heldout::errors(context, declared, &f, folds), k) && helps(before, k))
     });
     stands.then_some((pair, held))
 }

@@ -42,6 +42,11 @@ impl Effect for BeamResonance {
         }
     }
 
+    fn never_beside(&self) -> &'static [&'static str] {
+        // a reading between two coarse steps toggles, as if it shook
+        &["quantisation"]
+    }
+
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         let order = order(instance);
         let top = context.rpm.iter().copied().fold(1.0, f64::max) / 60.0 * order;

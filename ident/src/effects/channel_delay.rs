@@ -5,7 +5,9 @@
 //! Units: s, positive is late.
 //! Reference: pure transport delay of a logger.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, meters, operator, through_meter};
+use super::{
+    About, Amplitude, Effect, Estimate, Instance, Shape, Stage, lone_speed, meters, operator, reads_meter, through_meter,
+};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -35,6 +37,7 @@ impl Effect for ChannelDelay {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         meters(context)
             .iter()
+            .chain(&lone_speed(context))
             .flat_map(|s| {
                 operator::courses(context).iter().map(|jumps| Instance::new(s, if *jumps { operator::OF_STEPS } else { "" }))
             })
@@ -42,7 +45,7 @@ impl Effect for ChannelDelay {
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
-        let most = (15.0 * context.step()).max(2.0);
+        let most = (15.0 * context.step()).max(5.0);
         // fractions of a row move single samples only: no point of a coarse grid sees them
         let rows = [-2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.5].map(|k| k * context.step());
         let coarse = (-6..=24).map(|k| most * f64::from(k) / 24.0).filter(|d| d.abs() > 4.0 * context.step());
@@ -58,7 +61,8 @@ impl Effect for ChannelDelay {
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         let [delay, phase @ ..] = shape else { return };
         let course = operator::course(&instance.form, phase);
-        let late = operator::Late::new(&context.t, course, |_| *delay);
+        let own = if reads_meter(instance, design.relation) { -delay } else { *delay };
+        let late = operator::Late::new(&context.t, course, |_| own);
         through_meter(context, design, |columns| columns.iter().map(|c| late.of(c)).collect());
     }
 

@@ -5,8 +5,11 @@
 //! Units: s.
 //! Reference: boxcar and RC filters; RCbenchmark load cells average over about half a second.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, meters, operator, through_meter};
-use crate::context::Context;
+use super::{
+    About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, lone_speed, meters, operator, reads_meter,
+    through_meter,
+};
+use crate::context::{CALM_US, Context};
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -41,7 +44,10 @@ impl Effect for ChannelFilter {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let forms: &[&str] = if operator::abrupt(context) { &FORMS[2..] } else { &FORMS[..2] };
-        meters(context).iter().flat_map(|s| forms.iter().map(|form| Instance::new(s, form))).collect()
+        let of_meters = meters(context);
+        // an average cannot be undone: the truth is read off a lag only; the lag itself hides whether the load jumps
+        let of_lone = lone_speed(context).into_iter().flat_map(|s| [FORMS[1], FORMS[3]].map(|form| Instance::new(&s, form)));
+        of_meters.iter().flat_map(|s| forms.iter().map(|form| Instance::new(s, form))).chain(of_lone).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
@@ -67,7 +73,13 @@ impl Effect for ChannelFilter {
         let course = operator::course(&instance.form, phase);
         if is_lag(instance) {
             let lag = operator::Lag::new(&context.t, *width, course);
-            through_meter(context, design, |columns| lag.of(columns));
+            if reads_meter(instance, design.relation) {
+                let jumped = |i: usize| context.pulse.as_ref().is_some_and(|p| (p[i] - p[i - 1]).abs() > CALM_US);
+                let truth = operator::Lead::new(&context.t, *width, phase.first().copied().unwrap_or(0.0), jumped);
+                design.map_together(|columns| columns.iter().map(|c| truth.of(c)).collect());
+            } else {
+                through_meter(context, design, |columns| lag.of(columns));
+            }
         } else {
             let average = operator::Average::new(&context.t, *width, course);
             through_meter(context, design, |columns| columns.iter().map(|c| average.of(c)).collect());

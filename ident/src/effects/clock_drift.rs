@@ -45,7 +45,9 @@ impl Effect for ClockDrift {
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         // lateness at the end of the run, in rows
-        let rows: [f64; 17] = [0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0, 30.0, 45.0, 70.0, -1.0, -3.0, -8.0, -20.0];
+        let late = [0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0, 30.0, 45.0, 70.0];
+        let early = [0.06, 0.12, 0.25, 0.5, 1.0, 3.0, 8.0, 20.0].map(|r: f64| -r);
+        let rows: Vec<f64> = late.into_iter().chain(early).collect();
         let unit = context.step() / context.duration().max(1e-9);
         let rate = Shape {
             name: "rate",

@@ -7,6 +7,7 @@
 //! Reference: running median as an outlier filter, Tukey 1977, *Exploratory Data Analysis*; Hampel identifier, Pearson 2002.
 
 use super::pulses::PULSES;
+use super::quantisation;
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;
@@ -114,7 +115,8 @@ fn glitches(context: &Context, target: &Target) -> Vec<(usize, f64)> {
     let middle = |k: usize| median(&mut y[k - 2..=k + 2].to_vec());
     let departures: Vec<f64> = (2..y.len() - 2).map(|k| y[k] - middle(k)).collect();
     let mut sizes: Vec<f64> = departures.iter().map(|d| d.abs()).collect();
-    let scatter = 1.4826 * median(&mut sizes);
+    // a coarse reading toggles between its own steps, most of the time not at all
+    let scatter = (1.4826 * median(&mut sizes)).max(quantisation::step(target).map_or(0.0, |step| 0.5 * step));
     let mut sorted = y.clone();
     sorted.sort_unstable_by(f64::total_cmp);
     let span = sorted[sorted.len() * 99 / 100] - sorted[sorted.len() / 100];

@@ -29,7 +29,7 @@ mod hysteresis;
 mod missed_pulses;
 mod operator;
 mod pulses;
-mod quantisation;
+pub(crate) mod quantisation;
 mod reynolds_thrust;
 mod rotor_inertia;
 mod sample_hold;
@@ -167,6 +167,10 @@ pub trait Effect: Sync {
     fn never_beside(&self) -> &'static [&'static str] {
         &[]
     }
+    /// Evidence, nats, that the readings themselves show, whatever the model says of them.
+    fn seen(&self, _context: &Context, _instance: &Instance) -> f64 {
+        0.0
+    }
     /// Whether it says something of the scatter of the thrust, not only of its mean.
     fn scatters(&self) -> bool {
         false
@@ -248,7 +252,8 @@ fn thrust_over_time(context: &Context) -> Vec<Instance> {
 }
 
 /// The sets of meters that may be slow or late together: each alone, the two of the load cell, and each speed sensor beside
-/// its difference from the others (alone where there are only two; a single one cannot be told from the rotor itself).
+/// its difference from the others (alone where there are only two). A single one is told from the rotor itself by what is a
+/// function of its speed: see [`lone_speed`].
 fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
     if context.time_is_row {
         return Vec::new();
@@ -267,6 +272,20 @@ fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
         }
     }
     sets
+}
+
+/// The only speed channel together with all that is a function of the speed: what is slow or late in it alone is ahead in them.
+fn lone_speed<'a>(context: &Context) -> Option<Vec<&'a str>> {
+    let functions = present(context, &["thrust_n", "torque_nm", "current_a"]);
+    let speeds = speeds(context);
+    let asked = !context.time_is_row && speeds.len() == 1 && !functions.is_empty();
+    asked.then(|| speeds.into_iter().chain(functions).collect())
+}
+
+/// Whether an instance holds the speed channel as its meter, and this relation is a function of its reading.
+fn reads_meter(instance: &Instance, relation: Relation) -> bool {
+    let of_speed = matches!(relation, Relation::Thrust | Relation::Torque | Relation::Current);
+    of_speed && instance.channels.iter().any(|c| c.starts_with("rpm"))
 }
 
 /// What a meter makes of its channel: every column passes through it. The difference of a speed channel from the consensus is

@@ -190,6 +190,43 @@ impl Lag {
     }
 }
 
+/// What a first-order lag was made of: its inverse, for an input that stands between rows as it ends, or jumps.
+#[derive(Debug, Clone)]
+pub(crate) struct Lead {
+    /// From each row to the next what is left of the lag's distance from its input at the jump, and of that after it.
+    left: Vec<(f64, f64)>,
+}
+
+impl Lead {
+    /// Of a lag with time constant `tau`, s. Where `jumps` says so of a row, its input jumped after a share `phase` of the interval
+    /// before it.
+    pub(crate) fn new(t: &[f64], tau: f64, phase: f64, jumps: impl Fn(usize) -> bool) -> Self {
+        let mut decays = [Decay::new(); 3];
+        let [whole, before, after] = &mut decays;
+        let interval = |(i, w): (usize, &[f64])| {
+            let h = (w[1] - w[0]) / tau.max(1e-9);
+            let (early, late) =
+                if jumps(i + 1) { (before.of(h * phase), after.of(h * (1.0 - phase))) } else { (1.0, whole.of(h)) };
+            (early, late.min(MOST_LEFT))
+        };
+        Self { left: t.windows(2).enumerate().map(interval).collect() }
+    }
+
+    /// The input whose lag is `x`.
+    pub(crate) fn of(&self, x: &[f64]) -> Vec<f64> {
+        let mut input = x.first().copied().unwrap_or(0.0);
+        let inputs = x.windows(2).zip(&self.left).map(|(x, (early, late))| {
+            let at_jump = input + (x[0] - input) * early;
+            input = (x[1] - late * at_jump) / (1.0 - late);
+            input
+        });
+        x.iter().take(1).copied().chain(inputs).collect()
+    }
+}
+
+/// A lag that leaves more than this of its state from row to row buries its input in noise.
+const MOST_LEFT: f64 = 0.99;
+
 /// Weight of the change of a lag's input over an interval of `h` time constants, `decay` = exp(-h), over which the input goes in a straight
 /// line: u(s) = from + (to - from) s/h.
 pub(crate) fn weight_of_ramp(h: f64, decay: f64) -> f64 {
@@ -296,6 +333,17 @@ mod tests {
         assert!((Lag::new(&t, 0.3, Course::Line).of(&[&x])[0][i] - 2.0 * (t[i] - 0.3)).abs() < 1e-6);
         assert!((Late::new(&t, Course::Line, |_| 0.27).of(&x)[i] - 2.0 * (t[i] - 0.27)).abs() < 1e-9);
         assert!((Late::new(&t, Course::Line, |_| -0.27).of(&x)[100] - 2.0 * (t[100] + 0.27)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_lead_gives_back_what_was_lagged() {
+        let (t, _) = ramp();
+        let x: Vec<f64> = (0..t.len()).map(|i| if i / 40 % 2 == 0 { 3.0 } else { 7.0 }).collect();
+        for (phase, tau) in [(0.0, 0.2), (0.8, 0.04), (0.3, 1.0)] {
+            let lagged = Lag::new(&t, tau, Course::Jump(phase)).of(&[&x]).remove(0);
+            let back = Lead::new(&t, tau, phase, |i| i % 40 == 0).of(&lagged);
+            assert!(back.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-9), "{phase} {tau}");
+        }
     }
 
     #[test]

@@ -45,6 +45,12 @@ impl Effect for Quantisation {
         vec![Shape { name: "step", unit: "channel", range: (found, found), starts: vec![found] }]
     }
 
+    fn seen(&self, context: &Context, instance: &Instance) -> f64 {
+        // of readings without steps each lies a quarter of a step from the next multiple, on average
+        let target = context.targets.iter().find(|t| instance.touches(t.name));
+        target.and_then(|t| Some(t.y.len() as f64 * (0.25 / lattice(t)?.departure.max(0.01)).ln())).unwrap_or(0.0)
+    }
+
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         vec![Amplitude { name: "depth", unit: "1" }]
     }
@@ -110,16 +116,27 @@ const SAMPLES: usize = 1000;
 const PROJECTIONS: usize = 30;
 
 /// The step of a channel whose readings all lie on a coarse grid: at least as large as the scatter between rows.
-fn step(target: &Target) -> Option<f64> {
+pub(crate) fn step(target: &Target) -> Option<f64> {
+    lattice(target).map(|l| l.step)
+}
+
+/// A grid that readings lie on.
+struct Lattice {
+    step: f64,
+    /// Mean distance from it, in steps.
+    departure: f64,
+}
+
+fn lattice(target: &Target) -> Option<Lattice> {
     let mut values = target.y.clone();
     values.sort_unstable_by(f64::total_cmp);
     let span = values.last()? - values.first()?;
     let gaps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1e-9 * span).collect();
     let step = grid(&values, gaps.iter().copied().fold(f64::INFINITY, f64::min));
-    let mean = values.iter().map(|v| (v / step - (v / step).round()).abs()).sum::<f64>() / values.len() as f64;
+    let departure = values.iter().map(|v| (v / step - (v / step).round()).abs()).sum::<f64>() / values.len() as f64;
     // few distinct values, on a grid, and most successive readings in steady stretches repeat
     let repeats = target.y.windows(2).filter(|w| (w[0] - w[1]).abs() < 0.5 * step).count() as f64 / target.y.len() as f64;
-    (step.is_finite() && span / step < 2000.0 && mean < 0.05 && repeats > 0.35).then_some(step)
+    (step.is_finite() && span / step < 2000.0 && departure < 0.05 && repeats > 0.35).then_some(Lattice { step, departure })
 }
 
 /// The step of the grid through zero that sorted values lie on: read off the smallest gap, then off ever larger values, because
