@@ -128,6 +128,8 @@ const LEVELLED: f64 = 0.5;
 /// Share of the mean variance in the likelihood: enough to keep a standing rotor's silence from counting without bound.
 const FLOORED: f64 = 0.05;
 
+/// Below this speed, rev/min, a rotor counts as standing: slower than any brushless motor runs without position sensors.
+pub(crate) const STANDSTILL: f64 = 100.0;
 /// Fewest samples after jumps, and between them, that show how well either is predicted.
 pub(crate) const FEWEST_OF_A_KIND: usize = 10;
 
@@ -138,7 +140,7 @@ impl Target {
         let floored = rows.iter().map(|i| noise.weight_variance(speed(i), FLOORED)).collect();
         let mut calm = vec![false; context.t.len()];
         context.calm.iter().for_each(|(a, b)| calm[*a..*b].fill(true));
-        let mut unsettled: Vec<bool> = rows.iter().map(|i| !calm[*i]).collect();
+        let mut unsettled: Vec<bool> = rows.iter().map(|i| !calm[*i] || context.runs_down(relation, *i)).collect();
         let jumps = unsettled.iter().filter(|u| **u).count();
         if jumps < FEWEST_OF_A_KIND || unsettled.len() - jumps < FEWEST_OF_A_KIND.max(unsettled.len() / 4) {
             unsettled.clear();
@@ -257,6 +259,13 @@ impl Context {
         let unclaimed: Vec<Vec<usize>> = context.targets.iter().map(|t| glitch_rows::unclaimed(&context, t)).collect();
         context.targets.iter_mut().zip(unclaimed).for_each(|(target, rows)| target.unclaimed = rows);
         context
+    }
+
+    /// Whether a rotor whose motor is off still turns at a row: no curve of a driven motor holds for its speed, torque and current.
+    fn runs_down(&self, relation: Relation, row: usize) -> bool {
+        let driven = matches!(relation, Relation::SpeedFromPulse | Relation::Torque | Relation::Current);
+        let off = self.pulse.as_ref().is_some_and(|p| p[row] < self.start_pulse_us);
+        driven && off && self.rpm.get(row).is_some_and(|r| *r > STANDSTILL)
     }
 
     /// What every declared relation needs and no more: command, consensus speed, steady stretches. No targets; see [`Context::declared`].

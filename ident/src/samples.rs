@@ -202,7 +202,8 @@ impl<'c> Samples<'c> {
             if late >= 3.0 && n - late > kept.columns.len() as f64 + 3.0 {
                 let mut excess = scales(found).max(1.0);
                 if excess > WORSE {
-                    for _ in 0..2 {
+                    for _ in 0..ROUNDS {
+                        let before = excess;
                         weights
                             .to_mut()
                             .iter_mut()
@@ -212,6 +213,9 @@ impl<'c> Samples<'c> {
                         solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
                         found = sums(&solution);
                         excess = scales(found).max(1.0);
+                        if (excess / before).ln().abs() < 0.1 {
+                            break;
+                        }
                     }
                 }
                 mean = part(found.0, n - late) + part(found.1, late) - weight * half_logs;
@@ -297,6 +301,10 @@ impl<'c> Base<'c> {
             .fold(0.0, |sum, part| sum + part)
     }
 }
+
+/// Most rounds of weighting the samples after jumps by how badly they are predicted; a rotor that runs down bends the curves of
+/// the first ones.
+const ROUNDS: usize = 12;
 
 /// Sum of the logarithms of positive numbers, one logarithm for every eight of them.
 fn log_product(values: &[f64]) -> f64 {

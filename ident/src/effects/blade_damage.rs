@@ -122,5 +122,4 @@ pub(super) fn relative_to_rest(context: &Context, channel: &str, column: &[f64],
     })
 }
 
-/// Below this speed, rev/min, a rotor counts as standing: slower than any brushless motor runs without position sensors.
-pub(super) const STANDSTILL: f64 = 100.0;
+pub(super) use crate::context::STANDSTILL;

@@ -5,10 +5,12 @@
 //! a healthy run of the same rig is known to whoever owns it, and is not counted on the run that hides the effect. Both go through
 //! `quadrig sim`; only their logs reach the tool.
 //! What can go wrong: a run that the firmware stops (a protection, a fault) is recorded as `stopped`.
-//! Units: sizes in noise floors: the residual beside that of the healthy run, on the channel where most is added.
+//! Units: sizes in noise floors: what the effect changes of a run that is the same in all else, row for row, a cubic of the pulse
+//! taken out (the declared curves absorb that), on the channel where most is left.
 //! Reference: specification `closing-the-loop.md`, "Blind trials".
 
 use super::chance::Chance;
+use super::fit::left_over;
 use super::scenario::CLEAN;
 use super::score::Line;
 use crate::quadrig;
@@ -80,7 +82,8 @@ fn fly(rig: &Scenario, folder: &Path, name: &str) -> Result<Log, String> {
 pub fn score(seed: u64) -> Line {
     let id = hidden(seed);
     let first = healthy(seed);
-    let mut second = Scenario { seed: seed.wrapping_add(7_919), ..first.clone() };
+    let twin = Scenario { seed: seed.wrapping_add(7_919), ..first.clone() };
+    let mut second = twin.clone();
     if let Some(entry) = id.and_then(effect::find) {
         second.effects.push(entry.draw(seed, second.run_s()).into());
     }
@@ -103,10 +106,10 @@ pub fn score(seed: u64) -> Line {
         ..Line::empty()
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let logs = fly(&first, folder.path(), "healthy").and_then(|a| Ok((a, fly(&second, folder.path(), "run")?)));
-    let (before, log) = match logs {
-        Ok(logs) => logs,
-        Err(why) => {
+    let logs = [(&first, "healthy"), (&second, "run"), (&twin, "twin")].map(|(rig, name)| fly(rig, folder.path(), name));
+    let [before, log, twin] = match logs {
+        [Ok(a), Ok(b), Ok(c)] => [a, b, c],
+        [Err(why), ..] | [_, Err(why), _] | [.., Err(why)] => {
             line.verdict = "stopped".into();
             line.named = why;
             return line;
@@ -118,7 +121,13 @@ pub fn score(seed: u64) -> Line {
     let outcome = std::panic::catch_unwind(|| -> Result<(Verdict, Verdict), String> { Ok((verdict(&before)?, verdict(&log)?)) });
     line.seconds = 0.5 * started.elapsed().as_secs_f64();
     match outcome {
-        Ok(Ok((own, v))) => judge(id, kind, &own, &v, &mut line),
+        Ok(Ok((own, v))) => {
+            if id.is_some() {
+                (line.size, line.shown) = size(&log, &twin, &own);
+                line.sizes = format!("{:.2}", line.size);
+            }
+            judge(id, kind, &own, &v, &mut line);
+        }
         Ok(Err(why)) => {
             line.verdict = "refused".into();
             line.named = why.replace([',', '\n'], ";");
@@ -128,15 +137,24 @@ pub fn score(seed: u64) -> Line {
     line
 }
 
-fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Line) {
-    let added = |(name, c): (&String, &ident::verdict::Channel)| {
-        let healthy = own.channels.get(name).map_or(c.noise_floor_rms, |h| h.before.rms);
-        (((c.before.rms.powi(2) - healthy.powi(2)).max(0.0)).sqrt() / c.noise_floor_rms, name.clone())
+/// Above this pulse every rig of the campaign turns, us: while it stops, a moment's difference is a large one.
+const DRIVEN_US: f64 = 1090.0;
+
+/// Largest size of what a run has beyond its twin, and the channel that shows it.
+fn size(log: &Log, twin: &Log, healthy: &Verdict) -> (f64, String) {
+    let of = |name: &'static str| -> Option<(f64, String)> {
+        let (with, without) = (log.column(name)?, twin.column(name)?);
+        let pulse = log.column("pulse_us")?;
+        let driven = |i: &usize| pulse[*i] > DRIVEN_US && (with[*i] - without[*i]).is_finite();
+        let rows: Vec<usize> = (0..with.len().min(without.len())).filter(driven).collect();
+        let (pulse, changed): (Vec<f64>, Vec<f64>) = rows.iter().map(|i| (pulse[*i] - 1000.0, with[*i] - without[*i])).unzip();
+        let floor = healthy.channels.get(name)?.noise_floor_rms;
+        Some((left_over(&pulse, &changed, 3) / floor, name.to_owned()))
     };
-    let most = v.channels.iter().map(added).max_by(|a, b| a.0.total_cmp(&b.0));
-    if let (Some((size, channel)), true) = (most, kind != "clean") {
-        (line.size, line.sizes, line.shown) = (size, format!("{size:.2}"), channel);
-    }
+    log.measured().filter_map(of).filter(|s| s.0.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
+}
+
+fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Line) {
     let standing: Vec<&str> = own.effects.iter().map(|e| e.id.as_str()).collect();
     let beyond = |ids: Vec<&str>| -> Vec<String> {
         ids.into_iter().filter(|i| !standing.contains(i) || Some(*i) == id).map(str::to_owned).collect()
