@@ -16,10 +16,8 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod bank;
 pub mod capture;
 pub mod config;
-mod elapsed;
 pub mod line;
 pub mod mass;
 mod operator;

@@ -5,7 +5,6 @@
 //! Units: as in [`frame::message`].
 //! Reference: specification `rig.md`, "Acquisition".
 
-use crate::elapsed::Elapsed;
 use crate::rig::Rig;
 use crate::settings::Settings;
 use esc_pwm::{ArmingEvent, Chirp, Schedule, ScheduleStep, Staircase, Step};
@@ -91,7 +90,7 @@ impl Rig {
     fn run(&mut self, now: Ticks, schedule: Schedule) -> Result<(), Refusals> {
         self.ask(now, ArmingEvent::Run, schedule.check())?;
         self.schedule = schedule;
-        self.started = Elapsed::since(now);
+        self.started = now;
         Ok(())
     }
 

@@ -6,7 +6,7 @@
 //! Units: as the channels state.
 //! Reference: specification `formats.md`.
 
-mod inertial;
+pub(crate) mod inertial;
 
 use crate::Failure;
 use crate::progress::Bar;
@@ -28,7 +28,7 @@ pub(crate) struct Args {
     /// Another run of the same rig, for the error before and after.
     #[arg(long)]
     validate: Vec<PathBuf>,
-    /// Folder for model.toml, verdict.json and report.html.
+    /// Folder for model.toml, verdict.json and report.html (attitude logs: pred.csv as well).
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// The verdict on stdout and nothing else.

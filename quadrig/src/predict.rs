@@ -1,11 +1,12 @@
 //! `quadrig predict`.
 //!
 //! What it is: a model's prediction of every measured channel of a log, one line for each row of the log.
-//! What can go wrong: a model that knows none of the log's channels is refused. Glitch rows, which the log alone decides, stay empty.
+//! What can go wrong: an inertial model predicts its own recording only. A model that knows none of the log's channels is refused. Glitch rows, which the log alone decides, stay empty.
 //! Units: the log's.
 //! Reference: specification `formats.md`.
 
 use crate::Failure;
+use crate::close_loop::inertial;
 use clap::ValueEnum;
 use ident::context::Context;
 use ident::log::{Column, Log, write_whole};
@@ -39,6 +40,14 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(text) = inertial::model_text(&args.model) {
+        if args.from == From::Command {
+            return Err(
+                format!("{}: of an attitude log, which holds no command; only --from relations", args.model.display()).into()
+            );
+        }
+        return inertial::predict(&args.model, &text, &args.log, &args.output);
+    }
     let model = Model::read(&args.model)?;
     let log = Log::read(&args.log)?;
     let columns = match args.from {

@@ -1,6 +1,7 @@
 //! The loop closed on an inertial unit: a hidden cause in a simulated log is named, its size comes back, and the figures are true.
 
-use quadrig_tests::inertial::{Answer, CAUSES, Cause, JUDGING, ask, judged, simulate};
+use quadrig_tests::call;
+use quadrig_tests::inertial::{Answer, CAUSES, Cause, JUDGING, ask, hidden, judged, right, simulate};
 
 fn judge(answer: &Answer, cause: Cause) -> bool {
     judged(cause, &answer.verdict, &answer.ids.iter().map(String::as_str).collect::<Vec<_>>())
@@ -26,13 +27,40 @@ fn hidden_causes_are_named_and_clean_logs_are_not_accused() {
     }
 }
 
-/// The verdict's figures are those of `pred.csv`, row for row.
+/// What the simulator hides is named from the text of its readings, and its size comes back.
 #[test]
-fn figures_can_be_recomputed_from_the_predictions() {
+fn what_the_simulator_hides_is_named() {
+    let bench = tempfile::tempdir().unwrap();
+    for id in ["", "hard_iron", "vibration", "gyro_temperature", "transmitter"] {
+        let log = hidden::fly(bench.path(), Some(id).filter(|i| !i.is_empty()), JUDGING);
+        // every kind of entry that a model holds predicts again what the loop predicted
+        let answer = ask(bench.path(), "run", &log.csv, Some("out"));
+        call(bench.path(), &["predict", "out/model.toml", "run.csv", "-o", "again.csv"]).succeeded();
+        let read = |name: &str| std::fs::read(bench.path().join(name)).unwrap();
+        assert!(read("again.csv") == read("out/pred.csv"), "{id}");
+        let ids: Vec<&str> = answer.ids.iter().map(String::as_str).collect();
+        let judged_as = if id == "transmitter" { "unknown" } else { id };
+        assert!(right(judged_as, &answer.verdict, &ids), "{id}: {} {ids:?}", answer.verdict);
+        for (name, value) in log.truth {
+            let (found, [low, high]) = answer.parameter(id, &name).unwrap_or_else(|| panic!("{id}: no {name}"));
+            let wide = 3.0 * (high - low); // six times the half width: five standard errors and more
+            assert!((found - value).abs() <= wide, "{id} {name}: {found} ({low} to {high}), hidden {value}");
+        }
+    }
+}
+
+/// The verdict's figures are those of `quadrig predict` with the model that the loop wrote, row for row, and of `pred.csv`.
+#[test]
+fn figures_can_be_recomputed_from_the_model() {
     let bench = tempfile::tempdir().unwrap();
     let log = simulate(Cause::HardIron, 3, JUDGING).csv;
     let answer = ask(bench.path(), "run", &log, Some("out"));
-    let predicted = std::fs::read_to_string(bench.path().join("out/pred.csv")).unwrap();
+    call(bench.path(), &["predict", "out/model.toml", "run.csv", "-o", "again.csv"]).succeeded();
+    let predicted = std::fs::read_to_string(bench.path().join("again.csv")).unwrap();
+    assert!(
+        predicted == std::fs::read_to_string(bench.path().join("out/pred.csv")).unwrap(),
+        "the model predicts what the loop did"
+    );
     let column = |text: &str, name: &str| -> Vec<f64> {
         let place = text.lines().next().unwrap().split(',').position(|n| n == name).unwrap();
         text.lines().skip(1).map(|l| l.split(',').nth(place).unwrap().parse().unwrap_or(f64::NAN)).collect()
@@ -48,6 +76,10 @@ fn figures_can_be_recomputed_from_the_predictions() {
         let before = answer.json["channels"][name]["before"]["rms"].as_f64().unwrap();
         assert!(claimed <= before * 1.001, "{name}: {before} {claimed}");
     }
+    // the model is of its own recording
+    let other: String = log.lines().take(9_000).map(|l| format!("{l}\n")).collect();
+    std::fs::write(bench.path().join("other.csv"), other).unwrap();
+    call(bench.path(), &["predict", "out/model.toml", "other.csv", "-o", "no.csv"]).refused(&["other.csv", "run.csv"]);
     // 6 uT were hidden
     let size: f64 = ["offset_x", "offset_y", "offset_z"]
         .iter()

@@ -38,6 +38,7 @@ pub(crate) fn verdicts(place: &Place, tally: &mut Tally) -> Result<(), Failure> 
     run(&mut cargo(place, &["build", "--quiet", "--release", "--bin", "quadrig"]))?;
     let mut logs = imports(place, &data)?;
     logs.push(glitches(place)?);
+    logs.extend(attitudes(place)?);
     logs.extend(listed(&data.join("blind-sample"), |name| name.ends_with(".csv") && !name.contains(".validate."))?);
     let kept = check_all(&logs, |log| check(&python, &checker, &place.quadrig(), log))?;
     tally.passed += kept;
@@ -68,6 +69,14 @@ fn glitches(place: &Place) -> Result<PathBuf, Failure> {
     let words = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "blind", "--", "--dump", SEED];
     run(cargo(place, &words).arg(&folder))?;
     Ok(folder.join(format!("{SEED}.csv")))
+}
+
+/// Attitude logs: simulated ones of both generators and the disturbed BROAD trials.
+fn attitudes(place: &Place) -> Result<Vec<PathBuf>, Failure> {
+    let folder = place.root.join("target/verdict/attitude");
+    let words = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "causes", "--", "--dump"];
+    run(cargo(place, &words).arg(&folder))?;
+    listed(&folder, |name| name.ends_with(".csv"))
 }
 
 /// The files of a folder that a test of the name accepts, in order of name.

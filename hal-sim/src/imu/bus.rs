@@ -9,6 +9,7 @@
 
 use super::chip::{ChipKind, SensorChip, Served};
 use super::errors::Errors;
+use super::hidden::Hidden;
 use super::motion::Motion;
 use crate::clock::VirtualClock;
 use crate::scenario::{FaultKind, Scenario, ScheduledFault};
@@ -106,6 +107,13 @@ impl I2cBus {
     pub fn new(clock: VirtualClock, fitted: &[ChipKind], motion: Motion, errors: &Errors, fault: BusFault) -> Self {
         let chips = fitted.iter().map(|kind| SensorChip::new(*kind, motion, errors)).collect();
         Self { clock, chips, fault, clocks_seen: 0 }
+    }
+
+    /// The same bus with hidden effects about its chips.
+    #[must_use]
+    pub fn with(mut self, hidden: &Hidden) -> Self {
+        self.chips = self.chips.into_iter().map(|chip| chip.with(hidden)).collect();
+        self
     }
 
     /// What each chip handed out, in the order of [`ChipKind::ALL`]; nothing of a chip that is not fitted.

@@ -9,7 +9,8 @@
 //! taken from them.
 
 use super::errors::{ChipErrors, Errors};
-use super::motion::Motion;
+use super::hidden::{Hidden, ImuLevers};
+use super::motion::{G, Motion};
 use super::to_chip;
 use crate::noise::Stream;
 
@@ -86,6 +87,7 @@ pub struct SensorChip {
     motion: Motion,
     errors: Errors,
     own: ChipErrors,
+    hidden: Hidden,
     noise: Stream,
     registers: [u8; 64],
     pointer: u8,
@@ -112,6 +114,7 @@ impl SensorChip {
             motion,
             errors: *errors,
             own: errors.of(kind),
+            hidden: Hidden::default(),
             noise: errors.stream(kind),
             registers: kind.reset_registers(),
             pointer: 0,
@@ -123,6 +126,35 @@ impl SensorChip {
         }
     }
 
+    /// The same chip with hidden effects about it.
+    #[must_use]
+    pub fn with(self, hidden: &Hidden) -> Self {
+        Self { hidden: hidden.clone(), ..self }
+    }
+
+    /// What acts now, and the temperature of the board, degC.
+    fn surroundings(&self, at_ns: u64) -> (ImuLevers, f64) {
+        let levers = self.hidden.levers(at_ns, &self.motion);
+        (levers, self.errors.celsius(at_ns) + levers.warm_k)
+    }
+
+    /// Specific force where the chip is, body axes, g.
+    fn force(&self, at_ns: u64, levers: &ImuLevers) -> [f64; 3] {
+        let (own, carried) = (self.motion.force(at_ns), self.motion.to_body(at_ns, levers.carried));
+        core::array::from_fn(|i| own[i] + (carried[i] + levers.shaken[i]) / G)
+    }
+
+    /// Field where the chip is, body axes, gauss, at the instant that the reading is of.
+    fn field(&self, at_ns: u64, levers: &ImuLevers) -> [f64; 3] {
+        let then = at_ns.saturating_sub((levers.late_s * 1e9) as u64);
+        let (own, room) = (self.motion.magnetic(then), self.motion.to_body(then, levers.room_field));
+        let there: [f64; 3] = core::array::from_fn(|i| own[i] + room[i]);
+        core::array::from_fn(|i| {
+            let induced: f64 = (0..3).map(|j| levers.iron[i][j] * there[j]).sum();
+            there[i] + induced + levers.body_field[i]
+        })
+    }
+
     /// Which chip it is.
     #[must_use]
     pub fn kind(&self) -> ChipKind {
@@ -131,7 +163,12 @@ impl SensorChip {
 
     /// The words that the chip would measure now in the state that its registers put it into.
     fn measure(&mut self, at_ns: u64) -> [i16; 3] {
-        let celsius = self.errors.celsius(at_ns);
+        let (levers, celsius) = self.surroundings(at_ns);
+        let (force, field) = match self.kind {
+            ChipKind::Itg3200 => ([0.0; 3], [0.0; 3]),
+            ChipKind::Hmc5883l => ([0.0; 3], self.field(at_ns, &levers)),
+            ChipKind::Adxl345 | ChipKind::Lis3dh => (self.force(at_ns, &levers), [0.0; 3]),
+        };
         let mut seen = |truth: [f64; 3]| self.own.seen(to_chip(truth), celsius, &mut self.noise);
         let file = &self.registers;
         match self.kind {
@@ -139,7 +176,9 @@ impl SensorChip {
                 if file[0x3E] & 0x40 != 0 || file[0x16] >> 3 & 3 != 3 {
                     return [0; 3]; // asleep, or a full scale that the data sheet does not define
                 }
-                seen(self.motion.rate(at_ns)).map(|w| rounded(w.to_degrees() * 14.375, 32_767.0))
+                let rate = self.motion.rate(at_ns);
+                let read = core::array::from_fn(|i| rate[i] + levers.rate[i] + levers.rate_per_k[i] * (celsius - 25.0));
+                seen(read).map(|w| rounded(w.to_degrees() * 14.375, 32_767.0))
             }
             ChipKind::Adxl345 => {
                 if file[0x2D] & 0x08 == 0 {
@@ -149,14 +188,14 @@ impl SensorChip {
                 let full = file[0x31] & 8 != 0;
                 let (per_g, limit) =
                     if full { (256.0, f64::from(512 << range) - 1.0) } else { (256.0 / f64::from(1 << range), 511.0) };
-                seen(self.motion.force(at_ns)).map(|f| rounded(f * per_g, limit))
+                seen(force).map(|f| rounded(f * per_g, limit))
             }
             ChipKind::Hmc5883l => {
                 if file[0x02] & 3 != 0 {
                     return [0; 3]; // idle, or a single measurement that nobody asked for
                 }
                 let per_gauss = [1370.0, 1090.0, 820.0, 660.0, 440.0, 390.0, 330.0, 230.0][usize::from(file[0x01] >> 5)];
-                seen(self.motion.magnetic(at_ns)).map(|m| {
+                seen(field).map(|m| {
                     let counts = libm::round(m * per_gauss);
                     if (-2048.0..=2047.0).contains(&counts) { counts as i16 } else { -4096 }
                 })
@@ -168,7 +207,7 @@ impl SensorChip {
                 }
                 let mg_per_digit = [1.0, 2.0, 4.0, 12.0][usize::from(form >> 4 & 3)];
                 // twelve bits, left justified
-                seen(self.motion.force(at_ns)).map(|f| rounded(f * 1000.0 / mg_per_digit, 2047.0) << 4)
+                seen(force).map(|f| rounded(f * 1000.0 / mg_per_digit, 2047.0) << 4)
             }
         }
     }
@@ -180,7 +219,7 @@ impl SensorChip {
         let bytes: Vec<u8> = match self.kind {
             ChipKind::Itg3200 => {
                 // -13 200 at 35 degC, 280 counts a kelvin
-                let warm = rounded((self.errors.celsius(at_ns) - 35.0) * 280.0 - 13_200.0, 32_767.0);
+                let warm = rounded((self.surroundings(at_ns).1 - 35.0) * 280.0 - 13_200.0, 32_767.0);
                 [warm, x, y, z].iter().flat_map(|w: &i16| w.to_be_bytes()).collect()
             }
             ChipKind::Adxl345 | ChipKind::Lis3dh => words.iter().flat_map(|w| w.to_le_bytes()).collect(),

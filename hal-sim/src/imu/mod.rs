@@ -1,7 +1,7 @@
 //! The IMU board's surroundings: a body that moves, three chips that sense it with all their faults, a bus between.
 //!
 //! What it is: [`Motion`] says where the body is at any instant; [`SensorChip`] is the register file of one chip, which measures
-//! that motion through its [`Errors`]; [`I2cBus`] carries the board's transfers to the chips. [`Lis3dh`], the test
+//! that motion through its [`Errors`] and whatever is [`Hidden`]; [`I2cBus`] carries the board's transfers to the chips. [`Lis3dh`], the test
 //! accelerometer, is on SPI ([`crate::hal`]), and on I2C as one of the chips. The native run ([`crate::native::ahrs`])
 //! and the emulated board use the same chips.
 //! What can go wrong: an unconfigured chip behaves like one (asleep, idle, wrong range), so a driver that skips its configuration is
@@ -12,12 +12,14 @@
 mod bus;
 mod chip;
 mod errors;
+pub mod hidden;
 mod lis3dh;
 mod motion;
 
 pub use bus::{BusError, BusFault, I2cBus};
 pub use chip::{ChipKind, SensorChip, Served};
 pub use errors::{ChipErrors, Errors};
+pub use hidden::{Hidden, ImuEffectKind, ImuScheduled};
 pub use lis3dh::Lis3dh;
 pub use motion::Motion;
 

@@ -1,4 +1,4 @@
-//! A body that turns at a constant rate, rocks about an axis of its own and is shaken along a line.
+//! A body that turns at a constant rate, rocks about an axis of its own, rests at times, is shaken along a line and carried about.
 //!
 //! What it is: attitude, rate, specific force and magnetic field in body axes at any instant, in closed form.
 //! What can go wrong: nothing here fails; attitudes are products of rotations of known angles, so nothing integrates and nothing drifts.
@@ -9,7 +9,7 @@
 use core::f64::consts::TAU;
 
 /// Standard gravity, m/s^2 (CGPM 1901).
-const G: f64 = 9.806_65;
+pub(super) const G: f64 = 9.806_65;
 
 /// How the body moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +30,16 @@ pub struct Motion {
     pub shake_hz: f64,
     /// Place of the accelerometer from the centre of rotation, body axes, m.
     pub lever_m: [f64; 3],
+    /// Turning and rocking pause this long at the beginning of each period, s, and so often, s; 0 for never.
+    pub pause_s: [f64; 2],
+    /// Half widths of a slow round through the room, earth NED, m: an ellipse that goes up and down twice.
+    pub walk_m: [f64; 3],
+    /// Rounds in a second, Hz.
+    pub walk_hz: f64,
 }
+
+/// Time in which turning begins and ends, s.
+const RAMP_S: f64 = 1.0;
 
 type Matrix = [[f64; 3]; 3];
 
@@ -67,7 +76,29 @@ impl Motion {
         shake_m: [0.0; 3],
         shake_hz: 0.0,
         lever_m: [0.0; 3],
+        pause_s: [0.0; 2],
+        walk_m: [0.0; 3],
+        walk_hz: 0.0,
     };
+
+    /// The clock of turning and rocking, which stands still in pauses: its time, s, its pace and the change of that, 1/s.
+    fn clock(&self, at_ns: u64) -> [f64; 3] {
+        let t = at_ns as f64 * 1e-9;
+        let [rest, every] = self.pause_s;
+        if rest <= 0.0 || every <= rest + 2.0 * RAMP_S {
+            return [t, 1.0, 0.0];
+        }
+        // a smooth step of the pace, 3 s^2 - 2 s^3, at either end of each period's motion
+        let step = |x: f64| {
+            let s = (x / RAMP_S).clamp(0.0, 1.0);
+            let within = RAMP_S * (s * s * s - 0.5 * s * s * s * s) + (x - RAMP_S).max(0.0);
+            [within, s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / RAMP_S]
+        };
+        let periods = libm::floor(t / every);
+        let now = t - periods * every;
+        let (up, down) = (step(now - rest), step(now - every + RAMP_S));
+        [periods * (every - rest - RAMP_S) + up[0] - down[0], up[1] - down[1], up[2] - down[2]]
+    }
 
     /// Rotation body to earth at a time, R = Rz Ry Rx exp(rate t) exp(rock sin(2 pi f t)).
     #[must_use]
@@ -79,7 +110,7 @@ impl Motion {
             [-st, sf * ct, cf * ct],
         ];
         if let Some((speed, axis)) = length_and_axis(self.rate) {
-            attitude = product(&attitude, &turn(axis, speed * at_ns as f64 * 1e-9));
+            attitude = product(&attitude, &turn(axis, speed * self.clock(at_ns)[0]));
         }
         if let Some((_, rocked)) = self.rocked(at_ns) {
             attitude = product(&attitude, &rocked);
@@ -90,17 +121,38 @@ impl Motion {
     /// Phase of the rocking, rad, and the rotation by which it has turned the body.
     fn rocked(&self, at_ns: u64) -> Option<(f64, Matrix)> {
         let (amplitude, axis) = length_and_axis(self.rock)?;
-        let phase = TAU * self.rock_hz * at_ns as f64 * 1e-9;
+        let phase = TAU * self.rock_hz * self.clock(at_ns)[0];
         Some((phase, turn(axis, amplitude * libm::sin(phase))))
     }
 
-    /// The constant rate as seen in body axes, the rate of the rocking and its change, rad/s and rad/s^2.
+    /// The constant rate as seen in body axes, the rate of the rocking and the change of both paces, rad/s and rad/s^2.
     fn rates(&self, at_ns: u64) -> [[f64; 3]; 3] {
-        let Some((phase, rocked)) = self.rocked(at_ns) else { return [self.rate, [0.0; 3], [0.0; 3]] };
+        let [_, pace, change] = self.clock(at_ns);
+        let Some((phase, rocked)) = self.rocked(at_ns) else {
+            return [self.rate.map(|r| r * pace), [0.0; 3], self.rate.map(|r| r * change)];
+        };
         let w = TAU * self.rock_hz;
-        let steady = core::array::from_fn(|j| (0..3).map(|i| rocked[i][j] * self.rate[i]).sum());
+        let steady: [f64; 3] = core::array::from_fn(|j| (0..3).map(|i| rocked[i][j] * self.rate[i]).sum());
         let (s, c) = libm::sincos(phase);
-        [steady, self.rock.map(|a| a * w * c), self.rock.map(|a| -a * w * w * s)]
+        let swing = w * c * change - w * w * s * pace * pace;
+        let changes = core::array::from_fn(|i| self.rock[i] * swing + steady[i] * change);
+        [steady.map(|r| r * pace), self.rock.map(|a| a * w * c * pace), changes]
+    }
+
+    /// Where the centre of rotation is, earth NED, m, from the middle of shaking and walk.
+    #[must_use]
+    pub fn place(&self, at_ns: u64) -> [f64; 3] {
+        let t = at_ns as f64 * 1e-9;
+        let shaken = libm::sin(TAU * self.shake_hz * t);
+        let round = self.round(t);
+        core::array::from_fn(|i| self.shake_m[i] * shaken + self.walk_m[i] * round[i].0)
+    }
+
+    /// Each direction's share of the round, and its second derivative, 1/s^2.
+    fn round(&self, t: f64) -> [(f64, f64); 3] {
+        let w = TAU * self.walk_hz;
+        let (s, c) = libm::sincos(w * t);
+        [(s, -w * w * s), (c, -w * w * c), (2.0 * s * c, -8.0 * w * w * s * c)]
     }
 
     /// Rate of the body, body axes, rad/s.
@@ -110,7 +162,9 @@ impl Motion {
         core::array::from_fn(|i| steady[i] + rocking[i])
     }
 
-    fn to_body(self, at_ns: u64, earth: [f64; 3]) -> [f64; 3] {
+    /// A vector in earth axes as the body has it.
+    #[must_use]
+    pub fn to_body(&self, at_ns: u64, earth: [f64; 3]) -> [f64; 3] {
         let r = self.attitude(at_ns);
         core::array::from_fn(|j| (0..3).map(|i| r[i][j] * earth[i]).sum())
     }
@@ -120,7 +174,8 @@ impl Motion {
     pub fn force(&self, at_ns: u64) -> [f64; 3] {
         let w = TAU * self.shake_hz;
         let swing = -w * w * libm::sin(w * at_ns as f64 * 1e-9) / G;
-        let [x, y, z] = self.shake_m.map(|m| m * swing);
+        let round = self.round(at_ns as f64 * 1e-9);
+        let [x, y, z] = core::array::from_fn(|i| self.shake_m[i] * swing + self.walk_m[i] * round[i].1 / G);
         let body = self.to_body(at_ns, [x, y, z - 1.0]);
         let [steady, rocking, change] = self.rates(at_ns);
         let rate: [f64; 3] = core::array::from_fn(|i| steady[i] + rocking[i]);
@@ -147,9 +202,17 @@ mod tests {
     /// The rate is what turns the attitude: (R(t+h) - R(t-h))/2h = R [w]x, and R stays a rotation.
     #[test]
     fn the_attitude_turns_at_the_rate() {
-        let (at, h) = (1_700_000_000u64, 10_000u64);
-        let (before, now, after) = (OBLIQUE.attitude(at - h), OBLIQUE.attitude(at), OBLIQUE.attitude(at + h));
-        let [x, y, z] = OBLIQUE.rate(at);
+        let pausing = Motion { pause_s: [1.0, 5.0], ..OBLIQUE };
+        assert_eq!(pausing.rate(5_500_000_000), [0.0; 3], "a pause");
+        for (body, at) in [(OBLIQUE, 1_700_000_000u64), (pausing, 1_700_000_000), (pausing, 9_300_000_000)] {
+            turns_at_its_rate(&body, at);
+        }
+    }
+
+    fn turns_at_its_rate(body: &Motion, at: u64) {
+        let h = 10_000u64;
+        let (before, now, after) = (body.attitude(at - h), body.attitude(at), body.attitude(at + h));
+        let [x, y, z] = body.rate(at);
         let turned = product(&now, &[[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]);
         for i in 0..3 {
             for j in 0..3 {
@@ -164,14 +227,22 @@ mod tests {
     /// The force is the second difference of the accelerometer's place, less gravity.
     #[test]
     fn the_force_is_the_acceleration_of_the_accelerometer_less_gravity() {
-        let moved = Motion { shake_m: [0.01, -0.02, 0.005], shake_hz: 3.0, lever_m: [0.05, 0.02, -0.03], ..OBLIQUE };
+        let moved = Motion {
+            shake_m: [0.01, -0.02, 0.005],
+            shake_hz: 3.0,
+            lever_m: [0.05, 0.02, -0.03],
+            pause_s: [0.2, 4.0],
+            walk_m: [0.5, 0.3, 0.1],
+            walk_hz: 0.2,
+            ..OBLIQUE
+        };
         let place = |at: u64| -> [f64; 3] {
-            let r = moved.attitude(at);
-            let s = libm::sin(TAU * moved.shake_hz * at as f64 * 1e-9);
-            core::array::from_fn(|i| moved.shake_m[i] * s + (0..3).map(|j| r[i][j] * moved.lever_m[j]).sum::<f64>())
+            let (r, centre) = (moved.attitude(at), moved.place(at));
+            core::array::from_fn(|i| centre[i] + (0..3).map(|j| r[i][j] * moved.lever_m[j]).sum::<f64>())
         };
         let h = 1_000_000u64;
-        for at in [40_000_000u64, 611_000_000, 1_234_000_000] {
+        // at rest, speeding up, under way, slowing down, and all of it in the second period
+        for at in [40_000_000u64, 611_000_000, 1_734_000_000, 3_500_000_000, 4_100_000_000, 4_900_000_000] {
             let (a, b, c) = (place(at - h), place(at), place(at + h));
             let second: [f64; 3] = core::array::from_fn(|i| (a[i] - 2.0 * b[i] + c[i]) / (h as f64 * 1e-9).powi(2) / G);
             let want = moved.to_body(at, [second[0], second[1], second[2] - 1.0]);

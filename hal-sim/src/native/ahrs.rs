@@ -7,7 +7,7 @@
 //! Reference: specification `ahrs.md`, "Board"; house rule 1.
 
 use crate::clock::VirtualClock;
-use crate::imu::{BusFault, ChipKind, Errors, I2cBus, Motion, Served};
+use crate::imu::{BusFault, ChipKind, Errors, Hidden, I2cBus, Motion, Served};
 use firmware_ahrs::{Ahrs, AhrsConfig, Inputs, Sampler, TICK_HZ};
 use frame::message::{Hello, Message};
 use frame::units::Ticks;
@@ -28,6 +28,8 @@ pub struct ImuRig {
     pub fitted: Vec<ChipKind>,
     /// Their errors.
     pub errors: Errors,
+    /// What acts on sensors and room and is not declared.
+    pub hidden: Hidden,
     /// What goes wrong on the bus.
     pub fault: BusFault,
 }
@@ -35,7 +37,13 @@ pub struct ImuRig {
 impl Default for ImuRig {
     /// Three ideal chips at rest.
     fn default() -> Self {
-        Self { motion: Motion::LEVEL, fitted: ChipKind::ALL.to_vec(), errors: Errors::default(), fault: BusFault::None }
+        Self {
+            motion: Motion::LEVEL,
+            fitted: ChipKind::ALL.to_vec(),
+            errors: Errors::default(),
+            hidden: Hidden::default(),
+            fault: BusFault::None,
+        }
     }
 }
 
@@ -81,7 +89,7 @@ pub fn run_at(rig: &ImuRig, ticks: &[u64]) -> Result<ImuRun, wire::EncodeError> 
 
 fn ticked(rig: &ImuRig, ticks: &[u64], progress: &mut dyn FnMut(f64)) -> Result<ImuRun, wire::EncodeError> {
     let clock = VirtualClock::default();
-    let bus = I2cBus::new(clock.clone(), &rig.fitted, rig.motion, &rig.errors, rig.fault);
+    let bus = I2cBus::new(clock.clone(), &rig.fitted, rig.motion, &rig.errors, rig.fault).with(&rig.hidden);
     let mut sampler = Sampler::new(bus);
     let mut ahrs = Ahrs::new(AhrsConfig::default());
     let hello = Ahrs::hello(CORE_HZ, 0, sampler.alive());

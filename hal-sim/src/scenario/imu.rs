@@ -9,7 +9,7 @@
 
 use super::section::{not_negative, positive};
 use super::{FaultKind, ScheduledFault};
-use crate::imu::{BusFault, ChipErrors, ChipKind, Errors, Motion};
+use crate::imu::{BusFault, ChipErrors, ChipKind, Errors, Hidden, ImuScheduled, Motion};
 use crate::native::ahrs::ImuRig;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
@@ -28,6 +28,9 @@ pub struct ImuScenario {
     pub seed: u64,
     /// The body and its chips.
     pub imu: ImuSection,
+    /// Hidden effects.
+    #[serde(default, rename = "effect")]
+    pub effects: Vec<ImuScheduled>,
     /// A fault of the bus, its times counted from power-up; one at the most.
     #[serde(default, rename = "fault", deserialize_with = "one_of_the_bus")]
     pub faults: Vec<ScheduledFault>,
@@ -90,6 +93,13 @@ pub struct BodySection {
     pub shake_hz: f64,
     /// Place of the accelerometer from the centre of rotation, body axes, m.
     pub lever_m: [f64; 3],
+    /// Turning and rocking pause so long at the beginning of each period, and the period, s; 0 for never.
+    pub pause_s: [f64; 2],
+    /// Half widths of a slow round through the room, earth axes, m.
+    pub walk_m: [f64; 3],
+    /// Rounds in a second, Hz.
+    #[serde(deserialize_with = "not_negative")]
+    pub walk_hz: f64,
     /// Magnetic field, earth axes, uT.
     pub field_ut: [f64; 3],
 }
@@ -134,6 +144,9 @@ impl Default for BodySection {
             shake_m: [0.0; 3],
             shake_hz: 0.0,
             lever_m: [0.0; 3],
+            pause_s: [0.0; 2],
+            walk_m: [0.0; 3],
+            walk_hz: 0.0,
             field_ut: Motion::LEVEL.field.map(|gauss| gauss / GAUSS_PER_UT),
         }
     }
@@ -156,6 +169,7 @@ impl ImuScenario {
             motion: imu.body.motion(),
             fitted: imu.fitted.iter().map(|field| ChipKind::ALL[*field as usize]).collect(),
             errors,
+            hidden: Hidden::new(&self.effects),
             fault: BusFault::first(&self.faults),
         }
     }
@@ -180,6 +194,9 @@ impl BodySection {
             shake_m: self.shake_m,
             shake_hz: self.shake_hz,
             lever_m: self.lever_m,
+            pause_s: self.pause_s,
+            walk_m: self.walk_m,
+            walk_hz: self.walk_hz,
         }
     }
 }
@@ -242,6 +259,10 @@ mod tests {
     #[test]
     fn what_is_written_reads_back_and_refusals_name_the_place() {
         let scenario = parse("name = \"a\"\n[imu]\nduration_s = 3\n[imu.body]\nrock_deg = [1, 2, 3]\nrock_hz = 0.5\n").unwrap();
+        assert_eq!(parse(&toml::to_string(&scenario).unwrap()).unwrap(), scenario);
+        let hidden = "[imu]\n[[effect]]\nid = \"channel_delay\"\nfrom_s = 2.0\ndelay_s = 0.03\n";
+        let scenario = parse(hidden).unwrap();
+        assert_eq!(scenario.effects.first().map(|e| (e.effect.id(), e.from_s)), Some(("channel_delay", Some(2.0))));
         assert_eq!(parse(&toml::to_string(&scenario).unwrap()).unwrap(), scenario);
         for (text, start, word) in [
             ("motor = \"570KV\"\n[imu]\n", "imu.toml:1:1: ", "motor"),

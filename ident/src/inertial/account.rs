@@ -8,6 +8,7 @@
 
 use super::Recording;
 use super::least::Readings;
+use super::model::{FORMAT as MODEL_FORMAT, InertialModel, Part};
 use crate::residual::whiteness;
 use crate::verdict::{Alternative, Channel, EffectEntry, FORMAT, Figures, Kind, NextExperiment, ScheduleStep, Verdict};
 use nalgebra::Vector3;
@@ -33,6 +34,8 @@ pub struct Sensor {
     pub(crate) kind: Kind,
     /// What is left over, in noise floors, before and after.
     pub(crate) excess: [f64; 2],
+    /// Its share of the corrected model.
+    pub(crate) part: Part,
 }
 
 /// A closed loop.
@@ -40,6 +43,8 @@ pub struct Sensor {
 pub struct Closed {
     /// The verdict.
     pub verdict: Verdict,
+    /// The corrected model.
+    pub model: InertialModel,
     /// The traces, of the sensors that could be predicted.
     pub sensors: Vec<Sensor>,
 }
@@ -113,7 +118,13 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         next_experiment,
         validation: Vec::new(),
     };
-    Closed { verdict, sensors }
+    let model = InertialModel {
+        format: MODEL_FORMAT.to_owned(),
+        source: recording.name.clone(),
+        span_s: super::span(recording),
+        sensor: sensors.iter().map(|s| s.part.clone()).collect(),
+    };
+    Closed { verdict, model, sensors }
 }
 
 /// The motion that tells causes of an inertial unit apart. The schedule has the rig's form: the motors stay off.

@@ -8,6 +8,7 @@
 
 use super::account::Sensor;
 use super::least::{Column, Readings, Term};
+use super::model::{Part, linear};
 use super::noise::{axis_level, floor, levels};
 use super::search::Scene;
 use super::trace::{Setting, trace};
@@ -24,6 +25,9 @@ const DOUBT: f64 = 0.006;
 const TURNS: usize = 6;
 /// Iron on the sensor that the heading must not take for north, uT.
 const IRON_UT: f64 = 20.0;
+/// Causes that multiply the predicted field, and how often they are asked again with a better one.
+const MULTIPLIES: [&str; 2] = ["soft_iron", "channel_delay"];
+const AGAIN: usize = 2;
 /// Fewest blocks.
 const LEAST_BLOCKS: usize = 200;
 
@@ -41,8 +45,17 @@ impl Heading {
     }
 }
 
-/// The trace; nothing without a magnetometer or with too little of it.
-pub(crate) fn trace_field(recording: &Recording, attitude: &Attitude) -> Option<Sensor> {
+/// What was heard of the field.
+struct Heard {
+    /// Rows with field and attitude.
+    claimed: Vec<bool>,
+    readings: Readings,
+    from: f64,
+    to: f64,
+}
+
+/// Nothing without a magnetometer or with too little of it.
+fn hear(recording: &Recording, attitude: &Attitude) -> Option<Heard> {
     let t = &recording.t;
     let known = |i: usize| recording.mag[i].iter().all(|c| c.is_finite()) && attitude.to_earth[i].m11.is_finite();
     if recording.mag.is_empty() {
@@ -53,25 +66,68 @@ pub(crate) fn trace_field(recording: &Recording, attitude: &Attitude) -> Option<
     for (used, pair) in used.iter_mut().skip(1).zip(recording.mag.windows(2)) {
         *used &= pair[1] != pair[0];
     }
-    let readings = Readings::new(t, &recording.mag, used.clone(), CUTS.0, CUTS.1, CUTS.2);
+    let readings = Readings::new(t, &recording.mag, used, CUTS.0, CUTS.1, CUTS.2);
     if readings.blocks.len() < LEAST_BLOCKS {
         return None;
     }
-    let fresh: Vec<Vector3<f64>> = (0..t.len()).filter(|i| used[*i]).map(|i| recording.mag[i]).collect();
+    let (from, to) = (readings.blocks.first()?.t, readings.blocks.last()?.t);
+    Some(Heard { claimed, readings, from, to })
+}
+
+/// The trace; nothing without a magnetometer or with too little of it.
+pub(crate) fn trace_field(recording: &Recording, attitude: &Attitude) -> Option<Sensor> {
+    let t = &recording.t;
+    let Heard { claimed, readings, from, to } = hear(recording, attitude)?;
+    let fresh: Vec<Vector3<f64>> = (0..t.len()).filter(|i| readings.used[*i]).map(|i| recording.mag[i]).collect();
     let noise = floor(&levels(&fresh, 50)) / (fresh.len() as f64 / readings.blocks.len() as f64).sqrt();
-    let (to_earth, earth) = north(recording, attitude, &readings, noise)?;
-    let predicted: Vec<Vector3<f64>> = to_earth.iter().map(|r| r.tr_mul(&earth)).collect();
-    let heard = (readings.blocks[0].t, readings.blocks.last()?.t);
-    let scene = Scene { recording, to_earth: &to_earth, predicted: &predicted, turning: &[], heard };
-    let setting = Setting {
-        channels: ["mx", "my", "mz"],
-        unit: "uT",
-        floor: std::array::from_fn(|k| axis_level(&fresh, k)),
-        noise,
-        doubt: DOUBT * earth.norm(),
+    let (mut heading, mut earth) = north(recording, attitude, &readings, noise)?;
+    let floor = std::array::from_fn(|k| axis_level(&fresh, k));
+    let once = |heading: &Heading, earth: Vector3<f64>| {
+        let to_earth = turned(recording, attitude, heading);
+        let predicted: Vec<Vector3<f64>> = to_earth.iter().map(|r| r.tr_mul(&earth)).collect();
+        let scene = Scene { recording, to_earth: &to_earth, predicted: &predicted, turning: &[], heard: (from, to) };
+        let setting = Setting { channels: ["mx", "my", "mz"], unit: "uT", floor, noise, doubt: DOUBT * earth.norm() };
+        let base = declared(t, &to_earth, earth, (from, to));
+        trace(&setting, &readings, &base, &effects::field(), &scene, &claimed).map(|traced| traced.sensor)
     };
-    let base = declared(t, &to_earth, earth, heard);
-    Some(trace(&setting, &readings, &base, &effects::field(), &scene, &claimed)?.sensor)
+    let mut sensor = once(&heading, earth)?;
+    // what a cause multiplies is the field that the declared model had before the cause was known: again with the one after
+    for _ in 0..AGAIN {
+        if !sensor.part.effect.iter().any(|e| MULTIPLIES.contains(&e.id.as_str())) {
+            break;
+        }
+        let [north, down, drift @ ..] = sensor.part.declared.as_slice() else { break };
+        let field = Vector3::new(*north, 0.0, *down);
+        let knots = heading.knots.iter().zip(drift).map(|(k, d)| k + d.clamp(-0.5, 0.5)).collect();
+        let better = Heading { from, knots };
+        let Some(next) = once(&better, field) else { break };
+        (heading, earth, sensor) = (better, field, next);
+    }
+    sensor.part.earth_ut = earth.iter().copied().collect();
+    sensor.part.heading_rad = heading.knots;
+    Some(sensor)
+}
+
+/// The predictions of a model.
+pub(crate) fn again(recording: &Recording, attitude: &Attitude, part: &Part) -> Option<Vec<Vector3<f64>>> {
+    let Heard { claimed, from, to, .. } = hear(recording, attitude)?;
+    let earth = Vector3::from_row_slice(part.earth_ut.get(..3)?);
+    let heading = Heading { from, knots: part.heading_rad.clone() };
+    if heading.knots.len() < 2 {
+        return None;
+    }
+    let to_earth = turned(recording, attitude, &heading);
+    let predicted: Vec<Vector3<f64>> = to_earth.iter().map(|r| r.tr_mul(&earth)).collect();
+    let scene = Scene { recording, to_earth: &to_earth, predicted: &predicted, turning: &[], heard: (from, to) };
+    let base = declared(&recording.t, &to_earth, earth, (from, to));
+    Some(linear(part, &base, &effects::field(), &scene, ["mx", "my", "mz"], &claimed).0)
+}
+
+/// The attitude turned to the field's north all along.
+fn turned(recording: &Recording, attitude: &Attitude, heading: &Heading) -> Vec<Matrix3<f64>> {
+    let about =
+        |(t, body): (&f64, &Matrix3<f64>)| Rotation3::from_axis_angle(&Vector3::z_axis(), -heading.at(*t)).into_inner() * body;
+    recording.t.iter().zip(&attitude.to_earth).map(about).collect()
 }
 
 /// The declared model's terms: a constant field in earth axes, and a heading that drifts slowly.
@@ -92,23 +148,13 @@ fn declared<'a>(t: &'a [f64], to_earth: &'a [Matrix3<f64>], earth: Vector3<f64>,
     terms
 }
 
-/// The attitude turned to the field's north all along, and the field in earth axes.
-fn north(
-    recording: &Recording,
-    attitude: &Attitude,
-    readings: &Readings,
-    noise: f64,
-) -> Option<(Vec<Matrix3<f64>>, Vector3<f64>)> {
+/// Where the field's north is in the attitude's axes all along, and the field in earth axes.
+fn north(recording: &Recording, attitude: &Attitude, readings: &Readings, noise: f64) -> Option<(Heading, Vector3<f64>)> {
     let t = &recording.t;
     let heard = (readings.blocks.first()?.t, readings.blocks.last()?.t);
     let mut heading = first_guess(recording, attitude, readings, heard);
-    let turned = |heading: &Heading| -> Vec<Matrix3<f64>> {
-        let about =
-            |i: usize| Rotation3::from_axis_angle(&Vector3::z_axis(), -heading.at(t[i])).into_inner() * attitude.to_earth[i];
-        (0..t.len()).map(about).collect()
-    };
     let mut earth = Vector3::new(20.0, 0.0, 40.0);
-    let mut to_earth = turned(&heading);
+    let mut to_earth = turned(recording, attitude, &heading);
     for turn in 0..=TURNS {
         let found = once(t, &to_earth, earth, heard, readings, noise, turn > 0)?;
         earth = Vector3::new(found[0], 0.0, found[1]);
@@ -117,10 +163,10 @@ fn north(
             for (k, d) in heading.knots.iter_mut().zip(&found[2..]) {
                 *k += d.clamp(-0.5, 0.5);
             }
-            to_earth = turned(&heading);
+            to_earth = turned(recording, attitude, &heading);
         }
     }
-    Some((to_earth, earth))
+    Some((heading, earth))
 }
 
 /// North and down of the field and, where asked for, the turn of each knot, from one linear fit.

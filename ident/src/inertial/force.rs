@@ -10,6 +10,7 @@
 
 use super::account::{Sensor, by_axis, judge};
 use super::least::{Readings, Term};
+use super::model::{Part, linear};
 use super::noise::{axis_level, floor, levels};
 use super::search::{Scene, evidence, parameter};
 use super::trace::{Setting, Traced, trace};
@@ -54,14 +55,12 @@ pub(crate) fn trace_force(recording: &Recording, attitude: &Attitude) -> Option<
         heard: (readings.blocks.first()?.t, readings.blocks.last()?.t),
     };
     let to_earth = &attitude.to_earth;
-    let mut base = vec![Term::new("gravity", "m/s^2", move |i: usize| -to_earth[i].row(2).transpose())];
-    for k in 0..3 {
-        base.push(Term::new(["offset_x", "offset_y", "offset_z"][k], "m/s^2", move |_| Vector3::ith(k, 1.0)));
-    }
+    let base = declared(to_earth);
     let mut traced = trace(&setting, &readings, &base, &effects::force(), &scene, &used)?;
     let nameless = traced.sensor.clone();
-    let (mut named, with) = std::mem::take(&mut traced.named);
+    let (mut named, with, part) = std::mem::take(&mut traced.named);
     traced.sensor.corrected = with;
+    traced.sensor.part = part;
     if let Some(entry) = accelerate(recording, to_earth, &readings, &setting, &used, &mut traced) {
         named.push(entry);
     }
@@ -85,6 +84,62 @@ pub(crate) fn trace_force(recording: &Recording, attitude: &Attitude) -> Option<
     sensor.heldout_before = by_axis(&flat(recording, &sensor.declared));
     sensor.heldout_after = by_axis(&flat(recording, &sensor.corrected));
     Some(traced.sensor)
+}
+
+/// The declared model's terms.
+fn declared<'a>(to_earth: &'a [Matrix3<f64>]) -> Vec<Term<'a>> {
+    let mut base = vec![Term::new("gravity", "m/s^2", move |i: usize| -to_earth[i].row(2).transpose())];
+    for k in 0..3 {
+        base.push(Term::new(["offset_x", "offset_y", "offset_z"][k], "m/s^2", move |_| Vector3::ith(k, 1.0)));
+    }
+    base
+}
+
+/// The predictions of a model.
+pub(crate) fn again(recording: &Recording, attitude: &Attitude, part: &Part) -> Vec<Vector3<f64>> {
+    let known = |i: usize| recording.accel[i].iter().all(|c| c.is_finite()) && attitude.to_earth[i].m11.is_finite();
+    let used: Vec<bool> = (0..recording.t.len()).map(known).collect();
+    let readings = Readings::new(&recording.t, &recording.accel, used.clone(), CUTS.0, CUTS.1, CUTS.2);
+    let (turning, to_earth) = (turning(recording), &attitude.to_earth);
+    let scene = Scene { recording, to_earth, predicted: &[], turning: &turning, heard: (0.0, 0.0) };
+    let (mut rows, _) = linear(part, &declared(to_earth), &effects::force(), &scene, ["ax", "ay", "az"], &used);
+    if let Some(width) = part.carried_width_s {
+        let (t, y) = over(recording, to_earth, &readings, &used, &rows);
+        let back = smooth::predict(&t, &y, CUTS.1, width);
+        rows = carried(recording, to_earth, &rows, &t, &back);
+    }
+    if let Some(hz) = part.line_hz {
+        vibration::add_line(recording, &used, &mut rows, hz);
+    }
+    rows
+}
+
+/// What a prediction leaves over, in earth axes, at each block's middle.
+fn over(
+    recording: &Recording,
+    to_earth: &[Matrix3<f64>],
+    readings: &Readings,
+    used: &[bool],
+    from: &[Vector3<f64>],
+) -> (Vec<f64>, Vec<Vector3<f64>>) {
+    let mean_of = |b: &super::least::Block| {
+        let rows = b.rows.clone().filter(|i| used[*i]);
+        let (sum, n) =
+            rows.fold((Vector3::zeros(), 0.0), |(s, n), i| (s + to_earth[i] * (recording.accel[i] - from[i]), n + 1.0));
+        (b.t, sum / f64::max(n, 1.0))
+    };
+    readings.blocks.iter().map(mean_of).unzip()
+}
+
+/// A prediction with smooth accelerations in earth axes on top.
+fn carried(
+    recording: &Recording,
+    to_earth: &[Matrix3<f64>],
+    from: &[Vector3<f64>],
+    t: &[f64],
+    back: &[Vector3<f64>],
+) -> Vec<Vector3<f64>> {
+    (0..recording.t.len()).map(|i| from[i] + to_earth[i].tr_mul(&smooth::between(t, back, recording.t[i]))).collect()
 }
 
 /// Residual at the claimed rows, x, y, z, x, y, z, ...
@@ -120,15 +175,7 @@ fn accelerate(
     used: &[bool],
     traced: &mut Traced,
 ) -> Option<EffectEntry> {
-    let from = &traced.sensor.corrected;
-    let mean_of = |b: &super::least::Block| {
-        let rows = b.rows.clone().filter(|i| used[*i]);
-        let (sum, n) =
-            rows.fold((Vector3::zeros(), 0.0), |(s, n), i| (s + to_earth[i] * (recording.accel[i] - from[i]), n + 1.0));
-        sum / f64::max(n, 1.0)
-    };
-    let y: Vec<Vector3<f64>> = readings.blocks.iter().map(mean_of).collect();
-    let t: Vec<f64> = readings.blocks.iter().map(|b| b.t).collect();
+    let (t, y) = over(recording, to_earth, readings, used, &traced.sensor.corrected);
     let square = |v: &dyn Fn(usize) -> Vector3<f64>| (0..y.len()).map(|i| v(i).norm_squared()).sum::<f64>();
     let now = square(&|i| y[i]);
     let (width, back) = WIDTHS
@@ -146,9 +193,8 @@ fn accelerate(
     if nats < NAMED || size < SMOOTH * explained {
         return None;
     }
-    let corrected: Vec<Vector3<f64>> =
-        (0..recording.t.len()).map(|i| from[i] + to_earth[i].tr_mul(&smooth::between(&t, &back, recording.t[i]))).collect();
-    traced.sensor.corrected = corrected;
+    traced.sensor.corrected = carried(recording, to_earth, &traced.sensor.corrected, &t, &back);
+    traced.sensor.part.carried_width_s = Some(width);
     let axis = |k: usize| (back.iter().map(|v| v[k] * v[k]).sum::<f64>() / back.len() as f64).sqrt();
     let spread = |v: f64| v / (2.0 * looks / 3.0).sqrt();
     let slow = slow_share(&t, &back);

@@ -8,6 +8,7 @@
 //! Reference: Bjorck, *Numerical Methods for Least Squares Problems*, 1996, section 2; Liang & Zeger, Biometrika 73, 1986 (clusters).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
 
 /// One of so many stretches is left out at a time.
@@ -188,15 +189,19 @@ impl Readings {
         Some(Solved { coefficients: x.iter().copied().collect(), sigma, heldout })
     }
 
-    /// Standard errors from clusters of neighbouring blocks.
+    /// Standard errors: the larger of those from clusters of neighbouring blocks, which know the residual's colour but are too small where
+    /// few clusters say something of a term, and those of a white residual of its size. Student's law for so many clusters is in
+    /// them, so that 1.96 of them are a 95 % interval.
     fn sigma(&self, columns: &[&Column], residual: &[f64], cholesky: &Cholesky<f64, Dyn>, scale: &DVector<f64>) -> Vec<f64> {
         let k = columns.len();
-        let clusters = self.cluster.last().map_or(0, |c| c + 1);
+        let mut numbers = self.cluster.clone();
+        numbers.dedup();
+        let clusters = numbers.len();
         let mut scores = DMatrix::<f64>::zeros(k, clusters);
         for (i, a) in columns.iter().enumerate() {
             for (n, v) in a.values.iter().enumerate() {
                 let e = a.from + n;
-                scores[(i, self.cluster[e / 3])] += v * residual[e];
+                scores[(i, numbers.partition_point(|c| *c < self.cluster[e / 3]))] += v * residual[e];
             }
         }
         for mut column in scores.column_iter_mut() {
@@ -207,8 +212,21 @@ impl Readings {
             column.component_div_assign(scale);
         }
         let few = clusters as f64 / (clusters as f64 - 1.0).max(1.0);
-        (0..k).map(|i| (few * spread.row(i).norm_squared()).sqrt()).collect()
+        let white = Self::square(residual) / (residual.len() as f64 - k as f64).max(1.0);
+        let inverse = cholesky.inverse();
+        let wide = student(clusters as f64 - 1.0) / 1.96;
+        let one = |i: usize| {
+            let clustered = few * spread.row(i).norm_squared();
+            let plain = white * inverse[(i, i)] / (scale[i] * scale[i]);
+            wide * clustered.max(plain).sqrt()
+        };
+        (0..k).map(one).collect()
     }
+}
+
+/// The 97.5 % point of Student's law.
+fn student(freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(1.96, |law| law.inverse_cdf(0.975))
 }
 
 fn sum(parts: &[DVector<f64>; FOLDS]) -> DVector<f64> {

@@ -14,6 +14,7 @@ mod effects;
 mod field;
 mod force;
 mod least;
+mod model;
 mod noise;
 mod page;
 mod rate;
@@ -24,6 +25,7 @@ mod unknown;
 mod vibration;
 
 pub use account::{Closed, Sensor};
+pub use model::{Added, FORMAT as MODEL_FORMAT, InertialModel, Part, Predicted};
 pub use page::page;
 
 use nalgebra::{Matrix3, Vector3};
@@ -80,6 +82,27 @@ pub enum InertialError {
         /// Log.
         name: String,
     },
+    /// A model file that cannot be taken.
+    #[error("{file}: {reason}; expected a model written by `quadrig close-loop` on an attitude log")]
+    Model {
+        /// File and line.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Another recording than the model's.
+    #[error("{name}: not the recording of the model ({source_name}); its heading and drift are that recording's own")]
+    Other {
+        /// Log.
+        name: String,
+        /// Log of the model.
+        source_name: String,
+    },
+}
+
+/// First and last time of a recording, s.
+fn span(recording: &Recording) -> [f64; 2] {
+    [recording.t.first(), recording.t.last()].map(|t| t.copied().unwrap_or(0.0))
 }
 
 /// Residual, cause, and error before and after.

@@ -7,6 +7,7 @@
 
 use super::account::Sensor;
 use super::least::{Readings, Term};
+use super::model::{Part, linear};
 use super::noise::{axis_level, floor, levels};
 use super::search::Scene;
 use super::trace::{Setting, trace};
@@ -41,12 +42,28 @@ pub(crate) fn trace_rate(recording: &Recording, attitude: &Attitude) -> (Option<
     };
     let heard = (readings.blocks[0].t, readings.blocks.last().map_or(0.0, |b| b.t));
     let scene = Scene { recording, to_earth: &attitude.to_earth, predicted: &[], turning: &[], heard };
-    let base: Vec<Term<'_>> =
-        AXES.iter().enumerate().map(|(k, name)| Term::new(name, "rad/s", move |_| Vector3::ith(k, 1.0))).collect();
-    let Some(traced) = trace(&setting, &readings, &base, &effects::rate(), &scene, &used) else { return (None, None) };
-    let changed = traced.effect.iter().any(|e| *e != Vector3::zeros());
-    let corrected = changed.then(|| recording.gyro.iter().zip(&traced.effect).map(|(g, e)| g - e).collect());
+    let Some(traced) = trace(&setting, &readings, &declared(), &effects::rate(), &scene, &used) else { return (None, None) };
+    let corrected = without(recording, &traced.effect);
     (Some(traced.sensor), corrected)
+}
+
+fn declared<'a>() -> Vec<Term<'a>> {
+    AXES.iter().enumerate().map(|(k, name)| Term::new(name, "rad/s", move |_| Vector3::ith(k, 1.0))).collect()
+}
+
+/// The rates without what was found, where something was.
+fn without(recording: &Recording, effect: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+    let changed = effect.iter().any(|e| *e != Vector3::zeros());
+    changed.then(|| recording.gyro.iter().zip(effect).map(|(g, e)| g - e).collect())
+}
+
+/// The predictions of a model, and the rates without what it names.
+pub(crate) fn again(recording: &Recording, attitude: &Attitude, part: &Part) -> (Vec<Vector3<f64>>, Option<Vec<Vector3<f64>>>) {
+    let used = resting(recording, attitude);
+    let scene = Scene { recording, to_earth: &attitude.to_earth, predicted: &[], turning: &[], heard: (0.0, 0.0) };
+    let (rows, effect) = linear(part, &declared(), &effects::rate(), &scene, ["gx", "gy", "gz"], &used);
+    let named = part.effect.iter().all(|e| e.variable.is_none());
+    (rows, if named { without(recording, &effect) } else { None })
 }
 
 /// Rows of rest, without the end of each.

@@ -265,9 +265,8 @@ fn conclude<'a>(
         .collect();
     for (t, left) in chosen.into_iter().zip(lost) {
         let least = t.scanned.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
-        let near = |s: &&(f64, f64)| 0.5 * looks * (s.1 / least.max(1e-300)).ln() < 1.92;
-        let ends = t.scanned.iter().filter(near).map(|s| s.0);
-        let shape_ci = [ends.clone().fold(f64::INFINITY, f64::min), ends.fold(f64::NEG_INFINITY, f64::max)];
+        let near = |s: &(f64, f64)| 0.5 * looks * (s.1 / least.max(1e-300)).ln() < 1.92;
+        let shape_ci = bracket(&t.scanned, near);
         found.push(Found {
             instance: t.instance,
             shape_ci,
@@ -276,6 +275,15 @@ fn conclude<'a>(
         });
     }
     Outcome { found, before, after, probability, alternatives }
+}
+
+/// From the last shape below those that explain nearly as well as the best to the first above them: the truth lies between tries.
+fn bracket(scanned: &[(f64, f64)], near: impl Fn(&(f64, f64)) -> bool) -> [f64; 2] {
+    let known: Vec<&(f64, f64)> = scanned.iter().filter(|s| s.0.is_finite()).collect();
+    let (Some(first), Some(last)) = (known.iter().position(|s| near(s)), known.iter().rposition(|s| near(s))) else {
+        return [f64::INFINITY, f64::NEG_INFINITY];
+    };
+    [known[first.saturating_sub(1)].0, known[(last + 1).min(known.len() - 1)].0]
 }
 
 /// Sum of terms at a row, with coefficients from `from` on.

@@ -7,6 +7,7 @@
 
 use super::account::{Sensor, by_axis, judge};
 use super::least::{Readings, Term};
+use super::model::{Added, Part};
 use super::search::{Cause, Found, Outcome, Scene, parameters, predict, search};
 use super::unknown::correct;
 use crate::verdict::{Alternative, EffectEntry, Kind};
@@ -28,8 +29,8 @@ pub(crate) struct Setting {
 pub(crate) struct Traced {
     pub(crate) sensor: Sensor,
     pub(crate) effect: Vec<Vector3<f64>>,
-    /// What was found, whatever the word for it all is, and the predictions with it.
-    pub(crate) named: (Vec<EffectEntry>, Vec<Vector3<f64>>),
+    /// What was found, whatever the word for it all is, the predictions with it and its share of the model.
+    pub(crate) named: (Vec<EffectEntry>, Vec<Vector3<f64>>, Part),
 }
 
 /// Searches and reports; `claimed` rows are predicted.
@@ -66,10 +67,12 @@ pub(crate) fn trace<'a>(
         alternatives: Vec::new(),
         kind,
         excess: [over(before), over(before)],
+        part: part(setting, &outcome.before.coefficients, Vec::new()),
     };
     let mut effect = vec![Vector3::zeros(); t.len()];
     let with = rows(&|i| predict(base, &outcome.after.coefficients, t[i], i) + contribution(&outcome, base.len(), t[i], i));
-    let named = (entries(&outcome, base.len(), setting), with);
+    let all = part(setting, &outcome.after.coefficients[..base.len()], added(&outcome, base.len()));
+    let named = (entries(&outcome, base.len(), setting), with, all);
     match kind {
         Kind::None => {}
         Kind::Unattributed => {
@@ -77,11 +80,13 @@ pub(crate) fn trace<'a>(
                 sensor.corrected = rows(&|i| c.predict(base, t[i], i));
                 sensor.heldout_after = by_axis(&c.solved.heldout);
                 sensor.excess[1] = over(mean(&c.solved.heldout));
+                sensor.part = part(setting, &c.solved.coefficients[..base.len()], vec![c.added(base.len())]);
                 sensor.effects = vec![c.entry];
             }
         }
         Kind::Attributed | Kind::Ambiguous => {
             sensor.corrected.clone_from(&named.1);
+            sensor.part.clone_from(&named.2);
             sensor.heldout_after = by_axis(&outcome.after.heldout);
             sensor.excess[1] = over(after);
             sensor.effects.clone_from(&named.0);
@@ -100,6 +105,27 @@ pub(crate) fn trace<'a>(
         .map(|(ids, p)| Alternative { ids: ids.iter().map(|i| (*i).to_owned()).collect(), probability: *p })
         .collect();
     Some(Traced { sensor, effect, named })
+}
+
+fn part(setting: &Setting, declared: &[f64], effect: Vec<Added>) -> Part {
+    let channels = setting.channels.map(str::to_owned).to_vec();
+    Part { channels, declared: declared.to_vec(), effect, ..Part::default() }
+}
+
+/// The found causes for the model.
+fn added(outcome: &Outcome<'_>, base: usize) -> Vec<Added> {
+    let mut at = base;
+    let one = |f: &Found<'_>| {
+        let from = at;
+        at += f.instance.terms.len();
+        Added {
+            id: f.instance.id.to_owned(),
+            shape_s: f.instance.shape.map(|s| s.2).filter(|s| s.is_finite()),
+            variable: None,
+            coefficients: outcome.after.coefficients[from..at].to_vec(),
+        }
+    };
+    outcome.found.iter().map(one).collect()
 }
 
 /// What the found causes add at a row.

@@ -7,6 +7,7 @@
 //! Reference: specification `closing-the-loop.md`, step 7.
 
 use super::least::{Column, Readings, Solved, Term};
+use super::model::Added;
 use super::search::{Scene, parameter, predict};
 use crate::verdict::EffectEntry;
 use nalgebra::Vector3;
@@ -17,12 +18,34 @@ pub(crate) struct Correction<'a> {
     pub(crate) solved: Solved,
     pub(crate) terms: Vec<Term<'a>>,
     pub(crate) entry: EffectEntry,
+    variable: &'static str,
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A variable and its value at a row.
-type Variable<'a> = (&'static str, Box<dyn Fn(usize) -> Vector3<f64> + 'a>);
+/// Rate, specific force, time.
+const VARIABLES: [&str; 3] = ["g", "a", "t"];
+
+/// The terms of a correction that is linear in a variable.
+pub(crate) fn terms<'a>(name: &str, scene: &Scene<'a>, channels: [&'static str; 3]) -> Vec<Term<'a>> {
+    let recording = scene.recording;
+    let known = |v: Vector3<f64>| if v.iter().all(|c| c.is_finite()) { v } else { Vector3::zeros() };
+    let which = VARIABLES.iter().position(|v| *v == name);
+    let value = move |i: usize| match which {
+        Some(0) => known(recording.gyro[i]),
+        Some(1) => known(recording.accel[i]),
+        _ => Vector3::new(recording.t[i], 0.0, 0.0),
+    };
+    let axes = if name == "t" { 1 } else { 3 };
+    let mut terms = Vec::new();
+    for (i, channel) in channels.iter().enumerate() {
+        for (j, axis) in AXES.iter().enumerate().take(axes) {
+            let label = if name == "t" { format!("{channel}_t") } else { format!("{channel}_{name}{axis}") };
+            terms.push(Term { prior: 1e3, ..Term::new(&label, "1", move |row| Vector3::ith(i, value(row)[j])) });
+        }
+    }
+    terms
+}
 
 /// The best correction on top of the declared model.
 pub(crate) fn correct<'a>(
@@ -34,26 +57,11 @@ pub(crate) fn correct<'a>(
 ) -> Option<Correction<'a>> {
     let fixed: Vec<Column> = base.iter().map(|t| readings.column(t)).collect();
     let before = Readings::square(&readings.solve(&fixed.iter().collect::<Vec<_>>(), noise)?.heldout);
-    let recording = scene.recording;
-    let known = |v: Vector3<f64>| if v.iter().all(|c| c.is_finite()) { v } else { Vector3::zeros() };
-    let mut variables: Vec<Variable<'a>> = vec![
-        ("g", Box::new(move |i| known(recording.gyro[i]))),
-        ("a", Box::new(move |i| known(recording.accel[i]))),
-        ("t", Box::new(move |i| Vector3::new(recording.t[i], 0.0, 0.0))),
-    ];
-    variables.retain(|(name, _)| !channels[0].starts_with(name)); // a channel does not explain itself
-    let mut best: Option<(f64, &str, Vec<Term<'a>>, Solved)> = None;
-    for (name, value) in variables {
-        let value = std::rc::Rc::new(value);
-        let axes = if name == "t" { 1 } else { 3 };
-        let mut terms = Vec::new();
-        for (i, channel) in channels.iter().enumerate() {
-            for (j, axis) in AXES.iter().enumerate().take(axes) {
-                let value = std::rc::Rc::clone(&value);
-                let label = if name == "t" { format!("{channel}_t") } else { format!("{channel}_{name}{axis}") };
-                terms.push(Term { prior: 1e3, ..Term::new(&label, "1", move |row| Vector3::ith(i, value(row)[j])) });
-            }
-        }
+    // a channel does not explain itself
+    let variables = VARIABLES.into_iter().filter(|name| !channels[0].starts_with(name));
+    let mut best: Option<(f64, &'static str, Vec<Term<'a>>, Solved)> = None;
+    for name in variables {
+        let terms = terms(name, scene, channels);
         let own: Vec<Column> = terms.iter().map(|t| readings.column(t)).collect();
         let Some(solved) = readings.solve(&fixed.iter().chain(&own).collect::<Vec<_>>(), noise) else { continue };
         let left = Readings::square(&solved.heldout);
@@ -88,10 +96,20 @@ pub(crate) fn correct<'a>(
         parameters,
         heldout_error_reduction: 1.0 - (left / before.max(1e-300)).sqrt(),
     };
-    Some(Correction { solved, terms, entry })
+    Some(Correction { solved, terms, entry, variable: name })
 }
 
 impl Correction<'_> {
+    /// Its share of the model, behind so many coefficients of the declared one.
+    pub(crate) fn added(&self, base: usize) -> Added {
+        Added {
+            id: self.entry.id.clone(),
+            shape_s: None,
+            variable: Some(self.variable.to_owned()),
+            coefficients: self.solved.coefficients[base..].to_vec(),
+        }
+    }
+
     /// The declared model and the correction at a row.
     pub(crate) fn predict(&self, base: &[Term<'_>], t: f64, row: usize) -> Vector3<f64> {
         let c = &self.solved.coefficients;

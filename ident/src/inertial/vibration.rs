@@ -53,12 +53,14 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
     let reduction = 1.0 - (square(&after) / square(&left).max(1e-300)).sqrt();
     let predicted = has_line && reduction > 0.02;
     if predicted {
-        for (i, w) in rows.iter().zip(&wave) {
-            sensor.corrected[*i] += w;
-        }
+        add(&mut sensor.corrected, &rows, &wave);
+        sensor.part.line_hz = Some(frequency);
     }
     let looks = level.len() as f64;
-    let rms = (mean - quiet * quiet).max(0.0).sqrt();
+    // a line's own strength: its prediction does not know the noise of the rows that it predicts; second differences would weigh it
+    // by its frequency
+    let shared = left.iter().zip(&wave).map(|(l, w)| l.dot(w)).sum::<f64>() / (3.0 * left.len() as f64);
+    let rms = if has_line { shared.max(0.0).sqrt() } else { (mean - quiet * quiet).max(0.0).sqrt() };
     let mut parameters = vec![
         parameter("rms", rms, "m/s^2", rms / (2.0 * looks).sqrt()),
         parameter("level_ratio", all.sqrt(), "1", all.sqrt() / (2.0 * looks).sqrt()),
@@ -91,6 +93,20 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
             loud.sqrt()
         ),
     })
+}
+
+fn add(predicted: &mut [Vector3<f64>], rows: &[usize], wave: &[Vector3<f64>]) {
+    for (i, w) in rows.iter().zip(wave) {
+        predicted[*i] += w;
+    }
+}
+
+/// Adds the line of a known frequency to a prediction.
+pub(crate) fn add_line(recording: &Recording, used: &[bool], predicted: &mut [Vector3<f64>], frequency: f64) {
+    let rows: Vec<usize> = (0..used.len()).filter(|i| used[*i]).collect();
+    let left: Vec<Vector3<f64>> = rows.iter().map(|i| recording.accel[*i] - predicted[*i]).collect();
+    let wave = sinusoid(&rows, &left, &recording.t, frequency);
+    add(predicted, &rows, &wave);
 }
 
 /// Evidence for a line, nats: that of a bin whose power, summed over three axes of two quadratures in each window, has another mean than

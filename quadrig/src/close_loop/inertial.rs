@@ -11,7 +11,7 @@ use crate::Failure;
 use crate::ahrs::imu_log::{ImuLog, Row};
 use crate::progress::Bar;
 use dcm::{Config, Dcm, Measurement, Vec3};
-use ident::inertial::{Attitude, Closed, Recording, close, page};
+use ident::inertial::{Attitude, InertialModel, MODEL_FORMAT, Predicted, Recording, Sensor, close, page};
 use ident::log::write_whole;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
@@ -43,7 +43,15 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         let say = |e: std::io::Error| format!("{}: {e}", folder.display());
         std::fs::create_dir_all(folder).map_err(say)?;
         write_whole(&folder.join("verdict.json"), |out| writeln!(out, "{json}")).map_err(say)?;
-        write_whole(&folder.join("pred.csv"), |out| out.write_all(predictions(&log, &closed).as_bytes())).map_err(say)?;
+        let model = closed.model.to_toml();
+        write_whole(&folder.join("model.toml"), |out| out.write_all(model.as_bytes())).map_err(say)?;
+        type Rows = fn(&Sensor) -> &Vec<Vector3<f64>>;
+        let files: [(&str, Rows); 2] = [("declared.csv", |s| &s.declared), ("pred.csv", |s| &s.corrected)];
+        for (name, rows) in files {
+            let of = |s: &Sensor| Predicted { channels: s.channels.map(str::to_owned).to_vec(), rows: rows(s).clone() };
+            let predicted: Vec<Predicted> = closed.sensors.iter().map(of).collect();
+            write_whole(&folder.join(name), |out| out.write_all(predictions(&log, &predicted).as_bytes())).map_err(say)?;
+        }
         write_whole(&folder.join("report.html"), |out| out.write_all(page(&recording, &closed).as_bytes())).map_err(say)?;
     }
     if args.json {
@@ -69,12 +77,16 @@ fn recording(log: &ImuLog, path: &Path) -> Recording {
     }
 }
 
-/// The board's filter without its magnetometer: north is wherever it starts.
+/// The board's filter without its magnetometer: north is wherever it starts. Between two rows it turns at the mean of both rates: the
+/// board's own rule, the newest rate alone, is half a step ahead, which would pass for a magnetometer that is late by as much.
 fn attitude(log: &ImuLog, rates: &[Vector3<f64>]) -> Attitude {
     let mut filter = Dcm::new(Config::DEFAULT);
     let mut out = Attitude::default();
+    let mut before = None;
     for ((row, dt), rate) in log.steps().zip(rates) {
-        let gyro = row.gyro.map(|_| rate.map(|w| w as f32));
+        let mean = (before.unwrap_or(*rate) + rate) / 2.0;
+        before = rate.iter().all(|w| w.is_finite()).then_some(*rate);
+        let gyro = row.gyro.map(|_| mean.map(|w| w as f32));
         filter.update(dt, &Measurement { gyro, accel: row.accel, mag: None });
         let known = filter.is_started();
         out.to_earth.push(if known { filter.matrix().map(f64::from) } else { Matrix3::repeat(f64::NAN) });
@@ -83,21 +95,33 @@ fn attitude(log: &ImuLog, rates: &[Vector3<f64>]) -> Attitude {
     out
 }
 
+/// The text of an inertial model, where `path` is one.
+pub(crate) fn model_text(path: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let first = text.lines().find(|l| !l.trim().is_empty() && !l.starts_with('#'))?;
+    (first.starts_with("format") && first.contains(MODEL_FORMAT)).then_some(text)
+}
+
+/// `quadrig predict` with an inertial model.
+pub(crate) fn predict(model: &Path, text: &str, path: &Path, output: &Path) -> Result<(), Failure> {
+    let model = InertialModel::parse(&model.display().to_string(), text)?;
+    let log = ImuLog::read(path)?;
+    let predicted = model.predict(&recording(&log, path), &|rates| attitude(&log, rates))?;
+    write_whole(output, |out| out.write_all(predictions(&log, &predicted).as_bytes()))
+        .map_err(|e| format!("{}: {e}", output.display()).into())
+}
+
 /// The corrected model's prediction of every channel, row for row; empty where it makes no claim.
-fn predictions(log: &ImuLog, closed: &Closed) -> String {
+fn predictions(log: &ImuLog, predicted: &[Predicted]) -> String {
     let mut out = String::from("t_s");
-    for s in &closed.sensors {
-        for c in s.channels {
-            let _ = write!(out, ",{c}");
-        }
+    for c in predicted.iter().flat_map(|s| &s.channels) {
+        let _ = write!(out, ",{c}");
     }
     out.push('\n');
     for row in 0..log.rows.len() {
         out.push_str(log.time_text(row));
-        for s in &closed.sensors {
-            for v in s.corrected[row].iter() {
-                let _ = if v.is_finite() { write!(out, ",{v:.8}") } else { write!(out, ",") };
-            }
+        for v in predicted.iter().flat_map(|s| s.rows[row].iter()) {
+            let _ = if v.is_finite() { write!(out, ",{v:.8}") } else { write!(out, ",") };
         }
         out.push('\n');
     }

@@ -11,6 +11,7 @@ use crate::Failure;
 use crate::ahrs;
 use crate::progress::Bar;
 use dcm::{Mat3, STANDARD_GRAVITY};
+use firmware_ahrs::itg3200::GyroReading;
 use firmware_ahrs::{ACCEL, GYRO, MAG, adxl345, hmc5883l, itg3200};
 use frame::ImuSample;
 use hal_sim::imu::Motion;
@@ -100,7 +101,7 @@ fn truth(samples: &[ImuSample], motion: &Motion) -> String {
 
 /// What the sensors gave, nominally scaled, body axes; a field is empty where a sensor gave nothing new.
 fn readings(samples: &[ImuSample]) -> String {
-    let mut out = String::from("t_s,gx,gy,gz,ax,ay,az,mx,my,mz\n");
+    let mut out = String::from("t_s,gx,gy,gz,ax,ay,az,mx,my,mz,temp_c\n");
     for sample in samples {
         out.push_str(&time(sample));
         let sensors = [
@@ -115,6 +116,10 @@ fn readings(samples: &[ImuSample]) -> String {
                     let _ = write!(out, "{:.6}", f32::from(word) * unit); // a string takes everything
                 }
             }
+        }
+        out.push(',');
+        if sample.fresh & GYRO != 0 {
+            let _ = write!(out, "{:.3}", GyroReading { temperature: sample.temperature, rate: sample.gyro }.celsius());
         }
         out.push('\n');
     }

@@ -141,6 +141,38 @@ impl Fault {
         Self { cause, size: base, vector, matrix, from, frequency, phase, bursts }
     }
 
+    /// What a verdict should say of it: names, and values in its units. A stationary magnet and a hand have no such number: what the
+    /// verdict gives of them depends on the run.
+    pub(super) fn truth(&self) -> Vec<(String, f64)> {
+        let axes = |name: &str| -> Vec<(String, f64)> {
+            ["x", "y", "z"].iter().zip(self.vector).map(|(axis, v)| (format!("{name}_{axis}"), self.size * v)).collect()
+        };
+        match self.cause {
+            Cause::HardIron => [axes("offset"), vec![("t0".to_owned(), self.from)]].concat(),
+            Cause::GyroBias => [axes("step"), vec![("t0".to_owned(), self.from)]].concat(),
+            Cause::GyroTemperature => axes("per_kelvin"),
+            Cause::SoftIron => self.iron(),
+            Cause::ChannelDelay => vec![("delay".to_owned(), 0.03 * self.size)],
+            // forty of ninety seconds of a sinusoid, spread over three axes
+            Cause::Vibration => {
+                let rms = self.size * 1.73 * (0.5 * 40.0 / 90.0 / 3.0f64).sqrt();
+                vec![("frequency".to_owned(), self.frequency), ("rms".to_owned(), rms)]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Soft iron without what is one with the size of the field.
+    fn iron(&self) -> Vec<(String, f64)> {
+        let common = 1.0 + self.size * (0..3).map(|k| self.matrix[k][k]).sum::<f64>() / 3.0;
+        let names = ["x", "y", "z"];
+        let entry = |i: usize, j: usize| {
+            let own = if i == j { 1.0 } else { 0.0 };
+            (format!("s_{}{}", names[i], names[j]), (own + self.size * self.matrix[i][j]) / common - own)
+        };
+        [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1), (0, 0), (1, 1)].map(|(i, j)| entry(i, j)).to_vec()
+    }
+
     pub(super) fn seen(&mut self, truth: &Truth) -> Seen {
         let t = truth.t;
         let (mut gyro, mut accel, mut mag) = (truth.rate, truth.force, truth.field);

@@ -10,11 +10,14 @@
 mod ask;
 mod body;
 mod cause;
+mod coverage;
+pub mod hidden;
 mod score;
 
 pub use ask::{Answer, ask};
 pub use cause::{CAUSES, Cause, UNKNOWN};
-pub use score::{Tally, judged, wilson};
+pub use coverage::Coverage;
+pub use score::{Tally, judged, right, wilson};
 
 use body::Body;
 use rand::{Rng, SeedableRng};
@@ -36,8 +39,8 @@ type V = [f64; 3];
 pub struct Simulated {
     /// The log's text.
     pub csv: String,
-    /// Temperatures are in the log.
-    pub warm: bool,
+    /// Parameters of the cause under the names and in the units of a verdict.
+    pub truth: Vec<(String, f64)>,
 }
 
 /// A recording with a cause of a size (1 small, 2 middle, 3 large) or none.
@@ -92,5 +95,5 @@ pub fn simulate(cause: Cause, size: usize, seed: u64) -> Simulated {
         }
         csv.push('\n');
     }
-    Simulated { csv, warm }
+    Simulated { csv, truth: fault.truth() }
 }

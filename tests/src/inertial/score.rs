@@ -23,10 +23,16 @@ pub fn wilson(hits: usize, of: usize) -> (f64, f64) {
 /// Whether a verdict is right: `ids` are those of its effects, the first one counting.
 #[must_use]
 pub fn judged(cause: Cause, verdict: &str, ids: &[&str]) -> bool {
-    match cause {
-        Cause::Clean => verdict == "none",
-        Cause::Clipped | Cause::Bursts => matches!(verdict, "unattributed" | "ambiguous"),
-        known => ids.first() == Some(&known.id()) && verdict != "unattributed",
+    right(cause.id(), verdict, ids)
+}
+
+/// The same for a hidden cause by its id: empty for none, `unknown` for one that the library lacks.
+#[must_use]
+pub fn right(hidden: &str, verdict: &str, ids: &[&str]) -> bool {
+    match hidden {
+        "" => verdict == "none",
+        "unknown" => matches!(verdict, "unattributed" | "ambiguous"),
+        known => ids.first() == Some(&known) && verdict != "unattributed",
     }
 }
 

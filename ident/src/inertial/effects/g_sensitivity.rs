@@ -10,8 +10,9 @@ use super::super::search::{Cause, Instance, Scene};
 use super::AXES;
 use nalgebra::Vector3;
 
-/// Ten times the 0.1 deg/s/g of an ITG-3200 (PS-ITG-3200A rev 1.4, table 3.1), rad/s per m/s^2.
-const PRIOR: f64 = 1.8e-3;
+/// Three times the 0.1 deg/s/g of an ITG-3200 (PS-ITG-3200A rev 1.4, table 3.1), rad/s per m/s^2. With much more, its nine numbers take any
+/// jump of the offset between rests in a few attitudes for their own.
+const PRIOR: f64 = 5e-4;
 
 pub(crate) struct GSensitivity;
 
