@@ -48,13 +48,15 @@ impl Staircase {
     }
 
     fn pulse_at(&self, ms: u64) -> Option<PulseWidth> {
-        let index = ms.checked_div(u64::from(self.hold_ms))?;
-        let levels = u64::from(self.levels());
+        // 32 bits reach for 49 days; the board divides them itself
+        let index = u64::from(u32::try_from(ms).ok()?.checked_div(self.hold_ms)?);
+        let up = u64::from(self.increments());
+        let levels = if self.down { 2 * up + 1 } else { up + 1 };
         if index >= levels * u64::from(self.visits.max(1)) {
             return None;
         }
-        let level = index.checked_rem(levels)?; // levels() is at least 1, which the compiler does not know: no panic path
-        let up = u64::from(self.increments());
+        // levels are at least 1, which the compiler does not know: no panic path
+        let level = if index < levels { index } else { index.checked_rem(levels)? };
         let level = if level > up { 2 * up - level } else { level };
         Some(PulseWidth(PulseWidth::MIN.0 + self.step.0 * level as u32))
     }

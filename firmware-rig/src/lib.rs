@@ -16,8 +16,10 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod bank;
 pub mod capture;
 pub mod config;
+mod elapsed;
 pub mod line;
 pub mod mass;
 mod operator;

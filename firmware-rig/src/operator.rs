@@ -5,6 +5,7 @@
 //! Units: as in [`frame::message`].
 //! Reference: specification `rig.md`, "Acquisition".
 
+use crate::elapsed::Elapsed;
 use crate::rig::Rig;
 use crate::settings::Settings;
 use esc_pwm::{ArmingEvent, Chirp, Schedule, ScheduleStep, Staircase, Step};
@@ -90,7 +91,7 @@ impl Rig {
     fn run(&mut self, now: Ticks, schedule: Schedule) -> Result<(), Refusals> {
         self.ask(now, ArmingEvent::Run, schedule.check())?;
         self.schedule = schedule;
-        self.started = now;
+        self.started = Elapsed::since(now);
         Ok(())
     }
 

@@ -6,8 +6,9 @@
 //! Units: ticks of the capture timer; the tick is called at 1 kHz.
 //! Reference: specification `rig.md`; house rule "ticks without I/O".
 
-use crate::capture::CaptureBank;
+use crate::bank::CaptureBank;
 use crate::config::Config;
+use crate::elapsed::Elapsed;
 use crate::line::LineNews;
 use crate::mass::MassPoints;
 use crate::sampling::AdcBlock;
@@ -66,7 +67,7 @@ pub struct Rig {
     pub(crate) state: RigState,
     pub(crate) faults: FaultSet,
     pub(crate) schedule: Schedule,
-    pub(crate) started: Ticks,
+    pub(crate) started: Elapsed,
     pub(crate) upload: Uploaded,
     pub(crate) bank: CaptureBank,
     pub(crate) codes: [AdcCode; ADC_CHANNELS],
@@ -75,13 +76,13 @@ pub struct Rig {
     pub(crate) masses: MassPoints,
     pub(crate) store: Option<Settings>,
     pub(crate) trial: Option<Trial>,
-    entered: Ticks,
+    entered: Elapsed,
     setting: PulseWidth,
     last_live: Option<Ticks>,
     blocks: [AdcBlock; ADC_CHANNELS],
     supply: Option<Volt>,
     protection: Protection,
-    heard: Ticks,
+    heard: Elapsed,
     last_tick: Option<Ticks>,
     next_sample: Ticks,
     events: Deque<Event, 16>,
@@ -111,16 +112,16 @@ impl Rig {
             state: RigState::Disarmed,
             faults: FaultSet::NONE,
             schedule: Schedule::Manual(PulseWidth::MIN),
-            started: Ticks(0),
+            started: Elapsed::since(Ticks(0)),
             upload: Uploaded::new(),
             codes: [AdcCode::default(); ADC_CHANNELS],
-            entered: Ticks(0),
+            entered: Elapsed::since(Ticks(0)),
             setting: PulseWidth::MIN,
             last_live: None,
             blocks: [AdcBlock::default(); ADC_CHANNELS],
             supply: None,
             protection: Protection::default(),
-            heard: Ticks(0),
+            heard: Elapsed::since(Ticks(0)),
             last_tick: None,
             next_sample: Ticks(0),
             events: Deque::new(),
@@ -187,7 +188,7 @@ impl Rig {
         // only a rig that is disarmed may be held up: it gives minimum pulses whatever happens
         let tick_ms = if inputs.paused && self.state == RigState::Disarmed { 1 } else { tick_ms };
         if inputs.command.is_some() {
-            self.heard = now;
+            self.heard = Elapsed::since(now);
         }
         if inputs.line.replayed > 0 {
             self.tell(Event::Refused(Refusals(Refusals::REPLAYED)));
@@ -204,13 +205,15 @@ impl Rig {
             self.obey(now, &command);
         }
         if let Some(limit) = time_out(self.state, &self.config.times)
-            && self.ms_since(now, self.entered) >= u64::from(limit)
+            && self.entered.ms(now, self.config.ticks_per_ms()) >= u64::from(limit)
         {
             self.apply(now, ArmingEvent::TimeOut, Refusals::default());
         }
         let pulse = self.drive(now, tick_ms);
         let sample = (now >= self.next_sample).then(|| self.sample(now, pulse));
-        let (store, trial) = (self.store.take(), self.trial.take());
+        // asked first: taking what is not there would move the whole of it, every tick
+        let store = if self.store.is_some() { self.store.take() } else { None };
+        let trial = self.trial.take();
         Outputs { pulse, sample, event: self.events.pop_front(), store, trial }
     }
 
@@ -218,12 +221,16 @@ impl Rig {
     fn advance(&mut self, now: Ticks) -> u32 {
         let per_ms = u64::from(self.config.ticks_per_ms());
         let Some(before) = self.last_tick.replace(now) else {
-            self.entered = now;
-            self.heard = now;
+            self.entered = Elapsed::since(now);
+            self.heard = Elapsed::since(now);
             self.next_sample = Ticks(now.0 + self.config.log_period().0);
             return 1;
         };
-        let passed = (now.since(before).0 + per_ms / 2).checked_div(per_ms).unwrap_or(u64::MAX);
+        let passed = now.since(before).0 + per_ms / 2;
+        if (per_ms..2 * per_ms).contains(&passed) {
+            return 1; // as always, and without a division
+        }
+        let passed = passed.checked_div(per_ms).unwrap_or(u64::MAX);
         u32::try_from(passed).unwrap_or(u32::MAX)
     }
 
@@ -259,7 +266,7 @@ impl Rig {
             damaged: inputs.line.damaged,
             replayed: inputs.line.replayed,
             brown_out: inputs.brown_out,
-            silence_ms: u32::try_from(self.ms_since(now, self.heard)).unwrap_or(u32::MAX),
+            silence_ms: u32::try_from(self.heard.ms(now, self.config.ticks_per_ms())).unwrap_or(u32::MAX),
             tick_ms,
         };
         let tripped = self.protection.check(self.state, &readings, &self.config.limits);
@@ -318,7 +325,7 @@ impl Rig {
             }
             if to != from {
                 self.state = to;
-                self.entered = now;
+                self.entered = Elapsed::since(now);
                 self.tell(Event::State { from, to, at: now });
             }
         }
@@ -328,7 +335,7 @@ impl Rig {
     /// Follows the schedule and gives the pulse of this tick.
     fn drive(&mut self, now: Ticks, tick_ms: u32) -> PulseWidth {
         if self.state == RigState::Running {
-            match self.schedule.pulse_at(self.ms_since(now, self.started)) {
+            match self.schedule.pulse_at(self.started.ms(now, self.config.ticks_per_ms())) {
                 Some(target) => {
                     let target = self.config.curve.apply(target);
                     self.setting = self.config.slew.toward(self.setting, target, tick_ms);

@@ -49,11 +49,9 @@ impl AdcBlock {
             *self = *other;
             return;
         }
-        let (Some(sum), Some(sum_sq), Some(count)) =
-            (self.sum.checked_add(other.sum), self.sum_sq.checked_add(other.sum_sq), self.count.checked_add(other.count))
-        else {
-            return;
-        };
+        let Some(count) = self.count.checked_add(other.count) else { return };
+        // as in `push`: what 65 535 codes come to fits
+        let (sum, sum_sq) = (self.sum.wrapping_add(other.sum), self.sum_sq.wrapping_add(other.sum_sq));
         *self = Self { sum, sum_sq, count, min: self.min.min(other.min), max: self.max.max(other.max) };
     }
 

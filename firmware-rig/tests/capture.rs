@@ -1,7 +1,7 @@
 //! Speed from edges: exact to the tick, across the wrap of the timer, with verdicts that tell the truth.
 
 use firmware_rig::Config;
-use firmware_rig::capture::CaptureBank;
+use firmware_rig::bank::CaptureBank;
 use frame::rig::{CaptureCode, CaptureVerdict};
 use frame::units::Ticks;
 use proptest::prelude::*;

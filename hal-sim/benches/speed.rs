@@ -45,7 +45,7 @@ fn parts(c: &mut Criterion) {
     group.throughput(Throughput::Elements(1));
     let mut plant = RigPlant::new(scenario(None).parts().plant, 1);
     let mut block = PlantBlock::default();
-    group.bench_function("plant", |b| b.iter(|| plant.advance_block(1.0e-4, black_box(1600.0), &mut block)));
+    group.bench_function("plant", |b| b.iter(|| plant.advance_block(1.0e-4, black_box(1600.0), &mut block, &mut || ())));
     let mut bench = Bench::new(&scenario(None), None, EdgeDetail::Captured);
     bench.set_power(true);
     let (mut ms, mut gathered) = (0u64, Millisecond::default());

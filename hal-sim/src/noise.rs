@@ -87,13 +87,14 @@ impl Stream {
     /// Two coarser and faster ones than [`Stream::normal`]: four 8-bit uniforms each, 148 levels a standard deviation.
     #[inline]
     pub fn quick_normals(&mut self) -> [f64; 2] {
-        quick(self.word())
+        quick(self.rng.next_u64())
     }
 
-    /// The word of which [`Stream::quick_normals`] makes its two, for whoever makes many at once.
+    /// The words of which [`Stream::quick_normals`] makes its two each, many at once: the same as one after the other, the lowest
+    /// byte first.
     #[inline]
-    pub(crate) fn word(&mut self) -> u64 {
-        self.rng.next_u64()
+    pub(crate) fn words(&mut self, into: &mut [[u8; 8]]) {
+        self.rng.fill_bytes(into.as_flattened_mut());
     }
 }
 
@@ -163,6 +164,17 @@ mod tests {
         assert!((m / n).abs() < 0.01);
         assert!((v / n - 1.0).abs() < 0.01, "{}", v / n);
         assert!((w / n - 1.0).abs() < 0.01, "{}", w / n);
+    }
+
+    #[test]
+    fn many_words_are_one_after_the_other() {
+        let (mut one, mut many) = (Stream::new(5, Source::Adc, 0), Stream::new(5, Source::Adc, 0));
+        for _ in 0..100 {
+            let want: [[f64; 2]; 25] = core::array::from_fn(|_| one.quick_normals());
+            let mut words = [[0; 8]; 25];
+            many.words(&mut words);
+            assert_eq!(words.map(|word| quick(u64::from_le_bytes(word))), want);
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! sensor at a time. A hundred seeds each.
 
 use firmware_rig::Config;
-use firmware_rig::capture::CaptureBank;
+use firmware_rig::bank::CaptureBank;
 use frame::Consensus;
 use frame::rig::{CAPTURE_NAMES, CaptureCode, CaptureVerdict};
 use frame::units::Ticks;

@@ -42,6 +42,7 @@ use frame::calibration::Calibration;
 use frame::message::Beep;
 use frame::rig::ADC_CHANNELS;
 use frame::units::Ticks;
+use imbalance::Whirl;
 use parts::{fitted, open};
 use std::collections::VecDeque;
 
@@ -79,6 +80,8 @@ pub struct Bench {
     heavy_spot_rev: f64,
     /// What the plant did in the last millisecond at once; its place is kept, for clearing it costs as much as a step.
     turned: PlantBlock,
+    /// How that turned the rotor.
+    whirl: Whirl,
     strain_v: [f64; STEPS_PER_MS],
     torque_v: f64,
     output_us: f64,
@@ -108,13 +111,13 @@ impl Bench {
             effects,
             open,
             seed,
-            levers: Levers::default(),
+            levers: Levers { seed, ..Levers::default() },
             mode: BeamMode::new(&parts.beam, STEP_S),
             beam: parts.beam,
             bridge: BridgeState::new(parts.bridge, STEP_S),
+            rigid: parts.mount == Mount::default(),
             mount: parts.mount,
             joints: MountState::default(),
-            rigid: true,
             shake_n: 0.0,
             logger: Logger::default(),
             recorded: false,
@@ -128,6 +131,7 @@ impl Bench {
             angle_rev,
             heavy_spot_rev: phase.uniform(),
             turned: PlantBlock::default(),
+            whirl: Whirl::default(),
             strain_v: [front.zero_v[0]; STEPS_PER_MS],
             torque_v: front.zero_v[1],
             front,
@@ -145,6 +149,7 @@ impl Bench {
         self.mode.refit(&parts.beam, STEP_S);
         self.beam = parts.beam;
         self.bridge.refit(parts.bridge, STEP_S);
+        self.rigid = parts.mount == Mount::default();
         self.mount = parts.mount;
         self.tachometers.refit(&parts.geometry, self.angle_rev);
         self.geometry = parts.geometry;

@@ -5,17 +5,16 @@
 //! Units: ns and steps since power-up; V at the pins.
 //! Reference: house rule 7; `docs/speed.md`, for what is computed part by part.
 
-use super::imbalance::{TOGETHER, shake, turn_cosine};
+use super::imbalance::{SPEEDS, turn_cosine};
 use super::parts::open;
 use super::{Bench, Millisecond, STEP_NS, STEP_S, Truth};
 use crate::effect::Levers;
+use crate::plant::Beam;
+use crate::plant::bridge::Load;
 use crate::plant::powerplant::STEPS_PER_MS;
-use crate::plant::{Beam, Mount};
 use crate::sensor::Edge;
 use core::f64::consts::TAU;
 
-/// Speeds that a powerplant may give, rev/min; with any other the rotor rests.
-const SPEEDS: core::ops::Range<f64> = 0.0..1.0e6;
 /// Ticks of 84 MHz in a step.
 const STEP_TICKS: u64 = 8_400;
 
@@ -62,7 +61,9 @@ impl Bench {
             self.open = open;
             self.refit();
         }
-        self.levers = Levers { seed: self.seed, ..Levers::default() };
+        if !self.effects.is_empty() {
+            self.levers = Levers { seed: self.seed, ..Levers::default() };
+        }
         self.levers.plant.run_s = run_s;
         if run_s >= 0.0 {
             for (i, effect) in self.effects.iter().enumerate() {
@@ -74,7 +75,6 @@ impl Bench {
         self.tachometers.couple(!self.levers.encoder_off);
         let unbalance = Beam { unbalance_kgm: self.beam.unbalance_kgm + self.levers.unbalance_kgm, ..self.beam };
         self.shake_n = unbalance.shaking_n(TAU, 1.0);
-        self.rigid = self.mount == Mount::default();
         // the logger's clock may stand still again; its tape then runs out
         self.recorded |= self.levers.late_s > 0.0;
         self.plant.adjust(&self.levers.plant);
@@ -88,42 +88,36 @@ impl Bench {
     /// Ten steps at once, part by part instead of step by step: the same numbers, for what comes later in a step never acts on what
     /// comes earlier in the next. Only for stiff joints and no logger.
     fn block(&mut self, out: &mut Millisecond, count: u16) {
-        let plant = &mut self.turned;
-        self.plant.advance_block(STEP_S, self.output_us, plant);
-        // each step of the rotor waits for the one before; what needs no rotor runs beside the last of them
-        self.converter.draw_ahead(count);
-        if !plant.rpm.iter().all(|rpm| SPEEDS.contains(rpm)) {
-            plant.rpm = plant.rpm.map(|rpm| if SPEEDS.contains(&rpm) { rpm } else { 0.0 });
+        let (plant, whirl, converter) = (&mut self.turned, &mut self.whirl, &mut self.converter);
+        self.plant.advance_block(STEP_S, self.output_us, plant, &mut || converter.draw_ahead(count));
+        if !SPEEDS.contains(&plant.last.rpm) {
+            plant.last.rpm = 0.0;
         }
-        plant.last.rpm = plant.rpm[STEPS_PER_MS - 1];
         if !self.esc.powered() {
             (plant.last.voltage_v, plant.last.current_a) = (0.0, 0.0);
         }
 
-        // what is beyond the ten steps fills the last vector and is left there
-        let (mut rev_s, mut turned) = ([0.0; TOGETHER], [self.angle_rev; TOGETHER + 1]);
-        rev_s.iter_mut().zip(&plant.rpm).for_each(|(rev_s, rpm)| *rev_s = rpm / 60.0);
-        for i in 0..STEPS_PER_MS {
-            turned[i + 1] = turned[i] + rev_s[i] * STEP_S;
-        }
+        whirl.turn(self.angle_rev, &plant.rpm);
         let start_ticks = self.steps * STEP_TICKS;
-        self.tachometers.block(&turned[..=STEPS_PER_MS], &rev_s[..STEPS_PER_MS], |channel, rising, step, fraction| {
+        let ([turned @ .., _, _], [rev_s @ .., _, _]) = (&whirl.turned, &whirl.rev_s);
+        self.angle_rev = turned[STEPS_PER_MS];
+        self.tachometers.block(turned, rev_s, |channel, rising, step, fraction| {
             if rising {
                 let ticks = start_ticks + step as u64 * STEP_TICKS + (fraction * STEP_TICKS as f64) as u64;
                 out.edges[usize::from(channel)].push(ticks as u32);
             }
         });
-        self.angle_rev = turned[STEPS_PER_MS];
 
-        let (mut pin, mut shaking) = (plant.thrust_n, [0.0; TOGETHER]);
-        shake(&mut shaking, &rev_s, &turned[1..], self.shake_n, self.heavy_spot_rev);
-        pin.iter_mut().zip(shaking).for_each(|(pin, shaking)| *pin += shaking);
-        self.mode.block(&mut pin);
-        let beam_n = pin[STEPS_PER_MS - 1];
-        let l = &self.levers;
-        let zero_n = plant.torque_nm.map(|torque_nm| l.strain_zero_n + l.torque_to_lift * torque_nm);
-        self.bridge.block(&mut pin, &zero_n, l.strain_gain, &plant.temp_c);
-        self.strain_v = pin;
+        whirl.shake(self.shake_n, self.heavy_spot_rev);
+        let load = Load {
+            thrust_n: &plant.thrust_n,
+            shaking_n: &whirl.force_n,
+            torque_nm: &plant.torque_nm,
+            temp_c: &plant.temp_c,
+            zero_n: (self.levers.strain_zero_n, self.levers.torque_to_lift),
+            gain: self.levers.strain_gain,
+        };
+        let beam_n = self.bridge.block(&mut self.mode, &load, &mut self.strain_v);
         self.torque_v = self.front.torque_v(plant.torque_nm[STEPS_PER_MS - 1]);
         self.truth = Truth { pulse_us: self.output_us, plant: plant.last, beam_n, ..self.truth };
         self.steps += STEPS_PER_MS as u64;

@@ -159,7 +159,7 @@ impl Host {
 
     /// A run that its faults have stopped is recorded for as long as its schedule would have taken.
     pub(super) fn give_up(&mut self, ms: u64, over: bool) {
-        if self.tolerant && over && self.phase != Phase::Done {
+        if over && self.phase != Phase::Done {
             self.enter(Phase::Done, ms);
         }
     }

@@ -212,17 +212,21 @@ impl Session {
         if self.host.phase != Phase::Done && ms > self.limit_ms {
             return Err(SimError::Stuck { phase: self.host.phase.name(), state: self.host.state, at_s: now.as_s() });
         }
-        self.host.give_up(ms, self.run_time() > self.run_s);
+        if !self.faults.is_empty() {
+            self.host.give_up(ms, self.run_time() > self.run_s);
+        }
         Ok(self.host.phase != Phase::Done)
     }
 
     /// The board's bytes reach the host, as far as the line lets them.
     fn deliver(&mut self, now: Ticks) -> Result<(), SimError> {
+        if self.board.sent.is_empty() {
+            return Ok(());
+        }
         let dropped = self.on(|k| matches!(k, FaultKind::TelemetryDropped { .. }));
         let corrupted = self.on(|k| matches!(k, FaultKind::TelemetryCorrupted { .. }));
         let mut sent = core::mem::take(&mut self.board.sent);
         if let Some(FaultKind::TelemetryDropped { probability }) = dropped
-            && !sent.is_empty()
             && self.line.uniform() < probability
         {
             sent.clear();

@@ -89,15 +89,6 @@ impl BeamMode {
         self.rate = self.a[1][0] * x + self.a[1][1] * v + self.b[1] * force_n;
         self.force_n
     }
-
-    /// As many steps as there are forces; leaves the spring forces in their place.
-    pub fn block(&mut self, force_n: &mut [f64]) {
-        let mut mode = *self;
-        for force in force_n {
-            *force = mode.step(*force);
-        }
-        *self = mode;
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! Units: newton of lift (up is positive) in, volt at the ADC pin out.
 //! Reference: Beharie 2013 Eq. 5.47-5.55 (corrected: V = 6 K F L G V_in/(b h^2 E)), Table 7; errata "signal after the amplifier".
 
+use super::beam::BeamMode;
 use super::meter::{Meter, MeterState};
 
 /// Share of a change of load that the joint's friction holds back until it slips (assumed).
@@ -102,6 +103,34 @@ pub struct BridgeState {
     empty_v: f64,
 }
 
+/// What acts on beam and bridge in the steps of a block.
+#[derive(Debug, Clone, Copy)]
+pub struct Load<'a> {
+    /// Thrust, N.
+    pub thrust_n: &'a [f64],
+    /// Force of the unbalance, N.
+    pub shaking_n: &'a [f64],
+    /// Torque on the arm, N.m.
+    pub torque_nm: &'a [f64],
+    /// Temperature of the rig, degC.
+    pub temp_c: &'a [f64],
+    /// Shift of the zero, N, and what each newton metre of torque adds to it.
+    pub zero_n: (f64, f64),
+    /// Factor on the reading.
+    pub gain: f64,
+}
+
+impl Load<'_> {
+    /// Force on the beam, shift of the zero and temperature, step by step.
+    #[inline]
+    fn steps(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        let (zero_n, per_torque) = self.zero_n;
+        let forces = self.thrust_n.iter().zip(self.shaking_n).map(|(thrust, shaking)| thrust + shaking);
+        let zeros = self.torque_nm.iter().map(move |torque| zero_n + per_torque * torque);
+        forces.zip(zeros).zip(self.temp_c).map(|((force, zero), temp)| (force, zero, *temp))
+    }
+}
+
 /// Fraction of a first-order lag covered in one step; 1 when there is no lag.
 fn share(dt_s: f64, tau_s: f64) -> f64 {
     if tau_s > 0.0 { 1.0 - libm::exp(-dt_s / tau_s) } else { 1.0 }
@@ -169,37 +198,47 @@ impl BridgeState {
         self.meter.step(self.pin_v)
     }
 
-    /// As many steps as `lift_n` has, with the same numbers: takes the lift and leaves the pin voltages in its place.
-    pub fn block(&mut self, lift_n: &mut [f64], zero_n: &[f64], gain: f64, temperature_c: &[f64]) {
+    /// As many steps as `load` has, `beam` ahead of the bridge, with the same numbers: puts the pin voltages into `pin_v` and gives the
+    /// force that the gauges saw last.
+    pub fn block(&mut self, beam: &mut BeamMode, load: &Load<'_>, pin_v: &mut [f64]) -> f64 {
         let b = &self.bridge;
         let creeps = b.creep_share != 0.0 || self.creep_n != 0.0;
         let sticks = b.hysteresis_n != 0.0 || self.stuck_n != 0.0;
         if creeps || sticks || b.filter_s > 0.0 || !self.meter.is_wire() {
-            for ((lift, zero), temperature) in lift_n.iter_mut().zip(zero_n).zip(temperature_c) {
-                *lift = self.step(*lift, *zero, gain, *temperature);
+            for (pin_v, (force_n, zero_n, temperature_c)) in pin_v.iter_mut().zip(load.steps()) {
+                *pin_v = self.step(beam.step(force_n), zero_n, load.gain, temperature_c);
             }
-            return;
+        } else if self.rise == self.fall {
+            self.plain_block::<true>(beam, load, pin_v);
+        } else {
+            self.plain_block::<false>(beam, load, pin_v);
         }
-        // gauges, amplifier and divider alone
-        self.lift_n = lift_n.last().copied().unwrap_or(self.lift_n);
-        for ((lift, zero), temperature) in lift_n.iter_mut().zip(zero_n).zip(temperature_c) {
-            let shift = zero + b.zero_n_per_k * (temperature - b.zero_temperature_c);
-            *lift = (self.empty_v - b.volt_per_newton * (*lift * gain + shift)).clamp(b.rails_v.0, b.rails_v.1);
+        self.lift_n
+    }
+
+    /// Gauges, amplifier and divider alone; `EVEN` when its output falls as it rises. Beam and amplifier are two chains of steps that
+    /// wait for the ones before: in one loop they wait at the same time.
+    #[inline]
+    fn plain_block<const EVEN: bool>(&mut self, beam: &mut BeamMode, load: &Load<'_>, pin_v: &mut [f64]) {
+        let b = &self.bridge;
+        let (mut mode, mut output_v, mut seen_n) = (*beam, self.output_v, self.lift_n);
+        for (pin_v, (force_n, zero_n, temperature_c)) in pin_v.iter_mut().zip(load.steps()) {
+            seen_n = mode.step(force_n);
+            let shift = zero_n + b.zero_n_per_k * (temperature_c - b.zero_temperature_c);
+            let wanted = (self.empty_v - b.volt_per_newton * (seen_n * load.gain + shift)).clamp(b.rails_v.0, b.rails_v.1);
+            let error = wanted - output_v;
+            output_v += error * if EVEN || error > 0.0 { self.rise } else { self.fall };
+            *pin_v = b.divider * output_v;
         }
-        let mut output_v = self.output_v;
-        for wanted in lift_n.iter_mut() {
-            let error = *wanted - output_v;
-            output_v += error * if self.rise == self.fall || error > 0.0 { self.rise } else { self.fall };
-            *wanted = b.divider * output_v;
-        }
-        self.output_v = output_v;
-        self.pin_v = lift_n.last().copied().unwrap_or(self.pin_v);
+        self.pin_v = b.divider * output_v;
+        (*beam, self.output_v, self.lift_n) = (mode, output_v, seen_n);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::Beam;
 
     #[test]
     fn the_slope_and_the_voltages_of_the_errata_come_out() {
@@ -245,14 +284,26 @@ mod tests {
         ];
         for b in odd {
             let (mut one, mut ten) = (BridgeState::new(b, 1e-4), BridgeState::new(b, 1e-4));
+            let (mut beam, mut beam_of_ten) = (BeamMode::new(&Beam::default(), 1e-4), BeamMode::new(&Beam::default(), 1e-4));
             for ms in 0..400 {
-                let mut lift: [f64; 10] = core::array::from_fn(|i| 2.0 + 1.9 * libm::sin(0.3 * f64::from(ms) + i as f64));
-                let zero: [f64; 10] = core::array::from_fn(|i| 1e-3 * i as f64);
+                let thrust: [f64; 10] = core::array::from_fn(|i| 2.0 + 1.9 * libm::sin(0.3 * f64::from(ms) + i as f64));
+                let (torque, shaking): ([f64; 10], _) = (core::array::from_fn(|i| 1e-3 * i as f64), [0.01; 12]);
                 let warm = [23.0 + 0.01 * f64::from(ms); 10];
-                let want: [f64; 10] = core::array::from_fn(|i| one.step(lift[i], zero[i], 1.01, warm[i]));
-                ten.block(&mut lift, &zero, 1.01, &warm);
-                assert_eq!(lift, want, "{b:?}");
-                assert_eq!(one, ten);
+                let want: [f64; 10] =
+                    core::array::from_fn(|i| one.step(beam.step(thrust[i] + shaking[i]), 0.02 + 0.3 * torque[i], 1.01, warm[i]));
+                let load = Load {
+                    thrust_n: &thrust,
+                    shaking_n: &shaking,
+                    torque_nm: &torque,
+                    temp_c: &warm,
+                    zero_n: (0.02, 0.3),
+                    gain: 1.01,
+                };
+                let mut pin_v = [0.0; 10];
+                let seen_n = ten.block(&mut beam_of_ten, &load, &mut pin_v);
+                assert_eq!(pin_v, want, "{b:?}");
+                assert_eq!((&one, beam), (&ten, beam_of_ten));
+                assert_eq!(seen_n, ten.lift_n);
             }
         }
     }

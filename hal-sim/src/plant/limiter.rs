@@ -71,10 +71,10 @@ impl LimiterState {
 }
 
 impl Limiter {
-    /// Whether its duty stands still while the pulse does and no millisecond ends: no lag, no limit of the current.
+    /// Whether its duty stands still while the pulse does: no lag, no limit of the current, nothing taken for heat.
     #[must_use]
     pub fn is_steady(&self) -> bool {
-        self.lag_s == (0.0, 0.0) && !self.current_a.is_finite()
+        self.lag_s == (0.0, 0.0) && !self.current_a.is_finite() && self.derate_per_a2 == 0.0
     }
 
     /// The highest duty up to `duty` that keeps duty x motor current within the limit, for a back-EMF, an open-circuit voltage,

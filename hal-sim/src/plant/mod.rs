@@ -13,6 +13,7 @@ pub mod commutation;
 pub mod esc;
 pub mod esc_guard;
 pub mod esc_program;
+mod fixed;
 pub mod flux;
 pub mod limiter;
 pub mod meter;

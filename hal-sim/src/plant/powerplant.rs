@@ -50,10 +50,12 @@ pub trait Powerplant: Send {
     fn advance(&mut self, dt_s: f64, pulse_us: f64) -> PlantState;
 
     /// Ten steps of `dt_s` at one pulse: the same numbers as ten times [`Powerplant::advance`].
-    fn advance_block(&mut self, dt_s: f64, pulse_us: f64, out: &mut PlantBlock) {
+    /// `meanwhile` is work that needs nothing of them, done once: beside steps that wait for one another it takes next to no time.
+    fn advance_block(&mut self, dt_s: f64, pulse_us: f64, out: &mut PlantBlock, meanwhile: &mut dyn FnMut()) {
         for i in 0..STEPS_PER_MS {
             out.put(i, self.advance(dt_s, pulse_us));
         }
+        meanwhile();
     }
 
     /// Takes what the effects make of the plant at this moment. A model that is not made of parts ignores it.

@@ -7,12 +7,13 @@
 //! Reference: Beharie 2013 section 2.3 and Eq. 5.11 corrected; errata 2.22-2.24 (the frame feels inertia and drag, not friction).
 
 use super::commutation::CommutationState;
+use super::fixed::Fixed;
 use super::flux::FluxState;
 use super::limiter::LimiterState;
 use super::parts::Parts;
 use super::powerplant::{PlantBlock, PlantLevers, PlantState, Powerplant, STEPS_PER_MS};
 use super::room_air::Draught;
-use super::shaft::{Acting, Shaft};
+use super::shaft::{Acting, Shaft, Turns, show};
 use super::thermal::ThermalState;
 use crate::noise::{Coloured, Source, Stream};
 use crate::sensor::BackEmf;
@@ -50,6 +51,7 @@ struct Drive {
 #[derive(Debug, Clone)]
 pub struct RigPlant {
     parts: Parts,
+    fixed: Fixed,
     levers: PlantLevers,
     thermal: ThermalState,
     flux: FluxState,
@@ -65,6 +67,8 @@ pub struct RigPlant {
     motor_a: f64,
     supply_a: f64,
     charge_as: f64,
+    /// The steps of the last block; their place is kept.
+    turns: Turns,
 }
 
 /// Interval and correlation time of the gusts, s.
@@ -96,34 +100,40 @@ impl RigPlant {
             motor_a: 0.0,
             supply_a: ESC_IDLE_A,
             charge_as: 0.0,
+            turns: Turns::default(),
+            fixed: Fixed::of(&parts),
             parts,
         }
     }
 
     /// Everything that moves in seconds, once a millisecond.
     fn settle(&mut self, duty: f64) {
-        let (p, l, dt_s) = (&mut self.parts, &self.levers, self.elapsed_s);
+        let (p, fixed, l, dt_s) = (&mut self.parts, &self.fixed, &self.levers, self.elapsed_s);
         p.supply.draw(self.charge_as, 1.0);
         let run_s = l.run_s.max(0.0);
-        let loss_w = self.motor_a * self.motor_a * p.motor.resistance_ohm + p.motor.friction_nm() * self.speed;
+        let loss_w = self.motor_a * self.motor_a * p.motor.resistance_ohm + fixed.friction_nm * self.speed;
         self.thermal.step(loss_w, run_s, dt_s);
         self.limiter.warm(&p.limiter, self.supply_a, dt_s);
 
         let gust = 1.0 + self.gusts.next();
-        let thinning = if p.air_follows_room { p.thermal.thinning(run_s) } else { 1.0 };
-        let density = p.air.density() * thinning;
-        let relative = density / p.propeller.reference_density;
+        let (density, relative) = if p.air_follows_room {
+            let density = fixed.density * p.thermal.thinning(run_s);
+            (density, density / p.propeller.reference_density)
+        } else {
+            (fixed.density, fixed.relative_density)
+        };
         let rpm = self.speed * RPM_PER_RAD_S;
         let blade = p.blade.factors(rpm);
         let thrust_n = self.slow.thrust_k * self.speed * self.speed;
         let inflow = self.draught.step(&p.room, thrust_n, self.speed, density, dt_s);
-        let flux = self.flux.step(&p.flux, rpm, loss_w, self.motor_a, p.thermal.room_c(run_s), dt_s);
+        let flux =
+            if fixed.flux_acts { self.flux.step(&p.flux, rpm, loss_w, self.motor_a, p.thermal.room_c(run_s), dt_s) } else { 1.0 };
         let inertia = p.propeller.inertia_kgm2 + p.motor.inertia_kgm2 + l.inertia_kgm2;
         self.slow = Slow {
             open_v: p.supply.open_circuit_v(),
             line_ohm: p.supply.resistance_ohm + l.resistance_ohm,
-            kt: p.motor.torque_constant() * flux,
-            holding_nm: p.motor.friction_nm() + l.drag_nm,
+            kt: fixed.torque_constant * flux,
+            holding_nm: fixed.friction_nm + l.drag_nm,
             drag_nms: l.drag_nms,
             air_k: p.propeller.torque_coefficient * relative * l.torque_factor * blade.1 * inflow.1 * gust,
             thrust_k: p.propeller.thrust_coefficient * relative * l.thrust_factor * blade.0 * inflow.0,
@@ -135,12 +145,12 @@ impl RigPlant {
         (self.steps, self.elapsed_s, self.charge_as) = (0, 0.0, 0.0);
     }
 
-    fn driving(&self, duty: f64) -> Drive {
+    fn driving(&mut self, duty: f64) -> Drive {
         if duty <= 0.0 || !self.slow.driven {
             return Drive { duty, ..Drive::default() };
         }
         let s = &self.slow;
-        let per_ohm = 1.0 / (self.parts.motor.resistance_ohm + duty * duty * s.line_ohm);
+        let per_ohm = self.fixed.per_ohm(duty, s.line_ohm);
         Drive { duty, emf_free_v: duty * (s.open_v - s.line_ohm * ESC_IDLE_A), per_ohm }
     }
 
@@ -164,23 +174,21 @@ impl RigPlant {
         Shaft::new(acting, dt_s)
     }
 
-    /// The nine steps that are left of a millisecond at a steady duty.
-    fn rest_of_block(&mut self, dt_s: f64, duty: f64, out: &mut PlantBlock) {
+    /// The ten steps of a millisecond at a steady duty.
+    fn whole_block(&mut self, dt_s: f64, duty: f64, out: &mut PlantBlock, meanwhile: &mut dyn FnMut()) {
         let shaft = self.shaft(dt_s);
-        let (mut w, mut motor_a, mut supply_a, mut charge_as) = (self.speed, self.motor_a, self.supply_a, self.charge_as);
-        let mut elapsed_s = self.elapsed_s;
-        for i in 1..STEPS_PER_MS {
-            let (next, gained) = shaft.turn(w);
-            w = next;
-            motor_a = shaft.motor_current(next);
-            supply_a = duty * motor_a + ESC_IDLE_A;
-            charge_as += supply_a * dt_s;
-            elapsed_s += dt_s;
-            out.rpm[i] = next * RPM_PER_RAD_S;
-            (out.thrust_n[i], out.torque_nm[i]) = shaft.reaction(next, gained);
+        shaft.turns(self.speed, &mut self.turns, meanwhile);
+        let turns = &self.turns;
+        let mut motor_a = [0.0; STEPS_PER_MS];
+        show(&shaft, turns, &mut out.rpm, &mut out.thrust_n, &mut out.torque_nm, &mut motor_a);
+        for motor_a in motor_a {
+            self.supply_a = duty * motor_a + ESC_IDLE_A;
+            self.charge_as += self.supply_a * dt_s;
+            self.elapsed_s += dt_s;
         }
-        (self.speed, self.motor_a, self.supply_a, self.charge_as) = (w, motor_a, supply_a, charge_as);
-        self.elapsed_s = elapsed_s;
+        self.motor_a = motor_a[STEPS_PER_MS - 1];
+        self.speed = turns.speed[STEPS_PER_MS - 1];
+        self.steps = SLOW_STEPS;
     }
 
     /// State of the outside at the speed, torque and currents of now.
@@ -205,6 +213,7 @@ impl Powerplant for RigPlant {
         let drawn_as = self.parts.supply.drawn_as;
         self.parts = parts.clone();
         self.parts.supply.drawn_as = drawn_as;
+        self.fixed = Fixed::of(parts);
         self.thermal.refit(parts.thermal);
     }
 
@@ -236,21 +245,19 @@ impl Powerplant for RigPlant {
         self.state(thrust_n, torque_nm)
     }
 
-    fn advance_block(&mut self, dt_s: f64, pulse_us: f64, out: &mut PlantBlock) {
-        out.put(0, self.advance(dt_s, pulse_us));
-        if self.steps != 1 || !self.parts.limiter.is_steady() {
-            for i in 1..STEPS_PER_MS {
+    fn advance_block(&mut self, dt_s: f64, pulse_us: f64, out: &mut PlantBlock, meanwhile: &mut dyn FnMut()) {
+        let begins = self.steps == 0 || self.steps >= SLOW_STEPS;
+        if !begins || !self.parts.limiter.is_steady() {
+            for i in 0..STEPS_PER_MS {
                 out.put(i, self.advance(dt_s, pulse_us));
             }
+            meanwhile();
             return;
         }
         // From here to the end of the millisecond nothing but the shaft moves.
         let duty = self.limiter.duty(&self.parts.limiter, pulse_us, dt_s);
-        if duty != self.drive.duty {
-            self.drive = self.driving(duty);
-        }
-        self.rest_of_block(dt_s, duty, out);
-        self.steps += STEPS_PER_MS as u32 - 1;
+        self.settle(duty);
+        self.whole_block(dt_s, duty, out, meanwhile);
         out.temp_c = [self.thermal.temperature_c; STEPS_PER_MS];
         out.last = self.state(out.thrust_n[STEPS_PER_MS - 1], out.torque_nm[STEPS_PER_MS - 1]);
     }
@@ -342,7 +349,7 @@ mod tests {
                 for i in 0..STEPS_PER_MS {
                     want.put(i, one.advance(1.0e-4, pulse));
                 }
-                ten.advance_block(1.0e-4, pulse, &mut block);
+                ten.advance_block(1.0e-4, pulse, &mut block, &mut || ());
                 assert_eq!(block, want, "{limiter:?}, {ms} ms");
             }
         }

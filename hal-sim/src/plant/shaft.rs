@@ -5,6 +5,10 @@
 //! Units: SI.
 //! Reference: Beharie 2013 Eq. 5.11 corrected; errata 2.22-2.24 (the frame feels inertia and drag, not friction).
 
+use super::powerplant::STEPS_PER_MS;
+use super::rig_plant::RPM_PER_RAD_S;
+use multiversion::multiversion;
+
 /// What a rotor of speed w gains in a step, rad/s: s - d w - a w^2.
 #[derive(Debug, Clone, Copy)]
 struct Gain {
@@ -17,8 +21,14 @@ impl Gain {
     /// Gain at `w`; friction holds a resting rotor. The air's part is the longest way and the last to come in.
     #[inline(always)]
     fn at(&self, w: f64) -> f64 {
-        let gain = (self.standing - self.damping * w) - self.air * w * w;
+        let gain = self.turning(w);
         if w > 0.0 || gain >= 0.0 { gain } else { zero() }
+    }
+
+    /// Gain of a rotor that turns.
+    #[inline(always)]
+    fn turning(&self, w: f64) -> f64 {
+        (self.standing - self.damping * w) - self.air * w * w
     }
 
     /// Gain of half a step: exact halves.
@@ -42,6 +52,14 @@ pub(super) struct Acting {
     pub(super) extra_nm: f64,
     pub(super) extra_nms: f64,
     pub(super) seen_share: f64,
+}
+
+/// Ten steps of the shaft: the speed after each, what was gained in it, and the speed that its rule looked ahead to, rad/s.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Turns {
+    pub(super) speed: [f64; STEPS_PER_MS],
+    gained: [f64; STEPS_PER_MS],
+    ahead: [f64; STEPS_PER_MS],
 }
 
 /// The shaft while duty and air stand still.
@@ -103,6 +121,60 @@ impl Shaft {
         (next, if next > 0.0 { 0.5 * first + half } else { stopped(w) })
     }
 
+    /// Ten steps from `w`: the numbers of [`Shaft::turn`] one after the other. `meanwhile` is done while they wait for one another.
+    #[inline]
+    pub(super) fn turns(&self, w: f64, turns: &mut Turns, meanwhile: &mut dyn FnMut()) {
+        let driven = w > 0.0 && self.is_driven(w);
+        if driven {
+            self.drive(w, turns);
+        }
+        meanwhile();
+        if !(driven && self.drove(turns)) {
+            self.one_by_one(w, turns);
+        }
+    }
+
+    /// Ten steps of a rotor that turns and is driven all the way: nothing is asked in between, so that the chain of the steps is short
+    /// enough for the processor to see beyond it.
+    #[inline]
+    fn drive(&self, w: f64, turns: &mut Turns) {
+        let (whole, half) = self.driven;
+        let mut from = w;
+        for ((speed, gained), ahead) in turns.speed.iter_mut().zip(&mut turns.gained).zip(&mut turns.ahead) {
+            let first = whole.turning(from);
+            let there = from + first;
+            let second = half.turning(there);
+            from = (from + 0.5 * first) + second;
+            (*speed, *gained, *ahead) = (from, 0.5 * first + second, there);
+        }
+    }
+
+    /// Whether it was so all the way.
+    #[inline]
+    fn drove(&self, turns: &Turns) -> bool {
+        // a speed that is no number stays one up to the last
+        let (mut slowest, mut fastest) = (turns.speed[STEPS_PER_MS - 1], turns.speed[STEPS_PER_MS - 1]);
+        for (speed, ahead) in turns.speed.iter().zip(&turns.ahead) {
+            let (low, high) = if speed < ahead { (*speed, *ahead) } else { (*ahead, *speed) };
+            slowest = if low < slowest { low } else { slowest };
+            fastest = if high > fastest { high } else { fastest };
+        }
+        slowest > 0.0 && self.is_driven(fastest)
+    }
+
+    #[cold]
+    fn one_by_one(&self, w: f64, turns: &mut Turns) {
+        let (mut from, mut gain) = self.turn(w);
+        if w == 0.0 && from == 0.0 {
+            (turns.speed, turns.gained) = ([from; STEPS_PER_MS], [gain; STEPS_PER_MS]); // it goes on resting
+            return;
+        }
+        for (speed, gained) in turns.speed.iter_mut().zip(&mut turns.gained) {
+            (*speed, *gained) = (from, gain);
+            (from, gain) = self.turn(from);
+        }
+    }
+
     /// Lift and torque on the arm at `w` after a step that `gained` so much.
     #[inline]
     pub(super) fn reaction(&self, w: f64, gained: f64) -> (f64, f64) {
@@ -110,6 +182,30 @@ impl Shaft {
         let extra = a.extra_nm + a.extra_nms * w;
         let seen_drag = if w > 0.0 { a.seen_share * extra } else { 0.0 };
         (a.thrust_k * w * w, self.air_nm(w) + seen_drag + a.inertia * (gained * self.per_step_s))
+    }
+}
+
+/// What steps show, side by side: the numbers of [`Shaft::reaction`] and [`Shaft::motor_current`], and the speed in rev/min.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn show(
+    shaft: &Shaft,
+    turns: &Turns,
+    rpm: &mut [f64],
+    thrust_n: &mut [f64],
+    torque_nm: &mut [f64],
+    motor_a: &mut [f64],
+) {
+    let (a, per_step_s) = (shaft.acting, shaft.per_step_s);
+    let places = rpm.iter_mut().zip(thrust_n).zip(torque_nm).zip(motor_a);
+    for ((((rpm, thrust_n), torque_nm), motor_a), (w, gained)) in places.zip(turns.speed.iter().zip(&turns.gained)) {
+        let w = *w;
+        *rpm = w * RPM_PER_RAD_S;
+        let current = (a.emf_free_v - a.kt * w) * a.per_ohm;
+        *motor_a = if current > 0.0 { current } else { 0.0 };
+        let seen_drag = a.seen_share * (a.extra_nm + a.extra_nms * w);
+        let seen_drag = if w > 0.0 { seen_drag } else { 0.0 };
+        *thrust_n = a.thrust_k * w * w;
+        *torque_nm = a.air_k * w * w + seen_drag + a.inertia * (gained * per_step_s);
     }
 }
 
@@ -163,6 +259,25 @@ mod tests {
         let current = ((a.emf_free_v - a.kt * w) * a.per_ohm).max(0.0);
         let net = a.kt * current - a.holding_nm - a.drag_nms * w - a.air_k * w * w;
         if w > 0.0 || net >= 0.0 { net * a.per_inertia } else { 0.0 }
+    }
+
+    /// Ten steps at once are ten steps: at rest, starting, driven, into and out of coasting, to rest.
+    #[test]
+    fn ten_turns_are_one_after_the_other() {
+        for (emf_free_v, from) in
+            [(0.0, 0.0), (7.0, 0.0), (7.0, 300.0), (7.0, 423.9), (7.0, 424.6), (0.0, 600.0), (0.0, 3.0), (0.0, 0.1)]
+        {
+            let shaft = Shaft::new(Acting { emf_free_v, ..RIG }, 1.0e-4);
+            let (mut w, mut turns) = (from, Turns::default());
+            for _ in 0..100 {
+                shaft.turns(w, &mut turns, &mut || ());
+                for (speed, gained) in turns.speed.iter().zip(&turns.gained) {
+                    let (next, gain) = shaft.turn(w);
+                    assert_eq!((speed.to_bits(), gained.to_bits()), (next.to_bits(), gain.to_bits()), "{emf_free_v} V, {from}");
+                    w = next;
+                }
+            }
+        }
     }
 
     /// Steps by gains are Heun's steps of the equation of motion: driven, coasting, across the two and to rest.

@@ -6,8 +6,9 @@
 //! Units: V at the pin, counts of 3.3 V / 4096.
 //! Reference: STM32F405 ADC, RM0090 section 13; Beharie 2013 Eq. 5.57-5.58 and errata 5.59 (shunt: I = V/(R_s G)).
 
-use super::conversions::{EIGHT, Pairs, whole_code};
-use crate::noise::{Coloured, Source, Stream};
+use super::conversions::{ALL, EIGHT, Levels, PAIRS, Pairs};
+use crate::noise::{Coloured, Source, Stream, quick};
+use crate::plant::powerplant::STEPS_PER_MS;
 use crate::plant::{Bridge, PlantState};
 use firmware_rig::AdcBlock;
 use frame::calibration::AdcScale;
@@ -79,8 +80,8 @@ pub struct Converter {
     conversion: Stream,
     conversion_counts: f64,
     eight: Pairs,
-    /// Noise of a ninth conversion of each channel.
-    ninth: [f64; ADC_CHANNELS],
+    /// Words with those of a ninth among them; their place is kept.
+    drawn: [[u8; 8]; ALL + ADC_CHANNELS],
 }
 
 impl Converter {
@@ -98,7 +99,7 @@ impl Converter {
             conversion: Stream::new(seed, Source::Adc, 0),
             conversion_counts: 1.2, // rms, STM32F405 datasheet: total unadjusted error +-2 LSB typical
             eight: Pairs::default(),
-            ninth: [0.0; ADC_CHANNELS],
+            drawn: [[0; 8]; ALL + ADC_CHANNELS],
         }
     }
 
@@ -106,13 +107,15 @@ impl Converter {
     /// [`Converter::renew`] and one conversion after the other would: work that needs no level, for whoever waits for one.
     pub fn draw_ahead(&mut self, count: u16) {
         self.renew();
-        for (channel, ninth) in self.ninth.iter_mut().enumerate() {
-            for word in self.eight.words(channel) {
-                *word = self.conversion.word();
+        if usize::from(count) > EIGHT {
+            self.conversion.words(&mut self.drawn);
+            let places = self.eight.words.chunks_exact_mut(PAIRS).zip(&mut self.eight.ninth);
+            for (own, (eight, ninth)) in self.drawn.chunks_exact(PAIRS + 1).zip(places) {
+                eight.copy_from_slice(&own[..PAIRS]);
+                [*ninth, _] = quick(u64::from_le_bytes(own[PAIRS]));
             }
-            if usize::from(count) > EIGHT {
-                *ninth = self.conversion.quick_normals()[0];
-            }
+        } else {
+            self.conversion.words(&mut self.eight.words);
         }
     }
 
@@ -143,50 +146,32 @@ impl Converter {
         (noisy as u16).min(CODES as u16 - 1)
     }
 
-    /// The conversions of every channel, of which the noise has been drawn ahead: strain at the voltages of one millisecond, the others at one.
-    pub fn blocks(&mut self, count: u16, strain_v: &[f64], pins_v: &[f64; ADC_CHANNELS], out: &mut [AdcBlock; ADC_CHANNELS]) {
+    /// The conversions of every channel, of which the noise has been drawn ahead: strain at the voltages of one millisecond, the
+    /// others at one.
+    pub fn blocks(
+        &mut self,
+        count: u16,
+        strain_v: &[f64; STEPS_PER_MS],
+        pins_v: &[f64; ADC_CHANNELS],
+        out: &mut [AdcBlock; ADC_CHANNELS],
+    ) {
         let counts = |pin_v: f64, offset_v: f64| (pin_v + offset_v) * (CODES / REFERENCE_V);
-        let mut strain = Spread { pins_v: strain_v, count: usize::from(count), place: 0, rest: 0 };
-        for (first, second) in self.eight.levels(0) {
-            *first = counts(strain.next(), self.offset_v[0]);
-            *second = counts(strain.next(), self.offset_v[0]);
+        let nine = usize::from(count) > EIGHT;
+        let strain = if nine { readings::<9>(strain_v) } else { readings::<8>(strain_v) };
+        let strain = strain.map(|pin_v| counts(pin_v, self.offset_v[0]));
+        let mut level = [strain[EIGHT]; ADC_CHANNELS];
+        for ((level, pin_v), offset_v) in level.iter_mut().zip(pins_v).zip(&self.offset_v).skip(1) {
+            *level = counts(*pin_v, *offset_v);
         }
-        for (channel, (pin_v, offset_v)) in pins_v.iter().zip(&self.offset_v).enumerate().skip(1) {
-            let level = counts(*pin_v, *offset_v);
-            self.eight.levels(channel).for_each(|(first, second)| (*first, *second) = (level, level));
-        }
-        self.eight.convert(self.conversion_counts);
-        for (channel, block) in out.iter_mut().enumerate() {
-            let mut sums = self.eight.sums(channel);
-            if usize::from(count) > EIGHT {
-                let pin_v = if channel == 0 { strain.next() } else { pins_v[channel] };
-                let level = counts(pin_v, self.offset_v[channel]);
-                sums.one(whole_code(level + self.conversion_counts * self.ninth[channel] + 0.5));
-            }
-            *block = sums.block(count);
-        }
+        let [first @ .., _] = strain;
+        let level = Levels { first, all: level, nine };
+        self.eight.convert(&level, self.conversion_counts, out);
     }
 }
 
-/// Gives the i-th of `count` readings the voltage at i x length / count, without a division for each.
-struct Spread<'a> {
-    pins_v: &'a [f64],
-    count: usize,
-    place: usize,
-    rest: usize,
-}
-
-impl Spread<'_> {
-    #[inline]
-    fn next(&mut self) -> f64 {
-        let pin = self.pins_v.get(self.place).copied().unwrap_or_default();
-        self.rest += self.pins_v.len();
-        while self.rest >= self.count {
-            self.rest -= self.count;
-            self.place += 1;
-        }
-        pin
-    }
+/// What each of `COUNT` readings of a millisecond finds: the i-th that of step i x steps / count.
+fn readings<const COUNT: usize>(steps: &[f64; STEPS_PER_MS]) -> [f64; EIGHT + 1] {
+    core::array::from_fn(|i| steps[(i * STEPS_PER_MS / COUNT).min(STEPS_PER_MS - 1)])
 }
 
 #[cfg(test)]
@@ -194,7 +179,12 @@ mod tests {
     use super::*;
 
     /// The conversions of one millisecond.
-    fn millisecond(c: &mut Converter, count: u16, strain_v: &[f64], pins_v: &[f64; ADC_CHANNELS]) -> [AdcBlock; ADC_CHANNELS] {
+    fn millisecond(
+        c: &mut Converter,
+        count: u16,
+        strain_v: &[f64; 10],
+        pins_v: &[f64; ADC_CHANNELS],
+    ) -> [AdcBlock; ADC_CHANNELS] {
         let mut blocks = [AdcBlock::default(); ADC_CHANNELS];
         c.draw_ahead(count);
         c.blocks(count, strain_v, pins_v, &mut blocks);

@@ -39,7 +39,8 @@ impl Default for BackEmfMeter {
 pub struct BackEmfState {
     meter: BackEmfMeter,
     first_s: Option<f64>,
-    last_s: f64,
+    /// The turning in which the last crossing came; its instant is asked for once a gate.
+    last: Turning,
     crossings: u32,
     gate_end_s: f64,
     reading: Option<f64>,
@@ -58,20 +59,18 @@ impl BackEmfState {
         self.reading
     }
 
-    /// The rotor turned evenly from `from` to `to` revolutions in the `dt_s` up to `now_s`, with `emf` at the windings.
+    /// The rotor turned evenly from `from` to `to` revolutions, neither negative, in the `dt_s` up to `now_s`, with `emf` at the windings.
     pub fn pass(&mut self, (from, to): (f64, f64), emf: Option<BackEmf>, now_s: f64, dt_s: f64) {
         if let Some(emf) = emf.filter(|e| e.amplitude_v >= self.meter.threshold_v && to > from) {
             let pairs = f64::from(emf.pole_pairs);
-            let (begin, end) = (from * pairs, to * pairs);
-            let passed = end.floor() - begin.floor();
+            let turning = Turning { begin: from * pairs, end: to * pairs, now_s, dt_s };
+            let passed = whole(turning.end) - whole(turning.begin);
             if passed >= 1.0 {
-                let at = |crossing: f64| now_s - dt_s * (end - crossing) / (end - begin);
-                let before = self.crossings;
-                if before == 0 {
-                    self.first_s = Some(at(begin.floor() + 1.0));
+                if self.crossings == 0 {
+                    self.first_s = Some(turning.at(whole(turning.begin) + 1.0));
                 }
-                self.crossings = before + passed as u32;
-                self.last_s = at(end.floor());
+                self.crossings += passed as u32;
+                self.last = turning;
             }
         }
         if now_s < self.gate_end_s {
@@ -80,11 +79,32 @@ impl BackEmfState {
         let pairs = emf.map(|e| f64::from(self.meter.pole_pairs.unwrap_or(e.pole_pairs)));
         self.reading = self.first_s.zip(pairs).filter(|_| self.crossings > 1).map(|(first, pairs)| {
             let periods = f64::from(self.crossings - 1);
-            60.0 * periods / (self.last_s - first) / pairs
+            60.0 * periods / (self.last.at(whole(self.last.end)) - first) / pairs
         });
         (self.first_s, self.crossings) = (None, 0);
         self.gate_end_s += self.meter.gate_s;
     }
+}
+
+/// Even turning between two angles, electrical turns, in the time up to an instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Turning {
+    begin: f64,
+    end: f64,
+    now_s: f64,
+    dt_s: f64,
+}
+
+impl Turning {
+    /// When it passed the angle `crossing`, s.
+    fn at(&self, crossing: f64) -> f64 {
+        self.now_s - self.dt_s * (self.end - crossing) / (self.end - self.begin)
+    }
+}
+
+/// Whole turns in an angle that is not negative.
+fn whole(turns: f64) -> f64 {
+    (turns as i64) as f64
 }
 
 #[cfg(test)]

@@ -127,6 +127,12 @@ impl Channel {
         self.threshold > to && self.extra.is_empty()
     }
 
+    /// Angle at which the next mark is seen, when it is all that can happen: no mark of this sensor gives a second pulse.
+    #[inline]
+    pub(super) fn single(&self) -> Option<f64> {
+        (self.double <= 0.0 && self.twist.1 <= 0.0 && self.extra.is_empty()).then_some(self.threshold)
+    }
+
     /// The next edge at or before `to`, as (angle, rising); `None` inside where a mark gives no edge.
     pub(super) fn pass(&mut self, to: f64, rev_s: f64) -> Option<(f64, Option<bool>)> {
         if let Some(&(at, rising)) = self.extra.front()

@@ -14,73 +14,97 @@ use multiversion::multiversion;
 /// Conversions of a channel that are made side by side.
 pub(super) const EIGHT: usize = 8;
 /// Pairs of a channel's conversions: a random word holds the noise of two.
-const PAIRS: usize = EIGHT / 2;
+pub(super) const PAIRS: usize = EIGHT / 2;
 /// Pairs of all channels.
-const ALL: usize = PAIRS * ADC_CHANNELS;
+pub(super) const ALL: usize = PAIRS * ADC_CHANNELS;
+/// Sums of nine codes stay below this, 2^16, and those of their squares times it below 2^44: both go in one double, exactly.
+const SQUARES: f64 = 65_536.0;
 /// 2^52: a double of this size has no fraction.
 const ROUNDING: f64 = 4_503_599_627_370_496.0;
 
 /// Eight conversions of every channel, pair by pair. The places are kept: clearing them costs as much as filling them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pairs {
-    words: [u64; ALL],
+    /// Random words, those of a channel side by side.
+    pub(super) words: [[u8; 8]; ALL],
     first: [f64; ALL],
     second: [f64; ALL],
-    sum: [f64; ALL],
-    squares: [f64; ALL],
+    /// Codes, and their squares in units of [`SQUARES`].
+    sums: [f64; ALL],
     min: [f64; ALL],
     max: [f64; ALL],
+    /// Noise of a ninth conversion of each channel.
+    pub(super) ninth: [f64; ADC_CHANNELS],
 }
 
 impl Pairs {
-    /// Random words of `channel`.
-    pub(super) fn words(&mut self, channel: usize) -> impl Iterator<Item = &mut u64> {
-        self.words[channel * PAIRS..][..PAIRS].iter_mut()
-    }
-
-    /// Levels of `channel`, counts; those of a pair's two conversions together.
-    pub(super) fn levels(&mut self, channel: usize) -> impl Iterator<Item = (&mut f64, &mut f64)> {
-        let own = channel * PAIRS..(channel + 1) * PAIRS;
-        self.first[own.clone()].iter_mut().zip(&mut self.second[own])
-    }
-
-    /// Makes all conversions, with `noise_counts` as the standard deviation of the converter's own noise.
-    pub(super) fn convert(&mut self, noise_counts: f64) {
-        convert(self, noise_counts);
-    }
-
-    /// What the conversions of `channel` come to.
-    pub(super) fn sums(&self, channel: usize) -> Sums {
-        let of = |all: &[f64; ALL], join: fn(f64, f64) -> f64| {
-            let [a, b, c, d] = core::array::from_fn(|pair| all[channel * PAIRS + pair]);
-            join(join(a, b), join(c, d))
-        };
-        Sums {
-            sum: of(&self.sum, |a, b| a + b),
-            squares: of(&self.squares, |a, b| a + b),
-            min: of(&self.min, lower),
-            max: of(&self.max, higher),
+    /// Makes the conversions of a millisecond at the levels of `level`, with the noise that stands in `words` and `ninth`.
+    pub(super) fn convert(&mut self, level: &Levels, noise_counts: f64, out: &mut [AdcBlock; ADC_CHANNELS]) {
+        for ((first, second), reading) in self.first.iter_mut().zip(&mut self.second).zip(level.first.chunks_exact(2)) {
+            (*first, *second) = (reading[0], reading[1]);
         }
+        convert(self, level, noise_counts, out);
     }
 }
 
+/// What stands at the pins in a millisecond, counts.
+pub(super) struct Levels {
+    /// The eight levels of the first channel.
+    pub(super) first: [f64; EIGHT],
+    /// The level of each of the other channels, and in the place of the first that of its ninth conversion.
+    pub(super) all: [f64; ADC_CHANNELS],
+    /// Whether there is a ninth.
+    pub(super) nine: bool,
+}
+
 #[multiversion(targets("x86_64+avx2"))]
-fn convert(pairs: &mut Pairs, noise_counts: f64) {
+fn convert(pairs: &mut Pairs, level: &Levels, noise_counts: f64, out: &mut [AdcBlock; ADC_CHANNELS]) {
+    // as wide as they are read again: narrower ones would have to reach memory first
+    for (channel, level) in level.all.iter().enumerate().skip(1) {
+        pairs.first[channel * PAIRS..][..PAIRS].fill(*level);
+        pairs.second[channel * PAIRS..][..PAIRS].fill(*level);
+    }
     for i in 0..ALL {
-        let [now, next] = quick(pairs.words[i]);
+        let [now, next] = quick(u64::from_le_bytes(pairs.words[i]));
         let a = whole_code(pairs.first[i] + noise_counts * now + 0.5);
         let b = whole_code(pairs.second[i] + noise_counts * next + 0.5);
-        pairs.sum[i] = a + b;
-        pairs.squares[i] = a * a + b * b;
+        pairs.sums[i] = (a + b) + SQUARES * (a * a + b * b);
         pairs.min[i] = lower(a, b);
         pairs.max[i] = higher(a, b);
     }
+    let own = |all: &[f64; ALL], channel: usize, join: fn(f64, f64) -> f64| {
+        let at = |pair: usize| all[channel * PAIRS + pair];
+        join(join(at(0), at(1)), join(at(2), at(3)))
+    };
+    for (channel, block) in out.iter_mut().enumerate() {
+        let mut sums = own(&pairs.sums, channel, |a, b| a + b);
+        let (mut min, mut max) = (own(&pairs.min, channel, lower), own(&pairs.max, channel, higher));
+        if level.nine {
+            let code = whole_code(level.all[channel] + noise_counts * pairs.ninth[channel] + 0.5);
+            sums += code + SQUARES * (code * code);
+            (min, max) = (lower(code, min), higher(code, max));
+        }
+        let sums = bits(sums);
+        *block = AdcBlock {
+            sum: (sums % SQUARES as u64) as u32,
+            sum_sq: sums / SQUARES as u64,
+            count: EIGHT as u16 + u16::from(level.nine),
+            min: bits(min) as u16,
+            max: bits(max) as u16,
+        };
+    }
+}
+
+/// A whole number below 2^52: it stands in the lowest bits of itself plus 2^52.
+#[inline]
+fn bits(whole: f64) -> u64 {
+    (whole + ROUNDING).to_bits() ^ ROUNDING.to_bits()
 }
 
 /// The ideal converter's code for a level: truncated, at its ends clipped. As a float, so that many go side by side; sums of codes and
 /// of their squares are exact in it.
 #[inline]
-pub(super) fn whole_code(noisy: f64) -> f64 {
+fn whole_code(noisy: f64) -> f64 {
     let inside = if noisy > 0.0 { noisy } else { 0.0 };
     let inside = if inside < CODES - 1.0 { inside } else { CODES - 1.0 };
     let nearest = (inside + ROUNDING) - ROUNDING;
@@ -95,36 +119,4 @@ fn lower(a: f64, b: f64) -> f64 {
 #[inline]
 fn higher(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
-}
-
-/// Sums over the conversions of a block.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sums {
-    sum: f64,
-    squares: f64,
-    min: f64,
-    max: f64,
-}
-
-impl Sums {
-    /// Takes one conversion more.
-    pub(super) fn one(&mut self, code: f64) {
-        self.sum += code;
-        self.squares += code * code;
-        self.min = lower(code, self.min);
-        self.max = higher(code, self.max);
-    }
-
-    /// The block of these `count` conversions.
-    pub(super) fn block(&self, count: u16) -> AdcBlock {
-        // a whole number below 2^52 stands in the lowest bits of itself plus 2^52
-        let whole = |x: f64| (x + ROUNDING).to_bits() ^ ROUNDING.to_bits();
-        AdcBlock {
-            sum: whole(self.sum) as u32,
-            sum_sq: whole(self.squares),
-            count,
-            min: whole(self.min) as u16,
-            max: whole(self.max) as u16,
-        }
-    }
 }

@@ -8,6 +8,7 @@
 use super::channel::Channel;
 use super::edge::{EdgeDetail, Geometry};
 use crate::noise::{Source, Stream};
+use crate::plant::powerplant::STEPS_PER_MS;
 use frame::rig::CAPTURE_CHANNELS;
 
 /// The four sensors on one rotor.
@@ -74,17 +75,39 @@ impl Tachometers {
 
     /// Steps between the angles of `turned` (one more of them than of the speeds `rev_s`), channel by channel: calls
     /// `edge(channel, rising, step, fraction of the step)` with the same numbers as [`Tachometers::step`].
-    pub fn block(&mut self, turned: &[f64], rev_s: &[f64], mut edge: impl FnMut(u8, bool, usize, f64)) {
-        let (Some(first), Some(last)) = (turned.first(), turned.last()) else { return };
+    pub fn block(
+        &mut self,
+        turned: &[f64; STEPS_PER_MS + 1],
+        rev_s: &[f64; STEPS_PER_MS],
+        mut edge: impl FnMut(u8, bool, usize, f64),
+    ) {
+        let ([first, after @ ..], [.., last]) = (turned, turned);
         if last <= first {
             return;
         }
+        let turns = turned.windows(2).all(|pair| pair[0] < pair[1]);
         let slips = !self.coupled || (self.geometry.slip != 0.0 && self.geometry.slip_onset_rpm.is_finite());
         for i in 0..CAPTURE_CHANNELS {
             let follows = i == 3 && slips;
             let mut behind = if i == 3 { self.behind } else { 0.0 };
             if !follows && self.channels[i].as_ref().is_none_or(|c| c.idle(last - behind)) {
                 continue;
+            }
+            if turns
+                && !follows
+                && behind == 0.0
+                && let Some(channel) = &mut self.channels[i]
+            {
+                // one mark after the other: the step of each is found by counting, which no branch has to foresee
+                while let Some(at) = channel.single().filter(|at| at <= last) {
+                    let step = after.iter().map(|to| usize::from(*to < at)).sum::<usize>();
+                    if let Some((at, Some(rising))) = channel.pass(after[step], rev_s[step]) {
+                        edge(i as u8, rising, step, share_of_step(at, turned[step], after[step]));
+                    }
+                }
+                if channel.idle(*last) {
+                    continue;
+                }
             }
             for (step, (pair, speed)) in turned.windows(2).zip(rev_s).enumerate() {
                 let (from, to) = (pair[0], pair[1]);

@@ -1,0 +1,209 @@
+//! The four channels of speed together.
+//!
+//! What it is: the bank of [`CaptureChannel`]s that compares them: consensus, channels that are lost, that disagree, a blade that twists.
+//! What can go wrong: a channel 1 % off the median twice running is flagged `Disagrees`; a twisted blade shows as a pattern of the beam
+//! that changes with the speed (`BladeTwist`).
+//! Units: ticks of the capture timer, rev/min.
+//! Reference: specification `rig.md`, "Four RPM capture channels"; Beharie 2013, sections 5.4 and 5.7.2.
+
+use crate::capture::CaptureChannel;
+use crate::config::Config;
+use crate::pattern::unevenness;
+use frame::rig::{CAPTURE_CHANNELS, CaptureCode, CaptureVerdict};
+use frame::units::{RevPerMin, Ticks};
+
+/// Deviation from the median that counts as disagreement at constant speed (specification: 1 % on hardware).
+const DISAGREEMENT: f32 = 0.01;
+/// Speed below which the blades count as straight, and are learnt as they are, rev/min.
+const STRAIGHT_BELOW: f32 = 4000.0;
+/// Change of the blades' unevenness from there that counts as twist: 3.6 degrees between two blades.
+const TWIST: f32 = 0.02;
+
+/// Speed below which channels are not judged against each other, rev/min: with one mark a revolution then takes nearly as
+/// long as the time-out to zero (0.25 s), so that channels read zero one after the other.
+const SLOWEST_JUDGED: u64 = 300;
+
+/// The four channels together.
+#[derive(Debug, Clone)]
+pub struct CaptureBank {
+    channels: [CaptureChannel; CAPTURE_CHANNELS],
+    timer_hz: u32,
+    turning_since: Option<Ticks>,
+    /// Two earlier medians and their times, each at least a revolution and a half after the other.
+    before: [Option<(Ticks, f32)>; 2],
+    flagged: u8,
+    /// Unevenness of the blades at low speed.
+    straight: Option<f32>,
+}
+
+impl CaptureBank {
+    /// Channels of `config`.
+    #[must_use]
+    pub fn new(config: &Config) -> Self {
+        let channels = config.marks.map(|marks| CaptureChannel::new(marks, config.timer_hz, config.capture));
+        Self { channels, timer_hz: config.timer_hz, turning_since: None, before: [None; 2], flagged: 0, straight: None }
+    }
+
+    /// Takes the captures since the last tick.
+    pub fn take(&mut self, now: Ticks, edges: &[&[u32]; CAPTURE_CHANNELS], over_capture: &[bool; CAPTURE_CHANNELS]) {
+        for ((channel, edges), over) in self.channels.iter_mut().zip(edges).zip(over_capture) {
+            channel.take(now, edges, *over);
+        }
+        let turning = self.channels.iter().any(|c| c.is_turning(now));
+        self.turning_since = turning.then(|| self.turning_since.unwrap_or(now));
+        if !turning {
+            self.flagged = 0; // they were lost one after the other because the rotor stopped
+        }
+    }
+
+    /// The channels.
+    #[must_use]
+    pub fn channels(&self) -> &[CaptureChannel; CAPTURE_CHANNELS] {
+        &self.channels
+    }
+
+    /// Whether any channel sees the rotor turn.
+    #[must_use]
+    pub fn is_turning(&self) -> bool {
+        self.turning_since.is_some()
+    }
+
+    /// Median speed of the channels that see it turn.
+    #[must_use]
+    pub fn consensus(&self, now: Ticks) -> Option<RevPerMin> {
+        if !self.is_turning() {
+            return None;
+        }
+        let speeds = self.channels.each_ref().map(|c| c.speed().filter(|_| c.is_turning(now)));
+        median(speeds.map(|s| s.map(|v| v.0))).map(RevPerMin)
+    }
+
+    /// Channels whose speed could not be trusted in the last sample.
+    #[must_use]
+    pub fn flagged(&self) -> u8 {
+        self.flagged
+    }
+
+    /// Channels that are silent for longer than a turning rotor can explain, while others see it turn. Judged above
+    /// 300 rev/min only, and never while all of them fall silent together.
+    #[must_use]
+    pub fn lost(&self, now: Ticks) -> u8 {
+        let Some(since) = self.turning_since else { return 0 };
+        // nobody is silent for longer than the margin alone: the usual case, and the cheap one
+        if self.channels.iter().all(|c| now.since(c.last.max(since)).0 <= c.times.lost_margin.0) {
+            return 0;
+        }
+        // a rotor that runs down is slower than the last period says: what has passed since the last edge counts too
+        let told = self.channels.each_ref().map(|c| {
+            let revolution = c.revolution().filter(|_| c.is_turning(now))?;
+            Some(revolution.max(u64::from(c.marks).saturating_mul(now.since(c.last).0)))
+        });
+        let lost = |(n, channel): &(usize, &CaptureChannel)| {
+            let others = told.iter().enumerate().filter(|(other, _)| other != n).filter_map(|(_, revolution)| *revolution);
+            others.max().is_some_and(|revolution| !self.is_slow(revolution) && channel.is_lost(now, (revolution, since)))
+        };
+        self.channels.iter().enumerate().filter(lost).count() as u8
+    }
+
+    /// Ticks a revolution of the channels that turn, and since when any did.
+    fn others(&self, now: Ticks) -> Option<(u64, Ticks)> {
+        let known = self.channels.each_ref().map(|c| c.revolution().filter(|_| c.is_turning(now)).map(|r| r as f32));
+        median(known).map(|r| r as u64).zip(self.turning_since)
+    }
+
+    fn is_slow(&self, revolution: u64) -> bool {
+        revolution > 60 * u64::from(self.timer_hz) / SLOWEST_JUDGED
+    }
+
+    /// The codes of one sample.
+    pub fn sample(&mut self, now: Ticks) -> [CaptureCode; CAPTURE_CHANNELS] {
+        let others = self.others(now);
+        let mut codes = self.channels.each_ref().map(|c| c.code(now, others));
+        self.watch_blades(&mut codes);
+        let healthy =
+            |c: &CaptureChannel, code: &CaptureCode| c.speed().filter(|_| code.verdict == CaptureVerdict::Nominal).map(|v| v.0);
+        let mut speeds = [None; CAPTURE_CHANNELS];
+        for ((speed, channel), code) in speeds.iter_mut().zip(&self.channels).zip(&codes) {
+            *speed = healthy(channel, code);
+        }
+        let middle = median(speeds);
+        let tolerance = self.tolerance(now, middle);
+        for ((channel, code), speed) in self.channels.iter_mut().zip(&mut codes).zip(speeds) {
+            let apart = match (speed, middle) {
+                (Some(speed), Some(middle)) => (speed - middle).abs() > tolerance * middle,
+                _ => false,
+            };
+            if apart && channel.deviations > 0 {
+                code.verdict = CaptureVerdict::Disagrees;
+            }
+            channel.deviations = u8::from(apart);
+            // An over-capture is told once, and on until a whole span has been seen again or the rotor stands.
+            channel.overwritten &= channel.reading.is_none() && now.since(channel.last).0 <= channel.stop_after();
+        }
+        let bad = |code: &&CaptureCode| match code.verdict {
+            CaptureVerdict::Disagrees | CaptureVerdict::Doubled | CaptureVerdict::Missed => true,
+            CaptureVerdict::Lost => others.is_some(), // all together: the rotor stops
+            _ => false,
+        };
+        let slow = others.is_some_and(|(revolution, _)| self.is_slow(revolution));
+        self.flagged = if slow { 0 } else { codes.iter().filter(bad).count() as u8 };
+        codes
+    }
+
+    /// Tells a blade that twists at speed from blades that were never opposite: by the change of the beam's pattern.
+    fn watch_blades(&mut self, codes: &mut [CaptureCode; CAPTURE_CHANNELS]) {
+        let ([beam, ..], [code, ..]) = (&self.channels, codes);
+        if !matches!(code.verdict, CaptureVerdict::Nominal | CaptureVerdict::Alternating) {
+            return;
+        }
+        let edges = usize::from(code.edges).max(4 * usize::from(beam.marks));
+        let Some(speed) = beam.speed() else { return };
+        let Some(uneven) = unevenness(beam.marks, beam.periods().take(edges)) else { return };
+        if speed.0 < STRAIGHT_BELOW {
+            let known = self.straight.unwrap_or(uneven);
+            self.straight = Some(known + 0.25 * (uneven - known));
+        } else if uneven - self.straight.unwrap_or(0.0) > TWIST {
+            code.verdict = CaptureVerdict::BladeTwist;
+        }
+    }
+
+    /// Relative deviation that is still agreement: 1 %, and what the speed changed lately, because the channels' spans begin
+    /// and end up to a revolution and a half apart.
+    fn tolerance(&mut self, now: Ticks, middle: Option<f32>) -> f32 {
+        let Some(middle) = middle.filter(|m| *m > 0.0) else {
+            self.before = [None; 2];
+            return f32::INFINITY;
+        };
+        let apart = (1.5 * 60.0 * self.timer_hz as f32 / middle) as u64;
+        let [older, newer] = self.before;
+        if newer.is_none_or(|(then, _)| now.since(then).0 >= apart) {
+            self.before = [newer, Some((now, middle))];
+        }
+        match older.or(newer) {
+            Some((_, before)) => DISAGREEMENT + (middle - before).abs() / middle,
+            None => f32::INFINITY,
+        }
+    }
+}
+
+/// Median of those present, of which none is negative or no number; the mean of the middle two when they are even in number.
+fn median(values: [Option<f32>; CAPTURE_CHANNELS]) -> Option<f32> {
+    let n = values.iter().flatten().count();
+    // sorted by five comparisons, those that are missing at the end
+    let [a, b, c, d] = values.map(|v| v.unwrap_or(f32::INFINITY));
+    let (low, high) = (in_order(a, b), in_order(c, d));
+    let ((first, p), (q, _)) = (in_order(low.0, high.0), in_order(low.1, high.1));
+    let (second, third) = in_order(p, q);
+    match n {
+        0 => None,
+        1 => Some(first),
+        2 => Some(0.5 * (first + second)),
+        3 => Some(second),
+        _ => Some(0.5 * (second + third)),
+    }
+}
+
+/// The lower of two first.
+fn in_order(a: f32, b: f32) -> (f32, f32) {
+    if b < a { (b, a) } else { (a, b) }
+}

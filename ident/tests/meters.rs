@@ -1,0 +1,190 @@
+//! What meters make of a run: slow, late, coarse, and with a clock of their own.
+//!
+//! What it is: a quasi-static rig on random levels; the meters read it through what each test hides in them.
+//! What can go wrong: a case whose effect the search misses fails with the verdict in its message.
+//! Units: SI, rev/min, us.
+//! Reference: specification `closing-the-loop.md`, "Timing and acquisition"; effects `channel_filter`, `channel_delay`, `clock_drift`,
+//! `quantisation`, `glitch_rows`.
+
+mod rig;
+
+use ident::close::{Closed, close};
+use ident::log::{Column, Log};
+use ident::verdict::Kind;
+use rig::Chance;
+
+const STEP: f64 = 0.05;
+const ROWS: usize = 3000;
+
+/// The instant of a row, and the command at any instant: levels of 2 to 5 s, a jump somewhere within a row.
+struct Command(Vec<(f64, f64)>);
+
+impl Command {
+    fn new(seed: u64) -> Self {
+        let mut chance = Chance::new(seed);
+        let mut at = 0.0;
+        let mut levels = Vec::new();
+        while at < ROWS as f64 * STEP {
+            levels.push((at, (1150.0 + 750.0 * chance.uniform()).round()));
+            at = ((at + 2.0 + 3.0 * chance.uniform()) / STEP).floor() * STEP + 0.3 * STEP;
+        }
+        Self(levels)
+    }
+
+    /// Up and down once, a little at every row.
+    fn ramp() -> Self {
+        let pulse = |i: usize| 1900.0 - 800.0 * (2.0 * i as f64 / ROWS as f64 - 1.0).abs();
+        Self((0..ROWS).map(|i| (STEP * (i as f64 - 0.5), pulse(i))).collect())
+    }
+
+    fn pulse(&self, t: f64) -> f64 {
+        self.0.iter().rev().find(|l| l.0 <= t).map_or(1000.0, |l| l.1)
+    }
+
+    fn speed(&self, t: f64) -> f64 {
+        6.0 * (self.pulse(t) - 1000.0)
+    }
+}
+
+fn thrust(rpm: f64) -> f64 {
+    0.25 * (rpm / 1000.0).powi(2)
+}
+
+fn torque(rpm: f64) -> f64 {
+    0.004 * (rpm / 1000.0).powi(2)
+}
+
+fn current(rpm: f64) -> f64 {
+    0.3 + 0.05 * (rpm / 1000.0).powi(3)
+}
+
+/// A log of what four meters read at each instant, noise added.
+fn log(command: &Command, meters: [&dyn Fn(f64) -> f64; 4], noise: [f64; 4]) -> Log {
+    let mut chance = Chance::new(3);
+    let t: Vec<f64> = (0..ROWS).map(|i| STEP * i as f64).collect();
+    let column = |name: &str, values: Vec<f64>| Column { name: name.to_owned(), values };
+    let mut columns = vec![column("pulse_us", t.iter().map(|t| command.pulse(*t)).collect())];
+    for ((name, meter), noise) in ["rpm", "thrust_n", "torque_nm", "current_a"].into_iter().zip(meters).zip(noise) {
+        columns.push(column(name, t.iter().map(|t| meter(*t) + noise * chance.normal()).collect()));
+    }
+    Log { name: "meters.csv".to_owned(), t, columns, ..Log::default() }
+}
+
+const NOISE: [f64; 4] = [3.0, 0.01, 0.0003, 0.02];
+
+fn verdict(log: &Log) -> Closed {
+    close(log, None, &[], &mut |_| {}).expect("a verdict")
+}
+
+fn names(closed: &Closed) -> Vec<&str> {
+    closed.verdict.effects.iter().map(|e| e.id.as_str()).collect()
+}
+
+fn close_to(closed: &Closed, name: &str, truth: f64, tolerance: f64) {
+    let p = closed.verdict.effects[0].parameters.iter().find(|p| p.name == name).expect(name);
+    assert!((p.value - truth).abs() < tolerance, "{p:?} for {truth}");
+}
+
+/// A first-order lag of a signal of jumps, by small steps.
+fn lagged(signal: &dyn Fn(f64) -> f64, tau: f64) -> Vec<f64> {
+    let fine = 50;
+    let h = STEP / f64::from(fine);
+    let mut state = signal(0.0);
+    (0..ROWS)
+        .map(|i| {
+            let value = state;
+            (0..fine).for_each(|k| {
+                let now = signal(STEP * i as f64 + h * (f64::from(k) + 1.0));
+                state = now + (state - now) * (-h / tau).exp();
+            });
+            value
+        })
+        .collect()
+}
+
+#[test]
+fn the_only_speed_meter_is_slow_where_all_that_follows_the_speed_is_ahead_of_it() {
+    let c = Command::new(11);
+    let tau = 0.06;
+    let slow = lagged(&|t| c.speed(t), tau);
+    let rpm = |t: f64| slow[(t / STEP).round() as usize];
+    let closed = verdict(&log(&c, [&rpm, &|t| thrust(c.speed(t)), &|t| torque(c.speed(t)), &|t| current(c.speed(t))], NOISE));
+    assert_eq!(names(&closed), ["channel_filter"], "{:?}", closed.verdict.alternatives);
+    assert!(closed.verdict.effects[0].channels.contains(&"rpm".to_owned()));
+    close_to(&closed, "tau", tau, 0.004);
+}
+
+#[test]
+fn the_only_speed_meter_is_late_where_all_that_follows_the_speed_is_ahead_of_it() {
+    let c = Command::new(12);
+    let closed = verdict(&log(
+        &c,
+        [&|t| c.speed(t - 0.4), &|t| thrust(c.speed(t)), &|t| torque(c.speed(t)), &|t| current(c.speed(t))],
+        NOISE,
+    ));
+    assert_eq!(names(&closed), ["channel_delay"], "{:?}", closed.verdict.alternatives);
+    close_to(&closed, "delay", 0.4, STEP);
+}
+
+#[test]
+fn a_channel_may_be_seconds_late() {
+    let c = Command::new(13);
+    let closed = verdict(&log(
+        &c,
+        [&|t| c.speed(t), &|t| thrust(c.speed(t - 4.3)), &|t| torque(c.speed(t)), &|t| current(c.speed(t))],
+        NOISE,
+    ));
+    assert_eq!(names(&closed), ["channel_delay"], "{:?}", closed.verdict.alternatives);
+    close_to(&closed, "delay", 4.3, STEP);
+}
+
+#[test]
+fn a_clock_may_drift_by_less_than_a_row() {
+    let c = Command::new(14);
+    // a second-order ramp between levels, so that every instant counts
+    let smooth = lagged(&|t| c.speed(t), 0.5);
+    let at = |t: f64| {
+        let x = (t / STEP).clamp(0.0, (ROWS - 2) as f64);
+        let i = x as usize;
+        smooth[i] + (x - i as f64) * (smooth[i + 1] - smooth[i])
+    };
+    let rate = 0.1 * STEP / (ROWS as f64 * STEP);
+    let late = |t: f64| t - rate * t;
+    let quiet = [0.3, 0.0005, 0.00001, 0.02];
+    let closed = verdict(&log(&c, [&at, &|t| thrust(at(late(t))), &|t| torque(at(late(t))), &|t| current(at(t))], quiet));
+    assert!(names(&closed).contains(&"clock_drift"), "{:?}", names(&closed));
+    let e = closed.verdict.effects.iter().find(|e| e.id == "clock_drift").expect("named");
+    assert!((e.parameters[0].value / rate - 1.0).abs() < 0.1, "{:?} for {rate}", e.parameters[0]);
+}
+
+#[test]
+fn a_coarse_reading_is_neither_glitch_nor_resonance() {
+    let c = Command::ramp();
+    let mut log = log(
+        &c,
+        [&|t| c.speed(t), &|t| thrust(c.speed(t)), &|t| torque(c.speed(t)), &|t| current(c.speed(t))],
+        [3.0, 0.06, 0.0003, 0.02],
+    );
+    let step = 0.9;
+    log.columns[2].values.iter_mut().for_each(|v| *v = (*v / step).round() * step);
+    let closed = verdict(&log);
+    assert_eq!(names(&closed), ["quantisation"], "{:?}", closed.verdict.alternatives);
+    close_to(&closed, "step", step, 1e-6);
+}
+
+#[test]
+fn what_nothing_explains_comes_with_what_is_nearest() {
+    let c = Command::new(16);
+    // a wave of the zero that no effect of the library makes, and a drift in it
+    let wave = |t: f64| 0.15 * (std::f64::consts::TAU * t / 6.0).sin() + 0.003 * t;
+    let closed = verdict(&log(
+        &c,
+        [&|t| c.speed(t), &|t| thrust(c.speed(t)) + wave(t), &|t| torque(c.speed(t)), &|t| current(c.speed(t))],
+        NOISE,
+    ));
+    assert_eq!(closed.verdict.verdict, Kind::Unattributed, "{:?}", names(&closed));
+    let others = &closed.verdict.alternatives;
+    assert!(!others.is_empty() && others.iter().all(|a| a.probability < closed.verdict.effects[0].probability), "{others:?}");
+    let all: f64 = others.iter().map(|a| a.probability).sum::<f64>() + closed.verdict.effects[0].probability;
+    assert!(all < 1.0 + 1e-9, "{all}");
+}
