@@ -36,7 +36,8 @@ pub struct BiasConfig {
     pub rest_weight: f32,
     /// Share of the tilt correction that goes to the bias in motion, 1/s.
     pub tilt_gain: f32,
-    /// How much more of it goes there while nothing is known of the bias.
+    /// How much more of it goes there while nothing is known of the bias: at most as fast as `lag` lets the direction be known, so
+    /// that `tilt_gain` times one more than this stays below its inverse.
     pub tilt_boost: f32,
     /// Growth of the bias about the vertical for a heading error of one radian, 1/s^2.
     pub heading_gain: f32,
@@ -128,11 +129,11 @@ impl Config {
             limit: 10.0 * DEGREE,
             rest_weight: 0.035,
             tilt_gain: 0.03,
-            tilt_boost: 20.0,
+            tilt_boost: 7.0,
             heading_gain: 2e-4,
             heading_boost: 100.0,
-            lag: 3.0,
-            motion_tau: 30.0,
+            lag: 4.0,
+            motion_tau: 60.0,
             forgetting: 1e-4,
             trusted: 0.2,
         },

@@ -105,7 +105,7 @@ impl<C: Borrow<Config>> Dcm<C> {
         let ([x, y, z], k) = (*mean, inverse_sqrt(long));
         // beyond 90 degrees the sine shrinks again: any turn leads out
         let by = if z < 0.0 { [-y * k, x * k, 0.0] } else { [0.5, 0.0, 0.0] };
-        if !self.rest.now && !self.tilt.starting(config.tilt_tau) {
+        if !self.rest.now {
             self.bias.take_tilt(&config.bias, &by, dt);
         }
         self.turn_earth(&by);
