@@ -15,6 +15,15 @@ fn budget(filter: &str) -> f64 {
     line.split('=').nth(1).unwrap().trim().parse().unwrap()
 }
 
+/// Instructions until they sleep of the images in `QUADRIG_COST_IMAGES`.
+#[test]
+#[ignore = "a part of `cargo xtask ahrs-peers`, which names the images"]
+fn instructions_of_the_images_that_are_named() {
+    for name in std::env::var("QUADRIG_COST_IMAGES").unwrap().split(' ') {
+        println!("image {name} {}", instructions(name, 2000).unwrap_or_else(|error| panic!("{error}")));
+    }
+}
+
 #[test]
 fn an_update_keeps_its_budget() {
     let count = |name: &str| instructions(name, 400).unwrap_or_else(|error| panic!("{error}"));

@@ -30,11 +30,11 @@ const SRAM_BYTES: u64 = 128 * 1024;
 
 /// What an image takes of the chip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Size {
+pub(crate) struct Size {
     /// Code, constants and initial values.
-    flash: u64,
+    pub(crate) flash: u64,
     /// Static data, initialised or not, and buffers that are never initialised.
-    ram: u64,
+    pub(crate) ram: u64,
 }
 
 /// Builds, measures, and compares or blesses.
@@ -98,7 +98,7 @@ pub(crate) fn build(place: &Place) -> Result<(), Failure> {
     run(&mut command)
 }
 
-fn measure(path: &Path) -> Result<Size, Failure> {
+pub(crate) fn measure(path: &Path) -> Result<Size, Failure> {
     let bytes = std::fs::read(path).map_err(|error| Failure(format!("{}: {error}", path.display())))?;
     let size = size(&bytes).map_err(|error| Failure(format!("{}: {error}", path.display())))?;
     if size.flash == 0 {

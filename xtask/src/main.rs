@@ -14,6 +14,7 @@ mod ahrs_bench;
 mod callgraph;
 mod emulator;
 mod image;
+mod peers;
 mod place;
 mod run;
 mod setup;
@@ -33,6 +34,8 @@ usage: cargo xtask COMMAND
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
   ahrs-bench       the attitude filter on the shared BROAD trials and their stress variants, with its targets
   ahrs-bench --plots DIR  the error over time in each trial, as a page and figures
+  ahrs-bench --vqf  VQF's Rust port on every variant, those included of which nothing is published (fetches it once)
+  ahrs-peers       instructions, flash and RAM of other attitude filters beside ours (fetches them once)
   ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)
   test             everything: format, lints, images, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
@@ -57,6 +60,8 @@ fn main() -> ExitCode {
             let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "blind", "--"];
             run::run(&mut run::cargo(&place, &[&head, rest].concat()))
         }
+        ["ahrs-bench", "--vqf"] => peers::vqf(&place),
+        ["ahrs-peers"] => peers::peers(&place),
         ["ahrs-bench", rest @ ..] => ahrs_bench::bench(&place, rest),
         ["ahrs-causes", rest @ ..] => {
             let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "causes", "--"];
