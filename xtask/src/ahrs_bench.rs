@@ -55,10 +55,8 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
                 println!("    {:<48} {:>6.2} {:>6.2} {:>6.2}", t.name, s.total, s.heading, s.inclination);
             }
         }
-        if variant == Variant::Base {
-            if mine.total > TOTAL || mine.inclination > INCLINATION {
-                missed.push(format!("base: {:.3} and {:.3}, targets {TOTAL} and {INCLINATION}", mine.total, mine.inclination));
-            }
+        if variant == Variant::Base && (mine.total > TOTAL || mine.inclination > INCLINATION) {
+            missed.push(format!("base: {:.3} and {:.3}, targets {TOTAL} and {INCLINATION}", mine.total, mine.inclination));
         }
         // no comparison holds where nothing is published
         let worse = mine.total > theirs.total || mine.heading > theirs.heading || mine.inclination > theirs.inclination;
