@@ -12,7 +12,7 @@ use frame::wire::Decoder;
 use frame::{ImuSample, Message};
 use hal_sim::Scenario;
 use hal_sim::emulated::ahrs::{AhrsRun, ahrs_with};
-use hal_sim::imu::{BusFault, Errors, Motion};
+use hal_sim::imu::{BusFault, Errors, Hidden, ImuEffectKind, ImuScheduled, Motion};
 use hal_sim::native::ahrs::{ImuRig, ImuRun, run_at};
 use quadrig_tests::budget::judge_tick;
 use std::path::Path;
@@ -32,7 +32,7 @@ fn rig(fault: BusFault) -> ImuRig {
 }
 
 fn image(rig: &ImuRig, milliseconds: u64) -> (AhrsRun, Vec<ImuSample>) {
-    let run = ahrs_with(rig.motion, &rig.fitted, &rig.errors, rig.fault, milliseconds).unwrap_or_else(|e| panic!("{e}"));
+    let run = ahrs_with(rig, milliseconds).unwrap_or_else(|e| panic!("{e}"));
     run.outcome.accesses.only(&[]).unwrap();
     let mut decoder = Decoder::default();
     let messages = run.outcome.telemetry.iter().filter_map(|b| decoder.push::<Message>(*b)).map(|r| r.message);
@@ -110,6 +110,35 @@ fn the_native_bus_gives_what_the_emulated_one_gives() {
     let (before, after) = (worst(0, first), worst(first, samples.len()));
     println!("attitudes apart by {before:.6} deg at most before the first word differs (sample {first}), {after:.6} after it");
     assert!(before < 0.001 && after < 0.05, "{before} {after}");
+}
+
+/// What is hidden about the sensors acts on both boards, word by word.
+#[test]
+fn hidden_effects_are_the_same_on_both() {
+    let plain = image(&rig(BusFault::None), 1000).1;
+    let mut acted = Vec::new();
+    for id in ImuEffectKind::IDS {
+        let effect = ImuEffectKind::draw(id, 5, 1.0).expect("an effect");
+        let hidden = Hidden::new(&[ImuScheduled { from_s: None, until_s: None, effect }]);
+        let rig = ImuRig { hidden, ..rig(BusFault::None) };
+        let (run, samples) = image(&rig, 1000);
+        let native = native(&rig, &samples, &run);
+        let words = |s: &ImuSample| [s.gyro, s.accel, s.mag, [s.temperature; 3]].into_iter().flatten();
+        let pairs = || samples.iter().zip(&native.samples).flat_map(|(a, b)| words(a).zip(words(b)));
+        let equal = pairs().filter(|(a, b)| a == b).count();
+        let worst = pairs().map(|(a, b)| a.abs_diff(b)).max().expect("words");
+        let moved = samples.iter().zip(&plain).filter(|(a, b)| words(a).ne(words(b))).count();
+        println!(
+            "{id}: {equal} of {} words bit-equal, {worst} LSB apart at most; {moved} samples changed by it",
+            pairs().count()
+        );
+        assert!(worst <= 1 && equal * 100 >= pairs().count() * 97, "{id}");
+        if moved > 0 {
+            acted.push(*id);
+        }
+    }
+    // some begin later than the run ends
+    assert!(acted.len() * 3 >= ImuEffectKind::IDS.len() * 2, "{acted:?}");
 }
 
 /// A scenario file's bus faults reach both boards, and both tell the same of them.

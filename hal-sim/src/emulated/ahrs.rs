@@ -8,6 +8,7 @@
 
 use super::machine::{EmulatedError, Machine, Outcome, Pins, Port, World, firmware, run};
 pub use crate::imu::{BusFault, ChipKind, Errors, Motion, SensorChip, Served};
+use crate::native::ahrs::ImuRig;
 use rigless::{
     chip::{Timeline, i2c},
     snapshot::Store,
@@ -160,22 +161,15 @@ pub struct AhrsRun {
 /// # Errors
 /// [`EmulatedError`] when there is no image or the emulator gives up.
 pub fn ahrs(motion: Motion, fitted: &[ChipKind], fault: BusFault, milliseconds: u64) -> Result<AhrsRun, EmulatedError> {
-    ahrs_with(motion, fitted, &Errors::default(), fault, milliseconds)
+    ahrs_with(&ImuRig { motion, fitted: fitted.to_vec(), fault, ..ImuRig::default() }, milliseconds)
 }
 
-/// The same with chips that have errors.
+/// Runs the IMU image on everything that the native run is given: chips with errors, hidden effects, bus faults.
 ///
 /// # Errors
 /// [`EmulatedError`] when there is no image or the emulator gives up.
-pub fn ahrs_with(
-    motion: Motion,
-    fitted: &[ChipKind],
-    errors: &Errors,
-    fault: BusFault,
-    milliseconds: u64,
-) -> Result<AhrsRun, EmulatedError> {
-    let world = ImuWorld { fault, ..ImuWorld::default() };
-    ahrs_in(world, motion, fitted, errors, milliseconds)
+pub fn ahrs_with(rig: &ImuRig, milliseconds: u64) -> Result<AhrsRun, EmulatedError> {
+    ahrs_in(ImuWorld { fault: rig.fault, ..ImuWorld::default() }, rig, milliseconds)
 }
 
 /// Runs the image on a body that moves as `motion`, with a `script` of what is done to the board, by ms since power-up.
@@ -190,25 +184,20 @@ pub fn ahrs_by_script(
     milliseconds: u64,
 ) -> Result<AhrsRun, EmulatedError> {
     let script = script.iter().map(|(ms, act)| (ms * 1_000_000, act.clone())).collect();
-    ahrs_in(ImuWorld { script, ..ImuWorld::default() }, motion, fitted, errors, milliseconds)
+    let rig = ImuRig { motion, fitted: fitted.to_vec(), errors: *errors, ..ImuRig::default() };
+    ahrs_in(ImuWorld { script, ..ImuWorld::default() }, &rig, milliseconds)
 }
 
-fn ahrs_in(
-    world: ImuWorld,
-    motion: Motion,
-    fitted: &[ChipKind],
-    errors: &Errors,
-    milliseconds: u64,
-) -> Result<AhrsRun, EmulatedError> {
+fn ahrs_in(world: ImuWorld, rig: &ImuRig, milliseconds: u64) -> Result<AhrsRun, EmulatedError> {
     let elf = firmware("firmware-ahrs")?;
     let mut machine = Machine::new()?;
-    for kind in fitted {
-        machine.mcu.i2c1.inner.attach(Peer(SensorChip::new(*kind, motion, errors)));
+    for kind in &rig.fitted {
+        machine.mcu.i2c1.inner.attach(Peer(SensorChip::new(*kind, rig.motion, &rig.errors).with(&rig.hidden)));
     }
     let (outcome, mut machine) = run(&elf, machine, world, milliseconds * 1_000_000)?;
     let mut unfinished = 0;
     let mut record = |kind: ChipKind| {
-        let place = fitted.iter().position(|f| *f == kind);
+        let place = rig.fitted.iter().position(|f| *f == kind);
         let chip = place.and_then(|n| machine.mcu.i2c1.inner.chip_mut::<Peer>(n));
         chip.map_or_else(Vec::new, |chip| {
             unfinished += chip.0.unfinished;
