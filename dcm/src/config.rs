@@ -3,8 +3,8 @@
 //! What it is: time constants, thresholds and ranges, each with its unit and, where it is a filter, its cut-off.
 //! What can go wrong: constants per sample would change their meaning with the sample rate; these are all in seconds.
 //! Units: s, rad, rad/s, m/s^2, uT.
-//! Reference: chosen on half of the shared BROAD trials, reported on the other half (`docs/ahrs.md`); the thresholds of rest
-//! and of the field are those of Laidig & Seel 2023.
+//! Reference: what half of the shared BROAD trials picks, reported on the other half (`docs/ahrs-constants.md`); the thresholds of
+//! rest and of the field are those of Laidig & Seel 2023.
 
 use crate::STANDARD_GRAVITY;
 use core::borrow::Borrow;
@@ -56,6 +56,8 @@ pub struct BiasConfig {
 /// When the field is believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldConfig {
+    /// Time over which fields are summed in earth axes before their average is used, s.
+    pub window: f32,
     /// Smoothing of norm and dip, s.
     pub smoothing: f32,
     /// Largest deviation of the norm, as a share of the reference.
@@ -99,6 +101,8 @@ pub struct IronConfig {
 pub struct Config {
     /// Averaging of the specific force in the earth frame, s; second order, cut-off sqrt(2)/(2 pi tau) = 0.09 Hz.
     pub tilt_tau: f32,
+    /// Time over which the specific force is summed in earth axes before it is used, s (five readings of 200 Hz, one of 48).
+    pub tilt_window: f32,
     /// Averaging of the heading, s; first order, cut-off 1/(2 pi tau) = 0.013 Hz.
     pub heading_tau: f32,
     /// Rest.
@@ -123,6 +127,7 @@ impl Config {
     /// The one default, for every sensor and motion.
     pub const DEFAULT: Self = Self {
         tilt_tau: 2.5,
+        tilt_window: 0.0205,
         heading_tau: 12.0,
         rest: RestConfig { filter_tau: 0.5, time: 1.5, rate: 2.0 * DEGREE, force: 0.5, known_rate: 2.0 * DEGREE },
         bias: BiasConfig {
@@ -138,6 +143,7 @@ impl Config {
             trusted: 0.2,
         },
         field: FieldConfig {
+            window: 0.035,
             smoothing: 0.05,
             norm: 0.1,
             dip: 10.0 * DEGREE,

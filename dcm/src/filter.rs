@@ -31,7 +31,6 @@ use crate::{Mat3, STANDARD_GRAVITY, Vec3};
 use bias::Bias;
 use core::borrow::Borrow;
 use field::Field;
-use heading::ENOUGH_MAG;
 use iron::Iron;
 use lowpass::LowPass;
 use rest::Rest;
@@ -109,7 +108,7 @@ impl<C: Borrow<Config>> Dcm<C> {
         if let Some(force) = column(&measured.accel) {
             self.accel(force, &mut step);
         }
-        let mut due = self.since_mag > ENOUGH_MAG;
+        let mut due = self.since_mag > self.config.borrow().field.window;
         if let Some(field) = column(&measured.mag) {
             due |= self.mag(field, &mut step);
         }

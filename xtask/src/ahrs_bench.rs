@@ -6,14 +6,16 @@
 //! Units: degrees.
 //! Reference: specification `ahrs.md`; README of the data; `docs/ahrs.md`.
 
+mod constants;
 mod plots;
+mod scan;
 pub(crate) mod score;
 pub(crate) mod trial;
 pub(crate) mod variant;
 
 use crate::place::Place;
 use crate::run::Failure;
-use dcm::{BiasConfig, Classic, ClassicConfig, Config, Dcm, FieldConfig, IronConfig};
+use dcm::{Classic, ClassicConfig, Config, Dcm};
 use score::{Score, run};
 use trial::Trial;
 use variant::Variant;
@@ -28,7 +30,7 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
     let folder = place.data().join("ahrs");
     let trials = trial::trials(&folder.join("broad"))?;
     if let ["--scan"] = words {
-        return scan(&trials);
+        return scan::scan(&trials);
     }
     if let ["--plots", target] = words {
         return plots::plots(std::path::Path::new(target), &trials);
@@ -77,52 +79,4 @@ fn scores(trials: &[Trial], variant: Variant, new: impl Fn() -> Box<dyn score::F
         let handles: Vec<_> = trials.iter().map(|t| scope.spawn(|| run(new().as_mut(), &variant.of(t), |_| {}))).collect();
         handles.into_iter().filter_map(|h| h.join().ok()).collect()
     })
-}
-
-/// Every constant once lower and once higher: total and inclination of half A / half B. Constants are chosen on half A.
-fn scan(trials: &[Trial]) -> Result<(), Failure> {
-    let base = Config::DEFAULT;
-    let mut list: Vec<(String, Config)> = vec![("default".into(), base)];
-    for z in [2.0, 3.0] {
-        list.push((format!("tilt_tau {z} s"), Config { tilt_tau: z, ..base }));
-    }
-    for z in [9.0, 16.0] {
-        list.push((format!("heading_tau {z} s"), Config { heading_tau: z, ..base }));
-    }
-    for z in [0.0, 0.01, 0.1] {
-        list.push((format!("tilt_gain {z} 1/s"), Config { bias: BiasConfig { tilt_gain: z, ..base.bias }, ..base }));
-    }
-    for z in [4.0, 10.0, 20.0] {
-        list.push((format!("tilt_boost {z}"), Config { bias: BiasConfig { tilt_boost: z, ..base.bias }, ..base }));
-    }
-    for z in [3.0, 5.0] {
-        list.push((format!("lag {z} s"), Config { bias: BiasConfig { lag: z, ..base.bias }, ..base }));
-    }
-    for z in [30.0, 100.0] {
-        list.push((format!("motion_tau {z} s"), Config { bias: BiasConfig { motion_tau: z, ..base.bias }, ..base }));
-    }
-    for z in [0.0, 1e-4, 4e-4] {
-        list.push((format!("heading_gain {z} 1/s2"), Config { bias: BiasConfig { heading_gain: z, ..base.bias }, ..base }));
-    }
-    for z in [7.0f32, 15.0] {
-        list.push((format!("dip {z} deg"), Config { field: FieldConfig { dip: z.to_radians(), ..base.field }, ..base }));
-    }
-    for z in [0.07, 0.15] {
-        list.push((format!("norm {z}"), Config { field: FieldConfig { norm: z, ..base.field }, ..base }));
-    }
-    for z in [3.0, 8.0, 1000.0] {
-        list.push((format!("dead_zone {z} uT"), Config { iron: IronConfig { dead_zone: z, ..base.iron }, ..base }));
-    }
-    for (name, config) in list {
-        print!("{name:<24}");
-        for variant in [Variant::Base, Variant::Cold, Variant::Hardware] {
-            let s = scores(trials, variant, || Box::new(Dcm::new(config)));
-            let half = |k: usize| Score::mean(s.iter().skip(k).step_by(2));
-            let (a, b) = (half(0), half(1));
-            let name = variant.name();
-            print!("  {name} {:.2}/{:.2} {:.2}/{:.2}", a.total, b.total, a.inclination, b.inclination);
-        }
-        println!();
-    }
-    Ok(())
 }

@@ -34,6 +34,7 @@ usage: cargo xtask COMMAND
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
   ahrs-bench       the attitude filter on the shared BROAD trials and their stress variants, with its targets
   ahrs-bench --plots DIR  the error over time in each trial, as a page and figures
+  ahrs-bench --scan  what half of the trials says of each constant of the default (docs/ahrs-constants.md)
   ahrs-bench --vqf  VQF's Rust port on every variant, those included of which nothing is published (fetches it once)
   ahrs-peers       instructions, flash and RAM of other attitude filters beside ours (fetches them once)
   ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)

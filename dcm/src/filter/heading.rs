@@ -15,8 +15,6 @@ use crate::measurement::Step;
 use crate::trig::{angle, root};
 use core::borrow::Borrow;
 
-/// Time over which fields are summed in earth axes before their average is used, s.
-pub(super) const ENOUGH_MAG: f32 = 0.035;
 /// Horizontal part of the field below which it has no heading, as a share of the whole.
 const LEAST_LEVEL: f32 = 0.02;
 

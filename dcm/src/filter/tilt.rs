@@ -15,9 +15,6 @@ use crate::measurement::Step;
 use crate::rotation::{exponential, inverse_sqrt, orthonormalise};
 use core::borrow::Borrow;
 
-/// Time over which the specific force is summed in earth axes before it is used, s (five readings of 200 Hz, one of 48): its average
-/// is one of seconds.
-const ENOUGH: f32 = 0.0205;
 /// Weight of the turn of the axis between two steps (Savage 1998, Eq. 47, one sample before).
 const CONING: f32 = 1.0 / 12.0;
 /// Largest turn in one step that the increment can express, rad. (2000 deg/s at 48 Hz is 0.73.)
@@ -75,7 +72,7 @@ impl<C: Borrow<Config>> Dcm<C> {
         turn(&self.matrix.data.0, core::slice::from_mut(&mut up));
         self.sum = plus(&self.sum, &up, dt);
         self.summed += dt;
-        if self.summed >= ENOUGH {
+        if self.summed >= self.config.borrow().tilt_window {
             self.level(force, step);
         }
     }
