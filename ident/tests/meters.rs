@@ -188,3 +188,24 @@ fn what_nothing_explains_comes_with_what_is_nearest() {
     let all: f64 = others.iter().map(|a| a.probability).sum::<f64>() + closed.verdict.effects[0].probability;
     assert!(all < 1.0 + 1e-9, "{all}");
 }
+
+#[test]
+fn the_interval_of_held_values_is_known_to_the_clock_of_their_updates_although_rows_are_missing() {
+    let c = Command::new(14);
+    let period = 0.0813;
+    let mut log = log(&c, [&|t| c.speed(t), &|t| thrust(c.speed(t)), &|t| torque(c.speed(t)), &|t| current(c.speed(t))], NOISE);
+    let mut chance = Chance::new(15);
+    let readings = &mut log.columns.iter_mut().find(|c| c.name == "current_a").expect("a current").values;
+    let (mut due, mut held) = (0.0, 0.0);
+    for (i, reading) in readings.iter_mut().enumerate() {
+        let t = STEP * i as f64;
+        if t >= due {
+            held = *reading;
+            due = ((t / period).floor() + 1.0) * period;
+        }
+        *reading = if chance.uniform() < 0.06 { f64::NAN } else { held };
+    }
+    let closed = verdict(&log);
+    assert_eq!(names(&closed), ["sample_hold"], "{:?}", closed.verdict.alternatives);
+    close_to(&closed, "period", period, 3e-5);
+}

@@ -117,45 +117,84 @@ fn period(context: &Context, target: &Target) -> Option<(f64, f64)> {
     (even && mean > 1.4 * dt).then(|| slope(context, &rows, &live, mean))
 }
 
-/// Interval of updates that come at a rate of their own and show on the next row: slope of their times over their count, the
-/// count being the rounded number of intervals since the last one.
+/// Updates whose times are first asked for their rate.
+const FIRST_LOOK: f64 = 100.0;
+
+/// Share by which the mean of the single intervals may be wrong: rows that are missing make some of them longer.
+const ROUGH: f64 = 0.03;
+
+/// Standard deviation, in rows, of what is left of the updates' times about even intervals beyond which their clock has stopped
+/// in between. Updates that show on the next row leave 0.29.
+const EVEN: f64 = 0.6;
+
+/// Interval of updates that come at a rate of their own and show on the next row, and its standard error, s: slope of their times
+/// over their count. The count needs the rate to a part in the number of updates: the frequency at which their times have most of
+/// one phase, over a span that doubles.
 fn slope(context: &Context, rows: &[usize], live: &dyn Fn(usize) -> bool, first: f64) -> (f64, f64) {
     let dt = context.step();
-    let mut period = first;
-    let mut se = first;
-    for _ in 0..4 {
-        // each stretch without a stand-still is a line of its own, all with one slope
-        let (mut count, mut n) = (0.0, 0.0);
-        let (mut line, mut kk, mut kt): (Vec<(f64, f64)>, f64, f64) = (Vec::new(), 0.0, 0.0);
-        let mut close = |line: &mut Vec<(f64, f64)>| {
-            let m = line.len() as f64;
-            let (k, t) = (line.iter().map(|p| p.0).sum::<f64>() / m, line.iter().map(|p| p.1).sum::<f64>() / m);
-            kk += line.iter().map(|p| (p.0 - k).powi(2)).sum::<f64>();
-            kt += line.iter().map(|p| (p.0 - k) * (p.1 - t)).sum::<f64>();
-            n += m;
-            line.clear();
-        };
-        for w in rows.windows(2) {
-            let gap = context.t[w[1]] - context.t[w[0]];
-            if !live(w[0]) || !live(w[1]) || gap > 6.0 * first {
-                if line.len() > 4 {
-                    close(&mut line);
-                } else {
-                    line.clear();
-                }
-                continue;
-            }
-            count += (gap / period).round().max(1.0);
-            line.push((count, context.t[w[1]]));
-        }
-        if line.len() > 4 {
-            close(&mut line);
-        }
-        if kk <= 0.0 {
+    let times: Vec<f64> = rows.iter().filter(|r| live(**r)).map(|r| context.t[*r]).collect();
+    let guess = (first, first / (times.len().max(1) as f64).sqrt());
+    let (Some(&from), Some(&to)) = (times.first(), times.last()) else { return guess };
+    let (mut rate, mut reach, mut span) = (1.0 / first, ROUGH / first, FIRST_LOOK * first);
+    loop {
+        let known = &times[..times.partition_point(|t| *t - from <= span)];
+        let step = 0.2 / span.min(to - from);
+        rate = most_of_one_phase(known, rate, reach, step);
+        reach = 2.0 * step;
+        if span >= to - from {
             break;
         }
-        // and a count may have slipped by one
-        (period, se) = (kt / kk, (dt / (12.0 * kk).sqrt()).hypot(kt / kk / n.max(1.0)));
+        span *= 2.0;
     }
-    (period, se)
+    let (late, _) = phase(&times, rate);
+    let count = |t: f64| (t * rate - late).round();
+    match Line::through(times.iter().map(|t| (count(*t), *t))) {
+        // the next row is up to one row late, at both ends
+        Some(line) if line.scatter < EVEN * dt => (line.slope, dt * (0.5 / line.longest).max(1.0 / (12.0 * line.squares).sqrt())),
+        _ => guess,
+    }
+}
+
+/// Phase of times at a rate, in turns, and the length of their mean on the circle.
+fn phase(times: &[f64], rate: f64) -> (f64, f64) {
+    let turn = |t: &f64| (std::f64::consts::TAU * (t * rate).fract()).sin_cos();
+    let (s, c) = times.iter().map(turn).fold((0.0, 0.0), |sum, v| (sum.0 + v.0, sum.1 + v.1));
+    (s.atan2(c) / std::f64::consts::TAU, s.hypot(c) / times.len().max(1) as f64)
+}
+
+/// The rate within `reach` at which times have most of one phase. Rows at even intervals mirror a rate about half of their own:
+/// of the two the nearer one counts.
+fn most_of_one_phase(times: &[f64], rate: f64, reach: f64, step: f64) -> f64 {
+    let steps = (reach / step).ceil() as i32;
+    let of = |k: i32| rate + f64::from(k) * step;
+    let score = |k: i32| phase(times, of(k)).1 * (1.0 - 0.05 * f64::from(k.abs()) / f64::from(steps.max(1)));
+    (-steps..=steps).max_by(|a, b| score(*a).total_cmp(&score(*b))).map_or(rate, of)
+}
+
+/// A straight line through times over their counts.
+struct Line {
+    slope: f64,
+    /// Sum of the squared counts about their mean.
+    squares: f64,
+    /// Largest difference of two counts.
+    longest: f64,
+    /// Standard deviation of the times about the line, s.
+    scatter: f64,
+}
+
+impl Line {
+    fn through(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Self> {
+        let n = points.clone().count() as f64;
+        let (k, t) = points.clone().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / n, sum.1 + p.1 / n));
+        let squares: f64 = points.clone().map(|p| (p.0 - k).powi(2)).sum();
+        if squares <= 0.0 {
+            return None;
+        }
+        let slope = points.clone().map(|p| (p.0 - k) * (p.1 - t)).sum::<f64>() / squares;
+        let start = t - slope * k;
+        let left: f64 = points.clone().map(|p| (p.1 - start - slope * p.0).powi(2)).sum();
+        let counts = points.map(|p| p.0);
+        let (least, most) = counts.fold((f64::INFINITY, f64::NEG_INFINITY), |m, k| (m.0.min(k), m.1.max(k)));
+        Some(Self { slope, squares, longest: most - least, scatter: (left / n).sqrt() })
+    }
 }
