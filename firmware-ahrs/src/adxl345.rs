@@ -70,19 +70,23 @@ pub fn saturated(words: &[i16; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
+    use crate::failing_bus::fails_at_every_step;
     use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
     extern crate std;
     use std::vec;
 
-    #[test]
-    fn configures_when_the_identity_is_right_and_measures_last() {
-        let mut bus = Mock::new(&[
+    fn configuration() -> std::vec::Vec<Transaction> {
+        vec![
             Transaction::write_read(0x53, vec![0x00], vec![0xE5]),
             Transaction::write(0x53, vec![0x2C, 0x0C]),
             Transaction::write(0x53, vec![0x31, 0x0B]),
             Transaction::write(0x53, vec![0x2D, 0x08]),
-        ]);
+        ]
+    }
+
+    #[test]
+    fn configures_when_the_identity_is_right_and_measures_last() {
+        let mut bus = Mock::new(&configuration());
         assert_eq!(configure(&mut bus), Ok(()));
         bus.done();
     }
@@ -110,14 +114,8 @@ mod tests {
     }
 
     #[test]
-    fn a_nack_is_reported() {
-        let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
-        let mut bus = Mock::new(&[
-            Transaction::write_read(0x53, vec![0x00], vec![0]).with_error(nack),
-            Transaction::write_read(0x53, vec![0x32], vec![0; 6]).with_error(nack),
-        ]);
-        assert_eq!(configure(&mut bus), Err(SensorError::Bus(nack)));
-        assert_eq!(read(&mut bus), Err(SensorError::Bus(nack)));
-        bus.done();
+    fn a_silent_or_stuck_bus_is_an_error_at_every_step() {
+        let burst = Transaction::write_read(0x53, vec![0x32], vec![0; 6]);
+        fails_at_every_step(&configuration(), &burst, configure, read);
     }
 }

@@ -1,6 +1,6 @@
 //! What a sensor driver reports.
 //!
-//! What it is: one error type for the three drivers, generic over the bus error.
+//! What it is: one error type for the four drivers, generic over the bus error.
 //! What can go wrong: nothing here; the variants name it.
 //! Units: register values as read.
 //! Reference: identities in the data sheets named in each driver.

@@ -74,19 +74,23 @@ pub fn overflowed(words: &[i16; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
+    use crate::failing_bus::fails_at_every_step;
     use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
     extern crate std;
     use std::vec;
 
-    #[test]
-    fn configures_when_the_identity_is_right() {
-        let mut bus = Mock::new(&[
+    fn configuration() -> std::vec::Vec<Transaction> {
+        vec![
             Transaction::write_read(0x1E, vec![0x0A], vec![0x48, 0x34, 0x33]),
             Transaction::write(0x1E, vec![0x00, 0x18]),
             Transaction::write(0x1E, vec![0x01, 0x20]),
             Transaction::write(0x1E, vec![0x02, 0x00]),
-        ]);
+        ]
+    }
+
+    #[test]
+    fn configures_when_the_identity_is_right() {
+        let mut bus = Mock::new(&configuration());
         assert_eq!(configure(&mut bus), Ok(()));
         bus.done();
     }
@@ -114,14 +118,8 @@ mod tests {
     }
 
     #[test]
-    fn a_nack_is_reported() {
-        let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
-        let mut bus = Mock::new(&[
-            Transaction::write_read(0x1E, vec![0x0A], vec![0; 3]).with_error(nack),
-            Transaction::write_read(0x1E, vec![0x03], vec![0; 6]).with_error(nack),
-        ]);
-        assert_eq!(configure(&mut bus), Err(SensorError::Bus(nack)));
-        assert_eq!(read(&mut bus), Err(SensorError::Bus(nack)));
-        bus.done();
+    fn a_silent_or_stuck_bus_is_an_error_at_every_step() {
+        let burst = Transaction::write_read(0x1E, vec![0x03], vec![0; 6]);
+        fails_at_every_step(&configuration(), &burst, configure, read);
     }
 }

@@ -86,7 +86,7 @@ pub fn read<B: I2c>(bus: &mut B) -> Result<GyroReading, SensorError<B::Error>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
+    use crate::failing_bus::fails_at_every_step;
     use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
     extern crate std;
     use std::vec;
@@ -138,16 +138,8 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_bus_is_an_error_at_every_step() {
-        let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
-        for step in 0..4 {
-            let mut script = configuration(0x68);
-            script.truncate(step + 1);
-            let last = script.pop().unwrap().with_error(nack);
-            script.push(last);
-            let mut bus = Mock::new(&script);
-            assert_eq!(configure(&mut bus), Err(SensorError::Bus(nack)), "step {step}");
-            bus.done();
-        }
+    fn a_silent_or_stuck_bus_is_an_error_at_every_step() {
+        let burst = Transaction::write_read(0x68, vec![0x1B], vec![0; 8]);
+        fails_at_every_step(&configuration(0x68), &burst, configure, read);
     }
 }

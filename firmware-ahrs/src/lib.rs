@@ -19,6 +19,8 @@ pub mod ahrs;
 pub mod calibrator;
 pub mod console;
 pub mod error;
+#[cfg(test)]
+mod failing_bus;
 pub mod hmc5883l;
 pub mod itg3200;
 pub mod job;

@@ -102,7 +102,7 @@ pub fn saturated(words: &[i16; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
+    use crate::failing_bus::fails_at_every_step;
     use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
     use embedded_hal_mock::eh1::spi::{Mock as SpiMock, Transaction as Spi};
     extern crate std;
@@ -164,19 +164,7 @@ mod tests {
 
     #[test]
     fn a_silent_or_stuck_bus_is_an_error_at_every_step() {
-        for kind in [ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address), ErrorKind::Bus] {
-            for step in 0..3 {
-                let mut script = configuration(0x33);
-                script.truncate(step + 1);
-                let last = script.pop().unwrap().with_error(kind);
-                script.push(last);
-                let mut bus = Mock::new(&script);
-                assert_eq!(configure(&mut bus), Err(SensorError::Bus(kind)), "step {step}");
-                bus.done();
-            }
-            let mut bus = Mock::new(&[Transaction::write_read(0x18, vec![0xA8], vec![0; 6]).with_error(kind)]);
-            assert_eq!(read(&mut bus), Err(SensorError::Bus(kind)));
-            bus.done();
-        }
+        let burst = Transaction::write_read(0x18, vec![0xA8], vec![0; 6]);
+        fails_at_every_step(&configuration(0x33), &burst, configure, read);
     }
 }
