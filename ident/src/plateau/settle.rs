@@ -67,7 +67,7 @@ fn last_visible(off: &[f64], spread: f64) -> usize {
 fn approach(t: &[f64], off: &[f64], spread: f64, visible: usize) -> Option<(f64, f64)> {
     let n = off.len();
     let step = (t[n - 1] - t[0]) / (n - 1) as f64;
-    let window = (3 * visible).clamp(12, n);
+    let window = (3 * visible).max(12).min(n);
     let mut best: Option<(f64, f64, f64, f64)> = None;
     for k in 0..24 {
         let tau = step * 0.3 * (0.25 * n as f64 / 0.3).powf(f64::from(k) / 23.0);
@@ -91,6 +91,13 @@ fn approach(t: &[f64], off: &[f64], spread: f64, visible: usize) -> Option<(f64,
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stretch_of_ten_rows_has_an_approach_too() {
+        let t: Vec<f64> = (0..10).map(f64::from).collect();
+        let at: Vec<f64> = t.iter().map(|t| 3000.0 - 300.0 * (-t / 0.5).exp() + 0.1 * (t * 2.39).sin()).collect();
+        assert!((2..=6).contains(&rows(&t, &at, 0, 10)), "{}", rows(&t, &at, 0, 10));
+    }
 
     #[test]
     fn a_slow_step_takes_longer_and_a_noisy_level_is_no_step() {

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated] [--failures] [--table] | blind --dump SEED DIR | blind --plan N";
+const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated] [--failures] [--table] | blind --dump SEED DIR [--simulated] | blind --plan N";
 
 struct Options {
     runs: usize,
@@ -51,8 +51,13 @@ fn main() -> ExitCode {
 fn command(words: &[String]) -> Result<(), String> {
     match words.first().map(String::as_str) {
         Some("--dump") => {
-            let [_, seed, folder] = words else { return Err(USAGE.into()) };
-            dump(seed.parse().map_err(|_| USAGE)?, &PathBuf::from(folder)).map_err(|e| e.to_string())
+            let [_, seed, folder, rest @ ..] = words else { return Err(USAGE.into()) };
+            let (seed, folder) = (seed.parse().map_err(|_| USAGE)?, PathBuf::from(folder));
+            match rest {
+                [] => dump(seed, &folder).map_err(|e| e.to_string()),
+                [flag] if flag == "--simulated" => simulated::dump(seed, &folder),
+                _ => Err(USAGE.into()),
+            }
         }
         Some("--plan") => {
             for seed in 0..words.get(1).and_then(|n| n.parse().ok()).ok_or(USAGE)? {

@@ -74,6 +74,26 @@ fn fly(rig: &Scenario, folder: &Path, name: &str) -> Result<Log, String> {
     Log::parse(name, &bytes[..]).map_err(|e| e.to_string())
 }
 
+/// What a seed flies: the rig on an earlier day, the run in question, and that run without the effect.
+fn flights(seed: u64) -> [(Scenario, &'static str); 3] {
+    let first = healthy(seed);
+    let twin = Scenario { seed: seed.wrapping_add(7_919), ..first.clone() };
+    let mut second = twin.clone();
+    if let Some(entry) = hidden(seed).and_then(effect::find) {
+        second.effects.push(entry.draw(seed, second.run_s()).into());
+    }
+    [(first, "healthy"), (second, "run"), (twin, "twin")]
+}
+
+/// Writes scenarios and logs of a seed into a folder.
+///
+/// # Errors
+/// What the simulator refused.
+pub fn dump(seed: u64, folder: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    flights(seed).iter().try_for_each(|(rig, name)| fly(rig, folder, name).map(|_| ()))
+}
+
 /// Runs the tool on a seed.
 ///
 /// # Panics
@@ -81,12 +101,8 @@ fn fly(rig: &Scenario, folder: &Path, name: &str) -> Result<Log, String> {
 #[must_use]
 pub fn score(seed: u64) -> Line {
     let id = hidden(seed);
-    let first = healthy(seed);
-    let twin = Scenario { seed: seed.wrapping_add(7_919), ..first.clone() };
-    let mut second = twin.clone();
-    if let Some(entry) = id.and_then(effect::find) {
-        second.effects.push(entry.draw(seed, second.run_s()).into());
-    }
+    let flights = flights(seed);
+    let first = &flights[0].0;
     let kind = match id {
         None => "clean",
         Some(id) if UNKNOWN.contains(&id) => "unknown",
@@ -106,7 +122,7 @@ pub fn score(seed: u64) -> Line {
         ..Line::empty()
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let logs = [(&first, "healthy"), (&second, "run"), (&twin, "twin")].map(|(rig, name)| fly(rig, folder.path(), name));
+    let logs = flights.each_ref().map(|(rig, name)| fly(rig, folder.path(), name));
     let [before, log, twin] = match logs {
         [Ok(a), Ok(b), Ok(c)] => [a, b, c],
         [Err(why), ..] | [_, Err(why), _] | [.., Err(why)] => {
