@@ -6,6 +6,7 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use crate::context::{Context, Relation};
+use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// What a column's coefficient means.
@@ -119,6 +120,13 @@ impl TargetDesign {
             *o += f;
         }
         out
+    }
+
+    /// Variance of the prediction of a row, from the covariance of the coefficients.
+    #[must_use]
+    pub fn variance(&self, covariance: &DMatrix<f64>, row: usize) -> f64 {
+        let values = || self.columns.iter().map(|c| c.values[row]).enumerate();
+        values().map(|(i, x)| values().map(|(j, y)| x * covariance[(i, j)] * y).sum::<f64>()).sum::<f64>().max(0.0)
     }
 }
 

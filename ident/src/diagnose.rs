@@ -10,7 +10,7 @@
 
 use crate::context::{Context, Relation};
 use crate::effects::{self, Effect, Instance, quantisation};
-use crate::heldout::{self, Held};
+use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
 use crate::opponent::{nameless, opponent};
 use crate::residual::whiteness;
@@ -380,20 +380,20 @@ fn choose(
     folds: &[Vec<bool>],
 ) -> Option<Chosen> {
     for (k, winner) in ranked.iter().enumerate().take_while(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
-        let (without, held) = heldout::errors_around_newest(context, declared, &winner.fit, folds, errors);
-        if !worth_a_name(context, winner, winner.evidence - best.evidence, &held, &without) {
+        let around = heldout::errors_around_newest(context, declared, &winner.fit, folds, errors);
+        if !worth_a_name(context, winner, winner.evidence - best.evidence, &around) {
             continue;
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
         let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL * probability);
         let named = best.fit.placed.len();
-        let small = largest_reduction(context, winner, &held, &without) < CLEAR_REDUCTION;
+        let small = largest_reduction(context, winner, &around.with, &around.without) < CLEAR_REDUCTION;
         // what an earlier effect's rough form leaves of itself looks like a further small one
         let beside = connected(&winner.fit.placed, named).len() > 1;
         if small && (beside || unclear && named > 0 || named >= EASILY_NAMED) {
             continue;
         }
-        return Some(Chosen { winner: winner.clone(), held, probability, rivals });
+        return Some(Chosen { winner: winner.clone(), held: around.with, probability, rivals });
     }
     None
 }
@@ -421,7 +421,7 @@ fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
 }
 
 /// The newest effect must remove some of the held-out error on one of its channels, and spoil none.
-pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, held: &[Held], before: &[Held]) -> bool {
+pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, around: &Around) -> bool {
     let Some(newest) = candidate.fit.placed.last() else { return false };
     let mut helps = false;
     // a resonance that one level alone has met is not predicted by the others: when that level is left out, the height of its
@@ -431,9 +431,9 @@ pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, 
         if !newest.instance.touches(target.name) {
             continue;
         }
-        let share = held[i].share_gone(&before[i]);
-        helps |= share > NEEDED_REDUCTION;
-        if share < -NEEDED_REDUCTION && !target.relation.is_evidence() && !certain {
+        helps |= around.with[i].share_gone(&around.without[i]) > NEEDED_REDUCTION;
+        let spoils = around.known_with[i].share_gone(&around.known_without[i]) < -NEEDED_REDUCTION;
+        if spoils && !target.relation.is_evidence() && !certain {
             return false;
         }
     }

@@ -5,7 +5,7 @@
 //! Units: the channel's.
 //! Reference: specification `formats.md` (`heldout_rms`); blocked cross-validation, Roberts et al. 2017, Ecography 40:913.
 
-use crate::context::Context;
+use crate::context::{Context, Target};
 use crate::hypothesis::{Declared, Designs, Fit, Placed, Rows, fit_target};
 use crate::search::{refine, refine_group};
 
@@ -81,9 +81,33 @@ pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec
         .collect()
 }
 
+/// What the newest effect does to the held-out errors, by target.
+#[derive(Debug, Clone)]
+pub struct Around {
+    /// Without it.
+    pub without: Vec<Held>,
+    /// With it.
+    pub with: Vec<Held>,
+    /// Without it, on the rows that the others say something about.
+    pub known_without: Vec<Held>,
+    /// With it, on the same rows.
+    pub known_with: Vec<Held>,
+}
+
+impl Around {
+    /// Where every row that was left out is known.
+    pub(crate) fn of(without: &[Held], with: &[Held]) -> Self {
+        let (without, with) = (without.to_vec(), with.to_vec());
+        Self { known_without: without.clone(), known_with: with.clone(), without, with }
+    }
+}
+
 /// What the newest effect does to the held-out errors: without it, and with it. The shapes of the other effects stay as all rows
 /// gave them, in both: an instant that lies in a fold is unknown to the rest, and what is guessed for it must not decide about
 /// the newcomer. Targets that the newcomer does not reach keep their `previous` error.
+///
+/// A row is known where the fold's prediction of it with the newcomer is itself surer than one reading is: a level that the rest of
+/// the run does not surround may speak for a newcomer, but not against it.
 #[must_use]
 pub fn errors_around_newest(
     context: &Context,
@@ -91,20 +115,41 @@ pub fn errors_around_newest(
     fit: &Fit,
     folds: &[Vec<bool>],
     previous: &[Held],
-) -> (Vec<Held>, Vec<Held>) {
-    let Some((newest, others)) = fit.placed.split_last() else { return (previous.to_vec(), previous.to_vec()) };
-    let moved: Vec<bool> = context.targets.iter().map(|t| newest.instance.touches(t.name)).collect();
-    let or_previous =
-        |found: Vec<Option<Held>>| -> Vec<Held> { found.into_iter().zip(previous).map(|(e, p)| e.unwrap_or(*p)).collect() };
-    let without = if others.is_empty() {
-        previous.to_vec()
-    } else {
-        or_previous(pooled(context, declared, folds, &moved, &|_| others.to_vec()))
-    };
-    let with = pooled(context, declared, folds, &moved, &|keep| {
-        refine_group(context, declared, &fit.placed, &[others.len()], Rows::Where(keep), EVALUATIONS)
+) -> Around {
+    let Some((newest, others)) = fit.placed.split_last() else { return Around::of(previous, previous) };
+    let mut sums = vec![[Sum::default(); 4]; context.targets.len()];
+    for out in folds {
+        let keep: Vec<bool> = out.iter().map(|o| !o).collect();
+        let placed = refine_group(context, declared, &fit.placed, &[others.len()], Rows::Where(&keep), EVALUATIONS);
+        let (mut with, mut without) = (Designs::new(context, declared, &placed), Designs::new(context, declared, others));
+        for (target, sums) in context.targets.iter().zip(&mut sums).filter(|(t, _)| newest.instance.touches(t.name)) {
+            let (with, without) = (with.of(target), without.of(target));
+            let fits = (fit_target(target, with, Rows::Where(&keep)), fit_target(target, without, Rows::Where(&keep)));
+            let (Some(fitted), Some(plain)) = fits else { continue };
+            let new = with.predict(&fitted.coefficients, context.len());
+            let old = without.predict(&plain.coefficients, context.len());
+            let left = left_over(target, &new, &keep);
+            for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| out[**row]) {
+                let known = with.variance(&fitted.covariance, *row) < left;
+                let of_row = [y - old[*row], y - new[*row]];
+                for (sum, residual) in sums.iter_mut().zip(of_row.into_iter().cycle().take(if known { 4 } else { 2 })) {
+                    sum.add(target, *row, residual);
+                }
+            }
+        }
+    }
+    let [without, with, known_without, known_with] = [0, 1, 2, 3].map(|k| {
+        let parts = sums.iter().zip(&context.targets).zip(previous);
+        parts.map(|((s, target), previous)| s[k].held(target).unwrap_or(*previous)).collect()
     });
-    (without, or_previous(with))
+    Around { without, with, known_without, known_with }
+}
+
+/// Mean square of what a prediction leaves on the rows that taught it.
+fn left_over(target: &Target, prediction: &[f64], keep: &[bool]) -> f64 {
+    let taught = target.rows.iter().zip(&target.y).filter(|(row, _)| keep[**row]);
+    let (sum, n) = taught.fold((0.0, 0.0), |s, (row, y)| (s.0 + (y - prediction[*row]).powi(2), s.1 + 1.0));
+    sum / f64::max(n, 1.0)
 }
 
 /// Evaluations that each fold may spend on its shapes, starting from those of all rows.
@@ -118,7 +163,7 @@ pub(crate) fn pooled(
     wanted: &[bool],
     refined: &dyn Fn(&[bool]) -> Vec<Placed>,
 ) -> Vec<Option<Held>> {
-    let mut sums = vec![(0.0, 0.0, 0usize, 0.0, 0usize); context.targets.len()];
+    let mut sums = vec![Sum::default(); context.targets.len()];
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
         let placed = refined(&keep);
@@ -127,31 +172,44 @@ pub(crate) fn pooled(
             let design = designs.of(target);
             let Some(fitted) = fit_target(target, design, Rows::Where(&keep)) else { continue };
             let prediction = design.predict(&fitted.coefficients, context.len());
-            for (row, y) in target.rows.iter().zip(&target.y) {
-                if out[*row] {
-                    let square = (y - prediction[*row]).powi(2);
-                    sum.0 += square;
-                    sum.1 += (square / target.noise.rms.powi(2)).ln_1p();
-                    sum.2 += 1;
-                    if target.claims(*row) {
-                        sum.3 += square;
-                        sum.4 += 1;
-                    }
-                }
+            for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| out[**row]) {
+                sum.add(target, *row, y - prediction[*row]);
             }
         }
     }
-    sums.iter()
-        .zip(&context.targets)
-        .map(|((squares, logs, n, claimed, k), target)| {
-            let mean = |sum: f64| sum / *n as f64;
-            (*n > 0).then(|| Held {
-                rms: mean(*squares).sqrt(),
-                typical: target.noise.rms * mean(*logs).exp_m1().sqrt(),
-                claimed: (claimed / *k as f64).sqrt(),
-            })
+    sums.iter().zip(&context.targets).map(|(sum, target)| sum.held(target)).collect()
+}
+
+/// Sums over rows that were left out.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    squares: f64,
+    logs: f64,
+    rows: usize,
+    claimed_squares: f64,
+    claimed: usize,
+}
+
+impl Sum {
+    fn add(&mut self, target: &Target, row: usize, residual: f64) {
+        let square = residual.powi(2);
+        self.squares += square;
+        self.logs += (square / target.noise.rms.powi(2)).ln_1p();
+        self.rows += 1;
+        if target.claims(row) {
+            self.claimed_squares += square;
+            self.claimed += 1;
+        }
+    }
+
+    fn held(self, target: &Target) -> Option<Held> {
+        let mean = |sum: f64| sum / self.rows as f64;
+        (self.rows > 0).then(|| Held {
+            rms: mean(self.squares).sqrt(),
+            typical: target.noise.rms * mean(self.logs).exp_m1().sqrt(),
+            claimed: (self.claimed_squares / self.claimed as f64).sqrt(),
         })
-        .collect()
+    }
 }
 
 /// Residual of each target on its own rows.

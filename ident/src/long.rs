@@ -13,7 +13,7 @@ use crate::diagnose::{
     Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, may_join, net_gain, offers, shares, without, worth_a_name,
 };
 use crate::effects::Estimate;
-use crate::heldout::{self, Held};
+use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Placed, Rows, allow_for_the_form, fit, plausible};
 use crate::log::{Column, Log};
 use crate::search::refine;
@@ -227,7 +227,7 @@ impl AllRows<'_> {
             }
             let candidate = Candidate { evidence: best.evidence + gain, fit: new };
             let held = self.errors(&placed, &self.touched(&placed[placed.len() - 1..]), errors);
-            if worth_a_name(context, &candidate, gain, &held, errors) {
+            if worth_a_name(context, &candidate, gain, &Around::of(errors, &held)) {
                 (*best, *errors) = (candidate, held);
             }
         }

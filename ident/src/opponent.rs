@@ -44,7 +44,7 @@ pub(crate) fn opponent(
             if candidate.evidence < 2.0 * NEEDED_EVIDENCE || better < NEEDED_EVIDENCE || elsewhere > candidate.evidence {
                 continue;
             }
-            let (_, held) = heldout::errors_around_newest(context, declared, &candidate.fit, folds, before);
+            let held = heldout::errors_around_newest(context, declared, &candidate.fit, folds, before).with;
             let gain = (before[i].rms / held[i].rms).ln();
             let rival = (before[i].rms / named[i].rms).ln();
             // a name that depends on the same variable has found the dependence; only its form may be rough
@@ -151,7 +151,7 @@ pub(crate) fn nameless(
         .filter(|v| !is_load(context, &context.targets[i], v))
         .filter_map(|variable| correction(context, declared, start, &group, &variable))
         .map(|f| {
-            let (_, held) = heldout::errors_around_newest(context, declared, &f, folds, before);
+            let held = heldout::errors_around_newest(context, declared, &f, folds, before).with;
             (Candidate { evidence: f.targets[i].loglik.mean - start.targets[i].loglik.mean, fit: f }, held)
         })
         .min_by(|a, b| a.1[i].rms.total_cmp(&b.1[i].rms))

@@ -9,6 +9,10 @@
 mod rig;
 
 use ident::close::{Closed, close};
+use ident::context::Context;
+use ident::effects::library;
+use ident::heldout;
+use ident::hypothesis::{Declared, Placed, Rows, fit};
 use ident::log::{Column, Log};
 use ident::verdict::Kind;
 use rig::Chance;
@@ -35,6 +39,13 @@ impl Command {
     fn ramp() -> Self {
         let pulse = |i: usize| 1900.0 - 800.0 * (2.0 * i as f64 / ROWS as f64 - 1.0).abs();
         Self((0..ROWS).map(|i| (STEP * (i as f64 - 0.5), pulse(i))).collect())
+    }
+
+    /// From a low level to each of some others and back, every one of them once.
+    fn visits(levels: &[f64]) -> Self {
+        let stay = ROWS as f64 * STEP / (2.0 * levels.len() as f64);
+        let at = |i: usize| ((i as f64 * stay / STEP).floor() + 0.3) * STEP;
+        Self((0..2 * levels.len()).map(|i| (at(i), if i % 2 == 0 { 1100.0 } else { levels[i / 2] })).collect())
     }
 
     fn pulse(&self, t: f64) -> f64 {
@@ -208,4 +219,35 @@ fn the_interval_of_held_values_is_known_to_the_clock_of_their_updates_although_r
     let closed = verdict(&log);
     assert_eq!(names(&closed), ["sample_hold"], "{:?}", closed.verdict.alternatives);
     close_to(&closed, "period", period, 3e-5);
+}
+
+#[test]
+fn a_level_that_the_rest_does_not_surround_is_no_judge_of_a_damaged_blade() {
+    let c = Command::visits(&[1600.0, 1300.0, 1900.0, 1450.0, 1750.0, 1350.0, 1550.0, 1850.0]);
+    // after it two levels only, both in the last fifth of the run
+    let t0 = 114.0;
+    let after = |t: f64| if t > t0 { 1.0 } else { 0.0 };
+    let speed = |t: f64| c.speed(t) * (1.0 - 0.02 * after(t));
+    let log = log(
+        &c,
+        [&speed, &|t| thrust(speed(t)) * (1.0 - 0.04 * after(t)), &|t| torque(speed(t)) * (1.0 + 0.06 * after(t)), &|t| {
+            current(speed(t)) * (1.0 + 0.06 * after(t))
+        }],
+        NOISE,
+    );
+    let context = Context::new(&log, None);
+    let declared = Declared::default();
+    let damage = library().iter().find(|e| e.id() == "blade_damage").expect("in the library");
+    let instance = damage.instances(&context).remove(0);
+    let placed = [Placed { effect: *damage, instance, shape: vec![t0] }];
+    let fitted = fit(&context, declared, &placed, None, Rows::All).expect("a fit");
+    let folds = heldout::folds(&context);
+    let nothing = fit(&context, declared, &[], None, Rows::All).expect("a fit");
+    let before = heldout::errors(&context, declared, &nothing, &folds);
+    let around = heldout::errors_around_newest(&context, declared, &fitted, &folds, &before);
+    let speed = context.target("rpm").expect("a speed");
+    let (all, known) =
+        (around.with[speed].rms / around.without[speed].rms, around.known_with[speed].rms / around.known_without[speed].rms);
+    assert!(all > 1.05, "{all}");
+    assert!(known < 1.05, "{known}");
 }
