@@ -10,6 +10,7 @@ use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
 use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
+use crate::plateau::settle;
 use crate::solve::Normal;
 use crate::start::start_pulse;
 use std::borrow::Cow;
@@ -207,6 +208,8 @@ pub struct Context {
     pub steady: Vec<(usize, usize)>,
     /// Stretches without a jump of the load, ramps included: where the noise is read off.
     pub calm: Vec<(usize, usize)>,
+    /// Rows at the head of the steady stretches in which the rotor still approaches its new speed; empty without a command or a speed.
+    pub(crate) settling: Vec<bool>,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
     powers: [OnceLock<Vec<Values>>; 2],
     /// What effects ask again and again.
@@ -275,6 +278,7 @@ impl Context {
         let (rpm, consensus) = consensus(log);
         let steady = steady_stretches(&log.t, pulse.as_deref(), &rpm, STILL_US);
         let calm = steady_stretches(&log.t, pulse.as_deref(), &rpm, CALM_US);
+        let settling = if pulse.is_some() { settling(&log.t, &rpm, &steady) } else { Vec::new() };
         let start = start_pulse_us.unwrap_or_else(|| start_pulse(&log.t, pulse.as_deref(), &rpm));
         Self {
             name: log.name.clone(),
@@ -292,6 +296,7 @@ impl Context {
             targets: Vec::new(),
             steady,
             calm,
+            settling,
             powers: Default::default(),
             facts: Facts::default(),
         }
@@ -492,7 +497,7 @@ fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
 }
 
 /// Change of the command from row to row, us, below which it holds still.
-const STILL_US: f64 = 0.5;
+pub(crate) const STILL_US: f64 = 0.5;
 /// Change of the command from row to row, us, below which it does not jump: a ramp from end to end in two seconds at 50 Hz.
 pub(crate) const CALM_US: f64 = 10.0;
 
@@ -516,6 +521,18 @@ fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) ->
             }
             from = i;
         }
+    }
+    out
+}
+
+/// Rows at the head of each steady stretch in which the speed has not arrived yet.
+fn settling(t: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Vec<bool> {
+    if rpm.is_empty() {
+        return Vec::new();
+    }
+    let mut out = vec![false; t.len()];
+    for (from, to) in steady {
+        out[*from..from + settle::rows(t, rpm, *from, *to)].fill(true);
     }
     out
 }

@@ -37,6 +37,8 @@ pub(crate) struct Samples<'c> {
     squares: f64,
     /// Which of them follow a jump of the load; empty where the target does not tell.
     unsettled: Vec<bool>,
+    /// The same as positions.
+    late: Vec<usize>,
     /// The columns of the last design: most of the next one's are the same.
     known: RefCell<Vec<Known>>,
 }
@@ -48,8 +50,10 @@ struct Known {
     values: Values,
     weighted: Vec<f64>,
     with_y: f64,
-    /// With itself and with those before it in the last design.
-    with_others: Vec<(Values, f64)>,
+    /// With itself and with those before it in the last design: over all samples, and over the unsettled ones.
+    with_others: Vec<(Values, [f64; 2])>,
+    /// Values, weighted values and product with `y` over the unsettled samples.
+    late: (Vec<f64>, Vec<f64>, f64),
 }
 
 /// What went into a fit: columns, samples less the known part, and their variances in the two views, each one value a sample.
@@ -96,6 +100,7 @@ impl<'c> Samples<'c> {
             weights,
             half_logs: 0.5 * log_product(&levelled),
             levelled,
+            late: (0..unsettled.len()).filter(|i| unsettled[*i]).collect(),
             unsettled,
             known: RefCell::default(),
             whole: target.rows.len() == log_rows && !matches!(rows, Rows::Where(_)),
@@ -112,9 +117,15 @@ impl<'c> Samples<'c> {
         }
     }
 
-    /// The columns of a design on the samples and the normal equations of all of them with `y`. Columns that stood in the last design
-    /// bring their products along.
-    fn equations(&self, design: &TargetDesign) -> (Vec<Values>, Normal) {
+    /// Of one value a sample those of the unsettled ones.
+    fn of_late(&self, values: &[f64]) -> Vec<f64> {
+        self.late.iter().map(|i| values[*i]).collect()
+    }
+
+    /// The columns of a design on the samples and the normal equations with `y` of all of them and of the unsettled ones. Columns that
+    /// stood in the last design bring their products along.
+    fn equations(&self, design: &TargetDesign) -> (Vec<Values>, [Normal; 2]) {
+        let y = self.of_late(&self.y);
         let mut known = self.known.borrow_mut();
         let mut last = std::mem::take(&mut *known);
         for column in &design.columns {
@@ -123,18 +134,25 @@ impl<'c> Samples<'c> {
                 let values = self.of_samples(&column.values);
                 let weighted: Vec<f64> = values.iter().zip(&self.weights).map(|(a, w)| a * w).collect();
                 let with_y = dot(&weighted, &self.y);
-                Known { column: column.values.clone(), values, weighted, with_y, with_others: Vec::new() }
+                let (late, late_weighted) = (self.of_late(&values), self.of_late(&weighted));
+                let late_with_y = dot(&late_weighted, &y);
+                let late = (late, late_weighted, late_with_y);
+                Known { column: column.values.clone(), values, weighted, with_y, with_others: Vec::new(), late }
             });
             let product = |other: &Known| {
                 let old = own.with_others.iter().find(|(of, _)| Arc::ptr_eq(of, &other.column));
-                (other.column.clone(), old.map_or_else(|| dot(&own.weighted, &other.values), |o| o.1))
+                let new = || [dot(&own.weighted, &other.values), dot(&own.late.1, &other.late.0)];
+                (other.column.clone(), old.map_or_else(new, |o| o.1))
             };
             own.with_others = known.iter().chain([&own]).map(product).collect();
             known.push(own);
         }
-        let products = known.iter().map(|k| (k.with_others.iter().map(|o| o.1), k.with_y));
-        let normal = Normal::of_products(products, self.squares, self.y.len());
-        (known.iter().map(|k| k.values.clone()).collect(), normal)
+        let products = known.iter().map(|k| (k.with_others.iter().map(|o| o.1[0]), k.with_y));
+        let whole = Normal::of_products(products, self.squares, self.y.len());
+        let products = known.iter().map(|k| (k.with_others.iter().map(|o| o.1[1]), k.late.2));
+        let squares = self.late.iter().map(|i| self.weights[*i] * self.y[*i] * self.y[*i]).sum();
+        let late = Normal::of_products(products, squares, self.late.len());
+        (known.iter().map(|k| k.values.clone()).collect(), [whole, late])
     }
 
     /// A column on the samples.
@@ -167,12 +185,14 @@ impl<'c> Samples<'c> {
             weights = levelled.iter().map(|v| 1.0 / v).collect();
             half_logs = 0.5 * log_product(&levelled);
         }
-        let (columns, normal) = if design.fixed.is_empty() && design.extra_variance.is_empty() {
+        let (columns, [normal, late]) = if design.fixed.is_empty() && design.extra_variance.is_empty() {
             self.equations(design)
         } else {
             let columns: Vec<_> = design.columns.iter().map(|c| self.of_samples(&c.values)).collect();
-            let normal = Normal::of_columns(&columns, &y, &weights);
-            (columns, normal)
+            let of_late: Vec<_> = columns.iter().map(|c| self.of_late(c)).collect();
+            let late = Normal::of_columns(&of_late, &self.of_late(&y), &self.of_late(&weights));
+            let whole = Normal::of_columns(&columns, &y, &weights);
+            (columns, [whole, late])
         };
         let mut kept = Kept { columns, y, floored, jumps: None };
         let mut solution = normal.solve()?;
@@ -187,30 +207,18 @@ impl<'c> Samples<'c> {
         // after a jump of the load a static relation is off by more than the noise: those samples have a scale of their own, so that
         // they neither rule the coefficients nor drown what the others say
         let mut mean = profile(solution.rss, half_logs);
-        if !self.unsettled.is_empty() {
-            let unsettled = &self.unsettled;
-            let late = unsettled.iter().filter(|u| **u).count() as f64;
-            let sums = |solution: &Solution| {
-                let mut sums = (0.0, 0.0);
-                for ((r, v), u) in kept.residual(&solution.coefficients).iter().zip(levelled.iter()).zip(unsettled) {
-                    *(if *u { &mut sums.1 } else { &mut sums.0 }) += r * r / v;
-                }
-                sums
-            };
-            let scales = |(calm, after): (f64, f64)| (after / late.max(1.0)).max(0.01) / (calm / (n - late).max(1.0)).max(0.01);
+        if !self.late.is_empty() {
+            let count = self.late.len() as f64;
+            let calm = normal.less(&late, 1.0);
+            let sums = |s: &Solution| (calm.left_by(&s.coefficients), late.left_by(&s.coefficients));
+            let scales = |(calm, after): (f64, f64)| (after / count).max(0.01) / (calm / (n - count).max(1.0)).max(0.01);
             let mut found = sums(&solution);
-            if late >= 3.0 && n - late > kept.columns.len() as f64 + 3.0 {
+            if count >= 3.0 && n - count > kept.columns.len() as f64 + 3.0 {
                 let mut excess = scales(found).max(1.0);
                 if excess > WORSE {
                     for _ in 0..ROUNDS {
                         let before = excess;
-                        weights
-                            .to_mut()
-                            .iter_mut()
-                            .zip(levelled.iter())
-                            .zip(unsettled)
-                            .for_each(|((w, v), u)| *w = 1.0 / (v * if *u { excess } else { 1.0 }));
-                        solution = Normal::of_columns(&kept.columns, &kept.y, &weights).solve()?;
+                        solution = normal.less(&late, 1.0 - 1.0 / excess).solve()?;
                         found = sums(&solution);
                         excess = scales(found).max(1.0);
                         if (excess / before).ln().abs() < 0.1 {
@@ -218,8 +226,8 @@ impl<'c> Samples<'c> {
                         }
                     }
                 }
-                mean = part(found.0, n - late) + part(found.1, late) - weight * half_logs;
-                kept.jumps = Some((unsettled, excess));
+                mean = part(found.0, n - count) + part(found.1, count) - weight * half_logs;
+                kept.jumps = Some((&self.unsettled, excess));
             }
         }
         let scatter = if looks_at_scatter {

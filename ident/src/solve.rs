@@ -115,6 +115,28 @@ impl Normal {
         self.count += other.count;
     }
 
+    /// Less a `share` of what another of the same columns holds: rows that went into both then weigh so much less.
+    pub(crate) fn less(&self, other: &Self, share: f64) -> Self {
+        Self {
+            gram: &self.gram - &other.gram * share,
+            rhs: &self.rhs - &other.rhs * share,
+            yy: self.yy - other.yy * share,
+            count: self.count,
+        }
+    }
+
+    /// Weighted square sum that coefficients leave of the readings.
+    pub(crate) fn left_by(&self, coefficients: &[f64]) -> f64 {
+        let mut left = self.yy;
+        for (j, a) in coefficients.iter().enumerate() {
+            left -= 2.0 * a * self.rhs[j];
+            for (k, b) in coefficients.iter().enumerate().take(j + 1) {
+                left += if k == j { 1.0 } else { 2.0 } * a * b * self.gram[(j, k)];
+            }
+        }
+        left.max(0.0)
+    }
+
     /// Solves; `None` when the numbers are not finite.
     #[must_use]
     pub fn solve(&self) -> Option<Solution> {

@@ -7,8 +7,9 @@
 
 use super::speed_channel::expected_at as curve;
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
-use crate::context::Context;
+use crate::context::{Context, STILL_US};
 use crate::design::TargetDesign;
+use crate::noise::median;
 
 /// See the module.
 pub(crate) struct ThrottleQuantisation;
@@ -93,26 +94,37 @@ fn slope(context: &Context) -> Vec<f64> {
     expected.iter().zip(later).map(|(a, b)| if *a > 0.0 { b - a } else { 0.0 }).collect()
 }
 
-/// Pulse, slope of the static curve, and mean departure from it, for each microsecond of pulse that the run visits.
+/// Pulse, slope of the static curve, and median departure from it, for each half microsecond of pulse that the run visits: where the
+/// command is held and the rotor has arrived, if that is [`ENOUGH`] levels, for on a ramp the rotor lags; else also where the command
+/// moves evenly.
 fn levels(context: &Context) -> Vec<(f64, f64, f64)> {
+    let held = levels_where(context, STILL_US);
+    if held.len() < ENOUGH { levels_where(context, EVEN_US) } else { held }
+}
+
+/// The same where the command changes by less than `most` from row to row.
+fn levels_where(context: &Context, most: f64) -> Vec<(f64, f64, f64)> {
     let Some(pulse) = &context.pulse else { return Vec::new() };
     let (expected, slope) = (curve(context, 0.0), context.facts.slope.get_or_init(|| slope(context)));
-    let mut bins: std::collections::BTreeMap<i64, (f64, f64, f64, f64)> = std::collections::BTreeMap::new();
+    let mut bins: std::collections::BTreeMap<i64, (f64, f64, Vec<f64>)> = std::collections::BTreeMap::new();
     for (i, p) in pulse.iter().enumerate() {
         // the command has been held, or has moved evenly, for a while
-        let settled = i >= 8 && (i - 7..=i).all(|k| (pulse[k] - pulse[k - 1]).abs() < EVEN_US);
-        if settled && *p > context.start_pulse_us && context.rpm.get(i).is_some_and(|r| *r > 0.0) {
+        let arrived =
+            i >= 8 && (i - 7..=i).all(|k| (pulse[k] - pulse[k - 1]).abs() < most) && !context.settling.get(i).is_some_and(|s| *s);
+        if arrived && *p > context.start_pulse_us && context.rpm.get(i).is_some_and(|r| *r > 0.0) {
             let bin = bins.entry((2.0 * p).round() as i64).or_default();
             bin.0 += p;
             bin.1 += slope[i];
-            bin.2 += context.rpm[i] - expected[i];
-            bin.3 += 1.0;
+            bin.2.push(context.rpm[i] - expected[i]);
         }
     }
     // a pulse on the edge of a step must not fall off it by rounding
     let exact = |p: f64| (p * 1e6).round() * 1e-6;
-    bins.into_values().map(|(p, e, d, n)| (exact(p / n), e / n, d / n)).collect()
+    bins.into_values().map(|(p, e, mut d)| (exact(p / d.len() as f64), e / d.len() as f64, median(&mut d))).collect()
 }
+
+/// Held levels from which on ramps are not needed: a saw-tooth has three unknowns beside the five of the curve, and a few must be left.
+const ENOUGH: usize = 12;
 
 /// Change of the command from row to row below which the rotor keeps up with it, us.
 const EVEN_US: f64 = 5.0;
@@ -293,6 +305,7 @@ const LONGEST: f64 = 80.0;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::{Column, Log};
 
     #[test]
     fn a_cut_off_pulse_on_a_grid_gives_its_step_and_anchor() {
@@ -304,5 +317,32 @@ mod tests {
         let Best { step, offset, anchored, others } = best_tooth(&levels);
         assert!(anchored && (step - 13.0).abs() < 1e-9 && offset == -0.5, "{step} {offset} {anchored}");
         assert!(others.0 > 12.8 && others.1 < 13.2, "{others:?}");
+    }
+
+    #[test]
+    fn a_rotor_that_lags_on_ramps_does_not_speak_of_held_levels() {
+        // twenty levels in any order, ramps of 4 us a row between them on which the rotor is 40 rev/min behind
+        let visits = (0..20).map(|k| 1150.0 + f64::from(k * 7 % 20) * 37.0);
+        let mut pulse: Vec<f64> = vec![1000.0; 20];
+        for level in visits {
+            while (pulse[pulse.len() - 1] - level).abs() > 4.0 {
+                let last = pulse[pulse.len() - 1];
+                pulse.push(last + 4.0 * (level - last).signum());
+            }
+            pulse.extend([level; 40]);
+        }
+        let speed = |i: usize| {
+            let behind = if i == 0 { 0.0 } else { 10.0 * (pulse[i] - pulse[i - 1]).clamp(-4.0, 4.0) };
+            (6.0 * (pulse[i] - 1000.0) - behind).max(0.0)
+        };
+        let column = |name: &str, values: Vec<f64>| Column { name: name.into(), values };
+        let log = Log {
+            name: "ramps".into(),
+            t: (0..pulse.len()).map(|i| 0.05 * i as f64).collect(),
+            columns: vec![column("rpm_opto", (0..pulse.len()).map(speed).collect()), column("pulse_us", pulse)],
+            ..Log::default()
+        };
+        let found = levels(&Context::new(&log, None));
+        assert_eq!(found.len(), 20);
     }
 }

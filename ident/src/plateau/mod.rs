@@ -10,7 +10,7 @@
 mod change;
 mod mean;
 pub mod score;
-mod settle;
+pub(crate) mod settle;
 pub mod study;
 
 use crate::context::Context;
