@@ -64,7 +64,10 @@ pub(crate) fn revise(
             }
             continue;
         };
-        let others: Vec<Candidate> = ranked.iter().enumerate().filter(|(i, _)| *i != winner).map(|(_, c)| c.clone()).collect();
+        // what has more evidence and was refused, for it predicts worse, is no rival
+        let refused = |i: usize| i < winner && ranked[i].evidence > standing + CLEARLY_BETTER;
+        let others: Vec<Candidate> =
+            ranked.iter().enumerate().filter(|(i, _)| *i != winner && !refused(*i)).map(|(_, c)| c.clone()).collect();
         rounds[k] = probabilities(&ranked[winner], &others, 0.0);
         if better == Some(winner) {
             settled.fill(false);
