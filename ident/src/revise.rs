@@ -64,10 +64,7 @@ pub(crate) fn revise(
             }
             continue;
         };
-        // what has more evidence and was refused, for it predicts worse, is no rival
-        let refused = |i: usize| i < winner && ranked[i].evidence > standing + CLEARLY_BETTER;
-        let others: Vec<Candidate> =
-            ranked.iter().enumerate().filter(|(i, _)| *i != winner && !refused(*i)).map(|(_, c)| c.clone()).collect();
+        let others = standing_beside(&ranked, winner, standing);
         rounds[k] = probabilities(&ranked[winner], &others, 0.0);
         if better == Some(winner) {
             settled.fill(false);
@@ -77,6 +74,13 @@ pub(crate) fn revise(
             }
         }
     }
+}
+
+/// All that applied for a place but its winner, and what has clearly more evidence than the effect in place and was refused all
+/// the same: it predicts worse, and is no rival.
+fn standing_beside(ranked: &[Candidate], winner: usize, standing: f64) -> Vec<Candidate> {
+    let refused = |i: usize| i < winner && ranked[i].evidence > standing + CLEARLY_BETTER;
+    ranked.iter().enumerate().filter(|(i, _)| *i != winner && !refused(*i)).map(|(_, c)| c.clone()).collect()
 }
 
 /// Whether a hypothesis predicts held-out rows of every channel about as well as the one in place.
@@ -124,4 +128,28 @@ fn in_place(context: &Context, declared: Declared<'_>, start: &Fit, whole: &Fit,
     placed.insert(k, newest);
     let fit = fit(context, declared, &placed, Some(start), Rows::All)?;
     Some(Candidate { evidence: evidence_over(context, &fit, start), fit })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{Instance, library};
+
+    fn on_the_thrust(id: &str, evidence: f64) -> Candidate {
+        let effect = *library().iter().find(|e| e.id() == id).expect("in the library");
+        let placed = vec![Placed { effect, instance: Instance::new(&["thrust_n"], ""), shape: Vec::new() }];
+        Candidate { fit: Fit { placed, targets: Vec::new() }, evidence }
+    }
+
+    #[test]
+    fn what_was_refused_takes_no_probability_from_the_name_in_place() {
+        let ranked = [("stall", 90.0), ("zero_drift", 50.0), ("tare_shift", 30.0)].map(|(id, e)| on_the_thrust(id, e));
+        let (winner, standing) = (1, 50.0);
+        let (probability, rivals) = probabilities(&ranked[winner], &standing_beside(&ranked, winner, standing), 0.0);
+        assert!(probability > 0.9, "{probability}");
+        assert_eq!(rivals.len(), 1);
+        // what came as close as the newcomer may is a rival still
+        let close = [("stall", 51.0), ("zero_drift", 50.0)].map(|(id, e)| on_the_thrust(id, e));
+        assert!(probabilities(&close[winner], &standing_beside(&close, winner, standing), 0.0).0 < 0.5);
+    }
 }
