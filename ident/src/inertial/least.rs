@@ -11,6 +11,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
 
+/// With more columns than this a cluster is not left out for the standard errors: each would be a factorisation.
+const LEFT_OUT: usize = 64;
 /// One of so many stretches is left out at a time.
 pub(crate) const FOLDS: usize = 5;
 
@@ -61,6 +63,19 @@ pub(crate) struct Column {
     from: usize,
     values: Vec<f64>,
     prior: f64,
+}
+
+impl Column {
+    /// Where it is not zero.
+    fn span(&self) -> Range<usize> {
+        self.from..self.from + self.values.len()
+    }
+
+    /// Its product with `other` over a range.
+    fn dot(&self, range: &Range<usize>, other: impl Fn(usize) -> f64) -> f64 {
+        let own = self.span();
+        (own.start.max(range.start)..own.end.min(range.end)).map(|e| self.values[e - self.from] * other(e)).sum()
+    }
 }
 
 /// A fit.
@@ -190,28 +205,27 @@ impl Readings {
     }
 
     /// Standard errors: the larger of those from clusters of neighbouring blocks, which know the residual's colour but are too small where
-    /// few clusters say something of a term, and those of a white residual of its size. Student's law for so many clusters is in
-    /// them, so that 1.96 of them are a 95 % interval.
+    /// few clusters say something of a term, and those of a white residual of its size. Each cluster is judged by what the fit without
+    /// it would say (the jackknife), as its own fit has made its residual too small. Student's law for so many clusters is in them, so
+    /// that 1.96 of them are a 95 % interval.
     fn sigma(&self, columns: &[&Column], residual: &[f64], cholesky: &Cholesky<f64, Dyn>, scale: &DVector<f64>) -> Vec<f64> {
         let k = columns.len();
         let mut numbers = self.cluster.clone();
         numbers.dedup();
         let clusters = numbers.len();
-        let mut scores = DMatrix::<f64>::zeros(k, clusters);
-        for (i, a) in columns.iter().enumerate() {
-            for (n, v) in a.values.iter().enumerate() {
-                let e = a.from + n;
-                scores[(i, numbers.partition_point(|c| *c < self.cluster[e / 3]))] += v * residual[e];
-            }
+        let mut spread = DMatrix::<f64>::zeros(k, clusters);
+        for (n, number) in numbers.iter().enumerate() {
+            let blocks = self.cluster.partition_point(|c| c < number)..self.cluster.partition_point(|c| c <= number);
+            let own = 3 * blocks.start..3 * blocks.end;
+            let score = DVector::from_fn(k, |i, _| columns[i].dot(&own, |e| residual[e]) / scale[i]);
+            let without = (k <= LEFT_OUT).then(|| cholesky.l() * cholesky.l().transpose() - gram(columns, &own, scale));
+            let change = match without.and_then(DMatrix::cholesky) {
+                Some(others) => others.solve(&score),
+                None => cholesky.solve(&score),
+            };
+            spread.set_column(n, &change.component_div(scale));
         }
-        for mut column in scores.column_iter_mut() {
-            column.component_div_assign(scale);
-        }
-        let mut spread = cholesky.solve(&scores);
-        for mut column in spread.column_iter_mut() {
-            column.component_div_assign(scale);
-        }
-        let few = clusters as f64 / (clusters as f64 - 1.0).max(1.0);
+        let few = if k <= LEFT_OUT { 1.0 } else { clusters as f64 / (clusters as f64 - 1.0).max(1.0) };
         let white = Self::square(residual) / (residual.len() as f64 - k as f64).max(1.0);
         let inverse = cholesky.inverse();
         let wide = student(clusters as f64 - 1.0) / 1.96;
@@ -222,6 +236,21 @@ impl Readings {
         };
         (0..k).map(one).collect()
     }
+}
+
+/// Scaled normal matrix of a range.
+fn gram(columns: &[&Column], range: &Range<usize>, scale: &DVector<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(columns.len(), columns.len());
+    for (i, a) in columns.iter().enumerate() {
+        for (j, b) in columns.iter().enumerate().take(i + 1) {
+            let both = b.span();
+            let both = both.start.max(range.start)..both.end.min(range.end);
+            let sum = a.dot(&both, |e| b.values[e - b.from]) / (scale[i] * scale[j]);
+            out[(i, j)] = sum;
+            out[(j, i)] = sum;
+        }
+    }
+    out
 }
 
 /// The 97.5 % point of Student's law.

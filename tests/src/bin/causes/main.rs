@@ -30,13 +30,14 @@ fn main() {
     let seeds: u64 = words.first().and_then(|w| w.parse().ok()).unwrap_or(10);
     let first = if flag("--tuning") { TUNING } else { JUDGING };
     print!("{}", include_str!("causes.md"));
+    let only = words.iter().position(|w| w == "--only").and_then(|k| words.get(k + 1)).map(String::as_str);
     let mut coverage = [Coverage::default(), Coverage::default()];
     if !flag("--simulator") {
-        simulated(folder.path(), seeds, first, &mut coverage[0]);
+        simulated(folder.path(), (seeds, first), only, &mut coverage[0]);
     }
-    hidden_ones(folder.path(), seeds, first, &mut coverage[1]);
+    hidden_ones(folder.path(), (seeds, first), only, &mut coverage[1]);
     covered(&coverage);
-    if !flag("--tuning") && !flag("--simulator") {
+    if only.is_none() && !flag("--tuning") && !flag("--simulator") {
         broad::recorded(folder.path());
     }
 }
@@ -95,11 +96,12 @@ fn beside(further: Tally) -> String {
     if further.of > 0 { further.to_string() } else { "-".to_owned() }
 }
 
-fn simulated(folder: &Path, seeds: u64, first: u64, coverage: &mut Coverage) {
+fn simulated(folder: &Path, (seeds, first): (u64, u64), only: Option<&str>, coverage: &mut Coverage) {
     println!("\n## Simulated: the tests' own generator\n");
     println!("Seeds {first} to {} for each size.\n", first + seeds - 1);
     println!("| hidden | small | middle | large | with further names |\n| --- | --- | --- | --- | --- |");
-    for cause in [Cause::Clean].into_iter().chain(CAUSES).chain(UNKNOWN) {
+    let asked_for = |id: &str| only.is_none_or(|o| o == id);
+    for cause in [Cause::Clean].into_iter().chain(CAUSES).chain(UNKNOWN).filter(|c| asked_for(c.id())) {
         let cases: Vec<(usize, u64)> = (1..=3).flat_map(|size| (first..first + seeds).map(move |s| (size, s))).collect();
         let asked = all(folder, &cases, |_, (size, seed)| simulate(cause, *size, *seed));
         let mut further = Tally::default();
@@ -117,12 +119,12 @@ fn simulated(folder: &Path, seeds: u64, first: u64, coverage: &mut Coverage) {
     }
 }
 
-fn hidden_ones(folder: &Path, seeds: u64, first: u64, coverage: &mut Coverage) {
+fn hidden_ones(folder: &Path, (seeds, first): (u64, u64), only: Option<&str>, coverage: &mut Coverage) {
     print!("{}", include_str!("causes_hidden.md"));
     println!("Seeds {first} to {}.\n", first + seeds - 1);
     println!("| hidden | named first | with further names |\n| --- | --- | --- |");
     let cases: Vec<u64> = (first..first + seeds).collect();
-    for id in [""].iter().chain(ImuEffectKind::IDS) {
+    for id in [""].iter().chain(ImuEffectKind::IDS).filter(|id| only.is_none_or(|o| o == **id)) {
         let asked = all(folder, &cases, |own, seed| hidden::fly(own, Some(*id).filter(|i| !i.is_empty()), *seed));
         let judged_as = if FOREIGN.contains(id) { "unknown" } else { id };
         let mut further = Tally::default();
