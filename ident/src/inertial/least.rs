@@ -304,4 +304,45 @@ mod tests {
         }
         assert!(Readings::square(&s.heldout) < 1e-9);
     }
+
+    /// Normal deviates of a fixed seed.
+    struct Deviates(u64);
+
+    impl Deviates {
+        fn next(&mut self) -> f64 {
+            let mut uniform = || {
+                self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+            };
+            let (u, v) = (uniform(), uniform());
+            (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        }
+    }
+
+    #[test]
+    fn intervals_hold_the_truth_although_few_clusters_say_something_of_a_term() {
+        let t: Vec<f64> = (0..600).map(|i| 0.02 * f64::from(i)).collect();
+        // twelve clusters; what tells the slope happens in the last three
+        let lever = |i: usize| (t[i] - 9.0).max(0.0);
+        let mut noise = Deviates(5);
+        let draws = 400;
+        let inside = (0..draws)
+            .filter(|_| {
+                let shift: Vec<f64> = (0..12).map(|_| noise.next()).collect();
+                let y: Vec<Vector3<f64>> = (0..t.len())
+                    .map(|i| Vector3::new(1.0 + 2.0 * lever(i) + shift[i / 50] + 0.1 * noise.next(), 0.0, 0.0))
+                    .collect();
+                let readings = Readings::new(&t, &y, vec![true; t.len()], 0.1, 0.4, 1.0);
+                let terms = [
+                    Term::new("level", "1", |_| Vector3::new(1.0, 0.0, 0.0)),
+                    Term::new("slope", "1", |i| Vector3::new(lever(i), 0.0, 0.0)),
+                ];
+                let columns: Vec<Column> = terms.iter().map(|term| readings.column(term)).collect();
+                let solved = readings.solve(&columns.iter().collect::<Vec<_>>(), 0.1).expect("a fit");
+                (solved.coefficients[1] - 2.0).abs() < 1.96 * solved.sigma[1]
+            })
+            .count();
+        let share = inside as f64 / f64::from(draws);
+        assert!((0.92..0.99).contains(&share), "{share}");
+    }
 }
