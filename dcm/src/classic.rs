@@ -122,7 +122,7 @@ impl Classic {
     /// Proportional turn for `error` over `held` seconds; the integral goes to the bias.
     fn correct(&mut self, error: Vec3, gains: Gains, held: f32) -> Vec3 {
         let limit = self.config.bias_limit;
-        self.bias = (self.bias - error * (gains.ki * held)).map(|b| b.clamp(-limit, limit));
+        self.bias = (self.bias - error * (gains.ki * held)).map(|b| b.max(-limit).min(limit));
         error * (gains.kp * held).min(1.0)
     }
 
@@ -196,7 +196,7 @@ impl Classic {
     /// Sets the bias, for instance from a stored calibration; what is not finite or beyond the limit is limited.
     pub fn set_bias(&mut self, bias: Vec3) {
         let limit = self.config.bias_limit;
-        self.bias = bias.map(|b| if b.is_finite() { b.clamp(-limit, limit) } else { 0.0 });
+        self.bias = bias.map(|b| if b.is_finite() { b.max(-limit).min(limit) } else { 0.0 });
     }
 
     /// Difference of this heading to another attitude's, rad in (-pi, pi].

@@ -15,7 +15,7 @@ const DEGREE: f32 = core::f32::consts::PI / 180.0;
 /// When the body is said to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RestConfig {
-    /// Low-pass that readings are compared with, s; second order, cut-off sqrt(2)/(2 pi tau).
+    /// Low-pass that readings are compared with, s; second order, cut-off sqrt(2)/(2 pi tau) = 0.45 Hz.
     pub filter_tau: f32,
     /// Time for which all readings must stay near it, s.
     pub time: f32,
@@ -43,7 +43,8 @@ pub struct BiasConfig {
     pub heading_gain: f32,
     /// How much more while nothing is known of the bias.
     pub heading_boost: f32,
-    /// Time constant of the averaged attitude that corrections are turned into body axes with, s; cut-off 1/(2 pi tau).
+    /// Time constant of the averaged attitude that corrections are turned into body axes with, s; first order, cut-off
+    /// 1/(2 pi tau) = 0.04 Hz.
     pub lag: f32,
     /// Time in which motion resolves the ignorance, s.
     pub motion_tau: f32,
@@ -58,13 +59,13 @@ pub struct BiasConfig {
 pub struct FieldConfig {
     /// Time over which fields are summed in earth axes before their average is used, s.
     pub window: f32,
-    /// Smoothing of norm and dip, s.
+    /// Smoothing of norm and dip, s; first order, cut-off 1/(2 pi tau) = 3.2 Hz.
     pub smoothing: f32,
     /// Largest deviation of the norm, as a share of the reference.
     pub norm: f32,
     /// Largest deviation of the dip angle, rad.
     pub dip: f32,
-    /// Time for which the reference follows, s.
+    /// Averaging of the reference, which follows a field that is believed, s; first order, cut-off 1/(2 pi tau) = 0.008 Hz.
     pub reference_tau: f32,
     /// Undisturbed time before the field is believed again, s.
     pub settle: f32,
@@ -85,9 +86,9 @@ pub struct FieldConfig {
 /// How the hard iron that travels with the sensor is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IronConfig {
-    /// Time constant of the averages of attitude and field, s.
+    /// Averages of attitude and field, s; first order, cut-off 1/(2 pi tau) = 0.053 Hz.
     pub lag: f32,
-    /// Time in which evidence is forgotten, s.
+    /// Time in which evidence is forgotten, s; first order, cut-off 1/(2 pi tau) = 0.0013 Hz.
     pub memory: f32,
     /// An offset shorter than this is not applied, and a longer one shortened by it, uT: below it soft iron and a field that
     /// changes with place look the same.

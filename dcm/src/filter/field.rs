@@ -85,7 +85,7 @@ impl Field {
             return (0.0, 0.0);
         }
         let (now, reference) = (root(self.now.square()), root(self.reference.square()));
-        let dip = |shape: &Shape, norm| angle(shape.down, shape.level, norm);
+        let dip = |shape: &Shape, norm| if norm > 0.0 { angle(shape.down, shape.level, norm) } else { 0.0 };
         (now / reference - 1.0, dip(&self.now, now) - dip(&self.reference, reference))
     }
 

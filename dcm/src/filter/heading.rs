@@ -2,7 +2,7 @@
 //!
 //! What it is: fields are averaged in earth axes over a short time, the hard iron that was found is taken off, and the matrix turns
 //! about the vertical by a share of what is left, while the field is believed.
-//! What can go wrong: a vertical field has no heading and changes nothing; one beyond the range is left out.
+//! What can go wrong: a vertical field, or one whose readings cancel, has no heading and changes nothing; one beyond the range is left out.
 //! Units: uT, rad, s.
 //! Reference: Laidig & Seel 2023, sections 3.2 and 3.5.
 
@@ -55,7 +55,8 @@ impl<C: Borrow<Config>> Dcm<C> {
         let spin = plus(self.rest.rate.value(), &self.bias.value, -1.0);
         let turning = square(&spin) > config.field.new_rate * config.field.new_rate;
         self.field.take(&config.field, &Shape { level, down: *down }, dt, turning);
-        if level < LEAST_LEVEL * down.abs() {
+        // nothing at all, where readings cancel, has no heading either
+        if level <= LEAST_LEVEL * down.abs() {
             return;
         }
         let error = wrapped(config.declination, angle(*y, *x, level));

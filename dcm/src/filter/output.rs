@@ -5,20 +5,20 @@
 //! Units: rad, rad/s, m/s^2, uT.
 //! Reference: specification `ahrs.md`, "Attitude", outputs.
 
-use super::state::Words;
+use super::state::{Words, checksum};
 use super::{Dcm, StateError};
 use crate::angles::{euler_of, quaternion_of};
-use crate::columns::square;
+use crate::columns::{cut, least, square};
 use crate::linear::determinant;
 use crate::trig::root;
 use crate::{Config, Earth, Euler, Mat3, STANDARD_GRAVITY, Vec3};
 use core::borrow::Borrow;
-use core::f32::consts::PI;
+use core::f32::consts::{PI, TAU};
 
 /// Words of a saved state.
-pub const STATE_WORDS: usize = 103;
+pub const STATE_WORDS: usize = 104;
 /// First word of a saved state: changes whenever the list of fields does.
-const STATE_VERSION: u32 = 0x4443_4D04;
+const STATE_VERSION: u32 = 0x4443_4D05;
 
 /// What holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -103,9 +103,10 @@ impl<C: Borrow<Config> + Clone> Dcm<C> {
     /// finite or beyond the limit is cut.
     pub fn set_bias(&mut self, bias: Vec3, sigma: f32) {
         let limit = self.config.borrow().bias.limit;
-        self.bias.value = [bias.x, bias.y, bias.z].map(|b| if b.is_finite() { b.clamp(-limit, limit) } else { 0.0 });
-        let share = if sigma.is_finite() { sigma / limit } else { 1.0 };
-        self.bias.ignorance = (share * share).clamp(0.0, 1.0);
+        self.bias.value = [bias.x, bias.y, bias.z].map(|b| if b.is_finite() { b } else { 0.0 });
+        cut(&mut self.bias.value, limit);
+        let share = sigma / limit;
+        self.bias.ignorance = if share.is_finite() { least(share * share, 1.0) } else { 1.0 };
     }
 
     /// Hard iron that was found, uT, body axes: what a calibration has not taken out.
@@ -121,12 +122,12 @@ impl<C: Borrow<Config> + Clone> Dcm<C> {
         self.heading_age = 0.0;
     }
 
-    /// Turns the heading to `yaw` (rad, NED) and keeps the tilt. With a magnetometer the field pulls it back; without, it stays.
+    /// Turns the heading to `yaw` (rad, NED, any number of turns) and keeps the tilt. With a magnetometer the field pulls it back; without, it stays.
     pub fn set_heading(&mut self, yaw: f32) {
         if !yaw.is_finite() {
             return;
         }
-        self.turn_earth(&[0.0, 0.0, yaw - self.euler().yaw]);
+        self.turn_earth(&[0.0, 0.0, libm::remainderf(yaw - self.euler().yaw, TAU)]);
     }
 
     /// What is left of a specific force without gravity, body axes, m/s^2.
@@ -175,29 +176,29 @@ impl<C: Borrow<Config> + Clone> Dcm<C> {
         }
     }
 
-    /// The state, bit by bit; the configuration is not in it.
+    /// The state, bit by bit, between a version and a checksum; the configuration is not in it.
     #[must_use]
     pub fn save(&self) -> [u32; STATE_WORDS] {
         let mut out = [0; STATE_WORDS];
-        let mut slots = out.iter_mut();
-        if let Some(slot) = slots.next() {
-            *slot = STATE_VERSION;
-        }
+        let [version, numbers @ .., sum] = &mut out;
+        *version = STATE_VERSION;
+        let mut slots = numbers.iter_mut();
         let mut copy = self.clone();
         copy.words(&mut |word| {
             if let Some(slot) = slots.next() {
                 *slot = word.to_bits();
             }
         });
+        *sum = checksum(numbers);
         out
     }
 
     /// Continues from a saved state.
     ///
     /// # Errors
-    /// [`StateError`] when the words are of another version or no possible state; the filter is then unchanged.
+    /// [`StateError`] when the words are of another version or not those that [`Dcm::save`] gave; the filter is then unchanged.
     pub fn restore(&mut self, words: &[u32; STATE_WORDS]) -> Result<(), StateError> {
-        let [version, rest @ ..] = words;
+        let [version, rest @ .., sum] = words;
         if *version != STATE_VERSION {
             return Err(StateError::Version(*version));
         }
@@ -215,6 +216,9 @@ impl<C: Borrow<Config> + Clone> Dcm<C> {
         let good = (m * m.transpose() - Mat3::identity()).abs().max() < 1e-2 && determinant(m) > 0.0;
         if !good {
             return Err(StateError::NoRotation);
+        }
+        if *sum != checksum(rest) {
+            return Err(StateError::Damaged);
         }
         *self = next;
         Ok(())
@@ -235,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_number_of_words_is_the_number_of_fields() {
-        let mut n = 1;
+        let mut n = 2; // version and checksum
         Dcm::new(Config::default()).words(&mut |_| n += 1);
         assert_eq!(n, STATE_WORDS);
     }

@@ -2,10 +2,10 @@
 //!
 //! What it is: the whole state as words of 32 bits, written and read by one list of fields, so that a filter that was
 //! restored continues with the same bits.
-//! What can go wrong: words of another version, words that are no rotation or not finite: refused, and the filter keeps what
+//! What can go wrong: words of another version, damaged, no rotation or not finite: refused, and the filter keeps what
 //! it had.
 //! Units: bits.
-//! Reference: IEEE 754 single precision.
+//! Reference: IEEE 754 single precision; Fowler, Noll & Vo for the checksum.
 
 use crate::Mat3;
 use crate::columns::Column;
@@ -41,6 +41,11 @@ pub(super) fn flag(value: &mut bool, visit: &mut dyn FnMut(&mut f32)) {
     *value = word != 0.0;
 }
 
+/// Checksum of the numbers of a state: FNV-1a, a word at a time. Any change of one word changes it.
+pub(super) fn checksum(words: &[u32]) -> u32 {
+    words.iter().fold(0x811c_9dc5, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193))
+}
+
 /// Why a saved state is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -52,4 +57,6 @@ pub enum StateError {
     NotFinite(usize),
     /// The matrix is no rotation.
     NoRotation,
+    /// The checksum is another: not the words that were saved.
+    Damaged,
 }
