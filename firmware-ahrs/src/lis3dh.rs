@@ -103,6 +103,7 @@ pub fn saturated(words: &[i16; 3]) -> bool {
 mod tests {
     use super::*;
     use crate::failing_bus::fails_at_every_step;
+    use embedded_hal::spi::ErrorKind;
     use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
     use embedded_hal_mock::eh1::spi::{Mock as SpiMock, Transaction as Spi};
     extern crate std;
@@ -160,6 +161,51 @@ mod tests {
         assert_eq!(configure_spi(&mut spi), Ok(()));
         assert_eq!(read_spi(&mut spi), Ok([256, -256, 2047]));
         spi.done();
+    }
+
+    /// A device whose n-th transaction fails; the others read the identity.
+    struct Failing {
+        after: usize,
+        asked: usize,
+    }
+
+    impl embedded_hal::spi::ErrorType for Failing {
+        type Error = ErrorKind;
+    }
+
+    impl SpiDevice for Failing {
+        fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
+            self.asked += 1;
+            if self.asked > self.after {
+                return Err(ErrorKind::ModeFault);
+            }
+            for operation in operations {
+                if let Operation::Read(into) = operation {
+                    into.fill(IDENTITY);
+                }
+            }
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn on_spi_another_chip_is_named_and_a_failing_bus_is_an_error_at_every_step() {
+        // nothing answers: the line rests high
+        let mut spi = SpiMock::new(&[
+            Spi::transaction_start(),
+            Spi::write_vec(vec![0x8F]),
+            Spi::read_vec(vec![0xFF]),
+            Spi::transaction_end(),
+        ]);
+        assert_eq!(configure_spi(&mut spi), Err(SensorError::WrongIdentity { address: 0x18, found: 0xFF }));
+        spi.done();
+        for after in 0..3 {
+            let mut spi = Failing { after, asked: 0 };
+            assert_eq!(configure_spi(&mut spi), Err(SensorError::Bus(ErrorKind::ModeFault)));
+            assert_eq!(spi.asked, after + 1, "the bus is touched no further");
+        }
+        assert_eq!(configure_spi(&mut Failing { after: 3, asked: 0 }), Ok(()));
+        assert_eq!(read_spi(&mut Failing { after: 0, asked: 0 }), Err(SensorError::Bus(ErrorKind::ModeFault)));
     }
 
     #[test]
