@@ -35,6 +35,10 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
     if let ["--plots", target] = words {
         return plots::plots(std::path::Path::new(target), &trials);
     }
+    if let Some(word) = words.iter().find(|w| Variant::ALL.iter().all(|v| v.name() != **w)) {
+        let names = Variant::ALL.map(Variant::name).join(", ");
+        return Err(Failure(format!("{word}: no variant; whose trials are to be listed is one of {names}")));
+    }
     let peers = folder.join("peers-shared.csv");
     let mut missed = Vec::new();
     println!(
@@ -47,6 +51,14 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
             .iter()
             .map(|(_, [total, heading, inclination])| Score { total: *total, heading: *heading, inclination: *inclination })
             .collect();
+        if variant != Variant::Worst && vqf.len() != trials.len() {
+            let (found, name) = (vqf.len(), variant.name());
+            return Err(Failure(format!(
+                "{}: {found} rows of VQF's default on {name}, {} trials",
+                peers.display(),
+                trials.len()
+            )));
+        }
         let (mine, theirs) = (Score::mean(ours.iter()), Score::mean(vqf.iter()));
         let half = |k: usize| Score::mean(ours.iter().skip(k).step_by(2)).total;
         let three = |s: &Score| format!("{:>13.2} {:>7.2} {:>7.3}", s.total, s.heading, s.inclination);
@@ -74,9 +86,14 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
     if missed.is_empty() { Ok(()) } else { Err(Failure(format!("targets missed: {}", missed.join("; ")))) }
 }
 
+/// What a thread gave; its panic goes on here, so that no trial is missing from a mean.
+fn joined<T>(handle: std::thread::ScopedJoinHandle<'_, T>) -> T {
+    handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
 fn scores(trials: &[Trial], variant: Variant, new: impl Fn() -> Box<dyn score::Filter> + Sync) -> Vec<Score> {
     std::thread::scope(|scope| {
         let handles: Vec<_> = trials.iter().map(|t| scope.spawn(|| run(new().as_mut(), &variant.of(t), |_| {}))).collect();
-        handles.into_iter().filter_map(|h| h.join().ok()).collect()
+        handles.into_iter().map(joined).collect()
     })
 }

@@ -32,7 +32,8 @@ usage: cargo xtask COMMAND
   image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
                    interrupts reach no panic, and its stack is bounded (budgets/rig.toml)
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
-  ahrs-bench       the attitude filter on the shared BROAD trials and their stress variants, with its targets
+  ahrs-bench [VARIANT]...  the attitude filter on the shared BROAD trials and their stress variants, with its targets;
+                   each trial of the variants that are named
   ahrs-bench --plots DIR  the error over time in each trial, as a page and figures
   ahrs-bench --scan  what half of the trials says of each constant of the default (docs/ahrs-constants.md)
   ahrs-bench --vqf  VQF's Rust port on every variant, those included of which nothing is published (fetches it once)

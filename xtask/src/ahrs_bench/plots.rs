@@ -29,7 +29,7 @@ struct Course {
 pub(super) fn plots(folder: &Path, trials: &[Trial]) -> Result<(), Failure> {
     let courses: Vec<Course> = std::thread::scope(|scope| {
         let handles: Vec<_> = trials.iter().map(|t| scope.spawn(|| course(&t.samples))).collect();
-        handles.into_iter().filter_map(|h| h.join().ok()).collect()
+        handles.into_iter().map(super::joined).collect()
     });
     let mut sheet = Sheet::new("Attitude error in each BROAD trial");
     sheet.say("Ours: the one default. Classic: the thesis' algorithm with tuned gains. Errors are drawn where the benchmark scores. Shaded: our filter takes the field for disturbed and holds its heading. Green bar at zero: it takes the body for resting.");

@@ -8,6 +8,7 @@
 //! Reference: `docs/ahrs.md`, "What was chosen on what".
 
 use super::constants::{ALL, Constant};
+use super::joined;
 use super::score::{Score, run};
 use super::trial::Trial;
 use super::variant::Variant;
@@ -79,7 +80,7 @@ fn error(trials: &[&Trial], config: Config) -> f64 {
     };
     std::thread::scope(|scope| {
         let handles: Vec<_> = trials.iter().map(|t| scope.spawn(|| of(t))).collect();
-        handles.into_iter().filter_map(|h| h.join().ok()).sum::<f64>() / trials.len() as f64
+        handles.into_iter().map(joined).sum::<f64>() / trials.len() as f64
     })
 }
 
