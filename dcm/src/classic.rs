@@ -122,7 +122,7 @@ impl Classic {
     /// Proportional turn for `error` over `held` seconds; the integral goes to the bias.
     fn correct(&mut self, error: Vec3, gains: Gains, held: f32) -> Vec3 {
         let limit = self.config.bias_limit;
-        self.bias = (self.bias - error * (gains.ki * held)).map(|b| b.max(-limit).min(limit));
+        self.bias = (self.bias - error * (gains.ki * held)).map(|b| within(b, limit));
         error * (gains.kp * held).min(1.0)
     }
 
@@ -196,7 +196,7 @@ impl Classic {
     /// Sets the bias, for instance from a stored calibration; what is not finite or beyond the limit is limited.
     pub fn set_bias(&mut self, bias: Vec3) {
         let limit = self.config.bias_limit;
-        self.bias = bias.map(|b| if b.is_finite() { b.max(-limit).min(limit) } else { 0.0 });
+        self.bias = bias.map(|b| if b.is_finite() { within(b, limit) } else { 0.0 });
     }
 
     /// Difference of this heading to another attitude's, rad in (-pi, pi].
@@ -204,6 +204,17 @@ impl Classic {
     pub fn heading_against(&self, other: &Mat3) -> f32 {
         let relative = self.matrix * other.transpose();
         atan2f(relative.m21 - relative.m12, relative.m11 + relative.m22)
+    }
+}
+
+/// Cut to `limit` on both sides of zero. (The library's `clamp` panics at a limit that is none.)
+fn within(value: f32, limit: f32) -> f32 {
+    if value > limit {
+        limit
+    } else if value < -limit {
+        -limit
+    } else {
+        value
     }
 }
 
