@@ -1,6 +1,6 @@
 //! What the filter says of itself: innovation, state of the field's gate, doubt of the bias; six axes beside nine.
 
-use dcm::{Config, Dcm, Euler, Mat3, Measurement, STANDARD_GRAVITY, Vec3, matrix_of};
+use dcm::{Config, Dcm, Euler, Increment, Mat3, Measurement, STANDARD_GRAVITY, Vec3, matrix_of, rotate};
 
 const FIELD: [f32; 3] = [20.0, 0.0, 43.0];
 const DT: f32 = 1.0 / 200.0;
@@ -80,4 +80,29 @@ fn the_innovation_is_what_the_field_says_against_the_heading() {
     }
     let off = dcm.quality().heading_error.to_degrees();
     assert!((off - 10.0).abs() < 0.5, "{off}");
+}
+
+/// Six axes: the tilt of a body that turns about all axes, and the bias, seen through gravity alone.
+#[test]
+fn without_field_tilt_and_bias_are_found_in_motion_and_start_up_ends() {
+    let bias = Vec3::new(0.02, -0.03, 0.015);
+    let (mut dcm, mut truth, mut worst) = (Dcm::new(Config::default()), heading(30.0), 0.0f32);
+    for k in 0..60_000u16 {
+        let t = f32::from(k) * DT;
+        let rate = Vec3::new((0.9 * t).sin(), 0.8 * (0.7 * t).cos(), 1.1 * (0.4 * t).sin());
+        for _ in 0..8 {
+            truth = rotate(&truth, &(rate * (DT / 8.0)), Increment::Exponential);
+        }
+        let accel = truth.transpose() * Vec3::new(0.0, 0.0, -STANDARD_GRAVITY);
+        let step = dcm.update(DT, &Measurement { gyro: Some(rate + bias), accel: Some(accel), mag: None });
+        assert!(!step.mag_used && !step.bad_input);
+        if k > 30_000 {
+            let across = dcm.gravity().cross(&truth.row(2).transpose());
+            worst = worst.max(across.dot(&across).sqrt().asin().to_degrees());
+        }
+    }
+    let off = dcm.bias() - bias;
+    println!("six axes in motion: tilt within {worst:.2} degrees, bias off by {off:?}");
+    assert!(worst < 0.5 && off.abs().max() < 3e-3, "{worst} {off}");
+    assert!(!dcm.flags().startup && !dcm.heading_is_absolute());
 }

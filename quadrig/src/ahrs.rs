@@ -136,7 +136,8 @@ pub(crate) fn line(out: &mut String, time: &str, attitude: Option<Mat3>) {
             }
             for angle in [e.roll, e.pitch, e.yaw] {
                 out.push(',');
-                text::fixed::<5>(out, f64::from(angle).to_degrees());
+                // single precision's half turn lies a little beyond it
+                text::fixed::<5>(out, f64::from(angle).to_degrees().clamp(-180.0, 180.0));
             }
         }
     }

@@ -26,7 +26,7 @@ const STATE_VERSION: u32 = 0x4443_4D05;
 pub struct Flags {
     /// Roll and pitch are set.
     pub started: bool,
-    /// The first averages still fill: gains are larger than later.
+    /// The first averages still fill (that of the heading where there is a field): gains are larger than later.
     pub startup: bool,
     /// The body rests.
     pub rest: bool,
@@ -154,7 +154,7 @@ impl<C: Borrow<Config> + Clone> Dcm<C> {
         let config = self.config.borrow();
         Flags {
             started: self.started,
-            startup: self.tilt.starting(config.tilt_tau) || self.heading_age < config.heading_tau,
+            startup: self.tilt.starting(config.tilt_tau) || (self.heading_absolute && self.heading_age < config.heading_tau),
             rest: self.rest.now,
             heading_absolute: self.heading_absolute,
             field_known: self.field.known(),
