@@ -10,11 +10,16 @@ use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
 use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
-use crate::plateau::settle;
 use crate::solve::Normal;
 use crate::start::start_pulse;
 use std::borrow::Cow;
 use std::sync::OnceLock;
+
+mod consensus;
+mod stretches;
+
+pub use consensus::Consensus;
+pub(crate) use stretches::{CALM_US, STILL_US};
 
 /// Efficiency of ESC and motor at work: 0.65 to 0.85 for motors of this size.
 const EFFICIENCY: f64 = 0.75;
@@ -141,7 +146,9 @@ impl Target {
         let floored = rows.iter().map(|i| noise.weight_variance(speed(i), FLOORED)).collect();
         let mut calm = vec![false; context.t.len()];
         context.calm.iter().for_each(|(a, b)| calm[*a..*b].fill(true));
-        let mut unsettled: Vec<bool> = rows.iter().map(|i| !calm[*i] || context.runs_down(relation, *i)).collect();
+        let driven = matches!(relation, Relation::SpeedFromPulse | Relation::Torque | Relation::Current);
+        let on_the_way = |i: usize| driven && context.under_way.get(i).is_some_and(|u| *u);
+        let mut unsettled: Vec<bool> = rows.iter().map(|i| !calm[*i] || on_the_way(*i)).collect();
         let jumps = unsettled.iter().filter(|u| **u).count();
         if jumps < FEWEST_OF_A_KIND || unsettled.len() - jumps < FEWEST_OF_A_KIND.max(unsettled.len() / 4) {
             unsettled.clear();
@@ -162,17 +169,6 @@ impl Target {
         self.floored = self.rows.iter().map(|i| variance(i, FLOORED)).collect();
         self.noise = noise;
     }
-}
-
-/// How the consensus speed is made; stands in `model.toml`.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Consensus {
-    /// Channels whose median is taken.
-    pub channels: Vec<String>,
-    /// Channels that disagree with the others, left out.
-    pub excluded: Vec<String>,
-    /// Rows whose speed dropped out for at most three rows and came back: bridged.
-    pub bridged_rows: usize,
 }
 
 /// A log made ready.
@@ -210,6 +206,8 @@ pub struct Context {
     pub calm: Vec<(usize, usize)>,
     /// Rows at the head of the steady stretches in which the rotor still approaches its new speed; empty without a command or a speed.
     pub(crate) settling: Vec<bool>,
+    /// Rows on which the rotor is on its way to another speed, driven or not; empty without a command or a speed.
+    pub(crate) under_way: Vec<bool>,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
     powers: [OnceLock<Vec<Values>>; 2],
     /// What effects ask again and again.
@@ -264,22 +262,18 @@ impl Context {
         context
     }
 
-    /// Whether a rotor whose motor is off still turns at a row: no curve of a driven motor holds for its speed, torque and current.
-    fn runs_down(&self, relation: Relation, row: usize) -> bool {
-        let driven = matches!(relation, Relation::SpeedFromPulse | Relation::Torque | Relation::Current);
-        let off = self.pulse.as_ref().is_some_and(|p| p[row] < self.start_pulse_us);
-        driven && off && self.rpm.get(row).is_some_and(|r| *r > STANDSTILL)
-    }
-
     /// What every declared relation needs and no more: command, consensus speed, steady stretches. No targets; see [`Context::declared`].
     #[must_use]
     pub fn bare(log: &Log, start_pulse_us: Option<f64>) -> Self {
         let pulse = log.column("pulse_us").filter(|c| c.iter().any(|v| v.is_finite())).map(|c| bridge(&log.t, c));
-        let (rpm, consensus) = consensus(log);
-        let steady = steady_stretches(&log.t, pulse.as_deref(), &rpm, STILL_US);
-        let calm = steady_stretches(&log.t, pulse.as_deref(), &rpm, CALM_US);
-        let settling = if pulse.is_some() { settling(&log.t, &rpm, &steady) } else { Vec::new() };
+        let (rpm, consensus) = consensus::of(log);
+        let steady = stretches::steady(&log.t, pulse.as_deref(), &rpm, STILL_US);
+        let calm = stretches::steady(&log.t, pulse.as_deref(), &rpm, CALM_US);
+        let settling = if pulse.is_some() { stretches::settling(&log.t, &rpm, &steady) } else { Vec::new() };
         let start = start_pulse_us.unwrap_or_else(|| start_pulse(&log.t, pulse.as_deref(), &rpm));
+        // a rotor whose motor is off still turns for a while
+        let runs_down = |row: usize| rpm[row] > STANDSTILL && pulse.as_ref().is_some_and(|p| p[row] < start);
+        let under_way = stretches::under_way(&settling, &calm, runs_down);
         Self {
             name: log.name.clone(),
             t: log.t.clone(),
@@ -296,6 +290,7 @@ impl Context {
             targets: Vec::new(),
             steady,
             calm,
+            under_way,
             settling,
             powers: Default::default(),
             facts: Facts::default(),
@@ -418,121 +413,6 @@ pub fn bridge(t: &[f64], values: &[f64]) -> Vec<f64> {
     if let Some(j) = last {
         let v = values[j];
         out[j + 1..].fill(v);
-    }
-    out
-}
-
-fn consensus(log: &Log) -> (Vec<f64>, Consensus) {
-    let present: Vec<&str> =
-        SPEED.into_iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).collect();
-    if present.is_empty() {
-        return (Vec::new(), Consensus::default());
-    }
-    let all = median_of(log, &present);
-    let scale = all.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max).max(1.0);
-    let excluded: Vec<&str> = if present.len() >= 3 {
-        present.iter().copied().filter(|name| disagreement(log, name, &all, scale) > 0.005).collect()
-    } else {
-        Vec::new()
-    };
-    let kept: Vec<&str> = if excluded.len() * 2 < present.len() {
-        present.iter().copied().filter(|n| !excluded.contains(n)).collect()
-    } else {
-        present.clone()
-    };
-    let excluded = if kept.len() == present.len() { Vec::new() } else { excluded };
-    let mut rpm = if excluded.is_empty() { all } else { median_of(log, &kept) };
-    let bridged_rows = remove_dropouts(&mut rpm, scale);
-    let info = Consensus {
-        channels: kept.iter().map(|s| (*s).to_owned()).collect(),
-        excluded: excluded.iter().map(|s| (*s).to_owned()).collect(),
-        bridged_rows,
-    };
-    (bridge(&log.t, &rpm), info)
-}
-
-fn median_of(log: &Log, names: &[&str]) -> Vec<f64> {
-    let columns: Vec<&[f64]> = names.iter().filter_map(|n| log.column(n)).collect();
-    (0..log.len())
-        .map(|i| {
-            let mut v: Vec<f64> = columns.iter().map(|c| c[i]).filter(|v| v.is_finite()).collect();
-            if v.is_empty() { f64::NAN } else { noise::median(&mut v) }
-        })
-        .collect()
-}
-
-/// Median relative deviation of a channel from the median of all, while the rotor turns.
-fn disagreement(log: &Log, name: &str, all: &[f64], scale: f64) -> f64 {
-    let Some(column) = log.column(name) else { return 0.0 };
-    let mut d: Vec<f64> = column
-        .iter()
-        .zip(all)
-        .filter(|(v, m)| v.is_finite() && m.is_finite() && **m > 0.1 * scale)
-        .map(|(v, m)| ((v - m) / m).abs())
-        .collect();
-    if d.is_empty() { 0.0 } else { noise::median(&mut d) }
-}
-
-/// A speed that leaves by more than 2 % for at most three rows and comes back to within 1 % is a sensor's drop-out:
-/// no rotor does that. Such rows become missing and are bridged.
-fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
-    let mut removed = 0;
-    let finite: Vec<usize> = (0..rpm.len()).filter(|i| rpm[*i].is_finite()).collect();
-    let mut k = 1;
-    while k + 1 < finite.len() {
-        let before = rpm[finite[k - 1]];
-        if before > 0.05 * scale && (rpm[finite[k]] - before).abs() > 0.02 * before {
-            let back = (1..=3).find(|m| finite.get(k + m).is_some_and(|j| (rpm[*j] - before).abs() < 0.01 * before));
-            if let Some(m) = back {
-                for j in &finite[k..k + m] {
-                    rpm[*j] = f64::NAN;
-                    removed += 1;
-                }
-                k += m;
-            }
-        }
-        k += 1;
-    }
-    removed
-}
-
-/// Change of the command from row to row, us, below which it holds still.
-pub(crate) const STILL_US: f64 = 0.5;
-/// Change of the command from row to row, us, below which it does not jump: a ramp from end to end in two seconds at 50 Hz.
-pub(crate) const CALM_US: f64 = 10.0;
-
-/// Row ranges in which the command changes by at most `most` us a row (or, without a command, the speed holds still).
-fn steady_stretches(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) -> Vec<(usize, usize)> {
-    let n = t.len();
-    let (signal, tolerance): (&[f64], f64) = match pulse {
-        Some(p) => (p, most),
-        None if !rpm.is_empty() => (rpm, 0.01 * rpm.iter().copied().fold(0.0, f64::max)),
-        None => return vec![(0, n)],
-    };
-    let mut out = Vec::new();
-    let mut from = 0;
-    for i in 1..=n {
-        let ends = i == n
-            || (signal[i] - signal[i - 1]).abs() > tolerance
-            || (pulse.is_none() && (signal[i] - signal[from]).abs() > 2.0 * tolerance);
-        if ends {
-            if i - from >= 6 {
-                out.push((from, i));
-            }
-            from = i;
-        }
-    }
-    out
-}
-
-/// Rows at the head of each steady stretch in which the speed has not arrived yet.
-fn settling(t: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Vec<bool> {
-    if rpm.is_empty() {
-        return Vec::new();
-    }
-    let mut out = vec![false; t.len()];
-    for (from, to) in steady {
-        out[*from..from + settle::rows(t, rpm, *from, *to)].fill(true);
     }
     out
 }

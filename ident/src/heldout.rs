@@ -60,14 +60,23 @@ pub struct Held {
     pub typical: f64,
     /// Root mean square over the rows about which a claim is made: the figure of a verdict.
     pub claimed: f64,
+    /// Root mean square where the load has settled; NaN where the log does not tell (see [`Target::unsettled`]).
+    pub settled: f64,
+    /// Root mean square where it has not.
+    pub unsettled: f64,
 }
 
 impl Held {
+    /// What is not known.
+    pub(crate) const UNKNOWN: Self =
+        Self { rms: f64::NAN, typical: f64::NAN, claimed: f64::NAN, settled: f64::NAN, unsettled: f64::NAN };
+
     /// Share of `before` that is gone, in the measure in which more is gone: rows right after a step, whose instant is known
     /// only to a sample, may rule the one, and a resonance or a saturation that few rows show rules the other.
     #[must_use]
     pub fn share_gone(&self, before: &Self) -> f64 {
-        (1.0 - self.rms / before.rms).max(1.0 - self.typical / before.typical)
+        let gone = |of: fn(&Self) -> f64| 1.0 - of(self) / of(before);
+        gone(|h| h.rms).max(gone(|h| h.typical)).max(gone(|h| h.settled)).max(gone(|h| h.unsettled))
     }
 }
 
@@ -77,7 +86,7 @@ pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec
     let all = vec![true; context.targets.len()];
     pooled(context, declared, folds, &all, &|keep| refine(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS))
         .into_iter()
-        .map(|e| e.unwrap_or(Held { rms: f64::NAN, typical: f64::NAN, claimed: f64::NAN }))
+        .map(|e| e.unwrap_or(Held::UNKNOWN))
         .collect()
 }
 
@@ -129,11 +138,11 @@ pub fn errors_around_newest(
             let new = with.predict(&fitted.coefficients, context.len());
             let old = without.predict(&plain.coefficients, context.len());
             let left = left_over(target, &new, &keep);
-            for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| out[**row]) {
+            for (j, (row, y)) in target.rows.iter().zip(&target.y).enumerate().filter(|(_, (row, _))| out[**row]) {
                 let known = with.variance(&fitted.covariance, *row) < left;
                 let of_row = [y - old[*row], y - new[*row]];
                 for (sum, residual) in sums.iter_mut().zip(of_row.into_iter().cycle().take(if known { 4 } else { 2 })) {
-                    sum.add(target, *row, residual);
+                    sum.add(target, j, residual);
                 }
             }
         }
@@ -172,13 +181,16 @@ pub(crate) fn pooled(
             let design = designs.of(target);
             let Some(fitted) = fit_target(target, design, Rows::Where(&keep)) else { continue };
             let prediction = design.predict(&fitted.coefficients, context.len());
-            for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| out[**row]) {
-                sum.add(target, *row, y - prediction[*row]);
+            for (j, (row, y)) in target.rows.iter().zip(&target.y).enumerate().filter(|(_, (row, _))| out[**row]) {
+                sum.add(target, j, y - prediction[*row]);
             }
         }
     }
     sums.iter().zip(&context.targets).map(|(sum, target)| sum.held(target)).collect()
 }
+
+/// Fewest rows that a figure of a part of them is made of.
+const FEWEST: usize = 20;
 
 /// Sums over rows that were left out.
 #[derive(Debug, Clone, Copy, Default)]
@@ -188,23 +200,33 @@ struct Sum {
     rows: usize,
     claimed_squares: f64,
     claimed: usize,
+    late_squares: f64,
+    late: usize,
 }
 
 impl Sum {
-    fn add(&mut self, target: &Target, row: usize, residual: f64) {
+    fn add(&mut self, target: &Target, sample: usize, residual: f64) {
         let square = residual.powi(2);
         self.squares += square;
         self.logs += (square / target.noise.rms.powi(2)).ln_1p();
         self.rows += 1;
-        if target.claims(row) {
+        if target.claims(target.rows[sample]) {
             self.claimed_squares += square;
             self.claimed += 1;
+        }
+        if target.unsettled.get(sample).is_some_and(|u| *u) {
+            self.late_squares += square;
+            self.late += 1;
         }
     }
 
     fn held(self, target: &Target) -> Option<Held> {
         let mean = |sum: f64| sum / self.rows as f64;
+        // all rows are of one kind where the log does not tell
+        let root = |sum: f64, n: usize| if self.late > 0 && n >= FEWEST { (sum / n as f64).sqrt() } else { f64::NAN };
         (self.rows > 0).then(|| Held {
+            settled: root(self.squares - self.late_squares, self.rows - self.late),
+            unsettled: root(self.late_squares, self.late),
             rms: mean(self.squares).sqrt(),
             typical: target.noise.rms * mean(self.logs).exp_m1().sqrt(),
             claimed: (self.claimed_squares / self.claimed as f64).sqrt(),

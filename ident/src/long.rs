@@ -205,7 +205,7 @@ impl AllRows<'_> {
             let seen: Vec<bool> = self.rows.iter().map(|i| keep[*i]).collect();
             refine(self.means, self.declared, placed, Rows::Where(&seen), heldout::EVALUATIONS)
         };
-        let nothing = Held { rms: f64::NAN, typical: f64::NAN, claimed: f64::NAN };
+        let nothing = Held::UNKNOWN;
         let pooled = heldout::pooled(self.context, self.declared, self.folds, wanted, &shapes).into_iter().enumerate();
         pooled.map(|(i, e)| e.or(previous.get(i).copied()).unwrap_or(nothing)).collect()
     }

@@ -77,8 +77,9 @@ impl Stretches<'_> {
 /// measured speed (a gust moves speed and thrust together, and is no noise of the load cell).
 #[must_use]
 pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], stretches: Stretches<'_>) -> Noise {
-    let quantum = quantum(reading);
-    let floor = quantum * quantum / 12.0;
+    let quantum = resolution(rows, reading, stretches);
+    let digits = LAST_DIGIT * reading.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
+    let floor = (quantum * quantum / 12.0).max(digits * digits);
     let mut samples: Vec<(f64, f64)> = Vec::new(); // (speed/1000)^2, squared second difference scaled to a variance
     let mut colour = Colour::default();
     for (from, to) in stretches.calm {
@@ -125,6 +126,31 @@ pub fn estimate(rows: &[usize], reading: &[f64], y: &[f64], rpm: &[f64], stretch
     let speed = |r: &usize| if rpm.is_empty() { 0.0 } else { rpm[*r] };
     noise.rms = (rows.iter().map(|r| noise.variance(speed(r))).sum::<f64>() / rows.len().max(1) as f64).sqrt();
     noise
+}
+
+/// Part of its largest reading that no channel of a log is trusted below: six digits.
+const LAST_DIGIT: f64 = 1e-6;
+
+/// Stretches without a jump for each distinct value from which on a channel that does not move within any of them is one whose display
+/// is too coarse to, rather than one without noise.
+const SHARED: usize = 4;
+
+/// The resolution of a channel, also where a run shows a few digits of its display only; 0 where the readings do not tell it: a
+/// channel without noise has a value a level, and their distances are the schedule's.
+fn resolution(rows: &[usize], reading: &[f64], stretches: Stretches<'_>) -> f64 {
+    let moves = stretches.calm.iter().any(|(from, to)| {
+        let skip = from + 2 + (to - from) / 10;
+        let (lo, hi) = (rows.partition_point(|r| *r < skip), rows.partition_point(|r| r < to));
+        reading.get(lo..hi).is_some_and(|r| r.windows(2).any(|w| w[0] != w[1]))
+    });
+    let mut values = reading.to_vec();
+    values.sort_unstable_by(f64::total_cmp);
+    values.dedup();
+    if !moves && values.len() * SHARED > stretches.calm.len() {
+        return 0.0;
+    }
+    let finest = values.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 1e-12).fold(f64::INFINITY, f64::min);
+    if values.len() <= 8 && finest.is_finite() { finest } else { quantum(reading) }
 }
 
 /// Smallest non-zero step between sorted distinct values: the resolution of the log.
@@ -292,6 +318,24 @@ mod tests {
         assert!((noise.rms - 2.0).abs() < 0.1 && noise.rho == 0.0, "{noise:?}");
         // what jumps while the load is held is not explained by the command
         assert!(estimate(&rows, &y, &y, &[], held(&[(0, 4000)])).rms > 5.0);
+    }
+
+    #[test]
+    fn a_display_of_few_digits_keeps_its_step() {
+        let rows: Vec<usize> = (0..1200).collect();
+        let levels: Vec<(usize, usize)> = (0..12).map(|k| (100 * k, 100 * (k + 1))).collect();
+        let floor = |y: &[f64]| estimate(&rows, y, y, &[], held(&levels)).rms;
+        let step = 0.1 / 12.0_f64.sqrt();
+        let rounded = |v: f64| (10.0 * v).round() / 10.0;
+        // it toggles, and it changes between levels only
+        let toggles: Vec<f64> = rows.iter().map(|i| rounded(11.45 + 0.03 * hash_noise(*i))).collect();
+        assert!(floor(&toggles) >= step, "{}", floor(&toggles));
+        let still: Vec<f64> = rows.iter().map(|i| if *i < 700 { 11.5 } else { 11.4 }).collect();
+        assert!((floor(&still) / step - 1.0).abs() < 1e-6, "{}", floor(&still));
+        // a constant has the last of six digits; what has no noise has a value a level, and those are no digits
+        assert!((floor(&[11.5; 1200]) / 11.5e-6 - 1.0).abs() < 1e-6);
+        let clean: Vec<f64> = rows.iter().map(|i| 700.0 * (1 + i / 100) as f64).collect();
+        assert!(floor(&clean) < 1.0, "{}", floor(&clean));
     }
 
     fn hash_noise(i: usize) -> f64 {

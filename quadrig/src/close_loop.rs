@@ -93,6 +93,9 @@ pub(crate) fn table(verdict: &Verdict) -> String {
         }
         out += &format!("  evidence: {}\n", e.evidence);
     }
+    if matches!(verdict.verdict, Kind::Attributed | Kind::Ambiguous) {
+        out += &unexplained(verdict);
+    }
     if !verdict.alternatives.is_empty() {
         let list: Vec<String> =
             verdict.alternatives.iter().map(|a| format!("{} ({:.3})", a.ids.join(" + "), a.probability)).collect();
@@ -112,6 +115,20 @@ pub(crate) fn table(verdict: &Verdict) -> String {
         }
     }
     out
+}
+
+/// Noise floors of held-out error from which on a channel counts as not understood, whatever was named on others.
+const FAR: f64 = 3.0;
+
+/// The channels on which the named effects leave far more than noise, and how much: a name explains what it was found on.
+fn unexplained(verdict: &Verdict) -> String {
+    let far =
+        verdict.channels.iter().filter(|(_, c)| c.after.heldout_rms > FAR * c.noise_floor_rms && c.after.whiteness_p < 1e-6);
+    let list: Vec<String> = far.map(|(name, c)| format!("{name} {:.0}", c.after.heldout_rms / c.noise_floor_rms)).collect();
+    if list.is_empty() {
+        return String::new();
+    }
+    format!("\nnot explained by these names, held-out error in noise floors: {}\n", list.join(", "))
 }
 
 fn sentence(verdict: &Verdict) -> String {

@@ -18,12 +18,16 @@ use hal_sim::Scenario;
 use hal_sim::effect::{self, UNKNOWN};
 use hal_sim::scenario::{Schedule, Step};
 use ident::log::Log;
-use ident::verdict::{Kind, Verdict};
+use ident::verdict::{EffectEntry, Kind, Verdict};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// Rigs: motor, propeller, supply that the pair stays within.
 const RIGS: [(&str, &str); 4] = [("570KV", "11x4.7"), ("690KV", "10x4.5"), ("490KV", "11x4.5"), ("390KV", "12x4.5")];
+
+/// Names that are true of every simulated rig: its rotor has inertia. They count where they are what is hidden.
+const OWN: [&str; 2] = ["spinup_lag", "rotor_inertia"];
 
 /// What a seed hides: an effect of the simulator's catalogue, or nothing.
 #[must_use]
@@ -170,14 +174,20 @@ fn size(log: &Log, twin: &Log, healthy: &Verdict) -> (f64, String) {
     log.measured().filter_map(of).filter(|s| s.0.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
 }
 
+/// Whether two entries speak of the same channels.
+fn alike(one: &EffectEntry, other: &EffectEntry) -> bool {
+    let channels = |e: &EffectEntry| e.channels.iter().cloned().collect::<BTreeSet<String>>();
+    channels(one) == channels(other)
+}
+
 fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Line) {
     let standing: Vec<&str> = own.effects.iter().map(|e| e.id.as_str()).collect();
-    let beyond = |ids: Vec<&str>| -> Vec<String> {
-        ids.into_iter().filter(|i| !standing.contains(i) || Some(*i) == id).map(str::to_owned).collect()
-    };
-    let named = beyond(v.effects.iter().map(|e| e.id.as_str()).collect());
-    let others: Vec<Vec<String>> =
-        v.alternatives.iter().map(|a| beyond(a.ids.iter().map(String::as_str).collect())).take(2).collect();
+    let is_own = |name: &str| OWN.contains(&name) && id != Some(name);
+    // the same name on another channel is news
+    let known = |e: &&EffectEntry| is_own(&e.id) || own.effects.iter().any(|o| o.id == e.id && alike(o, e));
+    let named: Vec<String> = v.effects.iter().filter(|e| !known(e)).map(|e| e.id.clone()).collect();
+    let new = |name: &&String| !is_own(name) && (named.contains(*name) || !standing.contains(&name.as_str()));
+    let others: Vec<Vec<String>> = v.alternatives.iter().map(|a| a.ids.iter().filter(new).cloned().collect()).take(2).collect();
     line.verdict = format!("{:?}", v.verdict).to_lowercase();
     line.named = named.join("+");
     line.probability = v.effects.first().map_or(f64::NAN, |e| e.probability);

@@ -80,6 +80,26 @@ pub fn calibration<'a>(lines: impl Iterator<Item = &'a Line>) -> f64 {
     bins.iter().map(|b| (b.1 - b.2).abs()).sum::<f64>() / n
 }
 
+/// The calibration curve: of all hypotheses that were claimed with about this probability, how many were right. Right is the exact
+/// set of names; for an effect that the library does not know, that none was given.
+fn calibration_curve(lines: &[Line]) -> String {
+    let mut out = "\n### Calibration: probability of the verdict against how often it is right, effects of three noise floors and above\n\n| claimed | mean of the claims | right: one effect | two effects | unknown | all |\n| --- | --- | --- | --- | --- | --- |\n".to_owned();
+    let right = |l: &&Line| if l.kind == "unknown" { l.first } else { l.exact };
+    for k in 0..10 {
+        let (low, high) = (f64::from(k) / 10.0, f64::from(k + 1) / 10.0);
+        let claims = |l: &&Line| l.size >= 3.0 && l.probability >= low && (l.probability < high || k == 9);
+        let of = |kind: &str| Rate::over(lines.iter().filter(claims).filter(|l| l.kind == kind), right).text();
+        let all: Vec<&Line> = lines.iter().filter(claims).filter(|l| l.kind != "clean").collect();
+        let mean = all.iter().map(|l| l.probability).sum::<f64>() / all.len() as f64;
+        if !all.is_empty() {
+            let rate = Rate::over(all.iter().copied(), right).text();
+            let row = [format!("{low:.1}-{high:.1}"), format!("{mean:.3}"), of("one"), of("two"), of("unknown"), rate];
+            let _ = writeln!(out, "| {} |", row.join(" | "));
+        }
+    }
+    out
+}
+
 fn median(mut v: Vec<f64>) -> f64 {
     v.retain(|x| x.is_finite());
     v.sort_by(f64::total_cmp);
@@ -130,6 +150,7 @@ pub fn markdown(lines: &[Line]) -> String {
             Rate::over(of("unknown", bin), |l| l.first).text()
         );
     }
+    out.push_str(&calibration_curve(lines));
     let _ = writeln!(
         out,
         "\n### Each effect alone at three noise floors and above\n\n| true | first | exact | among three | cover | after/noise | after/told | named instead |\n| --- | --- | --- | --- | --- | --- | --- | --- |"
@@ -198,6 +219,27 @@ mod tests {
         let (lo, hi) = Rate { hits: 45, of: 50 }.wilson();
         assert!((lo - 0.786).abs() < 1e-3 && (hi - 0.9565).abs() < 1e-3, "{lo} {hi}");
         assert_eq!(Rate::default().text(), "none");
+    }
+
+    #[test]
+    fn the_calibration_curve_holds_each_claim_once() {
+        let line = |kind: &str, probability: f64, right: bool| Line {
+            kind: kind.into(),
+            size: 5.0,
+            probability,
+            first: right,
+            exact: right && kind != "unknown",
+            ..Line::empty()
+        };
+        let lines = [line("one", 1.0, true), line("one", 0.95, false), line("unknown", 0.9, true), line("two", 0.55, true)];
+        let text = calibration_curve(&lines);
+        let rows: Vec<&str> = text.lines().filter(|l| l.starts_with("| 0")).collect();
+        assert_eq!(rows.len(), 2, "{text}");
+        assert!(rows[0].starts_with("| 0.5-0.6 | 0.550 | none | 100.0 %"), "{text}");
+        assert!(
+            rows[1].starts_with("| 0.9-1.0 | 0.950 | 50.0 %") && rows[1].ends_with("| 66.7 % (20.8-93.9, n = 3) |"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -1,0 +1,96 @@
+//! One speed from up to four sensors.
+//!
+//! What it is: the median of the channels that agree, drop-outs bridged.
+//! What can go wrong: of two channels that disagree none can be outvoted, and both are kept.
+//! Units: rev/min.
+//! Reference: specification `formats.md` (primary relations).
+
+use super::bridge;
+use crate::log::{Log, SPEED};
+use crate::noise;
+
+/// How the consensus speed is made; stands in `model.toml`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Consensus {
+    /// Channels whose median is taken.
+    pub channels: Vec<String>,
+    /// Channels that disagree with the others, left out.
+    pub excluded: Vec<String>,
+    /// Rows whose speed dropped out for at most three rows and came back: bridged.
+    pub bridged_rows: usize,
+}
+
+/// The consensus speed on every row, and how it was made.
+pub(super) fn of(log: &Log) -> (Vec<f64>, Consensus) {
+    let present: Vec<&str> =
+        SPEED.into_iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).collect();
+    if present.is_empty() {
+        return (Vec::new(), Consensus::default());
+    }
+    let all = median_of(log, &present);
+    let scale = all.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max).max(1.0);
+    let excluded: Vec<&str> = if present.len() >= 3 {
+        present.iter().copied().filter(|name| disagreement(log, name, &all, scale) > 0.005).collect()
+    } else {
+        Vec::new()
+    };
+    let kept: Vec<&str> = if excluded.len() * 2 < present.len() {
+        present.iter().copied().filter(|n| !excluded.contains(n)).collect()
+    } else {
+        present.clone()
+    };
+    let excluded = if kept.len() == present.len() { Vec::new() } else { excluded };
+    let mut rpm = if excluded.is_empty() { all } else { median_of(log, &kept) };
+    let bridged_rows = remove_dropouts(&mut rpm, scale);
+    let info = Consensus {
+        channels: kept.iter().map(|s| (*s).to_owned()).collect(),
+        excluded: excluded.iter().map(|s| (*s).to_owned()).collect(),
+        bridged_rows,
+    };
+    (bridge(&log.t, &rpm), info)
+}
+
+fn median_of(log: &Log, names: &[&str]) -> Vec<f64> {
+    let columns: Vec<&[f64]> = names.iter().filter_map(|n| log.column(n)).collect();
+    (0..log.len())
+        .map(|i| {
+            let mut v: Vec<f64> = columns.iter().map(|c| c[i]).filter(|v| v.is_finite()).collect();
+            if v.is_empty() { f64::NAN } else { noise::median(&mut v) }
+        })
+        .collect()
+}
+
+/// Median relative deviation of a channel from the median of all, while the rotor turns.
+fn disagreement(log: &Log, name: &str, all: &[f64], scale: f64) -> f64 {
+    let Some(column) = log.column(name) else { return 0.0 };
+    let mut d: Vec<f64> = column
+        .iter()
+        .zip(all)
+        .filter(|(v, m)| v.is_finite() && m.is_finite() && **m > 0.1 * scale)
+        .map(|(v, m)| ((v - m) / m).abs())
+        .collect();
+    if d.is_empty() { 0.0 } else { noise::median(&mut d) }
+}
+
+/// A speed that leaves by more than 2 % for at most three rows and comes back to within 1 % is a sensor's drop-out:
+/// no rotor does that. Such rows become missing and are bridged.
+fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
+    let mut removed = 0;
+    let finite: Vec<usize> = (0..rpm.len()).filter(|i| rpm[*i].is_finite()).collect();
+    let mut k = 1;
+    while k + 1 < finite.len() {
+        let before = rpm[finite[k - 1]];
+        if before > 0.05 * scale && (rpm[finite[k]] - before).abs() > 0.02 * before {
+            let back = (1..=3).find(|m| finite.get(k + m).is_some_and(|j| (rpm[*j] - before).abs() < 0.01 * before));
+            if let Some(m) = back {
+                for j in &finite[k..k + m] {
+                    rpm[*j] = f64::NAN;
+                    removed += 1;
+                }
+                k += m;
+            }
+        }
+        k += 1;
+    }
+    removed
+}
