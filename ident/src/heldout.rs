@@ -248,3 +248,46 @@ pub fn residuals(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<Ve
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_after_jumps_rule_neither_view_of_the_others() {
+        let held = |rms: f64, settled: f64, unsettled: f64| Held { rms, typical: rms, claimed: rms, settled, unsettled };
+        let before = held(100.0, 3.0, 400.0);
+        // a friction shows on the levels only, a lag after the jumps only; the whole error says hardly anything of the first
+        assert!(held(99.9, 1.0, 400.0).share_gone(&before) > 0.6);
+        assert!(held(60.0, 3.0, 240.0).share_gone(&before) > 0.35);
+        assert!(held(110.0, 3.3, 440.0).share_gone(&before) < -0.05);
+        // where the log does not tell the two apart only the whole counts
+        let whole = |rms: f64| held(rms, f64::NAN, f64::NAN);
+        assert!((whole(90.0).share_gone(&whole(100.0)) - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn each_sample_counts_for_its_kind() {
+        let rows: Vec<usize> = (0..60).collect();
+        let log = crate::log::Log {
+            t: rows.iter().map(|i| *i as f64).collect(),
+            columns: vec![crate::log::Column { name: "voltage_v".into(), values: vec![11.0; 60] }],
+            ..crate::log::Log::default()
+        };
+        let mut target = Context::new(&log, None).targets.remove(0);
+        let mut sum = |unsettled: Vec<bool>| {
+            target.unsettled = unsettled;
+            let mut sum = Sum::default();
+            (0..60).for_each(|j| sum.add(&target, j, if j < 20 { 5.0 } else { 1.0 }));
+            sum.held(&target).unwrap()
+        };
+        let told = sum((0..60).map(|j| j < 20).collect());
+        assert!((told.settled - 1.0).abs() < 1e-12 && (told.unsettled - 5.0).abs() < 1e-12, "{told:?}");
+        assert!((told.rms - 3.0).abs() < 1e-12);
+        // too few rows make no figure of their own
+        let few = sum((0..60).map(|j| j < 19).collect());
+        assert!(few.unsettled.is_nan() && few.settled > 1.0, "{few:?}");
+        let none = sum(Vec::new());
+        assert!(none.unsettled.is_nan() && none.settled.is_nan(), "{none:?}");
+    }
+}
