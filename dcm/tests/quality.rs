@@ -106,3 +106,25 @@ fn without_field_tilt_and_bias_are_found_in_motion_and_start_up_ends() {
     assert!(worst < 0.5 && off.abs().max() < 3e-3, "{worst} {off}");
     assert!(!dcm.flags().startup && !dcm.heading_is_absolute());
 }
+
+/// The first rest sets the attitude anew, because the bias was not known before; where the field is disturbed just then, its heading is
+/// not taken.
+#[test]
+fn the_first_rest_beside_a_magnet_keeps_the_heading() {
+    let mut dcm = Dcm::new(Config::default());
+    for k in 1..=6_000u16 {
+        dcm.update(DT, &turning(60.0 * DT * f32::from(k), 60.0, FIELD));
+    }
+    assert!(dcm.flags().field_known && !dcm.flags().field_disturbed && !dcm.flags().rest);
+    let mut worst = 0.0f32;
+    for _ in 0..2_000 {
+        dcm.update(DT, &turning(0.0, 0.0, [20.0, 25.0, 43.0]));
+        worst = worst.max(dcm.euler().yaw.abs().to_degrees());
+    }
+    assert!(dcm.flags().rest && dcm.flags().field_disturbed, "{:?}", dcm.flags());
+    assert!(worst < 2.0, "{worst}");
+    for _ in 0..12_000 {
+        dcm.update(DT, &turning(0.0, 0.0, FIELD));
+    }
+    assert!(!dcm.flags().field_disturbed && dcm.euler().yaw.abs().to_degrees() < 0.5);
+}

@@ -115,7 +115,10 @@ impl<C: Borrow<Config>> Dcm<C> {
         if self.rest.ever && along * along.abs() > TILT_BEYOND_DOUBT * TILT_BEYOND_DOUBT * square(&force) {
             return false;
         }
+        // the next field sets the heading too, unless it is known for a disturbed one
+        let held = self.heading_absolute && self.field.known() && self.field.disturbed;
         self.start(&force, None, step);
+        self.heading_absolute |= held;
         self.rest.ever |= step.started;
         step.started
     }
