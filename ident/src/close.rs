@@ -14,6 +14,7 @@ use crate::log::Log;
 use crate::long::diagnose_any;
 use crate::model::Model;
 use crate::residual::whiteness;
+use crate::sparse;
 use crate::verdict::{Alternative, BeforeAfter, Channel, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict};
 use std::collections::BTreeMap;
 
@@ -46,15 +47,17 @@ pub struct Closed {
     pub verdict: Verdict,
 }
 
-/// Closes the loop on a log.
+/// Closes the loop on a log. Channels with too few samples are left out, and the verdict names them.
 ///
 /// # Errors
 /// [`CloseError`] when no channel can be fitted.
 pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut dyn FnMut(f64)) -> Result<Closed, CloseError> {
+    let left_out = sparse::left_out(log);
+    let log = &*sparse::without(log, &left_out);
     let context = Context::new(log, model.map(|m| m.start_pulse_us));
     let declared = Declared { model };
     let refused = || CloseError::NoRelation { run: log.name.clone() };
-    if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > 8) {
+    if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > sparse::TOO_FEW) {
         return Err(refused());
     }
     let found = diagnose_any(log, &context, declared, progress).ok_or_else(refused)?;
@@ -72,6 +75,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         effects: entries(&context, &diagnosis, estimates),
         alternatives: diagnosis.rivals.iter().map(|r| Alternative { ids: r.ids.clone(), probability: r.probability }).collect(),
         next_experiment: None,
+        left_out,
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
     };
     if verdict.verdict == Kind::Ambiguous {

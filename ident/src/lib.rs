@@ -40,6 +40,7 @@ pub mod select;
 pub mod shift;
 pub mod simulate;
 pub mod solve;
+pub mod sparse;
 mod start;
 mod steps;
 mod together;

@@ -17,6 +17,7 @@ use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Placed, Rows, allow_for_the_form, fit, plausible};
 use crate::log::{Column, Log};
 use crate::search::refine;
+use crate::sparse::TOO_FEW;
 
 /// Rows above which the search is given fewer.
 pub const SEARCHED: usize = 12_000;
@@ -101,12 +102,13 @@ pub(crate) fn diagnose_any(log: &Log, context: &Context, declared: Declared<'_>,
         return Some(Found { diagnosis: diagnose(context, declared, progress)?, searched: None, estimates: None });
     };
     let few = Context::new(&thinned(log, &rows), Some(context.start_pulse_us));
-    let mut diagnosis = diagnose(&few, declared, &mut |p| progress(0.5 * p))?;
+    let means = means(log, context, &rows);
     // targets of all contexts stand in the same order; where thinning lost a channel, nothing is saved
-    if few.targets.len() != context.targets.len() {
+    let whole = |c: &Context| c.targets.len() == context.targets.len() && c.targets.iter().all(|t| t.rows.len() > TOO_FEW);
+    if !whole(&few) || !whole(&means) {
         return Some(Found { diagnosis: diagnose(context, declared, progress)?, searched: None, estimates: None });
     }
-    let means = means(log, context, &rows);
+    let mut diagnosis = diagnose(&few, declared, &mut |p| progress(0.5 * p))?;
     let folds = heldout::folds(context);
     let all = AllRows { means: &means, context, declared, rows: &rows, folds: &folds };
     let estimates = all.carry_over(&mut diagnosis, &mut |p| progress(0.5 + 0.5 * p))?;

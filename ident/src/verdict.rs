@@ -5,6 +5,7 @@
 //! Units: each channel and parameter states its own.
 //! Reference: specification `formats.md`, "Verdict".
 
+use crate::sparse::LeftOut;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -146,6 +147,9 @@ pub struct Verdict {
     /// Where two explain it equally well.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_experiment: Option<NextExperiment>,
+    /// Channels about which nothing is said: too few samples.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
     /// Other runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub validation: Vec<Validation>,

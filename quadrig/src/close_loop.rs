@@ -48,6 +48,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         let bar = Bar::new("searching", quiet);
         close(&log, model.as_ref(), &others, &mut |share| bar.set(share))?
     };
+    if !quiet {
+        closed.verdict.left_out.iter().for_each(|l| eprintln!("{}: {l}", args.log.display()));
+    }
     let json = serde_json::to_string_pretty(&closed.verdict)?;
     if let Some(folder) = &args.output {
         write_folder(folder, &log, &closed, &json)?;
@@ -78,6 +81,9 @@ pub(crate) fn table(verdict: &Verdict) -> String {
     for (name, c) in &verdict.channels {
         let (b, a) = (c.before.heldout_rms, c.after.heldout_rms);
         out += &format!("{name:<12} {:>11.5} {b:>11.5} {a:>11.5} {:>7.2}  {}\n", c.noise_floor_rms, b / a.max(1e-300), c.unit);
+    }
+    for left_out in &verdict.left_out {
+        out += &format!("{left_out}\n");
     }
     for e in &verdict.effects {
         out += &format!("\n{} (p = {:.2}) on {}\n  {}\n", e.id, e.probability, e.channels.join(", "), e.equation);

@@ -7,6 +7,7 @@
 //! Reference: `QUADRIG_DATA` names the data folder, `CI` marks a build server.
 #![forbid(unsafe_code)]
 
+pub mod bench;
 pub mod blind;
 pub mod budget;
 pub mod desk;

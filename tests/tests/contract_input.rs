@@ -6,39 +6,12 @@
 //! Units: as the channels state.
 //! Reference: specification `formats.md`, "Command line" and "Rig log".
 
-use quadrig_tests::{Said, call, quadrig};
+use quadrig_tests::bench::{Bench, HEAD, PULSES, ROWS, good_log};
+use quadrig_tests::{Said, quadrig};
 use std::fs::{self, File};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
-use tempfile::TempDir;
-
-/// Lines of the good log before its first row: format, metadata, header.
-const HEAD: usize = 3;
-/// Plateaus of the good log, us.
-const PULSES: [f64; 7] = [1000.0, 1200.0, 1350.0, 1500.0, 1650.0, 1800.0, 1000.0];
-/// Rows of each plateau, at 10 Hz.
-const ROWS: usize = 60;
-
-/// A run of a made-up rig: a quadratic propeller on a motor with a time constant, a little repeatable noise.
-fn good_log() -> String {
-    let mut text = "# quadrig-log 1\n# sample_hz = 10.0\nt_s,pulse_us,rpm,thrust_n,current_a,voltage_v\n".to_owned();
-    let (mut rpm, mut seed) = (0.0_f64, 7_u64);
-    let mut noise = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-    };
-    for (n, pulse) in PULSES.iter().flat_map(|p| std::iter::repeat_n(p, ROWS)).enumerate() {
-        let steady = if *pulse > 1060.0 { 8.0 * (pulse - 1000.0) } else { 0.0 };
-        rpm += (steady - rpm) * 0.7;
-        let measured = (rpm + 6.0 * noise()).max(0.0);
-        let thrust = 1.1e-7 * rpm * rpm + 0.01 * noise();
-        let current = 0.05 + 2e-11 * rpm.powi(3) + 0.02 * noise();
-        let voltage = 11.5 + 0.01 * noise();
-        text += &format!("{:.1},{pulse:.1},{measured:.1},{thrust:.4},{current:.3},{voltage:.3}\n", n as f64 * 0.1);
-    }
-    text
-}
 
 /// One file with a fault, and where it lies.
 struct Fault {
@@ -108,36 +81,6 @@ fn faults() -> Vec<Fault> {
     ]
 }
 
-/// A folder with a good log, a good model, and room for outputs.
-struct Bench {
-    folder: TempDir,
-}
-
-impl Bench {
-    fn new() -> Self {
-        let bench = Self { folder: TempDir::new().unwrap() };
-        fs::write(bench.path("good.csv"), good_log()).unwrap();
-        bench.call(&["--quiet", "identify", "good.csv", "-o", "model.toml"]).succeeded();
-        bench
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn call(&self, words: &[&str]) -> Said {
-        call(self.folder.path(), words)
-    }
-
-    /// Every name in the folder, so that anything left behind shows.
-    fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> =
-            fs::read_dir(self.folder.path()).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-}
-
 /// The commands that read a log.
 fn readers(log: &str) -> [Vec<&str>; 5] {
     [
@@ -157,6 +100,49 @@ fn the_good_log_is_good() {
     }
     bench.call(&["import", "good.csv", "-o", "imported.csv"]).succeeded();
     assert!(fs::read_to_string(bench.path("imported.csv")).unwrap().starts_with("# quadrig-log 1\n"));
+}
+
+/// A sensor that answered three times in a run says nothing: the verdict is that of the log without its column, and names it.
+#[test]
+fn a_nearly_empty_column_costs_no_other_channel_its_verdict() {
+    let bench = Bench::new();
+    let with_hall = |keep: &dyn Fn(usize) -> bool| -> String {
+        let more = |(n, line): (usize, &str)| match n.checked_sub(HEAD) {
+            None if n + 1 == HEAD => format!("{line},rpm_hall\n"),
+            None => format!("{line}\n"),
+            Some(row) => format!("{line},{}\n", if keep(row) { line.split(',').nth(2).unwrap_or_default() } else { "" }),
+        };
+        good_log().lines().enumerate().map(more).collect()
+    };
+    let sparse_voltage: String = good_log()
+        .lines()
+        .enumerate()
+        .map(|(n, line)| match line.rsplit_once(',') {
+            Some((rest, _)) if n >= HEAD && n % 150 != 0 => format!("{rest},\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let without_voltage: String = good_log()
+        .lines()
+        .map(|line| if line.starts_with('#') { line } else { line.rsplit_once(',').unwrap().0 }.to_owned() + "\n")
+        .collect();
+    for (name, sparse, without, samples) in
+        [("voltage_v", sparse_voltage, without_voltage, 2), ("rpm_hall", with_hall(&|row| row % 100 == 7), good_log(), 5)]
+    {
+        let verdict = |text: &str| -> (serde_json::Value, Said) {
+            fs::write(bench.path("run.csv"), text).unwrap();
+            let said = bench.call(&["close-loop", "run.csv", "-o", "out", "--json"]).succeeded();
+            (serde_json::from_str(&said.out).expect("a verdict"), said)
+        };
+        let (expected, quiet) = verdict(&without);
+        let (mut found, said) = verdict(&sparse);
+        let left_out = found.as_object_mut().expect("an object").remove("left_out").expect("names what it left out");
+        assert_eq!(left_out, serde_json::json!([{"channel": name, "samples": samples}]));
+        assert_eq!(found, expected, "{name}");
+        let line = format!("run.csv: column {name}: {samples} samples; expected more than 8; the channel is left out\n");
+        assert_eq!((said.err, quiet.err), (line, String::new()));
+        assert!(fs::read_to_string(bench.path("out/report.html")).unwrap().contains(&format!("Left out: column {name}")));
+    }
 }
 
 #[test]
@@ -232,7 +218,7 @@ fn a_line_of_a_gigabyte_costs_no_memory() {
             .args(["-c", "ulimit -v 600000 && exec \"$0\" \"$@\""])
             .arg(quadrig())
             .args(words)
-            .current_dir(bench.folder.path())
+            .current_dir(bench.folder())
             .stdin(Stdio::null())
             .output()
             .unwrap();
@@ -370,7 +356,7 @@ fn the_same_input_twice_gives_the_same_bytes() {
         .into_iter()
         .map(|words| bench.call(words).succeeded().out)
         .collect();
-        (said, contents(bench.folder.path()))
+        (said, contents(bench.folder()))
     };
     let ((said, files), (said_again, files_again)) = (once(), once());
     assert_eq!(said, said_again);

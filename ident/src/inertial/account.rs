@@ -116,6 +116,7 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         effects,
         alternatives,
         next_experiment,
+        left_out: Vec::new(),
         validation: Vec::new(),
     };
     let model = InertialModel {

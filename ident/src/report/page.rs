@@ -79,6 +79,9 @@ fn table(out: &mut String, closed: &Closed) {
         );
     }
     out.push_str("</table></div>\n");
+    for left_out in &closed.verdict.left_out {
+        let _ = writeln!(out, "<p>Left out: {}.</p>", escape(&left_out.to_string()));
+    }
     for val in &closed.verdict.validation {
         let _ = write!(
             out,
