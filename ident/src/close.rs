@@ -79,7 +79,8 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
     };
     if verdict.verdict == Kind::Ambiguous {
-        verdict.next_experiment = crate::experiment::next(found.searched.as_ref().unwrap_or(&context), &after_model, &diagnosis);
+        verdict.next_experiment =
+            crate::experiment::next(found.searched.as_ref().unwrap_or(&context), declared, &after_model, &diagnosis);
     }
     Ok(Closed { context, diagnosis, declared: before_model, model: after_model, verdict })
 }

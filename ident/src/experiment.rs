@@ -2,7 +2,8 @@
 //!
 //! What it is: both hypotheses predict each of a few schedules that the rig can fly; the one with the largest squared
 //! difference over the noise is proposed.
-//! What can go wrong: where no schedule separates them the best is still proposed, and the reason says how little it gives.
+//! What can go wrong: where no schedule separates them the best is still proposed, and the reason says how little it gives, or that
+//! the two differ by something that no schedule commands.
 //! Units: pulse in us, hold in s.
 //! Reference: T-optimal designs, Atkinson & Fedorov 1975, Biometrika 62:57.
 
@@ -13,6 +14,7 @@ use crate::log::Log;
 use crate::model::Model;
 use crate::simulate::from_command;
 use crate::verdict::{NextExperiment, ScheduleStep};
+use crate::weather::continued;
 
 /// Schedules that the rig can run, each with the reason for which it is good.
 fn families(top: f64) -> Vec<(&'static str, Vec<ScheduleStep>)> {
@@ -31,31 +33,67 @@ fn families(top: f64) -> Vec<(&'static str, Vec<ScheduleStep>)> {
     ]
 }
 
-/// The best of the families for the winner and its closest rival.
+/// The best of the families for the winner and its closest rival, both of them added to `declared`.
 #[must_use]
-pub fn next(context: &Context, model: &Model, diagnosis: &Diagnosis) -> Option<NextExperiment> {
+pub fn next(context: &Context, declared: Declared<'_>, model: &Model, diagnosis: &Diagnosis) -> Option<NextExperiment> {
     let rival = diagnosis.rivals.first()?;
     let source = Log { name: context.name.clone(), ..Log::default() };
-    let other = Model::from_fit(context, &source, Declared::default(), &rival.fit);
+    let other = Model::from_fit(context, &source, declared, &rival.fit);
     let top = context.pulse.as_ref().map_or(2000.0, |p| p.iter().copied().fold(1000.0, f64::max));
-    let best = families(top)
+    let both = format!("{} and {} explain this run about equally well", diagnosis.best.ids().join(" + "), rival.ids.join(" + "));
+    let mut families = families(top);
+    let weather = uncontrolled(context, model, &other);
+    let moved = |schedule: &[ScheduleStep]| {
+        size(&less(difference(context, model, &other, schedule), difference(context, model, &other, &at_rest(schedule))))
+    };
+    if !weather.is_empty() && families.iter().all(|(_, schedule)| moved(schedule) < TOLD) {
+        // what the rig does in a long rest is the one thing that a schedule can still give
+        let schedule = families.pop()?.1;
+        let names = weather.join(" and ");
+        let how = if weather.iter().any(|w| w == "temp_c") {
+            ": let the rig cool down in a pause that is much longer than the run, or run it at another ambient temperature"
+        } else {
+            ": run on another day"
+        };
+        let why = format!(
+            "{both}, and no schedule tells them apart: they differ by what {names} does, which in this run followed time and not the load; repeat the run while {names} takes another course{how}"
+        );
+        return Some(NextExperiment { why, schedule });
+    }
+    let best = families
         .into_iter()
-        .map(|(why, schedule)| (separation(context, model, &other, &schedule), why, schedule))
+        .map(|(why, schedule)| (size(&difference(context, model, &other, &schedule)), why, schedule))
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(NextExperiment {
-        why: format!(
-            "{} and {} explain this run about equally well; {}: their predictions then differ by {:.1} times the noise (rms)",
-            diagnosis.best.ids().join(" + "),
-            rival.ids.join(" + "),
-            best.1,
-            best.0
-        ),
+        why: format!("{both}; {}: their predictions then differ by {:.1} times the noise (rms)", best.1, best.0),
         schedule: best.2,
     })
 }
 
-/// Root mean square difference of two models over the noise, on the channel where it is largest.
-fn separation(context: &Context, a: &Model, b: &Model, schedule: &[ScheduleStep]) -> f64 {
+/// Difference over the noise (rms) that a command must make for a schedule to tell two hypotheses apart.
+const TOLD: f64 = 0.5;
+
+/// The quantities that no schedule commands, that the log holds, and that only one of the two models depends on (or both, by
+/// different effects).
+fn uncontrolled(context: &Context, a: &Model, b: &Model) -> Vec<String> {
+    let apart = |model: &Model, other: &Model| -> Vec<&'static str> {
+        let of_other = |id: &str| other.effects.iter().any(|o| o.placed.effect.id() == id);
+        let own = model.effects.iter().map(|e| e.placed.effect).filter(|e| !of_other(e.id()));
+        own.flat_map(|e| e.about().depends_on.iter().copied()).collect()
+    };
+    let asked: Vec<&str> = apart(a, b).into_iter().chain(apart(b, a)).collect();
+    let held = context.temperature.iter().map(|_| "temp_c").chain(context.covariates.iter().map(|c| c.0.as_str()));
+    held.filter(|name| asked.contains(name)).map(str::to_owned).collect()
+}
+
+/// The same time with the motor off.
+fn at_rest(schedule: &[ScheduleStep]) -> Vec<ScheduleStep> {
+    schedule.iter().map(|s| ScheduleStep { pulse_us: 1000.0, ..*s }).collect()
+}
+
+/// By how much the predictions of two models differ on a schedule, over the noise, a list for each channel; what the schedule does
+/// not command goes on as it went in the run.
+fn difference(context: &Context, a: &Model, b: &Model, schedule: &[ScheduleStep]) -> Vec<Vec<f64>> {
     let dt = 0.2;
     let (mut t, mut pulse) = (Vec::new(), Vec::new());
     for s in schedule {
@@ -64,15 +102,110 @@ fn separation(context: &Context, a: &Model, b: &Model, schedule: &[ScheduleStep]
             pulse.push(s.pulse_us);
         }
     }
-    let (la, lb) = (from_command(a, "a", &t, &pulse, &[]), from_command(b, "b", &t, &pulse, &[]));
+    let weather = continued(context, &t, &pulse);
+    let (la, lb) = (from_command(a, "a", &t, &pulse, &weather), from_command(b, "b", &t, &pulse, &weather));
     context
         .targets
         .iter()
         .filter_map(|target| {
             let (x, y) = (la.column(target.name)?, lb.column(target.name)?);
-            let mean = x.iter().zip(y).map(|(x, y)| x - y).sum::<f64>() / x.len() as f64;
-            let ss: f64 = x.iter().zip(y).map(|(x, y)| (x - y - mean).powi(2)).sum();
-            Some((ss / x.len() as f64).sqrt() / target.noise.rms)
+            Some(x.iter().zip(y).map(|(x, y)| (x - y) / target.noise.rms).collect())
         })
-        .fold(0.0, f64::max)
+        .collect()
+}
+
+fn less(mut a: Vec<Vec<f64>>, b: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    a.iter_mut().zip(&b).for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a -= b));
+    a
+}
+
+/// Root mean square about the mean, which is the next run's own tare, on the channel where it is largest.
+fn size(channels: &[Vec<f64>]) -> f64 {
+    let rms = |d: &Vec<f64>| {
+        let mean = d.iter().sum::<f64>() / d.len() as f64;
+        (d.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / d.len() as f64).sqrt()
+    };
+    channels.iter().map(rms).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::close::{Closed, close};
+    use crate::log::Column;
+
+    /// A staircase up, on which the thrust drifts by 0.0015 N/s and a thermometer by 0.05 K/s and `warming` at full load.
+    fn staircase(warming: f64) -> Log {
+        let mut seed = 11_u64;
+        let mut noise = move || {
+            let mut uniform = || {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (seed >> 33) as f64 / f64::from(1_u32 << 31)
+            };
+            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+        };
+        let t: Vec<f64> = (0..660).map(|i| 0.1 * f64::from(i)).collect();
+        let pulse: Vec<f64> = (0..660).map(|i| 1000.0 + 100.0 * f64::from(i / 60)).collect();
+        let rpm: Vec<f64> = pulse.iter().map(|p| if *p > 1050.0 { 7.0 * (p - 1000.0) } else { 0.0 }).collect();
+        let mut held = 0.0;
+        let temperature: Vec<f64> = rpm
+            .iter()
+            .zip(&t)
+            .map(|(r, t)| {
+                held += 0.1 / 15.0 * ((r / 7000.0).powi(3) - held);
+                20.0 + 0.05 * t + warming * held
+            })
+            .collect();
+        let mut column = |name: &str, values: Vec<f64>, size: f64| Column {
+            name: name.to_owned(),
+            values: values.into_iter().map(|v| v + size * noise()).collect(),
+        };
+        let thrust = rpm.iter().zip(&temperature).map(|(r, c)| 1e-7 * r * r + 0.03 * (c - 20.0)).collect();
+        let current = rpm.iter().map(|r| 3e-11 * r.powi(3)).collect();
+        let columns = vec![
+            column("pulse_us", pulse, 0.0),
+            column("rpm", rpm.clone(), 8.0),
+            column("thrust_n", thrust, 0.02),
+            column("current_a", current, 0.03),
+            column("temp_c", temperature, 0.0),
+        ];
+        Log { name: "run.csv".to_owned(), t, columns, ..Log::default() }
+    }
+
+    /// The question between thermal zero and zero drift, whatever the search itself asks.
+    fn asked(closed: &Closed, declared: Declared<'_>) -> NextExperiment {
+        let placed = |id: &str| {
+            let effect = *crate::effects::library().iter().find(|e| e.id() == id).expect("in the library");
+            let instance = effect.instances(&closed.context).into_iter().find(|i| i.touches("thrust_n")).expect("offered");
+            let shapes = effect.shapes(&closed.context, &instance);
+            vec![crate::hypothesis::Placed { effect, instance, shape: shapes.iter().map(|s| s.starts[0]).collect() }]
+        };
+        let fitted = |id: &str| {
+            crate::hypothesis::fit(&closed.context, declared, &placed(id), None, crate::hypothesis::Rows::All).expect("a fit")
+        };
+        let mut diagnosis = closed.diagnosis.clone();
+        diagnosis.best = crate::diagnose::Candidate { fit: fitted("thermal_zero"), evidence: 0.0 };
+        let ids = vec!["zero_drift".to_owned()];
+        diagnosis.rivals = vec![crate::rivals::Rival { ids, probability: 0.5, fit: fitted("zero_drift") }];
+        let model = Model::from_fit(&closed.context, &Log::default(), declared, &diagnosis.best.fit);
+        next(&closed.context, declared, &model, &diagnosis).expect("a rival")
+    }
+
+    #[test]
+    fn what_no_schedule_moves_is_said_to_be_so() {
+        let closed = close(&staircase(0.0), None, &[], &mut |_| {}).expect("a log");
+        for declared in [Declared::default(), Declared { model: Some(&closed.declared) }] {
+            let next = asked(&closed, declared);
+            assert!(next.why.contains("no schedule tells them apart"), "{}", next.why);
+            assert!(next.why.contains("another ambient temperature"), "{}", next.why);
+            assert!(!next.schedule.is_empty());
+        }
+    }
+
+    #[test]
+    fn a_temperature_that_follows_the_load_is_asked_by_a_schedule() {
+        let closed = close(&staircase(10.0), None, &[], &mut |_| {}).expect("a log");
+        let next = asked(&closed, Declared::default());
+        assert!(next.why.contains("times the noise"), "{}", next.why);
+    }
 }

@@ -46,3 +46,4 @@ mod steps;
 mod together;
 pub mod told;
 pub mod verdict;
+mod weather;

@@ -108,7 +108,7 @@ pub fn next(runs: &[Run], leader: &Standing, rival: &Standing) -> Option<NextExp
         rivals: vec![Rival { ids: rival.ids.clone(), probability: rival.probability, fit: rival.fits[0].clone() }],
         ..first.diagnosis.clone()
     };
-    experiment::next(&first.context, &model(runs, leader, 0), &question)
+    experiment::next(&first.context, Declared::default(), &model(runs, leader, 0), &question)
 }
 
 /// Every hypothesis that stood on a run, with the probability that it had there.
