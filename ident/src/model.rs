@@ -7,11 +7,12 @@
 
 use crate::context::{Context, Relation, Target, unit_of};
 use crate::design::{Label, TargetDesign};
-use crate::effects::{self, Estimate, Instance};
+use crate::effects::Estimate;
 use crate::hypothesis::{Declared, Fit, Placed, design};
 use crate::log::Log;
-use std::path::Path;
 use toml::{Table, Value};
+
+mod read;
 
 /// First key of the format.
 pub const FORMAT: &str = "quadrig-model 1";
@@ -32,7 +33,7 @@ pub struct Polynomial {
 pub struct AddedEffect {
     /// The effect, its channels and form, its shapes.
     pub placed: Placed,
-    /// Amplitudes in the order of [`effects::Effect::amplitudes`], one list a channel.
+    /// Amplitudes in the order of [`crate::effects::Effect::amplitudes`], one list a channel.
     pub amplitudes: Vec<(String, Vec<f64>)>,
     /// What was estimated, for the reader.
     pub estimates: Vec<Estimate>,
@@ -260,84 +261,6 @@ impl Model {
             "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors.\n{root}"
         )
     }
-
-    /// Reads a model.
-    ///
-    /// # Errors
-    /// [`ModelError`] with file and key.
-    pub fn read(path: &Path) -> Result<Self, ModelError> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| ModelError::Io { file: file.clone(), source })?;
-        Self::parse(&file, &text)
-    }
-
-    /// Parses the file's text; `file` is the name for messages.
-    ///
-    /// # Errors
-    /// As [`Model::read`].
-    pub fn parse(file: &str, text: &str) -> Result<Self, ModelError> {
-        let root: Table = text.parse().map_err(|e: toml::de::Error| {
-            let line = e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
-            ModelError::Syntax {
-                file: format!("{file}:{line}"),
-                message: format!(
-                    "{}; expected a model written by `quadrig identify` or `close-loop`",
-                    e.message().lines().next().unwrap_or("not TOML")
-                ),
-            }
-        })?;
-        let refuse = |key: &str, found: &str, expected: &str| ModelError::Key {
-            file: file.to_owned(),
-            key: key.to_owned(),
-            found: found.to_owned(),
-            expected: expected.to_owned(),
-        };
-        match root.get("format").and_then(Value::as_str) {
-            Some(FORMAT) => {}
-            other => return Err(refuse("format", &other.map_or("missing".into(), |o| format!("'{o}'")), &format!("'{FORMAT}'"))),
-        }
-        let mut model =
-            Self { source: root.get("source").and_then(Value::as_str).unwrap_or_default().to_owned(), ..Self::default() };
-        model.start_pulse_us = root
-            .get("start_pulse_us")
-            .and_then(number)
-            .ok_or_else(|| refuse("start_pulse_us", "missing or not a number", "microseconds"))?;
-        model.meta = root.get("rig").and_then(Value::as_table).cloned().unwrap_or_default();
-        model.consensus = root
-            .get("consensus")
-            .and_then(|c| c.get("channels"))
-            .and_then(Value::as_array)
-            .map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect())
-            .unwrap_or_default();
-        let channels = root
-            .get("channel")
-            .and_then(Value::as_table)
-            .ok_or_else(|| refuse("channel", "missing", "one table for each channel"))?;
-        for (name, table) in channels {
-            let read = |k: usize, suffix: &str| table.get(format!("{}{suffix}", coefficient_key(name, k))).and_then(number);
-            let coefficients: Vec<f64> = (0..).map_while(|k| read(k, "")).collect();
-            if coefficients.is_empty() || !coefficients.iter().all(|c| c.is_finite()) {
-                return Err(refuse(
-                    &format!("channel.{name}.{}", coefficient_key(name, 0)),
-                    "missing or not a finite number",
-                    "a coefficient",
-                ));
-            }
-            let errors = (0..coefficients.len()).map(|k| read(k, "_se").unwrap_or(0.0)).collect();
-            model.polynomials.push(Polynomial { channel: name.clone(), coefficients, errors });
-        }
-        for (i, value) in root.get("effect").and_then(Value::as_array).into_iter().flatten().enumerate() {
-            let key = format!("effect[{i}]");
-            let effect = AddedEffect::from_table(value)
-                .map_err(|(k, found, expected)| refuse(&format!("{key}.{k}"), &found, &expected))?;
-            model.effects.push(effect);
-        }
-        Ok(model)
-    }
-}
-
-fn number(v: &Value) -> Option<f64> {
-    v.as_float().or_else(|| v.as_integer().map(|i| i as f64))
 }
 
 /// Where an effect's numbers are kept: `shape.<name_unit>`, `amplitude.<channel>.<name_unit>`.
@@ -370,58 +293,6 @@ impl AddedEffect {
         }
         t.insert("parameter".into(), parameters.into());
         t
-    }
-
-    fn from_table(value: &Value) -> Result<Self, (String, String, String)> {
-        let missing = |k: &str, expected: &str| (k.to_owned(), "missing or of the wrong kind".to_owned(), expected.to_owned());
-        let id = value.get("id").and_then(Value::as_str).ok_or_else(|| missing("id", "the id of an effect"))?;
-        let effect = effects::by_id(id).ok_or_else(|| {
-            let known: Vec<&str> = effects::library().iter().map(|e| e.id()).collect();
-            ("id".to_owned(), format!("'{id}'"), format!("one of {}", known.join(", ")))
-        })?;
-        let strings = |k: &str| -> Option<Vec<String>> {
-            value.get(k)?.as_array().map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect())
-        };
-        let channels = strings("channels").ok_or_else(|| missing("channels", "a list of channels"))?;
-        let form = value.get("form").and_then(Value::as_str).unwrap_or_default().to_owned();
-        let instance = Instance { channels, form };
-        let shape: Vec<f64> = value
-            .get("shape")
-            .and_then(Value::as_array)
-            .ok_or_else(|| missing("shape", "a list of numbers"))?
-            .iter()
-            .filter_map(number)
-            .collect();
-        let names = effect.amplitudes(&instance);
-        let amplitudes = instance
-            .channels
-            .iter()
-            .map(|c| {
-                let per = value.get("amplitude").and_then(|a| a.get(c));
-                (
-                    c.clone(),
-                    names
-                        .iter()
-                        .map(|a| per.and_then(|p| p.get(keyed(a.name, a.unit))).and_then(number).unwrap_or(0.0))
-                        .collect(),
-                )
-            })
-            .collect();
-        let parameters = value.get("parameter").and_then(Value::as_table);
-        let estimates = parameters
-            .into_iter()
-            .flatten()
-            .filter(|(k, _)| !k.ends_with("_se"))
-            .filter_map(|(k, v)| {
-                Some(Estimate {
-                    name: k.clone(),
-                    unit: String::new(),
-                    value: number(v)?,
-                    se: parameters?.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0),
-                })
-            })
-            .collect();
-        Ok(Self { placed: Placed { effect, instance, shape }, amplitudes, estimates })
     }
 }
 

@@ -234,31 +234,6 @@ fn a_line_of_a_gigabyte_costs_no_memory() {
 }
 
 #[test]
-fn bad_models_are_refused() {
-    let bench = Bench::new();
-    let model = fs::read_to_string(bench.path("model.toml")).unwrap();
-    let format = model.lines().find(|l| l.starts_with("format")).expect("a model names its format").to_owned();
-    for (name, text) in [
-        ("empty", String::new()),
-        ("not TOML", "[channel\n".to_owned()),
-        ("another format", model.replacen(&format, "format = \"something else\"", 1)),
-        ("no format", model.replacen(&format, "", 1)),
-        ("cut in half", model[..model.len() / 2].rsplit_once('=').expect("keys have values").0.to_owned()),
-        ("a log", good_log()),
-    ] {
-        fs::write(bench.path("bad.toml"), text).unwrap();
-        let before = bench.names();
-        for words in
-            [["predict", "bad.toml", "good.csv", "-o", "out.csv"], ["close-loop", "good.csv", "--json", "--model", "bad.toml"]]
-        {
-            println!("{name}: quadrig {}", words.join(" "));
-            bench.call(&words).refused(&["bad.toml", "expected"]);
-            assert_eq!(bench.names(), before, "{name}");
-        }
-    }
-}
-
-#[test]
 fn absent_inputs_are_refused_by_name() {
     let bench = Bench::new();
     let before = bench.names();

@@ -1,0 +1,215 @@
+//! Reading `model.toml`.
+//!
+//! What it is: every key that a prediction hangs on is read, and anything else in its table is refused: a misspelt amplitude or a
+//! missing coefficient must not predict a zero.
+//! What can go wrong: a file that does not say what it must is refused with its key, what stands there and what should.
+//! Units: in the key of each number.
+//! Reference: specification `formats.md`, "Powerplant model".
+
+use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed};
+use crate::context::{Context, Relation};
+use crate::effects::{self, Effect, Estimate, Instance};
+use crate::hypothesis::Placed;
+use crate::log::Log;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// Key, what stands there, what should.
+type Refusal = (String, String, String);
+
+impl Model {
+    /// Reads a model.
+    ///
+    /// # Errors
+    /// [`ModelError`] with file and key.
+    pub fn read(path: &Path) -> Result<Self, ModelError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|source| ModelError::Io { file: file.clone(), source })?;
+        Self::parse(&file, &text)
+    }
+
+    /// Parses the file's text; `file` is the name for messages.
+    ///
+    /// # Errors
+    /// As [`Model::read`].
+    pub fn parse(file: &str, text: &str) -> Result<Self, ModelError> {
+        let root: Table = text.parse().map_err(|e: toml::de::Error| {
+            let line = e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
+            ModelError::Syntax {
+                file: format!("{file}:{line}"),
+                message: format!(
+                    "{}; expected a model written by `quadrig identify` or `close-loop`",
+                    e.message().lines().next().unwrap_or("not TOML")
+                ),
+            }
+        })?;
+        Self::from_table(&root).map_err(|(key, found, expected)| ModelError::Key { file: file.to_owned(), key, found, expected })
+    }
+
+    fn from_table(root: &Table) -> Result<Self, Refusal> {
+        if root.get("format").and_then(Value::as_str) != Some(FORMAT) {
+            return Err(refusal("format", root.get("format"), &format!("'{FORMAT}'")));
+        }
+        let start = root.get("start_pulse_us");
+        let mut model = Self {
+            source: root.get("source").and_then(Value::as_str).unwrap_or_default().to_owned(),
+            start_pulse_us: start
+                .and_then(finite)
+                .ok_or_else(|| refusal("start_pulse_us", start, "a finite number of microseconds"))?,
+            meta: root.get("rig").and_then(Value::as_table).cloned().unwrap_or_default(),
+            ..Self::default()
+        };
+        if let Some(channels) = root.get("consensus").and_then(|c| c.get("channels")) {
+            model.consensus =
+                strings(channels).ok_or_else(|| refusal("consensus.channels", Some(channels), "a list of channels"))?;
+        }
+        let channels = root.get("channel");
+        let channels =
+            channels.and_then(Value::as_table).ok_or_else(|| refusal("channel", channels, "one table for each channel"))?;
+        for (name, value) in channels {
+            let polynomial = polynomial(name, value).map_err(|refusal| within(&format!("channel.{name}"), refusal))?;
+            model.polynomials.push(polynomial);
+        }
+        let list = match root.get("effect") {
+            None => [].as_slice(),
+            Some(list) => list.as_array().ok_or_else(|| refusal("effect", Some(list), "a list of tables, [[effect]]"))?,
+        };
+        for (i, value) in list.iter().enumerate() {
+            model.effects.push(AddedEffect::from_table(value).map_err(|refusal| within(&format!("effect[{i}]"), refusal))?);
+        }
+        Ok(model)
+    }
+}
+
+fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {
+    let table = value.as_table().ok_or_else(|| refusal("", Some(value), "a table of coefficients"))?;
+    let terms = |has_pulse| Relation::of(channel, has_pulse).map(|r| r.degree() + 1);
+    let (Some(full), Some(alone)) = (terms(true), terms(false)) else { return Err(no_channel("", channel)) };
+    let keys: Vec<String> = (0..full).map(|k| coefficient_key(channel, k)).collect();
+    let known = |key: &str| key == "relation" || keys.iter().any(|k| key == k || key.strip_suffix("_se") == Some(k));
+    if let Some((key, value)) = table.iter().find(|(key, _)| !known(key)) {
+        return Err(refusal(key, Some(value), &format!("no key but relation, {}, and each of them with _se", keys.join(", "))));
+    }
+    // a speed without a command is a constant: the only relation with two degrees
+    let highest = keys.iter().rposition(|k| table.contains_key(k)).map_or(0, |k| k + 1);
+    let count = if highest == alone { alone } else { full };
+    let read = |key: &String| {
+        let value = table.get(key);
+        value.and_then(finite).ok_or_else(|| refusal(key, value, "a finite number"))
+    };
+    let coefficients = keys[..count].iter().map(read).collect::<Result<_, _>>()?;
+    let errors = keys[..count].iter().map(|k| table.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0)).collect();
+    Ok(Polynomial { channel: channel.to_owned(), coefficients, errors })
+}
+
+impl AddedEffect {
+    fn from_table(value: &Value) -> Result<Self, Refusal> {
+        let at = |k: &str| value.get(k);
+        let id = at("id").and_then(Value::as_str).ok_or_else(|| refusal("id", at("id"), "the id of an effect"))?;
+        let effect = effects::by_id(id).ok_or_else(|| {
+            let known: Vec<&str> = effects::library().iter().map(|e| e.id()).collect();
+            refusal("id", at("id"), &format!("one of {}", known.join(", ")))
+        })?;
+        let channels = at("channels").and_then(strings).filter(|c| !c.is_empty());
+        let channels = channels.ok_or_else(|| refusal("channels", at("channels"), "a list of channels"))?;
+        if let Some(unknown) = channels.iter().find(|c| Relation::of(c, true).is_none()) {
+            return Err(no_channel("channels", unknown));
+        }
+        let form = match at("form") {
+            None => "",
+            Some(form) => form.as_str().ok_or_else(|| refusal("form", Some(form), "a text"))?,
+        };
+        let instance = Instance { channels, form: form.to_owned() };
+        let names = shape_names(effect, &instance);
+        let wanted = || match names.len() {
+            0 => "an empty list".to_owned(),
+            n => format!("a list of {n} finite number{}: {}", if n == 1 { "" } else { "s" }, names.join(", ")),
+        };
+        let list = at("shape").and_then(Value::as_array).filter(|list| list.len() == names.len());
+        let shape: Option<Vec<f64>> = list.and_then(|list| list.iter().map(finite).collect());
+        let shape = shape.ok_or_else(|| refusal("shape", at("shape"), &wanted()))?;
+        let amplitudes = amplitudes(effect, &instance, at("amplitude"))?;
+        let estimates = at("parameter").and_then(Value::as_table).map(estimates).unwrap_or_default();
+        Ok(Self { placed: Placed { effect, instance, shape }, amplitudes, estimates })
+    }
+}
+
+/// Names of the shape parameters that an effect has in this form: how many they are does not depend on a log.
+fn shape_names(effect: &'static dyn Effect, instance: &Instance) -> Vec<&'static str> {
+    let two_rows = Log { t: vec![0.0, 1.0], ..Log::default() };
+    effect.shapes(&Context::bare(&two_rows, Some(1000.0)), instance).iter().map(|s| s.name).collect()
+}
+
+/// Amplitudes of each channel; what the file leaves out is zero.
+fn amplitudes(
+    effect: &'static dyn Effect,
+    instance: &Instance,
+    value: Option<&Value>,
+) -> Result<Vec<(String, Vec<f64>)>, Refusal> {
+    let none = Table::new();
+    let table = match value {
+        None => &none,
+        Some(value) => value.as_table().ok_or_else(|| refusal("amplitude", Some(value), "one table for each channel"))?,
+    };
+    if let Some((channel, value)) = table.iter().find(|(channel, _)| !instance.channels.contains(channel)) {
+        return Err(refusal(&format!("amplitude.{channel}"), Some(value), &format!("one of {}", instance.channels.join(", "))));
+    }
+    let keys: Vec<String> = effect.amplitudes(instance).iter().map(|a| keyed(a.name, a.unit)).collect();
+    let mut out = Vec::new();
+    for channel in &instance.channels {
+        let mut values = vec![0.0; keys.len()];
+        let place = |key: &str| format!("amplitude.{channel}{}{key}", if key.is_empty() { "" } else { "." });
+        if let Some(own) = table.get(channel) {
+            let own = own.as_table().ok_or_else(|| refusal(&place(""), Some(own), "a table of amplitudes"))?;
+            for (key, value) in own {
+                let known = keys.iter().position(|k| k == key).ok_or_else(|| {
+                    let wanted = if keys.is_empty() { "no key".to_owned() } else { format!("a key of {}", keys.join(", ")) };
+                    refusal(&place(key), Some(value), &wanted)
+                })?;
+                values[known] = finite(value).ok_or_else(|| refusal(&place(key), Some(value), "a finite number"))?;
+            }
+        }
+        out.push((channel.clone(), values));
+    }
+    Ok(out)
+}
+
+/// What was estimated, for the reader: no prediction hangs on it.
+fn estimates(parameters: &Table) -> Vec<Estimate> {
+    let own = parameters.iter().filter(|(k, _)| !k.ends_with("_se"));
+    let estimate = |(k, v): (&String, &Value)| {
+        let se = parameters.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0);
+        Some(Estimate { name: k.clone(), unit: String::new(), value: number(v)?, se })
+    };
+    own.filter_map(estimate).collect()
+}
+
+fn number(v: &Value) -> Option<f64> {
+    v.as_float().or_else(|| v.as_integer().map(|i| i as f64))
+}
+
+fn finite(v: &Value) -> Option<f64> {
+    number(v).filter(|v| v.is_finite())
+}
+
+fn strings(v: &Value) -> Option<Vec<String>> {
+    v.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
+}
+
+fn refusal(key: &str, found: Option<&Value>, expected: &str) -> Refusal {
+    let found = match found {
+        None => "missing".to_owned(),
+        Some(Value::Table(_)) => "a table".to_owned(),
+        Some(value) => value.to_string().replace('\n', " "),
+    };
+    (key.to_owned(), found, expected.to_owned())
+}
+
+fn no_channel(key: &str, name: &str) -> Refusal {
+    let speeds = "rpm_beam, rpm_opto, rpm_hall, rpm_encoder, rpm";
+    (key.to_owned(), format!("no channel '{name}'"), format!("{speeds}, thrust_n, torque_nm, current_a or voltage_v"))
+}
+
+fn within(place: &str, (key, found, expected): Refusal) -> Refusal {
+    (if key.is_empty() { place.to_owned() } else { format!("{place}.{key}") }, found, expected)
+}

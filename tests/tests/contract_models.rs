@@ -1,0 +1,113 @@
+//! Refused models: what `predict` and `close-loop --model` promise whatever file they are given.
+//!
+//! What it is: the built program on models with one fault each, made by one edit of a model that it wrote itself.
+//! What can go wrong: a fault that is accepted and predicts a zero, a message without file and key, a half-written file.
+//! Units: in the key of each number.
+//! Reference: specification `formats.md`, "Powerplant model".
+
+use quadrig_tests::bench::{Bench, good_log};
+use std::fs;
+
+/// Both commands that read a model refuse this text in one line that holds each of `said`, and leave nothing behind.
+#[track_caller]
+fn refused(bench: &Bench, name: &str, text: &str, said: &[&str]) {
+    fs::write(bench.path("bad.toml"), text).unwrap();
+    let before = bench.names();
+    for words in
+        [["predict", "bad.toml", "good.csv", "-o", "out.csv"], ["close-loop", "good.csv", "--json", "--model", "bad.toml"]]
+    {
+        println!("{name}: quadrig {}", words.join(" "));
+        bench.call(&words).refused(&[&["bad.toml", "expected"], said].concat());
+        assert_eq!(bench.names(), before, "{name}");
+    }
+}
+
+#[test]
+fn bad_models_are_refused() {
+    let bench = Bench::new();
+    let model = fs::read_to_string(bench.path("model.toml")).unwrap();
+    let format = model.lines().find(|l| l.starts_with("format")).expect("a model names its format").to_owned();
+    for (name, text) in [
+        ("empty", String::new()),
+        ("not TOML", "[channel\n".to_owned()),
+        ("another format", model.replacen(&format, "format = \"something else\"", 1)),
+        ("no format", model.replacen(&format, "", 1)),
+        ("cut in half", model[..model.len() / 2].rsplit_once('=').expect("keys have values").0.to_owned()),
+        ("a log", good_log()),
+    ] {
+        refused(&bench, name, &text, &[]);
+    }
+}
+
+/// Two effects as the program writes them, to be added to a model.
+const EFFECTS: &str = r#"
+[[effect]]
+id = "zero_drift"
+channels = ["thrust_n"]
+shape = []
+[effect.amplitude.thrust_n]
+rate_n_per_s = 0.001
+[[effect]]
+id = "channel_delay"
+channels = ["current_a"]
+shape = [0.4]
+"#;
+
+/// Each of these was once accepted: the number was dropped, and the prediction was without it.
+#[test]
+fn numbers_that_a_prediction_needs_are_refused_by_key() {
+    let bench = Bench::new();
+    let model = fs::read_to_string(bench.path("model.toml")).unwrap() + EFFECTS;
+    fs::write(bench.path("good.toml"), &model).unwrap();
+    bench.call(&["predict", "good.toml", "good.csv", "-o", "pred.csv"]).succeeded();
+    let with = |key: &str, text: &str| -> String {
+        let found = model.lines().filter(|l| l.split(" = ").next() == Some(key)).count();
+        assert_eq!(found, 1, "{key} stands once in\n{model}");
+        let edit = |line: &str| if line.split(" = ").next() == Some(key) { text.to_owned() } else { line.to_owned() } + "\n";
+        model.lines().map(edit).collect()
+    };
+    let swap = |from: &str, to: &str| {
+        assert!(model.contains(from), "{from} stands in\n{model}");
+        model.replacen(from, to, 1)
+    };
+    let (drift, delay) = ("effect[0]", "effect[1].shape");
+    for (name, text, said) in [
+        ("a start that is no number", with("start_pulse_us", "start_pulse_us = nan"), vec!["start_pulse_us", "nan"]),
+        ("an infinite coefficient", with("c0_v", "c0_v = inf"), vec!["channel.voltage_v.c0_v", "inf"]),
+        ("a gap", with("c1_n_per_krpm", ""), vec!["channel.thrust_n.c1_n_per_krpm", "missing"]),
+        ("a last coefficient that is missing", with("c3_a_per_krpm3", ""), vec!["channel.current_a.c3_a_per_krpm3", "missing"]),
+        (
+            "a coefficient too many",
+            with("c2_n_per_krpm2", "c2_n_per_krpm2 = 0.1\nc3_n_per_krpm3 = 1"),
+            vec!["channel.thrust_n.c3_n_per_krpm3"],
+        ),
+        ("a channel that is none", swap("[channel.thrust_n]", "[channel.trust_n]"), vec!["channel.trust_n", "thrust_n"]),
+        (
+            "an effect on no channel",
+            swap("channels = [\"current_a\"]", "channels = [\"curent_a\"]"),
+            vec!["effect[1].channels", "curent_a"],
+        ),
+        (
+            "a misspelt amplitude",
+            swap("rate_n_per_s", "rat_n_per_s"),
+            vec![drift, "amplitude.thrust_n.rat_n_per_s", "rate_n_per_s"],
+        ),
+        (
+            "an amplitude of another channel",
+            swap("amplitude.thrust_n", "amplitude.torque_nm"),
+            vec![drift, "amplitude.torque_nm", "thrust_n"],
+        ),
+        (
+            "an amplitude that is no number",
+            swap("rate_n_per_s = 0.001", "rate_n_per_s = nan"),
+            vec![drift, "rate_n_per_s", "nan"],
+        ),
+        ("a shape that is too short", swap("shape = [0.4]", "shape = []"), vec![delay, "delay"]),
+        ("a shape that is too long", swap("shape = [0.4]", "shape = [0.4, 1.0]"), vec![delay, "1 finite number"]),
+        ("a shape in words", swap("shape = [0.4]", "shape = [\"0.4\"]"), vec![delay, "0.4"]),
+        ("an infinite shape", swap("shape = [0.4]", "shape = [inf]"), vec![delay, "inf"]),
+        ("no shape", swap("shape = [0.4]", ""), vec![delay, "missing"]),
+    ] {
+        refused(&bench, name, &text, &said);
+    }
+}
