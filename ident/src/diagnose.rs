@@ -15,7 +15,7 @@ use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
 use crate::opponent::{nameless, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
-use crate::rivals::{Rival, UNEXPLAINED, list_nearest, probabilities, rivals_of};
+use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
 use crate::search::{base, connected, refine, refine_newest, scan, stride};
 use crate::together::{Ground, choose_pair};
 
@@ -182,13 +182,13 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let Some(idle) = idle else { break without };
         // a later effect has taken over what this one was named for
         let mut placed = best.fit.placed.clone();
-        let dropped = placed.remove(idle).effect.id().to_owned();
-        rivals.iter_mut().for_each(|r| r.ids.retain(|id| *id != dropped));
+        let (names, dropped) = (placed.len(), placed.remove(idle).effect.id());
+        rivals.iter_mut().for_each(|r| drop_name(&mut r.ids, names, (idle, dropped)));
         best.fit = fit(context, declared, &refine(context, declared, &placed, Rows::All, 60), Some(&start), Rows::All)?;
         errors = heldout::errors(context, declared, &best.fit, &folds);
     };
     // a rival that differed by what was dropped is the winner itself
-    let same = |ids: &[String]| ids.len() == best.fit.placed.len() && best.ids().iter().all(|id| ids.contains(id));
+    let same = |ids: &[String]| sorted(ids.to_vec()) == sorted(best.ids());
     rivals.retain(|r| is_unknown || !same(&r.ids));
     progress(1.0);
     Some(Diagnosis {

@@ -9,7 +9,7 @@
 
 use crate::context::Context;
 use crate::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, may_join, offers, round_of};
-use crate::heldout;
+use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::rivals::probabilities;
 use crate::search::{connected, refine};
@@ -65,14 +65,13 @@ pub(crate) fn revise(
             continue;
         };
         let others = standing_beside(&ranked, winner, standing);
-        rounds[k] = probabilities(&ranked[winner], &others, 0.0);
         if better == Some(winner) {
+            let Some(moved) = in_place(context, declared, start, &ranked[winner].fit, k) else { continue };
+            *best = moved;
             settled.fill(false);
             settled[k] = true;
-            if let Some(moved) = in_place(context, declared, start, &ranked[winner].fit, k) {
-                *best = moved;
-            }
         }
+        rounds[k] = probabilities(&ranked[winner], &others, 0.0);
     }
 }
 
@@ -87,9 +86,15 @@ fn standing_beside(ranked: &[Candidate], winner: usize, standing: f64) -> Vec<Ca
 fn predicts_as_well(context: &Context, declared: Declared<'_>, folds: &[Vec<bool>], new: &Fit, old: &Fit) -> bool {
     let (new, old) = (heldout::errors(context, declared, new, folds), heldout::errors(context, declared, old, folds));
     let judged = context.targets.iter().zip(new.iter().zip(&old)).filter(|(t, _)| !t.relation.is_evidence());
-    judged.into_iter().all(|(_, (n, o))| n.share_gone(o) > -SPOILT)
+    judged.into_iter().all(|(_, (n, o))| as_well(n, o))
 }
 
+/// The same of one channel. Where no fold could predict it, all its samples lying in one block, it says nothing.
+fn as_well(new: &Held, old: &Held) -> bool {
+    old.rms.is_nan() || new.share_gone(old) > -SPOILT
+}
+
+/// Whether a candidate's newest effect is this one, in whatever form.
 fn newest_is(candidate: &Candidate, placed: &Placed) -> bool {
     candidate.fit.placed.last().is_some_and(|p| p.effect.id() == placed.effect.id())
 }
@@ -151,5 +156,13 @@ mod tests {
         // what came as close as the newcomer may is a rival still
         let close = [("stall", 51.0), ("zero_drift", 50.0)].map(|(id, e)| on_the_thrust(id, e));
         assert!(probabilities(&close[winner], &standing_beside(&close, winner, standing), 0.0).0 < 0.5);
+    }
+
+    #[test]
+    fn a_channel_that_no_fold_predicts_forbids_no_exchange() {
+        let held = |rms: f64| Held { rms, typical: rms, claimed: rms, ..Held::UNKNOWN };
+        assert!(as_well(&held(f64::NAN), &held(f64::NAN)));
+        assert!(as_well(&held(1.01), &held(1.0)) && !as_well(&held(1.1), &held(1.0)));
+        assert!(!as_well(&held(f64::NAN), &held(1.0)), "one that the newcomer alone cannot predict is spoilt");
     }
 }

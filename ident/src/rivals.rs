@@ -80,3 +80,37 @@ pub(crate) fn list_nearest(rivals: &mut Vec<Rival>, singles: &[Candidate], unkno
         rival.probability = (1.0 - unknown) * 0.5_f64.powi(k as i32) / shares;
     }
 }
+
+/// Takes the name at a position out of a rival's, where it stands there: the rival may have another effect in that place, and the same
+/// name may stand twice, for two channels. `names` counts those of the winner.
+pub(crate) fn drop_name(ids: &mut Vec<String>, names: usize, (position, name): (usize, &str)) {
+    let at = if ids.len() == names { Some(position) } else { ids.iter().position(|id| id == name) };
+    if let Some(at) = at.filter(|at| ids.get(*at).is_some_and(|id| id == name)) {
+        ids.remove(at);
+    }
+}
+
+/// Names in an order that does not depend on who came first.
+pub(crate) fn sorted(mut ids: Vec<String>) -> Vec<String> {
+    ids.sort_unstable();
+    ids
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_stands_for_two_channels_is_dropped_once() {
+        let names = |list: &[&str]| list.iter().map(|id| (*id).to_owned()).collect::<Vec<String>>();
+        let dropped = |list: &[&str], of: usize, at: usize| {
+            let mut ids = names(list);
+            drop_name(&mut ids, of, (at, "glitch_rows"));
+            ids
+        };
+        assert_eq!(dropped(&["glitch_rows", "stall", "glitch_rows"], 3, 2), names(&["glitch_rows", "stall"]));
+        assert_eq!(dropped(&["glitch_rows", "stall", "creep"], 3, 2), names(&["glitch_rows", "stall", "creep"]));
+        assert_eq!(dropped(&["creep", "glitch_rows"], 3, 0), names(&["creep"]));
+        assert_ne!(sorted(names(&["glitch_rows", "stall"])), sorted(names(&["glitch_rows", "glitch_rows"])));
+    }
+}
