@@ -7,13 +7,14 @@
 
 use crate::context::{Context, DIFFERENCES, unit_of};
 use crate::diagnose::Diagnosis;
-use crate::effects::Estimate;
+use crate::effects::{Estimate, Shape};
 use crate::heldout;
-use crate::hypothesis::{Declared, Fit};
+use crate::hypothesis::{Declared, Fit, Rows};
 use crate::log::Log;
 use crate::long::diagnose_any;
 use crate::model::Model;
 use crate::residual::whiteness;
+use crate::search::refine;
 use crate::sparse;
 use crate::verdict::{Alternative, BeforeAfter, Channel, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict};
 use std::collections::BTreeMap;
@@ -103,12 +104,13 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
             .iter()
             .zip(held)
             .zip(&context.targets)
-            .map(|((r, held), target)| {
+            .enumerate()
+            .map(|(i, ((r, held), target))| {
                 let judged = |k: &usize| target.claims(target.rows[*k]);
                 let r: Vec<f64> = (0..r.len()).filter(judged).map(|k| r[k]).collect();
                 let t: Vec<f64> = target.rows.iter().filter(|i| target.claims(**i)).map(|i| context.t[*i]).collect();
                 let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
-                let heldout_rms = if held.claimed.is_finite() { held.claimed } else { rms };
+                let heldout_rms = if held.claimed.is_finite() { held.claimed } else { of_its_own(context, declared, fit, i) };
                 Figures { rms, heldout_rms, whiteness_p: whiteness(&t, &r) }
             })
             .collect()
@@ -125,6 +127,19 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
         .collect()
 }
 
+/// Held-out error of a channel that was measured in one of the five blocks of the run only, so that no fold predicts it: its own time is
+/// cut into five. Not a number where even that leaves too little; what the fit saw never stands in its place.
+fn of_its_own(context: &Context, declared: Declared<'_>, fit: &Fit, i: usize) -> f64 {
+    let target = &context.targets[i];
+    let (Some(first), Some(last)) = (target.rows.first(), target.rows.last()) else { return f64::NAN };
+    let (from, span) = (context.t[*first], (context.t[*last] - context.t[*first]).max(1e-9));
+    let block = |t: f64| ((t - from) / span * 5.0).floor().clamp(0.0, 4.0);
+    let folds: Vec<Vec<bool>> = (0..5).map(|k| context.t.iter().map(|t| block(*t) == f64::from(k)).collect()).collect();
+    let wanted: Vec<bool> = (0..context.targets.len()).map(|k| k == i).collect();
+    let shapes = |keep: &[bool]| refine(context, declared, &fit.placed, Rows::Where(keep), heldout::EVALUATIONS);
+    heldout::pooled(context, declared, &folds, &wanted, &shapes)[i].map_or(f64::NAN, |held| held.claimed)
+}
+
 /// One entry an effect, the one that helps most first.
 fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> Vec<EffectEntry> {
     let mut out: Vec<EffectEntry> = d
@@ -137,6 +152,7 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
         .map(|(k, (p, estimates))| {
             let about = p.effect.about();
             let estimates = p.effect.report(context, &p.instance, estimates);
+            let shapes = p.effect.shapes(context, &p.instance);
             let (first, reduction) = quoted(context, d, k);
             let mut channels: Vec<String> =
                 p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();
@@ -156,7 +172,7 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
                     format!("{} [{}]", about.equation, p.instance.form)
                 },
                 probability: d.probability,
-                parameters: estimates.iter().map(parameter).collect(),
+                parameters: estimates.iter().map(|e| parameter(e, &shapes)).collect(),
                 heldout_error_reduction: reduction,
                 evidence: format!(
                     "{}; without it the held-out error of {first} is {:.2} times as large",
@@ -185,9 +201,16 @@ fn quoted(context: &Context, d: &Diagnosis, k: usize) -> (String, f64) {
         .unwrap_or_else(|| (p.instance.channels.first().cloned().unwrap_or_default(), 0.0))
 }
 
-fn parameter(e: &Estimate) -> Parameter {
-    let half = if e.se.is_finite() { 1.96 * e.se } else { 0.0 };
-    Parameter { name: e.name.clone(), value: e.value, unit: e.unit.clone(), ci95: [e.value - half, e.value + half] }
+/// A parameter with its interval. Where its standard error is not known the interval is what is known at all: the range of the shape,
+/// or for an amplitude everything from nothing to twice its size.
+fn parameter(e: &Estimate, shapes: &[Shape]) -> Parameter {
+    let range = shapes.iter().find(|s| s.name == e.name && s.range.1 > s.range.0).map(|s| s.range);
+    let ci95 = match range {
+        _ if e.se.is_finite() => [e.value - 1.96 * e.se, e.value + 1.96 * e.se],
+        Some((from, to)) => [from.min(e.value), to.max(e.value)],
+        None => [e.value - e.value.abs(), e.value + e.value.abs()],
+    };
+    Parameter { name: e.name.clone(), value: e.value, unit: e.unit.clone(), ci95 }
 }
 
 /// Both models on another run of the same rig, as they stand.
@@ -207,4 +230,45 @@ pub(crate) fn validation(other: &Log, before: &Model, after: &Model) -> Validati
         .filter_map(|t| Some((t.name.to_owned(), BeforeAfter { before: error(before, t.name)?, after: error(after, t.name)? })))
         .collect();
     Validation { run: other.name.clone(), channels }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Column;
+
+    #[test]
+    fn an_unknown_error_is_no_sharp_value() {
+        let shapes = [Shape { name: "tau", unit: "s", range: (0.5, 9.0), starts: vec![1.0] }];
+        let of = |name: &str, value: f64, se: f64| {
+            parameter(&Estimate { name: name.to_owned(), unit: "s".to_owned(), value, se }, &shapes).ci95
+        };
+        for unknown in [f64::NAN, f64::INFINITY] {
+            assert_eq!(of("tau", 2.0, unknown), [0.5, 9.0]);
+            assert_eq!(of("rate", -2.0, unknown), [-4.0, 0.0]);
+        }
+        assert_eq!(of("tau", 2.0, 1.0), [2.0 - 1.96, 2.0 + 1.96]);
+    }
+
+    /// A torque meter that was switched on for the last tenth of a run: on five levels, the last of them with an error that a fit which
+    /// sees it takes away.
+    #[test]
+    fn what_the_fit_saw_is_never_called_held_out() {
+        let t: Vec<f64> = (0..1000).map(|i| 0.1 * f64::from(i)).collect();
+        let pulse: Vec<f64> = (0..1000).map(|i| 1100.0 + 20.0 * f64::from(i % 500 / 20)).collect();
+        let wave = |i: usize, k: f64| (k * (i * i) as f64).sin();
+        let rpm: Vec<f64> = pulse.iter().enumerate().map(|(i, p)| 7.0 * (p - 1000.0) + 4.0 * wave(i, 0.7)).collect();
+        let thrust = rpm.iter().enumerate().map(|(i, r)| 1e-7 * r * r + 0.01 * wave(i, 1.3)).collect();
+        let torque = |(i, r): (usize, &f64)| if i < 900 { f64::NAN } else { 2e-9 * r * r + 1e-4 * wave(i, 2.9) };
+        let torque = rpm.iter().enumerate().map(torque).collect();
+        let columns = [("pulse_us", pulse), ("rpm", rpm), ("thrust_n", thrust), ("torque_nm", torque)];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        let log = Log { name: "late.csv".to_owned(), t, columns, ..Log::default() };
+        let closed = close(&log, None, &[], &mut |_| {}).expect("a log");
+        let torque = &closed.verdict.channels["torque_nm"];
+        for figures in [torque.before, torque.after] {
+            let (held, seen) = (figures.heldout_rms, figures.rms);
+            assert!(held.is_finite() && held > 1.001 * seen && held < 3.0 * seen, "{held} held out, {seen} seen");
+        }
+    }
 }
