@@ -55,7 +55,8 @@ pub struct Closed {
 pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut dyn FnMut(f64)) -> Result<Closed, CloseError> {
     let left_out = sparse::left_out(log);
     let log = &*sparse::without(log, &left_out);
-    let context = Context::new(log, model.map(|m| m.start_pulse_us));
+    let mut context = Context::new(log, model.map(|m| m.start_pulse_us));
+    context.against_model = model.is_some();
     let declared = Declared { model };
     let refused = || CloseError::NoRelation { run: log.name.clone() };
     if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > sparse::TOO_FEW) {

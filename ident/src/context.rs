@@ -208,6 +208,8 @@ pub struct Context {
     pub(crate) settling: Vec<bool>,
     /// Rows on which the rotor is on its way to another speed, driven or not; empty without a command or a speed.
     pub(crate) under_way: Vec<bool>,
+    /// What is sought may have set in before the run: a declared model stands as it is, and a constant departure from it is news.
+    pub(crate) against_model: bool,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
     powers: [OnceLock<Vec<Values>>; 2],
     /// What effects ask again and again.
@@ -291,6 +293,7 @@ impl Context {
             steady,
             calm,
             under_way,
+            against_model: false,
             settling,
             powers: Default::default(),
             facts: Facts::default(),

@@ -1,11 +1,15 @@
 //! The pulse at which the motor starts.
 //!
 //! What it is: the declared speed curve is a cubic above this pulse and zero below it; where the boundary lies is read off the log.
-//! What can go wrong: a log whose motor never stands, or never turns, has its boundary just below the lowest pulse, or out of reach.
+//! What can go wrong: a log whose motor never stands says nothing of the boundary (that of any speed controller is taken, so that
+//! another run may go lower); of one whose motor never turns it is out of reach.
 //! Units: us.
 //! Reference: specification `formats.md`, "Verdict" (declared baseline).
 
 use crate::context::{CALM_US, FEWEST_OF_A_KIND};
+
+/// Pulse at which every speed controller keeps its motor still, us.
+const IDLE_US: f64 = 1000.0;
 
 /// Time after a jump of the command, s, and rows, for which the rotor may still stand or coast.
 const COASTS: (f64, usize) = (1.0, 5);
@@ -48,7 +52,7 @@ pub(crate) fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 
         if sorted[k].1 { turning += 1 } else { standing += 1 }
     }
     match best.1 {
-        0 => sorted[0].0 - 0.5,
+        0 => f64::min(sorted[0].0 - 0.5, IDLE_US),
         k => 0.5 * (sorted[k - 1].0 + sorted[k].0),
     }
 }
@@ -81,9 +85,9 @@ mod tests {
     }
 
     #[test]
-    fn a_motor_that_never_turns_or_never_stands_has_no_start_between() {
+    fn a_motor_that_never_turns_or_never_stands_has_no_start_of_its_own() {
         let (t, pulse) = ((0..40).map(f64::from).collect::<Vec<_>>(), vec![1200.0; 40]);
         assert_eq!(start_pulse(&t, Some(&pulse), &[0.0; 40]), 2500.0);
-        assert_eq!(start_pulse(&t, Some(&pulse), &[900.0; 40]), 1199.5);
+        assert_eq!(start_pulse(&t, Some(&pulse), &[900.0; 40]), 1000.0);
     }
 }

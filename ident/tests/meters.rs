@@ -271,3 +271,52 @@ fn a_rotor_that_runs_down_drowns_no_friction() {
     assert_eq!(names(&closed)[0], "bearing_friction", "{:?} {:?}", names(&closed), closed.verdict.alternatives);
     close_to(&closed, "t0", t0, 1.0);
 }
+
+/// What changed since a model was made, on another day of the same rig: zero, gain and friction of the whole run.
+#[test]
+fn what_was_there_before_the_run_shows_against_a_model_of_another_day() {
+    let (first, second) = (Command::new(21), Command::new(22));
+    let healthy = |c: &Command| {
+        log(c, [&|t| c.speed(t), &|t| thrust(c.speed(t)), &|t| torque(c.speed(t)), &|t| current(c.speed(t))], NOISE)
+    };
+    let model = verdict(&healthy(&first)).model;
+    let against = |log: Log| close(&log, Some(&model), &[], &mut |_| {}).expect("a verdict");
+    let same = against(healthy(&second));
+    assert_eq!(names(&same), [""; 0], "{:?}", same.verdict.effects);
+    let with = |column: usize, change: &dyn Fn(f64) -> f64| {
+        let mut log = healthy(&second);
+        // the room is as warm as on any day, and hardly changes
+        let warmth = log.t.iter().map(|t| 24.5 + 0.3 * (t / 40.0).sin()).collect();
+        log.columns[column].values.iter_mut().for_each(|v| *v = change(*v));
+        log.columns.push(Column { name: "temp_c".into(), values: warmth });
+        against(log)
+    };
+    let tare = with(2, &|v| v + 0.02);
+    assert_eq!(names(&tare), ["tare_shift"], "{:?}", tare.verdict.effects);
+    close_to(&tare, "offset", 0.02, 0.002);
+    let gain = with(2, &|v| 1.03 * v);
+    assert_eq!(names(&gain), ["gain_change"], "{:?}", gain.verdict.effects);
+    close_to(&gain, "gain_change", 0.03, 0.002);
+    assert!(gain.verdict.effects[0].parameters.iter().any(|p| p.name == "t0" && p.value <= 0.0));
+    // the model that names it loads, and predicts the day on which it was found
+    let text = gain.model.to_toml();
+    let again = ident::model::Model::parse("model.toml", &text).expect("a model");
+    let known = close(&with_gain(&healthy(&second)), Some(&again), &[], &mut |_| {}).expect("a verdict");
+    assert_eq!(names(&known), [""; 0], "{:?}", known.verdict.effects);
+    let drag = 0.004;
+    let rubs = log(
+        &second,
+        [&|t| second.speed(t) * 0.99, &|t| thrust(second.speed(t) * 0.99), &|t| torque(second.speed(t) * 0.99), &|t| {
+            current(second.speed(t) * 0.99) + drag * second.speed(t) * std::f64::consts::TAU / 60.0 / 12.0
+        }],
+        NOISE,
+    );
+    let friction = against(rubs);
+    assert_eq!(names(&friction)[0], "bearing_friction", "{:?}", friction.verdict.effects);
+}
+
+fn with_gain(log: &Log) -> Log {
+    let mut log = log.clone();
+    log.columns[2].values.iter_mut().for_each(|v| *v *= 1.03);
+    log
+}

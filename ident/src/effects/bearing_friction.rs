@@ -46,7 +46,7 @@ impl Effect for BearingFriction {
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
-        vec![super::tare_shift::coarse_onset(context)]
+        vec![super::tare_shift::onset_or_before(context)]
     }
 
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
@@ -65,8 +65,9 @@ impl Effect for BearingFriction {
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         let t0 = fitted.iter().find(|e| e.name == "t0").map_or(0.0, |e| e.value);
         let turned = context.t.iter().zip(&context.rpm).filter(|(t, r)| **t < t0 && **r > STANDSTILL).count();
-        // friction sets in on a rotor that has turned without it
-        brakes(fitted) && costs(context, fitted) && turned * 20 > context.len()
+        // friction sets in on a rotor that has turned without it, in this run or when its model was made
+        let turned_before = turned * 20 > context.len() || context.against_model && context.t.first().is_some_and(|t| t0 <= *t);
+        brakes(fitted) && costs(context, fitted) && turned_before
     }
 }
 

@@ -41,7 +41,7 @@ impl Effect for BladeDamage {
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
-        vec![super::tare_shift::coarse_onset(context)]
+        vec![super::tare_shift::onset_or_before(context)]
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {

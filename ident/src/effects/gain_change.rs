@@ -5,7 +5,8 @@
 //! Units: 1, 1/s, s.
 //! Reference: Beharie 2013, Eq. 5.34-5.35 (two calibrations differ by 9.7 % in slope).
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
+use super::tare_shift::{BEFORE, coarse_onset, step, with_first_instant};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -36,7 +37,9 @@ impl Effect for GainChange {
         if context.time_is_row || present(context, &["thrust_n"]).is_empty() {
             Vec::new()
         } else {
-            vec![Instance::new(&["thrust_n"], "step"), Instance::new(&["thrust_n"], "drift")]
+            let forms = ["step", "drift", BEFORE];
+            let known = if context.against_model { 3 } else { 2 };
+            forms.iter().take(known).map(|form| Instance::new(&["thrust_n"], form)).collect()
         }
     }
 
@@ -50,15 +53,13 @@ impl Effect for GainChange {
                 starts: [-0.3, -0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1, 0.3].map(|k| k * most).to_vec(),
             }]
         } else {
-            vec![
-                Shape {
-                    name: "gain_change",
-                    unit: "1",
-                    range: (-0.5, 0.5),
-                    starts: vec![-0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1],
-                },
-                super::tare_shift::coarse_onset(context),
-            ]
+            let change = Shape {
+                name: "gain_change",
+                unit: "1",
+                range: (-0.5, 0.5),
+                starts: vec![-0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1],
+            };
+            if instance.form == BEFORE { vec![change] } else { vec![change, coarse_onset(context)] }
         }
     }
 
@@ -72,9 +73,14 @@ impl Effect for GainChange {
                 let t0 = context.t.first().copied().unwrap_or(0.0);
                 context.t.iter().map(|t| 1.0 + rate * (t - t0)).collect()
             }
-            (_, [change, t0]) => super::tare_shift::step(context, *t0).iter().map(|s| 1.0 + change * s).collect(),
+            (BEFORE, [change]) => vec![1.0 + change; context.len()],
+            (_, [change, t0]) => step(context, *t0).iter().map(|s| 1.0 + change * s).collect(),
             _ => return,
         };
         design.scale(&factor);
+    }
+
+    fn report(&self, context: &Context, instance: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
+        with_first_instant(context, instance, fitted)
     }
 }

@@ -5,7 +5,7 @@
 //! Units: N, s.
 //! Reference: step change with unknown instant, Basseville & Nikiforov 1993, section 2.2.
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, thrust_over_time};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, thrust_over_time};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -33,11 +33,15 @@ impl Effect for TareShift {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        thrust_over_time(context)
+        let mut out = thrust_over_time(context);
+        if context.against_model && !out.is_empty() {
+            out.push(Instance::new(&["thrust_n"], BEFORE));
+        }
+        out
     }
 
-    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
-        vec![onset(context)]
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form == BEFORE { Vec::new() } else { vec![onset(context)] }
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
@@ -45,9 +49,28 @@ impl Effect for TareShift {
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
-        let [t0] = shape else { return };
-        design.add(position, 0, step(context, *t0));
+        let offset = match shape {
+            [] => vec![1.0; context.len()],
+            [t0, ..] => step(context, *t0),
+        };
+        design.add(position, 0, offset);
     }
+
+    fn report(&self, context: &Context, instance: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
+        with_first_instant(context, instance, fitted)
+    }
+}
+
+/// Form of an effect that was there before the run began: only a declared model can tell.
+pub(super) const BEFORE: &str = "since before the run";
+
+/// The estimates of an effect that was there before the run, and the run's first instant as the latest at which it set in.
+pub(super) fn with_first_instant(context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+    if instance.form == BEFORE {
+        let value = context.t.first().copied().unwrap_or(0.0);
+        fitted.push(Estimate { name: "t0".into(), value, unit: "s".into(), se: context.step() });
+    }
+    fitted
 }
 
 /// The instant at which something sets in: 48 starts over the run.
@@ -59,6 +82,17 @@ pub(super) fn onset(context: &Context) -> Shape {
         range: (t0 + 0.02 * span, t0 + 0.98 * span),
         starts: (1..48).map(|k| t0 + span * f64::from(k) / 48.0).collect(),
     }
+}
+
+/// The same for an effect that, against a declared model, may have been there before the run.
+pub(super) fn onset_or_before(context: &Context) -> Shape {
+    let mut shape = coarse_onset(context);
+    if context.against_model {
+        let before = context.t.first().copied().unwrap_or(0.0) - 2.0 * context.step();
+        shape.range.0 = before;
+        shape.starts.insert(0, before);
+    }
+    shape
 }
 
 /// The same with 24 starts, for effects on many channels.

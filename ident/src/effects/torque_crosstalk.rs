@@ -56,8 +56,7 @@ impl Effect for TorqueCrosstalk {
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
         for e in fitted.iter_mut().filter(|e| e.name == "coefficient") {
-            let farthest = bounds(context).map_or(0.0, |b| b.map(|b| (e.value - b).abs()).into_iter().fold(0.0, f64::max));
-            e.se += farthest / 1.96;
+            e.se += farthest(context, e.value) / 1.96;
         }
         fitted
     }
@@ -69,8 +68,17 @@ impl Effect for TorqueCrosstalk {
         // a wake or an error of the speed shakes both in the ratio of the readings themselves; and a cell that reads more of
         // the torque than of the thrust is another instrument
         let credible = |c: f64| c.abs() < MOST_OF_THE_THRUST * (ratio - c);
-        fitted.iter().all(|e| e.value.abs() > 4.0 * e.se && credible(e.value) && is_seen_between_jumps(context, e.value))
+        // a declared model does not absorb the course with the speed, and a gain of the cell has that too: what the torque does
+        // beyond it must show the coefficient by itself
+        let by_itself = |c: f64| !context.against_model || farthest(context, c) < c.abs();
+        let known = |e: &Estimate| e.value.abs() > 4.0 * e.se && by_itself(e.value);
+        fitted.iter().all(|e| known(e) && credible(e.value) && is_seen_between_jumps(context, e.value))
     }
+}
+
+/// How far the direct and the reverse regression of thrust on torque lie from a coefficient.
+fn farthest(context: &Context, coefficient: f64) -> f64 {
+    bounds(context).map_or(0.0, |b| b.map(|b| (coefficient - b).abs()).into_iter().fold(0.0, f64::max))
 }
 
 /// Largest torque share for the thrust that is left once it is taken away.
