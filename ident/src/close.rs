@@ -7,9 +7,10 @@
 
 use crate::context::{Context, DIFFERENCES, unit_of};
 use crate::diagnose::Diagnosis;
+use crate::effects::unknown::Words;
 use crate::effects::{Estimate, Shape};
 use crate::heldout;
-use crate::hypothesis::{Declared, Fit, Rows};
+use crate::hypothesis::{Declared, Fit, Placed, Rows};
 use crate::log::Log;
 use crate::long::diagnose_any;
 use crate::model::Model;
@@ -151,7 +152,6 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
         .zip(estimates)
         .enumerate()
         .map(|(k, (p, estimates))| {
-            let about = p.effect.about();
             let estimates = p.effect.report(context, &p.instance, estimates);
             let shapes = p.effect.shapes(context, &p.instance);
             let (first, reduction) = quoted(context, d, k);
@@ -160,32 +160,35 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
             if let Some(at) = channels.iter().position(|c| *c == first) {
                 channels.swap(0, at);
             }
-            let mut depends_on: Vec<String> = about.depends_on.iter().map(|v| (*v).to_owned()).collect();
-            if p.effect.id() == "unknown" {
-                depends_on.push(p.instance.form.clone());
-            }
+            let Words { depends_on, equation, evidence } = words(p, &first, reduction);
             EffectEntry {
                 id: p.effect.id().to_owned(),
                 depends_on,
-                equation: if p.instance.form.is_empty() {
-                    about.equation.to_owned()
-                } else {
-                    format!("{} [{}]", about.equation, p.instance.form)
-                },
+                equation,
                 probability: d.probability,
                 parameters: estimates.iter().map(|e| parameter(e, &shapes)).collect(),
                 heldout_error_reduction: reduction,
-                evidence: format!(
-                    "{}; without it the held-out error of {first} is {:.2} times as large",
-                    about.signature,
-                    1.0 / (1.0 - reduction).max(1e-6)
-                ),
+                evidence,
                 channels,
             }
         })
         .collect();
     out.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
     out
+}
+
+/// What is said of an effect that removes such a share of the held-out error of its first channel.
+fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
+    let (about, form) = (placed.effect.about(), &placed.instance.form);
+    if placed.effect.id() == "unknown" {
+        return Words::of(form, first, 1.0 - reduction);
+    }
+    let times = 1.0 / (1.0 - reduction).max(1e-6);
+    Words {
+        depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
+        equation: if form.is_empty() { about.equation.to_owned() } else { format!("{} [{form}]", about.equation) },
+        evidence: format!("{}; without it the held-out error of {first} is {times:.2} times as large", about.signature),
+    }
 }
 
 /// The channel that an effect's figure is quoted for (the one it helps most) and the figure.

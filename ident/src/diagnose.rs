@@ -9,10 +9,11 @@
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
 use crate::context::{Context, Relation};
-use crate::effects::{self, Effect, Instance, quantisation};
+use crate::correction::correct;
+use crate::effects::{self, Effect, Instance};
 use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
-use crate::opponent::{nameless, opponent};
+use crate::opponent::{explains, nameless, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
@@ -141,32 +142,20 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     }
     let mut probability: f64 = rounds.iter().map(|r| r.0).product();
     let mut rivals = rivals_of(&best, rounds);
-    let unknown = opponent(context, declared, &start, &folds, &heldout_before, &best, &errors);
-    let is_unknown = unknown.is_some();
-    if let Some((candidate, held)) = unknown {
-        let named = std::mem::replace(&mut best, candidate);
+    let won = opponent(context, declared, &start, &folds, &heldout_before, &best, &errors);
+    let named = !best.fit.placed.is_empty();
+    let turned_down = named && (won.is_some() || !explains(context, declared, &start, &best.fit));
+    if won.is_some() {
         rivals.clear();
-        if !named.fit.placed.is_empty() {
-            rivals.push(Rival { ids: named.ids(), probability, fit: named.fit });
-        }
-        errors = held;
     }
-    let credible = best.fit.placed.is_empty() || is_unknown || explains(context, declared, &start, &best.fit);
-    if !credible {
+    if turned_down {
         rivals.insert(0, Rival { ids: best.ids(), probability, fit: best.fit.clone() });
     }
-    let forced = if best.fit.placed.is_empty() || !credible {
-        let left = if credible { &best.fit } else { &start };
-        nameless(context, declared, &start, left, &folds, &heldout_before)
-    } else {
-        None
-    };
-    let is_unknown = is_unknown || forced.is_some();
-    if let Some((candidate, held)) = forced {
-        best = candidate;
-        errors = held;
-    }
-    if is_unknown {
+    let forced = || if named && !turned_down { None } else { nameless(context, declared, &start) };
+    let unexplained = won.or_else(forced);
+    let is_unknown = unexplained.is_some();
+    if let Some(group) = unexplained {
+        (best, errors) = correct(context, declared, &start, &folds, &heldout_before, &group);
         probability = UNEXPLAINED;
         list_nearest(&mut rivals, candidates.first().map_or(&[], Vec::as_slice), probability);
     }
@@ -439,36 +428,6 @@ pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, 
     }
     // extra scatter has no mean to predict: the evidence alone must carry it
     helps || (newest.effect.scatters() && gain > 4.0 * NEEDED_EVIDENCE)
-}
-
-/// Share of what a channel shows above its noise that the names must take away to be believed.
-const NEEDED_SHARE: f64 = 0.85;
-
-/// Whether the named effects are the cause of most of what they were named for: on one channel that they touch they take away
-/// most of the squared residual above the noise. A part of a large residual is what any flexible term can have.
-fn explains(context: &Context, declared: Declared<'_>, start: &Fit, fit: &Fit) -> bool {
-    if fit.placed.iter().any(|p| p.effect.scatters()) {
-        return true;
-    }
-    let before = heldout::residuals(context, declared, start);
-    let after = heldout::residuals(context, declared, fit);
-    let touched = || context.targets.iter().enumerate().filter(|(_, t)| fit.placed.iter().any(|p| p.instance.touches(t.name)));
-    let enough = |i: usize, calm_only: bool| {
-        let target = &context.targets[i];
-        let counts = |j: usize| !calm_only || !target.unsettled[j];
-        let square = |r: &[f64]| {
-            let (sum, n) =
-                r.iter().enumerate().filter(|(j, _)| counts(*j)).fold((0.0, 0.0), |s, (_, v)| (s.0 + v * v, s.1 + 1.0));
-            sum / f64::max(n, 1.0)
-        };
-        // rounding to coarse steps cannot be taken away whole
-        let rounding = quantisation::step(target).map_or(0.0, |step| step * step / 12.0);
-        let floor = (target.noise.rms * target.noise.rms).max(rounding);
-        let (b, a) = (square(&before[i]), square(&after[i]));
-        // between jumps only what stood out there can have been explained there
-        !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > NEEDED_SHARE * (b - floor)
-    };
-    touched().any(|(i, t)| enough(i, false) || !t.unsettled.is_empty() && enough(i, true))
 }
 
 /// Whether an effect of the final set no longer removes any held-out error. Extra scatter has no mean to predict.

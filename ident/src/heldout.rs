@@ -172,21 +172,38 @@ pub(crate) fn pooled(
     wanted: &[bool],
     refined: &dyn Fn(&[bool]) -> Vec<Placed>,
 ) -> Vec<Option<Held>> {
+    let by_fold: Vec<Vec<Sum>> = folds.iter().map(|out| left_out(context, declared, out, wanted, refined)).collect();
+    together(context, &by_fold)
+}
+
+/// The errors that the sums of all folds amount to, by target.
+pub(crate) fn together(context: &Context, by_fold: &[Vec<Sum>]) -> Vec<Option<Held>> {
+    let whole = |k: usize| by_fold.iter().fold(Sum::default(), |whole, fold| whole.and(fold[k]));
+    context.targets.iter().enumerate().map(|(k, target)| whole(k).held(target)).collect()
+}
+
+/// Sums over the rows of one fold, by target, the effects as `refined` gives them for the rows that it may see.
+pub(crate) fn left_out(
+    context: &Context,
+    declared: Declared<'_>,
+    out: &[bool],
+    wanted: &[bool],
+    refined: &dyn Fn(&[bool]) -> Vec<Placed>,
+) -> Vec<Sum> {
     let mut sums = vec![Sum::default(); context.targets.len()];
-    for out in folds {
-        let keep: Vec<bool> = out.iter().map(|o| !o).collect();
-        let placed = refined(&keep);
-        let mut designs = Designs::new(context, declared, &placed);
-        for ((target, sum), _) in context.targets.iter().zip(&mut sums).zip(wanted).filter(|(_, w)| **w) {
-            let design = designs.of(target);
-            let Some(fitted) = fit_target(target, design, Rows::Where(&keep)) else { continue };
-            let prediction = design.predict(&fitted.coefficients, context.len());
-            for (j, (row, y)) in target.rows.iter().zip(&target.y).enumerate().filter(|(_, (row, _))| out[**row]) {
-                sum.add(target, j, y - prediction[*row]);
-            }
+    let keep: Vec<bool> = out.iter().map(|o| !o).collect();
+    let taught = |p: Placed| Placed { shape: p.effect.taught(context, &p.instance, &p.shape, &keep), ..p };
+    let placed: Vec<Placed> = refined(&keep).into_iter().map(taught).collect();
+    let mut designs = Designs::new(context, declared, &placed);
+    for ((target, sum), _) in context.targets.iter().zip(&mut sums).zip(wanted).filter(|(_, w)| **w) {
+        let design = designs.of(target);
+        let Some(fitted) = fit_target(target, design, Rows::Where(&keep)) else { continue };
+        let prediction = design.predict(&fitted.coefficients, context.len());
+        for (j, (row, y)) in target.rows.iter().zip(&target.y).enumerate().filter(|(_, (row, _))| out[**row]) {
+            sum.add(target, j, y - prediction[*row]);
         }
     }
-    sums.iter().zip(&context.targets).map(|(sum, target)| sum.held(target)).collect()
+    sums
 }
 
 /// Fewest rows that a figure of a part of them is made of.
@@ -194,12 +211,14 @@ const FEWEST: usize = 20;
 
 /// Sums over rows that were left out.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sum {
+pub(crate) struct Sum {
     squares: f64,
     logs: f64,
     rows: usize,
-    claimed_squares: f64,
-    claimed: usize,
+    /// Square sum over the rows about which a claim is made.
+    pub(crate) claimed_squares: f64,
+    /// Number of these rows.
+    pub(crate) claimed: usize,
     late_squares: f64,
     late: usize,
 }
@@ -217,6 +236,18 @@ impl Sum {
         if target.unsettled.get(sample).is_some_and(|u| *u) {
             self.late_squares += square;
             self.late += 1;
+        }
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            squares: self.squares + other.squares,
+            logs: self.logs + other.logs,
+            rows: self.rows + other.rows,
+            claimed_squares: self.claimed_squares + other.claimed_squares,
+            claimed: self.claimed + other.claimed,
+            late_squares: self.late_squares + other.late_squares,
+            late: self.late + other.late,
         }
     }
 

@@ -11,6 +11,7 @@ pub mod beam;
 pub mod circle;
 pub mod close;
 pub mod context;
+mod correction;
 pub mod design;
 pub mod diagnose;
 pub mod effects;

@@ -9,14 +9,14 @@
 use crate::context::{Context, Relation, Target};
 use crate::diagnose::{Candidate, FEWEST_SAMPLES, NEEDED_EVIDENCE, NEEDED_REDUCTION, net_gain, shares};
 use crate::effects::unknown::{Unknown, variables};
-use crate::effects::{Effect, Instance};
+use crate::effects::{Effect, Instance, quantisation};
 use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::residual::whiteness;
 
 /// The opponent without a name: a smooth function of one variable on one channel, or on all speed channels alike. It wins where
 /// it predicts held-out rows clearly better than whatever was named there, significantly, and names elsewhere are not the
-/// larger part of what was found.
+/// larger part of what was found. Gives the channels on which it won.
 pub(crate) fn opponent(
     context: &Context,
     declared: Declared<'_>,
@@ -25,8 +25,8 @@ pub(crate) fn opponent(
     before: &[Held],
     best: &Candidate,
     named: &[Held],
-) -> Option<(Candidate, Vec<Held>)> {
-    let mut champion: Option<(f64, Candidate, Vec<Held>)> = None;
+) -> Option<Vec<usize>> {
+    let mut champion: Option<(f64, Vec<usize>)> = None;
     for group in groups(context) {
         let (i, target) = (group[0], &context.targets[group[0]]);
         let on_group = |f: &Fit, shares: &[f64]| -> f64 {
@@ -59,11 +59,11 @@ pub(crate) fn opponent(
             let margin = if same { std::f64::consts::LN_2 } else { 0.15 };
             let clearly = gain > (1.0 / (1.0 - NEEDED_REDUCTION)).ln() && (best.fit.placed.is_empty() || gain > rival + margin);
             if clearly && champion.as_ref().is_none_or(|c| gain > c.0) {
-                champion = Some((gain, candidate, held));
+                champion = Some((gain, group.clone()));
             }
         }
     }
-    champion.map(|(_, c, h)| (c, h))
+    champion.map(|c| c.1)
 }
 
 /// Channels that a correction without a name is tried on: each alone, and the speed channels together, which see one rotor.
@@ -78,10 +78,10 @@ fn groups(context: &Context) -> Vec<Vec<usize>> {
     std::iter::once(speeds).chain(out.into_iter().map(|k| vec![k])).filter(|g| !g.is_empty()).collect()
 }
 
-/// A smooth function of a variable added to the channels of a group.
-fn correction(context: &Context, declared: Declared<'_>, start: &Fit, group: &[usize], variable: &str) -> Option<Fit> {
+/// A smooth function of a variable, in one of its forms, added to the channels of a group.
+pub(crate) fn correction(context: &Context, declared: Declared<'_>, start: &Fit, group: &[usize], form: &str) -> Option<Fit> {
     let names: Vec<&str> = group.iter().map(|k| context.targets[*k].name).collect();
-    let instance = Instance::new(&names, variable);
+    let instance = Instance::new(&names, form);
     let shape = Unknown.shapes(context, &instance).iter().map(|s| s.range.0).collect();
     fit(context, declared, &[Placed { effect: &Unknown, instance, shape }], Some(start), Rows::All)
 }
@@ -96,7 +96,7 @@ fn net_of_group(best: &Fit, start: &Fit, shares: &[f64], group: &[usize]) -> f64
 
 /// Whether a variable stands for the channel itself or for the load, which its relation holds already. (The departure of
 /// thrust from its polynomial in the speed is still a question; current and voltage follow the load with their own lags.)
-fn is_load(context: &Context, target: &Target, name: &str) -> bool {
+pub(crate) fn is_load(context: &Context, target: &Target, name: &str) -> bool {
     let held = match target.relation {
         Relation::Torque | Relation::Thrust | Relation::Current => ["pulse_us", "current_a", "voltage_v"].contains(&name),
         _ => ["pulse_us", "current_a", "voltage_v", "rpm"].contains(&name),
@@ -122,17 +122,10 @@ fn twin(context: &Context, target: &Target, name: &str) -> bool {
 /// Residual over noise floor, and whiteness, beyond which something is there even if nothing that we try predicts it.
 const LEFT_OVER: (f64, f64) = (1.3, 1e-6);
 
-/// Where no name and no smooth function won although a residual is large and coloured, something is there all the same: the
-/// smooth function that predicts held-out rows best stands for it, however little that is.
-pub(crate) fn nameless(
-    context: &Context,
-    declared: Declared<'_>,
-    start: &Fit,
-    best: &Fit,
-    folds: &[Vec<bool>],
-    before: &[Held],
-) -> Option<(Candidate, Vec<Held>)> {
-    let residuals = heldout::residuals(context, declared, best);
+/// Where no name and no smooth function won although a residual is large and coloured, something is there all the same: on these
+/// channels.
+pub(crate) fn nameless(context: &Context, declared: Declared<'_>, start: &Fit) -> Option<Vec<usize>> {
+    let residuals = heldout::residuals(context, declared, start);
     let excess = |i: usize| {
         residuals[i].iter().map(|v| v * v).sum::<f64>() / (residuals[i].len() as f64 * context.targets[i].noise.rms.powi(2))
     };
@@ -145,14 +138,37 @@ pub(crate) fn nameless(
         .into_iter()
         .filter(|g| g.iter().any(|i| left_over(*i)))
         .max_by(|a, b| excess(a[0]).total_cmp(&excess(b[0])))?;
-    let i = group[0];
-    variables(context)
-        .into_iter()
-        .filter(|v| !is_load(context, &context.targets[i], v))
-        .filter_map(|variable| correction(context, declared, start, &group, &variable))
-        .map(|f| {
-            let held = heldout::errors_around_newest(context, declared, &f, folds, before).with;
-            (Candidate { evidence: f.targets[i].loglik.mean - start.targets[i].loglik.mean, fit: f }, held)
-        })
-        .min_by(|a, b| a.1[i].rms.total_cmp(&b.1[i].rms))
+    let may_depend_on = |v: &String| !is_load(context, &context.targets[group[0]], v);
+    let something = |v: &String| may_depend_on(v) && correction(context, declared, start, &group, v).is_some();
+    variables(context).iter().any(something).then_some(group)
+}
+
+/// Share of what a channel shows above its noise that the names must take away to be believed.
+const NEEDED_SHARE: f64 = 0.85;
+
+/// Whether the named effects are the cause of most of what they were named for: on one channel that they touch they take away
+/// most of the squared residual above the noise. A part of a large residual is what any flexible term can have.
+pub(crate) fn explains(context: &Context, declared: Declared<'_>, start: &Fit, fit: &Fit) -> bool {
+    if fit.placed.iter().any(|p| p.effect.scatters()) {
+        return true;
+    }
+    let before = heldout::residuals(context, declared, start);
+    let after = heldout::residuals(context, declared, fit);
+    let touched = || context.targets.iter().enumerate().filter(|(_, t)| fit.placed.iter().any(|p| p.instance.touches(t.name)));
+    let enough = |i: usize, calm_only: bool| {
+        let target = &context.targets[i];
+        let counts = |j: usize| !calm_only || !target.unsettled[j];
+        let square = |r: &[f64]| {
+            let (sum, n) =
+                r.iter().enumerate().filter(|(j, _)| counts(*j)).fold((0.0, 0.0), |s, (_, v)| (s.0 + v * v, s.1 + 1.0));
+            sum / f64::max(n, 1.0)
+        };
+        // rounding to coarse steps cannot be taken away whole
+        let rounding = quantisation::step(target).map_or(0.0, |step| step * step / 12.0);
+        let floor = (target.noise.rms * target.noise.rms).max(rounding);
+        let (b, a) = (square(&before[i]), square(&after[i]));
+        // between jumps only what stood out there can have been explained there
+        !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > NEEDED_SHARE * (b - floor)
+    };
+    touched().any(|(i, t)| enough(i, false) || !t.unsettled.is_empty() && enough(i, true))
 }

@@ -159,6 +159,10 @@ pub trait Effect: Sync {
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude>;
     /// Changes the design of one target that this instance touches.
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign);
+    /// The shapes where only the rows of `keep` may teach: those that are read off the log instead of fitted are read off these.
+    fn taught(&self, _context: &Context, _instance: &Instance, shape: &[f64], _keep: &[bool]) -> Vec<f64> {
+        shape.to_vec()
+    }
     /// Parameters as they are reported, from those that were fitted (shapes first, then amplitudes).
     fn report(&self, _context: &Context, _instance: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
         fitted

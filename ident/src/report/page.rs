@@ -55,10 +55,15 @@ fn lead(closed: &Closed) -> String {
             "Ambiguous: {} explains the residual, and so do others. A next experiment is proposed below.",
             ids.join(" and ")
         ),
-        Kind::Unattributed => format!(
-            "Unattributed: no known effect explains the residual. It depends on {}; an empirical correction was fitted.",
-            closed.verdict.effects.iter().flat_map(|e| e.depends_on.iter().cloned()).collect::<Vec<_>>().join(", ")
-        ),
+        Kind::Unattributed => {
+            let variables: Vec<&str> =
+                closed.verdict.effects.iter().flat_map(|e| e.depends_on.iter().map(String::as_str)).collect();
+            let found = match variables.as_slice() {
+                [] => "Nothing that was tried predicts it on rows that it has not seen, so nothing was corrected.".to_owned(),
+                on => format!("It depends on {}; an empirical correction was fitted.", on.join(", ")),
+            };
+            format!("Unattributed: no known effect explains the residual. {found}")
+        }
         Kind::None => "Nothing significant is left over.".to_owned(),
     }
 }
