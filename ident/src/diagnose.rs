@@ -409,6 +409,9 @@ fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
     0.5 * (shapes.len() + amplitudes) as f64 * n.max(2.0).ln() + (grid as f64).ln().max(0.0) * 0.5
 }
 
+/// Share by which an effect may make the error of a channel worse on rows of which the rest of the run says nothing.
+const RUINED: f64 = 1.0;
+
 /// The newest effect must remove some of the held-out error on one of its channels, and spoil none.
 pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, around: &Around) -> bool {
     let Some(newest) = candidate.fit.placed.last() else { return false };
@@ -422,7 +425,9 @@ pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, 
         }
         helps |= around.with[i].share_gone(&around.without[i]) > NEEDED_REDUCTION;
         let spoils = around.known_with[i].share_gone(&around.known_without[i]) < -NEEDED_REDUCTION;
-        if spoils && !target.relation.is_evidence() && !certain {
+        // a guess may be wrong by the error itself, and no further
+        let ruins = around.with[i].share_gone(&around.without[i]) < -RUINED;
+        if (spoils || ruins) && !target.relation.is_evidence() && !certain {
             return false;
         }
     }

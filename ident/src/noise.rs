@@ -138,11 +138,16 @@ const SHARED: usize = 4;
 /// The resolution of a channel, also where a run shows a few digits of its display only; 0 where the readings do not tell it: a
 /// channel without noise has a value a level, and their distances are the schedule's.
 fn resolution(rows: &[usize], reading: &[f64], stretches: Stretches<'_>) -> f64 {
-    let moves = stretches.calm.iter().any(|(from, to)| {
+    let settled = stretches.calm.iter().filter_map(|(from, to)| {
         let skip = from + 2 + (to - from) / 10;
         let (lo, hi) = (rows.partition_point(|r| *r < skip), rows.partition_point(|r| r < to));
-        reading.get(lo..hi).is_some_and(|r| r.windows(2).any(|w| w[0] != w[1]))
+        reading.get(lo..hi).filter(|r| r.len() >= 4)
     });
+    let moves: Vec<bool> = settled.map(|r| r.windows(2).any(|w| w[0] != w[1])).collect();
+    if moves.is_empty() {
+        return quantum(reading);
+    }
+    let moves = moves.contains(&true);
     let mut values = reading.to_vec();
     values.sort_unstable_by(f64::total_cmp);
     values.dedup();
@@ -334,6 +339,10 @@ mod tests {
         assert!((floor(&still) / step - 1.0).abs() < 1e-6, "{}", floor(&still));
         // a constant has the last of six digits; what has no noise has a value a level, and those are no digits
         assert!((floor(&[11.5; 1200]) / 11.5e-6 - 1.0).abs() < 1e-6);
+        // a table of single points does not tell the two apart, and keeps the coarser
+        let table: Vec<f64> = (0..16).map(|i| 0.3 * f64::from(i * i)).collect();
+        let points: Vec<(usize, usize)> = (0..16).map(|i| (i, i + 1)).collect();
+        assert_eq!(resolution(&rows[..16], &table, held(&points)), quantum(&table));
         let clean: Vec<f64> = rows.iter().map(|i| 700.0 * (1 + i / 100) as f64).collect();
         assert!(floor(&clean) < 1.0, "{}", floor(&clean));
     }

@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn a_channel_that_no_fold_predicts_forbids_no_exchange() {
-        let held = |rms: f64| Held { rms, typical: rms, claimed: rms, ..Held::UNKNOWN };
+        let held = |rms: f64| Held { rms, typical: rms, claimed: rms };
         assert!(as_well(&held(f64::NAN), &held(f64::NAN)));
         assert!(as_well(&held(1.01), &held(1.0)) && !as_well(&held(1.1), &held(1.0)));
         assert!(!as_well(&held(f64::NAN), &held(1.0)), "one that the newcomer alone cannot predict is spoilt");
