@@ -1,6 +1,8 @@
 //! The classic filter against simulated bodies whose attitude is known.
 
-use dcm::{Classic, ClassicConfig, Euler, Increment, Mat3, Measurement, STANDARD_GRAVITY, Vec3, matrix_of, rotate};
+mod body;
+
+use dcm::{Classic, ClassicConfig, Euler, Increment, Mat3, Measurement, Vec3, matrix_of, rotate};
 use proptest::prelude::*;
 
 /// Horizontal and vertical part of a field with a dip of 65 degrees, gauss.
@@ -9,11 +11,7 @@ const DT: f32 = 1.0 / 200.0;
 
 /// What ideal sensors of a body at rest at `r` read.
 fn at_rest(r: &Mat3) -> Measurement {
-    Measurement {
-        gyro: Some(Vec3::zeros()),
-        accel: Some(r.transpose() * Vec3::new(0.0, 0.0, -STANDARD_GRAVITY)),
-        mag: Some(r.transpose() * Vec3::from(FIELD)),
-    }
+    body::at_rest(r, FIELD)
 }
 
 fn length(v: &Vec3) -> f32 {

@@ -1,5 +1,7 @@
 //! The filter against simulated bodies whose attitude is known.
 
+mod body;
+
 use dcm::{
     Config, Dcm, Earth, Euler, Increment, Mat3, Measurement, STANDARD_GRAVITY, STATE_WORDS, Standard, Vec3, matrix_of, rotate,
 };
@@ -10,11 +12,7 @@ const FIELD: [f32; 3] = [20.0, 0.0, 43.0];
 const DT: f32 = 1.0 / 200.0;
 
 fn at_rest(r: &Mat3) -> Measurement {
-    Measurement {
-        gyro: Some(Vec3::zeros()),
-        accel: Some(r.transpose() * Vec3::new(0.0, 0.0, -STANDARD_GRAVITY)),
-        mag: Some(r.transpose() * Vec3::from(FIELD)),
-    }
+    body::at_rest(r, FIELD)
 }
 
 fn length(v: &Vec3) -> f32 {

@@ -1,20 +1,15 @@
 //! Input, settings and saved states that no sensor and no sane caller gives: the filter stays a filter.
 
-use dcm::{
-    BiasConfig, Classic, ClassicConfig, Config, Dcm, Euler, Mat3, Measurement, STANDARD_GRAVITY, STATE_WORDS, StateError, Vec3,
-    matrix_of,
-};
+mod body;
+
+use dcm::{BiasConfig, Classic, ClassicConfig, Config, Dcm, Euler, Mat3, Measurement, STATE_WORDS, StateError, Vec3, matrix_of};
 use proptest::prelude::*;
 
 const FIELD: [f32; 3] = [20.0, 0.0, 43.0];
 const DT: f32 = 1.0 / 200.0;
 
 fn at_rest(r: &Mat3) -> Measurement {
-    Measurement {
-        gyro: Some(Vec3::zeros()),
-        accel: Some(r.transpose() * Vec3::new(0.0, 0.0, -STANDARD_GRAVITY)),
-        mag: Some(r.transpose() * Vec3::from(FIELD)),
-    }
+    body::at_rest(r, FIELD)
 }
 
 fn heading(degrees: f32) -> Mat3 {
