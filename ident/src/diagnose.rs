@@ -8,7 +8,7 @@
 //! Units: evidence in nats.
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
-use crate::context::{Context, Relation};
+use crate::context::{Context, Relation, Target};
 use crate::correction::correct;
 use crate::effects::{self, Effect, Instance};
 use crate::heldout::{self, Around, Held};
@@ -409,8 +409,11 @@ fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
     0.5 * (shapes.len() + amplitudes) as f64 * n.max(2.0).ln() + (grid as f64).ln().max(0.0) * 0.5
 }
 
-/// Share by which an effect may make the error of a channel worse on rows of which the rest of the run says nothing.
-const RUINED: f64 = 1.0;
+/// Distance between a channel's lowest and highest reading.
+fn span(target: &Target) -> f64 {
+    let (low, high) = target.y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
+    high - low
+}
 
 /// The newest effect must remove some of the held-out error on one of its channels, and spoil none.
 pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, around: &Around) -> bool {
@@ -425,8 +428,8 @@ pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, 
         }
         helps |= around.with[i].share_gone(&around.without[i]) > NEEDED_REDUCTION;
         let spoils = around.known_with[i].share_gone(&around.known_without[i]) < -NEEDED_REDUCTION;
-        // a guess may be wrong by the error itself, and no further
-        let ruins = around.with[i].share_gone(&around.without[i]) < -RUINED;
+        // what is off by more than all that the channel ever reads is no prediction
+        let ruins = around.with[i].rms > span(target);
         if (spoils || ruins) && !target.relation.is_evidence() && !certain {
             return false;
         }

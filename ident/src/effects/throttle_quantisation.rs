@@ -36,7 +36,7 @@ impl Effect for ThrottleQuantisation {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = speeds(context);
-        if channels.is_empty() || levels(context).len() < ENOUGH { Vec::new() } else { vec![Instance::new(&channels, "")] }
+        if channels.is_empty() || levels(context).len() < 8 { Vec::new() } else { vec![Instance::new(&channels, "")] }
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
