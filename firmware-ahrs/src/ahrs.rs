@@ -6,13 +6,14 @@
 //!
 //! What can go wrong: a missing reading repeats the last word and clears its `fresh` bit; a magnetometer overflow counts as
 //! missing; a saturated gyro or accelerometer is passed on, flagged in [`Outputs::saturated`], and not shown to the filter
-//! where it would mislead it (accelerometer).
+//! where it would mislead it (accelerometer); words that never change are flagged in [`Outputs::stuck`] (see [`crate::stuck`]).
 //!
 //! Units: counts and ticks in; counts, ticks and 2^-30 quaternion units out; rad/s, m/s^2, uT towards the filter.
 //!
 //! Reference: specification `ahrs.md`, "Board"; Beharie 2013 Eq. 4.1-4.7 with errata.
 
 use crate::sampler::Readings;
+use crate::stuck::Watch;
 use crate::{ACCEL, GYRO, MAG, Mounting, TICK_HZ, adxl345, hmc5883l, itg3200};
 use dcm::calibration::Calibration;
 use dcm::{Dcm, Measurement, STANDARD_GRAVITY, Standard, Step, Vec3};
@@ -57,6 +58,8 @@ pub struct Outputs {
     pub calibrated: Measurement,
     /// Sensors at the end of their range: bits as in [`ImuSample::fresh`].
     pub saturated: u8,
+    /// Sensors that answer with the same words for ever: bits as in [`ImuSample::fresh`].
+    pub stuck: u8,
     /// What the filter used of this tick.
     pub filter: Step,
 }
@@ -69,14 +72,43 @@ pub struct Ahrs {
     calibration: Calibration,
     last: ImuSample,
     before: Option<Ticks>,
+    watches: Watches,
+}
+
+/// One watch a sensor, and what they found last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Watches {
+    gyro: Watch,
+    accel: Watch,
+    mag: Watch,
+    stuck: u8,
+}
+
+impl Watches {
+    /// Takes the fresh readings; sensors that gave none stay as they were.
+    fn take(&mut self, readings: &Readings) -> u8 {
+        let seen = [
+            (GYRO, readings.gyro.map(|g| self.gyro.take(&g.rate))),
+            (ACCEL, readings.accel.map(|words| self.accel.take(&words))),
+            (MAG, readings.mag.map(|words| self.mag.take(&words))),
+        ];
+        for (bit, found) in seen {
+            match found {
+                Some(true) => self.stuck |= bit,
+                Some(false) => self.stuck &= !bit,
+                None => {}
+            }
+        }
+        self.stuck
+    }
 }
 
 impl Ahrs {
     /// A board that has seen nothing yet.
     #[must_use]
     pub fn new(config: AhrsConfig) -> Self {
-        let calibration = Calibration::default();
-        Self { config, filter: Dcm::new(Standard), calibration, last: ImuSample::default(), before: None }
+        let (calibration, watches) = (Calibration::default(), Watches::default());
+        Self { config, filter: Dcm::new(Standard), calibration, last: ImuSample::default(), before: None, watches }
     }
 
     /// The calibration in force.
@@ -114,6 +146,7 @@ impl Ahrs {
     /// Takes one instant.
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         let Readings { gyro, accel, mag, alive, .. } = inputs.readings;
+        let stuck = self.watches.take(&inputs.readings);
         let mut saturated = 0;
         let mut measured = Measurement::default();
         let sample = &mut self.last;
@@ -160,7 +193,7 @@ impl Ahrs {
         sample.quaternion_q30 =
             if self.filter.is_started() { self.filter.quaternion().map(|q| (q * Q30) as i32) } else { [0; 4] };
         let lives = alive & (GYRO | ACCEL | MAG) != 0;
-        Outputs { sample: lives.then_some(*sample), read: measured, calibrated, saturated, filter }
+        Outputs { sample: lives.then_some(*sample), read: measured, calibrated, saturated, stuck, filter }
     }
 }
 
@@ -263,6 +296,28 @@ mod tests {
         let sample = out.sample.unwrap();
         assert_eq!(sample.accel, [4095, 0, -256], "the raw word travels");
         assert_eq!((sample.mag, sample.fresh), ([218, 0, 470], GYRO | ACCEL));
+    }
+
+    #[test]
+    fn a_sensor_that_never_changes_is_named_and_the_others_are_not() {
+        let mut ahrs = Ahrs::new(AhrsConfig::default());
+        let mut found = 0;
+        for k in 0..u64::from(crate::stuck::STUCK_AFTER) {
+            let mut i = level(Ticks::from_ms(5 * k));
+            let noise = (k % 3) as i16;
+            i.readings.gyro = Some(GyroReading { temperature: noise, rate: [5, 0, 0] });
+            i.readings.accel = Some([noise, 0, 256]);
+            // a reading in two or three, as the chip gives them
+            i.readings.mag = (k % 2 == 0).then_some([218 + noise, 0, -470]);
+            found = ahrs.tick(&i).stuck;
+        }
+        assert_eq!(found, GYRO, "its temperature moves, its rates do not");
+        let mut i = level(Ticks::from_ms(1_005));
+        i.readings.gyro = Some(GyroReading { temperature: 0, rate: [5, 1, 0] });
+        assert_eq!(ahrs.tick(&i).stuck, 0);
+        // no reading is no news
+        let gone = Readings { alive: ALL, ..Readings::default() };
+        assert_eq!(ahrs.tick(&Inputs { now: Ticks::from_ms(1_010), readings: gone }).stuck, 0);
     }
 
     #[test]

@@ -128,6 +128,7 @@ impl Console {
         let add = |count: &mut u16, now: bool| *count = count.saturating_add(u16::from(now));
         let errors = &mut self.errors;
         errors.alive = inputs.readings.alive;
+        errors.stuck = outputs.stuck;
         for (bit, count) in errors.lost.iter_mut().enumerate() {
             add(count, inputs.readings.lost >> bit & 1 != 0);
         }

@@ -30,6 +30,7 @@ pub mod mounting;
 pub mod sampler;
 pub mod settings;
 mod still;
+pub mod stuck;
 pub mod text;
 
 pub use ahrs::{Ahrs, AhrsConfig, Inputs, Outputs};

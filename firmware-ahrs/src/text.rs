@@ -162,7 +162,8 @@ fn write_report(out: &mut String<LINE>, report: &ImuReport) -> fmt::Result {
         }
         ImuReport::Errors(e) => {
             let ([g, a, m, t], [sg, sa, sm], [low, high]) = (e.lost, e.saturated, e.tick_span);
-            write!(out, "errors: alive {}, lost {g},{a},{m},{t}, saturated {sg},{sa},{sm}, unusable {}", e.alive, e.unusable)?;
+            write!(out, "errors: alive {}, lost {g},{a},{m},{t}, saturated {sg},{sa},{sm}, stuck {}", e.alive, e.stuck)?;
+            write!(out, ", unusable {}", e.unusable)?;
             write!(out, ", damaged {}, unknown {}, tick span {low},{high}, tick cycles {}", e.damaged, e.unknown, e.tick_cycles)
         }
     }
@@ -205,6 +206,7 @@ mod tests {
             alive: 255,
             lost: [u16::MAX; 4],
             saturated: [u16::MAX; 3],
+            stuck: 7,
             unusable: u16::MAX,
             damaged: u16::MAX,
             unknown: u16::MAX,

@@ -135,6 +135,8 @@ pub struct ImuErrors {
     pub lost: [u16; 4],
     /// Readings at the end of the range of gyro, accelerometer and magnetometer.
     pub saturated: [u16; 3],
+    /// Sensors that now give the same words for ever: bits as in [`crate::ImuSample::fresh`].
+    pub stuck: u8,
     /// Readings that the filter could not use.
     pub unusable: u16,
     /// Command frames that were damaged or of another version.

@@ -78,13 +78,15 @@ fn every_command_of_the_line_is_obeyed_and_the_tick_keeps_its_time() {
     for start in [
         "ok",
         "cal,0.2",
-        "errors: alive 7, lost 0,0,0,0, saturated 0,0,0, unusable 0, damaged 0, unknown 0, tick span ",
+        "errors: alive 7, lost 0,0,0,0, saturated 0,0,0, stuck ",
         "imu board, firmware 0.1.0, sensors gyro accel mag",
         "mag: refused, 1 readings, 40 are needed",
         "refused: a value is out of range",
     ] {
         assert!(has(start), "no line {start:?}: {lines:#?}");
     }
+    let errors = lines.iter().find(|l| l.starts_with("errors: ")).expect("an error report");
+    assert!(errors.contains(", unusable 0, damaged 0, unknown 0, tick span "), "{errors}");
     let raw_line = lines.iter().find(|l| l.starts_with("raw,")).expect("a raw line");
     assert_eq!(raw_line.split(',').count(), 14, "{raw_line}");
 
