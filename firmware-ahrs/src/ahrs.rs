@@ -75,31 +75,22 @@ pub struct Ahrs {
     watches: Watches,
 }
 
-/// One watch a sensor, and what they found last.
+/// One watch a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Watches {
     gyro: Watch,
     accel: Watch,
     mag: Watch,
-    stuck: u8,
 }
 
 impl Watches {
-    /// Takes the fresh readings; sensors that gave none stay as they were.
+    /// Takes the fresh readings; gives the sensors that are stuck. One without a reading stays as it was.
     fn take(&mut self, readings: &Readings) -> u8 {
-        let seen = [
-            (GYRO, readings.gyro.map(|g| self.gyro.take(&g.rate))),
-            (ACCEL, readings.accel.map(|words| self.accel.take(&words))),
-            (MAG, readings.mag.map(|words| self.mag.take(&words))),
-        ];
-        for (bit, found) in seen {
-            match found {
-                Some(true) => self.stuck |= bit,
-                Some(false) => self.stuck &= !bit,
-                None => {}
-            }
-        }
-        self.stuck
+        let Self { gyro, accel, mag } = self;
+        readings.gyro.iter().for_each(|reading| gyro.take(&reading.rate));
+        readings.accel.iter().for_each(|words| accel.take(words));
+        readings.mag.iter().for_each(|words| mag.take(words));
+        [(GYRO, gyro), (ACCEL, accel), (MAG, mag)].into_iter().filter(|(_, w)| w.is_stuck()).fold(0, |bits, (bit, _)| bits | bit)
     }
 }
 
