@@ -17,6 +17,7 @@ mod blade_twist;
 mod channel_delay;
 mod channel_filter;
 mod clock_drift;
+mod coasting;
 mod coupling_slip;
 mod creep;
 mod current_limit;
@@ -114,10 +115,11 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Whether it only places something within a row: it may lie on a bound without making the effect implausible.
+    /// Whether it only places something within a row, or may be nothing at all: it may lie on a bound without making the effect
+    /// implausible.
     #[must_use]
     pub fn is_nuisance(&self) -> bool {
-        self.name == "phase"
+        matches!(self.name, "phase" | "latency" | "friction")
     }
 }
 

@@ -1,16 +1,23 @@
 //! `spinup_lag`: the rotor takes time to follow the command.
 //!
-//! What it is: rpm follows its static value by a first-order lag, with different time constants up and down.
+//! What it is: rpm follows its static value by a first-order lag, with different time constants up and down, or as a rotor that is
+//! driven and never braked (`coasting`: see [`super::coasting`]).
 //! What can go wrong: needs steps and samples inside the transient; with none it is not offered.
 //! Units: s.
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
 
+use super::coasting::{Coasting, Rotor};
 use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, speeds};
 use crate::context::{CALM_US, Context};
 use crate::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct SpinupLag;
+
+/// Form of a rotor that nothing brakes but air and friction.
+const COASTING: &str = "coasting";
+/// The same where the load jumps from row to row.
+const COASTING_OF_STEPS: &str = "coasting_of_steps";
 
 impl Effect for SpinupLag {
     fn id(&self) -> &'static str {
@@ -34,11 +41,27 @@ impl Effect for SpinupLag {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = speeds(context);
-        if context.time_is_row || channels.is_empty() { Vec::new() } else { vec![Instance::new(&channels, "")] }
+        if context.time_is_row || channels.is_empty() {
+            return Vec::new();
+        }
+        ["", COASTING, COASTING_OF_STEPS].iter().map(|form| Instance::new(&channels, form)).collect()
     }
 
-    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         let dt = context.step();
+        if !instance.form.is_empty() {
+            return vec![
+                Shape {
+                    name: "tau_up",
+                    unit: "s",
+                    range: (0.02 * dt, (100.0 * dt).max(5.0)),
+                    starts: [0.4, 1.2, 4.0].map(|k| k * dt).to_vec(),
+                },
+                Shape { name: "tau_down", unit: "s", range: (0.1, 60.0), starts: vec![0.2, 0.6, 2.0] },
+                Shape { name: "friction", unit: "1/s", range: (0.0, 10.0), starts: vec![0.1] },
+                Shape { name: "latency", unit: "s", range: (0.0, 3.0 * dt), starts: vec![0.3 * dt, dt] },
+            ];
+        }
         let starts: Vec<f64> = [0.3, 1.0, 3.0, 10.0].iter().map(|k| k * dt).collect();
         let range = (0.02 * dt, (100.0 * dt).max(5.0));
         vec![
@@ -52,7 +75,13 @@ impl Effect for SpinupLag {
         Vec::new()
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        if let [tau_up, tau_down, friction, latency] = *shape {
+            let rotor = Rotor { tau_up, tau_down, friction, latency };
+            let coasting = Coasting::new(context, rotor, instance.form == COASTING_OF_STEPS);
+            design.map_together(|columns| coasting.of(columns));
+            return;
+        }
         let ([up, down, phase], Some(pulse)) = (shape, &context.pulse) else { return };
         // which of the two constants holds is decided by the command alone, so that every column sees the same operator
         let mut state = pulse.first().copied().unwrap_or(0.0);
