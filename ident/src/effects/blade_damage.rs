@@ -89,12 +89,18 @@ impl Effect for BladeDamage {
         fitted
     }
 
-    fn plausible(&self, _: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         // damage is a change of the thrust coefficient first of all, and a load that grows slows the rotor down
         let sure = |name: &str| fitted.iter().find(|e| e.name == name).is_none_or(|e| e.value.abs() > 3.0 * e.se);
-        sure("thrust_step") && (!instance.touches("torque_nm") || sure("torque_step"))
+        let reported = self.report(context, instance, fitted.to_vec());
+        let of_a_blade = |e: &Estimate| !e.name.ends_with("_change") || e.value.abs() < MOST;
+        sure("thrust_step") && (!instance.touches("torque_nm") || sure("torque_step")) && reported.iter().all(of_a_blade)
     }
 }
+
+/// Largest relative change of a coefficient that still is that of a damaged blade: with less than a fifth left, or nearly twice as much, it is
+/// another propeller.
+const MOST: f64 = 0.8;
 
 /// The share by which a term `amplitude * column` changes what a channel would read without it, over the rows where the
 /// column is not zero; the reading at standstill is no part of either.

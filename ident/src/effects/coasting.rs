@@ -126,3 +126,70 @@ impl Coasting {
         x.iter().take(1).copied().chain(rows).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Column, Log};
+
+    const ROTOR: Rotor = Rotor { tau_up: 0.04, tau_down: 0.4, friction: 0.1, latency: 0.0 };
+
+    /// A command that stands at one value, then at another, 50 rows a second, and the speed of a rotor whose curve is a straight line.
+    fn speed(rotor: Rotor, from_us: f64, to_us: f64, jumps: bool) -> (Vec<f64>, Vec<f64>) {
+        let t: Vec<f64> = (0..200).map(|i| 0.02 * f64::from(i)).collect();
+        let pulse: Vec<f64> = (0..200).map(|i| if i < 50 { from_us } else { to_us }).collect();
+        let column = |name: &str, values: Vec<f64>| Column { name: name.to_owned(), values };
+        let rpm = pulse.iter().map(|p| 7.0 * (p - 1000.0)).collect();
+        let log = Log { t: t.clone(), columns: vec![column("pulse_us", pulse.clone()), column("rpm", rpm)], ..Log::default() };
+        let context = Context::new(&log, Some(1050.0));
+        let goal: Vec<f64> = pulse.iter().map(|p| if *p < 1050.0 { 0.0 } else { (p - 1000.0) / 1000.0 }).collect();
+        (t, Coasting::new(&context, rotor, jumps).of(&[&goal]).remove(0))
+    }
+
+    /// The rotor's equation in small steps, from the instant of the jump on.
+    fn integrated(rotor: Rotor, mut v: f64, goal: f64, s: f64) -> f64 {
+        let (air, n) = (1.0 / rotor.tau_down, 20_000);
+        let winding = 1.0 / rotor.tau_up - 2.0 * air;
+        for _ in 0..n {
+            let driven = (goal - v) * (winding + air * (goal + v));
+            v += s / f64::from(n) * driven.max(-(air * v * v + rotor.friction));
+        }
+        v
+    }
+
+    #[test]
+    fn it_is_the_rotor_s_equation_driven_and_coasting() {
+        for (from, to) in [(1200.0, 1900.0), (1900.0, 1200.0), (2000.0, 1950.0), (1800.0, 1000.0)] {
+            let (t, v) = speed(ROTOR, from, to, true);
+            let goal = |us: f64| if us < 1050.0 { 0.0 } else { (us - 1000.0) / 1000.0 };
+            // the jump lies between rows 49 and 50, at the earlier one
+            for row in [50, 53, 60, 90, 199] {
+                let exact = integrated(ROTOR, goal(from), goal(to), t[row] - t[49]);
+                assert!((v[row] - exact).abs() < 0.012, "{from} {to} row {row}: {} {exact}", v[row]);
+            }
+        }
+    }
+
+    #[test]
+    fn its_constants_are_what_they_say() {
+        // a small change at full speed is over but for 1/e after one time constant
+        let (t, v) = speed(Rotor { tau_up: 0.1, ..ROTOR }, 1980.0, 2000.0, true);
+        let row = t.iter().position(|s| s - t[49] >= 0.1 - 1e-9).unwrap();
+        assert!(((1.0 - v[row]) / 0.02 - (-1.0_f64).exp()).abs() < 0.01, "{}", v[row]);
+        // the air alone halves the full speed
+        let (t, v) = speed(Rotor { friction: 0.0, ..ROTOR }, 2000.0, 1000.0, true);
+        let row = t.iter().position(|s| s - t[49] >= 0.4 - 1e-9).unwrap();
+        assert!((v[row] - 0.5).abs() < 0.01, "{}", v[row]);
+        // a line between rows is later than a jump at the earlier one by half a row, and the latency by itself
+        let at = |rotor: Rotor, jumps: bool| speed(rotor, 1200.0, 1900.0, jumps).1[52];
+        let late = |s: f64| at(Rotor { latency: s, ..ROTOR }, true);
+        assert!((at(ROTOR, false) - late(0.01)).abs() < 0.03 && late(0.0) > late(0.01) && late(0.01) > late(0.02));
+        assert!((late(0.02) - speed(ROTOR, 1200.0, 1900.0, true).1[51]).abs() < 0.02);
+    }
+
+    #[test]
+    fn what_stands_stays() {
+        let (_, v) = speed(ROTOR, 1500.0, 1500.0, false);
+        assert!(v.iter().all(|v| (v - 0.5).abs() < 1e-12));
+    }
+}

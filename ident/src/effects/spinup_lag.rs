@@ -18,6 +18,10 @@ pub(crate) struct SpinupLag;
 const COASTING: &str = "coasting";
 /// The same where the load jumps from row to row.
 const COASTING_OF_STEPS: &str = "coasting_of_steps";
+/// Time constant of the quickest rotors, s.
+const QUICK: f64 = 0.04;
+/// What meters and a command that is let go slowly add to the latency, s.
+const LATE: f64 = 0.05;
 
 impl Effect for SpinupLag {
     fn id(&self) -> &'static str {
@@ -27,8 +31,8 @@ impl Effect for SpinupLag {
     fn about(&self) -> About {
         About {
             title: "Rotor follows the command with a lag",
-            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down",
-            source: "Beharie 2013, section 5.7.3",
+            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down; coasting (driven, never braked), v = rpm over that at 2000 us: dv/dt = (v_static(t - latency) - v) (1/tau_up - 2/tau_down + (v_static + v)/tau_down), but not below -v^2/tau_down - friction",
+            source: "Beharie 2013, section 5.7.3; coasting: J dw/dt = kt i - kQ w^2 - Q_f with i = max(0, (V - kt w)/R), Eq. 2.21 as corrected and 5.11",
             depends_on: &["pulse_us", "time_since_step"],
             signature: "rpm(pulse) is off for a moment after every step and right before the next; thrust(rpm) holds throughout",
             look_alikes: &["channel_filter", "channel_delay"],
@@ -44,23 +48,20 @@ impl Effect for SpinupLag {
         if context.time_is_row || channels.is_empty() {
             return Vec::new();
         }
-        ["", COASTING, COASTING_OF_STEPS].iter().map(|form| Instance::new(&channels, form)).collect()
+        let coasting = if operator::abrupt(context) { COASTING_OF_STEPS } else { COASTING };
+        ["", coasting].iter().map(|form| Instance::new(&channels, form)).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         let dt = context.step();
         if !instance.form.is_empty() {
-            return vec![
-                Shape {
-                    name: "tau_up",
-                    unit: "s",
-                    range: (0.02 * dt, (100.0 * dt).max(5.0)),
-                    starts: [0.4, 1.2, 4.0].map(|k| k * dt).to_vec(),
-                },
-                Shape { name: "tau_down", unit: "s", range: (0.1, 60.0), starts: vec![0.2, 0.6, 2.0] },
-                Shape { name: "friction", unit: "1/s", range: (0.0, 10.0), starts: vec![0.1] },
-                Shape { name: "latency", unit: "s", range: (0.0, 3.0 * dt), starts: vec![0.3 * dt, dt] },
-            ];
+            let base = dt.max(QUICK);
+            let (up, late) = ([1.0, 4.0].map(|k| k * base), [0.4, 1.6].map(|k| f64::min(k * dt, 0.5 * dt + LATE)));
+            let tau_up = Shape { name: "tau_up", unit: "s", range: (0.02 * dt, (100.0 * dt).max(5.0)), starts: up.to_vec() };
+            let tau_down = Shape { name: "tau_down", unit: "s", range: (0.1, 60.0), starts: vec![0.3, 1.0] };
+            let friction = Shape { name: "friction", unit: "1/s", range: (0.0, 10.0), starts: vec![0.1] };
+            let latency = Shape { name: "latency", unit: "s", range: (0.0, 3.0 * dt + LATE), starts: late.to_vec() };
+            return vec![tau_up, tau_down, friction, latency];
         }
         let starts: Vec<f64> = [0.3, 1.0, 3.0, 10.0].iter().map(|k| k * dt).collect();
         let range = (0.02 * dt, (100.0 * dt).max(5.0));

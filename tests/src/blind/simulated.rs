@@ -18,7 +18,7 @@ use hal_sim::Scenario;
 use hal_sim::effect::{self, UNKNOWN};
 use hal_sim::scenario::{Schedule, Step};
 use ident::log::Log;
-use ident::verdict::{EffectEntry, Kind, Verdict};
+use ident::verdict::{EffectEntry, Kind, Parameter, Verdict};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -174,17 +174,32 @@ fn size(log: &Log, twin: &Log, healthy: &Verdict) -> (f64, String) {
     log.measured().filter_map(of).filter(|s| s.0.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
 }
 
-/// Whether two entries speak of the same channels.
-fn alike(one: &EffectEntry, other: &EffectEntry) -> bool {
-    let channels = |e: &EffectEntry| e.channels.iter().cloned().collect::<BTreeSet<String>>();
-    channels(one) == channels(other)
+/// Whether the rig has on its healthy day what an entry says: the same name, on no channel that the healthy day did not name it for, and
+/// with the rotor's own constants where they were.
+fn stood_before(own: &[EffectEntry], entry: &EffectEntry) -> bool {
+    let same: Vec<&EffectEntry> = own.iter().filter(|o| o.id == entry.id).collect();
+    let channels: BTreeSet<&String> = same.iter().flat_map(|o| &o.channels).collect();
+    entry.channels.iter().all(|c| channels.contains(c)) && !same.iter().any(|o| has_moved(o, entry))
+}
+
+/// Share by which a constant of the rotor must differ to have moved, beside intervals that do not meet.
+const MOVED: f64 = 0.25;
+
+/// Whether a constant of the rotor itself is another one; two forms of an equation are not compared.
+fn has_moved(before: &EffectEntry, now: &EffectEntry) -> bool {
+    let apart = |a: &Parameter, b: &Parameter| {
+        let far = (a.value - b.value).abs() > MOVED * a.value.abs().max(b.value.abs());
+        far && (a.ci95[1] < b.ci95[0] || b.ci95[1] < a.ci95[0])
+    };
+    let constants = ["tau_up", "tau_down", "inertia"];
+    let mut pairs = before.parameters.iter().zip(&now.parameters);
+    before.equation == now.equation && pairs.any(|(a, b)| constants.contains(&a.name.as_str()) && apart(a, b))
 }
 
 fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Line) {
     let standing: Vec<&str> = own.effects.iter().map(|e| e.id.as_str()).collect();
     let is_own = |name: &str| OWN.contains(&name) && id != Some(name);
-    // the same name on another channel is news
-    let known = |e: &&EffectEntry| is_own(&e.id) || own.effects.iter().any(|o| o.id == e.id && alike(o, e));
+    let known = |e: &&EffectEntry| is_own(&e.id) || stood_before(&own.effects, e);
     let named: Vec<String> = v.effects.iter().filter(|e| !known(e)).map(|e| e.id.clone()).collect();
     let new = |name: &&String| !is_own(name) && (named.contains(*name) || !standing.contains(&name.as_str()));
     let others: Vec<Vec<String>> = v.alternatives.iter().map(|a| a.ids.iter().filter(new).cloned().collect()).take(2).collect();
