@@ -129,3 +129,27 @@ pub(super) fn relative_to_rest(context: &Context, channel: &str, column: &[f64],
 }
 
 pub(super) use crate::context::STANDSTILL;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Column, Log};
+
+    #[test]
+    fn a_blade_that_changes_by_more_than_a_blade_can_is_none() {
+        let t: Vec<f64> = (0..400).map(|i| 0.1 * f64::from(i)).collect();
+        let rpm: Vec<f64> = (0..400).map(|i| 2000.0 + 1000.0 * f64::from(i / 50 % 4)).collect();
+        let thrust = |share: f64| -> Vec<f64> {
+            let of_row = |(r, t): (&f64, &f64)| 1.5e-7 * r * r * if *t < 20.0 { 1.0 } else { 1.0 + share };
+            rpm.iter().zip(&t).map(of_row).collect()
+        };
+        for (share, stands) in [(-0.1, true), (0.05, true), (-0.95, false), (8.0, false)] {
+            let columns = [("rpm", rpm.clone()), ("thrust_n", thrust(share))];
+            let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+            let context = Context::new(&Log { t: t.clone(), columns, ..Log::default() }, None);
+            let estimate = |name: &str, value: f64| Estimate { name: name.into(), unit: "1".into(), value, se: 1e-6 };
+            let fitted = [estimate("t0", 20.0), estimate("thrust_step", 0.15 * share)];
+            assert_eq!(BladeDamage.plausible(&context, &Instance::new(&["thrust_n"], ""), &fitted), stands, "{share}");
+        }
+    }
+}

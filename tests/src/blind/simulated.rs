@@ -175,25 +175,28 @@ fn size(log: &Log, twin: &Log, healthy: &Verdict) -> (f64, String) {
 }
 
 /// Whether the rig has on its healthy day what an entry says: the same name, on no channel that the healthy day did not name it for, and
-/// with the rotor's own constants where they were.
+/// with its parameters where they were.
 fn stood_before(own: &[EffectEntry], entry: &EffectEntry) -> bool {
     let same: Vec<&EffectEntry> = own.iter().filter(|o| o.id == entry.id).collect();
     let channels: BTreeSet<&String> = same.iter().flat_map(|o| &o.channels).collect();
     entry.channels.iter().all(|c| channels.contains(c)) && !same.iter().any(|o| has_moved(o, entry))
 }
 
-/// Share by which a constant of the rotor must differ to have moved, beside intervals that do not meet.
+/// Share by which a parameter must differ to have moved, beside intervals that do not meet.
 const MOVED: f64 = 0.25;
 
-/// Whether a constant of the rotor itself is another one; two forms of an equation are not compared.
+/// What only places something within a row, or counts.
+const NO_CONSTANT: [&str; 5] = ["phase", "latency", "count", "size", "depth"];
+
+/// Whether a parameter is another one than on the healthy day; two forms of an equation are not compared.
 fn has_moved(before: &EffectEntry, now: &EffectEntry) -> bool {
     let apart = |a: &Parameter, b: &Parameter| {
         let far = (a.value - b.value).abs() > MOVED * a.value.abs().max(b.value.abs());
         far && (a.ci95[1] < b.ci95[0] || b.ci95[1] < a.ci95[0])
     };
-    let constants = ["tau_up", "tau_down", "inertia"];
+    let told = |p: &Parameter| !NO_CONSTANT.contains(&p.name.as_str());
     let mut pairs = before.parameters.iter().zip(&now.parameters);
-    before.equation == now.equation && pairs.any(|(a, b)| constants.contains(&a.name.as_str()) && apart(a, b))
+    before.equation == now.equation && pairs.any(|(a, b)| a.name == b.name && told(a) && apart(a, b))
 }
 
 fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Line) {
