@@ -146,9 +146,9 @@ impl Target {
         let floored = rows.iter().map(|i| noise.weight_variance(speed(i), FLOORED)).collect();
         let mut calm = vec![false; context.t.len()];
         context.calm.iter().for_each(|(a, b)| calm[*a..*b].fill(true));
+        // no curve of a driven motor holds for speed, torque and current of a rotor whose motor is off and that still turns
         let driven = matches!(relation, Relation::SpeedFromPulse | Relation::Torque | Relation::Current);
-        let on_the_way = |i: usize| driven && context.under_way.get(i).is_some_and(|u| *u);
-        let mut unsettled: Vec<bool> = rows.iter().map(|i| !calm[*i] || on_the_way(*i)).collect();
+        let mut unsettled: Vec<bool> = rows.iter().map(|i| !calm[*i] || driven && context.runs_down(*i)).collect();
         let jumps = unsettled.iter().filter(|u| **u).count();
         if jumps < FEWEST_OF_A_KIND || unsettled.len() - jumps < FEWEST_OF_A_KIND.max(unsettled.len() / 4) {
             unsettled.clear();
@@ -206,8 +206,6 @@ pub struct Context {
     pub calm: Vec<(usize, usize)>,
     /// Rows at the head of the steady stretches in which the rotor still approaches its new speed; empty without a command or a speed.
     pub(crate) settling: Vec<bool>,
-    /// Rows on which the rotor is on its way to another speed, driven or not; empty without a command or a speed.
-    pub(crate) under_way: Vec<bool>,
     /// What is sought may have set in before the run: a declared model stands as it is, and a constant departure from it is news.
     pub(crate) against_model: bool,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
@@ -265,7 +263,7 @@ impl Context {
     }
 
     /// Whether a rotor whose motor is off still turns at a row.
-    pub(crate) fn runs_down(&self, row: usize) -> bool {
+    fn runs_down(&self, row: usize) -> bool {
         let off = self.pulse.as_ref().is_some_and(|p| p[row] < self.start_pulse_us);
         off && self.rpm.get(row).is_some_and(|r| *r > STANDSTILL)
     }
@@ -279,7 +277,7 @@ impl Context {
         let calm = stretches::steady(&log.t, pulse.as_deref(), &rpm, CALM_US);
         let settling = if pulse.is_some() { stretches::settling(&log.t, &rpm, &steady) } else { Vec::new() };
         let start = start_pulse_us.unwrap_or_else(|| start_pulse(&log.t, pulse.as_deref(), &rpm));
-        let mut context = Self {
+        Self {
             name: log.name.clone(),
             t: log.t.clone(),
             time_is_row: log.time_is_row(),
@@ -295,14 +293,11 @@ impl Context {
             targets: Vec::new(),
             steady,
             calm,
-            under_way: Vec::new(),
             against_model: false,
             settling,
             powers: Default::default(),
             facts: Facts::default(),
-        };
-        context.under_way = stretches::under_way(&context.settling, &context.calm, |row| context.runs_down(row));
-        context
+        }
     }
 
     /// Names of the targets that a log has, in order.

@@ -10,7 +10,6 @@
 
 use crate::context::{Context, Relation, Target};
 use crate::correction::correct;
-use crate::curve;
 use crate::effects::{self, Effect, Instance};
 use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
@@ -374,9 +373,6 @@ fn choose(
         if !worth_a_name(context, winner, winner.evidence - best.evidence, &around) {
             continue;
         }
-        if curve::explains_better(context, declared, &best.fit, winner) {
-            continue;
-        }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
         let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL * probability);
         let named = best.fit.placed.len();
@@ -413,9 +409,6 @@ fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
     0.5 * (shapes.len() + amplitudes) as f64 * n.max(2.0).ln() + (grid as f64).ln().max(0.0) * 0.5
 }
 
-/// Times by which an effect may make the error of a channel worse on rows of which the rest of the run says nothing.
-const RUINED: f64 = 3.0;
-
 /// Distance between a channel's lowest and highest reading.
 fn span(target: &Target) -> f64 {
     let (low, high) = target.y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
@@ -433,13 +426,10 @@ pub(crate) fn worth_a_name(context: &Context, candidate: &Candidate, gain: f64, 
         if !newest.instance.touches(target.name) {
             continue;
         }
-        let (with, without) = (&around.with[i], &around.without[i]);
-        // what acts on readings one by one acts on all parts of a run alike
-        let in_parts = !newest.effect.about().depends_on.iter().any(|v| ["reading", "row"].contains(v));
-        helps |= with.share_gone_of_all(without) > NEEDED_REDUCTION || in_parts && with.share_gone(without) > CLEAR_REDUCTION;
-        let spoils = around.known_with[i].share_gone_of_all(&around.known_without[i]) < -NEEDED_REDUCTION;
-        // what is off by more than all that the channel ever reads, or by several times what it was, is no prediction
-        let ruins = with.rms > span(target) || with.share_gone_of_all(without) < 1.0 - RUINED;
+        helps |= around.with[i].share_gone(&around.without[i]) > NEEDED_REDUCTION;
+        let spoils = around.known_with[i].share_gone(&around.known_without[i]) < -NEEDED_REDUCTION;
+        // what is off by more than all that the channel ever reads is no prediction
+        let ruins = around.with[i].rms > span(target);
         if (spoils || ruins) && !target.relation.is_evidence() && !certain {
             return false;
         }

@@ -60,29 +60,16 @@ pub struct Held {
     pub typical: f64,
     /// Root mean square over the rows about which a claim is made: the figure of a verdict.
     pub claimed: f64,
-    /// Root mean square where the load has settled; NaN where the log does not tell (see [`Target::unsettled`]).
-    pub settled: f64,
-    /// Root mean square where it has not.
-    pub unsettled: f64,
 }
 
 impl Held {
     /// What is not known.
-    pub(crate) const UNKNOWN: Self =
-        Self { rms: f64::NAN, typical: f64::NAN, claimed: f64::NAN, settled: f64::NAN, unsettled: f64::NAN };
+    pub(crate) const UNKNOWN: Self = Self { rms: f64::NAN, typical: f64::NAN, claimed: f64::NAN };
 
     /// Share of `before` that is gone, in the measure in which more is gone: rows right after a step, whose instant is known
-    /// only to a sample, may rule the one, and a resonance or a saturation that few rows show rules the other. What acts where the load
-    /// has settled only, or where it has not, is seen by the error of these rows alone.
+    /// only to a sample, may rule the one, and a resonance or a saturation that few rows show rules the other.
     #[must_use]
     pub fn share_gone(&self, before: &Self) -> f64 {
-        let gone = |of: fn(&Self) -> f64| 1.0 - of(self) / of(before);
-        self.share_gone_of_all(before).max(gone(|h| h.settled)).max(gone(|h| h.unsettled))
-    }
-
-    /// The same over the whole run: what helps one part of it and ruins another as much is no gain.
-    #[must_use]
-    pub fn share_gone_of_all(&self, before: &Self) -> f64 {
         (1.0 - self.rms / before.rms).max(1.0 - self.typical / before.typical)
     }
 }
@@ -123,8 +110,7 @@ impl Around {
 /// the newcomer. Targets that the newcomer does not reach keep their `previous` error.
 ///
 /// A row is known where the fold's prediction of it with the newcomer is itself surer than one reading is: a level that the rest of
-/// the run does not surround may speak for a newcomer, but not against it. No more may a rotor that runs down, where the rest of the
-/// run holds none that does.
+/// the run does not surround may speak for a newcomer, but not against it.
 #[must_use]
 pub fn errors_around_newest(
     context: &Context,
@@ -137,8 +123,6 @@ pub fn errors_around_newest(
     let mut sums = vec![[Sum::default(); 4]; context.targets.len()];
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
-        let runs_down = |row: usize| context.runs_down(row);
-        let untaught = !(0..keep.len()).any(|row| keep[row] && runs_down(row));
         let placed = refine_group(context, declared, &fit.placed, &[others.len()], Rows::Where(&keep), EVALUATIONS);
         let (mut with, mut without) = (Designs::new(context, declared, &placed), Designs::new(context, declared, others));
         for (target, sums) in context.targets.iter().zip(&mut sums).filter(|(t, _)| newest.instance.touches(t.name)) {
@@ -148,11 +132,11 @@ pub fn errors_around_newest(
             let new = with.predict(&fitted.coefficients, context.len());
             let old = without.predict(&plain.coefficients, context.len());
             let left = left_over(target, &new, &keep);
-            for (j, (row, y)) in target.rows.iter().zip(&target.y).enumerate().filter(|(_, (row, _))| out[**row]) {
-                let known = with.variance(&fitted.covariance, *row) < left && !(untaught && runs_down(*row));
+            for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| out[**row]) {
+                let known = with.variance(&fitted.covariance, *row) < left;
                 let of_row = [y - old[*row], y - new[*row]];
                 for (sum, residual) in sums.iter_mut().zip(of_row.into_iter().cycle().take(if known { 4 } else { 2 })) {
-                    sum.add(target, j, residual);
+                    sum.add(target, *row, residual);
                 }
             }
         }
@@ -209,15 +193,12 @@ pub(crate) fn left_out(
         let design = designs.of(target);
         let Some(fitted) = fit_target(target, design, Rows::Where(&keep)) else { continue };
         let prediction = design.predict(&fitted.coefficients, context.len());
-        for (j, (row, y)) in target.rows.iter().zip(&target.y).enumerate().filter(|(_, (row, _))| out[**row]) {
-            sum.add(target, j, y - prediction[*row]);
+        for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| out[**row]) {
+            sum.add(target, *row, y - prediction[*row]);
         }
     }
     sums
 }
-
-/// Fewest rows that a figure of a part of them is made of.
-const FEWEST: usize = 20;
 
 /// Sums over rows that were left out.
 #[derive(Debug, Clone, Copy, Default)]
@@ -229,23 +210,17 @@ pub(crate) struct Sum {
     pub(crate) claimed_squares: f64,
     /// Number of these rows.
     pub(crate) claimed: usize,
-    late_squares: f64,
-    late: usize,
 }
 
 impl Sum {
-    fn add(&mut self, target: &Target, sample: usize, residual: f64) {
+    fn add(&mut self, target: &Target, row: usize, residual: f64) {
         let square = residual.powi(2);
         self.squares += square;
         self.logs += (square / target.noise.rms.powi(2)).ln_1p();
         self.rows += 1;
-        if target.claims(target.rows[sample]) {
+        if target.claims(row) {
             self.claimed_squares += square;
             self.claimed += 1;
-        }
-        if target.unsettled.get(sample).is_some_and(|u| *u) {
-            self.late_squares += square;
-            self.late += 1;
         }
     }
 
@@ -256,18 +231,12 @@ impl Sum {
             rows: self.rows + other.rows,
             claimed_squares: self.claimed_squares + other.claimed_squares,
             claimed: self.claimed + other.claimed,
-            late_squares: self.late_squares + other.late_squares,
-            late: self.late + other.late,
         }
     }
 
     fn held(self, target: &Target) -> Option<Held> {
         let mean = |sum: f64| sum / self.rows as f64;
-        // all rows are of one kind where the log does not tell
-        let root = |sum: f64, n: usize| if self.late > 0 && n >= FEWEST { (sum / n as f64).sqrt() } else { f64::NAN };
         (self.rows > 0).then(|| Held {
-            settled: root(self.squares - self.late_squares, self.rows - self.late),
-            unsettled: root(self.late_squares, self.late),
             rms: mean(self.squares).sqrt(),
             typical: target.noise.rms * mean(self.logs).exp_m1().sqrt(),
             claimed: (self.claimed_squares / self.claimed as f64).sqrt(),
@@ -288,50 +257,4 @@ pub fn residuals(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<Ve
             target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).collect()
         })
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_after_jumps_rule_neither_view_of_the_others() {
-        let held = |rms: f64, settled: f64, unsettled: f64| Held { rms, typical: rms, claimed: rms, settled, unsettled };
-        let before = held(100.0, 3.0, 400.0);
-        // a friction shows on the levels only, a lag after the jumps only; the whole error says hardly anything of the first
-        assert!(held(99.9, 1.0, 400.0).share_gone(&before) > 0.6);
-        assert!(held(60.0, 3.0, 240.0).share_gone(&before) > 0.35);
-        assert!(held(110.0, 3.3, 440.0).share_gone(&before) < -0.05);
-        // what helps the levels and ruins the rest spoils the whole
-        let ruined = held(110.0, 1.0, 440.0);
-        assert!(ruined.share_gone(&before) > 0.6 && ruined.share_gone_of_all(&before) < -0.05);
-        // where the log does not tell the two apart only the whole counts
-        let whole = |rms: f64| held(rms, f64::NAN, f64::NAN);
-        assert!((whole(90.0).share_gone(&whole(100.0)) - 0.1).abs() < 1e-12);
-    }
-
-    #[test]
-    fn each_sample_counts_for_its_kind() {
-        let rows: Vec<usize> = (0..60).collect();
-        let log = crate::log::Log {
-            t: rows.iter().map(|i| *i as f64).collect(),
-            columns: vec![crate::log::Column { name: "voltage_v".into(), values: vec![11.0; 60] }],
-            ..crate::log::Log::default()
-        };
-        let mut target = Context::new(&log, None).targets.remove(0);
-        let mut sum = |unsettled: Vec<bool>| {
-            target.unsettled = unsettled;
-            let mut sum = Sum::default();
-            (0..60).for_each(|j| sum.add(&target, j, if j < 20 { 5.0 } else { 1.0 }));
-            sum.held(&target).unwrap()
-        };
-        let told = sum((0..60).map(|j| j < 20).collect());
-        assert!((told.settled - 1.0).abs() < 1e-12 && (told.unsettled - 5.0).abs() < 1e-12, "{told:?}");
-        assert!((told.rms - 3.0).abs() < 1e-12);
-        // too few rows make no figure of their own
-        let few = sum((0..60).map(|j| j < 19).collect());
-        assert!(few.unsettled.is_nan() && few.settled > 1.0, "{few:?}");
-        let none = sum(Vec::new());
-        assert!(none.unsettled.is_nan() && none.settled.is_nan(), "{none:?}");
-    }
 }

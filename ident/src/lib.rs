@@ -12,7 +12,6 @@ pub mod circle;
 pub mod close;
 pub mod context;
 mod correction;
-mod curve;
 pub mod design;
 pub mod diagnose;
 pub mod effects;

@@ -91,7 +91,7 @@ fn predicts_as_well(context: &Context, declared: Declared<'_>, folds: &[Vec<bool
 
 /// The same of one channel. Where no fold could predict it, all its samples lying in one block, it says nothing.
 fn as_well(new: &Held, old: &Held) -> bool {
-    old.rms.is_nan() || new.share_gone_of_all(old) > -SPOILT
+    old.rms.is_nan() || new.share_gone(old) > -SPOILT
 }
 
 /// Whether a candidate's newest effect is this one, in whatever form.
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn a_channel_that_no_fold_predicts_forbids_no_exchange() {
-        let held = |rms: f64| Held { rms, typical: rms, claimed: rms, ..Held::UNKNOWN };
+        let held = |rms: f64| Held { rms, typical: rms, claimed: rms };
         assert!(as_well(&held(f64::NAN), &held(f64::NAN)));
         assert!(as_well(&held(1.01), &held(1.0)) && !as_well(&held(1.1), &held(1.0)));
         assert!(!as_well(&held(f64::NAN), &held(1.0)), "one that the newcomer alone cannot predict is spoilt");

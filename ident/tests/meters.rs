@@ -251,27 +251,6 @@ fn a_level_that_the_rest_does_not_surround_is_no_judge_of_a_damaged_blade() {
     assert!(all > 1.05, "{all}");
     assert!(known < 1.05, "{known}");
 }
-#[test]
-fn a_rotor_that_runs_down_drowns_no_friction() {
-    let mut c = Command::new(17);
-    let off = ROWS as f64 * STEP - 4.0;
-    c.0.retain(|l| l.0 < off - 1.0);
-    let last = c.speed(off);
-    c.0.push((off, 1000.0));
-    let (t0, drag) = (60.0, 0.005);
-    let rubs = |t: f64| if t > t0 && t < off { 1.0 } else { 0.0 };
-    let speed = |t: f64| if t < off { c.speed(t) - 25.0 * rubs(t) } else { last / (1.0 + (t - off) / 0.4) };
-    let driven = |t: f64| if t < off { speed(t) } else { 0.0 };
-    let extra = |t: f64| rubs(t) * drag * speed(t) * std::f64::consts::TAU / 60.0 / 12.0;
-    let closed = verdict(&log(
-        &c,
-        [&speed, &|t| thrust(speed(t)), &|t| torque(driven(t)), &|t| current(driven(t)) + extra(t)],
-        [3.0, 0.01, 0.0003, 0.05],
-    ));
-    assert_eq!(names(&closed)[0], "bearing_friction", "{:?} {:?}", names(&closed), closed.verdict.alternatives);
-    close_to(&closed, "t0", t0, 1.0);
-}
-
 /// What changed since a model was made, on another day of the same rig: zero, gain and friction of the whole run.
 #[test]
 fn what_was_there_before_the_run_shows_against_a_model_of_another_day() {

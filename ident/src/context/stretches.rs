@@ -1,4 +1,4 @@
-//! Which rows of a run are alike: held, without a jump, on the way to another speed.
+//! Which rows of a run are alike: held, without a jump, approaching a level.
 //!
 //! What it is: row ranges read off the command, or off the speed where there is none.
 //! What can go wrong: a slow ramp logged quickly changes little from row to row and counts as held.
@@ -46,47 +46,4 @@ pub(super) fn settling(t: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Vec
         out[*from..from + settle::rows(t, rpm, *from, *to)].fill(true);
     }
     out
-}
-
-/// Rows on which the rotor is on its way to another speed: after a jump, approaching a level, or running down with its motor off.
-/// No lag of first order describes the way exactly: a speed controller limits its slope, a coasting rotor is braked by the air alone.
-#[must_use]
-pub(super) fn under_way(settling: &[bool], calm: &[(usize, usize)], runs_down: impl Fn(usize) -> bool) -> Vec<bool> {
-    if settling.is_empty() {
-        return Vec::new();
-    }
-    let mut out = vec![true; settling.len()];
-    calm.iter().for_each(|(from, to)| out[*from..*to].fill(false));
-    out.iter_mut().enumerate().for_each(|(row, o)| *o |= settling[row] || runs_down(row));
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_rotor_is_under_way_after_jumps_and_while_it_runs_down_and_nowhere_else() {
-        // three levels of 100 rows; the speed approaches each with a time constant of 4 rows; the last is a motor switched off
-        let pulse: Vec<f64> = (0..300).map(|i| [1300.0, 1600.0, 1000.0][i / 100]).collect();
-        let target = |i: usize| [3000.0, 6000.0, 0.0][i / 100];
-        let mut speed = 3000.0;
-        let mut jitter = 0.0;
-        let rpm: Vec<f64> = (0..300)
-            .map(|i| {
-                speed += (target(i) - speed) / 4.0;
-                jitter = 1.0 - jitter;
-                speed + jitter
-            })
-            .collect();
-        let t: Vec<f64> = (0..300).map(|i| 0.05 * f64::from(i)).collect();
-        let (held, calm) = (steady(&t, Some(&pulse), &rpm, STILL_US), steady(&t, Some(&pulse), &rpm, CALM_US));
-        assert_eq!(held, [(0, 100), (100, 200), (200, 300)]);
-        let late = under_way(&settling(&t, &rpm, &held), &calm, |row| pulse[row] < 1040.0 && rpm[row] > 100.0);
-        let rows = |from: usize, to: usize| late[from..to].iter().filter(|l| **l).count();
-        // 3000 rev/min decay to half a rev/min in 35 rows
-        assert!(rows(0, 100) <= 4 && (25..=60).contains(&rows(100, 200)), "{} {}", rows(0, 100), rows(100, 200));
-        assert!(late[100] && late[115] && late[205] && !late[199] && !late[50], "{late:?}");
-        assert!(under_way(&[], &calm, |_| true).is_empty());
-    }
 }

@@ -1,9 +1,10 @@
 //! A rotor whose controller drives it and never brakes it.
 //!
-//! What it is: the way of a rotor from one speed to another as an operator on columns. Driven, it approaches its new speed the faster
-//! the more the winding and the air hold it; above it no current flows, and the air and friction alone slow it down.
+//! What it is: the way of a rotor from one speed to another as an operator on columns. Near its new speed it approaches with the time
+//! constant of winding and load; far above it no current flows, and the air and friction alone slow it down.
 //! What can go wrong: the rates are those of a rotor whose speed goes with the command above 1000 us; a curve that bends much makes
-//! them rough. How a standing rotor starts is the controller's programme and is not in it.
+//! them rough. That a driven rotor is quicker at high speed, where the air holds it more, is left out. How a standing rotor starts is the
+//! controller's programme and is not in it.
 //! Units: s; speeds as a share of that at 2000 us.
 //! Reference: J dw/dt = kt i - kQ w^2 - Q_f with i = max(0, (V - kt w)/R): Beharie 2013, Eq. 2.21 as corrected and 5.11.
 
@@ -13,16 +14,16 @@ use crate::context::Context;
 const PARTS: usize = 8;
 /// Distance from the new speed, a share of full speed, below which a rotor has arrived.
 const ARRIVED: f64 = 1e-3;
-/// Most rows whose input one row of the output hangs on; of a longer span the last stands for the rest.
+/// Most rows whose input one row of the output hangs on; of a longer span the first stands for those before it.
 const REACH: usize = 4;
 
 /// Constants of a rotor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rotor {
-    /// Time constant of a small change at full speed, driven, s.
+    /// Time constant while current flows, s.
     pub(super) tau_up: f64,
     /// Time in which the air alone halves the full speed, s.
-    pub(super) tau_down: f64,
+    pub(super) tau_air: f64,
     /// What friction alone takes, shares of full speed a second.
     pub(super) friction: f64,
     /// How late the speed answers to the logged command, s.
@@ -32,14 +33,13 @@ pub(super) struct Rotor {
 impl Rotor {
     /// Rate of approach, 1/s, at speed `v` towards `goal`.
     fn rate(&self, v: f64, goal: f64) -> f64 {
-        let air = 1.0 / self.tau_down.max(1e-6);
-        let winding = (1.0 / self.tau_up.max(1e-6) - 2.0 * air).max(0.0);
-        let driven = winding + air * (goal + v);
-        if v > goal { driven.min((air * v * v + self.friction) / (v - goal)) } else { driven }
+        let driven = 1.0 / self.tau_up.max(1e-6);
+        let coasting = v * v / self.tau_air.max(1e-6) + self.friction;
+        if v > goal { driven.min(coasting / (v - goal)) } else { driven }
     }
 }
 
-/// The input of an interval, and what it leaves of the state.
+/// What one row of the output keeps of the row before, and takes of the input.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     left: f64,
@@ -53,28 +53,29 @@ pub(super) struct Coasting {
     rows: Vec<Row>,
 }
 
-/// Where an instant lies: a row and the share of the way to the next.
-struct Place<'t> {
-    t: &'t [f64],
-    row: usize,
-    jumps: bool,
-}
+/// The input of a rotor over a part of an interval: a row, the share of the way to the next, and what is left of the state after it.
+type Part = (usize, f64, f64);
 
-impl Place<'_> {
-    /// Instants are asked for in order of time.
-    fn of(&mut self, at: f64) -> (usize, f64) {
-        let t = self.t;
-        while self.row + 2 < t.len() && t[self.row + 1] <= at {
-            self.row += 1;
+impl Row {
+    /// Of the parts of an interval, in order.
+    fn of(parts: &[Part]) -> Self {
+        let newest = parts.last().map_or(0, |p| p.0);
+        let oldest = parts.first().map_or(0, |p| p.0);
+        let first = oldest.max((newest + 2).saturating_sub(REACH));
+        let mut row = Self { left: 1.0, first, weights: [0.0; REACH] };
+        for (j, share, left) in parts {
+            row.left *= left;
+            row.weights.iter_mut().for_each(|w| *w *= left);
+            let at = j.saturating_sub(first);
+            row.weights[at] += (1.0 - left) * (1.0 - share);
+            row.weights[at + 1] += (1.0 - left) * share;
         }
-        let share = ((at - t[self.row]) / (t[self.row + 1] - t[self.row])).clamp(0.0, 1.0);
-        // a command that jumps has its new value from the earlier row on
-        (self.row, if self.jumps && at > t[0] { 1.0 } else { share })
+        row
     }
 }
 
 impl Coasting {
-    /// Of a rotor along the command of a log. `jumps`: the command goes from row to row at once, and not in a straight line.
+    /// Of a rotor along the command of a log. `jumps`: the command has its next value from a row on, and goes there in no straight line.
     pub(super) fn new(context: &Context, rotor: Rotor, jumps: bool) -> Self {
         let (t, Some(pulse)) = (&context.t, &context.pulse) else { return Self { rows: Vec::new() } };
         if t.len() < 2 {
@@ -82,31 +83,30 @@ impl Coasting {
         }
         let goals: Vec<f64> =
             pulse.iter().map(|p| if *p < context.start_pulse_us { 0.0 } else { (p - 1000.0).max(0.0) / 1000.0 }).collect();
-        let mut place = Place { t, row: 0, jumps };
-        let mut speed = goals[0];
-        let mut last = 0;
+        let latency = rotor.latency.max(0.0);
+        let (mut speed, mut row, mut parts) = (goals[0], 0, Vec::with_capacity(PARTS + REACH));
         let interval = |i: usize| {
-            let (from, h) = (t[i - 1] - rotor.latency, t[i] - t[i - 1]);
-            let calm = goals[last..=i].iter().all(|g| (g - speed).abs() < ARRIVED);
-            let parts = if calm { 1 } else { PARTS };
-            let step = h / parts as f64;
-            let mut row = Row { left: 1.0, first: 0, weights: [0.0; REACH] };
-            for part in 0..parts {
-                let (j, share) = place.of(from + (part as f64 + 0.5) * step);
-                if part == 0 {
-                    row.first = j;
-                    last = j;
+            let (from, to) = (t[i - 1] - latency, t[i] - latency);
+            let calm = goals[row..=i].iter().all(|g| (g - speed).abs() < ARRIVED);
+            let step = (t[i] - t[i - 1]) / if calm { 1.0 } else { PARTS as f64 };
+            parts.clear();
+            let mut now = from;
+            while now < to - 1e-9 * step {
+                while row + 2 < t.len() && t[row + 1] <= now + 1e-9 * step {
+                    row += 1;
                 }
-                let goal = goals[j] + share * (goals[j + 1] - goals[j]);
-                let left = (-rotor.rate(speed, goal) * step).exp();
+                // a part ends at the next row at the latest: there a command that jumps does so
+                let next = if t[row + 1] > now + 1e-9 * step { t[row + 1] } else { f64::INFINITY };
+                let end = (now + step).min(to).min(next);
+                let middle = (0.5 * (now + end) - t[row]) / (t[row + 1] - t[row]);
+                let share = if jumps { if now >= t[0] { 1.0 } else { 0.0 } } else { middle.clamp(0.0, 1.0) };
+                let goal = goals[row] + share * (goals[row + 1] - goals[row]);
+                let left = (-rotor.rate(speed, goal) * (end - now)).exp();
                 speed = goal + (speed - goal) * left;
-                row.left *= left;
-                row.weights.iter_mut().for_each(|w| *w *= left);
-                let at = (j - row.first).min(REACH - 2);
-                row.weights[at] += (1.0 - left) * (1.0 - share);
-                row.weights[at + 1] += (1.0 - left) * share;
+                parts.push((row, share, left));
+                now = end;
             }
-            row
+            Row::of(&parts)
         };
         Self { rows: (1..t.len()).map(interval).collect() }
     }
@@ -117,6 +117,9 @@ impl Coasting {
     }
 
     fn of_one(&self, x: &[f64]) -> Vec<f64> {
+        if self.rows.is_empty() {
+            return x.to_vec();
+        }
         let mut state = x.first().copied().unwrap_or(0.0);
         let rows = self.rows.iter().map(|row| {
             let input = row.weights.iter().zip(&x[row.first..]).fold(0.0, |sum, (w, x)| sum + w * x);
@@ -132,7 +135,7 @@ mod tests {
     use super::*;
     use crate::log::{Column, Log};
 
-    const ROTOR: Rotor = Rotor { tau_up: 0.04, tau_down: 0.4, friction: 0.1, latency: 0.0 };
+    const ROTOR: Rotor = Rotor { tau_up: 0.04, tau_air: 0.4, friction: 0.1, latency: 0.0 };
 
     /// A command that stands at one value, then at another, 50 rows a second, and the speed of a rotor whose curve is a straight line.
     fn speed(rotor: Rotor, from_us: f64, to_us: f64, jumps: bool) -> (Vec<f64>, Vec<f64>) {
@@ -148,11 +151,9 @@ mod tests {
 
     /// The rotor's equation in small steps, from the instant of the jump on.
     fn integrated(rotor: Rotor, mut v: f64, goal: f64, s: f64) -> f64 {
-        let (air, n) = (1.0 / rotor.tau_down, 20_000);
-        let winding = 1.0 / rotor.tau_up - 2.0 * air;
+        let n = 20_000;
         for _ in 0..n {
-            let driven = (goal - v) * (winding + air * (goal + v));
-            v += s / f64::from(n) * driven.max(-(air * v * v + rotor.friction));
+            v += s / f64::from(n) * ((goal - v) / rotor.tau_up).max(-(v * v / rotor.tau_air + rotor.friction));
         }
         v
     }
@@ -172,7 +173,7 @@ mod tests {
 
     #[test]
     fn its_constants_are_what_they_say() {
-        // a small change at full speed is over but for 1/e after one time constant
+        // a small change is over but for 1/e after one time constant
         let (t, v) = speed(Rotor { tau_up: 0.1, ..ROTOR }, 1980.0, 2000.0, true);
         let row = t.iter().position(|s| s - t[49] >= 0.1 - 1e-9).unwrap();
         assert!(((1.0 - v[row]) / 0.02 - (-1.0_f64).exp()).abs() < 0.01, "{}", v[row]);

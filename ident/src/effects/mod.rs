@@ -115,11 +115,10 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Whether it only places something within a row, or may be nothing at all: it may lie on a bound without making the effect
-    /// implausible.
+    /// Whether it only places something within a row: it may lie on a bound without making the effect implausible.
     #[must_use]
     pub fn is_nuisance(&self) -> bool {
-        matches!(self.name, "phase" | "latency" | "friction")
+        self.name == "phase"
     }
 }
 

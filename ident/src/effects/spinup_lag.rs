@@ -31,7 +31,7 @@ impl Effect for SpinupLag {
     fn about(&self) -> About {
         About {
             title: "Rotor follows the command with a lag",
-            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down; coasting (driven, never braked), v = rpm over that at 2000 us: dv/dt = (v_static(t - latency) - v) (1/tau_up - 2/tau_down + (v_static + v)/tau_down), but not below -v^2/tau_down - friction",
+            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down; coasting (driven, never braked), v = rpm over that at 2000 us: dv/dt = (v_static(t - latency) - v)/tau_up, but not below -v^2/tau_air - friction",
             source: "Beharie 2013, section 5.7.3; coasting: J dw/dt = kt i - kQ w^2 - Q_f with i = max(0, (V - kt w)/R), Eq. 2.21 as corrected and 5.11",
             depends_on: &["pulse_us", "time_since_step"],
             signature: "rpm(pulse) is off for a moment after every step and right before the next; thrust(rpm) holds throughout",
@@ -56,12 +56,12 @@ impl Effect for SpinupLag {
         let dt = context.step();
         if !instance.form.is_empty() {
             let base = dt.max(QUICK);
-            let (up, late) = ([1.0, 4.0].map(|k| k * base), [0.4, 1.6].map(|k| f64::min(k * dt, 0.5 * dt + LATE)));
+            let (up, late) = ([0.6, 1.5].map(|k| k * base), [0.4, 1.6].map(|k| f64::min(k * dt, 0.5 * dt + LATE)));
             let tau_up = Shape { name: "tau_up", unit: "s", range: (0.02 * dt, (100.0 * dt).max(5.0)), starts: up.to_vec() };
-            let tau_down = Shape { name: "tau_down", unit: "s", range: (0.1, 60.0), starts: vec![0.3, 1.0] };
+            let tau_air = Shape { name: "tau_air", unit: "s", range: (0.1, 60.0), starts: vec![0.3, 1.0] };
             let friction = Shape { name: "friction", unit: "1/s", range: (0.0, 10.0), starts: vec![0.1] };
             let latency = Shape { name: "latency", unit: "s", range: (0.0, 3.0 * dt + LATE), starts: late.to_vec() };
-            return vec![tau_up, tau_down, friction, latency];
+            return vec![tau_up, tau_air, friction, latency];
         }
         let starts: Vec<f64> = [0.3, 1.0, 3.0, 10.0].iter().map(|k| k * dt).collect();
         let range = (0.02 * dt, (100.0 * dt).max(5.0));
@@ -77,8 +77,8 @@ impl Effect for SpinupLag {
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
-        if let [tau_up, tau_down, friction, latency] = *shape {
-            let rotor = Rotor { tau_up, tau_down, friction, latency };
+        if let [tau_up, tau_air, friction, latency] = *shape {
+            let rotor = Rotor { tau_up, tau_air, friction, latency };
             let coasting = Coasting::new(context, rotor, instance.form == COASTING_OF_STEPS);
             design.map_together(|columns| coasting.of(columns));
             return;

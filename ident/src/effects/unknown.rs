@@ -38,12 +38,6 @@ pub(crate) fn parts(form: &str) -> (&str, usize) {
     }
 }
 
-/// The shapes of a correction over all that a run shows of a variable.
-pub(crate) fn whole(context: &Context, name: &str) -> Option<Vec<f64>> {
-    let (from, to) = range(variable(context, name)?.into_iter());
-    Some(vec![from, to])
-}
-
 /// What a verdict says of a correction.
 pub(crate) struct Words {
     /// Variables that it stands on.

@@ -179,7 +179,8 @@ fn size(log: &Log, twin: &Log, healthy: &Verdict) -> (f64, String) {
 fn stood_before(own: &[EffectEntry], entry: &EffectEntry) -> bool {
     let same: Vec<&EffectEntry> = own.iter().filter(|o| o.id == entry.id).collect();
     let channels: BTreeSet<&String> = same.iter().flat_map(|o| &o.channels).collect();
-    entry.channels.iter().all(|c| channels.contains(c)) && !same.iter().any(|o| has_moved(o, entry))
+    let on_it = |o: &&&EffectEntry| o.channels.iter().any(|c| entry.channels.contains(c));
+    entry.channels.iter().all(|c| channels.contains(c)) && !same.iter().filter(on_it).any(|o| has_moved(o, entry))
 }
 
 /// Share by which a parameter must differ to have moved, beside intervals that do not meet.
