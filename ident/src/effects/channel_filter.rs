@@ -63,9 +63,14 @@ impl Effect for ChannelFilter {
     }
 
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
-        // within two rows of a jump an average cannot be told from a delay
-        let least = if is_lag(instance) { 0.6 } else { 2.0 } * context.step();
-        !operator::abrupt(context) || fitted.iter().any(|e| (e.name == "tau" || e.name == "window") && e.value > least)
+        // an average over one row of straight lines is a delay by half of it, and within two rows of a jump it cannot be told from one
+        let least = match (is_lag(instance), operator::abrupt(context)) {
+            (true, true) => 0.6,
+            (true, false) => 0.0,
+            (false, _) => 2.0,
+        };
+        let width = fitted.iter().find(|e| e.name == "tau" || e.name == "window");
+        width.is_some_and(|e| e.value > least * context.step())
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
@@ -84,5 +89,31 @@ impl Effect for ChannelFilter {
             let average = operator::Average::new(&context.t, *width, course);
             through_meter(context, design, |columns| columns.iter().map(|c| average.of(c)).collect());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Column, Log};
+
+    /// Two names for one thing are no question that an experiment could answer.
+    #[test]
+    fn an_average_that_is_a_delay_is_not_called_an_average() {
+        let t: Vec<f64> = (0..300).map(|i| 0.2 * f64::from(i)).collect();
+        let wave: Vec<f64> = t.iter().map(|t| 3000.0 + 800.0 * (0.4 * t).sin()).collect();
+        let window = 0.14;
+        let average = operator::Average::new(&t, window, operator::Course::Line).of(&wave);
+        let delay = operator::Late::new(&t, operator::Course::Line, |_| 0.5 * window).of(&wave);
+        assert!(average.iter().zip(&delay).skip(1).all(|(a, d)| (a - d).abs() < 1e-9));
+        let column = |name: &str, values: &[f64]| Column { name: name.to_owned(), values: values.to_vec() };
+        let log = Log { t, columns: vec![column("rpm", &wave), column("thrust_n", &average)], ..Log::default() };
+        let context = Context::new(&log, None);
+        assert!(!operator::abrupt(&context));
+        let stands = |form: &str, name: &str, value: f64| {
+            let width = Estimate { name: name.into(), unit: "s".into(), value, se: 0.01 };
+            ChannelFilter.plausible(&context, &Instance::new(&["thrust_n"], form), &[width])
+        };
+        assert!(!stands(FORMS[0], "window", window) && stands(FORMS[0], "window", 0.6) && stands(FORMS[1], "tau", window));
     }
 }
