@@ -77,12 +77,12 @@ impl Effect for ChannelFilter {
         let [width, phase @ ..] = shape else { return };
         let course = operator::course(&instance.form, phase);
         if is_lag(instance) {
-            let lag = operator::Lag::new(&context.t, *width, course);
             if reads_meter(instance, design.relation) {
                 let jumped = |i: usize| context.pulse.as_ref().is_some_and(|p| (p[i] - p[i - 1]).abs() > CALM_US);
-                let truth = operator::Lead::new(&context.t, *width, phase.first().copied().unwrap_or(0.0), jumped);
-                design.map_together(|columns| columns.iter().map(|c| truth.of(c)).collect());
+                let truth = operator::Lag::undone(&context.t, *width, phase.first().copied().unwrap_or(0.0), jumped);
+                design.map_together(|columns| truth.of(columns));
             } else {
+                let lag = operator::Lag::new(&context.t, *width, course);
                 through_meter(context, design, |columns| lag.of(columns));
             }
         } else {

@@ -8,12 +8,15 @@
 //! Units: s; speeds as a share of that at 2000 us.
 //! Reference: J dw/dt = kt i - kQ w^2 - Q_f with i = max(0, (V - kt w)/R): Beharie 2013, Eq. 2.21 as corrected and 5.11.
 
+use super::operator::{Decay, weight_of_ramp};
 use crate::context::Context;
 
-/// Parts that a row is cut into while the rotor is on its way.
+/// Parts that a row is cut into while the rotor coasts; the way of a driven one is exact.
 const PARTS: usize = 8;
 /// Distance from the new speed, a share of full speed, below which a rotor has arrived.
 const ARRIVED: f64 = 1e-3;
+/// The same below which it stands there.
+const STANDS: f64 = 1e-9;
 /// Most rows whose input one row of the output hangs on; of a longer span the first stands for those before it.
 const REACH: usize = 4;
 
@@ -31,11 +34,56 @@ pub(super) struct Rotor {
 }
 
 impl Rotor {
+    /// What slows it down without a current, 1/s, at speed `v`.
+    fn braking(&self, v: f64) -> f64 {
+        v * v / self.tau_air.max(1e-6) + self.friction
+    }
+
     /// Rate of approach, 1/s, at speed `v` towards `goal`.
     fn rate(&self, v: f64, goal: f64) -> f64 {
         let driven = 1.0 / self.tau_up.max(1e-6);
-        let coasting = v * v / self.tau_air.max(1e-6) + self.friction;
-        if v > goal { driven.min(coasting / (v - goal)) } else { driven }
+        if v > goal { driven.min(self.braking(v) / (v - goal)) } else { driven }
+    }
+
+    /// Whether current flows at speed `v` on the way to `goal`.
+    fn is_driven(&self, v: f64, goal: f64) -> bool {
+        v <= goal + self.tau_up.max(1e-6) * self.braking(v)
+    }
+
+    /// Where current flows from the beginning of some seconds to their end: the share of the way of the goal that one goal would stand
+    /// at for the same effect (exact for a straight line), and what is left of the distance from it.
+    fn driven(&self, (v, s): (f64, f64), course: Course, (from, to): (f64, f64), decay: &mut Decay) -> Option<(f64, f64)> {
+        if !self.is_driven(v, course.goal(from)) {
+            return None;
+        }
+        let h = s / self.tau_up.max(1e-6);
+        let left = decay.of(h);
+        let share = from + (to - from) * weight_of_ramp(h, left) / (1.0 - left).max(1e-12);
+        let goal = course.goal(share);
+        self.is_driven(goal + (v - goal) * left, course.goal(to)).then_some((share, left))
+    }
+}
+
+/// What the goal does between two rows.
+#[derive(Debug, Clone, Copy)]
+struct Course {
+    /// The goal at the earlier row.
+    from: f64,
+    /// What it changes by until the later one.
+    change: f64,
+    /// Where the command jumps, whether it has done so yet: it has its next value from a row on, and before the log its first.
+    jumps: Option<bool>,
+}
+
+impl Course {
+    /// The share of the change that is done after a share of the interval.
+    fn share(self, of_interval: f64) -> f64 {
+        self.jumps.map_or(of_interval.clamp(0.0, 1.0), |done| if done { 1.0 } else { 0.0 })
+    }
+
+    /// The goal where a share of the change is done.
+    fn goal(self, share: f64) -> f64 {
+        self.from + share * self.change
     }
 }
 
@@ -85,7 +133,17 @@ impl Coasting {
             pulse.iter().map(|p| if *p < context.start_pulse_us { 0.0 } else { (p - 1000.0).max(0.0) / 1000.0 }).collect();
         let latency = rotor.latency.max(0.0);
         let (mut speed, mut row, mut parts) = (goals[0], 0, Vec::with_capacity(PARTS + REACH));
+        let mut decay = Decay::new();
+        let mut settled: Option<(f64, Row)> = None;
         let interval = |i: usize| {
+            // once it stands at its speed every row is like the one before
+            let length = t[i] - t[i - 1];
+            let stands = goals[row..=i].iter().all(|g| (g - speed).abs() < STANDS);
+            if let Some((_, last)) = settled.as_mut().filter(|(of, _)| stands && (of - length).abs() < 1e-9 * length) {
+                last.first += 1;
+                row += 1;
+                return *last;
+            }
             let (from, to) = (t[i - 1] - latency, t[i] - latency);
             let calm = goals[row..=i].iter().all(|g| (g - speed).abs() < ARRIVED);
             let step = (t[i] - t[i - 1]) / if calm { 1.0 } else { PARTS as f64 };
@@ -97,16 +155,27 @@ impl Coasting {
                 }
                 // a part ends at the next row at the latest: there a command that jumps does so
                 let next = if t[row + 1] > now + 1e-9 * step { t[row + 1] } else { f64::INFINITY };
-                let end = (now + step).min(to).min(next);
-                let middle = (0.5 * (now + end) - t[row]) / (t[row + 1] - t[row]);
-                let share = if jumps { if now >= t[0] { 1.0 } else { 0.0 } } else { middle.clamp(0.0, 1.0) };
-                let goal = goals[row] + share * (goals[row + 1] - goals[row]);
-                let left = (-rotor.rate(speed, goal) * (end - now)).exp();
+                let course =
+                    Course { from: goals[row], change: goals[row + 1] - goals[row], jumps: jumps.then_some(now >= t[0]) };
+                let share = |at: f64| course.share((at - t[row]) / (t[row + 1] - t[row]));
+                let whole = to.min(next);
+                let driven = rotor.driven((speed, whole - now), course, (share(now), share(whole)), &mut decay);
+                let (end, share, left) = driven.map_or_else(
+                    || {
+                        let end = (now + step).min(whole);
+                        let share = share(0.5 * (now + end));
+                        (end, share, (-rotor.rate(speed, course.goal(share)) * (end - now)).exp())
+                    },
+                    |(share, left)| (whole, share, left),
+                );
+                let goal = course.goal(share);
                 speed = goal + (speed - goal) * left;
                 parts.push((row, share, left));
                 now = end;
             }
-            Row::of(&parts)
+            let out = Row::of(&parts);
+            settled = (stands && i > REACH).then_some((length, out));
+            out
         };
         Self { rows: (1..t.len()).map(interval).collect() }
     }

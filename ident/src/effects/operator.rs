@@ -33,10 +33,11 @@ impl Course {
 pub(crate) struct Average<'t> {
     t: &'t [f64],
     window: f64,
-    course: Course,
-    /// For each row the row before its window begins, the share of the interval after it, and that interval's length; none where the
-    /// window begins before the log.
-    begins: Vec<Option<(u32, f64, f64)>>,
+    /// Share of an interval for which its earlier value counts.
+    early: f64,
+    /// For each row the row before its window begins, and the seconds that the values there and at the next row count between that row
+    /// and the window; less than none where the window begins before the log.
+    begins: Vec<(u32, f64, f64)>,
 }
 
 impl<'t> Average<'t> {
@@ -46,39 +47,39 @@ impl<'t> Average<'t> {
         let begin = |now: &f64| {
             let start = now - window;
             if start < t[0] {
-                return None;
+                return (0, start - t[0], 0.0);
             }
             while j + 1 < t.len() && t[j + 1] <= start {
                 j += 1;
             }
             let length = (t[(j + 1).min(t.len() - 1)] - t[j]).max(1e-12);
-            Some((j as u32, (start - t[j]) / length, length))
+            let share = (start - t[j]) / length;
+            // what unit values at either end amount to from the row to the window
+            let [from, to] = [(1.0, 0.0), (0.0, 1.0)].map(|(a, b)| course.at(a, b, share).1 * length);
+            (j as u32, from, to)
         };
         let begins = if window <= 0.0 || t.len() < 2 { Vec::new() } else { t.iter().map(begin).collect() };
-        Self { t, window, course, begins }
+        Self { t, window, early: course.at(1.0, 0.0, 1.0).1, begins }
     }
 
     /// The mean of a signal.
     pub(crate) fn of(&self, x: &[f64]) -> Vec<f64> {
-        let (t, course) = (self.t, self.course);
+        let (t, early) = (self.t, self.early);
         if self.begins.is_empty() {
             return x.to_vec();
         }
-        let mut integral = Vec::with_capacity(t.len());
+        let mut integral = vec![0.0; t.len()];
         let mut sum = 0.0;
-        integral.push(sum);
-        integral.extend(t.windows(2).zip(x.windows(2)).map(|(t, x)| {
-            sum += course.at(x[0], x[1], 1.0).1 * (t[1] - t[0]);
-            sum
-        }));
-        let head = |begin: &Option<(u32, f64, f64)>, now: f64| match *begin {
-            None => x[0] * (now - self.window - t[0]),
-            Some((j, share, length)) => {
-                let j = j as usize;
-                integral[j] + course.at(x[j], x[(j + 1).min(x.len() - 1)], share).1 * length
-            }
+        for ((to, t), x) in integral.iter_mut().skip(1).zip(t.windows(2)).zip(x.windows(2)) {
+            sum += (x[1] + early * (x[0] - x[1])) * (t[1] - t[0]);
+            *to = sum;
+        }
+        let last = x.len() - 1;
+        let mean = |(i, (j, from, to)): (&f64, &(u32, f64, f64))| {
+            let j = *j as usize;
+            (i - integral[j] - from * x[j] - to * x[(j + 1).min(last)]) / self.window
         };
-        integral.iter().zip(t).zip(&self.begins).map(|((i, now), begin)| (i - head(begin, *now)) / self.window).collect()
+        integral.iter().zip(&self.begins).map(mean).collect()
     }
 }
 
@@ -104,25 +105,23 @@ impl Decay {
     }
 }
 
-/// What a first-order lag does from one row to the next.
+/// What a first-order lag does from one row to the next: shares of its state, of its input before and of its input after.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Interval {
-    /// Its input runs straight, or jumps at a known instant: what is left of the state, and the weight of the change of the input.
-    Change(f64, f64),
-    /// Its input jumps at once: what is left of the state's distance from the input at the jump, and of that after it.
-    Jump(f64, f64),
+pub(crate) struct Interval {
+    state: f64,
+    from: f64,
+    to: f64,
 }
 
 impl Interval {
-    /// The state after an interval over which the input goes from one value to another.
-    fn next(self, state: f64, from: f64, to: f64) -> f64 {
-        match self {
-            Self::Change(left, change) => left * state + (1.0 - left) * from + change * (to - from),
-            Self::Jump(early, late) => {
-                let before = from + (state - from) * early;
-                to + (before - to) * late
-            }
-        }
+    /// The input runs straight, or jumps at a known instant: what is left of the state, and the weight of the change of the input.
+    pub(crate) fn change(left: f64, change: f64) -> Self {
+        Self { state: left, from: 1.0 - left - change, to: change }
+    }
+
+    /// The input jumps at once: what is left of the state's distance from the input at the jump, and of that after it.
+    pub(crate) fn jump(early: f64, late: f64) -> Self {
+        Self { state: early * late, from: (1.0 - early) * late, to: 1.0 - late }
     }
 }
 
@@ -148,9 +147,25 @@ impl Lag {
                 Course::Jump(phase) if phase >= 1.0 => 0.0,
                 Course::Jump(phase) => 1.0 - part.of(h * (1.0 - phase)),
             };
-            Interval::Change(e, change)
+            Interval::change(e, change)
         };
         Self { intervals: t.windows(2).map(interval).collect() }
+    }
+
+    /// What a lag of time constant `tau`, s, was made of: its inverse, for an input that stands between rows as it ends, or jumps. Where
+    /// `jumps` says so of a row, its input jumped after a share `phase` of the interval before it.
+    pub(crate) fn undone(t: &[f64], tau: f64, phase: f64, jumps: impl Fn(usize) -> bool) -> Self {
+        let mut decays = [Decay::new(); 3];
+        let [whole, before, after] = &mut decays;
+        let interval = |(i, w): (usize, &[f64])| {
+            let h = (w[1] - w[0]) / tau.max(1e-9);
+            let (early, late) =
+                if jumps(i + 1) { (before.of(h * phase), after.of(h * (1.0 - phase))) } else { (1.0, whole.of(h)) };
+            let late = late.min(MOST_LEFT);
+            let gain = 1.0 / (1.0 - late);
+            Interval { state: -late * (1.0 - early) * gain, from: -late * early * gain, to: gain }
+        };
+        Self { intervals: t.windows(2).enumerate().map(interval).collect() }
     }
 
     /// A lag that does this from each row to the next.
@@ -163,64 +178,26 @@ impl Lag {
         if self.intervals.is_empty() {
             return signals.iter().map(|x| x.to_vec()).collect();
         }
-        let some = |four: &[&[f64]]| -> Vec<Vec<f64>> {
-            match *four {
-                [a] => self.side_by_side([a]).into(),
-                [a, b] => self.side_by_side([a, b]).into(),
-                [a, b, c] => self.side_by_side([a, b, c]).into(),
-                [a, b, c, d] => self.side_by_side([a, b, c, d]).into(),
-                _ => Vec::new(),
-            }
+        let some = |few: &[&[f64]]| -> Vec<Vec<f64>> {
+            let four = [0, 1, 2, 3].map(|k| few[k.min(few.len() - 1)]);
+            self.side_by_side(four).into_iter().take(few.len()).collect()
         };
         signals.chunks(4).flat_map(some).collect()
     }
 
-    fn side_by_side<const N: usize>(&self, signals: [&[f64]; N]) -> [Vec<f64>; N] {
-        let signals = signals.map(|x| &x[..=self.intervals.len()]);
-        let mut out = signals.map(|x| Vec::with_capacity(x.len()));
-        let mut states = signals.map(|x| x[0]);
-        out.iter_mut().zip(states).for_each(|(out, state)| out.push(state));
-        for (i, interval) in self.intervals.iter().enumerate() {
-            for k in 0..N {
-                states[k] = interval.next(states[k], signals[k][i], signals[k][i + 1]);
-                out[k].push(states[k]);
-            }
+    fn side_by_side(&self, signals: [&[f64]; 4]) -> [Vec<f64>; 4] {
+        let mut out = signals.map(|x| vec![x[0]; self.intervals.len() + 1]);
+        let [mut a, mut b, mut c, mut d] = signals.map(|x| x[0]);
+        let [xa, xb, xc, xd] = signals.map(|x| x.windows(2));
+        let [oa, ob, oc, od] = out.each_mut().map(|out| out[1..].iter_mut());
+        let inputs = xa.zip(xb).zip(xc.zip(xd));
+        let outputs = oa.zip(ob).zip(oc.zip(od));
+        for ((i, ((xa, xb), (xc, xd))), ((oa, ob), (oc, od))) in self.intervals.iter().zip(inputs).zip(outputs) {
+            let next = |state: f64, x: &[f64]| i.state * state + (i.from * x[0] + i.to * x[1]);
+            (a, b, c, d) = (next(a, xa), next(b, xb), next(c, xc), next(d, xd));
+            (*oa, *ob, *oc, *od) = (a, b, c, d);
         }
         out
-    }
-}
-
-/// What a first-order lag was made of: its inverse, for an input that stands between rows as it ends, or jumps.
-#[derive(Debug, Clone)]
-pub(crate) struct Lead {
-    /// From each row to the next what is left of the lag's distance from its input at the jump, and of that after it.
-    left: Vec<(f64, f64)>,
-}
-
-impl Lead {
-    /// Of a lag with time constant `tau`, s. Where `jumps` says so of a row, its input jumped after a share `phase` of the interval
-    /// before it.
-    pub(crate) fn new(t: &[f64], tau: f64, phase: f64, jumps: impl Fn(usize) -> bool) -> Self {
-        let mut decays = [Decay::new(); 3];
-        let [whole, before, after] = &mut decays;
-        let interval = |(i, w): (usize, &[f64])| {
-            let h = (w[1] - w[0]) / tau.max(1e-9);
-            let (early, late) =
-                if jumps(i + 1) { (before.of(h * phase), after.of(h * (1.0 - phase))) } else { (1.0, whole.of(h)) };
-            (early, late.min(MOST_LEFT))
-        };
-        Self { left: t.windows(2).enumerate().map(interval).collect() }
-    }
-
-    /// The input whose lag is `x`.
-    pub(crate) fn of(&self, x: &[f64]) -> Vec<f64> {
-        let mut input = x.first().copied().unwrap_or(0.0);
-        let inputs = x.windows(2).zip(&self.left).map(|(x, (early, late))| {
-            let at_jump = input + (x[0] - input) * early;
-            input = (x[1] - late * at_jump) / (1.0 - late);
-            input
-        });
-        x.iter().take(1).copied().chain(inputs).collect()
     }
 }
 
@@ -341,7 +318,7 @@ mod tests {
         let x: Vec<f64> = (0..t.len()).map(|i| if i / 40 % 2 == 0 { 3.0 } else { 7.0 }).collect();
         for (phase, tau) in [(0.0, 0.2), (0.8, 0.04), (0.3, 1.0)] {
             let lagged = Lag::new(&t, tau, Course::Jump(phase)).of(&[&x]).remove(0);
-            let back = Lead::new(&t, tau, phase, |i| i % 40 == 0).of(&lagged);
+            let back = Lag::undone(&t, tau, phase, |i| i % 40 == 0).of(&[&lagged]).remove(0);
             assert!(back.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-9), "{phase} {tau}");
         }
     }

@@ -86,29 +86,23 @@ impl Effect for SpinupLag {
         let ([up, down, phase], Some(pulse)) = (shape, &context.pulse) else { return };
         // which of the two constants holds is decided by the command alone, so that every column sees the same operator
         let mut state = pulse.first().copied().unwrap_or(0.0);
-        let mut rising = Vec::with_capacity(pulse.len());
-        let mut last = context.t.first().copied().unwrap_or(0.0);
-        let tau = |up_now: bool| if up_now { up.max(1e-9) } else { down.max(1e-9) };
-        let mut decays = [operator::Decay::new(); 2];
-        for (p, t) in pulse.iter().zip(&context.t) {
-            let up_now = *p >= state;
-            rising.push(up_now);
-            state = p + (state - p) * decays[usize::from(up_now)].of((t - last) / tau(up_now));
-            last = *t;
-        }
+        let tau = [down.max(1e-9), up.max(1e-9)];
         let mut decays = [[operator::Decay::new(); 2]; 2];
-        let interval = |i: usize| {
-            let h = (context.t[i] - context.t[i - 1]) / tau(rising[i]);
-            let [early, late] = &mut decays[usize::from(rising[i])];
-            if (pulse[i] - pulse[i - 1]).abs() > CALM_US {
+        let interval = |(p, t): (&[f64], &[f64])| {
+            let rising = usize::from(p[1] >= state);
+            let h = (t[1] - t[0]) / tau[rising];
+            let [early, late] = &mut decays[rising];
+            let left = late.of(h);
+            state = p[1] + (state - p[1]) * left;
+            if (p[1] - p[0]).abs() > CALM_US {
                 // a command jumps somewhere between two rows
-                operator::Interval::Jump(early.of(h * phase), late.of(h * (1.0 - phase)))
+                operator::Interval::jump(early.of(h * phase), late.of(h * (1.0 - phase)))
             } else {
-                let left = late.of(h);
-                operator::Interval::Change(left, operator::weight_of_ramp(h, left))
+                operator::Interval::change(left, operator::weight_of_ramp(h, left))
             }
         };
-        let lag = operator::Lag::of_intervals((1..context.len()).map(interval).collect());
+        let intervals = pulse.windows(2).zip(context.t.windows(2)).map(interval).collect();
+        let lag = operator::Lag::of_intervals(intervals);
         design.map_together(|columns| lag.of(columns));
     }
 }
