@@ -5,12 +5,13 @@
 //! Units: as the channels state.
 //! Reference: specification `closing-the-loop.md`, steps 1 to 8.
 
-use crate::context::{Context, DIFFERENCES, unit_of};
+use crate::context::{Context, DIFFERENCES, Target, unit_of};
 use crate::diagnose::Diagnosis;
 use crate::effects::unknown::Words;
 use crate::effects::{Estimate, Shape};
 use crate::heldout;
 use crate::hypothesis::{Declared, Fit, Placed, Rows};
+use crate::leftover;
 use crate::log::Log;
 use crate::long::diagnose_any;
 use crate::model::Model;
@@ -57,8 +58,8 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let left_out = sparse::left_out(log);
     let log = &*sparse::without(log, &left_out);
     let mut context = Context::new(log, model.map(|m| m.start_pulse_us));
-    context.against_model = model.is_some();
     let declared = Declared { model };
+    context.against(declared);
     let refused = || CloseError::NoRelation { run: log.name.clone() };
     if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > sparse::TOO_FEW) {
         return Err(refused());
@@ -68,8 +69,9 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let fit = &diagnosis.best.fit;
     let estimates =
         found.estimates.unwrap_or_else(|| (0..fit.placed.len()).map(|k| fit.profiled_estimates(&context, declared, k)).collect());
-    let before_model = Model::from_fit(&context, log, declared, &diagnosis.declared);
-    let after_model = Model::of_estimates(&context, log, declared, fit, estimates.clone());
+    let left = |fit: &Fit| leftover::of(&context, declared, fit);
+    let before_model = Model::from_fit(&context, log, declared, &diagnosis.declared).leaving(&context, left(&diagnosis.declared));
+    let after_model = Model::of_estimates(&context, log, declared, fit, estimates.clone()).leaving(&context, left(fit));
     let mut verdict = Verdict {
         format: FORMAT,
         run: log.name.clone(),
@@ -109,7 +111,7 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
             .enumerate()
             .map(|(i, ((r, held), target))| {
                 let judged = |k: &usize| target.claims(target.rows[*k]);
-                let r: Vec<f64> = (0..r.len()).filter(judged).map(|k| r[k]).collect();
+                let r: Vec<f64> = (0..r.len()).filter(judged).map(|k| target.as_it_stands(target.rows[k], r[k])).collect();
                 let t: Vec<f64> = target.rows.iter().filter(|i| target.claims(**i)).map(|i| context.t[*i]).collect();
                 let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
                 let heldout_rms = if held.claimed.is_finite() { held.claimed } else { of_its_own(context, declared, fit, i) };
@@ -144,7 +146,7 @@ fn of_its_own(context: &Context, declared: Declared<'_>, fit: &Fit, i: usize) ->
 
 /// One entry an effect, the one that helps most first.
 fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> Vec<EffectEntry> {
-    let mut out: Vec<EffectEntry> = d
+    let mut out: Vec<(f64, EffectEntry)> = d
         .best
         .fit
         .placed
@@ -154,14 +156,14 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
         .map(|(k, (p, estimates))| {
             let estimates = p.effect.report(context, &p.instance, estimates);
             let shapes = p.effect.shapes(context, &p.instance);
-            let (first, reduction) = quoted(context, d, k);
+            let Quoted { channel: first, of_news, reduction } = quoted(context, d, k);
             let mut channels: Vec<String> =
                 p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();
             if let Some(at) = channels.iter().position(|c| *c == first) {
                 channels.swap(0, at);
             }
             let Words { depends_on, equation, evidence } = words(p, &first, reduction);
-            EffectEntry {
+            let entry = EffectEntry {
                 id: p.effect.id().to_owned(),
                 depends_on,
                 equation,
@@ -170,11 +172,12 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
                 heldout_error_reduction: reduction,
                 evidence,
                 channels,
-            }
+            };
+            (of_news, entry)
         })
         .collect();
-    out.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
-    out
+    out.sort_by(|a, b| b.0.total_cmp(&a.0));
+    out.into_iter().map(|(_, entry)| entry).collect()
 }
 
 /// What is said of an effect that removes such a share of the held-out error of its first channel.
@@ -191,18 +194,30 @@ fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
     }
 }
 
-/// The channel that an effect's figure is quoted for (the one it helps most) and the figure.
-fn quoted(context: &Context, d: &Diagnosis, k: usize) -> (String, f64) {
+/// What an effect takes away of the held-out error of the channel that it helps most.
+struct Quoted {
+    channel: String,
+    /// Share of the error in the measure in which it is news (see [`Target::news`](crate::context::Target::news)): what effects are ordered by.
+    of_news: f64,
+    /// Share of the error as it stands.
+    reduction: f64,
+}
+
+fn quoted(context: &Context, d: &Diagnosis, k: usize) -> Quoted {
     let p = &d.best.fit.placed[k];
-    context
-        .targets
-        .iter()
-        .enumerate()
-        .filter(|(_, t)| p.instance.touches(t.name) && !t.relation.is_evidence())
-        .map(|(i, t)| (t.name.to_owned(), 1.0 - d.heldout_after[i].rms / d.heldout_without[k][i].rms))
-        .filter(|(_, r)| r.is_finite())
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .unwrap_or_else(|| (p.instance.channels.first().cloned().unwrap_or_default(), 0.0))
+    let of_channel = |(i, t): (usize, &Target)| {
+        let (after, without) = (d.heldout_after[i], d.heldout_without[k][i]);
+        let of_news = 1.0 - after.rms / without.rms;
+        let reduction = if t.trust.is_empty() { of_news } else { 1.0 - after.claimed / without.claimed };
+        Quoted { channel: t.name.to_owned(), of_news, reduction }
+    };
+    let touched = context.targets.iter().enumerate().filter(|(_, t)| p.instance.touches(t.name) && !t.relation.is_evidence());
+    let figures = touched.map(of_channel).filter(|q| q.of_news.is_finite() && q.reduction.is_finite());
+    figures.max_by(|a, b| a.of_news.total_cmp(&b.of_news)).unwrap_or_else(|| Quoted {
+        channel: p.instance.channels.first().cloned().unwrap_or_default(),
+        of_news: 0.0,
+        reduction: 0.0,
+    })
 }
 
 /// A parameter with its interval. Where its standard error is not known the interval is what is known at all: the range of the shape,

@@ -8,6 +8,8 @@
 
 use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
+use crate::hypothesis::Declared;
+use crate::leftover::{self, Leftover};
 use crate::log::{Log, MODELLED, SPEED};
 use crate::noise::{self, Noise};
 use crate::solve::Normal;
@@ -124,6 +126,10 @@ pub struct Target {
     pub floored: Vec<f64>,
     /// Rows about which no prediction makes a claim, in order: the channel's glitches. The log alone decides which.
     pub unclaimed: Vec<usize>,
+    /// Error that a declared model is known to make, on every row of the log; empty without one.
+    pub known: Vec<f64>,
+    /// Share of the noise in the scatter that it is known to leave about that, on every row of the log; empty without one.
+    pub trust: Vec<f64>,
     /// For each sample whether the load has just jumped; empty where too few have, or too few have not, to tell the two apart.
     pub unsettled: Vec<bool>,
 }
@@ -153,13 +159,56 @@ impl Target {
         if jumps < FEWEST_OF_A_KIND || unsettled.len() - jumps < FEWEST_OF_A_KIND.max(unsettled.len() / 4) {
             unsettled.clear();
         }
-        Self { name, relation, rows, y, noise, weight: 1.0, levelled, floored, unclaimed: Vec::new(), unsettled }
+        Self {
+            name,
+            relation,
+            rows,
+            y,
+            noise,
+            weight: 1.0,
+            levelled,
+            floored,
+            unclaimed: Vec::new(),
+            known: Vec::new(),
+            trust: Vec::new(),
+            unsettled,
+        }
     }
 
     /// Whether predictions of a row are to be judged.
     #[must_use]
     pub fn claims(&self, row: usize) -> bool {
         self.unclaimed.binary_search(&row).is_err()
+    }
+
+    /// Takes what the declared model leaves over of its own run for known, and weighs the samples by how well: `load` and `classes` of
+    /// every row of the log, and how often the run repeats each class.
+    fn allow(&mut self, left: &Leftover, load: &[f64], classes: &[usize], alike: &leftover::Alike) {
+        self.known = load.iter().map(|x| left.known(*x)).collect();
+        let square = |row: usize| left.variance(classes[row], alike);
+        for variances in [&mut self.levelled, &mut self.floored] {
+            variances.iter_mut().zip(&self.rows).for_each(|(v, row)| *v += square(*row));
+        }
+        let noise = self.noise.rms;
+        self.trust = (0..load.len()).map(|row| noise / (noise * noise + square(row)).sqrt()).collect();
+    }
+
+    /// A residual in the measure in which it is news: against a declared model less where that is known to be rough.
+    #[must_use]
+    pub fn news(&self, row: usize, residual: f64) -> f64 {
+        residual * self.trust.get(row).copied().unwrap_or(1.0)
+    }
+
+    /// A residual against the declared model as it stands: what is known of its error belongs to it.
+    #[must_use]
+    pub fn as_it_stands(&self, row: usize, residual: f64) -> f64 {
+        residual + self.known.get(row).copied().unwrap_or(0.0)
+    }
+
+    /// The least scale of the variances that a fit may have: a tenth of the noise's standard deviation; what a declared model leaves over
+    /// does not shrink because a run happens to agree with it.
+    pub(crate) fn least_scale(&self) -> f64 {
+        if self.trust.is_empty() { 0.01 } else { 1.0 }
     }
 
     /// Takes the noise of single rows for samples that are means of `sizes[row]` rows each.
@@ -208,6 +257,9 @@ pub struct Context {
     pub(crate) settling: Vec<bool>,
     /// What is sought may have set in before the run: a declared model stands as it is, and a constant departure from it is news.
     pub(crate) against_model: bool,
+    /// Logarithm of the density of a declared model's air over that of ISO 2533 air at 20 degC; 0 where none is declared, and where the
+    /// model speaks of the density itself.
+    pub(crate) air: f64,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
     powers: [OnceLock<Vec<Values>>; 2],
     /// What effects ask again and again.
@@ -294,6 +346,7 @@ impl Context {
             steady,
             calm,
             against_model: false,
+            air: 0.0,
             settling,
             powers: Default::default(),
             facts: Facts::default(),
@@ -333,6 +386,24 @@ impl Context {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
+    }
+
+    /// Where a model is declared: what is sought may be older than the run, and every target is allowed what the model leaves over of
+    /// its own run.
+    pub(crate) fn against(&mut self, declared: Declared<'_>) {
+        let Some(model) = declared.model else { return };
+        let classes = leftover::classes(self);
+        let alike = leftover::Alike::of(self, &classes);
+        let loads: Vec<Vec<f64>> = self.targets.iter().map(|t| self.regressor(t.relation).unwrap_or_default()).collect();
+        for (target, load) in self.targets.iter_mut().zip(loads) {
+            if let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) {
+                target.allow(left, &load, &classes, &alike);
+            }
+        }
+        let speaks_of_air = model.effects.iter().any(|e| e.placed.effect.id() == "air_density");
+        self.air = model.air.filter(|_| !speaks_of_air).map_or(0.0, f64::ln);
+        self.facts.density = OnceLock::new();
+        self.against_model = true;
     }
 
     /// Index of a target by its channel name.

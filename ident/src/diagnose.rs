@@ -115,6 +115,11 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let mut candidates = Vec::new();
     let mut all = offers(context);
     let mut offers: Vec<&mut Scanned> = all.iter_mut().collect();
+    tare(context, declared, &start, &mut best);
+    if !best.fit.placed.is_empty() {
+        errors = heldout::errors(context, declared, &best.fit, &folds);
+        rounds.extend(best.fit.placed.iter().map(|_| (1.0, Vec::new())));
+    }
     for round in 0..MOST_EFFECTS {
         let ranked =
             round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
@@ -194,6 +199,29 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     })
 }
 
+/// Whether an effect is a zero that is older than the run: see [`tare`].
+fn is_tare(placed: &Placed) -> bool {
+    placed.effect.id() == "tare_shift" && placed.instance.form == effects::BEFORE
+}
+
+/// Against a declared model the zeros of the load cell are asked first: it is tared anew before every run, and a zero that is off looks
+/// like a change of whatever acts on thrust or torque.
+fn tare(context: &Context, declared: Declared<'_>, start: &Fit, best: &mut Candidate) {
+    for offer in offers(context) {
+        let mut placed = best.fit.placed.clone();
+        placed.push(Placed { effect: offer.effect, instance: offer.instance, shape: Vec::new() });
+        if !placed.last().is_some_and(is_tare) {
+            continue;
+        }
+        if let Some(fit) = fit(context, declared, &placed, Some(start), Rows::All) {
+            let evidence = evidence_over(context, &fit, start);
+            if evidence > best.evidence + NEEDED_EVIDENCE {
+                *best = Candidate { fit, evidence };
+            }
+        }
+    }
+}
+
 /// What a scan of one instance gave; it stays valid until an effect is added on one of its channels.
 pub(crate) struct Scanned {
     pub(crate) effect: &'static dyn Effect,
@@ -221,8 +249,12 @@ pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
 pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
     instance.channels.iter().all(|c| {
         let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
+        // what is older than the run may have happened once more
+        let older = |p: &Placed| {
+            p.instance.form != instance.form && [&p.instance.form, &instance.form].iter().any(|f| *f == effects::BEFORE)
+        };
         let apart = |p: &&Placed| {
-            p.effect.id() != effect.id()
+            (p.effect.id() != effect.id() || older(p))
                 && !p.effect.never_beside().contains(&effect.id())
                 && !effect.never_beside().contains(&p.effect.id())
         };
@@ -309,9 +341,11 @@ pub(crate) fn loud(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<
         .iter()
         .zip(&context.targets)
         .map(|(r, target)| {
-            let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
+            let news = target.rows.iter().zip(r).map(|(row, v)| target.news(*row, *v).powi(2));
+            let rms = (news.sum::<f64>() / r.len().max(1) as f64).sqrt();
             let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
-            rms > QUIET.0 * target.noise.rms || whiteness(&t, r) < QUIET.1
+            // what a declared model leaves over is coloured
+            rms > QUIET.0 * target.noise.rms || target.trust.is_empty() && whiteness(&t, r) < QUIET.1
         })
         .collect()
 }
@@ -375,10 +409,11 @@ fn choose(
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
         let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL * probability);
-        let named = best.fit.placed.len();
+        let named = best.fit.placed.iter().filter(|p| !is_tare(p)).count();
         let small = largest_reduction(context, winner, &around.with, &around.without) < CLEAR_REDUCTION;
         // what an earlier effect's rough form leaves of itself looks like a further small one
-        let beside = connected(&winner.fit.placed, named).len() > 1;
+        let newest = winner.fit.placed.len() - 1;
+        let beside = connected(&winner.fit.placed, newest).iter().any(|k| *k != newest && !is_tare(&winner.fit.placed[*k]));
         if small && (beside || unclear && named > 0 || named >= EASILY_NAMED) {
             continue;
         }

@@ -54,7 +54,7 @@ fn levels(context: &Context) -> Vec<Option<usize>> {
 /// Error of one target on rows that the fit did not see.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
-    /// Root mean square.
+    /// Root mean square, of what is news (see [`Target::news`]).
     pub rms: f64,
     /// An error that a few grossly wrong rows cannot decide: the noise floor times sqrt(exp(mean ln(1 + (r / floor)^2)) - 1).
     pub typical: f64,
@@ -214,12 +214,12 @@ pub(crate) struct Sum {
 
 impl Sum {
     fn add(&mut self, target: &Target, row: usize, residual: f64) {
-        let square = residual.powi(2);
+        let square = target.news(row, residual).powi(2);
         self.squares += square;
         self.logs += (square / target.noise.rms.powi(2)).ln_1p();
         self.rows += 1;
         if target.claims(row) {
-            self.claimed_squares += square;
+            self.claimed_squares += target.as_it_stands(row, residual).powi(2);
             self.claimed += 1;
         }
     }

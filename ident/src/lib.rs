@@ -23,6 +23,7 @@ pub mod identify;
 pub mod import;
 pub mod inertial;
 pub mod inspect;
+pub mod leftover;
 pub mod log;
 pub mod long;
 pub mod model;

@@ -102,8 +102,8 @@ pub(crate) fn diagnose_any(log: &Log, context: &Context, declared: Declared<'_>,
         return Some(Found { diagnosis: diagnose(context, declared, progress)?, searched: None, estimates: None });
     };
     let mut few = Context::new(&thinned(log, &rows), Some(context.start_pulse_us));
-    few.against_model = context.against_model;
-    let means = means(log, context, &rows);
+    few.against(declared);
+    let means = means(log, context, declared, &rows);
     // targets of all contexts stand in the same order; where thinning lost a channel, nothing is saved
     let whole = |c: &Context| c.targets.len() == context.targets.len() && c.targets.iter().all(|t| t.rows.len() > TOO_FEW);
     if !whole(&few) || !whole(&means) {
@@ -119,9 +119,8 @@ pub(crate) fn diagnose_any(log: &Log, context: &Context, declared: Declared<'_>,
 }
 
 /// The context of the means, each weighted by what the noise of all rows makes of its number of rows.
-fn means(log: &Log, context: &Context, rows: &[usize]) -> Context {
+fn means(log: &Log, context: &Context, declared: Declared<'_>, rows: &[usize]) -> Context {
     let mut means = Context::new(&averaged(log, rows), Some(context.start_pulse_us));
-    means.against_model = context.against_model;
     let sizes: Vec<f64> = rows.iter().zip(rows[1..].iter().copied().chain([log.len()])).map(|(a, b)| (b - a) as f64).collect();
     let speeds = means.rpm.clone();
     for target in &mut means.targets {
@@ -129,6 +128,7 @@ fn means(log: &Log, context: &Context, rows: &[usize]) -> Context {
             target.weigh(whole.noise, &speeds, &sizes);
         }
     }
+    means.against(declared);
     means
 }
 

@@ -7,8 +7,9 @@
 
 use crate::context::{Context, Relation, Target, unit_of};
 use crate::design::{Label, TargetDesign};
-use crate::effects::Estimate;
+use crate::effects::{Estimate, air_density};
 use crate::hypothesis::{Declared, Fit, Placed, design};
+use crate::leftover::Leftover;
 use crate::log::Log;
 use toml::{Table, Value};
 
@@ -54,6 +55,10 @@ pub struct Model {
     pub polynomials: Vec<Polynomial>,
     /// Added effects.
     pub effects: Vec<AddedEffect>,
+    /// Density of the air over that of ISO 2533 air at 20 degC, the mean of the run that the model was identified from, where its log tells.
+    pub air: Option<f64>,
+    /// For each channel what the model leaves over of the run that it was identified from, where that is known.
+    pub leftovers: Vec<(String, Leftover)>,
 }
 
 /// Why a model was refused.
@@ -110,12 +115,23 @@ fn keyed(name: &str, unit: &str) -> String {
 
 fn coefficient_key(channel: &str, order: usize) -> String {
     let unit = slug(unit_of(channel));
-    let per = if channel.starts_with("rpm") { "kus" } else { "krpm" };
+    let per = load_unit(channel);
     match order {
         0 => format!("c0_{unit}"),
         1 => format!("c1_{unit}_per_{per}"),
         n => format!("c{n}_{unit}_per_{per}{n}"),
     }
+}
+
+/// Keys of what is left over of a channel: scatter by class of row, and the curve's loads and errors.
+fn leftover_keys(channel: &str) -> [String; 3] {
+    let unit = slug(unit_of(channel));
+    [format!("left_scatter_{unit}"), format!("left_at_{}", load_unit(channel)), format!("left_{unit}")]
+}
+
+/// Unit of the load that a channel's polynomial is of.
+fn load_unit(channel: &str) -> &'static str {
+    if channel.starts_with("rpm") { "kus" } else { "krpm" }
 }
 
 impl Model {
@@ -184,6 +200,13 @@ impl Model {
         model
     }
 
+    /// The model, with the air of its own run and what it leaves over of each target of it.
+    pub(crate) fn leaving(mut self, context: &Context, left: Vec<Leftover>) -> Self {
+        self.air = air_density::of_run(context);
+        self.leftovers = context.targets.iter().map(|t| t.name.to_owned()).zip(left).collect();
+        self
+    }
+
     fn placed(&self) -> Vec<Placed> {
         self.effects.iter().map(|e| e.placed.clone()).collect()
     }
@@ -219,7 +242,11 @@ impl Model {
     #[must_use]
     pub fn pinned(&self, context: &Context, target: &Target) -> TargetDesign {
         match self.design(context, target) {
-            Some((design, coefficients)) => design.pinned(&coefficients),
+            Some((design, coefficients)) => {
+                let mut design = design.pinned(&coefficients);
+                design.fixed.iter_mut().zip(&target.known).for_each(|(f, known)| *f += known);
+                design
+            }
             None => TargetDesign::baseline(context, target.name, target.relation),
         }
     }
@@ -233,6 +260,9 @@ impl Model {
         root.insert("start_pulse_us".into(), self.start_pulse_us.into());
         if !self.meta.is_empty() {
             root.insert("rig".into(), Value::Table(self.meta.clone()));
+        }
+        if let Some(air) = self.air {
+            root.insert("air_density_ratio".into(), air.into());
         }
         let mut consensus = Table::new();
         consensus.insert(
@@ -250,6 +280,12 @@ impl Model {
                 t.insert(coefficient_key(&p.channel, k), (*c).into());
                 t.insert(format!("{}_se", coefficient_key(&p.channel, k)), (*e).into());
             }
+            if let Some((_, left)) = self.leftovers.iter().find(|(channel, _)| *channel == p.channel) {
+                let [scatter, at, error] = leftover_keys(&p.channel);
+                t.insert(scatter, left.scatter.to_vec().into());
+                t.insert(at, left.curve.iter().map(|p| p.0).collect::<Vec<f64>>().into());
+                t.insert(error, left.curve.iter().map(|p| p.1).collect::<Vec<f64>>().into());
+            }
             channels.insert(p.channel.clone(), t.into());
         }
         root.insert("channel".into(), channels.into());
@@ -258,7 +294,7 @@ impl Model {
             root.insert("effect".into(), list.into());
         }
         format!(
-            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors.\n{root}"
+            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and beyond that and the noise the scatter, rms, up to\n# 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n{root}"
         )
     }
 }

@@ -127,7 +127,9 @@ const LEFT_OVER: (f64, f64) = (1.3, 1e-6);
 pub(crate) fn nameless(context: &Context, declared: Declared<'_>, start: &Fit) -> Option<Vec<usize>> {
     let residuals = heldout::residuals(context, declared, start);
     let excess = |i: usize| {
-        residuals[i].iter().map(|v| v * v).sum::<f64>() / (residuals[i].len() as f64 * context.targets[i].noise.rms.powi(2))
+        let target = &context.targets[i];
+        let news = target.rows.iter().zip(&residuals[i]).map(|(row, v)| target.news(*row, *v).powi(2));
+        news.sum::<f64>() / (residuals[i].len() as f64 * target.noise.rms.powi(2))
     };
     let left_over = |i: usize| {
         let (r, target) = (&residuals[i], &context.targets[i]);
@@ -159,13 +161,16 @@ pub(crate) fn explains(context: &Context, declared: Declared<'_>, start: &Fit, f
         let target = &context.targets[i];
         let counts = |j: usize| !calm_only || !target.unsettled[j];
         let square = |r: &[f64]| {
-            let (sum, n) =
-                r.iter().enumerate().filter(|(j, _)| counts(*j)).fold((0.0, 0.0), |s, (_, v)| (s.0 + v * v, s.1 + 1.0));
+            let (sum, n) = r
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| counts(*j))
+                .fold((0.0, 0.0), |s, (j, v)| (s.0 + target.news(target.rows[j], *v).powi(2), s.1 + 1.0));
             sum / f64::max(n, 1.0)
         };
         // rounding to coarse steps cannot be taken away whole
         let rounding = quantisation::step(target).map_or(0.0, |step| step * step / 12.0);
-        let floor = (target.noise.rms * target.noise.rms).max(rounding);
+        let floor = target.noise.rms.powi(2).max(rounding);
         let (b, a) = (square(&before[i]), square(&after[i]));
         // between jumps only what stood out there can have been explained there
         !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > NEEDED_SHARE * (b - floor)

@@ -199,8 +199,9 @@ impl<'c> Samples<'c> {
         let n = self.chosen.len() as f64;
         let weight = self.target.weight * self.stride as f64;
         // the scale of the noise is profiled, but never below a tenth of the floor's standard deviation
+        let least = self.target.least_scale();
         let part = |rss: f64, n: f64| {
-            let scale = (rss / n).max(0.01);
+            let scale = (rss / n).max(least);
             weight * (-0.5 * n * scale.ln() - 0.5 * rss / scale)
         };
         let profile = |rss: f64, log_sigma: f64| part(rss, n) - weight * log_sigma;

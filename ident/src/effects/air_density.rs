@@ -25,7 +25,7 @@ impl Effect for AirDensity {
     fn about(&self) -> About {
         About {
             title: "Density of the air changes",
-            equation: "thrust_n, torque_nm *= (density / 1.2041)^exponent, density = p / (287.05 T)",
+            equation: "thrust_n, torque_nm *= (density / reference)^exponent, density = p / (287.05 T), reference = 1.2041 kg/m3 or that of the declared model's own run",
             source: "ISO 2533; Beharie 2013, Eq. 2.17-2.18",
             depends_on: &["temp_c", "pressure_hpa"],
             signature: "thrust and torque at a speed fall together as the air gets warmer or thinner",
@@ -40,19 +40,32 @@ impl Effect for AirDensity {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let density = context.facts.density.get_or_init(|| log_density(context));
         let (lo, hi) = density.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        if hi - lo < LEAST_SPREAD { Vec::new() } else { super::blade_flex::with_and_without_load(context) }
+        if hi - lo < LEAST_SPREAD && !(context.against_model && hi.max(-lo) > LEAST_SPREAD) {
+            return Vec::new();
+        }
+        let mut out = super::blade_flex::with_and_without_load(context);
+        if context.against_model {
+            out.iter_mut().for_each(|instance| instance.form = BENT.to_owned());
+        }
+        out
     }
 
     fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
         vec![Shape { name: "exponent", unit: "1", range: (0.1, 3.0), starts: vec![0.3, 0.6, 1.0, 1.5] }]
     }
 
-    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "current_gain", unit: "A/krpm3" }, Amplitude { name: "speed_loss", unit: "1" }]
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        let mut out = vec![Amplitude { name: "current_gain", unit: "A/krpm3" }, Amplitude { name: "speed_loss", unit: "1" }];
+        if instance.form == BENT {
+            out.push(Amplitude { name: "current_bend", unit: "A/krpm4" });
+            out.push(Amplitude { name: "speed_bend", unit: "1/krpm" });
+        }
+        out
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let [exponent] = shape else { return };
+        let bent = instance.form == BENT;
         let density = context.facts.density.get_or_init(|| log_density(context));
         match design.relation {
             Relation::Thrust | Relation::Torque => {
@@ -60,13 +73,19 @@ impl Effect for AirDensity {
                 design.scale(&factor);
             }
             Relation::Current => {
-                design.add(
-                    position,
-                    0,
-                    density.iter().zip(&context.rpm).map(|(d, r)| exponent * d * (r / 1000.0).powi(3)).collect(),
-                );
+                let power = |n| density.iter().zip(&context.rpm).map(|(d, r)| exponent * d * (r / 1000.0).powi(n)).collect();
+                design.add(position, 0, power(3));
+                if bent {
+                    design.add(position, 2, power(4));
+                }
             }
-            _ => design.add(position, 1, density.iter().zip(expected(context)).map(|(d, r)| -exponent * d * r).collect()),
+            _ => {
+                let expected = expected(context);
+                design.add(position, 1, density.iter().zip(expected).map(|(d, r)| -exponent * d * r).collect());
+                if bent {
+                    design.add(position, 3, density.iter().zip(expected).map(|(d, r)| -exponent * d * r * r / 1000.0).collect());
+                }
+            }
         }
     }
 
@@ -79,7 +98,18 @@ impl Effect for AirDensity {
     }
 }
 
-/// Logarithm of the density over that of ISO 2533 air at 20 degC, on every row; zero where nothing says what it is.
+/// Form against a declared model, whose curves do not hold the rest of what denser air does to speed and current.
+const BENT: &str = "beside a bend";
+
+/// Mean density of a run's air over that of ISO 2533 air at 20 degC, where its log tells.
+pub(crate) fn of_run(context: &Context) -> Option<f64> {
+    let density = log_density(context);
+    let known = density.iter().any(|d| *d != 0.0);
+    known.then(|| (density.iter().sum::<f64>() / density.len() as f64).exp())
+}
+
+/// Logarithm of the density over that of ISO 2533 air at 20 degC, or over that of a declared model's day, on every row; zero where nothing
+/// says what it is.
 fn log_density(context: &Context) -> Vec<f64> {
     let pressure = ["pressure_hpa", "pressure_pa"].iter().zip([1013.25, 101_325.0]).find_map(|(name, standard)| {
         let column = &context.covariates.iter().find(|c| c.0 == *name)?.1;
@@ -90,7 +120,7 @@ fn log_density(context: &Context) -> Vec<f64> {
     (0..context.len())
         .map(|i| {
             let p = pressure.as_ref().map_or(0.0, |p| p[i].ln());
-            p - temperature.map_or(0.0, |t| ((t[i] + 273.15) / 293.15).max(0.1).ln())
+            p - temperature.map_or(0.0, |t| ((t[i] + 273.15) / 293.15).max(0.1).ln()) - context.air
         })
         .collect()
 }

@@ -46,7 +46,7 @@ impl Effect for BatteryDischarge {
         let mut channels = vec!["voltage_v"];
         channels.extend(present(context, &["current_a"]));
         channels.extend(speeds(context));
-        vec![Instance::new(&channels, "")]
+        vec![Instance::new(&channels, if context.against_model { OTHER_SUPPLY } else { "" })]
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
@@ -54,32 +54,55 @@ impl Effect for BatteryDischarge {
             return Vec::new();
         }
         let total = charge(context).last().copied().unwrap_or(0.0).max(1e-6);
-        vec![Shape {
+        let loss = Shape {
             name: "speed_loss",
             unit: "1/Ah",
             range: (-0.02 / total, 0.5 / total),
             starts: [0.001, 0.004, 0.015, 0.06].map(|k| k / total).to_vec(),
-        }]
+        };
+        if instance.form != OTHER_SUPPLY {
+            return vec![loss];
+        }
+        let level = Shape { name: "speed_level", unit: "1", range: (-0.4, 0.4), starts: vec![-0.1, -0.03, 0.0, 0.03, 0.1] };
+        vec![loss, level]
     }
 
-    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        let mut out = vec![
             Amplitude { name: "slope", unit: "V/Ah" },
             Amplitude { name: "bend", unit: "V/Ah2" },
             Amplitude { name: "current_rise", unit: "A/Ah.krpm3" },
-        ]
+        ];
+        if instance.form == OTHER_SUPPLY {
+            out.push(Amplitude { name: "level", unit: "V" });
+            out.push(Amplitude { name: "current_level", unit: "A/krpm3" });
+            out.push(Amplitude { name: "resistance", unit: "ohm" });
+        }
+        out
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let charge = charge(context);
+        let other = instance.form == OTHER_SUPPLY;
+        let cube = |r: &f64| (r / 1000.0).powi(3);
         if design.relation == Relation::Voltage {
             design.add(position, 0, charge.iter().map(|q| -q).collect());
             design.add(position, 1, charge.iter().map(|q| -q * q).collect());
+            if other {
+                design.add(position, 3, vec![1.0; charge.len()]);
+                if let Some((current, _)) = context.draw() {
+                    design.add(position, 5, current.iter().map(|i| -i).collect());
+                }
+            }
         } else if design.relation == Relation::Current {
             // the same power from a lower voltage
-            design.add(position, 2, charge.iter().zip(&context.rpm).map(|(q, r)| q * (r / 1000.0).powi(3)).collect());
-        } else if let [loss] = shape {
-            design.map_columns(|column| column.iter().zip(&charge).map(|(v, q)| v * (1.0 - loss * q)).collect());
+            design.add(position, 2, charge.iter().zip(&context.rpm).map(|(q, r)| q * cube(r)).collect());
+            if other {
+                design.add(position, 4, context.rpm.iter().map(cube).collect());
+            }
+        } else if let [loss, level @ ..] = shape {
+            let level = 1.0 + level.first().copied().unwrap_or(0.0);
+            design.map_columns(|column| column.iter().zip(&charge).map(|(v, q)| v * (level - loss * q)).collect());
         }
     }
 
@@ -100,9 +123,17 @@ impl Effect for BatteryDischarge {
     /// A slope that belongs to a battery larger than any rig carries is a supply that drifts.
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         let reported = self.report(context, instance, fitted.to_vec());
-        reported.iter().any(|e| e.name == "capacity" && e.value < LARGEST_BATTERY)
+        let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or(0.0, |e| e.value);
+        let drawn = charge(context).last().copied().unwrap_or(0.0);
+        // a level and a resistance of its own make a sag of it; what is discharged must show
+        let fall = (value("slope") + value("bend") * drawn) * drawn;
+        let shows = context.target("voltage_v").is_some_and(|k| fall > context.targets[k].noise.rms);
+        (instance.form != OTHER_SUPPLY || shows) && reported.iter().any(|e| e.name == "capacity" && e.value < LARGEST_BATTERY)
     }
 }
+
+/// Form against a declared model: the battery is another supply than that of the model's day, with a level and a resistance of its own.
+const OTHER_SUPPLY: &str = "in the place of another supply";
 
 /// The largest battery that a motor rig is fed from, Ah.
 const LARGEST_BATTERY: f64 = 40.0;

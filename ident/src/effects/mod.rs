@@ -5,7 +5,7 @@
 //! Units: stated on each parameter.
 //! Reference: specification `closing-the-loop.md`, list of effects.
 
-mod air_density;
+pub(crate) mod air_density;
 mod alternating_period;
 mod amplifier_saturation;
 mod battery_discharge;
@@ -48,6 +48,7 @@ mod zero_drift;
 
 use crate::context::{Context, DIFFERENCES, Relation};
 use crate::design::TargetDesign;
+pub(crate) use tare_shift::BEFORE;
 pub(crate) use throttle_quantisation::Best as SawTooth;
 
 /// Where in the causal chain an effect acts; effects are applied in this order.

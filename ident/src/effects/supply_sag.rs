@@ -7,7 +7,7 @@
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
-use crate::context::Context;
+use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -30,27 +30,53 @@ impl Effect for SupplySag {
     }
 
     fn stage(&self) -> Stage {
-        Stage::Term
+        Stage::Gain
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         if context.draw().is_none() || present(context, &["voltage_v"]).is_empty() {
             Vec::new()
         } else {
-            vec![Instance::new(&["voltage_v"], "")]
+            let mut channels = vec!["voltage_v"];
+            // against a declared model the speed that the sag takes is news; without one the static curve holds it
+            if context.against_model {
+                channels.extend(present(context, &["current_a"]));
+                channels.extend(super::speeds(context));
+            }
+            vec![Instance::new(&channels, "")]
         }
     }
 
-    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
-        Vec::new()
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.channels.len() < 2 {
+            return Vec::new();
+        }
+        let most = context.draw().map_or(1.0, |(current, _)| current.iter().copied().fold(1e-3, f64::max));
+        let starts = [0.0, 0.003, 0.01, 0.03, 0.1].map(|k| k / most).to_vec();
+        vec![Shape { name: "speed_loss", unit: "1/A", range: (-0.02 / most, 0.5 / most), starts }]
     }
 
-    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "resistance", unit: "ohm" }]
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        let mut out = vec![Amplitude { name: "resistance", unit: "ohm" }];
+        if instance.touches("current_a") {
+            out.push(Amplitude { name: "current_rise", unit: "1/krpm3" });
+        }
+        out
     }
 
-    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let Some((current, _)) = context.draw() else { return };
+        if design.relation == Relation::Current {
+            // the same power from a lower voltage
+            let rise = current.iter().zip(&context.rpm).map(|(i, r)| i * (r / 1000.0).powi(3));
+            design.add(position, 1, rise.collect());
+            return;
+        }
+        if design.relation != Relation::Voltage {
+            let loss = shape.first().copied().unwrap_or(0.0);
+            design.map_columns(|column| column.iter().zip(current.iter()).map(|(v, i)| v * (1.0 - loss * i)).collect());
+            return;
+        }
         design.add(position, 0, current.iter().map(|i| -i).collect());
     }
 
@@ -65,6 +91,6 @@ impl Effect for SupplySag {
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        fitted.iter().all(|e| e.value > 0.0 && e.value < 5.0)
+        fitted.iter().all(|e| e.name != "resistance" || e.value > 0.0 && e.value < 5.0)
     }
 }

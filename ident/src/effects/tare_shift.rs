@@ -1,6 +1,7 @@
 //! `tare_shift`: the load cell's zero jumps once.
 //!
-//! What it is: thrust_n += offset for t >= t0: a cable touched, a clamp slipped.
+//! What it is: thrust_n += offset for t >= t0: a cable touched, a clamp slipped. Against a declared model also an offset of thrust or torque that is
+//! older than the run: the cell was tared anew.
 //! What can go wrong: a jump at a level change looks like a wrong polynomial.
 //! Units: N, s.
 //! Reference: step change with unknown instant, Basseville & Nikiforov 1993, section 2.2.
@@ -20,7 +21,7 @@ impl Effect for TareShift {
     fn about(&self) -> About {
         About {
             title: "Step of the load cell's zero",
-            equation: "thrust_n += offset for t >= t0",
+            equation: "thrust_n (against a declared model also torque_nm) += offset for t >= t0",
             source: "Basseville & Nikiforov 1993, section 2.2",
             depends_on: &["t_s"],
             signature: "the thrust residual has one step in time and is flat on both sides",
@@ -37,6 +38,9 @@ impl Effect for TareShift {
         if context.against_model && !out.is_empty() {
             out.push(Instance::new(&["thrust_n"], BEFORE));
         }
+        if context.against_model && context.target("torque_nm").is_some() {
+            out.push(Instance::new(&["torque_nm"], BEFORE));
+        }
         out
     }
 
@@ -44,8 +48,12 @@ impl Effect for TareShift {
         if instance.form == BEFORE { Vec::new() } else { vec![onset(context)] }
     }
 
-    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "offset", unit: "N" }]
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "offset", unit: if instance.touches("torque_nm") { "N.m" } else { "N" } }]
+    }
+
+    fn seen(&self, _: &Context, instance: &Instance) -> f64 {
+        if instance.form == BEFORE { TARED_ANEW } else { 0.0 }
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
@@ -61,8 +69,12 @@ impl Effect for TareShift {
     }
 }
 
+/// Evidence, nats, that a load cell's zero is another one than on the day of the model: it is tared anew before every run, so that no
+/// other name is as likely before anything is seen. As much as a name must bring, but for one.
+const TARED_ANEW: f64 = 6.0;
+
 /// Form of an effect that was there before the run began: only a declared model can tell.
-pub(super) const BEFORE: &str = "since before the run";
+pub(crate) const BEFORE: &str = "since before the run";
 
 /// The estimates of an effect that was there before the run, and the run's first instant as the latest at which it set in.
 pub(super) fn with_first_instant(context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {

@@ -7,7 +7,7 @@
 
 use super::speed_channel::expected_at as curve;
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
-use crate::context::{Context, STILL_US};
+use crate::context::{Context, Relation, STILL_US};
 use crate::design::TargetDesign;
 use crate::noise::median;
 
@@ -36,7 +36,8 @@ impl Effect for ThrottleQuantisation {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = speeds(context);
-        if channels.is_empty() || levels(context).len() < 8 { Vec::new() } else { vec![Instance::new(&channels, "")] }
+        let form = if context.against_model { SHIFTED } else { "" };
+        if channels.is_empty() || levels(context).len() < 8 { Vec::new() } else { vec![Instance::new(&channels, form)] }
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
@@ -49,12 +50,16 @@ impl Effect for ThrottleQuantisation {
         ]
     }
 
-    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "depth", unit: "1" }]
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        let depth = Amplitude { name: "depth", unit: "1" };
+        if instance.form == SHIFTED { vec![depth, Amplitude { name: "shift", unit: "us" }] } else { vec![depth] }
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let ([step, offset], Some(pulse)) = (shape, &context.pulse) else { return };
+        if instance.form == SHIFTED {
+            design.add(position, 1, context.facts.slope.get_or_init(|| slope(context)).clone());
+        }
         design.add(
             position,
             0,
@@ -85,6 +90,9 @@ impl Effect for ThrottleQuantisation {
     }
 }
 
+/// Form against a declared model, whose curve does not hold the half step by which a command that is cut off is too short.
+const SHIFTED: &str = "beside a shift of the pulse";
+
 /// Share to which the depth must be known: on few levels a tooth of some step fits any misfit of the static curve.
 const KNOWN: f64 = 0.08;
 
@@ -106,6 +114,8 @@ fn levels(context: &Context) -> Vec<(f64, f64, f64)> {
 fn levels_where(context: &Context, most: f64) -> Vec<(f64, f64, f64)> {
     let Some(pulse) = &context.pulse else { return Vec::new() };
     let (expected, slope) = (curve(context, 0.0), context.facts.slope.get_or_init(|| slope(context)));
+    // what a declared model's curve misses on a healthy day is no tooth
+    let known = context.with_relation(Relation::SpeedFromPulse).next().map_or(&[][..], |k| context.targets[k].known.as_slice());
     let mut bins: std::collections::BTreeMap<i64, (f64, f64, Vec<f64>)> = std::collections::BTreeMap::new();
     for (i, p) in pulse.iter().enumerate() {
         // the command has been held, or has moved evenly, for a while
@@ -115,7 +125,7 @@ fn levels_where(context: &Context, most: f64) -> Vec<(f64, f64, f64)> {
             let bin = bins.entry((2.0 * p).round() as i64).or_default();
             bin.0 += p;
             bin.1 += slope[i];
-            bin.2.push(context.rpm[i] - expected[i]);
+            bin.2.push(context.rpm[i] - expected[i] - known.get(i).copied().unwrap_or(0.0));
         }
     }
     // a pulse on the edge of a step must not fall off it by rounding

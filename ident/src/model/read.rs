@@ -6,10 +6,11 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Powerplant model".
 
-use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed};
+use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys};
 use crate::context::{Context, Relation};
 use crate::effects::{self, Effect, Estimate, Instance};
 use crate::hypothesis::Placed;
+use crate::leftover::{CLASSES, Leftover};
 use crate::log::Log;
 use std::path::Path;
 use toml::{Table, Value};
@@ -59,6 +60,10 @@ impl Model {
             meta: root.get("rig").and_then(Value::as_table).cloned().unwrap_or_default(),
             ..Self::default()
         };
+        if let Some(air) = root.get("air_density_ratio") {
+            let ratio = finite(air).filter(|r| *r > 0.0);
+            model.air = Some(ratio.ok_or_else(|| refusal("air_density_ratio", Some(air), "a finite number above zero"))?);
+        }
         if let Some(channels) = root.get("consensus").and_then(|c| c.get("channels")) {
             model.consensus =
                 strings(channels).ok_or_else(|| refusal("consensus.channels", Some(channels), "a list of channels"))?;
@@ -69,6 +74,8 @@ impl Model {
         for (name, value) in channels {
             let polynomial = polynomial(name, value).map_err(|refusal| within(&format!("channel.{name}"), refusal))?;
             model.polynomials.push(polynomial);
+            let left = leftover(name, value).map_err(|refusal| within(&format!("channel.{name}"), refusal))?;
+            model.leftovers.extend(left.map(|left| (name.clone(), left)));
         }
         let list = match root.get("effect") {
             None => [].as_slice(),
@@ -86,9 +93,16 @@ fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {
     let terms = |has_pulse| Relation::of(channel, has_pulse).map(|r| r.degree() + 1);
     let (Some(full), Some(alone)) = (terms(true), terms(false)) else { return Err(no_channel("", channel)) };
     let keys: Vec<String> = (0..full).map(|k| coefficient_key(channel, k)).collect();
-    let known = |key: &str| key == "relation" || keys.iter().any(|k| key == k || key.strip_suffix("_se") == Some(k));
+    let left = leftover_keys(channel);
+    let known = |key: &str| {
+        key == "relation" || left.iter().any(|k| key == k) || keys.iter().any(|k| key == k || key.strip_suffix("_se") == Some(k))
+    };
     if let Some((key, value)) = table.iter().find(|(key, _)| !known(key)) {
-        return Err(refusal(key, Some(value), &format!("no key but relation, {}, and each of them with _se", keys.join(", "))));
+        return Err(refusal(
+            key,
+            Some(value),
+            &format!("no key but relation, {}, each of them with _se, and {}", keys.join(", "), left.join(", ")),
+        ));
     }
     // a speed without a command is a constant: the only relation with two degrees
     let highest = keys.iter().rposition(|k| table.contains_key(k)).map_or(0, |k| k + 1);
@@ -100,6 +114,25 @@ fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {
     let coefficients = keys[..count].iter().map(read).collect::<Result<_, _>>()?;
     let errors = keys[..count].iter().map(|k| table.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0)).collect();
     Ok(Polynomial { channel: channel.to_owned(), coefficients, errors })
+}
+
+/// What the model leaves over of a channel of its own run: all three lists or none.
+fn leftover(channel: &str, value: &Value) -> Result<Option<Leftover>, Refusal> {
+    let keys = leftover_keys(channel);
+    if keys.iter().all(|key| value.get(key).is_none()) {
+        return Ok(None);
+    }
+    let list = |key: &String| -> Option<Vec<f64>> { value.get(key)?.as_array()?.iter().map(finite).collect() };
+    let refused = |key: &String, expected: &str| refusal(key, value.get(key), expected);
+    let [scatter_key, at_key, error_key] = &keys;
+    let scatter = list(scatter_key).filter(|s| s.iter().all(|v| *v >= 0.0)).and_then(|s| s.try_into().ok());
+    let scatter =
+        scatter.ok_or_else(|| refused(scatter_key, &format!("a list of {CLASSES} finite numbers that are not negative")))?;
+    let at = list(at_key).filter(|at| at.is_sorted_by(|a, b| a < b));
+    let at = at.ok_or_else(|| refused(at_key, "a list of finite numbers, each larger than the one before"))?;
+    let error = list(error_key).filter(|error| error.len() == at.len());
+    let error = error.ok_or_else(|| refused(error_key, &format!("a list of {} finite numbers, as {at_key} has", at.len())))?;
+    Ok(Some(Leftover { curve: at.into_iter().zip(error).collect(), scatter }))
 }
 
 impl AddedEffect {

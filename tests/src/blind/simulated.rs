@@ -1,9 +1,9 @@
 //! Scenarios from the simulator's truth side: the real firmware, first-principles effects, edges of real sensors.
 //!
 //! What it is: seed -> a rig of the catalogue, a schedule, an effect of the simulator (or none, or one that the library does not
-//! know). The simulated rig has dynamics of its own (its rotor, its meters), which the static baseline lacks: what the tool names on
-//! a healthy run of the same rig is known to whoever owns it, and is not counted on the run that hides the effect. Both go through
-//! `quadrig sim`; only their logs reach the tool.
+//! know). The simulated rig has dynamics of its own (its rotor, its meters), which the static baseline lacks: the loop is closed on a
+//! healthy run of the same rig first, and its model is what the run that hides the effect is held against (`close-loop --model`). Both
+//! go through `quadrig sim`; only their logs reach the tool.
 //! What can go wrong: a run that the firmware stops (a protection, a fault) is recorded as `stopped`.
 //! Units: sizes in noise floors: what the effect changes of a run that is the same in all else, row for row, a cubic of the pulse
 //! taken out (the declared curves absorb that), on the channel where most is left.
@@ -18,16 +18,13 @@ use hal_sim::Scenario;
 use hal_sim::effect::{self, UNKNOWN};
 use hal_sim::scenario::{Schedule, Step};
 use ident::log::Log;
-use ident::verdict::{EffectEntry, Kind, Parameter, Verdict};
-use std::collections::BTreeSet;
+use ident::model::Model;
+use ident::verdict::{EffectEntry, Kind, Verdict};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// Rigs: motor, propeller, supply that the pair stays within.
 const RIGS: [(&str, &str); 4] = [("570KV", "11x4.7"), ("690KV", "10x4.5"), ("490KV", "11x4.5"), ("390KV", "12x4.5")];
-
-/// Names that are true of every simulated rig: its rotor has inertia. They count where they are what is hidden.
-const OWN: [&str; 2] = ["spinup_lag", "rotor_inertia"];
 
 /// What a seed hides: an effect of the simulator's catalogue, or nothing.
 #[must_use]
@@ -137,8 +134,13 @@ pub fn score(seed: u64) -> Line {
     };
     line.rows = log.t.len();
     let started = std::time::Instant::now();
-    let verdict = |log: &Log| ident::close::close(log, None, &[], &mut |_| {}).map(|c| c.verdict).map_err(|e| e.to_string());
-    let outcome = std::panic::catch_unwind(|| -> Result<(Verdict, Verdict), String> { Ok((verdict(&before)?, verdict(&log)?)) });
+    let closed = |log: &Log, model: Option<&Model>| ident::close::close(log, model, &[], &mut |_| {}).map_err(|e| e.to_string());
+    let outcome = std::panic::catch_unwind(|| -> Result<(Verdict, Verdict), String> {
+        let own = closed(&before, None)?;
+        // what is written down and read back, as the command line does it
+        let model = Model::parse("model.toml", &own.model.to_toml()).map_err(|e| e.to_string())?;
+        Ok((own.verdict, closed(&log, Some(&model))?.verdict))
+    });
     line.seconds = 0.5 * started.elapsed().as_secs_f64();
     match outcome {
         Ok(Ok((own, v))) => {
@@ -174,45 +176,24 @@ fn size(log: &Log, twin: &Log, healthy: &Verdict) -> (f64, String) {
     log.measured().filter_map(of).filter(|s| s.0.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
 }
 
-/// Whether the rig has on its healthy day what an entry says: the same name, on no channel that the healthy day did not name it for, and
-/// with its parameters where they were.
-fn stood_before(own: &[EffectEntry], entry: &EffectEntry) -> bool {
-    let same: Vec<&EffectEntry> = own.iter().filter(|o| o.id == entry.id).collect();
-    let channels: BTreeSet<&String> = same.iter().flat_map(|o| &o.channels).collect();
-    let on_it = |o: &&&EffectEntry| o.channels.iter().any(|c| entry.channels.contains(c));
-    entry.channels.iter().all(|c| channels.contains(c)) && !same.iter().filter(on_it).any(|o| has_moved(o, entry))
-}
-
-/// Share by which a parameter must differ to have moved, beside intervals that do not meet.
-const MOVED: f64 = 0.25;
-
-/// What only places something within a row, or counts.
-const NO_CONSTANT: [&str; 5] = ["phase", "latency", "count", "size", "depth"];
-
-/// Whether a parameter is another one than on the healthy day; two forms of an equation are not compared.
-fn has_moved(before: &EffectEntry, now: &EffectEntry) -> bool {
-    let apart = |a: &Parameter, b: &Parameter| {
-        let far = (a.value - b.value).abs() > MOVED * a.value.abs().max(b.value.abs());
-        far && (a.ci95[1] < b.ci95[0] || b.ci95[1] < a.ci95[0])
-    };
-    let told = |p: &Parameter| !NO_CONSTANT.contains(&p.name.as_str());
-    let mut pairs = before.parameters.iter().zip(&now.parameters);
-    before.equation == now.equation && pairs.any(|(a, b)| a.name == b.name && told(a) && apart(a, b))
+/// The load cell is tared anew before every run: a zero that is another one than on the healthy day is true, and not what is hidden.
+fn is_own_tare(entry: &EffectEntry) -> bool {
+    entry.id == "tare_shift" && entry.equation.contains("since before the run")
 }
 
 fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Line) {
     let standing: Vec<&str> = own.effects.iter().map(|e| e.id.as_str()).collect();
-    let is_own = |name: &str| OWN.contains(&name) && id != Some(name);
-    let known = |e: &&EffectEntry| is_own(&e.id) || stood_before(&own.effects, e);
-    let named: Vec<String> = v.effects.iter().filter(|e| !known(e)).map(|e| e.id.clone()).collect();
-    let new = |name: &&String| !is_own(name) && (named.contains(*name) || !standing.contains(&name.as_str()));
-    let others: Vec<Vec<String>> = v.alternatives.iter().map(|a| a.ids.iter().filter(new).cloned().collect()).take(2).collect();
+    let own_tare = v.effects.iter().any(is_own_tare);
+    let named: Vec<String> = v.effects.iter().filter(|e| !is_own_tare(e)).map(|e| e.id.clone()).collect();
+    let without_tare =
+        |ids: &[String]| -> Vec<String> { ids.iter().filter(|i| !own_tare || *i != "tare_shift").cloned().collect() };
+    let others: Vec<Vec<String>> = v.alternatives.iter().map(|a| without_tare(&a.ids)).take(2).collect();
     line.verdict = format!("{:?}", v.verdict).to_lowercase();
     line.named = named.join("+");
     line.probability = v.effects.first().map_or(f64::NAN, |e| e.probability);
     line.alternatives = format!("healthy:{}", standing.join("+"));
     let hit = |ids: &[String]| id.is_some_and(|id| ids.iter().any(|i| i == id));
-    let silent = named.is_empty() && (v.verdict != Kind::Unattributed || own.verdict == Kind::Unattributed);
+    let silent = named.is_empty();
     (line.first, line.top3, line.exact) = match kind {
         "one" => {
             let first = named.first().is_some_and(|n| Some(n.as_str()) == id);

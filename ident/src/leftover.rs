@@ -1,0 +1,175 @@
+//! What a model leaves over of the run that it was identified from.
+//!
+//! What it is: no model is a rig. By how much it is off on a day when nothing was wrong is written down beside each channel's polynomial: as
+//! a curve over the load where the load is held, and about that curve as a scatter beyond the noise that depends on the time since the load
+//! last jumped. When a later run is held against the model (`--model`) the curve is known and the scatter weighs, so that a departure
+//! which the healthy day has as well is no news.
+//! What can go wrong: what is off while the load changes repeats itself from run to run, and looks like noise here.
+//! Units: the channel's; the curve's load in krpm or kus as the polynomial's.
+//! Reference: model discrepancy, Kennedy & O'Hagan 2001, JRSS B 63:425; specification `closing-the-loop.md`, step 1.
+
+use crate::context::{Context, Target};
+use crate::heldout;
+use crate::hypothesis::{Declared, Fit};
+
+/// Times since the load last jumped that part the classes of a scatter, s.
+pub const AGES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
+/// Classes of a scatter: one before, between and after [`AGES`], one for a load that moves evenly, and one for a rotor that runs down with
+/// its motor off.
+pub const CLASSES: usize = AGES.len() + 3;
+
+/// Part of the range of the load that one point of a curve stands for.
+const BINS: f64 = 40.0;
+/// Fewest rows that make a point of a curve, and a class of its own.
+const FEWEST: usize = 5;
+/// Rows right before a jump that may hold some of it.
+const LATE: usize = 2;
+/// Classes in which the load is held and has settled, where the curve is read off.
+const HELD: std::ops::Range<usize> = 4..AGES.len() + 1;
+/// Class of a load that moves evenly.
+const MOVING: usize = AGES.len() + 1;
+/// Class of a rotor that runs down with its motor off.
+const RUNS_DOWN: usize = AGES.len() + 2;
+/// Fewest rows of a load that moves evenly.
+const RAMP: usize = 10;
+/// Rows before and after a rotor comes to rest that belong to its running down.
+const REST: usize = 3;
+
+/// Error of a model on one channel of its own run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Leftover {
+    /// Where the load is held: load and mean error, from low to high.
+    pub curve: Vec<(f64, f64)>,
+    /// Root mean square about the curve by class of row, the noise taken out.
+    pub scatter: [f64; CLASSES],
+}
+
+impl Leftover {
+    /// The known error at a load: straight lines between the points, the outer ones beyond.
+    #[must_use]
+    pub fn known(&self, load: f64) -> f64 {
+        let after = self.curve.partition_point(|(at, _)| *at < load);
+        match (after.checked_sub(1).and_then(|k| self.curve.get(k)), self.curve.get(after)) {
+            (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (load - a.0) / (b.0 - a.0),
+            (Some(only), None) | (None, Some(only)) => only.1,
+            (None, None) => 0.0,
+        }
+    }
+}
+
+impl Leftover {
+    /// Variance beyond the noise of a row of a class. What is off while the load settles is off after every jump in the same way: many
+    /// jumps are no more witnesses than one.
+    pub(crate) fn variance(&self, class: usize, alike: &Alike) -> f64 {
+        self.scatter[class].powi(2) * alike.0[class]
+    }
+}
+
+/// How often a run repeats what is in each class.
+pub(crate) struct Alike([f64; CLASSES]);
+
+impl Alike {
+    /// Of a run with these rows. Where the load is held there is a level for each load; and a run that hardly ever holds it is one ramp.
+    pub(crate) fn of(context: &Context, classes: &[usize]) -> Self {
+        let jumps = context.calm.len().max(1) as f64;
+        let moves = 2 * classes.iter().filter(|class| **class == MOVING).count() > classes.len();
+        Self(std::array::from_fn(|class| if HELD.contains(&class) || moves && class == MOVING { 1.0 } else { jumps }))
+    }
+}
+
+/// The class of every row of a log.
+pub(crate) fn classes(context: &Context) -> Vec<usize> {
+    let mut out = vec![0; context.len()];
+    let ramps = context.calm.iter().filter(|(from, to)| to - from >= RAMP);
+    ramps.for_each(|(from, to)| out[*from..*to].fill(MOVING));
+    for (from, to) in &context.steady {
+        for (class, t) in out[*from..*to].iter_mut().zip(&context.t[*from..*to]) {
+            let age = t - context.t[*from];
+            *class = AGES.partition_point(|edge| *edge <= age);
+        }
+    }
+    // the command of a row is not always that of its whole reading
+    for (_, to) in context.calm.iter().filter(|(_, to)| *to < context.len()) {
+        out[to.saturating_sub(LATE)..*to].fill(0);
+    }
+    // a rotor that comes to rest jumps from the slowest speed that its sensors see to none
+    let turns = |row: usize| context.rpm.get(row).is_some_and(|rpm| *rpm > 0.0);
+    let about = |row: usize| (row.saturating_sub(REST)..(row + REST + 1).min(context.len())).any(turns);
+    let off = |row: &usize| context.pulse.as_ref().is_some_and(|p| p[*row] < context.start_pulse_us);
+    (0..context.len()).filter(off).filter(|row| about(*row)).for_each(|row| out[row] = RUNS_DOWN);
+    out
+}
+
+/// Of each target of the run, what a fit leaves over.
+pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<Leftover> {
+    let (residuals, classes) = (heldout::residuals(context, declared, fit), classes(context));
+    let of_target = |(residual, target): (&Vec<f64>, &Target)| {
+        let load = context.regressor(target.relation).unwrap_or_default();
+        let rows = target.rows.iter().zip(residual).filter(|(row, _)| target.claims(**row));
+        let rows: Vec<(usize, f64, f64)> =
+            rows.filter_map(|(row, r)| Some((classes[*row], *load.get(*row)?, target.as_it_stands(*row, *r)))).collect();
+        leftover(&rows, target.noise.rms)
+    };
+    residuals.iter().zip(&context.targets).map(of_target).collect()
+}
+
+/// Of rows as class, load and residual.
+fn leftover(rows: &[(usize, f64, f64)], noise: f64) -> Leftover {
+    let mut left = Leftover { curve: curve(rows), ..Leftover::default() };
+    let mut sums = [(0.0, 0usize); CLASSES];
+    for (class, load, residual) in rows {
+        sums[*class].0 += (residual - left.known(*load)).powi(2);
+        sums[*class].1 += 1;
+    }
+    for (class, (sum, n)) in sums.into_iter().enumerate() {
+        // a class that the run hardly has is taken to be as bad as the one before it, or as the worst
+        let before = class.checked_sub(1).map_or(0.0, |k| left.scatter[k]);
+        let unknown = if HELD.contains(&class) { before } else { left.scatter.iter().copied().fold(0.0, f64::max) };
+        left.scatter[class] = if n < FEWEST { unknown } else { (sum / n as f64 - noise * noise).max(0.0).sqrt() };
+    }
+    left
+}
+
+/// Mean residual by load where the load is held, or, on a run that hardly ever holds it, moves evenly.
+fn curve(rows: &[(usize, f64, f64)]) -> Vec<(f64, f64)> {
+    let holds = 4 * rows.iter().filter(|(class, ..)| HELD.contains(class)).count() > rows.len();
+    let counts = |class: &usize| HELD.contains(class) || !holds && *class == MOVING;
+    let mut held: Vec<(f64, f64)> = rows.iter().filter(|(class, ..)| counts(class)).map(|(_, load, r)| (*load, *r)).collect();
+    held.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (Some(first), Some(last)) = (held.first(), held.last()) else { return Vec::new() };
+    let (low, width) = (first.0, ((last.0 - first.0) / BINS).max(1e-9));
+    let bin = |load: f64| ((load - low) / width) as usize;
+    let mean = |part: &[(f64, f64)]| {
+        let n = part.len() as f64;
+        (part.iter().map(|p| p.0).sum::<f64>() / n, part.iter().map(|p| p.1).sum::<f64>() / n)
+    };
+    held.chunk_by(|a, b| bin(a.0) == bin(b.0)).filter(|part| part.len() >= FEWEST).map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_where_the_load_is_held_and_a_scatter_by_the_time_since_it_jumped() {
+        // an error of the square of the load, one of 3 in the first quarter of a second, noise of 0.1
+        let rows: Vec<(usize, f64, f64)> = (0..2000)
+            .map(|i| {
+                let (class, load) = (i % 6, f64::from((i / 100) as u32));
+                let sign = if i / 6 % 2 == 0 { 1.0 } else { -1.0 };
+                (class, load, load * load + sign * if class == 0 { 3.0 } else { 0.1 })
+            })
+            .collect();
+        let left = leftover(&rows, 0.1);
+        for load in [0.0, 1.0, 7.0, 18.0, 19.0] {
+            assert!((left.known(load) - load * load).abs() < 0.05, "{load}: {}", left.known(load));
+        }
+        assert!((left.known(7.5) - 56.5).abs() < 0.05 && (left.known(40.0) - 361.0).abs() < 0.05);
+        assert!(
+            (left.scatter[0] - 3.0).abs() < 0.05 && left.scatter[1..6].iter().all(|s| *s < 0.05) && left.scatter[7] > 2.9,
+            "{:?}",
+            left.scatter
+        );
+        assert_eq!(Leftover::default().known(3.0), 0.0);
+    }
+}
