@@ -175,5 +175,10 @@ pub(crate) fn explains(context: &Context, declared: Declared<'_>, start: &Fit, f
         // between jumps only what stood out there can have been explained there
         !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > NEEDED_SHARE * (b - floor)
     };
+    if context.against_model {
+        // the floor of every channel is known: what the names leave of the news on any of them has another cause
+        let judged = context.targets.iter().enumerate().filter(|(_, t)| !t.relation.is_evidence());
+        return judged.into_iter().all(|(i, _)| enough(i, false));
+    }
     touched().any(|(i, t)| enough(i, false) || !t.unsettled.is_empty() && enough(i, true))
 }

@@ -13,6 +13,7 @@ use ident::context::Context;
 use ident::leftover::Leftover;
 use ident::log::{Column, Log};
 use ident::model::Model;
+use ident::verdict::Kind;
 use rig::{Chance, K_THRUST, K_TORQUE, KV, NO_LOAD, RESISTANCE, STEP};
 
 /// One day of the rig.
@@ -174,6 +175,20 @@ fn another_supply_colder_air_and_a_coarse_command_are_told() {
     assert_eq!(first(&cold), "air_density", "{:?}", cold.verdict.effects);
     let coarse = against(&model, &Day { acts_on: &|p| wavy(1000.0 + 23.0 * ((p - 1000.0) / 23.0 + 1e-9).floor()), ..day });
     assert_eq!(first(&coarse), "throttle_quantisation", "{:?}", coarse.verdict.effects);
+}
+
+/// A sag that explains all that is new of voltage and speed, and a torque that nothing in the library explains.
+#[test]
+fn a_name_that_leaves_news_on_another_channel_is_not_the_cause() {
+    let model = model();
+    let sagging = Day { seed: 5, supply: &|amps, _| 11.5 - 0.05 * amps, ..HEALTHY };
+    let mut log = log(&sagging);
+    let rpm = log.columns[1].values.clone();
+    let torque = &mut log.columns[3];
+    torque.values.iter_mut().zip(&rpm).for_each(|(q, r)| *q *= 1.0 + 0.08 * (r / 150.0).sin());
+    let closed = close(&log, Some(&model), &[], &mut |_| {}).expect("a day");
+    assert_eq!(closed.verdict.verdict, Kind::Unattributed, "{:?}", names(&closed));
+    assert_eq!(against(&model, &sagging).verdict.verdict, Kind::Attributed);
 }
 
 #[test]
