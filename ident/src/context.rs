@@ -257,8 +257,8 @@ pub struct Context {
     pub(crate) settling: Vec<bool>,
     /// What is sought may have set in before the run: a declared model stands as it is, and a constant departure from it is news.
     pub(crate) against_model: bool,
-    /// Logarithm of the density of a declared model's air over that of ISO 2533 air at 20 degC; 0 where none is declared, and where the
-    /// model speaks of the density itself.
+    /// Logarithm of the density of a declared model's air over that of ISO 2533 air at 20 degC; 0 where none is declared, and where an effect
+    /// of the model speaks of the density by itself.
     pub(crate) air: f64,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
     powers: [OnceLock<Vec<Values>>; 2],
@@ -402,7 +402,6 @@ impl Context {
         }
         let speaks_of_air = model.effects.iter().any(|e| e.placed.effect.id() == "air_density");
         self.air = model.air.filter(|_| !speaks_of_air).map_or(0.0, f64::ln);
-        self.facts.density = OnceLock::new();
         self.against_model = true;
     }
 

@@ -55,9 +55,7 @@ impl Leftover {
             (None, None) => 0.0,
         }
     }
-}
 
-impl Leftover {
     /// Variance beyond the noise of a row of a class. What is off while the load settles is off after every jump in the same way: many
     /// jumps are no more witnesses than one.
     pub(crate) fn variance(&self, class: usize, alike: &Alike) -> f64 {

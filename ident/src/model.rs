@@ -200,9 +200,12 @@ impl Model {
         model
     }
 
-    /// The model, with the air of its own run and what it leaves over of each target of it.
+    /// The model, with the air of its own run and what it leaves over of each target of it. A declared model keeps the air of the day that
+    /// its polynomials are of.
     pub(crate) fn leaving(mut self, context: &Context, left: Vec<Leftover>) -> Self {
-        self.air = air_density::of_run(context);
+        if !context.against_model {
+            self.air = air_density::of_run(context);
+        }
         self.leftovers = context.targets.iter().map(|t| t.name.to_owned()).zip(left).collect();
         self
     }

@@ -173,6 +173,15 @@ fn another_supply_colder_air_and_a_coarse_command_are_told() {
     assert_eq!(first(&battery), "battery_discharge", "{:?}", battery.verdict.effects);
     let cold = against(&model, &Day { room: &|t| 15.0 - 0.08 * t, ..day });
     assert_eq!(first(&cold), "air_density", "{:?}", cold.verdict.effects);
+    // the written model predicts what the verdict says, whatever day its reader knows
+    let day_log = log(&Day { room: &|t| 15.0 - 0.08 * t, ..day });
+    let written = Model::parse("model.toml", &cold.model.to_toml()).expect("what was written");
+    let context = Context::new(&day_log, Some(written.start_pulse_us));
+    let predicted = written.predict(&context, "thrust_n").expect("a thrust");
+    let measured = &day_log.columns[2].values;
+    let rms = (measured.iter().zip(&predicted).map(|(y, p)| (y - p).powi(2)).sum::<f64>() / predicted.len() as f64).sqrt();
+    let said = cold.verdict.channels["thrust_n"].after.rms;
+    assert!((rms / said - 1.0).abs() < 0.02, "{rms} {said}");
     let coarse = against(&model, &Day { acts_on: &|p| wavy(1000.0 + 23.0 * ((p - 1000.0) / 23.0 + 1e-9).floor()), ..day });
     assert_eq!(first(&coarse), "throttle_quantisation", "{:?}", coarse.verdict.effects);
 }

@@ -40,7 +40,7 @@ impl Effect for AirDensity {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let density = context.facts.density.get_or_init(|| log_density(context));
         let (lo, hi) = density.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        if hi - lo < LEAST_SPREAD && !(context.against_model && hi.max(-lo) > LEAST_SPREAD) {
+        if hi - lo < LEAST_SPREAD && !(context.against_model && (hi - context.air).max(context.air - lo) > LEAST_SPREAD) {
             return Vec::new();
         }
         let mut out = super::blade_flex::with_and_without_load(context);
@@ -50,8 +50,14 @@ impl Effect for AirDensity {
         out
     }
 
-    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
-        vec![Shape { name: "exponent", unit: "1", range: (0.1, 3.0), starts: vec![0.3, 0.6, 1.0, 1.5] }]
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        let exponent = Shape { name: "exponent", unit: "1", range: (0.1, 3.0), starts: vec![0.3, 0.6, 1.0, 1.5] };
+        if instance.form != BENT {
+            return vec![exponent];
+        }
+        // known, not fitted: it stands in the model with the rest, so that a prediction needs no other day's log
+        let air = context.air;
+        vec![exponent, Shape { name: "reference", unit: "1", range: (air, air), starts: vec![air] }]
     }
 
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
@@ -64,9 +70,11 @@ impl Effect for AirDensity {
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
-        let [exponent] = shape else { return };
+        let [exponent, reference @ ..] = shape else { return };
         let bent = instance.form == BENT;
+        let reference = reference.first().copied().unwrap_or(0.0);
         let density = context.facts.density.get_or_init(|| log_density(context));
+        let density: Vec<f64> = density.iter().map(|d| d - reference).collect();
         match design.relation {
             Relation::Thrust | Relation::Torque => {
                 let factor: Vec<f64> = density.iter().map(|d| (exponent * d).exp()).collect();
@@ -108,8 +116,7 @@ pub(crate) fn of_run(context: &Context) -> Option<f64> {
     known.then(|| (density.iter().sum::<f64>() / density.len() as f64).exp())
 }
 
-/// Logarithm of the density over that of ISO 2533 air at 20 degC, or over that of a declared model's day, on every row; zero where nothing
-/// says what it is.
+/// Logarithm of the density over that of ISO 2533 air at 20 degC, on every row; zero where nothing says what it is.
 fn log_density(context: &Context) -> Vec<f64> {
     let pressure = ["pressure_hpa", "pressure_pa"].iter().zip([1013.25, 101_325.0]).find_map(|(name, standard)| {
         let column = &context.covariates.iter().find(|c| c.0 == *name)?.1;
@@ -120,7 +127,7 @@ fn log_density(context: &Context) -> Vec<f64> {
     (0..context.len())
         .map(|i| {
             let p = pressure.as_ref().map_or(0.0, |p| p[i].ln());
-            p - temperature.map_or(0.0, |t| ((t[i] + 273.15) / 293.15).max(0.1).ln()) - context.air
+            p - temperature.map_or(0.0, |t| ((t[i] + 273.15) / 293.15).max(0.1).ln())
         })
         .collect()
 }

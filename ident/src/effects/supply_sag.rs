@@ -21,7 +21,7 @@ impl Effect for SupplySag {
     fn about(&self) -> About {
         About {
             title: "Supply voltage sags with the current",
-            equation: "voltage_v = V0 - resistance * current_a",
+            equation: "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a, current_a += current_rise * current_a rpm^3",
             source: "Ohm's law; Beharie 2013, Eq. 5.11 as corrected",
             depends_on: &["current_a"],
             signature: "the voltage residual mirrors the current; thrust(rpm) and torque(rpm) hold",
