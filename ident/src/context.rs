@@ -185,11 +185,11 @@ impl Target {
     /// every row of the log, and how often the run repeats each class.
     fn allow(&mut self, left: &Leftover, load: &[f64], classes: &[usize], alike: &leftover::Alike) {
         self.known = load.iter().map(|x| left.known(*x)).collect();
-        let square = |row: usize| left.variance(classes[row], alike);
+        let noise = self.noise.rms;
+        let square = |row: usize| left.variance(load[row], classes[row], alike, noise);
         for variances in [&mut self.levelled, &mut self.floored] {
             variances.iter_mut().zip(&self.rows).for_each(|(v, row)| *v += square(*row));
         }
-        let noise = self.noise.rms;
         self.trust = (0..load.len()).map(|row| noise / (noise * noise + square(row)).sqrt()).collect();
     }
 

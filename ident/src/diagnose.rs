@@ -12,7 +12,8 @@ use crate::context::{Context, Relation, Target};
 use crate::correction::correct;
 use crate::effects::{self, Effect, Instance};
 use crate::heldout::{self, Around, Held};
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, is_plausible, plausible, scatters};
+use crate::moment::lasts;
 use crate::opponent::{explains, nameless, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
@@ -171,8 +172,12 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
                     .map_or_else(|| heldout_before.clone(), |f| heldout::errors(context, declared, &f, &folds))
             })
             .collect();
-        let idle = (0..without.len())
-            .find(|k| !is_unknown && without.len() > 1 && is_idle(context, &best.fit.placed[*k], &errors, &without[*k]));
+        // beside a later effect an earlier one may make no sense any more
+        let senseless = |k: usize| context.against_model && !is_plausible(context, declared, &best.fit, k);
+        let idle = (0..without.len()).find(|k| {
+            let named = !is_unknown && without.len() > 1;
+            named && (is_idle(context, &best.fit.placed[*k], &errors, &without[*k]) || senseless(*k))
+        });
         let Some(idle) = idle else { break without };
         // a later effect has taken over what this one was named for
         let mut placed = best.fit.placed.clone();
@@ -404,7 +409,8 @@ fn choose(
 ) -> Option<Chosen> {
     for (k, winner) in ranked.iter().enumerate().take_while(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
         let around = heldout::errors_around_newest(context, declared, &winner.fit, folds, errors);
-        if !worth_a_name(context, winner, winner.evidence - best.evidence, &around) {
+        let gain = winner.evidence - best.evidence;
+        if !worth_a_name(context, winner, gain, &around) || !lasts(context, declared, &best.fit, &winner.fit) {
             continue;
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
@@ -435,7 +441,7 @@ fn largest_reduction(context: &Context, candidate: &Candidate, held: &[Held], be
 }
 
 /// Price of an effect: half a log of the effective sample for each parameter, and half a log of the grid that was searched.
-fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
+pub(crate) fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
     let touched = context.targets.iter().zip(shares).filter(|(t, _)| placed.instance.touches(t.name));
     let n: f64 = touched.map(|(t, share)| t.rows.len() as f64 * t.weight * share).sum();
     let shapes = placed.effect.shapes(context, &placed.instance);

@@ -200,7 +200,12 @@ pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: O
 
 /// Whether every shape lies within its range, and every effect makes physical sense.
 pub(crate) fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
-    fit.placed.iter().enumerate().all(|(k, p)| {
+    (0..fit.placed.len()).all(|k| is_plausible(context, declared, fit, k))
+}
+
+/// Whether the effect at a position of a fit makes physical sense and none of its shapes lies on a bound.
+pub(crate) fn is_plausible(context: &Context, declared: Declared<'_>, fit: &Fit, k: usize) -> bool {
+    fit.placed.get(k).is_none_or(|p| {
         let inside = p.effect.shapes(context, &p.instance).iter().zip(&p.shape).all(|(s, v)| {
             let margin = 1e-3 * (s.range.1 - s.range.0);
             s.is_nuisance() || s.range.1 <= s.range.0 || (*v > s.range.0 - margin && *v < s.range.1 - margin)
@@ -294,10 +299,16 @@ impl Fit {
         let moving: Vec<&str> = p.instance.channels.iter().map(String::as_str).collect();
         let scattering = self.placed.iter().any(|p| p.effect.scatters());
         let taught = Taught::new(context, declared, Rows::All);
+        let of_colour = |name: &str| context.target(name).map_or(1.0, |k| self.targets[k].share);
+        let least = moving.iter().map(|name| of_colour(name)).fold(1.0, f64::min);
         let value = |x: &[f64]| {
             let mut placed = self.placed.clone();
             placed[position].shape = x.to_vec();
-            taught.loglik(&placed, &moving, scattering)
+            if context.against_model {
+                // speeds are coloured by what the model leaves over of them, and a load cell that knows the shape is not
+                return moving.iter().map(|name| of_colour(name) * taught.loglik(&placed, &[name], scattering)).sum();
+            }
+            least * taught.loglik(&placed, &moving, scattering)
         };
         let h: Vec<f64> =
             shapes.iter().zip(&p.shape).map(|(s, v)| (0.02 * v.abs()).max(1e-4 * (s.range.1 - s.range.0)).max(1e-9)).collect();
@@ -320,14 +331,6 @@ impl Fit {
                 hessian[(j, i)] = -mixed;
             }
         }
-        let share = context
-            .targets
-            .iter()
-            .zip(&self.targets)
-            .filter(|(t, _)| p.instance.touches(t.name))
-            .map(|(_, f)| f.share)
-            .fold(1.0, f64::min);
-        hessian *= share;
         let inverse = hessian.clone().try_inverse();
         let curvature = |i: usize| match &inverse {
             Some(v) if v[(i, i)] > 0.0 => v[(i, i)].sqrt(),
@@ -343,7 +346,7 @@ impl Fit {
                 let fall = |to: f64| {
                     let mut x = p.shape.clone();
                     x[i] = to;
-                    share * (centre - value(&x))
+                    centre - value(&x)
                 };
                 let reach = |sign: f64| {
                     let bound = if sign > 0.0 { shapes[i].range.1 - p.shape[i] } else { p.shape[i] - shapes[i].range.0 };

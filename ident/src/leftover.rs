@@ -1,8 +1,8 @@
 //! What a model leaves over of the run that it was identified from.
 //!
 //! What it is: no model is a rig. By how much it is off on a day when nothing was wrong is written down beside each channel's polynomial: as
-//! a curve over the load where the load is held, and about that curve as a scatter beyond the noise that depends on the time since the load
-//! last jumped. When a later run is held against the model (`--model`) the curve is known and the scatter weighs, so that a departure
+//! a curve over the load where the load is held, and about that curve as a scatter that depends on the time since the load last jumped.
+//! The noise is part of the scatter: a rotor in gusts wanders, and how much of that the noise of a run is said to hold differs from day to day. When a later run is held against the model (`--model`) the curve is known and the scatter weighs, so that a departure
 //! which the healthy day has as well is no news.
 //! What can go wrong: what is off while the load changes repeats itself from run to run, and looks like noise here.
 //! Units: the channel's; the curve's load in krpm or kus as the polynomial's.
@@ -15,8 +15,11 @@ use crate::hypothesis::{Declared, Fit};
 /// Times since the load last jumped that part the classes of a scatter, s.
 pub const AGES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 /// Classes of a scatter: one before, between and after [`AGES`], one for a load that moves evenly, and one for a rotor that runs down with
-/// its motor off.
+/// its motor off, comes to rest or leaves it.
 pub const CLASSES: usize = AGES.len() + 3;
+
+/// Parts of the range of the load that a scatter is told apart in: a rotor is slower to settle at low speeds.
+pub const PARTS: usize = 3;
 
 /// Part of the range of the load that one point of a curve stands for.
 const BINS: f64 = 40.0;
@@ -28,7 +31,7 @@ const LATE: usize = 2;
 const HELD: std::ops::Range<usize> = 4..AGES.len() + 1;
 /// Class of a load that moves evenly.
 const MOVING: usize = AGES.len() + 1;
-/// Class of a rotor that runs down with its motor off.
+/// Class of a rotor that runs down with its motor off, comes to rest or leaves it.
 const RUNS_DOWN: usize = AGES.len() + 2;
 /// Fewest rows of a load that moves evenly.
 const RAMP: usize = 10;
@@ -40,8 +43,8 @@ const REST: usize = 3;
 pub struct Leftover {
     /// Where the load is held: load and mean error, from low to high.
     pub curve: Vec<(f64, f64)>,
-    /// Root mean square about the curve by class of row, the noise taken out.
-    pub scatter: [f64; CLASSES],
+    /// Root mean square about the curve by part of the curve's range of loads and class of row, the noise included.
+    pub scatter: [[f64; CLASSES]; PARTS],
 }
 
 impl Leftover {
@@ -56,10 +59,17 @@ impl Leftover {
         }
     }
 
-    /// Variance beyond the noise of a row of a class. What is off while the load settles is off after every jump in the same way: many
-    /// jumps are no more witnesses than one.
-    pub(crate) fn variance(&self, class: usize, alike: &Alike) -> f64 {
-        self.scatter[class].powi(2) * alike.0[class]
+    /// The part of the curve's range that a load is in.
+    fn part(&self, load: f64) -> usize {
+        let (Some(first), Some(last)) = (self.curve.first(), self.curve.last()) else { return 0 };
+        let share = (load - first.0) / (last.0 - first.0).max(1e-9);
+        ((share * PARTS as f64).max(0.0) as usize).min(PARTS - 1)
+    }
+
+    /// Variance of a row of a class at a load beyond a run's own noise, rms. What is off while the load settles is off after every jump in
+    /// the same way: many jumps are no more witnesses than one.
+    pub(crate) fn variance(&self, load: f64, class: usize, alike: &Alike, noise: f64) -> f64 {
+        (self.scatter[self.part(load)][class].powi(2) - noise * noise).max(0.0) * alike.0[class]
     }
 }
 
@@ -90,11 +100,13 @@ pub(crate) fn classes(context: &Context) -> Vec<usize> {
     for (_, to) in context.calm.iter().filter(|(_, to)| *to < context.len()) {
         out[to.saturating_sub(LATE)..*to].fill(0);
     }
-    // a rotor that comes to rest jumps from the slowest speed that its sensors see to none
-    let turns = |row: usize| context.rpm.get(row).is_some_and(|rpm| *rpm > 0.0);
-    let about = |row: usize| (row.saturating_sub(REST)..(row + REST + 1).min(context.len())).any(turns);
-    let off = |row: &usize| context.pulse.as_ref().is_some_and(|p| p[*row] < context.start_pulse_us);
-    (0..context.len()).filter(off).filter(|row| about(*row)).for_each(|row| out[row] = RUNS_DOWN);
+    // a rotor that comes to rest, or leaves it, jumps between none and the slowest speed that its sensors see
+    let near =
+        |row: usize| context.rpm.get(row.saturating_sub(REST)..(row + REST + 1).min(context.rpm.len())).unwrap_or_default();
+    let turns = |row: usize| near(row).iter().any(|rpm| *rpm > 0.0);
+    let rests = |row: usize| near(row).iter().any(|rpm| *rpm <= 0.0);
+    let off = |row: usize| context.pulse.as_ref().is_some_and(|p| p[row] < context.start_pulse_us);
+    (0..context.len()).filter(|row| turns(*row) && (off(*row) || rests(*row))).for_each(|row| out[row] = RUNS_DOWN);
     out
 }
 
@@ -106,26 +118,53 @@ pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<Le
         let rows = target.rows.iter().zip(residual).filter(|(row, _)| target.claims(**row));
         let rows: Vec<(usize, f64, f64)> =
             rows.filter_map(|(row, r)| Some((classes[*row], *load.get(*row)?, target.as_it_stands(*row, *r)))).collect();
-        leftover(&rows, target.noise.rms)
+        leftover(&rows)
     };
     residuals.iter().zip(&context.targets).map(of_target).collect()
 }
 
 /// Of rows as class, load and residual.
-fn leftover(rows: &[(usize, f64, f64)], noise: f64) -> Leftover {
+fn leftover(rows: &[(usize, f64, f64)]) -> Leftover {
     let mut left = Leftover { curve: curve(rows), ..Leftover::default() };
-    let mut sums = [(0.0, 0usize); CLASSES];
+    let mut sums = [[Sum::default(); CLASSES]; PARTS];
     for (class, load, residual) in rows {
-        sums[*class].0 += (residual - left.known(*load)).powi(2);
-        sums[*class].1 += 1;
+        sums[left.part(*load)][*class].add((residual - left.known(*load)).powi(2));
     }
-    for (class, (sum, n)) in sums.into_iter().enumerate() {
+    let mut whole = [0.0; CLASSES];
+    for class in 0..CLASSES {
         // a class that the run hardly has is taken to be as bad as the one before it, or as the worst
-        let before = class.checked_sub(1).map_or(0.0, |k| left.scatter[k]);
-        let unknown = if HELD.contains(&class) { before } else { left.scatter.iter().copied().fold(0.0, f64::max) };
-        left.scatter[class] = if n < FEWEST { unknown } else { (sum / n as f64 - noise * noise).max(0.0).sqrt() };
+        let before = class.checked_sub(1).map_or(0.0, |k| whole[k]);
+        let unknown = if HELD.contains(&class) { before } else { whole.iter().copied().fold(0.0, f64::max) };
+        whole[class] = sums.iter().map(|part| part[class]).fold(Sum::default(), Sum::with).rms().unwrap_or(unknown);
+        for part in 0..PARTS {
+            // a part may be worse than the whole; that it is better few rows cannot tell
+            left.scatter[part][class] = sums[part][class].rms().unwrap_or(0.0).max(whole[class]);
+        }
     }
     left
+}
+
+/// Squares and how many.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    squares: f64,
+    rows: usize,
+}
+
+impl Sum {
+    fn add(&mut self, square: f64) {
+        self.squares += square;
+        self.rows += 1;
+    }
+
+    fn with(self, other: Self) -> Self {
+        Self { squares: self.squares + other.squares, rows: self.rows + other.rows }
+    }
+
+    /// Root of the mean, where there are enough.
+    fn rms(self) -> Option<f64> {
+        (self.rows >= FEWEST).then(|| (self.squares / self.rows as f64).sqrt())
+    }
 }
 
 /// Mean residual by load where the load is held, or, on a run that hardly ever holds it, moves evenly.
@@ -158,16 +197,29 @@ mod tests {
                 (class, load, load * load + sign * if class == 0 { 3.0 } else { 0.1 })
             })
             .collect();
-        let left = leftover(&rows, 0.1);
+        let left = leftover(&rows);
         for load in [0.0, 1.0, 7.0, 18.0, 19.0] {
             assert!((left.known(load) - load * load).abs() < 0.05, "{load}: {}", left.known(load));
         }
         assert!((left.known(7.5) - 56.5).abs() < 0.05 && (left.known(40.0) - 361.0).abs() < 0.05);
-        assert!(
-            (left.scatter[0] - 3.0).abs() < 0.05 && left.scatter[1..6].iter().all(|s| *s < 0.05) && left.scatter[7] > 2.9,
-            "{:?}",
-            left.scatter
-        );
+        for part in left.scatter {
+            let noisy = part[1..6].iter().all(|s| (*s - 0.1).abs() < 0.05);
+            assert!((part[0] - 3.0).abs() < 0.05 && noisy && part[7] > 2.9, "{part:?}");
+        }
         assert_eq!(Leftover::default().known(3.0), 0.0);
+    }
+
+    #[test]
+    fn a_part_of_the_loads_may_be_worse_than_the_whole() {
+        // a rotor that is slow to settle below a third of its speed
+        let error = |load: f64, class: usize| if class == 1 && load < 6.0 { 8.0 } else { 0.2 };
+        let rows = (0..3000).map(|i| {
+            let (class, load) = (i % 6, f64::from((i / 150) as u32));
+            (class, load, if i / 6 % 2 == 0 { error(load, class) } else { -error(load, class) })
+        });
+        let left = leftover(&rows.collect::<Vec<_>>());
+        let settling = left.scatter.map(|part| part[1]);
+        assert!(settling[0] > 7.0 && settling[1] < 6.0 && settling[1] == settling[2], "{settling:?}");
+        assert!(left.scatter.iter().all(|part| (part[3] - 0.2).abs() < 0.01), "{:?}", left.scatter);
     }
 }

@@ -27,6 +27,7 @@ pub mod leftover;
 pub mod log;
 pub mod long;
 pub mod model;
+mod moment;
 pub mod noise;
 mod opponent;
 pub mod plateau;

@@ -285,7 +285,7 @@ impl Model {
             }
             if let Some((_, left)) = self.leftovers.iter().find(|(channel, _)| *channel == p.channel) {
                 let [scatter, at, error] = leftover_keys(&p.channel);
-                t.insert(scatter, left.scatter.to_vec().into());
+                t.insert(scatter, left.scatter.iter().map(|part| Value::from(part.to_vec())).collect::<Vec<_>>().into());
                 t.insert(at, left.curve.iter().map(|p| p.0).collect::<Vec<f64>>().into());
                 t.insert(error, left.curve.iter().map(|p| p.1).collect::<Vec<f64>>().into());
             }
@@ -297,7 +297,7 @@ impl Model {
             root.insert("effect".into(), list.into());
         }
         format!(
-            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and beyond that and the noise the scatter, rms, up to\n# 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n{root}"
+            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and about that the scatter, rms, noise included, in each\n# third of the loads, up to 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n{root}"
         )
     }
 }

@@ -1,11 +1,14 @@
 //! `blade_twist`: the light beam over-reads at high speed.
 //!
-//! What it is: above an onset speed rpm_beam reads too high: the blade twists, and the beam is cut at another place.
-//! What can go wrong: an onset below the slowest speed of the run is a scale error, not a twist.
+//! What it is: above an onset speed rpm_beam reads too high: the blade twists, and the beam is cut at another place; or, in single
+//! readings, by whole cuts more than there are blades.
+//! What can go wrong: an onset below the slowest speed of the run is a scale error, not a twist. Readings with a cut too many are those of
+//! doubled pulses as well; that all of them lie above one speed is what tells the two apart.
 //! Units: rev/min, 1.
 //! Reference: Beharie 2013, section 5.7.1, Fig. 5.54-5.55.
 
 use super::blade_flex::upper_speeds;
+use super::pulses::{SCATTERED, struck_readings, struck_speeds};
 use super::speed_channel::{HINGE, LEAST, add_hinge, hinge_at_top, instance};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::Context;
@@ -22,7 +25,7 @@ impl Effect for BladeTwist {
     fn about(&self) -> About {
         About {
             title: "The light beam over-reads at high speed",
-            equation: "rpm_beam += slope (rpm - onset) + bend (rpm - onset)^2 / onset above onset",
+            equation: "rpm_beam += slope (rpm - onset) + bend (rpm - onset)^2 / onset above onset, or in scattered samples there whatever they read",
             source: "Beharie 2013, section 5.7.1, Fig. 5.54-5.55",
             depends_on: &["rpm"],
             signature: "rpm_beam leaves the other speed channels upwards above one speed",
@@ -35,23 +38,46 @@ impl Effect for BladeTwist {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        instance(context, "rpm_beam", "").into_iter().collect()
+        let forms = ["", SCATTERED].into_iter().filter_map(|form| instance(context, "rpm_beam", form));
+        forms.filter(|i| i.form.is_empty() || struck_speeds(context, i).is_some()).collect()
     }
 
-    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form == SCATTERED {
+            // read off, not fitted
+            let onset = struck_speeds(context, instance).map_or(0.0, |s| s.lowest);
+            return vec![Shape { name: "onset", unit: "rpm", range: (onset, onset), starts: vec![onset] }];
+        }
         vec![upper_speeds(context, 14)]
     }
 
-    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        HINGE.to_vec()
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        if instance.form == SCATTERED { Vec::new() } else { HINGE.to_vec() }
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let [onset] = shape else { return };
-        add_hinge(context, *onset, position, design);
+        if instance.form == SCATTERED {
+            struck_readings(context, instance, design);
+        } else {
+            add_hinge(context, *onset, position, design);
+        }
     }
 
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        hinge_at_top(context, fitted) > LEAST
+    fn seen(&self, context: &Context, instance: &Instance) -> f64 {
+        let speeds = (instance.form == SCATTERED).then(|| struck_speeds(context, instance)).flatten();
+        speeds.map_or(0.0, |s| s.unlikely)
+    }
+
+    fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        let speeds = (instance.form == SCATTERED).then(|| struck_speeds(context, instance)).flatten();
+        for e in fitted.iter_mut().filter(|e| e.name == "onset") {
+            e.se = speeds.as_ref().map_or(e.se, |s| s.spacing);
+        }
+        fitted
+    }
+
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        instance.form == SCATTERED || hinge_at_top(context, fitted) > LEAST
     }
 }

@@ -36,8 +36,8 @@ impl Effect for EncoderDrag {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let mut channels = load_channels(context, false);
-        // the encoder's own channel has no sample with the encoder off: nothing changes on it
-        channels.retain(|c| *c != "rpm_encoder");
+        // the encoder's own channel has no sample with the encoder off: nothing changes on it, but against a model that knows it without
+        channels.retain(|c| context.against_model || *c != "rpm_encoder");
         if context.rpm.is_empty() {
             return Vec::new();
         }

@@ -47,6 +47,10 @@ impl Effect for GlitchRows {
         context.targets.iter().filter(|t| !t.unclaimed.is_empty()).map(|t| Instance::new(&[t.name], "")).collect()
     }
 
+    fn is_of_moments(&self, _: &Instance) -> bool {
+        true
+    }
+
     fn never_beside(&self) -> &'static [&'static str] {
         // two pulses lost within one sample look absurd
         &["missed_pulses", "double_pulses"]

@@ -7,7 +7,7 @@
 //! Units: 1.
 //! Reference: Beharie 2013, section 5.7.1 (blade that the beam does not see).
 
-use super::pulses::{apply_pulses, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
+use super::pulses::{apply_pulses, is_of_single_readings, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;
@@ -36,6 +36,10 @@ impl Effect for MissedPulses {
 
     fn stage(&self) -> Stage {
         Stage::Term
+    }
+
+    fn is_of_moments(&self, instance: &Instance) -> bool {
+        is_of_single_readings(instance)
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {

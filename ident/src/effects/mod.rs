@@ -181,6 +181,10 @@ pub trait Effect: Sync {
     fn scatters(&self) -> bool {
         false
     }
+    /// Whether single rows are its nature.
+    fn is_of_moments(&self, _instance: &Instance) -> bool {
+        false
+    }
     /// Whether [`Self::plausible`] asks for the standard errors of the shapes: they cost several fits, and are not a number where
     /// nobody asks.
     fn judges_shape_errors(&self) -> bool {

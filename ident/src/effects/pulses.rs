@@ -104,13 +104,15 @@ pub(super) fn apply_pulses(context: &Context, instance: &Instance, sign: f64, po
     let (Relation::SpeedDifference, Some(target)) = (design.relation, difference(context, instance)) else { return };
     let on = if instance.form.is_empty() { vec![1.0; context.len()] } else { gross(context, target, sign) };
     if instance.form == ONCE {
-        design.fixed.resize(context.len(), 0.0);
-        for (row, departure) in target.rows.iter().zip(&target.y) {
-            design.fixed[*row] += on[*row] * departure;
-        }
+        as_they_read(target, &on, design);
     } else {
         design.add(position, 0, on.iter().zip(&context.rpm).map(|(s, r)| sign * s * r).collect());
     }
+}
+
+/// Whether single readings are off, and not the channel as a whole.
+pub(super) fn is_of_single_readings(instance: &Instance) -> bool {
+    !instance.form.is_empty()
 }
 
 /// Amplitude of such an instance.
@@ -143,6 +145,53 @@ fn gross(context: &Context, target: &Target, sign: f64) -> Vec<f64> {
         out[reading.row] = 1.0;
     }
     out
+}
+
+/// At what speeds the readings with pulses too many are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StruckSpeeds {
+    /// Lowest of them, rev/min.
+    pub(super) lowest: f64,
+    /// How unlikely it is that chance would strike such speeds only, nats.
+    pub(super) unlikely: f64,
+    /// How far below the lowest the next reading without is, rev/min.
+    pub(super) spacing: f64,
+}
+
+/// How unlikely it must be, in nats, that readings struck by chance are all as fast as they are, for speed to be what strikes them.
+const UNLIKELY: f64 = 7.0;
+
+/// The speeds of the readings with pulses too many, where it is no chance that they are among the upper ones.
+pub(super) fn struck_speeds(context: &Context, instance: &Instance) -> Option<StruckSpeeds> {
+    let target = difference(context, instance)?;
+    if form(context, target, 1.0) != Some(SCATTERED) {
+        return None;
+    }
+    let speed = |r: &Reading| context.rpm[r.row];
+    let struck: Vec<f64> = readings(context, target).filter(|r| r.is_gross(1.0)).map(|r| speed(&r)).collect();
+    let all: Vec<f64> = readings(context, target).map(|r| speed(&r)).collect();
+    let lowest = struck.iter().copied().fold(f64::INFINITY, f64::min);
+    // levels wander a little: what is as fast as the lowest but for that is at its level
+    let above = all.iter().filter(|s| **s > (1.0 - HELD) * lowest).count() as f64;
+    let below = all.iter().copied().filter(|s| *s <= (1.0 - HELD) * lowest).fold(0.0, f64::max);
+    let speeds =
+        StruckSpeeds { lowest, unlikely: -(struck.len() as f64) * (above / all.len() as f64).ln(), spacing: lowest - below };
+    (speeds.unlikely > UNLIKELY).then_some(speeds)
+}
+
+/// Takes readings with pulses too many for what they read, on the difference from the other channels: how many pulses each of them
+/// holds too many is its own.
+pub(super) fn struck_readings(context: &Context, instance: &Instance, design: &mut TargetDesign) {
+    let (Relation::SpeedDifference, Some(target)) = (design.relation, difference(context, instance)) else { return };
+    as_they_read(target, &gross(context, target, 1.0), design);
+}
+
+/// Takes what a channel departs from the others by for what it is, on some rows.
+fn as_they_read(target: &Target, on: &[f64], design: &mut TargetDesign) {
+    design.fixed.resize(on.len(), 0.0);
+    for (row, departure) in target.rows.iter().zip(&target.y) {
+        design.fixed[*row] += on[*row] * departure;
+    }
 }
 
 /// Loss of a reading that times one period and loses the pulse in its middle, and how near to it a loss must be.

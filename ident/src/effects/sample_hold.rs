@@ -1,6 +1,7 @@
 //! `sample_hold`: a channel repeats old values between its updates.
 //!
-//! What it is: the reading stands still until its next update, `period` seconds later; the updates are seen in the channel itself.
+//! What it is: the reading stands still until its next update, `period` seconds later; the updates are seen in the channel itself, as new
+//! values, or, where noise comes after the hold, as changes that are late by anything up to a period ([`beneath_noise`]).
 //! What can go wrong: a coarse resolution repeats values too, but not at even intervals.
 //! Units: s.
 //! Reference: zero-order hold; asynchronous telemetry of speed controllers.
@@ -9,6 +10,8 @@ use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, through_
 use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::design::TargetDesign;
 use crate::noise::median;
+
+mod beneath_noise;
 
 /// See the module.
 pub(crate) struct SampleHold;
@@ -37,20 +40,21 @@ impl Effect for SampleHold {
         if context.time_is_row {
             return Vec::new();
         }
-        let held = |t: &&Target| !t.relation.is_evidence() && t.relation != Relation::Voltage && period(context, t).is_some();
+        let held = |t: &&Target| !t.relation.is_evidence() && t.relation != Relation::Voltage;
         let difference =
             |channel: &str| DIFFERENCES.iter().find(|d| d.0 == channel && context.target(d.1).is_some()).map(|d| d.1);
-        context
-            .targets
-            .iter()
-            .filter(held)
-            .map(|t| Instance::new(&std::iter::once(t.name).chain(difference(t.name)).collect::<Vec<_>>(), ""))
-            .collect()
+        let of_form =
+            |t: &Target, form| Instance::new(&std::iter::once(t.name).chain(difference(t.name)).collect::<Vec<_>>(), form);
+        let seen = |t: &Target| {
+            let form = if period(context, t).is_some() { Some("") } else { beneath_noise::clock(context, t).map(|_| BENEATH) };
+            form.map(|form| of_form(t, form))
+        };
+        context.targets.iter().filter(held).filter_map(seen).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         // measured from the repeats, not fitted
-        let found = target(context, instance).and_then(|t| period(context, t)).map_or(0.0, |p| p.0);
+        let found = target(context, instance).and_then(|t| found(context, instance, t)).map_or(0.0, |p| p.0);
         vec![Shape { name: "period", unit: "s", range: (found, found), starts: vec![found] }]
     }
 
@@ -61,8 +65,10 @@ impl Effect for SampleHold {
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], _: usize, design: &mut TargetDesign) {
         let Some(target) = target(context, instance) else { return };
         let mut fresh = vec![false; context.len()];
-        for i in updates(target) {
-            fresh[i] = true;
+        if instance.form == BENEATH {
+            beneath_noise::clock(context, target).iter().for_each(|clock| clock.mark(&context.t, &mut fresh));
+        } else {
+            updates(target).into_iter().for_each(|i| fresh[i] = true);
         }
         let held = |column: &&[f64]| -> Vec<f64> {
             let mut value = column.first().copied().unwrap_or(0.0);
@@ -78,12 +84,24 @@ impl Effect for SampleHold {
     }
 
     fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
-        if let Some((value, se)) = target(context, instance).and_then(|t| period(context, t)) {
+        if let Some((value, se)) = target(context, instance).and_then(|t| found(context, instance, t)) {
             for e in fitted.iter_mut().filter(|e| e.name == "period") {
                 (e.value, e.se) = (value, se);
             }
         }
         fitted
+    }
+}
+
+/// Form in which the noise comes after the hold, so that no value repeats.
+const BENEATH: &str = "beneath the noise";
+
+/// Interval of the updates and its standard error, s, as the form of an instance reads it off.
+fn found(context: &Context, instance: &Instance, target: &Target) -> Option<(f64, f64)> {
+    if instance.form == BENEATH {
+        beneath_noise::clock(context, target).map(|c| (c.period, c.error))
+    } else {
+        period(context, target)
     }
 }
 

@@ -10,7 +10,7 @@ use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key,
 use crate::context::{Context, Relation};
 use crate::effects::{self, Effect, Estimate, Instance};
 use crate::hypothesis::Placed;
-use crate::leftover::{CLASSES, Leftover};
+use crate::leftover::{CLASSES, Leftover, PARTS};
 use crate::log::Log;
 use std::path::Path;
 use toml::{Table, Value};
@@ -122,12 +122,17 @@ fn leftover(channel: &str, value: &Value) -> Result<Option<Leftover>, Refusal> {
     if keys.iter().all(|key| value.get(key).is_none()) {
         return Ok(None);
     }
-    let list = |key: &String| -> Option<Vec<f64>> { value.get(key)?.as_array()?.iter().map(finite).collect() };
+    let numbers = |value: &Value| -> Option<Vec<f64>> { value.as_array()?.iter().map(finite).collect() };
+    let list = |key: &String| -> Option<Vec<f64>> { numbers(value.get(key)?) };
+    let part =
+        |value: &Value| -> Option<[f64; CLASSES]> { numbers(value).filter(|s| s.iter().all(|v| *v >= 0.0))?.try_into().ok() };
+    let parts = |key: &String| -> Option<[[f64; CLASSES]; PARTS]> {
+        value.get(key)?.as_array()?.iter().map(part).collect::<Option<Vec<_>>>()?.try_into().ok()
+    };
     let refused = |key: &String, expected: &str| refusal(key, value.get(key), expected);
     let [scatter_key, at_key, error_key] = &keys;
-    let scatter = list(scatter_key).filter(|s| s.iter().all(|v| *v >= 0.0)).and_then(|s| s.try_into().ok());
-    let scatter =
-        scatter.ok_or_else(|| refused(scatter_key, &format!("a list of {CLASSES} finite numbers that are not negative")))?;
+    let scatter = parts(scatter_key)
+        .ok_or_else(|| refused(scatter_key, &format!("{PARTS} lists of {CLASSES} finite numbers that are not negative")))?;
     let at = list(at_key).filter(|at| at.is_sorted_by(|a, b| a < b));
     let at = at.ok_or_else(|| refused(at_key, "a list of finite numbers, each larger than the one before"))?;
     let error = list(error_key).filter(|error| error.len() == at.len());
