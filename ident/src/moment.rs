@@ -1,4 +1,4 @@
-//! Whether a name is borne by more than one moment of a run.
+//! Whether a name, or what nothing explains, is borne by more than one moment of a run.
 //!
 //! What it is: against a declared model, the evidence that an effect has left once the stretch of a second that speaks loudest for it is
 //! taken out. A model is off here and there for a moment (a rotor that starts, a row between two commands), by more on one day than on
@@ -36,7 +36,7 @@ pub(crate) fn lasts(context: &Context, declared: Declared<'_>, before: &Fit, aft
 }
 
 /// Largest sum over a moment.
-fn best_moment(t: &[f64], gains: &[f64]) -> f64 {
+pub(crate) fn best_moment(t: &[f64], gains: &[f64]) -> f64 {
     let (mut from, mut sum, mut best) = (0, 0.0, 0.0);
     for (to, gain) in gains.iter().enumerate() {
         sum += gain;

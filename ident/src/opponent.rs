@@ -12,6 +12,7 @@ use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{Effect, Instance, quantisation};
 use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
+use crate::moment::best_moment;
 use crate::residual::whiteness;
 
 /// The opponent without a name: a smooth function of one variable on one channel, or on all speed channels alike. It wins where
@@ -128,8 +129,10 @@ pub(crate) fn nameless(context: &Context, declared: Declared<'_>, start: &Fit) -
     let residuals = heldout::residuals(context, declared, start);
     let excess = |i: usize| {
         let target = &context.targets[i];
-        let news = target.rows.iter().zip(&residuals[i]).map(|(row, v)| target.news(*row, *v).powi(2));
-        news.sum::<f64>() / (residuals[i].len() as f64 * target.noise.rms.powi(2))
+        let mut news = vec![0.0; context.len()];
+        target.rows.iter().zip(&residuals[i]).for_each(|(row, v)| news[*row] = target.news(*row, *v).powi(2));
+        let once = if context.against_model { best_moment(&context.t, &news) } else { 0.0 };
+        (news.iter().sum::<f64>() - once) / (residuals[i].len() as f64 * target.noise.rms.powi(2))
     };
     let left_over = |i: usize| {
         let (r, target) = (&residuals[i], &context.targets[i]);
