@@ -210,6 +210,14 @@ mod tests {
     }
 
     #[test]
+    fn what_a_day_wandered_weighs_where_another_day_hardly_has_noise() {
+        let left = Leftover { curve: vec![(0.0, 0.0), (3.0, 0.0)], scatter: [[0.3; CLASSES]; PARTS] };
+        let of = |noise: f64, alike: f64| left.variance(2.5, 0, &Alike([alike; CLASSES]), noise);
+        assert!((of(0.1, 1.0) - 0.08).abs() < 1e-12 && (of(0.1, 5.0) - 0.4).abs() < 1e-12);
+        assert_eq!(of(0.5, 5.0), 0.0);
+    }
+
+    #[test]
     fn a_part_of_the_loads_may_be_worse_than_the_whole() {
         // a rotor that is slow to settle below a third of its speed
         let error = |load: f64, class: usize| if class == 1 && load < 6.0 { 8.0 } else { 0.2 };
