@@ -189,6 +189,12 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     // a rival that differed by what was dropped is the winner itself
     let same = |ids: &[String]| sorted(ids.to_vec()) == sorted(best.ids());
     rivals.retain(|r| is_unknown || !same(&r.ids));
+    if !is_unknown {
+        let tares = best.fit.placed.iter().filter(|p| is_tare(p)).count();
+        let of_names = |names: usize| of_further_names(names.saturating_sub(tares));
+        probability *= of_names(best.fit.placed.len());
+        rivals.iter_mut().for_each(|r| r.probability *= of_names(r.ids.len()));
+    }
     progress(1.0);
     Some(Diagnosis {
         declared: start,
@@ -202,6 +208,15 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         folds,
         candidates,
     })
+}
+
+/// Probability that a name beside another is right although it was chosen beside it without a doubt: of 38 sets of two names that were claimed
+/// with 0.9 and more on tuning seeds of the blind campaign 31 were the hidden ones, of 154 single names 152.
+const FURTHER: f64 = 0.85;
+
+/// What the probability of a set loses for every name but the first.
+fn of_further_names(names: usize) -> f64 {
+    FURTHER.powi(names.saturating_sub(1) as i32)
 }
 
 /// Whether an effect is a zero that is older than the run: see [`tare`].

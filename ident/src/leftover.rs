@@ -136,9 +136,9 @@ fn leftover(rows: &[(usize, f64, f64)]) -> Leftover {
         let before = class.checked_sub(1).map_or(0.0, |k| whole[k]);
         let unknown = if HELD.contains(&class) { before } else { whole.iter().copied().fold(0.0, f64::max) };
         whole[class] = sums.iter().map(|part| part[class]).fold(Sum::default(), Sum::with).rms().unwrap_or(unknown);
-        for part in 0..PARTS {
+        for (scatter, sums) in left.scatter.iter_mut().zip(&sums) {
             // a part may be worse than the whole; that it is better few rows cannot tell
-            left.scatter[part][class] = sums[part][class].rms().unwrap_or(0.0).max(whole[class]);
+            scatter[class] = sums[class].rms().unwrap_or(0.0).max(whole[class]);
         }
     }
     left

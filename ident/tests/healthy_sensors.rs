@@ -111,8 +111,8 @@ fn an_encoder_that_brakes_is_slower_by_its_own_reading_too() {
 fn cuts_too_many_above_one_speed_are_those_of_a_twisted_blade() {
     let struck = |fast: f64| {
         move |k: usize, t: f64, rpm: f64| {
-            let often = (t / STEP).round() as u64 % 23 == 0;
-            let cuts = 8.0 + ((t / STEP).round() as u64 % 3) as f64;
+            let row = (t / STEP).round() as u64;
+            let (often, cuts) = (row.is_multiple_of(23), 8.0 + (row % 3) as f64);
             if k == 0 && often && rpm > fast { rpm * (cuts + 1.0) / cuts } else { rpm }
         }
     };

@@ -299,3 +299,20 @@ fn with_gain(log: &Log) -> Log {
     log.columns[2].values.iter_mut().for_each(|v| *v *= 1.03);
     log
 }
+
+#[test]
+fn a_cell_may_lose_a_third_of_the_thrust_and_two_names_are_claimed_less_surely() {
+    let c = Command::new(31);
+    let lost = |t: f64| thrust(c.speed(t)) * if t < 80.0 { 1.0 } else { 0.65 };
+    let one = verdict(&log(&c, [&|t| c.speed(t), &lost, &|t| torque(c.speed(t)), &|t| current(c.speed(t))], NOISE));
+    assert_eq!(names(&one), ["gain_change"]);
+    close_to(&one, "gain_change", -0.35, 0.005);
+    assert!(one.verdict.effects[0].probability > 0.9);
+    // each of two names may be wrong
+    let slow = lagged(&|t| current(c.speed(t)), 0.4);
+    let meter = |t: f64| slow[(t / STEP).round() as usize];
+    let two = verdict(&log(&c, [&|t| c.speed(t), &lost, &|t| torque(c.speed(t)), &meter], NOISE));
+    assert_eq!(names(&two).len(), 2, "{:?}", names(&two));
+    let claimed = two.verdict.effects[0].probability;
+    assert!((0.6..=0.85).contains(&claimed), "{claimed}");
+}

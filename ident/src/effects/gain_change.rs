@@ -57,7 +57,7 @@ impl Effect for GainChange {
                 name: "gain_change",
                 unit: "1",
                 range: (-0.5, 0.5),
-                starts: vec![-0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1],
+                starts: vec![-0.3, -0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1, 0.3],
             };
             if instance.form == BEFORE { vec![change] } else { vec![change, coarse_onset(context)] }
         }

@@ -46,7 +46,8 @@ impl Effect for SampleHold {
         let of_form =
             |t: &Target, form| Instance::new(&std::iter::once(t.name).chain(difference(t.name)).collect::<Vec<_>>(), form);
         let seen = |t: &Target| {
-            let form = if period(context, t).is_some() { Some("") } else { beneath_noise::clock(context, t).map(|_| BENEATH) };
+            let beneath = || context.against_model.then(|| beneath_noise::clock(context, t)).flatten();
+            let form = if period(context, t).is_some() { Some("") } else { beneath().map(|_| BENEATH) };
             form.map(|form| of_form(t, form))
         };
         context.targets.iter().filter(held).filter_map(seen).collect()

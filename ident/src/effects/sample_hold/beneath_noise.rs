@@ -26,8 +26,9 @@ const ONE_PHASE: (f64, f64) = (0.8, 10.0);
 const AS_GOOD: f64 = 0.95;
 /// Time from the first change within which the rate is first looked for, s.
 const LOOK: f64 = 300.0;
-/// Standard deviation of the lateness as a share of the period: a twelfth's root for a hold, none for a delay.
-const LATE: f64 = 0.12;
+/// Mean and standard deviation of the lateness as shares of the period: a half and a twelfth's root for a hold. A delay is late by the same
+/// every time, and what follows the load is hardly late.
+const LATE: (f64, f64) = (0.25, 0.12);
 
 /// When a held channel takes new values.
 #[derive(Debug, Clone, Copy)]
@@ -104,6 +105,6 @@ impl Clock {
         let n = late.len().max(1) as f64;
         let mean = late.iter().sum::<f64>() / n;
         let spread = (late.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / n).sqrt();
-        late.len() > 5 && spread > LATE * self.period
+        late.len() > 5 && mean > LATE.0 * self.period && spread > LATE.1 * self.period
     }
 }
