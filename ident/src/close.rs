@@ -162,7 +162,11 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
             if let Some(at) = channels.iter().position(|c| *c == first) {
                 channels.swap(0, at);
             }
-            let Words { depends_on, equation, evidence } = words(p, &first, reduction);
+            let Words { depends_on, equation, mut evidence } = words(p, &first, reduction);
+            if let Some((target, times)) = noisier(context, p) {
+                evidence =
+                    format!("{} scatters {times:.1} times as much as on the day of the declared model; {evidence}", target.name);
+            }
             let entry = EffectEntry {
                 id: p.effect.id().to_owned(),
                 depends_on,
@@ -178,6 +182,12 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
         .collect();
     out.sort_by(|a, b| b.0.total_cmp(&a.0));
     out.into_iter().map(|(_, entry)| entry).collect()
+}
+
+/// The channel of an unexplained dependence that has grown noisier by most, and by how much.
+fn noisier<'c>(context: &'c Context, placed: &Placed) -> Option<(&'c Target, f64)> {
+    let touched = context.targets.iter().filter(|t| placed.effect.id() == "unknown" && placed.instance.touches(t.name));
+    touched.filter_map(|t| Some((t, t.noisier()?))).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// What is said of an effect that removes such a share of the held-out error of its first channel.

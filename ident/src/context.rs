@@ -130,6 +130,8 @@ pub struct Target {
     pub known: Vec<f64>,
     /// Share of the noise in the scatter that it is known to leave about that, on every row of the log; empty without one.
     pub trust: Vec<f64>,
+    /// Root mean square about the curve where the load was held on the day of a declared model; 0 without one.
+    pub usual: f64,
     /// For each sample whether the load has just jumped; empty where too few have, or too few have not, to tell the two apart.
     pub unsettled: Vec<bool>,
 }
@@ -139,6 +141,10 @@ pub struct Target {
 const LEVELLED: f64 = 0.5;
 /// Share of the mean variance in the likelihood: enough to keep a standing rotor's silence from counting without bound.
 const FLOORED: f64 = 0.05;
+
+/// Times what a channel scattered on the day of a declared model from which on it is noisier than days differ: twice is seen where gusts
+/// are taken for noise on one day and for the rotor's way on another.
+const NOISIER: f64 = 4.0;
 
 /// Below this speed, rev/min, a rotor counts as standing: slower than any brushless motor runs without position sensors.
 pub(crate) const STANDSTILL: f64 = 100.0;
@@ -171,6 +177,7 @@ impl Target {
             unclaimed: Vec::new(),
             known: Vec::new(),
             trust: Vec::new(),
+            usual: 0.0,
             unsettled,
         }
     }
@@ -185,6 +192,7 @@ impl Target {
     /// every row of the log, and how often the run repeats each class.
     fn allow(&mut self, left: &Leftover, load: &[f64], classes: &[usize], alike: &leftover::Alike) {
         self.known = load.iter().map(|x| left.known(*x)).collect();
+        self.usual = left.held();
         let noise = self.noise.rms;
         let square = |row: usize| left.variance(load[row], classes[row], alike, noise);
         for variances in [&mut self.levelled, &mut self.floored] {
@@ -203,6 +211,13 @@ impl Target {
     #[must_use]
     pub fn as_it_stands(&self, row: usize, residual: f64) -> f64 {
         residual + self.known.get(row).copied().unwrap_or(0.0)
+    }
+
+    /// How many times what it scattered on the day of a declared model the channel does now, where that is more than days differ.
+    #[must_use]
+    pub fn noisier(&self) -> Option<f64> {
+        let times = if self.usual > 0.0 { self.noise.rms / self.usual } else { 0.0 };
+        (times > NOISIER).then_some(times)
     }
 
     /// The least scale of the variances that a fit may have: a tenth of the noise's standard deviation; what a declared model leaves over

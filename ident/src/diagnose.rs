@@ -14,7 +14,7 @@ use crate::effects::{self, Effect, Instance};
 use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, is_plausible, plausible, scatters};
 use crate::moment::lasts;
-use crate::opponent::{explains, nameless, opponent};
+use crate::opponent::{explains, nameless, noisier, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
@@ -158,7 +158,8 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         rivals.insert(0, Rival { ids: best.ids(), probability, fit: best.fit.clone() });
     }
     let forced = || if named && !turned_down { None } else { nameless(context, declared, &start) };
-    let unexplained = won.or_else(forced);
+    let nothing_but_zeros = best.fit.placed.iter().all(is_tare);
+    let unexplained = won.or_else(forced).or_else(|| if nothing_but_zeros { noisier(context) } else { None });
     let is_unknown = unexplained.is_some();
     if let Some(group) = unexplained {
         (best, errors) = correct(context, declared, &start, &folds, &heldout_before, &group);

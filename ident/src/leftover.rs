@@ -2,8 +2,9 @@
 //!
 //! What it is: no model is a rig. By how much it is off on a day when nothing was wrong is written down beside each channel's polynomial: as
 //! a curve over the load where the load is held, and about that curve as a scatter that depends on the time since the load last jumped.
-//! The noise is part of the scatter: a rotor in gusts wanders, and how much of that the noise of a run is said to hold differs from day to day. When a later run is held against the model (`--model`) the curve is known and the scatter weighs, so that a departure
-//! which the healthy day has as well is no news.
+//! The noise is part of the scatter: a rotor in gusts wanders, and how much of that the noise of a run is said to hold differs from day to
+//! day. When a later run is held against the model (`--model`) the curve is known and the scatter weighs, so that a departure which the
+//! healthy day has as well is no news.
 //! What can go wrong: what is off while the load changes repeats itself from run to run, and looks like noise here.
 //! Units: the channel's; the curve's load in krpm or kus as the polynomial's.
 //! Reference: model discrepancy, Kennedy & O'Hagan 2001, JRSS B 63:425; specification `closing-the-loop.md`, step 1.
@@ -57,6 +58,11 @@ impl Leftover {
             (Some(only), None) | (None, Some(only)) => only.1,
             (None, None) => 0.0,
         }
+    }
+
+    /// The largest scatter where the load is held.
+    pub(crate) fn held(&self) -> f64 {
+        self.scatter.iter().flat_map(|part| &part[HELD]).copied().fold(0.0, f64::max)
     }
 
     /// The part of the curve's range that a load is in.

@@ -123,6 +123,13 @@ fn twin(context: &Context, target: &Target, name: &str) -> bool {
 /// Residual over noise floor, and whiteness, beyond which something is there even if nothing that we try predicts it.
 const LEFT_OVER: (f64, f64) = (1.3, 1e-6);
 
+/// Channels that are noisier than on the day of a declared model by more than days differ.
+pub(crate) fn noisier(context: &Context) -> Option<Vec<usize>> {
+    let judged = |t: &Target| !t.relation.is_evidence() && t.rows.len() >= FEWEST_SAMPLES.0;
+    let noisy = (0..context.targets.len()).filter(|k| judged(&context.targets[*k]) && context.targets[*k].noisier().is_some());
+    Some(noisy.collect::<Vec<usize>>()).filter(|channels| !channels.is_empty())
+}
+
 /// Where no name and no smooth function won although a residual is large and coloured, something is there all the same: on these
 /// channels.
 pub(crate) fn nameless(context: &Context, declared: Declared<'_>, start: &Fit) -> Option<Vec<usize>> {

@@ -10,6 +10,7 @@ mod rig;
 use ident::close::{Closed, close};
 use ident::log::{Column, Log};
 use ident::model::Model;
+use ident::verdict::Kind;
 use rig::Chance;
 
 const STEP: f64 = 0.05;
@@ -25,11 +26,13 @@ struct Day<'d> {
     reads: &'d dyn Fn(usize, f64, f64) -> f64,
     /// Instant that the load cell shows at an instant, s.
     shows: &'d dyn Fn(f64) -> f64,
+    /// Noise of the beam, rev/min.
+    beam: f64,
     /// Random walk of the speed, rev/min a row.
     gusts: f64,
 }
 
-const HEALTHY: Day<'static> = Day { seed: 1, drag: &|_| 0.0, reads: &|_, _, rpm| rpm, shows: &|t| t, gusts: 0.0 };
+const HEALTHY: Day<'static> = Day { seed: 1, drag: &|_| 0.0, reads: &|_, _, rpm| rpm, shows: &|t| t, beam: 1.0, gusts: 0.0 };
 
 /// Command at each row: the same levels of 2 to 5 s every day.
 fn command() -> Vec<f64> {
@@ -65,7 +68,7 @@ fn log(day: &Day<'_>) -> Log {
     let drawn = |i: usize| 0.3 + 0.05 * krpm(i).powi(3) + (day.drag)(t[i]) * speeds[i] * std::f64::consts::TAU / 60.0 / 12.0;
     let mut columns = vec![Column { name: "pulse_us".to_owned(), values: pulse }];
     for (k, name) in SENSORS.into_iter().enumerate() {
-        columns.push(noisy(name, 1.0, &|i| (day.reads)(k, t[i], speeds[i])));
+        columns.push(noisy(name, if k == 0 { day.beam } else { 1.0 }, &|i| (day.reads)(k, t[i], speeds[i])));
     }
     columns.push(noisy("thrust_n", 0.01, &|i| 0.25 * krpm(row((day.shows)(t[i]))).powi(2)));
     columns.push(noisy("torque_nm", 0.0003, &|i| 0.004 * krpm(i).powi(2)));
@@ -154,4 +157,19 @@ fn no_name_rests_on_one_moment() {
     let slow = |k: usize, t: f64, rpm: f64| if k == 3 && (60.0..60.25).contains(&t) { rpm - 400.0 * (60.3 - t) } else { rpm };
     let once = against(&model(&HEALTHY), &Day { seed: 9, reads: &slow, ..HEALTHY });
     assert_eq!(names(&once), [""; 0]);
+}
+
+#[test]
+fn a_sensor_that_grows_noisy_is_news_without_a_name() {
+    let model = model(&HEALTHY);
+    let noisy = against(&model, &Day { seed: 20, beam: 6.0, ..HEALTHY });
+    assert_eq!((noisy.verdict.verdict, names(&noisy)), (Kind::Unattributed, vec!["unknown"]));
+    let found = &noisy.verdict.effects[0];
+    assert_eq!(found.channels, ["rpm_beam"]);
+    assert!(
+        found.evidence.starts_with("rpm_beam scatters 6.") || found.evidence.starts_with("rpm_beam scatters 5."),
+        "{}",
+        found.evidence
+    );
+    assert_eq!(names(&against(&model, &Day { seed: 21, beam: 2.0, ..HEALTHY })), [""; 0]);
 }

@@ -67,7 +67,8 @@ impl Effect for SampleHold {
         let Some(target) = target(context, instance) else { return };
         let mut fresh = vec![false; context.len()];
         if instance.form == BENEATH {
-            beneath_noise::clock(context, target).iter().for_each(|clock| clock.mark(&context.t, &mut fresh));
+            let Some(clock) = beneath_noise::clock(context, target) else { return };
+            clock.mark(&context.t, &mut fresh);
         } else {
             updates(target).into_iter().for_each(|i| fresh[i] = true);
         }
