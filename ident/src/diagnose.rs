@@ -314,6 +314,8 @@ pub(crate) fn round_of(
     }
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     let sketch = Rows::Every(stride(context, SKETCH));
+    // against a model many a name fits a moment on its grid, and stands before the one that fits the run once it is refined
+    let refined = if context.against_model { 2 * REFINED } else { REFINED };
     let mut out: Vec<Candidate> = Vec::new();
     let mut most = f64::NEG_INFINITY;
     for (k, (gain, placed)) in ranked.into_iter().enumerate() {
@@ -322,7 +324,7 @@ pub(crate) fn round_of(
             break;
         }
         // what explains on its grid alone twice as much as all that came out so far is worth a refinement, whatever stands before it
-        let promising = k < REFINED || k < 3 * REFINED && gain > (2.0 * most).max(0.0);
+        let promising = k < refined || k < 3 * refined && gain > (2.0 * most).max(0.0);
         let placed = if promising { refine_newest(context, declared, &placed, sketch, 120) } else { placed };
         if let Some(fitted) =
             fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))

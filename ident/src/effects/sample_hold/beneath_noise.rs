@@ -54,7 +54,7 @@ impl Clock {
 /// The clock of a channel's updates, where its changes have one.
 pub(super) fn clock(context: &Context, target: &Target) -> Option<Clock> {
     let dt = context.step();
-    let runs = changes(target);
+    let runs = changes(context, target);
     let long = runs.iter().filter(|run| run.1 > LONGEST_CHANGE).count();
     let rows: Vec<usize> = runs.iter().map(|run| run.0).collect();
     let times: Vec<f64> = rows.iter().map(|row| context.t[*row]).collect();
@@ -82,10 +82,11 @@ pub(super) fn clock(context: &Context, target: &Target) -> Option<Clock> {
 }
 
 /// Runs of rows on which a channel reads clearly another value than on the row before: the first of them, and how many.
-fn changes(target: &Target) -> Vec<(usize, usize)> {
-    let least = CHANGED * target.noise.rms;
+fn changes(context: &Context, target: &Target) -> Vec<(usize, usize)> {
+    let speed = |row: usize| context.rpm.get(row).copied().unwrap_or(0.0);
+    let least = |rows: &[usize]| rows.iter().map(|row| target.noise.variance(speed(*row))).fold(0.0, f64::max).sqrt() * CHANGED;
     let pairs = target.y.windows(2).zip(target.rows.windows(2));
-    let changed = pairs.filter(|(y, rows)| rows[1] == rows[0] + 1 && (y[1] - y[0]).abs() > least).map(|(_, rows)| rows[1]);
+    let changed = pairs.filter(|(y, rows)| rows[1] == rows[0] + 1 && (y[1] - y[0]).abs() > least(rows)).map(|(_, rows)| rows[1]);
     let mut out: Vec<(usize, usize)> = Vec::new();
     for row in changed {
         match out.last_mut() {
