@@ -130,7 +130,19 @@ fn campaign(words: &[String]) -> Result<(), String> {
     let found = found.into_inner().expect("no worker panics");
     let text = report(&found.into_values().filter(|l| l.seed >= from).collect::<Vec<_>>(), wanted, from);
     print!("{text}");
-    page.map_or(Ok(()), |file| std::fs::write(&file, text).map_err(|e| format!("{file}: {e}")))
+    page.map_or(Ok(()), |file| std::fs::write(&file, onto(&file, &text)).map_err(|e| format!("{file}: {e}")))
+}
+
+/// Heading of the part of the page that this command writes anew; what a page has before it stays.
+const OWN: &str = "## Its own next experiments\n";
+
+/// The page with its own part written anew.
+fn onto(file: &str, text: &str) -> String {
+    let old = std::fs::read_to_string(file).unwrap_or_default();
+    match (old.find(OWN), text.find(OWN)) {
+        (Some(kept), Some(own)) => format!("{}{}", &old[..kept], &text[own..]),
+        _ => text.to_owned(),
+    }
 }
 
 /// The scenario of a seed: what it hides, and its file. The room warms or cools in all of them, so that time and temperature go
