@@ -142,7 +142,7 @@ const LEVELLED: f64 = 0.5;
 /// Share of the mean variance in the likelihood: enough to keep a standing rotor's silence from counting without bound.
 const FLOORED: f64 = 0.05;
 
-/// Times what a channel scattered on the day of a declared model from which on it is noisier than days differ: twice is seen where gusts
+/// Times what a channel scattered on the day of a declared model from which on it is noisier than days differ: 2.6 times is seen where gusts
 /// are taken for noise on one day and for the rotor's way on another.
 const NOISIER: f64 = 4.0;
 

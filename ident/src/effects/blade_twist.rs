@@ -58,7 +58,7 @@ impl Effect for BladeTwist {
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let [onset] = shape else { return };
         if instance.form == SCATTERED {
-            struck_readings(context, instance, design);
+            struck_readings(context, instance, *onset, design);
         } else {
             add_hinge(context, *onset, position, design);
         }

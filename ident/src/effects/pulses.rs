@@ -179,11 +179,13 @@ pub(super) fn struck_speeds(context: &Context, instance: &Instance) -> Option<St
     (speeds.unlikely > UNLIKELY).then_some(speeds)
 }
 
-/// Takes readings with pulses too many for what they read, on the difference from the other channels: how many pulses each of them
-/// holds too many is its own.
-pub(super) fn struck_readings(context: &Context, instance: &Instance, design: &mut TargetDesign) {
+/// Takes readings with pulses too many above a speed for what they read, on the difference from the other channels: how many pulses each
+/// of them holds too many is its own.
+pub(super) fn struck_readings(context: &Context, instance: &Instance, onset: f64, design: &mut TargetDesign) {
     let (Relation::SpeedDifference, Some(target)) = (design.relation, difference(context, instance)) else { return };
-    as_they_read(target, &gross(context, target, 1.0), design);
+    let mut on = gross(context, target, 1.0);
+    on.iter_mut().zip(&context.rpm).filter(|(_, rpm)| **rpm <= (1.0 - HELD) * onset).for_each(|(on, _)| *on = 0.0);
+    as_they_read(target, &on, design);
 }
 
 /// Takes what a channel departs from the others by for what it is, on some rows.
