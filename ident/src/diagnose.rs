@@ -19,6 +19,7 @@ use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
 use crate::search::{base, connected, refine, refine_newest, scan, stride};
+use crate::suspects::{nearest, stand_beside, suspects};
 use crate::together::{Ground, choose_pair};
 
 /// Most effects on one channel.
@@ -45,6 +46,9 @@ const SKETCH: usize = 2700;
 const SHOWN: usize = 10;
 /// Share of the winner's probability at which a second hypothesis makes the verdict ambiguous.
 const RIVAL: f64 = 0.5;
+
+/// Share of the winner's probability from which on a rival of an ambiguous verdict must be considered.
+const CONSIDERED: f64 = 0.1;
 
 /// Probability below which a verdict is ambiguous although no single rival comes close.
 const UNSURE: f64 = 0.6;
@@ -92,6 +96,19 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Whether the verdict stands for an effect of the winner: where two hypotheses explain the residual about equally well, it stands for what
+    /// they share. A rival that is a tenth as probable as the winner is one of them.
+    #[must_use]
+    pub fn claims(&self, position: usize) -> bool {
+        let ids = self.best.ids();
+        let Some(id) = ids.get(position) else { return false };
+        let count = |of: &[String]| of.iter().filter(|i| *i == id).count();
+        let shares = |rival: &Rival| {
+            if rival.ids.len() == ids.len() { rival.ids[position] == *id } else { count(&rival.ids) >= count(&ids) }
+        };
+        !self.ambiguous() || self.rivals.iter().filter(|r| r.probability > CONSIDERED * self.probability).all(shares)
+    }
+
     /// Whether two hypotheses explain the residual about equally well.
     #[must_use]
     pub fn ambiguous(&self) -> bool {
@@ -157,14 +174,21 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     if turned_down {
         rivals.insert(0, Rival { ids: best.ids(), probability, fit: best.fit.clone() });
     }
-    let forced = || if named && !turned_down { None } else { nameless(context, declared, &start) };
+    // zeros that are older than the run are no cause of what else is left
     let nothing_but_zeros = best.fit.placed.iter().all(is_tare);
+    let forced = || match (named && !turned_down, nothing_but_zeros) {
+        (true, true) => nameless(context, declared, &best.fit),
+        (true, false) => None,
+        (false, _) => nameless(context, declared, &start),
+    };
     let unexplained = won.or_else(forced).or_else(|| if nothing_but_zeros { noisier(context) } else { None });
     let is_unknown = unexplained.is_some();
+    let suspects = if is_unknown || named { suspects(context, declared, &start) } else { Vec::new() };
     if let Some(group) = unexplained {
         (best, errors) = correct(context, declared, &start, &folds, &heldout_before, &group);
         probability = UNEXPLAINED;
-        list_nearest(&mut rivals, candidates.first().map_or(&[], Vec::as_slice), probability);
+        let singles = candidates.first().map_or(&[][..], Vec::as_slice);
+        list_nearest(&mut rivals, &nearest(context, &start, &suspects, singles), probability);
     }
     let heldout_without = loop {
         let without: Vec<Vec<Held>> = (0..best.fit.placed.len())
@@ -195,6 +219,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let of_names = |names: usize| of_further_names(names.saturating_sub(tares));
         probability *= of_names(best.fit.placed.len());
         rivals.iter_mut().for_each(|r| r.probability *= of_names(r.ids.len()));
+        stand_beside(&best, &mut probability, &mut rivals, &suspects);
     }
     progress(1.0);
     Some(Diagnosis {
@@ -250,6 +275,13 @@ pub(crate) struct Scanned {
     pub(crate) found: Option<(Vec<f64>, f64)>,
 }
 
+impl Scanned {
+    /// An instance that has not been scanned yet.
+    pub(crate) fn new(effect: &'static dyn Effect, instance: Instance) -> Self {
+        Self { effect, instance, found: None }
+    }
+}
+
 /// Fewest samples of a channel on which an effect with shape parameters is tried; a bare amplitude needs fewer.
 pub(crate) const FEWEST_SAMPLES: (usize, usize) = (30, 10);
 
@@ -261,7 +293,7 @@ pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
     };
     effects::library()
         .iter()
-        .flat_map(|e| e.instances(context).into_iter().map(|instance| Scanned { effect: *e, instance, found: None }))
+        .flat_map(|e| e.instances(context).into_iter().map(|instance| Scanned::new(*e, instance)))
         .filter(|o| enough(o.effect, &o.instance))
         .collect()
 }
@@ -347,7 +379,7 @@ pub(crate) fn round_of(
 }
 
 /// Evidence of each candidate beyond what it was added to, best first.
-fn weigh(context: &Context, best: &Candidate, candidates: &mut [Candidate]) {
+pub(crate) fn weigh(context: &Context, best: &Candidate, candidates: &mut [Candidate]) {
     let shares = shares(context, candidates.iter().map(|c| &c.fit));
     for c in candidates.iter_mut() {
         c.evidence = best.evidence + net_gain(context, &c.fit, &best.fit, &shares);

@@ -46,6 +46,7 @@ pub mod solve;
 pub mod sparse;
 mod start;
 mod steps;
+mod suspects;
 mod together;
 pub mod told;
 pub mod verdict;

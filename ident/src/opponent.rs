@@ -146,13 +146,8 @@ pub(crate) fn nameless(context: &Context, declared: Declared<'_>, start: &Fit) -
         let t: Vec<f64> = target.rows.iter().map(|row| context.t[*row]).collect();
         r.len() >= FEWEST_SAMPLES.0 && excess(i) > LEFT_OVER.0.powi(2) && whiteness(&t, r) < LEFT_OVER.1
     };
-    let group = groups(context)
-        .into_iter()
-        .filter(|g| g.iter().any(|i| left_over(*i)))
-        .max_by(|a, b| excess(a[0]).total_cmp(&excess(b[0])))?;
-    let may_depend_on = |v: &String| !is_load(context, &context.targets[group[0]], v);
-    let something = |v: &String| may_depend_on(v) && correction(context, declared, start, &group, v).is_some();
-    variables(context).iter().any(something).then_some(group)
+    let loud = groups(context).into_iter().filter(|g| g.iter().any(|i| left_over(*i)));
+    loud.max_by(|a, b| excess(a[0]).total_cmp(&excess(b[0])))
 }
 
 /// Share of what a channel shows above its noise that the names must take away to be believed.

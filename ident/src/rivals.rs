@@ -65,10 +65,10 @@ const LISTED: usize = 6;
 /// tuning half of the blind campaign 90 were right.
 pub(crate) const UNEXPLAINED: f64 = 0.9;
 
-/// Puts the effects that come nearest alone behind what was turned down, and shares what `unknown` leaves among all of them:
+/// Puts the effects that come nearest alone (see [`crate::suspects::nearest`]) behind what was turned down, and shares what `unknown` leaves among all of them:
 /// who must look for an unknown cause starts there.
 pub(crate) fn list_nearest(rivals: &mut Vec<Rival>, singles: &[Candidate], unknown: f64) {
-    for single in singles.iter().filter(|c| c.evidence > NEEDED_EVIDENCE) {
+    for single in singles {
         let ids = single.ids();
         if rivals.len() < LISTED && !rivals.iter().any(|r| r.ids == ids) {
             rivals.push(Rival { ids, probability: 0.0, fit: single.fit.clone() });

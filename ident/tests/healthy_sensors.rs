@@ -30,9 +30,12 @@ struct Day<'d> {
     beam: f64,
     /// Random walk of the speed, rev/min a row.
     gusts: f64,
+    /// Zero of the load cell, N.
+    zero: f64,
 }
 
-const HEALTHY: Day<'static> = Day { seed: 1, drag: &|_| 0.0, reads: &|_, _, rpm| rpm, shows: &|t| t, beam: 1.0, gusts: 0.0 };
+const HEALTHY: Day<'static> =
+    Day { seed: 1, drag: &|_| 0.0, reads: &|_, _, rpm| rpm, shows: &|t| t, beam: 1.0, gusts: 0.0, zero: 0.0 };
 
 /// Command at each row: the same levels of 2 to 5 s every day.
 fn command() -> Vec<f64> {
@@ -70,7 +73,7 @@ fn log(day: &Day<'_>) -> Log {
     for (k, name) in SENSORS.into_iter().enumerate() {
         columns.push(noisy(name, if k == 0 { day.beam } else { 1.0 }, &|i| (day.reads)(k, t[i], speeds[i])));
     }
-    columns.push(noisy("thrust_n", 0.01, &|i| 0.25 * krpm(row((day.shows)(t[i]))).powi(2)));
+    columns.push(noisy("thrust_n", 0.01, &|i| day.zero + 0.25 * krpm(row((day.shows)(t[i]))).powi(2)));
     columns.push(noisy("torque_nm", 0.0003, &|i| 0.004 * krpm(i).powi(2)));
     columns.push(noisy("current_a", 0.02, &drawn));
     Log { name: "day.csv".to_owned(), t, columns, ..Log::default() }
@@ -161,6 +164,13 @@ fn no_name_rests_on_one_moment() {
     let slow = |k: usize, t: f64, rpm: f64| if k == 3 && (60.0..60.25).contains(&t) { rpm - 400.0 * (60.3 - t) } else { rpm };
     let once = against(&model(&HEALTHY), &Day { seed: 9, reads: &slow, ..HEALTHY });
     assert_eq!(names(&once), [""; 0]);
+}
+
+#[test]
+fn a_new_zero_does_not_answer_for_the_rest() {
+    let wavers = |_: usize, t: f64, rpm: f64| rpm + 8.0 * (0.9 * t).sin();
+    let day = against(&model(&HEALTHY), &Day { seed: 23, reads: &wavers, zero: 0.2, ..HEALTHY });
+    assert_eq!((day.verdict.verdict, names(&day)), (Kind::Unattributed, vec!["unknown"]));
 }
 
 #[test]

@@ -316,3 +316,19 @@ fn a_cell_may_lose_a_third_of_the_thrust_and_two_names_are_claimed_less_surely()
     let claimed = two.verdict.effects[0].probability;
     assert!((0.6..=0.85).contains(&claimed), "{claimed}");
 }
+
+#[test]
+fn wrong_readings_come_after_the_meter() {
+    let command = Command::new(12);
+    let speed = |t: f64| command.speed(t);
+    // an ammeter that takes the mean of a second, and five readings of its line that are absurd
+    let mean = |t: f64| (0..40).map(|k| current(command.speed(t - 0.025 * f64::from(k)))).sum::<f64>() / 40.0;
+    let absurd = |t: f64| [401, 902, 1403, 2004, 2505].contains(&((t / STEP).round() as usize));
+    let read = |t: f64| if absurd(t) { 60.0 } else { mean(t) };
+    let run =
+        log(&command, [&speed, &|t| thrust(command.speed(t)), &|t| torque(command.speed(t)), &read], [1.0, 0.01, 0.0003, 0.02]);
+    let closed = close(&run, None, &[], &mut |_| {}).expect("a log");
+    let mut named: Vec<&str> = closed.verdict.effects.iter().map(|e| e.id.as_str()).collect();
+    named.sort_unstable();
+    assert_eq!(named, ["channel_filter", "glitch_rows"]);
+}

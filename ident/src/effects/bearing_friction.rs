@@ -72,9 +72,13 @@ impl Effect for BearingFriction {
 }
 
 /// Standard errors by which a torque must stand out where a meter sees it.
-const SEEN: f64 = 4.0;
+pub(super) const SEEN: f64 = 4.0;
 /// Share of the drag that an arm may read with the wrong sign: its own curve with the speed is not exact.
 const UNSEEN: f64 = 0.05;
+
+/// Share of a drag (at 300 rad/s) by which one of its two terms may fall below nothing, where the other takes more than all of it: the forms
+/// are not exact.
+const TRADED: f64 = 0.25;
 
 /// Drag is paid for: a measured current shows it. Where none was measured the torque arm, or a modest loss of speed, will do.
 pub(super) fn costs(context: &Context, fitted: &[Estimate]) -> bool {
@@ -114,13 +118,17 @@ pub(super) fn drag(context: &Context, on: &[f64], viscous: bool, position: usize
         Relation::SpeedFromPulse => (2, &|i| -1.0 / (1.0 + 2.0 * rho * load(i) / omega(i))),
         _ => return,
     };
+    let turning = STANDSTILL.min(TURNING * context.rpm.iter().copied().fold(0.0, f64::max));
     let column: Vec<f64> =
-        (0..context.len()).map(|i| if context.rpm[i] > STANDSTILL { on[i] * per_torque(i) } else { 0.0 }).collect();
+        (0..context.len()).map(|i| if context.rpm[i] > turning { on[i] * per_torque(i) } else { 0.0 }).collect();
     if viscous {
         design.add(position, first + 3, column.iter().enumerate().map(|(i, v)| v * omega(i)).collect());
     }
     design.add(position, first, column);
 }
+
+/// Share of the highest speed from which on a rotor turns, also below [`STANDSTILL`]: that of the starting pulse.
+pub(super) const TURNING: f64 = 0.01;
 
 /// rad/s in a rev/min.
 const OMEGA: f64 = std::f64::consts::TAU / 60.0;
@@ -179,7 +187,15 @@ pub(super) fn brakes(fitted: &[Estimate]) -> bool {
     // at 300 rad/s; a missing term is none
     let sum = |a: &str, b: &str| value(a).map(|a| a.value + 300.0 * value(b).map_or(0.0, |b| b.value));
     let unseen = UNSEEN * value("constant").map_or(0.0, |e| e.value.abs());
-    let some = |name: &str| value(name).is_none_or(|e| e.value > -2.0 * e.se - if name == "arm_constant" { unseen } else { 0.0 });
+    let traded = |name: &str| match name {
+        "constant" => TRADED * sum("constant", "viscous").unwrap_or(0.0),
+        "viscous" => TRADED * sum("constant", "viscous").unwrap_or(0.0) / 300.0,
+        "speed_loss" => TRADED * sum("speed_loss", "speed_loss_viscous").unwrap_or(0.0),
+        "speed_loss_viscous" => TRADED * sum("speed_loss", "speed_loss_viscous").unwrap_or(0.0) / 300.0,
+        "arm_constant" => unseen,
+        _ => 0.0,
+    };
+    let some = |name: &str| value(name).is_none_or(|e| e.value > -2.0 * e.se - traded(name).max(0.0));
     sum("constant", "viscous").is_none_or(|v| v > 0.0)
         && sum("speed_loss", "speed_loss_viscous").is_none_or(|v| v > 0.0)
         && AMPLITUDES.iter().all(|a| some(a.name))

@@ -6,9 +6,9 @@
 //! Units: N.m, 1; internally as `bearing_friction`.
 //! Reference: Beharie 2013, section 5.7.1 (the four speed sensors compared); power balance as `bearing_friction`.
 
-use super::bearing_friction::{AMPLITUDES, CONSTANT, brakes, costs, drag, with_share};
+use super::bearing_friction::{AMPLITUDES, CONSTANT, SEEN, TURNING, brakes, costs, drag, with_share};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, load_channels};
-use crate::context::Context;
+use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -55,15 +55,35 @@ impl Effect for EncoderDrag {
         }
     }
 
-    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
-        Vec::new()
+    /// An encoder that is never uncoupled: any friction that was always there looks like it.
+    fn suspects(&self, context: &Context) -> Vec<Instance> {
+        if context.rpm.is_empty() || share_coupled(context) <= THROUGHOUT {
+            return Vec::new();
+        }
+        vec![Instance::new(&load_channels(context, false), ALWAYS)]
+    }
+
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form != ALWAYS {
+            return Vec::new();
+        }
+        let top = context.rpm.iter().copied().fold(1.0, f64::max);
+        let starts = [0.03, 0.1, 0.3].map(|k| k * top).to_vec();
+        vec![Shape { name: "half_speed", unit: "rev/min", range: (0.002 * top, 2.0 * top), starts }]
     }
 
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        if instance.form == ALWAYS {
+            return vec![AMPLITUDES[1], AMPLITUDES[2], Amplitude { name: "start_current", unit: "A" }];
+        }
         if instance.form == CONSTANT { AMPLITUDES[..3].to_vec() } else { AMPLITUDES.to_vec() }
     }
 
-    fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        if let [half] = shape {
+            always(context, *half, position, design);
+            return;
+        }
         drag(context, &coupled(context), instance.form != CONSTANT, position, design);
     }
 
@@ -71,11 +91,36 @@ impl Effect for EncoderDrag {
         with_share(context, fitted)
     }
 
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        if share_coupled(context) > THROUGHOUT {
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        if instance.form == ALWAYS {
+            // what the speed loses is a curve beside another, and stands for what that lacks
+            let (mut braked, mut loads) =
+                (false, fitted.iter().filter(|e| ["arm_constant", "start_current"].contains(&e.name.as_str())));
+            return loads.all(|e| {
+                braked |= e.value > SEEN * e.se;
+                e.value > -2.0 * e.se
+            }) && braked;
+        }
+        if instance.channels.iter().all(|c| c == "torque_nm") && share_coupled(context) > THROUGHOUT {
             return fitted.iter().any(|e| e.name == "arm_constant" && e.value > 8.0 * e.se);
         }
         brakes(fitted) && costs(context, fitted)
+    }
+}
+
+/// Form of a brake that is never released: the static curves hold it, but for what it does where the rotor starts to turn.
+const ALWAYS: &str = "always";
+
+/// Adds the columns of a brake that is never released: a torque and a current that are there as soon as the rotor turns, and a loss of speed
+/// that is largest at the start, and half of that at a speed `half`.
+fn always(context: &Context, half: f64, position: usize, design: &mut TargetDesign) {
+    let turning = TURNING * context.rpm.iter().copied().fold(0.0, f64::max);
+    let column = |of: &dyn Fn(f64) -> f64| context.rpm.iter().map(|n| if *n > turning { of(*n) } else { 0.0 }).collect();
+    match design.relation {
+        Relation::Torque => design.add(position, 0, column(&|_| 1.0)),
+        Relation::SpeedFromPulse => design.add(position, 1, column(&|n| -1.0 / (1.0 + n / half))),
+        Relation::Current => design.add(position, 2, column(&|_| 1.0)),
+        _ => {}
     }
 }
 

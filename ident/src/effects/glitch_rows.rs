@@ -40,7 +40,7 @@ impl Effect for GlitchRows {
     }
 
     fn stage(&self) -> Stage {
-        Stage::Term
+        Stage::Readings
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {

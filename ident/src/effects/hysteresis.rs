@@ -2,7 +2,7 @@
 //!
 //! What it is: thrust_n += width * (direction / 2) * 4 f (1 - f), f the share of the full load, direction -1 going up and +1 coming down; or a play whose
 //! elements change sides one after the other.
-//! What can go wrong: needs a schedule that comes back; drift over an up-down sweep looks alike.
+//! What can go wrong: needs a schedule that comes back (one that only climbs makes it a suspect); drift over an up-down sweep looks alike.
 //! Units: N, at mid range.
 //! Reference: OIML R 60 (load cells), hysteresis error.
 
@@ -34,13 +34,12 @@ impl Effect for Hysteresis {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let direction = direction(context);
-        let (up, down) = (direction.iter().filter(|d| **d < 0.0).count(), direction.iter().filter(|d| **d > 0.0).count());
-        if present(context, &["thrust_n"]).is_empty() || up.min(down) * 20 < context.len() {
-            Vec::new()
-        } else {
-            vec![Instance::new(&["thrust_n"], ""), Instance::new(&["thrust_n"], PLAY)]
-        }
+        if comes_back(context) { forms(context) } else { Vec::new() }
+    }
+
+    /// A run that only climbs shows one side of it, which is a bend of the cell's curve.
+    fn suspects(&self, context: &Context) -> Vec<Instance> {
+        if comes_back(context) { Vec::new() } else { forms(context) }
     }
 
     fn shapes(&self, _: &Context, instance: &Instance) -> Vec<Shape> {
@@ -71,6 +70,20 @@ impl Effect for Hysteresis {
             .collect();
         design.add(position, 0, values);
     }
+}
+
+/// Whether a twentieth of the run is on the way up, and as much on the way down.
+fn comes_back(context: &Context) -> bool {
+    let direction = direction(context);
+    let (up, down) = (direction.iter().filter(|d| **d < 0.0).count(), direction.iter().filter(|d| **d > 0.0).count());
+    up.min(down) * 20 >= context.len()
+}
+
+fn forms(context: &Context) -> Vec<Instance> {
+    if present(context, &["thrust_n"]).is_empty() {
+        return Vec::new();
+    }
+    vec![Instance::new(&["thrust_n"], ""), Instance::new(&["thrust_n"], PLAY)]
 }
 
 /// Form in which the reading changes sides gradually: play elements in parallel.

@@ -1,11 +1,12 @@
 //! `rotor_inertia`: speeding the rotor up costs torque and current.
 //!
 //! What it is: torque_nm += inertia * domega/dt, current_a += current_gain * domega/dt.
-//! What can go wrong: shows only in transients; a lag between the channels looks alike.
+//! What can go wrong: shows only in transients; a lag between the channels looks alike, and so does, with the other sign, a current that a turning
+//! rotor draws beyond its curve: a negative inertia is refused, but against a declared model, whose rotor may have been heavier.
 //! Units: kg.m2, A.s2/rad.
 //! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt).
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
+use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -59,6 +60,11 @@ impl Effect for RotorInertia {
     fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
         let amplitude = usize::from(design.relation == Relation::Current);
         design.add(position, amplitude, acceleration(context));
+    }
+
+    /// Speeding up takes, it does not give. Against a model it is a difference of two inertias.
+    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        context.against_model || fitted.iter().all(|e| e.value > -2.0 * e.se) && fitted.iter().any(|e| e.value > 0.0)
     }
 }
 

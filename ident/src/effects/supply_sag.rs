@@ -1,7 +1,7 @@
 //! `supply_sag`: the supply gives way under load.
 //!
 //! What it is: voltage_v -= resistance * current_a: leads, connectors, the source itself.
-//! What can go wrong: without a measured voltage it cannot be told from a lower KV, and is not offered; without a measured
+//! What can go wrong: without a measured voltage it cannot be told from a lower KV, and is a suspect only; without a measured
 //! current the resistance is as uncertain as the efficiency that the current is estimated with.
 //! Units: ohm.
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
@@ -12,6 +12,9 @@ use crate::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct SupplySag;
+
+/// Form of a sag that no voltage shows.
+const UNSEEN: &str = "unseen";
 
 impl Effect for SupplySag {
     fn id(&self) -> &'static str {
@@ -47,8 +50,15 @@ impl Effect for SupplySag {
         }
     }
 
+    /// Without a measured voltage the speed that it takes is left, which a motor that gives way under load takes too.
+    fn suspects(&self, context: &Context) -> Vec<Instance> {
+        let speeds = super::speeds(context);
+        let unseen = context.draw().is_some() && present(context, &["voltage_v"]).is_empty() && !speeds.is_empty();
+        if unseen { vec![Instance::new(&speeds, UNSEEN)] } else { Vec::new() }
+    }
+
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
-        if instance.channels.len() < 2 {
+        if instance.touches("voltage_v") && instance.channels.len() < 2 {
             return Vec::new();
         }
         let most = context.draw().map_or(1.0, |(current, _)| current.iter().copied().fold(1e-3, f64::max));

@@ -5,7 +5,7 @@
 //! What can go wrong: a schedule whose levels last whole periods, or too few changes of the load, hide the updates; a channel that
 //! follows the load shows changes on rows that are next to each other, and is none.
 //! Units: s.
-//! Reference: Rayleigh's test of a common phase, Mardia & Jupp 2000, *Directional Statistics*, section 6.3.
+//! Reference: Rayleigh's test of a common phase, Mardia & Jupp 2000, *Directional Statistics*, sections 3.5.7 and 6.3.
 
 use super::{phase, slope};
 use crate::context::{Context, Target};
@@ -70,7 +70,7 @@ pub(super) fn clock(context: &Context, target: &Target) -> Option<Clock> {
     let rates: Vec<(f64, f64)> =
         (0..).map(|k| from + f64::from(k) * step).take_while(|f| *f < to).map(|f| (f, phase(known, f).1)).collect();
     let best = rates.iter().fold(0.0, |a: f64, r| a.max(r.1));
-    if best < ONE_PHASE.0 || known.len() as f64 * best * best < (rates.len() as f64).ln() + ONE_PHASE.1 {
+    if best < ONE_PHASE.0 || of_one_phase(known.len(), best, to * dt) < (rates.len() as f64).ln() + ONE_PHASE.1 {
         return None;
     }
     let first = rates.iter().position(|r| r.1 > AS_GOOD * best)?;
@@ -79,6 +79,15 @@ pub(super) fn clock(context: &Context, target: &Target) -> Option<Clock> {
     let (turn, _) = phase(&times, 1.0 / period);
     let clock = Clock { period, error, first: turn * period - 0.5 * dt };
     clock.is_late(context, &times).then_some(clock)
+}
+
+/// Evidence, nats, that phases whose mean has a length are of one phase and not of any: Rayleigh's, or where they lie close together that of a
+/// normal distribution of their width over a uniform one. None is closer than the row (a share of the shortest period) that each is read off.
+fn of_one_phase(n: usize, length: f64, row: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    let variance = (-2.0 * length.ln()).max((turn * row).powi(2) / 12.0);
+    let of_each = turn.ln() - 0.5 * (turn * std::f64::consts::E * variance).ln();
+    n as f64 * f64::max(of_each, length * length)
 }
 
 /// Runs of rows on which a channel reads clearly another value than on the row before: the first of them, and how many.
@@ -107,5 +116,20 @@ impl Clock {
         let mean = late.iter().sum::<f64>() / n;
         let spread = (late.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / n).sqrt();
         late.len() > 5 && mean > LATE.0 * self.period && spread > LATE.1 * self.period
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::of_one_phase;
+
+    #[test]
+    fn few_changes_that_lie_close_together_are_evidence_enough() {
+        // Rayleigh's measure of the same changes is n times the squared length
+        let (n, length, row) = (18, 0.9966, 0.02);
+        assert!(n as f64 * length * length < 18.0 && of_one_phase(n, length, row) > 50.0);
+        assert!((of_one_phase(n, 0.3, row) - 18.0 * 0.09).abs() < 1e-9, "what lies apart is Rayleigh's");
+        // what coarse rows make equal is not closer than they are
+        assert!(of_one_phase(n, 1.0 - 1e-12, 0.25) < 18.0 * 2.0);
     }
 }
