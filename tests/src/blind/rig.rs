@@ -251,8 +251,10 @@ impl Rig {
         if pulse < self.start {
             return 0.0;
         }
-        let declared = poly(&self.speed, (pulse - 1000.0) / 1000.0);
-        (declared + self.balance(pulse, d) - self.balance(pulse, self.declared())).max(0.0)
+        let (declared, driven) = (poly(&self.speed, (pulse - 1000.0) / 1000.0), self.balance(pulse, d));
+        // what a brake holds stands, and does not creep by what the declared curve and the balance differ
+        let held = d.drag > 0.0 && driven <= 0.0;
+        if held { 0.0 } else { (declared + driven - self.balance(pulse, self.declared())).max(0.0) }
     }
 
     /// Current of the rig at a speed in a state, A.

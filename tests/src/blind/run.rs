@@ -206,19 +206,32 @@ pub fn consensus(columns: &[(&'static str, Vec<f64>)], row: usize) -> f64 {
     0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2])
 }
 
+/// Where the refitted baseline has its starting pulse: the pulse that parts standing from turning with the fewest exceptions. A brake that
+/// only makes the rotor start later leaves nothing over there.
+fn starts_at(rig: &Rig, pulse: &[f64], n: &[f64]) -> f64 {
+    let stands: Vec<bool> = n.iter().map(|n| *n < 0.01 * rig.top).collect();
+    let mut cuts: Vec<f64> = pulse.iter().copied().filter(|p| *p >= rig.start).collect();
+    cuts.sort_by(f64::total_cmp);
+    cuts.dedup();
+    let exceptions = |cut: f64| pulse.iter().zip(&stands).filter(|(p, stands)| (**p >= cut) == **stands).count();
+    let best = cuts.into_iter().map(|cut| (exceptions(cut), cut)).min_by(|a, b| a.0.cmp(&b.0));
+    best.map_or(rig.start, |(_, cut)| cut)
+}
+
 /// What the declared baseline, refitted, leaves over in each channel of a quiet run, over the channel's noise floor.
 #[must_use]
 pub fn sizes(rig: &Rig, quiet: &Run) -> Vec<(&'static str, f64)> {
     let rows = quiet.t.len();
     let pulse = &quiet.columns[0].1;
     let n: Vec<f64> = (0..rows).map(|r| consensus(&quiet.columns, r)).collect();
+    let start = starts_at(rig, pulse, &n);
     quiet
         .columns
         .iter()
         .filter_map(|(name, y)| {
             let (x, degree, keep): (Vec<f64>, usize, Vec<bool>) = match *name {
                 c if c.starts_with("rpm") => {
-                    (pulse.iter().map(|p| (p - 1000.0) / 1000.0).collect(), 3, pulse.iter().map(|p| *p >= rig.start).collect())
+                    (pulse.iter().map(|p| (p - 1000.0) / 1000.0).collect(), 3, pulse.iter().map(|p| *p >= start).collect())
                 }
                 "thrust_n" | "torque_nm" => (n.iter().map(|v| v / 1000.0).collect(), 2, vec![true; rows]),
                 "current_a" => (n.iter().map(|v| v / 1000.0).collect(), 3, vec![true; rows]),

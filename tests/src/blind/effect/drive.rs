@@ -84,14 +84,15 @@ impl<'a> Train<'a> {
         v.max(3.0)
     }
 
-    fn drive(&self, t: f64, air: Air, amps: f64) -> Drive {
+    /// What drives a rotor that is to turn at a speed, whatever it did before.
+    fn drive(&self, t: f64, air: Air, amps: f64, speed: f64) -> Drive {
         let mut d = Drive { volt: self.voltage(amps), ..self.rig.declared() };
         for e in self.effects {
             let late = t >= e.t0;
             match e.id {
                 "thermal_derate" => d.resistance += e.strength * self.heat,
-                "bearing_friction" if late => d.drag += friction(e, self.speed),
-                "encoder_drag" => d.drag += friction(e, self.speed),
+                "bearing_friction" if late => d.drag += friction(e, speed.max(TURNING)),
+                "encoder_drag" => d.drag += friction(e, speed.max(TURNING)),
                 "air_density" => d.load *= density_ratio(air),
                 "blade_damage" if late => d.load *= 1.0 + e.b * e.strength,
                 _ => {}
@@ -112,9 +113,9 @@ impl<'a> Train<'a> {
         let rig = self.rig;
         let pulse = self.pulse(pulse);
         let mut amps = self.current;
-        let (mut wanted, mut d) = (0.0, rig.declared());
+        let (mut wanted, mut d) = (self.speed, rig.declared());
         for _ in 0..3 {
-            d = self.drive(t, air, amps);
+            d = self.drive(t, air, amps, wanted);
             wanted = rig.speed_at(pulse, d);
             amps = rig.current_at(wanted, d);
         }
@@ -197,6 +198,9 @@ impl<'a> Train<'a> {
         Output { speed: n, thrust, torque: torque + carried, current: reading, voltage: self.voltage(self.current) }
     }
 }
+
+/// Speed at which friction holds a rotor that has just been asked to turn, rev/min.
+const TURNING: f64 = 2.0;
 
 /// Friction torque of a turning rotor, N.m.
 fn friction(e: &Effect, n: f64) -> f64 {
