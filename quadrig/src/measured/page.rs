@@ -63,7 +63,7 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     for o in outcomes {
         let _ = writeln!(out, "{}", summary(o));
     }
-    out.push_str("\nA cause holds on another run where the model that was corrected on the first predicts the other, as it stands but for one constant a channel, at least 2 % better on a channel that the effect touches than the same model refitted without it.\n");
+    out.push_str("\nA cause holds on another run where the model that was corrected on the first predicts the other, as it stands but for one constant a channel, at least 2 % better on a channel that the effect touches than the same model refitted without it; one that the readings show by themselves (a grid that they lie on) where the other run's show it too. An ambiguous verdict stands for what its hypotheses share, those that are a tenth as probable as the first included; what they differ by is left open, and counted apart.\n");
     let absent: Vec<&str> = SETS
         .iter()
         .filter(|s| outcomes.iter().any(|o| o.set.folder == s.folder && o.runs.is_empty()))
@@ -104,7 +104,12 @@ pub(crate) fn summary(o: &Outcome) -> String {
     }
     named.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
     let list = |l: Vec<String>| if l.is_empty() { "-".to_owned() } else { l.join(", ") };
-    let held = o.tried.iter().filter(|t| t.holds()).count();
+    let of = |claimed: bool| -> (usize, usize) {
+        let tried = || o.tried.iter().filter(move |t| t.claimed == claimed);
+        (tried().filter(|t| t.holds()).count(), tried().count())
+    };
+    let ((held, claimed), (open_held, open)) = (of(true), of(false));
+    let left_open = if open == 0 { String::new() } else { format!("; {open_held} of {open} of what is left open") };
     format!(
         "| [{}](measured/{}.md) | {} | {} | {} | {} |",
         o.set.folder,
@@ -112,7 +117,7 @@ pub(crate) fn summary(o: &Outcome) -> String {
         o.runs.len(),
         list(verdicts.iter().map(|(k, n)| format!("{n} {k}")).collect()),
         list(named.iter().map(|(k, n)| format!("{k} ({n})")).collect()),
-        if o.tried.is_empty() { "one run a rig".to_owned() } else { format!("{held} of {} trials", o.tried.len()) }
+        if o.tried.is_empty() { "one run a rig".to_owned() } else { format!("{held} of {claimed} trials{left_open}") }
     )
 }
 
@@ -300,19 +305,20 @@ fn crossed(out: &mut String, o: &Outcome) {
         }
         return;
     }
-    out.push_str("\n## On the rig's other runs\n\nThe model corrected on one run predicts the others as it stands but for one constant a channel (tare, supply level), and so does the same model refitted without the effect.\n\n| effect | named on | tried on | channel | error without | with | holds | named there too |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+    out.push_str("\n## On the rig's other runs\n\nThe model corrected on one run predicts the others as it stands but for one constant a channel (tare, supply level), and so does the same model refitted without the effect.\n\n| effect | named on | tried on | channel | error without | with | the verdict stands for it | holds | named there too |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
     for t in &o.tried {
         let yes = |b: bool| if b { "yes" } else { "no" };
         let _ = writeln!(
             out,
-            "| {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             t.id,
             t.from,
             t.on,
             t.channel,
             three(t.errors.0),
             three(t.errors.1),
-            yes(t.holds()),
+            if t.claimed { "yes" } else { "left open" },
+            if t.seen_there == Some(true) { "in the readings" } else { yes(t.holds()) },
             yes(t.named_there)
         );
     }
