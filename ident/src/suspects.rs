@@ -44,9 +44,14 @@ pub(crate) fn nearest(context: &Context, start: &Fit, suspects: &[Candidate], si
     all
 }
 
-/// Puts the best suspect beside names that explain no more than it does alone: it is then as probable as they are.
+/// Puts the best suspect beside other names on its channels that explain no more than it does alone: it is then as probable as they are.
 pub(crate) fn stand_beside(best: &Candidate, probability: &mut f64, rivals: &mut Vec<Rival>, suspects: &[Candidate]) {
-    let Some(suspect) = suspects.first().filter(|s| s.evidence > best.evidence) else { return };
+    let names = best.ids();
+    let another = |s: &&Candidate| {
+        let on_its_channels = |p: &Placed| s.fit.placed.iter().any(|q| q.instance.channels.iter().any(|c| p.instance.touches(c)));
+        s.evidence > best.evidence && best.fit.placed.iter().any(on_its_channels) && s.ids().iter().all(|id| !names.contains(id))
+    };
+    let Some(suspect) = suspects.iter().find(another) else { return };
     *probability *= 0.5;
     rivals.iter_mut().for_each(|r| r.probability *= 0.5);
     rivals.insert(0, Rival { ids: suspect.ids(), probability: *probability, fit: suspect.fit.clone() });

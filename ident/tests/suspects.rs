@@ -102,6 +102,20 @@ fn an_encoder_that_is_never_uncoupled_is_suspected_of_what_a_turning_rotor_draws
     assert_suspected(&closed(&log(scattered(), columns)), "encoder_drag");
 }
 
+/// The arm sees the brake, and it is named: the suspect of the same name does not stand beside it.
+#[test]
+fn a_brake_that_the_arm_sees_is_named_without_a_doubt() {
+    let rpm: Vec<f64> = scattered().iter().map(|p| speed(*p)).collect();
+    let turning = |n: f64, more: f64| if n > 0.0 { more } else { 0.0 };
+    let torque = rpm.iter().map(|n| 0.004 * (n / 1000.0).powi(2) + turning(*n, 0.01)).collect();
+    let current = rpm.iter().map(|n| amps(*n) + turning(*n, 0.9)).collect();
+    let columns = vec![("rpm_encoder", rpm.clone(), 1.0), ("torque_nm", torque, 0.0003), ("current_a", current, 0.02)];
+    let verdict = closed(&log(scattered(), columns)).verdict;
+    let named: Vec<&str> = verdict.effects.iter().map(|e| e.id.as_str()).collect();
+    assert!(named.contains(&"encoder_drag"), "{named:?}");
+    assert!(verdict.alternatives.iter().all(|a| a.ids != ["encoder_drag"]), "{:?}", verdict.alternatives);
+}
+
 /// A current that falls while the rotor speeds up: what `rotor_inertia` would be with the wrong sign.
 #[test]
 fn an_inertia_that_gives_while_the_rotor_speeds_up_is_none() {
@@ -121,9 +135,9 @@ fn an_inertia_that_gives_while_the_rotor_speeds_up_is_none() {
 #[test]
 fn a_sweep_of_single_readings_says_nothing_of_time() {
     let mut chance = Chance::new(5);
-    let n = 14;
+    let n = 40;
     let t: Vec<f64> = (0..n).map(|i| 4.0 * i as f64).collect();
-    let pulse: Vec<f64> = (0..n).map(|i| 1100.0 + 60.0 * i as f64).collect();
+    let pulse: Vec<f64> = (0..n).map(|i| 1100.0 + 20.0 * i as f64).collect();
     let mut noisy = |of: &dyn Fn(usize) -> f64, noise: f64| (0..n).map(|i| of(i) + noise * chance.normal()).collect::<Vec<f64>>();
     let rpm = noisy(&|i| speed(pulse[i]), 0.5);
     let thrust = noisy(&|i| 0.25 * (speed(pulse[i]) / 1000.0).powi(2) + 0.004 * t[i], 0.003);

@@ -181,7 +181,7 @@ pub(super) fn with_share(context: &Context, mut fitted: Vec<Estimate>) -> Vec<Es
     fitted
 }
 
-/// Friction takes: current rises, the rotor slows down, and the arm sees nothing that pushes; nor does drag fall with speed.
+/// Friction takes: current rises, the rotor slows down, and the arm sees nothing that pushes; nor does drag fall with speed by more than a quarter of itself.
 pub(super) fn brakes(fitted: &[Estimate]) -> bool {
     let value = |name: &str| fitted.iter().find(|e| e.name == name);
     // at 300 rad/s; a missing term is none

@@ -67,6 +67,9 @@ impl Effect for SupplySag {
     }
 
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        if instance.form == UNSEEN {
+            return Vec::new();
+        }
         let mut out = vec![Amplitude { name: "resistance", unit: "ohm" }];
         if instance.touches("current_a") {
             out.push(Amplitude { name: "current_rise", unit: "1/krpm3" });
@@ -100,7 +103,10 @@ impl Effect for SupplySag {
         fitted
     }
 
-    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, _: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        if instance.form == UNSEEN {
+            return fitted.iter().all(|e| e.value > 0.0);
+        }
         fitted.iter().all(|e| e.name != "resistance" || e.value > 0.0 && e.value < 5.0)
     }
 }

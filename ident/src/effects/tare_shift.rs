@@ -35,7 +35,8 @@ impl Effect for TareShift {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let mut out = thrust_over_time(context);
-        if context.against_model && !out.is_empty() {
+        let thrust = !context.time_is_row && context.target("thrust_n").is_some();
+        if context.against_model && thrust {
             out.push(Instance::new(&["thrust_n"], BEFORE));
         }
         if context.against_model && context.target("torque_nm").is_some() {

@@ -7,7 +7,7 @@
 //! Reference: specification `closing-the-loop.md`, "Real measurements".
 
 use super::set::SETS;
-use super::{Outcome, Recorded};
+use super::{Outcome, Recorded, Tried};
 use ident::close::Closed;
 use ident::context::unit_of;
 use ident::report::{Figure, Layer};
@@ -63,7 +63,7 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     for o in outcomes {
         let _ = writeln!(out, "{}", summary(o));
     }
-    out.push_str("\nA cause holds on another run where the model that was corrected on the first predicts the other, as it stands but for one constant a channel, at least 2 % better on a channel that the effect touches than the same model refitted without it; one that the readings show by themselves (a grid that they lie on) where the other run's show it too. An ambiguous verdict stands for what its hypotheses share, those that are a tenth as probable as the first included; what they differ by is left open, and counted apart.\n");
+    out.push_str("\nA cause holds on another run where the model that was corrected on the first predicts the other, as it stands but for one constant a channel, at least 2 % better on a channel that the effect touches than the same model refitted without it; one that the readings show by themselves (a grid that they lie on), which predicts nothing better, where the other run's show it too: these are counted apart. An ambiguous verdict stands for what its hypotheses share, those that are a tenth as probable as the first included; what they differ by is left open, and counted apart.\n");
     let absent: Vec<&str> = SETS
         .iter()
         .filter(|s| outcomes.iter().any(|o| o.set.folder == s.folder && o.runs.is_empty()))
@@ -104,12 +104,15 @@ pub(crate) fn summary(o: &Outcome) -> String {
     }
     named.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
     let list = |l: Vec<String>| if l.is_empty() { "-".to_owned() } else { l.join(", ") };
-    let of = |claimed: bool| -> (usize, usize) {
-        let tried = || o.tried.iter().filter(move |t| t.claimed == claimed);
-        (tried().filter(|t| t.holds()).count(), tried().count())
+    let of = |wanted: &dyn Fn(&Tried) -> bool| -> (usize, usize) {
+        let tried: Vec<&Tried> = o.tried.iter().filter(|t| wanted(t)).collect();
+        (tried.iter().filter(|t| t.holds()).count(), tried.len())
     };
-    let ((held, claimed), (open_held, open)) = (of(true), of(false));
-    let left_open = if open == 0 { String::new() } else { format!("; {open_held} of {open} of what is left open") };
+    let (held, claimed) = of(&|t| t.claimed && t.seen_there.is_none());
+    let further =
+        [(of(&|t| t.claimed && t.seen_there.is_some()), "by the readings alone"), (of(&|t| !t.claimed), "of what is left open")];
+    let further: String =
+        further.iter().filter(|((_, all), _)| *all > 0).map(|((held, all), what)| format!("; {held} of {all} {what}")).collect();
     format!(
         "| [{}](measured/{}.md) | {} | {} | {} | {} |",
         o.set.folder,
@@ -117,7 +120,7 @@ pub(crate) fn summary(o: &Outcome) -> String {
         o.runs.len(),
         list(verdicts.iter().map(|(k, n)| format!("{n} {k}")).collect()),
         list(named.iter().map(|(k, n)| format!("{k} ({n})")).collect()),
-        if o.tried.is_empty() { "one run a rig".to_owned() } else { format!("{held} of {claimed} trials{left_open}") }
+        if o.tried.is_empty() { "one run a rig".to_owned() } else { format!("{held} of {claimed} trials{further}") }
     )
 }
 

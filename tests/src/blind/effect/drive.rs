@@ -114,10 +114,16 @@ impl<'a> Train<'a> {
         let pulse = self.pulse(pulse);
         let mut amps = self.current;
         let (mut wanted, mut d) = (self.speed, rig.declared());
-        for _ in 0..3 {
+        // supply and rotor settle at once: half steps, because a weak supply and a strong motor chase each other
+        for round in 0..ROUNDS {
             d = self.drive(t, air, amps, wanted);
             wanted = rig.speed_at(pulse, d);
-            amps = rig.current_at(wanted, d);
+            let drawn = rig.current_at(wanted, d);
+            let settled = (drawn - amps).abs() < 1e-9 * drawn.abs();
+            amps = if round == 0 { drawn } else { 0.5 * (amps + drawn) };
+            if settled && round > 0 {
+                break;
+            }
         }
         for e in self.effects {
             match e.id {
@@ -141,7 +147,8 @@ impl<'a> Train<'a> {
             None => wanted,
         };
         let n = reached * (1.0 + wander);
-        self.current = rig.current_at(n, d);
+        // friction brakes at the speed that the rotor has
+        self.current = rig.current_at(n, Drive { drag: self.drive(t, air, amps, n).drag, ..d });
         let full = poly(&rig.current, rig.top / 1000.0);
         let i2 = (self.current / full).powi(2);
         for e in self.effects {
@@ -198,6 +205,9 @@ impl<'a> Train<'a> {
         Output { speed: n, thrust, torque: torque + carried, current: reading, voltage: self.voltage(self.current) }
     }
 }
+
+/// Most rounds in which supply, current and speed are brought into balance.
+const ROUNDS: usize = 60;
 
 /// Speed at which friction holds a rotor that has just been asked to turn, rev/min.
 const TURNING: f64 = 2.0;
