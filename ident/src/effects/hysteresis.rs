@@ -6,7 +6,7 @@
 //! Units: N, at mid range.
 //! Reference: OIML R 60 (load cells), hysteresis error.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
+use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -52,11 +52,6 @@ impl Effect for Hysteresis {
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         vec![Amplitude { name: "width", unit: "N" }]
-    }
-
-    /// Coming down reads more than going up. Where both ways were seen an odd cell may do the opposite; where one was, it is a bend of the curve.
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        comes_back(context) || fitted.iter().all(|e| e.name != "width" || e.value > 0.0)
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
