@@ -181,17 +181,20 @@ pub(super) fn with_share(context: &Context, mut fitted: Vec<Estimate>) -> Vec<Es
     fitted
 }
 
-/// Friction takes: current rises, the rotor slows down, and the arm sees nothing that pushes; nor does drag fall with speed by more than a quarter of itself.
+/// Friction takes: current rises, the rotor slows down, and the arm sees nothing that pushes; nor does drag fall with speed by more than
+/// a quarter of itself.
 pub(super) fn brakes(fitted: &[Estimate]) -> bool {
     let value = |name: &str| fitted.iter().find(|e| e.name == name);
     // at 300 rad/s; a missing term is none
     let sum = |a: &str, b: &str| value(a).map(|a| a.value + 300.0 * value(b).map_or(0.0, |b| b.value));
     let unseen = UNSEEN * value("constant").map_or(0.0, |e| e.value.abs());
+    let of_drag = TRADED * sum("constant", "viscous").unwrap_or(0.0);
+    let of_loss = TRADED * sum("speed_loss", "speed_loss_viscous").unwrap_or(0.0);
     let traded = |name: &str| match name {
-        "constant" => TRADED * sum("constant", "viscous").unwrap_or(0.0),
-        "viscous" => TRADED * sum("constant", "viscous").unwrap_or(0.0) / 300.0,
-        "speed_loss" => TRADED * sum("speed_loss", "speed_loss_viscous").unwrap_or(0.0),
-        "speed_loss_viscous" => TRADED * sum("speed_loss", "speed_loss_viscous").unwrap_or(0.0) / 300.0,
+        "constant" => of_drag,
+        "viscous" => of_drag / 300.0,
+        "speed_loss" => of_loss,
+        "speed_loss_viscous" => of_loss / 300.0,
         "arm_constant" => unseen,
         _ => 0.0,
     };

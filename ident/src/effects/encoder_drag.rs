@@ -94,12 +94,8 @@ impl Effect for EncoderDrag {
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         if instance.form == ALWAYS {
             // what the speed loses is a curve beside another, and stands for what that lacks
-            let (mut braked, mut loads) =
-                (false, fitted.iter().filter(|e| ["arm_constant", "start_current"].contains(&e.name.as_str())));
-            return loads.all(|e| {
-                braked |= e.value > SEEN * e.se;
-                e.value > -2.0 * e.se
-            }) && braked;
+            let loads = || fitted.iter().filter(|e| ["arm_constant", "start_current"].contains(&e.name.as_str()));
+            return loads().all(|e| e.value > -2.0 * e.se) && loads().any(|e| e.value > SEEN * e.se);
         }
         if instance.channels.iter().all(|c| c == "torque_nm") && share_coupled(context) > THROUGHOUT {
             return fitted.iter().any(|e| e.name == "arm_constant" && e.value > 8.0 * e.se);
