@@ -6,6 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, steps 1 to 8.
 
 use crate::context::{Context, DIFFERENCES, Target, unit_of};
+use crate::course;
 use crate::diagnose::Diagnosis;
 use crate::effects::unknown::Words;
 use crate::effects::{Estimate, Shape};
@@ -69,9 +70,11 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let fit = &diagnosis.best.fit;
     let estimates =
         found.estimates.unwrap_or_else(|| (0..fit.placed.len()).map(|k| fit.profiled_estimates(&context, declared, k)).collect());
-    let left = |fit: &Fit| leftover::of(&context, declared, fit);
-    let before_model = Model::from_fit(&context, log, declared, &diagnosis.declared).leaving(&context, left(&diagnosis.declared));
-    let after_model = Model::of_estimates(&context, log, declared, fit, estimates.clone()).leaving(&context, left(fit));
+    let left = |model: Model, fit: &Fit| {
+        model.leaving(&context, leftover::of(&context, declared, fit), course::of(&context, declared, fit))
+    };
+    let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
+    let after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit);
     let mut verdict = Verdict {
         format: FORMAT,
         run: log.name.clone(),

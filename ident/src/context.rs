@@ -6,6 +6,7 @@
 //! Units: SI, rev/min, us; regressors of the polynomials are rpm/1000 and (pulse - 1000)/1000.
 //! Reference: specification `formats.md` (primary relations), `closing-the-loop.md` step 2.
 
+use crate::course::{self, Counterparts};
 use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
 use crate::hypothesis::Declared;
@@ -190,15 +191,27 @@ impl Target {
 
     /// Takes what the declared model leaves over of its own run for known, and weighs the samples by how well: `load` and `classes` of
     /// every row of the log, and how often the run repeats each class.
-    fn allow(&mut self, left: &Leftover, load: &[f64], classes: &[usize], alike: &leftover::Alike) {
+    fn allow(
+        &mut self,
+        left: &Leftover,
+        load: &[f64],
+        classes: &[usize],
+        alike: &leftover::Alike,
+        course: Option<Counterparts<'_>>,
+    ) {
         self.known = load.iter().map(|x| left.known(*x)).collect();
         self.usual = left.held();
         let noise = self.noise.rms;
-        let square = |row: usize| left.variance(load[row], classes[row], alike, noise);
+        let ahead = course.map_or_else(Vec::new, |c| course::ahead(c, self, classes));
+        let square = |row: usize| {
+            let usual = left.variance(load[row], classes[row], alike, noise);
+            ahead.get(row).copied().flatten().map_or(usual, |(_, differ)| differ.min(usual))
+        };
         for variances in [&mut self.levelled, &mut self.floored] {
             variances.iter_mut().zip(&self.rows).for_each(|(v, row)| *v += square(*row));
         }
         self.trust = (0..load.len()).map(|row| noise / (noise * noise + square(row)).sqrt()).collect();
+        self.known.iter_mut().zip(&ahead).for_each(|(known, ahead)| *known = ahead.map_or(*known, |(error, _)| error));
     }
 
     /// A residual in the measure in which it is news: against a declared model less where that is known to be rough.
@@ -275,6 +288,8 @@ pub struct Context {
     /// Logarithm of the density of a declared model's air over that of ISO 2533 air at 20 degC; 0 where none is declared, and where an effect
     /// of the model speaks of the density by itself.
     pub(crate) air: f64,
+    /// Torque that a declared model expects on every row, N.m, with what is known of its error: no sensor's noise is in it. Empty without one.
+    pub(crate) expected_torque: Vec<f64>,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
     powers: [OnceLock<Vec<Values>>; 2],
     /// What effects ask again and again.
@@ -363,6 +378,7 @@ impl Context {
             against_model: false,
             air: 0.0,
             settling,
+            expected_torque: Vec::new(),
             powers: Default::default(),
             facts: Facts::default(),
         }
@@ -410,14 +426,22 @@ impl Context {
         let classes = leftover::classes(self);
         let alike = leftover::Alike::of(self, &classes);
         let loads: Vec<Vec<f64>> = self.targets.iter().map(|t| self.regressor(t.relation).unwrap_or_default()).collect();
-        for (target, load) in self.targets.iter_mut().zip(loads) {
-            if let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) {
-                target.allow(left, &load, &classes, &alike);
-            }
-        }
         let speaks_of_air = model.effects.iter().any(|e| e.placed.effect.id() == "air_density");
         self.air = model.air.filter(|_| !speaks_of_air).map_or(0.0, f64::ln);
         self.against_model = true;
+        let known = model.course.as_ref().map(|course| (course, course.counterparts(self)));
+        let predictions: Vec<Option<Vec<f64>>> = self.targets.iter().map(|t| model.predict(self, t.name)).collect();
+        let step = self.step();
+        for ((target, load), prediction) in self.targets.iter_mut().zip(loads).zip(&predictions) {
+            let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) else { continue };
+            let course = known.as_ref().zip(prediction.as_ref()).and_then(|((course, rows), prediction)| {
+                Some(Counterparts { errors: course.of_channel(target.name)?, rows, prediction, step })
+            });
+            target.allow(left, &load, &classes, &alike, course);
+            if let Some(prediction) = prediction.as_ref().filter(|_| target.name == "torque_nm") {
+                self.expected_torque = prediction.iter().zip(&target.known).map(|(p, known)| p + known).collect();
+            }
+        }
     }
 
     /// Index of a target by its channel name.

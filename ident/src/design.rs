@@ -48,6 +48,8 @@ pub struct TargetDesign {
     pub fixed: Vec<f64>,
     /// Variance that an effect adds to the noise, one value a row; empty when there is none.
     pub extra_variance: Vec<f64>,
+    /// Coefficients where a written model predicts; empty while they are sought.
+    pub(crate) told: Vec<(Label, f64)>,
     /// What [`Self::map_columns`] has made of which column, for the effect that is being applied: before and after.
     pub(crate) mapped: Vec<(Values, Values)>,
 }
@@ -63,7 +65,7 @@ impl TargetDesign {
             .enumerate()
             .map(|(k, values)| Column { label: Label::Base(k), values: values.clone() })
             .collect();
-        Self { name, relation, columns, fixed: Vec::new(), extra_variance: Vec::new(), mapped: Vec::new() }
+        Self { name, relation, columns, fixed: Vec::new(), extra_variance: Vec::new(), told: Vec::new(), mapped: Vec::new() }
     }
 
     /// The same target with its baseline coefficients held at given values.
@@ -72,6 +74,21 @@ impl TargetDesign {
         self.fixed = weighted_sum(&self.columns, coefficients, self.columns.first().map_or(0, |c| c.values.len()));
         self.columns.clear();
         self
+    }
+
+    /// What a declared model, or one that predicts, makes of the columns so far; `None` while their coefficients are sought.
+    pub(crate) fn known(&self) -> Option<Vec<f64>> {
+        match (self.fixed.is_empty(), self.told.is_empty()) {
+            (true, true) => None,
+            (true, false) => Some(weighted_sum(&self.columns, &self.coefficients(), self.columns.first()?.values.len())),
+            (false, _) => Some(self.fixed.clone()),
+        }
+    }
+
+    /// What was told of each column; zero for one of which nothing was.
+    pub(crate) fn coefficients(&self) -> Vec<f64> {
+        let told = |column: &Column| self.told.iter().find(|(label, _)| *label == column.label).map_or(0.0, |(_, c)| *c);
+        self.columns.iter().map(told).collect()
     }
 
     /// Lets `change` act on every column and on the known part: for gains and output operators. At most once an effect, because what

@@ -79,6 +79,17 @@ impl Leftover {
     }
 }
 
+/// Whether rows of a class are those of a load that is held and has settled.
+pub(crate) fn settled(class: usize) -> bool {
+    HELD.contains(&class)
+}
+
+/// Whether rows of a class are those of a load that has jumped or moves, the motor on: sensors of a rotor that comes to rest hold what they saw
+/// last, which is another thing every day.
+pub(crate) fn on_its_way(class: usize) -> bool {
+    !settled(class) && class != RUNS_DOWN
+}
+
 /// How often a run repeats what is in each class.
 pub(crate) struct Alike([f64; CLASSES]);
 

@@ -12,6 +12,7 @@ pub mod circle;
 pub mod close;
 pub mod context;
 mod correction;
+pub mod course;
 pub mod design;
 pub mod diagnose;
 pub mod effects;

@@ -6,11 +6,13 @@
 //! Reference: specification `formats.md`, "Powerplant model".
 
 use crate::context::{Context, Relation, Target, unit_of};
+use crate::course::Course;
 use crate::design::{Label, TargetDesign};
 use crate::effects::{Estimate, air_density};
-use crate::hypothesis::{Declared, Fit, Placed, design};
+use crate::hypothesis::{Declared, Fit, Placed};
 use crate::leftover::Leftover;
 use crate::log::Log;
+use crate::steps::Steps;
 use toml::{Table, Value};
 
 mod read;
@@ -59,6 +61,8 @@ pub struct Model {
     pub air: Option<f64>,
     /// For each channel what the model leaves over of the run that it was identified from, where that is known.
     pub leftovers: Vec<(String, Leftover)>,
+    /// What it is off by on that run while the load is on its way, row for row.
+    pub course: Option<Course>,
 }
 
 /// Why a model was refused.
@@ -202,11 +206,12 @@ impl Model {
 
     /// The model, with the air of its own run and what it leaves over of each target of it. A declared model keeps the air of the day that
     /// its polynomials are of.
-    pub(crate) fn leaving(mut self, context: &Context, left: Vec<Leftover>) -> Self {
+    pub(crate) fn leaving(mut self, context: &Context, left: Vec<Leftover>, course: Option<Course>) -> Self {
         if !context.against_model {
             self.air = air_density::of_run(context);
         }
         self.leftovers = context.targets.iter().map(|t| t.name.to_owned()).zip(left).collect();
+        self.course = course;
         self
     }
 
@@ -224,20 +229,16 @@ impl Model {
 
     fn design(&self, context: &Context, target: &Target) -> Option<(TargetDesign, Vec<f64>)> {
         let polynomial = self.polynomials.iter().find(|p| p.channel == target.name)?;
-        let design = design(context, Declared::default(), &self.placed(), target);
-        let coefficients = design
-            .columns
-            .iter()
-            .map(|c| match c.label {
-                Label::Base(k) => polynomial.coefficients.get(k).copied().unwrap_or(0.0),
-                Label::Effect { effect, amplitude } => self.effects[effect]
-                    .amplitudes
-                    .iter()
-                    .find(|(channel, _)| channel == target.name)
-                    .and_then(|(_, v)| v.get(amplitude).copied())
-                    .unwrap_or(0.0),
-            })
-            .collect();
+        let base = polynomial.coefficients.iter().enumerate().map(|(k, c)| (Label::Base(k), *c));
+        let of_effect = |(effect, added): (usize, &AddedEffect)| {
+            let own = added.amplitudes.iter().find(|(channel, _)| channel == target.name).map(|(_, values)| values.clone());
+            let own = own.unwrap_or_default().into_iter().enumerate();
+            own.map(|(amplitude, c)| (Label::Effect { effect, amplitude }, c)).collect::<Vec<_>>()
+        };
+        let told = base.chain(self.effects.iter().enumerate().flat_map(of_effect)).collect();
+        let baseline = TargetDesign::baseline(context, target.name, target.relation);
+        let design = Steps::default().apply(context, &self.placed(), TargetDesign { told, ..baseline });
+        let coefficients = design.coefficients();
         Some((design, coefficients))
     }
 
@@ -297,7 +298,8 @@ impl Model {
             root.insert("effect".into(), list.into());
         }
         format!(
-            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and about that the scatter, rms, noise included, in each\n# third of the loads, up to 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n{root}"
+            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and about that the scatter, rms, noise included, in each\n# third of the loads, up to 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n{root}{}",
+            self.course.as_ref().map(Course::to_toml).unwrap_or_default()
         )
     }
 }

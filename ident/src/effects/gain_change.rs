@@ -53,12 +53,14 @@ impl Effect for GainChange {
                 starts: [-0.3, -0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1, 0.3].map(|k| k * most).to_vec(),
             }]
         } else {
-            let change = Shape {
-                name: "gain_change",
-                unit: "1",
-                range: (-0.5, 0.5),
-                starts: vec![-0.3, -0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1, 0.3],
+            // against a model the wrong size of two finds another instant
+            let sizes: &[f64] = if context.against_model {
+                &[0.3, 0.17, 0.1, 0.055, 0.03, 0.017, 0.01, 0.0055, 0.003]
+            } else {
+                &[0.3, 0.1, 0.03, 0.01, 0.003]
             };
+            let starts = sizes.iter().map(|s| -s).chain(sizes.iter().rev().copied()).collect();
+            let change = Shape { name: "gain_change", unit: "1", range: (-0.5, 0.5), starts };
             if instance.form == BEFORE { vec![change] } else { vec![change, coarse_onset(context)] }
         }
     }

@@ -1,6 +1,7 @@
 //! `quantisation`: a channel resolves only coarse steps.
 //!
-//! What it is: the reading is the nearest multiple of `step`; the departure from the truth is a saw-tooth of the truth.
+//! What it is: the reading is the nearest multiple of `step`; the departure from the truth is a saw-tooth of the truth. Where noise comes after the
+//! rounding no reading lies on the grid, but all gather about it ([`beneath_noise`]); against a declared model that form is asked too.
 //! What can go wrong: noise as large as the step smears the saw-tooth out, and nothing is offered then.
 //! Units: the channel's.
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*.
@@ -9,6 +10,8 @@ use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
 use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;
 use crate::solve::Normal;
+
+mod beneath_noise;
 
 /// See the module.
 pub(crate) struct Quantisation;
@@ -34,18 +37,37 @@ impl Effect for Quantisation {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let coarse =
-            |t: &&Target| matches!(t.relation, Relation::Thrust | Relation::Torque | Relation::Current) && step(t).is_some();
-        context.targets.iter().filter(coarse).map(|t| Instance::new(&[t.name], "")).collect()
+        let rounds = |t: &&Target| matches!(t.relation, Relation::Thrust | Relation::Torque | Relation::Current);
+        let beneath = |t: &Target| context.against_model && beneath_noise::grid(context, t).is_some();
+        let seen = |t: &Target| {
+            let form = if step(t).is_some() { Some("") } else { beneath(t).then_some(BENEATH) };
+            form.map(|form| Instance::new(&[t.name], form))
+        };
+        context.targets.iter().filter(rounds).filter_map(seen).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         // read off the values, not fitted
-        let found = context.targets.iter().find(|t| instance.touches(t.name)).and_then(step).unwrap_or(0.0);
-        vec![Shape { name: "step", unit: "channel", range: (found, found), starts: vec![found] }]
+        let target = context.targets.iter().find(|t| instance.touches(t.name));
+        let of = |name, found| Shape { name, unit: "channel", range: (found, found), starts: vec![found] };
+        if instance.form != BENEATH {
+            return vec![of("step", target.and_then(step).unwrap_or(0.0))];
+        }
+        let (step, offset) = target.and_then(|t| beneath_noise::grid(context, t)).map_or((0.0, 0.0), |g| (g.step, g.offset));
+        // by how much the zero is another one than the model's: a level that falls on the wrong side of an edge is off by a whole step
+        let zero = Shape {
+            name: "zero",
+            unit: "channel",
+            range: (-0.5 * step, 0.5 * step),
+            starts: (-20..21).map(|k| step * f64::from(k) / 41.0).collect(),
+        };
+        vec![of("step", step), of("offset", offset), zero]
     }
 
     fn seen(&self, context: &Context, instance: &Instance) -> f64 {
+        if instance.form == BENEATH {
+            return 0.0;
+        }
         // of readings without steps each lies a quarter of a step from the next multiple, on average
         let target = context.targets.iter().find(|t| instance.touches(t.name));
         target.and_then(|t| Some(t.y.len() as f64 * (0.25 / lattice(t)?.departure.max(0.01)).ln())).unwrap_or(0.0)
@@ -56,18 +78,37 @@ impl Effect for Quantisation {
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
-        let ([step], Some(target)) = (shape, context.targets.iter().find(|t| instance.touches(t.name))) else { return };
-        if *step <= 0.0 {
-            return;
+        let Some(target) = context.targets.iter().find(|t| instance.touches(t.name)) else { return };
+        if let [step, offset, zero] = shape {
+            // a declared model knows the truth but for the zero of the day; an edge is as sharp as that is known
+            let (Some(known), true) = (design.known(), *step > 0.0) else { return };
+            let edge = EDGE * target.noise.rms / step;
+            let read = |v: &f64| step * round((v + zero - offset) / step, edge) + offset;
+            design.add(position, 0, known.iter().map(|v| read(v) - v).collect());
+        } else if let [step] = shape
+            && *step > 0.0
+            && let Some(truth) = within_steps(context, target, design, *step)
+        {
+            design.add(position, 0, truth.iter().map(|v| step * (v / step).round() - v).collect());
         }
-        let Some(truth) = within_steps(context, target, design, *step) else { return };
-        design.add(position, 0, truth.iter().map(|v| step * (v / step).round() - v).collect());
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         fitted.iter().any(|e| e.name == "depth" && e.value > 0.2 && e.value < 1.5)
     }
 }
+
+/// Part of the noise within which a truth is known where noise comes after the rounding: a level within that of an edge may be on either side.
+const EDGE: f64 = 0.3;
+
+/// The nearest whole number, or on an edge of some width what lies between the two.
+fn round(v: f64, edge: f64) -> f64 {
+    let whole = v.floor();
+    whole + 0.5 * (1.0 + ((v - whole - 0.5) / edge).tanh())
+}
+
+/// Form in which noise comes after the rounding, so that no reading lies on the grid.
+const BENEATH: &str = "beneath the noise";
 
 /// The truth as the relation's own columns give it, moved until each reading is its rounding wherever they can: the readings
 /// are replaced by what is nearest to the fit within half a step of them, and the fit is made again.

@@ -4,11 +4,13 @@
 //! What can go wrong: torque is itself nearly quadratic in the speed, and the thrust polynomial takes that part: only torque's
 //! departures from it (gusts, spin-up, damage, friction on the arm) show, so that the standard error is large on a quiet run. The
 //! torque's own sensor noise never reached the thrust cell: left in the column it would make the coefficient too small, so the
-//! measured departures are first shrunk by the share of them that is real.
+//! measured departures are first shrunk by the share of them that is real. Against a declared model it may set in: a gain that changes looks
+//! alike where the load is held, and only jumps, whose torque also turns the rotor faster, tell.
 //! Units: N/(N.m).
 //! Reference: cross-axis sensitivity of multi-component balances, Barlow, Rae & Pope 1999, *Low-Speed Wind Tunnel Testing*, ch. 7;
 //! regression calibration, Carroll et al. 2006, *Measurement Error in Nonlinear Models*, ch. 4.
 
+use super::tare_shift::{coarse_onset, step};
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
 use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;
@@ -25,7 +27,7 @@ impl Effect for TorqueCrosstalk {
     fn about(&self) -> About {
         About {
             title: "The thrust cell reads part of the torque",
-            equation: "thrust_n += coefficient * torque_nm",
+            equation: "thrust_n += coefficient * torque_nm, against a declared model for t >= t0",
             source: "Barlow, Rae & Pope 1999, Low-Speed Wind Tunnel Testing, chapter 7",
             depends_on: &["torque_nm"],
             signature: "the thrust residual repeats what torque does beyond its own polynomial",
@@ -38,30 +40,46 @@ impl Effect for TorqueCrosstalk {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if present(context, &["thrust_n", "torque_nm"]).len() == 2 { vec![Instance::new(&["thrust_n"], "")] } else { Vec::new() }
+        if present(context, &["thrust_n", "torque_nm"]).len() < 2 {
+            return Vec::new();
+        }
+        let forms: &[&str] = if context.against_model && !context.time_is_row { &["", SETS_IN] } else { &[""] };
+        forms.iter().map(|form| Instance::new(&["thrust_n"], form)).collect()
     }
 
-    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
-        Vec::new()
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form == SETS_IN { vec![coarse_onset(context)] } else { Vec::new() }
+    }
+
+    fn seen(&self, _: &Context, instance: &Instance) -> f64 {
+        if instance.form == SETS_IN { -RARE } else { 0.0 }
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         vec![Amplitude { name: "coefficient", unit: "N/(N.m)" }]
     }
 
-    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
-        let Some(torque) = context.facts.torque.get_or_init(|| acting_torque(context)) else { return };
-        design.add(position, 0, torque.clone());
+    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        if let [t0] = shape {
+            let measured = context.torque.as_deref().unwrap_or_default();
+            let torque = if context.expected_torque.is_empty() { measured } else { &context.expected_torque };
+            design.add(position, 0, step(context, *t0).iter().zip(torque).map(|(s, q)| s * q).collect());
+        } else if let Some(torque) = context.facts.torque.get_or_init(|| acting_torque(context)) {
+            design.add(position, 0, torque.clone());
+        }
     }
 
-    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+    fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        if instance.form == SETS_IN {
+            return fitted;
+        }
         for e in fitted.iter_mut().filter(|e| e.name == "coefficient") {
             e.se += farthest(context, e.value) / 1.96;
         }
         fitted
     }
 
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         let top =
             |name: &str| context.target(name).map_or(0.0, |k| context.targets[k].y.iter().fold(0.0, |a: f64, v| a.max(v.abs())));
         let ratio = top("thrust_n") / top("torque_nm").max(1e-9);
@@ -71,10 +89,20 @@ impl Effect for TorqueCrosstalk {
         // a declared model does not absorb the course with the speed, and a gain of the cell has that too: what the torque does
         // beyond it must show the coefficient by itself
         let by_itself = |c: f64| !context.against_model || farthest(context, c) < c.abs();
+        if instance.form == SETS_IN {
+            let of = |e: &Estimate| e.value.abs() > 4.0 * e.se && credible(e.value);
+            return fitted.iter().filter(|e| e.name == "coefficient").all(of);
+        }
         let known = |e: &Estimate| e.value.abs() > 4.0 * e.se && by_itself(e.value);
         fitted.iter().all(|e| known(e) && credible(e.value) && is_seen_between_jumps(context, e.value))
     }
 }
+
+/// Form of a cell that reads the torque from an instant on.
+const SETS_IN: &str = "sets in";
+
+/// Evidence, nats, against a beam and an arm that move against each other during a run: a gain that changes is the simpler cause of what both explain.
+const RARE: f64 = 3.0;
 
 /// How far the direct and the reverse regression of thrust on torque lie from a coefficient.
 fn farthest(context: &Context, coefficient: f64) -> f64 {

@@ -8,6 +8,7 @@
 
 use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys};
 use crate::context::{Context, Relation};
+use crate::course::{COURSE_KEYS, Course};
 use crate::effects::{self, Effect, Estimate, Instance};
 use crate::hypothesis::Placed;
 use crate::leftover::{CLASSES, Leftover, PARTS};
@@ -84,8 +85,38 @@ impl Model {
         for (i, value) in list.iter().enumerate() {
             model.effects.push(AddedEffect::from_table(value).map_err(|refusal| within(&format!("effect[{i}]"), refusal))?);
         }
+        if let Some(value) = root.get("course") {
+            model.course = Some(course(value).map_err(|refusal| within("course", refusal))?);
+        }
         Ok(model)
     }
+}
+
+/// What the model is off by row for row: lists of finite numbers that are as long as they must be.
+fn course(value: &Value) -> Result<Course, Refusal> {
+    let table = value.as_table().ok_or_else(|| refusal("", Some(value), "a table of lists"))?;
+    let list = |key: &str, all: &dyn Fn(f64) -> bool, length: Option<usize>| -> Result<Vec<f64>, Refusal> {
+        let numbers = table.get(key).and_then(Value::as_array);
+        let numbers: Option<Vec<f64>> = numbers.and_then(|list| list.iter().map(|v| number(v).filter(|v| all(*v))).collect());
+        let wanted = || match length {
+            Some(n) => format!("a list of {n} numbers"),
+            None => "a list of finite numbers, each larger than the one before".to_owned(),
+        };
+        let fits = |list: &Vec<f64>| length.map_or(list.is_sorted_by(|a, b| a < b), |n| list.len() == n);
+        numbers.filter(fits).ok_or_else(|| refusal(key, table.get(key), &wanted()))
+    };
+    let finite = |v: f64| v.is_finite();
+    let [changed, t] = [COURSE_KEYS[0], COURSE_KEYS[2]].map(|key| list(key, &finite, None));
+    let (changed, t) = (changed?, t?);
+    let pulse = list(COURSE_KEYS[1], &finite, Some(changed.len()))?;
+    let mut errors = Vec::new();
+    for key in table.keys().filter(|key| !COURSE_KEYS.contains(&key.as_str())) {
+        if Relation::of(key, true).is_none() {
+            return Err(no_channel("", key));
+        }
+        errors.push((key.clone(), list(key, &|v| !v.is_infinite(), Some(t.len()))?));
+    }
+    Ok(Course { commands: changed.into_iter().zip(pulse).collect(), t, errors })
 }
 
 fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {

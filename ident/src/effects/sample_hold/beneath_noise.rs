@@ -69,8 +69,8 @@ pub(super) fn clock(context: &Context, target: &Target) -> Option<Clock> {
     let (from, to) = (1.0 / (least + 2.0 * dt), 1.0 / (FEWEST_ROWS * dt));
     let rates: Vec<(f64, f64)> =
         (0..).map(|k| from + f64::from(k) * step).take_while(|f| *f < to).map(|f| (f, phase(known, f).1)).collect();
-    let best = rates.iter().fold(0.0, |a: f64, r| a.max(r.1));
-    if best < ONE_PHASE.0 || of_one_phase(known.len(), best, to * dt) < (rates.len() as f64).ln() + ONE_PHASE.1 {
+    let (at, best) = rates.iter().fold((to, 0.0), |a: (f64, f64), r| if r.1 > a.1 { *r } else { a });
+    if best < ONE_PHASE.0 || of_one_phase(known.len(), best, at * dt) < (rates.len() as f64).ln() + ONE_PHASE.1 {
         return None;
     }
     let first = rates.iter().position(|r| r.1 > AS_GOOD * best)?;
@@ -82,7 +82,7 @@ pub(super) fn clock(context: &Context, target: &Target) -> Option<Clock> {
 }
 
 /// Evidence, nats, that phases whose mean has a length are of one phase and not of any: that of a normal distribution of their width over a
-/// uniform one, which is Rayleigh's where they lie apart. None is closer than a row, here as a share of the shortest period.
+/// uniform one, which is Rayleigh's where they lie apart. None is closer than a row, here as a share of the period.
 fn of_one_phase(n: usize, length: f64, row: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     let variance = (-2.0 * length.ln()).max((turn * row).powi(2) / 12.0);
@@ -93,7 +93,10 @@ fn of_one_phase(n: usize, length: f64, row: f64) -> f64 {
 /// Runs of rows on which a channel reads clearly another value than on the row before: the first of them, and how many.
 fn changes(context: &Context, target: &Target) -> Vec<(usize, usize)> {
     let speed = |row: usize| context.rpm.get(row).copied().unwrap_or(0.0);
-    let least = |rows: &[usize]| rows.iter().map(|row| target.noise.variance(speed(*row))).fold(0.0, f64::max).sqrt() * CHANGED;
+    // what is held beyond a jump of the load counts as noise of the level that it reaches into: on a healthy day none was
+    let healthy = if target.usual > 0.0 { (target.usual / target.noise.rms).min(1.0) } else { 1.0 };
+    let variance = |rows: &[usize]| rows.iter().map(|row| target.noise.variance(speed(*row))).fold(0.0, f64::max);
+    let least = |rows: &[usize]| variance(rows).sqrt() * healthy * CHANGED;
     let pairs = target.y.windows(2).zip(target.rows.windows(2));
     let changed = pairs.filter(|(y, rows)| rows[1] == rows[0] + 1 && (y[1] - y[0]).abs() > least(rows)).map(|(_, rows)| rows[1]);
     let mut out: Vec<(usize, usize)> = Vec::new();
