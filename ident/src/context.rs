@@ -430,8 +430,8 @@ impl Context {
         self.air = model.air.filter(|_| !speaks_of_air).map_or(0.0, f64::ln);
         self.against_model = true;
         let known = model.course.as_ref().map(|course| (course, course.counterparts(self)));
-        let predictions: Vec<Option<Vec<f64>>> = self.targets.iter().map(|t| model.predict(self, t.name)).collect();
         let step = self.step();
+        let predictions: Vec<Option<Vec<f64>>> = self.targets.iter().map(|t| model.predict(self, t.name)).collect();
         for ((target, load), prediction) in self.targets.iter_mut().zip(loads).zip(&predictions) {
             let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) else { continue };
             let course = known.as_ref().zip(prediction.as_ref()).and_then(|((course, rows), prediction)| {

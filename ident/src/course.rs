@@ -45,7 +45,15 @@ pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Option
     if rows.is_empty() || rows.len() > MOST || context.time_is_row {
         return None;
     }
-    let changes = (0..pulse.len()).filter(|row| *row == 0 || pulse[*row] != pulse[row - 1]);
+    let mut commands: Vec<(f64, f64)> = Vec::new();
+    for (t, pulse) in context.t.iter().zip(pulse) {
+        if commands.last().is_none_or(|(_, last)| (pulse - last).abs() > 0.5 * SAME_US) {
+            commands.push((*t, *pulse));
+        }
+    }
+    if commands.len() > MOST {
+        return None;
+    }
     let residuals = heldout::residuals(context, declared, fit);
     // sensors differ from each other by where each of them looks: that is another thing every day
     let repeats = context.targets.iter().zip(&residuals).filter(|(target, _)| target.relation != Relation::SpeedDifference);
@@ -56,11 +64,7 @@ pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Option
         }
         (target.name.to_owned(), rows.iter().map(|row| all[*row]).collect())
     });
-    Some(Course {
-        commands: changes.map(|row| (context.t[row], pulse[row])).collect(),
-        errors: errors.collect(),
-        t: rows.iter().map(|row| context.t[*row]).collect(),
-    })
+    Some(Course { commands, errors: errors.collect(), t: rows.iter().map(|row| context.t[*row]).collect() })
 }
 
 impl Course {
@@ -77,8 +81,9 @@ impl Course {
             if !command.is_some_and(|command| (command - pulse[row]).abs() <= SAME_US) {
                 since = None;
             } else if since.is_none() {
-                // a run that starts as this one has all of its history
-                since = Some(if row == 0 { t - HISTORY } else { *t });
+                // a run that starts where the model's own run did has all of its history
+                let first = row == 0 && self.commands.first().is_some_and(|(at, _)| (at - t).abs() <= apart);
+                since = Some(if first { t - HISTORY } else { *t });
             }
             let known = since.is_some_and(|since| t - since >= HISTORY);
             let near = self.t.partition_point(|at| *at < t - apart);
@@ -224,6 +229,9 @@ mod tests {
         let found = course.counterparts(&context(0.0, other));
         let back = 61 + (HISTORY / 0.1) as usize;
         assert!((100..back).all(|row| found[row].is_none()) && found[back + 1] == Some(back - 99) && found[200] == Some(20));
+        // a run that was begun later has a past of its own
+        let found = course.counterparts(&context(11.0, (110..300).map(pulse).collect()));
+        assert!(found[..49].iter().all(Option::is_none) && found[90] == Some(20), "{found:?}");
         // rows between the model's own rows have none
         assert!(course.counterparts(&context(0.03, same)).iter().all(Option::is_none));
     }

@@ -23,6 +23,17 @@ pub enum Label {
     },
 }
 
+/// A coefficient of a written model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Told {
+    /// Of which column.
+    pub(crate) label: Label,
+    /// Its value.
+    pub(crate) value: f64,
+    /// Whether it belongs to what the channel measures, and not to the zero that it was tared to on the day.
+    pub(crate) stands: bool,
+}
+
 /// One value a row of the log, in one piece of memory for all who hold it unchanged.
 pub type Values = Arc<Vec<f64>>;
 
@@ -49,7 +60,7 @@ pub struct TargetDesign {
     /// Variance that an effect adds to the noise, one value a row; empty when there is none.
     pub extra_variance: Vec<f64>,
     /// Coefficients where a written model predicts; empty while they are sought.
-    pub(crate) told: Vec<(Label, f64)>,
+    pub(crate) told: Vec<Told>,
     /// What [`Self::map_columns`] has made of which column, for the effect that is being applied: before and after.
     pub(crate) mapped: Vec<(Values, Values)>,
 }
@@ -76,18 +87,19 @@ impl TargetDesign {
         self
     }
 
-    /// What a declared model, or one that predicts, makes of the columns so far; `None` while their coefficients are sought.
+    /// What a declared model expects, or one that predicts makes of its columns so far but for the zeros of the day; `None` while coefficients are
+    /// sought without a model.
     pub(crate) fn known(&self) -> Option<Vec<f64>> {
-        match (self.fixed.is_empty(), self.told.is_empty()) {
-            (true, true) => None,
-            (true, false) => Some(weighted_sum(&self.columns, &self.coefficients(), self.columns.first()?.values.len())),
-            (false, _) => Some(self.fixed.clone()),
+        if !self.fixed.is_empty() {
+            return Some(self.fixed.clone());
         }
+        let standing = self.told.iter().any(|t| t.stands).then(|| self.coefficients(|t| t.stands))?;
+        Some(weighted_sum(&self.columns, &standing, self.columns.first()?.values.len()))
     }
 
-    /// What was told of each column; zero for one of which nothing was.
-    pub(crate) fn coefficients(&self) -> Vec<f64> {
-        let told = |column: &Column| self.told.iter().find(|(label, _)| *label == column.label).map_or(0.0, |(_, c)| *c);
+    /// What was told of each column by those that count; zero for one of which nothing was.
+    pub(crate) fn coefficients(&self, counts: impl Fn(&Told) -> bool) -> Vec<f64> {
+        let told = |column: &Column| self.told.iter().find(|t| t.label == column.label && counts(t)).map_or(0.0, |t| t.value);
         self.columns.iter().map(told).collect()
     }
 

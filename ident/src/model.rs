@@ -7,8 +7,8 @@
 
 use crate::context::{Context, Relation, Target, unit_of};
 use crate::course::Course;
-use crate::design::{Label, TargetDesign};
-use crate::effects::{Estimate, air_density};
+use crate::design::{Label, TargetDesign, Told};
+use crate::effects::{BEFORE, Estimate, air_density};
 use crate::hypothesis::{Declared, Fit, Placed};
 use crate::leftover::Leftover;
 use crate::log::Log;
@@ -229,16 +229,18 @@ impl Model {
 
     fn design(&self, context: &Context, target: &Target) -> Option<(TargetDesign, Vec<f64>)> {
         let polynomial = self.polynomials.iter().find(|p| p.channel == target.name)?;
-        let base = polynomial.coefficients.iter().enumerate().map(|(k, c)| (Label::Base(k), *c));
+        let base =
+            polynomial.coefficients.iter().enumerate().map(|(k, c)| Told { label: Label::Base(k), value: *c, stands: true });
         let of_effect = |(effect, added): (usize, &AddedEffect)| {
+            let stands = !(added.placed.effect.id() == "tare_shift" && added.placed.instance.form == BEFORE);
             let own = added.amplitudes.iter().find(|(channel, _)| channel == target.name).map(|(_, values)| values.clone());
             let own = own.unwrap_or_default().into_iter().enumerate();
-            own.map(|(amplitude, c)| (Label::Effect { effect, amplitude }, c)).collect::<Vec<_>>()
+            own.map(|(amplitude, value)| Told { label: Label::Effect { effect, amplitude }, value, stands }).collect::<Vec<_>>()
         };
         let told = base.chain(self.effects.iter().enumerate().flat_map(of_effect)).collect();
         let baseline = TargetDesign::baseline(context, target.name, target.relation);
         let design = Steps::default().apply(context, &self.placed(), TargetDesign { told, ..baseline });
-        let coefficients = design.coefficients();
+        let coefficients = design.coefficients(|_| true);
         Some((design, coefficients))
     }
 

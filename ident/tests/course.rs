@@ -137,22 +137,28 @@ fn a_cell_that_begins_to_read_the_torque_is_told_from_a_gain_that_changes() {
 #[test]
 fn coarse_steps_are_seen_beneath_the_noise() {
     let model = model();
-    let coarse = Day { seed: 5, cell: &|thrust, _, _| 0.2 * ((thrust + 0.03) / 0.2).round() + 0.01, ..HEALTHY };
-    let closed = against(&model, &coarse);
+    // a cell that was tared on one side of an edge
+    for zero in [0.01, 0.08] {
+        coarse_steps(&model, &Day { seed: 5, cell: &|thrust, _, _| 0.2 * ((thrust + 0.03) / 0.2).round() + zero, ..HEALTHY });
+    }
+}
+
+fn coarse_steps(model: &Model, coarse: &Day<'_>) {
+    let closed = against(model, coarse);
     assert_eq!(first(&closed), "quantisation", "{:?}", closed.verdict.effects);
     let entry = closed.verdict.effects.iter().find(|e| e.id == "quantisation").expect("named");
     let value = |name: &str| entry.parameters.iter().find(|p| p.name == name).expect("a parameter").value;
     assert!((value("step") / 0.2 - 1.0).abs() < 0.01, "{:?}", entry.parameters);
     let thrust = &closed.verdict.channels["thrust_n"];
     assert!(thrust.after.rms < 0.5 * thrust.before.rms, "{thrust:?}");
-    // the written model rounds as the verdict says
+    // the written model rounds as the verdict says, but for what the curve knows of a level on an edge
     let written = Model::parse("model.toml", &closed.model.to_toml()).expect("what was written");
-    let context = ident::context::Context::new(&log(&coarse), Some(written.start_pulse_us));
+    let context = ident::context::Context::new(&log(coarse), Some(written.start_pulse_us));
     let predicted = written.predict(&context, "thrust_n").expect("a thrust");
     let target = &context.targets[context.target("thrust_n").expect("a thrust")];
     let squares = target.rows.iter().zip(&target.y).map(|(row, y)| (y - predicted[*row]).powi(2)).sum::<f64>();
     let rms = (squares / target.rows.len() as f64).sqrt();
-    assert!((rms / thrust.after.rms - 1.0).abs() < 0.05, "{rms} {thrust:?}");
+    assert!((rms / thrust.after.rms - 1.0).abs() < 0.15, "{rms} {thrust:?}");
 }
 
 #[test]

@@ -24,10 +24,10 @@ impl Effect for Quantisation {
     fn about(&self) -> About {
         About {
             title: "A channel resolves only coarse steps",
-            equation: "reading = step * round(truth / step)",
+            equation: "reading = step * round(truth / step), beneath the noise offset + step * round((truth + zero - offset) / step)",
             source: "Widrow & Kollar 2008, Quantization Noise",
             depends_on: &["reading"],
-            signature: "all readings are multiples of one step, and the residual is a saw-tooth of the reading",
+            signature: "all readings are multiples of one step, or gather about the lines of a grid; the residual is a saw-tooth of the reading",
             look_alikes: &["sample_hold", "throttle_quantisation"],
         }
     }

@@ -5,7 +5,8 @@
 //! departures from it (gusts, spin-up, damage, friction on the arm) show, so that the standard error is large on a quiet run. The
 //! torque's own sensor noise never reached the thrust cell: left in the column it would make the coefficient too small, so the
 //! measured departures are first shrunk by the share of them that is real. Against a declared model it may set in: a gain that changes looks
-//! alike where the load is held, and only jumps, whose torque also turns the rotor faster, tell.
+//! alike where the load is held, and only jumps, whose torque also turns the rotor faster, tell. There the torque is the model's, free of noise; what
+//! is written down reads the measured one.
 //! Units: N/(N.m).
 //! Reference: cross-axis sensitivity of multi-component balances, Barlow, Rae & Pope 1999, *Low-Speed Wind Tunnel Testing*, ch. 7;
 //! regression calibration, Carroll et al. 2006, *Measurement Error in Nonlinear Models*, ch. 4.
@@ -27,7 +28,7 @@ impl Effect for TorqueCrosstalk {
     fn about(&self) -> About {
         About {
             title: "The thrust cell reads part of the torque",
-            equation: "thrust_n += coefficient * torque_nm, against a declared model for t >= t0",
+            equation: "thrust_n += coefficient * torque_nm, for t >= t0 where it sets in",
             source: "Barlow, Rae & Pope 1999, Low-Speed Wind Tunnel Testing, chapter 7",
             depends_on: &["torque_nm"],
             signature: "the thrust residual repeats what torque does beyond its own polynomial",
@@ -63,7 +64,9 @@ impl Effect for TorqueCrosstalk {
         if let [t0] = shape {
             let measured = context.torque.as_deref().unwrap_or_default();
             let torque = if context.expected_torque.is_empty() { measured } else { &context.expected_torque };
-            design.add(position, 0, step(context, *t0).iter().zip(torque).map(|(s, q)| s * q).collect());
+            if torque.len() == context.len() {
+                design.add(position, 0, step(context, *t0).iter().zip(torque).map(|(s, q)| s * q).collect());
+            }
         } else if let Some(torque) = context.facts.torque.get_or_init(|| acting_torque(context)) {
             design.add(position, 0, torque.clone());
         }

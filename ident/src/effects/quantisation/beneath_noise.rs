@@ -2,7 +2,7 @@
 //!
 //! What it is: the spacing at which readings gather, as the peak of their periodogram, and where one of its lines is.
 //! What can go wrong: a run that holds few levels has readings that gather somewhere by chance; whether they are roundings of what the relation
-//! expects is not asked here. Noise above a third of the step leaves no grid to see.
+//! expects is not asked here. Noise above a sixth of the step leaves no grid to see.
 //! Units: the channel's.
 //! Reference: directional statistics, Mardia & Jupp 2000, section 5.2.
 
@@ -25,6 +25,8 @@ const FEWEST: f64 = 6.0;
 const GATHERED: f64 = 0.6;
 /// Trials for each step that fits into the span once more.
 const FINE: f64 = 4.0;
+/// Most trials: a step of less than a thousandth of the span is as good as none.
+const MOST: usize = 4000;
 /// Trials on either side of the best, and how much finer they lie.
 const FINER: (i32, f64) = (10, 10.0);
 
@@ -40,7 +42,7 @@ pub(super) fn grid(context: &Context, target: &Target) -> Option<Grid> {
     if readings.len() < SAMPLES / 4 || span < FEWEST * least {
         return None;
     }
-    let trials = (FINE * (span / least - FEWEST)) as usize;
+    let trials = ((FINE * (span / least - FEWEST)) as usize).min(MOST);
     let best = |frequencies: &mut dyn Iterator<Item = f64>| -> Option<(f64, f64, f64)> {
         let gathered = frequencies.map(|f| {
             let (strength, phase) = gather(&readings, f);
