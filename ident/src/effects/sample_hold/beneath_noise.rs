@@ -94,9 +94,9 @@ fn of_one_phase(n: usize, length: f64, row: f64) -> f64 {
 fn changes(context: &Context, target: &Target) -> Vec<(usize, usize)> {
     let speed = |row: usize| context.rpm.get(row).copied().unwrap_or(0.0);
     // what is held beyond a jump of the load counts as noise of the level that it reaches into: on a healthy day none was
-    let healthy = if target.usual > 0.0 { (target.usual / target.noise.rms).min(1.0) } else { 1.0 };
-    let variance = |rows: &[usize]| rows.iter().map(|row| target.noise.variance(speed(*row))).fold(0.0, f64::max);
-    let least = |rows: &[usize]| variance(rows).sqrt() * healthy * CHANGED;
+    let healthy = if target.usual > 0.0 { target.usual } else { f64::INFINITY };
+    let deviation = |row: &usize| target.noise.variance(speed(*row)).sqrt().min(healthy);
+    let least = |rows: &[usize]| rows.iter().map(deviation).fold(0.0, f64::max) * CHANGED;
     let pairs = target.y.windows(2).zip(target.rows.windows(2));
     let changed = pairs.filter(|(y, rows)| rows[1] == rows[0] + 1 && (y[1] - y[0]).abs() > least(rows)).map(|(_, rows)| rows[1]);
     let mut out: Vec<(usize, usize)> = Vec::new();
