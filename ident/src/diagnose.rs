@@ -175,7 +175,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         rivals.insert(0, Rival { ids: best.ids(), probability, fit: best.fit.clone() });
     }
     // zeros that are older than the run are no cause of what else is left
-    let nothing_but_zeros = best.fit.placed.iter().all(is_tare);
+    let nothing_but_zeros = best.fit.placed.iter().all(Placed::is_tare);
     let forced = || match (named && !turned_down, nothing_but_zeros) {
         (true, true) => nameless(context, declared, &best.fit),
         (true, false) => None,
@@ -215,7 +215,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let same = |ids: &[String]| sorted(ids.to_vec()) == sorted(best.ids());
     rivals.retain(|r| is_unknown || !same(&r.ids));
     if !is_unknown {
-        let tares = best.fit.placed.iter().filter(|p| is_tare(p)).count();
+        let tares = best.fit.placed.iter().filter(|p| p.is_tare()).count();
         let of_names = |names: usize| of_further_names(names.saturating_sub(tares));
         probability *= of_names(best.fit.placed.len());
         rivals.iter_mut().for_each(|r| r.probability *= of_names(r.ids.len()));
@@ -245,18 +245,13 @@ fn of_further_names(names: usize) -> f64 {
     FURTHER.powi(names.saturating_sub(1) as i32)
 }
 
-/// Whether an effect is a zero that is older than the run: see [`tare`].
-fn is_tare(placed: &Placed) -> bool {
-    placed.effect.id() == "tare_shift" && placed.instance.form == effects::BEFORE
-}
-
 /// Against a declared model the zeros of the load cell are asked first: it is tared anew before every run, and a zero that is off looks
 /// like a change of whatever acts on thrust or torque.
 fn tare(context: &Context, declared: Declared<'_>, start: &Fit, best: &mut Candidate) {
     for offer in offers(context) {
         let mut placed = best.fit.placed.clone();
         placed.push(Placed { effect: offer.effect, instance: offer.instance, shape: Vec::new() });
-        if !placed.last().is_some_and(is_tare) {
+        if !placed.last().is_some_and(Placed::is_tare) {
             continue;
         }
         if let Some(fit) = fit(context, declared, &placed, Some(start), Rows::All) {
@@ -465,11 +460,11 @@ fn choose(
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
         let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL * probability);
-        let named = best.fit.placed.iter().filter(|p| !is_tare(p)).count();
+        let named = best.fit.placed.iter().filter(|p| !p.is_tare()).count();
         let small = largest_reduction(context, winner, &around.with, &around.without) < CLEAR_REDUCTION;
         // what an earlier effect's rough form leaves of itself looks like a further small one
         let newest = winner.fit.placed.len() - 1;
-        let beside = connected(&winner.fit.placed, newest).iter().any(|k| *k != newest && !is_tare(&winner.fit.placed[*k]));
+        let beside = connected(&winner.fit.placed, newest).iter().any(|k| *k != newest && !winner.fit.placed[*k].is_tare());
         if small && (beside || unclear && named > 0 || named >= EASILY_NAMED) {
             continue;
         }

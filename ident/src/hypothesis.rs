@@ -8,7 +8,7 @@
 
 use crate::context::{Context, Relation, Target};
 use crate::design::{Label, TargetDesign};
-use crate::effects::{Effect, Estimate, Instance};
+use crate::effects::{BEFORE, Effect, Estimate, Instance};
 use crate::model::Model;
 use crate::samples::{Samples, Taught};
 use crate::solve::Solution;
@@ -24,6 +24,13 @@ pub struct Placed {
     pub instance: Instance,
     /// Values of its shape parameters.
     pub shape: Vec<f64>,
+}
+
+impl Placed {
+    /// Whether it is a zero that is older than the run: a load cell is tared anew before every run.
+    pub(crate) fn is_tare(&self) -> bool {
+        self.effect.id() == "tare_shift" && self.instance.form == BEFORE
+    }
 }
 
 impl std::fmt::Debug for Placed {

@@ -8,7 +8,7 @@
 use crate::context::{Context, Relation, Target, unit_of};
 use crate::course::Course;
 use crate::design::{Label, TargetDesign, Told};
-use crate::effects::{BEFORE, Estimate, air_density};
+use crate::effects::{Estimate, air_density};
 use crate::hypothesis::{Declared, Fit, Placed};
 use crate::leftover::Leftover;
 use crate::log::Log;
@@ -232,7 +232,7 @@ impl Model {
         let base =
             polynomial.coefficients.iter().enumerate().map(|(k, c)| Told { label: Label::Base(k), value: *c, stands: true });
         let of_effect = |(effect, added): (usize, &AddedEffect)| {
-            let stands = !(added.placed.effect.id() == "tare_shift" && added.placed.instance.form == BEFORE);
+            let stands = !added.placed.is_tare();
             let own = added.amplitudes.iter().find(|(channel, _)| channel == target.name).map(|(_, values)| values.clone());
             let own = own.unwrap_or_default().into_iter().enumerate();
             own.map(|(amplitude, value)| Told { label: Label::Effect { effect, amplitude }, value, stands }).collect::<Vec<_>>()
