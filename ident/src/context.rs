@@ -290,6 +290,8 @@ pub struct Context {
     pub(crate) air: f64,
     /// Torque that a declared model expects on every row, N.m, with what is known of its error: no sensor's noise is in it. Empty without one.
     pub(crate) expected_torque: Vec<f64>,
+    /// Speed that it expects of the first speed channel, rev/min, likewise.
+    pub(crate) expected_speed: Vec<f64>,
     /// Powers 0 to 3 of the scaled pulse above the starting pulse (0 below it), and of the scaled speed.
     powers: [OnceLock<Vec<Values>>; 2],
     /// What effects ask again and again.
@@ -379,6 +381,7 @@ impl Context {
             air: 0.0,
             settling,
             expected_torque: Vec::new(),
+            expected_speed: Vec::new(),
             powers: Default::default(),
             facts: Facts::default(),
         }
@@ -438,8 +441,11 @@ impl Context {
                 Some(Counterparts { errors: course.of_channel(target.name)?, rows, prediction, step })
             });
             target.allow(left, &load, &classes, &alike, course);
-            if let Some(prediction) = prediction.as_ref().filter(|_| target.name == "torque_nm") {
-                self.expected_torque = prediction.iter().zip(&target.known).map(|(p, known)| p + known).collect();
+            let expected = || prediction.iter().flatten().zip(&target.known).map(|(p, known)| p + known).collect();
+            match target.relation {
+                Relation::Torque => self.expected_torque = expected(),
+                Relation::SpeedFromPulse if self.expected_speed.is_empty() => self.expected_speed = expected(),
+                _ => {}
             }
         }
     }

@@ -3,10 +3,11 @@
 //! What it is: after a jump a rotor takes the same way every day, and no model of a dozen numbers is right about it to the noise. A run that
 //! repeats the commands of the model's own run finds in its course what the model is off by on the same row, instead of how badly models are off
 //! after jumps (see [`crate::leftover`]). Where the load is held the course is empty: there the curve over the load knows more than one row.
+//! One day's noise is no part of what a model is off by: it is smoothed away as far as the course does not bend.
 //! What can go wrong: a row whose commands of the last seconds were others has no counterpart; two clocks that are not in step have none at all.
 //! Units: s, us, the channels' own.
-//! Reference: repetitive operation, Bristow, Tharayil & Alleyne 2006, IEEE Control Systems Magazine 26(3):96; specification
-//! `closing-the-loop.md`, step 1.
+//! Reference: repetitive operation, Bristow, Tharayil & Alleyne 2006, IEEE Control Systems Magazine 26(3):96; smoothing, Goldenshluger &
+//! Nemirovski 1997, Mathematical Methods of Statistics 6:135; specification `closing-the-loop.md`, step 1.
 
 use crate::context::{Context, Relation, Target};
 use crate::heldout;
@@ -62,9 +63,38 @@ pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Option
         for (row, r) in target.rows.iter().zip(residual).filter(|(row, _)| target.claims(**row)) {
             all[*row] = target.as_it_stands(*row, *r);
         }
+        for (from, to) in &context.calm {
+            let smooth = smoothed(&all[*from..*to], target.noise.rms);
+            all[*from..*to].copy_from_slice(&smooth);
+        }
         (target.name.to_owned(), rows.iter().map(|row| all[*row]).collect())
     });
     Some(Course { commands, errors: errors.collect(), t: rows.iter().map(|row| context.t[*row]).collect() })
+}
+
+/// Half the widths of the means that a course is smoothed by, rows.
+const HALVES: [usize; 4] = [1, 2, 4, 8];
+/// Standard errors by which a wider mean may differ from all narrower ones.
+const BENDS: f64 = 2.0;
+
+/// Between two jumps of the load: each value's mean over as many rows to both sides as differ from it by no more than the noise.
+fn smoothed(values: &[f64], noise: f64) -> Vec<f64> {
+    let of_row = |row: usize| {
+        let mut value = values[row];
+        let (mut low, mut high) = (value - BENDS * noise, value + BENDS * noise);
+        for half in HALVES.into_iter().take_while(|half| *half <= row && row + half < values.len()) {
+            let about = values[row - half..=row + half].iter().filter(|v| v.is_finite());
+            let (sum, count) = about.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+            let (mean, within) = (sum / f64::max(count, 1.0), BENDS * noise / f64::sqrt(f64::max(count, 1.0)));
+            (low, high) = (low.max(mean - within), high.min(mean + within));
+            if low > high {
+                break;
+            }
+            value = mean;
+        }
+        value
+    };
+    (0..values.len()).map(|row| if values[row].is_finite() { of_row(row) } else { f64::NAN }).collect()
 }
 
 impl Course {
@@ -199,7 +229,7 @@ pub(crate) fn ahead(course: Counterparts<'_>, target: &Target, classes: &[usize]
 
 #[cfg(test)]
 mod tests {
-    use super::{Course, HISTORY, out_of_step};
+    use super::{Course, HISTORY, out_of_step, smoothed};
     use crate::context::Context;
     use crate::log::{Column, Log};
 
@@ -234,6 +264,21 @@ mod tests {
         assert!(found[..49].iter().all(Option::is_none) && found[90] == Some(20), "{found:?}");
         // rows between the model's own rows have none
         assert!(course.counterparts(&context(0.03, same)).iter().all(Option::is_none));
+    }
+
+    #[test]
+    fn a_course_loses_its_noise_and_keeps_its_bends() {
+        let noise = |i: usize| 0.1 * if i * i % 7 < 3 { 1.0 } else { -1.0 };
+        // a rotor that arrives within four rows, and a level
+        let way = |i: usize| 10.0 * (-(i as f64) / 1.5).exp();
+        let values: Vec<f64> = (0..60).map(|i| way(i) + noise(i)).collect();
+        let smooth = smoothed(&values, 0.1);
+        let off = |i: usize| (smooth[i] - way(i)).abs();
+        assert!((0..5).all(|i| off(i) < 0.25), "{:?}", &smooth[..5]);
+        assert!((20..50).all(|i| off(i) < 0.07), "{:?}", &smooth[20..50]);
+        let gap: Vec<f64> = (0..9).map(|i| if i == 4 { f64::NAN } else { 1.0 }).collect();
+        let kept = smoothed(&gap, 0.1);
+        assert!(kept[4].is_nan() && (0..9).all(|i| i == 4 || kept[i] == 1.0));
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use crate::context::{Context, Relation};
+use crate::hypothesis::Placed;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -63,6 +64,8 @@ pub struct TargetDesign {
     pub(crate) told: Vec<Told>,
     /// What [`Self::map_columns`] has made of which column, for the effect that is being applied: before and after.
     pub(crate) mapped: Vec<(Values, Values)>,
+    /// Operators of a declared model that act on the rotor: what an effect does to the rotor goes through them, as the known part has.
+    pub(crate) rotor: Arc<[Placed]>,
 }
 
 impl TargetDesign {
@@ -76,7 +79,21 @@ impl TargetDesign {
             .enumerate()
             .map(|(k, values)| Column { label: Label::Base(k), values: values.clone() })
             .collect();
-        Self { name, relation, columns, fixed: Vec::new(), extra_variance: Vec::new(), told: Vec::new(), mapped: Vec::new() }
+        Self { columns, ..Self::empty(name, relation) }
+    }
+
+    /// A design without a column.
+    pub(crate) fn empty(name: &'static str, relation: Relation) -> Self {
+        Self {
+            name,
+            relation,
+            columns: Vec::new(),
+            fixed: Vec::new(),
+            extra_variance: Vec::new(),
+            told: Vec::new(),
+            mapped: Vec::new(),
+            rotor: Arc::default(),
+        }
     }
 
     /// The same target with its baseline coefficients held at given values.

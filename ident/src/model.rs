@@ -8,7 +8,7 @@
 use crate::context::{Context, Relation, Target, unit_of};
 use crate::course::Course;
 use crate::design::{Label, TargetDesign, Told};
-use crate::effects::{Estimate, air_density};
+use crate::effects::{self, Estimate, Stage, air_density};
 use crate::hypothesis::{Declared, Fit, Placed};
 use crate::leftover::Leftover;
 use crate::log::Log;
@@ -251,10 +251,21 @@ impl Model {
             Some((design, coefficients)) => {
                 let mut design = design.pinned(&coefficients);
                 design.fixed.iter_mut().zip(&target.known).for_each(|(f, known)| *f += known);
+                design.rotor = self.rotor(context, target).into();
                 design
             }
             None => TargetDesign::baseline(context, target.name, target.relation),
         }
+    }
+
+    /// The effects by which a rotor follows what drives it. One speed sensor alone may be what is late itself.
+    fn rotor(&self, context: &Context, target: &Target) -> Vec<Placed> {
+        let speeds = effects::speeds(context);
+        let of_rotor = |p: &Placed| {
+            let turns = p.effect.stage() == Stage::Output && speeds.len() > 1 && speeds.iter().all(|c| p.instance.touches(c));
+            turns && p.instance.touches(target.name) && p.effect.amplitudes(&p.instance).is_empty()
+        };
+        self.effects.iter().map(|e| e.placed.clone()).filter(of_rotor).collect()
     }
 
     /// The file's text.

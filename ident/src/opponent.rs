@@ -153,6 +153,9 @@ pub(crate) fn nameless(context: &Context, declared: Declared<'_>, start: &Fit) -
 /// Share of what a channel shows above its noise that the names must take away to be believed.
 const NEEDED_SHARE: f64 = 0.85;
 
+/// The same against a declared model, whose own forms are known: what is left there is the names' own, whose forms are right to a sixth.
+const NEEDED_AGAINST_MODEL: f64 = 0.97;
+
 /// Part of the rows that what is left may be in while the rest is explained, against a declared model: a form that is right for a run
 /// need not be for the moment in which its rotor starts.
 const FEW_ROWS: f64 = 0.02;
@@ -160,7 +163,8 @@ const FEW_ROWS: f64 = 0.02;
 /// Whether the named effects are the cause of most of what they were named for: on one channel that they touch they take away
 /// most of the squared residual above the noise. A part of a large residual is what any flexible term can have.
 pub(crate) fn explains(context: &Context, declared: Declared<'_>, start: &Fit, fit: &Fit) -> bool {
-    if fit.placed.iter().any(|p| p.effect.scatters()) {
+    let scatters = |t: &Target| fit.placed.iter().any(|p| p.effect.scatters() && p.instance.touches(t.name));
+    if !context.against_model && context.targets.iter().any(scatters) {
         return true;
     }
     let before = heldout::residuals(context, declared, start);
@@ -181,8 +185,9 @@ pub(crate) fn explains(context: &Context, declared: Declared<'_>, start: &Fit, f
         // rounding to coarse steps cannot be taken away whole
         let rounding = quantisation::step(target).map_or(0.0, |step| step * step / 12.0);
         let floor = target.noise.rms.powi(2).max(rounding);
+        let needed = if context.against_model { NEEDED_AGAINST_MODEL } else { NEEDED_SHARE };
         // between jumps only what stood out there can have been explained there
-        !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > NEEDED_SHARE * (b - floor)
+        !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > needed * (b - floor)
     };
     if context.against_model {
         // the floor of every channel is known: what the names leave of the news on any of them has another cause
@@ -192,7 +197,7 @@ pub(crate) fn explains(context: &Context, declared: Declared<'_>, start: &Fit, f
             let difference = DIFFERENCES.iter().find(|d| d.0 == name && touches(d.1));
             context.target(difference.map_or(name, |d| d.1))
         };
-        return judged.filter_map(|t| told_by(t.name)).all(|i| enough(i, false));
+        return judged.filter(|t| !scatters(t)).filter_map(|t| told_by(t.name)).all(|i| enough(i, false));
     }
     let mut touched = context.targets.iter().enumerate().filter(|(_, t)| touches(t.name));
     touched.any(|(i, t)| enough(i, false) || !t.unsettled.is_empty() && enough(i, true))

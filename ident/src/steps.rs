@@ -7,13 +7,18 @@
 //! Reference: memoisation, Michie 1968, Nature 218:19.
 
 use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::design::{Column, Label, TargetDesign, Values};
+use crate::effects::Stage;
 use crate::hypothesis::Placed;
 use std::sync::Arc;
 
 /// How one target's design came about.
 #[derive(Default)]
-pub(crate) struct Steps(Vec<Step>);
+pub(crate) struct Steps {
+    steps: Vec<Step>,
+    /// What a declared model's rotor has made of which column.
+    turned: Vec<(Values, Values)>,
+}
 
 struct Step {
     position: usize,
@@ -38,14 +43,18 @@ impl Steps {
     pub(crate) fn apply(&mut self, context: &Context, placed: &[Placed], mut design: TargetDesign) -> TargetDesign {
         let mut order: Vec<usize> = (0..placed.len()).filter(|i| placed[*i].instance.touches(design.name)).collect();
         order.sort_by_key(|i| placed[*i].effect.stage());
-        let mut last = std::mem::take(&mut self.0);
-        for i in order {
+        let meters = order.partition_point(|i| placed[*i].effect.stage() < Stage::Output);
+        let mut last = std::mem::take(&mut self.steps);
+        for (k, i) in order.iter().copied().enumerate() {
+            if k == meters {
+                self.turn(context, placed, &mut design);
+            }
             let p = &placed[i];
             let known = last.iter().position(|s| s.is_of(i, p)).map(|k| last.swap_remove(k));
             if let Some(step) = known.as_ref().filter(|s| stands(&s.before, &design)) {
                 design = step.after.clone();
                 design.mapped.clear();
-                self.0.extend(known);
+                self.steps.extend(known);
                 continue;
             }
             let before = design.clone();
@@ -53,10 +62,38 @@ impl Steps {
             let of_before = design.mapped.len();
             p.effect.apply(context, &p.instance, &p.shape, i, &mut design);
             design.mapped.drain(..of_before);
-            self.0.push(Step { position: i, placed: p.clone(), before, after: design.clone() });
+            self.steps.push(Step { position: i, placed: p.clone(), before, after: design.clone() });
             design.mapped.clear();
         }
+        if meters == order.len() {
+            self.turn(context, placed, &mut design);
+        }
         design
+    }
+
+    /// What effects do to the rotor goes through the declared model's rotor, as the known part of the design has, before a meter sees it.
+    fn turn(&mut self, context: &Context, placed: &[Placed], design: &mut TargetDesign) {
+        let rotor = design.rotor.clone();
+        let reaches = |column: &Column, rotor: &Placed| match column.label {
+            Label::Effect { effect, .. } => {
+                placed.get(effect).is_some_and(|p| rotor.instance.channels.iter().all(|c| p.instance.touches(c)))
+            }
+            Label::Base(_) => false,
+        };
+        for operator in rotor.iter() {
+            let reached: Vec<Values> = design.columns.iter().filter(|c| reaches(c, operator)).map(|c| c.values.clone()).collect();
+            for values in reached {
+                let known = self.turned.iter().find(|(before, _)| Arc::ptr_eq(before, &values)).map(|(_, after)| after.clone());
+                let after = known.unwrap_or_else(|| {
+                    let alone = Column { label: Label::Base(0), values: values.clone() };
+                    let mut of_one = TargetDesign { columns: vec![alone], ..TargetDesign::empty(design.name, design.relation) };
+                    operator.effect.apply(context, &operator.instance, &operator.shape, 0, &mut of_one);
+                    of_one.columns.swap_remove(0).values
+                });
+                self.turned.push((values.clone(), after.clone()));
+                design.columns.iter_mut().filter(|c| Arc::ptr_eq(&c.values, &values)).for_each(|c| c.values = after.clone());
+            }
+        }
     }
 }
 

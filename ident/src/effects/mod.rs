@@ -334,7 +334,7 @@ fn through_meter(context: &Context, design: &mut TargetDesign, meter: impl Fn(&[
 }
 
 /// Speed channels of the log.
-fn speeds(context: &Context) -> Vec<&'static str> {
+pub(crate) fn speeds(context: &Context) -> Vec<&'static str> {
     context.targets.iter().filter(|t| t.relation == Relation::SpeedFromPulse).map(|t| t.name).collect()
 }
 

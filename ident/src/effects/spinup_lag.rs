@@ -63,7 +63,9 @@ impl Effect for SpinupLag {
             let latency = Shape { name: "latency", unit: "s", range: (0.0, 3.0 * dt + LATE), starts: late.to_vec() };
             return vec![tau_up, tau_air, friction, latency];
         }
-        let starts: Vec<f64> = [0.3, 1.0, 3.0, 10.0].iter().map(|k| k * dt).collect();
+        // on a log of many rows a second ten rows are still quick for a rotor
+        let slow = [0.5, 2.0].into_iter().filter(|tau| *tau > 15.0 * dt);
+        let starts: Vec<f64> = [0.3, 1.0, 3.0, 10.0].iter().map(|k| k * dt).chain(slow).collect();
         let range = (0.02 * dt, (100.0 * dt).max(5.0));
         vec![
             Shape { name: "tau_up", unit: "s", range, starts: starts.clone() },

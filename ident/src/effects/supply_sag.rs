@@ -103,10 +103,20 @@ impl Effect for SupplySag {
         fitted
     }
 
-    fn plausible(&self, _: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         if instance.form == UNSEEN {
             return fitted.iter().all(|e| e.value > 0.0);
         }
-        fitted.iter().all(|e| e.name != "resistance" || e.value > 0.0 && e.value < 5.0)
+        let of = |name: &str| fitted.iter().find(|e| e.name == name);
+        let Some(resistance) = of("resistance") else { return true };
+        // the speed falls with the voltage, and with nothing else
+        let voltage = context.voltage.as_ref().map_or(f64::NAN, |v| v.iter().copied().fold(0.0, f64::max));
+        let follows = |loss: &Estimate| SPEED_PER_VOLTAGE.contains(&(loss.value * voltage / resistance.value));
+        let sag = resistance.value > 0.0 && resistance.value < 5.0;
+        sag && (!context.against_model || resistance.value > 3.0 * resistance.se && of("speed_loss").is_none_or(follows))
     }
 }
+
+/// Relative loss of speed over that of voltage: V = k omega + R I with I as omega^2 gives 1 / (1 + R I / V), two thirds to one; with room for a
+/// static form, and for a voltage that is measured before half of the leads.
+const SPEED_PER_VOLTAGE: std::ops::Range<f64> = 0.25..2.0;

@@ -7,9 +7,10 @@
 
 use super::speed_channel::expected_at as curve;
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
-use crate::context::{Context, Relation, STILL_US};
+use crate::context::{Context, STILL_US};
 use crate::design::TargetDesign;
 use crate::noise::median;
+use std::borrow::Cow;
 
 /// See the module.
 pub(crate) struct ThrottleQuantisation;
@@ -36,13 +37,16 @@ impl Effect for ThrottleQuantisation {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = speeds(context);
-        let form = if context.against_model { SHIFTED } else { "" };
-        if channels.is_empty() || levels(context).len() < 8 { Vec::new() } else { vec![Instance::new(&channels, form)] }
+        if channels.is_empty() || levels(context).len() < 8 {
+            return Vec::new();
+        }
+        let form = if context.against_model && best_of(context).short > 0.0 { CUT_OFF } else { "" };
+        vec![Instance::new(&channels, form)]
     }
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
         // the saw-tooth has a likelihood with many narrow peaks: the search starts on the highest
-        let Best { step, offset, anchored, .. } = *context.facts.tooth.get_or_init(|| best_tooth(&levels(context)));
+        let Best { step, offset, anchored, .. } = *best_of(context);
         let free = if anchored { 0.0 } else { 0.3 };
         vec![
             Shape { name: "step", unit: "us", range: (0.985 * step, 1.015 * step), starts: vec![step] },
@@ -50,25 +54,16 @@ impl Effect for ThrottleQuantisation {
         ]
     }
 
-    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
-        let depth = Amplitude { name: "depth", unit: "1" };
-        if instance.form == SHIFTED { vec![depth, Amplitude { name: "shift", unit: "us" }] } else { vec![depth] }
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        vec![Amplitude { name: "depth", unit: "1" }]
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let ([step, offset], Some(pulse)) = (shape, &context.pulse) else { return };
-        if instance.form == SHIFTED {
-            design.add(position, 1, context.facts.slope.get_or_init(|| slope(context)).clone());
-        }
-        design.add(
-            position,
-            0,
-            pulse
-                .iter()
-                .zip(context.facts.slope.get_or_init(|| slope(context)))
-                .map(|(p, slope)| slope * step * tooth(*p, *step, *offset))
-                .collect(),
-        );
+        let short = if instance.form == CUT_OFF { CUT } else { 0.0 };
+        let slope = context.facts.slope.get_or_init(|| slope(context));
+        let departure = |(p, slope): (&f64, &f64)| slope * step * (tooth(*p, *step, *offset) - short);
+        design.add(position, 0, pulse.iter().zip(slope).map(departure).collect());
     }
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
@@ -76,7 +71,7 @@ impl Effect for ThrottleQuantisation {
         let levels = levels(context);
         if let [first, .., last] = levels.as_slice() {
             let gap = (last.0 - first.0) / (levels.len() as f64 - 1.0);
-            let others = context.facts.tooth.get_or_init(|| best_tooth(&levels)).others;
+            let others = best_of(context).others;
             for e in fitted.iter_mut().filter(|e| e.name == "step") {
                 let between = gap * e.value / (last.0 - first.0) / 12.0_f64.sqrt();
                 e.se = e.se.max(between).max((others.1 - e.value).max(e.value - others.0) / 1.96);
@@ -91,7 +86,9 @@ impl Effect for ThrottleQuantisation {
 }
 
 /// Form against a declared model, whose curve does not hold the half step by which a command that is cut off is too short.
-const SHIFTED: &str = "beside a shift of the pulse";
+const CUT_OFF: &str = "cut off";
+/// See [`CUT_OFF`], in steps.
+const CUT: f64 = 0.5;
 
 /// Share to which the depth must be known: on few levels a tooth of some step fits any misfit of the static curve.
 const KNOWN: f64 = 0.08;
@@ -100,6 +97,11 @@ const KNOWN: f64 = 0.08;
 fn slope(context: &Context) -> Vec<f64> {
     let (expected, later) = (curve(context, 0.0), curve(context, 1.0));
     expected.iter().zip(later).map(|(a, b)| if *a > 0.0 { b - a } else { 0.0 }).collect()
+}
+
+/// The saw-tooth of a run.
+fn best_of(context: &Context) -> &Best {
+    context.facts.tooth.get_or_init(|| best_tooth(&levels(context), context.against_model))
 }
 
 /// Pulse, slope of the static curve, and median departure from it, for each half microsecond of pulse that the run visits: where the
@@ -113,9 +115,10 @@ fn levels(context: &Context) -> Vec<(f64, f64, f64)> {
 /// The same where the command changes by less than `most` from row to row.
 fn levels_where(context: &Context, most: f64) -> Vec<(f64, f64, f64)> {
     let Some(pulse) = &context.pulse else { return Vec::new() };
-    let (expected, slope) = (curve(context, 0.0), context.facts.slope.get_or_init(|| slope(context)));
     // what a declared model's curve misses on a healthy day is no tooth
-    let known = context.with_relation(Relation::SpeedFromPulse).next().map_or(&[][..], |k| context.targets[k].known.as_slice());
+    let declared = !context.expected_speed.is_empty();
+    let expected = if declared { Cow::Borrowed(&context.expected_speed) } else { Cow::Owned(curve(context, 0.0)) };
+    let slope = context.facts.slope.get_or_init(|| slope(context));
     let mut bins: std::collections::BTreeMap<i64, (f64, f64, Vec<f64>)> = std::collections::BTreeMap::new();
     for (i, p) in pulse.iter().enumerate() {
         // the command has been held, or has moved evenly, for a while
@@ -125,7 +128,7 @@ fn levels_where(context: &Context, most: f64) -> Vec<(f64, f64, f64)> {
             let bin = bins.entry((2.0 * p).round() as i64).or_default();
             bin.0 += p;
             bin.1 += slope[i];
-            bin.2.push(context.rpm[i] - expected[i] - known.get(i).copied().unwrap_or(0.0));
+            bin.2.push(context.rpm[i] - expected[i]);
         }
     }
     // a pulse on the edge of a step must not fall off it by rounding
@@ -152,6 +155,8 @@ pub(crate) struct Best {
     offset: f64,
     /// The offset is that of a plain counter.
     anchored: bool,
+    /// By how many steps the command is too short beside that.
+    short: f64,
     /// Shortest and longest step that explain nearly as much: on few levels one tooth passes for another.
     others: (f64, f64),
 }
@@ -159,10 +164,10 @@ pub(crate) struct Best {
 /// Share of the best score from which on another step could as well be the true one.
 const ALIAS: f64 = 0.8;
 
-/// The best saw-tooth: every step on a grid that is even in frequency, then a fine scan about the best ones.
-fn best_tooth(levels: &[(f64, f64, f64)]) -> Best {
+/// The best saw-tooth: every step on a grid that is even in frequency, then a fine scan about the best ones. A declared model has the curve.
+fn best_tooth(levels: &[(f64, f64, f64)], declared: bool) -> Best {
     let span = levels.last().map_or(1.0, |l| l.0) - levels.first().map_or(0.0, |l| l.0);
-    let departures = Departures::new(levels);
+    let departures = if declared { Departures::whole(levels) } else { Departures::new(levels) };
     let df = 0.15 / span.max(10.0);
     let (low, high) = (1.0 / LONGEST, 1.0 / SHORTEST);
     let mut coarse: Vec<(f64, f64)> = (0..((high - low) / df) as usize)
@@ -202,7 +207,7 @@ fn best_tooth(levels: &[(f64, f64, f64)]) -> Best {
     let Tooth { step, offset, .. } = if is_anchored { anchored } else { best };
     let alike = peaks.iter().filter(|p| p.score > ALIAS * best.score).map(|p| p.step);
     let others = alike.fold((step, step), |(low, high), s| (low.min(s), high.max(s)));
-    Best { step, offset, anchored: is_anchored, others }
+    Best { step, offset, anchored: is_anchored, short: departures.best(step, offset).0, others }
 }
 
 /// Offsets of a plain counter: cut off or rounded, counted from 1000 us or from 0.
@@ -222,7 +227,11 @@ const NUISANCES: usize = 5;
 
 /// Departures of the levels from the static curve, less all that a cubic or a shift of the pulse explains. Thousands of saw-teeth are
 /// held against them, so what each level has to say stands together.
-struct Departures(Vec<Level>);
+struct Departures {
+    levels: Vec<Level>,
+    /// By how many steps a rounded command is too short: nothing that can be told beside a free shift.
+    short: &'static [f64],
+}
 
 struct Level {
     pulse: f64,
@@ -255,14 +264,35 @@ impl Departures {
             nuisances: at(i),
             rest: rest[i],
         };
-        Self(levels.iter().enumerate().map(level).collect())
+        Self { levels: levels.iter().enumerate().map(level).collect(), short: &[0.0] }
+    }
+
+    /// Of a curve that is known: a command that is cut off is half a step too short, one that is rounded is not.
+    fn whole(levels: &[(f64, f64, f64)]) -> Self {
+        let level = |(pulse, slope, rest): &(f64, f64, f64)| Level {
+            pulse: *pulse,
+            slope: *slope,
+            nuisances: [0.0; NUISANCES],
+            rest: *rest,
+        };
+        Self { levels: levels.iter().map(level).collect(), short: &[0.0, CUT] }
     }
 
     /// Squared departure that a saw-tooth of about the depth of a rounding takes away.
     fn explained(&self, step: f64, offset: f64) -> f64 {
+        self.best(step, offset).1
+    }
+
+    /// By how many steps the command is too short, and what that explains.
+    fn best(&self, step: f64, offset: f64) -> (f64, f64) {
+        let each = self.short.iter().map(|short| (*short, self.explained_by(step, offset, *short)));
+        each.fold((0.0, f64::NEG_INFINITY), |best, other| if other.1 > best.1 { other } else { best })
+    }
+
+    fn explained_by(&self, step: f64, offset: f64, short: f64) -> f64 {
         let (mut with_nuisances, mut along, mut square) = ([0.0; NUISANCES], 0.0, 0.0);
-        for level in &self.0 {
-            let x = level.slope * step * tooth(level.pulse, step, offset);
+        for level in &self.levels {
+            let x = level.slope * step * (tooth(level.pulse, step, offset) - short);
             with_nuisances.iter_mut().zip(&level.nuisances).for_each(|(sum, q)| *sum += x * q);
             along += x * level.rest;
             square += x * x;
@@ -324,7 +354,7 @@ mod tests {
             .map(|k| 1100.0 + 6.0 * f64::from(k))
             .map(|p: f64| (p, 5.0, 5.0 * (13.0 * ((p - 1000.0) / 13.0).floor() - (p - 1000.0) + 6.0)))
             .collect();
-        let Best { step, offset, anchored, others } = best_tooth(&levels);
+        let Best { step, offset, anchored, others } = best_tooth(&levels, false);
         assert!(anchored && (step - 13.0).abs() < 1e-9 && offset == -0.5, "{step} {offset} {anchored}");
         assert!(others.0 > 12.8 && others.1 < 13.2, "{others:?}");
     }
