@@ -313,6 +313,8 @@ pub(crate) struct Facts {
     pub(crate) warmth: OnceLock<Option<Vec<f64>>>,
     /// Logarithm of the air's density over that of standard air on each row.
     pub(crate) density: OnceLock<Vec<f64>>,
+    /// Current that a held speed draws.
+    pub(crate) draw: OnceLock<Option<crate::effects::Draw>>,
     /// R/Kt^2 of the winding, W/(N.m)^2.
     pub(crate) winding: OnceLock<f64>,
     /// Slope of the static speed curve on each row, rev/min per us.

@@ -8,7 +8,7 @@
 
 use crate::context::{Context, Relation, Target};
 use crate::design::{Label, TargetDesign};
-use crate::effects::{BEFORE, Effect, Estimate, Instance};
+use crate::effects::{BEFORE, Effect, Estimate, Instance, Stage};
 use crate::model::Model;
 use crate::samples::{Samples, Taught};
 use crate::solve::Solution;
@@ -27,6 +27,11 @@ pub struct Placed {
 }
 
 impl Placed {
+    /// Where it acts in the causal chain.
+    pub(crate) fn stage(&self) -> Stage {
+        self.effect.stage_of(&self.instance)
+    }
+
     /// Whether it is a zero that is older than the run: a load cell is tared anew before every run.
     pub(crate) fn is_tare(&self) -> bool {
         self.effect.id() == "tare_shift" && self.instance.form == BEFORE

@@ -262,7 +262,7 @@ impl Model {
     fn rotor(&self, context: &Context, target: &Target) -> Vec<Placed> {
         let speeds = effects::speeds(context);
         let of_rotor = |p: &Placed| {
-            let turns = p.effect.stage() == Stage::Output && speeds.len() > 1 && speeds.iter().all(|c| p.instance.touches(c));
+            let turns = p.stage() == Stage::Output && speeds.len() > 1 && speeds.iter().all(|c| p.instance.touches(c));
             turns && p.instance.touches(target.name) && p.effect.amplitudes(&p.instance).is_empty()
         };
         self.effects.iter().map(|e| e.placed.clone()).filter(of_rotor).collect()

@@ -42,8 +42,8 @@ impl Steps {
     /// The effects of a hypothesis that touch the design's target, applied in causal order.
     pub(crate) fn apply(&mut self, context: &Context, placed: &[Placed], mut design: TargetDesign) -> TargetDesign {
         let mut order: Vec<usize> = (0..placed.len()).filter(|i| placed[*i].instance.touches(design.name)).collect();
-        order.sort_by_key(|i| placed[*i].effect.stage());
-        let meters = order.partition_point(|i| placed[*i].effect.stage() < Stage::Output);
+        order.sort_by_key(|i| placed[*i].stage());
+        let meters = order.partition_point(|i| placed[*i].stage() < Stage::Output);
         let mut last = std::mem::take(&mut self.steps);
         for (k, i) in order.iter().copied().enumerate() {
             if k == meters {

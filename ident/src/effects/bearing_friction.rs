@@ -106,7 +106,7 @@ pub(super) const AMPLITUDES: [Amplitude; 6] = [
 
 /// Adds the columns of an extra torque on the rotor that acts where `on` is 1.
 pub(super) fn drag(context: &Context, on: &[f64], viscous: bool, position: usize, design: &mut TargetDesign) {
-    let rho = *context.facts.winding.get_or_init(|| winding(context));
+    let rho = winding(context);
     let load = |i: usize| context.torque.as_ref().map_or(0.0, |q| q[i].max(0.0));
     let volts = |i: usize| volts(context, i);
     let omega = |i: usize| context.rpm[i] * OMEGA;
@@ -131,16 +131,20 @@ pub(super) fn drag(context: &Context, on: &[f64], viscous: bool, position: usize
 pub(super) const TURNING: f64 = 0.01;
 
 /// rad/s in a rev/min.
-const OMEGA: f64 = std::f64::consts::TAU / 60.0;
+pub(super) const OMEGA: f64 = std::f64::consts::TAU / 60.0;
 
 /// Supply voltage, V; three lithium cells where it was not measured.
-fn volts(context: &Context, i: usize) -> f64 {
+pub(super) fn volts(context: &Context, i: usize) -> f64 {
     context.voltage.as_ref().map_or(12.0, |v| v[i].max(1.0))
 }
 
 /// rho = R/Kt^2 of the winding, W/(N.m)^2, from the run's own balance of electrical and mechanical power; zero, which leaves
 /// the winding out, where torque or current was not measured.
-fn winding(context: &Context) -> f64 {
+pub(super) fn winding(context: &Context) -> f64 {
+    *context.facts.winding.get_or_init(|| balanced(context))
+}
+
+fn balanced(context: &Context) -> f64 {
     let (Some(torque), Some(current)) = (&context.torque, &context.current) else { return 0.0 };
     let n = context.len();
     let mut normal = Normal::new(2);

@@ -1,14 +1,20 @@
 //! `current_limit`: the speed controller or the supply caps the current.
 //!
-//! What it is: above the pulse at which `limit` is reached, more throttle brings no more speed; current(rpm) holds.
+//! What it is: above the pulse at which `limit` is reached, more throttle brings no more speed; current(rpm) holds. Against a declared model also
+//! a limit that is reached only while the rotor speeds up (`current_limit/spin_up.rs`).
 //! What can go wrong: a throttle end point below the longest pulse looks alike; the flat current tells.
 //! Units: A; internally us.
 //! Reference: constant-current limit of bench supplies and of speed controllers' firmware.
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
-use crate::context::Context;
+use crate::context::{Context, Relation};
 use crate::design::{Label, TargetDesign};
 use std::sync::Arc;
+
+mod spin_up;
+
+pub(crate) use spin_up::Draw;
+use spin_up::SPIN_UP;
 
 /// See the module.
 pub(crate) struct CurrentLimit;
@@ -33,12 +39,28 @@ impl Effect for CurrentLimit {
         Stage::Input
     }
 
-    fn instances(&self, context: &Context) -> Vec<Instance> {
-        let channels = speeds(context);
-        if channels.is_empty() { Vec::new() } else { vec![Instance::new(&channels, "")] }
+    fn stage_of(&self, instance: &Instance) -> Stage {
+        // how fast the rotor is known to be without a limit holds its lag
+        if instance.form == SPIN_UP { Stage::Output } else { self.stage() }
     }
 
-    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+    fn instances(&self, context: &Context) -> Vec<Instance> {
+        let mut channels = speeds(context);
+        if channels.is_empty() {
+            return Vec::new();
+        }
+        let mut out = vec![Instance::new(&channels, "")];
+        if !context.expected_speed.is_empty() && draw(context).is_some() {
+            channels.extend(super::present(context, &["current_a"]));
+            out.push(Instance::new(&channels, SPIN_UP));
+        }
+        out
+    }
+
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form == SPIN_UP {
+            return draw(context).map_or_else(Vec::new, spin_up::shapes);
+        }
         let top = context.pulse.as_ref().map_or(2000.0, |p| p.iter().copied().fold(1000.0, f64::max));
         let (from, to) = (context.start_pulse_us, top);
         let at = |u: f64| from + u * (to - from);
@@ -50,11 +72,16 @@ impl Effect for CurrentLimit {
         }]
     }
 
-    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        Vec::new()
+    fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
+        let of = |name| Amplitude { name, unit: "1" };
+        if instance.form == SPIN_UP { DEPTHS.map(of).to_vec() } else { Vec::new() }
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        if instance.form == SPIN_UP {
+            while_it_speeds_up(context, shape, position, design);
+            return;
+        }
         let ([reached], Some(pulse)) = (shape, &context.pulse) else { return };
         super::amplifier_saturation::hold_above(&mut design.fixed, pulse, *reached);
         for column in &mut design.columns {
@@ -65,7 +92,10 @@ impl Effect for CurrentLimit {
         }
     }
 
-    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+    fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        if instance.form == SPIN_UP {
+            return fitted;
+        }
         let (Some(reached), Some(pulse)) = (fitted.iter().find(|e| e.name == "reached_at").map(|e| e.value), &context.pulse)
         else {
             return fitted;
@@ -83,10 +113,49 @@ impl Effect for CurrentLimit {
         fitted
     }
 
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        if instance.form == SPIN_UP {
+            let within = |name: &str, range: std::ops::Range<f64>| {
+                fitted.iter().find(|e| e.name == name).is_none_or(|e| range.contains(&e.value))
+            };
+            return within(DEPTHS[0], DEPTH) && within(DEPTHS[1], DEPTH_OF_CURRENT);
+        }
         // the run must go well beyond, and the current must stand as still there as it does in steady stretches
         let reached = fitted.iter().find(|e| e.name == "reached_at").map_or(f64::INFINITY, |e| e.value);
         let top = context.pulse.as_ref().map_or(0.0, |p| p.iter().copied().fold(0.0, f64::max));
         top > reached + 4.0
+    }
+}
+
+/// Names of the amplitudes of a limit that is reached while the rotor speeds up: of the speed and of the current, over what the limit makes of them.
+const DEPTHS: [&str; 2] = ["depth", "depth_of_current"];
+/// Where that of the speed may lie.
+const DEPTH: std::ops::Range<f64> = 0.7..1.3;
+/// Where that of the current may: what the declared model expects of the current is that of another way up.
+const DEPTH_OF_CURRENT: std::ops::Range<f64> = 0.2..2.0;
+
+/// The draw of the run.
+fn draw(context: &Context) -> Option<&Draw> {
+    context.facts.draw.get_or_init(|| Draw::of(context)).as_ref()
+}
+
+/// Adds what a limit makes of a rotor that speeds up.
+fn while_it_speeds_up(context: &Context, shape: &[f64], position: usize, design: &mut TargetDesign) {
+    let ([limit, store, arrival], Some(known), Some(draw)) = (shape, design.known(), draw(context)) else { return };
+    let held = spin_up::Limit { draw, limit: *limit, store: *store, arrival: *arrival };
+    let follow = |expected: &[f64]| held.of(&context.t, expected);
+    let less = |of: &[f64]| of.iter().zip(&known).map(|(of, known)| of - known).collect();
+    match design.relation {
+        Relation::SpeedFromPulse => design.add(position, 0, less(&follow(&known))),
+        // a written model knows its rotor by the measured speed
+        Relation::Current if context.expected_speed.is_empty() => {
+            design.add(position, 1, known.iter().map(|known| (limit - known).min(0.0)).collect());
+        }
+        Relation::Current => {
+            let expected = &context.expected_speed;
+            let back = spin_up::held_back(expected, &follow(expected));
+            design.add(position, 1, known.iter().zip(back).map(|(known, back)| if back { limit - known } else { 0.0 }).collect());
+        }
+        _ => {}
     }
 }

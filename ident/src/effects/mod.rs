@@ -48,6 +48,7 @@ mod zero_drift;
 
 use crate::context::{Context, DIFFERENCES, Relation};
 use crate::design::TargetDesign;
+pub(crate) use current_limit::Draw;
 pub(crate) use tare_shift::BEFORE;
 pub(crate) use throttle_quantisation::Best as SawTooth;
 
@@ -155,6 +156,11 @@ pub trait Effect: Sync {
     fn about(&self) -> About;
     /// Where it acts.
     fn stage(&self) -> Stage;
+    /// The same for one of its forms.
+    fn stage_of(&self, instance: &Instance) -> Stage {
+        let _ = instance;
+        self.stage()
+    }
     /// The ways in which this log could hold it; none where the log lacks what it needs.
     fn instances(&self, context: &Context) -> Vec<Instance>;
     /// The ways in which this log may hold it without being able to show it: never named, but listed with an unknown cause where
