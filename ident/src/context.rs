@@ -313,8 +313,8 @@ pub(crate) struct Facts {
     pub(crate) warmth: OnceLock<Option<Vec<f64>>>,
     /// Logarithm of the air's density over that of standard air on each row.
     pub(crate) density: OnceLock<Vec<f64>>,
-    /// Current that a held speed draws.
-    pub(crate) draw: OnceLock<Option<crate::effects::Draw>>,
+    /// Current that a held speed draws, and the highest such speed, krpm.
+    pub(crate) draw: OnceLock<Option<(crate::effects::Draw, f64)>>,
     /// R/Kt^2 of the winding, W/(N.m)^2.
     pub(crate) winding: OnceLock<f64>,
     /// Slope of the static speed curve on each row, rev/min per us.
@@ -438,12 +438,14 @@ impl Context {
         let step = self.step();
         let predictions: Vec<Option<Vec<f64>>> = self.targets.iter().map(|t| model.predict(self, t.name)).collect();
         for ((target, load), prediction) in self.targets.iter_mut().zip(loads).zip(&predictions) {
-            let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) else { continue };
-            let course = known.as_ref().zip(prediction.as_ref()).and_then(|((course, rows), prediction)| {
-                Some(Counterparts { errors: course.of_channel(target.name)?, rows, prediction, step })
-            });
-            target.allow(left, &load, &classes, &alike, course);
-            let expected = || prediction.iter().flatten().zip(&target.known).map(|(p, known)| p + known).collect();
+            if let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) {
+                let course = known.as_ref().zip(prediction.as_ref()).and_then(|((course, rows), prediction)| {
+                    Some(Counterparts { errors: course.of_channel(target.name)?, rows, prediction, step })
+                });
+                target.allow(left, &load, &classes, &alike, course);
+            }
+            let expected =
+                || prediction.iter().flatten().enumerate().map(|(row, p)| target.as_it_stands(row, *p)).collect::<Vec<f64>>();
             match target.relation {
                 Relation::Torque => self.expected_torque = expected(),
                 Relation::SpeedFromPulse if self.expected_speed.is_empty() => self.expected_speed = expected(),

@@ -260,7 +260,8 @@ impl Model {
 
     /// The effects by which a rotor follows what drives it. One speed sensor alone may be what is late itself.
     fn rotor(&self, context: &Context, target: &Target) -> Vec<Placed> {
-        let speeds = effects::speeds(context);
+        let known = |c: &&'static str| self.polynomials.iter().any(|p| p.channel == **c);
+        let speeds: Vec<&'static str> = effects::speeds(context).into_iter().filter(known).collect();
         let of_rotor = |p: &Placed| {
             let turns = p.stage() == Stage::Output && speeds.len() > 1 && speeds.iter().all(|c| p.instance.touches(c));
             turns && p.instance.touches(target.name) && p.effect.amplitudes(&p.instance).is_empty()

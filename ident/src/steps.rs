@@ -74,16 +74,19 @@ impl Steps {
     /// What effects do to the rotor goes through the declared model's rotor, as the known part of the design has, before a meter sees it.
     fn turn(&mut self, context: &Context, placed: &[Placed], design: &mut TargetDesign) {
         let rotor = design.rotor.clone();
+        let last = std::mem::take(&mut self.turned);
         let reaches = |column: &Column, rotor: &Placed| match column.label {
             Label::Effect { effect, .. } => {
-                placed.get(effect).is_some_and(|p| rotor.instance.channels.iter().all(|c| p.instance.touches(c)))
+                let measured = |c: &&String| context.target(c).is_some();
+                placed.get(effect).is_some_and(|p| rotor.instance.channels.iter().filter(measured).all(|c| p.instance.touches(c)))
             }
             Label::Base(_) => false,
         };
         for operator in rotor.iter() {
             let reached: Vec<Values> = design.columns.iter().filter(|c| reaches(c, operator)).map(|c| c.values.clone()).collect();
             for values in reached {
-                let known = self.turned.iter().find(|(before, _)| Arc::ptr_eq(before, &values)).map(|(_, after)| after.clone());
+                let mut known = last.iter().chain(&self.turned);
+                let known = known.find(|(before, _)| Arc::ptr_eq(before, &values)).map(|(_, after)| after.clone());
                 let after = known.unwrap_or_else(|| {
                     let alone = Column { label: Label::Base(0), values: values.clone() };
                     let mut of_one = TargetDesign { columns: vec![alone], ..TargetDesign::empty(design.name, design.relation) };

@@ -7,7 +7,7 @@
 //! Reference: constant-current limit of bench supplies and of speed controllers' firmware.
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, speeds};
-use crate::context::{Context, Relation};
+use crate::context::Context;
 use crate::design::{Label, TargetDesign};
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ impl Effect for CurrentLimit {
     fn about(&self) -> About {
         About {
             title: "Current is limited",
-            equation: "rpm(pulse) = rpm(min(pulse, reached_at)), current_a <= limit",
+            equation: "rpm(pulse) = rpm(min(pulse, reached_at)), current_a <= limit; against a declared model also d(rpm^2)/dt <= gain (limit - draw(rpm)) efficiency(rpm)",
             source: "constant-current limit of supplies and speed controllers",
             depends_on: &["pulse_us", "current_a"],
             signature: "above one pulse speed and current stand still; thrust, torque and current go on following the speed",
@@ -45,13 +45,12 @@ impl Effect for CurrentLimit {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let mut channels = speeds(context);
+        let channels = speeds(context);
         if channels.is_empty() {
             return Vec::new();
         }
         let mut out = vec![Instance::new(&channels, "")];
-        if !context.expected_speed.is_empty() && draw(context).is_some() {
-            channels.extend(super::present(context, &["current_a"]));
+        if context.against_model && draw(context).is_some() {
             out.push(Instance::new(&channels, SPIN_UP));
         }
         out
@@ -59,7 +58,7 @@ impl Effect for CurrentLimit {
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
         if instance.form == SPIN_UP {
-            return draw(context).map_or_else(Vec::new, spin_up::shapes);
+            return spin_up::shapes(draw(context));
         }
         let top = context.pulse.as_ref().map_or(2000.0, |p| p.iter().copied().fold(1000.0, f64::max));
         let (from, to) = (context.start_pulse_us, top);
@@ -73,8 +72,7 @@ impl Effect for CurrentLimit {
     }
 
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
-        let of = |name| Amplitude { name, unit: "1" };
-        if instance.form == SPIN_UP { DEPTHS.map(of).to_vec() } else { Vec::new() }
+        if instance.form == SPIN_UP { vec![Amplitude { name: DEPTH.0, unit: "1" }] } else { Vec::new() }
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
@@ -115,10 +113,7 @@ impl Effect for CurrentLimit {
 
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         if instance.form == SPIN_UP {
-            let within = |name: &str, range: std::ops::Range<f64>| {
-                fitted.iter().find(|e| e.name == name).is_none_or(|e| range.contains(&e.value))
-            };
-            return within(DEPTHS[0], DEPTH) && within(DEPTHS[1], DEPTH_OF_CURRENT);
+            return fitted.iter().filter(|e| e.name == DEPTH.0).all(|e| DEPTH.1.contains(&e.value));
         }
         // the run must go well beyond, and the current must stand as still there as it does in steady stretches
         let reached = fitted.iter().find(|e| e.name == "reached_at").map_or(f64::INFINITY, |e| e.value);
@@ -127,35 +122,17 @@ impl Effect for CurrentLimit {
     }
 }
 
-/// Names of the amplitudes of a limit that is reached while the rotor speeds up: of the speed and of the current, over what the limit makes of them.
-const DEPTHS: [&str; 2] = ["depth", "depth_of_current"];
-/// Where that of the speed may lie.
-const DEPTH: std::ops::Range<f64> = 0.7..1.3;
-/// Where that of the current may: what the declared model expects of the current is that of another way up.
-const DEPTH_OF_CURRENT: std::ops::Range<f64> = 0.2..2.0;
+/// The speed's departure over what a limit that is reached while the rotor speeds up makes of it, and where it may lie.
+const DEPTH: (&str, std::ops::Range<f64>) = ("depth", 0.7..1.3);
 
-/// The draw of the run.
-fn draw(context: &Context) -> Option<&Draw> {
+/// The draw of the run, and its highest speed.
+fn draw(context: &Context) -> Option<&(Draw, f64)> {
     context.facts.draw.get_or_init(|| Draw::of(context)).as_ref()
 }
 
 /// Adds what a limit makes of a rotor that speeds up.
 fn while_it_speeds_up(context: &Context, shape: &[f64], position: usize, design: &mut TargetDesign) {
-    let ([limit, store, arrival], Some(known), Some(draw)) = (shape, design.known(), draw(context)) else { return };
-    let held = spin_up::Limit { draw, limit: *limit, store: *store, arrival: *arrival };
-    let follow = |expected: &[f64]| held.of(&context.t, expected);
-    let less = |of: &[f64]| of.iter().zip(&known).map(|(of, known)| of - known).collect();
-    match design.relation {
-        Relation::SpeedFromPulse => design.add(position, 0, less(&follow(&known))),
-        // a written model knows its rotor by the measured speed
-        Relation::Current if context.expected_speed.is_empty() => {
-            design.add(position, 1, known.iter().map(|known| (limit - known).min(0.0)).collect());
-        }
-        Relation::Current => {
-            let expected = &context.expected_speed;
-            let back = spin_up::held_back(expected, &follow(expected));
-            design.add(position, 1, known.iter().zip(back).map(|(known, back)| if back { limit - known } else { 0.0 }).collect());
-        }
-        _ => {}
-    }
+    let (Some(limit), Some(known)) = (spin_up::Limit::of_shape(shape), design.known()) else { return };
+    let held = limit.of(&context.t, &known);
+    design.add(position, 0, held.iter().zip(&known).map(|(held, known)| held - known).collect());
 }

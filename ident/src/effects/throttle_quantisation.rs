@@ -23,7 +23,7 @@ impl Effect for ThrottleQuantisation {
     fn about(&self) -> About {
         About {
             title: "Pulse acts in coarse steps",
-            equation: "rpm = rpm_static(1000 + step (round((pulse - 1000) / step - offset) + offset))",
+            equation: "rpm = rpm_static(1000 + step (round((pulse - 1000) / step - offset) + offset)), half a step less where a declared model tells that the pulse is cut off",
             source: "Widrow & Kollar 2008, Quantization Noise",
             depends_on: &["pulse_us"],
             signature: "rpm(pulse) is a staircase: the residual is a saw-tooth of the pulse; thrust(rpm) holds",
@@ -101,7 +101,22 @@ fn slope(context: &Context) -> Vec<f64> {
 
 /// The saw-tooth of a run.
 fn best_of(context: &Context) -> &Best {
-    context.facts.tooth.get_or_init(|| best_tooth(&levels(context), context.against_model))
+    context.facts.tooth.get_or_init(|| {
+        let levels = levels(context);
+        let beside_a_curve = || best_tooth(&levels, Departures::new(&levels));
+        if context.expected_speed.is_empty() {
+            return beside_a_curve();
+        }
+        // a declared model has the curve, but not what else has changed the speed
+        let whole = Departures::whole(&levels);
+        let all = levels.iter().map(|l| l.2 * l.2).sum::<f64>();
+        let best = best_tooth(&levels, whole);
+        if best.score > WHOLE * all {
+            return best;
+        }
+        let beside = beside_a_curve();
+        Best { short: Departures::whole(&levels).best(beside.step, beside.offset).0, ..beside }
+    })
 }
 
 /// Pulse, slope of the static curve, and median departure from it, for each half microsecond of pulse that the run visits: where the
@@ -157,6 +172,8 @@ pub(crate) struct Best {
     anchored: bool,
     /// By how many steps the command is too short beside that.
     short: f64,
+    /// Squared departure that it explains.
+    score: f64,
     /// Shortest and longest step that explain nearly as much: on few levels one tooth passes for another.
     others: (f64, f64),
 }
@@ -164,10 +181,9 @@ pub(crate) struct Best {
 /// Share of the best score from which on another step could as well be the true one.
 const ALIAS: f64 = 0.8;
 
-/// The best saw-tooth: every step on a grid that is even in frequency, then a fine scan about the best ones. A declared model has the curve.
-fn best_tooth(levels: &[(f64, f64, f64)], declared: bool) -> Best {
+/// The best saw-tooth: every step on a grid that is even in frequency, then a fine scan about the best ones.
+fn best_tooth(levels: &[(f64, f64, f64)], departures: Departures) -> Best {
     let span = levels.last().map_or(1.0, |l| l.0) - levels.first().map_or(0.0, |l| l.0);
-    let departures = if declared { Departures::whole(levels) } else { Departures::new(levels) };
     let df = 0.15 / span.max(10.0);
     let (low, high) = (1.0 / LONGEST, 1.0 / SHORTEST);
     let mut coarse: Vec<(f64, f64)> = (0..((high - low) / df) as usize)
@@ -207,7 +223,8 @@ fn best_tooth(levels: &[(f64, f64, f64)], declared: bool) -> Best {
     let Tooth { step, offset, .. } = if is_anchored { anchored } else { best };
     let alike = peaks.iter().filter(|p| p.score > ALIAS * best.score).map(|p| p.step);
     let others = alike.fold((step, step), |(low, high), s| (low.min(s), high.max(s)));
-    Best { step, offset, anchored: is_anchored, short: departures.best(step, offset).0, others }
+    let (short, score) = departures.best(step, offset);
+    Best { step, offset, anchored: is_anchored, short, score, others }
 }
 
 /// Offsets of a plain counter: cut off or rounded, counted from 1000 us or from 0.
@@ -221,16 +238,23 @@ const ANCHORED: f64 = 0.98;
 
 /// Depth of the tooth beside that of a pure rounding.
 const DEPTH: (f64, f64) = (0.7, 1.3);
+/// The same where the curve is known.
+const DEPTH_OF_WHOLE: (f64, f64) = (0.9, 1.1);
 
 /// Most nuisances: four powers of the pulse, and the slope of the curve.
 const NUISANCES: usize = 5;
 
-/// Departures of the levels from the static curve, less all that a cubic or a shift of the pulse explains. Thousands of saw-teeth are
+/// Share of all that the levels depart from a known curve that a saw-tooth must explain to be sought in the departures as they are.
+const WHOLE: f64 = 0.9;
+
+/// Departures of the levels from a curve: from the run's own static one less all that a cubic or a shift of the pulse explains. Thousands of saw-teeth are
 /// held against them, so what each level has to say stands together.
 struct Departures {
     levels: Vec<Level>,
     /// By how many steps a rounded command is too short: nothing that can be told beside a free shift.
     short: &'static [f64],
+    /// How deep a tooth may be.
+    depth: (f64, f64),
 }
 
 struct Level {
@@ -264,7 +288,7 @@ impl Departures {
             nuisances: at(i),
             rest: rest[i],
         };
-        Self { levels: levels.iter().enumerate().map(level).collect(), short: &[0.0] }
+        Self { levels: levels.iter().enumerate().map(level).collect(), short: &[0.0], depth: DEPTH }
     }
 
     /// Of a curve that is known: a command that is cut off is half a step too short, one that is rounded is not.
@@ -275,7 +299,7 @@ impl Departures {
             nuisances: [0.0; NUISANCES],
             rest: *rest,
         };
-        Self { levels: levels.iter().map(level).collect(), short: &[0.0, CUT] }
+        Self { levels: levels.iter().map(level).collect(), short: &[0.0, CUT], depth: DEPTH_OF_WHOLE }
     }
 
     /// Squared departure that a saw-tooth of about the depth of a rounding takes away.
@@ -301,7 +325,7 @@ impl Departures {
         if own <= 1e-12 {
             return 0.0;
         }
-        let depth = (along / own).clamp(DEPTH.0, DEPTH.1);
+        let depth = (along / own).clamp(self.depth.0, self.depth.1);
         depth * (2.0 * along - depth * own)
     }
 }
@@ -354,9 +378,22 @@ mod tests {
             .map(|k| 1100.0 + 6.0 * f64::from(k))
             .map(|p: f64| (p, 5.0, 5.0 * (13.0 * ((p - 1000.0) / 13.0).floor() - (p - 1000.0) + 6.0)))
             .collect();
-        let Best { step, offset, anchored, others } = best_tooth(&levels, false);
+        let Best { step, offset, anchored, others, .. } = best_tooth(&levels, Departures::new(&levels));
         assert!(anchored && (step - 13.0).abs() < 1e-9 && offset == -0.5, "{step} {offset} {anchored}");
         assert!(others.0 > 12.8 && others.1 < 13.2, "{others:?}");
+    }
+
+    #[test]
+    fn on_a_grid_of_levels_a_known_curve_tells_what_a_cubic_swallows() {
+        // a straight line of 5 rev/min per us whose pulse is cut to steps of 12.56 us, on levels 50 us apart
+        let cut = |p: f64| 12.56 * ((p - 1000.0) / 12.56).floor() - (p - 1000.0);
+        let levels: Vec<(f64, f64, f64)> =
+            (0..16).map(|k| 1100.0 + 50.0 * f64::from(k)).map(|p| (p, 5.0, 5.0 * cut(p))).collect();
+        let Best { step, short, score, .. } = best_tooth(&levels, Departures::whole(&levels));
+        let all: f64 = levels.iter().map(|l| l.2 * l.2).sum();
+        assert!((step - 12.56).abs() < 0.02 && short == CUT && score > 0.99 * all, "{step} {short} {score} of {all}");
+        let swallowed = best_tooth(&levels, Departures::new(&levels));
+        assert!(swallowed.score < 0.01 * all, "{}", swallowed.score);
     }
 
     #[test]

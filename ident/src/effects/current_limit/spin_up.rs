@@ -1,15 +1,16 @@
 //! The limit while the rotor speeds up.
 //!
 //! What it is: a rotor that is to turn faster draws several times what its speed needs. Where the limit is reached there only, no level shows it:
-//! what the limit leaves beyond the draw of the speed is all that turns the rotor faster, d(rpm^2)/dt = top^2 / store (limit - draw(rpm)) /
-//! draw(top) efficiency(rpm), until it is where the declared model expects it; meanwhile the current stands at the limit. The winding takes
-//! R i^2 of what comes in: efficiency = 2 u / (u + sqrt(u^2 + 1)) with u = K omega / sqrt(4 R V limit).
+//! what the limit leaves beyond the draw of the speed is all that turns the rotor faster, d(rpm^2)/dt = gain (limit - draw(rpm)) efficiency(rpm),
+//! until it is where the declared model expects it. The winding takes R i^2 of what comes in:
+//! efficiency = 2 u / (u + sqrt(u^2 + 1)) with u = K omega / sqrt(4 R V limit). Draw and winding are those of the run that the limit was found on.
 //! What can go wrong: where no torque was measured the winding is left out, and the time constant is a mean.
 //! Units: rev/min, A, s.
 //! Reference: energy balance of a rotor; Beharie 2013, Eq. 5.11 as corrected (the draw at a speed).
 
 use super::super::{Shape, bearing_friction};
 use crate::context::{Context, Relation};
+use crate::noise::median;
 use crate::solve::Normal;
 
 /// Form of an instance against a declared model, which knows how the rotor speeds up without a limit.
@@ -25,22 +26,21 @@ const ARRIVALS: [f64; 2] = [0.02, 0.08];
 const PARTS: usize = 4;
 /// Speed below which a motor is driven without looking at its rotor, krpm.
 const SLOW: f64 = 0.1;
-/// Share of the expected speed below which a rotor is held back.
-const BEHIND: f64 = 0.98;
+/// Faster than any propeller of the kind, krpm.
+const FASTEST: f64 = 100.0;
 
-/// Current that a speed draws where it is held: second and third power of krpm.
+/// Current that a speed draws where it is held, and what of it the winding takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Draw {
+    /// Second and third power of krpm, A.
     powers: [f64; 2],
-    /// Highest speed, krpm.
-    top: f64,
     /// Square of the speed at which the winding takes most, by the current, krpm^2/A.
     lossy: f64,
 }
 
 impl Draw {
-    /// As the run shows it where the rotor has arrived; `None` where it shows none.
-    pub(super) fn of(context: &Context) -> Option<Self> {
+    /// As the run shows it where the rotor has arrived, and the highest speed there, krpm; `None` where it shows none.
+    pub(super) fn of(context: &Context) -> Option<(Self, f64)> {
         let target = context.targets.iter().find(|t| t.relation == Relation::Current)?;
         let mut held = vec![false; context.len()];
         context.steady.iter().for_each(|(from, to)| held[*from..*to].fill(true));
@@ -54,10 +54,10 @@ impl Draw {
         }
         let solution = normal.solve()?;
         let powers = [*solution.coefficients.first()?, *solution.coefficients.get(1)?];
+        let volts = median(&mut context.voltage.clone().unwrap_or_else(|| vec![bearing_friction::volts(context, 0)]));
         let omega = 1000.0 * bearing_friction::OMEGA;
-        let lossy = 4.0 * bearing_friction::winding(context) * bearing_friction::volts(context, 0) / (omega * omega);
-        let draw = Self { powers, top, lossy };
-        (draw.at(top) > 0.0).then_some(draw)
+        let draw = Self { powers, lossy: 4.0 * bearing_friction::winding(context) * volts / (omega * omega) };
+        (draw.at(top) > 0.0).then_some((draw, top))
     }
 
     fn at(&self, krpm: f64) -> f64 {
@@ -71,32 +71,54 @@ impl Draw {
     }
 }
 
-/// Limit and time constant.
-pub(super) fn shapes(draw: &Draw) -> Vec<Shape> {
-    let most = draw.at(draw.top);
+/// What is sought, and what the run says of its draw. A log that shows no draw has the names.
+pub(super) fn shapes(draw: Option<&(Draw, f64)>) -> Vec<Shape> {
+    let (draw, top) = draw.copied().unwrap_or((Draw { powers: [0.0, 1.0], lossy: 0.0 }, 1.0));
+    let most = draw.at(top);
+    let gain = |store: f64| top * top / (store * most);
+    let told = |name, unit, value: f64| Shape { name, unit, range: (value, value), starts: vec![value] };
     vec![
         Shape { name: "limit", unit: "A", range: (0.3 * most, 5.0 * most), starts: LIMITS.map(|k| k * most).to_vec() },
-        Shape { name: "store", unit: "s", range: (0.01, 3.0), starts: STORES.to_vec() },
+        Shape { name: "gain", unit: "krpm2/A/s", range: (gain(3.0), gain(0.01)), starts: STORES.map(gain).to_vec() },
         Shape { name: "arrival", unit: "s", range: (1e-3, 1.0), starts: ARRIVALS.to_vec() },
+        told("draw_square", "A/krpm2", draw.powers[0]),
+        told("draw_cube", "A/krpm3", draw.powers[1]),
+        told("winding_square", "krpm2/A", draw.lossy),
     ]
 }
 
 /// A limit and the rotor that it holds back.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Limit<'d> {
-    pub(super) draw: &'d Draw,
+pub(super) struct Limit {
     /// A.
-    pub(super) limit: f64,
+    limit: f64,
+    /// krpm^2 a second for an ampere.
+    gain: f64,
     /// s.
-    pub(super) store: f64,
-    /// s.
-    pub(super) arrival: f64,
+    arrival: f64,
+    draw: Draw,
 }
 
-impl Limit<'_> {
+impl Limit {
+    /// Of the values of [`shapes`].
+    pub(super) fn of_shape(shape: &[f64]) -> Option<Self> {
+        let [limit, gain, arrival, square, cube, lossy] = *shape else { return None };
+        Some(Self { limit, gain, arrival, draw: Draw { powers: [square, cube], lossy } })
+    }
+
+    /// The speed that draws the limit, krpm: faster it does not become.
+    fn most(&self) -> f64 {
+        let (mut low, mut high) = (0.0, FASTEST);
+        while high - low > 1e-3 {
+            let middle = 0.5 * (low + high);
+            *(if self.draw.at(middle) < self.limit { &mut low } else { &mut high }) = middle;
+        }
+        high
+    }
+
     /// What the rotor makes of an expected speed, rev/min.
     pub(super) fn of(&self, t: &[f64], expected: &[f64]) -> Vec<f64> {
-        let gain = self.draw.top.powi(2) / (self.store * self.draw.at(self.draw.top));
+        let most = self.most();
         let (mut speed, mut last) = (f64::INFINITY, (f64::NAN, f64::NAN));
         let mut out = Vec::with_capacity(expected.len());
         for (t, expected) in t.iter().zip(expected) {
@@ -110,8 +132,8 @@ impl Limit<'_> {
                 let before = last.1 + rise * part as f64;
                 let free = before + rise - (before - speed) * left;
                 let power = (self.limit - self.draw.at(speed)) * self.draw.efficiency(speed, self.limit);
-                let energy = speed.powi(2) + dt * gain * power;
-                speed = energy.max(0.0).sqrt().min(free);
+                let driven = (speed.powi(2) + dt * self.gain * power).max(0.0).sqrt();
+                speed = if speed < most { driven.min(most) } else { driven.max(most) }.min(free);
             }
             last = (*t, expected);
             out.push(1000.0 * speed);
@@ -120,30 +142,38 @@ impl Limit<'_> {
     }
 }
 
-/// Rows in which a rotor is held back.
-pub(super) fn held_back(expected: &[f64], limited: &[f64]) -> Vec<bool> {
-    expected.iter().zip(limited).map(|(expected, limited)| *limited < BEHIND * expected).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Draw, Limit, held_back};
+    use super::{Draw, Limit};
+
+    /// A top speed of 5000 rev/min draws 5 A, which brings its energy in that many seconds.
+    fn under(limit: f64, store: f64) -> Limit {
+        Limit { limit, gain: 5.0 / store, arrival: 0.01, draw: Draw { powers: [0.0, 0.04], lossy: 0.0 } }
+    }
 
     #[test]
     fn a_rotor_under_a_limit_is_late_and_arrives_where_the_limit_lets_it() {
-        let draw = Draw { powers: [0.0, 0.04], top: 5.0, lossy: 0.0 };
         let t: Vec<f64> = (0..200).map(|i| 0.02 * f64::from(i)).collect();
         let expected: Vec<f64> = t.iter().map(|t| if *t < 1.0 { 1000.0 } else { 5000.0 }).collect();
         // more than the 5 A that the top speed draws: it arrives
-        let under = |limit: f64| Limit { draw: &draw, limit, store: 0.2, arrival: 0.01 }.of(&t, &expected);
-        let late = under(8.0);
-        let back = held_back(&expected, &late);
-        assert!(back[..50].iter().all(|b| !b) && back[50] && back[52] && !back[199], "{late:?}");
+        let late = under(8.0, 0.2).of(&t, &expected);
+        assert!(late[..50].iter().all(|v| (v - 1000.0).abs() < 1e-9) && late[52] < 4500.0, "{late:?}");
         assert!((late[199] - 5000.0).abs() < 1.0);
         // 2.56 A are the draw of 4000 rev/min
-        let short = under(2.56);
+        let short = under(2.56, 0.2).of(&t, &expected);
         assert!((short[199] - 4000.0).abs() < 20.0, "{}", short[199]);
         // the first row at the limit: 5^2 / 0.2 * (8 - 0.04) / 5 * 0.02 s on top of 1
         assert!((late[50] / 1000.0 - (1.0_f64 + 3.98).sqrt()).abs() < 0.05, "{}", late[50]);
+    }
+
+    #[test]
+    fn rows_far_apart_do_not_make_it_ring() {
+        let t: Vec<f64> = (0..40).map(|i| 0.5 * f64::from(i)).collect();
+        let expected: Vec<f64> = t.iter().map(|t| if *t < 5.0 { 1000.0 } else { 5000.0 }).collect();
+        let held = under(2.56, 0.04).of(&t, &expected);
+        assert!(held[12..].iter().all(|v| (v - 4000.0).abs() < 20.0), "{held:?}");
+        // one limit is one limit on a run that does not reach the top
+        let slow: Vec<f64> = expected.iter().map(|v| v.min(3000.0)).collect();
+        assert_eq!(under(2.56, 0.04).of(&t, &slow), slow);
     }
 }
