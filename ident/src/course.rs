@@ -63,8 +63,9 @@ pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Option
         for (row, r) in target.rows.iter().zip(residual).filter(|(row, _)| target.claims(**row)) {
             all[*row] = target.as_it_stands(*row, *r);
         }
+        let noise = target.noise.rms.min(from_row_to_row(&all));
         for (from, to) in &context.calm {
-            let smooth = smoothed(&all[*from..*to], target.noise.rms);
+            let smooth = smoothed(&all[*from..*to], noise);
             all[*from..*to].copy_from_slice(&smooth);
         }
         (target.name.to_owned(), rows.iter().map(|row| all[*row]).collect())
@@ -76,6 +77,13 @@ pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Option
 const HALVES: [usize; 4] = [1, 2, 4, 8];
 /// Standard errors by which a wider mean may differ from all narrower ones.
 const BENDS: f64 = 2.0;
+
+/// Noise by what most rows differ from the line between their neighbours: a channel that swings about a new level is no noisier for it.
+fn from_row_to_row(values: &[f64]) -> f64 {
+    let bend = |w: &[f64]| (w[0] - 2.0 * w[1] + w[2]).abs();
+    let mut bends: Vec<f64> = values.windows(3).map(bend).filter(|b| b.is_finite()).collect();
+    if bends.is_empty() { f64::INFINITY } else { median(&mut bends) / (QUANTILES[0].1 * 6.0_f64.sqrt()) }
+}
 
 /// Between two jumps of the load: each value's mean over as many rows to both sides as differ from it by no more than the noise.
 fn smoothed(values: &[f64], noise: f64) -> Vec<f64> {
