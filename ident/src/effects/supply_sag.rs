@@ -9,6 +9,7 @@
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
+use crate::noise::median;
 
 /// See the module.
 pub(crate) struct SupplySag;
@@ -110,7 +111,7 @@ impl Effect for SupplySag {
         let of = |name: &str| fitted.iter().find(|e| e.name == name);
         let Some(resistance) = of("resistance") else { return true };
         // the speed falls with the voltage, and with nothing else
-        let voltage = context.voltage.as_ref().map_or(f64::NAN, |v| v.iter().copied().fold(0.0, f64::max));
+        let voltage = context.voltage.clone().map_or(f64::NAN, |mut v| median(&mut v));
         let follows = |loss: &Estimate| SPEED_PER_VOLTAGE.contains(&(loss.value * voltage / resistance.value));
         let sag = resistance.value > 0.0 && resistance.value < 5.0;
         sag && (!context.against_model || resistance.value > 3.0 * resistance.se && of("speed_loss").is_none_or(follows))
