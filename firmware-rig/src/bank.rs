@@ -18,6 +18,8 @@ const DISAGREEMENT: f32 = 0.01;
 const STRAIGHT_BELOW: f32 = 4000.0;
 /// Change of the blades' unevenness from there that counts as twist: 3.6 degrees between two blades.
 const TWIST: f32 = 0.02;
+/// Parts of a period in which the unevenness is told.
+const UNEVEN_PARTS: f32 = 10_000.0;
 
 /// Speed below which channels are not judged against each other, rev/min: with one mark a revolution then takes nearly as
 /// long as the time-out to zero (0.25 s), so that channels read zero one after the other.
@@ -119,6 +121,7 @@ impl CaptureBank {
     pub fn sample(&mut self, now: Ticks) -> [CaptureCode; CAPTURE_CHANNELS] {
         let others = self.others(now);
         let mut codes = self.channels.each_ref().map(|c| c.code(now, others));
+        self.watch_marks(&mut codes);
         self.watch_blades(&mut codes);
         let healthy =
             |c: &CaptureChannel, code: &CaptureCode| c.speed().filter(|_| code.verdict == CaptureVerdict::Nominal).map(|v| v.0);
@@ -150,15 +153,23 @@ impl CaptureBank {
         codes
     }
 
+    /// Tells how unevenly the marks of each channel stand, where the readings show it.
+    fn watch_marks(&self, codes: &mut [CaptureCode; CAPTURE_CHANNELS]) {
+        for (channel, code) in self.channels.iter().zip(codes) {
+            if !matches!(code.verdict, CaptureVerdict::Nominal | CaptureVerdict::Alternating) {
+                continue;
+            }
+            let edges = usize::from(code.edges).max(4 * usize::from(channel.marks));
+            let uneven = unevenness(channel.marks, channel.periods().take(edges));
+            code.uneven = uneven.map_or(0, |uneven| ((UNEVEN_PARTS * uneven + 0.5) as u16).max(1));
+        }
+    }
+
     /// Tells a blade that twists at speed from blades that were never opposite: by the change of the beam's pattern.
     fn watch_blades(&mut self, codes: &mut [CaptureCode; CAPTURE_CHANNELS]) {
         let ([beam, ..], [code, ..]) = (&self.channels, codes);
-        if !matches!(code.verdict, CaptureVerdict::Nominal | CaptureVerdict::Alternating) {
-            return;
-        }
-        let edges = usize::from(code.edges).max(4 * usize::from(beam.marks));
-        let Some(speed) = beam.speed() else { return };
-        let Some(uneven) = unevenness(beam.marks, beam.periods().take(edges)) else { return };
+        let Some(speed) = beam.speed().filter(|_| code.uneven > 0) else { return };
+        let uneven = f32::from(code.uneven) / UNEVEN_PARTS;
         if speed.0 < STRAIGHT_BELOW {
             let known = self.straight.unwrap_or(uneven);
             self.straight = Some(known + 0.25 * (uneven - known));

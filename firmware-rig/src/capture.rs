@@ -234,9 +234,9 @@ impl CaptureChannel {
 
     /// What the channel reports, when the others turn with `others` = (ticks a revolution, since when), if they do.
     pub(crate) fn code(&self, now: Ticks, others: Option<(u64, Ticks)>) -> CaptureCode {
-        let bare = |verdict| CaptureCode { edges: 0, span: 0, verdict };
+        let bare = |verdict| CaptureCode { verdict, ..CaptureCode::default() };
         let full = |verdict| match self.reading {
-            Some((edges, span)) => CaptureCode { edges, span, verdict },
+            Some((edges, span)) => CaptureCode { edges, span, verdict, uneven: 0 },
             None => bare(verdict),
         };
         if self.marks == 0 {

@@ -44,6 +44,8 @@ pub struct Converted {
     pub adc: [Option<f64>; ADC_CHANNELS],
     /// Root mean square of the strain about its mean, N.
     pub thrust_rms_n: Option<f64>,
+    /// Angle by which the two marks of a capture channel stand off their opposite places, deg; of channels with two marks only.
+    pub uneven_deg: [Option<f64>; CAPTURE_CHANNELS],
 }
 
 impl Calibration {
@@ -63,6 +65,13 @@ impl Calibration {
                 Some(60.0 * revolutions * f64::from(self.timer_hz) / f64::from(code.span))
             }
         }
+    }
+
+    /// Angle by which the two marks of capture channel `channel` stand off their opposite places, deg: their periods are long and short by
+    /// turns, by `angle / 90 deg` of their mean. `None` where there are not two, or the reading does not tell.
+    #[must_use]
+    pub fn uneven_deg(&self, channel: usize, code: &CaptureCode) -> Option<f64> {
+        (self.marks.get(channel) == Some(&2) && code.uneven > 0).then(|| 90.0 * f64::from(code.uneven) / 1e4)
     }
 
     /// Value of ADC channel `channel` in its unit.
@@ -89,6 +98,9 @@ impl Calibration {
         };
         for (i, (value, code)) in out.rpm.iter_mut().zip(&sample.rpm).enumerate() {
             *value = self.speed(i, code);
+        }
+        for (i, (value, code)) in out.uneven_deg.iter_mut().zip(&sample.rpm).enumerate() {
+            *value = self.uneven_deg(i, code);
         }
         for (i, (value, code)) in out.adc.iter_mut().zip(&sample.adc).enumerate() {
             *value = self.value(i, code);

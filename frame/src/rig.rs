@@ -14,6 +14,9 @@ pub const CAPTURE_CHANNELS: usize = 4;
 pub const ADC_CHANNELS: usize = 5;
 /// Log column of each capture channel.
 pub const CAPTURE_NAMES: [&str; CAPTURE_CHANNELS] = ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder"];
+/// Log column of what each capture channel tells of its marks.
+pub const UNEVEN_NAMES: [&str; CAPTURE_CHANNELS] =
+    ["uneven_beam_deg", "uneven_opto_deg", "uneven_hall_deg", "uneven_encoder_deg"];
 /// Log column of each ADC channel.
 pub const ADC_NAMES: [&str; ADC_CHANNELS] = ["thrust_n", "torque_nm", "current_a", "voltage_v", "temp_c"];
 
@@ -258,6 +261,9 @@ pub struct CaptureCode {
     pub span: u32,
     /// What the channel says of it.
     pub verdict: CaptureVerdict,
+    /// How unevenly the marks stand: the difference of a revolution's two periods over their mean, in 1/10 000. A span over whole
+    /// revolutions does not show it. 0 where it is not known: no two marks, or too few periods.
+    pub uneven: u16,
 }
 
 /// What an ADC channel says of its own reading.

@@ -11,7 +11,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// Version of the frame layout and of the message sets.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 /// Longest frame before stuffing, bytes.
 pub const MAX_FRAME: usize = 240;
 /// Longest frame on the wire: COBS adds one byte in 254, plus the delimiter.
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn the_fullest_sample_fits() {
         let code = crate::rig::AdcCode { sum: u32::MAX, count: u16::MAX, rms_q8: u32::MAX, verdict: Default::default() };
-        let capture = crate::rig::CaptureCode { edges: u16::MAX, span: u32::MAX, verdict: Default::default() };
+        let capture = crate::rig::CaptureCode { edges: u16::MAX, span: u32::MAX, verdict: Default::default(), uneven: u16::MAX };
         let sample = RigSample { at: Ticks(u64::MAX), rpm: [capture; 4], adc: [code; 5], ..RigSample::default() };
         let mut out = [0; MAX_WIRE];
         assert!(Encoder::default().encode(Ticks(u64::MAX), &Message::Rig(sample), &mut out).is_ok());

@@ -163,6 +163,23 @@ fn healthy_channels_agree_within_a_twentieth_of_a_percent_on_a_plateau() {
     }
 }
 
+/// The angle of the second magnet is told beside the speed, which it does not change; of what stands as it should, next to nothing is.
+#[test]
+fn the_angle_of_a_crooked_magnet_is_told() {
+    let calibration = Config::thesis_570kv().calibration();
+    for seed in 0..SEEDS {
+        for (wrong, angle) in [(Wrong::CrookedMagnet, 20.0), (Wrong::Nothing, 0.0)] {
+            let rpm = speed_of(seed);
+            for codes in samples(seed, rpm, wrong) {
+                let told: [Option<f64>; 4] = core::array::from_fn(|c| calibration.uneven_deg(c, &codes[c]));
+                let [Some(beam), None, Some(hall), None] = told else { panic!("seed {seed}, {wrong:?}: {told:?}") };
+                assert!(beam < 2.0, "seed {seed}, {wrong:?}: {beam} deg between blades that stand as they should");
+                assert!((hall - angle).abs() < 1.0, "seed {seed}: {hall} deg of {angle}");
+            }
+        }
+    }
+}
+
 #[test]
 fn the_faulty_channel_is_the_one_that_is_flagged() {
     let mut list = vec![Wrong::CrookedMagnet, Wrong::Twist];

@@ -15,6 +15,7 @@ use crate::hypothesis::{Declared, Fit, Placed, Rows};
 use crate::leftover;
 use crate::log::Log;
 use crate::long::diagnose_any;
+use crate::marks;
 use crate::model::Model;
 use crate::residual::whiteness;
 use crate::search::refine;
@@ -74,7 +75,9 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         model.leaving(&context, leftover::of(&context, declared, fit), course::of(&context, declared, fit))
     };
     let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
-    let after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit);
+    let mut after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit);
+    let marks = marks::told(log, &context, declared);
+    after_model.effects.extend(marks.iter().cloned());
     let mut verdict = Verdict {
         format: FORMAT,
         run: log.name.clone(),
@@ -86,6 +89,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         left_out,
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
     };
+    marks::tell(&mut verdict, &marks, diagnosis.probability);
     if verdict.verdict == Kind::Ambiguous {
         verdict.next_experiment =
             crate::experiment::next(found.searched.as_ref().unwrap_or(&context), declared, &after_model, &diagnosis);
@@ -235,7 +239,7 @@ fn quoted(context: &Context, d: &Diagnosis, k: usize) -> Quoted {
 
 /// A parameter with its interval. Where its standard error is not known the interval is what is known at all: the range of the shape,
 /// or for an amplitude everything from nothing to twice its size.
-fn parameter(e: &Estimate, shapes: &[Shape]) -> Parameter {
+pub(crate) fn parameter(e: &Estimate, shapes: &[Shape]) -> Parameter {
     let range = shapes.iter().find(|s| s.name == e.name && s.range.1 > s.range.0).map(|s| s.range);
     let ci95 = match range {
         _ if e.se.is_finite() => [e.value - 1.96 * e.se, e.value + 1.96 * e.se],

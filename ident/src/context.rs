@@ -12,6 +12,7 @@ use crate::effects::glitch_rows;
 use crate::hypothesis::Declared;
 use crate::leftover::{self, Leftover};
 use crate::log::{Log, MODELLED, SPEED};
+use crate::marks;
 use crate::noise::{self, Noise};
 use crate::solve::Normal;
 use crate::start::start_pulse;
@@ -337,7 +338,8 @@ impl Context {
             .columns
             .iter()
             .filter(|c| {
-                !MODELLED.contains(&c.name.as_str()) && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&c.name.as_str())
+                let name = c.name.as_str();
+                !MODELLED.contains(&name) && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&name) && !marks::is_of_marks(name)
             })
             .filter(|c| c.values.iter().any(|v| v.is_finite()))
             .map(|c| (c.name.clone(), bridge(&log.t, &c.values)))

@@ -27,6 +27,7 @@ pub mod inspect;
 pub mod leftover;
 pub mod log;
 pub mod long;
+mod marks;
 pub mod model;
 mod moment;
 pub mod noise;

@@ -12,7 +12,7 @@ use crate::spool::Spool;
 use frame::Consensus;
 use frame::calibration::{Calibration, Converted};
 use frame::message::{Command, Event, Message};
-use frame::rig::{ADC_NAMES, CAPTURE_NAMES, RigSample};
+use frame::rig::{ADC_NAMES, CAPTURE_NAMES, RigSample, UNEVEN_NAMES};
 use frame::units::Ticks;
 use indicatif::ProgressBar;
 use std::fmt::Write;
@@ -56,6 +56,8 @@ pub(crate) struct Recorder {
     spool: Spool,
     head: Vec<(&'static str, String)>,
     calibration: Option<Calibration>,
+    /// Capture channels with two marks, which tell how unevenly these stand: as the head of the log says.
+    paired: Vec<usize>,
     early: Vec<RigSample>,
     started: bool,
     first: Option<Ticks>,
@@ -76,6 +78,7 @@ impl Recorder {
             spool: Spool::create(target)?,
             head,
             calibration: None,
+            paired: Vec::new(),
             early: Vec::new(),
             started: false,
             first: None,
@@ -131,9 +134,8 @@ impl Recorder {
 
     /// Writes the head once the scales and the rate are known, and the rows that came before.
     fn begin(&mut self) {
-        if self.started || self.calibration.is_none() || self.early.len() < HEAD_AFTER {
-            return;
-        }
+        let Some(calibration) = self.calibration.filter(|_| !self.started && self.early.len() >= HEAD_AFTER) else { return };
+        self.paired = (0..CAPTURE_NAMES.len()).filter(|i| calibration.marks[*i] == 2).collect();
         let early = std::mem::take(&mut self.early);
         let steps: Vec<f64> = early.windows(2).map(|w| w[1].at.since(w[0].at).as_s()).collect();
         let step = steps.iter().copied().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
@@ -144,7 +146,8 @@ impl Recorder {
         if step.is_finite() {
             let _ = writeln!(text, "# sample_hz = {:?}", (1.0 / step * 100.0).round() / 100.0);
         }
-        let _ = writeln!(text, "t_s,pulse_us,{},{},thrust_rms_n", CAPTURE_NAMES.join(","), ADC_NAMES.join(","));
+        let uneven: String = self.paired.iter().map(|i| format!(",{}", UNEVEN_NAMES[*i])).collect();
+        let _ = writeln!(text, "t_s,pulse_us,{},{},thrust_rms_n{uneven}", CAPTURE_NAMES.join(","), ADC_NAMES.join(","));
         if let Some(warning) = self.spool.add(&text) {
             self.say(&warning);
         }
@@ -164,7 +167,8 @@ impl Recorder {
         let t_s = self.offset_s + sample.at.since(self.first.unwrap_or(first)).as_s();
         let values = calibration.convert(sample);
         let mut line = format!("{t_s:.4},{:.3}", values.pulse_us);
-        for value in values.rpm.iter().chain(&values.adc).chain([&values.thrust_rms_n]) {
+        let uneven = self.paired.iter().map(|i| &values.uneven_deg[*i]);
+        for value in values.rpm.iter().chain(&values.adc).chain([&values.thrust_rms_n]).chain(uneven) {
             line.push(',');
             if let Some(value) = value.filter(|v| v.is_finite()) {
                 let _ = write!(line, "{value:.6}");

@@ -32,6 +32,9 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str) -> Log
         push(name, rows.iter().map(|r| r.adc[i].unwrap_or(f64::NAN)).collect());
     }
     push("thrust_rms_n", rows.iter().map(|r| r.thrust_rms_n.unwrap_or(f64::NAN)).collect());
+    for (i, name) in frame::rig::UNEVEN_NAMES.iter().enumerate() {
+        push(name, rows.iter().map(|r| r.uneven_deg[i].unwrap_or(f64::NAN)).collect());
+    }
     log
 }
 

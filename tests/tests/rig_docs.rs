@@ -29,7 +29,8 @@ fn resolution() -> String {
         let one = |n: f64| rpm * rpm * n / (60.0 * 84e6);
         let turns = (0.05 * 84e6 / ticks).ceil().max(1.0);
         // the reading itself, from the one conversion that everybody uses, one tick apart
-        let code = |span: f64| CaptureCode { edges: turns as u16, span: span as u32, verdict: CaptureVerdict::Nominal };
+        let code =
+            |span: f64| CaptureCode { edges: turns as u16, span: span as u32, verdict: CaptureVerdict::Nominal, uneven: 0 };
         let read = |span: f64| calibration.speed(1, &code(span)).expect("a speed");
         let step = read((ticks * turns).floor()) - read((ticks * turns).floor() + 1.0);
         assert!((step / (rpm / (ticks * turns)) - 1.0).abs() < 1e-3);

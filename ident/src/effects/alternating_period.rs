@@ -2,7 +2,7 @@
 //!
 //! What it is: a sensor that times one of two unequal periods reads rpm (1 +- angle/180) by turns.
 //! What can go wrong: which of the two it caught is known from the reading alone, so only readings with two clear values are
-//! taken for it; a sensor that counts whole turns shows nothing.
+//! taken for it; a sensor that times whole turns shows nothing, and its board must tell ([`crate::marks`]).
 //! Units: deg, deviation from 180.
 //! Reference: Beharie 2013, section 5.7.1 (Hall sensor with two magnets).
 
@@ -14,6 +14,12 @@ use crate::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct AlternatingPeriod;
+
+/// Form of an effect that no residual shows and the board's account of the pattern does: it changes no prediction.
+pub(crate) const TOLD_BY_THE_BOARD: &str = "told by the board, which times whole revolutions";
+
+/// What is estimated.
+pub(crate) const ANGLE: Amplitude = Amplitude { name: "angle", unit: "deg" };
 
 /// Kurtosis of the difference below which it has two values: 1 for two points, 1.8 for a uniform, 3 for a normal distribution.
 const TWO_VALUED: f64 = 1.7;
@@ -55,7 +61,7 @@ impl Effect for AlternatingPeriod {
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "angle", unit: "deg" }]
+        vec![ANGLE]
     }
 
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {

@@ -6,7 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, list of effects.
 
 pub(crate) mod air_density;
-mod alternating_period;
+pub(crate) mod alternating_period;
 mod amplifier_saturation;
 mod battery_discharge;
 mod beam_resonance;
