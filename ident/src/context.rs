@@ -320,6 +320,8 @@ pub(crate) struct Facts {
     pub(crate) winding: OnceLock<f64>,
     /// Slope of the static speed curve on each row, rev/min per us.
     pub(crate) slope: OnceLock<Vec<f64>>,
+    /// Where the thrust reads one and the same largest value.
+    pub(crate) rail: OnceLock<Option<crate::effects::Rail>>,
     /// See [`Context::step`].
     pub(crate) step: OnceLock<f64>,
 }

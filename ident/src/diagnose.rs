@@ -21,6 +21,7 @@ use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, 
 use crate::search::{base, connected, refine, refine_newest, scan, stride};
 use crate::suspects::{nearest, stand_beside, suspects};
 use crate::together::{Ground, choose_pair};
+use std::collections::BTreeSet;
 
 /// Most effects on one channel.
 const MOST_ON_A_CHANNEL: usize = 3;
@@ -38,6 +39,8 @@ const EASILY_NAMED: usize = 3;
 const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
 const REFINED: usize = 7;
+/// Share of the best gain of a grid from which on the first form of an effect is refined although others stand before it.
+const NOTABLE: f64 = 0.25;
 /// Of these, those whose shapes are refined on all rows in the end.
 const POLISHED: usize = 3;
 /// Samples of a channel that the refinement of every candidate looks at.
@@ -344,14 +347,17 @@ pub(crate) fn round_of(
     // against a model many a name fits a moment on its grid, and stands before the one that fits the run once it is refined
     let refined = if context.against_model { 2 * REFINED } else { REFINED };
     let mut out: Vec<Candidate> = Vec::new();
-    let mut most = f64::NEG_INFINITY;
+    let (mut most, mut heard) = (f64::NEG_INFINITY, BTreeSet::new());
+    let notable = ranked.first().map_or(0.0, |r| NOTABLE * r.0);
     for (k, (gain, placed)) in ranked.into_iter().enumerate() {
         progress(0.7 + 0.3 * (k as f64 / count));
         if gain < -20.0 {
             break;
         }
-        // what explains on its grid alone twice as much as all that came out so far is worth a refinement, whatever stands before it
-        let promising = k < refined || k < 3 * refined && gain > (2.0 * most).max(0.0);
+        // what explains on its grid alone twice as much as all that came out so far is worth a refinement, whatever stands before it; so is an
+        // effect of which no other form or channel has been heard yet
+        let first = placed.last().is_some_and(|p| heard.insert(p.effect.id()));
+        let promising = k < refined || k < 3 * refined && gain > 0.0 && (gain > 2.0 * most || first && gain > notable);
         let placed = if promising { refine_newest(context, declared, &placed, sketch, 120) } else { placed };
         if let Some(fitted) =
             fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))

@@ -42,11 +42,16 @@ impl Effect for AmplifierSaturation {
         let top = context.rpm.iter().copied().fold(1.0, f64::max);
         shape.range.1 = 0.999 * top;
         shape.starts.extend([0.965 * top, 0.99 * top]);
+        shape.starts.extend(rail_of(context).map(|r| r.reached).filter(|r| *r < shape.range.1));
         vec![Shape { name: "reached_at", ..shape }]
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         Vec::new()
+    }
+
+    fn seen(&self, context: &Context, _: &Instance) -> f64 {
+        rail_of(context).map_or(0.0, |rail| rail.unlikely)
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
@@ -67,9 +72,12 @@ impl Effect for AmplifierSaturation {
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
         let Some(reached) = fitted.iter().find(|e| e.name == "reached_at").map(|e| e.value) else { return fitted };
         let Some(target) = context.target("thrust_n").map(|k| &context.targets[k]) else { return fitted };
-        // a little beyond, so that the noise of the speed does not mix in rows below the rail
-        let above: Vec<f64> =
-            target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > 1.005 * reached).map(|(_, y)| *y).collect();
+        let beyond = |speed: f64| -> Vec<f64> {
+            target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > speed).map(|(_, y)| *y).collect()
+        };
+        // a little beyond, so that the noise of the speed does not mix in rows below the rail; or where the readings stand still
+        let above = Some(beyond(1.005 * reached)).filter(|y| !y.is_empty());
+        let above = above.unwrap_or_else(|| beyond(rail_of(context).map_or(reached, |rail| rail.reached.max(reached))));
         let n = above.len() as f64;
         let level = above.iter().sum::<f64>() / n;
         // a rail is hit exactly: what is left is the last digit of the log
@@ -91,13 +99,54 @@ impl Effect for AmplifierSaturation {
     }
 }
 
+/// Readings that repeat the largest one of the run to the last digit, from which on there is a rail.
+const REPEATED: usize = 20;
+/// Share of the readings below the rail that may repeat the one before: more is a meter that holds, or rounds.
+const HELD: f64 = 0.1;
+
+/// Where the thrust reads one and the same largest value.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rail {
+    /// Speed from which on it does, rev/min: what noise does at the rail's edge is left out. A grid of speeds meets no rail close beneath
+    /// the top speed.
+    reached: f64,
+    /// Evidence, nats, that noise alone does not repeat a reading to the last digit so often.
+    unlikely: f64,
+}
+
+/// The rail of a run, where it has one.
+fn rail(context: &Context) -> Option<Rail> {
+    let target = &context.targets[context.target("thrust_n")?];
+    let top = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let is_top = |y: f64| y >= top - 1e-9 * top.abs();
+    let at_the_rail = target.rows.iter().zip(&target.y).filter(|(_, y)| is_top(**y));
+    let mut speeds: Vec<f64> = at_the_rail.map(|(row, _)| context.rpm[*row]).collect();
+    speeds.sort_by(f64::total_cmp);
+    let below = || target.y.windows(2).filter(|w| !is_top(w[0]) && w[0] > 0.5 * top);
+    let repeats = below().filter(|w| w[0] == w[1]).count() as f64;
+    let unlikely = if repeats > HELD * below().count() as f64 {
+        0.0
+    } else {
+        // two normal readings differ by less than half a digit
+        let digit = crate::noise::quantum(&target.y).max(f64::MIN_POSITIVE);
+        let one = (2.0 * std::f64::consts::PI.sqrt() * target.noise.rms / digit).ln();
+        speeds.len() as f64 * one.max(0.0)
+    };
+    (speeds.len() > REPEATED).then(|| Rail { reached: speeds[speeds.len() / 20], unlikely })
+}
+
+/// The same, read off once a run.
+fn rail_of(context: &Context) -> Option<Rail> {
+    *context.facts.rail.get_or_init(|| rail(context))
+}
+
 /// Whether most readings above a speed are one and the same, the largest of the run.
 fn stands_still(context: &Context, reached: f64) -> bool {
     let Some(target) = context.target("thrust_n").map(|k| &context.targets[k]) else { return false };
     let top = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let above = || target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > reached);
     let same = above().filter(|(_, y)| **y >= top - 1e-9 * top.abs()).count();
-    same > 20 && same * 2 > above().count()
+    same > REPEATED && same * 2 > above().count()
 }
 
 /// Holds a known prediction at its value where the driving quantity reaches `reached`.

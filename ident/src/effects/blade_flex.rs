@@ -87,8 +87,11 @@ impl Effect for BladeFlex {
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        // both fall short: a torque that grows where thrust falls is a stall
-        let ratio = fitted.iter().find(|e| e.name == "torque_ratio").is_none_or(|e| e.value > 2.0 * e.se);
+        // both fall short: a torque that grows where thrust falls is a stall. A noisy torque meter leaves that to the lighter load,
+        // which draws less and turns faster
+        let beyond = |name: &str, errors: f64| fitted.iter().find(|e| e.name == name).map(|e| e.value > errors * e.se);
+        let lighter = ["current_loss", "speed_gain"].iter().all(|name| beyond(name, 3.0) == Some(true));
+        let ratio = beyond("torque_ratio", if lighter { 0.0 } else { 2.0 }).unwrap_or(true);
         ratio && fitted.iter().any(|e| e.name == "exponent" && e.value > 3.0 * e.se)
     }
 }
@@ -115,4 +118,26 @@ pub(super) fn with_and_without_load(context: &Context) -> Vec<Instance> {
         out.push(Instance::new(&all, ""));
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Log;
+
+    #[test]
+    fn a_lighter_load_speaks_for_a_torque_that_is_too_noisy_to_tell() {
+        let context = Context::bare(&Log { t: vec![0.0, 1.0], ..Log::default() }, Some(1000.0));
+        let judged = |ratio: (f64, f64), loss: f64, gain: f64| {
+            let of = |name: &str, value: f64, se: f64| Estimate { name: name.into(), unit: "1".into(), value, se };
+            let load = [("current_loss", loss), ("speed_gain", gain)].map(|(name, value)| of(name, value, 0.01));
+            let fitted: Vec<Estimate> =
+                [of("exponent", 0.2, 0.03), of("torque_ratio", ratio.0, ratio.1)].into_iter().chain(load).collect();
+            BladeFlex.plausible(&context, &Instance::new(&["thrust_n"], ""), &fitted)
+        };
+        assert!(judged((0.3, 0.05), 0.0, 0.0), "the torque alone tells");
+        assert!(judged((0.3, 0.2), 0.05, 0.05), "the load tells");
+        assert!(!judged((0.3, 0.2), 0.05, 0.02) && !judged((0.3, 0.2), -0.05, 0.05), "neither does");
+        assert!(!judged((-0.3, 0.2), 0.05, 0.05), "a torque that grows where thrust falls is a stall");
+    }
 }

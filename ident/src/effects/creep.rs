@@ -39,7 +39,7 @@ impl Effect for Creep {
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
         let (lo, hi) = ((5.0 * context.step()).max(1.0), (0.5 * context.duration()).max(2.0));
         vec![
-            Shape { name: "amplitude", unit: "1", range: (-0.5, 0.5), starts: vec![-0.1, -0.02, 0.02, 0.1] },
+            Shape { name: "amplitude", unit: "1", range: (-0.5, 0.5), starts: vec![-0.3, -0.1, -0.02, 0.02, 0.1, 0.3] },
             Shape { name: "tau", unit: "s", range: (lo, hi), starts: geometric(lo, hi, 8) },
         ]
     }

@@ -67,7 +67,8 @@ impl Effect for CurrentLimit {
             name: "reached_at",
             unit: "us",
             range: (at(0.1), at(0.998)),
-            starts: (0..22).map(|k| at(0.3 + 0.0328 * f64::from(k))).collect(),
+            // evenly, and once between the highest levels, which lie close together
+            starts: (0..22).map(|k| at(0.3 + 0.0328 * f64::from(k))).chain([at(0.994)]).collect(),
         }]
     }
 

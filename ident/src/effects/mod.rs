@@ -48,6 +48,7 @@ mod zero_drift;
 
 use crate::context::{Context, DIFFERENCES, Relation};
 use crate::design::TargetDesign;
+pub(crate) use amplifier_saturation::Rail;
 pub(crate) use current_limit::Draw;
 pub(crate) use tare_shift::BEFORE;
 pub(crate) use throttle_quantisation::Best as SawTooth;
