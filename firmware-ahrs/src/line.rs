@@ -186,14 +186,31 @@ mod tests {
         assert_eq!(command("reset"), Some(Command::Imu(ImuCommand::Factory)));
     }
 
+    /// Every command that this board obeys, with each of the values that one can have.
+    fn commands() -> impl Strategy<Value = Command> {
+        use frame::imu_command::{ImuContent, ImuFormat, ImuSensor};
+        let sensors = [ImuSensor::Gyro, ImuSensor::Accel, ImuSensor::Mag, ImuSensor::Alignment];
+        let imu = [ImuCommand::Once, ImuCommand::Finish, ImuCommand::Cancel, ImuCommand::Save, ImuCommand::Load]
+            .into_iter()
+            .chain([ImuCommand::Factory, ImuCommand::Errors, ImuCommand::Stream(true), ImuCommand::Stream(false)])
+            .chain([ImuFormat::Binary, ImuFormat::Text].map(ImuCommand::Format))
+            .chain([ImuContent::Raw, ImuContent::Calibrated, ImuContent::Both].map(ImuCommand::Content))
+            .chain(sensors.map(ImuCommand::Calibrate));
+        proptest::sample::select(imu.map(Command::Imu).chain([Command::Ping, Command::Identify]).collect::<Vec<_>>())
+    }
+
     proptest! {
-        /// Whatever the time of sending, and so the first byte of the frame, it is a frame, also right after a typed line.
+        /// Whatever the command and the time of sending, and so the first byte of the frame, it is a frame, also right after a typed line.
         #[test]
-        fn every_frame_is_taken_as_one(at in any::<u64>(), end in prop_oneof![Just("\n"), Just("\r\n"), Just("")]) {
+        fn every_frame_is_taken_as_one(
+            at in any::<u64>(),
+            command in commands(),
+            end in prop_oneof![Just("\n"), Just("\r\n"), Just("")],
+        ) {
+            prop_assert!(framed(Ticks(at), command).len() < usize::from(VERSION), "no stuffing byte is the version");
             let mut line = CommandLine::new();
             let typed = if end.is_empty() { 0 } else { heard(&mut line, std::format!("once{end}").as_bytes()).len() };
             prop_assert_eq!(typed, usize::from(!end.is_empty()));
-            let command = Command::Imu(ImuCommand::Errors);
             prop_assert_eq!(heard(&mut line, &framed(Ticks(at), command)), [Heard::Command(command)]);
         }
 

@@ -9,7 +9,7 @@
 use crate::capture::CaptureChannel;
 use crate::config::Config;
 use crate::pattern::unevenness;
-use frame::rig::{CAPTURE_CHANNELS, CaptureCode, CaptureVerdict};
+use frame::rig::{CAPTURE_CHANNELS, CaptureCode, CaptureVerdict, UNEVEN_PARTS};
 use frame::units::{RevPerMin, Ticks};
 
 /// Deviation from the median that counts as disagreement at constant speed (specification: 1 % on hardware).
@@ -18,8 +18,6 @@ const DISAGREEMENT: f32 = 0.01;
 const STRAIGHT_BELOW: f32 = 4000.0;
 /// Change of the blades' unevenness from there that counts as twist: 3.6 degrees between two blades.
 const TWIST: f32 = 0.02;
-/// Parts of a period in which the unevenness is told.
-const UNEVEN_PARTS: f32 = 10_000.0;
 
 /// Speed below which channels are not judged against each other, rev/min: with one mark a revolution then takes nearly as
 /// long as the time-out to zero (0.25 s), so that channels read zero one after the other.
@@ -161,7 +159,7 @@ impl CaptureBank {
             }
             let edges = usize::from(code.edges).max(4 * usize::from(channel.marks));
             let uneven = unevenness(channel.marks, channel.periods().take(edges));
-            code.uneven = uneven.map_or(0, |uneven| ((UNEVEN_PARTS * uneven + 0.5) as u16).max(1));
+            code.uneven = uneven.map_or(0, |uneven| ((f32::from(UNEVEN_PARTS) * uneven + 0.5) as u16).max(1));
         }
     }
 
@@ -169,7 +167,7 @@ impl CaptureBank {
     fn watch_blades(&mut self, codes: &mut [CaptureCode; CAPTURE_CHANNELS]) {
         let ([beam, ..], [code, ..]) = (&self.channels, codes);
         let Some(speed) = beam.speed().filter(|_| code.uneven > 0) else { return };
-        let uneven = f32::from(code.uneven) / UNEVEN_PARTS;
+        let uneven = f32::from(code.uneven) / f32::from(UNEVEN_PARTS);
         if speed.0 < STRAIGHT_BELOW {
             let known = self.straight.unwrap_or(uneven);
             self.straight = Some(known + 0.25 * (uneven - known));

@@ -5,7 +5,7 @@
 //! Units: SI and rev/min out; ADC counts and timer ticks in.
 //! Reference: speed over whole revolutions, specification `rig.md`; linear load-cell calibration, Beharie 2013 Eq. 5.35.
 
-use crate::rig::{ADC_CHANNELS, AdcCode, AdcVerdict, CAPTURE_CHANNELS, CaptureCode, CaptureVerdict, RigSample};
+use crate::rig::{ADC_CHANNELS, AdcCode, AdcVerdict, CAPTURE_CHANNELS, CaptureCode, CaptureVerdict, RigSample, UNEVEN_PARTS};
 use crate::units::Ticks;
 use serde::{Deserialize, Serialize};
 
@@ -71,7 +71,7 @@ impl Calibration {
     /// turns, by `angle / 90 deg` of their mean. `None` where there are not two, or the reading does not tell.
     #[must_use]
     pub fn uneven_deg(&self, channel: usize, code: &CaptureCode) -> Option<f64> {
-        (self.marks.get(channel) == Some(&2) && code.uneven > 0).then(|| 90.0 * f64::from(code.uneven) / 1e4)
+        (self.marks.get(channel) == Some(&2) && code.uneven > 0).then(|| 90.0 * f64::from(code.uneven) / f64::from(UNEVEN_PARTS))
     }
 
     /// Value of ADC channel `channel` in its unit.

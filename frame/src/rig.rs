@@ -14,6 +14,8 @@ pub const CAPTURE_CHANNELS: usize = 4;
 pub const ADC_CHANNELS: usize = 5;
 /// Log column of each capture channel.
 pub const CAPTURE_NAMES: [&str; CAPTURE_CHANNELS] = ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder"];
+/// Parts of a period in which a channel's unevenness is told.
+pub const UNEVEN_PARTS: u16 = 10_000;
 /// Log column of what each capture channel tells of its marks.
 pub const UNEVEN_NAMES: [&str; CAPTURE_CHANNELS] =
     ["uneven_beam_deg", "uneven_opto_deg", "uneven_hall_deg", "uneven_encoder_deg"];
@@ -261,8 +263,9 @@ pub struct CaptureCode {
     pub span: u32,
     /// What the channel says of it.
     pub verdict: CaptureVerdict,
-    /// How unevenly the marks stand: the difference of a revolution's two periods over their mean, in 1/10 000. A span over whole
-    /// revolutions does not show it. 0 where it is not known: no two marks, or too few periods.
+    /// How unevenly two to four marks stand: half the spread of the periods of one revolution about their neighbours' mean, over their mean, in
+    /// 1/[`UNEVEN_PARTS`]; of two marks that is the difference of their periods. A span over whole revolutions does not show it. 0 where it is
+    /// not known: another number of marks, or too few periods.
     pub uneven: u16,
 }
 

@@ -10,8 +10,9 @@ use crate::units::Ticks;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// Version of the frame layout and of the message sets; before it there was 1. Not printable, no line end, and above the first byte that stuffing
-/// gives a command (at most 12, as long as the high byte of its time is zero): so a board that hears typed lines as well knows a frame by it.
+/// Version of the frame layout and of the message sets; before it there was 1. Not printable, no line end, and longer than any frame that a board
+/// hears which takes typed lines as well (the first byte of a stuffed frame is at most its length): so that board tells a frame that begins
+/// without a stuffing byte from one that begins with it.
 pub const VERSION: u8 = 31;
 /// Longest frame before stuffing, bytes.
 pub const MAX_FRAME: usize = 240;

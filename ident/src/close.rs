@@ -77,7 +77,6 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
     let mut after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit);
     let marks = marks::told(log, &context, declared);
-    after_model.effects.extend(marks.iter().cloned());
     let mut verdict = Verdict {
         format: FORMAT,
         run: log.name.clone(),
@@ -89,7 +88,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         left_out,
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
     };
-    marks::tell(&mut verdict, &marks, diagnosis.probability);
+    marks::tell(&mut verdict, &mut after_model, &marks);
     if verdict.verdict == Kind::Ambiguous {
         verdict.next_experiment =
             crate::experiment::next(found.searched.as_ref().unwrap_or(&context), declared, &after_model, &diagnosis);

@@ -13,7 +13,7 @@ use crate::effects::alternating_period::{ANGLE, TOLD_BY_THE_BOARD};
 use crate::effects::{self, Estimate, Instance};
 use crate::hypothesis::{Declared, Placed};
 use crate::log::Log;
-use crate::model::AddedEffect;
+use crate::model::{AddedEffect, Model};
 use crate::noise::median;
 use crate::verdict::{EffectEntry, Kind, Verdict};
 
@@ -25,18 +25,34 @@ pub(crate) const UNEVEN: [(&str, &str); 4] = [
     ("rpm_encoder", "uneven_encoder_deg"),
 ];
 
-/// Smallest angle, or change of it since the declared model's day, that is worth a name, deg: marks are set by hand to a few degrees.
+/// Angle, or change of it since the declared model's day, beyond which it is worth a name, deg: a magnet set by hand on the rim of a rotor of
+/// 30 mm is off by a millimetre, which is 4 degrees.
 const LEAST_DEG: f64 = 5.0;
 /// Fewest readings at low and at high speed.
 const FEWEST: usize = 20;
-/// Largest difference between low and high speed, as a share of the angle.
-const STEADY: f64 = 0.2;
+/// Least ratio of the high to the low speed: an angle that grows as the square of the speed, as a twist does, changes by two fifths there.
+const APART: f64 = 1.3;
+/// Largest difference between low and high speed, as a share of the angle: half of what such a twist shows; and what edges' own noise may make of
+/// marks that stand as they should, deg.
+const STEADY: (f64, f64) = (0.2, 1.0);
 /// Probability of what a board tells at all speeds: no campaign has counted how often that is wrong.
 const CERTAIN: f64 = 0.95;
-/// Standard error of one reading that a board rounds to a ten-thousandth of a period, deg.
-const ROUNDING_DEG: f64 = 0.009 * 0.2887;
+/// Standard deviation, in digits, of what is rounded to whole ones: 1/sqrt(12).
+const ROUNDED: f64 = 0.288_675;
+/// Digit in which boards tell the angle, deg: 90 deg by a ten-thousandth of a period.
+const DIGIT_DEG: f64 = 90.0 / 10_000.0;
 /// Standard error of a median over that of a mean, of normal readings; and standard deviation over median absolute deviation.
 const OF_A_MEDIAN: f64 = 1.2533 * 1.4826;
+
+/// What the board tells of one channel, and no model said.
+pub(crate) struct Told {
+    /// The news, as an effect: the difference to what the declared model says.
+    pub(crate) added: AddedEffect,
+    /// Angle that the board sees, deg.
+    seen: f64,
+    /// Angle that the declared model says, deg.
+    known: f64,
+}
 
 /// Whether a column tells of marks: it explains no residual.
 pub(crate) fn is_of_marks(column: &str) -> bool {
@@ -44,17 +60,17 @@ pub(crate) fn is_of_marks(column: &str) -> bool {
 }
 
 /// The marks that stand off their places as the declared model does not say.
-pub(crate) fn told(log: &Log, context: &Context, declared: Declared<'_>) -> Vec<AddedEffect> {
+pub(crate) fn told(log: &Log, context: &Context, declared: Declared<'_>) -> Vec<Told> {
     let offset = |(channel, column): &(&str, &str)| {
-        let (angle, se) = angle(context, log.column(column)?)?;
-        let news = angle - known(declared, channel);
+        let (seen, se) = angle(context, log.column(column)?)?;
+        let known = known(declared, channel);
         context.target(channel)?;
-        (news.abs() > LEAST_DEG).then(|| added(channel, news, se))
+        ((seen - known).abs() > LEAST_DEG).then(|| Told { added: added(channel, seen - known, se), seen, known })
     };
     UNEVEN.iter().filter_map(offset).collect()
 }
 
-/// The angle that a column tells, and its standard error; `None` where it is not the same at low and at high speed.
+/// The angle that a column tells, and its standard error; `None` where it is not the same at low and at high speed, or the run has not both.
 fn angle(context: &Context, column: &[f64]) -> Option<(f64, f64)> {
     let turns = |i: &usize| column[*i].is_finite() && context.rpm.get(*i).is_some_and(|rpm| *rpm > STANDSTILL);
     let mut rows: Vec<usize> = (0..column.len()).filter(turns).collect();
@@ -63,15 +79,20 @@ fn angle(context: &Context, column: &[f64]) -> Option<(f64, f64)> {
     if third < FEWEST {
         return None;
     }
-    let of = |rows: &[usize]| median(&mut rows.iter().map(|i| column[*i]).collect::<Vec<f64>>());
-    let (slow, fast, all) = (of(&rows[..third]), of(&rows[rows.len() - third..]), of(&rows));
+    let of = |rows: &[usize], values: &[f64]| median(&mut rows.iter().map(|i| values[*i]).collect::<Vec<f64>>());
+    let (slow, fast) = (&rows[..third], &rows[rows.len() - third..]);
+    if of(fast, &context.rpm) < APART * of(slow, &context.rpm) {
+        return None;
+    }
+    let (all, change) = (of(&rows, column), (of(fast, column) - of(slow, column)).abs());
     let spread = median(&mut rows.iter().map(|i| (column[*i] - all).abs()).collect::<Vec<f64>>());
-    ((fast - slow).abs() < STEADY * all).then_some((all, (OF_A_MEDIAN * spread / (rows.len() as f64).sqrt()).hypot(ROUNDING_DEG)))
+    let se = (OF_A_MEDIAN * spread / (rows.len() as f64).sqrt()).hypot(ROUNDED * DIGIT_DEG).hypot(0.5 * change);
+    (change < (STEADY.0 * all).max(STEADY.1)).then_some((all, se))
 }
 
 /// What a declared model says of a channel's marks, deg.
 fn known(declared: Declared<'_>, channel: &str) -> f64 {
-    let own = declared.model.iter().flat_map(|m| &m.effects).filter(|e| e.placed.instance.form == TOLD_BY_THE_BOARD);
+    let own = declared.model.into_iter().flat_map(Model::told_by_the_board);
     own.flat_map(|e| &e.amplitudes).filter(|(of, _)| of == channel).filter_map(|(_, values)| values.first()).sum()
 }
 
@@ -82,44 +103,52 @@ fn added(channel: &str, angle: f64, se: f64) -> AddedEffect {
     AddedEffect { placed, amplitudes: vec![(channel.to_owned(), vec![angle])], estimates }
 }
 
-/// Adds what the board tells to a verdict. One without a name has one entry only, which then speaks of the marks as well.
-pub(crate) fn tell(verdict: &mut Verdict, told: &[AddedEffect], mut probability: f64) {
+/// Adds what the board tells to a verdict and to the model that it amounts to. A verdict without a name has one entry only, which then speaks of
+/// the marks as well, and the model does not hold what no verdict has named.
+pub(crate) fn tell(verdict: &mut Verdict, model: &mut Model, told: &[Told]) {
     if told.is_empty() {
         return;
     }
     if let (Kind::Unattributed, Some(unknown)) = (verdict.verdict, verdict.effects.first_mut()) {
-        unknown.evidence =
-            told.iter().fold(std::mem::take(&mut unknown.evidence), |text, added| format!("{text}; {}", words(added)));
+        unknown.evidence = told.iter().fold(std::mem::take(&mut unknown.evidence), |text, one| format!("{text}; {}", words(one)));
         return;
     }
     if verdict.verdict == Kind::None {
-        (verdict.verdict, probability) = (Kind::Attributed, 1.0);
+        verdict.verdict = Kind::Attributed;
     }
-    probability *= CERTAIN;
-    verdict.effects.extend(told.iter().map(entry));
-    // each entry has the probability of the whole
-    verdict.effects.iter_mut().for_each(|e| e.probability = probability);
+    model.effects.extend(told.iter().map(|one| one.added.clone()));
+    // each entry has the probability of the whole, and the other hypotheses hold what is told as well
+    verdict.effects.iter_mut().for_each(|e| e.probability *= CERTAIN);
+    let whole = verdict.effects.first().map_or(CERTAIN, |e| e.probability);
+    verdict.effects.extend(told.iter().map(|one| entry(one, whole)));
+    for other in &mut verdict.alternatives {
+        other.probability *= CERTAIN;
+        other.ids.extend(told.iter().map(|one| one.added.placed.effect.id().to_owned()));
+    }
 }
 
-fn entry(added: &AddedEffect) -> EffectEntry {
+fn entry(told: &Told, probability: f64) -> EffectEntry {
+    let Told { added, .. } = told;
     let about = added.placed.effect.about();
     EffectEntry {
         id: added.placed.effect.id().to_owned(),
         channels: added.placed.instance.channels.clone(),
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: format!("{} [{TOLD_BY_THE_BOARD}]", about.equation),
-        probability: CERTAIN,
+        probability,
         parameters: added.estimates.iter().map(|e| crate::close::parameter(e, &[])).collect(),
         heldout_error_reduction: 0.0,
-        evidence: words(added),
+        evidence: words(told),
     }
 }
 
 /// What the board tells, for people.
-fn words(added: &AddedEffect) -> String {
-    let channel = added.placed.instance.channels.join(", ");
-    let angle = added.estimates.first().map_or(f64::NAN, |e| e.value);
-    format!(
-        "the board sees the periods of {channel} long and short by turns at all speeds, as of marks {angle:.1} deg off; timed over whole revolutions the speed is right"
-    )
+fn words(told: &Told) -> String {
+    let (channel, seen) = (told.added.placed.instance.channels.join(", "), told.seen);
+    let news = if told.known == 0.0 {
+        format!("the board sees the periods of {channel} long and short by turns at all speeds, as of marks {seen:.1} deg off")
+    } else {
+        format!("the board sees the marks of {channel} {seen:.1} deg off at all speeds, where the model says {:.1}", told.known)
+    };
+    format!("{news}; timed over whole revolutions the speed is right")
 }

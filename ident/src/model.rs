@@ -8,6 +8,7 @@
 use crate::context::{Context, Relation, Target, unit_of};
 use crate::course::Course;
 use crate::design::{Label, TargetDesign, Told};
+use crate::effects::alternating_period::TOLD_BY_THE_BOARD;
 use crate::effects::{self, Estimate, Stage, air_density};
 use crate::hypothesis::{Declared, Fit, Placed};
 use crate::leftover::Leftover;
@@ -213,6 +214,11 @@ impl Model {
         self.leftovers = context.targets.iter().map(|t| t.name.to_owned()).zip(left).collect();
         self.course = course;
         self
+    }
+
+    /// Its effects that a board told ([`crate::marks`]): no prediction holds them, so no fit and no comparison of runs does.
+    pub fn told_by_the_board(&self) -> impl Iterator<Item = &AddedEffect> {
+        self.effects.iter().filter(|e| e.placed.instance.form == TOLD_BY_THE_BOARD)
     }
 
     fn placed(&self) -> Vec<Placed> {

@@ -61,6 +61,14 @@ fn magnets_that_stand_off_are_named_and_change_no_prediction() {
     let loose = self::closed(&self::log(3, |_| 31.0, |_| 0.0), Some(&model));
     assert_eq!(names(&loose), ["alternating_period"]);
     assert!((loose.verdict.effects[0].parameters[0].value - 9.0).abs() < 0.1, "{:?}", loose.verdict.effects[0].parameters);
+    assert!(loose.verdict.effects[0].evidence.contains("31.0 deg off"), "{}", loose.verdict.effects[0].evidence);
+    // and so is that they were set right, however small what is left of the angle
+    let mended = self::closed(&self::log(3, |rpm| 0.3 + 1e-4 * rpm, |_| 0.0), Some(&model));
+    assert_eq!(names(&mended), ["alternating_period"]);
+    let news = mended.verdict.effects[0].parameters[0].value;
+    assert!((news + 21.4).abs() < 0.3, "{news}");
+    let next = Model::parse("model.toml", &mended.model.to_toml()).expect("a model");
+    assert_eq!(self::closed(&self::log(4, |_| 0.6, |_| 0.0), Some(&next)).verdict.verdict, Kind::None);
 }
 
 #[test]
@@ -71,6 +79,12 @@ fn what_stands_as_it_should_or_changes_with_the_speed_is_not_named() {
     }
     let twisted = closed(&log(6, |rpm| 14.0 * (rpm / 5000.0).powi(2), |_| 0.0), None);
     assert_eq!(twisted.verdict.verdict, Kind::None, "{:?}", names(&twisted));
+    // at one speed nothing tells the two apart
+    let mut held = log(7, |_| 8.0, |_| 0.0);
+    let speed = held.column("rpm_beam").expect("a speed").to_vec();
+    let angle = held.columns.last_mut().expect("the marks");
+    angle.values.iter_mut().zip(speed).filter(|(_, rpm)| !(3000.0..3500.0).contains(rpm)).for_each(|(v, _)| *v = f64::NAN);
+    assert_eq!(closed(&held, None).verdict.verdict, Kind::None);
 }
 
 #[test]
@@ -89,4 +103,5 @@ fn beside_another_cause_it_is_a_further_name_and_beside_none_a_remark() {
     let unknown = closed(&log(9, |_| 15.0, |rpm| 0.3 * (rpm / 150.0).sin()), None);
     assert_eq!((names(&unknown), unknown.verdict.verdict), (vec!["unknown"], Kind::Unattributed));
     assert!(unknown.verdict.effects[0].evidence.contains("rpm_hall long and short"), "{}", unknown.verdict.effects[0].evidence);
+    assert_eq!(unknown.model.told_by_the_board().count(), 0, "no model holds what no verdict named");
 }

@@ -94,7 +94,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         "format": "quadrig-loop 1",
         "scenario": args.scenario.file_name().map(|n| n.to_string_lossy()),
         "verdict": last_word(&runs, &standing),
-        "effects": standing.first().map_or(&[][..], |s| &s.ids),
+        "effects": named(&runs, &standing),
         "extra_runs": runs.len() - 1,
         "rounds": rounds.iter().map(round_json).collect::<Vec<_>>(),
         "circle": closes.as_ref().map(circle_json),
@@ -149,9 +149,19 @@ fn last_word(runs: &[Run], standing: &[Standing]) -> Kind {
     }
 }
 
-/// The model that the loop ends with: the leader as it was fitted to the first run.
+/// What the loop ends with: the leader's names, and what the board told on the first run, which no comparison of runs holds.
+fn named(runs: &[Run], standing: &[Standing]) -> Vec<String> {
+    let told = runs[0].closed.model.told_by_the_board().map(|e| e.placed.effect.id().to_owned());
+    standing.first().into_iter().flat_map(|leader| leader.ids.iter().cloned()).chain(told).collect()
+}
+
+/// The model that the loop ends with: the leader as it was fitted to the first run, and what the board told on it.
 fn corrected(runs: &[Run], standing: &[Standing]) -> ident::model::Model {
-    standing.first().filter(|_| runs.len() > 1).map_or_else(|| runs[0].closed.model.clone(), |leader| model(runs, leader, 0))
+    let first = &runs[0].closed.model;
+    let Some(leader) = standing.first().filter(|_| runs.len() > 1) else { return first.clone() };
+    let mut model = model(runs, leader, 0);
+    model.effects.extend(first.told_by_the_board().cloned());
+    model
 }
 
 fn close_circle(scenario: &Scenario, runs: &[Run], standing: &[Standing], quiet: bool) -> Result<Circle, Failure> {
@@ -204,7 +214,7 @@ fn circle_table(circle: &Circle) -> String {
 }
 
 fn conclusion(runs: &[Run], standing: &[Standing], scenario: &Scenario) -> String {
-    let ids = standing.first().map(|s| s.ids.join(" + ")).unwrap_or_default();
+    let ids = named(runs, standing).join(" + ");
     let word = match last_word(runs, standing) {
         Kind::Attributed => format!("the model lacks {ids}"),
         Kind::Ambiguous => format!("still open: {ids}, or what looks the same on these runs"),

@@ -265,7 +265,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         }
         if !recorder.knows_its_board() && begun.elapsed() > CALIBRATION_TIME {
             recorder.spool.discard();
-            return Err(format!("{}: no calibration from the board; is it a rig board at 921600 baud?", args.port).into());
+            let cause = match board.stats().foreign {
+                0 => "is it a rig board at 921600 baud?",
+                _ => "its frames are of another version than this program's: flash the board with the image of the same release",
+            };
+            return Err(format!("{}: no calibration from the board; {cause}", args.port).into());
         }
         let enough = args.seconds.is_some_and(|s| recorder.seconds() >= s);
         let typed_end = end.as_ref().is_some_and(|end| matches!(end.try_recv(), Err(TryRecvError::Disconnected)));

@@ -94,6 +94,14 @@ fn a_wrong_model_does_not_close_the_circle() {
     assert!(!wrong.closes() && thrust(&wrong) < 1.0e-6, "{:?}", wrong.channels);
 }
 
+/// What no residual shows and the board tells is named by the loop too, beside what this rig's dynamics leave over.
+#[test]
+fn the_loop_names_what_the_board_tells_of_its_marks() {
+    let account = account(&scenario(3108, "id = \"alternating_period\"\nangle_deg = 20.0"), &["--no-circle"]);
+    assert_eq!(account["verdict"], "attributed", "{account:#}");
+    assert_eq!(account["effects"].as_array().expect("effects").last(), Some(&Value::from("alternating_period")), "{account:#}");
+}
+
 /// On a short upward staircase a shift of the tare looks like other things. The tool's own next runs settle it.
 #[test]
 fn the_tools_own_next_experiments_settle_a_question() {

@@ -6,7 +6,7 @@
 //! Reference: output swing of instrumentation amplifiers; Beharie 2013, section 4.4 (bridge and amplifier).
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
-use crate::context::Context;
+use crate::context::{Context, STANDSTILL, Target};
 use crate::design::{Label, TargetDesign};
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ impl Effect for AmplifierSaturation {
         let top = context.rpm.iter().copied().fold(1.0, f64::max);
         shape.range.1 = 0.999 * top;
         shape.starts.extend([0.965 * top, 0.99 * top]);
-        shape.starts.extend(rail_of(context).map(|r| r.reached).filter(|r| *r < shape.range.1));
+        shape.starts.extend(rail_of(context).map(|r| r.reached).filter(|r| (shape.range.0..shape.range.1).contains(r)));
         vec![Shape { name: "reached_at", ..shape }]
     }
 
@@ -95,14 +95,18 @@ impl Effect for AmplifierSaturation {
         let reached = fitted.iter().find(|e| e.name == "reached_at").map_or(f64::INFINITY, |e| e.value);
         let above: Vec<f64> = context.rpm.iter().copied().filter(|r| *r > reached).collect();
         let top = above.iter().copied().fold(0.0, f64::max);
-        above.len() > 20 && (top > 1.02 * reached || stands_still(context, reached))
+        let near = rail_of(context).is_none_or(|rail| (reached / rail.reached - 1.0).abs() < NEAR_RAIL);
+        above.len() > REPEATED && near && (top > 1.02 * reached || stands_still(context, reached))
     }
 }
 
-/// Readings that repeat the largest one of the run to the last digit, from which on there is a rail.
+/// Readings that repeat the largest one of the run to the last digit, from which on there is a rail: a second's worth at the rates of the
+/// format's examples.
 const REPEATED: usize = 20;
-/// Share of the readings below the rail that may repeat the one before: more is a meter that holds, or rounds.
+/// Share of the readings below the rail that may repeat the one before: more is a meter that holds, or rounds to more than its noise.
 const HELD: f64 = 0.1;
+/// Share of the rail's speed by which a fit may say another one: a fifth of the thrust more or less contradicts the readings.
+const NEAR_RAIL: f64 = 0.1;
 
 /// Where the thrust reads one and the same largest value.
 #[derive(Debug, Clone, Copy)]
@@ -110,29 +114,38 @@ pub(crate) struct Rail {
     /// Speed from which on it does, rev/min: what noise does at the rail's edge is left out. A grid of speeds meets no rail close beneath
     /// the top speed.
     reached: f64,
-    /// Evidence, nats, that noise alone does not repeat a reading to the last digit so often.
+    /// Evidence, nats, that noise alone does not repeat a reading to the last digit so often; none where that cannot be told from a meter
+    /// that holds or rounds, nor against a model, which may have the rail already.
     unlikely: f64,
 }
 
-/// The rail of a run, where it has one.
+/// The rail of a run, where it has one: most of what is read beyond a speed is the largest reading.
 fn rail(context: &Context) -> Option<Rail> {
     let target = &context.targets[context.target("thrust_n")?];
-    let top = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let is_top = |y: f64| y >= top - 1e-9 * top.abs();
+    let is_top = at_top(&target.y);
     let at_the_rail = target.rows.iter().zip(&target.y).filter(|(_, y)| is_top(**y));
     let mut speeds: Vec<f64> = at_the_rail.map(|(row, _)| context.rpm[*row]).collect();
     speeds.sort_by(f64::total_cmp);
+    let reached = *speeds.get(speeds.len() / 20)?;
+    if reached < STANDSTILL || !stands_still(context, reached) {
+        return None;
+    }
+    let beyond = speeds.iter().filter(|speed| **speed > reached).count();
+    Some(Rail { reached, unlikely: if context.against_model { 0.0 } else { beyond as f64 * unlikely_repeat(target) } })
+}
+
+/// Evidence, nats, of one reading that repeats another to the last digit: two normal readings differ by less than half a digit. 0 where the
+/// meter does so below its largest reading too, or where few readings lie there and nothing is known of it.
+fn unlikely_repeat(target: &Target) -> f64 {
+    let is_top = at_top(&target.y);
+    let top = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let below = || target.y.windows(2).filter(|w| !is_top(w[0]) && w[0] > 0.5 * top);
-    let repeats = below().filter(|w| w[0] == w[1]).count() as f64;
-    let unlikely = if repeats > HELD * below().count() as f64 {
-        0.0
-    } else {
-        // two normal readings differ by less than half a digit
-        let digit = crate::noise::quantum(&target.y).max(f64::MIN_POSITIVE);
-        let one = (2.0 * std::f64::consts::PI.sqrt() * target.noise.rms / digit).ln();
-        speeds.len() as f64 * one.max(0.0)
-    };
-    (speeds.len() > REPEATED).then(|| Rail { reached: speeds[speeds.len() / 20], unlikely })
+    let (count, repeats) = (below().count(), below().filter(|w| w[0] == w[1]).count());
+    let digit = crate::noise::quantum(&target.y);
+    if count < REPEATED || repeats as f64 > HELD * count as f64 || digit <= 0.0 || target.noise.rms < digit {
+        return 0.0;
+    }
+    (2.0 * std::f64::consts::PI.sqrt() * target.noise.rms / digit).ln()
 }
 
 /// The same, read off once a run.
@@ -143,10 +156,16 @@ fn rail_of(context: &Context) -> Option<Rail> {
 /// Whether most readings above a speed are one and the same, the largest of the run.
 fn stands_still(context: &Context, reached: f64) -> bool {
     let Some(target) = context.target("thrust_n").map(|k| &context.targets[k]) else { return false };
-    let top = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let is_top = at_top(&target.y);
     let above = || target.rows.iter().zip(&target.y).filter(|(i, _)| context.rpm[**i] > reached);
-    let same = above().filter(|(_, y)| **y >= top - 1e-9 * top.abs()).count();
+    let same = above().filter(|(_, y)| is_top(**y)).count();
     same > REPEATED && same * 2 > above().count()
+}
+
+/// Whether a reading is the largest of a run, to the last digit.
+fn at_top(y: &[f64]) -> impl Fn(f64) -> bool + use<> {
+    let top = y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    move |y| y >= top - 1e-9 * top.abs()
 }
 
 /// Holds a known prediction at its value where the driving quantity reaches `reached`.

@@ -67,8 +67,8 @@ impl Effect for CurrentLimit {
             name: "reached_at",
             unit: "us",
             range: (at(0.1), at(0.998)),
-            // evenly, and once between the highest levels, which lie close together
-            starts: (0..22).map(|k| at(0.3 + 0.0328 * f64::from(k))).chain([at(0.994)]).collect(),
+            // evenly, and once as close beneath the highest level as a limit can be told
+            starts: (0..22).map(|k| at(0.3 + 0.0328 * f64::from(k))).chain([top - 1.25 * BEYOND_US]).collect(),
         }]
     }
 
@@ -119,10 +119,12 @@ impl Effect for CurrentLimit {
         // the run must go well beyond, and the current must stand as still there as it does in steady stretches
         let reached = fitted.iter().find(|e| e.name == "reached_at").map_or(f64::INFINITY, |e| e.value);
         let top = context.pulse.as_ref().map_or(0.0, |p| p.iter().copied().fold(0.0, f64::max));
-        top > reached + 4.0
+        top > reached + BEYOND_US
     }
 }
 
+/// How far the highest command must go beyond the limit, us: less does not tell it from the noise of the last level.
+const BEYOND_US: f64 = 4.0;
 /// The speed's departure over what a limit that is reached while the rotor speeds up makes of it, and where it may lie.
 const DEPTH: (&str, std::ops::Range<f64>) = ("depth", 0.7..1.3);
 
