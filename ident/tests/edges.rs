@@ -55,29 +55,6 @@ fn an_amplifier_that_saturates_at_the_highest_level_only() {
     }
 }
 
-/// Readings that repeat the largest one speak for a rail only where that is no habit of the meter, and stands where a rail would.
-#[test]
-fn what_repeats_the_largest_reading_and_is_no_rail_is_not_named_one() {
-    let levels = || pulse(|k| [1150.0, 1300.0, 1420.0, 1560.0, 1700.0, 1830.0, 1900.0, 1960.0][k * 5 % 8]);
-    let thrust = |change: &dyn Fn(usize, f64) -> f64| {
-        let mut log = log(levels(), f64::INFINITY, f64::INFINITY);
-        let values = &mut log.columns.last_mut().expect("a thrust").values;
-        values.iter_mut().enumerate().for_each(|(i, v)| *v = change(i, *v));
-        close(&log, None, &[], &mut |_| {}).expect("a log").verdict
-    };
-    // few digits; a top level so far above the others that nothing is known of the meter; full scale by chance, at any speed
-    let coarse = thrust(&|_, v| (v / 0.1).round() * 0.1);
-    let glitches = thrust(&|i, v| if i % 133 == 7 { 20.0 } else { v });
-    for (what, verdict) in [("coarse", coarse), ("glitches", glitches)] {
-        assert!(verdict.effects.iter().all(|e| e.id != "amplifier_saturation"), "{what}: {:?}", verdict.effects);
-    }
-    let mut hold = log(pulse(|k| [1900.0, 1000.0, 1450.0, 1000.0][k % 4]), f64::INFINITY, f64::INFINITY);
-    let values = &mut hold.columns.last_mut().expect("a thrust").values;
-    values.iter_mut().for_each(|v| *v = (*v / 0.1).round() * 0.1);
-    let verdict = close(&hold, None, &[], &mut |_| {}).expect("a log").verdict;
-    assert!(verdict.effects.iter().all(|e| e.id != "amplifier_saturation"), "{:?}", verdict.effects);
-}
-
 #[test]
 fn a_supply_that_reaches_its_limit_at_the_highest_level_only() {
     // a wide range of levels, and one on which a share of the range is less than a limit needs above it

@@ -126,7 +126,8 @@ fn rail(context: &Context) -> Option<Rail> {
     let at_the_rail = target.rows.iter().zip(&target.y).filter(|(_, y)| is_top(**y));
     let mut speeds: Vec<f64> = at_the_rail.map(|(row, _)| context.rpm[*row]).collect();
     speeds.sort_by(f64::total_cmp);
-    let reached = *speeds.get(speeds.len() / 20)?;
+    // just beneath, so that rows that stand at this very speed count
+    let reached = speeds.get(speeds.len() / 20)?.next_down();
     if reached < STANDSTILL || !stands_still(context, reached) {
         return None;
     }
@@ -173,5 +174,54 @@ pub(super) fn hold_above(fixed: &mut [f64], driver: &[f64], reached: f64) {
     let at = fixed.iter().zip(driver).filter(|(_, r)| **r <= reached).max_by(|a, b| a.1.total_cmp(b.1)).map(|(v, _)| *v);
     if let Some(at) = at {
         fixed.iter_mut().zip(driver).filter(|(_, r)| **r > reached).for_each(|(v, _)| *v = at);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Facts;
+    use crate::log::{Column, Log};
+
+    /// Visits of eight levels, 80 readings each; `reading` makes of the row and the true thrust what the log says.
+    fn context(levels: &[f64; 8], reading: impl Fn(usize, f64) -> f64) -> Context {
+        let rows = 4000;
+        let rpm: Vec<f64> = (0..rows).map(|i| if i < 60 { 0.0 } else { levels[i / 80 * 5 % 8] }).collect();
+        let noise = |i: usize| 0.02 * ((i * 7919 % 1009) as f64 / 1009.0 - 0.5);
+        let thrust = rpm.iter().enumerate().map(|(i, r)| reading(i, 1.4e-7 * r * r + noise(i))).collect();
+        let columns = [("rpm", rpm), ("thrust_n", thrust)].map(|(name, values)| Column { name: name.into(), values });
+        let t = (0..rows).map(|i| 0.05 * i as f64).collect();
+        Context::new(&Log { t, columns: columns.into(), ..Log::default() }, Some(1000.0))
+    }
+
+    fn seen(context: &Context) -> f64 {
+        AmplifierSaturation.seen(context, &Instance::new(&["thrust_n"], ""))
+    }
+
+    const EVEN: [f64; 8] = [1000.0, 2000.0, 3000.0, 4000.0, 4500.0, 5000.0, 5500.0, 6000.0];
+
+    #[test]
+    fn readings_that_repeat_the_largest_one_speak_for_a_rail() {
+        let round = |v: f64, digit: f64| (v / digit).round() * digit;
+        let mut rail = context(&EVEN, |_, v| round(v, 0.001).min(4.9));
+        assert!(seen(&rail) > 100.0, "{}", seen(&rail));
+        rail.against_model = true;
+        rail.facts = Facts::default();
+        assert!(seen(&rail).abs() < 1e-12, "a model may have the rail already");
+    }
+
+    #[test]
+    fn what_repeats_the_largest_reading_and_is_no_rail_does_not() {
+        let round = |v: f64, digit: f64| (v / digit).round() * digit;
+        let few = [0.0, 0.0, 1000.0, 0.0, 1000.0, 0.0, 1000.0, 6000.0];
+        let looked_at = [
+            ("a coarse display", context(&EVEN, |_, v| round(v, 0.1))),
+            ("a coarse display that shows few levels", context(&few, |_, v| round(v, 0.1))),
+            ("full scale by chance, at any speed", context(&EVEN, |i, v| if i % 133 == 7 { 20.0 } else { round(v, 0.001) })),
+            ("a meter that holds its reading", context(&EVEN, |i, v| round(if i % 4 == 0 { v } else { v - v % 0.5 }, 0.001))),
+            ("thrust that rests at nothing", context(&EVEN, |_, v| -round(v, 0.001).max(0.0))),
+        ];
+        let spoken = looked_at.iter().map(|(what, context)| (*what, seen(context))).filter(|(_, nats)| *nats != 0.0);
+        assert_eq!(spoken.collect::<Vec<_>>(), [], "nats of evidence");
     }
 }
