@@ -205,7 +205,8 @@ fn judge(s: &Scenario, v: &Verdict, other: &Run, line: &mut Line) {
     line.alternatives = v.alternatives.iter().map(|a| a.ids.join("+")).collect::<Vec<_>>().join("|");
     let same = |set: &[&str]| set.len() == ids.len() && ids.iter().all(|i| set.contains(i));
     line.exact = same(&named);
-    let recognised = matches!(v.verdict, Kind::Unattributed | Kind::Ambiguous);
+    // a choice between names that are all wrong recognises nothing
+    let recognised = v.verdict == Kind::Unattributed;
     (line.first, line.top3) = match s.hidden {
         Hidden::Clean => (v.verdict == Kind::None, v.verdict == Kind::None),
         Hidden::Unknown(_) => (recognised, recognised),

@@ -200,7 +200,7 @@ fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Li
             (first, hit(&named) || others.iter().any(|o| hit(o)), first && named.len() == 1)
         }
         "unknown" => {
-            let recognised = matches!(v.verdict, Kind::Unattributed | Kind::Ambiguous);
+            let recognised = v.verdict == Kind::Unattributed;
             (recognised, recognised, false)
         }
         _ => (silent, silent, silent),
