@@ -56,7 +56,7 @@ pub(crate) struct Recorder {
     spool: Spool,
     head: Vec<(&'static str, String)>,
     calibration: Option<Calibration>,
-    /// Capture channels with two marks, which tell how unevenly these stand: as the head of the log says.
+    /// Capture channels with two marks, as the head of the log says.
     paired: Vec<usize>,
     early: Vec<RigSample>,
     started: bool,
@@ -135,7 +135,7 @@ impl Recorder {
     /// Writes the head once the scales and the rate are known, and the rows that came before.
     fn begin(&mut self) {
         let Some(calibration) = self.calibration.filter(|_| !self.started && self.early.len() >= HEAD_AFTER) else { return };
-        self.paired = (0..CAPTURE_NAMES.len()).filter(|i| calibration.marks[*i] == 2).collect();
+        self.paired = paired(&calibration);
         let early = std::mem::take(&mut self.early);
         let steps: Vec<f64> = early.windows(2).map(|w| w[1].at.since(w[0].at).as_s()).collect();
         let step = steps.iter().copied().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
@@ -146,8 +146,7 @@ impl Recorder {
         if step.is_finite() {
             let _ = writeln!(text, "# sample_hz = {:?}", (1.0 / step * 100.0).round() / 100.0);
         }
-        let uneven: String = self.paired.iter().map(|i| format!(",{}", UNEVEN_NAMES[*i])).collect();
-        let _ = writeln!(text, "t_s,pulse_us,{},{},thrust_rms_n{uneven}", CAPTURE_NAMES.join(","), ADC_NAMES.join(","));
+        text.push_str(&columns(&self.paired));
         if let Some(warning) = self.spool.add(&text) {
             self.say(&warning);
         }
@@ -166,16 +165,7 @@ impl Recorder {
         }
         let t_s = self.offset_s + sample.at.since(self.first.unwrap_or(first)).as_s();
         let values = calibration.convert(sample);
-        let mut line = format!("{t_s:.4},{:.3}", values.pulse_us);
-        let uneven = self.paired.iter().map(|i| &values.uneven_deg[*i]);
-        for value in values.rpm.iter().chain(&values.adc).chain([&values.thrust_rms_n]).chain(uneven) {
-            line.push(',');
-            if let Some(value) = value.filter(|v| v.is_finite()) {
-                let _ = write!(line, "{value:.6}");
-            }
-        }
-        line.push('\n');
-        if let Some(warning) = self.spool.add(&line) {
+        if let Some(warning) = self.spool.add(&cells(t_s, &values, &self.paired)) {
             self.say(&warning);
         }
         self.rows += 1;
@@ -234,6 +224,31 @@ impl Recorder {
     }
 }
 
+/// Capture channels with two marks, which tell how unevenly these stand.
+fn paired(calibration: &Calibration) -> Vec<usize> {
+    (0..CAPTURE_NAMES.len()).filter(|i| calibration.marks[*i] == 2).collect()
+}
+
+/// The line of a log that names its columns; `paired` are the capture channels with two marks.
+fn columns(paired: &[usize]) -> String {
+    let uneven: String = paired.iter().map(|i| format!(",{}", UNEVEN_NAMES[*i])).collect();
+    format!("t_s,pulse_us,{},{},thrust_rms_n{uneven}\n", CAPTURE_NAMES.join(","), ADC_NAMES.join(","))
+}
+
+/// One row under [`columns`]: what is not known is an empty cell.
+fn cells(t_s: f64, values: &Converted, paired: &[usize]) -> String {
+    let mut line = format!("{t_s:.4},{:.3}", values.pulse_us);
+    let uneven = paired.iter().map(|i| &values.uneven_deg[*i]);
+    for value in values.rpm.iter().chain(&values.adc).chain([&values.thrust_rms_n]).chain(uneven) {
+        line.push(',');
+        if let Some(value) = value.filter(|v| v.is_finite()) {
+            let _ = write!(line, "{value:.6}");
+        }
+    }
+    line.push('\n');
+    line
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut board = Board::open(&args.port)?;
@@ -280,4 +295,32 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let rows = recorder.rows;
     recorder.finish(&board, quiet)?;
     ended.map_err(|e| format!("{e}; the {rows} rows that arrived are in {}", args.output.display()).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use frame::calibration::AdcScale;
+    use frame::rig::CaptureCode;
+    use ident::log::Log;
+
+    /// Every value stands under its own name, also where a channel without two marks lies between those that have them.
+    #[test]
+    fn what_the_board_tells_of_its_marks_stands_under_its_channels_name() {
+        let marks = [2, 1, 2, 25];
+        let calibration = Calibration { timer_hz: 84_000_000, marks, adc: [AdcScale { zero: 0.0, gain: 1.0 }; 5] };
+        let code = |i: usize, uneven: u16| CaptureCode { edges: marks[i], span: 840_000, uneven, ..CaptureCode::default() };
+        let sample = |uneven: [u16; 4]| RigSample { rpm: std::array::from_fn(|i| code(i, uneven[i])), ..RigSample::default() };
+        let paired = paired(&calibration);
+        let mut text = format!("# quadrig-log 1\n{}", columns(&paired));
+        for (k, uneven) in [[1000, 3000, 500, 3000], [1000, 0, 0, 0], [0, 0, 2000, 0]].into_iter().enumerate() {
+            text.push_str(&cells(0.1 * k as f64, &calibration.convert(&sample(uneven)), &paired));
+        }
+        let log = Log::parse("run.csv", text.as_bytes()).expect("a log");
+        let told = |name: &str| log.column(name).map(|v| v.iter().map(|a| a.is_finite().then_some(*a)).collect::<Vec<_>>());
+        assert_eq!(told("uneven_beam_deg"), Some(vec![Some(9.0), Some(9.0), None]));
+        assert_eq!(told("uneven_hall_deg"), Some(vec![Some(4.5), None, Some(18.0)]));
+        assert_eq!((told("uneven_opto_deg"), told("uneven_encoder_deg")), (None, None), "these have no pair of marks");
+        assert_eq!(told("rpm_encoder").map(|v| v.len()), Some(3));
+    }
 }
