@@ -44,7 +44,7 @@ pub struct BiasConfig {
     /// How much more while nothing is known of the bias.
     pub heading_boost: f32,
     /// Time constant of the averaged attitude that corrections are turned into body axes with, s; first order, cut-off
-    /// 1/(2 pi tau) = 0.04 Hz.
+    /// 1/(2 pi tau) = 0.03 Hz.
     pub lag: f32,
     /// Time in which motion resolves the ignorance, s.
     pub motion_tau: f32,
@@ -100,8 +100,15 @@ pub struct IronConfig {
 /// Everything that does not change while the filter runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// Averaging of the specific force in the earth frame, s; second order, cut-off sqrt(2)/(2 pi tau) = 0.09 Hz.
+    /// Averaging of the specific force in the earth frame without true acceleration, s; second order, cut-off
+    /// sqrt(2)/(2 pi tau) = 0.10 Hz.
     pub tilt_tau: f32,
+    /// How much longer, as a share, it averages for a true acceleration of one g: the more it swings, the longer it takes to cancel.
+    pub tilt_stretch: f32,
+    /// Rate at which half of that is left, rad/s: scale and alignment errors of a gyro grow with its rate, and leave less time.
+    pub tilt_rate: f32,
+    /// Averaging of the acceleration that the stretch is made of, s; first order, a few steps of a walker.
+    pub tilt_memory: f32,
     /// Time over which the specific force is summed in earth axes before it is used, s (five readings of 200 Hz, one of 48).
     pub tilt_window: f32,
     /// Averaging of the heading, s; first order, cut-off 1/(2 pi tau) = 0.013 Hz.
@@ -127,18 +134,21 @@ pub struct Config {
 impl Config {
     /// The one default, for every sensor and motion.
     pub const DEFAULT: Self = Self {
-        tilt_tau: 2.5,
+        tilt_tau: 2.2,
+        tilt_stretch: 6.0,
+        tilt_rate: 2.0,
+        tilt_memory: 10.0,
         tilt_window: 0.0205,
         heading_tau: 12.0,
         rest: RestConfig { filter_tau: 0.5, time: 1.5, rate: 2.0 * DEGREE, force: 0.5, known_rate: 2.0 * DEGREE },
         bias: BiasConfig {
             limit: 10.0 * DEGREE,
             rest_weight: 0.035,
-            tilt_gain: 0.03,
-            tilt_boost: 7.0,
+            tilt_gain: 0.06,
+            tilt_boost: 1.5,
             heading_gain: 2e-4,
             heading_boost: 100.0,
-            lag: 4.0,
+            lag: 5.0,
             motion_tau: 60.0,
             forgetting: 1e-4,
             trusted: 0.2,
@@ -146,7 +156,7 @@ impl Config {
         field: FieldConfig {
             window: 0.035,
             smoothing: 0.05,
-            norm: 0.1,
+            norm: 0.15,
             dip: 10.0 * DEGREE,
             reference_tau: 20.0,
             settle: 0.5,

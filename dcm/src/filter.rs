@@ -63,7 +63,9 @@ pub struct Dcm<C = Config> {
     since_gyro: f32,
     since_accel: f32,
     since_mag: f32,
-    last_angle: Column,
+    last_rate: Column,
+    /// Mean size of true accelerations in g, less while the body turns fast.
+    pushed: f32,
     sum: Column,
     summed: f32,
     field_sum: Column,
@@ -90,7 +92,8 @@ impl<C: Borrow<Config>> Dcm<C> {
             since_gyro: 0.0,
             since_accel: 0.0,
             since_mag: 0.0,
-            last_angle: ZERO,
+            last_rate: ZERO,
+            pushed: 0.0,
             sum: ZERO,
             summed: 0.0,
             field_sum: ZERO,
@@ -222,7 +225,8 @@ impl<C> Words for Dcm<C> {
         visit(&mut self.since_gyro);
         visit(&mut self.since_accel);
         visit(&mut self.since_mag);
-        self.last_angle.words(visit);
+        self.last_rate.words(visit);
+        visit(&mut self.pushed);
         self.sum.words(visit);
         visit(&mut self.summed);
         self.field_sum.words(visit);

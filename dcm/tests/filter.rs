@@ -388,3 +388,47 @@ fn a_filter_with_a_fixed_configuration_gives_the_same() {
         assert_eq!(fixed.save(), held.save(), "step {k}");
     }
 }
+
+/// A strong magnet passes by a sensor that turns: what it adds is refused, and is neither iron on the sensor nor a drift of the gyro.
+#[test]
+fn a_field_that_is_refused_teaches_neither_iron_nor_bias() {
+    let (mut dcm, mut body) = (Dcm::new(Config::default()), Tumble::new());
+    follow(&mut dcm, &mut body, 60.0, |_, _| {});
+    let (iron, bias) = (dcm.iron(), dcm.bias());
+    let (mut refused, mut learnt, mut drifted) = (0, 0.0f32, 0.0f32);
+    for _ in 0..(15.0 / DT) as u32 {
+        let mut m = body.step();
+        let magnet = body.truth.transpose() * Vec3::new(60.0, 150.0, -90.0);
+        m.mag = m.mag.map(|field| field + magnet);
+        dcm.update(DT, &m);
+        refused += u32::from(dcm.flags().field_disturbed);
+        learnt = learnt.max(length(&(dcm.iron() - iron)));
+        drifted = drifted.max(length(&(dcm.bias() - bias)));
+    }
+    assert!(refused > (14.0 / DT) as u32, "{refused}");
+    assert!(learnt < 0.5 && drifted < 2e-4, "iron by {learnt} uT, bias by {drifted} rad/s");
+}
+
+/// A walker's swing of 0.6 g: the longer average that it calls for leaves less of it in the tilt.
+#[test]
+fn the_average_is_longer_while_true_accelerations_swing() {
+    let swung = |stretch: f32| {
+        let config = Config { tilt_stretch: stretch, ..Config::default() };
+        let (mut dcm, truth) = (Dcm::new(config), attitude(10.0, 5.0, 30.0));
+        let mut worst: f32 = 0.0;
+        for k in 0..(120.0 / DT) as u32 {
+            let t = k as f32 * DT;
+            let push = truth.transpose() * Vec3::new(0.6 * STANDARD_GRAVITY * (5.0 * t).sin(), 0.0, 0.0);
+            let mut m = at_rest(&truth);
+            m.accel = m.accel.map(|force| force + push);
+            dcm.update(DT, &m);
+            if t > 60.0 {
+                worst = worst.max(between(dcm.matrix(), &truth));
+            }
+        }
+        worst
+    };
+    let (longer, fixed) = (swung(Config::default().tilt_stretch), swung(0.0));
+    println!("{longer} and {fixed} degrees");
+    assert!(longer < 0.7 * fixed, "{longer} and {fixed}");
+}

@@ -98,12 +98,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut filter = Filter::new(args.preset, args.declination.to_radians());
     let mut out = String::with_capacity(96 * log.rows.len() + 64);
     out.push_str("t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg\n");
-    let mut fresh = Fresh::default();
+    let (mut forces, mut fields) = (Fresh::default(), Fresh::default());
     for (n, (row, dt)) in log.steps().enumerate() {
-        let mag = fresh.take(dt, row.mag);
+        let (accel, mag) = (forces.take(dt, row.accel), fields.take(dt, row.mag));
         let measured = Measurement {
             gyro: row.gyro.map(|w| calibration.gyro(&w)),
-            accel: row.accel.map(|f| calibration.accel(&f)),
+            accel: accel.map(|f| calibration.accel(&f)),
             mag: mag.map(|m| calibration.mag(&m)),
         };
         let attitude = filter.step(dt, &measured);

@@ -1,12 +1,14 @@
 //! `cargo xtask ahrs-bench`: the attitude filter on measured motion with optical truth.
 //!
-//! What it is: the filter's one default over every shared BROAD trial and stress variant, beside the classic filter and the
-//! published figures of VQF, and a check of the targets.
+//! What it is: the filter's one default over every shared BROAD trial and stress variant and over the shared trials of the phones, beside
+//! the classic filter and the published figures of VQF, and a check of the targets.
 //! What can go wrong: a target that is missed is a failure; so is missing data.
 //! Units: degrees.
 //! Reference: specification `ahrs.md`; README of the data; `docs/ahrs.md`.
 
 mod constants;
+mod groups;
+pub(crate) mod phones;
 mod plots;
 mod scan;
 pub(crate) mod score;
@@ -35,9 +37,9 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
     if let ["--plots", target] = words {
         return plots::plots(std::path::Path::new(target), &trials);
     }
-    if let Some(word) = words.iter().find(|w| Variant::ALL.iter().all(|v| v.name() != **w)) {
+    if let Some(word) = words.iter().find(|w| **w != "phones" && Variant::ALL.iter().all(|v| v.name() != **w)) {
         let names = Variant::ALL.map(Variant::name).join(", ");
-        return Err(Failure(format!("{word}: no variant; whose trials are to be listed is one of {names}")));
+        return Err(Failure(format!("{word}: no variant; whose trials are to be listed is one of {names}, phones")));
     }
     let peers = folder.join("peers-shared.csv");
     let mut missed = Vec::new();
@@ -83,6 +85,7 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
         let s = Score::mean(s.iter());
         println!("{name}: {:.2} {:.2} {:.2}", s.total, s.heading, s.inclination);
     }
+    missed.extend(groups::groups(&place.data().join("ahrs-phones"), words.contains(&"phones"))?);
     if missed.is_empty() { Ok(()) } else { Err(Failure(format!("targets missed: {}", missed.join("; ")))) }
 }
 

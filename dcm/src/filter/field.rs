@@ -6,7 +6,7 @@
 //! Units: uT, rad, s.
 //! Reference: Laidig & Seel 2023, section 3.5.
 
-use super::state::{Words, flag};
+use super::state::Words;
 use crate::columns::least;
 use crate::config::FieldConfig;
 use crate::trig::{angle, root};
@@ -61,8 +61,6 @@ pub(super) struct Field {
     good_time: f32,
     /// Time of freezing that was used up, s.
     frozen: f32,
-    /// It differs from the reference.
-    pub(super) disturbed: bool,
 }
 
 impl Field {
@@ -71,12 +69,22 @@ impl Field {
     pub(super) fn new() -> Self {
         let none = Shape::default();
         let (candidate_time, good_time, frozen) = (0.0, 0.0, 0.0);
-        Self { now: none, reference: none, candidate: none, candidate_time, good_time, frozen, disturbed: true }
+        Self { now: none, reference: none, candidate: none, candidate_time, good_time, frozen }
     }
 
     /// Whether a reference was found. (One without a horizontal part would be of no use.)
     pub(super) fn known(&self) -> bool {
         self.reference.level > 0.0
+    }
+
+    /// Whether it differs from the reference, or has not agreed with it for long enough.
+    pub(super) fn disturbed(&self, config: &FieldConfig) -> bool {
+        self.good_time < config.settle
+    }
+
+    /// Whether it differs from a reference that is known: what it says then is not learnt from.
+    pub(super) fn refused(&self, config: &FieldConfig) -> bool {
+        self.known() && self.disturbed(config)
     }
 
     /// Norm, as a share, and dip, rad, against the reference; 0 while none is known.
@@ -98,13 +106,11 @@ impl Field {
 
         if self.now.is_near(&self.reference, config.norm, config.dip) {
             self.good_time += dt;
-            if self.good_time >= config.settle {
-                self.disturbed = false;
+            if !self.disturbed(config) {
                 self.reference.follow(&self.now, slow);
             }
         } else {
             self.good_time = 0.0;
-            self.disturbed = true;
         }
 
         if !self.now.is_near(&self.candidate, config.norm, config.dip) {
@@ -117,9 +123,8 @@ impl Field {
             self.candidate_time += dt;
         }
         let wait = if self.known() { config.new_time } else { config.first_time };
-        if self.disturbed && self.candidate_time >= wait {
+        if self.disturbed(config) && self.candidate_time >= wait {
             self.reference = self.candidate;
-            self.disturbed = false;
             self.good_time = config.settle;
         }
     }
@@ -128,7 +133,7 @@ impl Field {
     /// while there is no reference.
     #[inline]
     pub(super) fn belief(&mut self, config: &FieldConfig, dt: f32, hold: bool) -> f32 {
-        if !self.disturbed {
+        if !self.disturbed(config) {
             self.frozen = -least(config.doubt * dt - self.frozen, 0.0);
             return 1.0;
         }
@@ -151,6 +156,5 @@ impl Words for Field {
         visit(&mut self.candidate_time);
         visit(&mut self.good_time);
         visit(&mut self.frozen);
-        flag(&mut self.disturbed, visit);
     }
 }

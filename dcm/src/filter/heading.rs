@@ -48,7 +48,9 @@ impl<C: Borrow<Config>> Dcm<C> {
         let mut free = self.iron.taken_from(&ZERO, config.iron.dead_zone, config.iron.limit);
         turn(&self.matrix.data.0, core::slice::from_mut(&mut free));
         let [x, y, down] = &plus(whole, &free, 1.0);
-        if settled {
+        // what a magnet in the room adds is neither on the sensor nor a drift of the gyro
+        let learns = settled && !self.field.refused(&config.field);
+        if learns {
             self.iron.take(&config.iron, &self.matrix.data.0, whole, dt);
         }
         let level = root(x * x + y * y);
@@ -61,7 +63,7 @@ impl<C: Borrow<Config>> Dcm<C> {
         }
         let error = wrapped(config.declination, angle(*y, *x, level));
         self.heading_error = error;
-        if !self.rest.now && settled {
+        if !self.rest.now && learns {
             self.bias.take_heading(&config.bias, error, dt);
         }
         self.heading_age = least(self.heading_age + dt, config.heading_tau);

@@ -37,11 +37,12 @@ impl<const N: usize> LowPass<N> {
         x
     }
 
-    /// Takes one value that stands for `dt` seconds; the square of its distance to the filtered one.
+    /// Takes one value that stands for `dt` seconds; the square of its distance to the filtered one. `start` is the time constant
+    /// that it starts with, which may not change.
     #[inline(never)]
-    pub(super) fn step(&mut self, z: &[f32; N], dt: f32, tau: f32) -> f32 {
+    pub(super) fn step(&mut self, z: &[f32; N], dt: f32, tau: f32, start: f32) -> f32 {
         // running means, z - x - 2v the distance to the first; then x' tau = v, v' tau = 2 (z - x - v)
-        let (lag, gain, keep, k) = if self.starting(tau) {
+        let (lag, gain, keep, k) = if self.starting(start) {
             self.age += dt;
             let k = least(dt / self.age, 1.0);
             (2.0, k, 0.5 - 0.5 * k, k)
@@ -82,14 +83,14 @@ mod tests {
     fn it_starts_at_the_mean_and_then_has_its_time_constant() {
         let (dt, tau) = (0.0035, 3.0);
         let mut filter = LowPass::new();
-        filter.step(&[1.0, 0.0, 0.0], dt, tau);
+        filter.step(&[1.0, 0.0, 0.0], dt, tau, tau);
         assert!((filter.value()[0] - 1.0).abs() < 1e-6, "the first value at once");
         for _ in 0..4000 {
-            filter.step(&[1.0, 0.0, 0.0], dt, tau);
+            filter.step(&[1.0, 0.0, 0.0], dt, tau, tau);
         }
         // step response at t = tau of the damped pair: 1 - e^-1 (cos 1 + sin 1) = 0.4917
         for _ in 0..(tau / dt) as u32 {
-            filter.step(&[0.0; 3], dt, tau);
+            filter.step(&[0.0; 3], dt, tau, tau);
         }
         assert!((filter.value()[0] - 0.5083).abs() < 2e-3, "{}", filter.value()[0]);
     }

@@ -18,7 +18,7 @@ use core::f32::consts::{PI, TAU};
 /// Words of a saved state.
 pub const STATE_WORDS: usize = 104;
 /// First word of a saved state: changes whenever the list of fields does.
-const STATE_VERSION: u32 = 0x4443_4D05;
+const STATE_VERSION: u32 = 0x4443_4D06;
 
 /// What holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -158,7 +158,7 @@ impl<C: Borrow<Config> + Clone> Dcm<C> {
             rest: self.rest.now,
             heading_absolute: self.heading_absolute,
             field_known: self.field.known(),
-            field_disturbed: self.heading_absolute && self.field.disturbed && self.field.known(),
+            field_disturbed: self.heading_absolute && self.field.refused(&config.field),
             bias_trusted: self.bias.trusted(&config.bias),
         }
     }

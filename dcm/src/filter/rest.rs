@@ -43,7 +43,7 @@ impl Rest {
     /// Takes a rate.
     #[inline]
     pub(super) fn rate(&mut self, config: &Config, rate: &Column, dt: f32, bias: &Bias) {
-        let away = self.rate.step(rate, dt, config.rest.filter_tau);
+        let away = self.rate.step(rate, dt, config.rest.filter_tau, config.rest.filter_tau);
         let mut mean = *self.rate.value();
         let fast = if bias.trusted(&config.bias) {
             square(&plus(&mean, &bias.value, -1.0)) >= config.rest.known_rate * config.rest.known_rate
@@ -58,7 +58,7 @@ impl Rest {
     /// Takes a specific force; rest is counted here.
     #[inline]
     pub(super) fn force(&mut self, config: &RestConfig, force: &Column, dt: f32) {
-        let away = self.force.step(force, dt, config.filter_tau);
+        let away = self.force.step(force, dt, config.filter_tau, config.filter_tau);
         if away > config.force * config.force {
             self.moved();
             return;

@@ -8,11 +8,12 @@
 //! Reference: Premerlani & Bizard 2009, Eq. 17-21; Savage 1998, Eq. 47; Laidig & Seel 2023, section 3.2.
 
 use super::{DEAD, Dcm, taken};
-use crate::Config;
 use crate::angles::up;
 use crate::columns::{Column, ZERO, cross, dot, least, plus, scaled, square, turn};
 use crate::measurement::Step;
 use crate::rotation::{exponential, inverse_sqrt, orthonormalise};
+use crate::trig::root;
+use crate::{Config, STANDARD_GRAVITY};
 use core::borrow::Borrow;
 
 /// Weight of the turn of the axis between two steps (Savage 1998, Eq. 47, one sample before).
@@ -44,8 +45,8 @@ impl<C: Borrow<Config>> Dcm<C> {
             return;
         }
         // the axis of turning moves within the step: the second-order term of the rotation vector
-        let coned = plus(&angle, &cross(&self.last_angle, &angle), CONING);
-        self.last_angle = angle;
+        let coned = plus(&angle, &cross(&self.last_rate, &angle), CONING * dt);
+        self.last_rate = rate;
         let mut next = exponential(&coned);
         turn(&self.matrix.data.0, &mut next);
         self.matrix.data.0 = next;
@@ -93,7 +94,11 @@ impl<C: Borrow<Config>> Dcm<C> {
             }
         }
         let config = self.config.borrow();
-        self.tilt.step(&mean, dt, config.tilt_tau);
+        let away = (root(square(&mean)) - STANDARD_GRAVITY).abs();
+        self.tilt.step(&mean, dt, config.tilt_tau * (1.0 + config.tilt_stretch * self.pushed), config.tilt_tau);
+        let turning = square(&self.last_rate) / (config.tilt_rate * config.tilt_rate);
+        let pushed = away / (STANDARD_GRAVITY + STANDARD_GRAVITY * turning);
+        self.pushed += (pushed - self.pushed) * least(dt / config.tilt_memory, 1.0);
         let mean = self.tilt.value();
         let long = square(mean);
         if long < 1.0 {
@@ -116,7 +121,7 @@ impl<C: Borrow<Config>> Dcm<C> {
             return false;
         }
         // the next field sets the heading too, unless it is known for a disturbed one
-        let held = self.heading_absolute && self.field.known() && self.field.disturbed;
+        let held = self.heading_absolute && self.field.refused(&self.config.borrow().field);
         self.start(&force, None, step);
         self.heading_absolute |= held;
         self.rest.ever |= step.started;

@@ -55,7 +55,10 @@ macro_rules! constants {
 }
 
 constants! {
-    tilt_tau, "s", 1.0, "half A", [1.5, 2.0, 2.5, 3.0, 4.0, 6.0];
+    tilt_tau, "s", 1.0, "both sets", [1.5, 1.8, 2.2, 2.5, 3.0, 4.0];
+    tilt_stretch, "", 1.0, "both sets", [0.0, 4.0, 5.0, 6.0, 8.0];
+    tilt_rate, "rad/s", 1.0, "both sets", [1.0, 1.5, 2.0, 3.0, 1000.0];
+    tilt_memory, "s", 1.0, "both sets", [2.0, 5.0, 10.0, 20.0];
     tilt_window, "ms", 1e-3, "cost", [1.0, 10.5, 20.5, 40.5];
     heading_tau, "s", 1.0, "half A", [6.0, 9.0, 12.0, 16.0, 20.0, 30.0];
     rest.filter_tau, "s", 1.0, "VQF", [0.25, 0.5, 1.0];
@@ -65,17 +68,17 @@ constants! {
     rest.known_rate, "deg/s", DEGREE, "VQF", [1.0, 2.0, 3.0, 5.0];
     bias.limit, "deg/s", DEGREE, "chip", [8.0, 10.0, 15.0, 20.0];
     bias.rest_weight, "s", 1.0, "prototype", [0.01, 0.02, 0.035, 0.05, 0.1];
-    bias.tilt_gain, "1/s", 1.0, "prototype", [0.0, 0.01, 0.02, 0.03, 0.05, 0.1];
-    bias.tilt_boost, "", 1.0, "half A, B seen", [0.0, 3.0, 5.0, 7.0, 10.0, 20.0];
+    bias.tilt_gain, "1/s", 1.0, "both sets", [0.0, 0.03, 0.045, 0.06, 0.08];
+    bias.tilt_boost, "", 1.0, "both sets", [0.0, 1.0, 1.5, 2.0];
     bias.heading_gain, "1e-4/s2", 1e-4, "half A", [0.0, 1.0, 2.0, 3.0, 5.0];
     bias.heading_boost, "", 1.0, "prototype", [0.0, 30.0, 50.0, 100.0, 200.0];
-    bias.lag, "s", 1.0, "half A, B seen", [2.0, 3.0, 4.0, 5.0, 7.0];
+    bias.lag, "s", 1.0, "both sets", [3.0, 4.0, 5.0, 6.0];
     bias.motion_tau, "s", 1.0, "half A, B seen", [20.0, 30.0, 60.0, 100.0, 200.0];
     bias.forgetting, "1e-4/s", 1e-4, "prototype", [0.1, 0.3, 1.0, 3.0, 10.0];
     bias.trusted, "", 1.0, "prototype", [0.05, 0.1, 0.2, 0.5];
     field.window, "ms", 1e-3, "cost", [1.0, 13.0, 20.0, 35.0, 50.0, 70.0];
     field.smoothing, "s", 1.0, "VQF", [0.02, 0.05, 0.1, 0.2];
-    field.norm, "", 1.0, "VQF", [0.05, 0.07, 0.1, 0.15, 0.2];
+    field.norm, "", 1.0, "both sets", [0.07, 0.1, 0.15, 0.2];
     field.dip, "deg", DEGREE, "VQF", [5.0, 7.0, 10.0, 15.0, 20.0];
     field.reference_tau, "s", 1.0, "VQF", [10.0, 20.0, 40.0];
     field.settle, "s", 1.0, "VQF", [0.2, 0.5, 1.0, 2.0];

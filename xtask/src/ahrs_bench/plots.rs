@@ -66,7 +66,7 @@ fn course(samples: &[Sample]) -> Course {
         out.disturbed.push(ours.flags().field_disturbed);
         let off = |matrix: &Mat3| -> [f64; 3] {
             let Some(truth) = s.truth else { return [f64::NAN; 3] };
-            let (heading, inclination, total) = errors(quaternion_of(&Earth::Enu.from_ned(matrix)).map(f64::from), truth);
+            let (heading, inclination, total) = errors(quaternion_of(&Earth::Enu.from_ned(matrix)).map(f64::from), truth.q);
             [total, heading, inclination]
         };
         for (k, e) in off(ours.matrix()).into_iter().enumerate() {

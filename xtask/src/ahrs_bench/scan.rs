@@ -117,7 +117,7 @@ than {:.0} %; then the best one is taken. Half B is run when all of half A is de
 
 With the default: half A {a:.3} degrees, half B {b:.3}. Columns: values tried, each with the change of half A's error against the default; the value with the
 least; what the rule takes; and, not used, the change of half B's error with the least one. Where the default comes from: `VQF` its published
-defaults, `prototype` a study of all shared trials, `chip` ranges of the sensors, `half A` chosen on it (`B seen`: with half B's figure in view), `cost` what the instruction budget asks for,
+defaults, `prototype` a study of all shared trials, `both sets` one of all shared trials of BROAD and the phones, `chip` ranges of the sensors, `half A` chosen on it (`B seen`: with half B's figure in view), `cost` what the instruction budget asks for,
 `gap` what counts as one. `declination` is an input and not chosen.
 
 | constant | default | from | half A with other values | least | taken | half B with the least |

@@ -16,8 +16,17 @@ pub(crate) struct Sample {
     pub(crate) gyro: [f32; 3],
     pub(crate) accel: [f32; 3],
     pub(crate) mag: [f32; 3],
-    /// Truth, sensor to east-north-up; `None` where it is not scored.
-    pub(crate) truth: Option<[f64; 4]>,
+    /// Truth; `None` where it is not scored.
+    pub(crate) truth: Option<Truth>,
+}
+
+/// A true attitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Truth {
+    /// Unit quaternion, sensor to east-north-up.
+    pub(crate) q: [f64; 4],
+    /// How long before the sample it holds, s; no longer than since the sample before, of which the estimate is then a mean.
+    pub(crate) before: f64,
 }
 
 /// One trial.
@@ -61,7 +70,7 @@ fn trial(path: &Path) -> Result<Trial, Failure> {
                 *slot = field.parse().map_err(|_| fail(&format!("line {}: {column}: {field:?} is no number", n + 2)))?;
             }
             let three = |i: usize| [v[i] as f32, v[i + 1] as f32, v[i + 2] as f32];
-            let truth = (v[14] == 1.0).then_some([v[10], v[11], v[12], v[13]]);
+            let truth = (v[14] == 1.0).then_some(Truth { q: [v[10], v[11], v[12], v[13]], before: 0.0 });
             Ok(Sample { t: v[0], gyro: three(1), accel: three(4), mag: three(7), truth })
         })
         .collect();

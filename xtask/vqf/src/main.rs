@@ -49,7 +49,7 @@ fn score(samples: &[Sample]) -> Score {
         filter.update(wide(s.gyro), wide(s.accel), Some(wide(s.mag)));
         let Some(truth) = s.truth else { continue };
         let q = filter.quat_9d();
-        let (heading, inclination, total) = errors([q.0, q.1, q.2, q.3], truth);
+        let (heading, inclination, total) = errors([q.0, q.1, q.2, q.3], truth.q);
         sum.heading += heading * heading;
         sum.inclination += inclination * inclination;
         sum.total += total * total;
