@@ -1,0 +1,237 @@
+//! What to fly, as a file.
+//!
+//! What it is: a TOML description of a flight (start, air, wind, pulses) and one of the airframe, with a default for everything: an
+//! empty mission is the thesis' quadrotor that hovers for 10 s at 63 m.
+//! What can go wrong: an unknown key, a wrong type, a value out of its range or a rotor that the airframe does not have is refused
+//! with file, line and column.
+//! Units: each key carries its own.
+//! Reference: specification `flight.md`, "Missions"; `docs/mission.md` lists every key.
+
+mod airframe;
+mod fly;
+
+pub use airframe::{AirframeFile, RotorSection};
+pub use fly::{HoverPoint, catalogue_plants, fly, hover, settled_catalogue};
+
+use crate::flight::attitude::from_euler;
+use crate::flight::vehicle::Surroundings;
+use crate::flight::wind::Blowing;
+use crate::flight::{Motion, Vector};
+use crate::scenario::{ScenarioError, Step, not_negative, parsed, place_of, positive, text_of};
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// A flight.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mission {
+    /// Title.
+    pub name: String,
+    /// Seed of the gusts.
+    pub seed: u64,
+    /// Longest flight, s; 0 for as long as the longest list of pulses.
+    #[serde(deserialize_with = "not_negative")]
+    pub duration_s: f64,
+    /// The flight ends as soon as a rotor touches the ground.
+    pub ends_on_ground: bool,
+    /// Rows of the log a second: a divisor of 1000.
+    #[serde(deserialize_with = "rate")]
+    pub log_hz: u32,
+    /// Airframe file, from the mission's folder; without one, the thesis' quadrotor.
+    pub airframe: Option<PathBuf>,
+    /// How it begins.
+    pub start: StartSection,
+    /// The air.
+    pub air: AirSection,
+    /// The wind.
+    pub wind: WindSection,
+    /// Pulses.
+    pub command: Vec<CommandSection>,
+}
+
+/// How a flight begins.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StartSection {
+    /// Height of the body above ground, m.
+    pub height_m: f64,
+    /// Velocity over ground, earth NED, m/s.
+    pub velocity_m_s: [f64; 3],
+    /// Roll, pitch, yaw, deg.
+    pub attitude_deg: [f64; 3],
+    /// The rotors already run at the first pulses.
+    pub spun_up: bool,
+}
+
+/// The air of a flight.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AirSection {
+    /// Height of the ground above sea level, m.
+    pub ground_altitude_m: f64,
+    /// Departure from the standard atmosphere, K.
+    pub temperature_offset_k: f64,
+}
+
+/// The wind of a flight.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WindSection {
+    /// Mean wind, earth NED, m/s: where the air moves to.
+    pub steady_m_s: [f64; 3],
+    /// Standard deviation of the gusts along each axis, m/s.
+    #[serde(deserialize_with = "not_negative")]
+    pub gust_m_s: f64,
+    /// Length of the turbulence, m.
+    #[serde(deserialize_with = "positive")]
+    pub gust_length_m: f64,
+}
+
+/// Pulses of some rotors.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CommandSection {
+    /// Which rotors, from 1.
+    pub rotors: Vec<Spanned<usize>>,
+    /// Their pulses one after the other; the last goes on to the end.
+    #[serde(deserialize_with = "steps")]
+    pub steps: Vec<Step>,
+}
+
+impl Default for Mission {
+    fn default() -> Self {
+        Self {
+            name: "hover".to_owned(),
+            seed: 1,
+            duration_s: 10.0,
+            ends_on_ground: false,
+            log_hz: 100,
+            airframe: None,
+            start: StartSection { height_m: 63.0, ..StartSection::default() },
+            air: AirSection::default(),
+            wind: WindSection::default(),
+            command: Vec::new(),
+        }
+    }
+}
+
+impl Default for StartSection {
+    fn default() -> Self {
+        Self { height_m: 0.0, velocity_m_s: [0.0; 3], attitude_deg: [0.0; 3], spun_up: true }
+    }
+}
+
+impl Default for WindSection {
+    /// No wind; 50 m, should gusts be asked for.
+    fn default() -> Self {
+        Self { steady_m_s: [0.0; 3], gust_m_s: 0.0, gust_length_m: 50.0 }
+    }
+}
+
+/// Pulse of a rotor that no command names: 8.36 % of 20 ms, the stated hover (errata, "hover"), us.
+pub const HOVER_US: f64 = 1672.0;
+
+impl Mission {
+    /// Reads a mission and the airframe that it names.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Unreadable`], or [`ScenarioError::Refused`] with line and column.
+    pub fn load(file: &Path) -> Result<(Self, AirframeFile), ScenarioError> {
+        let text = text_of(file)?;
+        let mission: Self = parsed(&text, file)?;
+        let airframe = match &mission.airframe {
+            Some(name) => AirframeFile::load(&file.parent().unwrap_or(Path::new("")).join(name))?,
+            None => AirframeFile::default(),
+        };
+        mission.check(&text, file, airframe.rotors().len())?;
+        Ok((mission, airframe))
+    }
+
+    /// Reads a mission for the thesis' quadrotor from `text`; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Refused`] with line and column.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, ScenarioError> {
+        let mission: Self = parsed(text, file)?;
+        mission.check(text, file, AirframeFile::default().rotors().len())?;
+        Ok(mission)
+    }
+
+    fn check(&self, text: &str, file: &Path, rotors: usize) -> Result<(), ScenarioError> {
+        let mut named = self.command.iter().flat_map(|c| &c.rotors);
+        let Some(rotor) = named.find(|r| !(1..=rotors).contains(r.get_ref())) else { return Ok(()) };
+        let (line, column) = place_of(text, rotor.span().start);
+        let reason = format!("expected a rotor from 1 to {rotors}, found {}", rotor.get_ref());
+        Err(ScenarioError::Refused { file: file.to_owned(), line, column, reason })
+    }
+
+    /// How long the flight may last, s.
+    #[must_use]
+    pub fn length_s(&self) -> f64 {
+        let longest = self.command.iter().map(|c| c.steps.iter().map(|s| s.hold_s).sum()).fold(0.0, f64::max);
+        if self.duration_s > 0.0 { self.duration_s } else { longest }
+    }
+
+    /// Pulse of a rotor (from 0) at a time, us; the last command that names it counts.
+    #[must_use]
+    pub fn pulse_us(&self, rotor: usize, t_s: f64) -> f64 {
+        let of_it = self.command.iter().rev().find(|c| c.rotors.iter().any(|r| *r.get_ref() == rotor + 1));
+        of_it.map_or(HOVER_US, |c| at(&c.steps, t_s))
+    }
+
+    /// The surroundings.
+    #[must_use]
+    pub fn surroundings(&self) -> Surroundings {
+        Surroundings {
+            ground_altitude_m: self.air.ground_altitude_m,
+            temperature_offset_k: self.air.temperature_offset_k,
+            blowing: Blowing {
+                steady: self.wind.steady_m_s,
+                gust_m_s: self.wind.gust_m_s,
+                gust_length_m: self.wind.gust_length_m,
+            },
+            seed: self.seed,
+        }
+    }
+
+    /// The motion that it begins with.
+    #[must_use]
+    pub fn motion(&self) -> Motion {
+        Motion {
+            place: Vector::new(0.0, 0.0, -self.start.height_m),
+            velocity: Vector::from(self.start.velocity_m_s),
+            attitude: from_euler(self.start.attitude_deg.map(f64::to_radians)),
+            ..Motion::default()
+        }
+    }
+}
+
+/// Pulse of a list at a time; a ramp begins at the pulse before it.
+fn at(steps: &[Step], t_s: f64) -> f64 {
+    let mut begins = 0.0;
+    let mut before = steps.first().map_or(1000.0, |s| s.pulse_us);
+    for step in steps {
+        if t_s < begins + step.hold_s - 1.0e-9 {
+            let share = if step.ramp { ((t_s - begins) / step.hold_s).max(0.0) } else { 1.0 };
+            return before + share * (step.pulse_us - before);
+        }
+        begins += step.hold_s;
+        before = step.pulse_us;
+    }
+    before
+}
+
+fn steps<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<Step>, D::Error> {
+    let list = Vec::<Step>::deserialize(d)?;
+    if list.is_empty() { Err(D::Error::custom("expected at least one step, found none")) } else { Ok(list) }
+}
+
+fn rate<'de, D: Deserializer<'de>>(d: D) -> Result<u32, D::Error> {
+    let rate = u32::deserialize(d)?;
+    if rate > 0 && 1000 % rate == 0 {
+        Ok(rate)
+    } else {
+        Err(D::Error::custom(format!("expected a rate from 1 to 1000 Hz that divides 1000, found {rate}")))
+    }
+}

@@ -1,0 +1,195 @@
+//! The example missions against what the thesis states of its own.
+//!
+//! What it is: 7.4.1 to 7.4.4 of Beharie 2013 flown on the catalogue's powerplants; each figure with the tolerance that is met, and what
+//! the catalogue cannot meet because the stated figures contradict each other.
+//! Reference: specification `flight.md`, "Missions"; errata, "Climb"; `docs/mission.md`, "Against the thesis".
+
+use hal_sim::ScenarioError;
+use hal_sim::flight::Flying;
+use hal_sim::flight::attitude::to_euler;
+use hal_sim::mission::{AirframeFile, HOVER_US, Mission, catalogue_plants, fly, hover, settled_catalogue};
+use hal_sim::plant::air::SEA_LEVEL_DENSITY;
+use std::path::{Path, PathBuf};
+
+fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/flight").join(name)
+}
+
+fn flown_by(mission: &Mission, airframe: &AirframeFile) -> Vec<Flying> {
+    fly(mission, airframe, catalogue_plants(airframe), SEA_LEVEL_DENSITY, &mut |_| ()).expect("a vehicle")
+}
+
+fn flown(name: &str) -> Vec<Flying> {
+    let (mission, airframe) = Mission::load(&file(name)).unwrap_or_else(|e| panic!("{e}"));
+    flown_by(&mission, &airframe)
+}
+
+fn upward(rows: &[Flying]) -> (f64, f64) {
+    let (first, last) = (&rows[0].motion, &rows[rows.len() - 1].motion);
+    (first.place.z - last.place.z, -last.velocity.z)
+}
+
+/// The take-off at another pulse on all four.
+fn climb(pulse_us: f64, airframe: &AirframeFile) -> (f64, f64) {
+    let (mut mission, _) = Mission::load(&file("takeoff.toml")).unwrap_or_else(|e| panic!("{e}"));
+    mission.command[0].steps[0].pulse_us = pulse_us;
+    upward(&flown_by(&mission, airframe))
+}
+
+fn row(rows: &[Flying], t_s: f64) -> &Flying {
+    rows.iter().find(|f| f.t_s >= t_s - 1e-9).expect("flown so long")
+}
+
+fn close(what: &str, ours: f64, stated: f64, tolerance: f64) {
+    println!("{what}: stated {stated}, ours {ours:.4}");
+    assert!((ours / stated - 1.0).abs() <= tolerance, "{what}: {ours} is not within {tolerance} of {stated}");
+}
+
+/// Level, on the spot, without a rate: what 7.4.1, 7.4.2 and 7.4.4 show.
+fn straight(rows: &[Flying]) {
+    for f in rows {
+        let m = &f.motion;
+        assert!(m.place.xy().norm() < 1e-9 && m.rate.norm() < 1e-9 && to_euler(&m.attitude).iter().all(|a| a.abs() < 1e-9));
+    }
+}
+
+/// Speed and thrust of the hover are the stated ones; the catalogue needs 8.42 % for them where the thesis states 8.36 %.
+#[test]
+fn hover_point() {
+    let airframe = AirframeFile::default();
+    let h = hover(&airframe, &|pulse| settled_catalogue(&airframe, pulse)).expect("it hovers");
+    close("hover speed, rev/min", h.rotor.rpm, 4100.0, 0.005);
+    close("hover thrust, N", h.rotor.thrust_n, 2.879, 0.005);
+    close("hover duty, %", h.pulse_us / 200.0, 8.36, 0.01);
+    // four rotors of 5.779 N over 1.174 kg
+    close("thrust to weight", h.thrust_to_weight, 4.0 * 5.779 / 11.513, 0.01);
+}
+
+/// The climb: 63 m in 20 s at 4.0 m/s follow from a lift of 4 x 1.36 N/% x 0.14 % above the weight (errata, "Climb"). With that lift
+/// the catalogue's rotors climb so. At the stated 8.5 % itself they have less, for they hover at 8.42 %.
+#[test]
+fn take_off() {
+    let rows = flown("takeoff.toml");
+    straight(&rows);
+    let (height, speed) = upward(&rows);
+    println!("at 8.50 %: {height:.1} m in 20 s at {speed:.2} m/s; stated 63 m and 4.0 to 4.4 m/s");
+    assert!((height - 45.9).abs() < 1.0 && (speed - 3.06).abs() < 0.1, "what docs/mission.md says");
+    let airframe = AirframeFile::default();
+    let lift_n = |pulse| 4.0 * settled_catalogue(&airframe, pulse).thrust_n;
+    let wanted = airframe.airframe().mass_kg * hal_sim::flight::G + 4.0 * 1.36 * 0.14;
+    let pulse = (1600..1800).map(f64::from).find(|p| lift_n(*p) >= wanted).expect("enough lift");
+    let (height, speed) = climb(pulse, &airframe);
+    println!("{pulse} us");
+    close("climb with the stated lift, m", height, 63.0, 0.06);
+    close("its speed, m/s", speed, 4.0, 0.05);
+    // a sphere of the hub's size (drag coefficient 0.47) holds back far too little: the counter-example of the errata
+    let sphere = AirframeFile { drag_area_m2: 0.47 * core::f64::consts::PI * 0.08 * 0.08, ..airframe };
+    let (height, speed) = climb(pulse, &sphere);
+    println!("a sphere: {height:.1} m at {speed:.2} m/s");
+    assert!(height > 95.0 && speed > 7.5);
+}
+
+/// At the stated 8.36 % the catalogue sinks; at its own hover pulse it stays, but for the 0.6 % of density that 63 m cost.
+#[test]
+fn hovering() {
+    let rows = flown("hover.toml");
+    straight(&rows);
+    println!("8.36 %: {:?}", upward(&rows));
+    assert!(upward(&rows).0 < 0.0);
+    let airframe = AirframeFile::default();
+    let h = hover(&airframe, &|pulse| settled_catalogue(&airframe, pulse)).expect("it hovers");
+    let (mut mission, _) = Mission::load(&file("hover.toml")).unwrap_or_else(|e| panic!("{e}"));
+    mission.command[0].steps[0].pulse_us = h.pulse_us;
+    mission.start.height_m = 0.0;
+    mission.air.ground_altitude_m = 0.0;
+    let (height, speed) = upward(&flown_by(&mission, &airframe));
+    assert!(height.abs() < 0.1 && speed.abs() < 0.01, "{height} {speed}");
+}
+
+/// Motor 4 at 8.51 % for 0.15 s: pitch up at about 2.3 deg/s, a small positive yaw rate, no roll at first; to the ground.
+#[test]
+fn excitation() {
+    let rows = flown("excitation.toml");
+    let soon = row(&rows, 2.0);
+    close("pitch rate, deg/s", soon.motion.rate.y.to_degrees(), 2.3, 0.08);
+    let yaw = soon.motion.rate.z.to_degrees();
+    println!("yaw rate {yaw:.3} deg/s");
+    assert!(yaw > 0.02 && yaw < 0.2);
+    assert!(to_euler(&soon.motion.attitude)[0].to_degrees().abs() < 0.01, "no roll at first");
+    let last = rows.last().expect("rows");
+    println!("on the ground after {:.2} s, {:.1} m behind the start", last.t_s, -last.motion.place.x);
+    assert!(last.motion.place.z > -0.5 && last.motion.place.x < -100.0 && last.motion.place.y < -1.0, "a curved path backwards");
+}
+
+/// Straight down to the ground. A lower pulse sinks faster and for a shorter time: the printed sentence of 7.4.4 has it reversed.
+#[test]
+fn landing() {
+    let rows = flown("landing.toml");
+    straight(&rows[..rows.len() - 1]);
+    let down = |rows: &[Flying]| (rows[rows.len() - 1].t_s, rows[rows.len() - 2].motion.velocity.z);
+    let (time, speed) = down(&rows);
+    println!("8.25 %: on the ground after {time:.2} s at {speed:.2} m/s");
+    assert!(time < 30.0 && speed > 4.0);
+    let (mut mission, airframe) = Mission::load(&file("landing.toml")).unwrap_or_else(|e| panic!("{e}"));
+    mission.command[0].steps[0].pulse_us = 1630.0;
+    let (sooner, faster) = down(&flown_by(&mission, &airframe));
+    assert!(sooner < time && faster > speed, "{sooner} {faster}");
+}
+
+/// The same mission twice gives the same states, gusts included; another seed blows otherwise.
+#[test]
+fn a_mission_repeats() {
+    let text = "duration_s = 2\n[wind]\nsteady_m_s = [3, 0, 0]\ngust_m_s = 1.0\n";
+    let mission =
+        |seed: u64| Mission::parse(&format!("seed = {seed}\n{text}"), Path::new("m.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let once = flown_by(&mission(1), &AirframeFile::default());
+    assert_eq!(once, flown_by(&mission(1), &AirframeFile::default()));
+    assert_ne!(once, flown_by(&mission(2), &AirframeFile::default()));
+}
+
+fn parse(text: &str) -> Result<Mission, ScenarioError> {
+    Mission::parse(text, Path::new("m.toml"))
+}
+
+#[test]
+fn refusals_name_file_line_and_column() {
+    for (text, start, word) in [
+        ("seed = 1\nspeed = 3\n", "m.toml:2:1: ", "speed"),
+        ("[wind]\ngust_m_s = -1.0\n", "m.toml:2:12: ", "not below 0"),
+        ("log_hz = 7\n", "m.toml:1:10: ", "divides 1000"),
+        ("[[command]]\nrotors = [1, 5]\nsteps = [{ pulse_us = 1700, hold_s = 1 }]\n", "m.toml:2:14: ", "from 1 to 4"),
+        ("[[command]]\nrotors = [1]\nsteps = [{ pulse_us = 2100, hold_s = 1 }]\n", "m.toml:3:", "1000 to 2000"),
+        ("[[command]]\nrotors = [1]\nsteps = []\n", "m.toml:3:9: ", "at least one"),
+    ] {
+        let message = parse(text).expect_err(text).to_string();
+        assert!(message.starts_with(start) && message.contains(word) && !message.contains('\n'), "{message}");
+    }
+}
+
+#[test]
+fn pulses_step_ramp_and_hold() {
+    let m = parse(
+        "duration_s = 0\n[[command]]\nrotors = [1, 2]\nsteps = [{ pulse_us = 1500, hold_s = 1 }, { pulse_us = 1600, hold_s = 2, ramp = true }]\n\
+         [[command]]\nrotors = [2]\nsteps = [{ pulse_us = 1200, hold_s = 0.5 }]\n",
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!([0.0, 1.0, 2.0, 3.0, 9.0].map(|t| m.pulse_us(0, t)), [1500.0, 1500.0, 1550.0, 1600.0, 1600.0]);
+    assert_eq!((m.pulse_us(1, 7.0), m.pulse_us(2, 0.0), m.length_s()), (1200.0, HOVER_US, 3.0));
+}
+
+/// An airframe file beside the mission: another layout, and a refusal that names that file.
+#[test]
+fn an_airframe_of_its_own() {
+    let folder = std::env::temp_dir().join(format!("quadrig-airframe-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a file");
+    write("m.toml", "airframe = \"a.toml\"\n[[command]]\nrotors = [6]\nsteps = [{ pulse_us = 1700, hold_s = 1 }]\n");
+    let rotor = |x: i32, turns: &str| format!("[[rotor]]\nplace_m = [{x}, 0.1, 0]\nturns = \"{turns}\"\n");
+    write("a.toml", &(0..6).map(|i| rotor(i, if i % 2 == 0 { "clockwise" } else { "counter_clockwise" })).collect::<String>());
+    let (_, airframe) = Mission::load(&folder.join("m.toml")).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((airframe.rotors().len(), airframe.rotors()[5].turns), (6, -1.0));
+    write("a.toml", &rotor(0, "left"));
+    let said = Mission::load(&folder.join("m.toml")).expect_err("a sense").to_string();
+    std::fs::remove_dir_all(&folder).expect("gone");
+    assert!(said.contains("a.toml:3:9: ") && said.contains("counter_clockwise"), "{said}");
+}
