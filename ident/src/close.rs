@@ -203,10 +203,16 @@ fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
         return Words::of(form, first, 1.0 - reduction);
     }
     let times = 1.0 / (1.0 - reduction).max(1e-6);
+    // a factor of one or below is no evidence for it
+    let helps = if times > 1.0 {
+        format!("without it the held-out error of {first} is {times:.2} times as large")
+    } else {
+        format!("the held-out error of {first} is no smaller with it")
+    };
     Words {
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: if form.is_empty() { about.equation.to_owned() } else { format!("{} [{form}]", about.equation) },
-        evidence: format!("{}; without it the held-out error of {first} is {times:.2} times as large", about.signature),
+        evidence: format!("{}; {helps}", about.signature),
     }
 }
 
@@ -270,6 +276,7 @@ pub(crate) fn validation(other: &Log, before: &Model, after: &Model) -> Validati
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::{self, Instance};
     use crate::log::Column;
 
     #[test]
@@ -283,6 +290,18 @@ mod tests {
             assert_eq!(of("rate", -2.0, unknown), [-4.0, 0.0]);
         }
         assert_eq!(of("tau", 2.0, 1.0), [2.0 - 1.96, 2.0 + 1.96]);
+    }
+
+    #[test]
+    fn what_takes_nothing_away_is_not_told_as_support() {
+        let instance = Instance::new(&["thrust_n"], "");
+        let effect = effects::by_id("quantisation").expect("in the library");
+        let placed = Placed { effect, instance, shape: vec![0.01] };
+        let said = |reduction: f64| words(&placed, "thrust_n", reduction).evidence;
+        assert!(said(0.5).ends_with("without it the held-out error of thrust_n is 2.00 times as large"), "{}", said(0.5));
+        for none in [0.0, -0.1] {
+            assert!(said(none).ends_with("the held-out error of thrust_n is no smaller with it"), "{}", said(none));
+        }
     }
 
     /// A torque meter that was switched on for the last tenth of a run: on five levels, the last of them with an error that a fit which

@@ -7,6 +7,7 @@
 //! Units: rates.
 //! Reference: specification `closing-the-loop.md`, "What counts as proof".
 
+use quadrig_tests::blind::messy;
 use quadrig_tests::blind::scenario::{CLEAN, Hidden, Scenario};
 use quadrig_tests::blind::score::score;
 
@@ -34,4 +35,17 @@ fn hidden_effects_are_found() {
     println!("{first} of {} first; missed: {missed:?}", lines.len());
     assert!(lines.len() >= 15, "{} runs at three noise floors and above prove nothing", lines.len());
     assert!(first * 10 >= lines.len() * 8, "{first} of {}: {missed:?}", lines.len());
+}
+
+/// Messy rigs: the engine's own rates are in `docs/blind.md` and far from their aims; here what must never happen. The floors lie below
+/// what half as good an engine as the published one reaches.
+#[test]
+fn messy_rigs_get_names_and_no_panic() {
+    let lines: Vec<_> = (0..8u64).map(|k| messy::score::score(2 * k)).collect();
+    let sum =
+        |of: fn(&messy::score::Line) -> [usize; 2]| lines.iter().map(of).fold([0, 0], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+    assert!(lines.iter().all(|l| l.verdict != "panic" && l.verdict != "refused"), "{lines:?}");
+    let (own, names) = (sum(|l| l.own_named), sum(|l| l.names));
+    assert!(own[0] >= 10 && own[1] * 5 >= own[0] * 2, "{} of {} of the rigs' own effects named", own[1], own[0]);
+    assert!(names[1] * 5 >= names[0] * 2, "{} of {} names are true", names[1], names[0]);
 }

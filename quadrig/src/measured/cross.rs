@@ -48,9 +48,10 @@ impl Tried {
 }
 
 /// Every cause of every run on the other runs of its rig.
-pub(crate) fn across(runs: &[Recorded]) -> Vec<Tried> {
+pub(crate) fn across(runs: &[Recorded], progress: &mut dyn FnMut(f64)) -> Vec<Tried> {
     let mut out = Vec::new();
-    for run in runs {
+    for (done, run) in runs.iter().enumerate() {
+        progress(done as f64 / runs.len() as f64);
         let (Ok(closed), Some(log)) = (&run.closed, &run.log) else { continue };
         for (k, placed) in closed.diagnosis.best.fit.placed.iter().enumerate() {
             if !runs.iter().any(|o| o.rig == run.rig && o.name != run.name) {

@@ -1,7 +1,7 @@
 //! `quadrig measured`: the loop on every recorded set, and the pages that say what came of it.
 //!
 //! What it is: each set under `DATA/rig` is imported, its loop is closed run by run, causes named on one run of a rig are tried on
-//! the rig's other runs, and `measured.md` with one page and its figures a set is written.
+//! the rig's other runs, each corrected model predicts them, and `measured.md` with one page and its figures a set is written.
 //! What can go wrong: a set that is absent is said to be absent; a run that cannot be closed says why on its page.
 //! Units: as the channels state.
 //! Reference: specification `closing-the-loop.md`, "Real measurements".
@@ -9,6 +9,8 @@
 mod cross;
 mod page;
 mod set;
+mod table;
+mod transfer;
 
 use crate::Failure;
 use crate::progress::Bar;
@@ -18,6 +20,7 @@ use ident::log::{Log, write_whole};
 use ident::report::write_figures;
 use set::{SETS, Set};
 use std::path::PathBuf;
+use transfer::Transfer;
 
 /// Arguments.
 #[derive(clap::Args)]
@@ -54,6 +57,8 @@ pub(crate) struct Outcome {
     pub(crate) runs: Vec<Recorded>,
     /// Each cause on the rig's other runs.
     pub(crate) tried: Vec<Tried>,
+    /// Each run's model on the rig's other runs.
+    pub(crate) transfer: Transfer,
 }
 
 /// Runs the command.
@@ -79,6 +84,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         write_figures(&folder, &figures).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
         if !quiet {
             println!("{}: {} runs, {}", set.folder, outcome.runs.len(), file.display());
+            if !outcome.transfer.is_empty() {
+                println!("{}", table::line(set.folder, &outcome.transfer));
+            }
         }
         outcomes.push(outcome);
     }
@@ -106,6 +114,9 @@ fn work(set: &'static Set, folder: &std::path::Path, quiet: bool) -> Result<Outc
             }
         });
     }
-    let tried = across(&runs);
-    Ok(Outcome { set, runs, tried })
+    drop(bar);
+    let bar = Bar::new("other runs", quiet);
+    let tried = across(&runs, &mut |p| bar.set(0.5 * p));
+    let transfer = transfer::of(&runs, &mut |p| bar.set(0.5 + 0.5 * p));
+    Ok(Outcome { set, runs, tried, transfer })
 }

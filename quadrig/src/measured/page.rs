@@ -23,7 +23,7 @@ const DOTS: usize = 700;
 const SUMMARY_HEAD: &str = "| set | runs | verdicts | effects named (runs) | causes that hold on another run of the rig |\n| --- | --- | --- | --- | --- |\n";
 
 /// Three significant digits.
-fn three(v: f64) -> String {
+pub(crate) fn three(v: f64) -> String {
     if v == 0.0 || !v.is_finite() {
         return format!("{v}");
     }
@@ -64,6 +64,7 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
         let _ = writeln!(out, "{}", summary(o));
     }
     out.push_str("\nA cause holds on another run where the model that was corrected on the first predicts the other, as it stands but for one constant a channel, at least 2 % better on a channel that the effect touches than the same model refitted without it; one that the readings show by themselves (a grid that they lie on), which predicts nothing better, where the other run's show it too: these are counted apart. An ambiguous verdict stands for what its hypotheses share, those that are a tenth as probable as the first included; what they differ by is left open, and counted apart.\n");
+    out.push_str(&super::table::index(outcomes));
     let absent: Vec<&str> = SETS
         .iter()
         .filter(|s| outcomes.iter().any(|o| o.set.folder == s.folder && o.runs.is_empty()))
@@ -74,7 +75,7 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     }
     for o in outcomes {
         let _ = writeln!(out, "\n## {}\n\n{} [All of it](measured/{}.md).", o.set.folder, o.set.what, o.set.folder);
-        if let Some((run, closed, entry)) = telling(o) {
+        if let Some((run, closed, entry)) = telling(o).filter(|_| o.set.figures) {
             let _ = writeln!(
                 out,
                 "\n![{} on {}](measured/{})\n\n{}: {}.",
@@ -144,12 +145,12 @@ pub(crate) fn set(o: &Outcome) -> (String, Vec<Figure>) {
         overview(&mut out, o);
         if let Some((run, closed, _)) = telling(o) {
             let _ = writeln!(out, "\nOne run in full, the one whose error falls most:");
-            self::run(&mut out, &mut figures, run, closed);
+            self::run(&mut out, &mut figures, run, closed, o.set.figures);
         }
     } else {
         for run in &o.runs {
             match &run.closed {
-                Ok(closed) => self::run(&mut out, &mut figures, run, closed),
+                Ok(closed) => self::run(&mut out, &mut figures, run, closed, o.set.figures),
                 Err(why) => {
                     let _ = writeln!(out, "\n## {}\n\nThe loop cannot be closed: {why}.", run.name);
                 }
@@ -157,6 +158,7 @@ pub(crate) fn set(o: &Outcome) -> (String, Vec<Figure>) {
         }
     }
     crossed(&mut out, o);
+    out.push_str(&super::table::pairs(&o.transfer));
     (out, figures)
 }
 
@@ -188,7 +190,7 @@ fn overview(out: &mut String, o: &Outcome) {
     }
 }
 
-fn run(out: &mut String, figures: &mut Vec<Figure>, run: &Recorded, closed: &Closed) {
+fn run(out: &mut String, figures: &mut Vec<Figure>, run: &Recorded, closed: &Closed, shown: bool) {
     let v = &closed.verdict;
     let rows = run.log.as_ref().map_or(0, ident::log::Log::len);
     let _ = writeln!(
@@ -249,7 +251,7 @@ fn run(out: &mut String, figures: &mut Vec<Figure>, run: &Recorded, closed: &Clo
     if let Some(next) = &v.next_experiment {
         let _ = writeln!(out, "\nNext experiment: {}.", next.why);
     }
-    for entry in v.effects.iter().take(2) {
+    for entry in v.effects.iter().take(if shown { 2 } else { 0 }) {
         if let Some(figure) = figure(run, closed, entry) {
             let _ = writeln!(out, "\n![{} on {}]({}.svg)", entry.id, run.name, figure.id);
             figures.push(figure);

@@ -37,19 +37,38 @@ pub(crate) struct Set {
     pub(crate) what: &'static str,
     /// How the files are read.
     pub(crate) kind: Kind,
-    /// Characters of a file's name that name the rig; 0: every run is a rig of its own, `usize::MAX`: all are one rig.
-    pub(crate) rig_letters: usize,
+    /// Which runs come from one rig.
+    pub(crate) rigs: Rigs,
+    /// What the name of a file that is no run of its own contains; empty where every file is a run.
+    pub(crate) leaves_out: &'static str,
+    /// Whether the data's licence lets figures of single runs be published.
+    pub(crate) figures: bool,
+}
+
+/// Which runs of a set come from one rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Rigs {
+    /// Every run is a rig of its own.
+    Own,
+    /// All runs are one rig.
+    One,
+    /// So many characters at the head of a file's name, up to a dot, name the rig.
+    Head(usize),
+    /// What follows this word in a file's name names the rig.
+    After(&'static str),
 }
 
 /// Every set.
-pub(crate) const SETS: [Set; 7] = [
+pub(crate) const SETS: [Set; 11] = [
     Set {
         folder: "spitz-esc-test",
         files: "original",
         holds: "Log_",
         what: "RCbenchmark stand, three motors with three ESCs, one three-bladed 7-inch propeller, the stand's own exports. Three rigs on one stand: what the stand does must come back, what a motor does need not.",
         kind: Kind::Stand,
-        rig_letters: 0,
+        rigs: Rigs::Own,
+        leaves_out: "",
+        figures: true,
     },
     Set {
         folder: "lever-rig-10x45",
@@ -57,7 +76,9 @@ pub(crate) const SETS: [Set; 7] = [
         holds: ".csv",
         what: "Lever-arm load cell, 760 KV motor with a 10x4.5 propeller, one rig at four supply voltages. The authors logged no time: it is reconstructed to about 20 %, and so are rates and time constants.",
         kind: Kind::Stand,
-        rig_letters: usize::MAX,
+        rigs: Rigs::One,
+        leaves_out: "",
+        figures: true,
     },
     Set {
         folder: "crazyflie-stand",
@@ -65,7 +86,9 @@ pub(crate) const SETS: [Set; 7] = [
         holds: ".csv",
         what: "Crazyflie 2.1 upside down on a scale, all four rotors together, 1S battery. No time column: rows are counted, and no effect of time is offered.",
         kind: Kind::Stand,
-        rig_letters: usize::MAX,
+        rigs: Rigs::One,
+        leaves_out: "",
+        figures: true,
     },
     Set {
         folder: "uiuc-static",
@@ -73,7 +96,9 @@ pub(crate) const SETS: [Set; 7] = [
         holds: ".csv",
         what: "APC Slow Flyer 9x4.7 of the UIUC propeller data site: sixteen rows of coefficients, thrust and torque computed from them.",
         kind: Kind::Stand,
-        rig_letters: usize::MAX,
+        rigs: Rigs::One,
+        leaves_out: "",
+        figures: true,
     },
     Set {
         folder: "fivein-static-tables",
@@ -81,7 +106,9 @@ pub(crate) const SETS: [Set; 7] = [
         holds: ".csv",
         what: "Static sweeps of eleven points, motors (letter) by five-inch propellers (digit) by two supply voltages: two runs of each rig.",
         kind: Kind::Stand,
-        rig_letters: 2,
+        rigs: Rigs::Head(2),
+        leaves_out: "",
+        figures: true,
     },
     Set {
         folder: "crazyflie-flights",
@@ -89,7 +116,9 @@ pub(crate) const SETS: [Set; 7] = [
         holds: "brush",
         what: "Figure-of-eight flights with four rotor speeds and an IMU. Not a rig: the vehicle is read as one rotor, its specific force times its mass against the root mean square of the four speeds.",
         kind: Kind::Flight { mass_kg: 0.037, command: "pwm_m" },
-        rig_letters: 9,
+        rigs: Rigs::Head(9),
+        leaves_out: "",
+        figures: true,
     },
     Set {
         folder: "arpl-crazyflie-flights",
@@ -97,7 +126,49 @@ pub(crate) const SETS: [Set; 7] = [
         holds: "log",
         what: "Excitation flight of a Crazyflie at 1 kHz with IMU and motor commands, without rotor speeds.",
         kind: Kind::Flight { mass_kg: 1.0, command: "motor_m" },
-        rig_letters: 0,
+        rigs: Rigs::Own,
+        leaves_out: "",
+        figures: true,
+    },
+    Set {
+        folder: "dualcell-eco2814c",
+        files: "tidy",
+        holds: ".csv",
+        what: "Two bar load cells (thrust, torque), one motor with 10- and 12-inch propellers, lithium batteries, speed and temperature from the ESC's telemetry. A rig is a propeller and a battery; two of them were measured in two sessions. The file has no time stamps: rows are taken as 0.1 s.",
+        kind: Kind::Stand,
+        rigs: Rigs::After("v2_"),
+        leaves_out: "",
+        figures: true,
+    },
+    Set {
+        folder: "stand1585-micro",
+        files: "tidy",
+        holds: ".csv",
+        what: "RCbenchmark 1585, a small motor on a 4S battery, two days: staircases of one row a step, and fast steps logged throughout.",
+        kind: Kind::Stand,
+        rigs: Rigs::One,
+        leaves_out: "",
+        figures: true,
+    },
+    Set {
+        folder: "stand1585-sov5",
+        files: "tidy",
+        holds: ".csv",
+        what: "RCbenchmark 1585, a racing motor on a 6S battery: two staircases of one row a step, one run of fast steps.",
+        kind: Kind::Stand,
+        rigs: Rigs::One,
+        leaves_out: "",
+        figures: true,
+    },
+    Set {
+        folder: "xnova-thrust-map",
+        files: "tidy",
+        holds: ".csv",
+        what: "RCbenchmark stand, xNova motor on a 6S battery: one rotor alone (sr), and beside the others of a multirotor (mr), whose current is that of several motors. The authors state no licence: no figures. Their pool of rows without time is no run.",
+        kind: Kind::Stand,
+        rigs: Rigs::Head(2),
+        leaves_out: "pool",
+        figures: false,
     },
 ];
 
@@ -108,7 +179,9 @@ impl Set {
         if !folder.is_dir() {
             return Ok(Vec::new());
         }
-        let wanted = |name: &str| name.contains(self.holds) && name.ends_with(".csv") && !name.ends_with(".mocap.csv");
+        let left_out = |name: &str| !self.leaves_out.is_empty() && name.contains(self.leaves_out);
+        let wanted =
+            |name: &str| name.contains(self.holds) && name.ends_with(".csv") && !name.ends_with(".mocap.csv") && !left_out(name);
         let mut out = Vec::new();
         for entry in std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))? {
             let path = entry.map_err(|e| format!("{}: {e}", folder.display()))?.path();
@@ -122,10 +195,11 @@ impl Set {
 
     /// Key of the rig that a run comes from.
     pub(crate) fn rig(&self, name: &str) -> String {
-        match self.rig_letters {
-            0 => name.to_owned(),
-            usize::MAX => self.folder.to_owned(),
-            n => name.chars().take(n).collect::<String>().split('.').next().unwrap_or_default().to_owned(),
+        match self.rigs {
+            Rigs::Own => name.to_owned(),
+            Rigs::One => self.folder.to_owned(),
+            Rigs::Head(n) => name.chars().take(n).collect::<String>().split('.').next().unwrap_or_default().to_owned(),
+            Rigs::After(word) => name.split_once(word).map_or(name, |(_, rest)| rest).to_owned(),
         }
     }
 

@@ -8,7 +8,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 use quadrig_tests::blind::scenario::{CLEAN, Hidden, Scenario};
 use quadrig_tests::blind::score::{HEADER, Line, score};
-use quadrig_tests::blind::{simulated, tally, write};
+use quadrig_tests::blind::{messy, simulated, tally, write};
 use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
 use std::io::{IsTerminal, Write};
@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated] [--failures] [--table] | blind --dump SEED DIR [--simulated] | blind --plan N";
+const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated | --messy] [--failures] [--table] | blind --dump SEED DIR [--simulated | --messy] | blind --plan N";
 
 struct Options {
     runs: usize,
@@ -31,6 +31,7 @@ struct Options {
     threads: usize,
     failures: bool,
     simulated: bool,
+    messy: bool,
     table: bool,
 }
 
@@ -56,6 +57,7 @@ fn command(words: &[String]) -> Result<(), String> {
             match rest {
                 [] => dump(seed, &folder).map_err(|e| e.to_string()),
                 [flag] if flag == "--simulated" => simulated::dump(seed, &folder),
+                [flag] if flag == "--messy" => dump_messy(seed, &folder).map_err(|e| e.to_string()),
                 _ => Err(USAGE.into()),
             }
         }
@@ -72,7 +74,10 @@ fn command(words: &[String]) -> Result<(), String> {
             }
             Ok(())
         }
-        _ => campaign(&options(words)?),
+        _ => {
+            let o = options(words)?;
+            if o.messy { messy_campaign(&o) } else { campaign(&o) }
+        }
     }
 }
 
@@ -89,6 +94,7 @@ fn options(words: &[String]) -> Result<Options, String> {
         threads: 2,
         failures: false,
         simulated: false,
+        messy: false,
         table: false,
     };
     let mut i = words.iter();
@@ -99,6 +105,10 @@ fn options(words: &[String]) -> Result<Options, String> {
         }
         if flag == "--simulated" {
             o.simulated = true;
+            continue;
+        }
+        if flag == "--messy" {
+            o.messy = true;
             continue;
         }
         if flag == "--table" {
@@ -202,6 +212,60 @@ fn campaign(o: &Options) -> Result<(), String> {
         println!("{}", tally::failures(&lines));
     }
     Ok(())
+}
+
+/// Messy rigs: every seed of a half has one, clean ones among them.
+fn messy_campaign(o: &Options) -> Result<(), String> {
+    let fault = |e: std::io::Error| format!("{}: {e}", o.out.display());
+    let first = o.from / 2 * 2 + u64::from(o.odd);
+    let wanted: Vec<u64> = if o.seeds.is_empty() { (0..o.runs as u64).map(|k| first + 2 * k).collect() } else { o.seeds.clone() };
+    let known = if o.out.exists() { fs::read_to_string(&o.out).map_err(fault)? } else { String::new() };
+    let mut lines: Vec<messy::score::Line> = known.lines().filter_map(messy::score::Line::parse).collect();
+    lines.retain(|l| wanted.contains(&l.seed));
+    let left: Vec<u64> = wanted.iter().copied().filter(|s| !lines.iter().any(|l| l.seed == *s)).collect();
+    if !o.table {
+        let mut file = OpenOptions::new().create(true).append(true).open(&o.out).map_err(fault)?;
+        if known.is_empty() {
+            writeln!(file, "{}", messy::score::HEADER).map_err(fault)?;
+        } else if !known.ends_with('\n') {
+            writeln!(file).map_err(fault)?;
+        }
+        let bar = if std::io::stderr().is_terminal() { ProgressBar::new(wanted.len() as u64) } else { ProgressBar::hidden() };
+        bar.set_position((wanted.len() - left.len()) as u64);
+        std::panic::set_hook(Box::new(|_| {})); // a panic of the tool is a figure of the campaign
+        let (next, sink) = (AtomicUsize::new(0), Mutex::new((file, Vec::new())));
+        std::thread::scope(|scope| {
+            for _ in 0..o.threads {
+                scope.spawn(|| {
+                    while let Some(seed) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let line = messy::score::score(*seed);
+                        let Ok(mut sink) = sink.lock() else { return };
+                        let _ = writeln!(sink.0, "{}", line.csv()).and_then(|()| sink.0.flush());
+                        sink.1.push(line);
+                        bar.inc(1);
+                    }
+                });
+            }
+        });
+        bar.finish_and_clear();
+        lines.extend(sink.into_inner().map_err(|e| e.to_string())?.1);
+    }
+    lines.sort_by_key(|l| l.seed);
+    println!("{} of {} runs\n\n{}", lines.len(), wanted.len(), messy::tally::markdown(&lines));
+    if o.failures {
+        println!("{}", messy::tally::failures(&lines));
+    }
+    Ok(())
+}
+
+fn dump_messy(seed: u64, folder: &std::path::Path) -> std::io::Result<()> {
+    let m = messy::scenario::Messy::new(seed);
+    fs::create_dir_all(folder)?;
+    for (which, name) in ["csv", "validate.csv"].iter().enumerate() {
+        fs::write(folder.join(format!("{seed}.{name}")), write::text(&m.rig, &m.run(which).0))?;
+    }
+    let truth = format!("own {}\n{:#?}\n{:#?}\n{:#?}\n", m.own, m.effects, m.sizes, m.dirt);
+    fs::write(folder.join(format!("{seed}.truth.txt")), truth)
 }
 
 fn dump(seed: u64, folder: &std::path::Path) -> std::io::Result<()> {

@@ -8,6 +8,7 @@
 pub mod chance;
 pub mod effect;
 pub mod fit;
+pub mod messy;
 pub mod rig;
 pub mod run;
 pub mod scenario;

@@ -70,6 +70,8 @@ pub struct Rig {
     pub top: f64,
     /// Real wander of the speed, relative.
     pub wander: f64,
+    /// Slow wander of the rotor that all sensors see: rms, rev/min, and correlation time, s.
+    pub common: (f64, f64),
     /// Real fluctuation of the torque, relative.
     pub turbulence: f64,
     /// Private noise of a speed channel, relative.
@@ -125,6 +127,7 @@ impl Rig {
             current: [0.0; 4],
             top: 0.0,
             wander: c.log_between(0.000_25, 0.000_9),
+            common: (0.0, 1.0),
             turbulence: 0.0,
             speed_noise: c.log_between(0.000_03, 0.000_3),
             noise: [ChannelNoise::default(); 5],
@@ -273,7 +276,10 @@ impl Rig {
             "current_a" => 2,
             "voltage_v" => 3,
             "temp_c" => 4,
-            _ => return n * self.wander.hypot(self.speed_noise).max(1e-9) + 0.03,
+            _ => {
+                let common = if n > 0.0 { self.common.0 } else { 0.0 };
+                return (n * self.wander.hypot(self.speed_noise).max(1e-9)).hypot(common) + 0.03;
+            }
         };
         let k = &self.noise[i];
         let real = if i == 1 { self.turbulence * poly(&self.torque, n / 1000.0) } else { 0.0 };

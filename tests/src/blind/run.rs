@@ -7,7 +7,7 @@
 //! Reference: module `effect`.
 
 use super::chance::Chance;
-use super::effect::drive::{Air, REFERENCE, Train};
+use super::effect::drive::{Air, Output, REFERENCE, Train};
 use super::effect::{Effect, cell, sense};
 use super::fit;
 use super::rig::{Rig, poly};
@@ -79,13 +79,20 @@ pub fn run(rig: &Rig, effects: &[Effect], schedule: &Schedule, seed: u64, stream
     let mut train = Train::new(rig, effects);
     let mut out = Vec::with_capacity(n);
     let (mut wander, mut rough, mut turns) = (0.0, 0.0, 0.0);
+    let (mut slow, mut drift) = (Chance::new(seed, stream + 6), 0.0);
     let mut revolutions = Vec::with_capacity(n);
     for i in 0..n {
         if i % per == 0 {
             wander = if noisy { rig.wander * real.normal() } else { 0.0 };
             rough = rig.turbulence * real.normal();
         }
-        let mut o = train.step(i as f64 * h, h, pulse[i], air[i], wander);
+        if noisy && rig.common.0 > 0.0 {
+            let keep = (-h / rig.common.1).exp();
+            drift = keep * drift + rig.common.0 * (1.0 - keep * keep).sqrt() * slow.normal();
+        }
+        let turning = out.last().map_or(0.0, |o: &Output| o.speed);
+        let all = if turning > 100.0 { wander + drift / turning } else { wander };
+        let mut o = train.step(i as f64 * h, h, pulse[i], air[i], all);
         o.torque *= 1.0 + rough;
         turns += o.speed / 60.0 * h;
         revolutions.push(turns);

@@ -150,6 +150,13 @@ impl<'a> Train<'a> {
         // friction brakes at the speed that the rotor has
         self.current = rig.current_at(n, Drive { drag: self.drive(t, air, amps, n).drag, ..d });
         let full = poly(&rig.current, rig.top / 1000.0);
+        for e in self.effects.iter().filter(|e| e.id == "rotor_inertia") {
+            // what speeds the rotor up is drawn from the supply at the duty that it has; no current flows back
+            let alpha = (self.speed - reached) / h * std::f64::consts::TAU / 60.0;
+            let duty = (n / (rig.kv * rig.volt)).clamp(0.0, 1.0);
+            let torque_per_ampere = 60.0 / (std::f64::consts::TAU * rig.kv);
+            self.current = (self.current + duty * e.strength * alpha / torque_per_ampere).max(rig.idle);
+        }
         let i2 = (self.current / full).powi(2);
         for e in self.effects {
             match e.id {
