@@ -129,9 +129,13 @@ pub struct Transition {
     pub to: RigState,
 }
 
-const ARM_UNLESS: u16 =
-    Refusals::FAULT_LATCHED | Refusals::THROTTLE_NOT_LOW | Refusals::NO_LOW_INTERVAL | Refusals::ROTOR_TURNING;
-const CALIBRATE_UNLESS: u16 = ARM_UNLESS | Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED;
+const ARM_UNLESS: u16 = Refusals::FAULT_LATCHED
+    | Refusals::THROTTLE_NOT_LOW
+    | Refusals::NO_LOW_INTERVAL
+    | Refusals::ROTOR_TURNING
+    | Refusals::STOP_OPEN;
+const CALIBRATE_UNLESS: u16 =
+    ARM_UNLESS | Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED | Refusals::SUPPLY_UNPROVEN | Refusals::NO_WITNESS;
 const RUN_UNLESS: u16 = Refusals::FAULT_LATCHED | Refusals::OUT_OF_RANGE | Refusals::EMPTY_SCHEDULE;
 
 const fn row(from: RigState, on: ArmingEvent, unless: u16, to: RigState) -> Transition {
@@ -186,7 +190,7 @@ pub const TABLE: &[Transition] = {
         row(S::ProgrammingEscape, E::Stop, 0, S::ProgrammingEscape), // minimum already; the ESC still needs its power cut
         row(S::ProgrammingEscape, E::Trip, 0, S::ProgrammingEscape),
         row(S::ProgrammingEscape, E::Clear, Refusals::ESC_POWERED, S::Disarmed),
-        row(S::Faulted, E::Clear, 0, S::Disarmed),
+        row(S::Faulted, E::Clear, Refusals::STOP_OPEN, S::Disarmed),
     ]
 };
 
@@ -249,6 +253,8 @@ pub struct ArmingTimes {
     pub armed_ms: u32,
     /// Holding maximum, waiting for power and the two beeps.
     pub hold_max_ms: u32,
+    /// Maximum from the instant at which the supply came on.
+    pub max_powered_ms: u32,
     /// Back at minimum, waiting for the three answers.
     pub calibrate_min_ms: u32,
     /// Minimum throttle needed after a run before the next arming.
@@ -264,6 +270,7 @@ impl Default for ArmingTimes {
             ready_ms: 10_000,
             armed_ms: 600_000,
             hold_max_ms: 30_000,
+            max_powered_ms: DOUBLE_AFTER_POWER_MS + MINIMUM_AFTER_DOUBLE_MS,
             calibrate_min_ms: 20_000,
             low_interval_ms: 2_000,
         }
@@ -272,8 +279,11 @@ impl Default for ArmingTimes {
 
 /// Latest return to minimum after the two beeps: at 5 s the ESC stops waiting, at 6 s it programs itself (Appendix C).
 ///
-/// The machine leaves `CalibrateHoldMax` with the event itself, so this is a bound for tests and not a timer.
+/// The machine leaves `CalibrateHoldMax` with the event itself; where nobody passes the beeps on, the time from the power edge ends it.
 pub const MINIMUM_AFTER_DOUBLE_MS: u32 = 4_500;
+
+/// Latest two beeps after the supply came on: self-test and recognition of maximum take less (Appendix C).
+pub const DOUBLE_AFTER_POWER_MS: u32 = 2_000;
 
 /// Time-out of a state, if it has one.
 #[must_use]

@@ -29,6 +29,9 @@ pub struct Limits {
     pub link_ms: u32,
     /// Longest time between two control ticks, milliseconds.
     pub stall_ms: u32,
+    /// How long current must be above idle during the range calibration, milliseconds: longer than charging the ESC's capacitors takes
+    /// (2200 uF through 0.2 ohm: five time constants are 2.2 ms), and no longer.
+    pub idle_ms: u32,
     /// How long speed must be exceeded, milliseconds.
     pub speed_ms: u32,
     /// How long current, voltage and load limits must be exceeded, or conversions be missing, milliseconds.
@@ -42,8 +45,10 @@ pub struct Limits {
 /// What the limits look at, one control tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Readings {
-    /// Fastest healthy channel.
+    /// Speed by which overspeed is judged: second-fastest plausible channel, the fastest where one or two are fitted.
     pub speed: Option<RevPerMin>,
+    /// The rotor moves, by any speed channel, while maximum is held towards an ESC that must be off.
+    pub stirs: bool,
     /// Current over the last tick.
     pub current: Option<Ampere>,
     /// Supply over the last tick.
@@ -75,6 +80,7 @@ pub struct Readings {
 pub struct Protection {
     speed_ms: u32,
     current_ms: u32,
+    idle_ms: u32,
     voltage_ms: u32,
     load_ms: u32,
     disagree_ms: u32,
@@ -102,10 +108,13 @@ impl Protection {
         let live = matches!(state, RigState::Running | RigState::CalibrateHoldMax);
         let linked = live || matches!(state, RigState::Armed | RigState::CalibrateHoldMin);
         let powered = matches!(state, RigState::Running | RigState::Armed);
-        let current_limit = if state == RigState::CalibrateHoldMax { limits.idle_current } else { limits.current };
+        let holds_max = state == RigState::CalibrateHoldMax;
 
         let speed = lasted(&mut self.speed_ms, readings.speed.is_some_and(|v| v > limits.speed), tick, limits.speed_ms);
-        let current = lasted(&mut self.current_ms, readings.current.is_some_and(|v| v > current_limit), tick, limits.analogue_ms);
+        let current =
+            lasted(&mut self.current_ms, readings.current.is_some_and(|v| v > limits.current), tick, limits.analogue_ms);
+        let not_idle = holds_max && readings.current.is_some_and(|v| v > limits.idle_current);
+        let idle = lasted(&mut self.idle_ms, not_idle, tick, limits.idle_ms);
         let under = powered && readings.voltage.is_some_and(|v| v < limits.voltage);
         let voltage = lasted(&mut self.voltage_ms, under, tick, limits.analogue_ms);
         let heavy = readings.load_saturated || readings.load.is_some_and(|v| v > limits.load || v < Newton(-limits.load.0));
@@ -117,7 +126,7 @@ impl Protection {
 
         [
             (Fault::Overspeed, speed),
-            (Fault::OverCurrent, current),
+            (Fault::OverCurrent, current || idle),
             (Fault::UnderVoltage, voltage),
             (Fault::LoadCellOverload, load),
             (Fault::SensorDisagreement, disagree),
@@ -126,6 +135,7 @@ impl Protection {
             (Fault::LinkCorrupt, linked && self.damage >= DAMAGE_LIMIT),
             (Fault::CommandReplayed, linked && readings.replayed > 0),
             (Fault::BrownOut, readings.brown_out),
+            (Fault::RotorTurned, holds_max && readings.stirs),
             (Fault::LinkLost, linked && readings.silence_ms > limits.link_ms),
             (Fault::ControlStalled, readings.tick_ms > limits.stall_ms),
         ]
@@ -147,6 +157,7 @@ mod tests {
         disagreeing: 1,
         link_ms: 1000,
         stall_ms: 5,
+        idle_ms: 5,
         speed_ms: 5,
         analogue_ms: 50,
         sensor_ms: 500,
@@ -183,7 +194,9 @@ mod tests {
         use RigState::{Armed, CalibrateHoldMax, Disarmed, Running};
         let over = Readings { current: Some(Ampere(31.0)), ..good() };
         assert_eq!(trips_after(Running, over, Fault::OverCurrent), Some(50));
-        assert_eq!(trips_after(CalibrateHoldMax, good(), Fault::OverCurrent), Some(50), "5 A is more than idle");
+        assert_eq!(trips_after(CalibrateHoldMax, good(), Fault::OverCurrent), Some(5), "5 A is more than idle");
+        assert_eq!(trips_after(CalibrateHoldMax, Readings { stirs: true, ..good() }, Fault::RotorTurned), Some(1));
+        assert_eq!(trips_after(Running, Readings { stirs: true, ..good() }, Fault::RotorTurned), None, "it turns, as it should");
         assert_eq!(trips_after(Running, Readings { speed: Some(RevPerMin(10_001.0)), ..good() }, Fault::Overspeed), Some(5));
         let low = Readings { voltage: Some(Volt(8.9)), ..good() };
         assert_eq!(trips_after(Running, low, Fault::UnderVoltage), Some(50));

@@ -92,6 +92,11 @@ impl Console {
         say(self.settings.format, &Message::Event(Event::Settings(news)));
     }
 
+    /// Tells what the board found at its start.
+    pub fn announce(&self, event: Event, say: Say<'_>) {
+        say(self.settings.format, &Message::Event(event));
+    }
+
     /// Takes one instant; gives work for the idle loop.
     pub fn tick(&mut self, inputs: &Inputs, asked: &Asked, say: Say<'_>) -> Option<Job> {
         let outputs = self.ahrs.tick(inputs);

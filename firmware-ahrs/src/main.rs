@@ -3,7 +3,8 @@
 //! What it is: the RTIC application: set-up, the 200 Hz sampling task, the serial interrupt, and the idle loop, which fits and
 //! stores. Pins and peripherals are listed in `board/mod.rs`; everything that decides something is in the library.
 //!
-//! What can go wrong: a panic resets the board; a stalled task lets the watchdog reset it.
+//! What can go wrong: a panic, a fault or a failing crystal resets the board, which tells it then; a stalled task lets the watchdog
+//! reset it.
 //!
 //! Units: as in the library.
 //!
@@ -20,25 +21,29 @@ fn main() {
     eprintln!("this is a firmware image: build it with `cargo xtask image`");
 }
 
+/// The last resort: the board drives nothing that could hurt, so it only keeps the place and resets.
 #[cfg(target_os = "none")]
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    defmt::error!("panic: reset");
-    cortex_m::peripheral::SCB::sys_reset()
+mod last_resort {
+    use frame::message::CrashCause;
+
+    safe_start::last_resort!(nothing, nothing);
+
+    fn nothing(_: Option<CrashCause>) {}
 }
 
 #[cfg(target_os = "none")]
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use super::board::{BAUD, CORE_HZ, CRYSTAL_HZ, INCOMING, OUTGOING, bus::Bus, clock::Clock};
+    use super::board::{BAUD, CORE_HZ, INCOMING, OUTGOING, bus::Bus, clock::Clock};
     use core::sync::atomic::{AtomicBool, Ordering};
     use cortex_m::peripheral::DWT;
     use defmt_rtt as _;
     use firmware_ahrs::console::Asked;
     use firmware_ahrs::{Ahrs, AhrsConfig, CommandLine, Console, Done, Inputs, Job, Sampler, TICK_HZ, text};
     use frame::wire::{Encoder, MAX_WIRE};
-    use frame::{ImuFormat, Message};
+    use frame::{Event, ImuFormat, Message};
     use heapless::spsc::{Consumer, Producer, Queue};
+    use safe_start::stm32f4::{clock, crash};
     use settings_store::stm32f4::{RANGE, SettingsFlash};
     use stm32f4xx_hal::{
         ClearFlags, Listen,
@@ -47,7 +52,7 @@ mod app {
         prelude::*,
         rcc::Config,
         serial::{Rx, Serial, Tx, config::Config as Line},
-        timer::{CounterHz, Event, Flag},
+        timer::{CounterHz, Event as TimerEvent, Flag},
         watchdog::IndependentWatchdog,
     };
 
@@ -127,10 +132,15 @@ mod app {
         ctx.core.DCB.enable_trace();
         ctx.core.DWT.enable_cycle_counter();
 
-        let mut rcc = ctx.device.RCC.freeze(Config::hse(CRYSTAL_HZ.Hz()).sysclk(CORE_HZ.Hz()));
+        let clock_news = clock::start_crystal(&ctx.device.RCC, &ctx.device.TIM11, || watchdog.feed());
+        let source = match clock_news.crystal_hz {
+            0 => Config::hsi(),
+            hz => Config::hse(hz.Hz()),
+        };
+        let mut rcc = ctx.device.RCC.freeze(source.sysclk(CORE_HZ.Hz()));
         let gpioa = ctx.device.GPIOA.split(&mut rcc);
         let gpiob = ctx.device.GPIOB.split(&mut rcc);
-        let mut clock = Clock::new(ctx.device.TIM2, &mut rcc);
+        let mut time = Clock::new(ctx.device.TIM2, &mut rcc);
 
         let Some(bus) = Bus::new(I2c::new(ctx.device.I2C1, (gpiob.pb6, gpiob.pb7), 400.kHz(), &mut rcc)) else {
             cortex_m::peripheral::SCB::sys_reset() // these are the pins it takes: cannot happen
@@ -152,18 +162,36 @@ mod app {
         let (producer, outgoing) = ctx.local.out.split();
         let (incoming, commands) = ctx.local.inn.split();
         let mut link = Link { encoder: Encoder::default(), bytes: producer, ragged: true };
-        let now = clock.now();
+        let now = time.now();
         console.greet(news, &mut |format, message| link.send(now, format, message));
+        console.announce(Event::Clock(clock_news), &mut |format, message| link.send(now, format, message));
+        if let Some(ended) = crash::take() {
+            console.announce(ended, &mut |format, message| link.send(now, format, message));
+        }
 
         let mut tick = ctx.device.TIM4.counter_hz(&mut rcc);
         if tick.start(TICK_HZ.Hz()).is_err() {
             cortex_m::peripheral::SCB::sys_reset(); // as above
         }
-        tick.listen(Event::Update);
+        tick.listen(TimerEvent::Update);
 
         let (line, cycles) = (CommandLine::new(), 0);
-        let local =
-            Local { console, sampler, clock, link, commands, line, cycles, flash, tick, watchdog, tx, rx, outgoing, incoming };
+        let local = Local {
+            console,
+            sampler,
+            clock: time,
+            link,
+            commands,
+            line,
+            cycles,
+            flash,
+            tick,
+            watchdog,
+            tx,
+            rx,
+            outgoing,
+            incoming,
+        };
         (Shared { job: None, done: None }, local)
     }
 
@@ -187,6 +215,7 @@ mod app {
         let begun = DWT::cycle_count();
         let sample::LocalResources { console, sampler, clock, link, commands, line, cycles, tick, watchdog, .. } = ctx.local;
         tick.clear_flags(Flag::Update);
+        crash::look_at_clock();
         let now = clock.now();
         let readings = sampler.read();
         while let Some(byte) = commands.dequeue() {
@@ -207,9 +236,9 @@ mod app {
     #[task(binds = USART1, priority = 2, local = [tx, rx, outgoing, incoming])]
     fn serial(ctx: serial::Context) {
         let serial::LocalResources { tx, rx, outgoing, incoming, .. } = ctx.local;
-        if rx.is_rx_not_empty()
-            && let Ok(byte) = rx.read()
-        {
+        // asked whether or not a byte waits: an overrun can come without one, and only reading status and then data takes it down
+        // (RM0090 section 30.3.3); left up, it would raise this interrupt for ever
+        if let Ok(byte) = rx.read() {
             let _ = incoming.enqueue(byte); // a full queue loses the command; its checksum will say so
         }
         if !outgoing.ready() {

@@ -8,7 +8,7 @@
 
 use core::fmt::{self, Display, Formatter, Write};
 use dcm::{Mat3, euler_of};
-use frame::message::SettingsNews;
+use frame::message::{ClockNews, CrashCause, SettingsNews};
 use frame::{Event, ImuReport, ImuSensor, Message, Ticks};
 use heapless::String;
 
@@ -136,8 +136,39 @@ fn write_line(out: &mut String<LINE>, message: &Message) -> fmt::Result {
             SettingsNews::Saved => "settings: saved",
             SettingsNews::Failed => "settings: could not be saved",
         }),
+        Message::Event(Event::Clock(clock)) => match clock {
+            ClockNews { crystal_hz: 0, measured_hz: 0 } => {
+                out.write_str("clock: internal oscillator, the crystal does not start")
+            }
+            ClockNews { crystal_hz: 0, measured_hz } => {
+                write!(
+                    out,
+                    "clock: internal oscillator, the crystal of about {} kHz is none of the known ones",
+                    measured_hz / 1000
+                )
+            }
+            ClockNews { crystal_hz, .. } => write!(out, "clock: crystal of {} kHz", crystal_hz / 1000),
+        },
+        Message::Event(Event::Crashed(crash)) => {
+            write!(out, "crashed before the reset: {} at {:08x}", cause(crash.cause), crash.pc)?;
+            write!(out, ", called from {:08x}, status {:08x}", crash.lr, crash.status)
+        }
+        Message::Event(Event::Panicked { line, file }) => {
+            let used = file.iter().position(|byte| *byte == 0).unwrap_or(file.len());
+            let name = file.get(..used).and_then(|name| core::str::from_utf8(name).ok()).unwrap_or("?");
+            write!(out, "panicked before the reset: {name}, line {line}")
+        }
         Message::ImuReport(report) => write_report(out, report),
         _ => Err(fmt::Error),
+    }
+}
+
+fn cause(cause: CrashCause) -> &'static str {
+    match cause {
+        CrashCause::HardFault => "hard fault",
+        CrashCause::ClockFailed => "the crystal failed",
+        CrashCause::NonMaskable => "non-maskable interrupt",
+        CrashCause::Unexpected(_) => "unexpected interrupt",
     }
 }
 
@@ -198,6 +229,21 @@ mod tests {
         let values = ImuValues { gyro: [0.1, 0.0, -0.25], accel: [f32::NAN; 3], mag: [20.0, 0.0, 43.5], ..ImuValues::default() };
         let wanted = "cal,0.000,0.1000,0.0000,-0.2500,-,-,-,20.00,0.00,43.50,-,-,-\n";
         assert_eq!(line(&Message::ImuValues(values)).unwrap(), wanted);
+    }
+
+    #[test]
+    fn what_the_board_found_at_its_start_is_told_in_words() {
+        let told = |event| line(&Message::Event(event)).unwrap();
+        let clock = |crystal_hz, measured_hz| told(Event::Clock(ClockNews { crystal_hz, measured_hz }));
+        assert_eq!(clock(12_000_000, 11_900_000), "clock: crystal of 12000 kHz\n");
+        assert_eq!(clock(0, 0), "clock: internal oscillator, the crystal does not start\n");
+        assert!(clock(0, 16_100_000).contains("about 16100 kHz"));
+        let crash = frame::message::Crash { cause: CrashCause::ClockFailed, pc: 0x0800_1234, lr: 0x0800_4321, status: 0 };
+        let words = "crashed before the reset: the crystal failed at 08001234, called from 08004321, status 00000000\n";
+        assert_eq!(told(Event::Crashed(crash)), words);
+        let mut file = [0; 24];
+        file[..11].copy_from_slice(b"src/main.rs");
+        assert_eq!(told(Event::Panicked { line: 9, file }), "panicked before the reset: src/main.rs, line 9\n");
     }
 
     #[test]

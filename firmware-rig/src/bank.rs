@@ -78,6 +78,33 @@ impl CaptureBank {
         median(speeds.map(|s| s.map(|v| v.0))).map(RevPerMin)
     }
 
+    /// Channels that are fitted.
+    #[must_use]
+    pub fn fitted(&self) -> usize {
+        self.channels.iter().filter(|c| c.marks > 0).count()
+    }
+
+    /// Speed by which overspeed is judged, over the last revolution: the second-fastest of the channels that see edges, so that one
+    /// channel alone stops nobody and two are enough; the fastest where only one or two are fitted, or only one sees edges.
+    #[must_use]
+    pub fn judged_speed(&self, now: Ticks) -> Option<RevPerMin> {
+        let (mut first, mut second) = (None, None);
+        for channel in &self.channels {
+            let Some(speed) = channel.latest_speed(now) else { continue };
+            if first.is_none_or(|fastest| speed > fastest) {
+                (first, second) = (Some(speed), first);
+            } else if second.is_none_or(|next| speed > next) {
+                second = Some(speed);
+            }
+        }
+        if self.fitted() <= 2 { first } else { second.or(first) }
+    }
+
+    /// Edges that each channel took in the last call of [`CaptureBank::take`].
+    pub(crate) fn taken(&self) -> [u16; CAPTURE_CHANNELS] {
+        self.channels.each_ref().map(|c| c.taken)
+    }
+
     /// Channels whose speed could not be trusted in the last sample.
     #[must_use]
     pub fn flagged(&self) -> u8 {

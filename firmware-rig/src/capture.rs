@@ -54,6 +54,8 @@ pub struct CaptureChannel {
     ceiling: u64,
     floor: u64,
     rejected: u32,
+    /// Edges of the last call that a rotor can give.
+    pub(crate) taken: u16,
     ring: [u32; DEPTH],
     next: usize,
     held: usize,
@@ -78,6 +80,7 @@ impl CaptureChannel {
             ceiling: u64::from(ceiling),
             floor: (60 * u64::from(timer_hz) / FASTEST / SPIKE).checked_div(u64::from(marks)).unwrap_or(0),
             rejected: 0,
+            taken: 0,
             ring: [0; DEPTH],
             next: 0,
             held: 0,
@@ -116,6 +119,7 @@ impl CaptureChannel {
 
     /// Takes the captures since the last tick.
     pub fn take(&mut self, now: Ticks, edges: &[u32], over_capture: bool) {
+        self.taken = 0;
         if self.marks == 0 {
             return;
         }
@@ -144,6 +148,7 @@ impl CaptureChannel {
                 self.forget();
             }
             self.store(*edge);
+            self.taken = self.taken.saturating_add(1);
         }
         if let Some(edge) = newest {
             let age = (now.0 as u32).wrapping_sub(edge);
@@ -224,6 +229,15 @@ impl CaptureChannel {
     #[must_use]
     pub fn speed(&self) -> Option<RevPerMin> {
         self.turn.and_then(|turn| turn.speed).map(RevPerMin)
+    }
+
+    /// Speed over the last revolution alone: rougher than the reading, and known 50 ms before it. It is what a limit is judged by.
+    /// `None` once the rotor has been silent for longer than that revolution took.
+    #[must_use]
+    pub fn latest_speed(&self, now: Ticks) -> Option<RevPerMin> {
+        let span = self.edge(0)?.wrapping_sub(self.edge(usize::from(self.marks))?);
+        let fresh = now.since(self.last).0 <= u64::from(span);
+        (span > 0 && fresh).then(|| RevPerMin(60.0 * self.timer_hz as f32 / span as f32))
     }
 
     /// Silent for more than three expected periods and the margin, when the others turn with (ticks a revolution, since when).

@@ -149,7 +149,9 @@ impl Config {
                 disagreeing: 1,
                 link_ms: 1000,
                 stall_ms: 5,
-                speed_ms: 20,
+                idle_ms: 5,
+                // with the revolution it is read over (6 ms at 10 000 rev/min) and the tick: within 20 ms of the cause
+                speed_ms: 12,
                 analogue_ms: 100,
                 sensor_ms: 500,
                 lost_ms: 50,

@@ -20,6 +20,7 @@ pub mod bank;
 pub mod capture;
 pub mod config;
 mod elapsed;
+mod hold_max;
 pub mod line;
 pub mod mass;
 mod operator;

@@ -22,7 +22,6 @@ mod app {
     use crate::board::converter::Converter;
     use crate::board::health::{self, Collector};
     use crate::board::link::Link;
-    use crate::board::panic::take_record;
     use crate::board::pulse::PulseOutput;
     use crate::board::supply::SupplyWatch;
     use crate::board::watchdog::{Watchdog, take_reset_cause};
@@ -31,7 +30,9 @@ mod app {
     use firmware_rig::{Config, Inputs, Rig, Settings, StopWatch};
     use frame::calibration::Calibration;
     use frame::message::{Command, Event, Message, SettingsNews, Trial};
+    use frame::rig::Fault;
     use frame::units::PulseWidth;
+    use safe_start::stm32f4::{clock, crash};
     use settings_store::stm32f4::{self as flash, SettingsFlash};
     use stm32f4xx_hal::gpio::{Input, PB12};
     use stm32f4xx_hal::pac::{ADC1, DMA2, PWR, TIM1, TIM2, TIM3, TIM4, USART1};
@@ -46,6 +47,8 @@ mod app {
     static TRIAL: AtomicU8 = AtomicU8::new(0);
     /// Core cycles of the late tick's trial: 8 ms at 168 MHz.
     const LATE_CYCLES: u32 = 8 * 168_000;
+    /// An event waits to be logged.
+    static LOG: AtomicBool = AtomicBool::new(false);
     /// Settings wait to be stored.
     static STORE: AtomicBool = AtomicBool::new(false);
 
@@ -54,6 +57,8 @@ mod app {
         capture_timer: TIM2,
         to_store: Option<Settings>,
         stored: Option<SettingsNews>,
+        /// The latest event, for the log: the idle loop writes it, never the tick.
+        to_log: Option<Event>,
     }
 
     #[local]
@@ -86,7 +91,15 @@ mod app {
         core.DWT.enable_cycle_counter();
         let device = cx.device;
         let reset_cause = take_reset_cause(&device.RCC);
-        let mut rcc = device.RCC.freeze(rcc::Config::hse(8.MHz()).sysclk(168.MHz()));
+        // before anything that may wait: a crystal that does not start must not hold the board up
+        let mut watchdog = Watchdog::start(device.IWDG);
+        let clock_news = clock::start_crystal(&device.RCC, &device.TIM11, || watchdog.feed());
+        let source = match clock_news.crystal_hz {
+            0 => rcc::Config::hsi(),
+            hz => rcc::Config::hse(hz.Hz()),
+        };
+        let mut rcc = device.RCC.freeze(source.sysclk(168.MHz()));
+        watchdog.feed();
         PWR::enable(&mut rcc);
         TIM1::enable(&mut rcc);
         TIM1::reset(&mut rcc);
@@ -107,23 +120,27 @@ mod app {
         let c = device.GPIOC.split(&mut rcc);
         let pulse = PulseOutput::start(device.TIM3);
         let _ = a.pa6.into_alternate::<2>();
-        let _ = (a.pa0.into_alternate::<1>(), a.pa1.into_alternate::<1>());
-        let _ = (a.pa2.into_alternate::<1>(), a.pa3.into_alternate::<1>());
+        // an open input reads high: no edges, and an open-collector sensor needs nothing more
+        let _ = (a.pa0.into_alternate::<1>().internal_pull_up(true), a.pa1.into_alternate::<1>().internal_pull_up(true));
+        let _ = (a.pa2.into_alternate::<1>().internal_pull_up(true), a.pa3.into_alternate::<1>().internal_pull_up(true));
         let encoder_b = a.pa7.into_pull_down_input();
-        let _ = a.pa8.into_alternate::<1>();
+        let _ = a.pa8.into_alternate::<1>().internal_pull_up(true);
         let _ = (a.pa9.into_alternate::<7>(), a.pa10.into_alternate::<7>().internal_pull_up(true));
         let _ = (c.pc0.into_analog(), c.pc1.into_analog(), c.pc2.into_analog(), c.pc3.into_analog(), c.pc4.into_analog());
-        let stop = b.pb12.into_pull_up_input();
+        let stop = b.pb12.into_pull_up_input(); // closed to ground while the rig may run: a broken wire reads as a stop
 
-        captures::start(&device.TIM2);
         let dma = device.DMA2;
-        device.TIM1.ccmr1_input().write(|w| w.cc1s().ti1());
+        device.TIM1.ccmr1_input().write(|w| w.cc1s().ti1().ic1f().fck_int_n8());
         device.TIM1.ccer().write(|w| w.cc1e().set_bit());
         let mut flash = SettingsFlash(device.FLASH);
         let (stored, news) = settings_store::load(&mut flash, flash::RANGE);
         let factory = Config::thesis_570kv();
         let settings = stored.unwrap_or_else(|| Settings::of(&factory));
-        let rig = Rig::with_settings(factory, settings);
+        let mut rig = Rig::with_settings(factory, settings);
+        if clock_news.crystal_hz == 0 {
+            rig.stand(Fault::ClockFailed);
+        }
+        captures::start(&device.TIM2, rig.fitted());
         let sampling = rig.config().sampling_cycles();
         let converter = Converter::start(device.ADC1, &device.ADC_COMMON, &dma, sampling);
         let mut link = Link::start(device.USART1, &dma);
@@ -134,10 +151,11 @@ mod app {
         link.send(now, &Message::Hello(rig.hello(reset_cause)));
         link.send(now, &Message::Calibration(told));
         link.send(now, &Message::Event(Event::Settings(news)));
-        if let Some(panicked) = take_record() {
-            link.send(now, &Message::Event(panicked));
+        link.send(now, &Message::Event(Event::Clock(clock_news)));
+        if let Some(ended) = crash::take() {
+            link.send(now, &Message::Event(ended));
         }
-        defmt::info!("rig board, reset cause {=u8:#x}", reset_cause);
+        defmt::info!("rig board, reset cause {=u8:#x}, {}", reset_cause, clock_news);
 
         let tick_timer = device.TIM4;
         tick_timer.psc().write(|w| w.psc().set(83));
@@ -146,7 +164,7 @@ mod app {
         tick_timer.sr().write(|w| w.uif().clear());
         tick_timer.dier().write(|w| w.uie().set_bit());
         tick_timer.cr1().write(|w| w.cen().set_bit());
-        let watchdog = Watchdog::start(device.IWDG);
+        watchdog.feed();
 
         let local = Local {
             edges: Edges::default(),
@@ -169,11 +187,11 @@ mod app {
             stops: StopWatch::default(),
             sampling,
         };
-        (Shared { capture_timer: device.TIM2, to_store: None, stored: None }, local)
+        (Shared { capture_timer: device.TIM2, to_store: None, stored: None, to_log: None }, local)
     }
 
     /// Everything that may take its time.
-    #[idle(shared = [to_store, stored], local = [flash])]
+    #[idle(shared = [to_store, stored, to_log], local = [flash])]
     fn idle(mut cx: idle::Context) -> ! {
         let mut second = u32::MAX;
         loop {
@@ -190,6 +208,12 @@ mod app {
                         cortex_m::asm::nop();
                     }
                 }),
+            }
+            let event = if LOG.swap(false, Ordering::Acquire) { cx.shared.to_log.lock(Option::take) } else { None };
+            match event {
+                Some(Event::State { from, to, .. }) => defmt::info!("{} -> {}: {=str}", from, to, esc_pwm::arming::message(to)),
+                Some(event) => defmt::info!("{}", event),
+                None => {}
             }
             let now = MILLIS.load(Ordering::Relaxed) / 1000;
             if now != second {
@@ -213,7 +237,7 @@ mod app {
         health::capture_took(start);
     }
 
-    #[task(binds = TIM4, priority = 2, shared = [capture_timer, to_store, stored], local = [
+    #[task(binds = TIM4, priority = 2, shared = [capture_timer, to_store, stored, to_log], local = [
         edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, rig, told, reset_cause, index, supply, collector,
         stops, sampling
     ])]
@@ -222,15 +246,20 @@ mod app {
         let board = cx.local;
         board.tick_timer.sr().write(|w| w.uif().clear());
         // a stop acts here already; the rig latches it in its next tick and gives minimum from then on
-        let half = board.stops.half(board.stop.is_low(), board.link.listen(board.dma));
+        let half = board.stops.half(board.stop.is_high(), board.link.listen(board.dma));
         if half.minimum {
             board.pulse.set(PulseWidth::MIN);
         }
         if !half.tick {
             return;
         }
+        crash::look_at_clock();
         let over_capture = captures::drain(board.edges);
-        let counter = cx.shared.capture_timer.lock(|timer| timer.cnt().read().bits());
+        let fitted = board.rig.fitted();
+        let counter = cx.shared.capture_timer.lock(|timer| {
+            captures::arm(timer, fitted);
+            timer.cnt().read().bits()
+        });
         let now = board.clock.now(counter);
         MILLIS.store(now.as_ms() as u32, Ordering::Relaxed);
         let (command, line) = board.link.next();
@@ -280,9 +309,8 @@ mod app {
             board.link.send(now, &Message::Rig(sample));
         }
         if let Some(event) = outputs.event {
-            if let Event::State { from, to, .. } = event {
-                defmt::info!("{} -> {}: {=str}", from, to, esc_pwm::arming::message(to));
-            }
+            cx.shared.to_log.lock(|waiting| *waiting = Some(event));
+            LOG.store(true, Ordering::Release);
             board.link.send(now, &Message::Event(event));
         }
         let calibration = board.rig.calibration();

@@ -64,11 +64,12 @@ impl Rig {
             }
             Command::SelfTest { confirm, trial } => {
                 let missing = Refusals::default().and(Refusals::NOT_CONFIRMED, confirm != Command::SELF_TEST_CONFIRM);
-                if missing.is_empty() {
+                let refusals = Refusals(missing.0 | self.at_rest().err().unwrap_or_default().0);
+                if refusals.is_empty() {
                     self.trial = Some(trial);
                     Ok(())
                 } else {
-                    Err(missing)
+                    Err(refusals)
                 }
             }
         };

@@ -9,10 +9,12 @@
 use crate::bank::CaptureBank;
 use crate::config::Config;
 use crate::elapsed::Elapsed;
+use crate::hold_max::{HoldWatch, SupplyProof};
 use crate::line::LineNews;
 use crate::mass::MassPoints;
 use crate::sampling::AdcBlock;
 use crate::settings::Settings;
+use crate::stop::StopLoop;
 use esc_pwm::{ArmingEvent, Objections, Protection, Readings, Schedule, Step, Uploaded, pulse_for, step, time_out};
 use frame::calibration::Calibration;
 use frame::message::{BoardId, Command, Event, Hello, Trial};
@@ -35,7 +37,7 @@ pub struct Inputs<'a> {
     pub command: Option<Command>,
     /// What went wrong on the host's line since the last tick.
     pub line: LineNews,
-    /// The hardware stop line.
+    /// The stop loop is open: its key is pressed, or it is broken or unplugged. Closed, it lies on ground.
     pub stop_input: bool,
     /// The voltage detector sees the board's own supply too low.
     pub brown_out: bool,
@@ -66,6 +68,8 @@ pub struct Rig {
     pub(crate) untared: Calibration,
     pub(crate) state: RigState,
     pub(crate) faults: FaultSet,
+    /// Faults that no command clears.
+    standing: FaultSet,
     pub(crate) schedule: Schedule,
     pub(crate) started: Elapsed,
     pub(crate) upload: Uploaded,
@@ -81,6 +85,9 @@ pub struct Rig {
     last_live: Option<Ticks>,
     blocks: [AdcBlock; ADC_CHANNELS],
     supply: Option<Volt>,
+    stop_loop: StopLoop,
+    proof: SupplyProof,
+    hold: HoldWatch,
     protection: Protection,
     heard: Elapsed,
     last_tick: Option<Ticks>,
@@ -111,6 +118,7 @@ impl Rig {
             untared,
             state: RigState::Disarmed,
             faults: FaultSet::NONE,
+            standing: FaultSet::NONE,
             schedule: Schedule::Manual(PulseWidth::MIN),
             started: Elapsed::since(Ticks(0)),
             upload: Uploaded::new(),
@@ -120,6 +128,9 @@ impl Rig {
             last_live: None,
             blocks: [AdcBlock::default(); ADC_CHANNELS],
             supply: None,
+            stop_loop: StopLoop::default(),
+            proof: SupplyProof::default(),
+            hold: HoldWatch::default(),
             protection: Protection::default(),
             heard: Elapsed::since(Ticks(0)),
             last_tick: None,
@@ -139,6 +150,12 @@ impl Rig {
     #[must_use]
     pub fn faults(&self) -> FaultSet {
         self.faults
+    }
+
+    /// Latches a fault that the board found at its start. No command clears it: the rig stays at minimum until a reset finds it gone.
+    pub fn stand(&mut self, fault: Fault) {
+        self.standing = self.standing.with(fault);
+        self.latch(Ticks(0), self.standing);
     }
 
     /// What turns the raw codes into values, with the present tare in it.
@@ -177,8 +194,13 @@ impl Rig {
     /// Who speaks, after a reset of the given cause.
     #[must_use]
     pub fn hello(&self, reset_cause: u8) -> Hello {
-        let fitted = self.config.marks.iter().rev().fold(0, |mask, marks| mask << 1 | u8::from(*marks > 0));
-        Hello { board: BoardId::Rig, firmware: VERSION, core_hz: self.config.core_hz, reset_cause, present: fitted }
+        Hello { board: BoardId::Rig, firmware: VERSION, core_hz: self.config.core_hz, reset_cause, present: self.fitted() }
+    }
+
+    /// Speed sensors that are fitted, a bit a capture channel.
+    #[must_use]
+    pub fn fitted(&self) -> u8 {
+        self.config.marks.iter().rev().fold(0, |mask, marks| mask << 1 | u8::from(*marks > 0))
     }
 
     /// One control tick.
@@ -198,15 +220,11 @@ impl Rig {
             whole.add(part);
         }
         self.protect(now, tick_ms, inputs);
-        if inputs.stop_input {
-            self.stop(now);
-        }
+        self.watch_stop(now, inputs.stop_input);
         if let Some(command) = inputs.command {
             self.obey(now, &command);
         }
-        if let Some(limit) = time_out(self.state, &self.config.times)
-            && self.entered.ms(now, self.config.ticks_per_ms()) >= u64::from(limit)
-        {
+        if self.is_overdue(now) {
             self.apply(now, ArmingEvent::TimeOut, Refusals::default());
         }
         let pulse = self.drive(now, tick_ms);
@@ -217,13 +235,22 @@ impl Rig {
         Outputs { pulse, sample, event: self.events.pop_front(), store, trial }
     }
 
+    /// The state has lasted longer than it may: since it was entered, or at maximum since the supply came on.
+    fn is_overdue(&mut self, now: Ticks) -> bool {
+        let (times, per_ms) = (self.config.times, self.config.ticks_per_ms());
+        let held = time_out(self.state, &times).is_some_and(|limit| self.entered.ms(now, per_ms) >= u64::from(limit));
+        let at_max = self.state == RigState::CalibrateHoldMax;
+        held || (at_max && self.hold.powered_ms(now, per_ms) >= u64::from(times.max_powered_ms))
+    }
+
     /// Notes the tick; milliseconds since the one before, rounded.
     fn advance(&mut self, now: Ticks) -> u32 {
         let per_ms = u64::from(self.config.ticks_per_ms());
         let Some(before) = self.last_tick.replace(now) else {
             self.entered = Elapsed::since(now);
             self.heard = Elapsed::since(now);
-            self.next_sample = Ticks(now.0 + self.config.log_period().0);
+            // half a tick early, so that a tick that comes a few cycles late or early takes the sample that is its own
+            self.next_sample = Ticks((now.0 + self.config.log_period().0).saturating_sub(per_ms / 2));
             return 1;
         };
         let passed = now.since(before).0 + per_ms / 2;
@@ -253,8 +280,14 @@ impl Rig {
         let stuck = rest.iter().zip(live_zero).any(|(block, live)| block.verdict(top, *live).is_stuck());
         let voltage = self.value(3, adc).map(Volt);
         self.supply = voltage.or(self.supply);
+        let powered = self.config.powered;
+        self.proof.take(voltage, powered, tick_ms, self.config.limits.analogue_ms);
+        if self.state == RigState::CalibrateHoldMax {
+            self.hold.take(now, self.bank.taken(), voltage.is_some_and(|v| v >= powered));
+        }
         let readings = Readings {
-            speed: self.bank.consensus(now),
+            speed: self.bank.judged_speed(now),
+            stirs: self.hold.stirs(),
             current: self.value(2, adc).map(Ampere),
             voltage,
             load: self.value(0, adc).map(Newton),
@@ -294,16 +327,30 @@ impl Rig {
         self.apply(now, ArmingEvent::Stop, Refusals::default());
     }
 
+    /// An open stop loop stops. One that was never closed since the reset keeps the rig as the reset left it, disarmed.
+    fn watch_stop(&mut self, now: Ticks, open: bool) {
+        if open != self.stop_loop.open {
+            self.tell(Event::StopLoop { open, at: now });
+        }
+        self.stop_loop = StopLoop { open, known: self.stop_loop.known || !open };
+        if open && self.stop_loop.known {
+            self.stop(now);
+        }
+    }
+
     /// Everything that speaks against a command at this moment.
     pub(crate) fn objections(&self, now: Ticks) -> Objections {
         let low_ms = u64::from(self.config.times.low_interval_ms);
+        let [_, _, _, live_supply, _] = self.config.live_zero;
         let recent = self.last_live.is_some_and(|at| self.ms_since(now, at) < low_ms);
         Refusals::default()
             .and(Refusals::FAULT_LATCHED, !self.faults.is_empty())
             .and(Refusals::THROTTLE_NOT_LOW, self.setting.is_live())
             .and(Refusals::NO_LOW_INTERVAL, recent)
             .and(Refusals::ESC_POWERED, self.supply.is_some_and(|v| v >= self.config.powered))
+            .and(Refusals::SUPPLY_UNPROVEN, !self.proof.is_off(self.config.limits.analogue_ms, live_supply))
             .and(Refusals::ROTOR_TURNING, self.bank.is_turning())
+            .and(Refusals::STOP_OPEN, self.stop_loop.open)
     }
 
     /// Puts `event` to the arming machine and does what follows from it.
@@ -317,7 +364,7 @@ impl Rig {
                 self.latch(now, FaultSet::NONE.with(fault));
             }
             if event == ArmingEvent::Clear {
-                self.faults = FaultSet::NONE;
+                self.faults = self.standing;
             }
             if to != RigState::Running {
                 self.schedule = Schedule::Manual(PulseWidth::MIN);
@@ -325,6 +372,7 @@ impl Rig {
             }
             if to != from {
                 self.state = to;
+                self.hold = HoldWatch::default();
                 self.entered = Elapsed::since(now);
                 self.tell(Event::State { from, to, at: now });
             }

@@ -2,7 +2,8 @@
 //!
 //! What it is: the control tick is called twice a millisecond and works every second time; a stop (key or command) is looked for
 //! each time and acts on the pulse timer at once. So a stop is in the timer at most half a millisecond after it came, whatever its
-//! phase, and the next pulse that starts more than a millisecond after it is a minimum pulse.
+//! phase, and the next pulse that starts more than a millisecond after it is a minimum pulse. The loop is normally closed to ground: open
+//! means stop, so that a broken wire stops as well.
 //! What can go wrong: a tick that began before the stop may still write its pulse after it; the half tick that follows overwrites
 //! it, because a tick is over within half a millisecond (`budgets/rig.toml`).
 //! Units: half milliseconds.
@@ -18,6 +19,15 @@ pub struct Half {
     pub tick: bool,
 }
 
+/// The stop loop as the tick knows it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct StopLoop {
+    /// Open now.
+    pub(crate) open: bool,
+    /// It was closed at some time since the reset.
+    pub(crate) known: bool,
+}
+
 /// Remembers a stop until the tick has taken it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct StopWatch {
@@ -26,14 +36,14 @@ pub struct StopWatch {
 }
 
 impl StopWatch {
-    /// Called twice a millisecond with the stop key's level and whether a stop of the host waits in the line.
-    pub fn half(&mut self, key: bool, waits: bool) -> Half {
-        self.seen |= key;
+    /// Called twice a millisecond with whether the stop loop is open and whether a stop of the host waits in the line.
+    pub fn half(&mut self, open: bool, waits: bool) -> Half {
+        self.seen |= open;
         self.between = !self.between;
         Half { minimum: self.seen || waits, tick: !self.between }
     }
 
-    /// Whether the key was pressed since the last tick.
+    /// Whether the loop was open at some look since the last tick.
     pub fn take(&mut self) -> bool {
         core::mem::take(&mut self.seen)
     }

@@ -10,6 +10,14 @@ use std::collections::{BTreeMap, VecDeque};
 
 const MS: u64 = 84_000;
 const LOW_MS: u64 = 60;
+/// How long supply and current must last to count, ms.
+const ANALOGUE_MS: u64 = 10;
+/// Longest maximum towards a supply that came on, ms.
+const MAX_POWERED_MS: u64 = 150;
+/// Time between two edges of the rotor that turns here, ms.
+const EDGE_MS: u64 = 10;
+/// Longest maximum while it turns, ms: two edges, and before them the first capture of all, which is the timer's own.
+const TURNING_MS: u64 = 3 * EDGE_MS;
 /// Longest time from the beginning of a tick to its pulse in the timer, us: the tick's whole budget of 40 000 cycles at 168 MHz.
 const TICK_US: u64 = 239;
 /// Steps of the phase at which a stop comes, us.
@@ -22,6 +30,7 @@ const TIMES: ArmingTimes = ArmingTimes {
     ready_ms: 200,
     armed_ms: 700,
     hold_max_ms: 300,
+    max_powered_ms: MAX_POWERED_MS as u32,
     calibrate_min_ms: 300,
     low_interval_ms: LOW_MS as u32,
 };
@@ -32,8 +41,10 @@ enum Happening {
     Say(Command),
     StopKey,
     Power(bool),
+    SenseWire(bool),
     Rotor(bool),
     OverCurrent,
+    AboveIdle,
     SagOfSupply,
     BrownOut,
     Replay,
@@ -77,9 +88,12 @@ fn happenings() -> Vec<Happening> {
         Happening::StopKey,
         Happening::Power(true),
         Happening::Power(false),
+        Happening::SenseWire(false),
+        Happening::SenseWire(true),
         Happening::Rotor(true),
         Happening::Rotor(false),
         Happening::OverCurrent,
+        Happening::AboveIdle,
         Happening::SagOfSupply,
         Happening::BrownOut,
         Happening::Replay,
@@ -99,6 +113,13 @@ struct Walk {
     rig: Rig,
     ms: u64,
     powered: bool,
+    /// The wire of the supply sense is on; open, it reads 0 V.
+    wired: bool,
+    /// How long the supply has read on, ms, and whether it ever did for long enough.
+    read_on: u64,
+    seen_on: bool,
+    /// How long maximum has been held since the supply was read on, since the rotor turns and since the current is above idle, ms.
+    held: [u64; 3],
     turning: bool,
     pulse: PulseWidth,
     last_live: Option<u64>,
@@ -106,32 +127,47 @@ struct Walk {
 }
 
 /// What makes two walks the same for the machine.
-type Key = (u8, bool, bool, bool, bool, bool, bool);
+type Key = (u8, [bool; 8]);
 
 impl Walk {
     fn new() -> Self {
         let mut config = Config { times: TIMES, ..Config::thesis_570kv() };
-        config.limits.analogue_ms = 10;
+        config.limits.analogue_ms = ANALOGUE_MS as u32;
         config.limits.link_ms = 500;
         config.limits.disagreeing = 4; // the one channel that turns here has no company
         config.limits.lost_ms = 1_000_000;
         let (pulse, state) = (PulseWidth::MIN, RigState::Disarmed);
-        Self { rig: Rig::new(config), ms: 0, powered: false, turning: false, pulse, last_live: None, state }
+        Self {
+            rig: Rig::new(config),
+            ms: 0,
+            powered: false,
+            wired: true,
+            read_on: 0,
+            seen_on: false,
+            held: [0; 3],
+            turning: false,
+            pulse,
+            last_live: None,
+            state,
+        }
     }
 
     fn key(&self) -> Key {
         let recent = self.last_live.is_some_and(|at| self.ms - at < LOW_MS);
         let one = |set: FaultSet| !set.is_empty();
         let live = self.pulse.is_live();
-        (self.state as u8, one(self.rig.faults()), live, recent, self.powered, self.turning, self.pulse == PulseWidth::MAX)
+        let world = [self.powered, self.turning, self.wired, self.seen_on];
+        let [powered, turning, wired, seen_on] = world;
+        let max = self.pulse == PulseWidth::MAX;
+        (self.state as u8, [one(self.rig.faults()), live, recent, powered, turning, wired, seen_on, max])
     }
 
     /// One tick, and the rules that hold on each.
     fn tick(&mut self, command: Option<Command>, change: impl FnOnce(&mut Inputs<'_>, &mut [u16; 5])) {
         self.ms += 1;
         let edge = [(self.ms * MS) as u32];
-        let turn = self.turning && self.ms.is_multiple_of(10);
-        let mut counts = [1427, 2048, 248, if self.powered { 2379 } else { 0 }, 900];
+        let turn = self.turning && self.ms.is_multiple_of(EDGE_MS);
+        let mut counts = [1427, 2048, 248, if self.powered && self.wired { 2379 } else { 0 }, 900];
         let mut inputs = Inputs {
             now: Ticks(self.ms * MS),
             edges: [&[], if turn { &edge } else { &[] }, &[], &[]],
@@ -163,10 +199,25 @@ impl Walk {
             assert!(self.rig.faults().is_empty(), "armed over a latched fault");
         }
         if now == RigState::CalibrateHoldMax && before != now {
-            assert!(!self.powered && !self.turning, "maximum pulses towards a powered ESC");
+            assert!(self.seen_on, "an open wire was believed");
+            assert!(!(self.turning || self.powered && self.wired), "maximum pulses towards a powered ESC");
         }
+        self.judge_maximum(counts);
         if outputs.pulse.is_live() {
             self.last_live = Some(self.ms);
+        }
+    }
+
+    /// Maximum pulses do not outlive what speaks against them.
+    fn judge_maximum(&mut self, counts: [u16; 5]) {
+        let reads_on = counts[3] > 400;
+        self.read_on = if reads_on { self.read_on + 1 } else { 0 };
+        self.seen_on |= self.read_on >= ANALOGUE_MS;
+        let against = [reads_on || self.held[0] > 0, self.turning, counts[2] > 500];
+        for ((held, against), most) in self.held.iter_mut().zip(against).zip([MAX_POWERED_MS, TURNING_MS, 5]) {
+            *held =
+                if against && self.pulse == PulseWidth::MAX && self.state == RigState::CalibrateHoldMax { *held + 1 } else { 0 };
+            assert!(*held <= most, "maximum for {held} ms, at most {most}");
         }
     }
 
@@ -181,7 +232,15 @@ impl Walk {
         match happening {
             Happening::Say(command) => self.tick(Some(command), |_, _| {}),
             Happening::StopKey => self.tick(None, |inputs, _| inputs.stop_input = true),
-            Happening::Power(on) => self.powered = on,
+            Happening::Power(on) => {
+                self.powered = on;
+                self.rest(ANALOGUE_MS); // until it counts
+            }
+            Happening::SenseWire(on) => {
+                self.wired = on;
+                self.rest(ANALOGUE_MS);
+            }
+            Happening::AboveIdle => (0..6).for_each(|_| self.tick(None, |_, counts| counts[2] = 800)),
             Happening::Rotor(on) => self.turning = on,
             Happening::OverCurrent => (0..12).for_each(|_| self.tick(None, |_, counts| counts[2] = 2500)),
             Happening::SagOfSupply => (0..12).for_each(|_| self.tick(None, |_, counts| counts[3] = 1000)),

@@ -1,7 +1,7 @@
 //! The rig through its one door, `Rig::tick`, at 1 kHz with a host that answers.
 
 use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Outputs, Rig};
-use frame::message::{Beep, Command, Event};
+use frame::message::{Beep, Command, Event, Trial};
 use frame::rig::{AdcVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::units::{PulseWidth, Ticks};
 use proptest::prelude::*;
@@ -39,6 +39,16 @@ impl Bench {
     }
 
     fn tick_with(&mut self, command: Option<Command>, edges: &[u32]) -> Outputs {
+        self.tick_on(0, command, edges)
+    }
+
+    fn tick_on(&mut self, channel: usize, command: Option<Command>, edges: &[u32]) -> Outputs {
+        let mut all: [&[u32]; 4] = [&[]; 4];
+        all[channel] = edges;
+        self.tick_all(command, all)
+    }
+
+    fn tick_all(&mut self, command: Option<Command>, edges: [&[u32]; 4]) -> Outputs {
         self.ms += 1;
         let keep_alive = (self.linked && self.ms.is_multiple_of(100)).then_some(Command::Ping);
         let adc = self.counts.map(|code| {
@@ -48,7 +58,7 @@ impl Bench {
         });
         let inputs = Inputs {
             now: Ticks(self.ms * MS),
-            edges: [edges, &[], &[], &[]],
+            edges,
             over_capture: [false; 4],
             adc,
             command: command.or(keep_alive),
@@ -87,17 +97,34 @@ impl Bench {
         self.counts[3] = 2379; // 11.5 V
     }
 
+    /// A rig that holds maximum, once it has seen the supply on and off.
+    fn holding_max() -> Self {
+        let mut bench = Self::new();
+        bench.power();
+        bench.run(150);
+        bench.counts[3] = 0;
+        bench.run(150);
+        let confirmed = Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM };
+        assert_eq!(bench.say(confirmed), Some(Event::Accepted));
+        assert_eq!(bench.pulse, PulseWidth::MAX);
+        bench
+    }
+
+    fn arm(&mut self) {
+        assert_eq!(self.say(Command::Arm), Some(Event::Accepted));
+        self.power();
+        self.run(500);
+        self.beep(Beep::Long);
+        self.run(300);
+        self.beep(Beep::Cells(3));
+        self.run(300);
+        self.beep(Beep::Ready);
+        assert_eq!(self.rig.state(), RigState::Armed);
+    }
+
     fn armed() -> Self {
         let mut bench = Self::new();
-        assert_eq!(bench.say(Command::Arm), Some(Event::Accepted));
-        bench.power();
-        bench.run(500);
-        bench.beep(Beep::Long);
-        bench.run(300);
-        bench.beep(Beep::Cells(3));
-        bench.run(300);
-        bench.beep(Beep::Ready);
-        assert_eq!(bench.rig.state(), RigState::Armed);
+        bench.arm();
         bench
     }
 
@@ -107,6 +134,34 @@ impl Bench {
         bench.run(200);
         assert_eq!(bench.pulse, PulseWidth::from_us(us));
         bench
+    }
+}
+
+/// Edges of a rotor on every fitted channel; some channels see it faster than it is said to turn.
+struct Rotor<'a> {
+    marks: [u16; 4],
+    /// Channels that see `rpm`; the others see at most 6000.
+    fast: &'a [usize],
+    /// Marks that have passed.
+    turned: [f64; 4],
+    rpm: f64,
+}
+
+impl Rotor<'_> {
+    fn tick(&mut self, bench: &mut Bench) {
+        let mut edges: [Vec<u32>; 4] = Default::default();
+        for (n, edges) in edges.iter_mut().enumerate() {
+            let rpm = if self.fast.contains(&n) { self.rpm } else { self.rpm.min(6000.0) };
+            let per_ms = f64::from(self.marks[n]) * rpm / 60_000.0;
+            let (from, to) = (self.turned[n], self.turned[n] + per_ms);
+            let mut mark = from.floor() + 1.0;
+            while mark <= to {
+                edges.push(((bench.ms as f64 + (mark - from) / per_ms) * MS as f64) as u64 as u32);
+                mark += 1.0;
+            }
+            self.turned[n] = to;
+        }
+        bench.tick_all(None, edges.each_ref().map(Vec::as_slice));
     }
 }
 
@@ -163,9 +218,35 @@ fn the_stop_line_works_without_a_host() {
     let mut bench = Bench::running(1300);
     bench.stop_line = true;
     assert_eq!(bench.tick_with(None, &[]).pulse, PulseWidth::MIN);
+    assert_eq!(bench.say(Command::ClearFaults), refused(Refusals::STOP_OPEN), "held");
+    assert_eq!(bench.rig.state(), RigState::Faulted);
+    bench.stop_line = false;
     assert_eq!(bench.say(Command::ClearFaults), Some(Event::Accepted));
-    bench.run(5);
-    assert_eq!(bench.rig.state(), RigState::Faulted, "held, it latches again");
+}
+
+/// A loop that was never closed: broken, unplugged, or the key is pressed already.
+#[test]
+fn a_stop_loop_open_from_the_start_keeps_the_board_disarmed_and_is_told() {
+    let mut bench = Bench::new();
+    bench.stop_line = true;
+    bench.run(20);
+    let told = |bench: &Bench, wanted: bool| {
+        bench.events.iter().filter(|e| matches!(e, Event::StopLoop { open, .. } if *open == wanted)).count()
+    };
+    assert_eq!(told(&bench, true), 1);
+    bench.run(2500);
+    for command in [Command::Arm, Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM }] {
+        let Some(Event::Refused(reasons)) = bench.say(command) else { panic!("{command:?} was taken") };
+        assert_ne!(reasons.0 & Refusals::STOP_OPEN, 0);
+    }
+    assert_eq!((bench.rig.state(), bench.pulse), (RigState::Disarmed, PulseWidth::MIN));
+    bench.stop_line = false;
+    bench.run(20);
+    assert_eq!(told(&bench, false), 1);
+    bench.arm();
+    bench.stop_line = true;
+    bench.run(1);
+    assert_eq!(bench.rig.state(), RigState::Faulted, "from then on it latches");
 }
 
 #[test]
@@ -215,12 +296,16 @@ fn analogue_limits_trip_in_time() {
 fn range_calibration() {
     let confirmed = Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM };
     let mut bench = Bench::new();
-    assert_eq!(bench.say(Command::CalibrateRange { confirm: 1 }), refused(Refusals::NOT_CONFIRMED));
+    bench.run(1000);
+    let unproven = Refusals::SUPPLY_UNPROVEN;
+    assert_eq!(bench.say(Command::CalibrateRange { confirm: 1 }), refused(Refusals::NOT_CONFIRMED | unproven));
+    assert_eq!(bench.say(confirmed), refused(unproven), "an open sense wire reads the same");
     bench.power();
-    assert_eq!(bench.say(confirmed), refused(Refusals::ESC_POWERED));
+    bench.run(150);
+    assert_eq!(bench.say(confirmed), refused(Refusals::ESC_POWERED | unproven));
     bench.counts[3] = 0;
-    assert_eq!(bench.say(confirmed), Some(Event::Accepted));
-    assert_eq!(bench.pulse, PulseWidth::MAX);
+    assert_eq!(bench.say(confirmed), refused(unproven), "30 ms of nothing are a loose contact");
+    let mut bench = Bench::holding_max();
     bench.power();
     bench.run(1000);
     assert_eq!(bench.pulse, PulseWidth::MAX);
@@ -235,18 +320,89 @@ fn range_calibration() {
 
 #[test]
 fn current_above_idle_ends_maximum_pulses() {
-    let mut bench = Bench::new();
-    bench.say(Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM });
+    let mut bench = Bench::holding_max();
     bench.counts[2] = 248 + 125; // 2 A
-    bench.run(101);
+    bench.run(4);
+    assert_eq!(bench.pulse, PulseWidth::MAX, "the ESC's capacitors charge");
+    bench.run(1);
     assert_eq!((bench.pulse, bench.rig.state()), (PulseWidth::MIN, RigState::Faulted));
     assert!(bench.rig.faults().contains(Fault::OverCurrent));
 }
 
+/// The supply sense came off after it was seen on and off, the ESC has power: the rotor tells.
+#[test]
+fn a_rotor_that_turns_ends_maximum_pulses() {
+    for channel in 0..4 {
+        let mut bench = Bench::holding_max();
+        let before = bench.ms;
+        while bench.pulse == PulseWidth::MAX && bench.ms < before + 30_000 {
+            // 6000 rev/min: an edge each 10 ms where there is one mark, and the channels with more have more
+            let edge = [(bench.ms * MS) as u32];
+            let turns = bench.ms.is_multiple_of(10);
+            bench.tick_on(channel, None, if turns { &edge } else { &[] });
+        }
+        let passed = bench.ms - before;
+        assert!(passed <= 31, "channel {channel}: maximum for {passed} ms"); // the first capture is the timer's own
+        assert!(bench.rig.faults().contains(Fault::RotorTurned), "{:?}", bench.rig.faults());
+    }
+}
+
+/// Nobody passes the beeps on.
+#[test]
+fn maximum_is_held_for_a_bounded_time_from_the_power_edge() {
+    let mut bench = Bench::holding_max();
+    bench.power();
+    bench.run(6_490);
+    assert_eq!(bench.pulse, PulseWidth::MAX);
+    bench.run(20);
+    assert_eq!((bench.pulse, bench.rig.state()), (PulseWidth::MIN, RigState::ProgrammingEscape));
+}
+
+/// Two of four channels: the second-fastest counts.
+#[test]
+fn overspeed_stops_within_20_ms() {
+    for (marks, fast, stops) in [
+        ([2, 1, 2, 25], &[2usize, 3][..], true),
+        ([2, 1, 2, 25], &[2], false), // one of four alone may be wrong; it disagrees
+        ([0, 0, 2, 25], &[2], true),
+        ([0, 1, 0, 0], &[1], true),
+    ] {
+        let mut bench = Bench::with(Config { marks, ..Config::thesis_570kv() });
+        bench.arm();
+        assert_eq!(bench.say(Command::SetPulse(PulseWidth::from_us(1500))), Some(Event::Accepted));
+        let mut rotor = Rotor { marks, fast, turned: [0.0; 4], rpm: 6000.0 };
+        for _ in 0..500 {
+            rotor.tick(&mut bench);
+        }
+        assert!(bench.pulse.is_live(), "{:?}", bench.rig.faults());
+        rotor.rpm = 12_000.0;
+        let from = bench.ms;
+        while bench.pulse.is_live() && bench.ms < from + 100 {
+            rotor.tick(&mut bench);
+        }
+        let passed = bench.ms - from;
+        assert_eq!(passed <= 20, stops, "{marks:?}, {fast:?} fast: {passed} ms");
+        assert_eq!(bench.rig.faults().contains(Fault::Overspeed), stops);
+    }
+}
+
+#[test]
+fn trials_of_the_last_resort_need_a_rig_at_rest() {
+    for trial in [Trial::Panic, Trial::Hang, Trial::Late] {
+        let ask = Command::SelfTest { confirm: Command::SELF_TEST_CONFIRM, trial };
+        for mut bench in [Bench::running(2000), Bench::armed(), Bench::holding_max()] {
+            let outputs = bench.tick_with(Some(ask), &[]);
+            assert_eq!(outputs.trial, None, "{trial:?} in {:?}", bench.rig.state());
+            assert_eq!(bench.say(ask), refused(Refusals::WRONG_STATE));
+        }
+        let mut bench = Bench::new();
+        assert_eq!(bench.tick_with(Some(ask), &[]).trial, Some(trial));
+    }
+}
+
 #[test]
 fn the_programming_mode_is_left_through_unpowered() {
-    let mut bench = Bench::new();
-    bench.say(Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM });
+    let mut bench = Bench::holding_max();
     bench.power();
     bench.beep(Beep::Programming);
     assert_eq!((bench.pulse, bench.rig.state()), (PulseWidth::MIN, RigState::ProgrammingEscape));

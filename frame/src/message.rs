@@ -85,6 +85,55 @@ pub enum Event {
         /// End of the file's path, padded with zeros.
         file: [u8; 24],
     },
+    /// The processor took an exception from which there is no way back, before the last reset; told once after it.
+    Crashed(Crash),
+    /// What the board's clock runs from; told once after a reset.
+    Clock(ClockNews),
+    /// The stop loop was opened or closed; after a reset told only when it is open.
+    StopLoop {
+        /// Open: no pulse above minimum.
+        open: bool,
+        /// When.
+        at: Ticks,
+    },
+}
+
+/// What ended the program before the last reset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Crash {
+    /// Which exception.
+    pub cause: CrashCause,
+    /// Address of the instruction that was interrupted: look it up in the ELF file (`addr2line`).
+    pub pc: u32,
+    /// Link register at that moment: the caller's address, mostly.
+    pub lr: u32,
+    /// Configurable fault status register (ARMv7-M B3.2.15): why a hard fault came.
+    pub status: u32,
+}
+
+/// An exception from which there is no way back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum CrashCause {
+    /// A hard fault.
+    HardFault,
+    /// The clock security system saw the crystal fail (RM0090 section 7.2.7).
+    ClockFailed,
+    /// A non-maskable interrupt that the clock security system did not raise.
+    NonMaskable,
+    /// An exception or interrupt that the firmware does not use: its number, negative for an exception of the core.
+    Unexpected(i8),
+}
+
+/// What the board's clock runs from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ClockNews {
+    /// Frequency of the crystal in use, Hz; 0: the internal oscillator, because no crystal could be trusted.
+    pub crystal_hz: u32,
+    /// Frequency of the crystal as measured against the internal oscillator (known to 10 %), Hz; 0: it did not start.
+    pub measured_hz: u32,
 }
 
 /// Outcome of a mass calibration (Beharie 2013, Eq. 5.34-5.35): newton = (counts - zero) * gain.
@@ -274,7 +323,8 @@ pub enum Command {
     MassFit,
     /// Forget the masses taken.
     MassForget,
-    /// Try the last resort on purpose; `confirm` must be [`Command::SELF_TEST_CONFIRM`]. Ends in minimum throttle and a reset.
+    /// Try the last resort on purpose; `confirm` must be [`Command::SELF_TEST_CONFIRM`]; only while disarmed. Ends in
+    /// minimum throttle and a reset, a late tick in a fault.
     SelfTest {
         /// Guards against a stray command.
         confirm: u32,

@@ -85,11 +85,16 @@ pub enum Fault {
     CommandReplayed = 13,
     /// The board's own supply fell below the voltage detector's level.
     BrownOut = 14,
+    /// The crystal is silent, failed, or is none that the firmware knows: the board runs from its internal oscillator. Stands until a
+    /// reset finds a good crystal.
+    ClockFailed = 15,
+    /// The rotor turned while it had to stand: during the range calibration.
+    RotorTurned = 16,
 }
 
 impl Fault {
     /// Every fault, in the order of its bit.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::OperatorStop,
         Self::LinkLost,
         Self::Overspeed,
@@ -105,6 +110,8 @@ impl Fault {
         Self::LinkCorrupt,
         Self::CommandReplayed,
         Self::BrownOut,
+        Self::ClockFailed,
+        Self::RotorTurned,
     ];
 
     /// The fault in words, for people.
@@ -126,6 +133,8 @@ impl Fault {
             Self::LinkCorrupt => "link corrupt",
             Self::CommandReplayed => "command replayed",
             Self::BrownOut => "brown-out",
+            Self::ClockFailed => "crystal failed",
+            Self::RotorTurned => "the rotor turned while it had to stand",
         }
     }
 }
@@ -133,7 +142,7 @@ impl Fault {
 /// A set of latched [`Fault`]s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct FaultSet(pub u16);
+pub struct FaultSet(pub u32);
 
 impl FaultSet {
     /// No fault.
@@ -191,9 +200,15 @@ impl Refusals {
     pub const REPLAYED: u16 = 1 << 9;
     /// The settings could not be stored.
     pub const NOT_STORED: u16 = 1 << 10;
+    /// The supply reads off, but it was never seen on since the reset: an unplugged wire reads the same.
+    pub const SUPPLY_UNPROVEN: u16 = 1 << 11;
+    /// Nothing is fitted that would see the rotor turn.
+    pub const NO_WITNESS: u16 = 1 << 12;
+    /// The stop loop is open: the key is pressed, or the loop broken or unplugged.
+    pub const STOP_OPEN: u16 = 1 << 13;
 
     /// Every reason and its words, for people.
-    pub const WORDS: [(u16, &'static str); 11] = [
+    pub const WORDS: [(u16, &'static str); 14] = [
         (Self::WRONG_STATE, "not in this state"),
         (Self::FAULT_LATCHED, "a fault is latched: clear it first"),
         (Self::THROTTLE_NOT_LOW, "throttle is not at minimum"),
@@ -205,6 +220,9 @@ impl Refusals {
         (Self::ROTOR_TURNING, "the rotor turns"),
         (Self::REPLAYED, "the frame is not newer than the last one"),
         (Self::NOT_STORED, "the settings could not be stored"),
+        (Self::SUPPLY_UNPROVEN, "the supply reads off but was never seen on: switch the ESC on and off once, then ask again"),
+        (Self::NO_WITNESS, "neither a speed sensor nor the current is fitted: nothing would see the rotor turn"),
+        (Self::STOP_OPEN, "the stop loop is open: let the key go, check plug and wire"),
     ];
 
     /// The reasons in words.

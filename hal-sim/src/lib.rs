@@ -19,8 +19,10 @@ pub mod effect;
 #[cfg(feature = "emulated")]
 pub mod emulated;
 pub mod fault;
+pub mod flight;
 pub mod hal;
 pub mod imu;
+pub mod mission;
 pub mod native;
 pub mod noise;
 pub mod plant;

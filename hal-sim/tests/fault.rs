@@ -4,7 +4,7 @@ use hal_sim::fault::campaign::{Failure, Survived, fly, fly_defenceless};
 use hal_sim::fault::{Mishap, Plan, REACTION_MS};
 use std::collections::BTreeMap;
 
-const RUNS: u64 = 1012; // 46 of each of the 22 kinds
+const RUNS: u64 = 1012; // 44 of each of the 23 kinds
 
 #[test]
 fn every_fault_ends_in_minimum_throttle_latched_and_named() {

@@ -228,6 +228,33 @@ fn what_a_program_holds_from_before_its_reset_has_no_effect() {
     assert!(second.drain()[0].count < 1024, "175 ms at 6.43 us a scan lap the ring of 1 024");
 }
 
+/// A board whose program never comes back after the watchdog's reset: the ESC's signal, once with the pull-down and once without.
+#[test]
+fn the_pulse_pin_of_a_board_in_reset_is_low_only_where_a_resistor_pulls_it_down() {
+    let speed_after_reset = |pulled_down: bool| {
+        let pins = RigPins::new(VirtualClock::default(), &Scenario::default());
+        if !pulled_down {
+            pins.leave_out_pull_down(1_800);
+        }
+        pins.set_power(true);
+        let mut pulse = PulsePin::start(&pins, timer(), timer().ticks(PulseWidth::MIN) as u16);
+        pins.clock().advance_to(8_000_000_000);
+        pulse.set_duty_cycle(timer().ticks(PulseWidth::from_us(1300)) as u16).unwrap();
+        pins.clock().advance_to(10_000_000_000);
+        let before = pins.truth().plant.rpm;
+        let _dog = Watchdog::start(&pins, 20_000_000);
+        pins.clock().advance_to(13_000_000_000); // bitten, and no program starts
+        assert!(pins.take_reset().is_some());
+        (before, pins.truth().plant.rpm)
+    };
+    let (before, low) = speed_after_reset(true);
+    let (same, floating) = speed_after_reset(false);
+    println!("{before:.0} rev/min; after the reset {low:.0} with the pull-down, {floating:.0} without");
+    assert!(before > 1_000.0 && before == same, "a driven pin picks nothing up: {before} and {same}");
+    assert!(low < before, "no signal: the ESC's own fallback");
+    assert!(floating > 1.5 * before, "throttle that nobody asked for");
+}
+
 #[test]
 fn captures_wait_in_their_queues_and_a_full_one_is_told() {
     let pins = RigPins::new(VirtualClock::default(), &Scenario::default());

@@ -282,6 +282,9 @@ impl Session {
                     self.faulted = Some(words.join(", "));
                 }
             }
+            Message::Event(Event::StopLoop { open: true, .. }) => {
+                eprintln!("stop loop open: let the key go, check plug and wire")
+            }
             Message::Event(Event::ScheduleDone { .. }) => self.finished = true,
             _ => {}
         }

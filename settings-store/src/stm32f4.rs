@@ -4,7 +4,7 @@
 //! What can go wrong: an erase holds the processor for 1 to 2 s, because the program runs from the same flash: the wait runs from
 //! RAM and feeds the watchdog, pulses go on by the timer alone, and the tick is told by [`PAUSED`]. Only a disarmed rig saves; the IMU board misses its ticks.
 //! Units: bytes, absolute addresses.
-//! Reference: RM0090 section 3.6 (keys, PSIZE, SER, SNB), table 5 (sectors); datasheet table 40 (erase times).
+//! Reference: RM0090 sections 3.6 (keys, PSIZE, SER, SNB, caches after an erase), 3.9.1 (ACR), table 5 (sectors); datasheet table 40 (erase times).
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_storage_async::nor_flash::{
@@ -26,6 +26,10 @@ const LOCK: u32 = 1 << 31;
 /// SR: operation, write protection, alignment, parallelism and sequence errors; busy.
 const ERRORS: u32 = 0xf2;
 const BUSY: u32 = 1 << 16;
+
+/// ACR: instruction cache on, data cache on; their resets, which count only while they are off (RM0090 section 3.9.1).
+const CACHES_ON: u32 = 1 << 9 | 1 << 10;
+const CACHES_RESET: u32 = 1 << 11 | 1 << 12;
 
 /// Set while an erase held up everything; the tick takes it down.
 pub static PAUSED: AtomicBool = AtomicBool::new(false);
@@ -73,6 +77,20 @@ impl SettingsFlash {
     #[allow(unsafe_code)]
     fn lock(&self) {
         unsafe { self.0.cr().write(|w| w.bits(LOCK)) };
+    }
+
+    /// Forgets what the caches hold of the sector that was erased: they are switched off, reset, and switched on as they were (RM0090
+    /// section 3.6.3). After programming nothing needs this: a store that the data cache holds changes it there as well (section 3.6.4).
+    #[allow(unsafe_code)] // bits of one register, each of which is named above
+    fn forget_cached(&self) {
+        let acr = self.0.acr();
+        let before = acr.read().bits();
+        unsafe {
+            acr.write(|w| w.bits(before & !CACHES_ON));
+            acr.write(|w| w.bits(before & !CACHES_ON | CACHES_RESET));
+            acr.write(|w| w.bits(before & !CACHES_ON));
+            acr.write(|w| w.bits(before));
+        }
     }
 
     fn outcome(&self) -> Result<(), Refused> {
@@ -129,6 +147,7 @@ impl NorFlash for SettingsFlash {
                 }
                 let (cr, sr) = (self.0.cr().as_ptr(), self.0.sr().as_ptr());
                 start_and_wait(cr, sr, IWDG::ptr().cast_mut().cast(), value | STRT);
+                self.forget_cached();
                 PAUSED.store(true, Ordering::Release);
             });
             self.outcome()?;

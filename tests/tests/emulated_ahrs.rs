@@ -142,7 +142,7 @@ fn the_test_accelerometer_is_found_and_its_words_arrive() {
 fn with_no_sensor_at_all_the_board_says_hello_and_stays_alive() {
     let run = run(Motion::LEVEL, &[], 300);
     let (hello, samples, link) = decoded(&run);
-    assert_eq!((hello.present, samples.len(), link.good), (0, 0, 2), "the greeting, and that no settings are stored");
+    assert_eq!((hello.present, samples.len(), link.good), (0, 0, 3), "the greeting, that no settings are stored, and the clock");
 }
 
 #[test]

@@ -164,3 +164,14 @@ fn a_calibration_survives_the_reset_and_a_supply_that_fails_in_the_midst_of_a_sa
     assert!(run.stores > 30, "{} stores", run.stores);
     assert_eq!(run.outcome.accesses.resets.len(), 1 + cuts.len(), "{:?}", run.outcome.accesses.resets);
 }
+
+/// The last byte was being read as one too many came: the flag stands, no byte waits, and only reading both registers takes it down.
+#[test]
+fn an_overrun_without_a_byte_costs_no_more_than_itself() {
+    let script = [(200, Act::Overrun), (300, framed(ImuCommand::Errors))];
+    let run = run(&Errors::default(), &script, 500);
+    let messages = messages(&run);
+    let after = messages.iter().filter(|(at, m)| *at > 210 && matches!(m, Message::Imu(_))).count();
+    assert!(after > 40, "{after} samples after it, of 58");
+    assert_eq!(errors_of(&messages).len(), 1, "and commands are heard");
+}

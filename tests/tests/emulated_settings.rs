@@ -5,7 +5,7 @@
 use frame::message::{Command, Event, Message, Setting, SettingsNews};
 use hal_sim::Scenario;
 use hal_sim::emulated::Machine;
-use hal_sim::emulated::rig::{Action, Heard, Operator, RigRun, rig};
+use hal_sim::emulated::rig::{Action, Heard, Operator, RigRun, rig, rig_on};
 
 /// From one reset to the next, ms; and in it: a new log period is put in force, saved, and the reset comes unless the supply failed.
 const CYCLE_MS: u64 = 200;
@@ -125,4 +125,19 @@ fn settings_survive_a_reset_and_a_supply_that_fails_in_the_midst_of_a_save() {
     assert!(old > stores as usize / 2, "{old} and {new}");
     assert!(run.outcome.accesses.resets.len() > stores as usize / 2, "cuts are resets: {:?}", run.outcome.accesses.resets);
     run.outcome.accesses.only(&[]).unwrap_or_else(|strange| assert!(strange.contains("resets"), "{strange}"));
+}
+
+/// What the caches held of an erased sector would be read back in place of what was saved (RM0090 section 3.6.3).
+#[test]
+fn an_erase_is_followed_by_a_reset_of_the_caches_while_they_are_off() {
+    if !can_be_shown() {
+        return;
+    }
+    let machine = Machine::new().unwrap_or_else(|error| panic!("{error}")).with_damaged_settings();
+    let operator = Saver { plan: vec![None], news: Vec::new(), samples: Vec::new() };
+    let run = rig_on(machine, &Scenario::default(), operator, CYCLE_MS - 20).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(run.operator.news.concat(), [SettingsNews::Damaged, SettingsNews::Saved]);
+    println!("{:?}", run.caches);
+    assert!(run.caches.erases > 0, "{:?}", run.caches);
+    assert!(!run.caches.stale && run.caches.vain == 0, "{:?}", run.caches);
 }

@@ -7,11 +7,15 @@ use hal_sim::emulated::rig::{Action, Heard, Operator, rig};
 
 /// Time from one reset to the next, ms: it is the reset that ends a stop, as clearing it would cost 2 s of minimum pulses before the
 /// next calibration.
-const CYCLE_MS: u64 = 300;
+const CYCLE_MS: u64 = 510;
+/// When the ESC's supply goes on and off in a cycle, ms: maximum needs a supply that was seen on, and off after that, each for 0.1 s. The
+/// board starts within 40 ms.
+const ON: u64 = 5;
+const OFF: u64 = 150;
 /// When maximum pulses are asked for in a cycle, the stop ordered, and the reset key pressed, ms.
-const ASK: u64 = 60;
-const STOP: u64 = 180;
-const RESET: u64 = 290;
+const ASK: u64 = 270;
+const STOP: u64 = 390;
+const RESET: u64 = 500;
 
 /// How long before a pulse each stop comes, ns: from just above 1 ms over a whole half tick (the board looks twice a
 /// millisecond, so half a millisecond holds every phase), and two that come from further away.
@@ -38,6 +42,8 @@ impl Operator for Sweep {
     fn millisecond(&mut self, ms: u64, _: &[Heard], actions: &mut Vec<Action>) {
         let Some((key, ns)) = BEFORE.get((ms / CYCLE_MS) as usize).copied() else { return };
         match ms % CYCLE_MS {
+            ON => actions.push(Action::Power(true)),
+            OFF => actions.push(Action::Power(false)),
             ASK => actions.push(Action::Send(Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM })),
             STOP => actions.push(Action::StopBeforePulse { key, ns }),
             RESET => actions.push(Action::Reset), // and lets the key go

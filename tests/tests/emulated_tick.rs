@@ -61,7 +61,7 @@ impl World for Script {
             for (input, code) in ADC_INPUTS.iter().zip(CODES) {
                 pins.set_adc(*input, f64::from(code));
             }
-            pins.drive(hal_sim::emulated::Port::B, 12, true); // the stop key is up
+            pins.drive(hal_sim::emulated::Port::B, 12, false); // the stop loop is closed
         }
         while let Some(edge) = self.edges.get_mut(self.next).filter(|e| e.at_ns <= now_ns) {
             pins.drive_timer(GeneralTimer::Tim2, edge.channel + 1, edge.rising);

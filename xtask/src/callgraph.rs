@@ -113,6 +113,11 @@ impl Graph {
         self.0.range(..=address).next_back().filter(|(_, f)| address < f.end).map(|(start, _)| *start)
     }
 
+    /// Whether the image holds the logger at all.
+    fn logs(&self) -> bool {
+        self.0.values().any(|function| is_logger(&function.name))
+    }
+
     /// Everything that `root` reaches. In a `strict` root no way may lead to a panic or through a register.
     pub(crate) fn reach(&self, root: &str, strict: bool) -> Result<Reach, Failure> {
         let start = self.named(root).ok_or_else(|| Failure(format!("the image has no function {root}")))?;
@@ -120,6 +125,20 @@ impl Graph {
         let mut chain = Vec::new();
         let stack = self.descend(start, strict, &mut chain, &mut depth)?;
         Ok(Reach { functions: depth.len(), stack })
+    }
+
+    /// No way from `at` leads to the log.
+    fn never_logs(&self, at: u32, chain: &mut Vec<u32>, seen: &mut BTreeSet<u32>) -> Result<(), Failure> {
+        let Some(function) = self.0.get(&at).filter(|_| seen.insert(at)) else { return Ok(()) };
+        if is_logger(&function.name) {
+            return Err(Failure(format!("a way to the log: {}", self.chain(chain, &function.name))));
+        }
+        chain.push(at);
+        for target in function.calls.iter().filter_map(|call| self.holding(*call)) {
+            self.never_logs(target, chain, seen)?;
+        }
+        chain.pop();
+        Ok(())
     }
 
     fn chain(&self, chain: &[u32], last: &str) -> String {
@@ -153,6 +172,25 @@ impl Graph {
         depth.insert(at, function.frame + deepest);
         Ok(function.frame + deepest)
     }
+}
+
+/// Whether a function is the log's beginning of a frame, by which every message goes (defmt's own interface to its logger).
+fn is_logger(name: &str) -> bool {
+    name == "_defmt_acquire"
+}
+
+/// Both images log, but never from an interrupt: encoding a message takes its time with interrupts off.
+pub(crate) fn quiet(path: &Path, roots: &[&str]) -> Result<(), Failure> {
+    let graph = Graph::read(path)?;
+    if !graph.logs() {
+        return Err(Failure(format!("{}: holds no log at all: is DEFMT_LOG set (.cargo/config.toml)?", path.display())));
+    }
+    for root in roots {
+        let start = graph.named(root).ok_or_else(|| Failure(format!("{}: no function {root}", path.display())))?;
+        graph.never_logs(start, &mut Vec::new(), &mut BTreeSet::new())?;
+    }
+    println!("{}: logs, and never from {}", path.file_name().unwrap_or_default().to_string_lossy(), roots.join(", "));
+    Ok(())
 }
 
 /// Checks the rig board's image and prints what was found; gives the bound on its stack.
@@ -201,5 +239,14 @@ mod tests {
         let g = graph(&[(0, "TIM4", &[16], 0), (16, "a", &[0], 0)]);
         assert!(g.reach("TIM4", true).unwrap_err().to_string().contains("recursion"));
         assert!(g.reach("TIM9", true).unwrap_err().to_string().contains("no function TIM9"));
+    }
+
+    #[test]
+    fn a_way_to_the_log_is_found_round_every_corner() {
+        let g = graph(&[(0, "TIM4", &[16, 48], 0), (16, "a", &[0, 32], 0), (32, "_defmt_acquire", &[], 0), (48, "b", &[], 0)]);
+        let ask = |root: &str| g.never_logs(g.named(root).unwrap(), &mut Vec::new(), &mut BTreeSet::new());
+        let failure = ask("TIM4").unwrap_err().to_string();
+        assert!(failure.contains("TIM4 -> a -> _defmt_acquire"), "{failure}");
+        assert!(ask("b").is_ok() && g.logs());
     }
 }

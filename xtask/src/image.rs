@@ -57,7 +57,9 @@ pub(crate) fn image(place: &Place, bless: bool) -> Result<(), Failure> {
     print!("{}", table(&sizes, &limits));
     compare(&sizes, &limits)?;
     filters(place)?;
-    stack(place)
+    stack(place)?;
+    callgraph::quiet(&place.images().join("firmware-rig"), &["TIM4", "TIM2"])?;
+    callgraph::quiet(&place.images().join("firmware-ahrs"), &["TIM4", "USART1"])
 }
 
 /// The rig board's control loop has no way to a panic, and its stack stays within its budget.

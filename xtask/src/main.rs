@@ -32,7 +32,7 @@ usage: cargo xtask COMMAND
   image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
                    interrupts reach no panic, and its stack is bounded (budgets/rig.toml)
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
-  ahrs-bench [VARIANT]...  the attitude filter on the shared BROAD trials and their stress variants, with its targets;
+  ahrs-bench [VARIANT]...  the attitude filter on the shared BROAD trials, their stress variants and the phones' trials, with its targets;
                    each trial of the variants that are named
   ahrs-bench --plots DIR  the error over time in each trial, as a page and figures
   ahrs-bench --scan  what half of the trials says of each constant of the default (docs/ahrs-constants.md)
@@ -42,7 +42,7 @@ usage: cargo xtask COMMAND
   test             everything: format, lints, images, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
   test --lints     format and lints, those of the code behind the emulator included (its crates take 140 s of processor time once)
-  blind [ARGS]     the blind campaign (docs/blind.md); ARGS go to it, --help lists them
+  blind [ARGS]     the blind campaign (docs/blind.md), on messy rigs with --messy; ARGS go to it, --help lists them
   test --emulated  the images on emulated boards, nothing else
   test --verdicts  the verdict contract on recorded and simulated logs, nothing else
 ";

@@ -4,7 +4,7 @@
 //!
 //! | What | Pin | Peripheral | Settings |
 //! |---|---|---|---|
-//! | Crystal | PH0, PH1 | HSE, PLL | 8 MHz in, core 168 MHz, APB1 42 MHz, APB2 84 MHz |
+//! | Crystal | PH0, PH1 | HSE, PLL | 8 or 12 MHz, measured ([`safe_start::crystal`]); core 168 MHz, APB1 42 MHz, APB2 84 MHz; the internal oscillator where it cannot be trusted |
 //! | Sensors, clock | PB6, AF4, open drain | I2C1 SCL | 400 kHz, pull-ups on the sensor board |
 //! | Sensors, data | PB7, AF4, open drain | I2C1 SDA | polled, every wait bounded |
 //! | Telemetry out | PA9, AF7 | USART1 TX | 460 800 baud 8N1, one interrupt a byte |
@@ -19,7 +19,7 @@
 //! so an interrupt a byte (a few per cent of the core at most) is preferred to DMA: it needs neither static buffers nor unsafe code.
 //!
 //! What can go wrong: a stuck bus ends in [`bus::BusError::Timeout`] after [`bus::PATIENCE_US`] instead of for ever; a tick
-//! that never ends, a lock-up or a fault handler ends in a watchdog reset; a full queue drops whole frames, which the
+//! that never ends or a lock-up ends in a watchdog reset; a full queue drops whole frames, which the
 //! receiver sees as a gap in the sequence.
 //!
 //! Units: ticks of 84 MHz; bytes.
@@ -31,8 +31,6 @@ pub(crate) mod clock;
 
 /// Core clock, Hz.
 pub(crate) const CORE_HZ: u32 = 168_000_000;
-/// Crystal, Hz.
-pub(crate) const CRYSTAL_HZ: u32 = 8_000_000;
 /// Telemetry line, bit/s.
 pub(crate) const BAUD: u32 = 460_800;
 /// Outgoing bytes that may wait: about 65 ms of samples.

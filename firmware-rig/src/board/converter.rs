@@ -1,9 +1,11 @@
 //! ADC1 scanning five channels into a circular buffer.
 //!
 //! What it is: continuous scan, DMA2 stream 0 in a circle, polled by the tick through the stream's remaining count.
-//! What can go wrong: a tick later than 6.5 ms would be lapped by the DMA; the portable half trips at 5 ms already.
+//! What can go wrong: a tick later than 6.5 ms would be lapped by the DMA; the portable half trips at 5 ms already. When the DMA did not
+//! fetch a conversion in time (OVR), or met a bus error, no further one is fetched: the tick starts the scan anew, and what was in the
+//! buffer is left out.
 //! Units: counts of 12 bits at 3.3 V.
-//! Reference: RM0090 section 13.8 (DMA and scan), table 43 (request mapping).
+//! Reference: RM0090 sections 13.8.1 (DMA, recovery from an overrun), 10.3.17 (stream configuration), table 43 (request mapping).
 
 use core::sync::atomic::{AtomicU16, Ordering};
 use firmware_rig::AdcBlock;
@@ -16,6 +18,30 @@ const LENGTH: usize = SCANS * ADC_CHANNELS;
 
 /// Written by the DMA. Atomics, because it changes under the program.
 static BUFFER: [AtomicU16; LENGTH] = [const { AtomicU16::new(0) }; LENGTH];
+
+/// Longest wait for the stream to end: a transfer takes some ten cycles.
+const PATIENCE: u32 = 1000;
+
+/// Lets the stream fill the buffer in a circle, from its beginning.
+fn start_stream(adc: &ADC1, dma: &DMA2) {
+    let stream = dma.st(0);
+    stream.cr().reset();
+    let mut patience = PATIENCE; // EN reads 0 once the stream has ended (RM0090 section 10.3.17)
+    while stream.cr().read().en().bit_is_set() && patience > 0 {
+        patience -= 1;
+    }
+    dma.lifcr().write(|w| w.ctcif0().set_bit().chtif0().set_bit().cteif0().set_bit().cdmeif0().set_bit().cfeif0().set_bit());
+    stream.ndtr().write(|w| w.ndt().set(LENGTH as u16));
+    #[allow(unsafe_code)] // the data register of this converter, and a static buffer of the length given above
+    unsafe {
+        stream.par().write(|w| w.pa().bits(adc.dr().as_ptr() as u32));
+        stream.m0ar().write(|w| w.m0a().bits(BUFFER.as_ptr() as u32));
+    }
+    stream.cr().write(|w| {
+        w.chsel().set(0).pl().high().msize().bits16().psize().bits16().minc().incremented().circ().enabled();
+        w.dir().peripheral_to_memory().en().enabled()
+    });
+}
 
 /// The converter.
 pub(crate) struct Converter {
@@ -32,22 +58,9 @@ impl Converter {
         adc.sqr3().write(|w| unsafe { w.sq1().bits(10).sq2().bits(11).sq3().bits(12).sq4().bits(13).sq5().bits(14) });
         adc.cr1().write(|w| w.scan().set_bit());
 
-        let stream = dma.st(0);
-        stream.ndtr().write(|w| w.ndt().set(LENGTH as u16));
-        #[allow(unsafe_code)] // the data register of this converter, and a static buffer of the length given above
-        unsafe {
-            stream.par().write(|w| w.pa().bits(adc.dr().as_ptr() as u32));
-            stream.m0ar().write(|w| w.m0a().bits(BUFFER.as_ptr() as u32));
-        }
-        stream.cr().write(|w| {
-            w.chsel().set(0).pl().high().msize().bits16().psize().bits16().minc().incremented().circ().enabled();
-            w.dir().peripheral_to_memory().en().enabled()
-        });
-
-        adc.cr2().write(|w| w.cont().set_bit().dma().set_bit().dds().set_bit().adon().set_bit());
-        cortex_m::asm::delay(168 * 5); // tSTAB, 3 us at most (datasheet table 67)
-        adc.cr2().modify(|_, w| w.swstart().set_bit());
+        start_stream(&adc, dma);
         let this = Self { tail: 0, adc };
+        this.begin();
         this.set_sampling(cycles);
         this
     }
@@ -63,8 +76,28 @@ impl Converter {
         });
     }
 
+    /// Starts the scan anew: converter off (which ends a scan that is under way, section 13.3.1), the stream from its beginning, the flag
+    /// down, and everything on again (section 13.8.1).
+    fn restart(&mut self, dma: &DMA2) {
+        self.adc.cr2().reset();
+        start_stream(&self.adc, dma);
+        self.adc.sr().write(|w| w.ovr().clear_bit());
+        self.tail = 0;
+        self.begin();
+    }
+
+    /// Switches the converter on and lets it scan without end.
+    fn begin(&self) {
+        self.adc.cr2().write(|w| w.cont().set_bit().dma().set_bit().dds().set_bit().adon().set_bit());
+        cortex_m::asm::delay(168 * 5); // tSTAB, 3 us at most (datasheet table 67)
+        self.adc.cr2().modify(|_, w| w.swstart().set_bit());
+    }
+
     /// The whole scans since the last call.
     pub(crate) fn drain(&mut self, dma: &DMA2) -> [AdcBlock; ADC_CHANNELS] {
+        if self.adc.sr().read().ovr().bit_is_set() || dma.st(0).cr().read().en().bit_is_clear() {
+            self.restart(dma);
+        }
         let left = usize::from(dma.st(0).ndtr().read().ndt().bits());
         let head = (LENGTH.saturating_sub(left) / ADC_CHANNELS) % SCANS;
         let mut blocks = [AdcBlock::default(); ADC_CHANNELS];

@@ -1,68 +1,42 @@
-//! The last resort: minimum throttle, a record of the place, then a reset.
+//! The last resort: minimum throttle in hardware, a record of the place, then a reset.
 //!
-//! What it is: the panic handler. It sets the minimum pulse, lets a pulse that has begun end, writes file and line into memory that
-//! survives a reset, and resets the core; the next start tells the host.
-//! What can go wrong: were the pulse timer not running yet, the wait ends by its own count. The record has a check word: what a
-//! power-up leaves in memory is not told.
+//! What it is: what the rig board adds to [`safe_start::stm32f4::crash`]. After a panic or a hard fault the pulse timer is set to its
+//! minimum, and a pulse that has begun ends as the timer has it. When the crystal has failed, the timer runs from another clock and a
+//! pulse would become many times as long: the output is forced low instead, at once, and the start after the reset gives minimum
+//! pulses of the right length from the internal oscillator.
+//! What can go wrong: were the pulse timer not running yet, the wait ends by its own count.
 //! Units: ticks of TIM3.
-//! Reference: specification `rig.md`, "a stop is a continuous train of 1000 us pulses".
+//! Reference: specification `rig.md`, "a stop is a continuous train of 1000 us pulses"; RM0090 sections 18.3.8 (forced output mode),
+//! 7.2.7 (clock security system).
 
 use crate::board::pulse::{MAXIMUM, MINIMUM};
-use core::sync::atomic::{AtomicU32, Ordering};
-use frame::message::Event;
+use frame::message::CrashCause;
 use stm32f4xx_hal::pac::TIM3;
 
-/// Words of the file's name.
-const NAME: usize = 6;
-/// Marks a record.
-const MAGIC: u32 = 0x50_41_4e_49;
+safe_start::last_resort!(quiet, settle);
 
-/// Check word, line, end of the file's name. Not initialised at the start.
-#[allow(unsafe_code)] // the section keeps its content over a reset
-#[unsafe(link_section = ".uninit.panic")]
-static RECORD: [AtomicU32; 2 + NAME] = [const { AtomicU32::new(0) }; 2 + NAME];
-
-/// The check word of what is recorded.
-fn check() -> u32 {
-    let [_, rest @ ..] = &RECORD;
-    rest.iter().fold(MAGIC, |sum, word| sum.rotate_left(5) ^ word.load(Ordering::Relaxed))
+fn timer() -> TIM3 {
+    #[allow(unsafe_code)] // nothing else runs any more: the program never goes on from here
+    unsafe {
+        TIM3::steal()
+    }
 }
 
-/// The record of a panic before the last reset, once.
-pub(crate) fn take_record() -> Option<Event> {
-    let [mark, line, name @ ..] = &RECORD;
-    let found = mark.load(Ordering::Relaxed) == check();
-    mark.store(0, Ordering::Relaxed);
-    if !found {
-        return None;
-    }
-    let mut file = [0; 4 * NAME];
-    for (bytes, word) in file.chunks_exact_mut(4).zip(name) {
-        bytes.copy_from_slice(&word.load(Ordering::Relaxed).to_le_bytes());
-    }
-    Some(Event::Panicked { line: line.load(Ordering::Relaxed), file })
-}
-
-#[panic_handler]
-fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
-    cortex_m::interrupt::disable();
-    #[allow(unsafe_code)] // nothing else runs any more: interrupts are off and we never return
-    let timer = unsafe { TIM3::steal() };
+fn quiet(cause: Option<CrashCause>) {
+    let timer = timer();
     timer.ccr1().write(|w| w.ccr().set(MINIMUM));
-    if let Some(place) = info.location() {
-        let [mark, line, name @ ..] = &RECORD;
-        line.store(place.line(), Ordering::Relaxed);
-        let bytes = place.file().as_bytes();
-        let mut end = bytes.iter().skip(bytes.len().saturating_sub(4 * NAME));
-        for word in name {
-            let mut next = || u32::from(end.next().copied().unwrap_or(0));
-            word.store(next() | next() << 8 | next() << 16 | next() << 24, Ordering::Relaxed);
-        }
-        mark.store(check(), Ordering::Relaxed);
+    if cause == Some(CrashCause::ClockFailed) {
+        timer.ccmr1_output().write(|w| w.oc1m().force_inactive());
     }
-    let mut patience = 2_000_000u32;
-    while timer.cnt().read().cnt().bits() <= MAXIMUM && patience > 0 {
+}
+
+/// Longest wait for the end of a pulse: 2 ms take some 60 000 turns of the loop.
+const PATIENCE: u32 = 200_000;
+
+fn settle(cause: Option<CrashCause>) {
+    let timer = timer();
+    let mut patience = PATIENCE;
+    while cause != Some(CrashCause::ClockFailed) && timer.cnt().read().cnt().bits() <= MAXIMUM && patience > 0 {
         patience -= 1;
     }
-    cortex_m::peripheral::SCB::sys_reset()
 }

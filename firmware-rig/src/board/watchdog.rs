@@ -1,7 +1,7 @@
 //! The independent watchdog, and why the board was reset.
 //!
 //! What it is: 20 ms on the 32 kHz LSI (14 to 38 ms over its tolerance), fed by the control tick alone.
-//! What can go wrong: a tick that stalls longer resets the board; the pulse pin is then low until the train starts anew.
+//! What can go wrong: a tick that stalls longer resets the board; the pulse pin then floats, held low by its pull-down, until the train starts anew.
 //! Units: milliseconds.
 //! Reference: RM0090 section 21.3 (IWDG), 7.3.21 (RCC_CSR); datasheet table 42 (LSI 17 to 47 kHz).
 
@@ -22,7 +22,9 @@ impl Watchdog {
         iwdg.kr().write(|w| w.key().unlock());
         iwdg.pr().write(|w| w.pr().divide_by4());
         iwdg.rlr().write(|w| w.rl().set(RELOAD));
-        let mut patience = 200_000u32; // the registers take up to five LSI cycles; without LSI the default 512 ms stays
+        // the registers take up to five LSI cycles, 0.3 ms at 17 kHz (RM0090 section 21.4.4); without LSI the default 512 ms stays.
+        // The core runs from the internal oscillator here: at least 2 ms
+        let mut patience = 10_000u32;
         while iwdg.sr().read().bits() != 0 && patience > 0 {
             patience -= 1;
         }

@@ -47,6 +47,8 @@ pub enum Act {
     Say(Vec<u8>),
     /// Presses the reset key.
     Reset,
+    /// The serial line shows an overrun without a byte.
+    Overrun,
     /// Lets the supply fail at the store of this number from now on; the board is reset then.
     FailAtStore(u32),
 }
@@ -85,6 +87,7 @@ impl ImuWorld {
             match act {
                 Act::Say(bytes) => pins.say(&bytes),
                 Act::Reset => reset = true,
+                Act::Overrun => pins.overrun_serial(),
                 Act::FailAtStore(nth) => {
                     pins.fail_at_store(nth);
                     self.failing = true;

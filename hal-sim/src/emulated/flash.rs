@@ -26,6 +26,9 @@ const SECTOR: usize = 128 * 1024;
 const FIRST_SECTOR: u64 = 10;
 const SECTORS: u64 = 2;
 
+/// What a damaged array is filled with.
+const DAMAGED: u8 = 0x5a;
+
 /// Bits of CR and SR.
 const PG: u64 = 1;
 const SER: u64 = 1 << 1;
@@ -33,6 +36,21 @@ const STRT: u64 = 1 << 16;
 const LOCK: u64 = 1 << 31;
 const PGPERR: u64 = 1 << 6;
 const PGSERR: u64 = 1 << 7;
+
+/// Bits of ACR: caches on, and their resets.
+const CACHES_ON: u64 = 1 << 9 | 1 << 10;
+const CACHES_RESET: u64 = 1 << 11 | 1 << 12;
+
+/// What the caches may still hold of a sector that was erased.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Caches {
+    /// Sectors that were erased.
+    pub erases: u32,
+    /// A sector was erased, and the caches were not reset since.
+    pub stale: bool,
+    /// Resets that were asked for while a cache was on, where they have no effect (RM0090 section 3.9.1).
+    pub vain: u32,
+}
 
 /// The controller and what the settings' sectors hold.
 #[derive(Debug)]
@@ -45,16 +63,35 @@ pub(super) struct ProgrammableFlash {
     pub(super) fails_at: Option<u32>,
     /// The supply has failed; the next reset brings it back.
     pub(super) failed: bool,
+    /// The caches in front of the array.
+    pub(super) caches: Caches,
 }
 
 impl ProgrammableFlash {
     pub(super) fn new(inner: Flash) -> Self {
-        Self { inner, array: vec![0xff; SECTOR * SECTORS as usize], stores: 0, fails_at: None, failed: false }
+        Self {
+            inner,
+            array: vec![0xff; SECTOR * SECTORS as usize],
+            stores: 0,
+            fails_at: None,
+            failed: false,
+            caches: Caches::default(),
+        }
     }
 
     /// Whether the emulator lets a model program its flash.
     pub(super) fn is_there(bus: &Bus) -> bool {
         bus.memory().iter().any(|region| region.contains(BASE) && region.programmer == Some("FLASH"))
+    }
+
+    /// Fills the array with what no program has written, before the board is switched on.
+    pub(super) fn damage(&mut self) {
+        self.array.fill(DAMAGED);
+    }
+
+    /// What the array holds, and where it lies, unless it is erased.
+    pub(super) fn content(&self) -> Option<(u64, Vec<u8>)> {
+        self.array.iter().any(|byte| *byte != 0xff).then(|| (BASE, self.array.clone()))
     }
 
     /// A reset: the registers begin anew, the array stays.
@@ -67,6 +104,8 @@ impl ProgrammableFlash {
         let Some(n) = sector.checked_sub(FIRST_SECTOR).filter(|n| *n < SECTORS) else { return };
         let from = n as usize * SECTOR;
         self.array[from..from + SECTOR].fill(0xff);
+        self.caches.erases += 1;
+        self.caches.stale = true;
         for word in (0..SECTOR as u64).step_by(8) {
             context.program(BASE + from as u64 + word, Width::W64, u64::MAX, 1);
         }
@@ -81,6 +120,13 @@ impl Device for ProgrammableFlash {
     }
 
     fn write(&mut self, register: Register, value: u64, file: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        if register == Register::Acr && value & CACHES_RESET != 0 {
+            if value & CACHES_ON != 0 {
+                self.caches.vain += 1;
+            } else if value & CACHES_RESET == CACHES_RESET {
+                self.caches.stale = false;
+            }
+        }
         let starts = register == Register::Cr && value & STRT != 0 && value & LOCK == 0;
         if starts && value & SER != 0 && !self.failed {
             self.erase(value >> 3 & 0x1f, context);

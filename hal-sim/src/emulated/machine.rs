@@ -6,14 +6,16 @@
 //! Units: ns since power-up.
 //! Reference: crate rigless 0.4 (register models section by section of RM0090).
 
+use super::converter::ADC_UNITS;
+use super::crystal::Quartz;
 use super::flash::ProgrammableFlash;
-use super::part::{ADC_UNITS, Part};
+use super::part::Part;
 use rigless::{
     chip::{Timeline, uart},
     device::{Device, Level},
     emulator::{self, Driver, Host, Settled, Start, Stop},
     image::Image,
-    machine::{Board, Crystal, Target, armv7m},
+    machine::{Board, Target, armv7m},
     mcu::{Mcu, Operate},
     session::Session,
     snapshot::Store,
@@ -34,7 +36,8 @@ use std::path::{Path, PathBuf};
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
 /// The part's SysTick reference is the core clock over 8.
 const SYSTICK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).unwrap();
-const CRYSTAL_HZ: u64 = 8_000_000;
+/// The crystal of most boards.
+const QUARTZ: Quartz = Quartz::Good(8_000_000);
 const SUPPLY_MV: u32 = 3300;
 /// Reference in the same units, so that a code goes in and comes out unchanged.
 const ADC_REFERENCE: u32 = 4095 * ADC_UNITS;
@@ -136,14 +139,28 @@ impl Machine {
     /// # Errors
     /// [`EmulatedError::Emulator`] when the emulator cannot build its part.
     pub fn new() -> Result<Self, EmulatedError> {
+        Self::with(QUARTZ)
+    }
+
+    /// The same with another crystal.
+    ///
+    /// # Errors
+    /// [`EmulatedError::Emulator`] when the emulator cannot build its part.
+    pub fn with(quartz: Quartz) -> Result<Self, EmulatedError> {
         let mut chip = Stm32f427::new().map_err(EmulatedError::emulator)?;
-        chip.rcc.attach_crystals(CRYSTAL_HZ, Crystal::NONE.0);
         chip.set_supply(SUPPLY_MV);
         for converter in &mut chip.adc {
             converter.set_reference(ADC_REFERENCE);
         }
         chip.usart[0].attach(FarEnd::default());
-        Ok(Self { mcu: Part::new(chip).map_err(EmulatedError::emulator)? })
+        Ok(Self { mcu: Part::new(chip, quartz).map_err(EmulatedError::emulator)? })
+    }
+
+    /// Fills the settings' flash with what no program has written.
+    #[must_use]
+    pub fn with_damaged_settings(mut self) -> Self {
+        self.mcu.flash.damage();
+        self
     }
 
     /// Whether the flash of this emulator can be programmed: `cargo xtask test` builds one that can.
@@ -179,6 +196,9 @@ pub enum Port {
     C = 2,
 }
 
+/// Place of TIM4 among the part's general-purpose timers.
+const TICK_TIMER: usize = 2;
+
 /// A general-purpose timer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GeneralTimer {
@@ -193,7 +213,11 @@ pub struct Pins<'a> {
     machine: &'a mut Machine,
     at: VirtualNanos,
     reset: bool,
+    fault: bool,
 }
+
+/// Addresses of GPIOB. RM0090 section 2.3, table 1.
+const PORT_B: std::ops::Range<u64> = 0x4002_0400..0x4002_0800;
 
 fn level(high: bool) -> Level {
     if high { Level::High } else { Level::Low }
@@ -215,6 +239,15 @@ impl Pins<'_> {
         }
     }
 
+    /// Drives a pin from outside no more: its pull decides, or nothing.
+    pub fn release(&mut self, port: Port, pin: u8) {
+        if let Some(pin) = Pin::new(pin) {
+            self.machine.mcu.chip.drive_port(self.at, port as usize, |gpio, registers, context| {
+                gpio.drive(pin, None, registers, context);
+            });
+        }
+    }
+
     /// Drives the input of a timer channel (1 to 4). The emulator does not connect pins and timers: ask [`Pins::alternate`].
     pub fn drive_timer(&mut self, timer: GeneralTimer, channel: u8, high: bool) {
         if let Some(channel) = TimerChannel::new(channel) {
@@ -222,6 +255,15 @@ impl Pins<'_> {
                 timer.drive_input(channel, level(high), registers, context);
             });
         }
+    }
+
+    /// Takes the interrupt of the control tick (TIM4) away as a stray write would, or gives it back: the control task does not come.
+    pub fn hold_tick(&mut self, held: bool) {
+        self.machine.mcu.chip.drive_timer(self.at, TICK_TIMER, |timer, registers, context| {
+            let enabled = u64::from(!held);
+            registers.set(TimerRegister::Dier, enabled); // the bus stores it, then the model looks
+            Device::write(timer, TimerRegister::Dier, enabled, registers, context);
+        });
     }
 
     /// What a timer's counter reads now.
@@ -241,17 +283,27 @@ impl Pins<'_> {
 
     /// Level on `channel` of ADC1 from now on, counts of 12 bits with their fraction.
     pub fn set_adc(&mut self, channel: u8, counts: f64) {
-        self.machine.mcu.adc1.set_level(channel, counts);
+        self.machine.mcu.adc1.set_level(self.at, channel, counts);
     }
 
     /// Noise of every single conversion, standard deviation in counts.
     pub fn set_adc_noise(&mut self, counts: f64) {
-        self.machine.mcu.adc1.noise = counts;
+        self.machine.mcu.adc1.set_noise(self.at, counts);
     }
 
     /// Lets no conversion end any more, or again.
     pub fn stop_adc(&mut self, stopped: bool) {
-        self.machine.mcu.adc1.stopped = stopped;
+        self.machine.mcu.adc1.stop(self.at, stopped);
+    }
+
+    /// USART1 shows an overrun without a byte (RM0090 section 30.3.3), until the program reads its status and then its data.
+    pub fn overrun_serial(&mut self) {
+        self.machine.mcu.stuck.up = true;
+    }
+
+    /// The DMA misses a conversion of ADC1: none is fetched until the program recovers.
+    pub fn overrun_adc(&mut self) {
+        self.machine.mcu.adc1.overrun(self.at);
     }
 
     /// The board's own supply, mV.
@@ -270,6 +322,17 @@ impl Pins<'_> {
     #[must_use]
     pub fn has_failed(&self) -> bool {
         self.machine.mcu.flash.failed
+    }
+
+    /// The crystal stops oscillating, for good.
+    pub fn fail_crystal(&mut self) {
+        let Part { chip, clocks, .. } = &mut self.machine.mcu;
+        chip.drive_clocks(self.at, |_, file, context| clocks.fail(file, context));
+    }
+
+    /// The next access of the core to GPIOB (the stop key's port) ends in a bus error: a hard fault.
+    pub fn fail_access(&mut self) {
+        self.fault = true;
     }
 
     /// Presses the reset key. Levels that were driven from outside are gone afterwards: drive them again.
@@ -380,7 +443,7 @@ struct Clockwork<W> {
 impl<W: World> Driver<Machine> for Clockwork<W> {
     fn on_settled(&mut self, session: &mut Session<Machine>, _: &mut dyn Host, settled: Settled) {
         if let (true, Settled::Access { access, .. }) = (self.world.watches(), settled) {
-            let mut pins = Pins { machine: session.board_mut(), at: access.virtual_time, reset: false };
+            let mut pins = Pins { machine: session.board_mut(), at: access.virtual_time, reset: false, fault: false };
             self.world.accessed(&mut pins);
         }
     }
@@ -390,9 +453,13 @@ impl<W: World> Driver<Machine> for Clockwork<W> {
         if now >= self.end_ns || self.world.is_over() {
             return None;
         }
-        let mut pins = Pins { machine: session.board_mut(), at: stop.at, reset: false };
+        let mut pins = Pins { machine: session.board_mut(), at: stop.at, reset: false, fault: false };
         let next = self.world.wake(now, &mut pins);
-        if pins.reset {
+        let (reset, fault) = (pins.reset, pins.fault);
+        if fault {
+            session.fail_next(PORT_B.start, PORT_B.end);
+        }
+        if reset {
             session.reset_by_pin(stop.at, stop.instruction_count, host);
         }
         Some(VirtualNanos(next.clamp(now + 1, self.end_ns)))
@@ -412,7 +479,10 @@ pub fn run<W: World + 'static>(
     world: W,
     end_ns: u64,
 ) -> Result<(Outcome<W>, Machine), EmulatedError> {
-    let images = [Image::read(elf, None).map_err(EmulatedError::emulator)?];
+    let mut images = vec![Image::read(elf, None).map_err(EmulatedError::emulator)?];
+    if let Some((base, bytes)) = machine.mcu.flash.content() {
+        images.push(Image::new(Path::new("settings"), bytes, Some(base)).map_err(EmulatedError::emulator)?);
+    }
     let session = Session::new(Box::new(machine), 0, VirtualNanos(FIRST_STOP_NS)).map_err(EmulatedError::emulator)?;
     let finished = emulator::run(session, &Start::new(&images), Clockwork { world, end_ns }).map_err(EmulatedError::emulator)?;
     let stop = finished.stop.ok_or_else(|| EmulatedError::Emulator("the run ended before its time".to_owned()))?;

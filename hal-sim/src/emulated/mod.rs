@@ -12,11 +12,15 @@
 //! Reference: RM0090 rev 22; crate rigless 0.4.
 
 pub mod ahrs;
+mod converter;
 pub mod cost;
+mod crystal;
 mod flash;
 mod machine;
 pub mod operator;
 mod part;
 pub mod rig;
 
+pub use crystal::Quartz;
+pub use flash::Caches;
 pub use machine::{Accesses, EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};

@@ -7,6 +7,7 @@
 //! Units: ns since power-up of the board; counts; ns of pulse.
 //! Reference: pin table in `firmware-rig/src/board/mod.rs`, written down here again on purpose.
 
+use super::flash::Caches;
 use super::machine::{EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
 use crate::bench::{Bench, STEP_NS, Truth};
 use crate::fault::Mishap;
@@ -26,7 +27,7 @@ const CAPTURE_FUNCTION: u8 = 1;
 const ADC_INPUTS: [u8; ADC_CHANNELS] = [10, 11, 12, 13, 14];
 /// ESC pulse: pin of port A with AF2, TIM3 channel 1.
 const PULSE_PIN: (u8, u8) = (6, 2);
-/// Operator's stop key: pin of port B, active low.
+/// Stop loop: pin of port B, closed to ground while the rig may run.
 const STOP_PIN: u8 = 12;
 /// Encoder's channel B: pin of port A.
 const ENCODER_B_PIN: u8 = 7;
@@ -39,6 +40,8 @@ const DIP_MV: u32 = 2600;
 /// How finely the start of a pulse is looked for, ns.
 const LOOK_NS: u64 = 1000;
 const MS: u64 = 1_000_000;
+/// Time between two changes of an input that screams, ns: a rising edge in every microsecond.
+const SCREAM_NS: u64 = 500;
 
 /// What an operator does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,8 +50,10 @@ pub enum Action {
     Send(Command),
     /// Throws the ESC's power switch.
     Power(bool),
-    /// Presses (or lets go) the stop key.
+    /// Opens the stop loop by its key (true), or closes it again.
     StopKey(bool),
+    /// Unplugs the stop loop's wire, for good.
+    UnplugStop,
     /// A stop by key or by command so many nanoseconds before a pulse starts: the next pulse that is far enough away.
     StopBeforePulse {
         /// By key; otherwise a command whose first bit leaves the host at that instant.
@@ -62,6 +67,19 @@ pub enum Action {
     FailAtStore(u32),
     /// The run of the schedule begins: effects count their time from here.
     StartRun,
+    /// The crystal stops oscillating.
+    FailCrystal,
+    /// The DMA misses a conversion.
+    OverrunAdc,
+    /// An input of the capture timer (channel 0 to 3) gets an edge in every microsecond, for so many milliseconds.
+    Scream {
+        /// Channel, from 0.
+        channel: u8,
+        /// How long, ms.
+        ms: u64,
+    },
+    /// The core's next look at the stop key's port ends in a bus error.
+    FailAccess,
     /// Something goes wrong at the pins, and stays so.
     Mishap(Mishap),
     /// The rotor turns the other way round, as channel B of the encoder shows it.
@@ -111,7 +129,8 @@ pub struct RigWorld<O> {
     read: usize,
     next_ms: u64,
     connected: bool,
-    strapped: bool,
+    stop_open: bool,
+    unplugged: bool,
     resets: Vec<u64>,
     running_pulse: Option<PulseTrain>,
     pulses: Vec<SeenPulse>,
@@ -124,9 +143,13 @@ pub struct RigWorld<O> {
     rise_at: u64,
     /// Pulses of this train so far.
     train: u32,
+    /// An input that screams: channel, until when, and its next edge.
+    scream: Option<(u8, u64, u64)>,
     /// A stop to come: when, and by key or by these bytes.
     stop_at: Option<(u64, Option<Vec<u8>>)>,
     stops: Vec<u64>,
+    /// When the control tick is given back, ms.
+    tick_back: Option<u64>,
 }
 
 impl<O: Operator> RigWorld<O> {
@@ -139,7 +162,8 @@ impl<O: Operator> RigWorld<O> {
             read: 0,
             next_ms: 0,
             connected: false,
-            strapped: false,
+            stop_open: false,
+            unplugged: false,
             resets: Vec::new(),
             running_pulse: None,
             pulses: Vec::new(),
@@ -150,8 +174,10 @@ impl<O: Operator> RigWorld<O> {
             last_frame: Vec::new(),
             rise_at: u64::MAX,
             train: 0,
+            scream: None,
             stop_at: None,
             stops: Vec::new(),
+            tick_back: None,
         }
     }
 
@@ -196,7 +222,10 @@ impl<O: Operator> RigWorld<O> {
         }
         match self.stop_at.take() {
             Some((_, Some(bytes))) => pins.say(&bytes),
-            _ => pins.drive(Port::B, STOP_PIN, false),
+            _ => {
+                self.stop_open = true;
+                pins.drive(Port::B, STOP_PIN, true);
+            }
         }
         self.stops.push(now_ns);
     }
@@ -215,10 +244,18 @@ impl<O: Operator> RigWorld<O> {
         }
     }
 
+    /// Edges of the input that screams.
+    fn drive_scream(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
+        let Some((channel, until, next)) = self.scream.filter(|(_, _, next)| *next <= now_ns) else { return };
+        let high = (next / SCREAM_NS).is_multiple_of(2);
+        pins.drive_timer(GeneralTimer::Tim2, channel + 1, high);
+        self.scream = (next < until).then_some((channel, until, next + SCREAM_NS));
+    }
+
     fn reset(&mut self, ms: u64, pins: &mut Pins<'_>) {
         pins.press_reset();
         self.connected = false;
-        self.strapped = false;
+        self.stop_open = false;
         self.running_pulse = None;
         self.resets.push(ms * MS);
     }
@@ -273,11 +310,24 @@ impl<O: Operator> RigWorld<O> {
                         Mishap::NoConversions => pins.stop_adc(true),
                         Mishap::SupplyDip => pins.set_supply(DIP_MV),
                         Mishap::Replay => pins.say(&self.last_frame),
+                        Mishap::StopOpen => self.stop_open = true, // driven with the next millisecond
+                        Mishap::Hang => pins.hold_tick(true),
+                        Mishap::LateTick { ms: late } => {
+                            pins.hold_tick(true);
+                            self.tick_back = Some(ms + u64::from(late));
+                        }
                         _ => {}
                     }
                 }
                 Action::Power(on) => self.bench.set_power(on),
-                Action::StopKey(pressed) => pins.drive(Port::B, STOP_PIN, !pressed),
+                Action::StopKey(pressed) => {
+                    self.stop_open = pressed;
+                    pins.drive(Port::B, STOP_PIN, pressed);
+                }
+                Action::UnplugStop => {
+                    self.unplugged = true;
+                    pins.release(Port::B, STOP_PIN);
+                }
                 Action::StopBeforePulse { key, ns } => {
                     let mut wire = [0; MAX_WIRE];
                     let used = self.encoder.encode(Ticks::from_ms(ms), &Command::Stop, &mut wire).unwrap_or(0);
@@ -290,6 +340,10 @@ impl<O: Operator> RigWorld<O> {
                     self.stop_at = Some((start - ns, bytes));
                 }
                 Action::FailAtStore(nth) => pins.fail_at_store(nth),
+                Action::FailCrystal => pins.fail_crystal(),
+                Action::OverrunAdc => pins.overrun_adc(),
+                Action::Scream { channel, ms: long } => self.scream = Some((channel, (ms + long) * MS, ms * MS)),
+                Action::FailAccess => pins.fail_access(),
                 Action::Reset => self.reset(ms, pins),
                 Action::StartRun => self.bench.start_run(),
             }
@@ -300,6 +354,7 @@ impl<O: Operator> RigWorld<O> {
 impl<O: Operator> World for RigWorld<O> {
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
         self.drive_edges(now_ns, pins);
+        self.drive_scream(now_ns, pins);
         self.stop_when_due(now_ns, pins);
         self.await_pulse(now_ns, pins);
         if now_ns >= self.bench.horizon_ns() {
@@ -315,9 +370,11 @@ impl<O: Operator> World for RigWorld<O> {
             }
             pins.set_adc_noise(CONVERSION_NOISE);
             if now_ns >= self.next_ms * MS {
-                if !self.strapped {
-                    pins.drive(Port::B, STOP_PIN, true);
-                    self.strapped = true;
+                if !self.unplugged {
+                    pins.drive(Port::B, STOP_PIN, self.stop_open); // again and again: a reset of the part forgets it
+                }
+                if self.tick_back.take_if(|at| self.next_ms >= *at).is_some() {
+                    pins.hold_tick(false);
                 }
                 self.connect(pins);
                 self.converse(self.next_ms, pins);
@@ -332,7 +389,8 @@ impl<O: Operator> World for RigWorld<O> {
         let rise = if self.running_pulse.is_none() { self.rise_at } else { u64::MAX };
         let stop = self.stop_at.as_ref().map_or(u64::MAX, |(at, _)| *at);
         let edge = self.bench.next_edge_ns().unwrap_or(u64::MAX);
-        self.bench.horizon_ns().min(edge).min(rise).min(stop)
+        let scream = self.scream.map_or(u64::MAX, |(_, _, next)| next);
+        self.bench.horizon_ns().min(edge).min(rise).min(stop).min(scream)
     }
 
     fn is_over(&self) -> bool {
@@ -359,6 +417,8 @@ pub struct RigRun<O> {
     pub truth: Vec<(u64, Truth)>,
     /// Stores to the settings' flash.
     pub stores: u32,
+    /// Its erases, and the caches in front of it.
+    pub caches: Caches,
     /// The run itself.
     pub outcome: Outcome<()>,
 }
@@ -368,8 +428,21 @@ pub struct RigRun<O> {
 /// # Errors
 /// [`EmulatedError`] when there is no image or the emulator gives up.
 pub fn rig<O: Operator + 'static>(scenario: &Scenario, operator: O, milliseconds: u64) -> Result<RigRun<O>, EmulatedError> {
+    rig_on(Machine::new()?, scenario, operator, milliseconds)
+}
+
+/// The same on a given machine.
+///
+/// # Errors
+/// As [`rig`].
+pub fn rig_on<O: Operator + 'static>(
+    machine: Machine,
+    scenario: &Scenario,
+    operator: O,
+    milliseconds: u64,
+) -> Result<RigRun<O>, EmulatedError> {
     let elf = firmware("firmware-rig")?;
-    let (outcome, machine) = run(&elf, Machine::new()?, RigWorld::new(scenario, operator), milliseconds * MS)?;
+    let (outcome, machine) = run(&elf, machine, RigWorld::new(scenario, operator), milliseconds * MS)?;
     let Outcome { world, telemetry, now_ns, instructions, accesses } = outcome;
     Ok(RigRun {
         operator: world.operator,
@@ -380,6 +453,7 @@ pub fn rig<O: Operator + 'static>(scenario: &Scenario, operator: O, milliseconds
         stops: world.stops,
         truth: world.truth,
         stores: machine.mcu.flash.stores,
+        caches: machine.mcu.flash.caches,
         outcome: Outcome { world: (), telemetry, now_ns, instructions, accesses },
     })
 }

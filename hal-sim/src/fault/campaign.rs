@@ -96,7 +96,7 @@ struct Board {
     rig: Rig,
     line: CommandLine,
     encoder: Encoder,
-    /// Compare register: the width of the pulses from the next frame on; `None` while the pin is low after a reset.
+    /// Compare register: the width of the pulses from the next frame on; `None` after a reset, while nothing drives the pin and its pull-down holds it low.
     register: Option<PulseWidth>,
 }
 
@@ -277,7 +277,7 @@ impl Flight {
             adc: gathered.adc,
             command,
             line,
-            stop_input: false,
+            stop_input: mishap == Some(Mishap::StopOpen) && !self.defenceless,
             brown_out: mishap == Some(Mishap::SupplyDip) && !self.defenceless,
             paused: false,
         });

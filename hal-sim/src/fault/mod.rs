@@ -45,6 +45,8 @@ pub enum Mishap {
     },
     /// The control task does not come any more.
     Hang,
+    /// The stop loop opens: the key, its wire or its plug.
+    StopOpen,
 }
 
 /// Highest time from a mishap to the instant at which the board can know it, ms, and where it comes from.
@@ -76,6 +78,7 @@ impl Mishap {
             Self::PowerLoss,
             Self::LateTick { ms: 7 },
             Self::Hang,
+            Self::StopOpen,
         ]);
         list
     }
@@ -94,6 +97,7 @@ impl Mishap {
             Self::Silence => Fault::LinkLost,
             Self::SupplyDip => Fault::BrownOut,
             Self::LateTick { .. } => Fault::ControlStalled,
+            Self::StopOpen => Fault::OperatorStop,
             Self::PowerLoss | Self::Hang => return None,
         })
     }
@@ -114,6 +118,7 @@ impl Mishap {
             Self::SupplyDip => say(1.0, "one tick"),
             Self::PowerLoss => say(0.0, "the reset is the detection"),
             Self::LateTick { ms } => say(f64::from(ms) + 1.0, "the late tick itself"),
+            Self::StopOpen => say(1.0, "one tick"),
             Self::Hang => say(38.0, "20 ms watchdog, 38 ms with the slowest oscillator"),
         }
     }
@@ -136,6 +141,7 @@ impl Mishap {
             Self::PowerLoss => "board supply lost (brown-out reset)".to_owned(),
             Self::LateTick { ms } => format!("control tick {ms} ms late"),
             Self::Hang => "control task hangs".to_owned(),
+            Self::StopOpen => "stop loop open".to_owned(),
         }
     }
 }
@@ -154,7 +160,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan of a seed: kinds follow one another, so that any run of 22 seeds holds each; level and instant are drawn.
+    /// The plan of a seed: kinds follow one another, so that any run of 23 seeds holds each; level and instant are drawn.
     #[must_use]
     pub fn of(seed: u64) -> Self {
         let mut draw = Stream::new(seed, Source::Phase, 77);

@@ -2,10 +2,11 @@
 //!
 //! What it is: the bench, and what the board's peripherals do by themselves while the program computes or waits: the pulse train, the scan
 //! of the converter, the watchdog. Whoever looks at a pin brings all of it up to the clock first, in the order of time.
-//! What can go wrong: after a reset by the watchdog the pulse pin is low and nothing converts until a new program starts its peripherals;
-//! what the old one still holds has no effect.
+//! What can go wrong: after a reset by the watchdog, and before the first program, the chip does not drive the pulse pin and nothing
+//! converts, until a new program starts its peripherals; what the old one still holds has no effect. The pin then floats: the board's
+//! pull-down holds it low; on a board without one ([`RigPins::leave_out_pull_down`]) it follows what its neighbours couple into it.
 //! Units: ns since power-up.
-//! Reference: specification `rig.md`, "The simulator"; RM0090 section 7.3.21 (reset flags).
+//! Reference: specification `rig.md`, "The simulator"; RM0090 sections 7.3.21 (reset flags) and 8.3 (pins float after a reset).
 
 use super::adc::Scan;
 use super::pwm::Train;
@@ -20,6 +21,9 @@ use std::rc::Rc;
 /// Flags of RCC_CSR, shifted down by 24: pin, power-on and brown-out after power-up; pin and watchdog after the dog has bitten.
 const POWERED_UP: u8 = 0x0E;
 const WATCHDOG: u8 = 0x24;
+
+/// Time from one coupled pulse to the next, ns: that of a neighbour's pulse train.
+const COUPLED_NS: u64 = 20_000_000;
 
 /// The rig at its board's pins; clones are the same rig.
 #[derive(Clone)]
@@ -36,6 +40,8 @@ pub(super) struct Behind {
     /// When the watchdog bites unless it is fed.
     pub(super) deadline_ns: Option<u64>,
     bitten_ns: Option<u64>,
+    /// Pulses that a floating pin picks up: width and start of the next, ns. `None` where a resistor pulls it down.
+    picked_up: Option<(u32, u64)>,
     reset_cause: u8,
     /// Programs that were reset; a peripheral of an earlier one is none any more.
     pub(super) life: u32,
@@ -51,6 +57,7 @@ impl RigPins {
             scan: None,
             deadline_ns: None,
             bitten_ns: None,
+            picked_up: None,
             reset_cause: POWERED_UP,
             life: 0,
         };
@@ -68,6 +75,13 @@ impl RigPins {
         let mut behind = self.behind.borrow_mut();
         behind.pass(self.clock.now_ns());
         behind
+    }
+
+    /// Leaves the pull-down out of the pulse pin: while nothing drives it, it follows a neighbour that couples pulses of `width_us` into
+    /// it every 20 ms, the worst that a floating wire can do.
+    pub fn leave_out_pull_down(&self, width_us: u32) {
+        let mut behind = self.now();
+        behind.picked_up = Some((width_us * 1000, self.clock.now_ns()));
     }
 
     /// The operator's switch: connects or cuts the ESC's power.
@@ -125,8 +139,22 @@ impl Behind {
             self.bench.advance_to(end_ns);
             self.bench.pulse(end_ns, width_ns);
         }
+        self.pick_up(until_ns);
         self.convert(until_ns);
         self.bench.advance_to(until_ns);
+    }
+
+    /// What a floating pin gives the ESC.
+    fn pick_up(&mut self, until_ns: u64) {
+        let Some((width_ns, mut start_ns)) = self.picked_up else { return };
+        while start_ns + u64::from(width_ns) <= until_ns {
+            if self.train.is_none() {
+                self.bench.advance_to(start_ns + u64::from(width_ns));
+                self.bench.pulse(start_ns + u64::from(width_ns), width_ns);
+            }
+            start_ns += COUPLED_NS;
+        }
+        self.picked_up = Some((width_ns, start_ns));
     }
 
     fn convert(&mut self, until_ns: u64) {

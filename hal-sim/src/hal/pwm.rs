@@ -2,7 +2,7 @@
 //!
 //! What it is: `embedded_hal::pwm::SetDutyCycle` whose period is the pulse timer's; a new value counts from the next period on, so a pulse
 //! that has begun is never cut or stretched.
-//! What can go wrong: a duty cycle above the maximum is taken as the maximum; after a reset the pin is low, and writing to the channel of
+//! What can go wrong: a duty cycle above the maximum is taken as the maximum; after a reset nothing drives the pin (see [`super::pins`]), and writing to the channel of
 //! the program that was reset does nothing.
 //! Units: timer ticks; ns since power-up.
 //! Reference: RM0090 sections 18.3.9 (PWM mode) and 18.4.13 (compare preload); embedded-hal 1.0, `pwm`.

@@ -1,6 +1,6 @@
 //! The independent watchdog.
 //!
-//! What it is: unless it is fed in time it resets the board: the pulse pin goes low, conversions end, and the reset cause says why.
+//! What it is: unless it is fed in time it resets the board: the pulse pin is let go, conversions end, and the reset cause says why.
 //! What can go wrong: once started there is no way back.
 //! Units: ns.
 //! Reference: RM0090 section 21.3 (IWDG); the board's 20 ms (`firmware-rig/src/board/watchdog.rs`).

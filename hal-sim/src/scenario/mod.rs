@@ -23,8 +23,7 @@ use crate::plant::{
 use crate::sensor::Geometry;
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::PulseWidth;
-pub(crate) use section::not_negative;
-use section::positive;
+pub(crate) use section::{not_negative, positive};
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned, de::Error};
 use std::path::{Path, PathBuf};
 
@@ -245,23 +244,26 @@ impl AnyScenario {
     }
 }
 
-fn text_of(file: &Path) -> Result<String, ScenarioError> {
+pub(crate) fn text_of(file: &Path) -> Result<String, ScenarioError> {
     std::fs::read_to_string(file).map_err(|source| ScenarioError::Unreadable { file: file.to_owned(), source })
 }
 
 /// What `text` describes, or where it does not.
-fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ScenarioError> {
+pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ScenarioError> {
     toml::from_str(text).map_err(|error| {
-        let at = error.span().map_or(0, |s| s.start).min(text.len());
-        let before = text.get(..at).unwrap_or(text);
-        let line = before.matches('\n').count() + 1;
-        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        let (line, column) = place_of(text, error.span().map_or(0, |s| s.start));
         let reason = error.message().replace('\n', " ");
         ScenarioError::Refused { file: file.to_owned(), line, column, reason }
     })
 }
 
-fn motor_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
+/// Line and column of a byte of `text`, from 1.
+pub(crate) fn place_of(text: &str, byte: usize) -> (usize, usize) {
+    let before = text.get(..byte.min(text.len())).unwrap_or(text);
+    (before.matches('\n').count() + 1, before.chars().rev().take_while(|c| *c != '\n').count() + 1)
+}
+
+pub(crate) fn motor_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
     let name = String::deserialize(d)?;
     if Motor::named(&name).is_some() {
         return Ok(name);
@@ -270,7 +272,7 @@ fn motor_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
     Err(D::Error::custom(format!("expected one of {names}, found {name:?}")))
 }
 
-fn propeller_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
+pub(crate) fn propeller_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
     let name = String::deserialize(d)?;
     if Propeller::named(&name).is_some() {
         return Ok(name);

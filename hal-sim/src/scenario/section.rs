@@ -234,7 +234,7 @@ fn checked<'de, D: Deserializer<'de>>(d: D, ok: impl Fn(f64) -> bool, expected: 
     if ok(value) { Ok(value) } else { Err(D::Error::custom(format!("expected {expected}, found {value}"))) }
 }
 
-pub(super) fn positive<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+pub(crate) fn positive<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
     checked(d, |v| v > 0.0 && v.is_finite(), "a number above 0")
 }
 
