@@ -120,8 +120,9 @@ fn the_imu_board_flies_a_scenario_of_its_own() {
             let swing = column(&truth, name).iter().fold(0.0f64, |m, v| m.max(v.abs()));
             let (wrong, apart) = (worst(&told, &truth, name), worst(&told, &again, name));
             println!("drawn errors {drawn}, {name} up to {swing:.1}: off by {wrong:.3}, quadrig ahrs apart by {apart:.4}");
-            // six decimals, and a word of the magnetometer that repeats itself counts as an old one in a file
-            assert!(swing > 10.0 && apart < 0.1, "{swing} {apart}");
+            // six decimals, and a word of the magnetometer that repeats itself counts as an old one in a file: what that is worth grows with
+            // how far the filter has yet to go (an offset of degrees a second that no rest has shown)
+            assert!(swing > 10.0 && apart < 0.02 + 0.03 * wrong, "{swing} {apart} {wrong}");
             *off = off.max(wrong);
         }
     }
