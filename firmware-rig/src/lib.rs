@@ -1,7 +1,8 @@
 //! The rig board's portable half: the same code on the board, in the native simulation and in the emulator.
 //!
 //! What it is: [`Rig::tick`] takes what the peripherals delivered since the last tick and gives the pulse, and from time to
-//! time a raw sample and an event. Nothing here reads a clock or a register.
+//! time a raw sample and an event; [`RigConsole`] is the shell around it, from bytes of the line to bytes of the line. Nothing here reads a
+//! clock or a register.
 //!
 //! What can go wrong: lost edges, missing conversions, late ticks and a silent host all arrive as data and leave as
 //! verdicts and latched faults; no input makes it panic.
@@ -19,7 +20,9 @@ extern crate std;
 pub mod bank;
 pub mod capture;
 pub mod config;
+pub mod console;
 mod elapsed;
+pub mod health;
 mod hold_max;
 pub mod line;
 pub mod mass;
@@ -34,6 +37,8 @@ pub mod strain;
 
 pub use capture::CaptureChannel;
 pub use config::Config;
+pub use console::{Delivered, Orders, RigConsole, Start};
+pub use health::Vitals;
 pub use line::{CommandLine, LineNews};
 pub use rig::{Inputs, Outputs, Rig};
 pub use sampling::AdcBlock;

@@ -1,6 +1,6 @@
 //! The flash image of the rig board. On the host this is an empty program: build the image with `cargo xtask image`.
 //!
-//! What it is: the RTIC application that connects the registers in `board` with `firmware_rig::Rig::tick`.
+//! What it is: the RTIC application that connects the registers in `board` with `firmware_rig::RigConsole`.
 //! What can go wrong: see `board`.
 //! Units: ticks of the capture timer.
 //! Reference: specification `rig.md`.
@@ -20,17 +20,15 @@ fn main() {
 mod app {
     use crate::board::captures::{self, Clock, Edges, EncoderB};
     use crate::board::converter::Converter;
-    use crate::board::health::{self, Collector};
+    use crate::board::health;
     use crate::board::link::Link;
     use crate::board::pulse::PulseOutput;
     use crate::board::supply::SupplyWatch;
     use crate::board::watchdog::{Watchdog, take_reset_cause};
     use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
-    use firmware_rig::{Config, Inputs, Rig, Settings, StopWatch};
-    use frame::calibration::Calibration;
-    use frame::message::{Command, Event, Message, SettingsNews, Trial};
-    use frame::rig::Fault;
+    use firmware_rig::{Config, Delivered, RigConsole, Settings, Start};
+    use frame::message::{Event, SettingsNews, Trial};
     use frame::units::PulseWidth;
     use safe_start::stm32f4::{clock, crash};
     use settings_store::stm32f4::{self as flash, SettingsFlash};
@@ -72,15 +70,12 @@ mod app {
         stop: PB12<Input>,
         tick_timer: TIM4,
         watchdog: Watchdog,
-        rig: Rig,
-        told: Calibration,
-        reset_cause: u8,
+        console: RigConsole,
         encoder_b: EncoderB,
         index: TIM1,
         supply: SupplyWatch,
         flash: SettingsFlash,
-        collector: Collector,
-        stops: StopWatch,
+        index_marks: u16,
         sampling: u16,
     }
 
@@ -134,27 +129,14 @@ mod app {
         device.TIM1.ccer().write(|w| w.cc1e().set_bit());
         let mut flash = SettingsFlash(device.FLASH);
         let (stored, news) = settings_store::load(&mut flash, flash::RANGE);
-        let factory = Config::thesis_570kv();
-        let settings = stored.unwrap_or_else(|| Settings::of(&factory));
-        let mut rig = Rig::with_settings(factory, settings);
-        if clock_news.crystal_hz == 0 {
-            rig.stand(Fault::ClockFailed);
-        }
-        captures::start(&device.TIM2, rig.fitted());
-        let sampling = rig.config().sampling_cycles();
-        let converter = Converter::start(device.ADC1, &device.ADC_COMMON, &dma, sampling);
-        let mut link = Link::start(device.USART1, &dma);
-
-        let told = rig.calibration();
         let mut clock = Clock::default();
         let now = clock.now(device.TIM2.cnt().read().bits());
-        link.send(now, &Message::Hello(rig.hello(reset_cause)));
-        link.send(now, &Message::Calibration(told));
-        link.send(now, &Message::Event(Event::Settings(news)));
-        link.send(now, &Message::Event(Event::Clock(clock_news)));
-        if let Some(ended) = crash::take() {
-            link.send(now, &Message::Event(ended));
-        }
+        let start = Start { reset_cause, clock: clock_news, stored, news, ended: crash::take() };
+        let console = RigConsole::start(now, Config::thesis_570kv(), &start);
+        captures::start(&device.TIM2, console.rig().fitted());
+        let sampling = console.rig().config().sampling_cycles();
+        let converter = Converter::start(device.ADC1, &device.ADC_COMMON, &dma, sampling);
+        let link = Link::start(device.USART1, &dma);
         defmt::info!("rig board, reset cause {=u8:#x}, {}", reset_cause, clock_news);
 
         let tick_timer = device.TIM4;
@@ -176,15 +158,12 @@ mod app {
             stop,
             tick_timer,
             watchdog,
-            rig,
-            told,
-            reset_cause,
+            console,
             encoder_b,
             index: device.TIM1,
             supply: SupplyWatch::start(device.PWR),
             flash,
-            collector: Collector::default(),
-            stops: StopWatch::default(),
+            index_marks: 0,
             sampling,
         };
         (Shared { capture_timer: device.TIM2, to_store: None, stored: None, to_log: None }, local)
@@ -238,15 +217,15 @@ mod app {
     }
 
     #[task(binds = TIM4, priority = 2, shared = [capture_timer, to_store, stored, to_log], local = [
-        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, rig, told, reset_cause, index, supply, collector,
-        stops, sampling
+        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, console, index, index_marks, supply, sampling
     ])]
     fn tick(mut cx: tick::Context) {
         let start = health::cycles();
         let board = cx.local;
         board.tick_timer.sr().write(|w| w.uif().clear());
         // a stop acts here already; the rig latches it in its next tick and gives minimum from then on
-        let half = board.stops.half(board.stop.is_high(), board.link.listen(board.dma));
+        board.link.listen(board.dma, board.console);
+        let half = board.console.look(board.stop.is_high());
         if half.minimum {
             board.pulse.set(PulseWidth::MIN);
         }
@@ -255,33 +234,31 @@ mod app {
         }
         crash::look_at_clock();
         let over_capture = captures::drain(board.edges);
-        let fitted = board.rig.fitted();
+        let fitted = board.console.rig().fitted();
         let counter = cx.shared.capture_timer.lock(|timer| {
             captures::arm(timer, fitted);
             timer.cnt().read().bits()
         });
         let now = board.clock.now(counter);
         MILLIS.store(now.as_ms() as u32, Ordering::Relaxed);
-        let (command, line) = board.link.next();
-        let inputs = Inputs {
+        if board.index.sr().read().cc1if().bit() {
+            let _ = board.index.ccr1().read(); // reading takes the flag down
+            *board.index_marks = board.index_marks.wrapping_add(1);
+        }
+        let adc = board.converter.drain(board.dma);
+        let delivered = Delivered {
             now,
             edges: board.edges.each_ref().map(|edges| edges.as_slice()),
             over_capture,
-            adc: board.converter.drain(board.dma),
-            command,
-            line,
-            stop_input: board.stops.take(),
+            adc: &adc,
             brown_out: board.supply.is_low(),
             paused: flash::PAUSED.swap(false, Ordering::Acquire),
+            stored: cx.shared.stored.lock(Option::take),
+            vitals: Some(health::vitals(*board.index_marks)),
         };
-        let outputs = board.rig.tick(&inputs);
-        board.pulse.set(outputs.pulse);
+        let orders = board.console.tick(&delivered, |pulse| board.pulse.set(pulse));
         board.watchdog.feed();
-        if board.index.sr().read().cc1if().bit() {
-            let _ = board.index.ccr1().read(); // reading takes the flag down
-            board.collector.index = board.collector.index.wrapping_add(1);
-        }
-        if let Some(trial) = outputs.trial {
+        if let Some(trial) = orders.trial {
             let number = match trial {
                 Trial::Panic => 1,
                 Trial::Hang => 2,
@@ -289,40 +266,21 @@ mod app {
             };
             TRIAL.store(number, Ordering::Relaxed);
         }
-        if let Some(settings) = outputs.store {
+        if orders.store {
+            let settings = board.console.rig().settings();
             cx.shared.to_store.lock(|wanted| *wanted = Some(settings));
             STORE.store(true, Ordering::Release);
         }
-        if let Some(news) = cx.shared.stored.lock(Option::take) {
-            board.link.send(now, &Message::Event(Event::Settings(news)));
+        if let Some(event) = orders.event {
+            cx.shared.to_log.lock(|waiting| *waiting = Some(event));
+            LOG.store(true, Ordering::Release);
         }
-        let sampling = board.rig.config().sampling_cycles();
+        let sampling = board.console.rig().config().sampling_cycles();
         if sampling != *board.sampling {
             *board.sampling = sampling;
             board.converter.set_sampling(sampling);
         }
-        if let Some(health) = board.collector.tick(now, board.link.frames()) {
-            board.link.send(now, &Message::Health(health));
-        }
-
-        if let Some(sample) = outputs.sample {
-            board.link.send(now, &Message::Rig(sample));
-        }
-        if let Some(event) = outputs.event {
-            cx.shared.to_log.lock(|waiting| *waiting = Some(event));
-            LOG.store(true, Ordering::Release);
-            board.link.send(now, &Message::Event(event));
-        }
-        let calibration = board.rig.calibration();
-        let identify = command == Some(Command::Identify);
-        if identify {
-            board.link.send(now, &Message::Hello(board.rig.hello(*board.reset_cause)));
-        }
-        if identify || calibration != *board.told {
-            *board.told = calibration;
-            board.link.send(now, &Message::Calibration(calibration));
-        }
-        board.link.flush(board.dma);
+        board.link.flush(board.dma, board.console);
         health::tick_took(start);
     }
 }

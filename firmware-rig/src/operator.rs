@@ -54,7 +54,7 @@ impl Rig {
                 self.run(now, Schedule::Chirp(Chirp { centre, amplitude, from_mhz, to_mhz, length_ms }))
             }
             Command::Configure(setting) => self.configure(&setting),
-            Command::SaveSettings => self.at_rest().map(|()| self.store = Some(self.settings)),
+            Command::SaveSettings => self.at_rest().map(|()| self.store = true),
             Command::MassPoint { mass_g } => self.take_mass(mass_g),
             Command::Imu(_) => Err(Refusals(Refusals::WRONG_STATE)), // meant for the other board
             Command::MassFit => self.fit_masses(),

@@ -32,7 +32,7 @@ pub struct Inputs<'a> {
     /// The channel's over-capture flag was set, or its queue was full.
     pub over_capture: [bool; CAPTURE_CHANNELS],
     /// What the converter delivered since the last tick.
-    pub adc: [AdcBlock; ADC_CHANNELS],
+    pub adc: &'a [AdcBlock; ADC_CHANNELS],
     /// At most one decoded command of the host.
     pub command: Option<Command>,
     /// What went wrong on the host's line since the last tick.
@@ -54,8 +54,8 @@ pub struct Outputs {
     pub sample: Option<RigSample>,
     /// The oldest event that has not been told yet.
     pub event: Option<Event>,
-    /// The operator asks for these settings to be stored.
-    pub store: Option<Settings>,
+    /// The operator asks for the settings in force to be stored.
+    pub store: bool,
     /// The operator asks for this trial of the last resort.
     pub trial: Option<Trial>,
 }
@@ -78,7 +78,7 @@ pub struct Rig {
     pub(crate) factory: Config,
     pub(crate) settings: Settings,
     pub(crate) masses: MassPoints,
-    pub(crate) store: Option<Settings>,
+    pub(crate) store: bool,
     pub(crate) trial: Option<Trial>,
     entered: Elapsed,
     setting: PulseWidth,
@@ -111,7 +111,7 @@ impl Rig {
             factory,
             settings,
             masses: MassPoints::new(),
-            store: None,
+            store: false,
             trial: None,
             bank: CaptureBank::new(&config),
             calibration: untared,
@@ -216,7 +216,7 @@ impl Rig {
             self.tell(Event::Refused(Refusals(Refusals::REPLAYED)));
         }
         self.bank.take(now, &inputs.edges, &inputs.over_capture);
-        for (whole, part) in self.blocks.iter_mut().zip(&inputs.adc) {
+        for (whole, part) in self.blocks.iter_mut().zip(inputs.adc) {
             whole.add(part);
         }
         self.protect(now, tick_ms, inputs);
@@ -229,8 +229,7 @@ impl Rig {
         }
         let pulse = self.drive(now, tick_ms);
         let sample = (now >= self.next_sample).then(|| self.sample(now, pulse));
-        // asked first: taking what is not there would move the whole of it, every tick
-        let store = if self.store.is_some() { self.store.take() } else { None };
+        let store = core::mem::take(&mut self.store);
         let trial = self.trial.take();
         Outputs { pulse, sample, event: self.events.pop_front(), store, trial }
     }
@@ -272,7 +271,7 @@ impl Rig {
     }
 
     fn protect(&mut self, now: Ticks, tick_ms: u32, inputs: &Inputs<'_>) {
-        let adc = &inputs.adc;
+        let adc = inputs.adc;
         let [strain, rest @ ..] = adc;
         let [_, live_zero @ ..] = &self.config.live_zero;
         let top = self.config.converter.top();

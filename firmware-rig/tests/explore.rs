@@ -172,7 +172,7 @@ impl Walk {
             now: Ticks(self.ms * MS),
             edges: [&[], if turn { &edge } else { &[] }, &[], &[]],
             over_capture: [false; 4],
-            adc: [AdcBlock::default(); 5],
+            adc: &[AdcBlock::default(); 5],
             command,
             line: LineNews::default(),
             stop_input: false,
@@ -180,11 +180,12 @@ impl Walk {
             paused: false,
         };
         change(&mut inputs, &mut counts);
-        inputs.adc = counts.map(|code| {
+        let adc = counts.map(|code| {
             let mut block = AdcBlock::default();
             (0..4).for_each(|_| block.push(code));
             block
         });
+        let inputs = Inputs { adc: &adc, ..inputs };
         let outputs = self.rig.tick(&inputs);
         let (before, now) = (self.state, self.rig.state());
         (self.state, self.pulse) = (now, outputs.pulse);

@@ -14,7 +14,7 @@ fn ticks_that_jitter_by_interrupts_leave_the_samples_evenly_spaced() {
             now: Ticks(n * 84_000 + late),
             edges: [&[]; 4],
             over_capture: [false; 4],
-            adc: [AdcBlock::default(); 5],
+            adc: &[AdcBlock::default(); 5],
             command: None,
             line: LineNews::default(),
             stop_input: false,

@@ -19,7 +19,7 @@ fn say(rig: &mut Rig, commands: &[Command]) -> Vec<Event> {
             now: Ticks(ms * 84_000),
             edges: [&[]; 4],
             over_capture: [false; 4],
-            adc,
+            adc: &adc,
             command,
             line: LineNews::default(),
             stop_input: false,

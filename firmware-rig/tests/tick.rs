@@ -60,7 +60,7 @@ impl Bench {
             now: Ticks(self.ms * MS),
             edges,
             over_capture: [false; 4],
-            adc,
+            adc: &adc,
             command: command.or(keep_alive),
             line: LineNews::default(),
             stop_input: self.stop_line,

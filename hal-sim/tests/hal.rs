@@ -6,14 +6,14 @@ use embedded_hal::pwm::SetDutyCycle;
 use embedded_io::{Read, ReadReady, Write};
 use esc_pwm::PulseTimer;
 use firmware_ahrs::{SensorError, lis3dh};
-use firmware_rig::Config;
 use firmware_rig::queue::{CAPACITY, EdgeQueue};
+use firmware_rig::{Config, Delivered, RigConsole, Start};
 use frame::calibration::Converted;
-use frame::message::{Command, Event, Hello, Message};
+use frame::message::{ClockNews, Command, Event, Hello, Message, SettingsNews};
 use frame::rig::{CAPTURE_CHANNELS, Fault, RigSample, RigState};
 use frame::units::{PulseWidth, Ticks};
 use frame::wire::{Decoder, Encoder, MAX_WIRE};
-use hal_sim::hal::{CaptureTimer, PulsePin, RigBoard, RigPins, ScanConverter, SerialEnd, SpiPort, VirtualClock, Watchdog};
+use hal_sim::hal::{CaptureTimer, PulsePin, RigPins, ScanConverter, SerialEnd, SpiPort, VirtualClock, Watchdog};
 use hal_sim::imu::{ChipErrors, Lis3dh, Motion};
 use hal_sim::{Scenario, Truth};
 
@@ -23,10 +23,75 @@ fn timer() -> PulseTimer {
     PulseTimer::new(84_000_000, 16).unwrap()
 }
 
+/// The firmware's console over the back ends: what the flash image does with registers, in the same order.
+struct Program {
+    console: RigConsole,
+    pulse: PulsePin,
+    line: SerialEnd,
+    captures: CaptureTimer,
+    queues: [EdgeQueue; CAPTURE_CHANNELS],
+    converter: ScanConverter,
+    watchdog: Watchdog,
+    now: Ticks,
+}
+
+impl Program {
+    fn start(pins: &RigPins, line: SerialEnd) -> Self {
+        let clock = ClockNews { crystal_hz: 8_000_000, measured_hz: 8_000_000 };
+        let news = SettingsNews::Absent;
+        let start = Start { reset_cause: pins.reset_cause(), clock, stored: None, news, ended: None };
+        let console = RigConsole::start(Ticks(0), Config::thesis_570kv(), &start);
+        Self {
+            pulse: PulsePin::start(pins, timer(), timer().ticks(PulseWidth::MIN) as u16),
+            line,
+            captures: CaptureTimer::start(pins),
+            queues: Default::default(),
+            converter: ScanConverter::start(pins, console.rig().config().sampling_cycles()),
+            watchdog: Watchdog::start(pins, 20_000_000),
+            now: Ticks(0),
+            console,
+        }
+    }
+
+    /// What the board's timer interrupt does every half millisecond.
+    fn half_tick(&mut self) {
+        let mut byte = [0];
+        while matches!(self.line.read_ready(), Ok(true)) && matches!(self.line.read(&mut byte), Ok(1)) {
+            self.console.hear(byte[0]);
+        }
+        let half = self.console.look(false);
+        if half.minimum {
+            self.pulse.set_duty_cycle(timer().ticks(PulseWidth::MIN) as u16).unwrap();
+        }
+        if !half.tick {
+            return;
+        }
+        let over_capture = self.captures.serve(&self.queues);
+        let edges = self.queues.each_ref().map(|queue| core::iter::from_fn(|| queue.take()).collect::<Vec<u32>>());
+        let counter = self.captures.counter();
+        self.now = Ticks(self.now.0 + u64::from(counter.wrapping_sub(self.now.0 as u32)));
+        let delivered = Delivered {
+            now: self.now,
+            edges: edges.each_ref().map(Vec::as_slice),
+            over_capture,
+            adc: &self.converter.drain(),
+            brown_out: false,
+            paused: false,
+            stored: None,
+            vitals: None,
+        };
+        let pin = &mut self.pulse;
+        self.console.tick(&delivered, |pulse| pin.set_duty_cycle(timer().ticks(pulse) as u16).unwrap());
+        self.watchdog.feed();
+        let _ = self.line.write_all(self.console.queued()); // a cut line hears nothing
+        self.console.sent();
+    }
+}
+
 /// Board, line and an operator at the other end of it.
 struct Table {
     pins: RigPins,
-    board: Option<RigBoard<PulsePin, SerialEnd>>,
+    board: Option<Program>,
     board_end: SerialEnd,
     host: SerialEnd,
     encoder: Encoder,
@@ -64,7 +129,7 @@ impl Table {
 
     /// The program starts (again).
     fn reset(&mut self) {
-        self.board = Some(RigBoard::start(&self.pins, self.board_end.clone(), Config::thesis_570kv()).unwrap());
+        self.board = Some(Program::start(&self.pins, self.board_end.clone()));
     }
 
     fn tell(&mut self, command: Command) {
@@ -183,7 +248,7 @@ fn a_cut_line_and_a_stop_reach_the_pin() {
         assert!(ms < 42.0 + if cut { f64::from(limit) + 200.0 } else { 0.0 }, "{ms} ms");
         table.pass(20);
         let fault = if cut { Fault::LinkLost } else { Fault::OperatorStop };
-        assert!(table.board.as_ref().is_some_and(|b| b.rig().faults().contains(fault)));
+        assert!(table.board.as_ref().is_some_and(|b| b.console.rig().faults().contains(fault)));
     }
 }
 
@@ -204,7 +269,7 @@ fn a_program_that_hangs_is_reset_and_starts_at_minimum() {
     table.events.clear();
     table.pass(42);
     assert!((table.pins.truth().pulse_us - 1000.0).abs() < 0.5, "minimum within two frames of the reset");
-    assert!(table.board.as_ref().is_some_and(|b| b.rig().state() == RigState::Disarmed));
+    assert!(table.board.as_ref().is_some_and(|b| b.console.rig().state() == RigState::Disarmed));
     let causes: Vec<u8> = table.hellos.iter().map(|h| h.reset_cause).collect();
     assert_eq!(causes, [0x0E, 0x24], "power-on with brown-out and pin; watchdog with pin");
 }

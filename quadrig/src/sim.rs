@@ -110,7 +110,7 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
 fn replayed(scenario: &Scenario, path: &Path, quiet: bool) -> Result<RunRecord, Failure> {
     let pins = PinRecord::read(path)?;
     let bar = Bar::new("replaying", quiet);
-    let telemetry = pins.replay(scenario, &mut |share| bar.set(share))?;
+    let telemetry = pins.replay(scenario, &mut |share| bar.set(share));
     Ok(RunRecord::from_telemetry(scenario, telemetry)?)
 }
 

@@ -7,11 +7,10 @@
 //! Units: ms of real time.
 //! Reference: specification `rig.md`; `formats.md`, "Telemetry".
 
-use firmware_rig::{CommandLine, Inputs, Rig};
-use frame::message::{Beep, Command, Message};
+use frame::message::{Beep, Message};
 use frame::units::{PulseWidth, Ticks};
-use frame::wire::{Encoder, MAX_WIRE};
-use hal_sim::native::firmware_config;
+use frame::wire::Decoder;
+use hal_sim::native::{Board, Wires, firmware_config};
 use hal_sim::{Bench, EdgeDetail, Millisecond, Scenario};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
@@ -233,10 +232,9 @@ fn play(
 ) {
     let scenario = Scenario::default();
     let mut bench = Bench::new(&scenario, None, EdgeDetail::Captured);
-    let mut rig = Rig::new(firmware_config(&scenario));
-    let (mut commands, mut encoder, mut gathered) = (CommandLine::new(), Encoder::default(), Millisecond::default());
+    let mut board = Board::new(firmware_config(&scenario));
+    let (mut gathered, mut decoder) = (Millisecond::default(), Decoder::default());
     let mut spoiler = Spoiler { line, sent: 0, runs_on: false };
-    let mut pulse = PulseWidth::MIN;
     let mut frame = PulseWidth::MIN;
     let mut pace = Pace { begun: Instant::now() };
     for ms in 1u64.. {
@@ -245,7 +243,7 @@ fn play(
         }
         pace.wait(ms);
         match ms % 20 {
-            0 => frame = pulse,
+            0 => frame = board.pulse(),
             2 => bench.pulse((ms - 2) * 1_000_000 + u64::from(frame.0), frame.0),
             _ => {}
         }
@@ -257,36 +255,14 @@ fn play(
         let mut bytes = [0; 512];
         let mut plugged = cable.lock().expect("nobody panics with it");
         let heard = plugged.as_mut().map_or(0, |cable| cable.hear(&mut bytes));
-        bytes[..heard].iter().for_each(|b| commands.take(*b));
-        let (command, news) = commands.next_command();
-        let now = Ticks::from_ms(ms);
-        let before = rig.calibration();
-        let outputs = rig.tick(&Inputs {
-            now,
-            edges: core::array::from_fn(|i| gathered.edges[i].as_slice()),
-            over_capture: [false; 4],
-            adc: gathered.adc,
-            command,
-            line: news,
-            stop_input: false,
-            brown_out: false,
-            paused: false,
-        });
-        pulse = outputs.pulse;
-        done.lock().expect("nobody panics with it").pulses.push(pulse);
-        let identify = command == Some(Command::Identify);
-        let told = [
-            identify.then(|| Message::Hello(rig.hello(0x08))),
-            (identify || rig.calibration() != before).then(|| Message::Calibration(rig.calibration())),
-            outputs.sample.map(Message::Rig),
-            outputs.event.map(Message::Event),
-        ];
-        for message in told.into_iter().flatten() {
-            let mut wire = [0; MAX_WIRE];
-            let used = encoder.encode(now, &message, &mut wire).expect("it fits");
-            let (bytes, whole) = spoiler.spoil(&wire[..used], ms);
+        board.hear(&bytes[..heard]);
+        board.millisecond(Ticks::from_ms(ms), &gathered, Wires::SOUND);
+        done.lock().expect("nobody panics with it").pulses.push(board.pulse());
+        for frame in board.sent().split_inclusive(|byte| *byte == 0) {
+            let (bytes, whole) = spoiler.spoil(frame, ms);
             let arrived = plugged.as_mut().is_some_and(|cable| cable.say(&bytes));
-            if let (true, true, Message::Rig(sample)) = (arrived, whole, message) {
+            let message = frame.iter().find_map(|byte| decoder.push::<Message>(*byte)).map(|received| received.message);
+            if let (true, true, Some(Message::Rig(sample))) = (arrived, whole, message) {
                 done.lock().expect("nobody panics with it").whole.push(sample.at);
             }
         }

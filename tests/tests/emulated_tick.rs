@@ -131,7 +131,7 @@ fn native(samples: &[RigSample], captures: &[Vec<u64>; CAPTURE_CHANNELS]) -> Vec
             now: Ticks(now),
             edges: core::array::from_fn(|c| taken[c].as_slice()),
             over_capture: [false; CAPTURE_CHANNELS],
-            adc,
+            adc: &adc,
             command: None,
             line: Default::default(),
             stop_input: false,

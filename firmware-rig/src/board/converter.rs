@@ -100,14 +100,24 @@ impl Converter {
         }
         let left = usize::from(dma.st(0).ndtr().read().ndt().bits());
         let head = (LENGTH.saturating_sub(left) / ADC_CHANNELS) % SCANS;
-        let mut blocks = [AdcBlock::default(); ADC_CHANNELS];
-        while self.tail != head {
-            let scan = BUFFER.iter().skip(self.tail * ADC_CHANNELS);
-            for (block, code) in blocks.iter_mut().zip(scan) {
-                block.push(code.load(Ordering::Relaxed));
-            }
-            self.tail = (self.tail + 1) % SCANS;
-        }
-        blocks
+        let tail = core::mem::replace(&mut self.tail, head);
+        let parts = if tail <= head { [scans(tail, head), &[]] } else { [scans(tail, SCANS), scans(0, head)] };
+        core::array::from_fn(|channel| sum(channel, parts))
     }
+}
+
+/// Codes of the scans from one to before another.
+fn scans(from: usize, to: usize) -> &'static [AtomicU16] {
+    BUFFER.get(from * ADC_CHANNELS..to * ADC_CHANNELS).unwrap_or(&[])
+}
+
+/// One channel at a time, so that its sums stay in registers.
+fn sum(channel: usize, parts: [&[AtomicU16]; 2]) -> AdcBlock {
+    let mut block = AdcBlock::default();
+    for part in parts {
+        for code in part.iter().skip(channel).step_by(ADC_CHANNELS) {
+            block.push(code.load(Ordering::Relaxed));
+        }
+    }
+    block
 }

@@ -1,14 +1,13 @@
-//! How the board is: stack, cycles, jitter, the encoder's direction and index.
+//! What the processor measures of itself: stack, cycles, the encoder's direction.
 //!
-//! What it is: counters that the interrupts fill and the tick sends once a second; the painted stack is measured in the idle loop.
+//! What it is: counters that the interrupts fill and the tick reads; the painted stack is measured in the idle loop.
 //! What can go wrong: none of it is used for control; a counter that wraps is only a figure.
-//! Units: core cycles (DWT), timer ticks, bytes.
+//! Units: core cycles (DWT), bytes.
 //! Reference: cortex-m-rt, feature `paint-stack`; ARMv7-M DWT_CYCCNT.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::DWT;
-use frame::message::Health;
-use frame::units::Ticks;
+use firmware_rig::Vitals;
 
 /// Most cycles of a tick and of a capture interrupt.
 static TICK: AtomicU32 = AtomicU32::new(0);
@@ -63,40 +62,15 @@ pub(crate) fn measure_stack() {
     STACK_FREE.store((at - end) as u32, Ordering::Relaxed);
 }
 
-/// What the tick collects.
-#[derive(Default)]
-pub(crate) struct Collector {
-    last: Option<Ticks>,
-    span: Option<[u32; 2]>,
-    next: Ticks,
-    steps: [u32; 2],
-    /// Index marks of the encoder.
-    pub(crate) index: u16,
-}
-
-impl Collector {
-    /// Notes a tick; a report once a second.
-    pub(crate) fn tick(&mut self, now: Ticks, frames: [u16; 3]) -> Option<Health> {
-        if let Some(last) = self.last.replace(now) {
-            let span = now.since(last).0 as u32;
-            self.span = Some(self.span.map_or([span; 2], |[low, high]| [low.min(span), high.max(span)]));
-        }
-        if now < self.next {
-            return None;
-        }
-        self.next = Ticks(now.0 + Ticks::from_ms(1000).0);
-        let total = [FORWARD.load(Ordering::Relaxed), BACKWARD.load(Ordering::Relaxed)];
-        let [[forward, backward], [f, b]] = [total, core::mem::replace(&mut self.steps, total)];
-        let (end, start) = bounds::stack();
-        Some(Health {
-            tick_cycles: TICK.load(Ordering::Relaxed),
-            capture_cycles: CAPTURE.load(Ordering::Relaxed),
-            stack_free: STACK_FREE.load(Ordering::Relaxed),
-            stack_size: (start - end) as u32,
-            tick_span: self.span.take().unwrap_or_default(),
-            frames,
-            steps: [forward.wrapping_sub(f) as u16, backward.wrapping_sub(b) as u16],
-            index: self.index,
-        })
+/// What this processor measures of itself; `index` is the encoder's index marks so far.
+pub(crate) fn vitals(index: u16) -> Vitals {
+    let (end, start) = bounds::stack();
+    Vitals {
+        tick_cycles: TICK.load(Ordering::Relaxed),
+        capture_cycles: CAPTURE.load(Ordering::Relaxed),
+        stack_free: STACK_FREE.load(Ordering::Relaxed),
+        stack_size: (start - end) as u32,
+        steps: [FORWARD.load(Ordering::Relaxed), BACKWARD.load(Ordering::Relaxed)],
+        index,
     }
 }

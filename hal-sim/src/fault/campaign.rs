@@ -1,6 +1,6 @@
 //! One planned mishap, flown natively: firmware, codec, pulse timer and bench in one loop of a millisecond.
 //!
-//! What it is: arming through the ESC's beeps, one level, the mishap at its instant, and the judgement from outside: the pulses
+//! What it is: the native run's board behind its line: arming through the ESC's beeps, one level, the mishap at its instant, and the judgement from outside: the pulses
 //! on the ESC pin and the decoded telemetry, nothing else.
 //! What can go wrong: see [`Failure`]; each names the seed's plan.
 //! Units: ms since power-up.
@@ -8,10 +8,10 @@
 
 use super::{Mishap, PING_MS, Plan, REACTION_MS};
 use crate::bench::{Bench, Millisecond};
-use crate::native::firmware_config;
+use crate::native::{Board, POWER_ON, WATCHDOG, Wires, firmware_config};
 use crate::scenario::Scenario;
 use crate::sensor::EdgeDetail;
-use firmware_rig::{AdcBlock, CommandLine, Config, Inputs, LineNews, Rig};
+use firmware_rig::{AdcBlock, Config};
 use frame::message::{Command, Event, Message};
 use frame::rig::{FaultSet, RigState};
 use frame::units::{PulseWidth, Ticks};
@@ -91,21 +91,6 @@ pub struct Survived {
     pub faults: FaultSet,
 }
 
-/// The board with its pulse timer.
-struct Board {
-    rig: Rig,
-    line: CommandLine,
-    encoder: Encoder,
-    /// Compare register: the width of the pulses from the next frame on; `None` after a reset, while nothing drives the pin and its pull-down holds it low.
-    register: Option<PulseWidth>,
-}
-
-impl Board {
-    fn new(config: Config) -> Self {
-        Self { rig: Rig::new(config), line: CommandLine::new(), encoder: Encoder::default(), register: Some(PulseWidth::MIN) }
-    }
-}
-
 /// The far side: a host that arms, runs, and hears.
 #[derive(Default)]
 struct Host {
@@ -160,11 +145,12 @@ fn config(plan: &Plan, scenario: &Scenario, defenceless: bool) -> Config {
 /// The whole run.
 struct Flight {
     plan: Plan,
-    scenario: Scenario,
     /// The protection that answers the mishap is taken away.
     defenceless: bool,
     bench: Bench,
     board: Board,
+    /// After a reset, while nothing drives the pin and its pull-down holds it low.
+    undriven: bool,
     host: Host,
     ms: u64,
     /// Start of each pulse above minimum, ms.
@@ -194,7 +180,7 @@ impl Flight {
         Self {
             bench: Bench::new(&scenario, None, EdgeDetail::Captured),
             board: Board::new(config(&plan, &scenario, defenceless)),
-            scenario,
+            undriven: false,
             plan,
             defenceless,
             host: Host::default(),
@@ -219,7 +205,8 @@ impl Flight {
         }
         if self.ms == self.next_frame {
             self.next_frame += FRAME_MS;
-            if let Some(width) = self.board.register {
+            if !self.undriven {
+                let width = self.board.pulse();
                 self.pulse = Some((self.ms + 2, width));
                 self.train.get_or_insert(self.ms);
                 if width.is_live() {
@@ -238,7 +225,9 @@ impl Flight {
             Some(Away::Hangs { until }) if self.ms >= until => self.reset(self.ms),
             Some(Away::Resets { until }) if self.ms >= until => {
                 self.away = None;
-                self.board = Board::new(config(&self.plan, &self.scenario, self.defenceless));
+                let cause = if self.plan.mishap == Mishap::Hang { WATCHDOG } else { POWER_ON };
+                self.board = self.board.after_reset(Ticks::from_ms(self.ms), cause);
+                self.undriven = false;
                 self.next_frame = self.ms;
                 self.train = None;
                 self.pulses();
@@ -248,7 +237,9 @@ impl Flight {
         if self.away.is_some() {
             return;
         }
-        bytes.iter().for_each(|byte| self.board.line.take(*byte));
+        // a board that lacks the protection against bad frames does not know that they came
+        let unknown = self.defenceless && matches!(mishap, Some(Mishap::CorruptFrames | Mishap::Replay));
+        self.board.hear(if unknown { &[] } else { bytes });
         if self.skip_ticks > 0 {
             self.skip_ticks -= 1;
             return;
@@ -265,30 +256,13 @@ impl Flight {
             Some(Mishap::NoConversions) => gathered.adc = Default::default(),
             _ => {}
         }
-        let (command, mut line): (Option<Command>, LineNews) = self.board.line.next_command();
-        if self.defenceless {
-            line = LineNews::default();
-        }
-        let now = Ticks::from_ms(self.ms);
-        let outputs = self.board.rig.tick(&Inputs {
-            now,
-            edges: core::array::from_fn(|i| gathered.edges[i].as_slice()),
-            over_capture: [false; 4],
-            adc: gathered.adc,
-            command,
-            line,
-            stop_input: mishap == Some(Mishap::StopOpen) && !self.defenceless,
+        let wires = Wires {
+            stop_open: mishap == Some(Mishap::StopOpen) && !self.defenceless,
             brown_out: mishap == Some(Mishap::SupplyDip) && !self.defenceless,
-            paused: false,
-        });
-        self.board.register = Some(outputs.pulse);
-        let told = [outputs.sample.map(Message::Rig), outputs.event.map(Message::Event)];
-        for message in told.into_iter().flatten() {
-            let mut wire = [0; MAX_WIRE];
-            if let Ok(used) = self.board.encoder.encode(now, &message, &mut wire) {
-                self.host.hear(&wire[..used]);
-            }
-        }
+        };
+        self.board.millisecond(Ticks::from_ms(self.ms), gathered, wires);
+        let sent = self.board.sent();
+        self.host.hear(&sent);
     }
 
     /// The pin goes low at once; the program starts anew a little later.
@@ -296,7 +270,7 @@ impl Flight {
         let boot = if self.defenceless { SLOW_BOOT_MS } else { BOOT_MS };
         self.away = Some(Away::Resets { until: from + boot });
         self.back = from;
-        self.board.register = None;
+        self.undriven = true;
         self.train = None;
         self.pulse = None;
         self.next_frame = u64::MAX;
@@ -398,7 +372,7 @@ fn flown(mut flight: Flight) -> Result<Survived, Failure> {
         return Err(Failure::NeverRan { plan, state: flight.host.state });
     }
     let struck = flight.ms;
-    let detection = plan.mishap.detection(rpm, flight.board.rig.config().marks).ms;
+    let detection = plan.mishap.detection(rpm, flight.board.rig().config().marks).ms;
     let bytes = flight.strike();
     flight.millisecond(&mut gathered, &bytes, Some(plan.mishap));
     let end = struck + (detection + REACTION_MS).ceil() as u64 + WATCH_MS;
@@ -416,7 +390,7 @@ fn judge(flight: &Flight, struck: u64, rpm: f64, detection: f64) -> Result<Survi
     if late_ms > 0.0 {
         return Err(Failure::Live { plan, late_ms });
     }
-    let state = flight.board.rig.state();
+    let state = flight.board.rig().state();
     match plan.mishap.fault() {
         Some(fault) if !flight.host.faults.contains(fault) => {
             return Err(Failure::Unnamed { plan, told: flight.host.faults });

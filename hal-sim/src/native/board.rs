@@ -1,85 +1,140 @@
 //! The board of a native run.
 //!
-//! What it is: firmware, codec and the timer that makes the pulses; one call a control tick.
-//! What can go wrong: a message that does not fit its frame.
+//! What it is: the firmware's console with what stands around it on a desk: the pulse timer's register, the flash, the resets. One call a
+//! control tick; native run, fault campaign and virtual boards use this one.
+//! What can go wrong: more captures in a millisecond than the board's queue holds are lost and told, as there.
 //! Units: ticks of 84 MHz.
-//! Reference: house rule 1 (ticks without I/O).
+//! Reference: house rules 1 (ticks without I/O) and 12 (one shell, many hosts).
 
-use super::SimError;
 use crate::bench::Millisecond;
-use firmware_rig::{Config, Inputs, Rig};
-use frame::message::{Command, Message};
+use firmware_rig::queue::CAPACITY;
+use firmware_rig::{Config, Delivered, Rig, RigConsole, Settings, Start};
+use frame::message::{ClockNews, Event, SettingsNews, Trial};
 use frame::units::{PulseWidth, Ticks};
-use frame::wire::{Decoder, Encoder, MAX_WIRE};
-/// The board's side: firmware, codec and the timer that makes the pulses.
-pub(super) struct Board {
-    pub(super) rig: Rig,
-    pub(super) encoder: Encoder,
-    pub(super) decoder: Decoder,
-    pub(super) pulse: PulseWidth,
-    pub(super) sent: Vec<u8>,
+
+/// Reset cause after power-on: power-on, brown-out and pin flags (RM0090 section 7.3.21).
+pub const POWER_ON: u8 = 0x0E;
+/// Reset cause of the watchdog: its own flag and the pin's.
+pub const WATCHDOG: u8 = 0x24;
+/// Reset cause of a panic: software's flag and the pin's.
+pub const SOFTWARE: u8 = 0x14;
+/// The crystal of a board on a desk, Hz.
+const CRYSTAL: ClockNews = ClockNews { crystal_hz: 8_000_000, measured_hz: 8_000_000 };
+/// Ticks that the self-test's trial holds up.
+const LATE_TICKS: u32 = 8;
+
+/// What the board's pins show beside captures and conversions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wires {
+    /// The stop loop is open.
+    pub stop_open: bool,
+    /// The board's own supply is too low.
+    pub brown_out: bool,
+}
+
+impl Wires {
+    /// The stop loop closed, the supply in order.
+    pub const SOUND: Self = Self { stop_open: false, brown_out: false };
+}
+
+/// The board with its pulse timer and its flash.
+pub struct Board {
+    console: RigConsole,
+    factory: Config,
+    flash: Option<Settings>,
+    stored: Option<SettingsNews>,
+    pulse: PulseWidth,
+    late: u32,
 }
 
 impl Board {
-    pub(super) fn new(config: Config) -> Self {
-        Self {
-            rig: Rig::new(config),
-            encoder: Encoder::default(),
-            decoder: Decoder::default(),
-            pulse: PulseWidth::MIN,
-            sent: Vec::new(),
-        }
+    /// A board that is switched on, with nothing in its flash.
+    #[must_use]
+    pub fn new(factory: Config) -> Self {
+        Self::start(Ticks(0), factory, None, POWER_ON, None)
     }
 
-    /// Starts again, as after a loss of its supply. The sequence of its frames begins anew as well.
-    pub(super) fn reset(&mut self, config: Config) {
-        *self = Self::new(config);
+    fn start(now: Ticks, factory: Config, flash: Option<Settings>, reset_cause: u8, ended: Option<Event>) -> Self {
+        let news = if flash.is_some() { SettingsNews::Loaded } else { SettingsNews::Absent };
+        let start = Start { reset_cause, clock: CRYSTAL, stored: flash, news, ended };
+        let console = RigConsole::start(now, factory.clone(), &start);
+        Self { console, factory, flash, stored: None, pulse: PulseWidth::MIN, late: 0 }
     }
 
-    /// One control tick with what the peripherals gathered; what it has to tell goes onto the line.
-    pub(super) fn tick(&mut self, now: Ticks, gathered: &Millisecond, command: Option<Command>) -> Result<(), SimError> {
-        let outputs = self.rig.tick(&Inputs {
-            now,
-            edges: core::array::from_fn(|i| gathered.edges[i].as_slice()),
-            over_capture: [false; 4],
-            adc: gathered.adc,
-            command,
-            line: Default::default(),
-            stop_input: false,
-            brown_out: false,
-            paused: false,
-        });
-        self.pulse = outputs.pulse;
-        if let Some(Command::Identify) = command {
-            self.tell(now, &Message::Hello(self.rig.hello(0)))?;
-        }
-        if let Some(Command::Identify | Command::Tare) = command {
-            self.tell(now, &Message::Calibration(self.rig.calibration()))?;
-        }
-        if let Some(sample) = outputs.sample {
-            self.tell(now, &Message::Rig(sample))?;
-        }
-        if let Some(event) = outputs.event {
-            self.tell(now, &Message::Event(event))?;
-        }
-        Ok(())
+    /// The same board after a reset of the given cause: its flash is what it was.
+    #[must_use]
+    pub fn after_reset(&self, now: Ticks, reset_cause: u8) -> Self {
+        Self::start(now, self.factory.clone(), self.flash, reset_cause, None)
     }
 
-    fn tell(&mut self, now: Ticks, message: &Message) -> Result<(), SimError> {
-        let mut frame = [0; MAX_WIRE];
-        let length = self.encoder.encode(now, message, &mut frame).map_err(|_| SimError::Codec)?;
-        self.sent.extend_from_slice(&frame[..length]);
-        Ok(())
+    /// The portable firmware, for reading.
+    #[must_use]
+    pub fn rig(&self) -> &Rig {
+        self.console.rig()
     }
 
-    /// Takes the bytes that the host sent; at most one command is in them.
-    pub(super) fn hear(&mut self, bytes: &[u8]) -> Option<Command> {
-        let mut command = None;
-        for byte in bytes {
-            if let Some(received) = self.decoder.push(*byte) {
-                command = Some(received.message);
+    /// What the timer's compare register holds: the pulse of the next frame.
+    #[must_use]
+    pub fn pulse(&self) -> PulseWidth {
+        self.pulse
+    }
+
+    /// Takes the bytes that arrived on the line.
+    pub fn hear(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.console.hear(*byte));
+    }
+
+    /// The millisecond that ends at `now`: two looks for a stop, and the control tick.
+    pub fn millisecond(&mut self, now: Ticks, gathered: &Millisecond, wires: Wires) {
+        if self.late > 0 {
+            self.late -= 1;
+            return;
+        }
+        for _ in 0..2 {
+            if self.console.look(wires.stop_open).minimum {
+                self.pulse = PulseWidth::MIN;
             }
         }
-        command
+        let fitted = self.console.rig().fitted();
+        let seen = |channel: usize| if fitted >> channel & 1 == 0 { &[][..] } else { gathered.edges[channel].as_slice() };
+        let delivered = Delivered {
+            now,
+            edges: core::array::from_fn(|n| &seen(n)[..seen(n).len().min(CAPACITY)]),
+            over_capture: core::array::from_fn(|n| seen(n).len() > CAPACITY),
+            adc: &gathered.adc,
+            brown_out: wires.brown_out,
+            paused: false, // the flash of a desk takes no time
+            stored: self.stored.take(),
+            vitals: None,
+        };
+        let orders = self.console.tick(&delivered, |pulse| self.pulse = pulse);
+        if orders.store {
+            self.flash = Some(self.console.rig().settings());
+            self.stored = Some(SettingsNews::Saved);
+        }
+        match orders.trial {
+            Some(Trial::Late) => self.late = LATE_TICKS,
+            Some(Trial::Hang) => *self = self.after_reset(now, WATCHDOG),
+            Some(Trial::Panic) => *self = self.after_reset(now, SOFTWARE),
+            None => {}
+        }
+    }
+
+    /// A millisecond of a session: the bytes of the host, then the tick; while the board's supply is gone (`dark`) it is in reset.
+    pub(super) fn pass(&mut self, now: Ticks, gathered: &Millisecond, bytes: &[u8], dark: bool) {
+        if dark {
+            *self = self.after_reset(now, POWER_ON);
+        } else {
+            self.hear(bytes);
+            self.millisecond(now, gathered, Wires::SOUND);
+        }
+    }
+
+    /// Takes the bytes that the board has sent.
+    #[must_use]
+    pub fn sent(&mut self) -> Vec<u8> {
+        let bytes = self.console.queued().to_vec();
+        self.console.sent();
+        bytes
     }
 }

@@ -125,7 +125,8 @@ impl Host {
     pub(super) fn take(&mut self, message: Message, ms: u64) -> Result<(), SimError> {
         match message {
             Message::Hello(hello) => self.hello = Some(hello),
-            Message::Calibration(calibration) => self.calibration = Some(calibration),
+            // a board that was reset in mid-run has lost its tare: the run is read with the one that it began with
+            Message::Calibration(calibration) if self.start.is_none() => self.calibration = Some(calibration),
             Message::Rig(sample) => {
                 if matches!(self.phase, Phase::RestBefore | Phase::Running | Phase::RestAfter) {
                     self.start.get_or_insert(sample.at);

@@ -12,6 +12,7 @@ mod host;
 mod pins;
 mod record;
 
+pub use board::{Board, POWER_ON, SOFTWARE, WATCHDOG, Wires};
 pub use pins::{PinRecord, PinsError};
 pub use record::{RunRecord, SimError};
 
@@ -20,7 +21,6 @@ use crate::noise::{Source, Stream};
 use crate::plant::Powerplant;
 use crate::scenario::{FaultKind, Scenario, ScheduledFault};
 use crate::sensor::EdgeDetail;
-use board::Board;
 use firmware_rig::{AdcBlock, Config};
 use frame::message::Message;
 use frame::rig::RigSample;
@@ -67,7 +67,6 @@ pub struct Session {
     bench: Bench,
     host: Host,
     board: Board,
-    config: Config,
     gathered: Millisecond,
     telemetry: Vec<u8>,
     truth: Vec<Truth>,
@@ -89,8 +88,7 @@ impl Session {
         Self {
             bench: Bench::new(scenario, plant, EdgeDetail::Captured),
             host: Host::new(scenario),
-            board: Board::new(config.clone()),
-            config,
+            board: Board::new(config),
             gathered: Millisecond::default(),
             telemetry: Vec::new(),
             truth: Vec::new(),
@@ -177,7 +175,7 @@ impl Session {
         }
         // The timer takes a new pulse at the start of a 20 ms frame; the pulse has ended 2 ms later at the latest.
         match ms % 20 {
-            0 => self.frame_pulse = self.board.pulse,
+            0 => self.frame_pulse = self.board.pulse(),
             2 if !dark => self.bench.pulse((ms - 2) * 1_000_000 + u64::from(self.frame_pulse.0), self.frame_pulse.0),
             _ => {}
         }
@@ -192,23 +190,21 @@ impl Session {
         }
         let now = Ticks::from_ms(ms);
         self.host.step(ms, &mut self.bench);
-        let mut command = None;
+        let mut bytes = Vec::new();
         if let Some(wanted) = self.host.send(ms) {
             let mut frame = [0; MAX_WIRE];
             let length = self.host.encoder.encode(now, &wanted, &mut frame).map_err(|_| SimError::Codec)?;
             if self.on(|k| matches!(k, FaultKind::LinkLost)).is_none() {
-                command = self.board.hear(&frame[..length]);
+                bytes = frame[..length].to_vec();
             }
         }
-        if dark {
-            self.board.reset(self.config.clone());
-        } else {
-            self.board.tick(now, &self.gathered, command)?;
-        }
         if let Some(pins) = &mut self.pins {
-            pins.take(&self.gathered, command, dark);
+            pins.take(&self.gathered, &bytes, dark);
         }
-        self.deliver(now)?;
+        self.board.pass(now, &self.gathered, &bytes, dark);
+        if !dark {
+            self.deliver(now)?;
+        }
         if self.host.phase != Phase::Done && ms > self.limit_ms {
             return Err(SimError::Stuck { phase: self.host.phase.name(), state: self.host.state, at_s: now.as_s() });
         }
@@ -220,12 +216,12 @@ impl Session {
 
     /// The board's bytes reach the host, as far as the line lets them.
     fn deliver(&mut self, now: Ticks) -> Result<(), SimError> {
-        if self.board.sent.is_empty() {
+        let mut sent = self.board.sent();
+        if sent.is_empty() {
             return Ok(());
         }
         let dropped = self.on(|k| matches!(k, FaultKind::TelemetryDropped { .. }));
         let corrupted = self.on(|k| matches!(k, FaultKind::TelemetryCorrupted { .. }));
-        let mut sent = core::mem::take(&mut self.board.sent);
         if let Some(FaultKind::TelemetryDropped { probability }) = dropped
             && self.line.uniform() < probability
         {

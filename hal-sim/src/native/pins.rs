@@ -1,6 +1,6 @@
 //! Record and replay of the pins' traffic.
 //!
-//! What it is: everything that reaches the rig board in a native run, millisecond by millisecond (edges, conversions, commands),
+//! What it is: everything that reaches the rig board in a native run, millisecond by millisecond (edges, conversions, bytes of the line),
 //! in a file; and the firmware alone on such a file, without plant, ESC or host. The same firmware gives the same telemetry to
 //! the byte; another firmware shows what it would have done with the same pins.
 //! What can go wrong: a file that is no record or is cut off is refused with the byte at which that shows.
@@ -8,11 +8,10 @@
 //! Reference: postcard wire format 1.0; house rule 1 (ticks without I/O).
 
 use super::board::Board;
-use super::{SimError, firmware_config};
+use super::firmware_config;
 use crate::bench::Millisecond;
 use crate::scenario::Scenario;
 use firmware_rig::AdcBlock;
-use frame::message::Command;
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::units::Ticks;
 use serde::{Deserialize, Serialize};
@@ -20,7 +19,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// First bytes of a record.
-const MAGIC: &[u8; 15] = b"quadrig pins 1\n";
+const MAGIC: &[u8; 15] = b"quadrig pins 2\n";
 
 /// Why a record was refused.
 #[derive(Debug, thiserror::Error)]
@@ -44,9 +43,6 @@ pub enum PinsError {
         /// What was expected.
         expected: &'static str,
     },
-    /// The firmware's answer did not fit its frame.
-    #[error(transparent)]
-    Sim(#[from] SimError),
 }
 
 /// What reached the board in one millisecond.
@@ -55,7 +51,8 @@ struct Traffic {
     edges: [Vec<u32>; CAPTURE_CHANNELS],
     /// Sum, sum of squares, count, lowest, highest.
     adc: [(u32, u64, u16, u16, u16); ADC_CHANNELS],
-    command: Option<Command>,
+    /// What the host sent.
+    line: Vec<u8>,
     reset: bool,
 }
 
@@ -71,9 +68,9 @@ impl PinRecord {
         Self { scenario: toml::to_string(scenario).unwrap_or_default(), traffic: Vec::new() }
     }
 
-    pub(super) fn take(&mut self, gathered: &Millisecond, command: Option<Command>, reset: bool) {
+    pub(super) fn take(&mut self, gathered: &Millisecond, line: &[u8], reset: bool) {
         let adc = gathered.adc.map(|b| (b.sum, b.sum_sq, b.count, b.min, b.max));
-        self.traffic.push(Traffic { edges: gathered.edges.clone(), adc, command, reset });
+        self.traffic.push(Traffic { edges: gathered.edges.clone(), adc, line: line.to_vec(), reset });
     }
 
     /// Milliseconds that it covers.
@@ -118,7 +115,7 @@ impl PinRecord {
         open.read_to_end(&mut bytes).map_err(|source| PinsError::File { file: file.to_owned(), source })?;
         let damaged = |at, expected| PinsError::Damaged { file: file.to_owned(), at, expected };
         let rest =
-            bytes.strip_prefix(MAGIC).ok_or_else(|| damaged(0, "expected the line \"quadrig pins 1\" of a record of pins"))?;
+            bytes.strip_prefix(MAGIC).ok_or_else(|| damaged(0, "expected the line \"quadrig pins 2\" of a record of pins"))?;
         let place = |rest: &[u8]| bytes.len() - rest.len();
         let (scenario, mut rest) =
             postcard::take_from_bytes::<String>(rest).map_err(|_| damaged(MAGIC.len(), "expected the scenario"))?;
@@ -133,27 +130,24 @@ impl PinRecord {
     }
 
     /// The firmware of `scenario` alone on these pins: every byte that it sends.
-    ///
-    /// # Errors
-    /// [`SimError::Codec`].
-    pub fn replay(&self, scenario: &Scenario, progress: &mut dyn FnMut(f64)) -> Result<Vec<u8>, SimError> {
+    #[must_use]
+    pub fn replay(&self, scenario: &Scenario, progress: &mut dyn FnMut(f64)) -> Vec<u8> {
         let mut board = Board::new(firmware_config(scenario));
         let mut sent = Vec::new();
         let mut gathered = Millisecond::default();
         for (i, one) in self.traffic.iter().enumerate() {
             let now = Ticks::from_ms(i as u64 + 1);
-            if one.reset {
-                board.reset(firmware_config(scenario));
-            }
             gathered.edges.clone_from(&one.edges);
             gathered.adc = one.adc.map(|(sum, sum_sq, count, min, max)| AdcBlock { sum, sum_sq, count, min, max });
-            board.tick(now, &gathered, one.command)?;
-            sent.append(&mut board.sent);
+            board.pass(now, &gathered, &one.line, one.reset);
+            if !one.reset {
+                sent.append(&mut board.sent());
+            }
             if i % 1000 == 0 {
                 progress(i as f64 / self.traffic.len() as f64);
             }
         }
         progress(1.0);
-        Ok(sent)
+        sent
     }
 }

@@ -81,12 +81,17 @@ impl RunRecord {
         let mut decoder = Decoder::default();
         let (mut hello, mut calibration) = (None, None);
         let (mut samples, mut events) = (Vec::new(), Vec::new());
+        let mut begun = false;
         for byte in &telemetry {
             match decoder.push::<Message>(*byte).map(|received| received.message) {
                 Some(Message::Hello(told)) => hello = Some(told),
-                Some(Message::Calibration(told)) => calibration = Some(told),
+                // a board that was reset in mid-run has lost its tare: the run is read with the one that it began with
+                Some(Message::Calibration(told)) if !begun => calibration = Some(told),
                 Some(Message::Rig(sample)) => samples.push(sample),
-                Some(Message::Event(event)) => events.push(event),
+                Some(Message::Event(event)) => {
+                    begun |= matches!(event, Event::State { to: RigState::Running, .. });
+                    events.push(event);
+                }
                 _ => {}
             }
         }

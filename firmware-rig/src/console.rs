@@ -1,0 +1,300 @@
+//! Everything that stands around a tick of the rig: the same shell on the board, in the native run and in the fault campaign.
+//!
+//! What it is: [`RigConsole`] takes the bytes of the line and what the peripherals delivered, looks for a stop twice a millisecond, calls
+//! [`Rig::tick`] with complete inputs, and queues the frames that leave the board. A host only moves bytes and registers.
+//! What can go wrong: a full queue drops a whole frame, which the far end sees as a gap in the sequence; what can go wrong with a
+//! command stands in [`crate::line`].
+//! Units: ticks of the capture timer; bytes.
+//! Reference: specification `formats.md`, "Telemetry"; `rig.md`, "Acquisition"; house rule 12 (one shell, many hosts).
+
+use crate::config::Config;
+use crate::health::{HealthWatch, Vitals};
+use crate::line::CommandLine;
+use crate::rig::{Inputs, Rig};
+use crate::sampling::AdcBlock;
+use crate::settings::Settings;
+use crate::stop::{Half, StopWatch};
+use frame::calibration::Calibration;
+use frame::message::{ClockNews, Command, Event, Message, SettingsNews, Trial};
+use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS, Fault};
+use frame::units::{PulseWidth, Ticks};
+use frame::wire::{Encoder, MAX_WIRE};
+use heapless::Vec;
+
+/// Bytes that may wait for the line.
+pub const QUEUED: usize = 1024;
+
+/// What a board finds when it starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Reset cause: bits 31..24 of RCC_CSR (RM0090 section 7.3.21), shifted down.
+    pub reset_cause: u8,
+    /// What its clock runs from.
+    pub clock: ClockNews,
+    /// What was found in flash.
+    pub stored: Option<Settings>,
+    /// And what became of it.
+    pub news: SettingsNews,
+    /// What ended the program before the reset.
+    pub ended: Option<Event>,
+}
+
+/// What the peripherals delivered since the last tick. Nothing here has a default: a host that lacks an input has to say so.
+#[derive(Debug, Clone, Copy)]
+pub struct Delivered<'a> {
+    /// 64-bit extended ticks of the capture timer.
+    pub now: Ticks,
+    /// Raw 32-bit captures since the last tick, a slice a channel, in order.
+    pub edges: [&'a [u32]; CAPTURE_CHANNELS],
+    /// The channel's over-capture flag was set, or its queue was full.
+    pub over_capture: [bool; CAPTURE_CHANNELS],
+    /// What the converter delivered since the last tick.
+    pub adc: &'a [AdcBlock; ADC_CHANNELS],
+    /// The voltage detector sees the board's own supply too low.
+    pub brown_out: bool,
+    /// The board itself held the tick up since the last one (it erased flash, which stops the processor).
+    pub paused: bool,
+    /// What became of the settings that were given to be stored, once.
+    pub stored: Option<SettingsNews>,
+    /// What the processor measures of itself; `None` on a host without one.
+    pub vitals: Option<Vitals>,
+}
+
+/// What the host has to do after a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Orders {
+    /// Store the settings in force ([`Rig::settings`]).
+    pub store: bool,
+    /// Make this trial of the last resort.
+    pub trial: Option<Trial>,
+    /// What was told, for the host's own log.
+    pub event: Option<Event>,
+}
+
+/// The board from a reset on.
+#[derive(Debug, Clone)]
+pub struct RigConsole {
+    rig: Rig,
+    line: CommandLine,
+    stops: StopWatch,
+    encoder: Encoder,
+    queue: Vec<u8, QUEUED>,
+    told: Calibration,
+    reset_cause: u8,
+    health: HealthWatch,
+}
+
+impl RigConsole {
+    /// The shell after a reset at `now`: who speaks, how its codes are meant, and what it found.
+    #[must_use]
+    pub fn start(now: Ticks, factory: Config, start: &Start) -> Self {
+        let mut rig = match start.stored {
+            Some(settings) => Rig::with_settings(factory, settings),
+            None => Rig::new(factory),
+        };
+        if start.clock.crystal_hz == 0 {
+            rig.stand(Fault::ClockFailed);
+        }
+        let mut console = Self {
+            told: rig.calibration(),
+            rig,
+            line: CommandLine::new(),
+            stops: StopWatch::default(),
+            encoder: Encoder::default(),
+            queue: Vec::new(),
+            reset_cause: start.reset_cause,
+            health: HealthWatch::default(),
+        };
+        console.introduce(now);
+        console.say(now, &Message::Event(Event::Settings(start.news)));
+        console.say(now, &Message::Event(Event::Clock(start.clock)));
+        if let Some(ended) = start.ended {
+            console.say(now, &Message::Event(ended));
+        }
+        console
+    }
+
+    /// The portable firmware, for reading.
+    #[must_use]
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// Takes one byte of the line.
+    pub fn hear(&mut self, byte: u8) {
+        self.line.take(byte);
+    }
+
+    /// Called twice a millisecond, after the bytes of the line: whether minimum is to be written to the pulse timer at once, and whether the
+    /// tick is due. `open` is the stop loop's pin.
+    pub fn look(&mut self, open: bool) -> Half {
+        self.stops.half(open, self.line.stop_waits())
+    }
+
+    /// One control tick. `give` takes the pulse for the ESC's next frame before anything is told.
+    pub fn tick(&mut self, delivered: &Delivered<'_>, give: impl FnOnce(PulseWidth)) -> Orders {
+        let now = delivered.now;
+        let (command, line) = self.line.next_command();
+        let outputs = self.rig.tick(&Inputs {
+            now,
+            edges: delivered.edges,
+            over_capture: delivered.over_capture,
+            adc: delivered.adc,
+            command,
+            line,
+            stop_input: self.stops.take(),
+            brown_out: delivered.brown_out,
+            paused: delivered.paused,
+        });
+        give(outputs.pulse);
+        if let Some(news) = delivered.stored {
+            self.say(now, &Message::Event(Event::Settings(news)));
+        }
+        if let Some(health) = self.health.tick(now, self.frames(), delivered.vitals.as_ref()) {
+            self.say(now, &Message::Health(health));
+        }
+        if let Some(sample) = outputs.sample {
+            self.say(now, &Message::Rig(sample));
+        }
+        if let Some(event) = outputs.event {
+            self.say(now, &Message::Event(event));
+        }
+        if command == Some(Command::Identify) {
+            self.introduce(now);
+        } else if command == Some(Command::Tare) || self.rig.calibration() != self.told {
+            self.tell_calibration(now);
+        }
+        Orders { store: outputs.store, trial: outputs.trial, event: outputs.event }
+    }
+
+    /// Bytes that wait for the line.
+    #[must_use]
+    pub fn queued(&self) -> &[u8] {
+        &self.queue
+    }
+
+    /// The waiting bytes are on their way.
+    pub fn sent(&mut self) {
+        self.queue.clear();
+    }
+
+    /// Frames heard: good, damaged, replayed.
+    fn frames(&self) -> [u16; 3] {
+        let stats = self.line.stats();
+        [stats.good as u16, stats.damaged as u16, self.line.replayed() as u16]
+    }
+
+    fn introduce(&mut self, now: Ticks) {
+        let hello = self.rig.hello(self.reset_cause);
+        self.say(now, &Message::Hello(hello));
+        self.tell_calibration(now);
+    }
+
+    fn tell_calibration(&mut self, now: Ticks) {
+        self.told = self.rig.calibration();
+        self.say(now, &Message::Calibration(self.told));
+    }
+
+    /// Queues one message, whole or not at all.
+    fn say(&mut self, now: Ticks, message: &Message) {
+        let mut wire = [0; MAX_WIRE];
+        if let Ok(used) = self.encoder.encode(now, message, &mut wire)
+            && let Some(bytes) = wire.get(..used)
+        {
+            let _ = self.queue.extend_from_slice(bytes); // full: the far end sees the gap in the sequence
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use frame::wire::Decoder;
+
+    fn started() -> RigConsole {
+        let clock = ClockNews { crystal_hz: 8_000_000, measured_hz: 8_010_000 };
+        let start = Start { reset_cause: 0x0E, clock, stored: None, news: SettingsNews::Absent, ended: None };
+        RigConsole::start(Ticks(0), Config::thesis_570kv(), &start)
+    }
+
+    fn messages(console: &mut RigConsole) -> std::vec::Vec<Message> {
+        let mut decoder = Decoder::default();
+        let told = console.queued().iter().filter_map(|b| decoder.push(*b)).map(|r| r.message).collect();
+        console.sent();
+        told
+    }
+
+    fn adc() -> [AdcBlock; ADC_CHANNELS] {
+        [1427, 2048, 248, 0, 900].map(|code| {
+            let mut block = AdcBlock::default();
+            (0..8).for_each(|_| block.push(code));
+            block
+        })
+    }
+
+    fn delivered(ms: u64, adc: &[AdcBlock; ADC_CHANNELS]) -> Delivered<'_> {
+        Delivered {
+            now: Ticks::from_ms(ms),
+            edges: [&[]; CAPTURE_CHANNELS],
+            over_capture: [false; CAPTURE_CHANNELS],
+            adc,
+            brown_out: false,
+            paused: false,
+            stored: None,
+            vitals: None,
+        }
+    }
+
+    #[test]
+    fn after_a_reset_it_says_who_it_is_and_what_it_found() {
+        let told = messages(&mut started());
+        assert!(matches!(
+            told[..],
+            [
+                Message::Hello(_),
+                Message::Calibration(_),
+                Message::Event(Event::Settings(SettingsNews::Absent)),
+                Message::Event(Event::Clock(_))
+            ]
+        ));
+    }
+
+    #[test]
+    fn a_stop_on_the_line_is_minimum_at_the_next_look_and_a_fault_at_the_next_tick() {
+        let mut console = started();
+        messages(&mut console);
+        let mut wire = [0; MAX_WIRE];
+        let used = Encoder::default().encode(Ticks(1), &Command::Stop, &mut wire).unwrap();
+        assert!(!console.look(false).minimum && console.look(false).tick);
+        console.tick(&delivered(1, &adc()), |_| ());
+        wire[..used].iter().for_each(|b| console.hear(*b));
+        assert!(console.look(false).minimum);
+        assert!(console.look(false).tick);
+        let mut given = None;
+        console.tick(&delivered(2, &adc()), |pulse| given = Some(pulse));
+        assert_eq!(given, Some(PulseWidth::MIN));
+        assert!(console.rig().faults().contains(Fault::OperatorStop));
+    }
+
+    #[test]
+    fn an_open_stop_loop_that_one_look_saw_reaches_the_tick() {
+        let mut console = started();
+        console.look(false);
+        console.look(false);
+        console.tick(&delivered(1, &adc()), |_| ());
+        assert!(console.look(true).minimum, "seen half a millisecond before the tick");
+        console.look(false);
+        console.tick(&delivered(2, &adc()), |_| ());
+        assert!(console.rig().faults().contains(Fault::OperatorStop));
+    }
+
+    #[test]
+    fn a_full_queue_drops_whole_frames() {
+        let mut console = started();
+        for ms in 1..3_000 {
+            console.tick(&delivered(ms, &adc()), |_| ());
+        }
+        assert!(console.queued().len() <= QUEUED);
+        assert_eq!(console.queued().last(), Some(&0), "it ends with a frame's end");
+    }
+}
