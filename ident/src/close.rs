@@ -5,7 +5,9 @@
 //! Units: as the channels state.
 //! Reference: specification `closing-the-loop.md`, steps 1 to 8.
 
-use crate::context::{Context, DIFFERENCES, Target, unit_of};
+use crate::conclude::{Quoted, quoted};
+use crate::context::{Context, DIFFERENCES, Relation, Target, unit_of};
+use crate::correction::without_correction;
 use crate::course;
 use crate::diagnose::Diagnosis;
 use crate::effects::unknown::Words;
@@ -18,10 +20,13 @@ use crate::long::diagnose_any;
 use crate::marks;
 use crate::model::Model;
 use crate::residual::whiteness;
+use crate::rivals::UNEXPLAINED;
 use crate::search::refine;
 use crate::sparse;
-use crate::verdict::{Alternative, BeforeAfter, Channel, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict};
-use std::collections::BTreeMap;
+use crate::unexplained::{LOUD, Left, unexplained};
+use crate::verdict::{
+    Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict,
+};
 
 /// Why the loop cannot be closed on a log.
 #[derive(Debug, thiserror::Error)]
@@ -67,22 +72,28 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         return Err(refused());
     }
     let found = diagnose_any(log, &context, declared, progress).ok_or_else(refused)?;
-    let diagnosis = found.diagnosis;
+    let mut diagnosis = found.diagnosis;
+    let marks = marks::told(log, &context, declared);
+    let channels = channels(&context, declared, &diagnosis);
+    let left_over = unexplained(&context, declared, &diagnosis.best.fit, &channels);
+    if diagnosis.best.fit.placed.is_empty() && marks.is_empty() {
+        tell_of(&context, &left_over, &mut diagnosis);
+    }
     let fit = &diagnosis.best.fit;
-    let estimates =
-        found.estimates.unwrap_or_else(|| (0..fit.placed.len()).map(|k| fit.profiled_estimates(&context, declared, k)).collect());
+    let estimates = found.estimates.unwrap_or_else(|| diagnosis.estimates.clone());
+    let estimates: Vec<Vec<Estimate>> = (0..fit.placed.len()).map(|k| estimates.get(k).cloned().unwrap_or_default()).collect();
     let left = |model: Model, fit: &Fit| {
         model.leaving(&context, leftover::of(&context, declared, fit), course::of(&context, declared, fit))
     };
     let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
     let mut after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit);
-    let marks = marks::told(log, &context, declared);
     let mut verdict = Verdict {
         format: FORMAT,
         run: log.name.clone(),
         verdict: kind(&diagnosis),
-        channels: channels(&context, declared, &diagnosis),
+        channels,
         effects: entries(&context, &diagnosis, estimates),
+        unexplained: left_over.into_iter().map(|l| l.told).collect(),
         alternatives: diagnosis.rivals.iter().map(|r| Alternative { ids: r.ids.clone(), probability: r.probability }).collect(),
         next_experiment: None,
         left_out,
@@ -94,6 +105,24 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
             crate::experiment::next(found.searched.as_ref().unwrap_or(&context), declared, &after_model, &diagnosis);
     }
     Ok(Closed { context, diagnosis, declared: before_model, model: after_model, verdict })
+}
+
+/// Where nothing stands and something loud is left all the same, on a channel or on what one speed sensor reads beyond the others, it is told.
+/// What a declared model was off by on its own day is no news.
+fn tell_of(context: &Context, left: &[Left], diagnosis: &mut Diagnosis) {
+    let of_contrast = |name: &str| DIFFERENCES.iter().find(|d| d.1 == name).and_then(|d| context.target(d.0));
+    let is_news = |l: &&Left| {
+        let (held, floor) = (diagnosis.heldout_after[l.target], context.targets[l.target].noise.rms);
+        l.told.over_floor > LOUD && (!context.against_model || held.rms > LOUD * floor)
+    };
+    let loudest = left.iter().filter(is_news).max_by(|a, b| a.told.over_floor.total_cmp(&b.told.over_floor));
+    if let Some(loudest) = loudest {
+        let channel = of_contrast(context.targets[loudest.target].name).unwrap_or(loudest.target);
+        diagnosis.best.fit = without_correction(context, &diagnosis.best.fit, &[channel]);
+        diagnosis.heldout_without.push(diagnosis.heldout_after.clone());
+        diagnosis.inclusion.push(UNEXPLAINED);
+        (diagnosis.unknown, diagnosis.probability) = (true, UNEXPLAINED);
+    }
 }
 
 fn kind(diagnosis: &Diagnosis) -> Kind {
@@ -108,7 +137,7 @@ fn kind(diagnosis: &Diagnosis) -> Kind {
     }
 }
 
-fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMap<String, Channel> {
+fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Channels {
     let figures = |fit: &Fit, held: &[heldout::Held]| -> Vec<Figures> {
         heldout::residuals(context, declared, fit)
             .iter()
@@ -126,16 +155,22 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> BTreeMa
             .collect()
     };
     let (before, after) = (figures(&d.declared, &d.heldout_before), figures(&d.best.fit, &d.heldout_after));
-    context
-        .targets
-        .iter()
-        .zip(before.into_iter().zip(after))
-        .filter(|(t, _)| !t.relation.is_evidence())
-        .map(|(t, (before, after))| {
-            (t.name.to_owned(), Channel { unit: unit_of(t.name).to_owned(), noise_floor_rms: t.noise.rms, before, after })
-        })
-        .collect()
+    let mut out = Channels::default();
+    for (t, (before, after)) in
+        context.targets.iter().zip(before.into_iter().zip(after)).filter(|(t, _)| !t.relation.is_evidence())
+    {
+        if t.relation == Relation::SpeedAlone {
+            out.not_predicted.insert(t.name.to_owned(), NO_COMMAND.to_owned());
+        } else {
+            let unit = unit_of(t.name).to_owned();
+            out.predicted.insert(t.name.to_owned(), Channel { unit, noise_floor_rms: t.noise.rms, before, after });
+        }
+    }
+    out
 }
+
+/// Why a speed has no prediction.
+const NO_COMMAND: &str = "no command was logged";
 
 /// Held-out error of a channel that was measured in one of the five blocks of the run only, so that no fold predicts it: its own time is
 /// cut into five. Not a number where even that leaves too little; what the fit saw never stands in its place.
@@ -150,7 +185,7 @@ fn of_its_own(context: &Context, declared: Declared<'_>, fit: &Fit, i: usize) ->
     heldout::pooled(context, declared, &folds, &wanted, &shapes)[i].map_or(f64::NAN, |held| held.claimed)
 }
 
-/// One entry an effect, the one that helps most first.
+/// One entry an effect, the one that helps most first, what has no name last.
 fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> Vec<EffectEntry> {
     let mut out: Vec<(f64, EffectEntry)> = d
         .best
@@ -162,7 +197,7 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
         .map(|(k, (p, estimates))| {
             let estimates = p.effect.report(context, &p.instance, estimates);
             let shapes = p.effect.shapes(context, &p.instance);
-            let Quoted { channel: first, of_news, reduction } = quoted(context, d, k);
+            let Quoted { channel: first, of_news, reduction } = quoted(context, p, &d.heldout_after, &d.heldout_without[k]);
             let mut channels: Vec<String> =
                 p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();
             if let Some(at) = channels.iter().position(|c| *c == first) {
@@ -175,9 +210,10 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
             }
             let entry = EffectEntry {
                 id: p.effect.id().to_owned(),
+                scope: p.effect.scope(&p.instance),
                 depends_on,
                 equation,
-                probability: d.probability,
+                probability: d.inclusion[k],
                 parameters: estimates.iter().map(|e| parameter(e, &shapes)).collect(),
                 heldout_error_reduction: reduction,
                 evidence,
@@ -186,7 +222,8 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
             (of_news, entry)
         })
         .collect();
-    out.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let nameless = |e: &EffectEntry| e.id == "unknown";
+    out.sort_by(|a, b| nameless(&a.1).cmp(&nameless(&b.1)).then(b.0.total_cmp(&a.0)));
     out.into_iter().map(|(_, entry)| entry).collect()
 }
 
@@ -214,32 +251,6 @@ fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
         equation: if form.is_empty() { about.equation.to_owned() } else { format!("{} [{form}]", about.equation) },
         evidence: format!("{}; {helps}", about.signature),
     }
-}
-
-/// What an effect takes away of the held-out error of the channel that it helps most.
-struct Quoted {
-    channel: String,
-    /// Share of the error in the measure in which it is news (see [`Target::news`](crate::context::Target::news)): what effects are ordered by.
-    of_news: f64,
-    /// Share of the error as it stands.
-    reduction: f64,
-}
-
-fn quoted(context: &Context, d: &Diagnosis, k: usize) -> Quoted {
-    let p = &d.best.fit.placed[k];
-    let of_channel = |(i, t): (usize, &Target)| {
-        let (after, without) = (d.heldout_after[i], d.heldout_without[k][i]);
-        let of_news = 1.0 - after.rms / without.rms;
-        let reduction = if t.trust.is_empty() { of_news } else { 1.0 - after.claimed / without.claimed };
-        Quoted { channel: t.name.to_owned(), of_news, reduction }
-    };
-    let touched = context.targets.iter().enumerate().filter(|(_, t)| p.instance.touches(t.name) && !t.relation.is_evidence());
-    let figures = touched.map(of_channel).filter(|q| q.of_news.is_finite() && q.reduction.is_finite());
-    figures.max_by(|a, b| a.of_news.total_cmp(&b.of_news)).unwrap_or_else(|| Quoted {
-        channel: p.instance.channels.first().cloned().unwrap_or_default(),
-        of_news: 0.0,
-        reduction: 0.0,
-    })
 }
 
 /// A parameter with its interval. Where its standard error is not known the interval is what is known at all: the range of the shape,

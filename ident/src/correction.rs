@@ -10,10 +10,10 @@
 //! `closing-the-loop.md`, step 7.
 
 use crate::context::{Context, Relation};
-use crate::diagnose::{Candidate, NEEDED_REDUCTION};
-use crate::effects::Instance;
+use crate::diagnose::NEEDED_REDUCTION;
 use crate::effects::unknown::{Unknown, form, variables};
-use crate::heldout::{self, Held, Sum};
+use crate::effects::{Effect, Instance, Scope};
+use crate::heldout::{self, Sum};
 use crate::hypothesis::{Declared, Fit, Placed};
 use crate::opponent::{correction, is_load};
 
@@ -31,15 +31,15 @@ struct Tried {
     squares: Vec<f64>,
 }
 
-/// The correction of a group of channels that predicts left-out rows best, with their errors; the plain one where several do.
+/// A fit with the correction of a group of channels added that predicts left-out rows best beside what is placed already; the plain one where
+/// several do. The second is whether it corrects anything.
 pub(crate) fn correct(
     context: &Context,
     declared: Declared<'_>,
-    start: &Fit,
+    base: &Fit,
     folds: &[Vec<bool>],
-    before: &[Held],
     group: &[usize],
-) -> (Candidate, Vec<Held>) {
+) -> (Fit, bool) {
     let wanted: Vec<bool> = (0..context.targets.len()).map(|k| group.contains(&k)).collect();
     let tried = |terms: usize, fit: Fit| {
         let placed = |_: &[bool]| fit.placed.clone();
@@ -48,26 +48,35 @@ pub(crate) fn correct(
         let squares = sums.iter().map(|fold| group.iter().map(|k| in_floors(fold, k)).sum()).collect();
         Tried { terms, fit, sums, squares }
     };
-    let names: Vec<&str> = group.iter().map(|k| context.targets[*k].name).collect();
-    let nothing = Placed { effect: &Unknown, instance: Instance::new(&names, ""), shape: Vec::new() };
-    let mut all = vec![tried(0, Fit { placed: vec![nothing], targets: start.targets.clone() })];
-    for variable in variables(context).iter().filter(|v| may_correct(context, group[0], v)) {
+    let mut all = vec![tried(0, without_correction(context, base, group))];
+    let beside_names = base.placed.iter().any(|p| p.effect.id() != Unknown.id());
+    let offered = variables(context);
+    for variable in offered.iter().filter(|v| may_correct(context, group[0], v, beside_names)) {
         for terms in TERMS {
-            let fitted = correction(context, declared, start, group, &form(variable, terms));
+            let fitted = correction(context, declared, base, group, &form(variable, terms));
             // where a fold cannot be fitted its rows are missing, and the rest is no comparison
             all.extend(fitted.map(|f| tried(terms, f)).filter(|t| t.judged() == all[0].judged()));
         }
     }
     let chosen = all.swap_remove(plainest(&all));
-    let held = heldout::together(context, &chosen.sums).into_iter().zip(before).map(|(own, before)| own.unwrap_or(*before));
-    let gain = |k: &usize| chosen.fit.targets[*k].loglik.mean - start.targets[*k].loglik.mean;
-    let held = held.collect();
-    (Candidate { evidence: group.iter().map(gain).sum(), fit: chosen.fit }, held)
+    (chosen.fit, chosen.terms > 0)
 }
 
-/// Whether a correction of a channel may stand on a variable: no reading that follows the channel's load, but the command of a speed.
-fn may_correct(context: &Context, target: usize, variable: &str) -> bool {
+/// A fit with an entry for a group of channels that something is left on and nothing corrects.
+pub(crate) fn without_correction(context: &Context, base: &Fit, group: &[usize]) -> Fit {
+    let names: Vec<&str> = group.iter().map(|k| context.targets[*k].name).collect();
+    let nothing = Placed { effect: &Unknown, instance: Instance::new(&names, ""), shape: Vec::new() };
+    let placed = base.placed.iter().cloned().chain([nothing]).collect();
+    Fit { placed, targets: base.targets.clone() }
+}
+
+/// Whether a correction of a channel may stand on a variable: no reading that follows the channel's load, but the command of a speed; and
+/// beside names no clock of the run, over which they would have what they leave of themselves corrected on this run alone.
+fn may_correct(context: &Context, target: usize, variable: &str, beside_names: bool) -> bool {
     let target = &context.targets[target];
+    if beside_names && Unknown.scope(&Instance::new(&[target.name], variable)) == Scope::Run {
+        return false;
+    }
     let of_command = target.relation == Relation::SpeedFromPulse && variable == "pulse_us";
     of_command || !is_load(context, target, variable)
 }

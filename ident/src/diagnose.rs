@@ -8,13 +8,13 @@
 //! Units: evidence in nats.
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
+use crate::beside::{NEEDED, ask, is_named, left_of, with_rests};
+use crate::conclude::{Errors, is_nothing, quoted, untenable};
 use crate::context::{Context, Relation, Target};
-use crate::correction::correct;
-use crate::effects::{self, Effect, Instance};
+use crate::effects::{self, Effect, Estimate, Instance};
 use crate::heldout::{self, Around, Held};
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, is_plausible, plausible, scatters};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
 use crate::moment::lasts;
-use crate::opponent::{explains, nameless, noisier, opponent};
 use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
@@ -72,6 +72,12 @@ impl Candidate {
     pub fn ids(&self) -> Vec<String> {
         self.fit.placed.iter().map(|p| p.effect.id().to_owned()).collect()
     }
+
+    /// Identifiers of those that have a name.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        self.fit.placed.iter().filter(|p| is_named(p)).map(|p| p.effect.id().to_owned()).collect()
+    }
 }
 
 /// What the search found.
@@ -83,9 +89,11 @@ pub struct Diagnosis {
     pub best: Candidate,
     /// Its probability.
     pub probability: f64,
+    /// For each effect of the winner the probability of its being there: that of all hypotheses together that hold it.
+    pub inclusion: Vec<f64>,
     /// Other hypotheses, most probable first.
     pub rivals: Vec<Rival>,
-    /// The winner is the empirical correction.
+    /// Something is there, and nothing of it has a name.
     pub unknown: bool,
     /// Held-out errors of the declared model, by target.
     pub heldout_before: Vec<Held>,
@@ -93,6 +101,8 @@ pub struct Diagnosis {
     pub heldout_after: Vec<Held>,
     /// For each effect of the winner the held-out errors without it, by target.
     pub heldout_without: Vec<Vec<Held>>,
+    /// For each effect of the winner its parameters, as they are reported.
+    pub estimates: Vec<Vec<Estimate>>,
     /// The folds.
     pub folds: Vec<Vec<bool>>,
     /// For each round of the search its best candidates, each what was found before and one effect more, best first.
@@ -104,7 +114,7 @@ impl Diagnosis {
     /// they share. A rival that is a tenth as probable as the winner is one of them.
     #[must_use]
     pub fn claims(&self, position: usize) -> bool {
-        let ids = self.best.ids();
+        let ids = self.best.names();
         let Some(id) = ids.get(position) else { return false };
         let count = |of: &[String]| of.iter().filter(|i| *i == id).count();
         let shares = |rival: &Rival| {
@@ -168,76 +178,116 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         errors = heldout::errors(context, declared, &best.fit, &folds);
     }
     let mut probability: f64 = rounds.iter().map(|r| r.0).product();
+    let mut inclusion: Vec<f64> = rounds.iter().map(|r| r.0).collect();
     let mut rivals = rivals_of(&best, rounds);
-    let won = opponent(context, declared, &start, &folds, &heldout_before, &best, &errors);
-    let named = !best.fit.placed.is_empty();
-    let turned_down = named && (won.is_some() || !explains(context, declared, &start, &best.fit));
-    if won.is_some() {
-        rivals.clear();
+    let ground = Ground { context, declared, start: &start, folds: &folds };
+    let asked = ask(ground, &heldout_before, &best, &errors);
+    if !asked.taken_back.is_empty() {
+        let before = best.ids();
+        let turned_down = Rival { ids: before.clone(), probability: (1.0 - UNEXPLAINED) * probability, fit: best.fit.clone() };
+        for k in asked.taken_back.iter().rev() {
+            forget(&mut rivals, &mut inclusion, &before, *k);
+        }
+        best.fit = left_of(ground, &best.fit, &asked.taken_back)?;
+        best.evidence = evidence_over(context, &best.fit, &start);
+        errors = heldout::errors(context, declared, &best.fit, &folds);
+        if best.fit.placed.is_empty() {
+            rivals.clear();
+        }
+        rivals.insert(0, turned_down);
     }
-    if turned_down {
-        rivals.insert(0, Rival { ids: best.ids(), probability, fit: best.fit.clone() });
-    }
-    // zeros that are older than the run are no cause of what else is left
-    let nothing_but_zeros = best.fit.placed.iter().all(Placed::is_tare);
-    let forced = || match (named && !turned_down, nothing_but_zeros) {
-        (true, true) => nameless(context, declared, &best.fit),
-        (true, false) => None,
-        (false, _) => nameless(context, declared, &start),
-    };
-    let unexplained = won.or_else(forced).or_else(|| if nothing_but_zeros { noisier(context) } else { None });
-    let is_unknown = unexplained.is_some();
-    let suspects = if is_unknown || named { suspects(context, declared, &start) } else { Vec::new() };
-    if let Some(group) = unexplained {
-        (best, errors) = correct(context, declared, &start, &folds, &heldout_before, &group);
-        probability = UNEXPLAINED;
-        let singles = candidates.first().map_or(&[][..], Vec::as_slice);
-        list_nearest(&mut rivals, &nearest(context, &start, &suspects, singles), probability);
-    }
-    let heldout_without = loop {
+    let mut rests_told = false;
+    let (heldout_without, estimates) = loop {
         let without: Vec<Vec<Held>> = (0..best.fit.placed.len())
             .map(|k| {
                 without(context, declared, &best.fit, k, &start)
                     .map_or_else(|| heldout_before.clone(), |f| heldout::errors(context, declared, &f, &folds))
             })
             .collect();
-        // beside a later effect an earlier one may make no sense any more
-        let senseless = |k: usize| context.against_model && !is_plausible(context, declared, &best.fit, k);
-        let idle = (0..without.len()).find(|k| {
-            let named = !is_unknown && without.len() > 1;
-            named && (is_idle(context, &best.fit.placed[*k], &errors, &without[*k]) || senseless(*k))
-        });
-        let Some(idle) = idle else { break without };
+        let names = best.fit.placed.iter().filter(|p| is_named(p)).count();
         // a later effect has taken over what this one was named for
-        let mut placed = best.fit.placed.clone();
-        let (names, dropped) = (placed.len(), placed.remove(idle).effect.id());
-        rivals.iter_mut().for_each(|r| drop_name(&mut r.ids, names, (idle, dropped)));
-        best.fit = fit(context, declared, &refine(context, declared, &placed, Rows::All, 60), Some(&start), Rows::All)?;
+        let idle = |k: &usize| {
+            names > 1 && is_named(&best.fit.placed[*k]) && is_idle(context, &best.fit.placed[*k], &errors, &without[*k])
+        };
+        let figures = Errors { before: &heldout_before, after: &errors, without: &without };
+        let mut goes = (0..without.len()).find(idle).or_else(|| untenable(context, declared, &best.fit, &figures));
+        if goes.is_none() && !rests_told {
+            rests_told = true;
+            let with = with_rests(ground, &best.fit, &errors, &asked.contested);
+            if with.placed.len() > best.fit.placed.len() {
+                inclusion.resize(with.placed.len(), UNEXPLAINED);
+                best.fit = with;
+                errors = heldout::errors(context, declared, &best.fit, &folds);
+                continue;
+            }
+        }
+        let mut estimates = Vec::new();
+        if goes.is_none() {
+            estimates = (0..best.fit.placed.len()).map(|k| best.fit.profiled_estimates(context, declared, k)).collect();
+            // an interval that is wide because size and shape trade places says nothing against a name that the rows need
+            let hardly_needed = |k: usize| quoted(context, &best.fit.placed[k], &errors, &without[k]).of_news < NEEDED;
+            goes = (0..estimates.len()).find(|k| is_nothing(context, &best.fit.placed[*k], &estimates[*k]) && hardly_needed(*k));
+        }
+        let Some(mut goes) = goes else { break (without, estimates) };
+        // a correction beside which a name makes no sense is no correction
+        if is_named(&best.fit.placed[goes]) {
+            let shares = |p: &Placed| p.instance.channels.iter().any(|c| best.fit.placed[goes].instance.touches(c));
+            goes = best.fit.placed.iter().position(|p| !is_named(p) && shares(p)).unwrap_or(goes);
+        }
+        let before = best.ids();
+        forget(&mut rivals, &mut inclusion, &before, goes);
+        best.fit = left_of(ground, &best.fit, &[goes])?;
         errors = heldout::errors(context, declared, &best.fit, &folds);
     };
-    // a rival that differed by what was dropped is the winner itself
-    let same = |ids: &[String]| sorted(ids.to_vec()) == sorted(best.ids());
-    rivals.retain(|r| is_unknown || !same(&r.ids));
-    if !is_unknown {
+    probability = best.fit.placed.iter().zip(&inclusion).filter(|(p, _)| is_named(p)).map(|(_, p)| p).product();
+    let suspects = if best.fit.placed.is_empty() { Vec::new() } else { suspects(context, declared, &start) };
+    let is_unknown = best.fit.placed.iter().any(|p| !is_named(p)) && !best.fit.placed.iter().any(is_named);
+    if is_unknown {
+        probability = UNEXPLAINED;
+        let singles = candidates.first().map_or(&[][..], Vec::as_slice);
+        list_nearest(&mut rivals, &nearest(context, &start, &suspects, singles), probability);
+    } else {
+        // a rival that differed by what was dropped is the winner itself
+        let same = |ids: &[String]| sorted(ids.to_vec()) == sorted(best.names());
+        rivals.retain(|r| !same(&r.ids) && !r.ids.is_empty());
         let tares = best.fit.placed.iter().filter(|p| p.is_tare()).count();
         let of_names = |names: usize| of_further_names(names.saturating_sub(tares));
-        probability *= of_names(best.fit.placed.len());
+        let names = best.names().len();
+        probability *= of_names(names);
         rivals.iter_mut().for_each(|r| r.probability *= of_names(r.ids.len()));
-        stand_beside(&best, &mut probability, &mut rivals, &suspects);
+        // what a set is less sure of than each of its names by itself, they share
+        let each = of_names(names).powf(1.0 / names.saturating_sub(tares).max(1) as f64);
+        let named = best.fit.placed.iter().zip(&mut inclusion).filter(|(p, _)| is_named(p) && !p.is_tare());
+        named.for_each(|(_, p)| *p *= each);
+        if let Some(suspect) = stand_beside(&best, &mut probability, &mut rivals, &suspects) {
+            let shares =
+                |p: &Placed| p.instance.channels.iter().any(|c| suspect.fit.placed.iter().any(|s| s.instance.touches(c)));
+            best.fit.placed.iter().zip(&mut inclusion).filter(|(p, _)| is_named(p) && shares(p)).for_each(|(_, p)| *p *= 0.5);
+        }
     }
     progress(1.0);
     Some(Diagnosis {
         declared: start,
         best,
         probability,
+        inclusion,
         rivals,
         unknown: is_unknown,
         heldout_before,
         heldout_after: errors,
         heldout_without,
+        estimates,
         folds,
         candidates,
     })
+}
+
+/// Takes the name at a position of the winner out of the rivals that hold it, and forgets how sure it was. What would have stood in its place
+/// has lost it too.
+fn forget(rivals: &mut Vec<Rival>, inclusion: &mut Vec<f64>, names: &[String], k: usize) {
+    rivals.retain(|r| r.ids.len() != names.len() || r.ids.get(k) == names.get(k));
+    rivals.iter_mut().for_each(|r| drop_name(&mut r.ids, names.len(), (k, &names[k])));
+    inclusion.remove(k);
 }
 
 /// Probability that a name beside another is right although it was chosen beside it without a doubt: of 38 sets of two names that were claimed

@@ -10,6 +10,8 @@ mod depends;
 mod left;
 mod orders;
 
+pub(crate) use depends::goes_with;
+
 use crate::close::{Closed, close};
 use crate::context::{Context, Relation, unit_of};
 use crate::effects::library;

@@ -8,8 +8,10 @@
 
 pub mod almanac;
 pub mod beam;
+mod beside;
 pub mod circle;
 pub mod close;
+mod conclude;
 pub mod context;
 mod correction;
 pub mod course;
@@ -51,5 +53,6 @@ mod steps;
 mod suspects;
 mod together;
 pub mod told;
+pub mod unexplained;
 pub mod verdict;
 mod weather;

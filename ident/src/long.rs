@@ -8,6 +8,7 @@
 //! Units: rows, s.
 //! Reference: notes on method, "for long logs scan on a part, refine on all rows"; rule of the rows in [`kept`].
 
+use crate::conclude::{Errors, harmful};
 use crate::context::{Context, Target};
 use crate::diagnose::{
     Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, may_join, net_gain, offers, shares, without, worth_a_name,
@@ -112,7 +113,13 @@ pub(crate) fn diagnose_any(log: &Log, context: &Context, declared: Declared<'_>,
     let mut diagnosis = diagnose(&few, declared, &mut |p| progress(0.5 * p))?;
     let folds = heldout::folds(context);
     let all = AllRows { means: &means, context, declared, rows: &rows, folds: &folds };
-    let estimates = all.carry_over(&mut diagnosis, &mut |p| progress(0.5 + 0.5 * p))?;
+    let mut estimates = all.carry_over(&mut diagnosis, true, &mut |p| progress(0.5 + 0.4 * p))?;
+    // what helped on some of the rows may harm on all of them
+    while let Some(harmful) = all.harmful(&diagnosis) {
+        diagnosis.best.fit.placed.remove(harmful);
+        diagnosis.inclusion.remove(harmful);
+        estimates = all.carry_over(&mut diagnosis, false, &mut |p| progress(0.9 + 0.1 * p))?;
+    }
     diagnosis.folds = folds;
     progress(1.0);
     Some(Found { diagnosis, searched: Some(few), estimates: Some(estimates) })
@@ -156,8 +163,15 @@ struct AllRows<'a> {
 }
 
 impl AllRows<'_> {
-    /// Carries a diagnosis of the thinned log over to every row; gives the parameters of its effects.
-    fn carry_over(&self, d: &mut Diagnosis, progress: &mut dyn FnMut(f64)) -> Option<Vec<Vec<Estimate>>> {
+    /// The position of an effect of a diagnosis of every row that makes a channel worse, if there is one.
+    fn harmful(&self, d: &Diagnosis) -> Option<usize> {
+        let errors = Errors { before: &d.heldout_before, after: &d.heldout_after, without: &d.heldout_without };
+        harmful(self.context, &d.best.fit, &errors)
+    }
+
+    /// Carries a diagnosis of the thinned log over to every row, where effects of single rows may be `asked` for again; gives the parameters
+    /// of its effects.
+    fn carry_over(&self, d: &mut Diagnosis, asked: bool, progress: &mut dyn FnMut(f64)) -> Option<Vec<Vec<Estimate>>> {
         let (context, declared) = (self.context, self.declared);
         let start = fit(context, declared, &[], None, Rows::All)?;
         let spoken: Vec<bool> = context.targets.iter().map(|t| !t.relation.is_evidence()).collect();
@@ -167,8 +181,9 @@ impl AllRows<'_> {
         let mut best = Candidate { evidence: d.best.evidence, fit: fit(context, declared, &placed, Some(&start), Rows::All)? };
         d.heldout_after = self.errors(&placed, &self.touched(&placed), &d.heldout_before);
         progress(0.4);
-        if !d.unknown {
+        if asked && !d.unknown {
             self.of_rows(&mut best, &mut d.heldout_after);
+            d.inclusion.resize(best.fit.placed.len(), d.probability);
         }
         progress(0.6);
         let placed = best.fit.placed.clone();

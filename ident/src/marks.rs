@@ -103,39 +103,35 @@ fn added(channel: &str, angle: f64, se: f64) -> AddedEffect {
     AddedEffect { placed, amplitudes: vec![(channel.to_owned(), vec![angle])], estimates }
 }
 
-/// Adds what the board tells to a verdict and to the model that it amounts to. A verdict without a name has one entry only, which then speaks of
-/// the marks as well, and the model does not hold what no verdict has named.
+/// Adds what the board tells to a verdict and to the model that it amounts to, beside what has no name.
 pub(crate) fn tell(verdict: &mut Verdict, model: &mut Model, told: &[Told]) {
     if told.is_empty() {
         return;
     }
-    if let (Kind::Unattributed, Some(unknown)) = (verdict.verdict, verdict.effects.first_mut()) {
-        unknown.evidence = told.iter().fold(std::mem::take(&mut unknown.evidence), |text, one| format!("{text}; {}", words(one)));
-        return;
-    }
-    if verdict.verdict == Kind::None {
+    if matches!(verdict.verdict, Kind::None | Kind::Unattributed) {
         verdict.verdict = Kind::Attributed;
     }
     model.effects.extend(told.iter().map(|one| one.added.clone()));
-    // each entry has the probability of the whole, and the other hypotheses hold what is told as well
-    verdict.effects.iter_mut().for_each(|e| e.probability *= CERTAIN);
-    let whole = verdict.effects.first().map_or(CERTAIN, |e| e.probability);
-    verdict.effects.extend(told.iter().map(|one| entry(one, whole)));
+    // what has no name stays last
+    let names = verdict.effects.iter().take_while(|e| e.id != "unknown").count();
+    verdict.effects.splice(names..names, told.iter().map(entry));
+    // the other hypotheses hold what is told as well
     for other in &mut verdict.alternatives {
         other.probability *= CERTAIN;
         other.ids.extend(told.iter().map(|one| one.added.placed.effect.id().to_owned()));
     }
 }
 
-fn entry(told: &Told, probability: f64) -> EffectEntry {
+fn entry(told: &Told) -> EffectEntry {
     let Told { added, .. } = told;
     let about = added.placed.effect.about();
     EffectEntry {
         id: added.placed.effect.id().to_owned(),
+        scope: added.placed.effect.scope(&added.placed.instance),
         channels: added.placed.instance.channels.clone(),
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: format!("{} [{TOLD_BY_THE_BOARD}]", about.equation),
-        probability,
+        probability: CERTAIN,
         parameters: added.estimates.iter().map(|e| crate::close::parameter(e, &[])).collect(),
         heldout_error_reduction: 0.0,
         evidence: words(told),

@@ -7,6 +7,7 @@
 //! Units: scores in nats.
 //! Reference: cross-validation over runs; discrimination by a second experiment, Atkinson & Fedorov 1975, Biometrika 62:57.
 
+use crate::beside::is_named;
 use crate::close::Closed;
 use crate::context::Context;
 use crate::diagnose::{Candidate, Diagnosis};
@@ -115,8 +116,9 @@ pub fn next(runs: &[Run], leader: &Standing, rival: &Standing) -> Option<NextExp
 fn hypotheses(runs: &[Run]) -> Vec<(Vec<Placed>, f64)> {
     let mut out: Vec<(Vec<Placed>, f64)> = Vec::new();
     let mut add = |placed: Vec<Placed>, probability: f64| {
-        let named = placed.iter().all(|p| p.effect.id() != "unknown");
-        let new = named && !placed.is_empty() && !out.iter().any(|(other, _)| same(other, &placed));
+        // what has no name is no hypothesis of another run
+        let placed: Vec<Placed> = placed.into_iter().filter(is_named).collect();
+        let new = !placed.is_empty() && !out.iter().any(|(other, _)| same(other, &placed));
         if new {
             out.push((placed, probability));
         }

@@ -45,16 +45,22 @@ pub(crate) fn nearest(context: &Context, start: &Fit, suspects: &[Candidate], si
 }
 
 /// Puts the best suspect beside other names on its channels that explain no more than it does alone: it is then as probable as they are.
-pub(crate) fn stand_beside(best: &Candidate, probability: &mut f64, rivals: &mut Vec<Rival>, suspects: &[Candidate]) {
-    let names = best.ids();
+pub(crate) fn stand_beside<'s>(
+    best: &Candidate,
+    probability: &mut f64,
+    rivals: &mut Vec<Rival>,
+    suspects: &'s [Candidate],
+) -> Option<&'s Candidate> {
+    let names = best.names();
     let another = |s: &&Candidate| {
         let on_its_channels = |p: &Placed| s.fit.placed.iter().any(|q| q.instance.channels.iter().any(|c| p.instance.touches(c)));
         s.evidence > best.evidence && best.fit.placed.iter().any(on_its_channels) && s.ids().iter().all(|id| !names.contains(id))
     };
-    let Some(suspect) = suspects.iter().find(another) else { return };
+    let suspect = suspects.iter().find(another)?;
     *probability *= 0.5;
     rivals.iter_mut().for_each(|r| r.probability *= 0.5);
     rivals.insert(0, Rival { ids: suspect.ids(), probability: *probability, fit: suspect.fit.clone() });
+    Some(suspect)
 }
 
 /// Whether a suspect's estimates make physical sense. A shape on its bound does no harm: nothing is named.

@@ -1,26 +1,29 @@
-//! The verdict file, `quadrig-verdict 1`.
+//! The verdict file, `quadrig-verdict 2`.
 //!
 //! What it is: the contract as types.
 //! What can go wrong: nothing here; every number in it is finite by construction of the diagnosis.
 //! Units: each channel and parameter states its own.
 //! Reference: specification `formats.md`, "Verdict".
 
+use crate::effects::Scope;
 use crate::sparse::LeftOut;
-use serde::Serialize;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
+use std::ops::Deref;
 
 /// First key of the format.
-pub const FORMAT: &str = "quadrig-verdict 1";
+pub const FORMAT: &str = "quadrig-verdict 2";
 
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// A known effect explains it.
+    /// At least one effect is named; something may be left beside it.
     Attributed,
-    /// Something is there that no known effect explains.
+    /// Something is there, and none of it could be named.
     Unattributed,
-    /// Nothing significant above the noise floor.
+    /// No channel is left with more than its noise.
     None,
     /// Two or more effects explain it equally well.
     Ambiguous,
@@ -50,6 +53,64 @@ pub struct Channel {
     pub after: Figures,
 }
 
+/// The channels of a log by name.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Channels {
+    /// Those that are predicted.
+    pub predicted: BTreeMap<String, Channel>,
+    /// Those that nothing predicts, each with the reason: inputs only.
+    pub not_predicted: BTreeMap<String, String>,
+}
+
+/// How a channel that nothing predicts stands in the file.
+#[derive(Serialize)]
+struct NotPredicted<'r> {
+    not_predicted: &'r str,
+}
+
+impl Serialize for Channels {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.predicted.len() + self.not_predicted.len()))?;
+        for (name, channel) in &self.predicted {
+            map.serialize_entry(name, channel)?;
+        }
+        for (name, reason) in &self.not_predicted {
+            map.serialize_entry(name, &NotPredicted { not_predicted: reason })?;
+        }
+        map.end()
+    }
+}
+
+impl Deref for Channels {
+    type Target = BTreeMap<String, Channel>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.predicted
+    }
+}
+
+impl<'c> IntoIterator for &'c Channels {
+    type Item = (&'c String, &'c Channel);
+    type IntoIter = std::collections::btree_map::Iter<'c, String, Channel>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.predicted.iter()
+    }
+}
+
+/// Something that is left on a channel, or on what one speed sensor reads beyond the others.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Channel, or contrast.
+    pub channel: String,
+    /// Error that is left, in noise floors.
+    pub over_floor: f64,
+    /// Variables that it goes with, the closest first.
+    pub depends_on: Vec<String>,
+    /// What it looks like, for people.
+    pub looks_like: String,
+}
+
 /// One parameter with its interval.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Parameter {
@@ -68,13 +129,15 @@ pub struct Parameter {
 pub struct EffectEntry {
     /// Identifier.
     pub id: String,
+    /// What it belongs to.
+    pub scope: Scope,
     /// Channels that it touches, the quoted one first.
     pub channels: Vec<String>,
     /// Variables that it depends on.
     pub depends_on: Vec<String>,
     /// Equation.
     pub equation: String,
-    /// Probability of the whole hypothesis.
+    /// Probability of this effect being there: that of all hypotheses together that hold it.
     pub probability: f64,
     /// Parameters.
     pub parameters: Vec<Parameter>,
@@ -139,9 +202,11 @@ pub struct Verdict {
     /// What was found.
     pub verdict: Kind,
     /// Channels by name.
-    pub channels: BTreeMap<String, Channel>,
-    /// The best hypothesis.
+    pub channels: Channels,
+    /// The best hypothesis, what has no name last.
     pub effects: Vec<EffectEntry>,
+    /// What is left beside it.
+    pub unexplained: Vec<Unexplained>,
     /// The others.
     pub alternatives: Vec<Alternative>,
     /// Where two explain it equally well.

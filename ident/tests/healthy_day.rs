@@ -190,7 +190,7 @@ fn another_supply_colder_air_and_a_coarse_command_are_told() {
 
 /// A sag that explains all that is new of voltage and speed, and a torque that nothing in the library explains.
 #[test]
-fn a_name_that_leaves_news_on_another_channel_is_not_the_cause() {
+fn a_name_stands_beside_news_on_another_channel_and_the_news_are_told() {
     let model = model();
     let sagging = Day { seed: 5, supply: &|amps, _| 11.5 - 0.05 * amps, ..HEALTHY };
     let mut log = log(&sagging);
@@ -198,8 +198,12 @@ fn a_name_that_leaves_news_on_another_channel_is_not_the_cause() {
     let torque = &mut log.columns[3];
     torque.values.iter_mut().zip(&rpm).for_each(|(q, r)| *q *= 1.0 + 0.08 * (r / 150.0).sin());
     let closed = close(&log, Some(&model), &[], &mut |_| {}).expect("a day");
-    assert_eq!(closed.verdict.verdict, Kind::Unattributed, "{:?}", names(&closed));
-    assert_eq!(against(&model, &sagging).verdict.verdict, Kind::Attributed);
+    assert_eq!((closed.verdict.verdict, first(&closed)), (Kind::Attributed, "supply_sag"), "{:?}", names(&closed));
+    let told = |closed: &Closed| closed.verdict.unexplained.iter().any(|u| u.channel == "torque_nm" && u.over_floor > 3.0);
+    assert!(told(&closed), "{:?}", closed.verdict.unexplained);
+    let alone = against(&model, &sagging);
+    assert_eq!(alone.verdict.verdict, Kind::Attributed);
+    assert!(!told(&alone), "{:?}", alone.verdict.unexplained);
 }
 
 #[test]

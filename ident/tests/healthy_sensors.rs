@@ -170,7 +170,10 @@ fn no_name_rests_on_one_moment() {
 fn a_new_zero_does_not_answer_for_the_rest() {
     let wavers = |_: usize, t: f64, rpm: f64| rpm + 8.0 * (0.9 * t).sin();
     let day = against(&model(&HEALTHY), &Day { seed: 23, reads: &wavers, zero: 0.2, ..HEALTHY });
-    assert_eq!((day.verdict.verdict, names(&day)), (Kind::Unattributed, vec!["unknown"]));
+    assert_eq!(names(&day), ["unknown"]);
+    let [zero, rest] = &day.verdict.effects[..] else { panic!("{:?}", day.verdict.effects) };
+    assert_eq!((zero.id.as_str(), zero.channels[0].as_str()), ("tare_shift", "thrust_n"));
+    assert!(rest.channels.iter().all(|c| c.starts_with("rpm")), "{:?}", rest.channels);
 }
 
 #[test]

@@ -99,9 +99,7 @@ pub(crate) fn table(verdict: &Verdict) -> String {
         }
         out += &format!("  evidence: {}\n", e.evidence);
     }
-    if matches!(verdict.verdict, Kind::Attributed | Kind::Ambiguous) {
-        out += &unexplained(verdict);
-    }
+    out += &unexplained(verdict);
     if !verdict.alternatives.is_empty() {
         let list: Vec<String> =
             verdict.alternatives.iter().map(|a| format!("{} ({:.3})", a.ids.join(" + "), a.probability)).collect();
@@ -123,22 +121,21 @@ pub(crate) fn table(verdict: &Verdict) -> String {
     out
 }
 
-/// Noise floors of held-out error from which on a channel counts as not understood, whatever was named on others.
-const FAR: f64 = 3.0;
-
-/// The channels on which the named effects leave far more than noise, and how much: a name explains what it was found on.
+/// What is left beside the names, channel by channel.
 fn unexplained(verdict: &Verdict) -> String {
-    let far =
-        verdict.channels.iter().filter(|(_, c)| c.after.heldout_rms > FAR * c.noise_floor_rms && c.after.whiteness_p < 1e-6);
-    let list: Vec<String> = far.map(|(name, c)| format!("{name} {:.0}", c.after.heldout_rms / c.noise_floor_rms)).collect();
-    if list.is_empty() {
-        return String::new();
+    let mut out = String::new();
+    for u in &verdict.unexplained {
+        let on = if u.depends_on.is_empty() { String::new() } else { format!(", goes with {}", u.depends_on.join(", ")) };
+        out += &format!("\nleft on {}: {:.1} noise floors, {}{on}", u.channel, u.over_floor, u.looks_like);
     }
-    format!("\nnot explained by these names, held-out error in noise floors: {}\n", list.join(", "))
+    for (channel, reason) in &verdict.channels.not_predicted {
+        out += &format!("\nnot predicted: {channel}, {reason}");
+    }
+    if out.is_empty() { out } else { out + "\n" }
 }
 
 fn sentence(verdict: &Verdict) -> String {
-    let ids: Vec<&str> = verdict.effects.iter().map(|e| e.id.as_str()).collect();
+    let ids: Vec<&str> = verdict.effects.iter().map(|e| e.id.as_str()).filter(|id| *id != "unknown").collect();
     match verdict.verdict {
         Kind::Attributed => format!("the model lacks {}", ids.join(" and ")),
         Kind::Ambiguous => format!("the model lacks {}, or something that looks the same on this run", ids.join(" and ")),

@@ -370,7 +370,10 @@ fn json_on_standard_output_is_the_verdict_and_nothing_else() {
     let bench = Bench::new();
     let said = bench.call(&["close-loop", "good.csv", "-o", "out", "--json"]).succeeded();
     let verdict: serde_json::Value = serde_json::from_str(&said.out).expect("one JSON document");
-    assert_eq!(verdict["format"], "quadrig-verdict 1");
+    assert_eq!(verdict["format"], "quadrig-verdict 2");
     assert_eq!(verdict["run"], "good.csv");
+    assert!(verdict["unexplained"].is_array());
+    let scopes = verdict["effects"].as_array().expect("effects").iter().map(|e| e["scope"].as_str().expect("a scope"));
+    assert!(scopes.into_iter().all(|s| ["rig", "run", "event"].contains(&s)), "{verdict}");
     assert_eq!(said.out, fs::read_to_string(bench.path("out/verdict.json")).unwrap());
 }

@@ -89,7 +89,7 @@ fn figures_can_be_recomputed_from_the_model() {
     assert!((5.0..7.0).contains(&size), "{size}");
     let page = std::fs::read_to_string(bench.path().join("out/report.html")).unwrap();
     assert!(page.contains("hard_iron") && page.contains("residual-mx") && !page.contains("NaN"), "a page with its figures");
-    assert_eq!(answer.json["format"], "quadrig-verdict 1");
+    assert_eq!(answer.json["format"], "quadrig-verdict 2");
 }
 
 #[test]

@@ -8,7 +8,7 @@
 //!
 //! Units: as the channels state.
 //!
-//! Reference: `check_verdict.py`, the contract of `quadrig-verdict 1` in executable form.
+//! Reference: `check_verdict.py`, the contract of `quadrig-verdict 2` in executable form.
 
 use crate::place::{Place, on_ci};
 use crate::run::{Failure, Tally, cargo, run};
@@ -122,7 +122,7 @@ fn check(python: &Path, checker: &Path, quadrig: &Path, log: &Path) -> Result<(b
     let quoted = format!("'{}'", quadrig.display());
     let done = Command::new(python)
         .arg(checker)
-        .args(["--cmd", &quoted])
+        .args(["--least", "2", "--cmd", &quoted])
         .arg(log)
         .stdin(Stdio::null())
         .output()

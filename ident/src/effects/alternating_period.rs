@@ -8,7 +8,7 @@
 
 use super::pulses::{HELD, against_the_others, held};
 use super::speed_channel::{difference, instances};
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -41,6 +41,10 @@ impl Effect for AlternatingPeriod {
             signature: "one speed channel jumps between two values about the others, in proportion to the speed",
             look_alikes: &["missed_pulses", "double_pulses"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

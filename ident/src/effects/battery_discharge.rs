@@ -7,7 +7,7 @@
 //! Reference: open-circuit voltage of lithium-polymer cells falls by 0.65 V +- 15 % per unit of charge between full and the
 //! knee: 4.20 V full, 3.87 V at 50 % (Chen & Rincon-Mora 2006, Fig. 8, and common discharge tables).
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present, speeds};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present, speeds};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -33,6 +33,10 @@ impl Effect for BatteryDischarge {
             signature: "voltage and speed at the same pulse fall together, fastest at high current, and never come back",
             look_alikes: &["supply_sag", "thermal_derate"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

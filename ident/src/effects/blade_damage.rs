@@ -5,7 +5,7 @@
 //! Units: 1, s; internally N/krpm2, N.m/krpm2, A/krpm3, A/krpm4, rev/min/kus, rev/min/kus2.
 //! Reference: thrust and torque coefficients, Beharie 2013, Eq. 2.17-2.18; step at an unknown instant, Basseville & Nikiforov 1993.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, load_channels, throttle};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, load_channels, throttle};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -26,6 +26,10 @@ impl Effect for BladeDamage {
             signature: "thrust, torque, current and speed all change at one instant, in proportion to the load",
             look_alikes: &["gain_change", "bearing_friction", "air_density"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Event
     }
 
     fn stage(&self) -> Stage {

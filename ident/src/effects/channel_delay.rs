@@ -6,7 +6,7 @@
 //! Reference: pure transport delay of a logger.
 
 use super::{
-    About, Amplitude, Effect, Estimate, Instance, Shape, Stage, lone_speed, meters, operator, reads_meter, through_meter,
+    About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, lone_speed, meters, operator, reads_meter, through_meter,
 };
 use crate::context::Context;
 use crate::design::TargetDesign;
@@ -28,6 +28,10 @@ impl Effect for ChannelDelay {
             signature: "rectangular spikes of the residual at every change of the load, as long as the delay",
             look_alikes: &["channel_filter", "clock_drift"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {
@@ -64,6 +68,11 @@ impl Effect for ChannelDelay {
         let own = if reads_meter(instance, design.relation) { -delay } else { *delay };
         let late = operator::Late::new(&context.t, course, |_| own);
         through_meter(context, design, |columns| columns.iter().map(|c| late.of(c)).collect());
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        // no meter shows a change before there is one
+        fitted.iter().all(|e| e.name != "delay" || e.value > 0.0)
     }
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {

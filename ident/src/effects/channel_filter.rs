@@ -6,7 +6,7 @@
 //! Reference: boxcar and RC filters; RCbenchmark load cells average over about half a second.
 
 use super::{
-    About, Amplitude, Effect, Estimate, Instance, Shape, Stage, geometric, lone_speed, meters, operator, reads_meter,
+    About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, geometric, lone_speed, meters, operator, reads_meter,
     through_meter,
 };
 use crate::context::{CALM_US, Context};
@@ -36,6 +36,10 @@ impl Effect for ChannelFilter {
             signature: "the residual spikes at every change of the load, with the sign of the change, and is flat elsewhere",
             look_alikes: &["channel_delay", "spinup_lag", "creep"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

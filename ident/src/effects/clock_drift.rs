@@ -5,7 +5,7 @@
 //! Units: 1 (seconds late a second), positive falls behind.
 //! Reference: frequency tolerance of two free-running oscillators.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, operator, present};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, operator, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -26,6 +26,10 @@ impl Effect for ClockDrift {
             signature: "spikes of the thrust and torque residual at every change of the load, wider and wider with time",
             look_alikes: &["channel_delay", "channel_filter"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

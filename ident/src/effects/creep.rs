@@ -5,7 +5,7 @@
 //! Units: 1, s.
 //! Reference: Hoffmann, *An Introduction to Stress Analysis using Strain Gauges*, section 3.3 (creep).
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, geometric, operator, thrust_over_time};
+use super::{About, Amplitude, Effect, Instance, Scope, Shape, Stage, geometric, operator, thrust_over_time};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -26,6 +26,10 @@ impl Effect for Creep {
             signature: "after each step the thrust residual relaxes exponentially, in proportion to the step",
             look_alikes: &["channel_filter", "hysteresis", "zero_drift"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

@@ -6,7 +6,7 @@
 //! Reference: sensor disagreement, specification `rig.md`; Beharie 2013, section 5.7.1.
 
 use super::speed_channel::instances;
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -27,6 +27,10 @@ impl Effect for DeadRotorSpeed {
             signature: "one speed channel reads a fixed, far-off multiple of what all others read",
             look_alikes: &["missed_pulses", "double_pulses"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

@@ -8,7 +8,7 @@
 //! Reference: Beharie 2013, section 5.7.1 (edges that ring).
 
 use super::pulses::{apply_pulses, is_of_single_readings, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -32,6 +32,10 @@ impl Effect for DoublePulses {
             signature: "one speed channel reads high against the others, by one share of the speed or in scattered samples",
             look_alikes: &["blade_twist", "dead_rotor_speed", "alternating_period"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

@@ -6,7 +6,7 @@
 //! Reference: Beharie 2013, Eq. 5.34-5.35 (two calibrations differ by 9.7 % in slope).
 
 use super::tare_shift::{BEFORE, coarse_onset, step, with_first_instant};
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, present};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -26,6 +26,14 @@ impl Effect for GainChange {
             depends_on: &["t_s", "thrust_n"],
             signature: "the thrust residual grows with the thrust, after an instant or with time; torque(rpm) holds",
             look_alikes: &["blade_damage", "air_density", "creep"],
+        }
+    }
+
+    fn scope(&self, instance: &Instance) -> Scope {
+        match instance.form.as_str() {
+            "drift" => Scope::Run,
+            BEFORE => Scope::Rig,
+            _ => Scope::Event,
         }
     }
 

@@ -6,7 +6,7 @@
 //! Units: N, at mid range.
 //! Reference: OIML R 60 (load cells), hysteresis error.
 
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, present};
+use super::{About, Amplitude, Effect, Instance, Scope, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -27,6 +27,10 @@ impl Effect for Hysteresis {
             signature: "the thrust residual of the way up and of the way down bend apart in the middle and meet at the ends",
             look_alikes: &["creep", "zero_drift"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

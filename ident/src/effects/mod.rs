@@ -68,6 +68,18 @@ pub enum Stage {
     Readings,
 }
 
+/// What an effect belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scope {
+    /// The rig: it is there on every run.
+    Rig,
+    /// One run: another run has a value of its own.
+    Run,
+    /// One instant of one run: it does not recur.
+    Event,
+}
+
 /// What an effect is, for reports and documentation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct About {
@@ -155,6 +167,8 @@ pub trait Effect: Sync {
     fn id(&self) -> &'static str;
     /// What it is.
     fn about(&self) -> About;
+    /// What it belongs to.
+    fn scope(&self, instance: &Instance) -> Scope;
     /// Where it acts.
     fn stage(&self) -> Stage;
     /// The same for one of its forms.

@@ -6,7 +6,7 @@
 //! Units: s.
 //! Reference: zero-order hold; asynchronous telemetry of speed controllers.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, through_meter};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, through_meter};
 use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::design::TargetDesign;
 use crate::noise::median;
@@ -30,6 +30,10 @@ impl Effect for SampleHold {
             signature: "exact repeats at even intervals, and steps of the load arrive late by up to one period",
             look_alikes: &["channel_delay", "quantisation"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

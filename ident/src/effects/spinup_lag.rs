@@ -7,7 +7,7 @@
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
 
 use super::coasting::{Coasting, Rotor};
-use super::{About, Amplitude, Effect, Instance, Shape, Stage, operator, speeds};
+use super::{About, Amplitude, Effect, Instance, Scope, Shape, Stage, operator, speeds};
 use crate::context::{CALM_US, Context};
 use crate::design::TargetDesign;
 
@@ -37,6 +37,10 @@ impl Effect for SpinupLag {
             signature: "rpm(pulse) is off for a moment after every step and right before the next; thrust(rpm) holds throughout",
             look_alikes: &["channel_filter", "channel_delay"],
         }
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
     }
 
     fn stage(&self) -> Stage {

@@ -6,7 +6,7 @@
 //! Units: N, s.
 //! Reference: step change with unknown instant, Basseville & Nikiforov 1993, section 2.2.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage, thrust_over_time};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, thrust_over_time};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -27,6 +27,10 @@ impl Effect for TareShift {
             signature: "the thrust residual has one step in time and is flat on both sides",
             look_alikes: &["zero_drift", "gain_change"],
         }
+    }
+
+    fn scope(&self, instance: &Instance) -> Scope {
+        if instance.form == BEFORE { Scope::Run } else { Scope::Event }
     }
 
     fn stage(&self) -> Stage {

@@ -5,7 +5,7 @@
 //! Units: each coefficient in the channel's unit; the variable is scaled to -1..1 over its fitted range, which is in its own unit.
 //! Reference: discrepancy modelling, Ebers et al. 2022 (arXiv 2203.05164).
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Shape, Stage};
+use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, unit_of};
 use crate::design::TargetDesign;
 
@@ -87,6 +87,11 @@ impl Effect for Unknown {
             signature: "a residual that a smooth function of one variable predicts on held-out blocks",
             look_alikes: &[],
         }
+    }
+
+    fn scope(&self, instance: &Instance) -> Scope {
+        // what depends on the clock of a run belongs to that run
+        if ["t_s", "charge"].contains(&parts(&instance.form).0) { Scope::Run } else { Scope::Rig }
     }
 
     fn stage(&self) -> Stage {

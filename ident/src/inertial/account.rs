@@ -10,7 +10,10 @@ use super::Recording;
 use super::least::Readings;
 use super::model::{FORMAT as MODEL_FORMAT, InertialModel, Part};
 use crate::residual::whiteness;
-use crate::verdict::{Alternative, Channel, EffectEntry, FORMAT, Figures, Kind, NextExperiment, ScheduleStep, Verdict};
+use crate::unexplained::LOUD;
+use crate::verdict::{
+    Alternative, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, NextExperiment, ScheduleStep, Unexplained, Verdict,
+};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -89,21 +92,20 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
     }
     // the sensor with the most left over speaks first
     sensors.sort_by(|a, b| b.excess[0].total_cmp(&a.excess[0]));
-    let named = sensors.iter().filter(|s| matches!(s.kind, Kind::Attributed | Kind::Ambiguous));
-    let unknown = sensors.iter().find(|s| s.kind == Kind::Unattributed);
-    let worst = named.clone().map(|s| s.excess[0]).fold(0.0, f64::max);
-    let (verdict, effects): (Kind, Vec<EffectEntry>) = match unknown {
-        Some(u) if u.excess[1] >= worst || named.clone().next().is_none() => (Kind::Unattributed, u.effects.clone()),
-        _ => {
-            let effects: Vec<EffectEntry> = named.clone().flat_map(|s| s.effects.clone()).collect();
-            let unsure = named.clone().any(|s| s.kind == Kind::Ambiguous);
-            match (effects.is_empty(), unsure) {
-                (true, _) => (Kind::None, effects),
-                (_, true) => (Kind::Ambiguous, effects),
-                _ => (Kind::Attributed, effects),
-            }
-        }
+    let of = |kinds: &[Kind]| -> Vec<EffectEntry> {
+        sensors.iter().filter(|s| kinds.contains(&s.kind)).flat_map(|s| s.effects.clone()).collect()
     };
+    let (mut effects, nameless) = (of(&[Kind::Attributed, Kind::Ambiguous]), of(&[Kind::Unattributed]));
+    let unsure = sensors.iter().any(|s| s.kind == Kind::Ambiguous);
+    // a sensor about which nothing is known takes back no name of another
+    let verdict = match (effects.is_empty(), nameless.is_empty()) {
+        (true, true) => Kind::None,
+        (true, false) => Kind::Unattributed,
+        _ if unsure => Kind::Ambiguous,
+        _ => Kind::Attributed,
+    };
+    effects.extend(nameless);
+    let unexplained = unexplained(&channels, &effects);
     let mut alternatives: Vec<Alternative> = sensors.iter().flat_map(|s| s.alternatives.clone()).collect();
     alternatives.retain(|a| a.probability >= 1e-3);
     alternatives.sort_by(|a, b| b.probability.total_cmp(&a.probability));
@@ -112,8 +114,9 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         format: FORMAT,
         run: recording.name.clone(),
         verdict,
-        channels,
+        channels: Channels { predicted: channels, ..Channels::default() },
         effects,
+        unexplained,
         alternatives,
         next_experiment,
         left_out: Vec::new(),
@@ -126,6 +129,23 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         sensor: sensors.iter().map(|s| s.part.clone()).collect(),
     };
     Closed { verdict, model, sensors }
+}
+
+/// The channels on which more than three noise floors are left.
+fn unexplained(channels: &BTreeMap<String, Channel>, effects: &[EffectEntry]) -> Vec<Unexplained> {
+    let depends_on = |name: &String| {
+        let nameless = effects.iter().find(|e| e.id == "unknown" && e.channels.contains(name));
+        nameless.map_or_else(Vec::new, |e| e.depends_on.clone())
+    };
+    let over = |c: &Channel| c.after.heldout_rms / c.noise_floor_rms;
+    let loud = channels.iter().filter(|(_, c)| over(c) > LOUD);
+    loud.map(|(name, c)| Unexplained {
+        channel: name.clone(),
+        over_floor: over(c),
+        depends_on: depends_on(name),
+        looks_like: "more than the sensor's noise; what the attitude is not known to is part of it".to_owned(),
+    })
+    .collect()
 }
 
 /// The motion that tells causes of an inertial unit apart. The schedule has the rig's form: the motors stay off.

@@ -15,6 +15,7 @@ use super::noise::{axis_level, floor, levels};
 use super::search::{Scene, evidence, parameter};
 use super::trace::{Setting, Traced, trace};
 use super::{Attitude, Recording, effects, smooth, vibration};
+use crate::effects::Scope;
 use crate::verdict::{EffectEntry, Kind};
 use nalgebra::{Matrix3, Vector3};
 
@@ -200,6 +201,7 @@ fn accelerate(
     let slow = slow_share(&t, &back);
     Some(EffectEntry {
         id: "linear_acceleration".to_owned(),
+        scope: Scope::Run,
         channels: setting.channels.map(str::to_owned).to_vec(),
         depends_on: vec!["t_s".to_owned()],
         equation: "f += R^T a(t), a smooth in earth axes with bounded speed".to_owned(),

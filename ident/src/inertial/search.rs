@@ -9,6 +9,7 @@
 //! Reference: specification `closing-the-loop.md`, step 6.
 
 use super::Recording;
+use super::account::by_axis;
 use super::least::{Column, Readings, Solved, Term};
 use crate::verdict::Parameter;
 use nalgebra::{Matrix3, Vector3};
@@ -104,6 +105,15 @@ struct Try<'a> {
     scanned: Scan,
     evidence: f64,
     gain: f64,
+}
+
+/// Share by which the error of an axis may grow.
+const WORSE: f64 = 0.02;
+
+/// Which axes are predicted worse after than before.
+pub(crate) fn spoils(before: &[f64], after: &[f64]) -> [bool; 3] {
+    let (before, after) = (by_axis(before), by_axis(after));
+    std::array::from_fn(|k| after[k] > (1.0 + WORSE) * before[k])
 }
 
 /// Searches; `noise` is a block's own standard deviation, `doubt` what the attitude's error makes of it.

@@ -8,8 +8,9 @@
 use super::account::{Sensor, by_axis, judge};
 use super::least::{Readings, Term};
 use super::model::{Added, Part};
-use super::search::{Cause, Found, Outcome, Scene, parameters, predict, search};
+use super::search::{Cause, Found, Outcome, Scene, parameters, predict, search, spoils};
 use super::unknown::correct;
+use crate::effects::Scope;
 use crate::verdict::{Alternative, EffectEntry, Kind};
 use nalgebra::Vector3;
 
@@ -76,7 +77,10 @@ pub(crate) fn trace<'a>(
     match kind {
         Kind::None => {}
         Kind::Unattributed => {
-            if let Some(c) = correct(readings, base, scene, setting.channels, noise) {
+            let correction = correct(readings, base, scene, setting.channels, noise);
+            if let Some(c) = correction.as_ref().filter(|c| spoils(&outcome.before.heldout, &c.solved.heldout).contains(&true)) {
+                sensor.effects = vec![c.refused()];
+            } else if let Some(c) = correction {
                 sensor.corrected = rows(&|i| c.predict(base, t[i], i));
                 sensor.heldout_after = by_axis(&c.solved.heldout);
                 sensor.excess[1] = over(mean(&c.solved.heldout));
@@ -141,19 +145,27 @@ fn contribution(outcome: &Outcome<'_>, base: usize, t: f64, row: usize) -> Vecto
 
 fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectEntry> {
     let mut at = base;
+    // an axis that is predicted worse with all that was found is none that they speak of
+    let worse = spoils(&outcome.before.heldout, &outcome.after.heldout);
+    let of = |bad: bool| -> Vec<String> {
+        setting.channels.iter().zip(worse).filter(|(_, w)| *w == bad).map(|(c, _)| (*c).to_owned()).collect()
+    };
+    let (channels, spoilt) = (of(false), of(true));
+    let but = if spoilt.is_empty() { String::new() } else { format!("; {} is predicted worse with them", spoilt.join(", ")) };
     let entry = |f: &Found<'_>, at: usize| {
         let count = f.instance.terms.len();
         let (c, s) = (&outcome.after.coefficients[at..at + count], &outcome.after.sigma[at..at + count]);
         EffectEntry {
             id: f.instance.id.to_owned(),
-            channels: setting.channels.map(str::to_owned).to_vec(),
+            scope: Scope::Rig,
+            channels: channels.clone(),
             depends_on: f.instance.depends_on.iter().map(|d| (*d).to_owned()).collect(),
             equation: f.instance.equation.to_owned(),
             probability: outcome.probability,
             parameters: parameters(f, c, s),
             heldout_error_reduction: f.reduction,
             evidence: format!(
-                "without it left-out stretches are predicted {:.1} % worse ({:.0} nats)",
+                "without it left-out stretches are predicted {:.1} % worse ({:.0} nats){but}",
                 100.0 * (1.0 / (1.0 - f.reduction).max(1e-9) - 1.0),
                 f.evidence
             ),

@@ -9,6 +9,7 @@
 use super::least::{Column, Readings, Solved, Term};
 use super::model::Added;
 use super::search::{Scene, parameter, predict};
+use crate::effects::Scope;
 use crate::verdict::EffectEntry;
 use nalgebra::Vector3;
 
@@ -85,6 +86,7 @@ pub(crate) fn correct<'a>(
         .collect();
     let entry = EffectEntry {
         id: "unknown".to_owned(),
+        scope: Scope::Run,
         channels: channels.map(str::to_owned).to_vec(),
         evidence: format!(
             "no known cause takes away half of what is over; linear in {} predicts left-out stretches best",
@@ -100,6 +102,19 @@ pub(crate) fn correct<'a>(
 }
 
 impl Correction<'_> {
+    /// What is said where it would predict an axis worse: something is there, and nothing is corrected.
+    pub(crate) fn refused(&self) -> EffectEntry {
+        EffectEntry {
+            depends_on: Vec::new(),
+            equation: "no correction".to_owned(),
+            parameters: Vec::new(),
+            heldout_error_reduction: 0.0,
+            evidence: "no known cause takes away half of what is over; no correction predicts left-out stretches of every axis"
+                .to_owned(),
+            ..self.entry.clone()
+        }
+    }
+
     /// Its share of the model, behind so many coefficients of the declared one.
     pub(crate) fn added(&self, base: usize) -> Added {
         Added {

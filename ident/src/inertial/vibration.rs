@@ -13,6 +13,7 @@ use super::account::Sensor;
 use super::noise::{levels, quantile};
 use super::search::{NAMED, parameter};
 use super::trace::Setting;
+use crate::effects::Scope;
 use crate::verdict::EffectEntry;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use std::f64::consts::TAU;
@@ -76,6 +77,7 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
     };
     Some(EffectEntry {
         id: "vibration".to_owned(),
+        scope: Scope::Run,
         channels: setting.channels.map(str::to_owned).to_vec(),
         depends_on: vec!["t_s".to_owned()],
         equation: if has_line {

@@ -17,6 +17,8 @@ const ORDER: usize = 6;
 const BLOCKS: usize = 12;
 /// Permutations.
 const SHUFFLES: usize = 99;
+/// Samples that a share needs.
+const FEWEST: usize = 2 * BLOCKS * (ORDER + 1) / 3;
 /// Samples of a channel that are looked at, evenly thinned.
 const MOST: usize = 1500;
 /// Squared correlation at which two variables are confounded.
@@ -119,6 +121,25 @@ fn chance(x: &[f64], y: &[f64], seen: f64) -> f64 {
     (better + 1) as f64 / (SHUFFLES + 1) as f64
 }
 
+/// Least share of a residual's variance that a variable must predict to be told, and most variables that are.
+const TOLD: (f64, usize) = (0.1, 3);
+
+/// The variables that predict the residual of a target, the best first.
+pub(crate) fn goes_with(context: &Context, target: usize, residual: &[f64]) -> Vec<String> {
+    let rows = &context.targets[target].rows;
+    let all = all_variables(context);
+    let mut found: Vec<(f64, &String)> = all
+        .iter()
+        .filter(|(name, _)| name != context.targets[target].name)
+        .map(|(name, values)| (thinned(rows, residual, values), name))
+        .filter(|((_, y), _)| y.len() > FEWEST)
+        .map(|((x, y), name)| (share(&x, &y), name))
+        .filter(|(share, _)| *share > TOLD.0)
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.into_iter().take(TOLD.1).map(|(_, name)| name.clone()).collect()
+}
+
 /// Each channel with each variable: name of the channel, of the variable, and the share.
 fn shares(start: &Start) -> Vec<(usize, usize, f64)> {
     let variables = all_variables(&start.context);
@@ -127,7 +148,7 @@ fn shares(start: &Start) -> Vec<(usize, usize, f64)> {
         // a channel says nothing of itself
         for (v, (_, values)) in variables.iter().enumerate().filter(|(_, (name, _))| name != target.name) {
             let (x, y) = pair(start, c, values);
-            if y.len() > 2 * BLOCKS * (ORDER + 1) / 3 {
+            if y.len() > FEWEST {
                 out.push((c, v, share(&x, &y)));
             }
         }
@@ -136,10 +157,14 @@ fn shares(start: &Start) -> Vec<(usize, usize, f64)> {
 }
 
 fn pair(start: &Start, channel: usize, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let rows = &start.context.targets[channel].rows;
+    thinned(&start.context.targets[channel].rows, &start.residuals[channel], values)
+}
+
+/// A variable and a residual on the same rows, evenly thinned.
+fn thinned(rows: &[usize], residual: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let stride = rows.len().div_ceil(MOST).max(1);
     let x = rows.iter().step_by(stride).map(|i| values[*i]).collect();
-    (x, start.residuals[channel].iter().step_by(stride).copied().collect())
+    (x, residual.iter().step_by(stride).copied().collect())
 }
 
 /// Variables that go together with one on this run.

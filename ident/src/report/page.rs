@@ -48,7 +48,7 @@ pub fn closed_loop(log: &Log, closed: &Closed) -> String {
 }
 
 fn lead(closed: &Closed) -> String {
-    let ids: Vec<String> = closed.verdict.effects.iter().map(|e| e.id.clone()).collect();
+    let ids: Vec<String> = closed.verdict.effects.iter().map(|e| e.id.clone()).filter(|id| id != "unknown").collect();
     match closed.verdict.verdict {
         Kind::Attributed => format!("Attributed: the declared model lacks {}.", ids.join(" and ")),
         Kind::Ambiguous => format!(
@@ -84,6 +84,10 @@ fn table(out: &mut String, closed: &Closed) {
         );
     }
     out.push_str("</table></div>\n");
+    for (channel, reason) in &closed.verdict.channels.not_predicted {
+        let _ = writeln!(out, "<p>Not predicted: {channel}, {}.</p>", escape(reason));
+    }
+    unexplained(out, closed);
     for left_out in &closed.verdict.left_out {
         let _ = writeln!(out, "<p>Left out: {}.</p>", escape(&left_out.to_string()));
     }
@@ -98,6 +102,25 @@ fn table(out: &mut String, closed: &Closed) {
         }
         out.push_str("</table></div>\n");
     }
+}
+
+/// What is left beside the names.
+fn unexplained(out: &mut String, closed: &Closed) {
+    if closed.verdict.unexplained.is_empty() {
+        return;
+    }
+    out.push_str("<h2>What is left</h2><div class=\"wide\"><table><tr><th>channel</th><th>noise floors</th><th>looks like</th><th>goes with</th></tr>");
+    for u in &closed.verdict.unexplained {
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td>{:.1}</td><td>{}</td><td>{}</td></tr>",
+            escape(&u.channel),
+            u.over_floor,
+            escape(&u.looks_like),
+            escape(&u.depends_on.join(", "))
+        );
+    }
+    out.push_str("</table></div>\n");
 }
 
 fn effects(out: &mut String, closed: &Closed) {

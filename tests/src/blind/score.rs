@@ -39,7 +39,7 @@ pub struct Line {
     pub verdict: String,
     /// Identifiers of the best hypothesis, joined by `+`.
     pub named: String,
-    /// Its probability.
+    /// Probability of its first effect being there.
     pub probability: f64,
     /// A true identifier stands first (or the unknown was recognised, or the clean run called none).
     pub first: bool,
@@ -198,9 +198,11 @@ pub fn score(seed: u64) -> Line {
 
 fn judge(s: &Scenario, v: &Verdict, other: &Run, line: &mut Line) {
     let ids = s.hidden.ids();
-    let named: Vec<&str> = v.effects.iter().map(|e| e.id.as_str()).collect();
+    let all: Vec<&str> = v.effects.iter().map(|e| e.id.as_str()).collect();
     line.verdict = format!("{:?}", v.verdict).to_lowercase();
-    line.named = named.join("+");
+    line.named = all.join("+");
+    // what has no name stands beside the names and is none of them
+    let named: Vec<&str> = all.into_iter().filter(|id| *id != "unknown").collect();
     line.probability = v.effects.first().map_or(f64::NAN, |e| e.probability);
     line.alternatives = v.alternatives.iter().map(|a| a.ids.join("+")).collect::<Vec<_>>().join("|");
     let same = |set: &[&str]| set.len() == ids.len() && ids.iter().all(|i| set.contains(i));

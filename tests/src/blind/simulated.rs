@@ -184,7 +184,7 @@ fn is_own_tare(entry: &EffectEntry) -> bool {
 fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Line) {
     let standing: Vec<&str> = own.effects.iter().map(|e| e.id.as_str()).collect();
     let own_tare = v.effects.iter().any(is_own_tare);
-    let named: Vec<String> = v.effects.iter().filter(|e| !is_own_tare(e)).map(|e| e.id.clone()).collect();
+    let named: Vec<String> = v.effects.iter().filter(|e| !is_own_tare(e) && e.id != "unknown").map(|e| e.id.clone()).collect();
     let without_tare =
         |ids: &[String]| -> Vec<String> { ids.iter().filter(|i| !own_tare || *i != "tare_shift").cloned().collect() };
     let others: Vec<Vec<String>> = v.alternatives.iter().map(|a| without_tare(&a.ids)).take(2).collect();
@@ -193,7 +193,7 @@ fn judge(id: Option<&str>, kind: &str, own: &Verdict, v: &Verdict, line: &mut Li
     line.probability = v.effects.first().map_or(f64::NAN, |e| e.probability);
     line.alternatives = format!("healthy:{}", standing.join("+"));
     let hit = |ids: &[String]| id.is_some_and(|id| ids.iter().any(|i| i == id));
-    let silent = named.is_empty();
+    let silent = v.effects.iter().all(is_own_tare);
     (line.first, line.top3, line.exact) = match kind {
         "one" => {
             let first = named.first().is_some_and(|n| Some(n.as_str()) == id);

@@ -66,7 +66,7 @@ pub fn coverage<'a>(lines: impl Iterator<Item = &'a Line>) -> Rate {
         .fold(Rate::default(), |r, h| Rate { hits: r.hits + usize::from(h == "1"), of: r.of + 1 })
 }
 
-/// Expected calibration error of the probability of the best hypothesis over ten bins.
+/// Expected calibration error of the probability of the first effect over ten bins.
 #[must_use]
 pub fn calibration<'a>(lines: impl Iterator<Item = &'a Line>) -> f64 {
     let mut bins = [(0.0, 0.0, 0.0); 10];
@@ -74,17 +74,17 @@ pub fn calibration<'a>(lines: impl Iterator<Item = &'a Line>) -> f64 {
         let b = &mut bins[((l.probability * 10.0) as usize).min(9)];
         b.0 += 1.0;
         b.1 += l.probability;
-        b.2 += f64::from(u8::from(l.exact));
+        b.2 += f64::from(u8::from(l.first));
     }
     let n: f64 = bins.iter().map(|b| b.0).sum();
     bins.iter().map(|b| (b.1 - b.2).abs()).sum::<f64>() / n
 }
 
-/// The calibration curve: of all hypotheses that were claimed with about this probability, how many were right. Right is the exact
-/// set of names; for an effect that the library does not know, that none was given.
+/// The calibration curve: of all effects that stood first with about this probability, how many were there. For an effect that the library
+/// does not know, that none was given.
 fn calibration_curve(lines: &[Line]) -> String {
-    let mut out = "\n### Calibration: probability of the verdict against how often it is right, effects of three noise floors and above\n\n| claimed | mean of the claims | right: one effect | two effects | unknown | all |\n| --- | --- | --- | --- | --- | --- |\n".to_owned();
-    let right = |l: &&Line| if l.kind == "unknown" { l.first } else { l.exact };
+    let mut out = "\n### Calibration: probability of the first effect against how often it is right, effects of three noise floors and above\n\n| claimed | mean of the claims | right: one effect | two effects | unknown | all |\n| --- | --- | --- | --- | --- | --- |\n".to_owned();
+    let right = |l: &&Line| l.first;
     for k in 0..10 {
         let (low, high) = (f64::from(k) / 10.0, f64::from(k + 1) / 10.0);
         let claims = |l: &&Line| l.size >= 3.0 && l.probability >= low && (l.probability < high || k == 9);

@@ -1,0 +1,114 @@
+//! What is left beside the names, told channel by channel.
+//!
+//! What it is: every predicted channel whose error on left-out rows is above [`LOUD`] noise floors, every one on which something smaller and
+//! coloured is left, and what one speed sensor reads beyond the others, with the variables that it goes with.
+//! What can go wrong: a sensor that is off by a constant share of the speed reads with a gain of its own, and is listed only where that is
+//! larger than sensors have it.
+//! Units: noise floors of the channel.
+//! Reference: specification `formats.md`, "Verdict" (`unexplained`); `closing-the-loop.md`, steps 2 and 7.
+
+use crate::context::{Context, DIFFERENCES, Relation, Target};
+use crate::heldout;
+use crate::hypothesis::{Declared, Fit, effective_share};
+use crate::inspect::goes_with;
+use crate::opponent::left_over;
+use crate::solve::Normal;
+use crate::verdict::{Channels, Unexplained};
+
+/// Error on left-out rows, in noise floors, from which on a channel must be told.
+pub const LOUD: f64 = 3.0;
+/// Largest gain that a healthy speed sensor has of its own: three standard deviations of 0.3 % (specification, step 2).
+const OWN_GAIN: f64 = 0.009;
+/// Share of the rows that may be anything when sensors are held against each other.
+const FEW: f64 = 0.01;
+/// Share of independent samples below which a residual is slow.
+const SLOW: f64 = 0.1;
+
+/// Something that is left, and the target that it is left on.
+pub(crate) struct Left {
+    pub(crate) target: usize,
+    /// What the verdict says of it.
+    pub(crate) told: Unexplained,
+}
+
+/// Everything that is left, in the order of the targets.
+pub(crate) fn unexplained(context: &Context, declared: Declared<'_>, fit: &Fit, channels: &Channels) -> Vec<Left> {
+    let residuals = heldout::residuals(context, declared, fit);
+    let mut out = Vec::new();
+    for (i, target) in context.targets.iter().enumerate() {
+        let over_floor = match target.relation {
+            Relation::SpeedDifference => contrast(context, target, &residuals[i]).filter(|over| *over > LOUD),
+            _ => channels
+                .get(target.name)
+                .map(|c| c.after.heldout_rms / c.noise_floor_rms)
+                .filter(|over| *over > LOUD || left_over(context, target, &residuals[i])),
+        };
+        if let Some(over_floor) = over_floor.filter(|over| over.is_finite()) {
+            let told = Unexplained {
+                channel: spoken(target.name),
+                over_floor,
+                depends_on: goes_with(context, i, &residuals[i]),
+                looks_like: looks_like(context, target, &residuals[i]),
+            };
+            out.push(Left { target: i, told });
+        }
+    }
+    out
+}
+
+/// The name of a channel as people say it.
+fn spoken(target: &str) -> String {
+    let of = DIFFERENCES.iter().find(|(_, difference)| *difference == target);
+    of.map_or_else(|| target.to_owned(), |(channel, _)| format!("{channel} - others"))
+}
+
+/// What one speed sensor reads beyond the others once its own gain is known, in noise floors of that difference, where the load is held.
+fn contrast(context: &Context, target: &Target, residual: &[f64]) -> Option<f64> {
+    let held = |j: &usize| target.claims(target.rows[*j]) && target.unsettled.get(*j).is_none_or(|u| !u);
+    let rows: Vec<(f64, f64)> = (0..residual.len())
+        .filter(held)
+        .map(|j| (context.rpm[target.rows[j]] / 1000.0, target.news(target.rows[j], residual[j])))
+        .collect();
+    let mut normal = Normal::new(2);
+    rows.iter().for_each(|(krpm, r)| normal.add(&[1.0, *krpm], *r, 1.0));
+    let line = normal.solve()?.coefficients;
+    let gain = line[1].clamp(-1000.0 * OWN_GAIN, 1000.0 * OWN_GAIN);
+    // beside another slope than the best the best constant is another one too
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| rows.iter().map(of).sum::<f64>() / rows.len() as f64;
+    let constant = mean(&|r| r.1) - gain * mean(&|r| r.0);
+    let mut squares: Vec<f64> = rows.iter().map(|(krpm, r)| (r - constant - gain * krpm).powi(2)).collect();
+    squares.sort_unstable_by(f64::total_cmp);
+    squares.truncate(squares.len() - (FEW * squares.len() as f64).ceil() as usize);
+    let rms = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+    Some(rms / target.noise.rms)
+}
+
+/// The shape of a residual in words.
+fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
+    let mut squares: Vec<f64> = residual.iter().map(|r| r * r).collect();
+    let whole = squares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let on_the_way: f64 = squares.iter().zip(&target.unsettled).filter(|(_, u)| **u).map(|(s, _)| s).sum();
+    if 2.0 * on_the_way > whole {
+        return "while the load is on its way".to_owned();
+    }
+    let grows = grows_with_the_load(context, target, &squares);
+    squares.sort_unstable_by(|a, b| b.total_cmp(a));
+    let few = (FEW * squares.len() as f64).ceil() as usize;
+    if 2.0 * squares.iter().take(few).sum::<f64>() > whole {
+        return "in single rows".to_owned();
+    }
+    let pace = if effective_share(residual) < SLOW { "slow" } else { "from row to row" };
+    if grows { format!("{pace}, grows with the load") } else { pace.to_owned() }
+}
+
+/// Whether the upper half of the loads holds most of a residual's squares.
+fn grows_with_the_load(context: &Context, target: &Target, squares: &[f64]) -> bool {
+    let Some(load) = context.regressor(target.relation).filter(|load| load.len() == context.len()) else { return false };
+    let mut loads: Vec<f64> = target.rows.iter().map(|row| load[*row]).collect();
+    loads.sort_unstable_by(f64::total_cmp);
+    let middle = loads.get(loads.len() / 2).copied().unwrap_or(0.0);
+    let part = |above: bool| -> f64 {
+        target.rows.iter().zip(squares).filter(|(row, _)| (load[**row] > middle) == above).map(|(_, s)| s).sum()
+    };
+    part(true) > 3.0 * part(false)
+}
