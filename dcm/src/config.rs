@@ -79,6 +79,9 @@ pub struct FieldConfig {
     pub longest_freeze: f32,
     /// Factor on the correction after that, and on how fast the time of freezing is given back.
     pub doubt: f32,
+    /// A stronger field, hard iron taken off, is a magnet's whatever it agrees with, uT: nothing is learnt from it and no heading taken.
+    /// (The Earth's is 67 at most, World Magnetic Model; half as much again for a room's iron and a rough calibration.)
+    pub strongest: f32,
     /// A reading beyond this is no reading, uT.
     pub range: f32,
 }
@@ -109,7 +112,7 @@ pub struct Config {
     pub tilt_rate: f32,
     /// Averaging of the acceleration that the stretch is made of, s; first order, a few steps of a walker.
     pub tilt_memory: f32,
-    /// Time over which the specific force is summed in earth axes before it is used, s (five readings of 200 Hz, one of 48).
+    /// Time over which the specific force is summed in earth axes before it is used, s (seven readings of 200 Hz, two of 48).
     pub tilt_window: f32,
     /// Averaging of the heading, s; first order, cut-off 1/(2 pi tau) = 0.013 Hz.
     pub heading_tau: f32,
@@ -138,7 +141,7 @@ impl Config {
         tilt_stretch: 6.0,
         tilt_rate: 2.0,
         tilt_memory: 10.0,
-        tilt_window: 0.0205,
+        tilt_window: 0.0305,
         heading_tau: 12.0,
         rest: RestConfig { filter_tau: 0.5, time: 1.5, rate: 2.0 * DEGREE, force: 0.5, known_rate: 2.0 * DEGREE },
         bias: BiasConfig {
@@ -165,6 +168,7 @@ impl Config {
             new_rate: 20.0 * DEGREE,
             longest_freeze: 60.0,
             doubt: 2.0,
+            strongest: 100.0,
             range: 1000.0,
         },
         iron: IronConfig { lag: 3.0, memory: 120.0, dead_zone: 5.0, limit: 100.0 },

@@ -53,6 +53,8 @@ pub struct Dcm<C = Config> {
     matrix: Mat3,
     started: bool,
     heading_absolute: bool,
+    /// A magnet was there.
+    magnet: bool,
     tilt: LowPass<3>,
     rest: Rest,
     bias: Bias,
@@ -64,7 +66,7 @@ pub struct Dcm<C = Config> {
     since_accel: f32,
     since_mag: f32,
     last_rate: Column,
-    /// Mean size of true accelerations in g, less while the body turns fast.
+    /// Mean size of true accelerations, m/s^2, less while the body turns fast.
     pushed: f32,
     sum: Column,
     summed: f32,
@@ -82,6 +84,7 @@ impl<C: Borrow<Config>> Dcm<C> {
             matrix: Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
             started: false,
             heading_absolute: false,
+            magnet: false,
             tilt: LowPass::new(),
             rest: Rest::new(),
             bias: Bias::new(),
@@ -182,7 +185,10 @@ impl<C: Borrow<Config>> Dcm<C> {
         self.started = true;
         self.heading_absolute = from_field;
         if from_field {
-            self.turn_earth(&[0.0, 0.0, self.config.borrow().declination]);
+            let declination = self.config.borrow().declination;
+            if declination != 0.0 {
+                self.turn_earth(&[0.0, 0.0, declination]);
+            }
             self.heading_age = 0.0;
         }
         step.started = true;
@@ -215,6 +221,7 @@ impl<C> Words for Dcm<C> {
         self.matrix.words(visit);
         flag(&mut self.started, visit);
         flag(&mut self.heading_absolute, visit);
+        flag(&mut self.magnet, visit);
         self.tilt.words(visit);
         self.rest.words(visit);
         self.bias.words(visit);

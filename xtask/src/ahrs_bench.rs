@@ -6,12 +6,15 @@
 //! Units: degrees.
 //! Reference: specification `ahrs.md`; README of the data; `docs/ahrs.md`.
 
+mod ablation;
+mod calm;
 mod constants;
 mod groups;
 pub(crate) mod phones;
 mod plots;
 mod scan;
 pub(crate) mod score;
+mod sets;
 pub(crate) mod trial;
 pub(crate) mod variant;
 
@@ -19,6 +22,7 @@ use crate::place::Place;
 use crate::run::Failure;
 use dcm::{Classic, ClassicConfig, Config, Dcm};
 use score::{Score, run};
+use sets::Sets;
 use trial::Trial;
 use variant::Variant;
 
@@ -31,11 +35,17 @@ const INCLINATION: f64 = 0.70;
 pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
     let folder = place.data().join("ahrs");
     let trials = trial::trials(&folder.join("broad"))?;
+    let second = place.data().join("ahrs-phones");
     if let ["--scan"] = words {
-        return scan::scan(&trials);
+        return scan::scan(&Sets::read(&trials, &second)?);
+    }
+    if let ["--ablation"] = words {
+        ablation::ablation(&Sets::read(&trials, &second)?);
+        return Ok(());
     }
     if let ["--plots", target] = words {
-        return plots::plots(std::path::Path::new(target), &trials);
+        let walks = phones::phones(&second.join("data"), phones::Gyro::Own)?;
+        return plots::plots(std::path::Path::new(target), &trials, &walks);
     }
     if let Some(word) = words.iter().find(|w| **w != "phones" && Variant::ALL.iter().all(|v| v.name() != **w)) {
         let names = Variant::ALL.map(Variant::name).join(", ");
@@ -43,10 +53,7 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
     }
     let peers = folder.join("peers-shared.csv");
     let mut missed = Vec::new();
-    println!(
-        "{:<9} {:>29} {:>29} {:>8} {:>8}",
-        "variant", "ours: total heading incl.", "VQF: total heading incl.", "half A", "half B"
-    );
+    println!("{:<9} {:>29} {:>29}", "variant", "ours: total heading incl.", "VQF: total heading incl.");
     for variant in Variant::ALL {
         let ours: Vec<Score> = scores(&trials, variant, || Box::new(Dcm::new(Config::DEFAULT)));
         let vqf: Vec<Score> = trial::peer(&peers, variant.name(), "vqf", "default")?
@@ -62,10 +69,9 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
             )));
         }
         let (mine, theirs) = (Score::mean(ours.iter()), Score::mean(vqf.iter()));
-        let half = |k: usize| Score::mean(ours.iter().skip(k).step_by(2)).total;
         let three = |s: &Score| format!("{:>13.2} {:>7.2} {:>7.3}", s.total, s.heading, s.inclination);
         let published = if vqf.is_empty() { "not published: --vqf".to_owned() } else { three(&theirs) };
-        println!("{:<9} {} {published:>29} {:>8.2} {:>8.2}", variant.name(), three(&mine), half(0), half(1));
+        println!("{:<9} {} {published:>29}", variant.name(), three(&mine));
         if variant == Variant::Base || words.contains(&variant.name()) {
             for (t, s) in trials.iter().zip(&ours) {
                 println!("    {:<48} {:>6.2} {:>6.2} {:>6.2}", t.name, s.total, s.heading, s.inclination);
@@ -85,7 +91,8 @@ pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
         let s = Score::mean(s.iter());
         println!("{name}: {:.2} {:.2} {:.2}", s.total, s.heading, s.inclination);
     }
-    missed.extend(groups::groups(&place.data().join("ahrs-phones"), words.contains(&"phones"))?);
+    println!("\n{}", calm::line("BROAD", trials.iter().map(|t| (t, 0.0)), &mut missed));
+    missed.extend(groups::groups(&second, words.contains(&"phones"))?);
     if missed.is_empty() { Ok(()) } else { Err(Failure(format!("targets missed: {}", missed.join("; ")))) }
 }
 

@@ -35,7 +35,8 @@ usage: cargo xtask COMMAND
   ahrs-bench [VARIANT]...  the attitude filter on the shared BROAD trials, their stress variants and the phones' trials, with its targets;
                    each trial of the variants that are named
   ahrs-bench --plots DIR  the error over time in each trial, as a page and figures
-  ahrs-bench --scan  what half of the trials says of each constant of the default (docs/ahrs-constants.md)
+  ahrs-bench --scan  what both sets say of each constant of the default (docs/ahrs-constants.md)
+  ahrs-bench --ablation  what each mechanism of the filter is worth on both sets (docs/ahrs-ablation.md)
   ahrs-bench --vqf  VQF's Rust port on every variant, those included of which nothing is published (fetches it once)
   ahrs-peers       instructions, flash and RAM of other attitude filters beside ours (fetches them once)
   ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)

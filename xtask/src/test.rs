@@ -8,6 +8,7 @@
 //!
 //! Reference: `.ci/run` calls exactly this.
 
+use crate::ahrs_bench;
 use crate::emulator;
 use crate::image;
 use crate::place::{BOARD, Place};
@@ -65,6 +66,7 @@ pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
         })?;
         images(place, &mut steps)?;
         host_tests(place, &mut steps)?;
+        steps.step("the attitude filter on recordings", |_| ahrs_bench::bench(place, &[]))?;
         boards(place, &mut steps)?;
         logs(place, &mut steps)
     })();

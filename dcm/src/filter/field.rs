@@ -97,9 +97,16 @@ impl Field {
         (now / reference - 1.0, dip(&self.now, now) - dip(&self.reference, reference))
     }
 
-    /// Takes a field that stands for `dt` seconds; `turning` says that the body turns fast.
+    /// A magnet is there: whatever was agreed upon has to hold anew.
+    pub(super) fn doubt(&mut self) {
+        self.good_time = 0.0;
+        self.candidate_time = 0.0;
+    }
+
+    /// Takes a field that stands for `dt` seconds; `turning` says that the body turns fast. Says whether it is the first
+    /// one that has held for long enough to become the reference.
     #[inline]
-    pub(super) fn take(&mut self, config: &FieldConfig, shape: &Shape, dt: f32, turning: bool) {
+    pub(super) fn take(&mut self, config: &FieldConfig, shape: &Shape, dt: f32, turning: bool) -> bool {
         let smooth = if self.now.level > 0.0 { dt / (dt + config.smoothing) } else { 1.0 };
         self.now.follow(shape, smooth);
         let slow = dt / config.reference_tau;
@@ -116,17 +123,20 @@ impl Field {
         if !self.now.is_near(&self.candidate, config.norm, config.dip) {
             self.candidate_time = 0.0;
             self.candidate = self.now;
-            return;
+            return false;
         }
         self.candidate.follow(&self.now, slow);
         if turning {
             self.candidate_time += dt;
         }
         let wait = if self.known() { config.new_time } else { config.first_time };
-        if self.disturbed(config) && self.candidate_time >= wait {
+        let first = !self.known();
+        let taken = self.disturbed(config) && self.candidate_time >= wait;
+        if taken {
             self.reference = self.candidate;
             self.good_time = config.settle;
         }
+        taken && first
     }
 
     /// Factor on the heading correction: 1 believed, 0 frozen, less than 1 after a long time of freezing. `hold` allows to freeze

@@ -47,16 +47,25 @@ impl<C: Borrow<Config>> Dcm<C> {
         self.fields = 0.0;
         let mut free = self.iron.taken_from(&ZERO, config.iron.dead_zone, config.iron.limit);
         turn(&self.matrix.data.0, core::slice::from_mut(&mut free));
-        let [x, y, down] = &plus(whole, &free, 1.0);
+        let seen = &plus(whole, &free, 1.0);
+        if square(seen) > config.field.strongest * config.field.strongest {
+            self.magnet = true;
+            self.field.doubt();
+            return;
+        }
         // what a magnet in the room adds is neither on the sensor nor a drift of the gyro
         let learns = settled && !self.field.refused(&config.field);
         if learns {
             self.iron.take(&config.iron, &self.matrix.data.0, whole, dt);
         }
+        let [x, y, down] = seen;
         let level = root(x * x + y * y);
         let spin = plus(self.rest.rate.value(), &self.bias.value, -1.0);
         let turning = square(&spin) > config.field.new_rate * config.field.new_rate;
-        self.field.take(&config.field, &Shape { level, down: *down }, dt, turning);
+        let first = self.field.take(&config.field, &Shape { level, down: *down }, dt, turning);
+        if first && self.magnet {
+            self.heading_age = 0.0; // the heading so far may be the magnet's
+        }
         // nothing at all, where readings cancel, has no heading either
         if level <= LEAST_LEVEL * down.abs() {
             return;

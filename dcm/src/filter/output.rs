@@ -16,9 +16,9 @@ use core::borrow::Borrow;
 use core::f32::consts::{PI, TAU};
 
 /// Words of a saved state.
-pub const STATE_WORDS: usize = 104;
+pub const STATE_WORDS: usize = 105;
 /// First word of a saved state: changes whenever the list of fields does.
-const STATE_VERSION: u32 = 0x4443_4D06;
+const STATE_VERSION: u32 = 0x4443_4D07;
 
 /// What holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -95,10 +95,15 @@ impl<C: Borrow<Config>> Dcm<C> {
         }
         let config = self.config.borrow();
         let away = (root(square(&mean)) - STANDARD_GRAVITY).abs();
-        self.tilt.step(&mean, dt, config.tilt_tau * (1.0 + config.tilt_stretch * self.pushed), config.tilt_tau);
+        self.tilt.step(
+            &mean,
+            dt,
+            config.tilt_tau + config.tilt_tau * (config.tilt_stretch / STANDARD_GRAVITY) * self.pushed,
+            config.tilt_tau,
+        );
         let turning = square(&self.last_rate) / (config.tilt_rate * config.tilt_rate);
-        let pushed = away / (STANDARD_GRAVITY + STANDARD_GRAVITY * turning);
-        self.pushed += (pushed - self.pushed) * least(dt / config.tilt_memory, 1.0);
+        let pushed = away / (1.0 + turning);
+        self.pushed += (pushed - self.pushed) * (dt / (dt + config.tilt_memory));
         let mean = self.tilt.value();
         let long = square(mean);
         if long < 1.0 {

@@ -107,6 +107,13 @@ fn between(a: [f64; 4], b: [f64; 4], share: f64) -> [f64; 4] {
     std::array::from_fn(|i| a[i] * (1.0 - share) + b[i] * share_b)
 }
 
+/// A vector in body axes seen in the axes that `q` maps to.
+pub(crate) fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
+    let [w, x, y, z] = q;
+    let t = [2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])];
+    [v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2], v[2] + w * t[2] + x * t[1] - y * t[0]]
+}
+
 /// Heading (signed), inclination and total error of an estimate, degrees.
 pub(crate) fn errors(a: [f64; 4], b: [f64; 4]) -> (f64, f64, f64) {
     let [aw, ax, ay, az] = a;
