@@ -11,6 +11,7 @@ use super::model::{Added, Part};
 use super::search::{Cause, Found, Outcome, Scene, parameters, predict, search, spoils};
 use super::unknown::correct;
 use crate::effects::Scope;
+use crate::unexplained::LOUD;
 use crate::verdict::{Alternative, EffectEntry, Kind};
 use nalgebra::Vector3;
 
@@ -79,7 +80,12 @@ pub(crate) fn trace<'a>(
         Kind::Unattributed => {
             let correction = correct(readings, base, scene, setting.channels, noise);
             if let Some(c) = correction.as_ref().filter(|c| spoils(&outcome.before.heldout, &c.solved.heldout).contains(&true)) {
-                sensor.effects = vec![c.refused()];
+                // what no correction predicts and nobody hears above the noise is nothing
+                if sensor.excess[0] > LOUD {
+                    sensor.effects = vec![c.refused()];
+                } else {
+                    sensor.kind = Kind::None;
+                }
             } else if let Some(c) = correction {
                 sensor.corrected = rows(&|i| c.predict(base, t[i], i));
                 sensor.heldout_after = by_axis(&c.solved.heldout);
