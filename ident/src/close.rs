@@ -5,6 +5,7 @@
 //! Units: as the channels state.
 //! Reference: specification `closing-the-loop.md`, steps 1 to 8.
 
+use crate::bad;
 use crate::conclude::{Quoted, quoted};
 use crate::context::{Context, DIFFERENCES, Relation, Target, unit_of};
 use crate::correction::without_correction;
@@ -64,7 +65,10 @@ pub struct Closed {
 pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut dyn FnMut(f64)) -> Result<Closed, CloseError> {
     let left_out = sparse::left_out(log);
     let log = &*sparse::without(log, &left_out);
-    let mut context = Context::new(log, model.map(|m| m.start_pulse_us));
+    let aside = bad::found(log);
+    let log = &*bad::without(log, &aside);
+    let mut context = Context::of_clean(log, model.map(|m| m.start_pulse_us));
+    context.leave_aside(aside);
     let declared = Declared { model };
     context.against(declared);
     let refused = || CloseError::NoRelation { run: log.name.clone() };
@@ -97,6 +101,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         alternatives: diagnosis.rivals.iter().map(|r| Alternative { ids: r.ids.clone(), probability: r.probability }).collect(),
         next_experiment: None,
         left_out,
+        set_aside: context.set_aside.clone(),
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
     };
     marks::tell(&mut verdict, &mut after_model, &marks);

@@ -6,6 +6,7 @@
 //! Units: SI, rev/min, us; regressors of the polynomials are rpm/1000 and (pulse - 1000)/1000.
 //! Reference: specification `formats.md` (primary relations), `closing-the-loop.md` step 2.
 
+use crate::bad::{self, SetAside};
 use crate::course::{self, Counterparts};
 use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
@@ -128,6 +129,8 @@ pub struct Target {
     pub floored: Vec<f64>,
     /// Rows about which no prediction makes a claim, in order: the channel's glitches. The log alone decides which.
     pub unclaimed: Vec<usize>,
+    /// Rows whose samples were set aside as bad ones (see [`crate::bad`]), in order.
+    pub aside: Vec<usize>,
     /// Error that a declared model is known to make, on every row of the log; empty without one.
     pub known: Vec<f64>,
     /// Share of the noise in the scatter that it is known to leave about that, on every row of the log; empty without one.
@@ -177,6 +180,7 @@ impl Target {
             levelled,
             floored,
             unclaimed: Vec::new(),
+            aside: Vec::new(),
             known: Vec::new(),
             trust: Vec::new(),
             usual: 0.0,
@@ -187,7 +191,7 @@ impl Target {
     /// Whether predictions of a row are to be judged.
     #[must_use]
     pub fn claims(&self, row: usize) -> bool {
-        self.unclaimed.binary_search(&row).is_err()
+        self.unclaimed.binary_search(&row).is_err() && self.aside.binary_search(&row).is_err()
     }
 
     /// Takes what the declared model leaves over of its own run for known, and weighs the samples by how well: `load` and `classes` of
@@ -264,6 +268,8 @@ pub struct Context {
     pub rpm: Vec<f64>,
     /// How it was made.
     pub consensus: Consensus,
+    /// Samples that were set aside as bad ones: they are missing everywhere else.
+    pub set_aside: Vec<SetAside>,
     /// Measured current, A, bridged.
     pub current: Option<Vec<f64>>,
     /// Measured voltage, V, bridged.
@@ -327,9 +333,27 @@ pub(crate) struct Facts {
 }
 
 impl Context {
-    /// Prepares a log. `start_pulse_us` is taken from a model where one is given.
+    /// Prepares a log, its bad samples set aside. `start_pulse_us` is taken from a model where one is given.
     #[must_use]
     pub fn new(log: &Log, start_pulse_us: Option<f64>) -> Self {
+        let aside = bad::found(log);
+        let mut context = Self::of_clean(&bad::without(log, &aside), start_pulse_us);
+        context.leave_aside(aside);
+        context
+    }
+
+    /// Remembers which samples are missing because they were bad ones.
+    pub(crate) fn leave_aside(&mut self, aside: Vec<SetAside>) {
+        for target in &mut self.targets {
+            target.aside = aside.iter().filter(|a| a.channel == target.name && !a.recurs).flat_map(SetAside::span).collect();
+            target.aside.sort_unstable();
+        }
+        self.set_aside = aside;
+    }
+
+    /// Prepares a log without bad samples.
+    #[must_use]
+    pub(crate) fn of_clean(log: &Log, start_pulse_us: Option<f64>) -> Self {
         let mut context = Self::bare(log, start_pulse_us);
         let bridged = |name: &str| log.column(name).filter(|c| c.iter().any(|v| v.is_finite())).map(|c| bridge(&log.t, c));
         context.current = bridged("current_a");
@@ -374,6 +398,7 @@ impl Context {
             pulse,
             rpm,
             consensus,
+            set_aside: Vec::new(),
             current: None,
             voltage: None,
             temperature: None,

@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 pub mod almanac;
+pub mod bad;
 pub mod beam;
 mod beside;
 pub mod circle;

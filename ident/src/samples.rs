@@ -370,7 +370,7 @@ mod tests {
     fn three_rows_do_not_outvote_a_run_against_its_model() {
         let model = close(&log(0.0), None, &[], &mut |_| {}).expect("a healthy day").model;
         let likelihood = |off: f64| {
-            let mut context = Context::new(&log(off), Some(model.start_pulse_us));
+            let mut context = Context::of_clean(&log(off), Some(model.start_pulse_us));
             let declared = Declared { model: Some(&model) };
             context.against(declared);
             let thrust = context.target("thrust_n").expect("a load cell");

@@ -5,6 +5,7 @@
 //! Units: each channel and parameter states its own.
 //! Reference: specification `formats.md`, "Verdict".
 
+use crate::bad::SetAside;
 use crate::effects::Scope;
 use crate::sparse::LeftOut;
 use serde::ser::SerializeMap;
@@ -215,6 +216,9 @@ pub struct Verdict {
     /// Channels about which nothing is said: too few samples.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
+    /// Samples that nothing else in the log bears out, in stretches: they took no part.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub set_aside: Vec<SetAside>,
     /// Other runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub validation: Vec<Validation>,

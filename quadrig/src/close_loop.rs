@@ -100,6 +100,7 @@ pub(crate) fn table(verdict: &Verdict) -> String {
         out += &format!("  evidence: {}\n", e.evidence);
     }
     out += &unexplained(verdict);
+    out += &set_aside(verdict);
     if !verdict.alternatives.is_empty() {
         let list: Vec<String> =
             verdict.alternatives.iter().map(|a| format!("{} ({:.3})", a.ids.join(" + "), a.probability)).collect();
@@ -130,6 +131,19 @@ fn unexplained(verdict: &Verdict) -> String {
     }
     for (channel, reason) in &verdict.channels.not_predicted {
         out += &format!("\nnot predicted: {channel}, {reason}");
+    }
+    if out.is_empty() { out } else { out + "\n" }
+}
+
+/// Most lines about samples that were set aside; the verdict's file has them all.
+const ASIDE: usize = 5;
+
+/// The samples that took no part.
+fn set_aside(verdict: &Verdict) -> String {
+    let all = &verdict.set_aside;
+    let mut out: String = all.iter().take(ASIDE).map(|aside| format!("\n{aside}")).collect();
+    if all.len() > ASIDE {
+        out += &format!("\nand {} more stretches like these, listed in verdict.json and in the report", all.len() - ASIDE);
     }
     if out.is_empty() { out } else { out + "\n" }
 }

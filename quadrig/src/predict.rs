@@ -81,7 +81,8 @@ fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
     let context = Context::new(log, Some(model.start_pulse_us));
     let claim = |name: &'static str| {
         let mut values = model.predict(&context, name)?;
-        for row in &context.targets[context.target(name)?].unclaimed {
+        let target = &context.targets[context.target(name)?];
+        for row in target.unclaimed.iter().chain(&target.aside) {
             values[*row] = f64::NAN; // an empty field
         }
         Some(Column { name: name.to_owned(), values })

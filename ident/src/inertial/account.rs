@@ -120,6 +120,7 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         alternatives,
         next_experiment,
         left_out: Vec::new(),
+        set_aside: Vec::new(),
         validation: Vec::new(),
     };
     let model = InertialModel {

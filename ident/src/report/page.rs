@@ -91,6 +91,9 @@ fn table(out: &mut String, closed: &Closed) {
     for left_out in &closed.verdict.left_out {
         let _ = writeln!(out, "<p>Left out: {}.</p>", escape(&left_out.to_string()));
     }
+    for aside in &closed.verdict.set_aside {
+        let _ = writeln!(out, "<p>Set aside: {}.</p>", escape(&aside.to_string()));
+    }
     for val in &closed.verdict.validation {
         let _ = write!(
             out,

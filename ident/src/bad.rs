@@ -1,0 +1,179 @@
+//! Bad samples: readings that nothing else in the log bears out.
+//!
+//! What it is: a spike, a drop-out with its slow recovery or a value that got stuck is found by what all other channels and the command say
+//! of the same rows, and of those just before and after. What is found is taken out of every fit and listed.
+//! What can go wrong: what lasts, what recurs with the load and what another channel shows as well is an effect and stays; so do single absurd
+//! readings that come more than once, which `glitch_rows`, `missed_pulses` and `double_pulses` speak of.
+//! Units: rows of the log, s, the channel's own.
+//! Reference: contaminated normal distribution, Tukey 1960; Lange, Little & Taylor 1989 (Student's t for robust modelling).
+
+mod curve;
+mod excursion;
+mod scale;
+mod spike;
+mod stuck;
+mod witness;
+
+use crate::log::{Column, Log, MODELLED, SPEED};
+use excursion::Event;
+use serde::Serialize;
+use std::borrow::Cow;
+use std::fmt;
+use std::ops::Range;
+use witness::Witnesses;
+
+/// Rows of one channel that were set aside.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SetAside {
+    /// Column.
+    pub channel: String,
+    /// First row, counted from 0 beneath the header.
+    pub row: usize,
+    /// How many samples in a row.
+    pub rows: usize,
+    /// Time of the first, s.
+    pub t_s: f64,
+    /// Time of the last, s.
+    pub until_s: f64,
+    /// The reading that is farthest off.
+    pub value: f64,
+    /// What all other channels make one expect there.
+    pub expected: f64,
+    /// One of several single readings of its channel: it stays in the log for the effect that speaks of them.
+    #[serde(skip)]
+    pub recurs: bool,
+}
+
+impl fmt::Display for SetAside {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { channel, row, rows, t_s, until_s, value, expected, .. } = self;
+        let place = if *rows == 1 {
+            format!("row {row} ({t_s:.3} s)")
+        } else {
+            format!("{rows} rows from {row} on ({t_s:.3} to {until_s:.3} s)")
+        };
+        // four figures that count
+        let digits = (3.0 - expected.abs().max(1e-6).log10().floor()).clamp(0.0, 9.0) as usize;
+        write!(f, "column {channel}, {place}: {value} where the rest of the log says {expected:.digits$}; set aside")
+    }
+}
+
+/// Fewest samples of a channel whose scatter can be told.
+const FEWEST: usize = 50;
+/// Largest share of a channel's samples that can be bad: one that is worse has an effect.
+const MOST: f64 = 0.05;
+/// Rows up to which a departure is a single reading: the running median of five that `glitch_rows` looks through copes with two.
+const SINGLE: usize = 2;
+
+/// The channels that are judged, those first that others are judged by.
+fn judged() -> impl Iterator<Item = &'static str> {
+    MODELLED.into_iter().chain(["thrust_rms_n", "temp_c"])
+}
+
+/// A way to find bad samples of a channel.
+type Finder = fn(&Witnesses<'_>, &'static str) -> Vec<Event>;
+
+/// The bad samples of a log, in the order of the channels.
+#[must_use]
+pub fn found(log: &Log) -> Vec<SetAside> {
+    let mut of_channels: Vec<(&str, &[f64], Vec<Event>)> = Vec::new();
+    let mut kept = Vec::new();
+    let speeds = SPEED.iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).count();
+    let mut witnesses = Witnesses::of(log);
+    for name in judged() {
+        let Some(column) = log.column(name) else { continue };
+        let samples = column.iter().filter(|v| v.is_finite()).count();
+        if samples < FEWEST {
+            continue;
+        }
+        let mut events = stuck::found(&witnesses, name);
+        witnesses.take_out(name, &events);
+        // a probe's recovery belongs to its drop-out; elsewhere a single reading stands by itself
+        let order: [Finder; 2] =
+            if SPEED.contains(&name) { [excursion::found, spike::found] } else { [spike::found, excursion::found] };
+        for found in order {
+            let more = found(&witnesses, name);
+            witnesses.take_out(name, &more);
+            events.extend(more);
+        }
+        let (events, recurring) = of_no_effect(name, column, events, samples, speeds);
+        witnesses.settle(name, &events);
+        kept.extend(recurring.iter().filter_map(|e| Some(SetAside { recurs: true, ..told(log, name, column, e)? })));
+        of_channels.push((name, column, events));
+    }
+    let borne_out = |name: &str, event: &Event| {
+        let others = of_channels.iter().filter(|(other, ..)| *other != name && !SPEED.contains(other) && !SPEED.contains(&name));
+        let mut lasting = others.flat_map(|(.., events)| events).filter(|e| e.rows.len() > SINGLE);
+        event.rows.len() > SINGLE && lasting.any(|e| e.rows.start < event.rows.end && event.rows.start < e.rows.end)
+    };
+    let each = of_channels.iter().flat_map(|(name, column, events)| events.iter().map(move |e| (*name, *column, e)));
+    each.filter(|(name, _, e)| !borne_out(name, e))
+        .filter_map(|(name, column, e)| told(log, name, column, e))
+        .chain(kept)
+        .collect()
+}
+
+/// The log without the samples that were set aside: they are missing ones.
+#[must_use]
+pub fn without<'l>(log: &'l Log, aside: &[SetAside]) -> Cow<'l, Log> {
+    if aside.iter().all(|a| a.recurs) {
+        return Cow::Borrowed(log);
+    }
+    let of_column = |c: &Column| {
+        let mut values = c.values.clone();
+        for a in aside.iter().filter(|a| a.channel == c.name && !a.recurs) {
+            values[a.span()].fill(f64::NAN);
+        }
+        Column { name: c.name.clone(), values }
+    };
+    let columns = log.columns.iter().map(of_column).collect();
+    Cow::Owned(Log { name: log.name.clone(), meta: log.meta.clone(), t: log.t.clone(), columns })
+}
+
+impl SetAside {
+    /// The rows.
+    #[must_use]
+    pub fn span(&self) -> Range<usize> {
+        self.row..self.row + self.rows
+    }
+}
+
+/// Fewest speed channels among which one can be outvoted, so that pulses too few or too many have a name.
+const VOTES: usize = 3;
+
+/// Those departures of a channel that are bad samples and no effect of it, and the single ones that an effect speaks of.
+fn of_no_effect(name: &str, column: &[f64], mut events: Vec<Event>, samples: usize, speeds: usize) -> (Vec<Event>, Vec<Event>) {
+    events.sort_by_key(|e| e.rows.start);
+    let bad: usize = events.iter().map(|e| e.rows.len()).sum();
+    if bad as f64 > MOST * samples as f64 {
+        return (Vec::new(), Vec::new());
+    }
+    let speed = SPEED.contains(&name);
+    let single = |e: &Event| e.rows.len() <= SINGLE;
+    let lasting = events.iter().filter(|e| !single(e)).count();
+    let singles = events.len() - lasting;
+    // what follows a step of the load at once is no glitch to any reader, unless others are
+    let settled = events.iter().filter(|e| single(e) && !e.at_step).count();
+    if singles < 2 || !speed && settled < 2 || speed && (lasting * 3 >= singles || speeds < VOTES) {
+        return (events, Vec::new());
+    }
+    // a speed of nothing at all is no pulse too few: the probe saw nothing
+    let saw_nothing = |e: &Event| speed && column[e.rows.start].abs() < 0.05 * e.expected.abs();
+    events.into_iter().partition(|e| !single(e) || saw_nothing(e))
+}
+
+/// An event in the words of the list.
+fn told(log: &Log, name: &str, column: &[f64], event: &Event) -> Option<SetAside> {
+    let mut measured = event.rows.clone().filter(|r| column[*r].is_finite());
+    let (first, last) = (measured.next()?, measured.next_back());
+    Some(SetAside {
+        channel: name.to_owned(),
+        row: first,
+        rows: last.map_or(1, |last| last + 1 - first),
+        t_s: log.t[first],
+        until_s: log.t[last.unwrap_or(first)],
+        value: column[event.worst],
+        expected: event.expected,
+        recurs: false,
+    })
+}
