@@ -7,7 +7,9 @@
 use hal_sim::ScenarioError;
 use hal_sim::flight::Flying;
 use hal_sim::flight::attitude::to_euler;
-use hal_sim::mission::{AirframeFile, HOVER_US, Mission, catalogue_plants, fly, hover, settled_catalogue};
+use hal_sim::mission::{
+    AirframeFile, Catalogue, HOVER_US, HoverPoint, Mission, RotorCurves, catalogue_plants, fly, hover, modes,
+};
 use hal_sim::plant::air::SEA_LEVEL_DENSITY;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +24,10 @@ fn flown_by(mission: &Mission, airframe: &AirframeFile) -> Vec<Flying> {
 fn flown(name: &str) -> Vec<Flying> {
     let (mission, airframe) = Mission::load(&file(name)).unwrap_or_else(|e| panic!("{e}"));
     flown_by(&mission, &airframe)
+}
+
+fn hovers(airframe: &AirframeFile) -> HoverPoint {
+    hover(&airframe.airframe(), &Catalogue(airframe)).expect("it hovers")
 }
 
 fn upward(rows: &[Flying]) -> (f64, f64) {
@@ -57,12 +63,36 @@ fn straight(rows: &[Flying]) {
 #[test]
 fn hover_point() {
     let airframe = AirframeFile::default();
-    let h = hover(&airframe, &|pulse| settled_catalogue(&airframe, pulse)).expect("it hovers");
+    let h = hovers(&airframe);
     close("hover speed, rev/min", h.rotor.rpm, 4100.0, 0.005);
     close("hover thrust, N", h.rotor.thrust_n, 2.879, 0.005);
     close("hover duty, %", h.pulse_us / 200.0, 8.36, 0.01);
     // four rotors of 5.779 N over 1.174 kg
     close("thrust to weight", h.thrust_to_weight, 4.0 * 5.779 / 11.513, 0.01);
+}
+
+/// The motion about the hover, against flights: the answer of pitch and yaw to the excitation's 2 us, the rotor's lag, and the swing of a
+/// vehicle that starts 50 m above the height at which its pulse carries it.
+#[test]
+fn about_the_hover() {
+    let airframe = AirframeFile::default();
+    let (body, at) = (airframe.airframe(), hovers(&airframe));
+    let m = modes(&body, &at, &Catalogue(&airframe), &Default::default());
+    println!("{m:?}");
+    close("thrust for a pulse, N/% of duty", m.thrust_per_us * 200.0, 1.59, 0.02);
+    assert_eq!((m.coning_rad_s, m.turning_per_us[0]), (0.0, m.turning_per_us[1]));
+    close("pitch rate of 2 us for 0.15 s, deg/s", (2.0 * 0.15 * m.turning_per_us[1]).to_degrees(), 2.45, 0.03);
+    assert!(m.rotor_lag_s > 0.01 && m.rotor_lag_s < 0.1);
+    close("minutes at full throttle, Table 9", HoverPoint::minutes(4.4, 4, at.full.current_a), 9.0, 0.02);
+    let text = format!(
+        "duration_s = 40\n[start]\nheight_m = 50\n[[command]]\nrotors = [1, 2, 3, 4]\nsteps = [{{ pulse_us = {:.6}, hold_s = 1 }}]\n",
+        at.pulse_us
+    );
+    let rows = flown_by(&parse(&text).unwrap_or_else(|e| panic!("{e}")), &airframe);
+    // a swing of 50 m about the ground is a fall of 50 (1 - cos w t) at first, before the drag of its speed counts
+    let t = 10.0;
+    let fallen = 50.0 + row(&rows, t).motion.place.z;
+    close("first fall of the swing, m", fallen, 50.0 * (1.0 - (m.heave_rad_s * t).cos()), 0.05);
 }
 
 /// The climb: 63 m in 20 s at 4.0 m/s follow from a lift of 4 x 1.36 N/% x 0.14 % above the weight (errata, "Climb"). With that lift
@@ -75,7 +105,7 @@ fn take_off() {
     println!("at 8.50 %: {height:.1} m in 20 s at {speed:.2} m/s; stated 63 m and 4.0 to 4.4 m/s");
     assert!((height - 45.9).abs() < 1.0 && (speed - 3.06).abs() < 0.1, "what docs/mission.md says");
     let airframe = AirframeFile::default();
-    let lift_n = |pulse| 4.0 * settled_catalogue(&airframe, pulse).thrust_n;
+    let lift_n = |pulse| 4.0 * Catalogue(&airframe).settled(pulse, 1.0).thrust_n;
     let wanted = airframe.airframe().mass_kg * hal_sim::flight::G + 4.0 * 1.36 * 0.14;
     let pulse = (1600..1800).map(f64::from).find(|p| lift_n(*p) >= wanted).expect("enough lift");
     let (height, speed) = climb(pulse, &airframe);
@@ -97,7 +127,7 @@ fn hovering() {
     println!("8.36 %: {:?}", upward(&rows));
     assert!(upward(&rows).0 < 0.0);
     let airframe = AirframeFile::default();
-    let h = hover(&airframe, &|pulse| settled_catalogue(&airframe, pulse)).expect("it hovers");
+    let h = hovers(&airframe);
     let (mut mission, _) = Mission::load(&file("hover.toml")).unwrap_or_else(|e| panic!("{e}"));
     mission.command[0].steps[0].pulse_us = h.pulse_us;
     mission.start.height_m = 0.0;

@@ -21,6 +21,7 @@ pub mod diagnose;
 pub mod effects;
 pub mod experiment;
 pub mod fit;
+pub mod flight_log;
 pub mod heldout;
 pub mod hypothesis;
 pub mod identify;

@@ -137,9 +137,14 @@ impl Log {
     /// # Errors
     /// As [`Log::read`].
     pub fn parse(file: &str, source: impl BufRead) -> Result<Self, ReadError> {
+        Self::parse_as(FORMAT, file, source)
+    }
+
+    /// The same for a log of another format with the same rules.
+    pub(crate) fn parse_as(format: &str, file: &str, source: impl BufRead) -> Result<Self, ReadError> {
         let mut lines = Lines::new(file, source);
         let mut log = Self { name: file.to_owned(), ..Self::default() };
-        let header = read_head(&mut lines, &mut log)?;
+        let header = read_head(format, &mut lines, &mut log)?;
         for name in header.iter().skip(1) {
             log.columns.push(Column { name: name.clone(), values: Vec::new() });
         }
@@ -170,7 +175,11 @@ impl Log {
     /// # Errors
     /// What the sink says.
     pub fn write_to(&self, out: &mut dyn Write) -> std::io::Result<()> {
-        writeln!(out, "# {FORMAT}")?;
+        self.write_as(FORMAT, out)
+    }
+
+    pub(crate) fn write_as(&self, format: &str, out: &mut dyn Write) -> std::io::Result<()> {
+        writeln!(out, "# {format}")?;
         for (key, value) in &self.meta {
             writeln!(out, "# {key} = {value}")?;
         }
@@ -216,8 +225,10 @@ fn decimals(name: &str) -> usize {
     match name {
         "torque_nm" => 6,
         "thrust_n" | "thrust_rms_n" => 5,
-        n if n.starts_with("rpm") => 3,
-        "pulse_us" => 3,
+        "qw" | "qx" | "qy" | "qz" => 9,
+        n if n.starts_with("gyro_") => 7,
+        n if n.starts_with("acc_") => 5,
+        n if n.starts_with("rpm") || n.starts_with("pulse_us") => 3,
         _ => 4,
     }
 }
@@ -291,25 +302,25 @@ impl<'a, R: BufRead> Lines<'a, R> {
     }
 }
 
-fn read_head<R: BufRead>(lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<String>, ReadError> {
+fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<String>, ReadError> {
     let mut format_seen = false;
     loop {
         let Some(line) = lines.next_line()? else {
             return Err(lines.place().refuse(
                 None,
                 "the file is empty or ends before its header",
-                format!("'# {FORMAT}' and a header line that starts with t_s"),
+                format!("'# {format}' and a header line that starts with t_s"),
             ));
         };
         let place = lines.place();
         if let Some(comment) = line.strip_prefix('#') {
             let comment = comment.trim();
             if !format_seen {
-                if comment != FORMAT {
+                if comment != format {
                     return Err(place.refuse(
                         None,
                         format!("'{line}'"),
-                        format!("'# {FORMAT}' on the first line (use `quadrig import` for other formats)"),
+                        format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
                     ));
                 }
                 format_seen = true;
@@ -325,7 +336,7 @@ fn read_head<R: BufRead>(lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<
             return Err(place.refuse(
                 None,
                 "no format line",
-                format!("'# {FORMAT}' on the first line (use `quadrig import` for other formats)"),
+                format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
             ));
         }
         return check_header(&line, &place);
@@ -438,7 +449,7 @@ fn check_time(value: f64, log: &Log, place: &Place<'_>) -> Result<(), ReadError>
 }
 
 fn check_range(name: &str, value: f64, place: &Place<'_>) -> Result<(), ReadError> {
-    if name == "pulse_us" && value.is_finite() && !(500.0..=2500.0).contains(&value) {
+    if (name == "pulse_us" || name.starts_with("pulse_us_")) && value.is_finite() && !(500.0..=2500.0).contains(&value) {
         return Err(place.refuse(Some(name), format!("{value}"), "500 to 2500 us (duty in percent is pulse_us / 200)"));
     }
     Ok(())

@@ -15,6 +15,7 @@ mod close_loop;
 mod demo;
 mod effects;
 mod flash;
+mod fly;
 mod identify;
 mod import;
 mod imu;
@@ -75,6 +76,8 @@ enum Command {
     Ahrs(ahrs::Args),
     /// The whole circle in simulation; with --auto the tool flies its own next experiments.
     Loop(circle::Args),
+    /// A mission in the air, on the catalogue's powerplants or on an identified model.
+    Fly(fly::Args),
     /// Builds, flashes and attaches through probe-rs.
     Flash(flash::Args),
     /// The loop on every recorded set; writes the pages that say what came of it.
@@ -111,6 +114,7 @@ fn main() -> ExitCode {
         Command::Calibrate(args) => calibrate::run(args, cli.quiet),
         Command::Ahrs(args) => ahrs::run(args, cli.quiet),
         Command::Loop(args) => circle::run(args, cli.quiet),
+        Command::Fly(args) => fly::run(args, cli.quiet),
         Command::Flash(args) => flash::run(args),
         Command::Measured(args) => measured::run(args, cli.quiet),
         Command::Step(args) => step::run(args, cli.quiet),

@@ -38,6 +38,34 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str) -> Log
     log
 }
 
+/// What a model predicts along the command of a log, row for row, and each channel as it would read; `None` of a model that predicts no
+/// speed from a command.
+pub(crate) fn along(model: &Model, log: &Log) -> Option<(Vec<PlantState>, Log)> {
+    let pulse = ident::context::bridge(&log.t, log.column("pulse_us")?);
+    let covariates: Vec<Column> =
+        log.columns.iter().map(|c| Column { name: c.name.clone(), values: ident::context::bridge(&log.t, &c.values) }).collect();
+    let predicted = from_command(model, &log.name, &log.t, &pulse, &covariates);
+    // the speed that every other relation hangs on is the consensus of the channels
+    let speed = ident::context::Context::new(&predicted, Some(model.start_pulse_us)).rpm;
+    if speed.is_empty() {
+        return None;
+    }
+    let column = |name: &str, absent: f64| predicted.column(name).map_or_else(|| vec![absent; log.len()], <[f64]>::to_vec);
+    let [thrust, torque] = ["thrust_n", "torque_nm"].map(|name| column(name, 0.0));
+    let [current, voltage, temperature] = [("current_a", 0.0), ("voltage_v", 0.0), ("temp_c", 20.0)].map(|(n, v)| column(n, v));
+    let rows = (0..log.len())
+        .map(|i| PlantState {
+            rpm: speed[i].max(0.0),
+            thrust_n: thrust[i],
+            torque_nm: torque[i],
+            current_a: current[i],
+            voltage_v: voltage[i],
+            temp_c: temperature[i],
+        })
+        .collect();
+    Some((rows, predicted))
+}
+
 /// An identified model in the powerplant's place: it plays, for the command of one run, what it predicts from that command.
 #[derive(Clone)]
 pub(crate) struct IdentifiedPlant {
@@ -52,38 +80,12 @@ pub(crate) struct IdentifiedPlant {
 impl IdentifiedPlant {
     /// Predicts the run that `log` commands. Temperatures are taken from the log: no model here predicts the weather.
     pub(crate) fn new(model: &Model, log: &Log) -> Option<Self> {
-        let pulse = ident::context::bridge(&log.t, log.column("pulse_us")?);
-        let covariates: Vec<Column> = log
-            .columns
-            .iter()
-            .map(|c| Column { name: c.name.clone(), values: ident::context::bridge(&log.t, &c.values) })
-            .collect();
-        let predicted = from_command(model, &log.name, &log.t, &pulse, &covariates);
-        let column = |name: &str| predicted.column(name).map(<[f64]>::to_vec);
-        // the speed that every other relation hangs on is the consensus of the channels
-        let speed = ident::context::Context::new(&predicted, Some(model.start_pulse_us)).rpm;
-        if speed.is_empty() {
-            return None;
-        }
-        let zero = || vec![0.0; log.len()];
-        let (thrust, torque) = (column("thrust_n").unwrap_or_else(zero), column("torque_nm").unwrap_or_else(zero));
-        let (current, voltage) = (column("current_a").unwrap_or_else(zero), column("voltage_v").unwrap_or_else(zero));
-        let temperature = column("temp_c").unwrap_or_else(|| vec![20.0; log.len()]);
-        let rows: Vec<PlantState> = (0..log.len())
-            .map(|i| PlantState {
-                rpm: speed[i].max(0.0),
-                thrust_n: thrust[i],
-                torque_nm: torque[i],
-                current_a: current[i],
-                voltage_v: voltage[i],
-                temp_c: temperature[i],
-            })
-            .collect();
+        let (rows, predicted) = along(model, log)?;
         let misread = predicted
             .columns
             .iter()
             .filter(|c| ident::log::SPEED.contains(&c.name.as_str()))
-            .map(|c| Column { name: c.name.clone(), values: c.values.iter().zip(&speed).map(|(v, s)| v - s).collect() })
+            .map(|c| Column { name: c.name.clone(), values: c.values.iter().zip(&rows).map(|(v, r)| v - r.rpm).collect() })
             .collect();
         let at_rest = PlantState { rpm: 0.0, thrust_n: 0.0, torque_nm: 0.0, ..rows.first().copied()? };
         Some(Self { run_s: -1.0, t: log.t.clone(), rows, at_rest, misread })

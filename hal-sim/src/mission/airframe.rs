@@ -27,6 +27,9 @@ pub struct AirframeFile {
     pub propeller: String,
     /// What feeds all rotors together.
     pub supply: SupplySection,
+    /// Charge of the battery that the time aloft is told for, A.h; a `lipo` supply brings its own.
+    #[serde(deserialize_with = "positive")]
+    pub battery_ah: f64,
     /// Arm of the plus layout, m.
     #[serde(deserialize_with = "positive")]
     pub arm_m: f64,
@@ -62,6 +65,9 @@ pub struct RotorSection {
     pub turns: f64,
 }
 
+/// The thesis' battery, A.h (Beharie 2013, Tables 8 and 9).
+const BATTERY_AH: f64 = 4.4;
+
 fn sense<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
     match String::deserialize(d)?.as_str() {
         "clockwise" => Ok(1.0),
@@ -78,6 +84,7 @@ impl Default for AirframeFile {
             motor: "570KV".to_owned(),
             propeller: "11x4.7".to_owned(),
             supply: SupplySection::Bench { voltage_v: 11.5 },
+            battery_ah: BATTERY_AH,
             arm_m: ARM_M,
             hub_kg: build.hub_kg,
             hub_radius_m: build.hub_radius_m,
@@ -97,6 +104,15 @@ impl AirframeFile {
     /// [`ScenarioError::Unreadable`], or [`ScenarioError::Refused`] with line and column.
     pub fn load(file: &Path) -> Result<Self, ScenarioError> {
         parsed(&text_of(file)?, file)
+    }
+
+    /// Charge on board, A.h.
+    #[must_use]
+    pub fn charge_ah(&self) -> f64 {
+        match self.supply {
+            SupplySection::Lipo { capacity_ah, .. } => capacity_ah,
+            SupplySection::Bench { .. } => self.battery_ah,
+        }
     }
 
     /// Its rotors.

@@ -9,9 +9,13 @@
 
 mod airframe;
 mod fly;
+mod hovering;
+mod pulses;
 
 pub use airframe::{AirframeFile, RotorSection};
-pub use fly::{HoverPoint, catalogue_plants, fly, hover, settled_catalogue};
+pub use fly::{catalogue_plants, fly};
+pub use hovering::{Catalogue, HoverPoint, Modes, RotorCurves, hover, modes};
+pub use pulses::PulseTable;
 
 use crate::flight::attitude::from_euler;
 use crate::flight::vehicle::Surroundings;
@@ -48,6 +52,11 @@ pub struct Mission {
     pub wind: WindSection,
     /// Pulses.
     pub command: Vec<CommandSection>,
+    /// Table of pulses, from the mission's folder, for the rotors that no command names.
+    pub pulses: Option<PathBuf>,
+    /// What that table says.
+    #[serde(skip)]
+    pub table: PulseTable,
 }
 
 /// How a flight begins.
@@ -112,6 +121,8 @@ impl Default for Mission {
             air: AirSection::default(),
             wind: WindSection::default(),
             command: Vec::new(),
+            pulses: None,
+            table: PulseTable::default(),
         }
     }
 }
@@ -129,7 +140,7 @@ impl Default for WindSection {
     }
 }
 
-/// Pulse of a rotor that no command names: 8.36 % of 20 ms, the stated hover (errata, "hover"), us.
+/// Pulse of a rotor that neither a command nor a table names: 8.36 % of 20 ms, the stated hover (errata, "hover"), us.
 pub const HOVER_US: f64 = 1672.0;
 
 impl Mission {
@@ -139,13 +150,22 @@ impl Mission {
     /// [`ScenarioError::Unreadable`], or [`ScenarioError::Refused`] with line and column.
     pub fn load(file: &Path) -> Result<(Self, AirframeFile), ScenarioError> {
         let text = text_of(file)?;
-        let mission: Self = parsed(&text, file)?;
-        let airframe = match &mission.airframe {
-            Some(name) => AirframeFile::load(&file.parent().unwrap_or(Path::new("")).join(name))?,
-            None => AirframeFile::default(),
-        };
-        mission.check(&text, file, airframe.rotors().len())?;
+        let mut mission: Self = parsed(&text, file)?;
+        let [airframe, pulses] = mission.files(file);
+        let airframe = airframe.map_or_else(|| Ok(AirframeFile::default()), |path| AirframeFile::load(&path))?;
+        let rotors = airframe.rotors().len();
+        mission.check(&text, file, rotors)?;
+        if let Some(path) = pulses {
+            mission.table = PulseTable::load(&path, rotors)?;
+        }
         Ok((mission, airframe))
+    }
+
+    /// The airframe file and the table of pulses that the mission in `file` names.
+    #[must_use]
+    pub fn files(&self, file: &Path) -> [Option<PathBuf>; 2] {
+        let folder = file.parent().unwrap_or(Path::new(""));
+        [&self.airframe, &self.pulses].map(|name| name.as_ref().map(|name| folder.join(name)))
     }
 
     /// Reads a mission for the thesis' quadrotor from `text`; `file` names it in errors.
@@ -169,15 +189,22 @@ impl Mission {
     /// How long the flight may last, s.
     #[must_use]
     pub fn length_s(&self) -> f64 {
-        let longest = self.command.iter().map(|c| c.steps.iter().map(|s| s.hold_s).sum()).fold(0.0, f64::max);
+        let longest = self.command.iter().map(|c| c.steps.iter().map(|s| s.hold_s).sum()).fold(self.table.length_s(), f64::max);
         if self.duration_s > 0.0 { self.duration_s } else { longest }
     }
 
-    /// Pulse of a rotor (from 0) at a time, us; the last command that names it counts.
+    /// Pulse of a rotor (from 0) at a time, us; the last command that names it counts, then the table of pulses.
     #[must_use]
     pub fn pulse_us(&self, rotor: usize, t_s: f64) -> f64 {
         let of_it = self.command.iter().rev().find(|c| c.rotors.iter().any(|r| *r.get_ref() == rotor + 1));
-        of_it.map_or(HOVER_US, |c| at(&c.steps, t_s))
+        of_it.map(|c| at(&c.steps, t_s)).or_else(|| self.table.pulse_us(rotor, t_s)).unwrap_or(HOVER_US)
+    }
+
+    /// Whether two rotors (from 0) get the same pulses throughout.
+    #[must_use]
+    pub fn same_pulses(&self, a: usize, b: usize) -> bool {
+        let of = |rotor: usize| self.command.iter().rposition(|c| c.rotors.iter().any(|r| *r.get_ref() == rotor + 1));
+        a == b || (of(a).is_some() && of(a) == of(b))
     }
 
     /// The surroundings.

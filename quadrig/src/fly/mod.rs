@@ -1,0 +1,134 @@
+//! `quadrig fly`.
+//!
+//! What it is: a mission flown on the powerplants of the catalogue or on an identified model; the states and the flight log in a folder,
+//! the hover and what came of the flight as a summary.
+//! What can go wrong: a mission, airframe or model that is refused, a model that predicts no thrust from a command; then nothing is written.
+//! Units: as the files state.
+//! Reference: docs/mission.md; specification `flight.md`, "Missions".
+
+mod folder;
+mod record;
+mod rotor;
+mod summary;
+
+use crate::Failure;
+use crate::progress::Bar;
+use folder::Folder;
+use hal_sim::Powerplant;
+use hal_sim::flight::{Airframe, Flying};
+use hal_sim::mission::{AirframeFile, Catalogue, Mission, RotorCurves, catalogue_plants, fly};
+use hal_sim::plant::air::SEA_LEVEL_DENSITY;
+use ident::model::Model;
+use rotor::ModelRotor;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use summary::Summary;
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The mission file.
+    mission: PathBuf,
+    /// An identified model in the place of the catalogue's powerplants.
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Folder for states.csv and flight.csv.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// The summary as JSON on stdout and nothing else.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The files of a flight.
+const FILES: [&str; 2] = ["states.csv", "flight.csv"];
+
+/// What turns the rotors.
+enum Rotors {
+    Catalogue,
+    Model(Box<ModelRotor>),
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let (mission, file) = Mission::load(&args.mission)?;
+    let mut inputs = vec![args.mission.clone()];
+    inputs.extend(mission.files(&args.mission).into_iter().flatten());
+    inputs.extend(args.model.clone());
+    let folder = args.output.as_deref().map(|path| Folder::new(path, &FILES, &inputs)).transpose()?;
+    let airframe = file.airframe();
+    if airframe.body().is_none() {
+        return Err(format!("{}: the airframe's masses make no body", args.mission.display()).into());
+    }
+    let model = args.model.as_deref().map(Model::read).transpose()?;
+    let rotors = rotors_of(model.as_ref(), args.model.as_deref(), &airframe)?;
+    let rows = flown(&mission, &file, &rotors, quiet || args.json)?;
+
+    let curves: &dyn RotorCurves = match &rotors {
+        Rotors::Catalogue => &Catalogue(&file),
+        Rotors::Model(rotor) => rotor.as_ref(),
+    };
+    let powerplant = powerplant(&file, &rotors, model.as_ref());
+    let summary = Summary::of(&mission, &file, &airframe, curves, powerplant, &rows);
+    if let Some(mut folder) = folder {
+        let told =
+            [("mission", mission.name.clone()), ("airframe", file.name.clone()), ("powerplant", summary.powerplant.clone())];
+        let mut log = Vec::new();
+        ident::flight_log::write_to(&record::flight_log(&rows, &airframe, &told), &mut log)?;
+        folder.add("states.csv", record::states(&rows).into_bytes());
+        folder.add("flight.csv", log);
+        folder.write()?;
+    }
+    let said = if args.json { summary.json() } else { summary.text() };
+    if args.json || !quiet {
+        writeln!(std::io::stdout().lock(), "{}", said.trim_end())?;
+    }
+    Ok(())
+}
+
+fn rotors_of(model: Option<&Model>, path: Option<&Path>, airframe: &Airframe) -> Result<Rotors, Failure> {
+    let (Some(model), Some(path)) = (model, path) else { return Ok(Rotors::Catalogue) };
+    let rotor = ModelRotor::new(model, airframe.rotor_inertia_kgm2)
+        .map_err(|why| format!("{}: the model predicts {why}", path.display()))?;
+    Ok(Rotors::Model(Box::new(rotor)))
+}
+
+/// What turns the rotors, in words.
+fn powerplant(file: &AirframeFile, rotors: &Rotors, model: Option<&Model>) -> String {
+    let (Rotors::Model(rotor), Some(model)) = (rotors, model) else {
+        return format!("{} with {}, catalogue", file.motor, file.propeller);
+    };
+    let [flies, stays] = rotor.effects(model);
+    let list = |names: &[&str]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    let air = (!rotor.density().1).then_some("air of its run unknown, taken as 1.225 kg/m^3");
+    let notes: String = rotor.lacks().into_iter().chain(air).map(|note| format!("; {note}")).collect();
+    format!("model of {}; its effects in flight: {}; of the rig alone: {}{notes}", model.source, list(&flies), list(&stays))
+}
+
+fn flown(mission: &Mission, file: &AirframeFile, rotors: &Rotors, quiet: bool) -> Result<Vec<Flying>, Failure> {
+    let (plants, density) = match rotors {
+        Rotors::Catalogue => (catalogue_plants(file), SEA_LEVEL_DENSITY),
+        Rotors::Model(rotor) => (planned(mission, file, rotor)?, rotor.density().0),
+    };
+    let bar = Bar::new("flying", quiet || mission.length_s() < 60.0);
+    fly(mission, file, plants, density, &mut |share| bar.set(share)).ok_or_else(|| "the vehicle has no body".into())
+}
+
+/// One rotor of the model for each of the vehicle; those with the same pulses share what the model says of them.
+fn planned(mission: &Mission, file: &AirframeFile, rotor: &ModelRotor) -> Result<Vec<Box<dyn Powerplant>>, Failure> {
+    let mut known: Vec<(usize, rotor::Planned)> = Vec::new();
+    let mut plants: Vec<Box<dyn Powerplant>> = Vec::new();
+    for i in 0..file.rotors().len() {
+        let same = |j: usize| mission.same_pulses(i, j);
+        let plan = match known.iter().find(|(j, _)| same(*j)) {
+            Some((_, plan)) => plan.clone(),
+            None => {
+                let plan = rotor.planned(|t| mission.pulse_us(i, t), mission.length_s(), mission.start.spun_up);
+                plan.ok_or("the model predicts no speed from a command")?
+            }
+        };
+        plants.push(Box::new(plan.clone()));
+        known.push((i, plan));
+    }
+    Ok(plants)
+}

@@ -1,0 +1,164 @@
+//! What came of a flight, for a reader and for a machine.
+//!
+//! What it is: hover, margins, time aloft, the modes about the hover, and how the flight ended.
+//! What can go wrong: a vehicle that cannot hover says so instead of its hover.
+//! Units: as printed.
+//! Reference: specification `flight.md`, "The body"; docs/mission.md, "The summary".
+
+use hal_sim::flight::attitude::to_euler;
+use hal_sim::flight::{Airframe, Flying, G};
+use hal_sim::mission::{AirframeFile, HoverPoint, Mission, Modes, RotorCurves, hover, modes};
+use serde_json::{Value, json};
+
+/// The summary of a flight.
+pub(super) struct Summary {
+    mission: String,
+    /// What turned the rotors.
+    pub(super) powerplant: String,
+    weight_n: f64,
+    charge_ah: f64,
+    rotors: usize,
+    hover: Option<(HoverPoint, Modes)>,
+    flight_s: f64,
+    highest_m: f64,
+    fastest_m_s: f64,
+    steepest_deg: f64,
+    touched: Option<(f64, f64)>,
+    place_m: [f64; 3],
+    velocity_m_s: [f64; 3],
+    attitude_deg: [f64; 3],
+}
+
+impl Summary {
+    /// Of a flight that was flown.
+    pub(super) fn of(
+        mission: &Mission,
+        file: &AirframeFile,
+        airframe: &Airframe,
+        curves: &dyn RotorCurves,
+        powerplant: String,
+        rows: &[Flying],
+    ) -> Self {
+        let around = mission.surroundings();
+        let hover = hover(airframe, curves).map(|at| (at, modes(airframe, &at, curves, &around)));
+        let most = |of: &dyn Fn(&Flying) -> f64| rows.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+        let last = &rows[rows.len() - 1];
+        let m = &last.motion;
+        // the row before the touch still has the speed of the fall
+        let touched = mission.ends_on_ground.then(|| (last.t_s, rows[rows.len().max(2) - 2].motion.velocity.z));
+        Self {
+            mission: mission.name.clone(),
+            powerplant,
+            weight_n: airframe.mass_kg * G,
+            charge_ah: file.charge_ah(),
+            rotors: airframe.rotors.len(),
+            hover,
+            flight_s: last.t_s,
+            highest_m: most(&|f| -f.motion.place.z),
+            fastest_m_s: most(&|f| f.motion.velocity.norm()),
+            steepest_deg: most(&|f| tilt(f).to_degrees()),
+            touched: touched.filter(|_| last.t_s + 1e-6 < mission.length_s()),
+            place_m: m.place.into(),
+            velocity_m_s: m.velocity.into(),
+            attitude_deg: to_euler(&m.attitude).map(f64::to_degrees),
+        }
+    }
+
+    /// Minutes on the charge on board; nothing where the current is not known.
+    fn minutes(&self, current_a: f64) -> Option<f64> {
+        (current_a > 0.0).then(|| HoverPoint::minutes(self.charge_ah, self.rotors, current_a))
+    }
+
+    /// For a reader.
+    pub(super) fn text(&self) -> String {
+        let mut out = format!("{}: {:.2} s on {}\n", self.mission, self.flight_s, self.powerplant);
+        match &self.hover {
+            Some((at, modes)) => out += &self.about_hover(at, modes),
+            None => out += &format!("hover     none: full throttle does not carry {:.2} N\n", self.weight_n),
+        }
+        let [n, e, d] = self.place_m;
+        out += &format!(
+            "flight    highest {:.1} m, fastest {:.2} m/s, steepest {:.1} deg\n",
+            self.highest_m, self.fastest_m_s, self.steepest_deg
+        );
+        if let Some((t, speed)) = self.touched {
+            out += &format!("ground    touched after {t:.2} s at {speed:.2} m/s downwards\n");
+        }
+        let ([vn, ve, vd], [roll, pitch, yaw]) = (self.velocity_m_s, self.attitude_deg);
+        out += &format!("end       {n:.1} m north, {e:.1} m east, {:.1} m up; {vn:.2}, {ve:.2}, {:.2} m/s; ", -d, -vd);
+        out + &format!("roll {roll:.1}, pitch {pitch:.1}, yaw {yaw:.1} deg\n")
+    }
+
+    fn about_hover(&self, at: &HoverPoint, m: &Modes) -> String {
+        let [roll, pitch, yaw] = m.turning_per_us.map(|w| (100.0 * w).to_degrees());
+        let period = if m.heave_rad_s > 0.0 {
+            format!("{:.0} s period, undamped", core::f64::consts::TAU / m.heave_rad_s)
+        } else {
+            "none".to_owned()
+        };
+        let minutes = |current_a: f64| self.minutes(current_a).map_or_else(|| "?".to_owned(), |m| format!("{m:.1}"));
+        let coning =
+            if m.coning_rad_s > 0.0 { format!("coning of roll and pitch {:.3} rad/s; ", m.coning_rad_s) } else { String::new() };
+        format!(
+            "hover     {:.1} us ({:.3} %), {:.0} rev/min, {:.3} N and {:.2} A a rotor\n\
+             margin    thrust to weight {:.2}; {:.0} us up to full throttle, {:.3} N for 1 us on all\n\
+             aloft     {} min in hover, {} min at full throttle on {} Ah\n\
+             modes     rotor lag {:.3} s; heave by the air's density {period}; {coning}all else neutral: roll and pitch 4 integrators each, yaw 2\n\
+             \x20         100 us on one rotor: roll {roll:.1}, pitch {pitch:.1}, yaw {yaw:.2} deg/s^2\n",
+            at.pulse_us,
+            at.pulse_us / 200.0,
+            at.rotor.rpm,
+            at.rotor.thrust_n,
+            at.rotor.current_a,
+            at.thrust_to_weight,
+            2000.0 - at.pulse_us,
+            m.thrust_per_us * self.rotors as f64,
+            minutes(at.rotor.current_a),
+            minutes(at.full.current_a),
+            self.charge_ah,
+            m.rotor_lag_s,
+        )
+    }
+
+    /// For a machine.
+    pub(super) fn json(&self) -> String {
+        let hover = self.hover.as_ref().map_or(Value::Null, |(at, m)| {
+            json!({
+                "pulse_us": at.pulse_us,
+                "rpm": at.rotor.rpm,
+                "thrust_n": at.rotor.thrust_n,
+                "current_a": at.rotor.current_a,
+                "thrust_to_weight": at.thrust_to_weight,
+                "minutes": self.minutes(at.rotor.current_a),
+                "minutes_full": self.minutes(at.full.current_a),
+                "modes": {
+                    "thrust_n_per_us": m.thrust_per_us,
+                    "turning_rad_s2_per_us": m.turning_per_us,
+                    "rotor_lag_s": m.rotor_lag_s,
+                    "heave_rad_s": m.heave_rad_s,
+                    "coning_rad_s": m.coning_rad_s,
+                },
+            })
+        });
+        let summary = json!({
+            "format": "quadrig-flight-summary 1",
+            "mission": self.mission,
+            "powerplant": self.powerplant,
+            "weight_n": self.weight_n,
+            "hover": hover,
+            "flight_s": self.flight_s,
+            "highest_m": self.highest_m,
+            "fastest_m_s": self.fastest_m_s,
+            "steepest_deg": self.steepest_deg,
+            "touched_s": self.touched.map(|t| t.0),
+            "touched_m_s": self.touched.map(|t| t.1),
+            "end": { "place_m": self.place_m, "velocity_m_s": self.velocity_m_s, "attitude_deg": self.attitude_deg },
+        });
+        format!("{summary:#}")
+    }
+}
+
+/// Angle between body and earth vertical, rad.
+fn tilt(f: &Flying) -> f64 {
+    (f.motion.attitude * hal_sim::flight::Vector::z()).z.clamp(-1.0, 1.0).acos()
+}
