@@ -22,6 +22,6 @@ pub mod schedule;
 pub mod timer;
 
 pub use arming::{ArmingEvent, ArmingTimes, Objections, Step, Transition, pulse_for, step, time_out};
-pub use protection::{Limits, Protection, Readings};
+pub use protection::{Bounds, Limits, Protection, Readings};
 pub use schedule::{Chirp, Schedule, ScheduleStep, Slew, Staircase, ThrottleCurve, Uploaded};
 pub use timer::{PulseTimer, TimerError};

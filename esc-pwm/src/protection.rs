@@ -6,23 +6,55 @@
 //! Reference: specification `rig.md`, "Protection"; beam yield margin Beharie 2013, Eq. 5.53-5.56.
 
 use frame::rig::{Fault, FaultSet, RigState};
-use frame::units::{Ampere, Newton, RevPerMin, Volt};
+use frame::units::{Ampere, Celsius, Newton, NewtonMetre, RevPerMin, Volt};
+use serde::{Deserialize, Serialize};
+
+/// Lowest and highest value of a channel, and for how long it may be beyond one of them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Bounds<T> {
+    /// Lowest; `None` for no limit.
+    pub low: Option<T>,
+    /// Highest; `None` for no limit.
+    pub high: Option<T>,
+    /// How long, milliseconds.
+    pub ms: u16,
+}
+
+impl<T: PartialOrd + Copy> Bounds<T> {
+    /// No limit either way.
+    pub const NONE: Self = Self { low: None, high: None, ms: 100 };
+
+    /// Whether a reading is above the highest value; one that is missing is not.
+    fn is_over(&self, reading: Option<T>) -> bool {
+        reading.zip(self.high).is_some_and(|(reading, high)| reading > high)
+    }
+
+    /// Whether a reading is below the lowest value; one that is missing is not.
+    fn is_under(&self, reading: Option<T>) -> bool {
+        reading.zip(self.low).is_some_and(|(reading, low)| reading < low)
+    }
+}
 
 /// Limits and their times. The time from cause to minimum throttle is the limit's time plus one control tick and one
 /// ESC frame (20 ms).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
-    /// Highest rotor speed.
-    pub speed: RevPerMin,
-    /// Highest current while running.
-    pub current: Ampere,
+    /// Rotor speed: the highest always, the lowest while the throttle is open.
+    pub speed: Bounds<RevPerMin>,
+    /// Load on the cell, untared, thrust up, while pulses above minimum are given.
+    pub thrust: Bounds<Newton>,
+    /// Torque, untared, while pulses above minimum are given.
+    pub torque: Bounds<NewtonMetre>,
+    /// Current: the highest always, the lowest while the throttle is open.
+    pub current: Bounds<Ampere>,
+    /// Supply, while armed or running.
+    pub voltage: Bounds<Volt>,
+    /// Temperature, while armed or running.
+    pub temperature: Bounds<Celsius>,
     /// Highest current while the ESC is meant to stand: above it, maximum pulses are not for calibration any more.
     pub idle_current: Ampere,
-    /// Lowest supply while armed or running.
-    pub voltage: Volt,
-    /// Largest load on the cell, either way.
-    pub load: Newton,
     /// Channels that may disagree with the others before it counts as a fault.
     pub disagreeing: u8,
     /// Longest silence of the host while armed or running, milliseconds.
@@ -32,9 +64,7 @@ pub struct Limits {
     /// How long current must be above idle during the range calibration, milliseconds: longer than charging the ESC's capacitors takes
     /// (2200 uF through 0.2 ohm: five time constants are 2.2 ms), and no longer.
     pub idle_ms: u32,
-    /// How long speed must be exceeded, milliseconds.
-    pub speed_ms: u32,
-    /// How long current, voltage and load limits must be exceeded, or conversions be missing, milliseconds.
+    /// How long conversions must be missing or stuck, milliseconds.
     pub analogue_ms: u32,
     /// How long sensors must disagree, milliseconds.
     pub sensor_ms: u32,
@@ -55,6 +85,12 @@ pub struct Readings {
     pub voltage: Option<Volt>,
     /// Load on the cell, motor's weight included.
     pub load: Option<Newton>,
+    /// Torque at the motor.
+    pub torque: Option<NewtonMetre>,
+    /// Temperature.
+    pub temperature: Option<Celsius>,
+    /// The throttle is open: pulses above minimum are given, and have been for as long as the rotor takes to start.
+    pub driven: bool,
     /// The strain code sits at an end of its range.
     pub load_saturated: bool,
     /// Channels that disagree with the others at this moment.
@@ -79,10 +115,15 @@ pub struct Readings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Protection {
     speed_ms: u32,
+    slow_ms: u32,
     current_ms: u32,
+    faint_ms: u32,
     idle_ms: u32,
     voltage_ms: u32,
+    high_voltage_ms: u32,
     load_ms: u32,
+    torque_ms: u32,
+    temperature_ms: u32,
     disagree_ms: u32,
     adc_ms: u32,
     lost_ms: u32,
@@ -110,24 +151,36 @@ impl Protection {
         let powered = matches!(state, RigState::Running | RigState::Armed);
         let holds_max = state == RigState::CalibrateHoldMax;
 
-        let speed = lasted(&mut self.speed_ms, readings.speed.is_some_and(|v| v > limits.speed), tick, limits.speed_ms);
-        let current =
-            lasted(&mut self.current_ms, readings.current.is_some_and(|v| v > limits.current), tick, limits.analogue_ms);
+        let driven = state == RigState::Running && readings.driven;
+
+        let Limits { speed, thrust, torque, current, voltage, temperature, .. } = limits;
+        let fast = lasted(&mut self.speed_ms, speed.is_over(readings.speed), tick, speed.ms.into());
+        let slow = lasted(&mut self.slow_ms, driven && speed.is_under(readings.speed), tick, speed.ms.into());
+        let much = lasted(&mut self.current_ms, current.is_over(readings.current), tick, current.ms.into());
+        let faint = lasted(&mut self.faint_ms, driven && current.is_under(readings.current), tick, current.ms.into());
         let not_idle = holds_max && readings.current.is_some_and(|v| v > limits.idle_current);
         let idle = lasted(&mut self.idle_ms, not_idle, tick, limits.idle_ms);
-        let under = powered && readings.voltage.is_some_and(|v| v < limits.voltage);
-        let voltage = lasted(&mut self.voltage_ms, under, tick, limits.analogue_ms);
-        let heavy = readings.load_saturated || readings.load.is_some_and(|v| v > limits.load || v < Newton(-limits.load.0));
-        let load = lasted(&mut self.load_ms, live && heavy, tick, limits.analogue_ms);
+        let under = lasted(&mut self.voltage_ms, powered && voltage.is_under(readings.voltage), tick, voltage.ms.into());
+        let over = lasted(&mut self.high_voltage_ms, powered && voltage.is_over(readings.voltage), tick, voltage.ms.into());
+        let heavy = readings.load_saturated || thrust.is_over(readings.load) || thrust.is_under(readings.load);
+        let load = lasted(&mut self.load_ms, live && heavy, tick, thrust.ms.into());
+        let twisted = torque.is_over(readings.torque) || torque.is_under(readings.torque);
+        let twist = lasted(&mut self.torque_ms, live && twisted, tick, torque.ms.into());
+        let warm = temperature.is_over(readings.temperature) || temperature.is_under(readings.temperature);
+        let heat = lasted(&mut self.temperature_ms, powered && warm, tick, temperature.ms.into());
         let disagree = lasted(&mut self.disagree_ms, live && readings.disagreeing > limits.disagreeing, tick, limits.sensor_ms);
         let adc = lasted(&mut self.adc_ms, live && readings.adc_missing, tick, limits.analogue_ms);
         let lost = lasted(&mut self.lost_ms, live && readings.lost > 0, tick, limits.lost_ms);
         self.damage = self.damage.saturating_sub(tick).saturating_add(DAMAGE_OF_A_FRAME * u32::from(readings.damaged));
 
         [
-            (Fault::Overspeed, speed),
-            (Fault::OverCurrent, current || idle),
-            (Fault::UnderVoltage, voltage),
+            (Fault::Overspeed, fast),
+            (Fault::OverCurrent, much || idle),
+            (Fault::UnderVoltage, under),
+            (Fault::BelowLimit, slow || faint),
+            (Fault::OverVoltage, over),
+            (Fault::TorqueLimit, twist),
+            (Fault::TemperatureLimit, heat),
             (Fault::LoadCellOverload, load),
             (Fault::SensorDisagreement, disagree),
             (Fault::AdcLost, adc),
@@ -149,16 +202,17 @@ mod tests {
     use super::*;
 
     const LIMITS: Limits = Limits {
-        speed: RevPerMin(10_000.0),
-        current: Ampere(30.0),
+        speed: Bounds { low: Some(RevPerMin(500.0)), high: Some(RevPerMin(10_000.0)), ms: 5 },
+        thrust: Bounds { low: Some(Newton(-30.0)), high: Some(Newton(30.0)), ms: 50 },
+        torque: Bounds { low: Some(NewtonMetre(-0.1)), high: Some(NewtonMetre(0.5)), ms: 40 },
+        current: Bounds { low: Some(Ampere(0.1)), high: Some(Ampere(30.0)), ms: 50 },
+        voltage: Bounds { low: Some(Volt(9.0)), high: Some(Volt(17.0)), ms: 50 },
+        temperature: Bounds { low: None, high: Some(Celsius(80.0)), ms: 1000 },
         idle_current: Ampere(1.0),
-        voltage: Volt(9.0),
-        load: Newton(30.0),
         disagreeing: 1,
         link_ms: 1000,
         stall_ms: 5,
         idle_ms: 5,
-        speed_ms: 5,
         analogue_ms: 50,
         sensor_ms: 500,
         lost_ms: 50,
@@ -170,6 +224,9 @@ mod tests {
             current: Some(Ampere(5.0)),
             voltage: Some(Volt(11.5)),
             load: Some(Newton(3.0)),
+            torque: Some(NewtonMetre(0.05)),
+            temperature: Some(Celsius(25.0)),
+            driven: true,
             tick_ms: 1,
             ..Readings::default()
         }
@@ -201,6 +258,18 @@ mod tests {
         let low = Readings { voltage: Some(Volt(8.9)), ..good() };
         assert_eq!(trips_after(Running, low, Fault::UnderVoltage), Some(50));
         assert_eq!(trips_after(Disarmed, low, Fault::UnderVoltage), None, "an unpowered ESC is no fault before arming");
+        let high = Readings { voltage: Some(Volt(17.1)), ..good() };
+        assert_eq!(trips_after(Armed, high, Fault::OverVoltage), Some(50));
+        assert_eq!(trips_after(Running, Readings { torque: Some(NewtonMetre(0.51)), ..good() }, Fault::TorqueLimit), Some(40));
+        assert_eq!(trips_after(Running, Readings { torque: Some(NewtonMetre(-0.11)), ..good() }, Fault::TorqueLimit), Some(40));
+        let hot = Readings { temperature: Some(Celsius(80.5)), ..good() };
+        assert_eq!(trips_after(Running, hot, Fault::TemperatureLimit), Some(1000));
+        assert_eq!(trips_after(Disarmed, hot, Fault::TemperatureLimit), None);
+        let slow = Readings { speed: Some(RevPerMin(499.0)), ..good() };
+        assert_eq!(trips_after(Running, slow, Fault::BelowLimit), Some(5));
+        assert_eq!(trips_after(Running, Readings { driven: false, ..slow }, Fault::BelowLimit), None, "it may stand");
+        assert_eq!(trips_after(Armed, slow, Fault::BelowLimit), None);
+        assert_eq!(trips_after(Running, Readings { current: Some(Ampere(0.05)), ..good() }, Fault::BelowLimit), Some(50));
         assert_eq!(trips_after(Running, Readings { load: Some(Newton(-31.0)), ..good() }, Fault::LoadCellOverload), Some(50));
         assert_eq!(trips_after(Running, Readings { load_saturated: true, ..good() }, Fault::LoadCellOverload), Some(50));
         assert_eq!(trips_after(Running, Readings { disagreeing: 2, ..good() }, Fault::SensorDisagreement), Some(500));

@@ -125,7 +125,7 @@ impl Ahrs {
     /// The first message after reset and the answer to `Identify`. `present` as found by the sampler.
     #[must_use]
     pub const fn hello(core_hz: u32, reset_cause: u8, present: u8) -> Hello {
-        Hello { board: BoardId::Ahrs, firmware: FIRMWARE, core_hz, reset_cause, present }
+        Hello { board: BoardId::Ahrs, firmware: FIRMWARE, core_hz, reset_cause, present, analogue: 0, config: 0 }
     }
 
     /// The attitude filter, for reading.

@@ -1,15 +1,17 @@
 //! The rig's configuration: immutable, with its units.
 //!
 //! What it is: clocks, marks, analogue scales, limits and times of one rig, and the [`Calibration`] that follows from them.
-//! What can go wrong: a log period out of 10 to 1000 ms is brought into that range by [`Config::log_period`].
+//! What can go wrong: a log period out of 1 to 1000 ms is brought into that range by [`Config::log_period`].
 //! Units: on each field.
 //! Reference: errata "Figures that the text states"; Beharie 2013, Tables 6-8 and Eq. 5.57.
 
+use crate::rig_config::{Answers, Calibrated};
 use crate::strain::StrainChannel;
-use esc_pwm::{ArmingTimes, Limits, Slew, ThrottleCurve};
+use esc_pwm::{ArmingTimes, Bounds, Limits, Slew, ThrottleCurve};
 use frame::calibration::{AdcScale, Calibration};
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
-use frame::units::{Ampere, Newton, RevPerMin, Ticks, Volt};
+use frame::units::{Ampere, Newton, PulseWidth, RevPerMin, Ticks, Volt};
+use serde::{Deserialize, Serialize};
 
 /// The converter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +37,7 @@ impl Converter {
 }
 
 /// Torque by the force on a lever arm (Beharie 2013, Eq. 5.57).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TorqueChannel {
     /// Arm, m.
     pub arm_m: f32,
@@ -46,7 +48,7 @@ pub struct TorqueChannel {
 }
 
 /// Current by a shunt: I = V/(R G) (errata 5.59).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CurrentChannel {
     /// Shunt, ohm.
     pub shunt_ohm: f32,
@@ -57,7 +59,7 @@ pub struct CurrentChannel {
 }
 
 /// A sensor of temperature with a linear output.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TemperatureChannel {
     /// Volts at 0 degC.
     pub zero: Volt,
@@ -93,8 +95,10 @@ pub struct Config {
     pub converter: Converter,
     /// Load cell.
     pub strain: StrainChannel,
-    /// Load-cell scale found with known masses, in place of the design's.
-    pub strain_scale: Option<AdcScale>,
+    /// Scales that were calibrated, in place of the design's.
+    pub calibrated: [Option<Calibrated>; ADC_CHANNELS],
+    /// Analogue channels that are fitted. What is not fitted is not read, not judged and raises no fault.
+    pub fitted: [bool; ADC_CHANNELS],
     /// Torque arm.
     pub torque: TorqueChannel,
     /// Shunt.
@@ -111,6 +115,10 @@ pub struct Config {
     pub limits: Limits,
     /// Time-outs of the arming machine.
     pub times: ArmingTimes,
+    /// Which beeps the ESC gives.
+    pub answers: Answers,
+    /// Highest pulse of a run.
+    pub highest: PulseWidth,
     /// Slew limit.
     pub slew: Slew,
     /// Throttle curve.
@@ -125,6 +133,7 @@ impl Config {
     #[must_use]
     pub fn thesis_570kv() -> Self {
         let strain = StrainChannel::THESIS;
+        let margin = strain.beam.load_at(strain.beam.yield_pa / 2.0); // safety factor 2 (Table 7)
         Self {
             core_hz: 168_000_000,
             timer_hz: Ticks::HZ,
@@ -133,7 +142,8 @@ impl Config {
             log_period: Ticks::from_ms(100),
             converter: Converter { reference: Volt(3.3), bits: 12 },
             strain,
-            strain_scale: None,
+            calibrated: [None; ADC_CHANNELS],
+            fitted: [true; ADC_CHANNELS],
             torque: TorqueChannel { arm_m: 0.1, volts_per_newton: 0.25, zero: Volt(1.65) },
             current: CurrentChannel { shunt_ohm: 0.001, gain: 50.0, zero: Volt(0.2) },
             voltage_divider: Self::SUPPLY_DIVIDER,
@@ -141,36 +151,40 @@ impl Config {
             live_zero: [true, true, true, false, true],
             powered: Volt(1.0),
             limits: Limits {
-                speed: RevPerMin(10_000.0), // encoder's highest (Beharie 2013, Appendix C)
-                current: Ampere(30.0),
+                // encoder's highest (Beharie 2013, Appendix C); with the revolution it is read over (6 ms at 10 000 rev/min) and the
+                // tick: within 20 ms of the cause
+                speed: Bounds { high: Some(RevPerMin(10_000.0)), ms: 12, ..Bounds::NONE },
+                thrust: Bounds { low: Some(Newton(-margin.0)), high: Some(margin), ..Bounds::NONE },
+                torque: Bounds::NONE,
+                current: Bounds { high: Some(Ampere(30.0)), ..Bounds::NONE },
+                voltage: Bounds { low: Some(Volt(9.0)), ..Bounds::NONE }, // 3 V a cell
+                temperature: Bounds::NONE,
                 idle_current: Ampere(1.0),
-                voltage: Volt(9.0),                                    // 3 V a cell
-                load: strain.beam.load_at(strain.beam.yield_pa / 2.0), // safety factor 2 (Table 7)
                 disagreeing: 1,
                 link_ms: 1000,
                 stall_ms: 5,
                 idle_ms: 5,
-                // with the revolution it is read over (6 ms at 10 000 rev/min) and the tick: within 20 ms of the cause
-                speed_ms: 12,
                 analogue_ms: 100,
                 sensor_ms: 500,
                 lost_ms: 50,
             },
             times: ArmingTimes::default(),
+            answers: Answers::LongCellsReady,
+            highest: PulseWidth::MAX,
             slew: Slew { ns_per_ms: 10_000 }, // full range in 0.1 s: a step stays a step to a motor of 50 ms
             curve: ThrottleCurve::Linear,
         }
     }
 
-    /// Time between samples, brought into 1 to 100 Hz.
+    /// Time between samples, brought into 1 to 1000 Hz.
     #[must_use]
     pub fn log_period(&self) -> Ticks {
         let ms = u64::from(self.timer_hz / 1000);
-        Ticks(self.log_period.0.max(10 * ms).min(1000 * ms)) // not clamp(): it can panic
+        Ticks(self.log_period.0.max(ms).min(1000 * ms)) // not clamp(): it can panic
     }
 
     /// Sampling time of the converter, cycles of its clock: short enough for 1024 conversions of each channel in a log period
-    /// with a margin (see `docs/rig.md`), long enough that a second's sum still fits.
+    /// of 10 ms or more with a margin (see `docs/rig.md`), long enough that a second's sum still fits.
     #[must_use]
     pub fn sampling_cycles(&self) -> u16 {
         if self.log_period().0 < u64::from(self.ticks_per_ms()) * 40 { 15 } else { 56 }
@@ -183,27 +197,34 @@ impl Config {
         if ticks == 0 { 1 } else { ticks }
     }
 
-    /// Scales of raw codes, before any tare.
+    /// Scales of raw codes, before any tare: the calibrated ones, the design's where there is none.
+    #[must_use]
+    pub fn calibration(&self) -> Calibration {
+        let mut whole = self.design();
+        for (scale, calibrated) in whole.adc.iter_mut().zip(&self.calibrated) {
+            *scale = calibrated.map_or(*scale, |c| c.scale);
+        }
+        whole
+    }
+
+    /// Scales of raw codes as designed.
     ///
     /// Thrust is zero at the load cell's own zero; the motor's weight reads as negative thrust until the operator tares.
     #[must_use]
-    pub fn calibration(&self) -> Calibration {
+    pub fn design(&self) -> Calibration {
         let per_volt = self.converter.counts_per_volt();
         let s = &self.strain;
         let sign = if s.down_is_positive { -1.0 } else { 1.0 };
         let scale =
             |zero_v: f32, volts_per_unit: f32| AdcScale { zero: zero_v * per_volt, gain: 1.0 / (volts_per_unit * per_volt) };
-        Calibration {
-            timer_hz: self.timer_hz,
-            marks: self.marks,
-            adc: [
-                self.strain_scale.unwrap_or_else(|| scale(s.zero.0 * s.divider, sign * s.volts_per_newton() * s.divider)),
-                scale(self.torque.zero.0, self.torque.volts_per_newton / self.torque.arm_m),
-                scale(self.current.zero.0, self.current.shunt_ohm * self.current.gain),
-                scale(0.0, self.voltage_divider),
-                scale(self.temperature.zero.0, self.temperature.volts_per_kelvin),
-            ],
-        }
+        let adc = [
+            scale(s.zero.0 * s.divider, sign * s.volts_per_newton() * s.divider),
+            scale(self.torque.zero.0, self.torque.volts_per_newton / self.torque.arm_m),
+            scale(self.current.zero.0, self.current.shunt_ohm * self.current.gain),
+            scale(0.0, self.voltage_divider),
+            scale(self.temperature.zero.0, self.temperature.volts_per_kelvin),
+        ];
+        Calibration { timer_hz: self.timer_hz, marks: self.marks, adc }
     }
 
     /// Largest load either way that the strain channel can express, for the operator's information.
@@ -251,8 +272,8 @@ mod tests {
     }
 
     #[test]
-    fn log_rates_are_one_to_a_hundred() {
+    fn log_rates_are_one_to_a_thousand() {
         let with = |ms| Config { log_period: Ticks::from_ms(ms), ..Config::thesis_570kv() }.log_period().as_ms();
-        assert_eq!([with(0), with(10), with(100), with(1000), with(5000)], [10, 10, 100, 1000, 1000]);
+        assert_eq!([with(0), with(1), with(100), with(1000), with(5000)], [1, 1, 100, 1000, 1000]);
     }
 }

@@ -11,12 +11,12 @@ use crate::config::Config;
 use crate::health::{HealthWatch, Vitals};
 use crate::line::CommandLine;
 use crate::rig::{Inputs, Rig};
+use crate::rig_config::RigConfig;
 use crate::sampling::AdcBlock;
-use crate::settings::Settings;
 use crate::stop::{Half, StopWatch};
 use frame::calibration::Calibration;
 use frame::message::{ClockNews, Command, Event, Message, SettingsNews, Trial};
-use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS, Fault};
+use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS, Fault, Refusals};
 use frame::units::{PulseWidth, Ticks};
 use frame::wire::{Encoder, MAX_WIRE};
 use heapless::Vec;
@@ -32,7 +32,7 @@ pub struct Start {
     /// What its clock runs from.
     pub clock: ClockNews,
     /// What was found in flash.
-    pub stored: Option<Settings>,
+    pub stored: Option<RigConfig>,
     /// And what became of it.
     pub news: SettingsNews,
     /// What ended the program before the reset.
@@ -80,6 +80,8 @@ pub struct RigConsole {
     encoder: Encoder,
     queue: Vec<u8, QUEUED>,
     told: Calibration,
+    /// Configuration that was told.
+    revision: u8,
     reset_cause: u8,
     health: HealthWatch,
 }
@@ -97,6 +99,7 @@ impl RigConsole {
         }
         let mut console = Self {
             told: rig.calibration(),
+            revision: rig.revision(),
             rig,
             line: CommandLine::new(),
             stops: StopWatch::default(),
@@ -159,7 +162,10 @@ impl RigConsole {
         if let Some(event) = outputs.event {
             self.say(now, &Message::Event(event));
         }
-        if command == Some(Command::Identify) {
+        if let Some(Command::ConfigRead { at }) = command {
+            self.tell_config(now, at);
+        }
+        if command == Some(Command::Identify) || self.revision != self.rig.revision() {
             self.introduce(now);
         } else if command == Some(Command::Tare) || self.rig.calibration() != self.told {
             self.tell_calibration(now);
@@ -185,9 +191,16 @@ impl RigConsole {
     }
 
     fn introduce(&mut self, now: Ticks) {
+        self.revision = self.rig.revision();
         let hello = self.rig.hello(self.reset_cause);
         self.say(now, &Message::Hello(hello));
         self.tell_calibration(now);
+    }
+
+    fn tell_config(&mut self, now: Ticks, at: u16) {
+        let refused = Message::Event(Event::Refused(Refusals(Refusals::OUT_OF_RANGE)));
+        let message = self.rig.settings().part(at).map_or(refused, Message::ConfigPart);
+        self.say(now, &message);
     }
 
     fn tell_calibration(&mut self, now: Ticks) {

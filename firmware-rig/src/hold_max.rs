@@ -35,6 +35,11 @@ impl SupplyProof {
         self.seen_on |= self.on_ms >= settle_ms;
     }
 
+    /// How long the supply has read on, ms.
+    pub(crate) fn on_ms(&self) -> u32 {
+        self.on_ms
+    }
+
     /// Off for long enough, and on before that; `live_zero` where an open wire cannot read as off.
     pub(crate) fn is_off(&self, settle_ms: u32, live_zero: bool) -> bool {
         self.off_ms >= settle_ms && (self.seen_on || live_zero)

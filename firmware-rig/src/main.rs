@@ -27,7 +27,7 @@ mod app {
     use crate::board::watchdog::{Watchdog, take_reset_cause};
     use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
-    use firmware_rig::{Config, Delivered, RigConsole, Settings, Start};
+    use firmware_rig::{Config, Delivered, RigConfig, RigConsole, Start};
     use frame::message::{Event, SettingsNews, Trial};
     use frame::units::PulseWidth;
     use safe_start::stm32f4::{clock, crash};
@@ -47,13 +47,13 @@ mod app {
     const LATE_CYCLES: u32 = 8 * 168_000;
     /// An event waits to be logged.
     static LOG: AtomicBool = AtomicBool::new(false);
-    /// Settings wait to be stored.
+    /// RigConfig wait to be stored.
     static STORE: AtomicBool = AtomicBool::new(false);
 
     #[shared]
     struct Shared {
         capture_timer: TIM2,
-        to_store: Option<Settings>,
+        to_store: Option<RigConfig>,
         stored: Option<SettingsNews>,
         /// The latest event, for the log: the idle loop writes it, never the tick.
         to_log: Option<Event>,

@@ -7,18 +7,19 @@
 
 use crate::elapsed::Elapsed;
 use crate::rig::Rig;
-use crate::settings::Settings;
+use crate::rig_config::{Calibrated, OutOfRange, RigConfig};
 use esc_pwm::{ArmingEvent, Chirp, Schedule, ScheduleStep, Staircase, Step};
 use frame::calibration::AdcScale;
 use frame::message::{Command, Event, Setting};
-use frame::rig::{AdcVerdict, Refusals, RigState};
+use frame::rig::{AdcCode, AdcVerdict, Refusals, RigState};
 use frame::units::{PulseWidth, Ticks};
 
 impl Rig {
     /// Does what the host asks and tells the answer.
     pub(crate) fn obey(&mut self, now: Ticks, command: &Command) {
         let answer = match *command {
-            Command::Ping | Command::Identify => return, // hearing it is all; the caller answers Identify
+            // hearing it is all; the caller answers the questions
+            Command::Ping | Command::Identify | Command::ConfigRead { .. } => return,
             Command::Beep(beep) => {
                 self.apply(now, beep.into(), Refusals::default());
                 return;
@@ -54,6 +55,8 @@ impl Rig {
                 self.run(now, Schedule::Chirp(Chirp { centre, amplitude, from_mhz, to_mhz, length_ms }))
             }
             Command::Configure(setting) => self.configure(&setting),
+            Command::ConfigPart(part) => self.incoming.take(&part).map_err(|OutOfRange| Refusals(Refusals::OUT_OF_RANGE)),
+            Command::ConfigApply { length, crc } => self.configure_whole(length, crc),
             Command::SaveSettings => self.at_rest().map(|()| self.store = true),
             Command::MassPoint { mass_g } => self.take_mass(mass_g),
             Command::Imu(_) => Err(Refusals(Refusals::WRONG_STATE)), // meant for the other board
@@ -106,9 +109,17 @@ impl Rig {
 
     fn configure(&mut self, setting: &Setting) -> Result<(), Refusals> {
         self.at_rest()?;
-        let factory = Settings::of(&self.factory);
+        let factory = RigConfig::of(&self.factory);
         let changed = self.settings.with(setting, &factory).map_err(|_| Refusals(Refusals::OUT_OF_RANGE))?;
         self.put_in_force(changed);
+        Ok(())
+    }
+
+    /// A whole configuration that came in parts.
+    fn configure_whole(&mut self, length: u16, crc: u32) -> Result<(), Refusals> {
+        self.at_rest()?;
+        let config = self.incoming.finish(length, crc).map_err(|OutOfRange| Refusals(Refusals::OUT_OF_RANGE))?;
+        self.put_in_force(config);
         Ok(())
     }
 
@@ -128,9 +139,19 @@ impl Rig {
 
     fn fit_masses(&mut self) -> Result<(), Refusals> {
         self.at_rest()?;
-        let [design, ..] = self.factory.calibration().adc;
+        let mut settings = self.settings;
+        let [design, ..] = settings.apply(&self.factory).design().adc;
         let fit = self.masses.fit(&design).map_err(|()| Refusals(Refusals::OUT_OF_RANGE))?;
-        self.put_in_force(Settings { strain: Some(AdcScale { zero: fit.zero, gain: fit.gain }), ..self.settings });
+        let calibrated = Calibrated {
+            scale: AdcScale { zero: fit.zero, gain: fit.gain },
+            residual: fit.residual_n,
+            worst: fit.worst_n,
+            points: fit.points,
+            day: 0,
+        };
+        let [thrust, ..] = &mut settings.calibrated;
+        *thrust = Some(calibrated);
+        self.put_in_force(settings);
         self.tell(Event::MassFitted(fit));
         Ok(())
     }
@@ -139,15 +160,16 @@ impl Rig {
     fn tare(&mut self) -> Result<(), Refusals> {
         let live = matches!(self.state, RigState::Running | RigState::CalibrateHoldMax);
         let [strain, torque, ..] = &self.codes;
-        let unusable = |code: &frame::rig::AdcCode| code.verdict != AdcVerdict::Nominal;
+        let unusable = |code: &AdcCode| !matches!(code.verdict, AdcVerdict::Nominal | AdcVerdict::Absent);
+        let nothing = strain.count == 0 && torque.count == 0;
         let refusals = Refusals::default()
             .and(Refusals::WRONG_STATE, live)
             .and(Refusals::ROTOR_TURNING, self.bank.is_turning())
-            .and(Refusals::OUT_OF_RANGE, unusable(strain) || unusable(torque));
+            .and(Refusals::OUT_OF_RANGE, nothing || unusable(strain) || unusable(torque));
         if !refusals.is_empty() {
             return Err(refusals);
         }
-        for (scale, code) in self.calibration.adc.iter_mut().zip(&self.codes).take(2) {
+        for (scale, code) in self.calibration.adc.iter_mut().zip(&self.codes).take(2).filter(|(_, code)| code.count > 0) {
             scale.zero = (f64::from(code.sum) / f64::from(code.count)) as f32;
         }
         Ok(())

@@ -12,14 +12,15 @@ use crate::elapsed::Elapsed;
 use crate::hold_max::{HoldWatch, SupplyProof};
 use crate::line::LineNews;
 use crate::mass::MassPoints;
+use crate::rig_config::{Answers, RigConfig};
 use crate::sampling::AdcBlock;
-use crate::settings::Settings;
 use crate::stop::StopLoop;
+use crate::transfer::Incoming;
 use esc_pwm::{ArmingEvent, Objections, Protection, Readings, Schedule, Step, Uploaded, pulse_for, step, time_out};
 use frame::calibration::Calibration;
 use frame::message::{BoardId, Command, Event, Hello, Trial};
 use frame::rig::{ADC_CHANNELS, AdcCode, AdcVerdict, CAPTURE_CHANNELS, Fault, FaultSet, Refusals, RigSample, RigState};
-use frame::units::{Ampere, Newton, PulseWidth, Ticks, Volt};
+use frame::units::{Ampere, Celsius, Newton, NewtonMetre, PulseWidth, RevPerMin, Ticks, Volt};
 use heapless::Deque;
 
 /// What the peripherals delivered since the last tick.
@@ -76,10 +77,15 @@ pub struct Rig {
     pub(crate) bank: CaptureBank,
     pub(crate) codes: [AdcCode; ADC_CHANNELS],
     pub(crate) factory: Config,
-    pub(crate) settings: Settings,
+    pub(crate) settings: RigConfig,
     pub(crate) masses: MassPoints,
     pub(crate) store: bool,
     pub(crate) trial: Option<Trial>,
+    pub(crate) incoming: Incoming,
+    /// Counts the configurations that were put in force.
+    revision: u8,
+    /// Since when the throttle is open.
+    live_since: Option<Ticks>,
     entered: Elapsed,
     setting: PulseWidth,
     last_live: Option<Ticks>,
@@ -99,12 +105,12 @@ impl Rig {
     /// A rig after reset: disarmed, at minimum.
     #[must_use]
     pub fn new(config: Config) -> Self {
-        Self::with_settings(config.clone(), Settings::of(&config))
+        Self::with_settings(config.clone(), RigConfig::of(&config))
     }
 
     /// A rig after reset with `settings` in force in place of what `factory` says.
     #[must_use]
-    pub fn with_settings(factory: Config, settings: Settings) -> Self {
+    pub fn with_settings(factory: Config, settings: RigConfig) -> Self {
         let config = settings.apply(&factory);
         let untared = config.calibration();
         Self {
@@ -113,6 +119,9 @@ impl Rig {
             masses: MassPoints::new(),
             store: false,
             trial: None,
+            incoming: Incoming::default(),
+            revision: 0,
+            live_since: None,
             bank: CaptureBank::new(&config),
             calibration: untared,
             untared,
@@ -166,12 +175,12 @@ impl Rig {
 
     /// The settings in force, the load cell's scale included.
     #[must_use]
-    pub fn settings(&self) -> Settings {
+    pub fn settings(&self) -> RigConfig {
         self.settings
     }
 
     /// Puts `settings` in force. The tare is gone when the scale of the load cell changes.
-    pub(crate) fn put_in_force(&mut self, settings: Settings) {
+    pub(crate) fn put_in_force(&mut self, settings: RigConfig) {
         let config = settings.apply(&self.factory);
         if config.marks != self.config.marks {
             self.bank = CaptureBank::new(&config);
@@ -183,6 +192,13 @@ impl Rig {
         }
         self.settings = settings;
         self.config = config;
+        self.revision = self.revision.wrapping_add(1);
+    }
+
+    /// Another number once another configuration is in force.
+    #[must_use]
+    pub fn revision(&self) -> u8 {
+        self.revision
     }
 
     /// The configuration.
@@ -194,7 +210,15 @@ impl Rig {
     /// Who speaks, after a reset of the given cause.
     #[must_use]
     pub fn hello(&self, reset_cause: u8) -> Hello {
-        Hello { board: BoardId::Rig, firmware: VERSION, core_hz: self.config.core_hz, reset_cause, present: self.fitted() }
+        Hello {
+            board: BoardId::Rig,
+            firmware: VERSION,
+            core_hz: self.config.core_hz,
+            reset_cause,
+            present: self.fitted(),
+            analogue: self.config.fitted.iter().rev().fold(0, |mask, fitted| mask << 1 | u8::from(*fitted)),
+            config: self.settings.digest(),
+        }
     }
 
     /// Speed sensors that are fitted, a bit a capture channel.
@@ -227,6 +251,9 @@ impl Rig {
         if self.is_overdue(now) {
             self.apply(now, ArmingEvent::TimeOut, Refusals::default());
         }
+        if let Some(answer) = self.unspoken(now) {
+            self.apply(now, answer, Refusals::default());
+        }
         let pulse = self.drive(now, tick_ms);
         let sample = (now >= self.next_sample).then(|| self.sample(now, pulse));
         let store = core::mem::take(&mut self.store);
@@ -240,6 +267,21 @@ impl Rig {
         let held = time_out(self.state, &times).is_some_and(|limit| self.entered.ms(now, per_ms) >= u64::from(limit));
         let at_max = self.state == RigState::CalibrateHoldMax;
         held || (at_max && self.hold.powered_ms(now, per_ms) >= u64::from(times.max_powered_ms))
+    }
+
+    /// The answer that this ESC does not give, where it is due: nobody has to type a beep that never came.
+    fn unspoken(&mut self, now: Ticks) -> Option<ArmingEvent> {
+        match (self.config.answers, self.state) {
+            (Answers::LongReady | Answers::Silent { .. }, RigState::ArmCells) => Some(ArmingEvent::Cells),
+            (Answers::Silent { .. }, RigState::ArmReady) => Some(ArmingEvent::Ready),
+            (Answers::Silent { hold_ms }, RigState::ArmHoldMin) => {
+                let [_, _, _, measured, _] = self.config.fitted;
+                let per_ms = self.config.ticks_per_ms();
+                let held = self.entered.ms(now, per_ms).min(if measured { self.proof.on_ms().into() } else { u64::MAX });
+                (held >= u64::from(hold_ms)).then_some(ArmingEvent::Long)
+            }
+            _ => None,
+        }
     }
 
     /// Notes the tick; milliseconds since the one before, rounded.
@@ -264,19 +306,21 @@ impl Rig {
         now.since(then).0.checked_div(u64::from(self.config.ticks_per_ms())).unwrap_or(u64::MAX)
     }
 
-    /// Value of an ADC channel over one tick, untared.
+    /// Value of an ADC channel over one tick, untared; none of a channel that is not fitted.
     fn value(&self, channel: usize, blocks: &[AdcBlock; ADC_CHANNELS]) -> Option<f32> {
-        let scale = self.untared.adc.get(channel)?;
+        let scale = self.untared.adc.get(channel).filter(|_| self.config.fitted.get(channel) == Some(&true))?;
         Some((blocks.get(channel)?.mean()? - scale.zero) * scale.gain)
     }
 
     fn protect(&mut self, now: Ticks, tick_ms: u32, inputs: &Inputs<'_>) {
         let adc = inputs.adc;
-        let [strain, rest @ ..] = adc;
-        let [_, live_zero @ ..] = &self.config.live_zero;
         let top = self.config.converter.top();
-        let end = strain.verdict(top, true);
-        let stuck = rest.iter().zip(live_zero).any(|(block, live)| block.verdict(top, *live).is_stuck());
+        let mut ends = [AdcVerdict::Nominal; ADC_CHANNELS];
+        for (((end, block), live), fitted) in ends.iter_mut().zip(adc).zip(self.config.live_zero).zip(self.config.fitted) {
+            *end = if fitted { block.verdict(top, live) } else { AdcVerdict::Absent };
+        }
+        let [end, rest @ ..] = &ends;
+        let missing = ends.contains(&AdcVerdict::Missing) || rest.iter().any(|end| end.is_stuck());
         let voltage = self.value(3, adc).map(Volt);
         self.supply = voltage.or(self.supply);
         let powered = self.config.powered;
@@ -285,16 +329,20 @@ impl Rig {
             self.hold.take(now, self.bank.taken(), voltage.is_some_and(|v| v >= powered));
         }
         let readings = Readings {
-            speed: self.bank.judged_speed(now),
+            // no edges at all: the rotor stands, where anything would see it turn
+            speed: self.bank.judged_speed(now).or((self.bank.fitted() > 0).then_some(RevPerMin(0.0))),
             stirs: self.hold.stirs(),
             current: self.value(2, adc).map(Ampere),
             voltage,
             load: self.value(0, adc).map(Newton),
+            torque: self.value(1, adc).map(NewtonMetre),
+            temperature: self.value(4, adc).map(Celsius),
+            driven: self.live_since.is_some_and(|since| now.since(since) >= START),
             load_saturated: end.is_stuck(),
             disagreeing: self.bank.flagged(),
             // a rotor that coasts to rest falls silent channel by channel: judged under throttle only
             lost: if self.setting.is_live() { self.bank.lost(now) } else { 0 },
-            adc_missing: end == AdcVerdict::Missing || stuck,
+            adc_missing: missing,
             damaged: inputs.line.damaged,
             replayed: inputs.line.replayed,
             brown_out: inputs.brown_out,
@@ -341,6 +389,7 @@ impl Rig {
     pub(crate) fn objections(&self, now: Ticks) -> Objections {
         let low_ms = u64::from(self.config.times.low_interval_ms);
         let [_, _, _, live_supply, _] = self.config.live_zero;
+        let [_, _, current, _, _] = self.config.fitted;
         let recent = self.last_live.is_some_and(|at| self.ms_since(now, at) < low_ms);
         Refusals::default()
             .and(Refusals::FAULT_LATCHED, !self.faults.is_empty())
@@ -349,6 +398,7 @@ impl Rig {
             .and(Refusals::ESC_POWERED, self.supply.is_some_and(|v| v >= self.config.powered))
             .and(Refusals::SUPPLY_UNPROVEN, !self.proof.is_off(self.config.limits.analogue_ms, live_supply))
             .and(Refusals::ROTOR_TURNING, self.bank.is_turning())
+            .and(Refusals::NO_WITNESS, self.bank.fitted() == 0 && !current)
             .and(Refusals::STOP_OPEN, self.stop_loop.open)
     }
 
@@ -384,7 +434,7 @@ impl Rig {
         if self.state == RigState::Running {
             match self.schedule.pulse_at(self.started.ms(now, self.config.ticks_per_ms())) {
                 Some(target) => {
-                    let target = self.config.curve.apply(target);
+                    let target = self.config.curve.apply(target).min(self.config.highest);
                     self.setting = self.config.slew.toward(self.setting, target, tick_ms);
                 }
                 None => {
@@ -396,6 +446,9 @@ impl Rig {
         let pulse = pulse_for(self.state, self.setting);
         if pulse.is_live() {
             self.last_live = Some(now);
+            self.live_since.get_or_insert(now);
+        } else {
+            self.live_since = None;
         }
         pulse
     }
@@ -405,13 +458,20 @@ impl Rig {
         let behind = now.since(self.next_sample).0.checked_div(period).unwrap_or(0);
         self.next_sample = Ticks(self.next_sample.0 + (behind + 1) * period);
         let top = self.config.converter.top();
-        for ((code, block), live) in self.codes.iter_mut().zip(&mut self.blocks).zip(self.config.live_zero) {
-            *code = core::mem::take(block).code(top, live);
+        let Config { live_zero, fitted, .. } = self.config;
+        for (((code, block), live), fitted) in self.codes.iter_mut().zip(&mut self.blocks).zip(live_zero).zip(fitted) {
+            let block = core::mem::take(block);
+            *code = if fitted { block.code(top, live) } else { ABSENT };
         }
         let rpm = self.bank.sample(now);
         RigSample { at: now, pulse, state: self.state, faults: self.faults, rpm, adc: self.codes }
     }
 }
+
+/// What an analogue channel reads that is not fitted.
+const ABSENT: AdcCode = AdcCode { sum: 0, count: 0, rms_q8: 0, verdict: AdcVerdict::Absent };
+/// How long the throttle must be open before speed and current have to be above their lower limits.
+const START: Ticks = Ticks::from_ms(2000);
 
 /// Firmware version from the package.
 const VERSION: [u8; 3] =

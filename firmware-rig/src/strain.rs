@@ -6,9 +6,10 @@
 //! Reference: Beharie 2013, Eq. 5.13, 5.26, 5.33, 5.47-5.56, Tables 6-7, all with the errata (E/4, E/2, E; K from configuration).
 
 use frame::units::{Newton, Volt};
+use serde::{Deserialize, Serialize};
 
 /// Active gauges of the bridge.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Bridge {
     /// One active gauge.
     Quarter,
@@ -42,7 +43,7 @@ pub fn balancing_trim(sg: [f32; 4]) -> f32 {
 }
 
 /// A cantilever of rectangular section, loaded at its tip.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Beam {
     /// From the gauges to the load, m.
     pub length_m: f32,
@@ -108,7 +109,7 @@ impl Beam {
 }
 
 /// Beam, gauges, amplifier and the divider before the converter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StrainChannel {
     /// The beam.
     pub beam: Beam,

@@ -133,6 +133,9 @@ impl Walk {
     fn new() -> Self {
         let mut config = Config { times: TIMES, ..Config::thesis_570kv() };
         config.limits.analogue_ms = ANALOGUE_MS as u32;
+        config.limits.current.ms = ANALOGUE_MS as u16;
+        config.limits.voltage.ms = ANALOGUE_MS as u16;
+        config.limits.thrust.ms = ANALOGUE_MS as u16;
         config.limits.link_ms = 500;
         config.limits.disagreeing = 4; // the one channel that turns here has no company
         config.limits.lost_ms = 1_000_000;

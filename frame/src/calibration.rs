@@ -79,7 +79,7 @@ impl Calibration {
     pub fn value(&self, channel: usize, code: &AdcCode) -> Option<f64> {
         let scale = self.adc.get(channel)?;
         match code.verdict {
-            AdcVerdict::Missing | AdcVerdict::Open | AdcVerdict::Short => None,
+            AdcVerdict::Missing | AdcVerdict::Open | AdcVerdict::Short | AdcVerdict::Absent => None,
             AdcVerdict::Nominal | AdcVerdict::Saturated if code.count > 0 => {
                 let mean = f64::from(code.sum) / f64::from(code.count);
                 Some((mean - f64::from(scale.zero)) * f64::from(scale.gain))

@@ -36,6 +36,10 @@ pub struct Hello {
     pub reset_cause: u8,
     /// IMU board: bit 0 gyro, 1 accelerometer, 2 magnetometer, 3 test accelerometer identified. Rig board: bit mask of fitted capture channels.
     pub present: u8,
+    /// Rig board: bit mask of fitted analogue channels.
+    pub analogue: u8,
+    /// Rig board: CRC-32 of the configuration in force.
+    pub config: u32,
 }
 
 /// Something happened.
@@ -211,6 +215,23 @@ pub enum Message {
     TestAccel(TestAccel),
     /// What became of its calibration, and its errors.
     ImuReport(ImuReport),
+    /// A part of the rig's configuration.
+    ConfigPart(ConfigPart),
+}
+
+/// Bytes of a configuration in one frame.
+pub const CONFIG_PART: usize = 32;
+
+/// A part of the rig's configuration (postcard form of `firmware_rig::RigConfig`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ConfigPart {
+    /// Where it begins, bytes.
+    pub at: u16,
+    /// Length of the whole, bytes.
+    pub length: u16,
+    /// The bytes, filled up with zeros at the end of the whole.
+    pub bytes: [u8; CONFIG_PART],
 }
 
 /// Most steps that one uploaded schedule may hold.
@@ -333,6 +354,20 @@ pub enum Command {
     },
     /// A user command of the IMU board.
     Imu(ImuCommand),
+    /// A part of a new configuration; the first one clears what was there.
+    ConfigPart(ConfigPart),
+    /// Put the configuration that was sent in force, if it is whole and every value possible; only while disarmed.
+    ConfigApply {
+        /// Its length, bytes.
+        length: u16,
+        /// CRC-32 of it.
+        crc: u32,
+    },
+    /// Send the part of the configuration in force that begins at this byte.
+    ConfigRead {
+        /// From 0.
+        at: u16,
+    },
 }
 
 /// What the self-test provokes.
@@ -351,7 +386,7 @@ pub enum Trial {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Setting {
-    /// Time between two samples, 10 to 1000 ms.
+    /// Time between two samples, 1 to 1000 ms, as far as the line carries them.
     LogPeriodMs(u16),
     /// Marks a revolution of the four capture channels after their prescalers; 0 where none is fitted.
     Marks([u16; 4]),

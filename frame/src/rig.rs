@@ -90,11 +90,19 @@ pub enum Fault {
     ClockFailed = 15,
     /// The rotor turned while it had to stand: during the range calibration.
     RotorTurned = 16,
+    /// Rotor speed or current below its lower limit although the throttle is open.
+    BelowLimit = 17,
+    /// Supply above the configured limit.
+    OverVoltage = 18,
+    /// Torque beyond a configured limit.
+    TorqueLimit = 19,
+    /// Temperature beyond a configured limit.
+    TemperatureLimit = 20,
 }
 
 impl Fault {
     /// Every fault, in the order of its bit.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 21] = [
         Self::OperatorStop,
         Self::LinkLost,
         Self::Overspeed,
@@ -112,6 +120,10 @@ impl Fault {
         Self::BrownOut,
         Self::ClockFailed,
         Self::RotorTurned,
+        Self::BelowLimit,
+        Self::OverVoltage,
+        Self::TorqueLimit,
+        Self::TemperatureLimit,
     ];
 
     /// The fault in words, for people.
@@ -135,6 +147,10 @@ impl Fault {
             Self::BrownOut => "brown-out",
             Self::ClockFailed => "crystal failed",
             Self::RotorTurned => "the rotor turned while it had to stand",
+            Self::BelowLimit => "speed or current below its limit",
+            Self::OverVoltage => "over-voltage",
+            Self::TorqueLimit => "torque beyond its limit",
+            Self::TemperatureLimit => "temperature beyond its limit",
         }
     }
 }
@@ -303,6 +319,8 @@ pub enum AdcVerdict {
     Missing,
     /// Every conversion sat at the high end: a short to the supply, or an amplifier that its wire drives there.
     Short,
+    /// This channel is not fitted.
+    Absent,
 }
 
 impl AdcVerdict {

@@ -11,7 +11,7 @@ use crate::board::{Board, Heard};
 use crate::spool::Spool;
 use frame::Consensus;
 use frame::calibration::{Calibration, Converted};
-use frame::message::{Command, Event, Message};
+use frame::message::{Command, Event, Hello, Message};
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES, RigSample, UNEVEN_NAMES};
 use frame::units::Ticks;
 use indicatif::ProgressBar;
@@ -56,6 +56,7 @@ pub(crate) struct Recorder {
     spool: Spool,
     head: Vec<(&'static str, String)>,
     calibration: Option<Calibration>,
+    board: Option<Hello>,
     /// Capture channels with two marks, as the head of the log says.
     paired: Vec<usize>,
     early: Vec<RigSample>,
@@ -78,6 +79,7 @@ impl Recorder {
             spool: Spool::create(target)?,
             head,
             calibration: None,
+            board: None,
             paired: Vec::new(),
             early: Vec::new(),
             started: false,
@@ -117,6 +119,7 @@ impl Recorder {
                 self.early.push(*sample);
                 self.begin();
             }
+            Message::Hello(hello) if !self.started => self.board = Some(*hello),
             Message::Event(Event::Faults { faults, .. }) => {
                 let words: Vec<&str> = faults.iter().map(frame::Fault::words).collect();
                 self.say(&format!("latched: {}", words.join(", ")));
@@ -142,6 +145,10 @@ impl Recorder {
         let mut text = String::from("# quadrig-log 1\n");
         for (key, value) in &self.head {
             let _ = writeln!(text, "# {key} = {}", toml::Value::String(value.clone()));
+        }
+        if let Some(Hello { firmware: [major, minor, patch], config, .. }) = self.board {
+            let _ = writeln!(text, "# firmware = \"rig {major}.{minor}.{patch}\"");
+            let _ = writeln!(text, "# config_crc32 = \"{config:08x}\"");
         }
         if step.is_finite() {
             let _ = writeln!(text, "# sample_hz = {:?}", (1.0 / step * 100.0).round() / 100.0);

@@ -6,12 +6,16 @@
 //! Units: us of pulse, s, g.
 //! Reference: specification `rig.md`, "Acquisition"; Beharie 2013, Fig. 3.10.
 
+mod configure;
+mod date;
+mod file;
+
 use crate::Failure;
 use crate::board::{Board, Heard};
 use crate::record::Recorder;
 use clap::Subcommand;
-use frame::message::{Beep, Command, Event, Message, Setting, SettingsNews};
-use frame::rig::{Fault, RigState};
+use frame::message::{Beep, BoardId, Command, Event, Hello, Message, Setting};
+use frame::rig::{ADC_NAMES, CAPTURE_NAMES, Fault, RigState};
 use frame::units::PulseWidth;
 use std::io::BufRead;
 use std::path::PathBuf;
@@ -74,12 +78,18 @@ enum Order {
     Tare,
     /// Clears the latched faults.
     Clear,
-    /// Changes one setting: log-ms, speed-limit, current-limit, voltage-limit, slew, link-ms, factory.
+    /// Configures the board from a file and stores it; or reads what is in force; or changes one setting until the next reset.
     Configure {
-        /// Which.
-        key: String,
-        /// Its value (none for factory).
+        /// The file (TOML), or a setting: log-ms, speed-limit, current-limit, voltage-limit, slew, link-ms, factory.
+        what: Option<String>,
+        /// The setting's value (none for factory).
         value: Option<f64>,
+        /// Read what is in force.
+        #[arg(long)]
+        read: bool,
+        /// File to read into; standard output without it.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
     },
     /// Takes a known mass on the load cell, or fits the scale to those taken.
     Mass {
@@ -146,9 +156,16 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             done("set");
             Ok(())
         }
-        Order::Configure { key, value } => {
+        Order::Configure { read: true, what: None, output, .. } => configure::to_file(&mut board, output.as_deref()),
+        Order::Configure { read: false, what: Some(path), value: None, output: None } if is_file(path) => {
+            let digest = configure::from_file(&mut board, path.as_ref())?;
+            done(&format!("in force and stored; CRC-32 {digest:08x}"));
+            Ok(())
+        }
+        Order::Configure { read: false, what: Some(key), value, output: None } => {
             board.obey(Command::Configure(setting(key, *value)?), silent).map(|()| done("in force until the next reset; `save` keeps it"))
         }
+        Order::Configure { .. } => Err("rig configure takes a file, or --read [-o FILE], or a setting with its value".into()),
         Order::Mass { forget: true, .. } => board.obey(Command::MassForget, silent).map(|()| done("forgotten")),
         Order::Mass { grams: Some(grams), .. } => {
             let taken = |m: &Message| match m {
@@ -173,19 +190,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             ));
             Ok(())
         }
-        Order::Save => {
-            let news = |m: &Message| match m {
-                Message::Event(Event::Settings(news @ (SettingsNews::Saved | SettingsNews::Failed))) => Some(*news),
-                _ => None,
-            };
-            match board.ask(Command::SaveSettings, silent, news)? {
-                SettingsNews::Saved => {
-                    done("saved, and read back the same");
-                    Ok(())
-                }
-                _ => Err("the board could not store its settings; they stay in force until the next reset".into()),
-            }
-        }
+        Order::Save => configure::save(&mut board).map(|()| done("saved, and read back the same")),
         Order::Arm => session(&mut board, Command::Arm, None, None, quiet),
         Order::Calibrate { esc_is_unpowered: false } => {
             Err("the board will give MAXIMUM pulses: disconnect the ESC's battery, take the propeller off, and say --esc-is-unpowered".into())
@@ -210,7 +215,18 @@ fn identify(board: &mut Board) -> Result<(), Failure> {
     let [major, minor, patch] = hello.firmware;
     println!("{:?} board, firmware {major}.{minor}.{patch}, core {} MHz", hello.board, hello.core_hz / 1_000_000);
     println!("last reset: {}", reset_cause(hello.reset_cause));
+    if hello.board == BoardId::Rig {
+        println!("fitted: {}; configuration {:08x}", fitted(&hello), hello.config);
+    }
     Ok(())
+}
+
+/// The channels that a board has, by their names in a log.
+fn fitted(hello: &Hello) -> String {
+    let named = |mask: u8, names: &[&'static str]| -> Vec<&'static str> {
+        names.iter().enumerate().filter(|(n, _)| mask >> n & 1 == 1).map(|(_, name)| *name).collect()
+    };
+    [named(hello.present, &CAPTURE_NAMES), named(hello.analogue, &ADC_NAMES)].concat().join(", ")
 }
 
 /// Bits 31..24 of RCC_CSR in words (RM0090 section 7.3.21); power-on and brown-out set further flags, so the rarest is told first.
@@ -225,6 +241,11 @@ fn reset_cause(flags: u8) -> &'static str {
         (0x04, "reset key"),
     ];
     NAMES.iter().find(|(bit, _)| flags & bit != 0).map_or("unknown", |(_, name)| name)
+}
+
+/// Whether the word names a file rather than a setting.
+fn is_file(word: &str) -> bool {
+    word.ends_with(".toml") || word.contains(std::path::MAIN_SEPARATOR)
 }
 
 fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {

@@ -18,6 +18,7 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str) -> Log
     let text = |s: &str| toml::Value::String(s.to_owned());
     log.meta.insert("motor".into(), text(&scenario.motor));
     log.meta.insert("propeller".into(), text(&scenario.propeller));
+    log.meta.insert("config_crc32".into(), text(&format!("{:08x}", record.hello.config)));
     log.meta.insert("sample_hz".into(), toml::Value::Float(f64::from(scenario.log.rate_hz)));
     log.columns.push(Column { name: "pulse_us".into(), values: rows.iter().map(|r| r.pulse_us).collect() });
     let mut push = |name: &str, values: Vec<f64>| {

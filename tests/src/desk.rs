@@ -7,15 +7,17 @@
 //! Units: ms of real time.
 //! Reference: specification `rig.md`; `formats.md`, "Telemetry".
 
+use firmware_rig::Config;
 use frame::message::{Beep, Message};
 use frame::units::{PulseWidth, Ticks};
 use frame::wire::Decoder;
-use hal_sim::native::{Board, Wires, firmware_config};
-use hal_sim::{Bench, EdgeDetail, Millisecond, Scenario};
+use hal_sim::native::{Board, Wires};
+use hal_sim::{Bench, EdgeDetail, Millisecond, Scenario, Truth};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -87,6 +89,8 @@ struct Done {
     pulses: Vec<PulseWidth>,
     /// Samples that left the board whole while a program listened, by the board's time.
     whole: Vec<Ticks>,
+    /// What was really there at the end of the last millisecond of each pulse that the ESC followed, by the pulse in us.
+    levels: BTreeMap<u32, Truth>,
 }
 
 /// A board behind a port.
@@ -116,6 +120,15 @@ impl Desk {
     /// When the system gives no pseudo-terminal.
     #[must_use]
     pub fn new(line: Line) -> Self {
+        Self::with_rig(line, Scenario::default())
+    }
+
+    /// Switches a board on, as it left the factory, before another rig.
+    ///
+    /// # Panics
+    /// When the system gives no pseudo-terminal.
+    #[must_use]
+    pub fn with_rig(line: Line, scenario: Scenario) -> Self {
         let (cable, port) = Cable::new().expect("a pseudo-terminal");
         let flag = || Arc::new(AtomicBool::new(false));
         let (power, quit) = (flag(), flag());
@@ -123,7 +136,7 @@ impl Desk {
         let (sender, beeps) = channel();
         let thread = std::thread::spawn({
             let (power, quit, cable, done) = (power.clone(), quit.clone(), cable.clone(), done.clone());
-            move || play(line, &cable, &power, &quit, &done, &sender)
+            move || play(line, &scenario, &cable, &power, &quit, &done, &sender)
         });
         Self { port, beeps, power, cable, done, thread: Some(thread), quit, link: None }
     }
@@ -184,6 +197,15 @@ impl Desk {
         self.done.lock().expect("the board lives").pulses.clone()
     }
 
+    /// What was really there in the last millisecond in which the ESC followed a pulse of `us`.
+    ///
+    /// # Panics
+    /// When the board's thread has panicked.
+    #[must_use]
+    pub fn truth_at(&self, us: u32) -> Option<Truth> {
+        self.done.lock().expect("the board lives").levels.get(&us).copied()
+    }
+
     /// Times on the board's clock of the samples that left it whole while a program had the port open.
     ///
     /// # Panics
@@ -224,15 +246,15 @@ impl Pace {
 
 fn play(
     line: Line,
+    scenario: &Scenario,
     cable: &Mutex<Option<Cable>>,
     power: &AtomicBool,
     quit: &AtomicBool,
     done: &Mutex<Done>,
     beeps: &Sender<Beep>,
 ) {
-    let scenario = Scenario::default();
-    let mut bench = Bench::new(&scenario, None, EdgeDetail::Captured);
-    let mut board = Board::new(firmware_config(&scenario));
+    let mut bench = Bench::new(scenario, None, EdgeDetail::Captured);
+    let mut board = Board::new(Config::thesis_570kv());
     let (mut gathered, mut decoder) = (Millisecond::default(), Decoder::default());
     let mut spoiler = Spoiler { line, sent: 0, runs_on: false };
     let mut frame = PulseWidth::MIN;
@@ -257,7 +279,11 @@ fn play(
         let heard = plugged.as_mut().map_or(0, |cable| cable.hear(&mut bytes));
         board.hear(&bytes[..heard]);
         board.millisecond(Ticks::from_ms(ms), &gathered, Wires::SOUND);
-        done.lock().expect("nobody panics with it").pulses.push(board.pulse());
+        let truth = bench.truth();
+        let mut seen = done.lock().expect("nobody panics with it");
+        seen.pulses.push(board.pulse());
+        seen.levels.insert(truth.pulse_us.round() as u32, truth);
+        drop(seen);
         for frame in board.sent().split_inclusive(|byte| *byte == 0) {
             let (bytes, whole) = spoiler.spoil(frame, ms);
             let arrived = plugged.as_mut().is_some_and(|cable| cable.say(&bytes));

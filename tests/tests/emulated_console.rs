@@ -24,7 +24,7 @@ const ADC_INPUTS: [u8; ADC_CHANNELS] = [10, 11, 12, 13, 14];
 const STOP_PIN: u8 = 12;
 /// The image runs this long after power-up, ms, at most.
 const START_MS: u64 = 30;
-const END_MS: u64 = 5_000;
+const END_MS: u64 = 5_400;
 
 /// What happens at a millisecond.
 #[derive(Debug, Clone)]
@@ -47,6 +47,7 @@ fn script() -> Vec<(u64, Step)> {
         Command::Configure(Setting::LogPeriodMs(50)),
         Command::Configure(Setting::LogPeriodMs(1001)),      // refused: no such rate
         Command::Configure(Setting::SlewNsPerMs(1_000_000)), // or the phase of the start would show in the ramp
+        Command::ConfigRead { at: 32 },
         Command::Tare,
         Command::MassPoint { mass_g: 200.0 },
         Command::MassFit, // refused: one point
@@ -182,7 +183,7 @@ fn the_same_bytes_and_pins_give_the_same_frames_natively_and_on_the_image() {
     assert!(image.len().abs_diff(native.len()) <= 1, "{} and {}", image.len(), native.len());
     let all = |word: &str| image.iter().filter(|(_, m)| m.contains(word)).count();
     println!("{} messages, {} samples, {} events", image.len(), all("Rig(RigSample"), all("Event("));
-    for word in ["Running", "Refused", "StopLoop", "MassTaken", "1200000", "Calibration"] {
+    for word in ["Running", "Refused", "StopLoop", "MassTaken", "1200000", "Calibration", "ConfigPart"] {
         assert!(all(word) > 0, "the script shows no {word}");
     }
     assert!(image.iter().any(|(_, m)| m.contains(&format!("{:?}", AdcVerdict::Nominal))), "conversions were read");

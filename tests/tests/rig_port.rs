@@ -53,7 +53,7 @@ fn one_command_each() {
     rig(&["set", "1300"]).refused(&["not in this state"]);
     rig(&["set", "2500"]).refused(&["2500 us", "1000 to 2000"]);
     rig(&["calibrate"]).refused(&["MAXIMUM", "--esc-is-unpowered"]);
-    rig(&["configure", "log-ms", "5"]).refused(&["out of range"]);
+    rig(&["configure", "log-ms", "1"]).refused(&["out of range"]); // a whole rig: more than the line carries
     rig(&["configure", "colour", "5"]).refused(&["no such setting"]);
     rig(&["configure", "log-ms", "20"]).succeeded();
     rig(&["mass"]).refused(&["out of range"]);
@@ -65,6 +65,45 @@ fn one_command_each() {
     call(folder.path(), &["rig", "stop"]).refused(&["--port"]);
     call(folder.path(), &["rig", "--port", "/dev/no-such-port", "stop"]).refused(&["/dev/no-such-port"]);
     assert!(desk.pulses().iter().all(|p| !p.is_live()), "nothing of this turned the motor");
+}
+
+/// One file for everything: what goes over comes back, is named in the log's head, and a file that is refused changes nothing.
+#[test]
+fn the_whole_configuration_is_one_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let desk = Desk::new(Line::Clean);
+    let rig = |words: &[&str]| call(folder.path(), &[&["rig", "--port", &desk.port], words].concat());
+    let examples = quadrig_tests::root().join("examples/rig");
+    let preset = |name: &str| examples.join(name).to_string_lossy().into_owned();
+    rig(&["configure", "--read", "-o", "before.toml"]).succeeded();
+    let before = std::fs::read_to_string(folder.path().join("before.toml")).expect("a file");
+    let said = rig(&["configure", &preset("hall-only.toml")]).succeeded();
+    let digest = said.out.trim().rsplit(' ').next().expect("a digest").to_owned();
+    let told = rig(&["identify"]).succeeded().out;
+    assert!(told.contains(&digest) && told.contains("fitted: rpm_hall, thrust_n, current_a, voltage_v;"), "{told}");
+
+    std::thread::sleep(Duration::from_millis(100));
+    call(folder.path(), &["log", "--port", &desk.port, "-o", "run.csv", "--seconds", "0.5"]).succeeded();
+    let log = std::fs::read_to_string(folder.path().join("run.csv")).expect("a log");
+    assert!(log.contains(&format!("# config_crc32 = \"{digest}\"")), "{log:.400}");
+    assert!(log.contains("# sample_hz = 100.0"), "{log:.400}");
+    let rows = rows(&folder.path().join("run.csv"));
+    assert!(rows.iter().all(|row| row[2].is_nan() && row[4] == 0.0), "the hall sensor alone is there, and stands");
+
+    for (text, place) in [("rate_hz = 10\ncolour = 1\n", "bad.toml:2:1"), ("rate_hz = 1000\n[speed]\nbeam = 0\n", "bad.toml:3:8")]
+    {
+        std::fs::write(folder.path().join("bad.toml"), text).expect("a file");
+        rig(&["configure", "bad.toml"]).refused(&[place]);
+    }
+    let whole = before.replace("rate_hz = 10\n", "rate_hz = 1000\n");
+    std::fs::write(folder.path().join("fast.toml"), whole).expect("a file");
+    rig(&["configure", "fast.toml"]).refused(&["fast.toml:2:11", "118000 bytes a second", "at most 500"]);
+    assert!(rig(&["identify"]).succeeded().out.contains(&digest), "what was refused changed nothing");
+
+    rig(&["configure", "before.toml"]).succeeded();
+    let said = rig(&["configure", "--read"]).succeeded();
+    assert_eq!(said.out, before, "and back");
+    rig(&["configure"]).refused(&["--read"]);
 }
 
 /// The whole session of an operator: arm by the beeps, run a staircase, record it; and the log is one that `identify` takes.

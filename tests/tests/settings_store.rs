@@ -4,12 +4,12 @@ use embedded_storage_async::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 use firmware_ahrs::Settings as ImuSettings;
-use firmware_rig::{Config, Settings};
+use firmware_rig::{Config, RigConfig};
 use frame::message::SettingsNews;
 use settings_store::{Stored, load, save};
 use std::fmt::Debug;
 
-const PAGE: usize = 1024;
+const PAGE: usize = 4096;
 const RANGE: std::ops::Range<u32> = 0..2 * PAGE as u32;
 
 /// Flash as the part has it: erased to ones, programming clears bits a word at a time. The power can be cut after any number of
@@ -94,7 +94,7 @@ trait Numbered: Stored + Debug + Clone {
     fn number(n: u16) -> Self;
 }
 
-impl Numbered for Settings {
+impl Numbered for RigConfig {
     fn number(n: u16) -> Self {
         Self { log_period_ms: 10 + n % 900, link_ms: 200 + n % 4000, ..Self::of(&Config::thesis_570kv()) }
     }
@@ -111,7 +111,7 @@ impl Numbered for ImuSettings {
 
 #[test]
 fn what_is_saved_is_loaded() {
-    saved_and_loaded::<Settings>();
+    saved_and_loaded::<RigConfig>();
     saved_and_loaded::<ImuSettings>();
 }
 
@@ -131,7 +131,7 @@ fn saved_and_loaded<T: Numbered>() {
 /// the cut is the old settings or the new ones, and the next save works.
 #[test]
 fn a_power_cut_at_any_operation_loses_nothing() {
-    cut_everywhere::<Settings>();
+    cut_everywhere::<RigConfig>();
     cut_everywhere::<ImuSettings>();
 }
 
@@ -160,7 +160,7 @@ fn cut_everywhere<T: Numbered>() {
 
 #[test]
 fn damage_is_never_taken_for_settings() {
-    damaged::<Settings>();
+    damaged::<RigConfig>();
     damaged::<ImuSettings>();
 }
 
@@ -185,5 +185,5 @@ fn damaged<T: Numbered>() {
 #[test]
 fn a_flash_that_cannot_be_written_is_told() {
     let mut chip = Chip { dead: true, ..Chip::new() };
-    assert_eq!(save(&mut chip, RANGE, &Settings::number(1)), SettingsNews::Failed);
+    assert_eq!(save(&mut chip, RANGE, &RigConfig::number(1)), SettingsNews::Failed);
 }

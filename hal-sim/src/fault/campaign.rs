@@ -127,14 +127,25 @@ impl Host {
     }
 }
 
-/// The configuration of a plan's board; without the protection that answers the plan's mishap, where it hangs on a limit.
+/// The configuration of a plan's board; without every protection that answers the plan's mishap, where
+/// they hang on limits.
 fn config(plan: &Plan, scenario: &Scenario, defenceless: bool) -> Config {
     let mut config = firmware_config(scenario);
     let limits = &mut config.limits;
     match plan.mishap {
         _ if !defenceless => {}
         Mishap::StuckLine { .. } => limits.lost_ms = u32::MAX,
-        Mishap::Saturated { .. } | Mishap::NoConversions => limits.analogue_ms = u32::MAX,
+        Mishap::Saturated { channel, .. } => {
+            // both that answer it: the lost converter, and the channel's own limit
+            limits.analogue_ms = u32::MAX;
+            match channel {
+                0 => limits.thrust.ms = u16::MAX,
+                2 => limits.current.ms = u16::MAX,
+                3 => limits.voltage.ms = u16::MAX,
+                _ => {}
+            }
+        }
+        Mishap::NoConversions => limits.analogue_ms = u32::MAX,
         Mishap::Silence => limits.link_ms = u32::MAX,
         Mishap::LateTick { .. } => limits.stall_ms = u32::MAX,
         _ => {} // not limits: see where the tick's inputs are gathered, and the reset
@@ -341,7 +352,7 @@ pub fn fly(plan: Plan) -> Result<Survived, Failure> {
     flown(Flight::new(plan, false))
 }
 
-/// Flies a plan with a board that lacks the one protection that answers the plan's mishap (for a power loss: one that starts too
+/// Flies a plan with a board that lacks the protection that answers the plan's mishap (for a power loss: one that starts too
 /// slowly). It shows that [`fly`] can fail.
 ///
 /// # Errors

@@ -8,7 +8,7 @@
 
 use crate::bench::Millisecond;
 use firmware_rig::queue::CAPACITY;
-use firmware_rig::{Config, Delivered, Rig, RigConsole, Settings, Start};
+use firmware_rig::{Config, Delivered, Rig, RigConfig, RigConsole, Start};
 use frame::message::{ClockNews, Event, SettingsNews, Trial};
 use frame::units::{PulseWidth, Ticks};
 
@@ -41,7 +41,7 @@ impl Wires {
 pub struct Board {
     console: RigConsole,
     factory: Config,
-    flash: Option<Settings>,
+    flash: Option<RigConfig>,
     stored: Option<SettingsNews>,
     pulse: PulseWidth,
     late: u32,
@@ -54,7 +54,7 @@ impl Board {
         Self::start(Ticks(0), factory, None, POWER_ON, None)
     }
 
-    fn start(now: Ticks, factory: Config, flash: Option<Settings>, reset_cause: u8, ended: Option<Event>) -> Self {
+    fn start(now: Ticks, factory: Config, flash: Option<RigConfig>, reset_cause: u8, ended: Option<Event>) -> Self {
         let news = if flash.is_some() { SettingsNews::Loaded } else { SettingsNews::Absent };
         let start = Start { reset_cause, clock: CRYSTAL, stored: flash, news, ended };
         let console = RigConsole::start(now, factory.clone(), &start);

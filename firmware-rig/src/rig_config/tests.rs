@@ -1,0 +1,131 @@
+use super::*;
+use crate::transfer::LONGEST;
+use frame::message::Message;
+use frame::rig::{AdcCode, AdcVerdict, CaptureCode, CaptureVerdict, FaultSet, RigSample, RigState};
+use frame::wire::{Encoder, MAX_WIRE};
+use proptest::prelude::*;
+use settings_store::{MAX_STORED, open, seal};
+
+fn factory() -> RigConfig {
+    RigConfig::of(&Config::thesis_570kv())
+}
+
+/// Every field at its longest.
+fn fullest() -> RigConfig {
+    let curve = Some([PulseWidth::MIN, PulseWidth::MAX, PulseWidth::MAX, PulseWidth::MAX, PulseWidth::MAX]);
+    let scale = AdcScale { zero: 1.5, gain: -0.1 };
+    let both = |ms| Bounds { low: Some(Newton(-1.0)), high: Some(Newton(1.0)), ms };
+    let mut full = RigConfig {
+        log_period_ms: 1000,
+        marks: [100; 4],
+        curve,
+        slew_ns_per_ms: 1_000_000,
+        link_ms: 5000,
+        calibrated: [Some(Calibrated { scale, residual: 0.1, worst: 0.2, points: 16, day: u16::MAX }); 5],
+        ..factory()
+    };
+    full.esc = EscProfile {
+        answers: Answers::Silent { hold_ms: 60_000 },
+        highest: PulseWidth::MAX,
+        hold_min_ms: 600_000,
+        cells_ms: 600_000,
+        ready_ms: 600_000,
+    };
+    full.limits.thrust = both(1000);
+    full.limits.speed = Bounds { low: Some(RevPerMin(1.0)), high: Some(RevPerMin(2.0)), ms: 10_000 };
+    full.limits.torque = Bounds { low: Some(NewtonMetre(1.0)), high: Some(NewtonMetre(2.0)), ms: 10_000 };
+    full.limits.current = Bounds { low: Some(Ampere(1.0)), high: Some(Ampere(2.0)), ms: 1_000 };
+    full.limits.voltage = Bounds { low: Some(Volt(1.0)), high: Some(Volt(2.0)), ms: 1_000 };
+    full.limits.temperature = Bounds { low: Some(Celsius(1.0)), high: Some(Celsius(2.0)), ms: 60_000 };
+    full
+}
+
+#[test]
+fn the_stored_form_comes_back_and_fits() {
+    for settings in [factory(), fullest()] {
+        assert!(settings.in_range());
+        let mut buffer = [0; MAX_STORED];
+        let stored = seal(&settings, &mut buffer).expect("it fits");
+        assert!(stored.len() <= LONGEST, "{} bytes", stored.len());
+        assert_eq!(open(stored), Some(settings));
+    }
+}
+
+#[test]
+fn applied_settings_say_the_same_again() {
+    let config = Config::thesis_570kv();
+    for changed in [fullest(), RigConfig { log_period_ms: 20, marks: [3, 1, 2, 25], link_ms: 700, ..factory() }] {
+        assert_eq!(RigConfig::of(&changed.apply(&config)), changed);
+    }
+    assert_ne!(fullest().digest(), factory().digest());
+}
+
+#[test]
+fn impossible_settings_change_nothing() {
+    for bad in [
+        Setting::LogPeriodMs(0),
+        Setting::LogPeriodMs(1), // a whole rig: more than the line carries
+        Setting::LogPeriodMs(1001),
+        Setting::Marks([101, 1, 1, 1]),
+        Setting::Curve(Some([PulseWidth::MAX, PulseWidth::MIN, PulseWidth::MIN, PulseWidth::MIN, PulseWidth::MIN])),
+        Setting::SlewNsPerMs(0),
+        Setting::SpeedLimit(f32::NAN),
+        Setting::CurrentLimit(f32::INFINITY),
+        Setting::VoltageLimit(-1000.0),
+        Setting::LinkMs(100),
+    ] {
+        assert_eq!(factory().with(&bad, &factory()), Err(OutOfRange), "{bad:?}");
+    }
+    let nothing = RigConfig { marks: [0; 4], fitted: [false; 5], ..factory() };
+    let mut nonsense = [nothing, factory(), factory(), factory(), factory()];
+    nonsense[1].strain.gain = f32::NAN;
+    nonsense[2].esc.highest = PulseWidth::MIN;
+    nonsense[3].limits.voltage = Bounds { low: Some(Volt(12.0)), high: Some(Volt(11.0)), ms: 100 };
+    nonsense[4].current.shunt_ohm = 0.0;
+    assert!(nonsense.iter().all(|config| !config.in_range()));
+}
+
+/// The arithmetic of the line is that of the codec: no sample is longer than what was reckoned with.
+#[test]
+fn no_sample_is_longer_than_the_arithmetic_says() {
+    for (marks, fitted) in [([2, 1, 2, 25], [true; 5]), ([2, 0, 0, 0], [false; 5]), ([0; 4], [true, false, false, true, false])] {
+        let config = RigConfig { marks, fitted, ..factory() };
+        let capture =
+            CaptureCode { edges: u16::MAX >> 2, span: u32::MAX >> 4, verdict: CaptureVerdict::Disagrees, uneven: 10_000 };
+        let code = AdcCode { sum: u32::MAX >> 4, count: u16::MAX >> 2, rms_q8: 2047 * 256, verdict: AdcVerdict::Short };
+        let absent = AdcCode { verdict: AdcVerdict::Absent, ..AdcCode::default() };
+        let sample = RigSample {
+            at: Ticks(1 << 48),
+            pulse: PulseWidth::MAX,
+            state: RigState::Faulted,
+            faults: FaultSet((1 << 21) - 1),
+            rpm: marks.map(|m| if m > 0 { capture } else { CaptureCode::default() }),
+            adc: fitted.map(|f| if f { code } else { absent }),
+        };
+        let mut wire = [0; MAX_WIRE];
+        let used = Encoder::default().encode(Ticks(1 << 48), &Message::Rig(sample), &mut wire).unwrap();
+        assert!(used as u32 <= config.sample_bytes(), "{used} bytes, reckoned {}", config.sample_bytes());
+        assert!(used as u32 + 8 > config.sample_bytes(), "{used} bytes, reckoned {}", config.sample_bytes());
+    }
+}
+
+#[test]
+fn a_thousand_samples_a_second_fit_where_few_channels_are_fitted() {
+    let beam_and_cell =
+        RigConfig { log_period_ms: 1, marks: [2, 0, 0, 0], fitted: [true, false, false, false, false], ..factory() };
+    assert!(beam_and_cell.in_range());
+    assert!(RigConfig { log_period_ms: 2, ..factory() }.in_range(), "the whole rig at 500 a second");
+}
+
+proptest! {
+    /// Any damage of any one byte, and any cut, is noticed.
+    #[test]
+    fn damage_is_refused(at in 0usize..400, flip in 1u8..=255, cut in 0usize..400) {
+        let mut buffer = [0; MAX_STORED];
+        let stored = seal(&factory(), &mut buffer).unwrap().to_vec();
+        let mut broken = stored.clone();
+        broken[at % stored.len()] ^= flip;
+        prop_assert_eq!(open::<RigConfig>(&broken), None);
+        prop_assert_eq!(open::<RigConfig>(&stored[..cut % stored.len()]), None);
+    }
+}
