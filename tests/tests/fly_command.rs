@@ -73,6 +73,13 @@ fn the_missions_of_the_thesis() {
         let (header, states) = columns(&folder.join("states.csv"));
         assert_eq!((header.len(), log.len(), ident::flight_log::rotors(&log)), (17, states[0].len(), 4));
         assert_eq!(log.meta["layout"].as_str(), Some("plus"));
+        let page = std::fs::read_to_string(folder.join("flight.html")).expect("the page");
+        for id in ["pulses", "thrust", "path-from-above", "path-from-the-east-side", "place", "velocity", "angles", "rates"] {
+            assert!(page.contains(&format!("<figure id=\"{id}\">")), "{id}");
+        }
+        let fetched = page.matches("http").count() - page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count();
+        assert!(!page.contains("NaN") && !page.contains("<script") && fetched == 0, "one page that needs nothing else");
+        assert!(page.contains("<td class=\"text\">thrust to weight 2.01"), "the summary is on the page");
         let apart = log.column("pos_z").expect("a height").iter().zip(&states[3]).map(|(a, b)| (a - b).abs());
         assert!(apart.fold(0.0, f64::max) < 1e-4);
     }

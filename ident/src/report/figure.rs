@@ -183,7 +183,11 @@ impl Figure {
     fn frame(&self) -> Frame {
         let mut xs: Vec<f64> = Vec::new();
         let mut ys: Vec<f64> = Vec::new();
-        let ends = |v: &[f64]| -> [f64; 2] { span(v.iter().filter(|v| v.is_finite())).into() };
+        // the extremes as they are: a level line must not push the others together
+        let ends = |v: &[f64]| -> [f64; 2] {
+            let finite = v.iter().copied().filter(|v| v.is_finite());
+            finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(v), hi.max(v)])
+        };
         for layer in &self.layers {
             match layer {
                 Layer::Line { x, y, .. } | Layer::Dots { x, y, .. }
@@ -497,6 +501,17 @@ mod tests {
         }
         assert!(example().file().contains("prefers-color-scheme:dark"), "a file of its own carries its colours");
         assert!(!example().svg().contains("<style>"));
+    }
+
+    /// A line that stands still beside one that moves by a hundredth: both fill the height.
+    #[test]
+    fn a_level_line_leaves_the_scale_to_the_others() {
+        let line = |y: [f64; 2]| Layer::Line { name: String::new(), class: "a", x: vec![0.0, 1.0], y: y.to_vec() };
+        let figure = Figure { layers: vec![line([8.5, 8.5]), line([8.5, 8.51])], ..Figure::default() };
+        let (low, high) = figure.frame().y;
+        assert!(low > 8.49 && high < 8.52, "{low} {high}");
+        let alone = Figure { layers: vec![line([8.5, 8.5])], ..Figure::default() }.frame().y;
+        assert!(alone.0 < 8.0 && alone.1 > 9.0, "{alone:?}");
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! `quadrig fly`.
 //!
-//! What it is: a mission flown on the powerplants of the catalogue or on an identified model; the states and the flight log in a folder,
+//! What it is: a mission flown on the powerplants of the catalogue or on an identified model; states, flight log and page in a folder,
 //! the hover and what came of the flight as a summary.
 //! What can go wrong: a mission, airframe or model that is refused, a model that predicts no thrust from a command; then nothing is written.
 //! Units: as the files state.
 //! Reference: docs/mission.md; specification `flight.md`, "Missions".
 
 mod folder;
+mod page;
 mod record;
 mod rotor;
 mod summary;
@@ -32,7 +33,7 @@ pub(crate) struct Args {
     /// An identified model in the place of the catalogue's powerplants.
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Folder for states.csv and flight.csv.
+    /// Folder for states.csv, flight.csv and flight.html.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// The summary as JSON on stdout and nothing else.
@@ -41,7 +42,7 @@ pub(crate) struct Args {
 }
 
 /// The files of a flight.
-const FILES: [&str; 2] = ["states.csv", "flight.csv"];
+const FILES: [&str; 3] = ["states.csv", "flight.csv", "flight.html"];
 
 /// What turns the rotors.
 enum Rotors {
@@ -77,6 +78,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         ident::flight_log::write_to(&record::flight_log(&rows, &airframe, &told), &mut log)?;
         folder.add("states.csv", record::states(&rows).into_bytes());
         folder.add("flight.csv", log);
+        folder.add("flight.html", page::page(&summary, &rows).into_bytes());
         folder.write()?;
     }
     let said = if args.json { summary.json() } else { summary.text() };

@@ -12,18 +12,21 @@ use serde_json::{Value, json};
 
 /// The summary of a flight.
 pub(super) struct Summary {
-    mission: String,
+    /// Its name.
+    pub(super) mission: String,
     /// What turned the rotors.
     pub(super) powerplant: String,
     weight_n: f64,
     charge_ah: f64,
     rotors: usize,
-    hover: Option<(HoverPoint, Modes)>,
+    /// Where it hovers and how it answers there.
+    pub(super) hover: Option<(HoverPoint, Modes)>,
     flight_s: f64,
     highest_m: f64,
     fastest_m_s: f64,
     steepest_deg: f64,
-    touched: Option<(f64, f64)>,
+    /// When the flight ended on the ground, and how fast it came down.
+    pub(super) touched: Option<(f64, f64)>,
     place_m: [f64; 3],
     velocity_m_s: [f64; 3],
     attitude_deg: [f64; 3],
@@ -71,53 +74,84 @@ impl Summary {
 
     /// For a reader.
     pub(super) fn text(&self) -> String {
-        let mut out = format!("{}: {:.2} s on {}\n", self.mission, self.flight_s, self.powerplant);
-        match &self.hover {
-            Some((at, modes)) => out += &self.about_hover(at, modes),
-            None => out += &format!("hover     none: full throttle does not carry {:.2} N\n", self.weight_n),
+        let mut out = format!("{}\n", self.lead());
+        for row in self.table() {
+            out += &format!("{:<9} {}\n", row[0], row[1]);
         }
-        let [n, e, d] = self.place_m;
-        out += &format!(
-            "flight    highest {:.1} m, fastest {:.2} m/s, steepest {:.1} deg\n",
-            self.highest_m, self.fastest_m_s, self.steepest_deg
-        );
-        if let Some((t, speed)) = self.touched {
-            out += &format!("ground    touched after {t:.2} s at {speed:.2} m/s downwards\n");
-        }
-        let ([vn, ve, vd], [roll, pitch, yaw]) = (self.velocity_m_s, self.attitude_deg);
-        out += &format!("end       {n:.1} m north, {e:.1} m east, {:.1} m up; {vn:.2}, {ve:.2}, {:.2} m/s; ", -d, -vd);
-        out + &format!("roll {roll:.1}, pitch {pitch:.1}, yaw {yaw:.1} deg\n")
+        out
     }
 
-    fn about_hover(&self, at: &HoverPoint, m: &Modes) -> String {
-        let [roll, pitch, yaw] = m.turning_per_us.map(|w| (100.0 * w).to_degrees());
-        let period = if m.heave_rad_s > 0.0 {
-            format!("{:.0} s period, undamped", core::f64::consts::TAU / m.heave_rad_s)
-        } else {
-            "none".to_owned()
+    /// What was flown on what.
+    pub(super) fn lead(&self) -> String {
+        format!("{}: {:.2} s on {}", self.mission, self.flight_s, self.powerplant)
+    }
+
+    /// What came of it: a word and what there is to say, a row each.
+    pub(super) fn table(&self) -> Vec<Vec<String>> {
+        let mut rows: Vec<(&str, String)> = match &self.hover {
+            Some((at, modes)) => self.about_hover(at, modes),
+            None => vec![("hover", format!("none: full throttle does not carry {:.2} N", self.weight_n))],
         };
+        let (highest, fastest, steepest) = (self.highest_m, self.fastest_m_s, self.steepest_deg);
+        rows.push(("flight", format!("highest {highest:.1} m, fastest {fastest:.2} m/s, steepest {steepest:.1} deg")));
+        if let Some((t, speed)) = self.touched {
+            rows.push(("ground", format!("touched after {t:.2} s at {speed:.2} m/s downwards")));
+        }
+        let ([n, e, d], [vn, ve, vd]) = (self.place_m.map(shown), self.velocity_m_s.map(shown));
+        let [roll, pitch, yaw] = self.attitude_deg.map(shown);
+        let place = format!("{n:.1} m north, {e:.1} m east, {:.1} m up; {vn:.2}, {ve:.2}, {:.2} m/s", shown(-d), shown(-vd));
+        rows.push(("end", format!("{place}; roll {roll:.1}, pitch {pitch:.1}, yaw {yaw:.1} deg")));
+        rows.into_iter().map(|(word, text)| vec![word.to_owned(), text]).collect()
+    }
+
+    fn about_hover(&self, at: &HoverPoint, m: &Modes) -> Vec<(&'static str, String)> {
+        let [roll, pitch, yaw] = m.turning_per_us.map(|w| (100.0 * w).to_degrees());
+        let heave = if m.heave_rad_s > 0.0 {
+            format!("heave by the air's density {:.0} s period, undamped", core::f64::consts::TAU / m.heave_rad_s)
+        } else {
+            "no heave".to_owned()
+        };
+        let coning = if m.coning_rad_s > 0.0 { format!("coning {:.3} rad/s; ", m.coning_rad_s) } else { String::new() };
         let minutes = |current_a: f64| self.minutes(current_a).map_or_else(|| "?".to_owned(), |m| format!("{m:.1}"));
-        let coning =
-            if m.coning_rad_s > 0.0 { format!("coning of roll and pitch {:.3} rad/s; ", m.coning_rad_s) } else { String::new() };
-        format!(
-            "hover     {:.1} us ({:.3} %), {:.0} rev/min, {:.3} N and {:.2} A a rotor\n\
-             margin    thrust to weight {:.2}; {:.0} us up to full throttle, {:.3} N for 1 us on all\n\
-             aloft     {} min in hover, {} min at full throttle on {} Ah\n\
-             modes     rotor lag {:.3} s; heave by the air's density {period}; {coning}all else neutral: roll and pitch 4 integrators each, yaw 2\n\
-             \x20         100 us on one rotor: roll {roll:.1}, pitch {pitch:.1}, yaw {yaw:.2} deg/s^2\n",
-            at.pulse_us,
-            at.pulse_us / 200.0,
-            at.rotor.rpm,
-            at.rotor.thrust_n,
-            at.rotor.current_a,
-            at.thrust_to_weight,
-            2000.0 - at.pulse_us,
-            m.thrust_per_us * self.rotors as f64,
-            minutes(at.rotor.current_a),
-            minutes(at.full.current_a),
-            self.charge_ah,
-            m.rotor_lag_s,
-        )
+        let (pulse, rotor) = (at.pulse_us, &at.rotor);
+        vec![
+            (
+                "hover",
+                format!(
+                    "{pulse:.1} us ({:.3} %), {:.0} rev/min, {:.3} N and {:.2} A a rotor",
+                    pulse / 200.0,
+                    rotor.rpm,
+                    rotor.thrust_n,
+                    rotor.current_a
+                ),
+            ),
+            (
+                "margin",
+                format!(
+                    "thrust to weight {:.2}; {:.0} us up to full throttle, {:.3} N for 1 us on all",
+                    at.thrust_to_weight,
+                    2000.0 - pulse,
+                    m.thrust_per_us * self.rotors as f64
+                ),
+            ),
+            (
+                "aloft",
+                format!(
+                    "{} min in hover, {} min at full throttle on {} Ah",
+                    minutes(rotor.current_a),
+                    minutes(at.full.current_a),
+                    self.charge_ah
+                ),
+            ),
+            (
+                "modes",
+                format!(
+                    "rotor lag {:.3} s; {heave}; {coning}all else neutral: roll and pitch 4 integrators each, yaw 2",
+                    m.rotor_lag_s
+                ),
+            ),
+            ("answer", format!("100 us on one rotor: roll {roll:.1}, pitch {pitch:.1}, yaw {yaw:.2} deg/s^2")),
+        ]
     }
 
     /// For a machine.
@@ -156,6 +190,11 @@ impl Summary {
         });
         format!("{summary:#}")
     }
+}
+
+/// A number without the sign of a rounding error.
+fn shown(value: f64) -> f64 {
+    if value.abs() < 5e-3 { 0.0 } else { value }
 }
 
 /// Angle between body and earth vertical, rad.
