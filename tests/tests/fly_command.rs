@@ -85,6 +85,51 @@ fn the_missions_of_the_thesis() {
     }
 }
 
+/// The controller on the board's attitude flies the square, on the catalogue and on an identified model; board and controller are in the
+/// summary, on the page and in a file; a lost magnetometer and a dead rotor end as they should.
+#[test]
+fn the_square() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let square = root().join("examples/flight/square.toml");
+    let square = square.to_str().expect("a plain name");
+    call(at, &["--quiet", "demo", "--seed", "3", "-o", "demo"]).succeeded();
+    for model in [&[][..], &["--model", "demo/model.toml"]] {
+        let out = json(at, &[&["fly", square, "-o", "out", "--json"][..], model].concat());
+        println!("{} {} {}", out["powerplant"], out["ahrs"], out["events"]);
+        assert_eq!(
+            (out["events"].as_array().map(Vec::len), out["events"][0]["what"].as_str()),
+            (Some(1), Some("landed, motors off"))
+        );
+        let most = |what: &str| out["ahrs"][what][0].as_f64().expect("a number");
+        assert!(most("tilt_deg") < 3.0 && most("heading_deg") < 3.0);
+        let states = at.join("out/states.csv");
+        let [t, north, east, down] = ["t_s", "north_m", "east_m", "down_m"].map(|name| column(&states, name));
+        let hover: Vec<usize> = (0..t.len()).filter(|i| (8.0..68.0).contains(&t[*i])).collect();
+        let off = hover.iter().map(|i| north[*i].hypot(east[*i]).hypot(down[*i] + 2.0)).fold(0.0, f64::max);
+        println!("hover off by {off:.3} m");
+        assert!(hover.len() > 2_900 && off < 0.5, "{} {off}", hover.len());
+        let (header, said) = columns(&at.join("out/attitude.csv"));
+        assert_eq!(header.join(","), "t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg");
+        assert!(said[0][0] < -290.0 && said[5].iter().all(|roll| roll.abs() < 15.0), "from its power-up on, 200 rows a second");
+        let page = std::fs::read_to_string(at.join("out/flight.html")).expect("the page");
+        assert!(["board-error", "board-roll", "wind"].iter().all(|id| page.contains(&format!("<figure id=\"{id}\">"))));
+    }
+    let text = std::fs::read_to_string(square).expect("the mission");
+    for (name, failure, words) in [
+        ("magnetometer", "chip = \"magnetometer\"", &["controlled descent: the magnetometer is lost", "landed, motors off"][..]),
+        ("rotor", "rotor = 2", &["motors off: the vehicle does not follow"]),
+    ] {
+        std::fs::write(at.join(format!("{name}.toml")), format!("{text}\n[[failure]]\nat_s = 30\n{failure}\n")).expect("a file");
+        let said = call(at, &["fly", &format!("{name}.toml")]).succeeded();
+        assert!(words.iter().all(|w| said.out.contains(w)), "{}", said.out);
+    }
+    std::fs::write(at.join("brick.toml"), "hub_kg = 4.0\n").expect("a file");
+    std::fs::write(at.join("heavy.toml"), format!("airframe = \"brick.toml\"\n{text}")).expect("a file");
+    call(at, &["fly", "heavy.toml", "-o", "never"]).refused(&["cannot hover"]);
+    assert!(!at.join("never").exists());
+}
+
 /// Steps and a ramp as a scenario of the rig and as a mission have them.
 const STEPS: &str = "[{ pulse_us = 1000, hold_s = 2 }, { pulse_us = 1300, hold_s = 4 }, { pulse_us = 1700, hold_s = 4 }, \
     { pulse_us = 1900, hold_s = 4 }, { pulse_us = 1400, hold_s = 4, ramp = true }, { pulse_us = 1400, hold_s = 3 }]";

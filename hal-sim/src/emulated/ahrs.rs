@@ -195,7 +195,7 @@ fn ahrs_in(world: ImuWorld, rig: &ImuRig, milliseconds: u64) -> Result<AhrsRun, 
     let elf = firmware("firmware-ahrs")?;
     let mut machine = Machine::new()?;
     for kind in &rig.fitted {
-        machine.mcu.i2c1.inner.attach(Peer(SensorChip::new(*kind, rig.motion, &rig.errors).with(&rig.hidden)));
+        machine.mcu.i2c1.inner.attach(Peer(SensorChip::new(*kind, rig.body(), &rig.errors).with(&rig.hidden)));
     }
     let (outcome, mut machine) = run(&elf, machine, world, milliseconds * 1_000_000)?;
     let mut unfinished = 0;

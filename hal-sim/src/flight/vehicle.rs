@@ -215,16 +215,29 @@ impl Vehicle {
         &self.airframe
     }
 
+    /// What each rotor does.
+    #[must_use]
+    pub fn rotors(&self) -> &[PlantState] {
+        &self.states
+    }
+
+    /// Specific force at the centre of gravity, m/s^2, and angular acceleration, rad/s^2, in body axes.
+    #[must_use]
+    pub fn felt(&self) -> (Vector, Vector) {
+        let acting = self.acting(&self.lift, &self.motion, self.around.density(-self.motion.place.z));
+        let felt = acting.force / self.airframe.mass_kg - Vector::new(0.0, 0.0, G);
+        (self.motion.attitude.inverse() * felt, self.body.angular_acceleration(&self.motion.rate, &acting))
+    }
+
     /// Everything at this instant.
     #[must_use]
     pub fn now(&self) -> Flying {
-        let acting = self.acting(&self.lift, &self.motion, self.around.density(-self.motion.place.z));
-        let felt = acting.force / self.airframe.mass_kg - Vector::new(0.0, 0.0, G);
+        let (specific_force, angular_acceleration) = self.felt();
         Flying {
             t_s: self.t_s(),
             motion: self.motion,
-            specific_force: self.motion.attitude.inverse() * felt,
-            angular_acceleration: self.body.angular_acceleration(&self.motion.rate, &acting),
+            specific_force,
+            angular_acceleration,
             pulses_us: self.pulses_us.clone(),
             rotors: self.states.clone(),
             wind: self.blows,

@@ -7,10 +7,10 @@
 //! Units: ns since power-up.
 //! Reference: NXP UM10204 rev 6, sections 3.1.10 (nine bits a byte) and 3.1.16 (bus clear); embedded-hal 1.0.
 
+use super::body::Body;
 use super::chip::{ChipKind, SensorChip, Served};
 use super::errors::Errors;
 use super::hidden::Hidden;
-use super::motion::Motion;
 use crate::clock::VirtualClock;
 use crate::scenario::{FaultKind, Scenario, ScheduledFault};
 use embedded_hal::i2c::{Error, ErrorKind, ErrorType, I2c, NoAcknowledgeSource, Operation};
@@ -102,10 +102,11 @@ pub struct I2cBus {
 }
 
 impl I2cBus {
-    /// A bus on `clock` with the chips of `fitted` on a body that moves as `motion`.
+    /// A bus on `clock` with the chips of `fitted` on `body`.
     #[must_use]
-    pub fn new(clock: VirtualClock, fitted: &[ChipKind], motion: Motion, errors: &Errors, fault: BusFault) -> Self {
-        let chips = fitted.iter().map(|kind| SensorChip::new(*kind, motion, errors)).collect();
+    pub fn new(clock: VirtualClock, fitted: &[ChipKind], body: impl Into<Body>, errors: &Errors, fault: BusFault) -> Self {
+        let body = body.into();
+        let chips = fitted.iter().map(|kind| SensorChip::new(*kind, body.clone(), errors)).collect();
         Self { clock, chips, fault, clocks_seen: 0 }
     }
 
@@ -210,6 +211,7 @@ impl I2c for I2cBus {
 
 #[cfg(test)]
 mod tests {
+    use super::super::motion::Motion;
     use super::*;
 
     fn bus(fitted: &[ChipKind], fault: BusFault) -> (VirtualClock, I2cBus) {

@@ -8,9 +8,10 @@
 //! Reference: the data sheets named in the drivers of `firmware-ahrs`; addresses and defaults written down here again on purpose, not
 //! taken from them.
 
+use super::body::Body;
 use super::errors::{ChipErrors, Errors};
 use super::hidden::{Hidden, ImuLevers};
-use super::motion::{G, Motion};
+use super::motion::G;
 use super::to_chip;
 use crate::noise::Stream;
 
@@ -84,7 +85,7 @@ pub struct Served {
 #[derive(Debug, Clone)]
 pub struct SensorChip {
     kind: ChipKind,
-    motion: Motion,
+    body: Body,
     errors: Errors,
     own: ChipErrors,
     hidden: Hidden,
@@ -106,12 +107,12 @@ fn rounded(value: f64, limit: f64) -> i16 {
 }
 
 impl SensorChip {
-    /// A chip after power-up on a body that moves as `motion`, with its share of `errors`.
+    /// A chip after power-up on a body, with its share of `errors`.
     #[must_use]
-    pub fn new(kind: ChipKind, motion: Motion, errors: &Errors) -> Self {
+    pub fn new(kind: ChipKind, body: impl Into<Body>, errors: &Errors) -> Self {
         Self {
             kind,
-            motion,
+            body: body.into(),
             errors: *errors,
             own: errors.of(kind),
             hidden: Hidden::default(),
@@ -134,20 +135,20 @@ impl SensorChip {
 
     /// What acts now, and the temperature of the board, degC.
     fn surroundings(&self, at_ns: u64) -> (ImuLevers, f64) {
-        let levers = self.hidden.levers(at_ns, &self.motion);
+        let levers = self.hidden.levers(at_ns, &self.body);
         (levers, self.errors.celsius(at_ns) + levers.warm_k)
     }
 
     /// Specific force where the chip is, body axes, g.
     fn force(&self, at_ns: u64, levers: &ImuLevers) -> [f64; 3] {
-        let (own, carried) = (self.motion.force(at_ns), self.motion.to_body(at_ns, levers.carried));
+        let (own, carried) = (self.body.force(at_ns), self.body.to_body(at_ns, levers.carried));
         core::array::from_fn(|i| own[i] + (carried[i] + levers.shaken[i]) / G)
     }
 
     /// Field where the chip is, body axes, gauss, at the instant that the reading is of.
     fn field(&self, at_ns: u64, levers: &ImuLevers) -> [f64; 3] {
         let then = at_ns.saturating_sub((levers.late_s * 1e9) as u64);
-        let (own, room) = (self.motion.magnetic(then), self.motion.to_body(then, levers.room_field));
+        let (own, room) = (self.body.magnetic(then), self.body.to_body(then, levers.room_field));
         let there: [f64; 3] = core::array::from_fn(|i| own[i] + room[i]);
         core::array::from_fn(|i| {
             let induced: f64 = (0..3).map(|j| levers.iron[i][j] * there[j]).sum();
@@ -176,7 +177,7 @@ impl SensorChip {
                 if file[0x3E] & 0x40 != 0 || file[0x16] >> 3 & 3 != 3 {
                     return [0; 3]; // asleep, or a full scale that the data sheet does not define
                 }
-                let rate = self.motion.rate(at_ns);
+                let rate = self.body.rate(at_ns);
                 let read = core::array::from_fn(|i| rate[i] + levers.rate[i] + levers.rate_per_k[i] * (celsius - 25.0));
                 seen(read).map(|w| rounded(w.to_degrees() * 14.375, 32_767.0))
             }

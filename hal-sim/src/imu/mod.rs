@@ -1,6 +1,6 @@
 //! The IMU board's surroundings: a body that moves, three chips that sense it with all their faults, a bus between.
 //!
-//! What it is: [`Motion`] says where the body is at any instant; [`SensorChip`] is the register file of one chip, which measures
+//! What it is: [`Motion`] says where the body is at any instant, [`Aboard`] where a flying one is; [`SensorChip`] is the register file of one chip, which measures
 //! that motion through its [`Errors`] and whatever is [`Hidden`]; [`I2cBus`] carries the board's transfers to the chips. [`Lis3dh`], the test
 //! accelerometer, is on SPI ([`crate::hal`]), and on I2C as one of the chips. The native run ([`crate::native::ahrs`])
 //! and the emulated board use the same chips.
@@ -9,6 +9,7 @@
 //! Units: ns since power-up; rad, m, gauss, g; counts in the registers.
 //! Reference: specification `ahrs.md`, "Sensors"; data sheets PS-ITG-3200A rev 1.4, ADXL345 rev E, HMC5883L.
 
+mod body;
 mod bus;
 mod chip;
 mod errors;
@@ -16,6 +17,7 @@ pub mod hidden;
 mod lis3dh;
 mod motion;
 
+pub use body::{Aboard, Body, Felt};
 pub use bus::{BusError, BusFault, I2cBus};
 pub use chip::{ChipKind, SensorChip, Served};
 pub use errors::{ChipErrors, Errors};

@@ -106,6 +106,12 @@ impl AirframeFile {
         parsed(&text_of(file)?, file)
     }
 
+    /// Blades of a rotor.
+    #[must_use]
+    pub fn blades(&self) -> u32 {
+        crate::plant::Propeller::named(&self.propeller).map_or(2, |p| p.blades)
+    }
+
     /// Charge on board, A.h.
     #[must_use]
     pub fn charge_ah(&self) -> f64 {

@@ -7,15 +7,20 @@
 //! Units: each key carries its own.
 //! Reference: specification `flight.md`, "Missions"; `docs/mission.md` lists every key.
 
+mod aboard;
 mod airframe;
 mod fly;
 mod hovering;
 mod pulses;
+mod sections;
+mod steering;
 
+pub use aboard::{Seen, apart};
 pub use airframe::{AirframeFile, RotorSection};
-pub use fly::{catalogue_plants, fly};
+pub use fly::{Flight, catalogue_plants, fly, fly_whole};
 pub use hovering::{Catalogue, HoverPoint, Modes, RotorCurves, hover, modes};
 pub use pulses::PulseTable;
+pub use sections::{Chips, ControllerSection, FailureSection, ImuSection, PositioningSection, WayPoint};
 
 use crate::flight::attitude::from_euler;
 use crate::flight::vehicle::Surroundings;
@@ -52,6 +57,12 @@ pub struct Mission {
     pub wind: WindSection,
     /// Pulses.
     pub command: Vec<CommandSection>,
+    /// The IMU board that rides along.
+    pub imu: Option<ImuSection>,
+    /// The controller that steers on the board's attitude, in the place of all pulses.
+    pub controller: Option<ControllerSection>,
+    /// What fails.
+    pub failure: Vec<FailureSection>,
     /// Table of pulses, from the mission's folder, for the rotors that no command names.
     pub pulses: Option<PathBuf>,
     /// What that table says.
@@ -121,6 +132,9 @@ impl Default for Mission {
             air: AirSection::default(),
             wind: WindSection::default(),
             command: Vec::new(),
+            imu: None,
+            controller: None,
+            failure: Vec::new(),
             pulses: None,
             table: PulseTable::default(),
         }
@@ -179,18 +193,25 @@ impl Mission {
     }
 
     fn check(&self, text: &str, file: &Path, rotors: usize) -> Result<(), ScenarioError> {
-        let mut named = self.command.iter().flat_map(|c| &c.rotors);
+        let refused = |byte: usize, reason: String| {
+            let (line, column) = place_of(text, byte);
+            Err(ScenarioError::Refused { file: file.to_owned(), line, column, reason })
+        };
+        if let Some((byte, reason)) = self.failure.iter().find_map(|f| f.sound().err()) {
+            return refused(byte, reason.to_owned());
+        }
+        let dead = self.failure.iter().filter_map(|f| f.rotor.as_ref());
+        let mut named = self.command.iter().flat_map(|c| &c.rotors).chain(dead);
         let Some(rotor) = named.find(|r| !(1..=rotors).contains(r.get_ref())) else { return Ok(()) };
-        let (line, column) = place_of(text, rotor.span().start);
-        let reason = format!("expected a rotor from 1 to {rotors}, found {}", rotor.get_ref());
-        Err(ScenarioError::Refused { file: file.to_owned(), line, column, reason })
+        refused(rotor.span().start, format!("expected a rotor from 1 to {rotors}, found {}", rotor.get_ref()))
     }
 
     /// How long the flight may last, s.
     #[must_use]
     pub fn length_s(&self) -> f64 {
         let longest = self.command.iter().map(|c| c.steps.iter().map(|s| s.hold_s).sum()).fold(self.table.length_s(), f64::max);
-        if self.duration_s > 0.0 { self.duration_s } else { longest }
+        let way = self.controller.as_ref().and_then(|c| c.way.last()).map_or(0.0, |w| w.at_s);
+        if self.duration_s > 0.0 { self.duration_s } else { longest.max(way) }
     }
 
     /// Pulse of a rotor (from 0) at a time, us; the last command that names it counts, then the table of pulses.

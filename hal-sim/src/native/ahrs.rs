@@ -7,7 +7,7 @@
 //! Reference: specification `ahrs.md`, "Board"; house rule 1.
 
 use crate::clock::VirtualClock;
-use crate::imu::{BusFault, ChipKind, Errors, Hidden, I2cBus, Motion, Served};
+use crate::imu::{Aboard, Body, BusFault, ChipKind, Errors, Hidden, I2cBus, Motion, Served};
 use firmware_ahrs::{Ahrs, AhrsConfig, Inputs, Sampler, TICK_HZ};
 use frame::message::{Hello, Message};
 use frame::units::Ticks;
@@ -24,6 +24,8 @@ const CORE_HZ: u32 = 168_000_000;
 pub struct ImuRig {
     /// How the body moves.
     pub motion: Motion,
+    /// The vehicle that it rides on instead.
+    pub aboard: Option<Aboard>,
     /// Chips that are fitted.
     pub fitted: Vec<ChipKind>,
     /// Their errors.
@@ -39,11 +41,20 @@ impl Default for ImuRig {
     fn default() -> Self {
         Self {
             motion: Motion::LEVEL,
+            aboard: None,
             fitted: ChipKind::ALL.to_vec(),
             errors: Errors::default(),
             hidden: Hidden::default(),
             fault: BusFault::None,
         }
+    }
+}
+
+impl ImuRig {
+    /// What the chips sit on.
+    #[must_use]
+    pub fn body(&self) -> Body {
+        self.aboard.clone().map_or(Body::Alone(self.motion), Body::Aboard)
     }
 }
 
@@ -89,7 +100,7 @@ pub fn run_at(rig: &ImuRig, ticks: &[u64]) -> Result<ImuRun, wire::EncodeError> 
 
 fn ticked(rig: &ImuRig, ticks: &[u64], progress: &mut dyn FnMut(f64)) -> Result<ImuRun, wire::EncodeError> {
     let clock = VirtualClock::default();
-    let bus = I2cBus::new(clock.clone(), &rig.fitted, rig.motion, &rig.errors, rig.fault).with(&rig.hidden);
+    let bus = I2cBus::new(clock.clone(), &rig.fitted, rig.body(), &rig.errors, rig.fault).with(&rig.hidden);
     let mut sampler = Sampler::new(bus);
     let mut ahrs = Ahrs::new(AhrsConfig::default());
     let hello = Ahrs::hello(CORE_HZ, 0, sampler.alive());

@@ -167,6 +167,7 @@ impl ImuScenario {
         }
         ImuRig {
             motion: imu.body.motion(),
+            aboard: None,
             fitted: imu.fitted.iter().map(|field| ChipKind::ALL[*field as usize]).collect(),
             errors,
             hidden: Hidden::new(&self.effects),

@@ -16,8 +16,8 @@ use crate::Failure;
 use crate::progress::Bar;
 use folder::Folder;
 use hal_sim::Powerplant;
-use hal_sim::flight::{Airframe, Flying};
-use hal_sim::mission::{AirframeFile, Catalogue, Mission, RotorCurves, catalogue_plants, fly};
+use hal_sim::flight::Airframe;
+use hal_sim::mission::{AirframeFile, Catalogue, Flight, Mission, RotorCurves, catalogue_plants, fly_whole};
 use hal_sim::plant::air::SEA_LEVEL_DENSITY;
 use ident::model::Model;
 use rotor::ModelRotor;
@@ -33,7 +33,7 @@ pub(crate) struct Args {
     /// An identified model in the place of the catalogue's powerplants.
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Folder for states.csv, flight.csv and flight.html.
+    /// Folder for states.csv, flight.csv, attitude.csv and flight.html.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// The summary as JSON on stdout and nothing else.
@@ -42,7 +42,7 @@ pub(crate) struct Args {
 }
 
 /// The files of a flight.
-const FILES: [&str; 3] = ["states.csv", "flight.csv", "flight.html"];
+const FILES: [&str; 4] = ["states.csv", "flight.csv", "attitude.csv", "flight.html"];
 
 /// What turns the rotors.
 enum Rotors {
@@ -63,22 +63,23 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     let model = args.model.as_deref().map(Model::read).transpose()?;
     let rotors = rotors_of(model.as_ref(), args.model.as_deref(), &airframe)?;
-    let rows = flown(&mission, &file, &rotors, quiet || args.json)?;
-
     let curves: &dyn RotorCurves = match &rotors {
         Rotors::Catalogue => &Catalogue(&file),
         Rotors::Model(rotor) => rotor.as_ref(),
     };
-    let powerplant = powerplant(&file, &rotors, model.as_ref());
-    let summary = Summary::of(&mission, &file, &airframe, curves, powerplant, &rows);
+    let flight = flown(&mission, &file, &rotors, curves, quiet || args.json)?;
+    let summary = Summary::of(&mission, &file, &airframe, curves, powerplant(&file, &rotors, model.as_ref()), &flight);
     if let Some(mut folder) = folder {
         let told =
             [("mission", mission.name.clone()), ("airframe", file.name.clone()), ("powerplant", summary.powerplant.clone())];
         let mut log = Vec::new();
-        ident::flight_log::write_to(&record::flight_log(&rows, &airframe, &told), &mut log)?;
-        folder.add("states.csv", record::states(&rows).into_bytes());
+        ident::flight_log::write_to(&record::flight_log(&flight.rows, &airframe, &told), &mut log)?;
+        folder.add("states.csv", record::states(&flight.rows).into_bytes());
         folder.add("flight.csv", log);
-        folder.add("flight.html", page::page(&summary, &rows).into_bytes());
+        if !flight.seen.is_empty() {
+            folder.add("attitude.csv", record::attitudes(&flight.seen).into_bytes());
+        }
+        folder.add("flight.html", page::page(&summary, &flight).into_bytes());
         folder.write()?;
     }
     let said = if args.json { summary.json() } else { summary.text() };
@@ -107,13 +108,27 @@ fn powerplant(file: &AirframeFile, rotors: &Rotors, model: Option<&Model>) -> St
     format!("model of {}; its effects in flight: {}; of the rig alone: {}{notes}", model.source, list(&flies), list(&stays))
 }
 
-fn flown(mission: &Mission, file: &AirframeFile, rotors: &Rotors, quiet: bool) -> Result<Vec<Flying>, Failure> {
+fn flown(
+    mission: &Mission,
+    file: &AirframeFile,
+    rotors: &Rotors,
+    curves: &dyn RotorCurves,
+    quiet: bool,
+) -> Result<Flight, Failure> {
     let (plants, density) = match rotors {
         Rotors::Catalogue => (catalogue_plants(file), SEA_LEVEL_DENSITY),
+        Rotors::Model(rotor) if mission.controller.is_some() => (following(file, rotor), rotor.density().0),
         Rotors::Model(rotor) => (planned(mission, file, rotor)?, rotor.density().0),
     };
     let bar = Bar::new("flying", quiet || mission.length_s() < 60.0);
-    fly(mission, file, plants, density, &mut |share| bar.set(share)).ok_or_else(|| "the vehicle has no body".into())
+    let flight = fly_whole(mission, file, plants, curves, density, &mut |share| bar.set(share));
+    flight.ok_or_else(|| "a controller is to steer what cannot hover; expected more thrust, or less weight".into())
+}
+
+/// Rotors of the model for pulses that the flight decides on.
+fn following(file: &AirframeFile, rotor: &ModelRotor) -> Vec<Box<dyn Powerplant>> {
+    let one = rotor.following();
+    file.rotors().iter().map(|_| Box::new(one.clone()) as Box<dyn Powerplant>).collect()
 }
 
 /// One rotor of the model for each of the vehicle; those with the same pulses share what the model says of them.

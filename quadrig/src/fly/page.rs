@@ -8,15 +8,17 @@
 
 use super::record::body_velocity;
 use super::summary::Summary;
-use hal_sim::flight::Flying;
 use hal_sim::flight::attitude::to_euler;
+use hal_sim::flight::{Flying, Rotation};
+use hal_sim::mission::{Flight, apart};
 use ident::report::{Figure, Layer, Sheet};
 
 /// Colours in the order of the rotors and axes.
 const CLASSES: [&str; 6] = ["a", "b", "c", "e", "f", "d"];
 
 /// The page of a flight with its summary.
-pub(super) fn page(summary: &Summary, rows: &[Flying]) -> String {
+pub(super) fn page(summary: &Summary, flight: &Flight) -> String {
+    let rows = &flight.rows[..];
     let mut sheet = Sheet::new(&format!("Flight: {}", summary.mission));
     sheet.say(&summary.lead());
     sheet.table(&["", ""], &summary.table(), |_| false);
@@ -81,7 +83,54 @@ pub(super) fn page(summary: &Summary, rows: &[Flying]) -> String {
         let wind = course("wind", "Wind", "m/s", [("north", &|f| f.wind.x), ("east", &|f| f.wind.y), ("down", &|f| f.wind.z)]);
         sheet.figures(vec![wind]);
     }
+    let board = board(flight);
+    if !board.is_empty() {
+        sheet.section("The IMU board against the truth");
+        sheet.say(
+            "Angle between the board's vertical and the true one, and between its heading and the true one, from the start on.",
+        );
+        sheet.figures(board);
+    }
     sheet.html()
+}
+
+/// What the IMU board says beside the truth, and what it is off by.
+fn board(flight: &Flight) -> Vec<Figure> {
+    let flying: Vec<(f64, Rotation, &Rotation)> =
+        flight.seen.iter().filter(|(s, _)| s.t_s >= 0.0).filter_map(|(s, truth)| Some((s.t_s, s.attitude?, truth))).collect();
+    if flying.is_empty() {
+        return Vec::new();
+    }
+    let t: Vec<f64> = flying.iter().map(|f| f.0).collect();
+    let line = |name: &str, class: &'static str, of: &dyn Fn(&(f64, Rotation, &Rotation)) -> f64| Layer::Line {
+        name: name.to_owned(),
+        class,
+        x: t.clone(),
+        y: flying.iter().map(|f| of(f).to_degrees()).collect(),
+    };
+    let figure = |id: &str, title: &str, layers: Vec<Layer>| Figure {
+        id: id.to_owned(),
+        title: title.to_owned(),
+        x_label: "time, s".to_owned(),
+        y_label: "deg".to_owned(),
+        layers,
+        ..Figure::default()
+    };
+    let mut figures = vec![figure(
+        "board-error",
+        "The board is off by",
+        vec![line("tilt", "a", &|f| apart(&f.1, f.2).0), line("heading", "b", &|f| apart(&f.1, f.2).1)],
+    )];
+    for (axis, name) in ["Roll", "Pitch", "Yaw"].into_iter().enumerate() {
+        let truth = line("truth", "d", &|f| to_euler(f.2)[axis]);
+        let said = line("board", "a", &|f| to_euler(&f.1)[axis]);
+        figures.push(figure(
+            &format!("board-{}", name.to_lowercase()),
+            &format!("{name} by the board and in truth"),
+            vec![truth, said],
+        ));
+    }
+    figures
 }
 
 fn times(rows: &[Flying]) -> Vec<f64> {

@@ -1,13 +1,14 @@
 //! A flight as files: the states, and the flight log.
 //!
-//! What it is: `states.csv` with the twelve states of the thesis and the quaternion; `flight.csv`, a `quadrig-flight 1` log with what is
+//! What it is: `states.csv` with the twelve states of the thesis and the quaternion; `attitude.csv` with what the IMU board said; `flight.csv`, a `quadrig-flight 1` log with what is
 //! really there at the centre of gravity.
 //! What can go wrong: nothing.
 //! Units: SI, rad; us, rev/min. Earth NED, body FRD.
 //! Reference: specification `flight.md`, "Missions" and "Flight log"; Beharie 2013, section 7.1 (the twelve outputs).
 
 use hal_sim::flight::attitude::to_euler;
-use hal_sim::flight::{Airframe, Flying, Vector};
+use hal_sim::flight::{Airframe, Flying, Rotation, Vector};
+use hal_sim::mission::Seen;
 use ident::log::{Column, Log};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -29,6 +30,25 @@ pub(super) fn states(rows: &[Flying]) -> String {
         let vectors = [m.place, body_velocity(f), Vector::from(to_euler(&m.attitude)), m.rate];
         for value in vectors.iter().flat_map(|v| v.iter()).chain(&[q.w, q.i, q.j, q.k]) {
             let _ = write!(out, ",{:.9}", if value.abs() < 5e-10 { 0.0 } else { *value });
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// What the IMU board said of its attitude, as an attitude log; empty fields before its filter has started.
+pub(super) fn attitudes(seen: &[(Seen, Rotation)]) -> String {
+    let mut out = String::from("t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg\n");
+    for (s, _) in seen {
+        let _ = write!(out, "{:.3}", s.t_s); // a string takes everything
+        match s.attitude {
+            Some(attitude) => {
+                let (q, angles) = (attitude.quaternion(), to_euler(&attitude).map(f64::to_degrees));
+                for v in [q.w, q.i, q.j, q.k].into_iter().chain(angles) {
+                    let _ = write!(out, ",{v:.7}");
+                }
+            }
+            None => out.push_str(",,,,,,,"),
         }
         out.push('\n');
     }

@@ -53,6 +53,8 @@ pub(crate) struct ModelRotor {
 
 /// Steps of the settled states, us.
 const LEVEL_US: f64 = 5.0;
+/// Where the lag of a rotor that follows is taken, us.
+const MIDDLE_US: f64 = 1500.0;
 /// Rows and time that each level is held.
 const LEVEL_ROWS: usize = 20;
 const LEVEL_ROW_S: f64 = 0.1;
@@ -123,10 +125,11 @@ impl ModelRotor {
         let mut rows = along(&self.model, &log)?.0;
         let mut before = rows.first().map_or(0.0, |r| r.rpm);
         for r in &mut rows {
-            let (rpm, resting) = (r.rpm, r.rpm <= 0.0);
-            r.thrust_n = if resting { 0.0 } else { r.thrust_n };
-            r.torque_nm = if resting { 0.0 } else { r.torque_nm } + self.inertia_kgm2 * (rpm - before) / RPM_PER_RAD_S / dt_s;
-            before = rpm;
+            if r.rpm <= 0.0 {
+                (r.thrust_n, r.torque_nm) = (0.0, 0.0);
+            }
+            r.torque_nm += self.inertia_kgm2 * (r.rpm - before) / RPM_PER_RAD_S / dt_s;
+            before = r.rpm;
         }
         Some(rows)
     }
@@ -139,6 +142,50 @@ impl ModelRotor {
         let flight = (0..=(seconds / ROW_S).ceil() as usize).map(|i| pulse(i as f64 * ROW_S));
         let rows = self.rows(ROW_S, std::iter::repeat_n(first, before).chain(flight).collect())?;
         Some(Planned { rows: rows.into(), before, run_s: 0.0, density: 1.0 })
+    }
+}
+
+impl ModelRotor {
+    /// A rotor whose pulses nobody knows before the flight: it goes to where the model settles with the lag of a small step about the middle
+    /// of the range, from rest. What a run has done to the model's rotor by then (charge drawn, heat) is not in it.
+    pub(crate) fn following(&self) -> Following {
+        let (from, to) = (MIDDLE_US, MIDDLE_US + 20.0);
+        let thrust = self.stepped(from, to);
+        let ends = thrust.last().copied().unwrap_or(0.0);
+        let starts = self.settled(from, 1.0).thrust_n;
+        let there = starts + (1.0 - 1.0 / core::f64::consts::E) * (ends - starts);
+        let lag_ms = thrust.iter().take_while(|t| **t < there).count() + 1;
+        Following { rpm: 0.0, rotor: self.clone(), lag_s: lag_ms as f64 * 1.0e-3, density: 1.0 }
+    }
+
+    /// The settled state of a speed.
+    fn turning(&self, rpm: f64) -> PlantState {
+        let after = self.settled.partition_point(|s| s.rpm < rpm).clamp(1, self.settled.len() - 1);
+        let (a, b) = (&self.settled[after - 1], &self.settled[after]);
+        between(a, b, (rpm - a.rpm) / (b.rpm - a.rpm).max(1.0e-9))
+    }
+}
+
+/// See [`ModelRotor::following`].
+#[derive(Clone)]
+pub(crate) struct Following {
+    rotor: ModelRotor,
+    lag_s: f64,
+    rpm: f64,
+    density: f64,
+}
+
+impl Powerplant for Following {
+    fn advance(&mut self, dt_s: f64, pulse_us: f64) -> PlantState {
+        let change = (self.rotor.settled(pulse_us, 1.0).rpm - self.rpm) * (1.0 - (-dt_s / self.lag_s).exp());
+        self.rpm = (self.rpm + change).max(0.0);
+        let state = self.rotor.turning(self.rpm).in_air(self.density);
+        let spun_nm = self.rotor.inertia_kgm2 * change / RPM_PER_RAD_S / dt_s;
+        PlantState { rpm: self.rpm, torque_nm: state.torque_nm + spun_nm, ..state }
+    }
+
+    fn adjust(&mut self, levers: &PlantLevers) {
+        self.density = levers.thrust_factor;
     }
 }
 

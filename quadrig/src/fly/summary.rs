@@ -7,7 +7,7 @@
 
 use hal_sim::flight::attitude::to_euler;
 use hal_sim::flight::{Airframe, Flying, G};
-use hal_sim::mission::{AirframeFile, HoverPoint, Mission, Modes, RotorCurves, hover, modes};
+use hal_sim::mission::{AirframeFile, Flight, HoverPoint, Mission, Modes, RotorCurves, apart, hover, modes};
 use serde_json::{Value, json};
 
 /// The summary of a flight.
@@ -27,9 +27,32 @@ pub(super) struct Summary {
     steepest_deg: f64,
     /// When the flight ended on the ground, and how fast it came down.
     pub(super) touched: Option<(f64, f64)>,
+    board: Option<Off>,
+    /// What the controller ended or changed, and when, s.
+    pub(super) events: Vec<(f64, String)>,
     place_m: [f64; 3],
     velocity_m_s: [f64; 3],
     attitude_deg: [f64; 3],
+}
+
+/// What the IMU board was off by in flight: at the most and rms, deg.
+struct Off {
+    tilt_deg: [f64; 2],
+    heading_deg: [f64; 2],
+}
+
+impl Off {
+    /// Nothing of a flight without a board, or of one whose filter has not started.
+    fn of(flight: &Flight) -> Option<Self> {
+        let flying = flight.seen.iter().filter(|(s, _)| s.t_s >= 0.0);
+        let off: Vec<(f64, f64)> = flying.filter_map(|(s, truth)| Some(apart(&s.attitude?, truth))).collect();
+        let figures = |of: &dyn Fn(&(f64, f64)) -> f64| {
+            let most = off.iter().map(|o| of(o).abs()).fold(0.0, f64::max);
+            let square = off.iter().map(|o| of(o) * of(o)).sum::<f64>() / off.len() as f64;
+            [most, square.sqrt()].map(f64::to_degrees)
+        };
+        (!off.is_empty()).then(|| Self { tilt_deg: figures(&|o| o.0), heading_deg: figures(&|o| o.1) })
+    }
 }
 
 impl Summary {
@@ -40,8 +63,9 @@ impl Summary {
         airframe: &Airframe,
         curves: &dyn RotorCurves,
         powerplant: String,
-        rows: &[Flying],
+        flight: &Flight,
     ) -> Self {
+        let rows = &flight.rows;
         let around = mission.surroundings();
         let hover = hover(airframe, curves).map(|at| (at, modes(airframe, &at, curves, &around)));
         let most = |of: &dyn Fn(&Flying) -> f64| rows.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
@@ -61,6 +85,8 @@ impl Summary {
             fastest_m_s: most(&|f| f.motion.velocity.norm()),
             steepest_deg: most(&|f| tilt(f).to_degrees()),
             touched: touched.filter(|_| last.t_s + 1e-6 < mission.length_s()),
+            board: Off::of(flight),
+            events: flight.events.clone(),
             place_m: m.place.into(),
             velocity_m_s: m.velocity.into(),
             attitude_deg: to_euler(&m.attitude).map(f64::to_degrees),
@@ -94,6 +120,13 @@ impl Summary {
         };
         let (highest, fastest, steepest) = (self.highest_m, self.fastest_m_s, self.steepest_deg);
         rows.push(("flight", format!("highest {highest:.1} m, fastest {fastest:.2} m/s, steepest {steepest:.1} deg")));
+        if let Some(off) = &self.board {
+            let of = |[most, rms]: [f64; 2]| format!("{most:.2} deg at the most, {rms:.2} rms");
+            rows.push(("ahrs", format!("tilt off by {}; heading by {}", of(off.tilt_deg), of(off.heading_deg))));
+        }
+        for (t, what) in &self.events {
+            rows.push(("control", format!("{t:.2} s: {what}")));
+        }
         if let Some((t, speed)) = self.touched {
             rows.push(("ground", format!("touched after {t:.2} s at {speed:.2} m/s downwards")));
         }
@@ -184,6 +217,8 @@ impl Summary {
             "highest_m": self.highest_m,
             "fastest_m_s": self.fastest_m_s,
             "steepest_deg": self.steepest_deg,
+            "ahrs": self.board.as_ref().map(|off| json!({ "tilt_deg": off.tilt_deg, "heading_deg": off.heading_deg })),
+            "events": self.events.iter().map(|(t, what)| json!({ "t_s": t, "what": what })).collect::<Vec<_>>(),
             "touched_s": self.touched.map(|t| t.0),
             "touched_m_s": self.touched.map(|t| t.1),
             "end": { "place_m": self.place_m, "velocity_m_s": self.velocity_m_s, "attitude_deg": self.attitude_deg },

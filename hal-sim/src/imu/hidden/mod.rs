@@ -8,7 +8,7 @@
 //!
 //! A new effect is one file and one line in the list below.
 
-use super::motion::Motion;
+use super::body::Body;
 use crate::noise::{Source, Stream};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -149,10 +149,10 @@ impl Hidden {
 
     /// Their sum at an instant.
     #[must_use]
-    pub fn levers(&self, at_ns: u64, motion: &Motion) -> ImuLevers {
+    pub fn levers(&self, at_ns: u64, body: &Body) -> ImuLevers {
         let mut levers = ImuLevers::default();
         if !self.0.is_empty() {
-            let at = Instant { run_s: at_ns as f64 * 1e-9, place_m: motion.place(at_ns) };
+            let at = Instant { run_s: at_ns as f64 * 1e-9, place_m: body.place(at_ns) };
             for s in self.0.iter() {
                 if s.from_s.is_none_or(|from| at.run_s >= from) && s.until_s.is_none_or(|until| at.run_s < until) {
                     s.effect.act(&at, &mut levers);
@@ -188,6 +188,7 @@ fn dipole(moment: [f64; 3], away: [f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::motion::Motion;
     use super::*;
 
     #[test]
@@ -199,7 +200,7 @@ mod tests {
             let text = toml::to_string(&a).unwrap();
             assert_eq!(toml::from_str::<ImuEffectKind>(&text).unwrap(), a, "{text}");
             let hidden = Hidden::new(&[ImuScheduled { from_s: Some(10.0), until_s: Some(80.0), effect: a }]);
-            let body = Motion { walk_m: [0.9, 0.6, 0.2], walk_hz: 0.05, ..Motion::LEVEL };
+            let body = Body::from(Motion { walk_m: [0.9, 0.6, 0.2], walk_hz: 0.05, ..Motion::LEVEL });
             let acts = |s: f64| hidden.levers((s * 1e9) as u64, &body) != ImuLevers::default();
             assert!(!acts(9.9) && !acts(80.1) && (0..700).any(|k| acts(10.0 + f64::from(k) * 0.1)), "{id}");
         }
