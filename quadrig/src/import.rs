@@ -1,6 +1,6 @@
 //! `quadrig import`.
 //!
-//! What it is: reads a foreign CSV, writes a rig log, prints what was repaired.
+//! What it is: reads a foreign CSV, writes a rig log or, of a flight, a flight log, prints what was repaired and turned.
 //! What can go wrong: what the importer refuses; then nothing is written.
 //! Units: converted, and said.
 //! Reference: specification `formats.md`.
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The export: RCbenchmark or Tyto CSV, a tidy CSV, or any CSV with --map.
+    /// The export: RCbenchmark or Tyto CSV, a tidy CSV, any CSV with --map, or a decoded flight of a Crazyflie.
     file: PathBuf,
     /// Where the log goes.
     #[arg(short, long)]
@@ -20,12 +20,44 @@ pub(crate) struct Args {
     /// A column's meaning, TARGET=SOURCE or TARGET=SOURCE*FACTOR; may be given more than once.
     #[arg(long = "map", value_name = "TARGET=SOURCE*FACTOR")]
     mappings: Vec<Mapping>,
+    /// Metadata of a flight, such as mass_kg=0.037; may be given more than once.
+    #[arg(long = "meta", value_name = "KEY=VALUE")]
+    meta: Vec<Meta>,
+}
+
+/// One line of metadata.
+#[derive(Clone)]
+struct Meta(String, toml::Value);
+
+impl std::str::FromStr for Meta {
+    type Err = String;
+
+    /// A TOML key and value; a value that is none is taken as text.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
+        let plain = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        if !plain {
+            return Err("expected letters, digits and _ before the =".to_owned());
+        }
+        let read = format!("v = {value}").parse::<toml::Table>().ok().and_then(|mut table| table.remove("v"));
+        Ok(Self(key.to_owned(), read.unwrap_or_else(|| toml::Value::String(value.to_owned()))))
+    }
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let (log, report) = ident::import::import(&args.file, &args.mappings)?;
-    log.write(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    let flight = if args.mappings.is_empty() { ident::import::flight(&args.file)? } else { None };
+    let is_flight = flight.is_some();
+    let (mut log, report) = flight.map_or_else(|| ident::import::import(&args.file, &args.mappings), Ok)?;
+    if is_flight {
+        args.meta.iter().for_each(|Meta(key, value)| drop(log.meta.insert(key.clone(), value.clone())));
+        ident::flight_log::write(&log, &args.output)
+    } else if let Some(Meta(key, _)) = args.meta.first() {
+        return Err(format!("--meta {key}: {} is no flight; expected a flight", args.file.display()).into());
+    } else {
+        log.write(&args.output)
+    }
+    .map_err(|e| format!("{}: {e}", args.output.display()))?;
     if !quiet {
         print!("{}", report.table());
         println!(

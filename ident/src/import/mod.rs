@@ -6,9 +6,11 @@
 //! Reference: specification `formats.md`, `quadrig import`; RCbenchmark and Tyto CSV headers carry their units in parentheses.
 
 mod findings;
+mod flight;
 mod header;
 mod table;
 
+pub use flight::{flight, flight_from};
 pub use table::{Mapping, import, import_from};
 
 /// One line of the import report.

@@ -1,0 +1,105 @@
+//! Recorded flights as flight logs: the frames that the importer says are those of the data.
+//!
+//! What it is: each Crazyflie flight is imported; the rate of change of its attitude is held against its gyro, that of its velocity against its
+//! accelerometer, axis by axis. A sign or an order that is wrong in any of them shows.
+//! What can go wrong: without the recorded data the test says so.
+//! Units: as the flight log.
+//! Reference: specification `flight.md`, "Flight log"; the data set's own description of its columns.
+
+use ident::flight_log;
+use ident::log::Log;
+use quadrig_tests::{call, data};
+
+const G: f64 = 9.806_65;
+
+fn rows<const N: usize>(log: &Log, names: [&str; N]) -> Vec<[f64; N]> {
+    let columns = names.map(|name| log.column(name).unwrap_or_else(|| panic!("{name}")));
+    (0..log.len()).map(|i| columns.map(|c| c[i])).collect()
+}
+
+/// Slope of `a` on `b` through their means, and their correlation.
+fn related(a: &[f64], b: &[f64]) -> (f64, f64) {
+    let n = a.len() as f64;
+    let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let of = |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(x, y)| f(x - ma, y - mb)).sum::<f64>();
+    let (aa, bb, ab) = (of(&|x, _| x * x), of(&|_, y| y * y), of(&|x, y| x * y));
+    (ab / bb, ab / (aa * bb).sqrt())
+}
+
+/// A vector in body axes as the earth has it.
+fn to_earth([w, x, y, z]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
+    let rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ];
+    rows.map(|row| row.iter().zip(v).map(|(a, b)| a * b).sum())
+}
+
+/// Twice the vector part of the turn from one attitude to another, body axes.
+fn turned([a, b, c, d]: [f64; 4], [w, x, y, z]: [f64; 4]) -> [f64; 3] {
+    let scalar = a * w + b * x + c * y + d * z;
+    [a * x - b * w - c * z + d * y, a * y + b * z - c * w - d * x, a * z - b * y + c * x - d * w]
+        .map(|v| 2.0 * v * scalar.signum())
+}
+
+#[test]
+fn the_frames_of_the_recorded_flights_are_ours() {
+    let Some(data) = data("recorded flights") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for name in ["brushless-eckart00", "brushless-eckart22", "brushed-jana01-first20s"] {
+        let source = data.join(format!("rig/crazyflie-flights/{name}.csv"));
+        let mass = if name.starts_with("brushed") { "mass_kg=0.0347" } else { "mass_kg=0.037" };
+        let said = call(at, &["import", source.to_str().expect("a plain name"), "-o", "flight.csv", "--meta", mass]).succeeded();
+        assert!(said.out.contains("forward-right-down") && said.out.contains("its x is taken for north"), "{}", said.out);
+        let log = flight_log::read(&at.join("flight.csv")).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!((flight_log::rotors(&log), log.meta["mass_kg"].is_float()), (4, true));
+        let (q, gyro) = (rows(&log, ["qw", "qx", "qy", "qz"]), rows(&log, ["gyro_x", "gyro_y", "gyro_z"]));
+        let (v, f) = (rows(&log, ["vel_x", "vel_y", "vel_z"]), rows(&log, ["acc_x", "acc_y", "acc_z"]));
+        // over spans of some 50 ms without a gap, beside the means of what was sensed in them
+        let span = 25;
+        let mut pairs = [const { (Vec::new(), Vec::new()) }; 6];
+        for i in (0..log.len() - span).step_by(5) {
+            let dt = log.t[i + span] - log.t[i];
+            if dt > 0.08 {
+                continue;
+            }
+            let mean = |of: &dyn Fn(usize) -> [f64; 3]| -> [f64; 3] {
+                let sum = (i..i + span).map(of).fold([0.0; 3], |s, x| [s[0] + x[0], s[1] + x[1], s[2] + x[2]]);
+                sum.map(|s| s / span as f64)
+            };
+            let (rate, force) = (mean(&|k| gyro[k]), mean(&|k| to_earth(q[k], f[k])));
+            let turn = turned(q[i], q[i + span]);
+            for axis in 0..3 {
+                pairs[axis].0.push(turn[axis] / dt);
+                pairs[axis].1.push(rate[axis]);
+                pairs[3 + axis].0.push((v[i + span][axis] - v[i][axis]) / dt);
+                pairs[3 + axis].1.push(force[axis] + if axis == 2 { G } else { 0.0 });
+            }
+        }
+        for (axis, (change, sensed)) in pairs.iter().enumerate() {
+            let (slope, correlation) = related(change, sensed);
+            println!("{name} {} axis {}: slope {slope:.3}, correlation {correlation:.3}", ["gyro", "force"][axis / 3], axis % 3);
+            assert!((0.7..1.3).contains(&slope) && correlation > 0.7, "{name} {axis}: {slope} {correlation}");
+        }
+    }
+}
+
+#[test]
+fn poses_and_commands_alone_are_flights_too() {
+    let Some(data) = data("recorded flights") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for (name, rotors, column) in
+        [("crazyflie-flights/brushless-eckart00.mocap.csv", 0, "qw"), ("arpl-crazyflie-flights/log10-10to20s.csv", 4, "gyro_x")]
+    {
+        let source = data.join("rig").join(name);
+        call(at, &["import", source.to_str().expect("a plain name"), "-o", "flight.csv"]).succeeded();
+        let log = flight_log::read(&at.join("flight.csv")).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!((flight_log::rotors(&log), log.column(column).is_some()), (rotors, true), "{name}");
+        assert!(log.len() > 600);
+    }
+    std::fs::write(at.join("rig.csv"), "t_s,pulse_us,rpm,thrust_n\n0,1000,0,0\n1,1500,3000,1\n").expect("a file");
+    call(at, &["import", "rig.csv", "-o", "never.csv", "--meta", "mass_kg=1"]).refused(&["mass_kg", "no flight"]);
+}
