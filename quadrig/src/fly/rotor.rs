@@ -177,7 +177,7 @@ pub(crate) struct Following {
 
 impl Powerplant for Following {
     fn advance(&mut self, dt_s: f64, pulse_us: f64) -> PlantState {
-        let change = (self.rotor.settled(pulse_us, 1.0).rpm - self.rpm) * (1.0 - (-dt_s / self.lag_s).exp());
+        let change = (self.rotor.settled(pulse_us, 1.0).rpm - self.rpm) * (dt_s / (dt_s + self.lag_s));
         self.rpm = (self.rpm + change).max(0.0);
         let state = self.rotor.turning(self.rpm).in_air(self.density);
         let spun_nm = self.rotor.inertia_kgm2 * change / RPM_PER_RAD_S / dt_s;
