@@ -24,6 +24,12 @@ pub fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Rotation {
     ))
 }
 
+/// The rotation of a quaternion of any length, scalar first.
+#[must_use]
+pub fn from_quaternion([w, x, y, z]: [f64; 4]) -> Rotation {
+    Unit::new_normalize(Quaternion::new(w, x, y, z))
+}
+
 /// Roll, pitch and yaw of a rotation.
 #[must_use]
 pub fn to_euler(attitude: &Rotation) -> [f64; 3] {

@@ -31,6 +31,17 @@ impl Felt {
         force: [0.0, 0.0, -1.0],
         place: [0.0; 3],
     };
+
+    /// A share of the way to another. Attitudes a millisecond apart lie on a straight line within the square of their angle.
+    fn towards(&self, other: &Self, share: f64) -> Self {
+        let line = |a: [f64; 3], b: [f64; 3]| core::array::from_fn(|i| a[i] + share * (b[i] - a[i]));
+        Self {
+            attitude: core::array::from_fn(|r| line(self.attitude[r], other.attitude[r])),
+            rate: line(self.rate, other.rate),
+            force: line(self.force, other.force),
+            place: line(self.place, other.place),
+        }
+    }
 }
 
 /// The entries, one a millisecond.
@@ -81,13 +92,15 @@ impl Aboard {
         }
     }
 
-    /// What is felt at an instant.
+    /// What is felt at an instant: on the straight line between two entries, the n-th of which (from 1) is of the end of millisecond n.
     #[must_use]
     pub fn at(&self, at_ns: u64) -> Felt {
         let track = self.reading();
-        let place = (at_ns / 1_000_000).saturating_sub(track.first) as usize;
-        let last = track.felt.len().saturating_sub(1);
-        track.felt.get(place.min(last)).copied().unwrap_or(Felt::LEVEL)
+        let Some(last) = track.felt.len().checked_sub(1) else { return Felt::LEVEL };
+        let since = at_ns.saturating_sub(1_000_000 * (track.first + 1));
+        let before = ((since / 1_000_000) as usize).min(last);
+        let share = if before == last { 0.0 } else { (since % 1_000_000) as f64 * 1.0e-6 };
+        track.felt[before].towards(&track.felt[(before + 1).min(last)], share)
     }
 }
 
@@ -181,11 +194,13 @@ mod tests {
 
     #[test]
     fn a_live_board_has_the_last_millisecond_and_a_recorded_one_each() {
-        for (aboard, first) in [(Aboard::live([0.2, 0.0, 0.4]), 3.0), (Aboard::recorded([0.2, 0.0, 0.4]), 0.0)] {
+        for (aboard, first, between) in [(Aboard::live([0.2, 0.0, 0.4]), 4.0, 4.0), (Aboard::recorded([0.2, 0.0, 0.4]), 1.0, 2.5)]
+        {
             assert_eq!(aboard.at(5_000_000), Felt::LEVEL);
-            (0..5).for_each(|ms| aboard.feel(at(f64::from(ms))));
+            (1..=5).for_each(|ms| aboard.feel(at(f64::from(ms))));
             let body = Body::from(aboard);
-            assert_eq!([0, 3_900_000, 4_000_000, 99_000_000].map(|ns| body.place(ns)[0]), [first, 3.0, 4.0, 4.0]);
+            let places = [0, 2_500_000, 4_000_000, 5_000_000, 99_000_000].map(|ns| body.place(ns)[0]);
+            assert_eq!(places, [first, between, 4.0, 5.0, 5.0]);
         }
     }
 

@@ -8,12 +8,13 @@
 
 use super::sections::{Chips, ImuSection};
 use crate::clock::VirtualClock;
+use crate::flight::attitude::from_quaternion;
 use crate::flight::vibration::Shaking;
 use crate::flight::{Airframe, G, Motion, Rotation, Vector, Vehicle, Vibration};
 use crate::imu::{Aboard, BusFault, ChipKind, Errors, Felt, I2cBus};
+use crate::native::ahrs::ImuRig;
 use crate::plant::PlantState;
 use firmware_ahrs::{ACCEL, Ahrs, AhrsConfig, GYRO, Inputs, MAG, Sampler, TICK_HZ};
-use nalgebra::{Quaternion, Unit};
 
 /// Milliseconds between two ticks of the board.
 const TICK_MS: u64 = 1000 / TICK_HZ as u64;
@@ -50,6 +51,8 @@ impl Seen {
 #[derive(Debug)]
 pub(super) struct Board {
     aboard: Aboard,
+    /// Where all that is felt is kept for a board that comes later.
+    kept: Option<Aboard>,
     clock: VirtualClock,
     sampler: Sampler<I2cBus>,
     ahrs: Ahrs,
@@ -58,6 +61,17 @@ pub(super) struct Board {
     milliseconds: u64,
     rest_ms: u64,
     rate: Vector,
+}
+
+/// The magnetic field, gauss.
+fn field(section: &ImuSection) -> [f64; 3] {
+    section.field_ut.map(|ut| ut * GAUSS_PER_UT)
+}
+
+/// The board of a mission, for a run over the flight that `kept` will have seen: natively or the flash image.
+pub(super) fn rig(section: &ImuSection, seed: u64, fault: BusFault) -> ImuRig {
+    let aboard = Some(Aboard::recorded(field(section)));
+    ImuRig { aboard, errors: errors(section.chips, seed), fault, ..ImuRig::default() }
 }
 
 /// Errors of the chips as the mission wants them.
@@ -83,13 +97,21 @@ fn errors(chips: Chips, seed: u64) -> Errors {
 
 impl Board {
     /// A board that powers up before the flight, with the chips and the fault that `section` and `fault` say.
-    pub(super) fn new(section: &ImuSection, airframe: &Airframe, blades: u32, seed: u64, fault: BusFault) -> Self {
+    pub(super) fn new(
+        section: &ImuSection,
+        airframe: &Airframe,
+        blades: u32,
+        seed: u64,
+        fault: BusFault,
+        kept: Option<Aboard>,
+    ) -> Self {
         let clock = VirtualClock::default();
-        let aboard = Aboard::live(section.field_ut.map(|ut| ut * GAUSS_PER_UT));
+        let aboard = Aboard::live(field(section));
         let bus = I2cBus::new(clock.clone(), &ChipKind::ALL, aboard.clone(), &errors(section.chips, seed), fault);
         let shaking = Shaking { imbalance_gmm: section.imbalance_gmm, blade_pass: section.blade_pass, blades };
         Self {
             aboard,
+            kept,
             sampler: Sampler::new(bus),
             clock,
             ahrs: Ahrs::new(AhrsConfig::default()),
@@ -119,12 +141,14 @@ impl Board {
         let rate = motion.rate + jitter;
         let carried = angular.cross(&self.lever) + motion.rate.cross(&motion.rate.cross(&self.lever));
         let matrix = motion.attitude.to_rotation_matrix();
-        self.aboard.feel(Felt {
+        let felt = Felt {
             attitude: core::array::from_fn(|r| core::array::from_fn(|c| matrix[(r, c)])),
             rate: rate.into(),
             force: ((force + carried + shaken) / G).into(),
             place: motion.place.into(),
-        });
+        };
+        self.aboard.feel(felt);
+        self.kept.iter().for_each(|kept| kept.feel(felt));
         self.milliseconds += 1;
         self.clock.advance_to(self.milliseconds * 1_000_000);
         self.milliseconds.is_multiple_of(TICK_MS).then(|| self.tick())
@@ -139,10 +163,7 @@ impl Board {
             let unbiased = rate - filter.bias();
             self.rate = Vector::new(f64::from(unbiased.x), f64::from(unbiased.y), f64::from(unbiased.z));
         }
-        let attitude = filter.is_started().then(|| {
-            let [w, x, y, z] = filter.quaternion().map(f64::from);
-            Unit::new_normalize(Quaternion::new(w, x, y, z))
-        });
+        let attitude = filter.is_started().then(|| from_quaternion(filter.quaternion().map(f64::from)));
         let t_s = (self.milliseconds as f64 - self.rest_ms as f64) * 1.0e-3;
         Seen { t_s, attitude, rate: self.rate, alive: readings.alive & !out.stuck }
     }

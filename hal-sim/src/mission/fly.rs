@@ -11,7 +11,8 @@ use super::steering::Steering;
 use super::{AirframeFile, Mission};
 use crate::flight::autopilot::Mixer;
 use crate::flight::{Flying, Vehicle};
-use crate::imu::BusFault;
+use crate::imu::{Aboard, BusFault};
+use crate::native::ahrs::ImuRig;
 use crate::plant::{Powerplant, RigPlant};
 
 /// Time for which the rotors of a flight that begins in the air run before it, s: some fifty of their time constants.
@@ -60,10 +61,38 @@ pub fn fly_whole(
     reference_density: f64,
     progress: &mut dyn FnMut(f64),
 ) -> Option<Flight> {
+    fly_kept(mission, airframe, plants, curves, reference_density, progress, None)
+}
+
+/// The same, and the board with its surroundings as it has ridden along, for another run of its firmware: that of the flash image, say.
+pub fn fly_again(
+    mission: &Mission,
+    airframe: &AirframeFile,
+    plants: Vec<Box<dyn Powerplant>>,
+    curves: &dyn RotorCurves,
+    reference_density: f64,
+) -> Option<(Flight, ImuRig)> {
+    let section = mission.imu.unwrap_or_default();
+    let rig = super::aboard::rig(&section, mission.seed, bus_fault(mission, section.rest_s));
+    let with_board = Mission { imu: Some(section), ..mission.clone() };
+    let kept = rig.aboard.clone();
+    let flight = fly_kept(&with_board, airframe, plants, curves, reference_density, &mut |_| (), kept)?;
+    Some((flight, rig))
+}
+
+fn fly_kept(
+    mission: &Mission,
+    airframe: &AirframeFile,
+    plants: Vec<Box<dyn Powerplant>>,
+    curves: &dyn RotorCurves,
+    reference_density: f64,
+    progress: &mut dyn FnMut(f64),
+    kept: Option<Aboard>,
+) -> Option<Flight> {
     let (body, rotors) = (airframe.airframe(), plants.len());
     let mut steering = steering(mission, &body, curves)?;
     let section = mission.imu.or(steering.as_ref().map(|_| Default::default()));
-    let mut board = section.map(|s| Board::new(&s, &body, airframe.blades(), mission.seed, bus_fault(mission, s.rest_s)));
+    let mut board = section.map(|s| Board::new(&s, &body, airframe.blades(), mission.seed, bus_fault(mission, s.rest_s), kept));
     let mut vehicle = Vehicle::new(body, plants, reference_density, mission.surroundings(), mission.motion())?;
     let dead = dead_rotors(mission);
     let pulses = |ms: u64, into: &mut Vec<f64>| {

@@ -17,7 +17,7 @@ mod steering;
 
 pub use aboard::{Seen, apart};
 pub use airframe::{AirframeFile, RotorSection};
-pub use fly::{Flight, catalogue_plants, fly, fly_whole};
+pub use fly::{Flight, catalogue_plants, fly, fly_again, fly_whole};
 pub use hovering::{Catalogue, HoverPoint, Modes, RotorCurves, hover, modes};
 pub use pulses::PulseTable;
 pub use sections::{Chips, ControllerSection, FailureSection, ImuSection, PositioningSection, WayPoint};
