@@ -1,22 +1,21 @@
-//! A board at the other end of a serial line.
+//! A board at the other end of a port.
 //!
-//! What it is: the port, the codec in both directions, and a question with its answer.
+//! What it is: the port, the codec in both directions, and a question with its answer. Waiting is counted in the port's own time.
 //! What can go wrong: no such port, a port that goes away, a board that does not answer, a command that is refused: one line each.
 //! Units: bytes; baud; ms.
 //! Reference: specification `formats.md`, "Telemetry".
 
 use crate::Failure;
-use frame::message::{Command, Event, Message};
+use crate::port::{Port, PortArgs};
+use frame::message::{Beep, Command, Event, Message};
 use frame::units::Ticks;
 use frame::wire::{Decoder, Encoder, LinkStats, MAX_WIRE, Received};
-use serialport::SerialPort;
 use std::io::ErrorKind;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
+use virtual_board::Hand;
 
 /// Speed of the rig's line (pin table of the board).
 const BAUD: u32 = 921_600;
-/// Longest wait in one read.
-const READ_TIME: Duration = Duration::from_millis(20);
 /// How long an answer may take.
 const ANSWER_TIME: Duration = Duration::from_millis(1500);
 /// Time between two signs of life towards an armed board.
@@ -32,46 +31,67 @@ pub(crate) enum Heard {
 
 /// The board.
 pub(crate) struct Board {
-    name: String,
-    baud: u32,
-    port: Box<dyn SerialPort>,
+    port: Port,
     encoder: Encoder,
     decoder: Decoder,
-    sent: Instant,
+    sent: Duration,
+    gone: Option<String>,
 }
 
 impl Board {
-    /// Opens the rig board's port by its name.
-    pub(crate) fn open(name: &str) -> Result<Self, Failure> {
-        Self::open_at(name, BAUD)
+    /// Opens the rig board's port.
+    pub(crate) fn open(port: &PortArgs) -> Result<Self, Failure> {
+        Ok(Self::at(port.open(BAUD, false)?))
     }
 
-    /// Opens a port of another speed.
-    pub(crate) fn open_at(name: &str, baud: u32) -> Result<Self, Failure> {
-        let port = serialport::new(name, baud).timeout(READ_TIME).open().map_err(|e| {
-            let known: Vec<String> = serialport::available_ports().unwrap_or_default().into_iter().map(|p| p.port_name).collect();
-            let known =
-                if known.is_empty() { "no serial port is there".to_owned() } else { format!("there are {}", known.join(", ")) };
-            format!("{name}: cannot be opened ({e}); {known}")
-        })?;
-        Ok(Self {
-            name: name.to_owned(),
-            baud,
-            port,
-            encoder: Encoder::default(),
-            decoder: Decoder::default(),
-            sent: Instant::now(),
-        })
+    /// The board at an open port.
+    pub(crate) fn at(port: Port) -> Self {
+        Self { port, encoder: Encoder::default(), decoder: Decoder::default(), sent: Duration::ZERO, gone: None }
     }
 
     /// Opens the same port again after it went away; the counters go on.
     pub(crate) fn reopen(&mut self) -> bool {
-        let opened = serialport::new(&self.name, self.baud).timeout(READ_TIME).open();
-        let open = opened.map(|port| self.port = port).is_ok();
+        let open = self.port.reopen();
         if open {
+            self.gone = None;
             let _ = self.decoder.push::<Message>(0); // the frame that the loss cut short ends here, not in the next one
         }
         open
+    }
+
+    /// Time since the port was opened: waits are counted in it.
+    pub(crate) fn now(&self) -> Duration {
+        self.port.now()
+    }
+
+    /// Why the port is gone, in one line.
+    pub(crate) fn gone(&self) -> String {
+        self.gone.clone().unwrap_or_else(|| format!("{}: the port is gone", self.port.name()))
+    }
+
+    /// Name of the port, for people.
+    pub(crate) fn name(&self) -> String {
+        self.port.name()
+    }
+
+    /// Whether the board is in this program.
+    pub(crate) fn is_virtual(&self) -> bool {
+        self.port.is_virtual()
+    }
+
+    /// The next beep pattern of a virtual board's ESC.
+    pub(crate) fn beep(&mut self) -> Option<Beep> {
+        self.port.beep()
+    }
+
+    /// Lays a hand on a virtual board's bench.
+    pub(crate) fn hand(&mut self, hand: &Hand) -> Result<(), Failure> {
+        self.port.hand(hand)
+    }
+
+    /// Whether a virtual board's ESC has power.
+    pub(crate) fn is_powered(&self) -> bool {
+        self.port.is_powered()
     }
 
     /// Counters of the line.
@@ -81,19 +101,23 @@ impl Board {
 
     /// Sends one command. Its time is the clock's since 1970, so that the board can tell a new frame from an old one.
     pub(crate) fn send(&mut self, command: Command) -> Result<(), Failure> {
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let now = if self.port.is_virtual() {
+            self.port.now() // the same run, the same bytes
+        } else {
+            SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
+        };
         let at = Ticks((now.as_nanos() * u128::from(Ticks::HZ) / 1_000_000_000) as u64);
         let mut wire = [0; MAX_WIRE];
         let used = self.encoder.encode(at, &command, &mut wire).map_err(|_| "a command did not fit its frame")?;
-        self.sent = Instant::now();
+        self.sent = self.port.now();
         // an empty frame first: whatever stood on the line before is not part of ours
         let bytes = [&[0], &wire[..used]].concat();
-        self.port.write_all(&bytes).map_err(|e| format!("{}: cannot be written to ({e})", self.name).into())
+        self.port.write_all(&bytes).map_err(|e| format!("{}: cannot be written to ({e})", self.port.name()).into())
     }
 
     /// A sign of life when one is due.
     pub(crate) fn keep_alive(&mut self) -> Result<(), Failure> {
-        if self.sent.elapsed() >= PING { self.send(Command::Ping) } else { Ok(()) }
+        if self.port.now() >= self.sent + PING { self.send(Command::Ping) } else { Ok(()) }
     }
 
     /// What arrived; waits for some 20 ms at most.
@@ -105,7 +129,10 @@ impl Board {
             Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock) => {
                 Heard::Messages(Vec::new())
             }
-            Err(_) => Heard::Gone,
+            Err(e) => {
+                self.gone = self.port.is_virtual().then(|| e.to_string());
+                Heard::Gone
+            }
         }
     }
 
@@ -117,10 +144,10 @@ impl Board {
         mut answer: impl FnMut(&Message) -> Option<T>,
     ) -> Result<T, Failure> {
         self.send(command)?;
-        let begun = Instant::now();
-        while begun.elapsed() < ANSWER_TIME {
+        let until = self.port.now() + ANSWER_TIME;
+        while self.port.now() < until {
             match self.hear() {
-                Heard::Gone => return Err(format!("{}: the port is gone", self.name).into()),
+                Heard::Gone => return Err(self.gone().into()),
                 Heard::Messages(messages) => {
                     for received in messages {
                         seen(&received.message);
@@ -137,7 +164,7 @@ impl Board {
         }
         Err(format!(
             "{}: no answer from the board in {} s; is it powered, and a rig board?",
-            self.name,
+            self.port.name(),
             ANSWER_TIME.as_secs_f32()
         )
         .into())

@@ -8,9 +8,10 @@
 
 use crate::Failure;
 use crate::board::{Board, Heard};
+use crate::port::PortArgs;
 use firmware_ahrs::{line, text};
 use frame::{Command, Event, ImuCommand, ImuFormat, ImuReport, ImuSensor, Message};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Speed of the IMU board's line (pin table of the board).
 const BAUD: u32 = 460_800;
@@ -20,9 +21,8 @@ const ANSWER: Duration = Duration::from_secs(5);
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Serial port of the board.
-    #[arg(long)]
-    port: String,
+    #[command(flatten)]
+    port: PortArgs,
     /// Longest calibration that is followed, s.
     #[arg(long, default_value_t = 300.0)]
     patience: f64,
@@ -40,7 +40,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if !(args.patience.is_finite() && args.patience > 0.0) {
         return Err(format!("--patience {}: expected seconds above 0", args.patience).into());
     }
-    let mut board = Board::open_at(&args.port, BAUD)?;
+    let mut board = Board::at(args.port.open(BAUD, true)?);
     let text_wanted = command == Command::Imu(ImuCommand::Format(ImuFormat::Text));
     if !text_wanted {
         // whatever mode it is in: its answers are to be frames; the answer to this is not waited for
@@ -89,10 +89,10 @@ fn answers(command: &Command, message: &Message) -> bool {
 
 /// Hears messages until one is the last.
 fn listen(board: &mut Board, patience: Duration, mut last: impl FnMut(&Message) -> bool) -> Result<bool, Failure> {
-    let begun = Instant::now();
-    while begun.elapsed() < patience {
+    let until = board.now() + patience;
+    while board.now() < until {
         match board.hear() {
-            Heard::Gone => return Err("the port is gone".into()),
+            Heard::Gone => return Err(board.gone().into()),
             Heard::Messages(messages) => {
                 if messages.iter().any(|received| last(&received.message)) {
                     return Ok(true);

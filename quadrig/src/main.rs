@@ -14,6 +14,7 @@ mod circle;
 mod close_loop;
 mod demo;
 mod effects;
+mod end;
 mod flash;
 mod fly;
 mod identify;
@@ -22,6 +23,7 @@ mod imu;
 mod live;
 mod measured;
 mod plateaus;
+mod port;
 mod predict;
 mod progress;
 mod record;
@@ -32,6 +34,7 @@ mod select;
 mod sim;
 mod spool;
 mod step;
+mod virtual_port;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -90,6 +93,8 @@ enum Command {
     Rig(rig::Args),
     /// Talks to the IMU board: its user commands, calibration included.
     Imu(imu::Args),
+    /// A board without hardware behind a pseudo-terminal, for other programs.
+    Virtual(virtual_port::Args),
     /// The library of effects as pages.
     Effects(effects::Args),
     /// A model's prediction of every measured channel, row for row.
@@ -121,6 +126,7 @@ fn main() -> ExitCode {
         Command::Log(args) => record::run(args, cli.quiet),
         Command::Rig(args) => rig::run(args, cli.quiet),
         Command::Imu(args) => imu::run(args, cli.quiet),
+        Command::Virtual(args) => virtual_port::run(args, cli.quiet),
         Command::Effects(args) => effects::run(args, cli.quiet),
         Command::Predict(args) => predict::run(args),
     };

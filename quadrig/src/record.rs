@@ -8,6 +8,8 @@
 
 use crate::Failure;
 use crate::board::{Board, Heard};
+use crate::end::Ended;
+use crate::port::PortArgs;
 use crate::spool::Spool;
 use frame::Consensus;
 use frame::calibration::{Calibration, Converted};
@@ -31,13 +33,12 @@ const HEAD_AFTER: usize = 3;
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Serial port of the board.
-    #[arg(long)]
-    port: String,
+    #[command(flatten)]
+    port: PortArgs,
     /// Log to write.
     #[arg(short, long)]
     output: PathBuf,
-    /// Stop after so many seconds of the board's time; without it, record until the port is gone or Ctrl-D is typed.
+    /// Stop after so many seconds of the board's time; without it, record until the port is gone or Ctrl-D or Ctrl-C is typed.
     #[arg(long)]
     seconds: Option<f64>,
     /// How long an unplugged port is waited for, s.
@@ -262,13 +263,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let named = [("motor", &args.motor), ("propeller", &args.propeller)];
     let head = named.into_iter().filter_map(|(key, value)| Some((key, value.clone()?))).collect();
     let mut recorder = Recorder::new(&args.output, head, quiet)?;
-    let begun = Instant::now();
-    let mut asked: Option<Instant> = None;
+    let signals = Ended::watch()?;
+    let begun = board.now();
+    let mut asked: Option<Duration> = None;
     let end = std::io::stdin().is_terminal().then(crate::rig::lines);
     let ended = loop {
-        if !recorder.knows_its_board() && asked.is_none_or(|at| at.elapsed() > ASK_AGAIN) {
+        if !recorder.knows_its_board() && asked.is_none_or(|at| board.now() > at + ASK_AGAIN) {
             let _ = board.send(Command::Identify); // a port that is gone shows in the next read
-            asked = Some(Instant::now());
+            asked = Some(board.now());
         }
         match board.hear() {
             Heard::Messages(messages) => messages.iter().for_each(|m| recorder.take(&m.message)),
@@ -280,22 +282,22 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
                     back = board.reopen();
                 }
                 if !back {
-                    break Err(format!("{}: the port is gone", args.port));
+                    break Err(board.gone());
                 }
                 let _ = board.send(Command::Identify); // the board may be another one, or tared anew
             }
         }
-        if !recorder.knows_its_board() && begun.elapsed() > CALIBRATION_TIME {
+        if !recorder.knows_its_board() && board.now() > begun + CALIBRATION_TIME {
             recorder.spool.discard();
             let cause = match board.stats().foreign {
                 0 => "is it a rig board at 921600 baud?",
                 _ => "its frames are of another version than this program's: flash the board with the image of the same release",
             };
-            return Err(format!("{}: no calibration from the board; {cause}", args.port).into());
+            return Err(format!("{}: no calibration from the board; {cause}", board.name()).into());
         }
         let enough = args.seconds.is_some_and(|s| recorder.seconds() >= s);
         let typed_end = end.as_ref().is_some_and(|end| matches!(end.try_recv(), Err(TryRecvError::Disconnected)));
-        if enough || typed_end {
+        if enough || typed_end || signals.now() {
             break Ok(());
         }
     };

@@ -12,6 +12,8 @@ mod file;
 
 use crate::Failure;
 use crate::board::{Board, Heard};
+use crate::end::Ended;
+use crate::port::PortArgs;
 use crate::record::Recorder;
 use clap::Subcommand;
 use frame::message::{Beep, BoardId, Command, Event, Hello, Message, Setting};
@@ -20,13 +22,14 @@ use frame::units::PulseWidth;
 use std::io::BufRead;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::Duration;
+use virtual_board::{Hand, sound};
 
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Serial port of the board.
-    #[arg(long, global = true, default_value = "")]
-    port: String,
+    #[command(flatten)]
+    port: PortArgs,
     #[command(subcommand)]
     order: Order,
 }
@@ -127,10 +130,8 @@ fn pulse(us: f64) -> Result<PulseWidth, Failure> {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    if args.port.is_empty() {
-        return Err("--port is needed: the serial port of the board".into());
-    }
     let mut board = Board::open(&args.port)?;
+    let assistant = args.port.assist.then(Assistant::default);
     let silent = |_: &Message| {};
     let done = |what: &str| {
         if !quiet {
@@ -144,9 +145,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Order::Clear => board.obey(Command::ClearFaults, silent).map(|()| done("cleared")),
         Order::Set { us, hold } => {
             board.obey(Command::SetPulse(pulse(*us)?), silent)?;
-            let until = std::time::Instant::now() + std::time::Duration::from_secs_f64(hold.clamp(0.0, 3600.0));
-            let mut session = Session { recorder: None, quiet, state: RigState::Running, finished: false, faulted: None };
-            while std::time::Instant::now() < until && session.faulted.is_none() {
+            let until = board.now() + Duration::from_secs_f64(hold.clamp(0.0, 3600.0));
+            let mut session = Session { recorder: None, assistant: None, quiet, state: RigState::Running, finished: false, faulted: None };
+            while board.now() < until && session.faulted.is_none() {
                 session.turn(&mut board)?;
             }
             session.verdict()?;
@@ -191,12 +192,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             Ok(())
         }
         Order::Save => configure::save(&mut board).map(|()| done("saved, and read back the same")),
-        Order::Arm => session(&mut board, Command::Arm, None, None, quiet),
+        Order::Arm => session(&mut board, Command::Arm, None, None, assistant, quiet),
         Order::Calibrate { esc_is_unpowered: false } => {
             Err("the board will give MAXIMUM pulses: disconnect the ESC's battery, take the propeller off, and say --esc-is-unpowered".into())
         }
         Order::Calibrate { .. } => {
-            session(&mut board, Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM }, None, None, quiet)
+            session(&mut board, Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM }, None, None, assistant, quiet)
         }
         Order::Run { step, hold, top, down, visits, output } => {
             let height = if *step > 0.0 && *step <= 1000.0 { PulseWidth((step * 1000.0).round() as u32) } else { return Err(format!("{step} us: a step is above 0 and up to 1000 us").into()) };
@@ -205,7 +206,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             }
             let run = Command::RunVisits { step: height, hold_ms: (hold * 1000.0) as u32, top: pulse(*top)?, down: *down, visits: *visits };
             let recorder = output.as_ref().map(|o| Recorder::new(o, Vec::new(), quiet)).transpose()?;
-            session(&mut board, Command::Arm, Some(run), recorder, quiet)
+            session(&mut board, Command::Arm, Some(run), recorder, assistant, quiet)
         }
     }
 }
@@ -279,6 +280,7 @@ fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
 /// A conversation that keeps the link alive.
 struct Session {
     recorder: Option<Recorder>,
+    assistant: Option<Assistant>,
     quiet: bool,
     state: RigState,
     finished: bool,
@@ -315,7 +317,20 @@ impl Session {
     fn turn(&mut self, board: &mut Board) -> Result<(), Failure> {
         match board.hear() {
             Heard::Messages(messages) => messages.iter().for_each(|m| self.take(&m.message)),
-            Heard::Gone => return Err("the port is gone; the board stops the motor by itself within its link time-out".into()),
+            Heard::Gone => {
+                return Err(format!("{}; the board stops the motor by itself within its link time-out", board.gone()).into());
+            }
+        }
+        while let Some(beep) = board.beep() {
+            if !self.quiet {
+                println!("the ESC: {}   ({})", sound::heard(beep), sound::meaning(beep));
+            }
+            if self.assistant.is_some() {
+                board.send(Command::Beep(beep))?;
+            }
+        }
+        if let Some(assistant) = &mut self.assistant {
+            assistant.help(board, self.state)?;
         }
         board.keep_alive()
     }
@@ -325,12 +340,43 @@ impl Session {
     }
 }
 
-/// What a typed line asks for; `None` for the end.
-fn typed(line: &str) -> Result<Option<Command>, Failure> {
+/// Hands and ears at a virtual board's bench: switches the ESC on where that is due, and passes on what it beeps.
+#[derive(Default)]
+struct Assistant {
+    /// Since when the board waits for the ESC to be powered.
+    waits: Option<Duration>,
+}
+
+/// How long the assistant takes to the switch.
+const TO_THE_SWITCH: Duration = Duration::from_millis(300);
+
+impl Assistant {
+    fn help(&mut self, board: &mut Board, state: RigState) -> Result<(), Failure> {
+        if !matches!(state, RigState::ArmHoldMin | RigState::CalibrateHoldMax) {
+            self.waits = None;
+        } else if board.now() >= *self.waits.get_or_insert(board.now()) + TO_THE_SWITCH && !board.is_powered() {
+            board.hand(&Hand::Power(true))?;
+        }
+        Ok(())
+    }
+}
+
+/// What a typed line means.
+enum Typed {
+    /// A command for the board.
+    Command(Command),
+    /// A hand at a virtual board's bench.
+    Hand(Hand),
+    /// The end.
+    End,
+}
+
+/// What a typed line asks for; `hands` where there is a bench to lay hands on.
+fn typed(line: &str, hands: bool) -> Result<Typed, Failure> {
     let mut words = line.split_whitespace();
     let (word, value) = (words.next().unwrap_or(""), words.next());
     let number = || value.and_then(|v| v.parse::<f64>().ok()).ok_or_else(|| format!("{line:?}: a number is needed"));
-    Ok(Some(match word {
+    Ok(Typed::Command(match word {
         "" => Command::Ping,
         "long" => Command::Beep(Beep::Long),
         "cells" => Command::Beep(Beep::Cells(number()?.clamp(0.0, 255.0) as u8)),
@@ -343,10 +389,15 @@ fn typed(line: &str) -> Result<Option<Command>, Failure> {
         "run" => Command::RunSchedule,
         "tare" => Command::Tare,
         "stop" => Command::Stop,
-        "quit" => return Ok(None),
+        "quit" => return Ok(Typed::End),
+        "bench" if hands => {
+            let words = line.trim_start().strip_prefix("bench").unwrap_or("");
+            return Ok(Typed::Hand(Hand::parse(words.trim())?));
+        }
         _ => {
+            let bench = if hands { ", or bench and what a hand does there (bench power on)" } else { "" };
             return Err(format!(
-                "{word:?}: type long, cells N, ready, double, programming, nosignal, selftest, set US, run, tare, stop or quit"
+                "{word:?}: type long, cells N, ready, double, programming, nosignal, selftest, set US, run, tare, stop or quit{bench}"
             )
             .into());
         }
@@ -359,9 +410,11 @@ fn session(
     first: Command,
     schedule: Option<Command>,
     recorder: Option<Recorder>,
+    assistant: Option<Assistant>,
     quiet: bool,
 ) -> Result<(), Failure> {
-    let mut session = Session { recorder, quiet, state: RigState::Disarmed, finished: false, faulted: None };
+    let ended = Ended::watch()?;
+    let mut session = Session { recorder, assistant, quiet, state: RigState::Disarmed, finished: false, faulted: None };
     // who it is and how its codes are meant, for the log
     let known = board.ask(
         Command::Identify,
@@ -383,7 +436,7 @@ fn session(
     let talk = (|| -> Result<(), Failure> {
         loop {
             session.turn(board)?;
-            if session.faulted.is_some() || (running && session.finished) {
+            if ended.now() || session.faulted.is_some() || (running && session.finished) {
                 return Ok(());
             }
             if session.state == RigState::Armed
@@ -392,15 +445,19 @@ fn session(
                 board.obey(run, |m| session.take(m))?;
             }
             match input.try_recv() {
-                Ok(line) => match typed(&line) {
-                    Ok(Some(command @ (Command::Beep(_) | Command::Ping))) => board.send(command)?,
-                    Ok(Some(Command::Stop)) => return Ok(()),
-                    Ok(Some(command)) => {
+                Ok(line) => match typed(&line, board.is_virtual()) {
+                    Ok(Typed::Command(command @ (Command::Beep(_) | Command::Ping))) => board.send(command)?,
+                    Ok(Typed::Command(Command::Stop) | Typed::End) => return Ok(()),
+                    Ok(Typed::Command(command)) => {
                         if let Err(refusal) = board.obey(command, |m| session.take(m)) {
                             eprintln!("{refusal}");
                         }
                     }
-                    Ok(None) => return Ok(()),
+                    Ok(Typed::Hand(hand)) => match board.hand(&hand) {
+                        Ok(()) if quiet => {}
+                        Ok(()) => println!("{}", hand.words()),
+                        Err(why) => eprintln!("{why}"),
+                    },
                     Err(mistake) => eprintln!("{mistake}"),
                 },
                 Err(TryRecvError::Disconnected) if !running => return Ok(()),

@@ -1,31 +1,24 @@
 //! A rig board on a pseudo-terminal: the portable firmware against the bench, in real time.
 //!
-//! What it is: one thread that plays board and rig behind the master side of a pseudo-terminal; programs open the other side as
-//! their serial port. The cable can be pulled and put back under the same name, with the board switched on all the while.
+//! What it is: one thread that holds a virtual board behind the master side of a pseudo-terminal, as `quadrig virtual` does; programs open the
+//! other side as their serial port. The cable can be pulled and put back under the same name, with the board switched on all the while.
 //! What can go wrong: a machine that is stopped for longer than the link time-out latches faults, here as on the bench; the
 //! board's time stands still while its own thread is kept waiting.
 //! Units: ms of real time.
 //! Reference: specification `rig.md`; `formats.md`, "Telemetry".
 
-use firmware_rig::Config;
 use frame::message::{Beep, Message};
 use frame::units::{PulseWidth, Ticks};
 use frame::wire::Decoder;
-use hal_sim::native::{Board, Wires};
-use hal_sim::{Bench, EdgeDetail, Millisecond, Scenario, Truth};
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+use hal_sim::{Scenario, Truth};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use virtual_board::{Cable, Hand, Pace, RigBoard, VirtualBoard};
 
 /// What the line does to the bytes of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,48 +32,6 @@ pub enum Line {
 
 /// A noisy line damages one byte in so many.
 const DAMAGED: u64 = 397;
-
-/// The master side of a pseudo-terminal. No program that is started inherits it (it is opened close-on-exec): a port whose master
-/// some child still holds never goes away.
-#[derive(Debug)]
-pub struct Cable {
-    master: File,
-}
-
-impl Cable {
-    /// A new pseudo-terminal in raw mode and the name of its other side.
-    ///
-    /// # Errors
-    /// When the system gives none.
-    pub fn new() -> std::io::Result<(Self, String)> {
-        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
-        grantpt(&master)?;
-        unlockpt(&master)?;
-        let name = ptsname(&master, Vec::new())?.to_string_lossy().into_owned();
-        let slave = open(name.as_str(), OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
-        let mut terminal = tcgetattr(&slave)?;
-        terminal.make_raw(); // or the line would echo what the board says before a program has opened it
-        tcsetattr(&slave, OptionalActions::Now, &terminal)?;
-        fcntl_setfl(&master, fcntl_getfl(&master)? | OFlags::NONBLOCK)?;
-        Ok((Self { master: master.into() }, name))
-    }
-
-    /// Some program has the port open.
-    fn is_open(&self) -> bool {
-        let mut asked = [PollFd::new(&self.master, PollFlags::IN)];
-        poll(&mut asked, Some(&Timespec::default())).is_ok() && !asked[0].revents().contains(PollFlags::HUP)
-    }
-
-    /// What the other side has sent.
-    pub fn hear(&mut self, bytes: &mut [u8]) -> usize {
-        self.master.read(bytes).unwrap_or(0) // nothing there, or nobody: both are silence
-    }
-
-    /// Sends bytes; `false` when they were lost, as on a cable to which nobody listens.
-    pub fn say(&mut self, bytes: &[u8]) -> bool {
-        self.is_open() && self.master.write_all(bytes).is_ok()
-    }
-}
 
 /// What the board has done so far.
 #[derive(Debug, Default)]
@@ -225,25 +176,6 @@ impl Drop for Desk {
     }
 }
 
-/// Paces a board's milliseconds by the clock; a machine that is late makes the board late, not hurried.
-struct Pace {
-    begun: Instant,
-}
-
-/// How far the board may lag behind the clock before its time stands still.
-const LAG: Duration = Duration::from_millis(20);
-
-impl Pace {
-    fn wait(&mut self, ms: u64) {
-        let due = Duration::from_millis(ms);
-        let passed = self.begun.elapsed();
-        if passed > due + LAG {
-            self.begun += passed - due;
-        }
-        std::thread::sleep(due.saturating_sub(passed));
-    }
-}
-
 fn play(
     line: Line,
     scenario: &Scenario,
@@ -253,38 +185,27 @@ fn play(
     done: &Mutex<Done>,
     beeps: &Sender<Beep>,
 ) {
-    let mut bench = Bench::new(scenario, None, EdgeDetail::Captured);
-    let mut board = Board::new(Config::thesis_570kv());
-    let (mut gathered, mut decoder) = (Millisecond::default(), Decoder::default());
+    let mut board = RigBoard::new(scenario, None);
+    let mut decoder = Decoder::default();
     let mut spoiler = Spoiler { line, sent: 0, runs_on: false };
-    let mut frame = PulseWidth::MIN;
-    let mut pace = Pace { begun: Instant::now() };
-    for ms in 1u64.. {
-        if quit.load(Ordering::Relaxed) {
-            return;
-        }
+    let mut pace = Pace::new(1.0);
+    while !quit.load(Ordering::Relaxed) {
+        let ms = board.ms() + 1;
         pace.wait(ms);
-        match ms % 20 {
-            0 => frame = board.pulse(),
-            2 => bench.pulse((ms - 2) * 1_000_000 + u64::from(frame.0), frame.0),
-            _ => {}
-        }
-        bench.set_power(power.load(Ordering::Relaxed));
-        bench.millisecond(&mut gathered);
-        while let Some((_, beep)) = bench.beep() {
-            let _ = beeps.send(beep);
-        }
+        board.hand(&Hand::Power(power.load(Ordering::Relaxed))).expect("the rig has a switch");
         let mut bytes = [0; 512];
         let mut plugged = cable.lock().expect("nobody panics with it");
         let heard = plugged.as_mut().map_or(0, |cable| cable.hear(&mut bytes));
-        board.hear(&bytes[..heard]);
-        board.millisecond(Ticks::from_ms(ms), &gathered, Wires::SOUND);
-        let truth = bench.truth();
+        let sent = board.millisecond(&bytes[..heard]).expect("nothing that could fail");
+        while let Some(beep) = board.beep() {
+            let _ = beeps.send(beep);
+        }
+        let truth = board.meters().expect("the rig's truth");
         let mut seen = done.lock().expect("nobody panics with it");
         seen.pulses.push(board.pulse());
         seen.levels.insert(truth.pulse_us.round() as u32, truth);
         drop(seen);
-        for frame in board.sent().split_inclusive(|byte| *byte == 0) {
+        for frame in sent.split_inclusive(|byte| *byte == 0) {
             let (bytes, whole) = spoiler.spoil(frame, ms);
             let arrived = plugged.as_mut().is_some_and(|cable| cable.say(&bytes));
             let message = frame.iter().find_map(|byte| decoder.push::<Message>(*byte)).map(|received| received.message);

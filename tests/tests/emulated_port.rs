@@ -9,7 +9,6 @@ use frame::rig::RigState;
 use frame::units::PulseWidth;
 use hal_sim::Scenario;
 use hal_sim::emulated::rig::{Action, Heard, Operator, rig};
-use quadrig_tests::desk::Cable;
 use quadrig_tests::{Said, call, quadrig};
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -17,6 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
+use virtual_board::Cable;
 
 /// The board goes off by itself after this time, ms: nobody switched it off.
 const AT_MOST_MS: u64 = 120_000;

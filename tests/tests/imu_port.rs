@@ -1,51 +1,23 @@
 //! `quadrig imu` against the portable IMU board behind a pseudo-terminal.
 
-use firmware_ahrs::console::Asked;
-use firmware_ahrs::{Ahrs, AhrsConfig, CommandLine, Console, Inputs, Sampler};
-use frame::message::SettingsNews;
-use frame::wire::{Encoder, MAX_WIRE};
-use frame::{ImuFormat, Message, Ticks};
-use hal_sim::clock::VirtualClock;
-use hal_sim::imu::{BusFault, ChipKind, Errors, I2cBus, Motion};
+use hal_sim::scenario::ImuScenario;
 use quadrig_tests::call;
-use quadrig_tests::desk::Cable;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use virtual_board::{Cable, ImuBoard, Pace, VirtualBoard};
 
-/// The board at rest, in real time, until it is told to quit. Its idle loop has no flash here.
+/// The board at rest, in real time, until it is told to quit.
 fn play(mut cable: Cable, quit: &AtomicBool) {
-    let clock = VirtualClock::default();
-    let errors = Errors::drawn(4);
-    let mut sampler = Sampler::new(I2cBus::new(clock.clone(), &ChipKind::ALL, Motion::LEVEL, &errors, BusFault::None));
-    let mut console = Console::new(AhrsConfig::default(), Ahrs::hello(168_000_000, 0, sampler.alive()), None);
-    let (mut line, mut encoder) = (CommandLine::new(), Encoder::default());
-    let begun = Instant::now();
-    for tick in 0u64.. {
-        if quit.load(Ordering::Relaxed) {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(5 * tick).saturating_sub(begun.elapsed()));
-        clock.advance_to(5_000_000 * tick);
+    let mut board = ImuBoard::new(&ImuScenario { seed: 4, ..ImuScenario::default() }, None);
+    let mut pace = Pace::new(1.0);
+    while !quit.load(Ordering::Relaxed) {
+        pace.wait(board.ms() + 1);
         let mut bytes = [0; 256];
         let heard = cable.hear(&mut bytes);
-        bytes[..heard].iter().for_each(|b| line.take(*b));
-        let now = Ticks::from_ms(5 * tick);
-        let asked = Asked { heard: line.next_heard(), damaged: line.damaged(), ..Asked::default() };
-        let mut say = |format: ImuFormat, message: &Message| {
-            if format == ImuFormat::Binary {
-                let mut wire = [0; MAX_WIRE];
-                let used = encoder.encode(now, message, &mut wire).expect("it fits");
-                cable.say(&wire[..used]);
-            } else {
-                cable.say(firmware_ahrs::text::line(message).expect("a line").as_bytes());
-                cable.say(&[0]);
-            }
-        };
-        if tick == 0 {
-            console.greet(SettingsNews::Absent, &mut say);
+        let sent = board.millisecond(&bytes[..heard]).expect("nothing that could fail");
+        if !sent.is_empty() {
+            cable.say(&sent);
         }
-        console.tick(&Inputs { now, readings: sampler.read() }, &asked, &mut say);
     }
 }
 
@@ -62,6 +34,7 @@ fn the_words_of_the_board_are_those_of_the_command_line() {
     assert!(imu(&["identify"]).succeeded().out.contains("imu board, firmware 0.1.0, sensors gyro accel mag"));
     let said = imu(&["calibrate", "gyro"]).succeeded().out;
     assert!(said.starts_with("ok\ngyro: offset ") && said.contains("readings 200"), "{said}");
+    assert!(imu(&["save"]).succeeded().out.contains("saved"), "its flash keeps it");
     imu(&["send", "calibrated"]).succeeded();
     imu(&["format", "text"]).succeeded();
     imu(&["stream", "off"]).succeeded();

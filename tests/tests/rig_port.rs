@@ -2,12 +2,13 @@
 
 use frame::message::Beep;
 use frame::units::Ticks;
-use quadrig_tests::desk::{Cable, Desk, Line};
+use quadrig_tests::desk::{Desk, Line};
 use quadrig_tests::{Said, call, quadrig};
 use std::io::Write;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
+use virtual_board::Cable;
 
 /// Rows of a log, each a list of fields, after a look at its head.
 fn rows(log: &Path) -> Vec<Vec<f64>> {

@@ -10,7 +10,7 @@
 //! Reference: rigless 0.4, `soc/stm32f427/memory_map.rs`; The Cargo Book, "Path overrides".
 
 use crate::place::Place;
-use crate::run::{Failure, cargo, output};
+use crate::run::{Failure, cargo, output, run};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -43,6 +43,18 @@ pub(crate) fn with_flash(place: &Place) -> Result<String, Failure> {
         fs::rename(&part, &copy)?;
     }
     Ok(format!("paths=[{:?}]", copy.display().to_string()))
+}
+
+/// Builds the command line with this emulator in it, and puts it where no later build of it replaces it.
+pub(crate) fn program(place: &Place) -> Result<(), Failure> {
+    let config = with_flash(place)?;
+    let words = ["build", "--release", "-p", "quadrig", "--features", "emulated", "--ignore-rust-version", "--config", &config];
+    run(&mut cargo(place, &words))?;
+    let name = |stem: &str| format!("{stem}{}", std::env::consts::EXE_SUFFIX);
+    let target = place.target.join(name("quadrig-emulated"));
+    fs::copy(place.target.join("release").join(name("quadrig")), &target)?;
+    println!("{}", target.display());
+    Ok(())
 }
 
 /// Folder of the crate as cargo has fetched it.

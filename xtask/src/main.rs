@@ -31,6 +31,7 @@ usage: cargo xtask COMMAND
   setup            Rust target of the boards, Python environment of the verdict checker
   image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
                    interrupts reach no panic, and its stack is bounded (budgets/rig.toml)
+  program          the command line with the emulator in it, for --image: target/quadrig-emulated
   image --bless    the same, and make the present sizes (with 2 % headroom) the budget
   ahrs-bench [VARIANT]...  the attitude filter on the shared BROAD trials, their stress variants and the phones' trials, with its targets;
                    each trial of the variants that are named
@@ -55,6 +56,7 @@ fn main() -> ExitCode {
     let done = match words.as_slice() {
         ["setup"] => setup::target(&place).and_then(|()| setup::python(&place).map(|_| ())),
         ["image"] => image::image(&place, false),
+        ["program"] => emulator::program(&place),
         ["image", "--bless"] => image::image(&place, true),
         ["test"] => test::everything(&place),
         ["test", "--quick"] => test::quick(&place),

@@ -50,6 +50,9 @@ use std::collections::VecDeque;
 pub const STEP_NS: u64 = 100_000;
 /// Integration step, s.
 pub const STEP_S: f64 = 1.0e-4;
+/// Standard gravity, m/s^2.
+const G: f64 = 9.806_65;
+
 /// The rig.
 pub struct Bench {
     esc: EscDialogue,
@@ -87,6 +90,8 @@ pub struct Bench {
     output_us: f64,
     edges: VecDeque<Edge>,
     truth: Truth,
+    /// What hands put on the load cell (as lift, N) and on the torque arm, N.m.
+    by_hand: (f64, f64),
 }
 
 impl Bench {
@@ -138,6 +143,7 @@ impl Bench {
             output_us: 1000.0,
             edges: VecDeque::new(),
             truth: Truth::default(),
+            by_hand: (0.0, 0.0),
         }
     }
 
@@ -169,6 +175,22 @@ impl Bench {
     /// The operator's switch: connects or cuts the ESC's power.
     pub fn set_power(&mut self, on: bool) {
         self.esc.set_power(on);
+    }
+
+    /// Hangs a mass on the load cell, gram; it pulls the beam down. 0 takes it off.
+    pub fn hang(&mut self, mass_g: f64) {
+        self.by_hand.0 = -mass_g * 1.0e-3 * G;
+    }
+
+    /// Twists the torque arm from outside, N.m. 0 lets it go.
+    pub fn twist(&mut self, torque_nm: f64) {
+        self.by_hand.1 = torque_nm;
+    }
+
+    /// Sets the bench supply, V. A battery takes no notice.
+    pub fn set_supply(&mut self, voltage_v: f64) {
+        self.base.plant.supply.set(voltage_v);
+        self.refit();
     }
 
     /// The run starts now: from here the effects count their time.

@@ -114,11 +114,11 @@ impl Bench {
             shaking_n: &whirl.force_n,
             torque_nm: &plant.torque_nm,
             temp_c: &plant.temp_c,
-            zero_n: (self.levers.strain_zero_n, self.levers.torque_to_lift),
+            zero_n: (self.levers.strain_zero_n + self.by_hand.0, self.levers.torque_to_lift),
             gain: self.levers.strain_gain,
         };
         let beam_n = self.bridge.block(&mut self.mode, &load, &mut self.strain_v);
-        self.torque_v = self.front.torque_v(plant.torque_nm[STEPS_PER_MS - 1]);
+        self.torque_v = self.front.torque_v(plant.torque_nm[STEPS_PER_MS - 1] + self.by_hand.1);
         self.truth = Truth { pulse_us: self.output_us, plant: plant.last, beam_n, ..self.truth };
         self.steps += STEPS_PER_MS as u64;
     }
@@ -160,12 +160,12 @@ impl Bench {
         }
         let force = lift_n + self.shake_n * speed_rev_s * speed_rev_s * turn_cosine(to + self.heavy_spot_rev);
         let beam_n = self.mode.step(force);
-        let zero_n = self.levers.strain_zero_n + self.levers.torque_to_lift * torque_nm;
+        let zero_n = self.levers.strain_zero_n + self.by_hand.0 + self.levers.torque_to_lift * torque_nm;
         let mut strain_v = self.bridge.step(beam_n, zero_n, self.levers.strain_gain, state.temp_c);
         if !self.rigid {
             torque_nm = self.joints.arm(&self.mount, torque_nm);
         }
-        let mut torque_v = self.front.torque_v(torque_nm);
+        let mut torque_v = self.front.torque_v(torque_nm + self.by_hand.1);
         if self.recorded {
             [strain_v, torque_v] = self.logger.pass([strain_v, torque_v], self.levers.late_s, STEP_S);
         }

@@ -89,6 +89,16 @@ impl ProgrammableFlash {
         self.array.fill(DAMAGED);
     }
 
+    /// Fills the array with what was stored before.
+    pub(super) fn fill(&mut self, sectors: &[u8]) {
+        self.array.iter_mut().zip(sectors).for_each(|(cell, byte)| *cell = *byte);
+    }
+
+    /// What the array holds.
+    pub(super) fn array(&self) -> &[u8] {
+        &self.array
+    }
+
     /// What the array holds, and where it lies, unless it is erased.
     pub(super) fn content(&self) -> Option<(u64, Vec<u8>)> {
         self.array.iter().any(|byte| *byte != 0xff).then(|| (BASE, self.array.clone()))

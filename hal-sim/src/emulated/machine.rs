@@ -163,6 +163,13 @@ impl Machine {
         self
     }
 
+    /// The part with these bytes in its settings' sectors, as many as they are long.
+    #[must_use]
+    pub fn with_settings(mut self, sectors: &[u8]) -> Self {
+        self.mcu.flash.fill(sectors);
+        self
+    }
+
     /// Whether the flash of this emulator can be programmed: `cargo xtask test` builds one that can.
     #[must_use]
     pub fn keeps_settings(&self) -> bool {
@@ -338,6 +345,13 @@ impl Pins<'_> {
     /// Presses the reset key. Levels that were driven from outside are gone afterwards: drive them again.
     pub fn press_reset(&mut self) {
         self.reset = true;
+    }
+
+    /// What the settings' sectors hold, and how often something was stored in them.
+    #[must_use]
+    pub fn settings(&self) -> (&[u8], u32) {
+        let flash = &self.machine.mcu.flash;
+        (flash.array(), flash.stores)
     }
 
     /// Electrical level of a pin.

@@ -11,6 +11,7 @@ use super::flash::Caches;
 use super::machine::{EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
 use crate::bench::{Bench, STEP_NS, Truth};
 use crate::fault::Mishap;
+use crate::native::PLUGS;
 use crate::scenario::Scenario;
 use crate::sensor::EdgeDetail;
 use crate::sensor::adc::{CODES, REFERENCE_V};
@@ -18,6 +19,7 @@ use frame::message::{Beep, Command, Message};
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::units::Ticks;
 use frame::wire::{Decoder, Encoder, LinkStats, MAX_WIRE};
+use std::path::Path;
 
 /// Capture channels: pin of port A with AF1, and channel of TIM2.
 const CAPTURE_PINS: [(u8, u8); CAPTURE_CHANNELS] = [(0, 1), (1, 2), (2, 3), (3, 4)];
@@ -84,6 +86,19 @@ pub enum Action {
     Mishap(Mishap),
     /// The rotor turns the other way round, as channel B of the encoder shows it.
     Backwards(bool),
+    /// Hangs a mass on the load cell, gram; 0 takes it off.
+    Hang(f64),
+    /// Twists the torque arm, N.m; 0 lets it go.
+    Twist(f64),
+    /// Sets the bench supply, V.
+    Supply(f64),
+    /// Pulls a plug (capture channels first, then analogue ones), or puts it back.
+    Plug {
+        /// Which.
+        plug: usize,
+        /// Out.
+        out: bool,
+    },
 }
 
 /// What an operator learns in a millisecond.
@@ -102,6 +117,17 @@ pub trait Operator: Send {
 
     /// Called every millisecond with the bytes that the board has sent since; what is pushed onto `say` goes to the board as it is.
     fn line(&mut self, _heard: &[u8], _say: &mut Vec<u8>) {}
+
+    /// Called every millisecond with what is really there.
+    fn see(&mut self, _truth: &Truth) {}
+
+    /// Called after a millisecond in which the board stored something, with what its settings' sectors hold now.
+    fn stored(&mut self, _sectors: &[u8]) {}
+
+    /// Whether messages and truth are kept for [`RigRun`]: whoever plays for hours has no room for them.
+    fn keeps_record(&self) -> bool {
+        true
+    }
 
     /// Whether the board is switched off now, before its time.
     fn is_over(&self) -> bool {
@@ -150,6 +176,9 @@ pub struct RigWorld<O> {
     stops: Vec<u64>,
     /// When the control tick is given back, ms.
     tick_back: Option<u64>,
+    plugs_out: [bool; PLUGS],
+    /// Stores to the flash that the operator knows of.
+    stores: u32,
 }
 
 impl<O: Operator> RigWorld<O> {
@@ -178,6 +207,8 @@ impl<O: Operator> RigWorld<O> {
             stop_at: None,
             stops: Vec::new(),
             tick_back: None,
+            plugs_out: [false; PLUGS],
+            stores: 0,
         }
     }
 
@@ -235,6 +266,7 @@ impl<O: Operator> RigWorld<O> {
         while let Some(edge) = self.bench.edge_until(now_ns) {
             let (_, channel) = CAPTURE_PINS[usize::from(edge.channel)];
             let stuck = self.mishap == Some(Mishap::StuckLine { channel: edge.channel });
+            let stuck = stuck || self.plugs_out[usize::from(edge.channel)];
             if self.connected && edge.channel == ENCODER {
                 pins.drive(Port::A, ENCODER_B_PIN, edge.rising == self.backwards); // B is 90 deg behind A, or ahead of it
             }
@@ -276,7 +308,9 @@ impl<O: Operator> RigWorld<O> {
         let bytes = pins.heard();
         for byte in &bytes[self.read.min(bytes.len())..] {
             if let Some(received) = self.decoder.push::<Message>(*byte) {
-                self.messages.push((received.at, received.message));
+                if self.operator.keeps_record() {
+                    self.messages.push((received.at, received.message));
+                }
                 heard.push(Heard::Board(received.message));
             }
         }
@@ -346,6 +380,14 @@ impl<O: Operator> RigWorld<O> {
                 Action::FailAccess => pins.fail_access(),
                 Action::Reset => self.reset(ms, pins),
                 Action::StartRun => self.bench.start_run(),
+                Action::Hang(mass_g) => self.bench.hang(mass_g),
+                Action::Twist(torque_nm) => self.bench.twist(torque_nm),
+                Action::Supply(voltage_v) => self.bench.set_supply(voltage_v),
+                Action::Plug { plug, out } => {
+                    if let Some(is_out) = self.plugs_out.get_mut(plug) {
+                        *is_out = out;
+                    }
+                }
             }
         }
     }
@@ -364,6 +406,7 @@ impl<O: Operator> World for RigWorld<O> {
                     Some(Mishap::Saturated { channel, high }) if usize::from(channel) == n => {
                         f64::from(u8::from(high)) * 5000.0 - 400.0
                     }
+                    _ if self.plugs_out[CAPTURE_CHANNELS + n] => -400.0, // pulled down
                     _ => self.bench.voltages()[n] * (CODES / REFERENCE_V),
                 };
                 pins.set_adc(*input, counts);
@@ -381,7 +424,16 @@ impl<O: Operator> World for RigWorld<O> {
                 if pins.has_failed() {
                     self.reset(self.next_ms, pins);
                 }
-                self.truth.push((now_ns, self.bench.truth()));
+                let truth = self.bench.truth();
+                self.operator.see(&truth);
+                let (sectors, stores) = pins.settings();
+                if stores != self.stores {
+                    self.stores = stores;
+                    self.operator.stored(sectors);
+                }
+                if self.operator.keeps_record() {
+                    self.truth.push((now_ns, truth));
+                }
                 self.next_ms += 1;
             }
             self.bench.advance_to(now_ns + STEP_NS);
@@ -441,8 +493,21 @@ pub fn rig_on<O: Operator + 'static>(
     operator: O,
     milliseconds: u64,
 ) -> Result<RigRun<O>, EmulatedError> {
-    let elf = firmware("firmware-rig")?;
-    let (outcome, machine) = run(&elf, machine, RigWorld::new(scenario, operator), milliseconds * MS)?;
+    rig_from(&firmware("firmware-rig")?, machine, scenario, operator, milliseconds)
+}
+
+/// The same with the image at `elf`.
+///
+/// # Errors
+/// As [`rig`].
+pub fn rig_from<O: Operator + 'static>(
+    elf: &Path,
+    machine: Machine,
+    scenario: &Scenario,
+    operator: O,
+    milliseconds: u64,
+) -> Result<RigRun<O>, EmulatedError> {
+    let (outcome, machine) = run(elf, machine, RigWorld::new(scenario, operator), milliseconds * MS)?;
     let Outcome { world, telemetry, now_ns, instructions, accesses } = outcome;
     Ok(RigRun {
         operator: world.operator,

@@ -117,6 +117,13 @@ impl I2cBus {
         self
     }
 
+    /// The same bus, whose chips keep nothing of what they hand out.
+    #[must_use]
+    pub fn forgetful(mut self) -> Self {
+        self.chips.iter_mut().for_each(|chip| chip.forgetful = true);
+        self
+    }
+
     /// What each chip handed out, in the order of [`ChipKind::ALL`]; nothing of a chip that is not fitted.
     #[must_use]
     pub fn served(&self) -> [&[Served]; 3] {

@@ -96,8 +96,10 @@ pub struct SensorChip {
     multiple: bool,
     pointer_comes: bool,
     driving: bool,
-    /// Everything that it handed out.
+    /// Everything that it handed out, as far as it keeps it.
     pub served: Vec<Served>,
+    /// It keeps nothing of what it hands out: a board that runs for days would fill the memory.
+    pub forgetful: bool,
     /// Reads whose last byte was acknowledged, so that the chip still drove the bus at their end.
     pub unfinished: u32,
 }
@@ -123,6 +125,7 @@ impl SensorChip {
             pointer_comes: false,
             driving: false,
             served: Vec::new(),
+            forgetful: false,
             unfinished: 0,
         }
     }
@@ -228,7 +231,9 @@ impl SensorChip {
         };
         let (first, count) = self.kind.data();
         self.registers[usize::from(first)..usize::from(first + count)].copy_from_slice(&bytes);
-        self.served.push(Served { at_ns, words });
+        if !self.forgetful {
+            self.served.push(Served { at_ns, words });
+        }
     }
 
     /// A start or stop came: a chip whose last byte was acknowledged still drives SDA then, and the bus locks up.

@@ -15,9 +15,9 @@ use frame::wire::{Encoder, MAX_WIRE};
 use frame::{ImuSample, wire};
 
 /// Time between two ticks, ns.
-const TICK_NS: u64 = 1_000_000_000 / TICK_HZ as u64;
+pub(super) const TICK_NS: u64 = 1_000_000_000 / TICK_HZ as u64;
 /// Core clock that the board's greeting names, Hz.
-const CORE_HZ: u32 = 168_000_000;
+pub(super) const CORE_HZ: u32 = 168_000_000;
 
 /// What is on the bus and around it.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,6 +6,7 @@
 //! Units: ticks of 84 MHz.
 //! Reference: house rules 1 (ticks without I/O) and 12 (one shell, many hosts).
 
+use super::sectors::Sectors;
 use crate::bench::Millisecond;
 use firmware_rig::queue::CAPACITY;
 use firmware_rig::{Config, Delivered, Rig, RigConfig, RigConsole, Start};
@@ -18,6 +19,8 @@ pub const POWER_ON: u8 = 0x0E;
 pub const WATCHDOG: u8 = 0x24;
 /// Reset cause of a panic: software's flag and the pin's.
 pub const SOFTWARE: u8 = 0x14;
+/// Reset cause of the reset key: the pin's flag alone.
+pub const PIN: u8 = 0x04;
 /// The crystal of a board on a desk, Hz.
 const CRYSTAL: ClockNews = ClockNews { crystal_hz: 8_000_000, measured_hz: 8_000_000 };
 /// Ticks that the self-test's trial holds up.
@@ -41,22 +44,54 @@ impl Wires {
 pub struct Board {
     console: RigConsole,
     factory: Config,
-    flash: Option<RigConfig>,
+    flash: Flash,
     stored: Option<SettingsNews>,
     pulse: PulseWidth,
     late: u32,
+}
+
+/// The settings' sectors and what was found in them.
+#[derive(Clone)]
+struct Flash {
+    /// `None` while they are erased: most boards of a campaign never store anything.
+    sectors: Option<Sectors>,
+    found: Option<RigConfig>,
+    news: SettingsNews,
+    /// Saves so far.
+    saves: u32,
+}
+
+impl Flash {
+    const ERASED: Self = Self { sectors: None, found: None, news: SettingsNews::Absent, saves: 0 };
+
+    fn holding(mut sectors: Sectors) -> Self {
+        let (found, news) = settings_store::load(&mut sectors, Sectors::RANGE);
+        Self { sectors: Some(sectors), found, news, saves: 0 }
+    }
+
+    fn save(&mut self, settings: &RigConfig) -> SettingsNews {
+        let mut sectors = self.sectors.take().unwrap_or_default();
+        let told = settings_store::save(&mut sectors, Sectors::RANGE, settings);
+        *self = Self { saves: self.saves + 1, ..Self::holding(sectors) };
+        told
+    }
 }
 
 impl Board {
     /// A board that is switched on, with nothing in its flash.
     #[must_use]
     pub fn new(factory: Config) -> Self {
-        Self::start(Ticks(0), factory, None, POWER_ON, None)
+        Self::start(Ticks(0), factory, Flash::ERASED, POWER_ON, None)
     }
 
-    fn start(now: Ticks, factory: Config, flash: Option<RigConfig>, reset_cause: u8, ended: Option<Event>) -> Self {
-        let news = if flash.is_some() { SettingsNews::Loaded } else { SettingsNews::Absent };
-        let start = Start { reset_cause, clock: CRYSTAL, stored: flash, news, ended };
+    /// A board that is switched on, with `sectors` in the place of its own.
+    #[must_use]
+    pub fn with_flash(factory: Config, sectors: Sectors) -> Self {
+        Self::start(Ticks(0), factory, Flash::holding(sectors), POWER_ON, None)
+    }
+
+    fn start(now: Ticks, factory: Config, flash: Flash, reset_cause: u8, ended: Option<Event>) -> Self {
+        let start = Start { reset_cause, clock: CRYSTAL, stored: flash.found, news: flash.news, ended };
         let console = RigConsole::start(now, factory.clone(), &start);
         Self { console, factory, flash, stored: None, pulse: PulseWidth::MIN, late: 0 }
     }
@@ -64,7 +99,7 @@ impl Board {
     /// The same board after a reset of the given cause: its flash is what it was.
     #[must_use]
     pub fn after_reset(&self, now: Ticks, reset_cause: u8) -> Self {
-        Self::start(now, self.factory.clone(), self.flash, reset_cause, None)
+        Self::start(now, self.factory.clone(), self.flash.clone(), reset_cause, None)
     }
 
     /// The portable firmware, for reading.
@@ -109,8 +144,7 @@ impl Board {
         };
         let orders = self.console.tick(&delivered, |pulse| self.pulse = pulse);
         if orders.store {
-            self.flash = Some(self.console.rig().settings());
-            self.stored = Some(SettingsNews::Saved);
+            self.stored = Some(self.flash.save(&self.console.rig().settings()));
         }
         match orders.trial {
             Some(Trial::Late) => self.late = LATE_TICKS,
@@ -120,14 +154,20 @@ impl Board {
         }
     }
 
-    /// A millisecond of a session: the bytes of the host, then the tick; while the board's supply is gone (`dark`) it is in reset.
-    pub(super) fn pass(&mut self, now: Ticks, gathered: &Millisecond, bytes: &[u8], dark: bool) {
+    /// The bytes of the host, then the tick; while the board's supply is gone (`dark`) it is in reset.
+    pub(super) fn pass(&mut self, now: Ticks, gathered: &Millisecond, bytes: &[u8], wires: Wires, dark: bool) {
         if dark {
             *self = self.after_reset(now, POWER_ON);
         } else {
             self.hear(bytes);
-            self.millisecond(now, gathered, Wires::SOUND);
+            self.millisecond(now, gathered, wires);
         }
+    }
+
+    /// The settings' sectors, once something was stored in them, and how often that was.
+    #[must_use]
+    pub fn flash(&self) -> (Option<&Sectors>, u32) {
+        (self.flash.sectors.as_ref(), self.flash.saves)
     }
 
     /// Takes the bytes that the board has sent.

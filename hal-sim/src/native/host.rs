@@ -7,7 +7,7 @@
 //! Reference: Beharie 2013 Figure 3.10 and Appendix C; specification `rig.md`, "ESC pulse and arming".
 
 use super::SimError;
-use crate::bench::Bench;
+use super::desk::RigDesk;
 use crate::scenario::{Scenario, Schedule, pulse_width};
 use frame::calibration::Calibration;
 use frame::message::{Command, Event, Hello, Message};
@@ -160,16 +160,16 @@ impl Host {
 
     /// A run that its faults have stopped is recorded for as long as its schedule would have taken.
     pub(super) fn give_up(&mut self, ms: u64, over: bool) {
-        if over && self.phase != Phase::Done {
+        if over && self.tolerant && self.phase != Phase::Done {
             self.enter(Phase::Done, ms);
         }
     }
 
     /// Goes on to the next phase when this one has come to its end.
-    pub(super) fn step(&mut self, ms: u64, bench: &mut Bench) {
+    pub(super) fn step(&mut self, ms: u64, desk: &mut RigDesk) {
         let age = ms - self.since_ms;
         let idle = self.outbox.is_empty() && self.waiting.is_none();
-        while let Some((_, beep)) = bench.beep() {
+        while let Some(beep) = desk.beep() {
             self.outbox.push_back(Command::Beep(beep));
         }
         match self.phase {
@@ -179,7 +179,7 @@ impl Host {
             }
             Phase::Arming => {
                 if self.state == RigState::ArmHoldMin && ms == self.state_ms + SWITCH_AFTER_MS {
-                    bench.set_power(true);
+                    desk.power(true);
                 }
                 if self.state == RigState::Armed {
                     self.enter(Phase::Settling, ms);

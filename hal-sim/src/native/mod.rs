@@ -8,23 +8,27 @@
 
 pub mod ahrs;
 mod board;
+mod desk;
 mod host;
+mod imu_desk;
 mod pins;
 mod record;
+mod sectors;
 
-pub use board::{Board, POWER_ON, SOFTWARE, WATCHDOG, Wires};
+pub use board::{Board, PIN, POWER_ON, SOFTWARE, WATCHDOG, Wires};
+pub use desk::{PLUGS, RigDesk};
+pub use imu_desk::ImuDesk;
 pub use pins::{PinRecord, PinsError};
 pub use record::{RunRecord, SimError};
+pub use sectors::{Refused, Sectors};
 
-use crate::bench::{Bench, Millisecond, Truth};
-use crate::noise::{Source, Stream};
+use crate::bench::Truth;
 use crate::plant::Powerplant;
-use crate::scenario::{FaultKind, Scenario, ScheduledFault};
-use crate::sensor::EdgeDetail;
+use crate::scenario::Scenario;
 use firmware_rig::{AdcBlock, Config};
 use frame::message::Message;
 use frame::rig::RigSample;
-use frame::units::{PulseWidth, Ticks};
+use frame::units::Ticks;
 use frame::wire::MAX_WIRE;
 use host::{Host, Phase};
 
@@ -53,7 +57,7 @@ pub fn run(
 ) -> Result<RunRecord, SimError> {
     let mut session = Session::new(scenario, plant);
     while session.step()? {
-        if session.ms.is_multiple_of(1000) {
+        if session.desk.ms().is_multiple_of(1000) {
             progress(session.share());
         }
     }
@@ -64,19 +68,12 @@ pub fn run(
 
 /// A native run that is taken a millisecond at a time: to pause, to single-step, to watch, to record its pins.
 pub struct Session {
-    bench: Bench,
+    desk: RigDesk,
     host: Host,
-    board: Board,
-    gathered: Millisecond,
     telemetry: Vec<u8>,
     truth: Vec<Truth>,
-    frame_pulse: PulseWidth,
-    ms: u64,
     run_s: f64,
     limit_ms: u64,
-    faults: Vec<ScheduledFault>,
-    line: Stream,
-    dark: bool,
     pins: Option<PinRecord>,
 }
 
@@ -84,21 +81,13 @@ impl Session {
     /// A rig, a board and a host, none of them switched on.
     #[must_use]
     pub fn new(scenario: &Scenario, plant: Option<Box<dyn Powerplant>>) -> Self {
-        let config = firmware_config(scenario);
         Self {
-            bench: Bench::new(scenario, plant, EdgeDetail::Captured),
+            desk: RigDesk::new(scenario, plant, Board::new(firmware_config(scenario))),
             host: Host::new(scenario),
-            board: Board::new(config),
-            gathered: Millisecond::default(),
             telemetry: Vec::new(),
             truth: Vec::new(),
-            frame_pulse: PulseWidth::MIN,
-            ms: 0,
             run_s: scenario.run_s(),
             limit_ms: (scenario.run_s() * 1000.0) as u64 + OVERHEAD_MS,
-            faults: scenario.faults.clone(),
-            line: Stream::new(scenario.seed, Source::Line, 0),
-            dark: false,
             pins: None,
         }
     }
@@ -117,7 +106,7 @@ impl Session {
     /// Simulated time since reset, s.
     #[must_use]
     pub fn now_s(&self) -> f64 {
-        self.ms as f64 * 1.0e-3
+        self.desk.ms() as f64 * 1.0e-3
     }
 
     /// What the host is doing.
@@ -129,7 +118,7 @@ impl Session {
     /// What is really there.
     #[must_use]
     pub fn truth(&self) -> Truth {
-        self.bench.truth()
+        self.desk.truth()
     }
 
     /// The sample that arrived last.
@@ -138,24 +127,17 @@ impl Session {
         self.host.samples.last().copied()
     }
 
+    /// Every byte that reached the host so far.
+    #[must_use]
+    pub fn telemetry(&self) -> &[u8] {
+        &self.telemetry
+    }
+
     /// Share of the logged run that is done.
     #[must_use]
     pub fn share(&self) -> f64 {
-        let now = Ticks::from_ms(self.ms).as_s();
+        let now = Ticks::from_ms(self.desk.ms()).as_s();
         self.host.start.map_or(0.0, |s| (now - s.as_s()) / self.run_s).min(1.0)
-    }
-
-    /// Time of the run, s; negative before it.
-    fn run_time(&self) -> f64 {
-        self.host.start.map_or(-1.0, |start| Ticks::from_ms(self.ms).as_s() - start.as_s())
-    }
-
-    fn on(&self, wanted: impl Fn(&FaultKind) -> bool) -> Option<FaultKind> {
-        if self.faults.is_empty() {
-            return None;
-        }
-        let run_s = self.run_time();
-        self.faults.iter().find(|f| f.is_on(run_s) && wanted(&f.kind)).map(|f| f.kind)
     }
 
     /// One millisecond; `false` once the run is over.
@@ -166,87 +148,43 @@ impl Session {
         if self.host.phase == Phase::Done {
             return Ok(false);
         }
-        self.ms += 1;
-        let ms = self.ms;
-        let dark = self.on(|k| matches!(k, FaultKind::BrownOut)).is_some();
-        if dark != self.dark {
-            self.bench.set_power(!dark);
-            self.dark = dark;
-        }
-        // The timer takes a new pulse at the start of a 20 ms frame; the pulse has ended 2 ms later at the latest.
-        match ms % 20 {
-            0 => self.frame_pulse = self.board.pulse(),
-            2 if !dark => self.bench.pulse((ms - 2) * 1_000_000 + u64::from(self.frame_pulse.0), self.frame_pulse.0),
-            _ => {}
-        }
-        self.bench.millisecond(&mut self.gathered);
-        let run_s = if self.faults.is_empty() { -1.0 } else { self.run_time() };
-        for fault in self.faults.iter().filter(|f| f.is_on(run_s)) {
-            if let FaultKind::AdcStuck { channel, high } = fault.kind
-                && let Some(block) = self.gathered.adc.get_mut(usize::from(channel))
-            {
-                *block = stuck(block.count, high);
-            }
-        }
+        self.desk.turn();
+        let ms = self.desk.ms();
         let now = Ticks::from_ms(ms);
-        self.host.step(ms, &mut self.bench);
-        let mut bytes = Vec::new();
+        self.host.step(ms, &mut self.desk);
+        let mut wire = [0; MAX_WIRE];
+        let mut said = 0;
         if let Some(wanted) = self.host.send(ms) {
-            let mut frame = [0; MAX_WIRE];
-            let length = self.host.encoder.encode(now, &wanted, &mut frame).map_err(|_| SimError::Codec)?;
-            if self.on(|k| matches!(k, FaultKind::LinkLost)).is_none() {
-                bytes = frame[..length].to_vec();
-            }
+            said = self.host.encoder.encode(now, &wanted, &mut wire).map_err(|_| SimError::Codec)?;
         }
+        let heard = self.desk.let_through(wire.get(..said).unwrap_or(&[]));
         if let Some(pins) = &mut self.pins {
-            pins.take(&self.gathered, &bytes, dark);
+            let (gathered, dark) = self.desk.pins();
+            pins.take(gathered, heard, dark);
         }
-        self.board.pass(now, &self.gathered, &bytes, dark);
-        if !dark {
-            self.deliver(now)?;
-        }
+        let mut sent = self.desk.tick(heard);
+        self.deliver(&sent)?;
+        self.telemetry.append(&mut sent);
         if self.host.phase != Phase::Done && ms > self.limit_ms {
             return Err(SimError::Stuck { phase: self.host.phase.name(), state: self.host.state, at_s: now.as_s() });
         }
-        if !self.faults.is_empty() {
-            self.host.give_up(ms, self.run_time() > self.run_s);
-        }
+        self.host.give_up(ms, self.desk.run_s() > self.run_s);
         Ok(self.host.phase != Phase::Done)
     }
 
-    /// The board's bytes reach the host, as far as the line lets them.
-    fn deliver(&mut self, now: Ticks) -> Result<(), SimError> {
-        let mut sent = self.board.sent();
-        if sent.is_empty() {
-            return Ok(());
-        }
-        let dropped = self.on(|k| matches!(k, FaultKind::TelemetryDropped { .. }));
-        let corrupted = self.on(|k| matches!(k, FaultKind::TelemetryCorrupted { .. }));
-        if let Some(FaultKind::TelemetryDropped { probability }) = dropped
-            && self.line.uniform() < probability
-        {
-            sent.clear();
-        }
-        if let Some(FaultKind::TelemetryCorrupted { probability }) = corrupted {
-            for byte in &mut sent {
-                if self.line.uniform() < probability {
-                    *byte ^= 1 << ((self.line.uniform() * 8.0) as u32).min(7);
-                }
-            }
-        }
+    /// The board's bytes reach the host.
+    fn deliver(&mut self, sent: &[u8]) -> Result<(), SimError> {
         let recorded = self.host.samples.len();
-        for byte in &sent {
+        for byte in sent {
             if let Some(received) = self.host.decoder.push::<Message>(*byte) {
-                self.host.take(received.message, self.ms)?;
+                self.host.take(received.message, self.desk.ms())?;
             }
         }
-        self.telemetry.append(&mut sent);
         if self.host.samples.len() > recorded {
             if recorded == 0 {
-                self.bench.start_run();
+                self.desk.start_run();
             }
-            let run_s = (now.as_s() - self.host.start.unwrap_or(now).as_s()).max(0.0);
-            self.truth.push(Truth { run_s, ..self.bench.truth() });
+            self.truth.push(Truth { run_s: self.desk.run_s().max(0.0), ..self.desk.truth() });
         }
         Ok(())
     }

@@ -7,7 +7,7 @@
 //! Units: ticks of 84 MHz modulo 2^32; 12-bit codes.
 //! Reference: postcard wire format 1.0; house rule 1 (ticks without I/O).
 
-use super::board::Board;
+use super::board::{Board, Wires};
 use super::firmware_config;
 use crate::bench::Millisecond;
 use crate::scenario::Scenario;
@@ -139,7 +139,7 @@ impl PinRecord {
             let now = Ticks::from_ms(i as u64 + 1);
             gathered.edges.clone_from(&one.edges);
             gathered.adc = one.adc.map(|(sum, sum_sq, count, min, max)| AdcBlock { sum, sum_sq, count, min, max });
-            board.pass(now, &gathered, &one.line, one.reset);
+            board.pass(now, &gathered, &one.line, Wires::SOUND, one.reset);
             if !one.reset {
                 sent.append(&mut board.sent());
             }

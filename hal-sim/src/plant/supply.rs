@@ -45,6 +45,13 @@ impl Supply {
         Self { source, resistance_ohm, drawn_as: 0.0 }
     }
 
+    /// Sets a bench supply's voltage, V; a battery has no knob.
+    pub fn set(&mut self, volts: f64) {
+        if let Source::Bench { voltage_v } = &mut self.source {
+            *voltage_v = volts;
+        }
+    }
+
     /// Voltage without load, V.
     #[must_use]
     pub fn open_circuit_v(&self) -> f64 {

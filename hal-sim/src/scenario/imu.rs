@@ -118,6 +118,13 @@ pub struct ChipSection {
     pub noise: Option<f64>,
 }
 
+impl Default for ImuScenario {
+    /// A board that lies still and level, its chips off by what the data sheets allow.
+    fn default() -> Self {
+        Self { name: String::new(), seed: 1, imu: ImuSection::default(), effects: Vec::new(), faults: Vec::new() }
+    }
+}
+
 impl Default for ImuSection {
     fn default() -> Self {
         Self {
