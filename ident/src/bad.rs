@@ -8,11 +8,14 @@
 //! Reference: contaminated normal distribution, Tukey 1960; Lange, Little & Taylor 1989 (Student's t for robust modelling).
 
 mod curve;
+mod dropout;
 mod excursion;
 mod scale;
 mod spike;
 mod stuck;
 mod witness;
+
+pub(crate) use curve::Curve;
 
 use crate::log::{Column, Log, MODELLED, SPEED};
 use excursion::Event;
@@ -86,6 +89,9 @@ pub fn found(log: &Log) -> Vec<SetAside> {
         if samples < FEWEST {
             continue;
         }
+        // a probe that has lost its mark reads nothing, however often: no effect speaks of it
+        let lost = if SPEED.contains(&name) { dropout::found(&witnesses, name) } else { Vec::new() };
+        witnesses.take_out(name, &lost);
         let mut events = stuck::found(&witnesses, name);
         witnesses.take_out(name, &events);
         // a probe's recovery belongs to its drop-out; elsewhere a single reading stands by itself
@@ -96,7 +102,9 @@ pub fn found(log: &Log) -> Vec<SetAside> {
             witnesses.take_out(name, &more);
             events.extend(more);
         }
-        let (events, recurring) = of_no_effect(name, column, events, samples, speeds);
+        let (mut events, recurring) = of_no_effect(name, column, events, samples, speeds);
+        events.extend(lost);
+        events.sort_by_key(|e| e.rows.start);
         witnesses.settle(name, &events);
         kept.extend(recurring.iter().filter_map(|e| Some(SetAside { recurs: true, ..told(log, name, column, e)? })));
         of_channels.push((name, column, events));
@@ -127,7 +135,7 @@ pub fn without<'l>(log: &'l Log, aside: &[SetAside]) -> Cow<'l, Log> {
         Column { name: c.name.clone(), values }
     };
     let columns = log.columns.iter().map(of_column).collect();
-    Cow::Owned(Log { name: log.name.clone(), meta: log.meta.clone(), t: log.t.clone(), columns })
+    Cow::Owned(Log { name: log.name.clone(), meta: log.meta.clone(), t: log.t.clone(), columns, sha256: log.sha256.clone() })
 }
 
 impl SetAside {

@@ -19,7 +19,7 @@ use crate::leftover;
 use crate::log::Log;
 use crate::long::diagnose_any;
 use crate::marks;
-use crate::model::Model;
+use crate::model::{FittedTo, Model};
 use crate::residual::whiteness;
 use crate::rivals::UNEXPLAINED;
 use crate::search::refine;
@@ -63,13 +63,15 @@ pub struct Closed {
 /// # Errors
 /// [`CloseError`] when no channel can be fitted.
 pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut dyn FnMut(f64)) -> Result<Closed, CloseError> {
+    let whole = log;
     let left_out = sparse::left_out(log);
     let log = &*sparse::without(log, &left_out);
     let aside = bad::found(log);
     let log = &*bad::without(log, &aside);
     let mut context = Context::of_clean(log, model.map(|m| m.start_pulse_us));
     context.leave_aside(aside);
-    let declared = Declared { model };
+    let model = model.map(|m| m.on(whole));
+    let declared = Declared { model: model.as_deref() };
     context.against(declared);
     let refused = || CloseError::NoRelation { run: log.name.clone() };
     if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > sparse::TOO_FEW) {
@@ -86,8 +88,13 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let fit = &diagnosis.best.fit;
     let estimates = found.estimates.unwrap_or_else(|| diagnosis.estimates.clone());
     let estimates: Vec<Vec<Estimate>> = (0..fit.placed.len()).map(|k| estimates.get(k).cloned().unwrap_or_default()).collect();
+    let runs = vec![FittedTo::of(whole)];
     let left = |model: Model, fit: &Fit| {
-        model.leaving(&context, leftover::of(&context, declared, fit), course::of(&context, declared, fit))
+        Model { runs: runs.clone(), ..model }.leaving(
+            &context,
+            leftover::of(&context, declared, fit),
+            course::of(&context, declared, fit),
+        )
     };
     let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
     let mut after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit);
@@ -270,8 +277,9 @@ pub(crate) fn parameter(e: &Estimate, shapes: &[Shape]) -> Parameter {
     Parameter { name: e.name.clone(), value: e.value, unit: e.unit.clone(), ci95 }
 }
 
-/// Both models on another run of the same rig, as they stand.
+/// Both models on another run of the same rig, as far as they carry over.
 pub(crate) fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
+    let (before, after) = (&*before.on(other), &*after.on(other));
     let context = Context::new(other, Some(after.start_pulse_us));
     let error = |model: &Model, name: &'static str| -> Option<f64> {
         let prediction = model.predict(&context, name)?;

@@ -9,10 +9,9 @@
 
 use crate::beside::is_named;
 use crate::context::{Context, Target};
-use crate::design::Label;
 use crate::effects::{Effect, Estimate, Instance};
 use crate::heldout::Held;
-use crate::hypothesis::{Declared, Designs, Fit, Placed, is_plausible};
+use crate::hypothesis::{Declared, Fit, Placed, is_plausible, part_of};
 
 /// Share by which the error of a channel may be larger with the names than before.
 const WORSE: f64 = 0.02;
@@ -121,25 +120,9 @@ fn cancel(a: &[f64], b: &[f64], floor: f64) -> bool {
     smaller > LARGE * floor && rms(&|j| a[j] + b[j]) < CANCELLED * smaller
 }
 
-/// What an effect adds to the prediction of a target, on its rows, all other coefficients as they are, about its mean.
+/// What an effect adds to the prediction of a target, about its mean.
 fn contribution(context: &Context, declared: Declared<'_>, fit: &Fit, k: usize, target: usize) -> Vec<f64> {
-    let (of, fitted) = (&context.targets[target], &fit.targets[target]);
-    let whole = Designs::new(context, declared, &fit.placed).of(of).predict(&fitted.coefficients, context.len());
-    let mut others = fit.placed.clone();
-    others.remove(k);
-    let mut designs = Designs::new(context, declared, &others);
-    let design = designs.of(of);
-    let as_before = |label: Label| match label {
-        Label::Effect { effect, amplitude } if effect >= k => Label::Effect { effect: effect + 1, amplitude },
-        other => other,
-    };
-    let coefficient = |label: Label| {
-        let at = fitted.labels.iter().position(|l| *l == as_before(label));
-        at.map_or(0.0, |at| fitted.coefficients[at])
-    };
-    let coefficients: Vec<f64> = design.columns.iter().map(|c| coefficient(c.label)).collect();
-    let rest = design.predict(&coefficients, context.len());
-    let part: Vec<f64> = of.rows.iter().map(|row| whole[*row] - rest[*row]).collect();
+    let part = part_of(context, declared, fit, k, target);
     let mean = part.iter().sum::<f64>() / part.len().max(1) as f64;
     part.into_iter().map(|v| v - mean).collect()
 }

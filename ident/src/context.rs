@@ -24,7 +24,7 @@ mod consensus;
 mod stretches;
 
 pub use consensus::Consensus;
-pub(crate) use stretches::{CALM_US, STILL_US};
+pub(crate) use stretches::{CALM_US, GAP, STILL_US, starts};
 
 /// Efficiency of ESC and motor at work: 0.65 to 0.85 for motors of this size.
 const EFFICIENCY: f64 = 0.75;
@@ -244,6 +244,21 @@ impl Target {
         if self.trust.is_empty() { 0.01 } else { 1.0 }
     }
 
+    /// Widens the variance of the samples whose speed was bridged by what the speed's own makes of it.
+    fn allow_for_speed(&mut self, context: &Context) {
+        let x = |row: usize| context.rpm[row] / 1000.0;
+        let points = self.rows.iter().zip(&self.y).map(|(i, v)| (x(*i), *v, 1.0));
+        let Some(fit) = Normal::of_polynomial(self.relation.degree(), points).solve() else { return };
+        let slope = |x: f64| {
+            let terms = fit.coefficients.iter().enumerate().skip(1);
+            terms.map(|(k, c)| k as f64 * c * x.powi(k as i32 - 1)).sum::<f64>()
+        };
+        let of_speed = |row: usize| (slope(x(row)) * context.rpm_sd[row] / 1000.0).powi(2);
+        for variances in [&mut self.levelled, &mut self.floored] {
+            variances.iter_mut().zip(&self.rows).for_each(|(v, row)| *v += of_speed(*row));
+        }
+    }
+
     /// Takes the noise of single rows for samples that are means of `sizes[row]` rows each.
     pub(crate) fn weigh(&mut self, noise: Noise, rpm: &[f64], sizes: &[f64]) {
         let variance = |i: &usize, share| noise.weight_variance(rpm.get(*i).copied().unwrap_or(0.0), share) / sizes[*i];
@@ -266,6 +281,10 @@ pub struct Context {
     pub pulse: Option<Vec<f64>>,
     /// Consensus speed, rev/min, on every row; empty when no speed was measured.
     pub rpm: Vec<f64>,
+    /// Standard deviation of the consensus speed beyond that of its sensors where it was bridged, rev/min; empty where it was measured throughout.
+    pub rpm_sd: Vec<f64>,
+    /// Rows before which the log did not see the rotor, in order, and its speed there, rev/min: after gaps in time.
+    pub(crate) starts: Vec<(usize, f64)>,
     /// How it was made.
     pub consensus: Consensus,
     /// Samples that were set aside as bad ones: they are missing everywhere else.
@@ -386,7 +405,7 @@ impl Context {
     #[must_use]
     pub fn bare(log: &Log, start_pulse_us: Option<f64>) -> Self {
         let pulse = log.column("pulse_us").filter(|c| c.iter().any(|v| v.is_finite())).map(|c| bridge(&log.t, c));
-        let (rpm, consensus) = consensus::of(log);
+        let consensus::Fused { rpm, sd: rpm_sd, how: consensus } = consensus::of(log);
         let steady = stretches::steady(&log.t, pulse.as_deref(), &rpm, STILL_US);
         let calm = stretches::steady(&log.t, pulse.as_deref(), &rpm, CALM_US);
         let settling = if pulse.is_some() { stretches::settling(&log.t, &rpm, &steady) } else { Vec::new() };
@@ -396,7 +415,9 @@ impl Context {
             t: log.t.clone(),
             time_is_row: log.time_is_row(),
             pulse,
+            starts: if log.time_is_row() { Vec::new() } else { starts(&log.t, &rpm) },
             rpm,
+            rpm_sd,
             consensus,
             set_aside: Vec::new(),
             current: None,
@@ -600,7 +621,11 @@ fn target(log: &Log, context: &Context, name: &'static str) -> Option<Target> {
     let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, context.stretches());
     let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
     let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
-    Some(Target { weight, ..Target::new(context, name, relation, rows, y, noise) })
+    let mut target = Target { weight, ..Target::new(context, name, relation, rows, y, noise) };
+    if needs_rpm && !context.rpm_sd.is_empty() {
+        target.allow_for_speed(context);
+    }
+    Some(target)
 }
 
 /// Speed channels that can be compared with the consensus: what all of them share (supply, load, lag) drops out. With fewer than

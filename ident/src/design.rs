@@ -99,7 +99,7 @@ impl TargetDesign {
     /// The same target with its baseline coefficients held at given values.
     #[must_use]
     pub fn pinned(mut self, coefficients: &[f64]) -> Self {
-        self.fixed = weighted_sum(&self.columns, coefficients, self.columns.first().map_or(0, |c| c.values.len()));
+        self.fixed = self.predict(coefficients, self.columns.first().map_or(0, |c| c.values.len()));
         self.columns.clear();
         self
     }
@@ -107,11 +107,12 @@ impl TargetDesign {
     /// What a declared model expects, or one that predicts makes of its columns so far but for the zeros of the day; `None` while coefficients are
     /// sought without a model.
     pub(crate) fn known(&self) -> Option<Vec<f64>> {
-        if !self.fixed.is_empty() {
+        let is_declared = !self.columns.iter().any(|c| matches!(c.label, Label::Base(_)));
+        if is_declared && !self.fixed.is_empty() {
             return Some(self.fixed.clone());
         }
         let standing = self.told.iter().any(|t| t.stands).then(|| self.coefficients(|t| t.stands))?;
-        Some(weighted_sum(&self.columns, &standing, self.columns.first()?.values.len()))
+        Some(self.predict(&standing, self.columns.first()?.values.len()))
     }
 
     /// What was told of each column by those that count; zero for one of which nothing was.

@@ -27,6 +27,11 @@ pub struct Placed {
 }
 
 impl Placed {
+    /// What is known of its shapes before any run, nats.
+    pub(crate) fn prior(&self) -> f64 {
+        self.effect.prior(&self.instance, &self.shape)
+    }
+
     /// Where it acts in the causal chain.
     pub(crate) fn stage(&self) -> Stage {
         self.effect.stage_of(&self.instance)
@@ -316,11 +321,13 @@ impl Fit {
         let value = |x: &[f64]| {
             let mut placed = self.placed.clone();
             placed[position].shape = x.to_vec();
+            let known = placed[position].prior();
             if context.against_model {
                 // speeds are coloured by what the model leaves over of them, and a load cell that knows the shape is not
-                return moving.iter().map(|name| of_colour(name) * taught.loglik(&placed, &[name], scattering)).sum();
+                return known
+                    + moving.iter().map(|name| of_colour(name) * taught.loglik(&placed, &[name], scattering)).sum::<f64>();
             }
-            least * taught.loglik(&placed, &moving, scattering)
+            known + least * taught.loglik(&placed, &moving, scattering)
         };
         let h: Vec<f64> =
             shapes.iter().zip(&p.shape).map(|(s, v)| (0.02 * v.abs()).max(1e-4 * (s.range.1 - s.range.0)).max(1e-9)).collect();
@@ -369,6 +376,27 @@ impl Fit {
             })
             .collect()
     }
+}
+
+/// What an effect adds to the prediction of a target, on its rows, all other coefficients as they are.
+pub(crate) fn part_of(context: &Context, declared: Declared<'_>, fit: &Fit, k: usize, target: usize) -> Vec<f64> {
+    let (of, fitted) = (&context.targets[target], &fit.targets[target]);
+    let whole = Designs::new(context, declared, &fit.placed).of(of).predict(&fitted.coefficients, context.len());
+    let mut others = fit.placed.clone();
+    others.remove(k);
+    let mut designs = Designs::new(context, declared, &others);
+    let design = designs.of(of);
+    let as_before = |label: Label| match label {
+        Label::Effect { effect, amplitude } if effect >= k => Label::Effect { effect: effect + 1, amplitude },
+        other => other,
+    };
+    let coefficient = |label: Label| {
+        let at = fitted.labels.iter().position(|l| *l == as_before(label));
+        at.map_or(0.0, |at| fitted.coefficients[at])
+    };
+    let coefficients: Vec<f64> = design.columns.iter().map(|c| coefficient(c.label)).collect();
+    let rest = design.predict(&coefficients, context.len());
+    of.rows.iter().map(|row| whole[*row] - rest[*row]).collect()
 }
 
 /// Standard error, as a share of a parameter, that stands for the forms themselves: a quadratic load curve, a lag of first order, a

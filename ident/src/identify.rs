@@ -9,7 +9,7 @@ use crate::close::CloseError;
 use crate::context::{Context, unit_of};
 use crate::fit::{Curve, Estimate, Fitted, Spin, declared, motor, relations, speeds, spin, square_law};
 use crate::log::Log;
-use crate::model::Model;
+use crate::model::{FittedTo, Model};
 use crate::plateau::{Plateau, detect};
 
 /// Quality of one fit.
@@ -155,5 +155,5 @@ fn all_rows(log: &Log, context: &Context) -> Option<(Model, Vec<Quality>)> {
             r2: fitted.r2,
         });
     }
-    related.then(|| (Model::of(context, log, polynomials), quality))
+    related.then(|| (Model { runs: vec![FittedTo::of(log)], ..Model::of(context, log, polynomials) }, quality))
 }

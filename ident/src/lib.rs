@@ -18,6 +18,7 @@ mod correction;
 pub mod course;
 pub mod design;
 pub mod diagnose;
+mod drive;
 pub mod effects;
 pub mod experiment;
 pub mod fit;

@@ -6,6 +6,7 @@
 //! Units: carried by the column names (`thrust_n`, `pulse_us`, ...); a missing sample is NaN in memory, an empty field on disk.
 //! Reference: specification `formats.md`, "Rig log".
 
+use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -88,9 +89,23 @@ pub struct Log {
     pub t: Vec<f64>,
     /// All other columns in the order of the file.
     pub columns: Vec<Column>,
+    /// SHA-256 of the file that it was read from, in hexadecimal; `None` of a log that was made in memory.
+    pub sha256: Option<String>,
 }
 
 impl Log {
+    /// What tells this log from every other: the SHA-256 of its file, or of the file that it would be written as.
+    #[must_use]
+    pub fn digest(&self) -> String {
+        let of_text = || {
+            let mut text = Digesting(Sha256::new());
+            // nothing that is kept in memory fails to take bytes
+            let _ = self.write_to(&mut text);
+            hexadecimal(text.0)
+        };
+        self.sha256.clone().unwrap_or_else(of_text)
+    }
+
     /// Number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -159,6 +174,7 @@ impl Log {
         if log.is_empty() {
             return Err(lines.place().refuse(None, "no data rows", "at least one line of numbers under the header"));
         }
+        log.sha256 = Some(hexadecimal(lines.digest));
         Ok(log)
     }
 
@@ -248,11 +264,31 @@ pub(crate) struct Lines<'a, R> {
     source: R,
     number: usize,
     unterminated: bool,
+    /// Of every byte that was read.
+    digest: Sha256,
+}
+
+/// A sink that keeps the digest of what is written to it.
+struct Digesting(Sha256);
+
+impl Write for Digesting {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+fn hexadecimal(digest: Sha256) -> String {
+    digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 impl<'a, R: BufRead> Lines<'a, R> {
     pub(crate) fn new(file: &'a str, source: R) -> Self {
-        Self { file, source, number: 0, unterminated: false }
+        Self { file, source, number: 0, unterminated: false, digest: Sha256::new() }
     }
 
     pub(crate) fn place(&self) -> Place<'a> {
@@ -281,6 +317,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
         if n == 0 {
             return Ok(false);
         }
+        self.digest.update(&bytes);
         self.number += 1;
         if n > MAX_LINE {
             return Err(self.place().refuse(
@@ -477,6 +514,11 @@ mod tests {
         log.write_to(&mut out).unwrap();
         let again = Log::parse("run.csv", out.as_slice()).unwrap();
         assert_eq!(again.meta, log.meta);
+        // what was made in memory has the digest of the file that it is written as, which `sha256sum` prints
+        assert_eq!(Log { sha256: None, ..log.clone() }.digest(), again.digest());
+        assert_ne!(parse(&text.replace("0.002", "0.003")).unwrap().digest(), log.digest());
+        let known = "# quadrig-log 1\nt_s,a,b\n0,1,2\n";
+        assert_eq!(parse(known).unwrap().digest(), "afdc1c5e8efe3f3426bc84a553229402e0ad54d4fb85a6dfc1c3617f2aee76ec");
         assert_eq!(again.column("thrust_n"), log.column("thrust_n"));
     }
 

@@ -85,6 +85,7 @@ fn map_columns(log: &Log, change: &dyn Fn(&[f64]) -> Vec<f64>) -> Log {
         meta: log.meta.clone(),
         t: change(&log.t),
         columns: log.columns.iter().map(|c| Column { name: c.name.clone(), values: change(&c.values) }).collect(),
+        sha256: None,
     }
 }
 

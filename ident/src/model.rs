@@ -17,6 +17,9 @@ use crate::steps::Steps;
 use toml::{Table, Value};
 
 mod read;
+mod scope;
+
+pub use scope::FittedTo;
 
 /// First key of the format.
 pub const FORMAT: &str = "quadrig-model 1";
@@ -41,6 +44,8 @@ pub struct AddedEffect {
     pub amplitudes: Vec<(String, Vec<f64>)>,
     /// What was estimated, for the reader.
     pub estimates: Vec<Estimate>,
+    /// For each channel the polynomial that stands for it on another run, in the order of the declared coefficients; empty where it acts there.
+    pub mean: Vec<(String, Vec<f64>)>,
 }
 
 /// A model.
@@ -48,6 +53,8 @@ pub struct AddedEffect {
 pub struct Model {
     /// Log that it was identified from.
     pub source: String,
+    /// The runs that it was fitted to; a model that names none stands as it is on every run.
+    pub runs: Vec<FittedTo>,
     /// Motor, propeller, ... as the log states them.
     pub meta: Table,
     /// Pulse at which the motor starts, us.
@@ -200,7 +207,8 @@ impl Model {
                     amplitudes.push((target.name.to_owned(), values));
                 }
             }
-            model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates });
+            let mean = scope::mean(context, declared, fit, position);
+            model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates, mean });
         }
         model
     }
@@ -288,10 +296,14 @@ impl Model {
         if let Some(air) = self.air {
             root.insert("air_density_ratio".into(), air.into());
         }
+        let runs: Vec<Value> = self.runs.iter().map(|r| Value::Table(run_table(r))).collect();
+        if !runs.is_empty() {
+            root.insert("run".into(), runs.into());
+        }
         let mut consensus = Table::new();
         consensus.insert(
             "rule".into(),
-            "median of the channels; speeds that leave by 2 % for at most three rows and come back are bridged".into(),
+            "median of the channels without their drop-outs; where none reads, what the command makes of the rotor, moved to the readings around".into(),
         );
         consensus.insert("channels".into(), self.consensus.clone().into());
         root.insert("consensus".into(), consensus.into());
@@ -318,7 +330,7 @@ impl Model {
             root.insert("effect".into(), list.into());
         }
         format!(
-            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and about that the scatter, rms, noise included, in each\n# third of the loads, up to 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n{root}{}",
+            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and about that the scatter, rms, noise included, in each\n# third of the loads, up to 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n# An effect of scope rig acts on every run. One of scope run or event acts on the runs listed here; on_another_run is what is added to the\n# channel's polynomial elsewhere, and what an event left behind acts there from the start.\n{root}{}",
             self.course.as_ref().map(Course::to_toml).unwrap_or_default()
         )
     }
@@ -335,6 +347,7 @@ impl AddedEffect {
             t.insert("form".into(), p.instance.form.clone().into());
         }
         t.insert("equation".into(), p.effect.about().equation.into());
+        t.insert("scope".into(), p.effect.scope(&p.instance).word().into());
         t.insert("run".into(), source.into());
         t.insert("shape".into(), Value::Array(p.shape.iter().map(|v| (*v).into()).collect()));
         let mut amplitude = Table::new();
@@ -347,6 +360,13 @@ impl AddedEffect {
             }
         }
         t.insert("amplitude".into(), amplitude.into());
+        let of_channel = |(channel, mean): &(String, Vec<f64>)| {
+            let coefficients = mean.iter().enumerate().map(|(k, c)| (coefficient_key(channel, k), Value::from(*c))).collect();
+            (channel.clone(), Value::Table(coefficients))
+        };
+        if !self.mean.is_empty() {
+            t.insert("on_another_run".into(), Value::Table(self.mean.iter().map(of_channel).collect()));
+        }
         let mut parameters = Table::new();
         for e in &self.estimates {
             parameters.insert(keyed(&e.name, &e.unit), e.value.into());
@@ -355,6 +375,17 @@ impl AddedEffect {
         t.insert("parameter".into(), parameters.into());
         t
     }
+}
+
+fn run_table(run: &FittedTo) -> Table {
+    let mut t = Table::new();
+    t.insert("log".into(), run.name.clone().into());
+    t.insert("sha256".into(), run.sha256.clone().into());
+    t.insert("rows".into(), (run.rows as i64).into());
+    if let Some(date) = &run.date {
+        t.insert("date".into(), date.clone().into());
+    }
+    t
 }
 
 fn relation_text(channel: &str, has_pulse: bool) -> &'static str {

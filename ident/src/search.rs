@@ -60,7 +60,8 @@ pub(crate) fn scan(
             .collect();
         let mut placed = base.placed.to_vec();
         placed.push(Placed { effect, instance: instance.clone(), shape: shape.clone() });
-        let gain = base.taught.loglik(&placed, &moving, scattering) - before;
+        let known = placed.last().map_or(0.0, Placed::prior);
+        let gain = base.taught.loglik(&placed, &moving, scattering) + known - before;
         if gain.is_finite() && best.as_ref().is_none_or(|b| gain > b.1) {
             best = Some((shape, gain));
         }
@@ -141,7 +142,9 @@ pub(crate) fn refine_group(
         }
         // a soft wall keeps the simplex inside the plausible box
         let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
-        -taught.loglik(&with_shapes(placed, &full), &moving, scattering) + 1e3 * wall
+        let placed = with_shapes(placed, &full);
+        let known: f64 = placed.iter().map(Placed::prior).sum();
+        -taught.loglik(&placed, &moving, scattering) - known + 1e3 * wall
     };
     let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
     let steps: Vec<f64> = free

@@ -32,7 +32,9 @@ pub fn from_command(model: &Model, name: &str, t: &[f64], pulse_us: &[f64], cova
         let share = if pass < 2 { 1.0 } else { 0.5 };
         let mut moved = 0.0_f64;
         for speed_pass in [true, false] {
-            let context = Context::new(&log, Some(model.start_pulse_us));
+            let mut context = Context::new(&log, Some(model.start_pulse_us));
+            // nothing was measured: a rotor begins where its command has it
+            context.starts.clear();
             let names: Vec<&'static str> =
                 context.targets.iter().map(|t| t.name).filter(|n| SPEED.contains(n) == speed_pass).collect();
             for name in names {

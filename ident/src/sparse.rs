@@ -51,7 +51,13 @@ pub fn without<'l>(log: &'l Log, left_out: &[LeftOut]) -> Cow<'l, Log> {
         return Cow::Borrowed(log);
     }
     let kept = log.columns.iter().filter(|c| left_out.iter().all(|l| l.channel != c.name));
-    Cow::Owned(Log { name: log.name.clone(), meta: log.meta.clone(), t: log.t.clone(), columns: kept.cloned().collect() })
+    Cow::Owned(Log {
+        name: log.name.clone(),
+        meta: log.meta.clone(),
+        t: log.t.clone(),
+        columns: kept.cloned().collect(),
+        sha256: log.sha256.clone(),
+    })
 }
 
 #[cfg(test)]

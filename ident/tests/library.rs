@@ -291,7 +291,14 @@ fn verdict(hidden: &[Hidden], schedule: Schedule, seed: u64) -> Closed {
         Schedule::UpDown => Schedule::Random,
         _ => Schedule::UpDown,
     };
-    close(&fly(hidden, schedule, seed), None, &[fly(hidden, other, seed + 1000)], &mut |_| {})
+    // what happened once has left something behind
+    let since = |h: &Hidden| match *h {
+        Hidden::BladeDamage { thrust, torque, .. } => Hidden::BladeDamage { thrust, torque, t0: 0.0 },
+        Hidden::Friction { constant, viscous, share, .. } => Hidden::Friction { constant, viscous, t0: 0.0, share },
+        h => h,
+    };
+    let later: Vec<Hidden> = hidden.iter().map(since).collect();
+    close(&fly(hidden, schedule, seed), None, &[fly(&later, other, seed + 1000)], &mut |_| {})
         .expect("a complete log can be fitted")
 }
 

@@ -12,6 +12,7 @@ use ident::context::Context;
 use ident::log::{Column, Log, write_whole};
 use ident::model::Model;
 use ident::simulate::from_command;
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// What a prediction starts from.
@@ -36,6 +37,10 @@ pub(crate) struct Args {
     /// What the prediction starts from.
     #[arg(long, value_enum, default_value_t = From::Relations)]
     from: From,
+    /// Events and drifts of the model's own run at the same instants of this log too; without it another run of the rig gets what
+    /// carries over: effects of the rig, what events left behind, and the mean of the rest.
+    #[arg(long)]
+    events: bool,
 }
 
 /// Runs the command.
@@ -50,6 +55,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let model = Model::read(&args.model)?;
     let log = Log::read(&args.log)?;
+    let model = if args.events { Cow::Borrowed(&model) } else { model.on(&log) };
     let columns = match args.from {
         From::Relations => by_relations(&model, &log),
         From::Command => by_command(&model, &log)?,

@@ -14,11 +14,11 @@ const BINS: usize = 48;
 const FEWEST: usize = 5;
 
 /// A curve.
-pub(super) struct Curve(Vec<(f64, f64)>);
+pub(crate) struct Curve(Vec<(f64, f64)>);
 
 impl Curve {
     /// Through pairs of regressor and reading; `None` for too few.
-    pub(super) fn through(mut pairs: Vec<(f64, f64)>) -> Option<Self> {
+    pub(crate) fn through(mut pairs: Vec<(f64, f64)>) -> Option<Self> {
         pairs.retain(|p| p.0.is_finite() && p.1.is_finite());
         if pairs.len() < 4 * FEWEST {
             return None;
@@ -38,7 +38,7 @@ impl Curve {
     }
 
     /// The reading at a value: straight lines between the points, the last ones beyond.
-    pub(super) fn at(&self, x: f64) -> f64 {
+    pub(crate) fn at(&self, x: f64) -> f64 {
         let after = self.0.partition_point(|p| p.0 < x);
         match (after.checked_sub(1).map(|k| self.0[k]), self.0.get(after)) {
             (Some(a), Some(b)) => line(a, *b, x),

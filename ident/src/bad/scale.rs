@@ -60,7 +60,7 @@ pub(super) fn before(r: &[f64], k: usize) -> f64 {
 }
 
 /// Times the scale at which a bad reading, one expected among `n` and anywhere in a span of so many scales, is as probable as a good one.
-fn times(n: usize, span: f64) -> f64 {
+pub(super) fn times(n: usize, span: f64) -> f64 {
     let bad = 1.0 / (n as f64 * span.max(2.0));
     // density of Student's t with eight degrees of freedom: 0.3867 (1 + z^2/8)^(-9/2)
     let at = (0.3867 / bad).powf(2.0 / (FREEDOM + 1.0));

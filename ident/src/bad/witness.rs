@@ -8,15 +8,13 @@
 
 use super::curve::Curve;
 use super::excursion::Event;
-use crate::context::{CALM_US, bridge};
+use crate::context::{CALM_US, GAP, bridge};
 use crate::log::{Log, SPEED};
 use crate::noise::median;
 use std::collections::BTreeMap;
 
 /// Change of a regressor within two rows, as a share of its span, that is a step where no command was logged.
 const STEP: f64 = 0.02;
-/// Time steps that are a gap.
-const GAP: f64 = 5.0;
 
 /// The log as far as it has been judged.
 pub(super) struct Witnesses<'l> {
@@ -60,6 +58,11 @@ impl<'l> Witnesses<'l> {
         let step = if steps.is_empty() { 1.0 } else { median(&mut steps) };
         let t = if log.time_is_row() { (0..log.len()).map(|i| 0.05 * i as f64).collect() } else { log.t.clone() };
         Self { log, t, clean, pulse, step }
+    }
+
+    /// A channel's readings without those that were found bad.
+    pub(super) fn clean(&self, name: &str) -> Option<&[f64]> {
+        self.clean.get(name).map(Vec::as_slice)
     }
 
     /// Leaves these rows of a channel out.
@@ -143,6 +146,12 @@ impl<'l> Witnesses<'l> {
     fn bridged(&self, values: &[f64]) -> Option<Vec<f64>> {
         let samples = values.iter().filter(|v| v.is_finite()).count();
         (samples >= super::FEWEST).then(|| bridge(&self.log.t, values))
+    }
+
+    /// First rows of the steps of the command; none without one.
+    pub(super) fn jumps(&self) -> Vec<usize> {
+        let jumps = |p: &[f64], i: usize| (p[i] - p[i - 1]).abs() > CALM_US;
+        self.pulse.as_ref().map_or_else(Vec::new, |p| (1..p.len()).filter(|i| jumps(p, *i)).collect())
     }
 
     /// Where the load steps: in the command, or in the signal where there is none; and where time has a gap.

@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md` (primary relations).
 
 use super::bridge;
+use crate::drive::Drive;
 use crate::log::{Log, SPEED};
 use crate::noise;
 
@@ -16,16 +17,29 @@ pub struct Consensus {
     pub channels: Vec<String>,
     /// Channels that disagree with the others, left out.
     pub excluded: Vec<String>,
-    /// Rows whose speed dropped out for at most three rows and came back: bridged.
+    /// Rows without a speed that can be believed: bridged.
     pub bridged_rows: usize,
 }
 
-/// The consensus speed on every row, and how it was made.
-pub(super) fn of(log: &Log) -> (Vec<f64>, Consensus) {
+/// Fewest rows in a row without a speed that the command bridges: fewer are a straight line.
+const STRETCH: usize = 4;
+
+/// A speed on every row.
+pub(super) struct Fused {
+    /// rev/min; empty without a speed.
+    pub(super) rpm: Vec<f64>,
+    /// Standard deviation beyond that of the sensors where the speed was bridged, rev/min; 0 where it was measured, empty where it was everywhere.
+    pub(super) sd: Vec<f64>,
+    /// How it was made.
+    pub(super) how: Consensus,
+}
+
+/// The consensus speed.
+pub(super) fn of(log: &Log) -> Fused {
     let present: Vec<&str> =
         SPEED.into_iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).collect();
     if present.is_empty() {
-        return (Vec::new(), Consensus::default());
+        return Fused { rpm: Vec::new(), sd: Vec::new(), how: Consensus::default() };
     }
     let all = median_of(log, &present);
     let scale = all.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max).max(1.0);
@@ -41,13 +55,38 @@ pub(super) fn of(log: &Log) -> (Vec<f64>, Consensus) {
     };
     let excluded = if kept.len() == present.len() { Vec::new() } else { excluded };
     let mut rpm = if excluded.is_empty() { all } else { median_of(log, &kept) };
-    let bridged_rows = remove_dropouts(&mut rpm, scale);
-    let info = Consensus {
+    let dropped = remove_dropouts(&mut rpm, scale);
+    let sd = bridge_by_command(log, &mut rpm);
+    let bridged_rows = dropped + sd.iter().filter(|sd| **sd > 0.0).count();
+    let how = Consensus {
         channels: kept.iter().map(|s| (*s).to_owned()).collect(),
         excluded: excluded.iter().map(|s| (*s).to_owned()).collect(),
         bridged_rows,
     };
-    (bridge(&log.t, &rpm), info)
+    Fused { rpm: bridge(&log.t, &rpm), sd, how }
+}
+
+/// Fills stretches without a speed with what the command makes of the rotor, moved to the readings at both ends; what is left is bridged
+/// by straight lines. The standard deviation of each row that was filled; empty where none was.
+fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
+    let measured: Vec<usize> = (0..rpm.len()).filter(|i| rpm[*i].is_finite()).collect();
+    let stretches: Vec<(usize, usize)> = measured.windows(2).filter(|w| w[1] - w[0] > STRETCH).map(|w| (w[0], w[1])).collect();
+    // a speed that is logged on some rows only has no gaps
+    if stretches.is_empty() || stretches.len() * 2 * STRETCH > measured.len() {
+        return Vec::new();
+    }
+    let Some(drive) = Drive::of(log, rpm) else { return Vec::new() };
+    let mut sd = vec![0.0; rpm.len()];
+    for (from, to) in stretches {
+        let off = [from, to].map(|i| rpm[i] - drive.speed[i]);
+        for i in from + 1..to {
+            let share = (log.t[i] - log.t[from]) / (log.t[to] - log.t[from]);
+            rpm[i] = (drive.speed[i] + off[0] + share * (off[1] - off[0])).max(0.0);
+            // what is known at both ends is known less in between
+            sd[i] = drive.sd[i] * (4.0 * share * (1.0 - share)).sqrt();
+        }
+    }
+    sd
 }
 
 fn median_of(log: &Log, names: &[&str]) -> Vec<f64> {

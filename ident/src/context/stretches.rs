@@ -5,6 +5,7 @@
 //! Units: us a row; row ranges `[from, to)`.
 //! Reference: specification `closing-the-loop.md`, step 2 (noise within plateaus).
 
+use crate::noise::median;
 use crate::plateau::settle;
 
 /// Change of the command from row to row, us, below which it holds still.
@@ -34,6 +35,17 @@ pub(super) fn steady(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) -
         }
     }
     out
+}
+
+/// Time steps that are a gap.
+pub(crate) const GAP: f64 = 5.0;
+
+/// Rows before which a log says nothing of the rotor, those after gaps in time, with the speed there.
+pub(crate) fn starts(t: &[f64], rpm: &[f64]) -> Vec<(usize, f64)> {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    let usual = median(&mut steps);
+    let begins = |i: &usize| t[*i] - t[*i - 1] > GAP * usual && rpm[*i].is_finite();
+    (1..rpm.len()).filter(begins).map(|i| (i, rpm[i])).collect()
 }
 
 /// Rows at the head of each steady stretch in which the speed has not arrived yet.

@@ -37,6 +37,10 @@ impl Effect for BearingFriction {
         Scope::Event
     }
 
+    fn leaves_behind(&self, _: &Instance) -> bool {
+        true
+    }
+
     fn stage(&self) -> Stage {
         Stage::Term
     }

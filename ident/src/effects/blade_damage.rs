@@ -32,6 +32,10 @@ impl Effect for BladeDamage {
         Scope::Event
     }
 
+    fn leaves_behind(&self, _: &Instance) -> bool {
+        true
+    }
+
     fn stage(&self) -> Stage {
         Stage::Term
     }

@@ -99,6 +99,8 @@ struct Row {
 #[derive(Debug, Clone)]
 pub(super) struct Coasting {
     rows: Vec<Row>,
+    /// Share of its input at which it stands on the first row: see [`super::operator::Lag`].
+    first: f64,
 }
 
 /// The input of a rotor over a part of an interval: a row, the share of the way to the next, and what is left of the state after it.
@@ -125,9 +127,9 @@ impl Row {
 impl Coasting {
     /// Of a rotor along the command of a log. `jumps`: the command has its next value from a row on, and goes there in no straight line.
     pub(super) fn new(context: &Context, rotor: Rotor, jumps: bool) -> Self {
-        let (t, Some(pulse)) = (&context.t, &context.pulse) else { return Self { rows: Vec::new() } };
+        let (t, Some(pulse)) = (&context.t, &context.pulse) else { return Self { rows: Vec::new(), first: 1.0 } };
         if t.len() < 2 {
-            return Self { rows: Vec::new() };
+            return Self { rows: Vec::new(), first: 1.0 };
         }
         let goals: Vec<f64> =
             pulse.iter().map(|p| if *p < context.start_pulse_us { 0.0 } else { (p - 1000.0).max(0.0) / 1000.0 }).collect();
@@ -177,7 +179,26 @@ impl Coasting {
             settled = (stands && i > REACH).then_some((length, out));
             out
         };
-        Self { rows: (1..t.len()).map(interval).collect() }
+        Self { rows: (1..t.len()).map(interval).collect(), first: 1.0 }
+    }
+
+    /// The same where the state of some rows is known by itself.
+    pub(super) fn starting_at(mut self, starts: &[(usize, f64)]) -> Self {
+        if self.rows.is_empty() {
+            return self;
+        }
+        for (row, _) in starts {
+            match row.checked_sub(1) {
+                None => self.first = 0.0,
+                Some(before) => self.rows[before] = Row { left: 0.0, weights: [0.0; REACH], ..self.rows[before] },
+            }
+        }
+        self
+    }
+
+    /// What is left of those states on every row.
+    pub(super) fn carried(&self, starts: &[(usize, f64)]) -> Vec<f64> {
+        super::operator::carried(self.rows.iter().map(|r| r.left), starts)
     }
 
     /// What becomes of signals.
@@ -189,13 +210,14 @@ impl Coasting {
         if self.rows.is_empty() {
             return x.to_vec();
         }
-        let mut state = x.first().copied().unwrap_or(0.0);
+        let first = self.first * x.first().copied().unwrap_or(0.0);
+        let mut state = first;
         let rows = self.rows.iter().map(|row| {
             let input = row.weights.iter().zip(&x[row.first..]).fold(0.0, |sum, (w, x)| sum + w * x);
             state = row.left * state + input;
             state
         });
-        x.iter().take(1).copied().chain(rows).collect()
+        std::iter::once(first).chain(rows).collect()
     }
 }
 

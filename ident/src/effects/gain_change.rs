@@ -37,6 +37,10 @@ impl Effect for GainChange {
         }
     }
 
+    fn leaves_behind(&self, instance: &Instance) -> bool {
+        self.scope(instance) == Scope::Event
+    }
+
     fn stage(&self) -> Stage {
         Stage::Gain
     }

@@ -80,6 +80,18 @@ pub enum Scope {
     Event,
 }
 
+impl Scope {
+    /// As files have it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Rig => "rig",
+            Self::Run => "run",
+            Self::Event => "event",
+        }
+    }
+}
+
 /// What an effect is, for reports and documentation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct About {
@@ -169,6 +181,10 @@ pub trait Effect: Sync {
     fn about(&self) -> About;
     /// What it belongs to.
     fn scope(&self, instance: &Instance) -> Scope;
+    /// Whether what an event left behind holds for later runs of the rig: a damaged blade does, a zero that slipped is set anew.
+    fn leaves_behind(&self, _instance: &Instance) -> bool {
+        false
+    }
     /// Where it acts.
     fn stage(&self) -> Stage;
     /// The same for one of its forms.
@@ -185,6 +201,11 @@ pub trait Effect: Sync {
     }
     /// Non-linear parameters with ranges and starts for this log.
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape>;
+    /// What is known of the shapes before any run: the logarithm of their density, nats, up to a constant. It decides where a run says
+    /// nothing of a shape.
+    fn prior(&self, _instance: &Instance, _shape: &[f64]) -> f64 {
+        0.0
+    }
     /// Linear parameters.
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude>;
     /// Changes the design of one target that this instance touches.

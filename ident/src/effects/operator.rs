@@ -119,6 +119,9 @@ impl Interval {
         Self { state: left, from: 1.0 - left - change, to: change }
     }
 
+    /// What the state was is not known: nothing of it is left, and nothing of the input is there yet.
+    pub(crate) const UNKNOWN: Self = Self { state: 0.0, from: 0.0, to: 0.0 };
+
     /// The input jumps at once: what is left of the state's distance from the input at the jump, and of that after it.
     pub(crate) fn jump(early: f64, late: f64) -> Self {
         Self { state: early * late, from: (1.0 - early) * late, to: 1.0 - late }
@@ -130,13 +133,15 @@ impl Interval {
 pub(crate) struct Lag {
     /// From each row to the next; none where the lag is too short to be one.
     intervals: Vec<Interval>,
+    /// Share of its input at which it stands on the first row: all of it, or none where that state is known otherwise.
+    first: f64,
 }
 
 impl Lag {
     /// A lag with time constant `tau`, exact for a signal of the given course.
     pub(crate) fn new(t: &[f64], tau: f64, course: Course) -> Self {
         if tau <= 1e-9 {
-            return Self { intervals: Vec::new() };
+            return Self { intervals: Vec::new(), first: 1.0 };
         }
         let (mut whole, mut part) = (Decay::new(), Decay::new());
         let interval = |w: &[f64]| {
@@ -149,7 +154,7 @@ impl Lag {
             };
             Interval::change(e, change)
         };
-        Self { intervals: t.windows(2).map(interval).collect() }
+        Self { intervals: t.windows(2).map(interval).collect(), first: 1.0 }
     }
 
     /// What a lag of time constant `tau`, s, was made of: its inverse, for an input that stands between rows as it ends, or jumps. Where
@@ -172,12 +177,29 @@ impl Lag {
             let gain = 1.0 / (1.0 - late);
             Interval { state: -late * (1.0 - early) * gain, from: -late * early * gain, to: gain }
         };
-        Self { intervals: t.windows(2).enumerate().map(interval).collect() }
+        Self { intervals: t.windows(2).enumerate().map(interval).collect(), first: 1.0 }
     }
 
     /// A lag that does this from each row to the next.
     pub(crate) fn of_intervals(intervals: Vec<Interval>) -> Self {
-        Self { intervals }
+        Self { intervals, first: 1.0 }
+    }
+
+    /// The same where the state of some rows is known by itself, and not from the rows before. What becomes of those states is no part of
+    /// any input: see [`Self::carried`].
+    pub(crate) fn starting_at(mut self, starts: &[(usize, f64)]) -> Self {
+        for (row, _) in starts {
+            match row.checked_sub(1) {
+                None => self.first = 0.0,
+                Some(before) => self.intervals[before] = Interval::UNKNOWN,
+            }
+        }
+        self
+    }
+
+    /// What is left of the states that some rows have by themselves, on every row.
+    pub(crate) fn carried(&self, starts: &[(usize, f64)]) -> Vec<f64> {
+        carried(self.intervals.iter().map(|i| i.state), starts)
     }
 
     /// What the lag makes of signals: four at a time, because each state waits for the one before it.
@@ -193,8 +215,8 @@ impl Lag {
     }
 
     fn side_by_side(&self, signals: [&[f64]; 4]) -> [Vec<f64>; 4] {
-        let mut out = signals.map(|x| vec![x[0]; self.intervals.len() + 1]);
-        let [mut a, mut b, mut c, mut d] = signals.map(|x| x[0]);
+        let mut out = signals.map(|x| vec![self.first * x[0]; self.intervals.len() + 1]);
+        let [mut a, mut b, mut c, mut d] = signals.map(|x| self.first * x[0]);
         let [xa, xb, xc, xd] = signals.map(|x| x.windows(2));
         let [oa, ob, oc, od] = out.each_mut().map(|out| out[1..].iter_mut());
         let inputs = xa.zip(xb).zip(xc.zip(xd));
@@ -206,6 +228,18 @@ impl Lag {
         }
         out
     }
+}
+
+/// What is left on every row of states that some rows have by themselves, of which each interval leaves a share.
+pub(super) fn carried(left: impl Iterator<Item = f64>, starts: &[(usize, f64)]) -> Vec<f64> {
+    let mut starts = starts.iter().copied().peekable();
+    let mut state = 0.0;
+    let rows = std::iter::once(0.0).chain(left).enumerate();
+    rows.map(|(row, left)| {
+        state = starts.next_if(|s| s.0 == row).map_or(left * state, |s| s.1);
+        state
+    })
+    .collect()
 }
 
 /// Time constants after which a lag has settled: a twentieth of the jump is left.

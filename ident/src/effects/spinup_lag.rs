@@ -2,7 +2,8 @@
 //!
 //! What it is: rpm follows its static value by a first-order lag, with different time constants up and down, or as a rotor that is
 //! driven and never braked (`coasting`: see [`super::coasting`]).
-//! What can go wrong: needs steps and samples inside the transient; with none it is not offered.
+//! What can go wrong: needs steps and samples inside the transient; with none it is not offered. After a gap in time
+//! its state is the speed that the first row measures.
 //! Units: s.
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
 
@@ -22,6 +23,11 @@ const COASTING_OF_STEPS: &str = "coasting_of_steps";
 const QUICK: f64 = 0.04;
 /// What meters and a command that is let go slowly add to the latency, s.
 const LATE: f64 = 0.05;
+
+/// Logarithm of how many times longer a rotor takes on its way down than on its way up, and its standard deviation: from one time, where
+/// the controller brakes, to two, where the air does (0.0125 and 0.025 s in RotorS: Furrer et al. 2016), so that both ends are one standard
+/// deviation out. A run that only climbs says nothing of the way down.
+const SLOWER: (f64, f64) = (0.35, 0.35);
 
 impl Effect for SpinupLag {
     fn id(&self) -> &'static str {
@@ -78,6 +84,11 @@ impl Effect for SpinupLag {
         ]
     }
 
+    fn prior(&self, _: &Instance, shape: &[f64]) -> f64 {
+        let [up, down, _] = shape else { return 0.0 };
+        -0.5 * (((down / up).max(f64::MIN_POSITIVE).ln() - SLOWER.0) / SLOWER.1).powi(2)
+    }
+
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         Vec::new()
     }
@@ -85,8 +96,9 @@ impl Effect for SpinupLag {
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         if let [tau_up, tau_air, friction, latency] = *shape {
             let rotor = Rotor { tau_up, tau_air, friction, latency };
-            let coasting = Coasting::new(context, rotor, instance.form == COASTING_OF_STEPS);
+            let coasting = Coasting::new(context, rotor, instance.form == COASTING_OF_STEPS).starting_at(&context.starts);
             design.map_together(|columns| coasting.of(columns));
+            starts(context, design, || coasting.carried(&context.starts));
             return;
         }
         let ([up, down, phase], Some(pulse)) = (shape, &context.pulse) else { return };
@@ -108,7 +120,16 @@ impl Effect for SpinupLag {
             }
         };
         let intervals = pulse.windows(2).zip(context.t.windows(2)).map(interval).collect();
-        let lag = operator::Lag::of_intervals(intervals);
+        let lag = operator::Lag::of_intervals(intervals).starting_at(&context.starts);
         design.map_together(|columns| lag.of(columns));
+        starts(context, design, || lag.carried(&context.starts));
+    }
+}
+
+/// Where the log did not see what the rotor did before a row, it begins there with the speed that was measured.
+fn starts(context: &Context, design: &mut TargetDesign, carried: impl FnOnce() -> Vec<f64>) {
+    if !context.starts.is_empty() {
+        design.fixed.resize(context.len(), 0.0);
+        design.fixed.iter_mut().zip(carried()).for_each(|(f, c)| *f += c);
     }
 }

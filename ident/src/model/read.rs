@@ -6,7 +6,7 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Powerplant model".
 
-use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys};
+use super::{AddedEffect, FORMAT, FittedTo, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys};
 use crate::context::{Context, Relation};
 use crate::course::{COURSE_KEYS, Course};
 use crate::effects::{self, Effect, Estimate, Instance};
@@ -69,6 +69,16 @@ impl Model {
             model.consensus =
                 strings(channels).ok_or_else(|| refusal("consensus.channels", Some(channels), "a list of channels"))?;
         }
+        model.runs = match root.get("run") {
+            None => Vec::new(),
+            Some(list) => list
+                .as_array()
+                .ok_or_else(|| refusal("run", Some(list), "a list of tables, [[run]]"))?
+                .iter()
+                .enumerate()
+                .map(|(i, value)| fitted_to(value).map_err(|refusal| within(&format!("run[{i}]"), refusal)))
+                .collect::<Result<_, _>>()?,
+        };
         let channels = root.get("channel");
         let channels =
             channels.and_then(Value::as_table).ok_or_else(|| refusal("channel", channels, "one table for each channel"))?;
@@ -90,6 +100,23 @@ impl Model {
         }
         Ok(model)
     }
+}
+
+/// A run that the model was fitted to.
+fn fitted_to(value: &Value) -> Result<FittedTo, Refusal> {
+    let text = |key: &str| value.get(key).and_then(Value::as_str).map(str::to_owned);
+    let wanted = |key: &str, expected: &str| refusal(key, value.get(key), expected);
+    let is_digest = |d: &String| d.len() == 64 && d.bytes().all(|b| b.is_ascii_hexdigit());
+    Ok(FittedTo {
+        name: text("log").ok_or_else(|| wanted("log", "the name of a log"))?,
+        sha256: text("sha256").filter(is_digest).ok_or_else(|| wanted("sha256", "64 hexadecimal digits, as sha256sum prints"))?,
+        rows: value
+            .get("rows")
+            .and_then(Value::as_integer)
+            .and_then(|n| usize::try_from(n).ok())
+            .ok_or_else(|| wanted("rows", "a number of rows"))?,
+        date: text("date"),
+    })
 }
 
 /// What the model is off by row for row: lists of finite numbers that are as long as they must be.
@@ -199,12 +226,20 @@ impl AddedEffect {
         let shape = shape.ok_or_else(|| refusal("shape", at("shape"), &wanted()))?;
         let amplitudes = amplitudes(effect, &instance, at("amplitude"))?;
         let estimates = at("parameter").and_then(Value::as_table).map(estimates).unwrap_or_default();
-        Ok(Self { placed: Placed { effect, instance, shape }, amplitudes, estimates })
+        let scope = effect.scope(&instance).word();
+        if at("scope").is_some_and(|s| s.as_str() != Some(scope)) {
+            return Err(refusal("scope", at("scope"), &format!("'{scope}', which {id} has in this form")));
+        }
+        let mean = match at("on_another_run") {
+            None => Vec::new(),
+            Some(value) => means(&instance, value)?,
+        };
+        Ok(Self { placed: Placed { effect, instance, shape }, amplitudes, estimates, mean })
     }
 }
 
 /// Names of the shape parameters that an effect has in this form: how many they are does not depend on a log.
-fn shape_names(effect: &'static dyn Effect, instance: &Instance) -> Vec<&'static str> {
+pub(super) fn shape_names(effect: &'static dyn Effect, instance: &Instance) -> Vec<&'static str> {
     let two_rows = Log { t: vec![0.0, 1.0], ..Log::default() };
     effect.shapes(&Context::bare(&two_rows, Some(1000.0)), instance).iter().map(|s| s.name).collect()
 }
@@ -241,6 +276,25 @@ fn amplitudes(
         out.push((channel.clone(), values));
     }
     Ok(out)
+}
+
+/// The polynomials that stand for an effect on another run.
+fn means(instance: &Instance, value: &Value) -> Result<Vec<(String, Vec<f64>)>, Refusal> {
+    let table = value.as_table().ok_or_else(|| refusal("on_another_run", Some(value), "one table for each channel"))?;
+    let of_channel = |(channel, own): (&String, &Value)| {
+        let place = format!("on_another_run.{channel}");
+        if !instance.channels.contains(channel) {
+            return Err(refusal(&place, Some(own), &format!("one of {}", instance.channels.join(", "))));
+        }
+        let table = own.as_table().ok_or_else(|| refusal(&place, Some(own), "a table of coefficients"))?;
+        let of = |k: usize| -> Result<f64, Refusal> {
+            let key = coefficient_key(channel, k);
+            let value = table.get(&key);
+            value.and_then(finite).ok_or_else(|| refusal(&format!("{place}.{key}"), value, "a finite number"))
+        };
+        Ok((channel.clone(), (0..table.len()).map(of).collect::<Result<_, _>>()?))
+    };
+    table.iter().map(of_channel).collect()
 }
 
 /// What was estimated, for the reader: no prediction hangs on it.

@@ -53,7 +53,16 @@ pub(crate) fn across(runs: &[Recorded], progress: &mut dyn FnMut(f64)) -> Vec<Tr
     for (done, run) in runs.iter().enumerate() {
         progress(done as f64 / runs.len() as f64);
         let (Ok(closed), Some(log)) = (&run.closed, &run.log) else { continue };
+        let corrected = closed.model.elsewhere();
         for (k, placed) in closed.diagnosis.best.fit.placed.iter().enumerate() {
+            // a drift and an event belong to their run
+            if !corrected
+                .effects
+                .iter()
+                .any(|e| e.placed.effect.id() == placed.effect.id() && e.placed.instance == placed.instance)
+            {
+                continue;
+            }
             if !runs.iter().any(|o| o.rig == run.rig && o.name != run.name) {
                 continue;
             }
@@ -68,11 +77,7 @@ pub(crate) fn across(runs: &[Recorded], progress: &mut dyn FnMut(f64)) -> Vec<Tr
                     .iter()
                     .filter(|t| !t.relation.is_evidence() && placed.instance.touches(t.name))
                     .filter_map(|t| {
-                        Some((
-                            t.name,
-                            error(&without, &context, t.name, moments)?,
-                            error(&closed.model, &context, t.name, moments)?,
-                        ))
+                        Some((t.name, error(&without, &context, t.name, moments)?, error(&corrected, &context, t.name, moments)?))
                     })
                     .min_by(|a, b| (a.2 / a.1).total_cmp(&(b.2 / b.1)));
                 let Some((channel, before, after)) = best else { continue };
@@ -100,7 +105,7 @@ fn without(closed: &Closed, log: &Log, k: usize) -> Option<Model> {
     let (context, declared) = (&closed.context, Declared::default());
     let placed = refine(context, declared, &placed, Rows::All, EVALUATIONS);
     let fitted = fit(context, declared, &placed, None, Rows::All)?;
-    Some(Model::from_fit(context, log, declared, &fitted))
+    Some(Model::from_fit(context, log, declared, &fitted).elsewhere())
 }
 
 /// Error of a channel on the rows of which something is claimed; of an effect that is single readings, on those readings too.

@@ -123,9 +123,10 @@ pub(crate) fn of(runs: &[Recorded], progress: &mut dyn FnMut(f64)) -> Transfer {
 /// Each channel of a log by the models of another run.
 fn predicted(closed: &Closed, log: &Log) -> Vec<Prediction> {
     let context = Context::new(log, Some(closed.model.start_pulse_us));
+    let [declared, corrected] = [&closed.declared, &closed.model].map(|model| model.on(log));
     let of_channel = |channel: &'static str| {
-        let before = error(&closed.declared, &context, channel)?;
-        let after = error(&closed.model, &context, channel)?;
+        let before = error(&declared, &context, channel)?;
+        let after = error(&corrected, &context, channel)?;
         let floor = context.targets[context.target(channel)?].noise.rms;
         Some(Prediction { from: String::new(), on: String::new(), channel, floor, before, after })
     };

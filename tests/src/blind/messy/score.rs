@@ -212,6 +212,7 @@ fn ratios(m: &Messy, closed: &Closed, other: &Log, second: &(Run, Vec<Vec<bool>>
         return Vec::new();
     }
     let context = Context::new(other, Some(closed.model.start_pulse_us));
+    let model = closed.model.elsewhere();
     let (run, made_up) = second;
     let still = m.still(1);
     let of_channel = |(name, y): &(&'static str, Vec<f64>), made_up: &Vec<bool>| {
@@ -219,7 +220,7 @@ fn ratios(m: &Messy, closed: &Closed, other: &Log, second: &(Run, Vec<Vec<bool>>
             return None;
         }
         let target = &context.targets[context.target(name)?];
-        let prediction = closed.model.predict(&context, name)?;
+        let prediction = model.predict(&context, name)?;
         let truth = truth(m, run, &still, name);
         let rows: Vec<usize> = (0..run.t.len())
             .filter(|r| y[*r].is_finite() && !made_up[*r] && target.claims(*r) && prediction[*r].is_finite())

@@ -1,0 +1,124 @@
+//! What of a model holds on which run.
+//!
+//! What it is: an effect of the rig acts on every run; one of a run, or an event, belongs to the run that it was fitted to. On another run
+//! of the rig an event acts as far as it left something behind, from the start; of all else the mean goes into the declared polynomial,
+//! so that leaving it out costs nothing.
+//! What can go wrong: a log is the model's own only where its SHA-256 is the same; a copy with another head is another run.
+//! Units: as the channels.
+//! Reference: specification `formats.md`, "Scope".
+
+use super::{AddedEffect, Model};
+use crate::context::{Context, Target};
+use crate::design::TargetDesign;
+use crate::effects::Scope;
+use crate::hypothesis::{Declared, Fit, Placed, part_of};
+use crate::log::Log;
+use crate::solve::Normal;
+use std::borrow::Cow;
+
+/// A run that a model was fitted to.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FittedTo {
+    /// File name of its log.
+    pub name: String,
+    /// SHA-256 of its log.
+    pub sha256: String,
+    /// Rows of its log.
+    pub rows: usize,
+    /// Date, where the log states one.
+    pub date: Option<String>,
+}
+
+impl FittedTo {
+    /// A log as the model names it.
+    #[must_use]
+    pub fn of(log: &Log) -> Self {
+        let date = log.meta.get("date").map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned));
+        Self { name: log.name.clone(), sha256: log.digest(), rows: log.len(), date }
+    }
+}
+
+/// What an effect does on another run of the rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Elsewhere {
+    /// It acts as it stands.
+    Acts,
+    /// It acts from before the first row on.
+    ActsFromTheStart,
+    /// Nothing but its mean is left of it.
+    Mean,
+}
+
+/// An instant before any run, s.
+const LONG_AGO: f64 = -1e9;
+
+fn elsewhere(placed: &Placed) -> Elsewhere {
+    match placed.effect.scope(&placed.instance) {
+        Scope::Rig => Elsewhere::Acts,
+        Scope::Event if placed.effect.leaves_behind(&placed.instance) => Elsewhere::ActsFromTheStart,
+        // a zero that is older than the run stands in the tare of each run, which no model knows
+        Scope::Run | Scope::Event => Elsewhere::Mean,
+    }
+}
+
+impl Model {
+    /// Whether a log is one that the model was fitted to.
+    #[must_use]
+    pub fn is_of(&self, log: &Log) -> bool {
+        let own = |digest: &str| self.runs.iter().any(|r| r.sha256 == digest);
+        self.runs.iter().any(|r| r.rows == log.len()) && own(&log.digest())
+    }
+
+    /// The model for the rows of a log: as it stands on a run that it was fitted to, else what carries over to it.
+    #[must_use]
+    pub fn on(&self, log: &Log) -> Cow<'_, Self> {
+        if self.runs.is_empty() || self.is_of(log) { Cow::Borrowed(self) } else { Cow::Owned(self.elsewhere()) }
+    }
+
+    /// The model for another run of its rig: effects of the rig, what events left behind, and the mean of the rest.
+    #[must_use]
+    pub fn elsewhere(&self) -> Self {
+        let mut out = Self { effects: Vec::new(), ..self.clone() };
+        for added in &self.effects {
+            match elsewhere(&added.placed) {
+                Elsewhere::Acts => out.effects.push(added.clone()),
+                Elsewhere::ActsFromTheStart => out.effects.push(added.since_long_ago()),
+                Elsewhere::Mean => {
+                    for (channel, mean) in &added.mean {
+                        let own = out.polynomials.iter_mut().find(|p| p.channel == *channel);
+                        own.into_iter().flat_map(|p| p.coefficients.iter_mut().zip(mean)).for_each(|(c, m)| *c += m);
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+impl AddedEffect {
+    fn since_long_ago(&self) -> Self {
+        let mut out = self.clone();
+        let names = super::read::shape_names(self.placed.effect, &self.placed.instance);
+        out.placed.shape.iter_mut().zip(names).filter(|(_, name)| *name == "t0").for_each(|(t0, _)| *t0 = LONG_AGO);
+        out
+    }
+}
+
+/// What another run expects of an effect in the place of its course: for each channel the declared polynomial that comes nearest to what the
+/// effect adds on its own run. Nothing for an effect that acts on other runs.
+pub(super) fn mean(context: &Context, declared: Declared<'_>, fit: &Fit, position: usize) -> Vec<(String, Vec<f64>)> {
+    let placed = &fit.placed[position];
+    if elsewhere(placed) != Elsewhere::Mean {
+        return Vec::new();
+    }
+    let of_target = |(k, target): (usize, &Target)| {
+        let part = part_of(context, declared, fit, position, k);
+        let columns = TargetDesign::baseline(context, target.name, target.relation).columns;
+        let mut normal = Normal::new(columns.len());
+        for (row, part) in target.rows.iter().zip(&part).filter(|(row, _)| target.claims(**row)) {
+            normal.add(&columns.iter().map(|c| c.values[*row]).collect::<Vec<f64>>(), *part, 1.0);
+        }
+        Some((target.name.to_owned(), normal.solve()?.coefficients))
+    };
+    context.targets.iter().enumerate().filter(|(_, t)| placed.instance.touches(t.name)).filter_map(of_target).collect()
+}
