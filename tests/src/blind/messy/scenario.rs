@@ -1,7 +1,7 @@
 //! A messy rig, what is on top of it, and two runs of it.
 //!
 //! What it is: everything that one seed stands for. The rig's own effects act on both runs; an event acts on the first, and what it left
-//! behind on the second from its start (a tare that slipped is set anew and leaves nothing).
+//! behind on the second from its start (a tare that slipped is set anew and leaves nothing). A drift is the first run's own.
 //! What can go wrong: an effect on top that this rig cannot show at the wanted size is kept at its largest, and its size says so.
 //! Units: sizes in noise floors.
 //! Reference: specification `closing-the-loop.md`, "Blind trials"; `formats.md`, scope.
@@ -122,11 +122,14 @@ impl Messy {
         Self { seed, top, rig, dirt, effects, own, sizes, schedules }
     }
 
-    /// What acts on a run: the second one has what an event left behind.
+    /// What acts on a run: the second one has what an event left behind, and no drift of the first.
     #[must_use]
     pub fn acting(&self, which: usize) -> Vec<Effect> {
         let event = self.top == Top::Event && which == 1;
         let mut out = self.effects.clone();
+        if which == 1 {
+            out.retain(|e| e.id != "zero_drift" && !(e.id == "gain_change" && e.form == 1));
+        }
         if event {
             out.retain(|e| e.id != "tare_shift");
             out[self.own.min(self.effects.len())..].iter_mut().for_each(|e| e.t0 = 0.0);
