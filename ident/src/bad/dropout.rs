@@ -8,13 +8,14 @@
 //! Reference: analytical redundancy, Chow & Willsky 1984; contaminated normal distribution, Tukey 1960.
 
 use super::curve::Curve;
-use super::excursion::Event;
+use super::excursion::{Event, LONGEST};
 use super::scale::times;
 use super::witness::Witnesses;
 use crate::context::{bridge, starts};
 use crate::drive::{Drive, SIGMA};
 use crate::log::SPEED;
 use crate::noise::{median, quantum};
+use std::cell::Cell;
 
 /// Share of a channel's readings that may be lost: one that loses more has a fault with a name.
 const MOST: f64 = 1.0 / 3.0;
@@ -46,12 +47,14 @@ struct Witness {
     sd: Vec<f64>,
     /// The same on most rows.
     usual: f64,
+    /// First row of what was last found to be no loss by its word.
+    refused: Cell<Option<usize>>,
 }
 
 impl Witness {
     fn new(said: Vec<f64>, sd: Vec<f64>) -> Self {
         let usual = median(&mut sd.clone());
-        Self { said, sd, usual }
+        Self { said, sd, usual, refused: Cell::new(None) }
     }
 }
 
@@ -114,7 +117,17 @@ impl Judge<'_> {
         let tells = |w: &&Witness| self.read[row].is_finite() && self.low(w, row).0 > self.low(w, row).1;
         let mut telling: Vec<&Witness> = self.all.iter().filter(tells).collect();
         telling.sort_by(|a, b| a.sd[row].total_cmp(&b.sd[row]));
-        telling.into_iter().find_map(|w| self.event_by(row, w))
+        telling.into_iter().find_map(|witness| {
+            let depth = self.low(witness, row).0;
+            let from = self.begins(row, depth, witness);
+            // what was refused once is not asked on each of its rows
+            if witness.refused.get() == Some(from) {
+                return None;
+            }
+            let event = self.event_by(from, row, depth, witness);
+            witness.refused.set(event.is_none().then_some(from));
+            event
+        })
     }
 
     /// Whether a witness that could tell a departure says on most of its rows that there is none.
@@ -153,7 +166,7 @@ impl Judge<'_> {
     fn begins(&self, row: usize, depth: f64, witness: &Witness) -> usize {
         let block = self.block(row);
         let low = |i: &usize| !self.read[*i].is_finite() || witness.said[*i] - self.read[*i] > HALF * depth;
-        (block..row).rev().take_while(low).last().unwrap_or(row)
+        (block..row).rev().take(LONGEST).take_while(low).last().unwrap_or(row)
     }
 
     /// First row of the stretch without a gap in time that a row is in.
@@ -169,9 +182,8 @@ impl Judge<'_> {
         before.iter().filter(right).count() >= AGAIN && before.iter().take(2).any(fell)
     }
 
-    fn event_by(&self, row: usize, witness: &Witness) -> Option<Event> {
-        let first = self.low(witness, row).0;
-        let (tells, row) = (row, self.begins(row, first, witness));
+    /// The loss that began at a row and that a witness tells on a later one to be so deep.
+    fn event_by(&self, row: usize, tells: usize, first: f64, witness: &Witness) -> Option<Event> {
         if !self.falls(row, first, witness) {
             return None;
         }
