@@ -1,7 +1,7 @@
 //! From a command to an ESC pulse that is always safe.
 //!
 //! What it is: exact pulse arithmetic ([`timer`]), the arming machine as a table ([`arming`]), throttle schedules as
-//! pure functions of elapsed time ([`schedule`]), and the limits that bring the throttle to minimum ([`protection`]).
+//! pure functions of elapsed time ([`schedule`]) or segments of a host ([`track`]), and the limits that bring the throttle to minimum ([`protection`]).
 //!
 //! What can go wrong: a timer clock that cannot divide the 20 ms period exactly is refused at construction; every
 //! refused command lists all of its reasons; every tripped limit latches until the operator clears it.
@@ -20,8 +20,10 @@ pub mod arming;
 pub mod protection;
 pub mod schedule;
 pub mod timer;
+pub mod track;
 
 pub use arming::{ArmingEvent, ArmingTimes, Objections, Step, Transition, pulse_for, step, time_out};
 pub use protection::{Bounds, Limits, Protection, Readings};
-pub use schedule::{Chirp, Schedule, ScheduleStep, Slew, Staircase, ThrottleCurve, Uploaded};
+pub use schedule::{Chirp, Schedule, Slew, Staircase, ThrottleCurve};
 pub use timer::{PulseTimer, TimerError};
+pub use track::{Played, TRACK, Track};

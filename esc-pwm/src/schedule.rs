@@ -1,15 +1,14 @@
 //! Throttle schedules as pure functions of elapsed time.
 //!
-//! What it is: the thesis staircase, up-down staircase, repeated visits, ramp, step, chirp and uploaded schedules,
+//! What it is: the thesis staircase, up-down staircase, repeated visits, ramp, step and chirp,
 //! all answering "which pulse at this time?"; beside them the slew limit and the throttle curve.
 //! What can go wrong: a schedule without steps, a zero step or a level out of 1000 to 2000 us is refused ([`Schedule::check`]).
 //! Units: milliseconds of elapsed time, nanoseconds of pulse, millihertz.
 //! Reference: Beharie 2013, section 3.2.6 (errata: 21 levels, 20 increments); specification `rig.md`.
 
-use frame::message::MAX_UPLOAD;
 use frame::rig::Refusals;
+use frame::schedule::FASTEST_MHZ;
 use frame::units::PulseWidth;
-use heapless::Vec;
 
 /// Levels of equal height and equal hold, from minimum throttle upwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,72 +61,8 @@ impl Staircase {
     }
 }
 
-/// One step of an uploaded schedule.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ScheduleStep {
-    /// Pulse to go to.
-    pub pulse: PulseWidth,
-    /// How long it takes, milliseconds.
-    pub hold_ms: u32,
-    /// Move there linearly during the hold instead of at its beginning.
-    pub ramp: bool,
-}
-
-/// A schedule uploaded from the host.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Uploaded {
-    steps: Vec<ScheduleStep, MAX_UPLOAD>,
-}
-
-impl Uploaded {
-    /// Empty.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { steps: Vec::new() }
-    }
-
-    /// Puts `step` at `index`; index 0 clears what was there.
-    ///
-    /// # Errors
-    /// [`Refusals::OUT_OF_RANGE`] when a step would be left out, there is no room, or the pulse or its hold is impossible.
-    pub fn put(&mut self, index: u8, step: ScheduleStep) -> Result<(), Refusals> {
-        let refused = Refusals(Refusals::OUT_OF_RANGE);
-        if step.pulse != step.pulse.clamped() || step.hold_ms == 0 {
-            return Err(refused);
-        }
-        if index == 0 {
-            self.steps.clear();
-        }
-        if usize::from(index) != self.steps.len() {
-            return Err(refused);
-        }
-        self.steps.push(step).map_err(|_| refused)
-    }
-
-    /// The steps.
-    #[must_use]
-    pub fn steps(&self) -> &[ScheduleStep] {
-        &self.steps
-    }
-
-    fn pulse_at(&self, ms: u64) -> Option<PulseWidth> {
-        let mut from = PulseWidth::MIN;
-        let mut left = ms;
-        for step in &self.steps {
-            let hold = u64::from(step.hold_ms);
-            if left < hold {
-                return Some(if step.ramp { between(from, step.pulse, left, hold) } else { step.pulse });
-            }
-            left -= hold;
-            from = step.pulse;
-        }
-        None
-    }
-}
-
 /// `from` + (`to` - `from`) * `at` / `whole`, in integers.
-fn between(from: PulseWidth, to: PulseWidth, at: u64, whole: u64) -> PulseWidth {
+pub(crate) fn between(from: PulseWidth, to: PulseWidth, at: u64, whole: u64) -> PulseWidth {
     let (from, to) = (i64::from(from.0), i64::from(to.0));
     let moved = ((to - from) * at as i64).checked_div(whole as i64).unwrap_or(0);
     PulseWidth((from + moved) as u32)
@@ -151,23 +86,50 @@ pub struct Chirp {
 
 impl Chirp {
     fn pulse_at(&self, ms: u64) -> Option<PulseWidth> {
-        if ms >= u64::from(self.length_ms) {
-            return None;
-        }
-        // Phase in millionths of a turn: exact integers, so the end of a long chirp is as sharp as its beginning.
-        let (t, length) = (i128::from(ms), i128::from(self.length_ms));
-        let sweep = i128::from(self.to_mhz) - i128::from(self.from_mhz);
-        let phase = i128::from(self.from_mhz) * t + (sweep * t * t).checked_div(2 * length)?;
-        let turn = phase.rem_euclid(1_000_000) as f32 / 1e6;
-        let offset = self.amplitude.0 as f32 * libm::sinf(turn * core::f32::consts::TAU);
-        let pulse = i64::from(self.centre.0) + offset as i64;
-        Some(PulseWidth(pulse.clamp(i64::from(PulseWidth::MIN.0), i64::from(PulseWidth::MAX.0)) as u32))
+        (ms < u64::from(self.length_ms)).then(|| self.value(ms))
+    }
+
+    /// The sine `ms` milliseconds after its beginning, up to its end.
+    pub(crate) fn value(&self, ms: u64) -> PulseWidth {
+        let offset = self.amplitude.0 as f32 * sine(self.phase(ms));
+        let rounded = if offset < 0.0 { offset - 0.5 } else { offset + 0.5 };
+        let pulse = i64::from(self.centre.0) + rounded as i64;
+        PulseWidth(pulse.max(i64::from(PulseWidth::MIN.0)).min(i64::from(PulseWidth::MAX.0)) as u32)
+    }
+
+    /// Phase in millionths of a turn: exact integers, so the end of a long chirp is as sharp as its beginning. The square of the time is
+    /// divided by twice the length before it meets the sweep, whole and rest apart: 64 bits are enough.
+    fn phase(&self, ms: u64) -> u32 {
+        let length = u64::from(self.length_ms);
+        let t = ms.min(length);
+        let square = t * t;
+        let (whole, rest) = (square.checked_div(2 * length).unwrap_or(0), square.checked_rem(2 * length).unwrap_or(0));
+        let sweep = i64::from(self.to_mhz) - i64::from(self.from_mhz);
+        let part = sweep.wrapping_mul(rest as i64).checked_div(2 * length as i64).unwrap_or(0);
+        let phase =
+            i64::from(self.from_mhz).wrapping_mul(t as i64).wrapping_add(sweep.wrapping_mul(whole as i64)).wrapping_add(part);
+        phase.rem_euclid(TURN) as u32
     }
 }
 
-/// What the throttle follows while running.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[allow(clippy::large_enum_variant)] // no heap on the board: the uploaded steps live in place, once
+/// Parts of a turn.
+const TURN: i64 = 1_000_000;
+
+/// Sine of an angle in millionths of a turn, to 1e-6: its series to the eleventh power over a quarter turn.
+fn sine(millionths: u32) -> f32 {
+    let half = TURN as u32 / 2;
+    let (within, negative) = if millionths < half { (millionths, false) } else { (millionths - half, true) };
+    let quarter = within.min(half.saturating_sub(within));
+    let x = quarter as f32 * (core::f32::consts::TAU / TURN as f32);
+    let square = x * x;
+    let series = [-1.0 / 39_916_800.0, 1.0 / 362_880.0, -1.0 / 5040.0, 1.0 / 120.0, -1.0 / 6.0, 1.0];
+    let value = x * series.iter().fold(0.0, |sum, term| sum * square + term);
+    if negative { -value } else { value }
+}
+
+/// A law that the throttle follows while running.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
     /// A constant setting, without end: the manual override.
     Manual(PulseWidth),
@@ -193,8 +155,6 @@ pub enum Schedule {
     },
     /// Swept sine.
     Chirp(Chirp),
-    /// From the host.
-    Uploaded(Uploaded),
 }
 
 impl Schedule {
@@ -213,7 +173,6 @@ impl Schedule {
                 _ => None,
             },
             Self::Chirp(chirp) => chirp.pulse_at(ms),
-            Self::Uploaded(uploaded) => uploaded.pulse_at(ms),
         }
     }
 
@@ -228,14 +187,13 @@ impl Schedule {
             Self::Step { before, after, hold_ms } => out(before) || out(after) || *hold_ms == 0,
             Self::Chirp(c) => {
                 c.length_ms == 0
+                    || c.from_mhz.max(c.to_mhz) > FASTEST_MHZ
                     || out(&c.centre)
                     || out(&PulseWidth(c.centre.0.saturating_add(c.amplitude.0)))
                     || out(&PulseWidth(c.centre.0.saturating_sub(c.amplitude.0)))
             }
-            Self::Uploaded(_) => false, // each step was checked when it came
         };
-        let empty = matches!(self, Self::Uploaded(uploaded) if uploaded.steps().is_empty());
-        Refusals::default().and(Refusals::OUT_OF_RANGE, bad).and(Refusals::EMPTY_SCHEDULE, empty)
+        Refusals::default().and(Refusals::OUT_OF_RANGE, bad)
     }
 }
 
@@ -297,6 +255,32 @@ impl ThrottleCurve {
             (Some(a), Some(b)) => between(*a, *b, u64::from(above % SPACING), u64::from(SPACING)).clamped(),
             (Some(a), None) => a.clamped(),
             _ => PulseWidth::MIN,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_sine_is_one_all_round() {
+        for part in 0..TURN as u32 {
+            let exact = (f64::from(part) * core::f64::consts::TAU / TURN as f64).sin();
+            assert!((f64::from(sine(part)) - exact).abs() < 1e-6, "{part}");
+        }
+    }
+
+    proptest! {
+        /// The phase is that of exact integers of any width.
+        #[test]
+        fn the_phase_is_exact(from_mhz in 0u32..=FASTEST_MHZ, to_mhz in 0u32..=FASTEST_MHZ, length_ms in 1u32.., share in 0.0f64..=1.0) {
+            let chirp = Chirp { centre: PulseWidth::MIN, amplitude: PulseWidth(0), from_mhz, to_mhz, length_ms };
+            let ms = (f64::from(length_ms) * share) as u64;
+            let (t, l) = (i128::from(ms), i128::from(length_ms));
+            let exact = i128::from(from_mhz) * t + (i128::from(to_mhz) - i128::from(from_mhz)) * t * t / (2 * l);
+            prop_assert_eq!(i128::from(chirp.phase(ms)), exact.rem_euclid(1_000_000));
         }
     }
 }

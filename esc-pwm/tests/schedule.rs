@@ -1,7 +1,6 @@
 //! Schedules: the thesis figures, impossible ones refused, and never a pulse out of range.
 
-use esc_pwm::{Chirp, Schedule, ScheduleStep, Slew, Staircase, ThrottleCurve, Uploaded};
-use frame::message::MAX_UPLOAD;
+use esc_pwm::{Chirp, Schedule, Slew, Staircase, ThrottleCurve};
 use frame::rig::Refusals;
 use frame::units::PulseWidth;
 use proptest::prelude::*;
@@ -32,26 +31,6 @@ fn up_and_down_and_again() {
 }
 
 #[test]
-fn uploads() {
-    let mut up = Uploaded::new();
-    let step = |pulse, hold_ms, ramp| ScheduleStep { pulse: us(pulse), hold_ms, ramp };
-    assert!(up.put(1, step(1500, 10, false)).is_err(), "a gap");
-    assert!(up.put(0, step(999, 10, false)).is_err(), "below minimum");
-    up.put(0, step(1500, 100, true)).unwrap();
-    up.put(1, step(1200, 50, false)).unwrap();
-    let schedule = Schedule::Uploaded(up.clone());
-    assert_eq!(schedule.pulse_at(50), Some(us(1250)));
-    assert_eq!(schedule.pulse_at(100), Some(us(1200)));
-    assert_eq!(schedule.pulse_at(150), None);
-    for i in 2..MAX_UPLOAD as u8 {
-        up.put(i, step(1100, 1, false)).unwrap();
-    }
-    assert!(up.put(MAX_UPLOAD as u8, step(1100, 1, false)).is_err(), "full");
-    up.put(0, step(1300, 1, false)).unwrap();
-    assert_eq!(up.steps().len(), 1);
-}
-
-#[test]
 fn impossible_schedules_are_refused() {
     let stairs = |step, hold_ms, top| Schedule::Staircase(Staircase { step, hold_ms, top, down: false, visits: 1 });
     for bad in [
@@ -64,7 +43,6 @@ fn impossible_schedules_are_refused() {
     ] {
         assert_eq!(bad.check(), Refusals(Refusals::OUT_OF_RANGE), "{bad:?}");
     }
-    assert_eq!(Schedule::Uploaded(Uploaded::new()).check(), Refusals(Refusals::EMPTY_SCHEDULE));
 }
 
 #[test]

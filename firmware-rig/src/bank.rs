@@ -40,7 +40,9 @@ impl CaptureBank {
     /// Channels of `config`.
     #[must_use]
     pub fn new(config: &Config) -> Self {
-        let channels = config.marks.map(|marks| CaptureChannel::new(marks, config.timer_hz, config.capture));
+        let [a, b, c, d] = config.marks;
+        let channel = |marks| CaptureChannel::new(marks, config.timer_hz, config.capture);
+        let channels = [channel(a), channel(b), channel(c), channel(d)]; // made where they stay: `map` would hold two of each on the stack
         Self { channels, timer_hz: config.timer_hz, turning_since: None, before: [None; 2], flagged: 0, straight: None }
     }
 

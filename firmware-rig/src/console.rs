@@ -90,17 +90,12 @@ impl RigConsole {
     /// The shell after a reset at `now`: who speaks, how its codes are meant, and what it found.
     #[must_use]
     pub fn start(now: Ticks, factory: Config, start: &Start) -> Self {
-        let mut rig = match start.stored {
-            Some(settings) => Rig::with_settings(factory, settings),
-            None => Rig::new(factory),
-        };
-        if start.clock.crystal_hz == 0 {
-            rig.stand(Fault::ClockFailed);
-        }
+        let settings = start.stored.unwrap_or_else(|| RigConfig::of(&factory));
+        // the rig is large: it is made where it stays
         let mut console = Self {
-            told: rig.calibration(),
-            revision: rig.revision(),
-            rig,
+            told: factory.calibration(), // until it introduces itself, below
+            revision: 0,
+            rig: Rig::with_settings(factory, settings),
             line: CommandLine::new(),
             stops: StopWatch::default(),
             encoder: Encoder::default(),
@@ -108,6 +103,9 @@ impl RigConsole {
             reset_cause: start.reset_cause,
             health: HealthWatch::default(),
         };
+        if start.clock.crystal_hz == 0 {
+            console.rig.stand(Fault::ClockFailed);
+        }
         console.introduce(now);
         console.say(now, &Message::Event(Event::Settings(start.news)));
         console.say(now, &Message::Event(Event::Clock(start.clock)));

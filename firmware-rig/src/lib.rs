@@ -21,6 +21,7 @@ pub mod bank;
 pub mod capture;
 pub mod config;
 pub mod console;
+mod course;
 mod elapsed;
 pub mod health;
 mod hold_max;

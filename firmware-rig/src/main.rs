@@ -25,6 +25,7 @@ mod app {
     use crate::board::pulse::PulseOutput;
     use crate::board::supply::SupplyWatch;
     use crate::board::watchdog::{Watchdog, take_reset_cause};
+    use core::mem::MaybeUninit;
     use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
     use firmware_rig::{Config, Delivered, RigConfig, RigConsole, Start};
@@ -70,7 +71,8 @@ mod app {
         stop: PB12<Input>,
         tick_timer: TIM4,
         watchdog: Watchdog,
-        console: RigConsole,
+        /// In memory of its own: moved about, it would lie on the stack several times over.
+        console: &'static mut RigConsole,
         encoder_b: EncoderB,
         index: TIM1,
         supply: SupplyWatch,
@@ -79,7 +81,7 @@ mod app {
         sampling: u16,
     }
 
-    #[init]
+    #[init(local = [memory: MaybeUninit<RigConsole> = MaybeUninit::uninit()])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let mut core = cx.core;
         core.DCB.enable_trace();
@@ -132,7 +134,7 @@ mod app {
         let mut clock = Clock::default();
         let now = clock.now(device.TIM2.cnt().read().bits());
         let start = Start { reset_cause, clock: clock_news, stored, news, ended: crash::take() };
-        let console = RigConsole::start(now, Config::thesis_570kv(), &start);
+        let console = cx.local.memory.write(RigConsole::start(now, Config::thesis_570kv(), &start));
         captures::start(&device.TIM2, console.rig().fitted());
         let sampling = console.rig().config().sampling_cycles();
         let converter = Converter::start(device.ADC1, &device.ADC_COMMON, &dma, sampling);

@@ -5,13 +5,13 @@
 //! Units: as in [`frame::message`].
 //! Reference: specification `rig.md`, "Acquisition".
 
-use crate::elapsed::Elapsed;
 use crate::rig::Rig;
 use crate::rig_config::{Calibrated, OutOfRange, RigConfig};
-use esc_pwm::{ArmingEvent, Chirp, Schedule, ScheduleStep, Staircase, Step};
+use esc_pwm::{ArmingEvent, Chirp, Schedule, Staircase, Step};
 use frame::calibration::AdcScale;
 use frame::message::{Command, Event, Setting};
 use frame::rig::{AdcCode, AdcVerdict, Refusals, RigState};
+use frame::schedule::{Segment, Shape};
 use frame::units::{PulseWidth, Ticks};
 
 impl Rig {
@@ -24,15 +24,24 @@ impl Rig {
                 self.apply(now, beep.into(), Refusals::default());
                 return;
             }
+            Command::Segments(batch) => {
+                self.take_segments(&batch);
+                return;
+            }
+            Command::Steer { segment, how } => {
+                self.steer(now, segment, how);
+                return;
+            }
             Command::Arm => self.ask(now, ArmingEvent::Arm, Refusals::default()),
             Command::CalibrateRange { confirm } => {
                 let missing = Refusals::default().and(Refusals::NOT_CONFIRMED, confirm != Command::CALIBRATE_CONFIRM);
                 self.ask(now, ArmingEvent::Calibrate, missing)
             }
             Command::ScheduleStep { index, pulse, hold_ms, ramp } => {
-                self.upload.put(index, ScheduleStep { pulse, hold_ms, ramp })
+                let shape = if ramp { Shape::Line { from: None } } else { Shape::Hold };
+                self.track.append_last(index.into(), Segment { pulse, length_ms: hold_ms, shape })
             }
-            Command::RunSchedule => self.run(now, Schedule::Uploaded(self.upload.clone())),
+            Command::RunSchedule => self.run_track(now),
             Command::RunStaircase { step, hold_ms, top, down } => {
                 self.run(now, Schedule::Staircase(Staircase { step, hold_ms, top, down, visits: 1 }))
             }
@@ -83,20 +92,13 @@ impl Rig {
     }
 
     /// Puts a command to the arming machine, with `more` beside the standing objections.
-    fn ask(&mut self, now: Ticks, event: ArmingEvent, more: Refusals) -> Result<(), Refusals> {
+    pub(crate) fn ask(&mut self, now: Ticks, event: ArmingEvent, more: Refusals) -> Result<(), Refusals> {
         let objections = Refusals(self.objections(now).0 | more.0);
         match self.apply(now, event, objections) {
             Step::To(_) => Ok(()),
             Step::Refused(reasons) => Err(reasons),
             Step::Ignored => Err(Refusals(Refusals::WRONG_STATE)),
         }
-    }
-
-    fn run(&mut self, now: Ticks, schedule: Schedule) -> Result<(), Refusals> {
-        self.ask(now, ArmingEvent::Run, schedule.check())?;
-        self.schedule = schedule;
-        self.started = Elapsed::since(now);
-        Ok(())
     }
 
     /// What changes the board itself needs the rig disarmed and the rotor at rest.

@@ -8,6 +8,7 @@
 
 use crate::bank::CaptureBank;
 use crate::config::Config;
+use crate::course::Course;
 use crate::elapsed::Elapsed;
 use crate::hold_max::{HoldWatch, SupplyProof};
 use crate::line::LineNews;
@@ -16,7 +17,7 @@ use crate::rig_config::{Answers, RigConfig};
 use crate::sampling::AdcBlock;
 use crate::stop::StopLoop;
 use crate::transfer::Incoming;
-use esc_pwm::{ArmingEvent, Objections, Protection, Readings, Schedule, Step, Uploaded, pulse_for, step, time_out};
+use esc_pwm::{ArmingEvent, Objections, Protection, Readings, Step, Track, step, time_out};
 use frame::calibration::Calibration;
 use frame::message::{BoardId, Command, Event, Hello, Trial};
 use frame::rig::{ADC_CHANNELS, AdcCode, AdcVerdict, CAPTURE_CHANNELS, Fault, FaultSet, Refusals, RigSample, RigState};
@@ -71,9 +72,11 @@ pub struct Rig {
     pub(crate) faults: FaultSet,
     /// Faults that no command clears.
     standing: FaultSet,
-    pub(crate) schedule: Schedule,
+    pub(crate) course: Course,
+    /// Since when it is followed: milliseconds counted on, and the instant.
     pub(crate) started: Elapsed,
-    pub(crate) upload: Uploaded,
+    pub(crate) began: Ticks,
+    pub(crate) track: Track,
     pub(crate) bank: CaptureBank,
     pub(crate) codes: [AdcCode; ADC_CHANNELS],
     pub(crate) factory: Config,
@@ -85,10 +88,10 @@ pub struct Rig {
     /// Counts the configurations that were put in force.
     revision: u8,
     /// Since when the throttle is open.
-    live_since: Option<Ticks>,
+    pub(crate) live_since: Option<Ticks>,
     entered: Elapsed,
-    setting: PulseWidth,
-    last_live: Option<Ticks>,
+    pub(crate) setting: PulseWidth,
+    pub(crate) last_live: Option<Ticks>,
     blocks: [AdcBlock; ADC_CHANNELS],
     supply: Option<Volt>,
     stop_loop: StopLoop,
@@ -128,9 +131,10 @@ impl Rig {
             state: RigState::Disarmed,
             faults: FaultSet::NONE,
             standing: FaultSet::NONE,
-            schedule: Schedule::Manual(PulseWidth::MIN),
+            course: Course::MINIMUM,
             started: Elapsed::since(Ticks(0)),
-            upload: Uploaded::new(),
+            began: Ticks(0),
+            track: Track::new(),
             codes: [AdcCode::default(); ADC_CHANNELS],
             entered: Elapsed::since(Ticks(0)),
             setting: PulseWidth::MIN,
@@ -356,7 +360,7 @@ impl Rig {
         }
     }
 
-    fn latch(&mut self, now: Ticks, faults: FaultSet) {
+    pub(crate) fn latch(&mut self, now: Ticks, faults: FaultSet) {
         let all = FaultSet(self.faults.0 | faults.0);
         if all != self.faults {
             self.faults = all;
@@ -416,7 +420,8 @@ impl Rig {
                 self.faults = self.standing;
             }
             if to != RigState::Running {
-                self.schedule = Schedule::Manual(PulseWidth::MIN);
+                self.course = Course::MINIMUM;
+                self.track.stop();
                 self.setting = PulseWidth::MIN;
             }
             if to != from {
@@ -427,30 +432,6 @@ impl Rig {
             }
         }
         answer
-    }
-
-    /// Follows the schedule and gives the pulse of this tick.
-    fn drive(&mut self, now: Ticks, tick_ms: u32) -> PulseWidth {
-        if self.state == RigState::Running {
-            match self.schedule.pulse_at(self.started.ms(now, self.config.ticks_per_ms())) {
-                Some(target) => {
-                    let target = self.config.curve.apply(target).min(self.config.highest);
-                    self.setting = self.config.slew.toward(self.setting, target, tick_ms);
-                }
-                None => {
-                    self.tell(Event::ScheduleDone { at: now });
-                    self.apply(now, ArmingEvent::Finished, Refusals::default());
-                }
-            }
-        }
-        let pulse = pulse_for(self.state, self.setting);
-        if pulse.is_live() {
-            self.last_live = Some(now);
-            self.live_since.get_or_insert(now);
-        } else {
-            self.live_since = None;
-        }
-        pulse
     }
 
     fn sample(&mut self, now: Ticks, pulse: PulseWidth) -> RigSample {

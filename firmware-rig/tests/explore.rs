@@ -5,6 +5,7 @@ use esc_pwm::ArmingTimes;
 use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig, StopWatch};
 use frame::message::{Beep, Command};
 use frame::rig::{FaultSet, RigState};
+use frame::schedule::{Segment, SegmentBatch, Shape, Steer};
 use frame::units::{PulseWidth, Ticks};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -54,6 +55,13 @@ enum Happening {
     Silence,
 }
 
+/// A segment that the host may move.
+const STEERED: Segment = Segment {
+    pulse: PulseWidth::from_us(1300),
+    length_ms: 600,
+    shape: Shape::Steered { low: PulseWidth::from_us(1100), high: PulseWidth::from_us(1500) },
+};
+
 fn happenings() -> Vec<Happening> {
     let us = PulseWidth::from_us;
     let mut list: Vec<Happening> = [
@@ -62,6 +70,9 @@ fn happenings() -> Vec<Happening> {
         Command::CalibrateRange { confirm: 0 },
         Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM },
         Command::ScheduleStep { index: 0, pulse: us(1400), hold_ms: 30, ramp: true },
+        Command::Segments(SegmentBatch { last: false, ..SegmentBatch::of(0, &[STEERED]) }), // more was to come: it runs dry
+        Command::Steer { segment: 0, how: Steer::Pulse(us(1450)) },
+        Command::Steer { segment: 0, how: Steer::GoOn },
         Command::RunSchedule,
         Command::RunStaircase { step: us(200), hold_ms: 10, top: us(1400), down: true },
         Command::RunVisits { step: us(200), hold_ms: 10, top: us(1200), down: false, visits: 2 },

@@ -3,6 +3,7 @@
 use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Outputs, Rig};
 use frame::message::{Beep, Command, Event, Trial};
 use frame::rig::{AdcVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
+use frame::schedule::{ScheduleNews, Segment, SegmentBatch, Shape, Steer};
 use frame::units::{PulseWidth, Ticks};
 use proptest::prelude::*;
 
@@ -457,6 +458,94 @@ fn an_upload_runs_and_manual_override_ends_it() {
     assert_eq!(bench.rig.state(), RigState::Armed);
 }
 
+fn segment(us: u32, length_ms: u32, shape: Shape) -> Segment {
+    Segment { pulse: PulseWidth::from_us(us), length_ms, shape }
+}
+
+/// Sends segments or steers, and gives the news that answers.
+fn news(bench: &mut Bench, command: Command) -> ScheduleNews {
+    bench.run(20);
+    bench.events.clear();
+    bench.tick_with(Some(command), &[]);
+    bench.run(3);
+    assert!(!bench.events.iter().any(|e| matches!(e, Event::Accepted | Event::Refused(_))), "one answer is enough");
+    bench.events.iter().find_map(|e| if let Event::Schedule(news) = e { Some(*news) } else { None }).expect("news")
+}
+
+#[test]
+fn a_stream_that_runs_dry_is_minimum_and_a_fault() {
+    let mut bench = Bench::armed();
+    let part =
+        |first, last| Command::Segments(SegmentBatch { last, ..SegmentBatch::of(first, &[segment(1500, 300, Shape::Hold)]) });
+    news(&mut bench, part(0, false));
+    assert_eq!(bench.say(Command::RunSchedule), refused(Refusals::SHORT_STREAM), "300 ms are too little to begin with");
+    let told = news(&mut bench, part(1, false));
+    assert_eq!((told.next, told.playing, told.refused), (2, None, Refusals::default()));
+    assert_eq!(bench.say(Command::RunSchedule), Some(Event::Accepted));
+    bench.run(580);
+    assert_eq!(bench.pulse, PulseWidth::from_us(1500));
+    bench.run(20);
+    assert_eq!((bench.pulse, bench.rig.state()), (PulseWidth::MIN, RigState::Faulted));
+    assert_eq!(bench.rig.faults(), FaultSet::NONE.with(Fault::StreamDry));
+}
+
+#[test]
+fn a_stream_that_is_fed_ends_as_any_schedule_does() {
+    let mut bench = Bench::armed();
+    let pulse = |n: u32| 1100 + 10 * (n % 40);
+    let batch = |first: u32| {
+        let list: Vec<Segment> = (first..first + 8).map(|n| segment(pulse(n), 50, Shape::Hold)).collect();
+        Command::Segments(SegmentBatch { last: first == 392, ..SegmentBatch::of(first, &list) })
+    };
+    let mut sent = 0;
+    while sent < 128 {
+        bench.tick_with(Some(batch(sent)), &[]);
+        sent += 8;
+    }
+    assert_eq!(bench.say(Command::RunSchedule), Some(Event::Accepted));
+    bench.run(1); // 10 ms and this one have been played
+    for ms in 12..20_000u32 {
+        let feed = (ms % 100 == 0 && sent < 400 && ms / 50 >= sent - 118).then(|| batch(sent));
+        sent += if feed.is_some() { 8 } else { 0 };
+        bench.tick_with(feed, &[]);
+        if ms % 50 >= 45 {
+            assert_eq!(bench.pulse, PulseWidth::from_us(pulse(ms / 50)), "{ms} ms");
+        }
+    }
+    bench.run(2);
+    assert_eq!(bench.rig.state(), RigState::Armed);
+    assert!(bench.events.iter().any(|e| matches!(e, Event::ScheduleDone { .. })));
+}
+
+#[test]
+fn only_a_steered_segment_that_is_being_played_is_steered() {
+    let us = PulseWidth::from_us;
+    let mut bench = Bench::armed();
+    let list = [segment(1300, 60_000, Shape::Steered { low: us(1200), high: us(1400) }), segment(1250, 100, Shape::Hold)];
+    news(&mut bench, Command::Segments(SegmentBatch::of(0, &list)));
+    let steer = |segment, how| Command::Steer { segment, how };
+    assert_eq!(news(&mut bench, steer(0, Steer::GoOn)).refused, Refusals(Refusals::WRONG_STATE), "it does not run");
+    assert_eq!(bench.say(Command::RunSchedule), Some(Event::Accepted));
+    bench.run(100);
+    assert_eq!(news(&mut bench, steer(0, Steer::Pulse(us(1401)))).refused, Refusals(Refusals::OUT_OF_RANGE));
+    assert_eq!(bench.pulse, us(1300));
+    assert_eq!(news(&mut bench, steer(0, Steer::Pulse(us(1400)))).refused, Refusals::default());
+    bench.run(10);
+    assert_eq!(bench.pulse, us(1400));
+    let told = news(&mut bench, steer(0, Steer::GoOn)).playing.expect("it runs");
+    assert_eq!((told.segment, told.since.as_ms()), (1, bench.ms - 3), "since the tick that took the command");
+    bench.run(20);
+    assert_eq!(bench.pulse, us(1250));
+    bench.run(100);
+    assert_eq!(bench.rig.state(), RigState::Armed);
+    assert_eq!(bench.say(Command::SetPulse(us(1500))), Some(Event::Accepted));
+    assert_eq!(
+        news(&mut bench, steer(0, Steer::Pulse(us(1200)))).refused,
+        Refusals(Refusals::WRONG_STATE),
+        "another course is followed"
+    );
+}
+
 #[test]
 fn tare_takes_the_last_means_as_zero() {
     let mut bench = Bench::new();
@@ -512,6 +601,19 @@ fn any_command() -> impl Strategy<Value = Command> {
             Command::ScheduleStep { index, pulse: PulseWidth(pulse), hold_ms, ramp }
         }),
         Just(Command::RunSchedule),
+        (0u32..3, 900_000u32..2_100_000, 0u32..700, any::<bool>(), any::<bool>()).prop_map(
+            |(first, ns, length_ms, steered, last)| {
+                let shape = if steered {
+                    Shape::Steered { low: PulseWidth::MIN, high: PulseWidth(ns) }
+                } else {
+                    Shape::Line { from: None }
+                };
+                let list = [Segment { pulse: PulseWidth(ns), length_ms, shape }; 2];
+                Command::Segments(SegmentBatch { last, ..SegmentBatch::of(first, &list) })
+            }
+        ),
+        (0u32..4, proptest::option::of(900_000u32..2_100_000))
+            .prop_map(|(segment, ns)| Command::Steer { segment, how: ns.map_or(Steer::GoOn, |ns| Steer::Pulse(PulseWidth(ns))) }),
         (900_000u32..2_100_000).prop_map(|ns| Command::SetPulse(PulseWidth(ns))),
         Just(Command::Stop),
         Just(Command::Tare),

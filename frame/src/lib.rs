@@ -20,6 +20,7 @@ pub mod imu;
 pub mod imu_command;
 pub mod message;
 pub mod rig;
+pub mod schedule;
 pub mod units;
 pub mod wire;
 

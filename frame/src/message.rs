@@ -9,6 +9,7 @@ use crate::calibration::Calibration;
 use crate::imu::ImuSample;
 use crate::imu_command::{ImuCommand, ImuReport, ImuValues, TestAccel};
 use crate::rig::{FaultSet, Refusals, RigSample, RigState};
+use crate::schedule::{ScheduleNews, SegmentBatch, Steer};
 use crate::units::{PulseWidth, Ticks};
 use serde::{Deserialize, Serialize};
 
@@ -100,6 +101,9 @@ pub enum Event {
         /// When.
         at: Ticks,
     },
+    /// How the host's schedule stands: the answer to [`Command::Segments`] and [`Command::Steer`], in the place of `Accepted` and
+    /// `Refused`.
+    Schedule(ScheduleNews),
 }
 
 /// What ended the program before the last reset.
@@ -254,9 +258,9 @@ pub enum Command {
     },
     /// The operator has heard a beep pattern or pressed its key.
     Beep(Beep),
-    /// Clear the upload buffer and append a first step, or append a further one.
+    /// Append a step to a short schedule, step by step; longer ones and other shapes: [`Command::Segments`].
     ScheduleStep {
-        /// Position in the schedule; 0 clears what was there.
+        /// Position in the schedule; 0 begins a new one.
         index: u8,
         /// Pulse to go to.
         pulse: PulseWidth,
@@ -265,7 +269,7 @@ pub enum Command {
         /// Ramp linearly from the last pulse during the hold instead of stepping.
         ramp: bool,
     },
-    /// Run the uploaded schedule.
+    /// Run the schedule that was sent, from its beginning.
     RunSchedule,
     /// Run the built-in up-down staircase or one of its relatives.
     RunStaircase {
@@ -367,6 +371,15 @@ pub enum Command {
     ConfigRead {
         /// From 0.
         at: u16,
+    },
+    /// Segments of a schedule, ahead of their playing; [`Command::RunSchedule`] starts it.
+    Segments(SegmentBatch),
+    /// Do something to the segment that is being played.
+    Steer {
+        /// Its number; another one than is being played is refused.
+        segment: u32,
+        /// What.
+        how: Steer,
     },
 }
 

@@ -98,11 +98,13 @@ pub enum Fault {
     TorqueLimit = 19,
     /// Temperature beyond a configured limit.
     TemperatureLimit = 20,
+    /// The host's schedule was played to the end of what had arrived, and more was to come.
+    StreamDry = 21,
 }
 
 impl Fault {
     /// Every fault, in the order of its bit.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::OperatorStop,
         Self::LinkLost,
         Self::Overspeed,
@@ -124,6 +126,7 @@ impl Fault {
         Self::OverVoltage,
         Self::TorqueLimit,
         Self::TemperatureLimit,
+        Self::StreamDry,
     ];
 
     /// The fault in words, for people.
@@ -151,6 +154,7 @@ impl Fault {
             Self::OverVoltage => "over-voltage",
             Self::TorqueLimit => "torque beyond its limit",
             Self::TemperatureLimit => "temperature beyond its limit",
+            Self::StreamDry => "schedule ran dry",
         }
     }
 }
@@ -222,9 +226,11 @@ impl Refusals {
     pub const NO_WITNESS: u16 = 1 << 12;
     /// The stop loop is open: the key is pressed, or the loop broken or unplugged.
     pub const STOP_OPEN: u16 = 1 << 13;
+    /// Of a schedule that is still to be sent too little is there to begin with.
+    pub const SHORT_STREAM: u16 = 1 << 14;
 
     /// Every reason and its words, for people.
-    pub const WORDS: [(u16, &'static str); 14] = [
+    pub const WORDS: [(u16, &'static str); 15] = [
         (Self::WRONG_STATE, "not in this state"),
         (Self::FAULT_LATCHED, "a fault is latched: clear it first"),
         (Self::THROTTLE_NOT_LOW, "throttle is not at minimum"),
@@ -239,6 +245,7 @@ impl Refusals {
         (Self::SUPPLY_UNPROVEN, "the supply reads off but was never seen on: switch the ESC on and off once, then ask again"),
         (Self::NO_WITNESS, "neither a speed sensor nor the current is fitted: nothing would see the rotor turn"),
         (Self::STOP_OPEN, "the stop loop is open: let the key go, check plug and wire"),
+        (Self::SHORT_STREAM, "too little of the schedule is there to begin with"),
     ];
 
     /// The reasons in words.

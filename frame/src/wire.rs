@@ -244,6 +244,21 @@ mod tests {
     }
 
     #[test]
+    fn the_fullest_batch_of_segments_fits() {
+        use crate::schedule::{BATCH, Segment, SegmentBatch, Shape};
+        use crate::units::PulseWidth;
+        let most = PulseWidth(u32::MAX);
+        for shape in
+            [Shape::Chirp { amplitude: most, from_mhz: u32::MAX, to_mhz: u32::MAX }, Shape::Steered { low: most, high: most }]
+        {
+            let segment = Segment { pulse: PulseWidth::MAX, length_ms: u32::MAX, shape };
+            let batch = SegmentBatch { first: u32::MAX, count: BATCH as u8, last: true, segments: [segment; BATCH] };
+            let mut out = [0; MAX_WIRE];
+            assert!(Encoder::default().encode(Ticks(u64::MAX), &Command::Segments(batch), &mut out).is_ok());
+        }
+    }
+
+    #[test]
     fn a_newer_version_is_counted_as_foreign() {
         let mut raw = std::vec![VERSION + 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
         let crc = CRC.checksum(&raw).to_le_bytes();

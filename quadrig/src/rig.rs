@@ -19,8 +19,9 @@ use clap::Subcommand;
 use frame::message::{Beep, BoardId, Command, Event, Hello, Message, Setting};
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES, Fault, RigState};
 use frame::units::PulseWidth;
+use schedule::{Plan, Player};
 use std::io::BufRead;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 use virtual_board::{Hand, sound};
@@ -46,8 +47,14 @@ enum Order {
         #[arg(long)]
         esc_is_unpowered: bool,
     },
-    /// Arms, runs a staircase, and records it.
+    /// Arms, runs a schedule, and records it: a file of parts, a verdict's next experiment, or a staircase.
     Run {
+        /// Schedule file (TOML); without it and --next, the staircase of the options below.
+        #[arg(conflicts_with_all = ["next", "step", "hold", "top", "down", "visits"])]
+        schedule: Option<PathBuf>,
+        /// Verdict whose next experiment is run, as it is.
+        #[arg(long, conflicts_with_all = ["step", "hold", "top", "down", "visits"])]
+        next: Option<PathBuf>,
         /// Height of a step, us.
         #[arg(long, default_value_t = 50.0)]
         step: f64,
@@ -146,7 +153,15 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Order::Set { us, hold } => {
             board.obey(Command::SetPulse(pulse(*us)?), silent)?;
             let until = board.now() + Duration::from_secs_f64(hold.clamp(0.0, 3600.0));
-            let mut session = Session { recorder: None, assistant: None, quiet, state: RigState::Running, finished: false, faulted: None };
+            let mut session = Session {
+                player: None,
+                recorder: None,
+                assistant: None,
+                quiet,
+                state: RigState::Running,
+                finished: false,
+                faulted: None,
+            };
             while board.now() < until && session.faulted.is_none() {
                 session.turn(&mut board)?;
             }
@@ -192,21 +207,31 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             Ok(())
         }
         Order::Save => configure::save(&mut board).map(|()| done("saved, and read back the same")),
-        Order::Arm => session(&mut board, Command::Arm, None, None, assistant, quiet),
+        Order::Arm => session(&mut board, Command::Arm, Course::Typed, None, assistant, quiet),
         Order::Calibrate { esc_is_unpowered: false } => {
             Err("the board will give MAXIMUM pulses: disconnect the ESC's battery, take the propeller off, and say --esc-is-unpowered".into())
         }
         Order::Calibrate { .. } => {
-            session(&mut board, Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM }, None, None, assistant, quiet)
+            session(&mut board, Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM }, Course::Typed, None, assistant, quiet)
         }
-        Order::Run { step, hold, top, down, visits, output } => {
+        Order::Run { schedule: None, next: None, step, hold, top, down, visits, output } => {
             let height = if *step > 0.0 && *step <= 1000.0 { PulseWidth((step * 1000.0).round() as u32) } else { return Err(format!("{step} us: a step is above 0 and up to 1000 us").into()) };
             if !(*hold > 0.0 && *hold < 86_400.0) {
                 return Err(format!("{hold} s: a level is held for more than 0 and less than 86400 s").into());
             }
             let run = Command::RunVisits { step: height, hold_ms: (hold * 1000.0) as u32, top: pulse(*top)?, down: *down, visits: *visits };
             let recorder = output.as_ref().map(|o| Recorder::new(o, Vec::new(), quiet)).transpose()?;
-            session(&mut board, Command::Arm, Some(run), recorder, assistant, quiet)
+            session(&mut board, Command::Arm, Course::Known(run), recorder, assistant, quiet)
+        }
+        Order::Run { schedule, next, output, .. } => {
+            let plan = match (schedule, next) {
+                (_, Some(verdict)) => Plan::next_experiment(verdict)?,
+                (file, None) => Plan::read(file.as_deref().unwrap_or(Path::new("")))?,
+            };
+            done(&plan.summary());
+            let head = vec![("schedule", plan.name.clone())];
+            let recorder = output.as_ref().map(|o| Recorder::new(o, head, quiet)).transpose()?;
+            session(&mut board, Command::Arm, Course::Played(Box::new(Player::new(plan))), recorder, assistant, quiet)
         }
     }
 }
@@ -277,8 +302,19 @@ fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
     })
 }
 
+/// What is run once the rig is armed.
+enum Course {
+    /// What the operator types.
+    Typed,
+    /// A schedule that the board knows.
+    Known(Command),
+    /// A schedule that is sent.
+    Played(Box<Player>),
+}
+
 /// A conversation that keeps the link alive.
 struct Session {
+    player: Option<Player>,
     recorder: Option<Recorder>,
     assistant: Option<Assistant>,
     quiet: bool,
@@ -291,6 +327,9 @@ impl Session {
     fn take(&mut self, message: &Message) {
         if let Some(recorder) = &mut self.recorder {
             recorder.take(message);
+        }
+        if let Some(player) = &mut self.player {
+            player.take(message);
         }
         match message {
             Message::Event(Event::State { to, .. }) => {
@@ -331,6 +370,12 @@ impl Session {
         }
         if let Some(assistant) = &mut self.assistant {
             assistant.help(board, self.state)?;
+        }
+        while let Some(command) = self.player.as_mut().and_then(|player| player.command(board.now().as_millis() as u64)) {
+            board.send(command)?;
+        }
+        if let Some(why) = self.player.as_ref().and_then(Player::failure) {
+            return Err(format!("the schedule was not played to its end: {why}").into());
         }
         board.keep_alive()
     }
@@ -408,13 +453,18 @@ fn typed(line: &str, hands: bool) -> Result<Typed, Failure> {
 fn session(
     board: &mut Board,
     first: Command,
-    schedule: Option<Command>,
+    course: Course,
     recorder: Option<Recorder>,
     assistant: Option<Assistant>,
     quiet: bool,
 ) -> Result<(), Failure> {
+    let (mut schedule, player) = match course {
+        Course::Typed => (None, None),
+        Course::Known(command) => (Some(command), None),
+        Course::Played(player) => (Some(Command::RunSchedule), Some(*player)),
+    };
     let ended = Ended::watch()?;
-    let mut session = Session { recorder, assistant, quiet, state: RigState::Disarmed, finished: false, faulted: None };
+    let mut session = Session { player, recorder, assistant, quiet, state: RigState::Disarmed, finished: false, faulted: None };
     // who it is and how its codes are meant, for the log
     let known = board.ask(
         Command::Identify,
@@ -431,7 +481,6 @@ fn session(
         return Err(refusal);
     }
     let input = lines();
-    let mut schedule = schedule;
     let running = schedule.is_some();
     let talk = (|| -> Result<(), Failure> {
         loop {
@@ -440,6 +489,7 @@ fn session(
                 return Ok(());
             }
             if session.state == RigState::Armed
+                && session.player.as_ref().is_none_or(Player::is_ready)
                 && let Some(run) = schedule.take()
             {
                 board.obey(run, |m| session.take(m))?;

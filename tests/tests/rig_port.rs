@@ -107,16 +107,11 @@ fn the_whole_configuration_is_one_file() {
     rig(&["configure"]).refused(&["--read"]);
 }
 
-/// The whole session of an operator: arm by the beeps, run a staircase, record it; and the log is one that `identify` takes.
-#[test]
-fn arm_run_and_record() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let desk = Desk::new(Line::Clean);
-    let words = ["rig", "--port", &desk.port, "run", "--step", "150", "--hold", "0.6", "--top", "1450", "-o", "run.csv"];
-    let mut child = start(folder.path(), &words);
+/// Passes the ESC's beeps on until it is ready.
+fn arms(desk: &Desk, child: &mut Child) {
     std::thread::sleep(Duration::from_millis(700));
     desk.power_the_esc();
-    let mut input = child.stdin.take().expect("its input");
+    let input = child.stdin.as_mut().expect("its input");
     while let Some(beep) = desk.beep(Duration::from_secs(8)) {
         let line = match beep {
             Beep::Long => "long\n".to_owned(),
@@ -129,6 +124,83 @@ fn arm_run_and_record() {
             break;
         }
     }
+}
+
+/// A schedule of three times the board's memory, ramps and a chirp among it.
+fn long_schedule() -> String {
+    let mut text = String::from("name = \"long\"\n[[part]]\nkind = \"steps\"\nsteps = [\n");
+    for n in 0..380 {
+        text += &format!("  {{ pulse_us = {}, hold_s = 0.013, ramp = {} }},\n", 1250 + 7 * (n % 20), n % 4 == 0);
+    }
+    text + "]\n[[part]]\nkind = \"chirp\"\ncentre_us = 1400\namplitude_us = 50\nfrom_hz = 1\nto_hz = 5\nlength_s = 1.5\n"
+}
+
+/// One schedule file: the virtual board's pulses are the simulator's, millisecond by millisecond.
+#[test]
+fn a_schedule_file_gives_the_same_pulses_here_and_in_the_simulator() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("plan.toml"), long_schedule()).expect("a file");
+    let desk = Desk::new(Line::Clean);
+    let words = ["rig", "--port", &desk.port, "run", "plan.toml", "-o", "run.csv"];
+    let mut child = start(folder.path(), &words);
+    arms(&desk, &mut child);
+    let said = end(&words, child).succeeded();
+    assert!(said.out.contains("long: 2 parts, 6.4 s, up to 1450 us"), "{}", said.out);
+    let log = std::fs::read_to_string(folder.path().join("run.csv")).expect("a log");
+    assert!(log.contains("# schedule = \"long\"\n"), "{log:.300}");
+    let live = |pulses: Vec<u32>| -> Vec<u32> {
+        let first = pulses.iter().position(|p| *p > 1_000_000).expect("it ran");
+        let last = pulses.iter().rposition(|p| *p > 1_000_000).expect("it ran");
+        pulses[first..=last].to_vec()
+    };
+    let here = live(desk.pulses().iter().map(|p| p.0).collect());
+
+    let text = "schedule = { kind = \"file\", file = \"plan.toml\" }\n[log]\nrate_hz = 100\n";
+    let scenario = hal_sim::Scenario::parse(text, &folder.path().join("run.toml")).expect("a scenario");
+    let mut session = hal_sim::native::Session::new(&scenario, None);
+    let mut pulses = Vec::new();
+    while session.step().expect("it flies") {
+        pulses.push(session.pulse().0);
+    }
+    let there = live(pulses);
+    assert_eq!(here.len(), there.len());
+    assert!(here == there, "from {:?} on", here.iter().zip(&there).position(|(a, b)| a != b));
+
+    let rig = |words: &[&str]| call(folder.path(), &[&["rig", "--port", &desk.port, "run"], words].concat());
+    std::fs::write(folder.path().join("bad.toml"), "[[part]]\nkind = \"hold\"\npulse_us = 900\n").expect("a file");
+    rig(&["bad.toml"]).refused(&["bad.toml:3:12: pulse_us: expected a number from 1000 to 2000, found 900"]);
+    std::fs::write(folder.path().join("verdict.json"), "{\"verdict\": \"none\"}").expect("a file");
+    rig(&["--next", "verdict.json"]).refused(&["verdict.json:1:1: this verdict proposes no next experiment"]);
+}
+
+/// A verdict's next experiment is run as it is.
+#[test]
+fn the_next_experiment_of_a_verdict_is_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let steps = r#"[{"pulse_us": 1300, "hold_s": 0.8}, {"pulse_us": 1450.0, "hold_s": 0.6}]"#;
+    let verdict =
+        format!(r#"{{"format": "quadrig-verdict 2", "next_experiment": {{"why": "quick steps", "schedule": {steps}}}}}"#);
+    std::fs::write(folder.path().join("verdict.json"), verdict).expect("a file");
+    let desk = Desk::new(Line::Clean);
+    let words = ["rig", "--port", &desk.port, "run", "--next", "verdict.json", "-o", "run.csv"];
+    let mut child = start(folder.path(), &words);
+    arms(&desk, &mut child);
+    end(&words, child).succeeded();
+    let rows = rows(&folder.path().join("run.csv"));
+    for (level, least) in [(1300.0, 7), (1450.0, 5)] {
+        let at = rows.iter().filter(|r| r[1] == level).count();
+        assert!((least..=least + 2).contains(&at), "{at} rows at {level} us");
+    }
+}
+
+/// The whole session of an operator: arm by the beeps, run a staircase, record it; and the log is one that `identify` takes.
+#[test]
+fn arm_run_and_record() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let desk = Desk::new(Line::Clean);
+    let words = ["rig", "--port", &desk.port, "run", "--step", "150", "--hold", "0.6", "--top", "1450", "-o", "run.csv"];
+    let mut child = start(folder.path(), &words);
+    arms(&desk, &mut child);
     let said = end(&words, child).succeeded();
     assert!(said.out.contains("Armed: keep clear"), "{}", said.out);
     let rows = rows(&folder.path().join("run.csv"));

@@ -10,10 +10,11 @@ use super::SimError;
 use super::desk::RigDesk;
 use crate::scenario::{Scenario, Schedule, pulse_width};
 use frame::calibration::Calibration;
-use frame::message::{Command, Event, Hello, Message};
+use frame::message::{Command, Event, Hello, MAX_UPLOAD, Message};
 use frame::rig::{RigSample, RigState};
 use frame::units::Ticks;
 use frame::wire::{Decoder, Encoder};
+use schedule::Player;
 use std::collections::VecDeque;
 
 /// What the host is doing.
@@ -63,6 +64,8 @@ pub(super) struct Host {
     since_ms: u64,
     sent_ms: u64,
     schedule: Vec<Command>,
+    /// Plays what the board does not know by itself.
+    player: Option<Player>,
     rest_ms: u64,
     pub(super) hello: Option<Hello>,
     pub(super) calibration: Option<Calibration>,
@@ -87,6 +90,7 @@ impl Host {
             since_ms: 0,
             sent_ms: 0,
             schedule: commands(&scenario.schedule),
+            player: scenario.schedule.plan().map(Player::new),
             rest_ms: (scenario.rest_s * 1000.0) as u64,
             hello: None,
             calibration: None,
@@ -110,6 +114,11 @@ impl Host {
         if self.waiting.is_some() {
             return None;
         }
+        let plays = matches!(self.phase, Phase::Uploading | Phase::RestBefore | Phase::Running);
+        if let Some(command) = self.player.as_mut().filter(|_| plays).and_then(|player| player.command(ms)) {
+            self.sent_ms = ms;
+            return Some(command);
+        }
         let command = match self.outbox.pop_front() {
             Some(command) => command,
             None if ms >= self.sent_ms + PING_MS => Command::Ping,
@@ -123,6 +132,12 @@ impl Host {
 
     /// Takes a message of the board.
     pub(super) fn take(&mut self, message: Message, ms: u64) -> Result<(), SimError> {
+        if let Some(player) = &mut self.player {
+            player.take(&message);
+            if let Some(reason) = player.failure() {
+                return Err(SimError::Schedule { reason: reason.to_owned() });
+            }
+        }
         match message {
             Message::Hello(hello) => self.hello = Some(hello),
             // a board that was reset in mid-run has lost its tare: the run is read with the one that it began with
@@ -143,7 +158,7 @@ impl Host {
                     Event::Accepted => self.waiting = None,
                     Event::Refused(_) | Event::Faults { .. } if self.tolerant && self.start.is_some() => self.faulted = true,
                     Event::Refused(reasons) => {
-                        let command = self.waiting.unwrap_or(Command::Ping);
+                        let command = Box::new(self.waiting.unwrap_or(Command::Ping));
                         return Err(SimError::Refused { command, phase: self.phase.name(), reasons });
                     }
                     Event::Faults { faults, at } => {
@@ -195,7 +210,7 @@ impl Host {
                 self.outbox.extend(self.schedule.drain(..uploads));
                 self.enter(Phase::Uploading, ms);
             }
-            Phase::Uploading if idle => self.enter(Phase::RestBefore, ms),
+            Phase::Uploading if idle && self.player.as_ref().is_none_or(Player::is_ready) => self.enter(Phase::RestBefore, ms),
             Phase::RestBefore if age >= self.rest_ms => {
                 self.outbox.extend(self.schedule.drain(..));
                 self.enter(Phase::Running, ms);
@@ -215,6 +230,14 @@ fn commands(schedule: &Schedule) -> Vec<Command> {
     match schedule {
         Schedule::Staircase { step_us, hold_s, top_us } => staircase(*step_us, *hold_s, *top_us, false),
         Schedule::UpDown { step_us, hold_s, top_us } => staircase(*step_us, *hold_s, *top_us, true),
+        Schedule::Chirp(chirp) => {
+            let mhz = |hz: f64| (hz * 1000.0).round() as u32;
+            let (centre, amplitude) = (pulse_width(chirp.centre_us), pulse_width(chirp.amplitude_us));
+            let (from_mhz, to_mhz, length_ms) = (mhz(chirp.from_hz), mhz(chirp.to_hz), ms(chirp.length_s));
+            vec![Command::RunChirp { centre, amplitude, from_mhz, to_mhz, length_ms }]
+        }
+        Schedule::Replay(_) | Schedule::File { .. } => vec![Command::RunSchedule],
+        Schedule::Steps { steps } if steps.len() > MAX_UPLOAD => vec![Command::RunSchedule],
         Schedule::Steps { steps } => {
             let mut list: Vec<_> = steps
                 .iter()

@@ -28,7 +28,7 @@ use crate::scenario::Scenario;
 use firmware_rig::{AdcBlock, Config};
 use frame::message::Message;
 use frame::rig::RigSample;
-use frame::units::Ticks;
+use frame::units::{PulseWidth, Ticks};
 use frame::wire::MAX_WIRE;
 use host::{Host, Phase};
 
@@ -131,6 +131,12 @@ impl Session {
     #[must_use]
     pub fn telemetry(&self) -> &[u8] {
         &self.telemetry
+    }
+
+    /// What the board's pulse timer holds: the pulse of the next frame.
+    #[must_use]
+    pub fn pulse(&self) -> PulseWidth {
+        self.desk.board().pulse()
     }
 
     /// Share of the logged run that is done.

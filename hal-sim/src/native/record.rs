@@ -20,7 +20,7 @@ pub enum SimError {
     #[error("the rig refused {command:?} while it was {phase}: reasons {reasons:?}")]
     Refused {
         /// What was asked.
-        command: Command,
+        command: Box<Command>,
         /// What the host was doing.
         phase: &'static str,
         /// Why not.
@@ -45,6 +45,12 @@ pub enum SimError {
         state: RigState,
         /// When, s since reset.
         at_s: f64,
+    },
+    /// The schedule cannot be played to its end.
+    #[error("the schedule was not played to its end: {reason}")]
+    Schedule {
+        /// Why not.
+        reason: String,
     },
     /// A message did not fit its frame.
     #[error("a message did not fit its frame")]

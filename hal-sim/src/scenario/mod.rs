@@ -12,7 +12,10 @@ mod section;
 
 pub use fault::{FaultKind, ScheduledFault};
 pub use imu::{BodySection, ChipSection, Field, ImuScenario, ImuSection};
-pub use section::{AirSection, EscSection, LogSection, NoiseSection, Schedule, SensorSection, SpeedSensor, Step, SupplySection};
+pub use section::{
+    AirSection, ChirpSection, EscSection, LogSection, NoiseSection, ReplaySection, Schedule, SensorSection, SpeedSensor, Step,
+    SupplySection,
+};
 
 use crate::bench::BenchParts;
 use crate::effect::{self, Scheduled};
@@ -51,6 +54,9 @@ pub enum ScenarioError {
         /// Why not.
         source: std::io::Error,
     },
+    /// The schedule that it names was refused.
+    #[error(transparent)]
+    Schedule(#[from] schedule::ScheduleError),
     /// No effect has this id.
     #[error("no effect is called {0:?}; there are: {list}", list = effect_ids())]
     UnknownEffect(String),
@@ -149,7 +155,9 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Refused`] with line and column.
     pub fn parse(text: &str, file: &Path) -> Result<Self, ScenarioError> {
-        parsed(text, file)
+        let mut scenario: Self = parsed(text, file)?;
+        scenario.schedule.load(file.parent().unwrap_or(Path::new("")))?;
+        Ok(scenario)
     }
 
     /// Length of the logged run, s.
@@ -240,7 +248,7 @@ impl AnyScenario {
         if of_the_imu {
             return parsed(&text, file).map(|s| Self::Imu(Box::new(s)));
         }
-        parsed(&text, file).map(|s| Self::Rig(Box::new(s)))
+        Scenario::parse(&text, file).map(|s| Self::Rig(Box::new(s)))
     }
 }
 

@@ -6,7 +6,10 @@
 //! Reference: `docs/scenario.md`.
 
 use crate::plant::{CutOff, Guard};
+use frame::message::MAX_UPLOAD;
+use schedule::{Plan, Replay, ScheduleError, part};
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use std::path::{Path, PathBuf};
 
 /// What feeds the ESC.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -86,12 +89,93 @@ pub enum Schedule {
         #[serde(deserialize_with = "pulse")]
         top_us: f64,
     },
-    /// A list, uploaded step by step; 64 at most.
+    /// A list: up to 64 uploaded step by step, more of them sent ahead of their playing.
     Steps {
         /// The list.
         #[serde(deserialize_with = "steps")]
         steps: Vec<Step>,
     },
+    /// A sine whose frequency moves linearly.
+    Chirp(ChirpSection),
+    /// The pulses of a log.
+    Replay(ReplaySection),
+    /// A schedule file, or a verdict whose next experiment is flown.
+    File {
+        /// The file, from the scenario's folder.
+        file: PathBuf,
+        /// What stands in it.
+        #[serde(skip)]
+        plan: Plan,
+    },
+}
+
+/// A sine about a level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ChirpKeys")]
+pub struct ChirpSection {
+    /// Middle, us.
+    pub centre_us: f64,
+    /// Amplitude, us.
+    pub amplitude_us: f64,
+    /// Frequency at the beginning, Hz.
+    pub from_hz: f64,
+    /// Frequency at the end, Hz.
+    pub to_hz: f64,
+    /// Duration, s.
+    pub length_s: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ChirpKeys {
+    #[serde(deserialize_with = "pulse")]
+    centre_us: f64,
+    #[serde(deserialize_with = "not_negative")]
+    amplitude_us: f64,
+    #[serde(deserialize_with = "frequency")]
+    from_hz: f64,
+    #[serde(deserialize_with = "frequency")]
+    to_hz: f64,
+    #[serde(deserialize_with = "positive")]
+    length_s: f64,
+}
+
+impl TryFrom<ChirpKeys> for ChirpSection {
+    type Error = String;
+
+    fn try_from(keys: ChirpKeys) -> Result<Self, String> {
+        let ChirpKeys { centre_us, amplitude_us, from_hz, to_hz, length_s } = keys;
+        let room = (centre_us - 1000.0).min(2000.0 - centre_us);
+        if amplitude_us <= room {
+            Ok(Self { centre_us, amplitude_us, from_hz, to_hz, length_s })
+        } else {
+            Err(format!(
+                "expected an amplitude_us of at most {room}, so that no pulse leaves 1000 to 2000 us; found {amplitude_us}"
+            ))
+        }
+    }
+}
+
+/// The pulses of a log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReplaySection {
+    /// The log, from the scenario's folder.
+    pub file: PathBuf,
+    /// Its column.
+    #[serde(default = "pulse_column")]
+    pub column: String,
+    /// Begin, s of the log's own time.
+    pub from_s: Option<f64>,
+    /// End, s.
+    pub until_s: Option<f64>,
+    /// What stands in it.
+    #[serde(skip)]
+    pub plan: Plan,
+}
+
+fn pulse_column() -> String {
+    Replay::default().column
 }
 
 /// Speed sensors.
@@ -225,6 +309,41 @@ impl Schedule {
             Self::Staircase { step_us, hold_s, top_us } => levels(*step_us, *top_us) * hold_s,
             Self::UpDown { step_us, hold_s, top_us } => (2.0 * levels(*step_us, *top_us) - 1.0) * hold_s,
             Self::Steps { steps } => steps.iter().map(|s| s.hold_s).sum(),
+            Self::Chirp(chirp) => chirp.length_s,
+            Self::Replay(ReplaySection { plan, .. }) | Self::File { plan, .. } => plan.longest_s(),
+        }
+    }
+
+    /// Reads the files that it names, from `folder`.
+    ///
+    /// # Errors
+    /// [`ScheduleError`], with the file's own line and column.
+    pub(crate) fn load(&mut self, folder: &Path) -> Result<(), ScheduleError> {
+        match self {
+            Self::File { file, plan } => *plan = Plan::read(&folder.join(file))?,
+            Self::Replay(ReplaySection { file, column, from_s, until_s, plan }) => {
+                let whole = Replay::default();
+                let (from_s, until_s) = (from_s.unwrap_or(whole.from_s), until_s.unwrap_or(whole.until_s));
+                let what = Replay { column: column.clone(), from_s, until_s };
+                *plan = Plan::new("replay", vec![schedule::replay(&folder.join(file), &what)?]);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// What is played by segments; `None` of a schedule that the board knows by itself.
+    #[must_use]
+    pub fn plan(&self) -> Option<Plan> {
+        match self {
+            Self::Replay(ReplaySection { plan, .. }) | Self::File { plan, .. } => Some(plan.clone()),
+            Self::Steps { steps } if steps.len() > MAX_UPLOAD => {
+                let ms = |s: f64| (s * 1000.0 + 0.5) as u32;
+                let list: Vec<(part::Level, bool)> =
+                    steps.iter().map(|s| ((super::pulse_width(s.pulse_us), ms(s.hold_s)), s.ramp)).collect();
+                Some(Plan::new("steps", vec![part::steps(&list)]))
+            }
+            _ => None,
         }
     }
 }
@@ -250,6 +369,11 @@ fn pulse<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
     checked(d, |v| (1000.0..=2000.0).contains(&v), "a pulse from 1000 to 2000 us")
 }
 
+fn frequency<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    let most = f64::from(frame::schedule::FASTEST_MHZ) / 1e3;
+    checked(d, |v| (0.0..=most).contains(&v), &format!("a frequency from 0 to {most} Hz"))
+}
+
 fn log_rate<'de, D: Deserializer<'de>>(d: D) -> Result<u32, D::Error> {
     let rate = u32::deserialize(d)?;
     if (1..=100).contains(&rate) && 1000 % rate == 0 {
@@ -261,10 +385,5 @@ fn log_rate<'de, D: Deserializer<'de>>(d: D) -> Result<u32, D::Error> {
 
 fn steps<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<Step>, D::Error> {
     let list = Vec::<Step>::deserialize(d)?;
-    let most = frame::message::MAX_UPLOAD;
-    if (1..=most).contains(&list.len()) {
-        Ok(list)
-    } else {
-        Err(D::Error::custom(format!("expected 1 to {most} steps, found {}", list.len())))
-    }
+    if list.is_empty() { Err(D::Error::custom("expected at least one step, found none")) } else { Ok(list) }
 }

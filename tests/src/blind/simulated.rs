@@ -113,6 +113,7 @@ pub fn score(seed: u64) -> Line {
         Schedule::Staircase { .. } => "stairs",
         Schedule::UpDown { .. } => "up-down",
         Schedule::Steps { .. } => "random",
+        Schedule::Chirp(_) | Schedule::Replay(_) | Schedule::File { .. } => "other",
     };
     let mut line = Line {
         seed,
