@@ -15,12 +15,13 @@ use crate::context::{bridge, starts};
 use crate::drive::{Drive, SIGMA};
 use crate::log::SPEED;
 use crate::noise::{median, quantum};
-use std::cell::Cell;
 
 /// Share of a channel's readings that may be lost: one that loses more has a fault with a name.
 const MOST: f64 = 1.0 / 3.0;
 /// Share of a departure that a witness must see of it, and that the reading must fall by at once.
 const HALF: f64 = 0.5;
+/// Rows along which the beginning of a loss is looked for: a probe that is dead all along must not cost the square of them.
+const REACH: usize = 4 * LONGEST;
 /// Rows after a step of the command in which what recurs belongs to the rotor.
 const RIGHT_AFTER: usize = 4;
 /// Probability below which it is no chance that departures begin there.
@@ -47,14 +48,12 @@ struct Witness {
     sd: Vec<f64>,
     /// The same on most rows.
     usual: f64,
-    /// First row of what was last found to be no loss by its word.
-    refused: Cell<Option<usize>>,
 }
 
 impl Witness {
     fn new(said: Vec<f64>, sd: Vec<f64>) -> Self {
         let usual = median(&mut sd.clone());
-        Self { said, sd, usual, refused: Cell::new(None) }
+        Self { said, sd, usual }
     }
 }
 
@@ -119,14 +118,7 @@ impl Judge<'_> {
         telling.sort_by(|a, b| a.sd[row].total_cmp(&b.sd[row]));
         telling.into_iter().find_map(|witness| {
             let depth = self.low(witness, row).0;
-            let from = self.begins(row, depth, witness);
-            // what was refused once is not asked on each of its rows
-            if witness.refused.get() == Some(from) {
-                return None;
-            }
-            let event = self.event_by(from, row, depth, witness);
-            witness.refused.set(event.is_none().then_some(from));
-            event
+            self.event_by(self.begins(row, depth, witness), row, depth, witness)
         })
     }
 
@@ -166,7 +158,7 @@ impl Judge<'_> {
     fn begins(&self, row: usize, depth: f64, witness: &Witness) -> usize {
         let block = self.block(row);
         let low = |i: &usize| !self.read[*i].is_finite() || witness.said[*i] - self.read[*i] > HALF * depth;
-        (block..row).rev().take(LONGEST).take_while(low).last().unwrap_or(row)
+        (block..row).rev().take(REACH).take_while(low).last().unwrap_or(row)
     }
 
     /// First row of the stretch without a gap in time that a row is in.
