@@ -112,7 +112,7 @@ fn what_the_image_stores_the_native_board_loads_and_back() {
         host.until("yes", 500, |m| matches!(m, Message::Event(Event::Accepted)).then_some(()));
         host.send(Command::SaveSettings);
         assert_eq!(host.news(), SettingsNews::Saved);
-        host.until("rest", 50, |m| matches!(m, Message::Rig(_)).then_some(())); // until what was stored lies in the file
+        host.until("a sample", 300, |m| matches!(m, Message::Rig(_)).then_some(())); // until what was stored lies in the file
         host.send(Command::Identify);
         host.until("hello", 500, |m| if let Message::Hello(hello) = m { Some(hello.config) } else { None })
     };

@@ -45,6 +45,8 @@ struct InStep {
     given: SyncSender<Given>,
     hands: Vec<Action>,
     next: Given,
+    /// The pulse that the rig was given last, us; `next` has been handed over before the hands are asked.
+    pulse_us: f64,
     begun: bool,
     over: bool,
 }
@@ -65,13 +67,14 @@ impl Operator for InStep {
         let beeps = heard.iter().filter_map(|heard| if let Heard::Esc(beep) = heard { Some(*beep) } else { None });
         self.next.beeps.extend(beeps);
         actions.append(&mut self.hands);
-        if !self.begun && self.next.truth.pulse_us > LIVE_US {
+        if !self.begun && self.pulse_us > LIVE_US {
             self.begun = true;
             actions.push(Action::StartRun);
         }
     }
 
     fn see(&mut self, truth: &Truth) {
+        self.pulse_us = truth.pulse_us;
         self.next.truth = *truth;
     }
 
@@ -123,7 +126,15 @@ impl ImageBoard {
         }
         let (asked, asks) = sync_channel(1);
         let (gives, given) = sync_channel(1);
-        let operator = InStep { asked: asks, given: gives, hands: Vec::new(), next: Given::default(), begun: false, over: false };
+        let operator = InStep {
+            asked: asks,
+            given: gives,
+            hands: Vec::new(),
+            next: Given::default(),
+            pulse_us: 0.0,
+            begun: false,
+            over: false,
+        };
         let (scenario, path) = (scenario.clone(), image.to_owned());
         let thread = std::thread::spawn(move || {
             rig_from(&path, machine, &scenario, operator, FOR_EVER_MS).err().map(|error| error.to_string())
