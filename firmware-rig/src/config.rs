@@ -58,6 +58,15 @@ pub struct CurrentChannel {
     pub zero: Volt,
 }
 
+/// The supply's divider.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct VoltageChannel {
+    /// Volts at the converter over volts of the supply.
+    pub divider: f32,
+    /// Volts at the converter without a supply: a bias makes it a live zero, so that a broken wire shows.
+    pub zero: Volt,
+}
+
 /// A sensor of temperature with a linear output.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TemperatureChannel {
@@ -103,8 +112,8 @@ pub struct Config {
     pub torque: TorqueChannel,
     /// Shunt.
     pub current: CurrentChannel,
-    /// Volts at the converter over volts of the supply.
-    pub voltage_divider: f32,
+    /// Supply.
+    pub voltage: VoltageChannel,
     /// Temperature.
     pub temperature: TemperatureChannel,
     /// Channels whose low end of range is a fault rather than a reading of zero.
@@ -146,7 +155,7 @@ impl Config {
             fitted: [true; ADC_CHANNELS],
             torque: TorqueChannel { arm_m: 0.1, volts_per_newton: 0.25, zero: Volt(1.65) },
             current: CurrentChannel { shunt_ohm: 0.001, gain: 50.0, zero: Volt(0.2) },
-            voltage_divider: Self::SUPPLY_DIVIDER,
+            voltage: VoltageChannel { divider: Self::SUPPLY_DIVIDER, zero: Volt(0.0) },
             temperature: TemperatureChannel { zero: Volt(0.5), volts_per_kelvin: 0.01 }, // TMP36
             live_zero: [true, true, true, false, true],
             powered: Volt(1.0),
@@ -221,7 +230,7 @@ impl Config {
             scale(s.zero.0 * s.divider, sign * s.volts_per_newton() * s.divider),
             scale(self.torque.zero.0, self.torque.volts_per_newton / self.torque.arm_m),
             scale(self.current.zero.0, self.current.shunt_ohm * self.current.gain),
-            scale(0.0, self.voltage_divider),
+            scale(self.voltage.zero.0, self.voltage.divider),
             scale(self.temperature.zero.0, self.temperature.volts_per_kelvin),
         ];
         Calibration { timer_hz: self.timer_hz, marks: self.marks, adc }

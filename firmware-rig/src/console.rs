@@ -7,6 +7,7 @@
 //! Units: ticks of the capture timer; bytes.
 //! Reference: specification `formats.md`, "Telemetry"; `rig.md`, "Acquisition"; house rule 12 (one shell, many hosts).
 
+use crate::burst::{Burst, Conversions};
 use crate::config::Config;
 use crate::health::{HealthWatch, Vitals};
 use crate::line::CommandLine;
@@ -23,6 +24,8 @@ use heapless::Vec;
 
 /// Bytes that may wait for the line.
 pub const QUEUED: usize = 1024;
+/// Room in the queue that a part of a burst needs: its own frame, and two that do not wait for it.
+const PART_ROOM: usize = 3 * MAX_WIRE;
 
 /// What a board finds when it starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +87,7 @@ pub struct RigConsole {
     revision: u8,
     reset_cause: u8,
     health: HealthWatch,
+    burst: Burst,
 }
 
 impl RigConsole {
@@ -102,6 +106,7 @@ impl RigConsole {
             queue: Vec::new(),
             reset_cause: start.reset_cause,
             health: HealthWatch::default(),
+            burst: Burst::default(),
         };
         if start.clock.crystal_hz == 0 {
             console.rig.stand(Fault::ClockFailed);
@@ -148,6 +153,9 @@ impl RigConsole {
             paused: delivered.paused,
         });
         give(outputs.pulse);
+        if let Some(channel) = outputs.burst {
+            self.burst.begin(channel);
+        }
         if let Some(news) = delivered.stored {
             self.say(now, &Message::Event(Event::Settings(news)));
         }
@@ -169,6 +177,25 @@ impl RigConsole {
             self.tell_calibration(now);
         }
         Orders { store: outputs.store, trial: outputs.trial, event: outputs.event }
+    }
+
+    /// The analogue channel of which every single conversion is wanted: see [`RigConsole::record`].
+    #[must_use]
+    pub fn wanted(&self) -> Option<usize> {
+        self.burst.wanted()
+    }
+
+    /// Called after each tick: takes the conversions of the channel that was [`RigConsole::wanted`] before it into `memory`, and queues a part
+    /// of a whole burst when the line has room beside the samples.
+    pub fn record(&mut self, now: Ticks, conversions: &Conversions<'_>, memory: &mut [u16]) {
+        self.burst.take(now, conversions, memory);
+        if self.queue.len() + PART_ROOM > QUEUED {
+            return;
+        }
+        if let Some(part) = self.burst.part(memory) {
+            self.say(now, &Message::BurstPart(part));
+            self.burst.sent(memory);
+        }
     }
 
     /// Bytes that wait for the line.

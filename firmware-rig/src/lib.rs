@@ -18,6 +18,7 @@
 extern crate std;
 
 pub mod bank;
+pub mod burst;
 pub mod capture;
 pub mod config;
 pub mod console;
@@ -26,7 +27,6 @@ mod elapsed;
 pub mod health;
 mod hold_max;
 pub mod line;
-pub mod mass;
 mod operator;
 pub mod pattern;
 pub mod queue;
@@ -37,6 +37,7 @@ pub mod stop;
 pub mod strain;
 pub mod transfer;
 
+pub use burst::Conversions;
 pub use capture::CaptureChannel;
 pub use config::Config;
 pub use console::{Delivered, Orders, RigConsole, Start};

@@ -19,7 +19,7 @@ fn main() {
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use crate::board::captures::{self, Clock, Edges, EncoderB};
-    use crate::board::converter::Converter;
+    use crate::board::converter::{self, Codes, Converter};
     use crate::board::health;
     use crate::board::link::Link;
     use crate::board::pulse::PulseOutput;
@@ -28,7 +28,7 @@ mod app {
     use core::mem::MaybeUninit;
     use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
-    use firmware_rig::{Config, Delivered, RigConfig, RigConsole, Start};
+    use firmware_rig::{Config, Conversions, Delivered, RigConfig, RigConsole, Start, burst};
     use frame::message::{Event, SettingsNews, Trial};
     use frame::units::PulseWidth;
     use safe_start::stm32f4::{clock, crash};
@@ -79,9 +79,17 @@ mod app {
         flash: SettingsFlash,
         index_marks: u16,
         sampling: u16,
+        codes: Codes,
+        burst: &'static mut [u16; burst::LENGTH],
     }
 
-    #[init(local = [memory: MaybeUninit<RigConsole> = MaybeUninit::uninit()])]
+    #[init(local = [
+        memory: MaybeUninit<RigConsole> = MaybeUninit::uninit(),
+        // core-coupled, which nothing else uses: whatever stands in it after power-up is overwritten before it is read
+        #[allow(unsafe_code)]
+        #[unsafe(link_section = ".ccmram")]
+        recorded: [u16; burst::LENGTH] = [0; burst::LENGTH]
+    ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let mut core = cx.core;
         core.DCB.enable_trace();
@@ -167,6 +175,8 @@ mod app {
             flash,
             index_marks: 0,
             sampling,
+            codes: Codes::new(),
+            burst: cx.local.recorded,
         };
         (Shared { capture_timer: device.TIM2, to_store: None, stored: None, to_log: None }, local)
     }
@@ -219,7 +229,8 @@ mod app {
     }
 
     #[task(binds = TIM4, priority = 2, shared = [capture_timer, to_store, stored, to_log], local = [
-        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, console, index, index_marks, supply, sampling
+        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, console, index, index_marks, supply, sampling, codes,
+        burst
     ])]
     fn tick(mut cx: tick::Context) {
         let start = health::cycles();
@@ -247,7 +258,7 @@ mod app {
             let _ = board.index.ccr1().read(); // reading takes the flag down
             *board.index_marks = board.index_marks.wrapping_add(1);
         }
-        let adc = board.converter.drain(board.dma);
+        let (adc, whole) = board.converter.drain(board.dma, board.console.wanted(), board.codes);
         let delivered = Delivered {
             now,
             edges: board.edges.each_ref().map(|edges| edges.as_slice()),
@@ -260,6 +271,9 @@ mod app {
         };
         let orders = board.console.tick(&delivered, |pulse| board.pulse.set(pulse));
         board.watchdog.feed();
+        let conversions =
+            Conversions { codes: whole.then_some(board.codes.as_slice()), rate_hz: converter::rate_hz(*board.sampling) };
+        board.console.record(now, &conversions, board.burst.as_mut_slice());
         if let Some(trial) = orders.trial {
             let number = match trial {
                 Trial::Panic => 1,

@@ -6,9 +6,8 @@
 //! Reference: specification `rig.md`, "Acquisition".
 
 use crate::rig::Rig;
-use crate::rig_config::{Calibrated, OutOfRange, RigConfig};
+use crate::rig_config::{OutOfRange, RigConfig};
 use esc_pwm::{ArmingEvent, Chirp, Schedule, Staircase, Step};
-use frame::calibration::AdcScale;
 use frame::message::{Command, Event, Setting};
 use frame::rig::{AdcCode, AdcVerdict, Refusals, RigState};
 use frame::schedule::{Segment, Shape};
@@ -67,13 +66,14 @@ impl Rig {
             Command::ConfigPart(part) => self.incoming.take(&part).map_err(|OutOfRange| Refusals(Refusals::OUT_OF_RANGE)),
             Command::ConfigApply { length, crc } => self.configure_whole(length, crc),
             Command::SaveSettings => self.at_rest().map(|()| self.store = true),
-            Command::MassPoint { mass_g } => self.take_mass(mass_g),
             Command::Imu(_) => Err(Refusals(Refusals::WRONG_STATE)), // meant for the other board
-            Command::MassFit => self.fit_masses(),
-            Command::MassForget => {
-                self.masses.forget();
-                Ok(())
-            }
+            Command::Burst { channel } => match self.config.fitted.get(usize::from(channel)) {
+                Some(true) => {
+                    self.burst = Some(channel);
+                    Ok(())
+                }
+                _ => Err(Refusals(Refusals::OUT_OF_RANGE)),
+            },
             Command::SelfTest { confirm, trial } => {
                 let missing = Refusals::default().and(Refusals::NOT_CONFIRMED, confirm != Command::SELF_TEST_CONFIRM);
                 let refusals = Refusals(missing.0 | self.at_rest().err().unwrap_or_default().0);
@@ -122,39 +122,6 @@ impl Rig {
         self.at_rest()?;
         let config = self.incoming.finish(length, crc).map_err(|OutOfRange| Refusals(Refusals::OUT_OF_RANGE))?;
         self.put_in_force(config);
-        Ok(())
-    }
-
-    /// The mean of the last whole log interval becomes the reading of a known mass.
-    fn take_mass(&mut self, mass_g: f32) -> Result<(), Refusals> {
-        self.at_rest()?;
-        let refused = Refusals(Refusals::OUT_OF_RANGE);
-        let [strain, ..] = &self.codes;
-        if strain.verdict != AdcVerdict::Nominal {
-            return Err(refused);
-        }
-        let counts = (f64::from(strain.sum) / f64::from(strain.count)) as f32;
-        let points = self.masses.take(mass_g, counts).map_err(|()| refused)?;
-        self.tell(Event::MassTaken { points, counts });
-        Ok(())
-    }
-
-    fn fit_masses(&mut self) -> Result<(), Refusals> {
-        self.at_rest()?;
-        let mut settings = self.settings;
-        let [design, ..] = settings.apply(&self.factory).design().adc;
-        let fit = self.masses.fit(&design).map_err(|()| Refusals(Refusals::OUT_OF_RANGE))?;
-        let calibrated = Calibrated {
-            scale: AdcScale { zero: fit.zero, gain: fit.gain },
-            residual: fit.residual_n,
-            worst: fit.worst_n,
-            points: fit.points,
-            day: 0,
-        };
-        let [thrust, ..] = &mut settings.calibrated;
-        *thrust = Some(calibrated);
-        self.put_in_force(settings);
-        self.tell(Event::MassFitted(fit));
         Ok(())
     }
 

@@ -12,7 +12,6 @@ use crate::course::Course;
 use crate::elapsed::Elapsed;
 use crate::hold_max::{HoldWatch, SupplyProof};
 use crate::line::LineNews;
-use crate::mass::MassPoints;
 use crate::rig_config::{Answers, RigConfig};
 use crate::sampling::AdcBlock;
 use crate::stop::StopLoop;
@@ -60,6 +59,8 @@ pub struct Outputs {
     pub store: bool,
     /// The operator asks for this trial of the last resort.
     pub trial: Option<Trial>,
+    /// The operator asks for every conversion of this channel.
+    pub burst: Option<u8>,
 }
 
 /// The rig.
@@ -81,9 +82,9 @@ pub struct Rig {
     pub(crate) codes: [AdcCode; ADC_CHANNELS],
     pub(crate) factory: Config,
     pub(crate) settings: RigConfig,
-    pub(crate) masses: MassPoints,
     pub(crate) store: bool,
     pub(crate) trial: Option<Trial>,
+    pub(crate) burst: Option<u8>,
     pub(crate) incoming: Incoming,
     /// Counts the configurations that were put in force.
     revision: u8,
@@ -119,9 +120,9 @@ impl Rig {
         Self {
             factory,
             settings,
-            masses: MassPoints::new(),
             store: false,
             trial: None,
+            burst: None,
             incoming: Incoming::default(),
             revision: 0,
             live_since: None,
@@ -261,8 +262,8 @@ impl Rig {
         let pulse = self.drive(now, tick_ms);
         let sample = (now >= self.next_sample).then(|| self.sample(now, pulse));
         let store = core::mem::take(&mut self.store);
-        let trial = self.trial.take();
-        Outputs { pulse, sample, event: self.events.pop_front(), store, trial }
+        let (trial, burst) = (self.trial.take(), self.burst.take());
+        Outputs { pulse, sample, event: self.events.pop_front(), store, trial, burst }
     }
 
     /// The state has lasted longer than it may: since it was entered, or at maximum since the supply came on.
@@ -325,7 +326,9 @@ impl Rig {
         }
         let [end, rest @ ..] = &ends;
         let missing = ends.contains(&AdcVerdict::Missing) || rest.iter().any(|end| end.is_stuck());
-        let voltage = self.value(3, adc).map(Volt);
+        // a wire whose zero is alive and that reads none is broken: it says nothing of the supply, least of all that it is off
+        let [_, _, _, supply_end, _] = ends;
+        let voltage = self.value(3, adc).map(Volt).filter(|_| supply_end != AdcVerdict::Open);
         self.supply = voltage.or(self.supply);
         let powered = self.config.powered;
         self.proof.take(voltage, powered, tick_ms, self.config.limits.analogue_ms);

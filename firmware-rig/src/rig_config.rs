@@ -6,7 +6,7 @@
 //! Units: on each field.
 //! Reference: specification `rig.md`, "Partial rigs are normal", "ESC dialogue is data".
 
-use crate::config::{Config, CurrentChannel, TemperatureChannel, TorqueChannel};
+use crate::config::{Config, CurrentChannel, TemperatureChannel, TorqueChannel, VoltageChannel};
 use crate::strain::StrainChannel;
 use crate::transfer::CRC;
 use esc_pwm::{Bounds, Slew, ThrottleCurve};
@@ -21,8 +21,8 @@ use settings_store::Stored;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OutOfRange;
 
-/// Bytes that the line carries in a second, 921 600 baud at ten bits a byte, less what events and health take.
-pub const LINE_BYTES_S: u32 = 92_160 - 2_000;
+/// Bytes that the line carries in a second: 2 Mbaud at ten bits a byte.
+pub const LINE_BYTES_S: u32 = 200_000;
 /// Longest frame of a sample without its channels; of a capture channel that is fitted, or not; of an analogue channel likewise.
 const FRAME_BYTES: u32 = 32;
 const CAPTURE_BYTES: [u32; 2] = [4, 9];
@@ -79,6 +79,10 @@ pub struct EscProfile {
 pub struct Calibrated {
     /// Counts to value.
     pub scale: AdcScale,
+    /// Standard error of the scale's zero, counts; 0 where it is not known.
+    pub zero_sigma: f32,
+    /// Standard error of its gain, the channel's unit per count; 0 where it is not known.
+    pub gain_sigma: f32,
     /// Root mean square of the residuals, in the channel's unit; 0 for two points.
     pub residual: f32,
     /// Largest residual.
@@ -114,8 +118,8 @@ pub struct RigConfig {
     pub torque: TorqueChannel,
     /// Shunt.
     pub current: CurrentChannel,
-    /// Volts at the converter over volts of the supply.
-    pub voltage_divider: f32,
+    /// Supply.
+    pub voltage: VoltageChannel,
     /// Temperature.
     pub temperature: TemperatureChannel,
     /// Limits.
@@ -150,7 +154,7 @@ impl RigConfig {
             strain: config.strain,
             torque: config.torque,
             current: config.current,
-            voltage_divider: config.voltage_divider,
+            voltage: config.voltage,
             temperature: config.temperature,
             limits: ChannelLimits {
                 speed: limits.speed,
@@ -193,12 +197,6 @@ impl RigConfig {
         FRAME_BYTES + captures + analogue
     }
 
-    /// Whether the line carries the samples at this rate.
-    #[must_use]
-    pub fn fits_the_line(&self) -> bool {
-        self.sample_bytes() * 1000 <= LINE_BYTES_S * u32::from(self.log_period_ms)
-    }
-
     /// Whether every value is possible. A NaN is in no range.
     #[must_use]
     pub fn in_range(&self) -> bool {
@@ -207,7 +205,6 @@ impl RigConfig {
             a <= b && b <= c && c <= d && d <= e && points.iter().all(|p| *p == p.clamped())
         };
         (1..=1000).contains(&self.log_period_ms)
-            && self.fits_the_line()
             && self.marks.iter().all(|m| *m <= 100)
             && (self.marks.iter().any(|m| *m > 0) || self.fitted.iter().any(|f| *f))
             && self.curve.as_ref().is_none_or(rising)
@@ -222,7 +219,7 @@ impl RigConfig {
     fn analogue_in_range(&self) -> bool {
         let s = &self.strain;
         let lengths = [s.beam.length_m, s.beam.width_m, s.beam.height_m];
-        let volts = [s.zero.0, self.torque.zero.0, self.current.zero.0, self.temperature.zero.0];
+        let volts = [s.zero.0, self.torque.zero.0, self.current.zero.0, self.voltage.zero.0, self.temperature.zero.0];
         lengths.iter().all(|m| (1e-4..=10.0).contains(m))
             && [s.beam.modulus_pa, s.beam.yield_pa].iter().all(|pa| (1e6..=1e12).contains(pa))
             && (1.0..=1e5).contains(&s.beam.density)
@@ -235,7 +232,7 @@ impl RigConfig {
             && size_within(self.torque.volts_per_newton, 1e-4, 1e3)
             && (1e-6..=10.0).contains(&self.current.shunt_ohm)
             && (1.0..=1000.0).contains(&self.current.gain)
-            && (1e-3..=1.0).contains(&self.voltage_divider)
+            && (1e-3..=1.0).contains(&self.voltage.divider)
             && size_within(self.temperature.volts_per_kelvin, 1e-5, 1.0)
     }
 
@@ -257,7 +254,7 @@ impl RigConfig {
         config.strain = self.strain;
         config.torque = self.torque;
         config.current = self.current;
-        config.voltage_divider = self.voltage_divider;
+        config.voltage = self.voltage;
         config.temperature = self.temperature;
         config.limits.speed = self.limits.speed;
         config.limits.thrust = self.limits.thrust;
@@ -316,13 +313,15 @@ impl ChannelLimits {
 
 impl Calibrated {
     fn in_range(&self) -> bool {
-        let numbers = [self.scale.zero, self.scale.gain, self.residual, self.worst];
-        numbers.iter().all(|n| n.is_finite()) && self.scale.gain != 0.0
+        let errors = [self.zero_sigma, self.gain_sigma, self.residual, self.worst];
+        [self.scale.zero, self.scale.gain].iter().all(|n| n.is_finite())
+            && self.scale.gain != 0.0
+            && errors.iter().all(|n| n.is_finite() && *n >= 0.0)
     }
 }
 
 impl Stored for RigConfig {
-    const VERSION: u8 = 2;
+    const VERSION: u8 = 3;
 
     fn write(&self, content: &mut [u8]) -> Option<usize> {
         Some(postcard::to_slice(self, content).ok()?.len())

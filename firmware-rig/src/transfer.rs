@@ -12,7 +12,7 @@ use heapless::Vec;
 use settings_store::Stored;
 
 /// Longest configuration, bytes.
-pub const LONGEST: usize = 384;
+pub const LONGEST: usize = 448;
 /// Checksum of a configuration.
 pub(crate) const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
 

@@ -86,8 +86,8 @@ fn happenings() -> Vec<Happening> {
         Command::Tare,
         Command::ClearFaults,
         Command::SaveSettings,
-        Command::MassPoint { mass_g: 100.0 },
-        Command::MassFit,
+        Command::Burst { channel: 0 },
+        Command::Burst { channel: 200 },
     ]
     .map(Happening::Say)
     .into();

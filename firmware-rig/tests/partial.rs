@@ -196,6 +196,32 @@ fn the_range_calibration_needs_a_witness_and_a_measured_supply() {
     assert_eq!(desk.say(ask), Some(Event::Refused(Refusals(Refusals::SUPPLY_UNPROVEN))));
 }
 
+/// A biased divider: off is believed as it stands, and an open wire, which reads less than that, is never taken for it.
+#[test]
+fn a_live_zero_of_the_supply_tells_off_from_unplugged() {
+    let ask = Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM };
+    let mut config = Config::thesis_570kv();
+    config.voltage.zero = Volt(0.3);
+    config.live_zero[3] = true;
+    let bias = (0.3 / 3.3 * 4096.0) as u16;
+    let mut desk = Desk::new(config.clone(), [2, 1, 2, 25]);
+    desk.counts[3] = OPEN;
+    desk.run(500);
+    assert_eq!(desk.say(ask), Some(Event::Refused(Refusals(Refusals::SUPPLY_UNPROVEN))), "unplugged");
+    assert_eq!(desk.last.map(|s| s.adc[3].verdict), Some(AdcVerdict::Open));
+    desk.counts[3] = bias;
+    desk.run(50);
+    assert_eq!(desk.say(ask), Some(Event::Refused(Refusals(Refusals::SUPPLY_UNPROVEN))), "a loose contact");
+    desk.run(150);
+    assert_eq!(desk.say(ask), Some(Event::Accepted), "plugged in, and off");
+    let mut desk = Desk::new(config, [2, 1, 2, 25]);
+    desk.counts[3] = 2379 + bias;
+    desk.run(500);
+    let reasons = Refusals::ESC_POWERED | Refusals::SUPPLY_UNPROVEN;
+    assert_eq!(desk.say(ask), Some(Event::Refused(Refusals(reasons))), "on");
+    assert!((desk.rig.calibration().adc[3].gain * f32::from(2379u16) - 11.5).abs() < 0.01);
+}
+
 /// When `fault` latches after `change`, ms; `None` within 10 s.
 fn latched(config: Config, rpm: f64, fault: Fault, change: impl FnOnce(&mut Desk)) -> Option<u64> {
     let mut desk = Desk::new(config, [2, 1, 2, 25]).running(rpm);

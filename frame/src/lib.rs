@@ -16,6 +16,7 @@
 
 pub mod calibration;
 pub mod consensus;
+pub mod flag;
 pub mod imu;
 pub mod imu_command;
 pub mod message;
@@ -26,6 +27,7 @@ pub mod wire;
 
 pub use calibration::{AdcScale, Calibration, Converted};
 pub use consensus::Consensus;
+pub use flag::Flag;
 pub use imu::ImuSample;
 pub use imu_command::{
     ImuCalibrated, ImuCommand, ImuContent, ImuErrors, ImuFormat, ImuRefusal, ImuReport, ImuSensor, ImuValues, TestAccel,

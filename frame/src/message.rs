@@ -72,15 +72,6 @@ pub enum Event {
         /// When.
         at: Ticks,
     },
-    /// A mass stands on the load cell and its reading was taken.
-    MassTaken {
-        /// Points so far.
-        points: u8,
-        /// Mean of the strain channel, counts.
-        counts: f32,
-    },
-    /// The load cell's scale was fitted to the masses.
-    MassFitted(MassFit),
     /// What became of the settings in flash.
     Settings(SettingsNews),
     /// The program panicked before the last reset; told once after it.
@@ -144,22 +135,6 @@ pub struct ClockNews {
     pub measured_hz: u32,
 }
 
-/// Outcome of a mass calibration (Beharie 2013, Eq. 5.34-5.35): newton = (counts - zero) * gain.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct MassFit {
-    /// Newton a count.
-    pub gain: f32,
-    /// Counts without load.
-    pub zero: f32,
-    /// Root mean square of the residuals, N; zero for two points.
-    pub residual_n: f32,
-    /// Largest residual, N.
-    pub worst_n: f32,
-    /// Points used.
-    pub points: u8,
-}
-
 /// What became of the settings in flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -221,6 +196,29 @@ pub enum Message {
     ImuReport(ImuReport),
     /// A part of the rig's configuration.
     ConfigPart(ConfigPart),
+    /// A part of a burst of conversions.
+    BurstPart(BurstPart),
+}
+
+/// Codes of a burst in one frame, in rows of 32.
+pub const BURST_PART: usize = 96;
+
+/// A part of a burst: every conversion of one analogue channel, in order and without a gap.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BurstPart {
+    /// Which channel: its place among the analogue channels.
+    pub channel: u8,
+    /// Instant of the first conversion of the burst, to a millisecond.
+    pub from: Ticks,
+    /// Conversions of the channel in a second.
+    pub rate_hz: f32,
+    /// Conversions of the whole burst.
+    pub length: u16,
+    /// Which conversion this part begins with.
+    pub at: u16,
+    /// Codes, filled up with zeros at the end of the whole.
+    pub codes: [[u16; 32]; BURST_PART / 32],
 }
 
 /// Bytes of a configuration in one frame.
@@ -336,18 +334,8 @@ pub enum Command {
     },
     /// Change one setting; only while disarmed.
     Configure(Setting),
-    /// Store the settings and the load cell's calibration in flash; only while disarmed.
+    /// Store the configuration in force, its calibrated scales included, in flash; only while disarmed.
     SaveSettings,
-    /// A known mass hangs on the load cell: take the mean of the last whole log interval as its reading. Thrust is up, so a
-    /// mass that pulls the beam down as the motor's weight does is positive here and reads as negative thrust.
-    MassPoint {
-        /// The mass, gram.
-        mass_g: f32,
-    },
-    /// Fit the load cell's scale to the masses taken: two points exactly, more by least squares.
-    MassFit,
-    /// Forget the masses taken.
-    MassForget,
     /// Try the last resort on purpose; `confirm` must be [`Command::SELF_TEST_CONFIRM`]; only while disarmed. Ends in
     /// minimum throttle and a reset, a late tick in a fault.
     SelfTest {
@@ -381,6 +369,11 @@ pub enum Command {
         /// What.
         how: Steer,
     },
+    /// Record every conversion of one analogue channel for as long as the board has memory, and send them; in any state.
+    Burst {
+        /// Its place among the analogue channels.
+        channel: u8,
+    },
 }
 
 /// What the self-test provokes.
@@ -399,7 +392,7 @@ pub enum Trial {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Setting {
-    /// Time between two samples, 1 to 1000 ms, as far as the line carries them.
+    /// Time between two samples, 1 to 1000 ms.
     LogPeriodMs(u16),
     /// Marks a revolution of the four capture channels after their prescalers; 0 where none is fitted.
     Marks([u16; 4]),

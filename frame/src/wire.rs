@@ -10,10 +10,10 @@ use crate::units::Ticks;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// Version of the frame layout and of the message sets; before it there were 1 and 31. Not printable, no line end, and longer than any frame
+/// Version of the frame layout and of the message sets; before it there were 1, 31 and 0xF4. Not printable, no line end, and longer than any frame
 /// (the first byte of a stuffed frame is at most its length): so a board that takes typed lines as well tells a frame that begins without a
 /// stuffing byte from one that begins with it.
-pub const VERSION: u8 = 0xF4;
+pub const VERSION: u8 = 0xF5;
 /// Longest frame before stuffing, bytes.
 pub const MAX_FRAME: usize = 240;
 /// Longest frame on the wire: COBS adds one byte in 254, plus the delimiter.

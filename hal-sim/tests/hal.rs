@@ -17,7 +17,7 @@ use hal_sim::hal::{CaptureTimer, PulsePin, RigPins, ScanConverter, SerialEnd, Sp
 use hal_sim::imu::{ChipErrors, Lis3dh, Motion};
 use hal_sim::{Scenario, Truth};
 
-const BAUD: u32 = 921_600;
+const BAUD: u32 = 2_000_000;
 
 fn timer() -> PulseTimer {
     PulseTimer::new(84_000_000, 16).unwrap()

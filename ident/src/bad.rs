@@ -135,7 +135,14 @@ pub fn without<'l>(log: &'l Log, aside: &[SetAside]) -> Cow<'l, Log> {
         Column { name: c.name.clone(), values }
     };
     let columns = log.columns.iter().map(of_column).collect();
-    Cow::Owned(Log { name: log.name.clone(), meta: log.meta.clone(), t: log.t.clone(), columns, sha256: log.sha256.clone() })
+    Cow::Owned(Log {
+        name: log.name.clone(),
+        meta: log.meta.clone(),
+        events: log.events.clone(),
+        t: log.t.clone(),
+        columns,
+        sha256: log.sha256.clone(),
+    })
 }
 
 impl SetAside {

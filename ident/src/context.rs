@@ -7,6 +7,7 @@
 //! Reference: specification `formats.md` (primary relations), `closing-the-loop.md` step 2.
 
 use crate::bad::{self, SetAside};
+use crate::board;
 use crate::course::{self, Counterparts};
 use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
@@ -384,7 +385,10 @@ impl Context {
             .iter()
             .filter(|c| {
                 let name = c.name.as_str();
-                !MODELLED.contains(&name) && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&name) && !marks::is_of_marks(name)
+                !MODELLED.contains(&name)
+                    && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&name)
+                    && !marks::is_of_marks(name)
+                    && !board::is_of_the_board(name)
             })
             .filter(|c| c.values.iter().any(|v| v.is_finite()))
             .map(|c| (c.name.clone(), bridge(&log.t, &c.values)))

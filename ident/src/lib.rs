@@ -10,6 +10,7 @@ pub mod almanac;
 pub mod bad;
 pub mod beam;
 mod beside;
+pub mod board;
 pub mod circle;
 pub mod close;
 mod conclude;

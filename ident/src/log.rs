@@ -85,6 +85,8 @@ pub struct Log {
     pub name: String,
     /// `key = value` comment lines at the head.
     pub meta: BTreeMap<String, toml::Value>,
+    /// What happened, one line each with its time (`12.340 s: sensor lost: rpm_beam`): the `event` lines of the file, wherever they stand.
+    pub events: Vec<String>,
     /// Time, s, strictly increasing (row index where `time = "row"`).
     pub t: Vec<f64>,
     /// All other columns in the order of the file.
@@ -165,7 +167,12 @@ impl Log {
         }
         let mut line = String::new();
         while lines.read_into(&mut line)? {
-            if line.is_empty() || line.starts_with('#') {
+            if line.is_empty() {
+                continue;
+            }
+            if let Some(comment) = line.strip_prefix('#') {
+                // a recorder that was cut short has left its events among the rows
+                log.events.extend(event(comment.trim()));
                 continue;
             }
             let place = lines.place();
@@ -197,7 +204,10 @@ impl Log {
     pub(crate) fn write_as(&self, format: &str, out: &mut dyn Write) -> std::io::Result<()> {
         writeln!(out, "# {format}")?;
         for (key, value) in &self.meta {
-            writeln!(out, "# {key} = {value}")?;
+            writeln!(out, "{}", meta_line(key, value))?;
+        }
+        for event in &self.events {
+            writeln!(out, "{}", event_line(event))?;
         }
         write!(out, "t_s")?;
         for column in &self.columns {
@@ -215,6 +225,31 @@ impl Log {
         }
         Ok(())
     }
+}
+
+/// The comment line of a key and its value: one line, whatever the value.
+#[must_use]
+pub fn meta_line(key: &str, value: &toml::Value) -> String {
+    match value {
+        // a basic string, in which a line's end is escaped: the file would end the comment there
+        toml::Value::String(text) if text.contains(['\n', '\r']) => {
+            let escaped = text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n").replace('\r', "\\r");
+            format!("# {key} = \"{escaped}\"")
+        }
+        value => format!("# {key} = {value}"),
+    }
+}
+
+/// The comment line of an event.
+#[must_use]
+pub fn event_line(text: &str) -> String {
+    meta_line("event", &toml::Value::String(text.to_owned()))
+}
+
+/// The event that a comment tells, if it tells one.
+fn event(comment: &str) -> Option<String> {
+    let table = comment.strip_prefix("event").and_then(|_| comment.parse::<toml::Table>().ok())?;
+    table.get("event")?.as_str().map(str::to_owned)
 }
 
 /// Writes a file whole or not at all: temporary file in the same folder, sync, rename.
@@ -361,6 +396,8 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
                     ));
                 }
                 format_seen = true;
+            } else if let Some(event) = event(comment) {
+                log.events.push(event);
             } else if let Ok(table) = comment.parse::<toml::Table>() {
                 log.meta.extend(table);
             }
@@ -520,6 +557,32 @@ mod tests {
         let known = "# quadrig-log 1\nt_s,a,b\n0,1,2\n";
         assert_eq!(parse(known).unwrap().digest(), "afdc1c5e8efe3f3426bc84a553229402e0ad54d4fb85a6dfc1c3617f2aee76ec");
         assert_eq!(again.column("thrust_n"), log.column("thrust_n"));
+    }
+
+    /// A configuration of many lines is one line of a head, and comes back as it was.
+    #[test]
+    fn a_text_of_several_lines_is_one_line() {
+        let text = "rate_hz = 10\n\n[esc]\nanswers = \"long-ready\" # a \\ b\n";
+        let mut log = parse("# quadrig-log 1\nt_s,rpm,thrust_n\n0,1,2\n").unwrap();
+        log.meta.insert("rig_config".to_owned(), toml::Value::String(text.to_owned()));
+        let mut out = Vec::new();
+        log.write_to(&mut out).unwrap();
+        assert_eq!(String::from_utf8_lossy(&out).lines().count(), 4);
+        let again = Log::parse("run.csv", out.as_slice()).unwrap();
+        assert_eq!(Log { sha256: log.sha256.clone(), ..again }, log);
+    }
+
+    /// An event is a line of its own, however many there are; those that a recorder left among the rows count as well.
+    #[test]
+    fn events_are_kept_in_their_order_wherever_they_stand() {
+        let text = "# quadrig-log 1\n# event = \"0.100 s: a \\\"word\\\"\"\n# event = \"0.200 s: b\"\n# eventful = 1\nt_s,rpm,thrust_n\n0,1,2\n# event = \"0.300 s: c\"\n1,1,2\n# event: none\n";
+        let log = parse(text).unwrap();
+        assert_eq!(log.events, ["0.100 s: a \"word\"", "0.200 s: b", "0.300 s: c"]);
+        assert_eq!((log.len(), log.meta.keys().map(String::as_str).collect::<Vec<_>>()), (2, vec!["eventful"]));
+        let mut out = Vec::new();
+        log.write_to(&mut out).unwrap();
+        let again = Log::parse("run.csv", out.as_slice()).unwrap();
+        assert_eq!(Log { sha256: log.sha256.clone(), ..again }, log);
     }
 
     #[test]

@@ -83,6 +83,7 @@ fn map_columns(log: &Log, change: &dyn Fn(&[f64]) -> Vec<f64>) -> Log {
     Log {
         name: log.name.clone(),
         meta: log.meta.clone(),
+        events: log.events.clone(),
         t: change(&log.t),
         columns: log.columns.iter().map(|c| Column { name: c.name.clone(), values: change(&c.values) }).collect(),
         sha256: None,

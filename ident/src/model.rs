@@ -5,6 +5,7 @@
 //! Units: in the key of each number; polynomials in krpm (rev/min / 1000) or kus ((pulse - 1000 us) / 1000).
 //! Reference: specification `formats.md`, "Powerplant model".
 
+use crate::board;
 use crate::context::{Context, Relation, Target, unit_of};
 use crate::course::Course;
 use crate::design::{Label, TargetDesign, Told};
@@ -152,7 +153,7 @@ impl Model {
     pub fn of(context: &Context, log: &Log, polynomials: Vec<Polynomial>) -> Self {
         Self {
             source: log.name.clone(),
-            meta: log.meta.iter().map(|(k, v)| (k.clone(), v.clone())).collect(),
+            meta: log.meta.iter().filter(|(k, _)| !board::is_evidence(k)).map(|(k, v)| (k.clone(), v.clone())).collect(),
             start_pulse_us: context.start_pulse_us,
             consensus: context.consensus.channels.clone(),
             polynomials,

@@ -54,6 +54,7 @@ pub fn without<'l>(log: &'l Log, left_out: &[LeftOut]) -> Cow<'l, Log> {
     Cow::Owned(Log {
         name: log.name.clone(),
         meta: log.meta.clone(),
+        events: log.events.clone(),
         t: log.t.clone(),
         columns: kept.cloned().collect(),
         sha256: log.sha256.clone(),

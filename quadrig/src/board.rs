@@ -15,7 +15,7 @@ use std::time::{Duration, SystemTime};
 use virtual_board::Hand;
 
 /// Speed of the rig's line (pin table of the board).
-const BAUD: u32 = 921_600;
+const BAUD: u32 = 2_000_000;
 /// How long an answer may take.
 const ANSWER_TIME: Duration = Duration::from_millis(1500);
 /// Time between two signs of life towards an armed board.

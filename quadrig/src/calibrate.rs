@@ -1,185 +1,138 @@
 //! `quadrig calibrate`.
 //!
-//! What it is: sensor errors from a recording: gyro zero and six-position accelerometer from its stretches of rest, hard and soft
-//! iron from the whole of it, the magnetometer's axes against the accelerometer's from the stretches of rest.
-//! What can go wrong: what the recording does not show is refused, one line a sensor; nothing is written then.
-//! Units: rad/s, m/s^2, uT in the recording and in the file.
-//! Reference: specification `ahrs.md`, "Calibration"; `dcm::calibration`.
+//! What it is: the IMU board's sensors from a recording ([`imu`]); the rig board's analogue channels from known values, in a recording
+//! ([`recording`]) or live over the line, step by step ([`guided`]). A rig's scale is a straight line with its standard errors and residuals.
+//! What can go wrong: a point that is saturated, or has not settled, is refused; so is a line that is far from the channel's design. Nothing
+//! is stored or written then.
+//! Units: as stated on each sensor.
+//! Reference: specification `ahrs.md`, "Calibration"; `rig.md`, "Partial rigs are normal"; Beharie 2013, Eq. 5.34-5.36 with the errata.
 
-mod rest;
+mod channel;
+mod found;
+mod guided;
+mod imu;
+mod line;
+mod point;
+mod recording;
+mod settle;
 
 use crate::Failure;
-use crate::ahrs::imu_log::ImuLog;
-use dcm::calibration::{Calibration, CalibrationError, Collector, GyroZero, alignment, ellipsoid, six_positions};
-use dcm::{Mat3, Vec3};
-use ident::log::write_whole;
-use rest::{Rest, length};
-use std::fmt::Write;
+use crate::port::PortArgs;
+use crate::rig::date;
+use channel::Channel;
+use clap::error::ErrorKind;
 use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Which sensors.
+    /// Sensors of the IMU board, or one channel of the rig board.
     #[arg(value_enum, required = true, num_args = 1..)]
-    sensors: Vec<Sensor>,
-    /// The recording: t_s,gx,gy,gz,ax,ay,az[,mx,my,mz].
+    what: Vec<What>,
+    /// The recording: of the IMU board `t_s,gx,gy,gz,ax,ay,az[,mx,my,mz]`, of the rig a log (best with --raw).
     #[arg(short, long)]
-    input: PathBuf,
+    input: Option<PathBuf>,
     /// Where the calibration goes (TOML).
     #[arg(short, long)]
-    output: PathBuf,
+    output: Option<PathBuf>,
+    /// The rig board: calibrate live, or store there what a recording gave.
+    #[command(flatten)]
+    port: PortArgs,
+    /// Known values of a rig's channel in order: `0 g, 200 g, 500 g`; of a recording with or without the time of each, `200 g@12..18`.
+    #[arg(long)]
+    points: Option<String>,
+    /// Arm at which masses for the torque hang, m; the configured arm without it.
+    #[arg(long)]
+    arm: Option<f64>,
+    /// Day of the calibration; today without it.
+    #[arg(long, value_name = "YYYY-MM-DD")]
+    date: Option<String>,
+    /// Store without asking.
+    #[arg(long)]
+    yes: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Sensor {
-    /// Zero from the stretches of rest.
+enum What {
+    /// IMU: zero from the stretches of rest.
     Gyro,
-    /// Offset and gain from rest with each axis up and down.
+    /// IMU: offset and gain from rest with each axis up and down.
     Accel,
-    /// Hard and soft iron from readings in all directions.
+    /// IMU: hard and soft iron from readings in all directions.
     Mag,
-    /// Magnetometer axes from rest in many attitudes; needs `mag` too, or readings without iron.
+    /// IMU: magnetometer axes from rest in many attitudes; needs `mag` too, or readings without iron.
     Align,
+    /// Rig: thrust by masses on the load cell.
+    #[value(alias = "thrust")]
+    Loadcell,
+    /// Rig: torque by masses on the arm.
+    Torque,
+    /// Rig: current by two points or more against a meter.
+    Current,
+    /// Rig: supply voltage by two points or more against a meter.
+    Voltage,
+    /// Rig: temperature by two points or more against a thermometer.
+    Temperature,
 }
 
-impl Sensor {
-    fn name(self) -> &'static str {
+impl What {
+    fn sensor(self) -> Option<imu::Sensor> {
         match self {
-            Self::Gyro => "gyro",
-            Self::Accel => "accel",
-            Self::Mag => "mag",
-            Self::Align => "align",
+            Self::Gyro => Some(imu::Sensor::Gyro),
+            Self::Accel => Some(imu::Sensor::Accel),
+            Self::Mag => Some(imu::Sensor::Mag),
+            Self::Align => Some(imu::Sensor::Align),
+            _ => None,
         }
     }
+
+    fn channel(self) -> Option<Channel> {
+        match self {
+            Self::Loadcell => Some(Channel::Thrust),
+            Self::Torque => Some(Channel::Torque),
+            Self::Current => Some(Channel::Current),
+            Self::Voltage => Some(Channel::Voltage),
+            Self::Temperature => Some(Channel::Temperature),
+            _ => None,
+        }
+    }
+}
+
+/// The command line is not one that means something.
+fn usage(words: &str) -> ! {
+    clap::Error::raw(ErrorKind::MissingRequiredArgument, format!("{words}\n")).exit()
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let log = ImuLog::read(&args.input)?;
-    let rests = rest::find(&log);
-    let mut calibration = Calibration::default();
-    let mut text = format!("# quadrig-imu-calibration 1\nrecording = {:?}\n", args.input.display().to_string());
-    for sensor in [Sensor::Gyro, Sensor::Accel, Sensor::Mag, Sensor::Align] {
-        if !args.sensors.contains(&sensor) {
-            continue;
+    let sensors: Vec<imu::Sensor> = args.what.iter().filter_map(|what| what.sensor()).collect();
+    let channels: Vec<Channel> = args.what.iter().filter_map(|what| what.channel()).collect();
+    match (sensors.as_slice(), channels.as_slice()) {
+        (sensors, []) => match (&args.input, &args.output) {
+            (Some(input), Some(output)) => imu::run(sensors, input, output, quiet),
+            _ => usage("the IMU board's sensors need -i RECORDING and -o FILE"),
+        },
+        ([], [channel]) => {
+            let day = day(args.date.as_deref())?;
+            match (&args.input, args.port.is_given(), &args.points) {
+                (Some(input), _, Some(points)) => recording::run(*channel, input, points, day, args, quiet),
+                (Some(_), _, None) => usage("a recording needs --points, such as \"0 g, 200 g, 500 g\""),
+                (None, true, points) => guided::run(*channel, points.as_deref(), day, args, quiet),
+                (None, false, _) => usage("a rig's channel needs -i RECORDING, or --port of the board"),
+            }
         }
-        let done = match sensor {
-            Sensor::Gyro => gyro(&rests, &mut calibration),
-            Sensor::Accel => accel(&rests, &mut calibration),
-            Sensor::Mag => mag(&log, &mut calibration),
-            Sensor::Align => align(&rests, &mut calibration),
-        };
-        let section = done.map_err(|e| format!("{}: {}: {e}", args.input.display(), sensor.name()))?;
-        let _ = write!(text, "\n[{}]\n{section}", sensor.name());
-    }
-    write_whole(&args.output, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", args.output.display()))?;
-    if !quiet {
-        print!("{text}");
-    }
-    Ok(())
-}
-
-/// What to do about a refusal.
-fn explain(error: CalibrationError) -> String {
-    match error {
-        CalibrationError::TooFew { found, needed } => format!("{found} readings, at least {needed} are needed: record longer"),
-        CalibrationError::Moving { scatter } => format!("it moved (scatter {scatter:.4}): leave it at rest"),
-        CalibrationError::Coverage { found } => {
-            format!("{:.0} % of what is needed was seen: turn it into every direction", 100.0 * found)
-        }
-        CalibrationError::Position { index } => {
-            let axis = ["+x", "-x", "+y", "-y", "+z", "-z"].get(usize::from(index)).unwrap_or(&"?");
-            format!("no rest with {axis} up")
-        }
-        other => format!("no fit ({other:?}): is the sensor saturated, or iron moving about?"),
+        _ => usage("one channel of the rig board at a time, and no sensor of the IMU board with it"),
     }
 }
 
-fn vector(name: &str, v: &Vec3) -> String {
-    format!("{name} = [{:.6}, {:.6}, {:.6}]\n", v.x, v.y, v.z)
-}
-
-fn matrix(m: &Mat3) -> String {
-    let rows: Vec<String> = m.row_iter().map(|r| format!("[{:.6}, {:.6}, {:.6}]", r[0], r[1], r[2])).collect();
-    format!("matrix = [{}]\n", rows.join(", "))
-}
-
-fn gyro(rests: &[Rest], calibration: &mut Calibration) -> Result<String, String> {
-    let mut zero = GyroZero::default();
-    rests.iter().flat_map(|r| &r.rates).for_each(|w| zero.add(w));
-    let (offset, sigma) = zero.finish(rest::GYRO_NOISE).map_err(explain)?;
-    calibration.gyro_offset = offset;
-    Ok(vector("offset_rad_s", &offset) + &vector("offset_sigma_rad_s", &sigma) + &format!("readings = {}\n", zero.count()))
-}
-
-fn accel(rests: &[Rest], calibration: &mut Calibration) -> Result<String, String> {
-    let mut best: [Option<(&Rest, f32)>; 6] = [None; 6];
-    for r in rests {
-        let (axis, value) =
-            r.force.iter().enumerate().fold((0, 0.0f32), |m: (usize, f32), (i, v)| if v.abs() > m.1.abs() { (i, *v) } else { m });
-        let share = value.abs() / length(&r.force);
-        let slot = &mut best[2 * axis + usize::from(value < 0.0)];
-        if share > 0.95 && slot.is_none_or(|(_, s)| share > s) {
-            *slot = Some((r, share));
+/// The day that is said, or today's by the clock.
+fn day(said: Option<&str>) -> Result<u16, Failure> {
+    match said {
+        Some(text) => date::day(text).ok_or_else(|| format!("--date {text}: expected a date as 2026-01-31").into()),
+        None => {
+            let days = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs() / 86_400;
+            Ok(u16::try_from(days).unwrap_or(0))
         }
     }
-    let mut readings = [Vec3::zeros(); 6];
-    for (index, (slot, found)) in readings.iter_mut().zip(best).enumerate() {
-        *slot = found.ok_or_else(|| explain(CalibrationError::Position { index: index as u8 }))?.0.force;
-    }
-    let noise = best.iter().flatten().map(|(r, _)| r.force_sigma).fold(0.0, f32::max);
-    let found = six_positions(&readings, noise).map_err(explain)?;
-    (calibration.accel_offset, calibration.accel_matrix) = (found.offset, found.matrix);
-    let gain_sigma = format!("gain_sigma = [{:.6}, {:.6}, {:.6}]\n", found.gain_sigma.x, found.gain_sigma.y, found.gain_sigma.z);
-    Ok(vector("offset_m_s2", &found.offset)
-        + &vector("offset_sigma_m_s2", &found.offset_sigma)
-        + &vector("gain", &found.gain)
-        + &gain_sigma
-        + &matrix(&found.matrix)
-        + &format!("residual_m_s2 = {:.4}\n", found.residual))
-}
-
-fn mag(log: &ImuLog, calibration: &mut Calibration) -> Result<String, String> {
-    let fields = || log.rows.iter().filter_map(|r| r.mag);
-    let count = fields().count();
-    if count == 0 {
-        return Err("no readings of mx,my,mz".to_owned());
-    }
-    let mean = fields().sum::<Vec3>() / count as f32;
-    let size = (fields()
-        .map(|m| {
-            let d = m - mean;
-            d.dot(&d)
-        })
-        .sum::<f32>()
-        / count as f32)
-        .sqrt();
-    let mut store = Collector::new(size);
-    fields().for_each(|m| {
-        store.add(&m);
-    });
-    let found = ellipsoid(store.readings()).map_err(explain)?;
-    (calibration.mag_offset, calibration.mag_matrix) = (found.offset, found.matrix);
-    Ok(vector("offset_ut", &found.offset)
-        + &vector("offset_sigma_ut", &found.offset_sigma)
-        + &matrix(&found.matrix)
-        + &format!(
-            "norm_ut = {:.3}\nresidual_ut = {:.3}\ncoverage = {:.2}\nreadings = {}\n",
-            found.norm,
-            found.residual,
-            found.coverage,
-            store.readings().len()
-        ))
-}
-
-fn align(rests: &[Rest], calibration: &mut Calibration) -> Result<String, String> {
-    let pairs: Vec<(Vec3, Vec3)> =
-        rests.iter().filter_map(|r| Some((calibration.accel(&r.force), calibration.mag(&r.field?)))).collect();
-    let found = alignment(&pairs).map_err(explain)?;
-    calibration.mag_matrix = found.matrix * calibration.mag_matrix;
-    Ok(vector("angle_rad", &found.angle)
-        + &vector("angle_sigma_rad", &found.sigma)
-        + &matrix(&found.matrix)
-        + &format!("residual_rad = {:.5}\nattitudes = {}\n", found.residual, pairs.len()))
 }

@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         return Ok(());
     }
     let mut out = std::io::stdout().lock();
-    match write!(out, "{}", text(&found)) {
+    match write!(out, "{}{}", text(&found), told(&log)) {
         // a reader that has seen enough, such as `head`, is no failure
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => Ok(other?),
@@ -127,6 +127,15 @@ fn text(found: &Identified) -> String {
         );
     }
     out
+}
+
+/// What the board told of the run, where it told anything.
+fn told(log: &Log) -> String {
+    let lines = ident::board::told(log);
+    if lines.is_empty() {
+        return String::new();
+    }
+    lines.iter().fold("\ntold by the board\n".to_owned(), |out, line| out + line + "\n")
 }
 
 fn terms(pairs: impl Iterator<Item = (f64, f64)>) -> String {

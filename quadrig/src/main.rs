@@ -15,6 +15,7 @@ mod close_loop;
 mod demo;
 mod effects;
 mod end;
+mod evidence;
 mod flash;
 mod fly;
 mod identify;
@@ -26,6 +27,7 @@ mod plateaus;
 mod port;
 mod predict;
 mod progress;
+mod recalibrate;
 mod record;
 mod rig;
 mod run_log;
@@ -73,8 +75,10 @@ enum Command {
     Select(select::Args),
     /// Design of the load cell's beam, with a warning of resonance.
     Beam(beam::Args),
-    /// Sensor errors of the IMU board from a recording.
+    /// Sensor errors of the IMU board from a recording; a rig channel's scale from known values, live or from a recording.
     Calibrate(calibrate::Args),
+    /// An old log's raw codes with a better calibration.
+    Recalibrate(recalibrate::Args),
     /// The firmware's attitude filter over a recorded file.
     Ahrs(ahrs::Args),
     /// The whole circle in simulation; with --auto the tool flies its own next experiments.
@@ -117,6 +121,7 @@ fn main() -> ExitCode {
         Command::Select(args) => select::run(args, cli.quiet),
         Command::Beam(args) => beam::run(args, cli.quiet),
         Command::Calibrate(args) => calibrate::run(args, cli.quiet),
+        Command::Recalibrate(args) => recalibrate::run(args, cli.quiet),
         Command::Ahrs(args) => ahrs::run(args, cli.quiet),
         Command::Loop(args) => circle::run(args, cli.quiet),
         Command::Fly(args) => fly::run(args, cli.quiet),

@@ -40,6 +40,11 @@ pub(crate) struct PortArgs {
 }
 
 impl PortArgs {
+    /// Whether one was named.
+    pub(crate) fn is_given(&self) -> bool {
+        !self.port.is_empty()
+    }
+
     /// The virtual board's scenario, if the port is one: `Some(None)` for the demonstration rig.
     fn scenario(&self) -> Option<Option<PathBuf>> {
         match self.port.strip_prefix(VIRTUAL)? {

@@ -1,20 +1,22 @@
 //! `quadrig rig`: talks to the rig board.
 //!
-//! What it is: one command a call (`identify`, `stop`, `tare`, `clear`, `set`, `configure`, `mass`, `save`), and two sessions that keep the
+//! What it is: one command a call (`identify`, `status`, `stop`, `tare`, `clear`, `set`, `configure`, `burst`, `save`), and two sessions that keep the
 //! link alive (`arm`, `calibrate`, `run`): there the operator types what the ESC beeps, and more commands.
 //! What can go wrong: a refused command names every reason; a session that ends, for whatever reason, stops the motor first.
-//! Units: us of pulse, s, g.
+//! Units: us of pulse, s.
 //! Reference: specification `rig.md`, "Acquisition"; Beharie 2013, Fig. 3.10.
 
-mod configure;
-mod date;
-mod file;
+mod burst;
+pub(crate) mod configure;
+pub(crate) mod date;
+pub(crate) mod file;
+mod status;
 
 use crate::Failure;
 use crate::board::{Board, Heard};
 use crate::end::Ended;
 use crate::port::PortArgs;
-use crate::record::Recorder;
+use crate::record::{self, Recorder};
 use clap::Subcommand;
 use frame::message::{Beep, BoardId, Command, Event, Hello, Message, Setting};
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES, Fault, RigState};
@@ -39,6 +41,8 @@ pub(crate) struct Args {
 enum Order {
     /// Firmware, board, reset cause.
     Identify,
+    /// What the board reads, how it is calibrated, and how it is: jitter, cycles, stack, encoder, line.
+    Status,
     /// Arms, then obeys typed lines: long, cells N, ready, set US, run, stop, tare, quit.
     Arm,
     /// Throttle-range calibration with the ESC unpowered; type double, long, cells N, ready as the ESC beeps.
@@ -73,6 +77,8 @@ enum Order {
         /// Log to write.
         #[arg(short, long)]
         output: Option<PathBuf>,
+        #[command(flatten)]
+        rig: record::Rig,
     },
     /// Sets the pulse of an armed rig and holds it for a while.
     Set {
@@ -101,15 +107,9 @@ enum Order {
         #[arg(short, long)]
         output: Option<PathBuf>,
     },
-    /// Takes a known mass on the load cell, or fits the scale to those taken.
-    Mass {
-        /// Mass in gram; without it, fit.
-        grams: Option<f32>,
-        /// Forget the masses taken before.
-        #[arg(long)]
-        forget: bool,
-    },
-    /// Stores settings and load-cell calibration in the board's flash.
+    /// Records every conversion of one channel and shows the spectrum of what vibrates.
+    Burst(burst::Args),
+    /// Stores the configuration in force in the board's flash.
     Save,
 }
 
@@ -147,6 +147,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     };
     match &args.order {
         Order::Identify => identify(&mut board),
+        Order::Status => status::run(&mut board),
         Order::Stop => board.obey(Command::Stop, silent).map(|()| done("stopped: minimum throttle, latched until cleared")),
         Order::Tare => board.obey(Command::Tare, silent).map(|()| done("tared")),
         Order::Clear => board.obey(Command::ClearFaults, silent).map(|()| done("cleared")),
@@ -182,30 +183,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             board.obey(Command::Configure(setting(key, *value)?), silent).map(|()| done("in force until the next reset; `save` keeps it"))
         }
         Order::Configure { .. } => Err("rig configure takes a file, or --read [-o FILE], or a setting with its value".into()),
-        Order::Mass { forget: true, .. } => board.obey(Command::MassForget, silent).map(|()| done("forgotten")),
-        Order::Mass { grams: Some(grams), .. } => {
-            let taken = |m: &Message| match m {
-                Message::Event(Event::MassTaken { points, counts }) => Some((*points, *counts)),
-                _ => None,
-            };
-            let (points, counts) = board.ask(Command::MassPoint { mass_g: *grams }, silent, taken)?;
-            done(&format!("{grams} g gives {counts:.2} counts; {points} points"));
-            Ok(())
-        }
-        Order::Mass { grams: None, .. } => {
-            let fitted = |m: &Message| if let Message::Event(Event::MassFitted(fit)) = m { Some(*fit) } else { None };
-            let fit = board.ask(Command::MassFit, silent, fitted)?;
-            let grams = |n: f32| n / 9.806_65e-3;
-            done(&format!(
-                "{} points: {:.5} g a count, zero at {:.2} counts; residuals {:.2} g rms, {:.2} g at most",
-                fit.points,
-                grams(fit.gain.abs()),
-                fit.zero,
-                grams(fit.residual_n),
-                grams(fit.worst_n)
-            ));
-            Ok(())
-        }
+        Order::Burst(args) => burst::run(&mut board, args, quiet),
         Order::Save => configure::save(&mut board).map(|()| done("saved, and read back the same")),
         Order::Arm => session(&mut board, Command::Arm, Course::Typed, None, assistant, quiet),
         Order::Calibrate { esc_is_unpowered: false } => {
@@ -214,23 +192,25 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Order::Calibrate { .. } => {
             session(&mut board, Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM }, Course::Typed, None, assistant, quiet)
         }
-        Order::Run { schedule: None, next: None, step, hold, top, down, visits, output } => {
+        Order::Run { schedule: None, next: None, step, hold, top, down, visits, output, rig } => {
             let height = if *step > 0.0 && *step <= 1000.0 { PulseWidth((step * 1000.0).round() as u32) } else { return Err(format!("{step} us: a step is above 0 and up to 1000 us").into()) };
             if !(*hold > 0.0 && *hold < 86_400.0) {
                 return Err(format!("{hold} s: a level is held for more than 0 and less than 86400 s").into());
             }
             let run = Command::RunVisits { step: height, hold_ms: (hold * 1000.0) as u32, top: pulse(*top)?, down: *down, visits: *visits };
-            let recorder = output.as_ref().map(|o| Recorder::new(o, Vec::new(), quiet)).transpose()?;
+            let way = if *down { "up and down" } else { "up" };
+            let words = format!("staircase {way} in steps of {step} us to {top} us, {hold} s each, {visits} times");
+            let recorder = output.as_ref().map(|o| rig.recorder(o, &[("schedule", words)], quiet)).transpose()?;
             session(&mut board, Command::Arm, Course::Known(run), recorder, assistant, quiet)
         }
-        Order::Run { schedule, next, output, .. } => {
+        Order::Run { schedule, next, output, rig, .. } => {
             let plan = match (schedule, next) {
                 (_, Some(verdict)) => Plan::next_experiment(verdict)?,
                 (file, None) => Plan::read(file.as_deref().unwrap_or(Path::new("")))?,
             };
             done(&plan.summary());
-            let head = vec![("schedule", plan.name.clone())];
-            let recorder = output.as_ref().map(|o| Recorder::new(o, head, quiet)).transpose()?;
+            let head = [("schedule", plan.name.clone())];
+            let recorder = output.as_ref().map(|o| rig.recorder(o, &head, quiet)).transpose()?;
             session(&mut board, Command::Arm, Course::Played(Box::new(Player::new(plan))), recorder, assistant, quiet)
         }
     }
@@ -248,7 +228,7 @@ fn identify(board: &mut Board) -> Result<(), Failure> {
 }
 
 /// The channels that a board has, by their names in a log.
-fn fitted(hello: &Hello) -> String {
+pub(super) fn fitted(hello: &Hello) -> String {
     let named = |mask: u8, names: &[&'static str]| -> Vec<&'static str> {
         names.iter().enumerate().filter(|(n, _)| mask >> n & 1 == 1).map(|(_, name)| *name).collect()
     };
@@ -256,7 +236,7 @@ fn fitted(hello: &Hello) -> String {
 }
 
 /// Bits 31..24 of RCC_CSR in words (RM0090 section 7.3.21); power-on and brown-out set further flags, so the rarest is told first.
-fn reset_cause(flags: u8) -> &'static str {
+pub(super) fn reset_cause(flags: u8) -> &'static str {
     const NAMES: [(u8, &str); 7] = [
         (0x80, "low-power management"),
         (0x40, "window watchdog"),
@@ -376,6 +356,10 @@ impl Session {
         }
         if let Some(why) = self.player.as_ref().and_then(Player::failure) {
             return Err(format!("the schedule was not played to its end: {why}").into());
+        }
+        let now = board.now();
+        if let Some(question) = self.recorder.as_mut().and_then(|recorder| recorder.question(now)) {
+            board.send(question)?;
         }
         board.keep_alive()
     }

@@ -5,20 +5,31 @@
 //! Units: as in the log.
 //! Reference: specification `formats.md`; `closing-the-loop.md`, step 9.
 
+use crate::evidence::{self, Fitted};
+use firmware_rig::RigConfig;
+use frame::message::Event;
+use frame::rig::{FaultSet, RigSample, RigState};
+use hal_sim::native::firmware_config;
 use hal_sim::plant::PlantLevers;
 use hal_sim::{PlantState, Powerplant, RunRecord, Scenario};
 use ident::log::{Column, Log};
 use ident::model::Model;
 use ident::simulate::from_command;
 
-/// The log of a run, as `quadrig log` would record it.
-pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str) -> Log {
+/// The log of a run, as `quadrig log` would record it; with the raw codes beside the readings where `raw` says so.
+pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: bool) -> Log {
     let rows: Vec<_> = record.converted().collect();
     let mut log = Log { name: name.to_owned(), t: rows.iter().map(|r| r.t_s).collect(), ..Log::default() };
     let text = |s: &str| toml::Value::String(s.to_owned());
     log.meta.insert("motor".into(), text(&scenario.motor));
     log.meta.insert("propeller".into(), text(&scenario.propeller));
-    log.meta.insert("config_crc32".into(), text(&format!("{:08x}", record.hello.config)));
+    let config = RigConfig::of(&firmware_config(scenario));
+    let config = (config.digest() == record.hello.config).then_some(&config);
+    log.meta.extend(evidence::head(Some(&record.hello), &record.calibration, config));
+    if let Ok(schedule) = toml::Value::try_from(&scenario.schedule) {
+        log.meta.insert("schedule".into(), schedule);
+    }
+    log.events = events(record);
     log.meta.insert("sample_hz".into(), toml::Value::Float(f64::from(scenario.log.rate_hz)));
     log.columns.push(Column { name: "pulse_us".into(), values: rows.iter().map(|r| r.pulse_us).collect() });
     let mut push = |name: &str, values: Vec<f64>| {
@@ -36,7 +47,38 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str) -> Log
     for (i, name) in frame::rig::UNEVEN_NAMES.iter().enumerate() {
         push(name, rows.iter().map(|r| r.uneven_deg[i].unwrap_or(f64::NAN)).collect());
     }
+    let fitted = Fitted::of(Some(&record.hello), &record.calibration);
+    let mut beside = |names: Vec<String>, cells: &dyn Fn(&RigSample) -> Vec<f64>| {
+        let mut columns: Vec<Column> = names.into_iter().map(|name| Column { name, values: Vec::new() }).collect();
+        for sample in &record.samples {
+            columns.iter_mut().zip(cells(sample)).for_each(|(column, cell)| column.values.push(cell));
+        }
+        log.columns.append(&mut columns);
+    };
+    beside(evidence::flag_columns(&fitted), &|s| fitted.flags(s).map(|f| f.map_or(f64::NAN, |f| f64::from(f.code))).collect());
+    if raw {
+        beside(evidence::raw_columns(&fitted), &|s| evidence::raw_codes(&fitted, s).into_iter().map(f64::from).collect());
+    }
     log
+}
+
+/// What happened in a run, with its times.
+fn events(record: &RunRecord) -> Vec<String> {
+    let mut latched = FaultSet::NONE;
+    let mut told = Vec::new();
+    for event in &record.events {
+        let before = latched;
+        match event {
+            Event::Faults { faults, .. } => latched = *faults,
+            Event::State { from: RigState::Faulted, .. } => latched = FaultSet::NONE,
+            _ => {}
+        }
+        let Some(at) = evidence::instant(event) else { continue };
+        let after = record.samples.iter().find(|s| s.at >= at);
+        let words = evidence::words(event, before, after);
+        told.extend(words.map(|words| evidence::timed(at.as_s() - record.start.as_s(), &words)));
+    }
+    told
 }
 
 /// What a model predicts along the command of a log, row for row, and each channel as it would read; `None` of a model that predicts no

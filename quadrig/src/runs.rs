@@ -88,7 +88,7 @@ fn fly(pair: &Pair, args: &Args, progress: &mut dyn FnMut(f64)) -> Result<f64, S
         return Err(format!("{}: the motor does not turn the propeller, no result", scenario.name));
     }
     let path = args.output.join(format!("{}_{}.csv", pair.motor, pair.propeller));
-    let log = to_log(&scenario, &record, &scenario.name);
+    let log = to_log(&scenario, &record, &scenario.name, false);
     log.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(record.samples.last().map_or(0.0, |s| s.at.as_s()))
 }

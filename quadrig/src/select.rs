@@ -181,7 +181,7 @@ fn fly(motor: &str, propeller: &str) -> Pair {
     };
     match hal_sim::run(&scenario, None, &mut |_| {}) {
         Ok(record) => {
-            let log = to_log(&scenario, &record, &scenario.name);
+            let log = to_log(&scenario, &record, &scenario.name, false);
             let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
             // a run that a protection cut short says nothing of full throttle
             let top = log.column("pulse_us").map_or(0.0, |p| p.iter().copied().fold(0.0, f64::max));

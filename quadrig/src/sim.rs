@@ -35,6 +35,9 @@ pub(crate) struct Args {
     /// Writes what was really there at each sample (CSV).
     #[arg(long, conflicts_with = "replay")]
     truth: Option<PathBuf>,
+    /// Records the raw codes as well (columns `raw_*`), so that a better calibration can be replayed with `quadrig recalibrate`.
+    #[arg(long, conflicts_with = "model")]
+    raw: bool,
     /// Writes what the sensors of the IMU board gave, as `quadrig ahrs` reads it (CSV).
     #[arg(long)]
     readings: Option<PathBuf>,
@@ -72,7 +75,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(path) = &args.truth {
         write_whole(path, |out| write_truth(out, &record.truth)).map_err(|e| format!("{}: {e}", path.display()))?;
     }
-    let mut log = to_log(&scenario, &record, &name);
+    let mut log = to_log(&scenario, &record, &name, args.raw);
     if log.is_empty() {
         return Err("the run ended before its first sample; no log was written".into());
     }
@@ -147,7 +150,7 @@ pub(crate) fn fly(
 ) -> Result<Log, Failure> {
     let bar = Bar::new(word, quiet);
     let record = hal_sim::run(scenario, plant, &mut |share| bar.set(share))?;
-    Ok(to_log(scenario, &record, name))
+    Ok(to_log(scenario, &record, name, false))
 }
 
 /// The same schedule with an identified model as the plant; `like` is the run whose command it follows.

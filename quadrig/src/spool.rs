@@ -8,8 +8,9 @@
 //! Reference: specification `formats.md` ("nothing half-written").
 
 use crate::Failure;
+use ident::log::write_whole;
 use std::fs::{File, OpenOptions};
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -79,10 +80,15 @@ impl Spool {
         let _ = std::fs::remove_file(&self.part);
     }
 
-    /// Syncs and renames. What found no room goes to the temporary folder.
+    /// Syncs and renames; what happened in mid-run goes into the head. What found no room goes to the temporary folder.
     pub(crate) fn finish(mut self) -> Result<(), Failure> {
         self.flush();
         let synced = self.file.sync_all();
+        // where there is no room for a second copy the events stay among the rows, where readers find them as well
+        if synced.is_ok() && self.waiting.is_empty() && lifted(&self.part, &self.target).unwrap_or(false) {
+            let _ = std::fs::remove_file(&self.part);
+            return Ok(());
+        }
         synced.and_then(|()| std::fs::rename(&self.part, &self.target)).map_err(|e| {
             format!("{}: cannot be renamed to {} ({e}); what was recorded is there", self.part.display(), self.target.display())
         })?;
@@ -106,5 +112,59 @@ impl Spool {
             )
             .into()),
         }
+    }
+}
+
+/// Writes what is in `part` to `target` with the events from among its rows in the head; `false` when there are none.
+fn lifted(part: &Path, target: &Path) -> std::io::Result<bool> {
+    let lines = || -> std::io::Result<_> { Ok(BufReader::new(File::open(part)?).lines()) };
+    let is_event = |line: &str| line.starts_with("# event = ");
+    let mut events = Vec::new();
+    for line in lines()? {
+        let line = line?;
+        if is_event(&line) {
+            events.push(line);
+        }
+    }
+    if events.is_empty() {
+        return Ok(false);
+    }
+    write_whole(target, |out| {
+        let mut events = Some(events);
+        for line in lines()? {
+            let line = line?;
+            if is_event(&line) {
+                continue;
+            }
+            if !line.starts_with('#') {
+                for event in events.take().into_iter().flatten() {
+                    writeln!(out, "{event}")?;
+                }
+            }
+            writeln!(out, "{line}")?;
+        }
+        Ok(())
+    })?;
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_happened_in_mid_run_stands_in_the_head() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let target = folder.path().join("run.csv");
+        let mut spool = Spool::create(&target).expect("a part");
+        for lines in
+            ["# quadrig-log 1\n# a = 1\nt_s,b,c\n", "0,1,2\n", "# event = \"0.050 s: x\"\n1,1,2\n", "# event = \"1.500 s: y\"\n"]
+        {
+            assert_eq!(spool.add(lines), None);
+        }
+        spool.finish().expect("it ends");
+        let text = std::fs::read_to_string(&target).expect("a log");
+        assert_eq!(text, "# quadrig-log 1\n# a = 1\n# event = \"0.050 s: x\"\n# event = \"1.500 s: y\"\nt_s,b,c\n0,1,2\n1,1,2\n");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 1, "and the part is gone");
     }
 }

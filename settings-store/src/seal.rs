@@ -6,7 +6,7 @@
 //! Reference: CRC-32/ISO-HDLC.
 
 /// Longest stored form, bytes.
-pub const MAX_STORED: usize = 400;
+pub const MAX_STORED: usize = 464;
 const TRAILER: usize = 4;
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 

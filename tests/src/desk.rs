@@ -44,6 +44,14 @@ struct Done {
     levels: BTreeMap<u32, Truth>,
 }
 
+/// What hands are to do at the bench.
+#[derive(Debug, Default)]
+struct Hands {
+    deeds: Vec<Hand>,
+    /// Mass in gram, and the part of itself by which its pull swings.
+    swinging: Option<(f64, f64)>,
+}
+
 /// A board behind a port.
 pub struct Desk {
     /// Name of the port to open.
@@ -52,6 +60,7 @@ pub struct Desk {
     power: Arc<AtomicBool>,
     cable: Arc<Mutex<Option<Cable>>>,
     done: Arc<Mutex<Done>>,
+    hands: Arc<Mutex<Hands>>,
     thread: Option<JoinHandle<()>>,
     quit: Arc<AtomicBool>,
     /// The name is a link that is ours to move.
@@ -84,12 +93,13 @@ impl Desk {
         let flag = || Arc::new(AtomicBool::new(false));
         let (power, quit) = (flag(), flag());
         let (cable, done) = (Arc::new(Mutex::new(Some(cable))), Arc::new(Mutex::new(Done::default())));
+        let hands = Arc::new(Mutex::new(Hands::default()));
         let (sender, beeps) = channel();
         let thread = std::thread::spawn({
-            let (power, quit, cable, done) = (power.clone(), quit.clone(), cable.clone(), done.clone());
-            move || play(line, &scenario, &cable, &power, &quit, &done, &sender)
+            let (power, quit, cable, done, hands) = (power.clone(), quit.clone(), cable.clone(), done.clone(), hands.clone());
+            move || play(line, &scenario, &cable, (&power, &hands), &quit, &done, &sender)
         });
-        Self { port, beeps, power, cable, done, thread: Some(thread), quit, link: None }
+        Self { port, beeps, power, cable, done, hands, thread: Some(thread), quit, link: None }
     }
 
     /// Switches a board on whose port has a name that stays: `link`, as udev makes them.
@@ -131,6 +141,24 @@ impl Desk {
         if let Some(link) = &self.link {
             name_it(link, &name);
         }
+    }
+
+    /// Does something at the bench.
+    ///
+    /// # Panics
+    /// When the board's thread has panicked.
+    pub fn hand(&self, hand: Hand) {
+        self.hands.lock().expect("the board lives").deeds.push(hand);
+    }
+
+    /// Lets a mass swing on the load cell: its pull goes up and down by a part of itself, once in a second. `None` takes it off.
+    ///
+    /// # Panics
+    /// When the board's thread has panicked.
+    pub fn swing(&self, mass: Option<(f64, f64)>) {
+        let mut hands = self.hands.lock().expect("the board lives");
+        hands.swinging = mass;
+        hands.deeds.push(Hand::Hang(0.0));
     }
 
     /// The next beep of the ESC.
@@ -180,7 +208,7 @@ fn play(
     line: Line,
     scenario: &Scenario,
     cable: &Mutex<Option<Cable>>,
-    power: &AtomicBool,
+    (power, hands): (&AtomicBool, &Mutex<Hands>),
     quit: &AtomicBool,
     done: &Mutex<Done>,
     beeps: &Sender<Beep>,
@@ -193,6 +221,15 @@ fn play(
         let ms = board.ms() + 1;
         pace.wait(ms);
         board.hand(&Hand::Power(power.load(Ordering::Relaxed))).expect("the rig has a switch");
+        let mut wanted = hands.lock().expect("nobody panics with it");
+        for hand in wanted.deeds.drain(..) {
+            board.hand(&hand).expect("the rig has it");
+        }
+        if let Some((grams, part)) = wanted.swinging {
+            let now = 1.0 + part * (std::f64::consts::TAU * ms as f64 * 1.0e-3).sin();
+            board.hand(&Hand::Hang(grams * now)).expect("the rig has a load cell");
+        }
+        drop(wanted);
         let mut bytes = [0; 512];
         let mut plugged = cable.lock().expect("nobody panics with it");
         let heard = plugged.as_mut().map_or(0, |cable| cable.hear(&mut bytes));

@@ -54,11 +54,9 @@ fn one_command_each() {
     rig(&["set", "1300"]).refused(&["not in this state"]);
     rig(&["set", "2500"]).refused(&["2500 us", "1000 to 2000"]);
     rig(&["calibrate"]).refused(&["MAXIMUM", "--esc-is-unpowered"]);
-    rig(&["configure", "log-ms", "1"]).refused(&["out of range"]); // a whole rig: more than the line carries
+    rig(&["configure", "log-ms", "0"]).refused(&["out of range"]);
     rig(&["configure", "colour", "5"]).refused(&["no such setting"]);
     rig(&["configure", "log-ms", "20"]).succeeded();
-    rig(&["mass"]).refused(&["out of range"]);
-    rig(&["mass", "0"]).succeeded();
     rig(&["stop"]).succeeded();
     rig(&["tare"]).succeeded();
     rig(&["configure", "log-ms", "50"]).refused(&["not in this state"]);
@@ -96,9 +94,6 @@ fn the_whole_configuration_is_one_file() {
         std::fs::write(folder.path().join("bad.toml"), text).expect("a file");
         rig(&["configure", "bad.toml"]).refused(&[place]);
     }
-    let whole = before.replace("rate_hz = 10\n", "rate_hz = 1000\n");
-    std::fs::write(folder.path().join("fast.toml"), whole).expect("a file");
-    rig(&["configure", "fast.toml"]).refused(&["fast.toml:2:11", "118000 bytes a second", "at most 500"]);
     assert!(rig(&["identify"]).succeeded().out.contains(&digest), "what was refused changed nothing");
 
     rig(&["configure", "before.toml"]).succeeded();
@@ -326,7 +321,7 @@ fn a_full_disk_costs_nothing_that_arrived() {
     let desk = Desk::new(Line::Clean);
     // `ulimit -f` counts blocks of 512 bytes; without the signal the write fails as on a full disk
     let script =
-        format!("trap '' XFSZ; ulimit -f 4; exec '{}' log --port {} -o full.csv --seconds 3", quadrig().display(), desk.port);
+        format!("trap '' XFSZ; ulimit -f 10; exec '{}' log --port {} -o full.csv --seconds 3", quadrig().display(), desk.port);
     let output = Command::new("sh")
         .args(["-c", &script])
         .current_dir(folder.path())
@@ -353,7 +348,7 @@ fn a_full_disk_costs_nothing_that_arrived() {
 fn a_silent_port_is_no_board() {
     let folder = tempfile::tempdir().expect("a folder");
     let (_cable, port) = Cable::new().expect("a pseudo-terminal");
-    call(folder.path(), &["log", "--port", &port, "-o", "none.csv"]).refused(&["no calibration", "921600"]);
+    call(folder.path(), &["log", "--port", &port, "-o", "none.csv"]).refused(&["no calibration", "2000000"]);
     assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing is left behind");
     call(folder.path(), &["rig", "--port", &port, "identify"]).refused(&["no answer"]);
     call(folder.path(), &["rig", "--port", &port, "run", "-o", "none.csv"]).refused(&["no answer"]);

@@ -21,6 +21,8 @@ pub enum Hand {
     Hang(f64),
     /// Twists the torque arm, N.m; 0 lets it go.
     Twist(f64),
+    /// Draws a current through the shunt with a load of one's own, A; 0 takes it off.
+    Draw(f64),
     /// Sets the bench supply, V.
     Supply(f64),
     /// Pulls a plug, or puts it back: capture channels first, then analogue ones.
@@ -35,7 +37,7 @@ pub enum Hand {
 }
 
 /// Every word.
-const WORDS: &str = "power on|off; stop, release (the emergency stop); hang GRAMS (on the load cell); twist NM (the torque arm); supply VOLTS; unplug CHANNEL, plug CHANNEL; reset (key)";
+const WORDS: &str = "power on|off; stop, release (the emergency stop); hang GRAMS (on the load cell); twist NM (the torque arm); draw AMPERES (a load of one's own); supply VOLTS; unplug CHANNEL, plug CHANNEL; reset (key)";
 
 impl Hand {
     /// Every word, for people.
@@ -63,6 +65,7 @@ impl Hand {
             ("stop", None) => Ok(Self::StopLoop { open: true }),
             ("release", None) => Ok(Self::StopLoop { open: false }),
             ("hang", Some(grams)) => Ok(Self::Hang(number(grams)?)),
+            ("draw", Some(current)) => Ok(Self::Draw(number(current)?)),
             ("twist", Some(torque)) => Ok(Self::Twist(number(torque)?)),
             ("supply", Some(volts)) => match number(volts)? {
                 v if (0.0..=60.0).contains(&v) => Ok(Self::Supply(v)),
@@ -88,6 +91,8 @@ impl Hand {
             Self::Hang(grams) => format!("{grams} g hang on the load cell"),
             Self::Twist(0.0) => "the torque arm is free".to_owned(),
             Self::Twist(torque) => format!("the torque arm is twisted by {torque} N.m"),
+            Self::Draw(0.0) => "nothing but the ESC draws current".to_owned(),
+            Self::Draw(current) => format!("a load draws {current} A through the shunt"),
             Self::Supply(volts) => format!("the supply is set to {volts} V"),
             Self::Plug { plug, out: true } => format!("{} is unplugged", name(plug)),
             Self::Plug { plug, out: false } => format!("{} is plugged in", name(plug)),

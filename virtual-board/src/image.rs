@@ -198,6 +198,7 @@ impl VirtualBoard for ImageBoard {
             Hand::StopLoop { open } => Action::StopKey(open),
             Hand::Hang(mass_g) => Action::Hang(mass_g),
             Hand::Twist(torque_nm) => Action::Twist(torque_nm),
+            Hand::Draw(current_a) => Action::Draw(current_a),
             Hand::Supply(voltage_v) => Action::Supply(voltage_v),
             Hand::Plug { plug, out } => Action::Plug { plug, out },
             Hand::Reset => Action::Reset,

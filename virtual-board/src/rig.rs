@@ -74,6 +74,7 @@ impl VirtualBoard for RigBoard {
             Hand::StopLoop { open } => self.desk.open_stop_loop(open),
             Hand::Hang(mass_g) => self.desk.hang(mass_g),
             Hand::Twist(torque_nm) => self.desk.twist(torque_nm),
+            Hand::Draw(current_a) => self.desk.draw(current_a),
             Hand::Supply(voltage_v) => self.desk.set_supply(voltage_v),
             Hand::Plug { plug, out } => self.desk.unplug(plug, out),
             Hand::Reset => self.desk.press_reset(),

@@ -13,7 +13,7 @@ use crate::callgraph;
 use crate::place::{BOARD, Place};
 use crate::run::{Failure, cargo, run};
 use object::elf::SHF_ALLOC;
-use object::{Object, ObjectSection, SectionFlags, SectionKind};
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -21,8 +21,9 @@ use std::path::Path;
 pub(crate) const PACKAGES: [&str; 2] = ["firmware-rig", "firmware-ahrs"];
 const BUDGETS: &str = "budgets/size.toml";
 const RIG_BUDGET: &str = "budgets/rig.toml";
-/// 128 KiB SRAM and 64 KiB core-coupled RAM. RM0090 section 2.3.1.
-const RAM: [std::ops::Range<u64>; 2] = [0x2000_0000..0x2002_0000, 0x1000_0000..0x1001_0000];
+/// 128 KiB SRAM, and 64 KiB core-coupled RAM. RM0090 section 2.3.1.
+const SRAM: std::ops::Range<u64> = 0x2000_0000..0x2002_0000;
+const CORE_COUPLED: std::ops::Range<u64> = 0x1000_0000..0x1001_0000;
 /// Flash of the STM32F405RG. RM0090 section 3.4.
 const FLASH_BYTES: u64 = 1024 * 1024;
 /// SRAM that static data and stack share. RM0090 section 2.3.1.
@@ -33,8 +34,10 @@ const SRAM_BYTES: u64 = 128 * 1024;
 pub(crate) struct Size {
     /// Code, constants and initial values.
     pub(crate) flash: u64,
-    /// Static data, initialised or not, and buffers that are never initialised.
+    /// Static data in SRAM, initialised or not, and buffers that are never initialised.
     pub(crate) ram: u64,
+    /// The same in the core-coupled RAM.
+    pub(crate) ccm: u64,
 }
 
 /// Builds, measures, and compares or blesses.
@@ -110,22 +113,36 @@ pub(crate) fn build(place: &Place) -> Result<(), Failure> {
 pub(crate) fn measure(path: &Path) -> Result<Size, Failure> {
     let bytes = std::fs::read(path).map_err(|error| Failure(format!("{}: {error}", path.display())))?;
     let size = size(&bytes).map_err(|error| Failure(format!("{}: {error}", path.display())))?;
+    if let Some(end) = stack_end(&bytes).filter(|end| !SRAM.contains(end)) {
+        return Err(Failure(format!(
+            "{}: the stack ends at {end:#010x}, expected SRAM: what does memory.x put behind .bss?",
+            path.display()
+        )));
+    }
     if size.flash == 0 {
         return Err(Failure(format!("{}: holds nothing for the flash; is it an image of the board?", path.display())));
     }
     Ok(size)
 }
 
+/// Where start-up believes the stack to end: it paints from there on, and outside of SRAM it would paint what is no memory.
+fn stack_end(bytes: &[u8]) -> Option<u64> {
+    let file = object::File::parse(bytes).ok()?;
+    file.symbols().find(|symbol| symbol.name() == Ok("_stack_end")).map(|symbol| symbol.address())
+}
+
 fn size(bytes: &[u8]) -> Result<Size, object::Error> {
     let file = object::File::parse(bytes)?;
-    let mut size = Size { flash: 0, ram: 0 };
+    let mut size = Size { flash: 0, ram: 0, ccm: 0 };
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags, .. } = section.flags() else { continue };
         if !sh_flags.contains(SHF_ALLOC) {
             continue;
         }
-        if RAM.iter().any(|r| r.contains(&section.address())) {
+        if SRAM.contains(&section.address()) {
             size.ram += section.size();
+        } else if CORE_COUPLED.contains(&section.address()) {
+            size.ccm += section.size();
         }
         if section.kind() != SectionKind::UninitializedData {
             size.flash += section.size();
@@ -139,7 +156,8 @@ fn budget(sizes: &[(&str, Size)]) -> String {
         "# Upper limits of the flash images, bytes; `cargo xtask image --bless` writes them from the present sizes plus 2 %.\n"
             .to_owned();
     for (package, size) in sizes {
-        let _ = write!(text, "\n[{package}]\nflash = {}\nram = {}\n", headroom(size.flash), headroom(size.ram));
+        let [flash, ram, ccm] = [size.flash, size.ram, size.ccm].map(headroom);
+        let _ = write!(text, "\n[{package}]\nflash = {flash}\nram = {ram}\nccm = {ccm}\n");
     }
     text
 }
@@ -157,7 +175,10 @@ fn read_budget(text: &str) -> Result<Vec<(String, Size)>, Failure> {
             .and_then(|v| u64::try_from(v).ok())
             .ok_or_else(|| Failure(format!("{BUDGETS}: [{package}] {key}: expected a number of bytes")))
     };
-    table.keys().map(|p| Ok((p.clone(), Size { flash: number(p, "flash")?, ram: number(p, "ram")? }))).collect()
+    let size = |p: &str| -> Result<Size, Failure> {
+        Ok(Size { flash: number(p, "flash")?, ram: number(p, "ram")?, ccm: number(p, "ccm")? })
+    };
+    table.keys().map(|p| Ok((p.clone(), size(p)?))).collect()
 }
 
 fn limit(limits: &[(String, Size)], package: &str) -> Option<Size> {
@@ -166,15 +187,19 @@ fn limit(limits: &[(String, Size)], package: &str) -> Option<Size> {
 
 fn table(sizes: &[(&str, Size)], limits: &[(String, Size)]) -> String {
     let mut text = format!(
-        "{:<14} {:>8} {:>8} {:>6} {:>11} {:>8} {:>11}\n",
-        "image", "flash", "budget", "chip", "static RAM", "budget", "stack room"
+        "{:<14} {:>8} {:>8} {:>6} {:>11} {:>8} {:>11} {:>8} {:>8}\n",
+        "image", "flash", "budget", "chip", "static RAM", "budget", "stack room", "CCM", "budget"
     );
     for (package, size) in sizes {
-        let none = "none".to_owned();
-        let (flash, ram) = limit(limits, package).map_or((none.clone(), none), |l| (l.flash.to_string(), l.ram.to_string()));
+        let most = limit(limits, package).map(|l| [l.flash, l.ram, l.ccm].map(|bytes| bytes.to_string()));
+        let [flash, ram, ccm] = most.unwrap_or_else(|| ["none"; 3].map(str::to_owned));
         let share = 100.0 * size.flash as f64 / FLASH_BYTES as f64;
         let room = SRAM_BYTES.saturating_sub(size.ram);
-        let _ = writeln!(text, "{package:<14} {:>8} {flash:>8} {share:>5.1}% {:>11} {ram:>8} {room:>11}", size.flash, size.ram);
+        let _ = writeln!(
+            text,
+            "{package:<14} {:>8} {flash:>8} {share:>5.1}% {:>11} {ram:>8} {room:>11} {:>8} {ccm:>8}",
+            size.flash, size.ram, size.ccm
+        );
     }
     text
 }
@@ -184,7 +209,9 @@ fn compare(sizes: &[(&str, Size)], limits: &[(String, Size)]) -> Result<(), Fail
         let Some(limit) = limit(limits, package) else {
             return Err(Failure(format!("{BUDGETS}: no entry [{package}]; `cargo xtask image --bless` writes it")));
         };
-        for (what, is, most) in [("flash", size.flash, limit.flash), ("static RAM", size.ram, limit.ram)] {
+        let kinds =
+            [("flash", size.flash, limit.flash), ("static RAM", size.ram, limit.ram), ("core-coupled RAM", size.ccm, limit.ccm)];
+        for (what, is, most) in kinds {
             if is > most {
                 return Err(Failure(format!("{package}: {is} bytes of {what}, the budget is {most} ({BUDGETS})")));
             }
@@ -197,12 +224,13 @@ fn compare(sizes: &[(&str, Size)], limits: &[(String, Size)]) -> Result<(), Fail
 mod tests {
     use super::*;
 
-    const NOW: [(&str, Size); 2] = [("a", Size { flash: 1000, ram: 100 }), ("b", Size { flash: 2000, ram: 200 })];
+    const NOW: [(&str, Size); 2] =
+        [("a", Size { flash: 1000, ram: 100, ccm: 40 }), ("b", Size { flash: 2000, ram: 200, ccm: 0 })];
 
     #[test]
     fn a_blessed_budget_reads_back_with_two_per_cent_of_headroom() {
         let limits = read_budget(&budget(&NOW)).unwrap();
-        assert_eq!(limit(&limits, "a"), Some(Size { flash: 1024, ram: 112 }));
+        assert_eq!(limit(&limits, "a"), Some(Size { flash: 1024, ram: 112, ccm: 48 }));
         assert!(compare(&NOW, &limits).is_ok());
     }
 
@@ -210,8 +238,9 @@ mod tests {
     fn growth_beyond_the_budget_is_refused_and_named() {
         let limits = read_budget(&budget(&NOW)).unwrap();
         for (grown, wanted) in [
-            (Size { flash: 1025, ram: 100 }, "a: 1025 bytes of flash"),
-            (Size { flash: 1024, ram: 113 }, "a: 113 bytes of static RAM"),
+            (Size { flash: 1025, ram: 100, ccm: 0 }, "a: 1025 bytes of flash"),
+            (Size { flash: 1024, ram: 113, ccm: 0 }, "a: 113 bytes of static RAM"),
+            (Size { flash: 1024, ram: 112, ccm: 49 }, "a: 49 bytes of core-coupled RAM"),
         ] {
             let failure = compare(&[("a", grown)], &limits).unwrap_err().to_string();
             assert!(failure.contains(wanted), "{failure}");
@@ -221,7 +250,7 @@ mod tests {
 
     #[test]
     fn a_broken_budget_is_refused() {
-        for text in ["[a]\nflash = 1\n", "[a]\nflash = -1\nram = 1\n", "a = 1\n", "[a\n"] {
+        for text in ["[a]\nflash = 1\nram = 1\n", "[a]\nflash = -1\nram = 1\nccm = 0\n", "a = 1\n", "[a\n"] {
             assert!(read_budget(text).is_err(), "{text}");
         }
     }
@@ -260,7 +289,7 @@ mod tests {
 
     #[test]
     fn sections_are_charged_to_flash_and_ram() {
-        assert_eq!(size(&elf()).unwrap(), Size { flash: 320, ram: 584 });
+        assert_eq!(size(&elf()).unwrap(), Size { flash: 320, ram: 520, ccm: 64 });
         assert!(size(b"not an image").is_err());
     }
 }

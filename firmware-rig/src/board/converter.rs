@@ -10,10 +10,14 @@
 use core::sync::atomic::{AtomicU16, Ordering};
 use firmware_rig::AdcBlock;
 use frame::rig::ADC_CHANNELS;
+use heapless::Vec;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, DMA2};
 
+/// Clock of the converter, Hz; cycles of a conversion beside its sampling time (RM0090 section 13.5).
+const CLOCK_HZ: u32 = 21_000_000;
+const TWELVE_BITS: u32 = 12;
 /// Scans in the buffer: 6.5 ms at the fastest rate.
-const SCANS: usize = 1024;
+pub(crate) const SCANS: usize = 1024;
 const LENGTH: usize = SCANS * ADC_CHANNELS;
 
 /// Written by the DMA. Atomics, because it changes under the program.
@@ -93,18 +97,34 @@ impl Converter {
         self.adc.cr2().modify(|_, w| w.swstart().set_bit());
     }
 
-    /// The whole scans since the last call.
-    pub(crate) fn drain(&mut self, dma: &DMA2) -> [AdcBlock; ADC_CHANNELS] {
-        if self.adc.sr().read().ovr().bit_is_set() || dma.st(0).cr().read().en().bit_is_clear() {
+    /// The whole scans since the last call, and in `codes` the single conversions of the `wanted` channel; false when some were lost.
+    pub(crate) fn drain(&mut self, dma: &DMA2, wanted: Option<usize>, codes: &mut Codes) -> ([AdcBlock; ADC_CHANNELS], bool) {
+        let lost = self.adc.sr().read().ovr().bit_is_set() || dma.st(0).cr().read().en().bit_is_clear();
+        if lost {
             self.restart(dma);
         }
         let left = usize::from(dma.st(0).ndtr().read().ndt().bits());
         let head = (LENGTH.saturating_sub(left) / ADC_CHANNELS) % SCANS;
         let tail = core::mem::replace(&mut self.tail, head);
         let parts = if tail <= head { [scans(tail, head), &[]] } else { [scans(tail, SCANS), scans(0, head)] };
-        core::array::from_fn(|channel| sum(channel, parts))
+        codes.clear();
+        if let Some(channel) = wanted {
+            let each = parts.iter().flat_map(|part| part.iter().skip(channel).step_by(ADC_CHANNELS));
+            for code in each {
+                let _ = codes.push(code.load(Ordering::Relaxed)); // as many as there are scans: it has room
+            }
+        }
+        (core::array::from_fn(|channel| sum(channel, parts)), !lost)
     }
 }
+
+/// Conversions of a channel in a second, with `cycles` of sampling time.
+pub(crate) fn rate_hz(cycles: u16) -> f32 {
+    CLOCK_HZ as f32 / ((u32::from(cycles) + TWELVE_BITS) * ADC_CHANNELS as u32) as f32
+}
+
+/// Conversions of one channel since the last tick.
+pub(crate) type Codes = Vec<u16, SCANS>;
 
 /// Codes of the scans from one to before another.
 fn scans(from: usize, to: usize) -> &'static [AtomicU16] {

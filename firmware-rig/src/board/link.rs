@@ -2,7 +2,7 @@
 //!
 //! What it is: what the console has queued leaves by DMA2 stream 7; bytes arrive by DMA2 stream 2 in a circle that the tick polls.
 //! What can go wrong: see `firmware_rig::console`.
-//! Units: bytes at 921 600 baud.
+//! Units: bytes at 2 Mbaud: 84 MHz over 42, without an error of its own. It carries every channel a thousand times a second.
 //! Reference: RM0090 section 30.3.13 (DMA), table 43; specification `formats.md`, "Telemetry".
 
 use core::sync::atomic::{AtomicU8, Ordering};
@@ -10,7 +10,7 @@ use firmware_rig::RigConsole;
 use firmware_rig::console::QUEUED;
 use stm32f4xx_hal::pac::{DMA2, USART1};
 
-const BAUD: u32 = 921_600;
+const BAUD: u32 = 2_000_000;
 const APB2_HZ: u32 = 84_000_000;
 const IN: usize = 256;
 

@@ -24,7 +24,7 @@
 //! | current | PC2 | ADC1 IN12 | same |
 //! | supply voltage / 6 | PC3 | ADC1 IN13 | same |
 //! | temperature | PC4 | ADC1 IN14, last of the scan | same |
-//! | telemetry out, 921 600 baud 8N1 | PA9, AF7 | USART1 TX | DMA2 stream 7 channel 4 |
+//! | telemetry out, 2 Mbaud 8N1 | PA9, AF7 | USART1 TX | DMA2 stream 7 channel 4 |
 //! | commands in | PA10, AF7 | USART1 RX | DMA2 stream 2 channel 4, circular, polled |
 //! | stop loop, normally closed to ground: high (pressed, broken, unplugged) is a stop, pull-up (drive it low in an emulator) | PB12 | GPIO, polled twice a tick | none |
 //! | board supply below 2.9 V | - | PVD, polled each tick | none |

@@ -26,7 +26,7 @@ mod imbalance;
 mod parts;
 mod steps;
 
-pub use parts::{BenchParts, Millisecond, Truth};
+pub use parts::{BenchParts, CONVERSION_HZ, Millisecond, Truth};
 
 use crate::effect::{Levers, Scheduled};
 use crate::noise::{Source, Stream};
@@ -87,6 +87,8 @@ pub struct Bench {
     whirl: Whirl,
     strain_v: [f64; STEPS_PER_MS],
     torque_v: f64,
+    /// What a load of one's own changes at the current's pin, V.
+    drawn_v: f64,
     output_us: f64,
     edges: VecDeque<Edge>,
     truth: Truth,
@@ -139,6 +141,7 @@ impl Bench {
             whirl: Whirl::default(),
             strain_v: [front.zero_v[0]; STEPS_PER_MS],
             torque_v: front.zero_v[1],
+            drawn_v: 0.0,
             front,
             output_us: 1000.0,
             edges: VecDeque::new(),
@@ -166,6 +169,7 @@ impl Bench {
         let strain_v = self.strain_v[((self.steps + STEPS_PER_MS as u64 - 1) % STEPS_PER_MS as u64) as usize];
         let mut pins = self.front.pins(strain_v, &self.truth.plant);
         pins[1] = self.torque_v;
+        pins[2] += self.drawn_v;
         for (pin, spike) in pins.iter_mut().zip(self.levers.spike_v) {
             *pin += spike;
         }
@@ -185,6 +189,11 @@ impl Bench {
     /// Twists the torque arm from outside, N.m. 0 lets it go.
     pub fn twist(&mut self, torque_nm: f64) {
         self.by_hand.1 = torque_nm;
+    }
+
+    /// Draws a current through the shunt with a load of one's own, A. 0 takes it off.
+    pub fn draw(&mut self, current_a: f64) {
+        self.drawn_v = self.front.volts_of(current_a);
     }
 
     /// Sets the bench supply, V. A battery takes no notice.

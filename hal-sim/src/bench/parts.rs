@@ -52,7 +52,14 @@ pub struct Millisecond {
     pub edges: [Vec<u32>; CAPTURE_CHANNELS],
     /// Conversions of each ADC channel.
     pub adc: [AdcBlock; ADC_CHANNELS],
+    /// The ADC channel of which every single conversion is to stand in `codes`.
+    pub watched: Option<usize>,
+    /// Those conversions, in order.
+    pub codes: Vec<u16>,
 }
+
+/// Conversions of a channel in a second of a native run: eight and nine in a millisecond by turns.
+pub const CONVERSION_HZ: f32 = 8_500.0;
 
 /// Bits of the effects whose windows are open `run_s` into the run. A scenario holds at most 128 effects.
 pub(super) fn open(effects: &[Scheduled], run_s: f64) -> u128 {

@@ -46,6 +46,10 @@ impl Bench {
             self.strain_v.iter_mut().for_each(|v| *v += self.levers.spike_v[0]);
         }
         self.converter.blocks(count, &self.strain_v, &pins_v, &mut out.adc);
+        out.codes.clear();
+        if let Some(channel) = out.watched {
+            out.codes.extend(self.converter.codes(channel, count, &self.strain_v, &pins_v));
+        }
     }
 
     pub(super) fn each_millisecond(&mut self) {

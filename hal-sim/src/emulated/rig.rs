@@ -90,6 +90,8 @@ pub enum Action {
     Hang(f64),
     /// Twists the torque arm, N.m; 0 lets it go.
     Twist(f64),
+    /// Draws a current through the shunt with a load of one's own, A; 0 takes it off.
+    Draw(f64),
     /// Sets the bench supply, V.
     Supply(f64),
     /// Pulls a plug (capture channels first, then analogue ones), or puts it back.
@@ -382,6 +384,7 @@ impl<O: Operator> RigWorld<O> {
                 Action::StartRun => self.bench.start_run(),
                 Action::Hang(mass_g) => self.bench.hang(mass_g),
                 Action::Twist(torque_nm) => self.bench.twist(torque_nm),
+                Action::Draw(current_a) => self.bench.draw(current_a),
                 Action::Supply(voltage_v) => self.bench.set_supply(voltage_v),
                 Action::Plug { plug, out } => {
                     if let Some(is_out) = self.plugs_out.get_mut(plug) {

@@ -7,9 +7,10 @@
 //! Reference: house rules 1 (ticks without I/O) and 12 (one shell, many hosts).
 
 use super::sectors::Sectors;
-use crate::bench::Millisecond;
+use crate::bench::{CONVERSION_HZ, Millisecond};
+use firmware_rig::burst;
 use firmware_rig::queue::CAPACITY;
-use firmware_rig::{Config, Delivered, Rig, RigConfig, RigConsole, Start};
+use firmware_rig::{Config, Conversions, Delivered, Rig, RigConfig, RigConsole, Start};
 use frame::message::{ClockNews, Event, SettingsNews, Trial};
 use frame::units::{PulseWidth, Ticks};
 
@@ -48,6 +49,8 @@ pub struct Board {
     stored: Option<SettingsNews>,
     pulse: PulseWidth,
     late: u32,
+    /// Memory of a burst.
+    burst: Vec<u16>,
 }
 
 /// The settings' sectors and what was found in them.
@@ -93,7 +96,7 @@ impl Board {
     fn start(now: Ticks, factory: Config, flash: Flash, reset_cause: u8, ended: Option<Event>) -> Self {
         let start = Start { reset_cause, clock: CRYSTAL, stored: flash.found, news: flash.news, ended };
         let console = RigConsole::start(now, factory.clone(), &start);
-        Self { console, factory, flash, stored: None, pulse: PulseWidth::MIN, late: 0 }
+        Self { console, factory, flash, stored: None, pulse: PulseWidth::MIN, late: 0, burst: Vec::new() }
     }
 
     /// The same board after a reset of the given cause: its flash is what it was.
@@ -119,6 +122,12 @@ impl Board {
         bytes.iter().for_each(|byte| self.console.hear(*byte));
     }
 
+    /// The analogue channel of which every single conversion is wanted: give it to [`Millisecond::watched`].
+    #[must_use]
+    pub fn wanted(&self) -> Option<usize> {
+        self.console.wanted()
+    }
+
     /// The millisecond that ends at `now`: two looks for a stop, and the control tick.
     pub fn millisecond(&mut self, now: Ticks, gathered: &Millisecond, wires: Wires) {
         if self.late > 0 {
@@ -142,7 +151,13 @@ impl Board {
             stored: self.stored.take(),
             vitals: None,
         };
+        let wanted = self.console.wanted();
         let orders = self.console.tick(&delivered, |pulse| self.pulse = pulse);
+        if wanted.is_some() {
+            self.burst.resize(burst::LENGTH, 0);
+        }
+        let codes = (wanted == gathered.watched).then_some(gathered.codes.as_slice());
+        self.console.record(now, &Conversions { codes, rate_hz: CONVERSION_HZ }, &mut self.burst);
         if orders.store {
             self.stored = Some(self.flash.save(&self.console.rig().settings()));
         }

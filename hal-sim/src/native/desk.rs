@@ -130,6 +130,11 @@ impl RigDesk {
         self.bench.twist(torque_nm);
     }
 
+    /// Draws a current through the shunt with a load of one's own, A. 0 takes it off.
+    pub fn draw(&mut self, current_a: f64) {
+        self.bench.draw(current_a);
+    }
+
     /// Sets the bench supply, V. A battery takes no notice.
     pub fn set_supply(&mut self, voltage_v: f64) {
         self.bench.set_supply(voltage_v);
@@ -173,6 +178,7 @@ impl RigDesk {
             }
             _ => {}
         }
+        self.gathered.watched = self.board.wanted();
         self.bench.millisecond(&mut self.gathered);
         self.disturb();
     }
@@ -193,6 +199,9 @@ impl RigDesk {
         }
         for (block, _) in self.gathered.adc.iter_mut().zip(analogue).filter(|(_, out)| **out) {
             *block = stuck(block.count, false);
+        }
+        if self.gathered.watched.is_some_and(|channel| analogue.get(channel) == Some(&true)) {
+            self.gathered.codes.fill(0);
         }
     }
 

@@ -206,7 +206,7 @@ pub enum SpeedSensor {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LogSection {
-    /// Samples a second, 1 to 100, a divisor of 1000.
+    /// Samples a second, 1 to 1000, a divisor of 1000.
     #[serde(deserialize_with = "log_rate")]
     pub rate_hz: u32,
 }
@@ -376,10 +376,10 @@ fn frequency<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
 
 fn log_rate<'de, D: Deserializer<'de>>(d: D) -> Result<u32, D::Error> {
     let rate = u32::deserialize(d)?;
-    if (1..=100).contains(&rate) && 1000 % rate == 0 {
+    if (1..=1000).contains(&rate) && 1000 % rate == 0 {
         Ok(rate)
     } else {
-        Err(D::Error::custom(format!("expected a rate from 1 to 100 Hz that divides 1000, found {rate}")))
+        Err(D::Error::custom(format!("expected a rate from 1 to 1000 Hz that divides 1000, found {rate}")))
     }
 }
 

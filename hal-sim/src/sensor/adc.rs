@@ -64,6 +64,12 @@ impl AnalogFront {
         out
     }
 
+    /// What a current changes at its pin, V.
+    #[must_use]
+    pub fn volts_of(&self, current_a: f64) -> f64 {
+        current_a * self.volt_per_unit[2]
+    }
+
     /// Voltage of the torque pin at `torque_nm`.
     #[must_use]
     #[inline]
@@ -155,6 +161,24 @@ impl Converter {
         pins_v: &[f64; ADC_CHANNELS],
         out: &mut [AdcBlock; ADC_CHANNELS],
     ) {
+        let level = self.levels(count, strain_v, pins_v);
+        self.eight.convert(&level, self.conversion_counts, out);
+    }
+
+    /// The single conversions of `channel` of which [`Converter::blocks`] was the sum, in order.
+    pub fn codes(
+        &self,
+        channel: usize,
+        count: u16,
+        strain_v: &[f64; STEPS_PER_MS],
+        pins_v: &[f64; ADC_CHANNELS],
+    ) -> impl Iterator<Item = u16> {
+        let level = self.levels(count, strain_v, pins_v);
+        self.eight.codes(channel, &level, self.conversion_counts).into_iter().take(usize::from(count))
+    }
+
+    /// What stands at the pins in a millisecond, the wires' noise included.
+    fn levels(&self, count: u16, strain_v: &[f64; STEPS_PER_MS], pins_v: &[f64; ADC_CHANNELS]) -> Levels {
         let counts = |pin_v: f64, offset_v: f64| (pin_v + offset_v) * (CODES / REFERENCE_V);
         let nine = usize::from(count) > EIGHT;
         let strain = if nine { readings::<9>(strain_v) } else { readings::<8>(strain_v) };
@@ -164,8 +188,7 @@ impl Converter {
             *level = counts(*pin_v, *offset_v);
         }
         let [first @ .., _] = strain;
-        let level = Levels { first, all: level, nine };
-        self.eight.convert(&level, self.conversion_counts, out);
+        Levels { first, all: level, nine }
     }
 }
 
@@ -223,6 +246,7 @@ mod tests {
             let blocks = millisecond(&mut c, count, &strain, &pins);
             for (channel, got) in blocks.iter().enumerate() {
                 let mut want = AdcBlock { count, min: u16::MAX, ..AdcBlock::default() };
+                let mut one_by_one = Vec::new();
                 let mut spare = 0.0;
                 for i in 0..count {
                     let noise = if i % 2 == 0 {
@@ -235,11 +259,14 @@ mod tests {
                     let pin =
                         if channel == 0 { strain[usize::from(i) * strain.len() / usize::from(count)] } else { pins[channel] };
                     let code = c.code((pin + c.offset_v(channel)) * (CODES / REFERENCE_V), noise);
+                    one_by_one.push(code);
                     want.sum += u32::from(code);
                     want.sum_sq += u64::from(u32::from(code) * u32::from(code));
                     (want.min, want.max) = (want.min.min(code), want.max.max(code));
                 }
                 assert_eq!(*got, want, "channel {channel}, {count}");
+                let codes: Vec<u16> = c.codes(channel, count, &strain, &pins).collect();
+                assert_eq!(codes, one_by_one, "channel {channel}, {count}");
             }
         }
     }

@@ -47,6 +47,22 @@ impl Pairs {
     }
 }
 
+impl Pairs {
+    /// The codes of `channel` one by one, of the same words: nine places, of which the last counts where there is a ninth.
+    pub(super) fn codes(&self, channel: usize, level: &Levels, noise_counts: f64) -> [u16; EIGHT + 1] {
+        let at = |n: usize| if channel == 0 { level.first[n] } else { level.all[channel] };
+        let code = |level: f64, noise: f64| whole_code(level + noise_counts * noise + 0.5) as u16;
+        let mut codes = [0; EIGHT + 1];
+        for pair in 0..PAIRS {
+            let [now, next] = quick(u64::from_le_bytes(self.words[channel * PAIRS + pair]));
+            codes[2 * pair] = code(at(2 * pair), now);
+            codes[2 * pair + 1] = code(at(2 * pair + 1), next);
+        }
+        codes[EIGHT] = code(level.all[channel], self.ninth[channel]);
+        codes
+    }
+}
+
 /// What stands at the pins in a millisecond, counts.
 pub(super) struct Levels {
     /// The eight levels of the first channel.

@@ -1,11 +1,13 @@
 //! One speed from up to four sensors.
 //!
-//! What it is: the median of the channels that agree, drop-outs bridged.
+//! What it is: the median of the channels that agree, drop-outs bridged. A sample that its board flags as wrong is left out where another
+//! channel has one that is not.
 //! What can go wrong: of two channels that disagree none can be outvoted, and both are kept.
 //! Units: rev/min.
 //! Reference: specification `formats.md` (primary relations).
 
 use super::bridge;
+use crate::board;
 use crate::drive::Drive;
 use crate::log::{Log, SPEED};
 use crate::noise;
@@ -90,10 +92,15 @@ fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
 }
 
 fn median_of(log: &Log, names: &[&str]) -> Vec<f64> {
-    let columns: Vec<&[f64]> = names.iter().filter_map(|n| log.column(n)).collect();
+    let columns: Vec<(&[f64], Option<&[f64]>)> =
+        names.iter().filter_map(|n| Some((log.column(n)?, board::flags(log, n)))).collect();
+    let present = |i: usize| columns.iter().filter(move |c| c.0[i].is_finite());
     (0..log.len())
         .map(|i| {
-            let mut v: Vec<f64> = columns.iter().map(|c| c[i]).filter(|v| v.is_finite()).collect();
+            let mut v: Vec<f64> = present(i).filter(|c| !c.1.is_some_and(|f| board::is_wrong(f[i]))).map(|c| c.0[i]).collect();
+            if v.is_empty() {
+                v = present(i).map(|c| c.0[i]).collect();
+            }
             if v.is_empty() { f64::NAN } else { noise::median(&mut v) }
         })
         .collect()

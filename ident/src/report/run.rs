@@ -10,6 +10,7 @@ use super::figure::{Figure, Layer, Mark};
 use super::number;
 use super::sheet::Sheet;
 use super::shift::filter_figures;
+use crate::board;
 use crate::context::unit_of;
 use crate::fit::Fitted;
 use crate::identify::Identified;
@@ -49,6 +50,12 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
     plateaus(&mut sheet, log, found);
     sheet.section("Coefficients");
     coefficients(&mut sheet, found);
+    let told = board::told(log);
+    if !told.is_empty() {
+        sheet.section("What the board told");
+        let rows: Vec<Vec<String>> = told.into_iter().map(|line| vec![line]).collect();
+        sheet.table(&["flags, and events with their times"], &rows, |_| false);
+    }
     sheet
 }
 

@@ -56,8 +56,15 @@ pub(crate) fn save(board: &mut Board) -> Result<(), Failure> {
     }
 }
 
-/// Configures the board from a file. A file without `[calibrated]` leaves the board's own scales.
+/// Configures the board from a file. A file without `[calibrated]` leaves the board's own scales; one with nothing else changes these alone.
 pub(crate) fn from_file(board: &mut Board, path: &Path) -> Result<u32, Failure> {
+    if file::is_scales_alone(path) {
+        let found = file::scales(path)?;
+        let mut config = in_force(board)?;
+        config.calibrated.iter_mut().zip(found).for_each(|(to, found)| *to = found.or(*to));
+        send(board, &config)?;
+        return Ok(config.digest());
+    }
     let (mut config, names_scales) = file::read(path)?;
     if !names_scales {
         config.calibrated = in_force(board)?.calibrated;

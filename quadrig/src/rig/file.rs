@@ -1,16 +1,15 @@
 //! A rig's configuration as a file.
 //!
 //! What it is: TOML to [`RigConfig`] and back. A section that is not there says that the channel is not fitted.
-//! What can go wrong: an unknown key, a missing one and a value out of its range are refused with file, line and column; a rate that the
-//! line does not carry is refused with the arithmetic.
+//! What can go wrong: an unknown key, a missing one and a value out of its range are refused with file, line and column.
 //! Units: each key carries its own.
 //! Reference: specification `rig.md`, "Partial rigs are normal"; `docs/configuration.md` lists every key.
 
 use super::date;
 use crate::Failure;
 use esc_pwm::Bounds;
-use firmware_rig::config::{CurrentChannel, TemperatureChannel, TorqueChannel};
-use firmware_rig::rig_config::{Answers, Calibrated, EscProfile, LINE_BYTES_S};
+use firmware_rig::config::{CurrentChannel, TemperatureChannel, TorqueChannel, VoltageChannel};
+use firmware_rig::rig_config::{Answers, Calibrated, EscProfile};
 use firmware_rig::strain::{Beam, Bridge, StrainChannel};
 use firmware_rig::{Config, RigConfig};
 use frame::calibration::AdcScale;
@@ -22,7 +21,7 @@ use std::path::Path;
 use toml::Spanned;
 
 /// Names of the analogue channels in the file.
-const ANALOGUE: [&str; 5] = ["thrust", "torque", "current", "voltage", "temperature"];
+pub(crate) const ANALOGUE: [&str; 5] = ["thrust", "torque", "current", "voltage", "temperature"];
 /// The encoder's steps of which the board's timer makes one capture.
 const PRESCALER: f64 = 4.0;
 
@@ -105,6 +104,7 @@ struct Current {
 #[serde(deny_unknown_fields)]
 struct Voltage {
     divider: Number,
+    zero_v: Option<Number>,
     live_zero: Option<bool>,
 }
 
@@ -168,7 +168,9 @@ struct Scales {
 #[serde(deny_unknown_fields)]
 struct Scale {
     zero_counts: Number,
+    zero_sigma: Option<Number>,
     per_count: Number,
+    per_count_sigma: Option<Number>,
     residual: Number,
     worst: Number,
     points: Number,
@@ -213,6 +215,11 @@ fn finite(number: &Number) -> Result<f32, Refused> {
     within(number, f64::from(f32::MIN), f64::from(f32::MAX))
 }
 
+/// A finite number that is not negative.
+fn error(number: &Number) -> Result<f32, Refused> {
+    within(number, 0.0, f64::from(f32::MAX))
+}
+
 impl Limit {
     fn bounds<T>(&self, unit: impl Fn(f32) -> T, most: f64, longest: f64) -> Result<Bounds<T>, Refused> {
         let limit = |n: &Option<Number>| n.as_ref().map(|n| within(n, -most, most)).transpose();
@@ -255,15 +262,12 @@ impl File {
         if let Some(esc) = &self.esc {
             config.esc = esc.profile()?;
         }
-        if let Some(Scales { thrust, torque, current, voltage, temperature }) = &self.calibrated {
-            for (to, scale) in config.calibrated.iter_mut().zip([thrust, torque, current, voltage, temperature]) {
-                *to = scale.as_ref().map(Scale::calibrated).transpose()?;
-            }
+        if let Some(scales) = &self.calibrated {
+            config.calibrated = scales.all()?;
         }
         if config.marks == [0; 4] && config.fitted == [false; 5] {
             return Err((0..0, "nothing is fitted: expected a section [speed], [thrust] or another channel".to_owned()));
         }
-        self.rate(&config)?;
         if config.in_range() {
             Ok((config, self.calibrated.is_some()))
         } else {
@@ -293,23 +297,6 @@ impl File {
             config.curve = Some(points.map(|us| PulseWidth((us * 1000.0).round() as u32)));
         }
         Ok(())
-    }
-
-    /// Refuses what the line does not carry.
-    fn rate(&self, config: &RigConfig) -> Result<(), Refused> {
-        if config.fits_the_line() {
-            return Ok(());
-        }
-        let (bytes, rate) = (config.sample_bytes(), 1000 / u32::from(config.log_period_ms));
-        let most = (1..=rate).rev().find(|r| 1000 % r == 0 && r * bytes <= LINE_BYTES_S).unwrap_or(1);
-        Err((
-            self.rate_hz.span(),
-            format!(
-                "{rate} samples a second of {bytes} bytes are {} bytes a second, the line carries {LINE_BYTES_S}: at most {most} with \
-                 these channels",
-                rate * bytes
-            ),
-        ))
     }
 
     fn channels(&self, config: &mut RigConfig) -> Result<(), Refused> {
@@ -361,7 +348,10 @@ impl File {
             };
         }
         if let Some(v) = &self.voltage {
-            config.voltage_divider = within(&v.divider, 1e-3, 1.0)?;
+            config.voltage = VoltageChannel {
+                divider: within(&v.divider, 1e-3, 1.0)?,
+                zero: Volt(v.zero_v.as_ref().map_or(Ok(0.0), |zero| within(zero, 0.0, 60.0))?),
+            };
         }
         if let Some(t) = &self.temperature {
             config.temperature = TemperatureChannel {
@@ -420,6 +410,17 @@ impl Esc {
     }
 }
 
+impl Scales {
+    fn all(&self) -> Result<[Option<Calibrated>; 5], Refused> {
+        let Self { thrust, torque, current, voltage, temperature } = self;
+        let mut found = [None; 5];
+        for (to, scale) in found.iter_mut().zip([thrust, torque, current, voltage, temperature]) {
+            *to = scale.as_ref().map(Scale::calibrated).transpose()?;
+        }
+        Ok(found)
+    }
+}
+
 impl Scale {
     fn calibrated(&self) -> Result<Calibrated, Refused> {
         let gain = finite(&self.per_count)?;
@@ -432,8 +433,10 @@ impl Scale {
         })?;
         Ok(Calibrated {
             scale: AdcScale { zero: finite(&self.zero_counts)?, gain },
-            residual: finite(&self.residual)?,
-            worst: finite(&self.worst)?,
+            zero_sigma: self.zero_sigma.as_ref().map_or(Ok(0.0), error)?,
+            gain_sigma: self.per_count_sigma.as_ref().map_or(Ok(0.0), error)?,
+            residual: error(&self.residual)?,
+            worst: error(&self.worst)?,
             points: whole(&self.points, 0.0, 255.0)? as u8,
             day,
         })
@@ -447,14 +450,48 @@ pub(crate) fn read(path: &Path) -> Result<(RigConfig, bool), Failure> {
 }
 
 fn parse(text: &str, path: &Path) -> Result<(RigConfig, bool), String> {
-    let refused = |(span, reason): Refused| {
-        let before = text.get(..span.start).unwrap_or(text);
-        let (line, column) = (before.matches('\n').count() + 1, before.chars().rev().take_while(|c| *c != '\n').count() + 1);
-        format!("{}:{line}:{column}: {reason}", path.display())
-    };
-    let file: File =
-        toml::from_str(text).map_err(|error| refused((error.span().unwrap_or(0..0), error.message().replace('\n', " "))))?;
-    file.config().map_err(refused)
+    let file: File = section(text, path)?;
+    file.config().map_err(|reason| placed(text, path, reason))
+}
+
+/// A refusal with its place.
+fn placed(text: &str, path: &Path, (span, reason): Refused) -> String {
+    let before = text.get(..span.start).unwrap_or(text);
+    let (line, column) = (before.matches('\n').count() + 1, before.chars().rev().take_while(|c| *c != '\n').count() + 1);
+    format!("{}:{line}:{column}: {reason}", path.display())
+}
+
+fn section<T: serde::de::DeserializeOwned>(text: &str, path: &Path) -> Result<T, String> {
+    toml::from_str(text).map_err(|error| placed(text, path, (error.span().unwrap_or(0..0), error.message().replace('\n', " "))))
+}
+
+/// What a file says of calibrated scales, whatever else stands in it.
+#[derive(Deserialize)]
+struct ScalesAlone {
+    calibrated: Option<Scales>,
+}
+
+/// The calibrated scales of a file: of a configuration, or of one that `quadrig calibrate` wrote.
+pub(crate) fn scales(path: &Path) -> Result<[Option<Calibrated>; 5], Failure> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let file: ScalesAlone = section(&text, path)?;
+    let found = file.calibrated.as_ref().map_or(Ok([None; 5]), Scales::all).map_err(|reason| placed(&text, path, reason))?;
+    if found == [None; 5] {
+        return Err(format!("{}: no section [calibrated.X]; `quadrig calibrate` writes one", path.display()).into());
+    }
+    Ok(found)
+}
+
+/// Whether a file holds calibrated scales and nothing else.
+pub(crate) fn is_scales_alone(path: &Path) -> bool {
+    let table = std::fs::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    table.is_some_and(|table| table.len() == 1 && table.contains_key("calibrated"))
+}
+
+/// The torque arm that a configuration's text names, m.
+pub(crate) fn arm_of(text: &str) -> Option<f64> {
+    let table: toml::Table = text.parse().ok()?;
+    table.get("torque")?.get("arm_m")?.as_float()
 }
 
 /// The file of a configuration; it reads back as the same.
@@ -502,13 +539,20 @@ pub(crate) fn text(config: &RigConfig) -> String {
     line(format!("cells_ms = {}\nready_ms = {}", esc.cells_ms, esc.ready_ms));
     line("\n[calibrated]".to_owned());
     for (name, calibrated) in ANALOGUE.iter().zip(config.calibrated) {
-        if let Some(c) = calibrated {
-            line(format!("[calibrated.{name}]\nzero_counts = {}\nper_count = {}", c.scale.zero, c.scale.gain));
-            line(format!("residual = {}\nworst = {}\npoints = {}", c.residual, c.worst, c.points));
-            if c.day > 0 {
-                line(format!("date = {:?}", date::text(c.day)));
-            }
+        if let Some(calibrated) = calibrated {
+            line(scale(name, &calibrated).trim_end().to_owned());
         }
+    }
+    out
+}
+
+/// The section of a calibrated scale.
+pub(crate) fn scale(name: &str, c: &Calibrated) -> String {
+    let mut out = format!("[calibrated.{name}]\nzero_counts = {}\nzero_sigma = {}\n", c.scale.zero, c.zero_sigma);
+    let _ = writeln!(out, "per_count = {}\nper_count_sigma = {}", c.scale.gain, c.gain_sigma);
+    let _ = writeln!(out, "residual = {}\nworst = {}\npoints = {}", c.residual, c.worst, c.points);
+    if c.day > 0 {
+        let _ = writeln!(out, "date = {:?}", date::text(c.day));
     }
     out
 }
@@ -550,7 +594,11 @@ fn current(config: &RigConfig) -> String {
 }
 
 fn voltage(config: &RigConfig) -> String {
-    format!("# volts at the converter over volts of the supply\ndivider = {}\n", config.voltage_divider)
+    let v = &config.voltage;
+    format!(
+        "# volts at the converter over volts of the supply, and without one\ndivider = {}\nzero_v = {}\n",
+        v.divider, v.zero.0
+    )
 }
 
 fn temperature(config: &RigConfig) -> String {
