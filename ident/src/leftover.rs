@@ -65,6 +65,19 @@ impl Leftover {
         self.scatter.iter().flat_map(|part| &part[HELD]).copied().fold(0.0, f64::max)
     }
 
+    /// What the model was off by about the known error on rows of a class at a load, rms, the noise included. While the load is on its way it was off in
+    /// proportion to the jump: `jumps` tells how many of its own run's this one is. `None` where no claim is made: of a rotor that runs down, and of a load on its
+    /// way where the jumps are not known.
+    pub(crate) fn floor(&self, load: f64, class: usize, jumps: f64) -> Option<f64> {
+        let scatter = &self.scatter[self.part(load)];
+        if class == RUNS_DOWN || jumps.is_nan() && !settled(class) {
+            return None;
+        }
+        let held = scatter[HELD.start];
+        let more = (scatter[class].powi(2) - held * held).max(0.0) * jumps.max(1.0).powi(2);
+        Some(if settled(class) { scatter[class] } else { (held * held + more).sqrt() })
+    }
+
     /// The part of the curve's range that a load is in.
     fn part(&self, load: f64) -> usize {
         let (Some(first), Some(last)) = (self.curve.first(), self.curve.last()) else { return 0 };

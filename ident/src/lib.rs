@@ -59,4 +59,5 @@ mod together;
 pub mod told;
 pub mod unexplained;
 pub mod verdict;
+pub mod watch;
 mod weather;

@@ -17,7 +17,7 @@ use virtual_board::Hand;
 /// Speed of the rig's line (pin table of the board).
 const BAUD: u32 = 2_000_000;
 /// How long an answer may take.
-const ANSWER_TIME: Duration = Duration::from_millis(1500);
+pub(crate) const ANSWER_TIME: Duration = Duration::from_millis(1500);
 /// Time between two signs of life towards an armed board.
 pub(crate) const PING: Duration = Duration::from_millis(200);
 
@@ -94,6 +94,11 @@ impl Board {
         self.port.is_powered()
     }
 
+    /// Whether a virtual bench's stop loop is open.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.port.is_stopped()
+    }
+
     /// Counters of the line.
     pub(crate) fn stats(&self) -> LinkStats {
         self.decoder.stats()
@@ -162,12 +167,13 @@ impl Board {
                 }
             }
         }
-        Err(format!(
-            "{}: no answer from the board in {} s; is it powered, and a rig board?",
-            self.port.name(),
-            ANSWER_TIME.as_secs_f32()
-        )
-        .into())
+        Err(self.unanswered())
+    }
+
+    /// No answer came, in one line.
+    pub(crate) fn unanswered(&self) -> Failure {
+        let s = ANSWER_TIME.as_secs_f32();
+        format!("{}: no answer from the board in {s} s; is it powered, and a rig board?", self.port.name()).into()
     }
 
     /// Sends a command that is accepted or refused.

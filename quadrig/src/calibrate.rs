@@ -1,7 +1,7 @@
 //! `quadrig calibrate`.
 //!
 //! What it is: the IMU board's sensors from a recording ([`imu`]); the rig board's analogue channels from known values, in a recording
-//! ([`recording`]) or live over the line, step by step ([`guided`]). A rig's scale is a straight line with its standard errors and residuals.
+//! ([`recording`]) or live over the line, step by step ([`guided`]), or in the terminal view ([`scaling`]). A rig's scale is a straight line with its standard errors and residuals.
 //! What can go wrong: a point that is saturated, or has not settled, is refused; so is a line that is far from the channel's design. Nothing
 //! is stored or written then.
 //! Units: as stated on each sensor.
@@ -14,7 +14,9 @@ mod imu;
 mod line;
 mod point;
 mod recording;
+pub(crate) mod scaling;
 mod settle;
+mod settling;
 
 use crate::Failure;
 use crate::port::PortArgs;
@@ -22,7 +24,6 @@ use crate::rig::date;
 use channel::Channel;
 use clap::error::ErrorKind;
 use std::path::PathBuf;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Arguments.
 #[derive(clap::Args)]
@@ -130,9 +131,6 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 fn day(said: Option<&str>) -> Result<u16, Failure> {
     match said {
         Some(text) => date::day(text).ok_or_else(|| format!("--date {text}: expected a date as 2026-01-31").into()),
-        None => {
-            let days = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs() / 86_400;
-            Ok(u16::try_from(days).unwrap_or(0))
-        }
+        None => Ok(date::today()),
     }
 }

@@ -1,19 +1,28 @@
 //! The live view of a simulated run.
 //!
-//! What it is: one line that is renewed ten times a simulated second, in step with the clock times a factor; lines on the
-//! standard input pause it, take single steps, change the speed or end it.
+//! What it is: the terminal view of a rig, fed with what the simulated board sends, in step with the clock times a factor; keys pause it, take single
+//! steps, change the speed or end it. Without a terminal one line ten times a simulated second, and lines on the standard input.
 //! What can go wrong: a machine that cannot keep up shows a lower factor than asked; nothing else changes, the bytes are the same.
 //! Units: s, rev/min, N, A.
 //! Reference: specification `rig.md`, "The simulator".
 
 use crate::Failure;
-use hal_sim::native::Session;
+use crate::end::Ended;
+use crate::view::keys::Wish as Key;
+use crate::view::{Live, Screen, Terminal};
+use firmware_rig::RigConfig;
+use frame::message::Message;
+use frame::wire::Decoder;
+use hal_sim::Scenario;
+use hal_sim::native::{Session, firmware_config};
 use std::io::{BufRead, IsTerminal, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
-/// Simulated milliseconds between two lines.
+/// Simulated milliseconds between two lines, and in a single step.
 const REFRESH_MS: u32 = 100;
+/// Simulated milliseconds between two looks at the keys.
+const LOOK_MS: u32 = 10;
 
 /// What the viewer asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +55,53 @@ fn wishes() -> Receiver<Wish> {
         }
     });
     receive
+}
+
+/// Shows the run in the terminal view to its end or until the viewer has had enough. What was flown until then is kept.
+pub(crate) fn view(session: &mut Session, scenario: &Scenario, speed: f64) -> Result<(), Failure> {
+    let ended = Ended::watch()?;
+    let mut terminal = Terminal::take()?;
+    let mut screen = Screen::new(format!("simulated rig  {}", scenario.name));
+    screen.configured(&RigConfig::of(&firmware_config(scenario)));
+    let mut live = Live { speed, paused: false, share: 0.0 };
+    let (mut decoder, mut read) = (Decoder::default(), 0);
+    let (mut from_s, mut begun) = (session.now_s(), Instant::now());
+    let mut running = true;
+    while running && !ended.now() {
+        screen.live = Some(live);
+        let mut steps = if live.paused { 0 } else { LOOK_MS };
+        for key in terminal.keys()? {
+            match screen.key(key) {
+                Some(Key::Quit | Key::Stop) => return Ok(()),
+                Some(Key::Pause) => live.paused = !live.paused,
+                Some(Key::Step) => (live.paused, steps) = (true, REFRESH_MS),
+                Some(Key::Speed(factor)) => (live.speed, live.paused) = (factor, false),
+                _ => continue,
+            }
+            (from_s, begun) = (session.now_s(), Instant::now());
+        }
+        for _ in 0..steps {
+            running &= running && session.step()?;
+        }
+        screen.now = Duration::from_secs_f64(session.now_s());
+        for byte in session.telemetry().iter().skip(read) {
+            if let Some(received) = decoder.push::<Message>(*byte) {
+                screen.take(&received.message);
+            }
+        }
+        read = session.telemetry().len();
+        screen.link = decoder.stats();
+        live.share = session.share();
+        screen.live = Some(live);
+        terminal.show(&screen, steps == REFRESH_MS)?;
+        if live.paused {
+            std::thread::sleep(Duration::from_millis(20));
+        } else if live.speed > 0.0 {
+            let due = Duration::from_secs_f64((session.now_s() - from_s) / live.speed);
+            std::thread::sleep(due.saturating_sub(begun.elapsed()));
+        }
+    }
+    Ok(())
 }
 
 /// Shows the run to its end or until the viewer has had enough.

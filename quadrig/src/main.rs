@@ -36,6 +36,7 @@ mod select;
 mod sim;
 mod spool;
 mod step;
+mod view;
 mod virtual_port;
 
 use clap::{Parser, Subcommand};

@@ -80,13 +80,21 @@ impl PortArgs {
             let wanted = if imu { "this command speaks with the IMU board" } else { "this command speaks with the rig board" };
             return Err(format!("{}: a virtual {}; {wanted}", self.port, board.kind().words()).into());
         }
-        Ok(Port::Virtual(Box::new(VirtualPort { board, pace: Pace::new(speed), said: Vec::new(), sent: Vec::new() })))
+        Ok(Port::Virtual(Box::new(VirtualPort {
+            board,
+            stop_open: false,
+            pace: Pace::new(speed),
+            said: Vec::new(),
+            sent: Vec::new(),
+        })))
     }
 }
 
 /// A board in this program.
 pub(crate) struct VirtualPort {
     board: Box<dyn VirtualBoard>,
+    /// Hands have opened the stop loop.
+    stop_open: bool,
     pace: Pace,
     said: Vec<u8>,
     sent: Vec<u8>,
@@ -191,8 +199,18 @@ impl Port {
     pub(crate) fn hand(&mut self, hand: &Hand) -> Result<(), Failure> {
         match self {
             Self::Serial { .. } => Err("hands are laid on a real bench by hand".into()),
-            Self::Virtual(port) => Ok(port.board.hand(hand)?),
+            Self::Virtual(port) => {
+                if let Hand::StopLoop { open } = hand {
+                    port.stop_open = *open;
+                }
+                Ok(port.board.hand(hand)?)
+            }
         }
+    }
+
+    /// Whether hands have opened a virtual board's stop loop.
+    pub(crate) fn is_stopped(&self) -> bool {
+        matches!(self, Self::Virtual(port) if port.stop_open)
     }
 
     /// Whether a virtual board's ESC has power.

@@ -1,6 +1,6 @@
 //! `quadrig log`: records from the rig board.
 //!
-//! What it is: samples become rows of a rig log as they arrive ([`Recorder`]); on a terminal, a live line.
+//! What it is: samples become rows of a rig log as they arrive ([`Recorder`]); on a terminal, in the view.
 //! What can go wrong: damaged frames are counted and cost themselves alone; an unplugged port is waited for, and what arrived stays; a
 //! full disk is handled by [`crate::spool`]; a board that sends no calibration is refused, because raw codes alone are no log.
 //! Units: as in the log.
@@ -13,12 +13,17 @@ mod recorder;
 pub(crate) use recorder::Recorder;
 
 use crate::Failure;
-use crate::board::{Board, Heard};
+use crate::board::Board;
 use crate::end::Ended;
 use crate::port::PortArgs;
-use frame::message::Command;
+use crate::rig::overseer::{self, Overseer};
+use crate::rig::seat::{News, Seat};
+use crate::rig::stage::Stage;
+use crate::view;
+use crate::view::keys::Wish;
+use frame::message::{Command, Event, Message};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::TryRecvError;
 use std::time::{Duration, Instant};
 
@@ -41,6 +46,11 @@ pub(crate) struct Args {
     /// How long an unplugged port is waited for, s.
     #[arg(long, default_value_t = 5.0)]
     wait: f64,
+    /// No terminal view.
+    #[arg(long)]
+    plain: bool,
+    #[command(flatten)]
+    under: overseer::Args,
     #[command(flatten)]
     rig: Rig,
 }
@@ -61,60 +71,147 @@ pub(crate) struct Rig {
 
 impl Rig {
     /// A recorder into `target`; `more` joins the head of the log.
-    pub(crate) fn recorder(&self, target: &std::path::Path, more: &[(&str, String)], quiet: bool) -> Result<Recorder, Failure> {
+    pub(crate) fn recorder(&self, target: &Path, more: &[(&str, String)]) -> Result<Recorder, Failure> {
         let named = [("motor", &self.motor), ("propeller", &self.propeller)];
         let own = named.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value.clone()?)));
         let head = own.chain(more.iter().map(|(key, value)| ((*key).to_owned(), value.clone())));
-        Recorder::new(target, head.map(|(key, value)| (key, toml::Value::String(value))).collect(), self.raw, quiet)
+        Recorder::new(target, head.map(|(key, value)| (key, toml::Value::String(value))).collect(), self.raw)
     }
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let mut board = Board::open(&args.port)?;
-    let mut recorder = args.rig.recorder(&args.output, &[], quiet)?;
-    let signals = Ended::watch()?;
-    let begun = board.now();
-    let mut asked: Option<Duration> = None;
-    let end = std::io::stdin().is_terminal().then(crate::rig::lines);
-    let ended = loop {
-        if !recorder.knows_its_board() && asked.is_none_or(|at| board.now() > at + ASK_AGAIN) {
-            let _ = board.send(Command::Identify); // a port that is gone shows in the next read
-            asked = Some(board.now());
+    let board = Board::open(&args.port)?;
+    let overseer = Overseer::new(&args.under, board.is_virtual())?;
+    let recorder = args.rig.recorder(&args.output, &[])?;
+    let mut seat = Seat::listening(board, recorder)?;
+    let view = !quiet && !args.plain && view::is_there();
+    let ended = if view { in_view(&mut seat, overseer, args) } else { line_by_line(&mut seat, overseer, args) };
+    let rows = seat.rows();
+    let (recorder, board) = seat.rise();
+    match ended {
+        Err(Ending::Nobody(why)) => {
+            recorder.into_iter().for_each(Recorder::discard);
+            Err(why)
         }
-        if let Some(question) = recorder.question(board.now()) {
-            let _ = board.send(question);
+        ended => {
+            recorder.map_or(Ok(()), |recorder| recorder.finish(&board, quiet))?;
+            let arrived = |e: Failure| format!("{e}; the {rows} rows that arrived are in {}", args.output.display());
+            ended.map_err(|e| arrived(e.into()).into())
         }
-        match board.hear() {
-            Heard::Messages(messages) => messages.iter().for_each(|m| recorder.take(&m.message)),
-            Heard::Gone => {
-                let gone = Instant::now();
-                let mut back = false;
-                while !back && gone.elapsed().as_secs_f64() < args.wait {
-                    std::thread::sleep(Duration::from_millis(50));
-                    back = board.reopen();
-                }
-                if !back {
-                    break Err(board.gone());
-                }
-                let _ = board.send(Command::Identify); // the board may be another one, or tared anew
+    }
+}
+
+/// Why a recording ends before its time.
+enum Ending {
+    /// No board was heard.
+    Nobody(Failure),
+    /// The port is gone, or the terminal.
+    Gone(Failure),
+    /// The run left its model.
+    Left(String),
+}
+
+impl From<Failure> for Ending {
+    fn from(why: Failure) -> Self {
+        Self::Gone(why)
+    }
+}
+
+impl From<Ending> for Failure {
+    fn from(ending: Ending) -> Self {
+        match ending {
+            Ending::Nobody(why) | Ending::Gone(why) => why,
+            Ending::Left(words) => format!("{words}; the motor was stopped").into(),
+        }
+    }
+}
+
+/// What every recording watches: that the board says who it is, that the port comes back, that it is enough.
+struct Vigil {
+    begun: Duration,
+    asked: Duration,
+    signals: Ended,
+    gone: Option<Instant>,
+}
+
+impl Vigil {
+    fn new(seat: &Seat) -> Result<Self, Failure> {
+        Ok(Self { begun: seat.now(), asked: seat.now(), signals: Ended::watch()?, gone: None })
+    }
+
+    /// Looks around; `true` when it is enough.
+    fn look(&mut self, seat: &mut Seat, args: &Args) -> Result<bool, Ending> {
+        if !seat.knows_its_board() {
+            if seat.now() > self.begun + CALIBRATION_TIME {
+                let cause = match seat.board.stats().foreign {
+                    0 => "is it a rig board at 2000000 baud?",
+                    _ => {
+                        "its frames are of another version than this program's: flash the board with the image of the same release"
+                    }
+                };
+                return Err(Ending::Nobody(format!("{}: no calibration from the board; {cause}", seat.board.name()).into()));
+            }
+            if seat.now() > self.asked + ASK_AGAIN {
+                self.asked = seat.now();
+                seat.ask(Command::Identify);
             }
         }
-        if !recorder.knows_its_board() && board.now() > begun + CALIBRATION_TIME {
-            recorder.discard();
-            let cause = match board.stats().foreign {
-                0 => "is it a rig board at 2000000 baud?",
-                _ => "its frames are of another version than this program's: flash the board with the image of the same release",
-            };
-            return Err(format!("{}: no calibration from the board; {cause}", board.name()).into());
+        self.gone = if seat.is_gone() { self.gone.or_else(|| Some(Instant::now())) } else { None };
+        if self.gone.is_some_and(|since| since.elapsed().as_secs_f64() > args.wait) {
+            return Err(Ending::Gone(seat.board.gone().into()));
         }
-        let enough = args.seconds.is_some_and(|s| recorder.seconds() >= s);
+        Ok(self.signals.now() || args.seconds.is_some_and(|s| seat.seconds() >= s))
+    }
+}
+
+/// Records, and says what has to be said.
+fn line_by_line(seat: &mut Seat, mut overseer: Option<Overseer>, args: &Args) -> Result<(), Ending> {
+    let end = std::io::stdin().is_terminal().then(crate::rig::lines);
+    let mut vigil = Vigil::new(seat)?;
+    loop {
+        for news in seat.turn()? {
+            if let (Some(overseer), News::Board(message)) = (&mut overseer, &news) {
+                overseer.take(message);
+            }
+            match news {
+                News::Board(Message::Event(Event::Faults { faults, .. })) => {
+                    let words: Vec<&str> = faults.iter().map(frame::Fault::words).collect();
+                    eprintln!("latched: {}", words.join(", "));
+                }
+                News::Recording(words) => eprintln!("{words}"),
+                _ => {}
+            }
+        }
+        if let Some(departure) = overseer.as_mut().and_then(Overseer::look) {
+            let words = overseer::words(&departure);
+            if overseer.as_ref().is_some_and(|o| o.under.stops) {
+                seat.stop();
+                return Err(Ending::Left(words));
+            }
+            eprintln!("{words}");
+        }
         let typed_end = end.as_ref().is_some_and(|end| matches!(end.try_recv(), Err(TryRecvError::Disconnected)));
-        if enough || typed_end || signals.now() {
-            break Ok(());
+        if vigil.look(seat, args)? || typed_end {
+            return Ok(());
         }
-    };
-    let rows = recorder.rows;
-    recorder.finish(&board, quiet)?;
-    ended.map_err(|e| format!("{e}; the {rows} rows that arrived are in {}", args.output.display()).into())
+    }
+}
+
+/// Records, and shows everything on the terminal.
+fn in_view(seat: &mut Seat, overseer: Option<Overseer>, args: &Args) -> Result<(), Ending> {
+    let mut stage = Stage::new(seat, None, overseer)?;
+    let mut vigil = Vigil::new(seat)?;
+    loop {
+        for news in seat.turn()? {
+            stage.take(seat, &news);
+        }
+        if let Some(words) = stage.look(seat) {
+            return Err(Ending::Left(words));
+        }
+        if stage.wishes(seat)?.contains(&Wish::Quit) || vigil.look(seat, args)? {
+            return Ok(());
+        }
+        stage.show()?;
+    }
 }

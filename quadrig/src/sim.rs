@@ -13,6 +13,7 @@ use crate::Failure;
 use crate::live;
 use crate::progress::Bar;
 use crate::run_log::{IdentifiedPlant, to_log};
+use crate::view;
 use hal_sim::native::{PinRecord, Session};
 use hal_sim::scenario::AnyScenario;
 use hal_sim::{Powerplant, RunRecord, Scenario, Truth};
@@ -47,7 +48,8 @@ pub(crate) struct Args {
     /// The firmware alone on recorded pins, without plant and ESC; the scenario gives its configuration.
     #[arg(long, conflicts_with_all = ["model", "live"])]
     replay: Option<PathBuf>,
-    /// Shows the run as it goes; lines on the standard input control it: p pauses, s steps 0.1 s, a number sets the speed, q ends.
+    /// Shows the run as it goes, in the terminal view; without a terminal a line at a time, and lines on the standard input control it:
+    /// p pauses, s steps 0.1 s, a number sets the speed, q ends.
     #[arg(long, conflicts_with = "model")]
     live: bool,
     /// Times real time in the live view; 0 for as fast as it goes.
@@ -95,7 +97,9 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
     if args.pins.is_some() {
         session.record_pins(scenario);
     }
-    if args.live {
+    if args.live && !quiet && view::is_there() {
+        live::view(&mut session, scenario, args.speed)?;
+    } else if args.live {
         live::watch(&mut session, args.speed)?;
     } else {
         let bar = Bar::new("flying", quiet);

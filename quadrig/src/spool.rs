@@ -51,6 +51,16 @@ impl Spool {
         Some(format!("{}: cannot be written to ({error}); rows are kept in memory and tried again", self.part.display()))
     }
 
+    /// Name of the target, for people.
+    pub(crate) fn name(&self) -> String {
+        self.target.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+    }
+
+    /// Lines wait in memory: the disk takes none.
+    pub(crate) fn waits(&self) -> bool {
+        self.failed.is_some()
+    }
+
     /// Tries to write what waits.
     fn flush(&mut self) {
         let tried = (|| {

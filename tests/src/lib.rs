@@ -13,6 +13,8 @@ pub mod budget;
 pub mod desk;
 pub mod inertial;
 pub mod probe;
+#[cfg(unix)]
+pub mod screen;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

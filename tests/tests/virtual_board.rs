@@ -129,6 +129,13 @@ impl Bench {
     }
 }
 
+impl Drop for Bench {
+    fn drop(&mut self) {
+        let _ = self.child.kill(); // a test that fails leaves no board behind
+        let _ = self.child.wait();
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn other_programs_find_it_behind_a_pseudo_terminal() {

@@ -10,21 +10,19 @@ use super::Args;
 use super::channel::Channel;
 use super::found::{Found, Taken};
 use super::point::{Point, list, point};
-use super::settle::{LENGTH_S, Reading, Sample, Unusable, reading};
+use super::settle::Reading;
+use super::settling::{Settling, at_rest};
 use crate::Failure;
 use crate::board::{Board, Heard};
 use crate::rig::{configure, lines};
 use firmware_rig::Config;
 use frame::message::Message;
-use frame::rig::{CaptureVerdict, RigSample, RigState};
+use frame::rig::RigSample;
 use ident::log::write_whole;
 use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 use virtual_board::Hand;
-
-/// How long a point may take to settle.
-const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The conversation.
 struct Talk<'b> {
@@ -148,46 +146,37 @@ impl Talk<'_> {
 
     /// Waits until the channel has settled; `None` when it does not, which has been told.
     fn settled(&mut self, said: &str) -> Result<Option<Reading>, Failure> {
-        let begun = self.board.now();
-        let mut samples: Vec<Sample> = Vec::new();
-        let mut why = Unusable::Short { samples: 0, seconds: 0.0 };
-        let mut shown = begun;
-        while self.board.now() < begun + PATIENCE {
+        let mut settling = Settling::new(self.channel, self.board.now());
+        let mut shown = self.board.now();
+        let why = loop {
             for sample in self.hear()? {
                 at_rest(&sample)?;
-                let code = &sample.adc[self.channel.place()];
-                let counts = f64::from(code.sum) / f64::from(code.count.max(1));
-                samples.push(Sample { t: sample.at.as_s(), counts, flag: code.verdict.flag().map(|flag| flag.words) });
+                settling.take(&sample);
             }
-            // the last two seconds, or as much more as holds enough samples
-            let from = samples.partition_point(|s| samples.last().is_some_and(|last| s.t <= last.t - LENGTH_S));
-            let from = from.min(samples.len().saturating_sub(super::settle::FEWEST));
-            match reading(&samples[from..]) {
-                Ok(reading) => {
+            match settling.look(self.board.now()) {
+                Some(Ok(reading)) => {
                     self.clear();
                     println!("{said}: {:.3} counts, known to {:.3}", reading.counts, reading.sigma);
                     return Ok(Some(reading));
                 }
-                Err(reason) => why = reason,
+                Some(Err(why)) => break why,
+                None => {}
             }
             if self.board.now() > shown + Duration::from_millis(200) {
                 shown = self.board.now();
-                self.show(&samples);
+                self.show(&settling);
             }
-            if why.stays() && self.board.now() > begun + Duration::from_secs(3) {
-                break; // no patience helps there
-            }
-        }
+        };
         self.clear();
         eprintln!("{}, {said}: {why}", self.channel.column());
         Ok(None)
     }
 
     /// What the channel reads meanwhile, on a terminal.
-    fn show(&self, samples: &[Sample]) {
-        if let Some(last) = samples.last().filter(|_| std::io::stderr().is_terminal()) {
+    fn show(&self, settling: &Settling) {
+        if let Some(counts) = settling.counts().filter(|_| std::io::stderr().is_terminal()) {
             let mut out = std::io::stderr().lock();
-            let _ = write!(out, "\r  settling: {:>9.2} counts", last.counts).and_then(|()| out.flush());
+            let _ = write!(out, "\r  settling: {counts:>9.2} counts").and_then(|()| out.flush());
         }
     }
 
@@ -196,19 +185,4 @@ impl Talk<'_> {
             eprint!("\r{:40}\r", "");
         }
     }
-}
-
-/// Scales are taken with the rig disarmed and the rotor at rest.
-fn at_rest(sample: &RigSample) -> Result<(), Failure> {
-    if sample.state != RigState::Disarmed {
-        return Err(
-            format!("the rig is {:?}; a channel is calibrated while it is disarmed; nothing was stored", sample.state).into()
-        );
-    }
-    let turns =
-        |verdict: CaptureVerdict| !matches!(verdict, CaptureVerdict::Stopped | CaptureVerdict::Absent | CaptureVerdict::Lost);
-    if sample.rpm.iter().any(|code| turns(code.verdict)) {
-        return Err("the rotor turns; a channel is calibrated at rest; nothing was stored".into());
-    }
-    Ok(())
 }

@@ -12,14 +12,14 @@ use crate::Failure;
 use crate::board::Board;
 use crate::evidence;
 use crate::spool::Spool;
+use crate::view::Recorded;
+use firmware_rig::RigConfig;
 use frame::Consensus;
 use frame::calibration::{Calibration, Converted};
 use frame::message::{Command, Event, Hello, Message};
 use frame::rig::{CAPTURE_NAMES, FaultSet, RigSample, RigState};
 use frame::units::Ticks;
 use ident::log::event_line;
-use indicatif::ProgressBar;
-use std::io::IsTerminal;
 use std::time::Duration;
 
 /// Samples before the head is written: they tell the rate.
@@ -54,18 +54,13 @@ pub(crate) struct Recorder {
     pub(crate) rows: usize,
     /// Sum of squares, worst and number of each channel's deviation from the consensus.
     deviation: [(f64, f64, u32); 4],
-    live: Option<ProgressBar>,
+    /// What is to be told and was not yet.
+    notes: Vec<String>,
 }
 
 impl Recorder {
     /// A recorder into `target`, with `head` in the head of the log, and the raw codes beside the readings where `raw` says so.
-    pub(crate) fn new(
-        target: &std::path::Path,
-        head: Vec<(String, toml::Value)>,
-        raw: bool,
-        quiet: bool,
-    ) -> Result<Self, Failure> {
-        let live = (!quiet && std::io::stderr().is_terminal()).then(ProgressBar::new_spinner);
+    pub(crate) fn new(target: &std::path::Path, head: Vec<(String, toml::Value)>, raw: bool) -> Result<Self, Failure> {
         Ok(Self {
             spool: Spool::create(target)?,
             head,
@@ -82,7 +77,7 @@ impl Recorder {
             pending: Vec::new(),
             rows: 0,
             deviation: [(0.0, 0.0, 0); 4],
-            live,
+            notes: Vec::new(),
         })
     }
 
@@ -152,8 +147,6 @@ impl Recorder {
         match event {
             Event::Faults { faults, .. } => {
                 self.latched = *faults;
-                let words: Vec<&str> = faults.iter().map(frame::Fault::words).collect();
-                self.say(&format!("latched: {}", words.join(", ")));
             }
             Event::State { from: RigState::Faulted, .. } => self.latched = FaultSet::NONE,
             _ => {}
@@ -176,16 +169,22 @@ impl Recorder {
     }
 
     fn write(&mut self, lines: &str) {
-        if let Some(warning) = self.spool.add(lines) {
-            self.say(&warning);
-        }
+        self.notes.extend(self.spool.add(lines));
     }
 
-    fn say(&self, line: &str) {
-        match &self.live {
-            Some(bar) => bar.println(line),
-            None => eprintln!("{line}"),
-        }
+    /// What is to be told since the last time.
+    pub(crate) fn notes(&mut self) -> impl Iterator<Item = String> {
+        std::mem::take(&mut self.notes).into_iter()
+    }
+
+    /// The recording as the view shows it.
+    pub(crate) fn shown(&self) -> Recorded {
+        Recorded { file: self.spool.name(), rows: self.rows, waiting: self.spool.waits() }
+    }
+
+    /// The board's configuration as the recording began, once it is known.
+    pub(crate) fn config(&self) -> Option<&RigConfig> {
+        self.inquiry.found()
     }
 
     /// Writes the head once the scales, the rate and the configuration are known, and the rows that came before.
@@ -231,7 +230,7 @@ impl Recorder {
         let values = calibration.convert(sample);
         let cells = columns.cells(t_s, sample, &values);
         if let Some(news) = news {
-            self.say(news);
+            self.notes.push(news.to_owned());
             self.latched = FaultSet::NONE;
             self.tell(t_s, "the board was reset");
         }
@@ -242,7 +241,7 @@ impl Recorder {
         self.watch(sample, &values);
     }
 
-    /// Live line and the account of disagreement.
+    /// The account of disagreement.
     fn watch(&mut self, sample: &RigSample, values: &Converted) {
         let consensus = Consensus::of(&values.rpm, &sample.rpm.map(|c| c.verdict));
         if let Some(consensus) = &consensus {
@@ -254,31 +253,12 @@ impl Recorder {
                 }
             }
         }
-        if let Some(bar) = &self.live {
-            let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
-            let [thrust, _, current, voltage, _] = values.adc;
-            bar.set_message(format!(
-                "{:8.1} s  {:?}  {:.0} us  {} rev/min  {} N  {} A  {} V  {} rows",
-                self.last_s,
-                sample.state,
-                values.pulse_us,
-                number(consensus.map(|c| c.rpm), 0),
-                number(thrust, 3),
-                number(current, 2),
-                number(voltage, 2),
-                self.rows
-            ));
-            bar.tick();
-        }
     }
 
     /// Ends the log; one line of summary for people.
     pub(crate) fn finish(mut self, board: &Board, quiet: bool) -> Result<(), Failure> {
         self.begin_anyhow();
         self.tell_pending(None);
-        if let Some(bar) = &self.live {
-            bar.finish_and_clear();
-        }
         let stats = board.stats();
         if !quiet {
             eprintln!("{} rows; {} good frames, {} damaged, {} missing", self.rows, stats.good, stats.damaged, stats.missing);

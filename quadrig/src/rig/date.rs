@@ -5,6 +5,28 @@
 //! Units: days.
 //! Reference: Hinnant, "chrono-compatible low-level date algorithms", `days_from_civil`.
 
+use std::path::PathBuf;
+use std::time::SystemTime;
+
+/// Seconds of a day.
+const DAY_S: u64 = 86_400;
+
+fn seconds() -> u64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs()
+}
+
+/// Today, UTC.
+pub(crate) fn today() -> u16 {
+    u16::try_from(seconds() / DAY_S).unwrap_or(u16::MAX)
+}
+
+/// Name of a log that begins now: `rig-YYYY-MM-DD-HHMMSS.csv`, UTC.
+pub(crate) fn file_of_now() -> PathBuf {
+    let s = seconds();
+    let (day, s) = (today(), s % DAY_S);
+    format!("rig-{}-{:02}{:02}{:02}.csv", text(day), s / 3600, s / 60 % 60, s % 60).into()
+}
+
 /// A day as `YYYY-MM-DD`.
 pub(crate) fn text(day: u16) -> String {
     let z = u32::from(day) + 719_468;
