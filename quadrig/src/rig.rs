@@ -32,7 +32,7 @@ use overseer::Overseer;
 use schedule::{Plan, Player};
 use seat::{News, Seat};
 use session::{Errand, hold, own_faults};
-use std::io::BufRead;
+use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
@@ -271,7 +271,7 @@ impl Session {
         let seat = Seat::new(board, Some(recorder), args.port.assist.then(Assistant::default))?;
         let done = hold(seat, errand, overseer, args.view(quiet), quiet);
         if !quiet && file.is_file() {
-            println!("recorded in {}", file.display());
+            let _ = writeln!(std::io::stdout(), "recorded in {}", file.display()); // the terminal may be gone
         }
         done
     }

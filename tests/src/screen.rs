@@ -108,6 +108,20 @@ impl Screen {
         assert!(sent.expect("kill").success());
     }
 
+    /// The terminal goes away, as with an ssh connection that breaks, and the program ends.
+    ///
+    /// # Panics
+    /// When it does not end within ten seconds.
+    #[track_caller]
+    pub fn hang_up(mut self) {
+        self.cable = Cable::new().expect("a pseudo-terminal").0;
+        let begun = Instant::now();
+        while self.child.try_wait().expect("a child").is_none() {
+            assert!(begun.elapsed() < Duration::from_secs(10), "it does not end");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
     /// Waits for the end; gives the status, and what was said after the screen was given back.
     ///
     /// # Panics

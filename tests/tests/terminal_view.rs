@@ -89,7 +89,7 @@ fn a_schedule_waits_for_its_key_shows_what_is_left_and_ends_by_itself() {
 /// Whatever ends a session stops the motor and closes the recording.
 #[test]
 fn an_end_by_signal_or_control_c_loses_nothing() {
-    for end in ["control-c", "HUP", "TERM"] {
+    for end in ["control-c", "HUP", "TERM", "hang-up"] {
         let folder = tempfile::tempdir().expect("a folder");
         let desk = Desk::new(Line::Clean);
         let mut screen = Screen::start(folder.path(), &["rig", "--port", &desk.port, "arm", "-o", "seen.csv"], SMALL);
@@ -102,12 +102,20 @@ fn an_end_by_signal_or_control_c_loses_nothing() {
         screen.until(" ARMED ");
         screen.press("=1200\r");
         screen.until("pulse  1200.0 us");
-        if end == "control-c" {
-            screen.press("\x03")
-        } else {
-            screen.signal(end)
-        }
-        let (_, rest) = screen.end();
+        let rest = match end {
+            "hang-up" => {
+                screen.hang_up();
+                String::new()
+            }
+            "control-c" => {
+                screen.press("\x03");
+                screen.end().1
+            }
+            signal => {
+                screen.signal(signal);
+                screen.end().1
+            }
+        };
         std::thread::sleep(Duration::from_millis(100));
         assert!(desk.pulses().last().is_some_and(|p| !p.is_live()), "{end}: the motor was stopped at once");
         let rows = rows(&folder.path().join("seen.csv"));

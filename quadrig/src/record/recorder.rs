@@ -20,6 +20,7 @@ use frame::message::{Command, Event, Hello, Message};
 use frame::rig::{CAPTURE_NAMES, FaultSet, RigSample, RigState};
 use frame::units::Ticks;
 use ident::log::event_line;
+use std::io::Write;
 use std::time::Duration;
 
 /// Samples before the head is written: they tell the rate.
@@ -261,10 +262,16 @@ impl Recorder {
         self.tell_pending(None);
         let stats = board.stats();
         if !quiet {
-            eprintln!("{} rows; {} good frames, {} damaged, {} missing", self.rows, stats.good, stats.damaged, stats.missing);
+            // to a terminal that may be gone: what was recorded is closed all the same
+            let mut out = std::io::stderr().lock();
+            let _ = writeln!(
+                out,
+                "{} rows; {} good frames, {} damaged, {} missing",
+                self.rows, stats.good, stats.damaged, stats.missing
+            );
             for (name, (square, worst, n)) in CAPTURE_NAMES.iter().zip(self.deviation).filter(|(_, (_, _, n))| *n > 0) {
                 let rms = (square / f64::from(n)).sqrt();
-                eprintln!("{name:>12}: {:.3} % rms from the consensus, {:.3} % at most", rms * 100.0, worst * 100.0);
+                let _ = writeln!(out, "{name:>12}: {:.3} % rms from the consensus, {:.3} % at most", rms * 100.0, worst * 100.0);
             }
         }
         if self.rows == 0 {

@@ -22,9 +22,29 @@ pub(crate) fn is_there() -> bool {
     std::io::stdin().is_terminal() && std::io::stdout().is_terminal()
 }
 
+/// Asks before a key is waited for: a wait at a terminal that is gone would never end. An error where it is gone.
+#[cfg(unix)]
+fn is_gone() -> Result<bool, Failure> {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let stdin = std::io::stdin();
+    let mut ends = [PollFd::new(&stdin, PollFlags::IN)];
+    let asked = poll(&mut ends, Some(&Timespec { tv_sec: 0, tv_nsec: 0 }));
+    if asked.is_ok() && ends.iter().any(|end| end.revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL)) {
+        return Err("the terminal is gone".into());
+    }
+    Ok(false)
+}
+
+/// The same where the system tells by itself.
+#[cfg(not(unix))]
+fn is_gone() -> Result<bool, Failure> {
+    Ok(false)
+}
+
 /// The terminal in the hands of the view.
 pub(crate) struct Terminal {
-    terminal: DefaultTerminal,
+    /// Until it is given back.
+    terminal: Option<DefaultTerminal>,
     ink: Ink,
     drawn: Option<Instant>,
 }
@@ -33,13 +53,13 @@ impl Terminal {
     /// Takes the terminal over.
     pub(crate) fn take() -> Result<Self, Failure> {
         let terminal = ratatui::try_init().map_err(|e| format!("the terminal cannot be taken over ({e}); --plain needs none"))?;
-        Ok(Self { terminal, ink: Ink::of_environment(), drawn: None })
+        Ok(Self { terminal: Some(terminal), ink: Ink::of_environment(), drawn: None })
     }
 
     /// Keys that were pressed since the last time. A terminal that is gone presses none more and says so.
     pub(crate) fn keys(&mut self) -> Result<Vec<KeyEvent>, Failure> {
         let mut keys = Vec::new();
-        while event::poll(Duration::ZERO)? {
+        while !is_gone()? && event::poll(Duration::ZERO)? {
             match event::read()? {
                 Event::Key(key) => keys.push(key),
                 Event::Resize(..) => self.drawn = None,
@@ -54,7 +74,10 @@ impl Terminal {
         if !now && self.drawn.is_some_and(|at| at.elapsed() < PICTURE) {
             return Ok(());
         }
-        self.terminal.draw(|frame| draw(frame, screen, self.ink))?;
+        let ink = self.ink;
+        if let Some(terminal) = &mut self.terminal {
+            terminal.draw(|frame| draw(frame, screen, ink))?;
+        }
         self.drawn = Some(Instant::now());
         Ok(())
     }
@@ -62,6 +85,9 @@ impl Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        ratatui::restore();
+        if ratatui::try_restore().is_err() {
+            // It is gone: there is nothing to give back, and nobody to tell. Its own end would try to, and panic before the motor is stopped.
+            std::mem::forget(self.terminal.take());
+        }
     }
 }
