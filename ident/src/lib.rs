@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 pub mod almanac;
+pub mod attribution;
 pub mod bad;
 pub mod beam;
 mod beside;
@@ -23,6 +24,7 @@ mod drive;
 pub mod effects;
 pub mod experiment;
 pub mod fit;
+pub mod flight;
 pub mod flight_log;
 pub mod heldout;
 pub mod hypothesis;

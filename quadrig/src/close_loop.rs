@@ -1,11 +1,12 @@
 //! `quadrig close-loop`.
 //!
 //! What it is: the verdict on a log, as a table or as JSON, and the folder with model, verdict and report. An attitude log, known by
-//! its columns, gets the verdict on the inertial unit instead.
+//! its columns, gets the verdict on the inertial unit instead; a flight log the one on the vehicle.
 //! What can go wrong: refused input; the folder's files appear whole or not at all.
 //! Units: as the channels state.
 //! Reference: specification `formats.md`.
 
+pub(crate) mod flight;
 pub(crate) mod inertial;
 
 use crate::Failure;
@@ -28,7 +29,7 @@ pub(crate) struct Args {
     /// Another run of the same rig, for the error before and after.
     #[arg(long)]
     validate: Vec<PathBuf>,
-    /// Folder for model.toml, verdict.json and report.html (attitude logs: pred.csv as well).
+    /// Folder for model.toml, verdict.json and report.html (attitude logs: pred.csv as well; flights: channels.csv).
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// The verdict on stdout and nothing else.
@@ -40,6 +41,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if inertial::is_attitude_log(&args.log) {
         return inertial::run(args, quiet);
+    }
+    if flight::is_flight_log(&args.log) {
+        return flight::run(args, quiet);
     }
     let log = Log::read(&args.log)?;
     let model = args.model.as_deref().map(Model::read).transpose()?;

@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`.
 
 use crate::Failure;
-use crate::close_loop::inertial;
+use crate::close_loop::{flight, inertial};
 use clap::ValueEnum;
 use ident::context::Context;
 use ident::log::{Column, Log, write_whole};
@@ -52,6 +52,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             );
         }
         return inertial::predict(&args.model, &text, &args.log, &args.output);
+    }
+    if let Some(text) = flight::model_text(&args.model) {
+        if args.from == From::Command {
+            return Err(format!(
+                "{}: of a flight, whose motion no command alone decides; only --from relations",
+                args.model.display()
+            )
+            .into());
+        }
+        return flight::predict(&args.model, &text, &args.log, &args.output);
     }
     let model = Model::read(&args.model)?;
     let log = Log::read(&args.log)?;

@@ -11,8 +11,10 @@ pub mod bench;
 pub mod blind;
 pub mod budget;
 pub mod desk;
+pub mod flights;
 pub mod inertial;
 pub mod probe;
+pub mod recorders;
 #[cfg(unix)]
 pub mod screen;
 

@@ -103,3 +103,85 @@ fn poses_and_commands_alone_are_flights_too() {
     std::fs::write(at.join("rig.csv"), "t_s,pulse_us,rpm,thrust_n\n0,1000,0,0\n1,1500,3000,1\n").expect("a file");
     call(at, &["import", "rig.csv", "-o", "never.csv", "--meta", "mass_kg=1"]).refused(&["mass_kg", "no flight"]);
 }
+
+/// A flight of the generator, and the places of its rotors.
+fn generated() -> (Log, Vec<[f64; 3]>) {
+    use quadrig_tests::flights::scenario::{CLEAN, Scenario};
+    let s = Scenario::new(CLEAN + 2);
+    let mut log = flight_log::parse("flight.csv", s.log(0).as_bytes()).unwrap_or_else(|e| panic!("{e}"));
+    if log.column("current_a").is_none() {
+        let values = vec![3.0; log.len()];
+        log.columns.push(ident::log::Column { name: "current_a".into(), values });
+    }
+    (log, s.vehicle.hubs.iter().map(|h| [h.x, h.y, h.turns]).collect())
+}
+
+/// Largest difference of two columns where both are known, and the share of rows where the second is.
+fn apart(a: &[f64], b: &[f64]) -> (f64, f64) {
+    let known: Vec<f64> = a.iter().zip(b).map(|(x, y)| (x - y).abs()).filter(|d| d.is_finite()).collect();
+    (known.iter().copied().fold(0.0, f64::max), known.len() as f64 / a.len() as f64)
+}
+
+#[test]
+fn a_ulog_holds_the_flight_that_was_written() {
+    let (log, places) = generated();
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let bytes = quadrig_tests::recorders::ulog(&log, &places);
+    std::fs::write(at.join("flight.ulg"), &bytes).expect("a file");
+    let said = call(at, &["import", "flight.ulg", "-o", "flight.csv", "--meta", "mass_kg=1.0"]).succeeded();
+    assert!(said.out.contains("not turned") && said.out.contains("CA_ROTOR"), "{}", said.out);
+    let seen = flight_log::read(&at.join("flight.csv")).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(seen.len(), log.len());
+    // floats of four bytes; what is sampled more seldom is on straight lines
+    for (name, most) in [
+        ("gyro_y", 1e-5),
+        ("acc_z", 1e-4),
+        ("rpm_3", 0.6),
+        ("pulse_us_2", 1e-3),
+        ("vel_x", 0.2),
+        ("qw", 0.02),
+        ("voltage_v", 0.3),
+    ] {
+        let (difference, share) = apart(log.column(name).expect(name), seen.column(name).expect(name));
+        assert!(difference <= most && share > 0.95, "{name}: {difference} on {share}");
+    }
+    let vehicle = ident::flight::vehicle::Vehicle::of(&seen).expect("a vehicle");
+    assert!(vehicle.rotors.iter().zip(&places).all(|(r, p)| (r.x - p[0]).abs() < 1e-6 && r.turns == p[2]));
+    std::fs::write(at.join("cut.ulg"), &bytes[..bytes.len() / 2]).expect("a file");
+    let said = call(at, &["import", "cut.ulg", "-o", "cut.csv"]).succeeded();
+    assert!(said.out.contains("breaks off"), "{}", said.out);
+    std::fs::write(at.join("head.ulg"), &bytes[..40]).expect("a file");
+    call(at, &["import", "head.ulg", "-o", "never.csv"]).refused(&["head.ulg"]);
+    assert!(!at.join("never.csv").exists());
+}
+
+#[test]
+fn a_blackbox_log_holds_the_flight_that_was_written() {
+    let (log, _) = generated();
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let bytes = quadrig_tests::recorders::blackbox(&log);
+    std::fs::write(at.join("flight.bbl"), &bytes).expect("a file");
+    let said = call(at, &["import", "flight.bbl", "-o", "flight.csv"]).succeeded();
+    assert!(said.out.contains("forward-left-up") && said.out.contains("propellers turning in"), "{}", said.out);
+    let seen = flight_log::read(&at.join("flight.csv")).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(seen.len(), log.len());
+    // half a step of each: a degree a second, 1/2048 g, a hundred electrical turns a minute over seven, DShot's 2000
+    for (name, most) in [
+        ("gyro_x", 0.0088),
+        ("gyro_z", 0.0088),
+        ("acc_y", 0.0025),
+        ("acc_z", 0.0025),
+        ("rpm_1", 7.2),
+        ("pulse_us_4", 0.26),
+        ("voltage_v", 0.0051),
+    ] {
+        let (difference, share) = apart(log.column(name).expect(name), seen.column(name).expect(name));
+        assert!(difference <= most && share > 0.99, "{name}: {difference} on {share}");
+    }
+    let text = String::from_utf8_lossy(&bytes);
+    let text = text.split("H motorOutput").next().expect("headers").replace("Data version:2", "Data version:9");
+    std::fs::write(at.join("old.bbl"), text).expect("a file");
+    call(at, &["import", "old.bbl", "-o", "never.csv"]).refused(&["old.bbl", "Betaflight"]);
+}

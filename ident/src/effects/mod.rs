@@ -6,6 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, list of effects.
 
 pub(crate) mod air_density;
+pub mod airframe;
 pub(crate) mod alternating_period;
 mod amplifier_saturation;
 mod battery_discharge;
@@ -69,7 +70,7 @@ pub enum Stage {
 }
 
 /// What an effect belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scope {
     /// The rig: it is there on every run.

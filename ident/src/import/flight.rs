@@ -1,6 +1,6 @@
 //! Flights of other programs become flight logs.
 //!
-//! What it is: the decoded logs of the Crazyflie (500 Hz groups with estimate, IMU, rotor speeds and motor commands; motion-capture poses; the
+//! What it is: PX4's ULog and Betaflight's Blackbox (`ulog`, `blackbox`); the decoded logs of the Crazyflie (500 Hz groups with estimate, IMU, rotor speeds and motor commands; motion-capture poses; the
 //! excitation logs of ARPL), each known by its header, its frames turned into ours.
 //! What can go wrong: a time stamp that repeats or steps back costs its row, which is counted; gaps are counted; a field that is no number is
 //! refused with its place.
@@ -91,6 +91,11 @@ fn is_flight(header: &str) -> bool {
 /// # Errors
 /// [`ReadError`] with file, line and column.
 pub fn flight(path: &Path) -> Result<Option<(Log, Report)>, ReadError> {
+    for binary in [super::ulog::ulog, super::blackbox::blackbox] {
+        if let Some(found) = binary(path)? {
+            return Ok(Some(found));
+        }
+    }
     let file = path.display().to_string();
     let handle = File::open(path).map_err(|source| ReadError::Io { file: file.clone(), source })?;
     let Some((mut log, report)) = flight_from(&file, BufReader::new(handle))? else { return Ok(None) };

@@ -5,13 +5,24 @@
 //! Units: converted to the contract's on the way in; the factor stands in the report.
 //! Reference: specification `formats.md`, `quadrig import`; RCbenchmark and Tyto CSV headers carry their units in parentheses.
 
+mod blackbox;
 mod findings;
 mod flight;
 mod header;
+mod streams;
 mod table;
+mod ulog;
 
 pub use flight::{flight, flight_from};
 pub use table::{Mapping, import, import_from};
+
+/// Whether a file begins with these bytes.
+fn begins(path: &std::path::Path, magic: &[u8]) -> std::io::Result<bool> {
+    use std::io::Read;
+    let mut head = Vec::with_capacity(magic.len());
+    std::fs::File::open(path)?.take(magic.len() as u64).read_to_end(&mut head)?;
+    Ok(head == magic)
+}
 
 /// One line of the import report.
 #[derive(Debug, Clone, PartialEq)]

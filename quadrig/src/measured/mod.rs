@@ -7,6 +7,7 @@
 //! Reference: specification `closing-the-loop.md`, "Real measurements".
 
 mod cross;
+mod flights;
 mod page;
 mod set;
 mod table;
@@ -63,8 +64,9 @@ pub(crate) struct Outcome {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    if let Some(unknown) = args.set.iter().find(|n| !SETS.iter().any(|s| s.folder == n.as_str())) {
-        let names: Vec<&str> = SETS.iter().map(|s| s.folder).collect();
+    let known = || SETS.iter().map(|s| s.folder).chain(flights::SETS.iter().map(|s| s.folder));
+    if let Some(unknown) = args.set.iter().find(|n| !known().any(|s| s == n.as_str())) {
+        let names: Vec<&str> = known().collect();
         return Err(format!("no set is called {unknown}; there are: {}", names.join(", ")).into());
     }
     let rig = args.data.join("rig");
@@ -90,9 +92,17 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         }
         outcomes.push(outcome);
     }
+    let mut flown = Vec::new();
+    for set in flights::SETS.iter().filter(|s| args.set.is_empty() || args.set.iter().any(|n| n == s.folder)) {
+        let page = flights::work(set, &rig, &folder, quiet)?;
+        if !quiet {
+            println!("{}", page.section());
+        }
+        flown.push(page);
+    }
     if args.set.is_empty() {
         let file = args.output.join("measured.md");
-        let text = page::index(&outcomes);
+        let text = page::index(&outcomes) + &flights::summary(&flown);
         write_whole(&file, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", file.display()))?;
     }
     Ok(())

@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use quadrig_tests::blind::scenario::{CLEAN, Hidden, Scenario};
 use quadrig_tests::blind::score::{HEADER, Line, score};
 use quadrig_tests::blind::{messy, simulated, tally, write};
+use quadrig_tests::flights;
 use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
 use std::io::{IsTerminal, Write};
@@ -17,7 +18,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated | --messy] [--failures] [--table] | blind --dump SEED DIR [--simulated | --messy] | blind --plan N";
+const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated | --messy | --flights] [--failures] [--table] | blind --dump SEED DIR [--simulated | --messy | --flights] | blind --plan N";
 
 struct Options {
     runs: usize,
@@ -32,7 +33,13 @@ struct Options {
     failures: bool,
     simulated: bool,
     messy: bool,
+    flights: bool,
     table: bool,
+}
+
+fn flights_of(o: Options) -> flights::campaign::Asked {
+    let Options { runs, clean, odd, from, seeds, effect, out, threads, failures, table, .. } = o;
+    flights::campaign::Asked { runs, clean, odd, from, seeds, effect, out, threads, failures, table }
 }
 
 #[global_allocator]
@@ -57,6 +64,7 @@ fn command(words: &[String]) -> Result<(), String> {
             match rest {
                 [] => dump(seed, &folder).map_err(|e| e.to_string()),
                 [flag] if flag == "--simulated" => simulated::dump(seed, &folder),
+                [flag] if flag == "--flights" => flights::campaign::dump(seed, &folder),
                 [flag] if flag == "--messy" => dump_messy(seed, &folder).map_err(|e| e.to_string()),
                 _ => Err(USAGE.into()),
             }
@@ -76,7 +84,11 @@ fn command(words: &[String]) -> Result<(), String> {
         }
         _ => {
             let o = options(words)?;
-            if o.messy { messy_campaign(&o) } else { campaign(&o) }
+            match (o.messy, o.flights) {
+                (true, _) => messy_campaign(&o),
+                (_, true) => flights::campaign::run(&flights_of(o)),
+                _ => campaign(&o),
+            }
         }
     }
 }
@@ -95,6 +107,7 @@ fn options(words: &[String]) -> Result<Options, String> {
         failures: false,
         simulated: false,
         messy: false,
+        flights: false,
         table: false,
     };
     let mut i = words.iter();
@@ -109,6 +122,10 @@ fn options(words: &[String]) -> Result<Options, String> {
         }
         if flag == "--messy" {
             o.messy = true;
+            continue;
+        }
+        if flag == "--flights" {
+            o.flights = true;
             continue;
         }
         if flag == "--table" {

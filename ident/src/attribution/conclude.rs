@@ -1,0 +1,290 @@
+//! Last stage: what is said.
+//!
+//! What it is: the names that stay once each has been asked for itself: none may make a channel worse on readings that no fit saw, none may
+//! rest on the edge of what is plausible; then how sure each is, what could stand in its place, and what is left beside them.
+//! What can go wrong: nothing; where no name stays there is none.
+//! Units: the channels' own; probabilities 0 to 1.
+//! Reference: specification `formats.md`, "Verdict"; `closing-the-loop.md`, steps 6 and 7.
+
+use super::channel::rms;
+use super::evidence::White;
+use super::fit::{Fit, Problem, fit};
+use super::library::Placed;
+use super::noise::Noise;
+use super::posterior::{Posterior, Seen, share};
+use super::validate::{fairest, held_out};
+
+/// Share by which names may make a channel's error larger (specification, "Verdict").
+const WORSE: f64 = 0.02;
+/// Error on left-out readings, in noise floors, from which on a channel is told in any case (specification, "Verdict").
+pub const LOUD: f64 = 3.0;
+/// Evidence of a wander from which on it is told, nats: on a dozen channels of white noise one in a hundred logs reaches it.
+const WANDERS: f64 = 10.0;
+/// A hypothesis is told beside the best from this probability on, relative to it.
+const BESIDE: f64 = 1.0 / 3.0;
+/// Alternatives below this are not listed.
+const LISTED: f64 = 0.01;
+
+/// Errors of one channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// Over all readings with the fit to all of them.
+    pub rms: f64,
+    /// Over readings that the fit did not see.
+    pub held_out: f64,
+}
+
+/// A term of the final hypothesis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Kept {
+    /// Its place in the hypothesis.
+    pub place: usize,
+    /// Probability that it is there.
+    pub probability: f64,
+    /// Evidence by which it is ahead of everything without it, nats.
+    pub lead: f64,
+    /// Channels that it changes, the one that it improves most first, each with 1 - (held-out error with all)/(without it).
+    pub channels: Vec<(usize, f64)>,
+    /// What could stand in its place: candidates, and their probability.
+    pub rivals: Vec<(Vec<usize>, f64)>,
+}
+
+/// Something that is left on a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Left {
+    /// The channel.
+    pub channel: usize,
+    /// Held-out error in noise floors.
+    pub over_floor: f64,
+    /// Memory of what wanders there, s; 0 where nothing does.
+    pub memory_s: f64,
+}
+
+/// The conclusion.
+#[derive(Debug, Clone)]
+pub struct Conclusion {
+    /// The declared model alone.
+    pub declared: Fit,
+    /// The final hypothesis.
+    pub fit: Fit,
+    /// Its terms, the surest first, those without a name last.
+    pub kept: Vec<Kept>,
+    /// Errors of the declared model, by channel.
+    pub before: Vec<Errors>,
+    /// Errors of the final hypothesis, by channel.
+    pub after: Vec<Errors>,
+    /// What is left.
+    pub left: Vec<Left>,
+    /// Whole hypotheses beside the final one, with their probability.
+    pub alternatives: Vec<(Vec<usize>, f64)>,
+    /// Whether something else explains the first cause equally well.
+    pub ambiguous: bool,
+}
+
+/// Concludes.
+#[must_use]
+pub fn conclude(problem: &Problem<'_>, posterior: &Posterior) -> Option<Conclusion> {
+    let (declared_noise, before) = fairest(problem, &posterior.declared)?;
+    let declared = fit_as(problem, &posterior.declared, &declared_noise)?;
+    let all = problem.library.candidates();
+    let is_named = |p: &Placed| all[p.candidate].is_named();
+    // names are judged without what has no name beside them: it would hold part of what they explain
+    let (names, nameless): (Vec<Placed>, Vec<Placed>) = posterior.best.placed.iter().cloned().partition(is_named);
+    let mut chosen = if nameless.is_empty() { posterior.best.clone() } else { fit(problem, &names, Some(&posterior.best), 0)? };
+    let mut judged = sifted(problem, &before, &mut chosen, &is_named)?;
+    if !nameless.is_empty() {
+        chosen = fit(problem, &[chosen.placed.as_slice(), &nameless].concat(), Some(&chosen), 0)?;
+        judged = sifted(problem, &before, &mut chosen, &|p| !is_named(p))?;
+    }
+    let last = fit_as(problem, &chosen, &judged.noise)?;
+    Some(account(problem, posterior, (declared, before), (last, judged)))
+}
+
+/// Concludes without asking any term to go: for a hypothesis that was told.
+#[must_use]
+pub fn conclude_told(problem: &Problem<'_>, posterior: &Posterior) -> Option<Conclusion> {
+    let (declared_noise, before) = fairest(problem, &posterior.declared)?;
+    let declared = fit_as(problem, &posterior.declared, &declared_noise)?;
+    let mut chosen = posterior.best.clone();
+    let judged = sifted(problem, &before, &mut chosen, &|_| false)?;
+    let last = fit_as(problem, &chosen, &judged.noise)?;
+    Some(account(problem, posterior, (declared, before), (last, judged)))
+}
+
+/// What left-out readings say of a hypothesis.
+struct Judged {
+    /// Weighting that predicts them best.
+    noise: Vec<Noise>,
+    /// Error by channel.
+    errors: Vec<f64>,
+    /// The same without each term.
+    without: Vec<Vec<f64>>,
+    /// Channels that each term changes.
+    touched: Vec<Vec<usize>>,
+}
+
+/// Takes those of the terms that are asked about out of a hypothesis that have to go, one after the other.
+fn sifted(problem: &Problem<'_>, before: &[f64], chosen: &mut Fit, asked: &dyn Fn(&Placed) -> bool) -> Option<Judged> {
+    loop {
+        let (noise, errors) = fairest(problem, chosen)?;
+        let terms = 0..chosen.placed.len();
+        let without = terms.clone().map(|k| errors_without(problem, chosen, &noise, k)).collect::<Option<_>>()?;
+        let touched = terms.map(|k| channels_of(problem, chosen, k)).collect();
+        let judged = Judged { noise, errors, without, touched };
+        let Some(falls) = falls(problem, chosen, before, &judged, asked) else { return Some(judged) };
+        let rest: Vec<Placed> = chosen.placed.iter().enumerate().filter(|(k, _)| *k != falls).map(|(_, p)| p.clone()).collect();
+        *chosen = fit(problem, &rest, Some(chosen), 0)?;
+    }
+}
+
+/// The same hypothesis with its amplitudes under another weighting.
+fn fit_as(problem: &Problem<'_>, of: &Fit, noise: &[Noise]) -> Option<Fit> {
+    let solved = White::new(problem.channels, noise, &of.design).solve()?;
+    let (amplitudes, covariance) = (solved.amplitudes.clone(), solved.covariance());
+    Some(Fit { amplitudes, covariance, solved, noise: noise.to_vec(), ..of.clone() })
+}
+
+/// Held-out errors without the term at `place`, the rest fitted again.
+fn errors_without(problem: &Problem<'_>, fit: &Fit, noise: &[Noise], place: usize) -> Option<Vec<f64>> {
+    let rest: Vec<Placed> = fit.placed.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, p)| p.clone()).collect();
+    Some(held_out(problem, &rest, noise, false)?.iter().map(|r| rms(r)).collect())
+}
+
+/// Channels whose prediction changes when the term at `place` goes and everything else stays.
+fn channels_of(problem: &Problem<'_>, fit: &Fit, place: usize) -> Vec<usize> {
+    let mut touched: Vec<usize> = fit.columns_of(place).flat_map(|i| fit.design.columns[i].parts.iter().map(|p| p.0)).collect();
+    let rest: Vec<Placed> = fit.placed.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, p)| p.clone()).collect();
+    let design = problem.library.design(&rest);
+    let own: Vec<usize> = fit.columns_of(place).collect();
+    let others: Vec<usize> = (0..fit.design.columns.len()).filter(|i| !own.contains(i)).collect();
+    for (column, i) in design.columns.iter().zip(others) {
+        for (channel, values) in &column.parts {
+            let same = fit.design.columns[i].parts.iter().any(|(c, v)| c == channel && v == values);
+            if !same {
+                touched.push(*channel);
+            }
+        }
+    }
+    touched.sort_unstable();
+    touched.dedup();
+    touched
+}
+
+/// The term that has to go, if one of those that are asked about has.
+fn falls(problem: &Problem<'_>, fit: &Fit, before: &[f64], judged: &Judged, asked: &dyn Fn(&Placed) -> bool) -> Option<usize> {
+    let Judged { errors: after, without, touched, .. } = judged;
+    let gain = |k: usize, c: usize| 1.0 - after[c] / without[k][c];
+    let best = |k: usize| touched[k].iter().map(|c| gain(k, *c)).fold(f64::NEG_INFINITY, f64::max);
+    let open = || (0..touched.len()).filter(|k| asked(&fit.placed[*k]));
+    // a channel that all of them together make worse: the one goes whose leaving helps it most
+    for c in (0..after.len()).filter(|c| after[*c] > (1.0 + WORSE) * before[*c]) {
+        let worst = open().filter(|k| touched[*k].contains(&c)).min_by(|a, b| gain(*a, c).total_cmp(&gain(*b, c)));
+        if worst.is_some_and(|k| gain(k, c) < 0.0) {
+            return worst;
+        }
+    }
+    let edge = |k: usize| {
+        let p = &fit.placed[k];
+        let shapes = &problem.library.candidates()[p.candidate].shapes;
+        p.shape.iter().zip(shapes).any(|(v, s)| !s.inside(*v))
+    };
+    let weak = |k: &usize| best(*k) < 0.0 || edge(*k) || spans_zero(fit, *k);
+    open().filter(weak).min_by(|a, b| best(*a).total_cmp(&best(*b)))
+}
+
+/// Whether every amplitude of a term could be nothing (a term of shapes alone is judged by its evidence).
+fn spans_zero(fit: &Fit, place: usize) -> bool {
+    let mut own = fit.columns_of(place).peekable();
+    own.peek().is_some()
+        && fit.placed[place].shape.is_empty()
+        && own.all(|i| fit.amplitudes[i].abs() < 1.96 * fit.covariance[(i, i)].sqrt())
+}
+
+fn account(
+    problem: &Problem<'_>,
+    posterior: &Posterior,
+    (declared, before_held): (Fit, Vec<f64>),
+    (fit, judged): (Fit, Judged),
+) -> Conclusion {
+    let Judged { errors: after_held, without, touched, .. } = judged;
+    let all = problem.library.candidates();
+    let mut kept: Vec<Kept> = (0..fit.placed.len())
+        .map(|place| {
+            let mut channels: Vec<(usize, f64)> =
+                touched[place].iter().map(|c| (*c, 1.0 - after_held[*c] / without[place][*c])).collect();
+            channels.sort_by(|a, b| b.1.total_cmp(&a.1));
+            let own = fit.placed[place].candidate;
+            let rivals = rivals(&posterior.seen, &fit, own);
+            Kept { place, probability: posterior.inclusion(own), lead: posterior.lead(own), channels, rivals }
+        })
+        .collect();
+    let named = |k: &Kept| all[fit.placed[k.place].candidate].is_named();
+    kept.sort_by(|a, b| named(b).cmp(&named(a)).then(b.lead.total_cmp(&a.lead)));
+    let errors = |of: &Fit, held: Vec<f64>| -> Vec<Errors> {
+        held.into_iter()
+            .enumerate()
+            .map(|(c, held_out)| Errors { rms: rms(&of.residual(problem.channels, c)), held_out })
+            .collect()
+    };
+    let ambiguous = kept.first().is_some_and(|k| named(k) && k.rivals.first().is_some_and(|r| r.1 > BESIDE * k.probability));
+    Conclusion {
+        left: left(problem, &fit, &after_held),
+        before: errors(&declared, before_held),
+        declared,
+        after: errors(&fit, after_held),
+        alternatives: alternatives(&posterior.seen, &fit),
+        ambiguous,
+        kept,
+        fit,
+    }
+}
+
+fn own_terms(fit: &Fit) -> Vec<usize> {
+    let mut out: Vec<usize> = fit.placed.iter().map(|p| p.candidate).collect();
+    out.sort_unstable();
+    out
+}
+
+/// What could stand in the place of a candidate: the hypotheses that hold something else instead.
+fn rivals(seen: &[Seen], fit: &Fit, own: usize) -> Vec<(Vec<usize>, f64)> {
+    let best = own_terms(fit);
+    let instead = |s: &Seen| -> Vec<usize> { s.terms.iter().copied().filter(|t| !best.contains(t)).collect() };
+    let mut out: Vec<(Vec<usize>, f64)> = Vec::new();
+    for s in seen.iter().filter(|s| !s.terms.contains(&own)) {
+        let other = instead(s);
+        let probability = share(seen, |h| std::ptr::eq(h, s));
+        match out.iter_mut().find(|o| o.0 == other) {
+            Some(o) => o.1 += probability,
+            None => out.push((other, probability)),
+        }
+    }
+    out.retain(|o| o.1 > LISTED && !o.0.is_empty());
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out
+}
+
+fn alternatives(seen: &[Seen], fit: &Fit) -> Vec<(Vec<usize>, f64)> {
+    let best = own_terms(fit);
+    let others = seen.iter().filter(|s| s.terms != best);
+    let mut out: Vec<(Vec<usize>, f64)> = others.map(|s| (s.terms.clone(), share(seen, |h| std::ptr::eq(h, s)))).collect();
+    out.retain(|o| o.1 > LISTED);
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out
+}
+
+/// What is left, channel by channel.
+fn left(problem: &Problem<'_>, fit: &Fit, held: &[f64]) -> Vec<Left> {
+    let one = |c: usize| {
+        let channel = &problem.channels[c];
+        let residual = fit.residual(problem.channels, c);
+        let noise = fit.noise[c].fitted(channel, &residual);
+        let wanders = noise.wander_evidence(channel, &residual) > WANDERS;
+        let over_floor = held[c] / channel.floor.max(f64::MIN_POSITIVE);
+        (wanders || over_floor > LOUD).then_some(Left {
+            channel: c,
+            over_floor,
+            memory_s: if wanders { noise.memory_s } else { 0.0 },
+        })
+    };
+    (0..problem.channels.len()).filter_map(one).collect()
+}

@@ -1,0 +1,64 @@
+//! `spinup_lag`: the rotors follow their pulses with a lag.
+//!
+//! What it is: first order, with one time constant on the way up and another down. Where no speed was measured, thrust and moments lag.
+//! What can go wrong: pulses that hardly move show no lag.
+//! Units: s.
+//! Reference: Beharie 2013, section 5.3; Eschmann, Albani & Loianno, 2024 (motor delays of the Crazyflie).
+
+use super::{About, AirframeEffect, Form, Found, Scope};
+use crate::attribution::Shape;
+use crate::flight::columns::Flight;
+use crate::flight::scene::{Scene, followed};
+use crate::verdict::Parameter;
+
+pub(super) struct SpinupLag;
+
+/// Time constants, s: range and starts.
+const RANGE: (f64, f64) = (1e-3, 0.5);
+const STARTS: [f64; 3] = [0.02, 0.05, 0.12];
+
+impl AirframeEffect for SpinupLag {
+    fn id(&self) -> &'static str {
+        "spinup_lag"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Rotors follow their pulses with a lag",
+            equation: "tau dw/dt = w_settled(pulse) - w, tau = tau_up or tau_down",
+            source: "Beharie 2013, section 5.3; Eschmann, Albani & Loianno 2024.",
+            depends_on: &["pulse_us"],
+            signature: "each rotor's speed is behind its pulse; forces and moments hold with the measured speeds",
+            look_alikes: &["channel_delay"],
+        }
+    }
+
+    fn scope(&self, _: &Form) -> Scope {
+        Scope::Rig
+    }
+
+    fn forms(&self, flight: &Flight) -> Vec<Form> {
+        if flight.record.command.is_empty() {
+            return Vec::new();
+        }
+        let along = |name| Shape { name, unit: "s", range: RANGE };
+        let starts = STARTS.map(|s| vec![s, s]).to_vec();
+        vec![Form { shapes: vec![along("tau_up"), along("tau_down")], starts, ..Form::default() }]
+    }
+
+    fn alters(&self) -> bool {
+        true
+    }
+
+    fn alter(&self, flight: &Flight, _: &Form, shape: &[f64], scene: &mut Scene<'_>) {
+        let lag = [shape[0], shape[1]];
+        scene.lag = Some(lag);
+        if flight.record.speed.is_empty() {
+            scene.drive = flight.record.command.iter().map(|c| followed(&flight.record.t, c, lag)).collect();
+        }
+    }
+
+    fn report(&self, found: &Found<'_>) -> Vec<Parameter> {
+        vec![found.plain("tau_up", "s"), found.plain("tau_down", "s")]
+    }
+}

@@ -1,0 +1,171 @@
+//! The declared model of a flight.
+//!
+//! What it is: thrust k_T times the sum of the squared speeds along -z, reaction torque, a rigid body that turns; each rotor's speed a cubic of
+//! its pulse, one for all with small differences; a constant voltage; a field that is constant in earth axes. No drag, no offset.
+//! What can go wrong: without measured speeds thrust and moments go with command and its square.
+//! Units: SI; rev/min for the speeds.
+//! Reference: specification `flight.md`, "The loop on flights"; Beharie 2013, Eq. 2.25 to 2.35 as corrected in the errata.
+
+use super::channels::Target;
+use super::columns::{Flight, Sink};
+use super::scene::{Broken, Scene, followed};
+use crate::attribution::{Column, Owner, Prior};
+
+/// Thrust coefficients lie this far from what carries the weight in the middle of the flight, as a share.
+const THRUST: f64 = 0.5;
+/// Difference of moments of inertia over the third: a flat body has -1, +1 and 0 about x, y and z.
+const FLAT: [f64; 3] = [-1.0, 1.0, 0.0];
+/// Standard deviation of that difference; where the inertia is known.
+const FLATNESS: (f64, f64) = (0.4, 0.05);
+/// Moment of inertia of a rotor over that of the body about a level axis.
+const SPIN: f64 = 5e-3;
+/// Reaction torque over thrust, in arms.
+const YAW: f64 = 0.2;
+/// Share by which rotors of one kind differ in speed at one pulse.
+const OWN: f64 = 0.03;
+/// Field of the earth, uT.
+const FIELD_UT: f64 = 60.0;
+
+/// The columns of the declared model, always as many.
+#[must_use]
+pub(super) fn declared(flight: &Flight, scene: &Scene<'_>) -> Vec<Column> {
+    let mut sink = Sink::new(flight, scene, &[], Owner::Declared);
+    thrust(&mut sink);
+    if !flight.record.vehicle.rotors.is_empty() {
+        turning(&mut sink);
+    }
+    speeds(&mut sink);
+    if flight.record.voltage.is_some() {
+        let volts = flight.usual.supply[0];
+        sink.column("voltage", Prior { mean: volts, sd: 0.2 * volts, sign: 0.0 }).constant(Target::Voltage);
+    }
+    field(&mut sink);
+    sink.done()
+}
+
+/// Powers of the drive that make thrust: the square of a speed, command and its square where no speed is known.
+fn powers(flight: &Flight) -> &'static [i32] {
+    if flight.record.speed.is_empty() { &[2, 1] } else { &[2] }
+}
+
+fn thrust(sink: &mut Sink<'_>) {
+    for power in powers(sink.flight) {
+        let values = sink.scene.thrusts(|_| -1.0, *power);
+        let (name, size) = thrust_of(sink.flight, *power);
+        let mean = if *power == 2 { size } else { 0.0 };
+        sink.column(name, Prior { mean, sd: THRUST * size, sign: 0.0 }).part(Target::Force(2), &values);
+    }
+}
+
+/// Name and usual size of a thrust coefficient over the mass.
+fn thrust_of(flight: &Flight, power: i32) -> (&'static str, f64) {
+    if power == 2 { ("thrust", super::G / flight.usual.squares) } else { ("thrust_linear", super::G / flight.usual.sum) }
+}
+
+fn turning(sink: &mut Sink<'_>) {
+    let (flight, scene) = (sink.flight, sink.scene);
+    let rotors = flight.record.vehicle.rotors.clone();
+    let usual = &flight.usual;
+    let names = [["roll", "roll_linear"], ["pitch", "pitch_linear"], ["yaw", "yaw_linear"]];
+    let coupling = ["roll_coupling", "pitch_coupling", "yaw_coupling"];
+    for axis in 0..3 {
+        let lever = |i: usize| match axis {
+            0 => -rotors[i].y,
+            1 => rotors[i].x,
+            _ => -rotors[i].turns,
+        };
+        let reach = if axis == 2 { YAW * usual.turning } else { usual.turning / usual.arm };
+        for (power, name) in powers(flight).iter().zip(names[axis]) {
+            let size = reach / if *power == 2 { usual.squares } else { usual.sum };
+            sink.column(name, Prior { mean: 0.0, sd: size, sign: 0.0 })
+                .part(Target::Turning(axis), &scene.thrusts(lever, *power));
+        }
+        let product: Vec<f64> = (0..scene.len())
+            .map(|row| {
+                let w = scene.rate_at(row);
+                w[(axis + 1) % 3] * w[(axis + 2) % 3]
+            })
+            .collect();
+        let prior = match flight.record.vehicle.inertia_kgm2 {
+            Some(i) => Prior { mean: (i[(axis + 1) % 3] - i[(axis + 2) % 3]) / i[axis], sd: FLATNESS.1, sign: 0.0 },
+            None => Prior { mean: FLAT[axis], sd: FLATNESS.0, sign: 0.0 },
+        };
+        sink.column(coupling[axis], prior).part(Target::Turning(axis), &product);
+    }
+    if flight.record.speed.is_empty() {
+        return;
+    }
+    // the rotors' own angular momentum: a moment against its turning with the body, and against its change
+    let spin = scene.drives(|i| rotors[i].turns);
+    let about = |axis: usize, sign: f64| -> Vec<f64> {
+        spin.iter().enumerate().map(|(row, h)| sign * scene.rate_at(row)[axis] * h).collect()
+    };
+    sink.column("spin", Prior::positive(SPIN)).part(Target::Turning(0), &about(1, -1.0)).part(Target::Turning(1), &about(0, 1.0));
+    let change: Vec<f64> = flight.windows.slope(&spin).iter().map(|s| -s).collect();
+    sink.column("spin_up", Prior::positive(SPIN)).window(Target::Turning(2), change);
+}
+
+/// Each rotor's speed, rev/min, from its pulse: powers of the command about its middle, through the rotor's lag if it has one.
+fn speeds(sink: &mut Sink<'_>) {
+    let (flight, scene) = (sink.flight, sink.scene);
+    if flight.record.speed.is_empty() || flight.record.command.is_empty() {
+        return;
+    }
+    let usual = &flight.usual;
+    let [middle, spread] = usual.command;
+    let powers: Vec<Vec<Vec<f64>>> =
+        (0..flight.record.rotors()).map(|i| (0..=3).map(|k| power(flight, scene, i, k)).collect()).collect();
+    let slope = 0.7 * usual.rpm * spread / middle.max(spread);
+    let priors = [(usual.rpm, 0.3 * usual.rpm), (slope, slope), (0.0, 0.3 * slope), (0.0, 0.1 * slope)];
+    for (k, (name, (mean, sd))) in ["speed", "speed_1", "speed_2", "speed_3"].into_iter().zip(priors).enumerate() {
+        sink.column(name, Prior { mean, sd, sign: 0.0 });
+        for (i, own) in powers.iter().enumerate() {
+            sink.part(Target::Speed(i), &own[k]);
+        }
+    }
+    for (i, own) in powers.iter().enumerate() {
+        sink.column("own", Prior::about_zero(OWN * usual.rpm)).part(Target::Speed(i), &own[0]);
+        sink.column("own_1", Prior::about_zero(3.0 * OWN * slope)).part(Target::Speed(i), &own[1]);
+    }
+}
+
+/// What a rotor's speed channel reads for a power of its command about the middle of all commands.
+fn power(flight: &Flight, scene: &Scene<'_>, rotor: usize, power: i32) -> Vec<f64> {
+    let [middle, spread] = flight.usual.command;
+    let own = |command: &[f64]| -> Vec<f64> { command.iter().map(|u| ((u - middle) / spread).powi(power)).collect() };
+    let command = &scene.record.command[rotor];
+    let mut out = scene.lag.map_or_else(|| own(command), |lag| own(&followed(&scene.record.t, command, lag)));
+    match scene.broken[rotor] {
+        Some(Broken::Factor(factor, from)) => {
+            out.iter_mut().zip(&scene.record.t).filter(|(_, t)| **t >= from).for_each(|(v, _)| *v *= factor);
+        }
+        Some(Broken::Refused(a, b)) => out[a..b].fill(0.0),
+        None => {}
+    }
+    out
+}
+
+fn field(sink: &mut Sink<'_>) {
+    let flight = sink.flight;
+    let (Some(_), Some(to_earth)) = (&flight.record.field, &flight.record.to_earth) else { return };
+    for (earth, name) in ["field_north", "field_east", "field_down"].into_iter().enumerate() {
+        sink.column(name, Prior::about_zero(FIELD_UT));
+        for axis in 0..3 {
+            let values: Vec<f64> = to_earth.iter().map(|r| r[(earth, axis)]).collect();
+            sink.part(Target::Field(axis), &values);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::FLAT;
+
+    #[test]
+    fn a_flat_body_has_the_sum_of_its_level_inertias_about_z() {
+        let inertia = [0.4, 0.6, 1.0];
+        let ratio = |a: usize, b: usize, c: usize| (inertia[a] - inertia[b]) / inertia[c];
+        assert!((ratio(1, 2, 0) - FLAT[0]).abs() < 0.01 && (ratio(2, 0, 1) - FLAT[1]).abs() < 0.01);
+        assert!(ratio(0, 1, 2).abs() < 0.3);
+    }
+}

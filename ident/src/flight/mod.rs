@@ -1,0 +1,79 @@
+//! Closing the loop on a flight: what the declared model of a flying vehicle leaves over, why, and the corrected model.
+//!
+//! What it is: a flight log becomes channels through a stated filter (`windows`, `channels`); the declared model (`declared`) and the effects
+//! of `effects/airframe` become columns (`library`); the attribution does the rest (`crate::attribution`).
+//! What can go wrong: a log that is too short, or that lacks what the model is made of, is refused with what it lacks.
+//! Units: SI; rad/s; body FRD, earth NED.
+//! Reference: specification `flight.md`, "The loop on flights".
+
+mod almanac;
+pub mod channels;
+mod close;
+pub mod columns;
+mod declared;
+pub mod library;
+pub mod model;
+mod nameless;
+mod page;
+pub mod predict;
+pub mod record;
+mod rows;
+pub mod scene;
+mod standard;
+pub mod vehicle;
+pub(crate) mod vibration;
+pub mod windows;
+mod words;
+
+pub use almanac::almanac;
+pub use close::{Closed, Shown, close, told};
+pub use model::{FORMAT as MODEL_FORMAT, FlightModel};
+pub use page::{figures, page};
+
+/// Standard gravity, m/s^2.
+pub(crate) const G: f64 = 9.806_65;
+/// rev/min of one rad/s.
+pub(crate) const RPM: f64 = 60.0 / std::f64::consts::TAU;
+
+/// Shortest flight in the air, s: below it nothing can be left out and predicted.
+pub const SHORTEST_S: f64 = 4.0;
+
+/// Why a flight cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FlightError {
+    /// It lacks a column.
+    #[error("{name}: holds {reason}; the loop on a flight needs one of them")]
+    Lacks {
+        /// Log.
+        name: String,
+        /// What is not there.
+        reason: String,
+    },
+    /// Metadata that cannot be read.
+    #[error("{name}: {reason}")]
+    Meta {
+        /// Log.
+        name: String,
+        /// Key, value and what is expected.
+        reason: String,
+    },
+    /// A model file that cannot be taken.
+    #[error("{file}: {reason}; expected a model written by `quadrig close-loop` on a flight log")]
+    Model {
+        /// File and line.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Too short.
+    #[error(
+        "{name}: {seconds:.1} s in the air with all its readings; at least {SHORTEST_S} s are needed to leave stretches out and predict them"
+    )]
+    Short {
+        /// Log.
+        name: String,
+        /// What there is.
+        seconds: f64,
+    },
+}

@@ -1,0 +1,80 @@
+//! What a flight's verdict says in words.
+//!
+//! What it is: sentences for evidence, for what is left, for the next flight.
+//! What can go wrong: nothing.
+//! Units: s, nats.
+//! Reference: specification `formats.md`, "Verdict".
+
+use super::columns::Usual;
+use super::library::Kind;
+use crate::attribution::{Candidate, Channel, Kept, UNKNOWN};
+use crate::effects::Scope;
+use crate::verdict::{EffectEntry, NextExperiment, ScheduleStep, Unexplained};
+
+/// Slower than this what is left is slow, s.
+const SLOW_S: f64 = 0.3;
+/// Stretch of the next flight, s.
+const STRETCH_S: f64 = 10.0;
+
+/// A candidate with its form.
+pub(super) fn name(candidate: &Candidate) -> String {
+    if candidate.form.is_empty() { candidate.id.to_owned() } else { format!("{} ({})", candidate.id, candidate.form) }
+}
+
+/// Why a term stands.
+pub(super) fn evidence(kept: &Kept, kind: &Kind, channels: &[Channel]) -> String {
+    let signature = match kind {
+        Kind::Effect(effect, form) => {
+            let what = if form.name.is_empty() { String::new() } else { format!("{}: ", form.name) };
+            format!("{what}{}", effect.about().signature)
+        }
+        Kind::Nameless(_) => "no known effect; straight lines between knots".to_owned(),
+    };
+    let worth = kept.channels.first().map_or(String::new(), |(c, reduction)| {
+        let factor = 1.0 / (1.0 - reduction).max(1e-9);
+        format!("; without it the held-out error of {} is {factor:.2} times as large", channels[*c].name)
+    });
+    format!("{signature}{worth}; {:.0} nats ahead of everything without it", kept.lead.clamp(0.0, 1e6))
+}
+
+/// The shape of what is left, from the memory of its wander.
+pub(super) fn looks_like(memory_s: f64) -> String {
+    if memory_s == 0.0 {
+        "from window to window".to_owned()
+    } else if memory_s > SLOW_S {
+        format!("slow, keeps for {memory_s:.1} s")
+    } else {
+        format!("keeps for {memory_s:.2} s")
+    }
+}
+
+/// The entry of an unattributed verdict for which no function predicts left-out rows either.
+pub(super) fn no_correction(left: &[Unexplained]) -> EffectEntry {
+    let mut loudest: Vec<&Unexplained> = left.iter().collect();
+    loudest.sort_by(|a, b| b.over_floor.total_cmp(&a.over_floor));
+    EffectEntry {
+        id: UNKNOWN.to_owned(),
+        scope: Scope::Run,
+        channels: loudest.iter().map(|u| u.channel.clone()).collect(),
+        depends_on: Vec::new(),
+        equation: "no correction".to_owned(),
+        probability: 1.0,
+        parameters: Vec::new(),
+        heldout_error_reduction: 0.0,
+        evidence: "something is left over; no function of one variable predicts left-out windows better".to_owned(),
+    }
+}
+
+/// The flight that would tell causes apart: the same vehicle slow and fast, high and low, up and down.
+pub(super) fn next(first: &str, rivals: &[String], usual: &Usual) -> NextExperiment {
+    let hover = 1000.0 + 1000.0 * usual.command[0];
+    let step =
+        |share: f64| ScheduleStep { pulse_us: (hover + share * (hover - 1000.0)).clamp(1000.0, 2000.0), hold_s: STRETCH_S };
+    NextExperiment {
+        why: format!(
+            "{first} and {} explain this flight alike. A flight that holds both still and moves tells them apart: {STRETCH_S:.0} s of hover, the same with the nose turned by 90 degrees, forward and sideways at two speeds, then climb and descent at the mean pulses below",
+            rivals.join(" or ")
+        ),
+        schedule: vec![step(0.0), step(0.05), step(-0.05), step(0.0)],
+    }
+}

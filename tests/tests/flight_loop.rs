@@ -1,0 +1,171 @@
+//! The loop on flights, through the command line.
+//!
+//! What it is: a flight of the independent generator with one hidden effect is closed, the effect comes out, its model predicts another flight; a
+//! clean flight has nothing; the two recorded flights of one vehicle show the same effects, and a broken speed channel among them is refused.
+//! What can go wrong: without the recorded data that part says so.
+//! Units: those of the flight log.
+//! Reference: specification `flight.md`, "The loop on flights".
+
+use quadrig_tests::flights::scenario::{CLEAN, Scenario, hidden};
+use quadrig_tests::{call, data};
+use serde_json::Value;
+use std::path::Path;
+
+/// The first seed of the tuning half that hides one effect alone.
+fn hides(id: &str) -> Scenario {
+    Scenario::new((0..4000).step_by(2).find(|s| hidden(*s) == [id]).unwrap_or_else(|| panic!("{id}")))
+}
+
+fn closed(at: &Path, log: &str, more: &[&str]) -> Value {
+    let words = [&["--quiet", "close-loop", log, "-o", "out", "--json"], more].concat();
+    serde_json::from_str(&call(at, &words).succeeded().out).expect("JSON")
+}
+
+fn named(v: &Value) -> Vec<&str> {
+    let all = v["effects"].as_array().expect("effects").iter().filter_map(|e| e["id"].as_str());
+    all.filter(|id| *id != "unknown").collect()
+}
+
+/// Root mean square of what a prediction leaves of the channels that were written beside it.
+fn left(at: &Path, predicted: &str, seen: &str, column: &str) -> f64 {
+    let read = |name: &str| -> Vec<f64> {
+        let text = std::fs::read_to_string(at.join(name)).expect("a file");
+        let mut lines = text.lines().filter(|l| !l.starts_with('#'));
+        let k = lines.next().expect("a header").split(',').position(|n| n == column).unwrap_or_else(|| panic!("{column}"));
+        lines.map(|l| l.split(',').nth(k).and_then(|c| c.parse().ok()).unwrap_or(f64::NAN)).collect()
+    };
+    let squares: Vec<f64> =
+        read(predicted).iter().zip(read(seen)).map(|(p, s)| (p - s).powi(2)).filter(|v| v.is_finite()).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[test]
+fn a_hidden_drag_is_named_and_its_model_predicts_another_flight() {
+    let s = hides("rotor_drag");
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for (k, name) in ["run.csv", "other.csv"].iter().enumerate() {
+        std::fs::write(at.join(name), s.log(k)).expect("a file");
+    }
+    let v = closed(at, "run.csv", &["--validate", "other.csv"]);
+    assert_eq!(
+        (v["format"].as_str(), v["verdict"].as_str(), named(&v)),
+        (Some("quadrig-verdict 2"), Some("attributed"), vec!["rotor_drag"])
+    );
+    let other = &v["validation"][0]["channels"]["acc_x"];
+    let (before, after) = (other["before"].as_f64().expect("a number"), other["after"].as_f64().expect("a number"));
+    assert!(after < 0.6 * before, "{before} {after}");
+    // anyone can recompute the figures
+    call(at, &["--quiet", "predict", "out/model.toml", "run.csv", "-o", "pred.csv"]).succeeded();
+    for (column, seen) in
+        [("acc_x", "out/channels.csv"), ("ang_acc_y", "out/channels.csv"), ("rpm_2", "run.csv"), ("voltage_v", "run.csv")]
+    {
+        let claimed = v["channels"][column]["after"]["rms"].as_f64().expect("a number");
+        let again = left(at, "pred.csv", seen, column);
+        assert!((again / claimed - 1.0).abs() < 0.02, "{column}: {claimed} {again}");
+    }
+    let page = std::fs::read_to_string(at.join("out/report.html")).expect("a page");
+    assert!(page.contains("rotor_drag") && page.contains("What this flight can show"));
+    // against its own model nothing is new
+    let again = closed(at, "run.csv", &["--model", "out/model.toml"]);
+    assert!(named(&again).is_empty(), "{again}");
+}
+
+#[test]
+fn a_clean_flight_has_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("run.csv"), Scenario::new(CLEAN).log(0)).expect("a file");
+    let v = closed(folder.path(), "run.csv", &[]);
+    assert_eq!((v["verdict"].as_str(), named(&v).len()), (Some("none"), 0), "{v}");
+}
+
+/// What the tool cannot use is refused with one line.
+#[test]
+fn what_is_no_usable_flight_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(at.join("a.csv"), "# quadrig-flight 1\nt_s,pulse_us_1,rpm_1\n0,1500,4000\n0.1,1500,4000\n").expect("a file");
+    call(at, &["close-loop", "a.csv", "-o", "out"]).refused(&["a.csv", "specific force"]);
+    let rows: String = (0..50).map(|i| format!("{},1500,4000,0,0,-9.8\n", 0.01 * f64::from(i))).collect();
+    std::fs::write(at.join("b.csv"), format!("# quadrig-flight 1\nt_s,pulse_us_1,rpm_1,acc_x,acc_y,acc_z\n{rows}"))
+        .expect("a file");
+    call(at, &["close-loop", "b.csv", "-o", "out"]).refused(&["b.csv", "in the air"]);
+    std::fs::write(
+        at.join("c.csv"),
+        format!("# quadrig-flight 1\n# layout = \"star\"\nt_s,pulse_us_1,rpm_1,acc_x,acc_y,acc_z\n{rows}"),
+    )
+    .expect("a file");
+    call(at, &["close-loop", "c.csv", "-o", "out"]).refused(&["layout", "star"]);
+    std::fs::write(at.join("m.toml"), "format = \"quadrig-flight-model 1\"\nsource = 3\n").expect("a file");
+    call(at, &["predict", "m.toml", "b.csv", "-o", "p.csv"]).refused(&["m.toml:2"]);
+    assert!(!at.join("out").exists());
+}
+
+/// The recorded brushless flights: one vehicle, two flights, the same effects of about the same size.
+#[test]
+fn two_flights_of_one_vehicle_show_the_same() {
+    let Some(data) = data("recorded flights") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for name in ["brushless-eckart00", "brushless-eckart22"] {
+        let source = data.join(format!("rig/crazyflie-flights/{name}.csv"));
+        let source = source.to_str().expect("a plain name");
+        let out = format!("{name}.csv");
+        call(at, &["--quiet", "import", source, "-o", &out, "--meta", "mass_kg=0.037", "--meta", "arm_m=0.046"]).succeeded();
+    }
+    let slow = closed(at, "brushless-eckart00.csv", &[]);
+    let fast = closed(at, "brushless-eckart22.csv", &[]);
+    for id in ["spinup_lag", "rotor_drag", "lever_arm", "hub_moment"] {
+        assert!(named(&slow).contains(&id) && named(&fast).contains(&id), "{id}: {:?} {:?}", named(&slow), named(&fast));
+    }
+    let value = |v: &Value, id: &str, parameter: &str| -> f64 {
+        let effect = v["effects"].as_array().expect("effects").iter().find(|e| e["id"] == id).expect("an effect").clone();
+        let list = effect["parameters"].as_array().expect("parameters").clone();
+        list.iter().find(|p| p["name"] == parameter).and_then(|p| p["value"].as_f64()).expect("a value")
+    };
+    // what is known of them: force across falls by some 0.34 1/s (flight.md), which is 0.0126 N/(m/s) at 37 g
+    for v in [&slow, &fast] {
+        let drag = value(v, "rotor_drag", "coefficient");
+        assert!((0.0105..0.0145).contains(&drag), "{drag}");
+        assert!((0.03..0.06).contains(&value(v, "spinup_lag", "tau_up")));
+    }
+    assert!((value(&slow, "lever_arm", "arm_z") / value(&fast, "lever_arm", "arm_z") - 1.0).abs() < 0.5);
+}
+
+/// A speed channel that reads half, or stands still, is named and not believed: force and moments are predicted as without the fault.
+#[test]
+fn a_broken_speed_channel_is_refused() {
+    let Some(data) = data("recorded flights") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let source = data.join("rig/crazyflie-flights/brushless-eckart22.csv");
+    let source = source.to_str().expect("a plain name");
+    call(at, &["--quiet", "import", source, "-o", "whole.csv", "--meta", "mass_kg=0.037", "--meta", "arm_m=0.046"]).succeeded();
+    let whole = closed(at, "whole.csv", &[]);
+    let text = std::fs::read_to_string(at.join("whole.csv")).expect("a file");
+    let header = text.lines().find(|l| l.starts_with("t_s")).expect("a header");
+    let column = header.split(',').position(|n| n == "rpm_3").expect("rpm_3");
+    let broken = |change: &dyn Fn(f64, f64) -> f64| -> String {
+        let row = |line: &str| {
+            if line.starts_with('#') || line.starts_with("t_s") {
+                return line.to_owned();
+            }
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            let (t, v): (f64, f64) = (cells[0].parse().expect("a time"), cells[column].parse().expect("a speed"));
+            cells[column] = format!("{}", change(t, v));
+            cells.join(",")
+        };
+        text.lines().map(row).collect::<Vec<_>>().join("\n") + "\n"
+    };
+    let halved = broken(&|_, v| 0.5 * v);
+    let stuck = broken(&|t, v| if t > 2.0 { 15_337.0 } else { v });
+    for (name, content) in [("halved.csv", halved), ("stuck.csv", stuck)] {
+        std::fs::write(at.join(name), content).expect("a file");
+        let v = closed(at, name, &[]);
+        assert!(named(&v).contains(&"dead_rotor_speed"), "{name}: {:?}", named(&v));
+        for channel in ["acc_z", "ang_acc_x"] {
+            let error = |v: &Value| v["channels"][channel]["after"]["heldout_rms"].as_f64().expect("a number");
+            assert!(error(&v) < 1.25 * error(&whole), "{name} {channel}: {} {}", error(&v), error(&whole));
+        }
+    }
+}
