@@ -210,17 +210,10 @@ fn taken(reading: &mut Column, shortest: f32, range: f32, step: &mut Step) -> bo
     let square = square(reading);
     // a square may overflow; zero times what is not finite is none
     let good = square >= shortest && (square < f32::MAX || dot(reading, &ZERO) == 0.0);
-    if !good {
-        step.bad_input = true;
-        return false;
-    }
-    // a length within the range has no component beyond
-    if square < range * range {
-        return true;
-    }
-    let over = cut(reading, range);
+    let over = good && cut(reading, range);
+    step.bad_input |= !good;
     step.overrange |= over;
-    !over
+    good && !over
 }
 
 impl<C> Words for Dcm<C> {
