@@ -145,6 +145,19 @@ fn cosine(a: &Signature, b: &Signature) -> f64 {
     dot(a, b) / (dot(a, a) * dot(b, b)).sqrt().max(f64::MIN_POSITIVE)
 }
 
+/// The section on look-alikes: what was taken out on which standard log, the effects with their cosines, and those that are told besides.
+pub(crate) fn looks_alike(on: &str, alike: impl Iterator<Item = (f64, &'static str)>, told: &[&str]) -> String {
+    let mut alike: Vec<(f64, &str)> = alike.filter(|(c, _)| *c > ALIKE).collect();
+    alike.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+    let list: Vec<String> = alike.iter().map(|(c, other)| format!("[{other}]({other}.md) ({c:.2})")).collect();
+    let list = if list.is_empty() { "none".to_owned() } else { list.join(", ") };
+    let mut text = format!("\n## Looks alike\n\nOn the standard {on}, cosine above {ALIKE}: {list}.\n");
+    if !told.is_empty() {
+        let _ = write!(text, "\nEasily taken for: {}.\n", told.join(", "));
+    }
+    text
+}
+
 fn page(
     context: &Context,
     effect: &'static dyn Effect,
@@ -177,25 +190,11 @@ fn page(
             }
         }
     }
-    let mut alike: Vec<(f64, &str)> = all
-        .iter()
-        .filter(|(other, _)| other.id() != id)
-        .filter_map(|(other, theirs)| {
-            let pairs = own.iter().flat_map(|a| theirs.iter().map(move |b| cosine(a, b).abs()));
-            pairs.max_by(f64::total_cmp).map(|c| (c, other.id()))
-        })
-        .filter(|(c, _)| *c > ALIKE)
-        .collect();
-    alike.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
-    let list: Vec<String> = alike.iter().map(|(c, other)| format!("[{other}]({other}.md) ({c:.2})")).collect();
-    let _ = write!(
-        text,
-        "\n## Looks alike\n\nOn the standard run, with the declared polynomials projected out, cosine above {ALIKE}: {}.\n",
-        if list.is_empty() { "none".to_owned() } else { list.join(", ") }
-    );
-    if !about.look_alikes.is_empty() {
-        let _ = write!(text, "\nEasily taken for: {}.\n", about.look_alikes.join(", "));
-    }
+    let alike = all.iter().filter(|(other, _)| other.id() != id).filter_map(|(other, theirs)| {
+        let pairs = own.iter().flat_map(|a| theirs.iter().map(move |b| cosine(a, b).abs()));
+        pairs.max_by(f64::total_cmp).map(|c| (c, other.id()))
+    });
+    text.push_str(&looks_alike("run, with the declared polynomials projected out", alike, about.look_alikes));
     let first = own.iter().max_by_key(|s| s.changes.len());
     match first {
         None => text

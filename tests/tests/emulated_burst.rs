@@ -96,15 +96,18 @@ fn swing(codes: &[f64], from: usize, rate: f64, hz: f64) -> (f64, f64) {
     (2.0 * re.hypot(im) / n, re.atan2(im))
 }
 
+/// Length of a recording, ms: a report of the health, which comes once a second, is in it.
+const END_MS: u64 = 1_200;
+
 #[test]
 fn every_conversion_of_one_channel_arrives_in_order_beside_the_samples() {
-    for (log_ms, rate_wanted, end_ms) in [(100u16, 61_764.7, 1_200), (1, 155_555.6, 1_000)] {
+    for (log_ms, rate_wanted) in [(100u16, 61_764.7), (1, 155_555.6)] {
         let script = vec![
             (60, Command::Configure(Setting::LogPeriodMs(log_ms))),
             (200, Command::Burst { channel: 0 }),
             (210, Command::Burst { channel: 9 }),
         ];
-        let (heard, stats) = recorded(script, end_ms);
+        let (heard, stats) = recorded(script, END_MS);
         println!("{log_ms} ms: {} samples, {} parts, {} refused; {stats:?}", heard.samples, heard.parts.len(), heard.refused);
         assert_eq!((stats.damaged, stats.missing), (0, 0), "no frame is lost for it");
         assert_eq!(heard.refused, 1, "there is no tenth channel");
@@ -126,10 +129,10 @@ fn every_conversion_of_one_channel_arrives_in_order_beside_the_samples() {
                 assert!(turned.abs() < 0.02, "{turned} rad");
             }
         }
-        let wanted = (end_ms - 100) / u64::from(log_ms);
+        let wanted = (END_MS - 100) / u64::from(log_ms);
         assert!(heard.samples as u64 + 10 >= wanted, "{} samples of {wanted}", heard.samples);
         let cycles = heard.health.expect("a report").tick_cycles;
         println!("{log_ms} ms: at most {cycles} cycles a tick");
-        assert!(cycles < 40_000, "{cycles} cycles");
+        assert!((1..40_000).contains(&cycles), "{cycles} cycles");
     }
 }

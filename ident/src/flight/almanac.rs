@@ -10,7 +10,7 @@ use super::columns::Flight;
 use super::library::{FlightLibrary, Kind};
 use super::record::Record;
 use super::standard::standard_flight;
-use crate::almanac::Page;
+use crate::almanac::{Page, looks_alike};
 use crate::attribution::evidence::White;
 use crate::attribution::fit::difference;
 use crate::attribution::{Column, Fit, Library, Noise, Owner, Placed, Prior, Problem, fit};
@@ -18,8 +18,6 @@ use crate::effects::airframe::{AirframeEffect, library};
 use crate::report::{Figure, Layer, number};
 use std::fmt::Write;
 
-/// Angle between what two effects change, as a cosine, from which they look alike.
-const ALIKE: f64 = 0.8;
 /// Channels that a figure holds at most.
 const DRAWN: usize = 6;
 
@@ -89,26 +87,12 @@ fn page(effect: &'static dyn AirframeEffect, flight: &Flight, all: &[Signature],
         let (lo, hi) = bounds.map_or(("fitted".to_owned(), String::new()), |(a, b)| (number(a), number(b)));
         let _ = writeln!(text, "| {name} | {unit} | {lo} | {hi} |");
     }
-    let mut alike: Vec<(f64, &str)> = library()
-        .iter()
-        .filter(|other| other.id() != id)
-        .filter_map(|other| {
-            let theirs = all.iter().filter(|s| s.effect.id() == other.id());
-            let pairs = theirs.flat_map(|t| own.iter().map(move |o| white.cosine(&o.column, &t.column).abs()));
-            pairs.max_by(f64::total_cmp).map(|c| (c, other.id()))
-        })
-        .filter(|(c, _)| *c > ALIKE)
-        .collect();
-    alike.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
-    let list: Vec<String> = alike.iter().map(|(c, other)| format!("[{other}]({other}.md) ({c:.2})")).collect();
-    let _ = write!(
-        text,
-        "\n## Looks alike\n\nOn the standard flight, with the declared model's columns taken out, cosine above {ALIKE}: {}.\n",
-        if list.is_empty() { "none".to_owned() } else { list.join(", ") }
-    );
-    if !about.look_alikes.is_empty() {
-        let _ = write!(text, "\nEasily taken for: {}.\n", about.look_alikes.join(", "));
-    }
+    let alike = library().iter().filter(|other| other.id() != id).filter_map(|other| {
+        let theirs = all.iter().filter(|s| s.effect.id() == other.id());
+        let pairs = theirs.flat_map(|t| own.iter().map(move |o| white.cosine(&o.column, &t.column).abs()));
+        pairs.max_by(f64::total_cmp).map(|c| (c, other.id()))
+    });
+    text.push_str(&looks_alike("flight, with the declared model's columns taken out", alike, about.look_alikes));
     match own.first() {
         Some(s) => {
             let form = flight_form(effect, flight, s);

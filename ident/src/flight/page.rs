@@ -73,27 +73,7 @@ pub fn figures(closed: &Closed) -> Vec<Figure> {
 }
 
 fn errors(sheet: &mut Sheet, closed: &Closed) {
-    sheet.section("Error before and after");
-    let rows: Vec<Vec<String>> = closed
-        .verdict
-        .channels
-        .iter()
-        .map(|(name, c)| {
-            let (b, a) = (c.before.heldout_rms, c.after.heldout_rms);
-            vec![
-                name.clone(),
-                c.unit.clone(),
-                number(c.noise_floor_rms),
-                number(b),
-                number(a),
-                format!("{:.2}", b / a.max(1e-300)),
-                number(c.before.rms),
-                number(c.after.rms),
-            ]
-        })
-        .collect();
-    let head = ["channel", "unit", "noise floor", "held-out before", "held-out after", "factor", "rms before", "rms after"];
-    sheet.table(&head, &rows, |_| false);
+    sheet.errors(&closed.verdict.channels);
     for (channel, reason) in &closed.verdict.channels.not_predicted {
         sheet.say(&format!("Not predicted: {channel}, {reason}."));
     }

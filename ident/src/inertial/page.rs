@@ -24,26 +24,7 @@ pub fn page(recording: &Recording, closed: &Closed) -> String {
         Kind::None => "Nothing significant is left over.".to_owned(),
     });
     sheet.say("Declared: a field that is constant in earth axes, gravity and a constant offset, a constant offset of the gyro at rest. The attitude comes from gyro and accelerometer alone. Held-out: stretches of the run predicted by a fit that did not see them.");
-    sheet.section("Error before and after");
-    let rows: Vec<Vec<String>> = v
-        .channels
-        .iter()
-        .map(|(name, c)| {
-            let (b, a) = (c.before.heldout_rms, c.after.heldout_rms);
-            vec![
-                name.clone(),
-                c.unit.clone(),
-                number(c.noise_floor_rms),
-                number(b),
-                number(a),
-                format!("{:.2}", b / a.max(1e-300)),
-                number(c.before.rms),
-                number(c.after.rms),
-            ]
-        })
-        .collect();
-    let head = ["channel", "unit", "noise floor", "held-out before", "held-out after", "factor", "rms before", "rms after"];
-    sheet.table(&head, &rows, |_| false);
+    sheet.errors(&v.channels);
     for e in &v.effects {
         sheet.section(&format!("{} (p = {:.2})", e.id, e.probability));
         sheet.say(&e.equation);

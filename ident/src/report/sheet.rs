@@ -6,9 +6,11 @@
 //! Reference: specification `identification.md`, item 5.
 
 use super::figure::Figure;
+use super::number;
 use super::style::{COLOURS, DRAWING, PAGE};
 use super::svg::escape;
 use crate::log::write_whole;
+use crate::verdict::Channels;
 use std::path::{Path, PathBuf};
 
 /// A page under construction.
@@ -39,6 +41,23 @@ impl Sheet {
     /// A paragraph that must not be overlooked.
     pub fn warn(&mut self, text: &str) {
         self.body += &format!("<p class=\"warn\">{}</p>\n", escape(text));
+    }
+
+    /// The section that every verdict's page begins with: the error of each channel before and after.
+    pub fn errors(&mut self, channels: &Channels) {
+        self.section("Error before and after");
+        let rows: Vec<Vec<String>> = channels
+            .iter()
+            .map(|(name, c)| {
+                let (b, a) = (c.before.heldout_rms, c.after.heldout_rms);
+                let factor = format!("{:.2}", b / a.max(1e-300));
+                let figures =
+                    [number(c.noise_floor_rms), number(b), number(a), factor, number(c.before.rms), number(c.after.rms)];
+                [name.clone(), c.unit.clone()].into_iter().chain(figures).collect()
+            })
+            .collect();
+        let head = ["channel", "unit", "noise floor", "held-out before", "held-out after", "factor", "rms before", "rms after"];
+        self.table(&head, &rows, |_| false);
     }
 
     /// A table; `chosen` rows stand out.

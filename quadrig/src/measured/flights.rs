@@ -6,14 +6,13 @@
 //! Units: as the channels state.
 //! Reference: specification `flight.md`, "The loop on flights".
 
-use super::page::three;
+use super::page::{three, word};
 use crate::Failure;
 use crate::progress::Bar;
 use ident::flight::{Closed, close};
 use ident::import::flight;
 use ident::log::{Column, Log, write_whole};
 use ident::report::{Figure, write_figures};
-use ident::verdict::Kind;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -116,15 +115,6 @@ fn halves(name: &str, log: &Log) -> Vec<(String, Log, Vec<Log>)> {
     };
     let (a, b) = (part("first", 0..middle), part("second", middle..log.len()));
     vec![(a.name.clone(), a.clone(), vec![b.clone()]), (b.name.clone(), b, vec![a])]
-}
-
-fn word(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Attributed => "attributed",
-        Kind::Unattributed => "unattributed",
-        Kind::None => "none",
-        Kind::Ambiguous => "ambiguous",
-    }
 }
 
 /// Channels of the tables, and their order.

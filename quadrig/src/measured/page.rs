@@ -31,7 +31,8 @@ pub(crate) fn three(v: f64) -> String {
     if !(-4..5).contains(&magnitude) { format!("{v:.2e}") } else { format!("{v:.*}", (2 - magnitude).max(0) as usize) }
 }
 
-fn word(kind: Kind) -> &'static str {
+/// A verdict in a word.
+pub(crate) fn word(kind: Kind) -> &'static str {
     match kind {
         Kind::Attributed => "attributed",
         Kind::Unattributed => "unattributed",
@@ -63,7 +64,7 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     for o in outcomes {
         let _ = writeln!(out, "{}", summary(o));
     }
-    out.push_str("\nA cause holds on another run where the model that was corrected on the first predicts the other, as it stands but for one constant a channel, at least 2 % better on a channel that the effect touches than the same model refitted without it; one that the readings show by themselves (a grid that they lie on), which predicts nothing better, where the other run's show it too: these are counted apart. An ambiguous verdict stands for what its hypotheses share, those that are a tenth as probable as the first included; what they differ by is left open, and counted apart.\n");
+    out.push_str("\nA cause holds on another run where the model corrected on the first predicts it better than the same model refitted without the cause: by 2 % or more, on a channel that the effect touches, one constant a channel apart. A cause that the readings show by themselves (a grid that they lie on) predicts nothing better. It holds where the other run's readings show it too, and is counted apart. An ambiguous verdict stands for what its hypotheses share, those that are a tenth as probable as the first included; what they differ by is left open, and counted apart.\n");
     out.push_str(&super::table::index(outcomes));
     let absent: Vec<&str> = SETS
         .iter()

@@ -5,18 +5,14 @@
 //! Units: sizes in noise floors.
 //! Reference: specification `closing-the-loop.md`, "What counts as proof".
 
-use indicatif::{ProgressBar, ProgressStyle};
+use quadrig_tests::blind::resume::{known, resumed};
 use quadrig_tests::blind::scenario::{CLEAN, Hidden, Scenario};
-use quadrig_tests::blind::score::{HEADER, Line, score};
+use quadrig_tests::blind::score::{Line, score};
 use quadrig_tests::blind::{messy, simulated, tally, write};
 use quadrig_tests::flights;
-use std::collections::BTreeSet;
-use std::fs::{self, OpenOptions};
-use std::io::{IsTerminal, Write};
+use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated | --messy | --flights] [--failures] [--table] | blind --dump SEED DIR [--simulated | --messy | --flights] | blind --plan N";
 
@@ -180,50 +176,15 @@ fn seeds(o: &Options) -> Vec<u64> {
 }
 
 fn campaign(o: &Options) -> Result<(), String> {
-    let fault = |e: std::io::Error| format!("{}: {e}", o.out.display());
-    let known = if o.out.exists() { fs::read_to_string(&o.out).map_err(fault)? } else { String::new() };
-    let mut lines: Vec<Line> = known.lines().filter_map(Line::parse).collect();
-    let done: BTreeSet<u64> = lines.iter().map(|l| l.seed).collect();
     let wanted = seeds(o);
-    let left: Vec<u64> = wanted.iter().copied().filter(|s| !done.contains(s)).collect();
     if o.table {
         // what an interrupted campaign has so far
-        lines.retain(|l| wanted.contains(&l.seed));
+        let lines: Vec<Line> = known(&o.out, &wanted)?;
         println!("{} of {} runs\n\n{}", lines.len(), wanted.len(), tally::markdown(&lines));
         return Ok(());
     }
-    let mut file = OpenOptions::new().create(true).append(true).open(&o.out).map_err(fault)?;
-    if known.is_empty() {
-        writeln!(file, "{HEADER}").map_err(fault)?;
-    } else if !known.ends_with('\n') {
-        writeln!(file).map_err(fault)?;
-    }
-    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(wanted.len() as u64) } else { ProgressBar::hidden() };
-    bar.set_style(
-        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} left").map_err(|e| e.to_string())?,
-    );
-    bar.set_position((wanted.len() - left.len()) as u64);
-    std::panic::set_hook(Box::new(|_| {})); // a panic of the tool is a figure of the campaign
-    let (next, sink) = (AtomicUsize::new(0), Mutex::new((file, Vec::new())));
-    std::thread::scope(|scope| {
-        for _ in 0..o.threads {
-            scope.spawn(|| {
-                while let Some(seed) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let line = if o.simulated { simulated::score(*seed) } else { score(*seed) };
-                    let Ok(mut sink) = sink.lock() else { return };
-                    let _ = writeln!(sink.0, "{}", line.csv()).and_then(|()| sink.0.flush());
-                    sink.1.push(line);
-                    bar.inc(1);
-                }
-            });
-        }
-    });
-    bar.finish_and_clear();
-    let (_, fresh) = sink.into_inner().map_err(|e| e.to_string())?;
-    lines.extend(fresh);
-    let asked: BTreeSet<u64> = wanted.into_iter().collect();
-    lines.retain(|l| asked.contains(&l.seed));
-    lines.sort_by_key(|l| l.seed);
+    let ask = |seed: u64| if o.simulated { simulated::score(seed) } else { score(seed) };
+    let lines = resumed(&o.out, &wanted, o.threads, ask)?;
     println!("{}", tally::markdown(&lines));
     if o.failures {
         println!("{}", tally::failures(&lines));
@@ -233,41 +194,9 @@ fn campaign(o: &Options) -> Result<(), String> {
 
 /// Messy rigs: every seed of a half has one, clean ones among them.
 fn messy_campaign(o: &Options) -> Result<(), String> {
-    let fault = |e: std::io::Error| format!("{}: {e}", o.out.display());
     let first = o.from / 2 * 2 + u64::from(o.odd);
     let wanted: Vec<u64> = if o.seeds.is_empty() { (0..o.runs as u64).map(|k| first + 2 * k).collect() } else { o.seeds.clone() };
-    let known = if o.out.exists() { fs::read_to_string(&o.out).map_err(fault)? } else { String::new() };
-    let mut lines: Vec<messy::score::Line> = known.lines().filter_map(messy::score::Line::parse).collect();
-    lines.retain(|l| wanted.contains(&l.seed));
-    let left: Vec<u64> = wanted.iter().copied().filter(|s| !lines.iter().any(|l| l.seed == *s)).collect();
-    if !o.table {
-        let mut file = OpenOptions::new().create(true).append(true).open(&o.out).map_err(fault)?;
-        if known.is_empty() {
-            writeln!(file, "{}", messy::score::HEADER).map_err(fault)?;
-        } else if !known.ends_with('\n') {
-            writeln!(file).map_err(fault)?;
-        }
-        let bar = if std::io::stderr().is_terminal() { ProgressBar::new(wanted.len() as u64) } else { ProgressBar::hidden() };
-        bar.set_position((wanted.len() - left.len()) as u64);
-        std::panic::set_hook(Box::new(|_| {})); // a panic of the tool is a figure of the campaign
-        let (next, sink) = (AtomicUsize::new(0), Mutex::new((file, Vec::new())));
-        std::thread::scope(|scope| {
-            for _ in 0..o.threads {
-                scope.spawn(|| {
-                    while let Some(seed) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let line = messy::score::score(*seed);
-                        let Ok(mut sink) = sink.lock() else { return };
-                        let _ = writeln!(sink.0, "{}", line.csv()).and_then(|()| sink.0.flush());
-                        sink.1.push(line);
-                        bar.inc(1);
-                    }
-                });
-            }
-        });
-        bar.finish_and_clear();
-        lines.extend(sink.into_inner().map_err(|e| e.to_string())?.1);
-    }
-    lines.sort_by_key(|l| l.seed);
+    let lines = if o.table { known(&o.out, &wanted)? } else { resumed(&o.out, &wanted, o.threads, messy::score::score)? };
     println!("{} of {} runs\n\n{}", lines.len(), wanted.len(), messy::tally::markdown(&lines));
     if o.failures {
         println!("{}", messy::tally::failures(&lines));

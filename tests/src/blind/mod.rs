@@ -9,6 +9,7 @@ pub mod chance;
 pub mod effect;
 pub mod fit;
 pub mod messy;
+pub mod resume;
 pub mod rig;
 pub mod run;
 pub mod scenario;

@@ -61,6 +61,8 @@ pub struct Line {
     pub seconds: f64,
 }
 
+crate::blind::resume::is_line!(Line, HEADER);
+
 impl Line {
     /// A run of which nothing is known yet.
     #[must_use]

@@ -6,14 +6,11 @@
 //! Reference: specification `flight.md`, "The loop on flights".
 
 use super::scenario::{CLEAN, Scenario, hidden};
-use super::score::{HEADER, Line, score};
+use super::score::{Line, score};
 use super::tally;
-use indicatif::ProgressBar;
-use std::fs::{self, OpenOptions};
-use std::io::{IsTerminal, Write};
+use crate::blind::resume::{known, resumed};
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -56,39 +53,8 @@ fn seeds(a: &Asked) -> Vec<u64> {
 /// # Errors
 /// A file that cannot be read or written.
 pub fn run(a: &Asked) -> Result<(), String> {
-    let fault = |e: std::io::Error| format!("{}: {e}", a.out.display());
     let wanted = seeds(a);
-    let known = if a.out.exists() { fs::read_to_string(&a.out).map_err(fault)? } else { String::new() };
-    let mut lines: Vec<Line> = known.lines().filter_map(Line::parse).collect();
-    lines.retain(|l| wanted.contains(&l.seed));
-    if !a.table {
-        let left: Vec<u64> = wanted.iter().copied().filter(|s| !lines.iter().any(|l| l.seed == *s)).collect();
-        let mut file = OpenOptions::new().create(true).append(true).open(&a.out).map_err(fault)?;
-        if known.is_empty() {
-            writeln!(file, "{HEADER}").map_err(fault)?;
-        } else if !known.ends_with('\n') {
-            writeln!(file).map_err(fault)?;
-        }
-        let bar = if std::io::stderr().is_terminal() { ProgressBar::new(left.len() as u64) } else { ProgressBar::hidden() };
-        std::panic::set_hook(Box::new(|_| {})); // a panic of the tool is a figure of the campaign
-        let (next, sink) = (AtomicUsize::new(0), Mutex::new((file, Vec::new())));
-        std::thread::scope(|scope| {
-            for _ in 0..a.threads {
-                scope.spawn(|| {
-                    while let Some(seed) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let line = score(*seed);
-                        let Ok(mut sink) = sink.lock() else { return };
-                        let _ = writeln!(sink.0, "{}", line.csv()).and_then(|()| sink.0.flush());
-                        sink.1.push(line);
-                        bar.inc(1);
-                    }
-                });
-            }
-        });
-        bar.finish_and_clear();
-        lines.extend(sink.into_inner().map_err(|e| e.to_string())?.1);
-    }
-    lines.sort_by_key(|l| l.seed);
+    let lines: Vec<Line> = if a.table { known(&a.out, &wanted)? } else { resumed(&a.out, &wanted, a.threads, score)? };
     println!("{} of {} trials\n\n{}", lines.len(), wanted.len(), tally::markdown(&lines));
     if a.failures {
         println!("{}", tally::failures(&lines));

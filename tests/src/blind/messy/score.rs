@@ -53,6 +53,8 @@ pub struct Line {
     pub seconds: f64,
 }
 
+crate::blind::resume::is_line!(Line, HEADER);
+
 impl Line {
     /// As a line of the file.
     #[must_use]
