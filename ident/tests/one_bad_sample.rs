@@ -172,15 +172,21 @@ fn in_a_simulated_run() {
     assert!(faults.is_empty(), "{} faults\n{}", faults.len(), faults.join("\n"));
 }
 
+/// A folder of the recorded data; nothing, and a word about it, on a desk without them.
+fn recorded(folder: &str) -> Option<PathBuf> {
+    let shared = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let folder = std::env::var_os("QUADRIG_DATA").map_or_else(shared, PathBuf::from).join(folder);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    assert!(std::env::var_os("CI").is_none(), "no recorded data at {}", folder.display());
+    println!("SKIPPED: no recorded data at {} (QUADRIG_DATA names the folder)", folder.display());
+    None
+}
+
 #[test]
 fn in_recorded_runs() {
-    let shared = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let folder = std::env::var_os("QUADRIG_DATA").map_or_else(shared, PathBuf::from).join("rig");
-    if !folder.is_dir() {
-        assert!(std::env::var_os("CI").is_none(), "no recorded data at {}", folder.display());
-        println!("SKIPPED: no recorded data at {} (QUADRIG_DATA names the folder)", folder.display());
-        return;
-    }
+    let Some(folder) = recorded("rig") else { return };
     let mut faults = Vec::new();
     for (file, cases) in
         [("lever-rig-10x45/tidy/robbe12.2.csv", 3), ("stand1585-micro/tidy/TimeConstant_Test_2023-12-17_162234.csv", 0)]
@@ -190,4 +196,27 @@ fn in_recorded_runs() {
         faults.extend(ask(file, &log, &channels, (cases, 150), 2));
     }
     assert!(faults.is_empty(), "{} faults\n{}", faults.len(), faults.join("\n"));
+}
+
+/// A departure that a witness cannot tell while the command steps is none: what every probe reads, the rotor did.
+#[test]
+fn what_all_speed_probes_read_is_kept() {
+    let Some(folder) = recorded("blind-sample") else { return };
+    let mut asked = 0;
+    for file in std::fs::read_dir(folder).expect("a folder").map(|f| f.expect("a file").path()) {
+        if file.extension().is_none_or(|e| e != "csv") {
+            continue;
+        }
+        let (log, _) = import(&file, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let probes: Vec<&str> = ["rpm_beam", "rpm_opto", "rpm_hall"].into_iter().filter(|c| log.column(c).is_some()).collect();
+        if probes.len() < 2 {
+            continue;
+        }
+        asked += 1;
+        let aside = bad::found(&log);
+        let on = |probe: &str, row: usize| aside.iter().any(|a| a.channel == probe && a.span().contains(&row));
+        let everywhere = (0..log.len()).find(|row| probes.iter().all(|p| on(p, *row)));
+        assert_eq!(everywhere, None, "{}: {aside:?}", file.display());
+    }
+    assert!(asked >= 10, "{asked} logs with several probes");
 }

@@ -21,3 +21,15 @@ pub fn judge_tick(board: &str, key: &str, measured: f64, available: f64) {
     assert!(measured <= budget, "{board}, {key}: {measured:.1} instructions a tick exceed the {budget} of budgets/tick.toml");
     assert!(measured > 0.7 * budget, "{board}, {key}: the budget {budget} is slack, write {measured:.0} plus 2 %");
 }
+
+/// An upper limit of the rig board at run time: `key` of `budgets/rig.toml`.
+///
+/// # Panics
+/// When it is not there or no whole number.
+#[must_use]
+pub fn rig(key: &str) -> u32 {
+    let text = include_str!("../../budgets/rig.toml");
+    let table: toml::Table = text.parse().unwrap_or_else(|e| panic!("budgets/rig.toml: {e}"));
+    let limit = table.get(key).and_then(toml::Value::as_integer).and_then(|v| u32::try_from(v).ok());
+    limit.unwrap_or_else(|| panic!("budgets/rig.toml: {key} is not a whole number"))
+}

@@ -8,6 +8,7 @@ use hal_sim::Scenario;
 use hal_sim::emulated::operator::ArmAndRun;
 use hal_sim::emulated::rig::{Action, Heard, Operator, RigRun, rig};
 use hal_sim::fault::{Mishap, REACTION_MS};
+use quadrig_tests::budget;
 
 /// Level of every run.
 const PULSE_US: u32 = 1450;
@@ -194,20 +195,15 @@ fn stack_cycles_and_jitter_stay_within_their_budgets() {
         run.messages.iter().filter_map(|(_, m)| if let Message::Health(h) = m { Some(*h) } else { None }).collect();
     let last = reports.last().expect("health reports");
     println!("{last:?}");
-    let text = std::fs::read_to_string(quadrig_tests::root().join("budgets/rig.toml")).expect("budgets/rig.toml");
-    let number = |key: &str| -> u32 {
-        let line = text.lines().find(|l| l.starts_with(&format!("{key} ="))).unwrap_or_else(|| panic!("no {key}"));
-        line.split('=').nth(1).and_then(|v| v.trim().parse().ok()).unwrap_or_else(|| panic!("{line}"))
-    };
     let used = last.stack_size - last.stack_free;
     println!(
         "tick {} cycles, capture {} cycles, stack {used} of {} bytes",
         last.tick_cycles, last.capture_cycles, last.stack_size
     );
     assert!(used > 100 && last.stack_free > 0, "measured at all: {last:?}");
-    assert!(last.tick_cycles > 1000 && last.tick_cycles <= number("tick_cycles"), "tick: {last:?}");
-    assert!(last.capture_cycles > 10 && last.capture_cycles <= number("capture_cycles"), "capture: {last:?}");
-    assert!(used <= number("stack_bytes"), "stack: {used}");
+    assert!(last.tick_cycles > 1000 && last.tick_cycles <= budget::rig("tick_cycles"), "tick: {last:?}");
+    assert!(last.capture_cycles > 10 && last.capture_cycles <= budget::rig("capture_cycles"), "capture: {last:?}");
+    assert!(used <= budget::rig("stack_bytes"), "stack: {used}");
     for report in &reports[1..] {
         let [low, high] = report.tick_span.map(|ticks| f64::from(ticks) / 84_000.0);
         assert!(low > 0.97 && high < 1.03, "ticks {low} to {high} ms apart");

@@ -180,16 +180,16 @@ impl Judge<'_> {
             return None;
         }
         let usual = ABLE * witness.usual.max(self.step);
-        let (mut worst, mut depth, mut back, mut end) = (row, first, 0, row + 1);
+        let (mut worst, mut depth, mut back, mut end) = (tells, first, 0, row + 1);
         for i in row..self.read.len() {
             if !self.read[i].is_finite() {
                 continue;
             }
-            let off = self.low(witness, i).0;
-            if off > depth {
+            let (off, sd) = (self.low(witness, i).0, self.sd(witness, i));
+            // where the command steps a witness is off by the step itself, and knows it
+            if off > depth && off > BACK * sd {
                 (worst, depth) = (i, off);
             }
-            let sd = self.sd(witness, i);
             // on its way the rotor hides whether the probe is back
             if BACK * sd > (BACK * usual).max(RECOVERED * depth) {
                 continue;
