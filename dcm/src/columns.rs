@@ -70,7 +70,7 @@ pub(crate) fn least(a: f32, b: f32) -> f32 {
 
 /// Cuts every component to `most` on both sides of zero; says whether one was there or beyond.
 #[inline(never)]
-pub(crate) fn cut<const N: usize>(v: &mut [f32; N], most: f32) -> bool {
+pub(crate) fn cut(v: &mut [f32], most: f32) -> bool {
     let mut reached = false;
     for x in v {
         if x.abs() >= most {

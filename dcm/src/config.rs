@@ -3,8 +3,8 @@
 //! What it is: time constants, thresholds and ranges, each with its unit and, where it is a filter, its cut-off.
 //! What can go wrong: constants per sample would change their meaning with the sample rate; these are all in seconds.
 //! Units: s, rad, rad/s, m/s^2, uT.
-//! Reference: what half of the shared BROAD trials picks, reported on the other half (`docs/ahrs-constants.md`); the thresholds of
-//! rest and of the field are those of Laidig & Seel 2023.
+//! Reference: what both sets of recordings say of each number stands in `docs/ahrs-constants.md`; the thresholds of rest and of the
+//! field are those of Laidig & Seel 2023.
 
 use crate::STANDARD_GRAVITY;
 use core::borrow::Borrow;

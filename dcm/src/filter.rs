@@ -210,10 +210,17 @@ fn taken(reading: &mut Column, shortest: f32, range: f32, step: &mut Step) -> bo
     let square = square(reading);
     // a square may overflow; zero times what is not finite is none
     let good = square >= shortest && (square < f32::MAX || dot(reading, &ZERO) == 0.0);
-    let over = good && cut(reading, range);
-    step.bad_input |= !good;
+    if !good {
+        step.bad_input = true;
+        return false;
+    }
+    // a length within the range has no component beyond
+    if square < range * range {
+        return true;
+    }
+    let over = cut(reading, range);
     step.overrange |= over;
-    good && !over
+    !over
 }
 
 impl<C> Words for Dcm<C> {

@@ -103,10 +103,10 @@ impl Field {
         self.candidate_time = 0.0;
     }
 
-    /// Takes a field that stands for `dt` seconds; `turning` says that the body turns fast. Says whether it is the first
-    /// one that has held for long enough to become the reference.
+    /// Takes a field that stands for `dt` seconds; `turning` says that the body turns fast, `magnet` that a magnet was there. Says whether
+    /// this field has held for long enough to become the reference, and the heading so far may be another one's.
     #[inline]
-    pub(super) fn take(&mut self, config: &FieldConfig, shape: &Shape, dt: f32, turning: bool) -> bool {
+    pub(super) fn take(&mut self, config: &FieldConfig, shape: &Shape, dt: f32, turning: bool, magnet: bool) -> bool {
         let smooth = if self.now.level > 0.0 { dt / (dt + config.smoothing) } else { 1.0 };
         self.now.follow(shape, smooth);
         let slow = dt / config.reference_tau;
@@ -136,7 +136,7 @@ impl Field {
             self.reference = self.candidate;
             self.good_time = config.settle;
         }
-        taken && first
+        taken && (magnet || !first)
     }
 
     /// Factor on the heading correction: 1 believed, 0 frozen, less than 1 after a long time of freezing. `hold` allows to freeze

@@ -62,9 +62,9 @@ impl<C: Borrow<Config>> Dcm<C> {
         let level = root(x * x + y * y);
         let spin = plus(self.rest.rate.value(), &self.bias.value, -1.0);
         let turning = square(&spin) > config.field.new_rate * config.field.new_rate;
-        let first = self.field.take(&config.field, &Shape { level, down: *down }, dt, turning);
-        if first && self.magnet {
-            self.heading_age = 0.0; // the heading so far may be the magnet's
+        let other = self.field.take(&config.field, &Shape { level, down: *down }, dt, turning, self.magnet);
+        if other {
+            self.iron.clear(); // what differs between two places is not on the sensor
         }
         // nothing at all, where readings cancel, has no heading either
         if level <= LEAST_LEVEL * down.abs() {
@@ -72,15 +72,18 @@ impl<C: Borrow<Config>> Dcm<C> {
         }
         let error = wrapped(config.declination, angle(*y, *x, level));
         self.heading_error = error;
+        // the heading so far may be that of a magnet: the further off, the less of it is kept
+        let doubt = if other { least(error.abs() * (0.5 / config.field.dip), 1.0) } else { 0.0 };
         if !self.rest.now && learns {
             self.bias.take_heading(&config.bias, error, dt);
         }
-        self.heading_age = least(self.heading_age + dt, config.heading_tau);
+        self.heading_age = least(self.heading_age * (1.0 - doubt) + dt, config.heading_tau);
         // an unknown bias does more harm than an unknown field, and the first seconds are the average that the heading starts from
         let hold = self.bias.trusted(&config.bias) && self.heading_age >= config.heading_tau;
         let belief = self.field.belief(&config.field, dt, hold);
         let gain = least(dt / self.heading_age, 1.0);
-        if belief > 0.0 {
+        // a gyro at rest, whose offset is seen, holds the heading better than a field that differs from the one that is known
+        if belief > 0.0 && !(self.rest.now && belief < 1.0 && self.field.known()) {
             self.turn_earth(&[0.0, 0.0, error * gain * belief]);
             step.mag_used = true;
         }

@@ -34,7 +34,7 @@ pub struct Flags {
     pub heading_absolute: bool,
     /// A field to compare with is known.
     pub field_known: bool,
-    /// The field differs from it; the heading is frozen, or follows at half gain after a minute.
+    /// The field differs from it; the heading is frozen, or follows at half gain after a minute while the body moves.
     pub field_disturbed: bool,
     /// Rest or motion has shown the gyro bias.
     pub bias_trusted: bool,

@@ -65,7 +65,6 @@ impl Rest {
         }
         self.quiet += dt;
         if self.quiet >= config.time {
-            self.quiet = config.time;
             self.now = true;
         }
     }

@@ -15,6 +15,7 @@ type Off = (&'static str, &'static str, fn(&mut Config));
 
 /// Each mechanism.
 const MECHANISMS: &[Off] = &[
+    ("force is averaged in earth axes", "`tilt_tau` 0.3 s", |c| c.tilt_tau = 0.3),
     ("averaging of the force stretches with true acceleration", "`tilt_stretch` 0", |c| c.tilt_stretch = 0.0),
     ("the stretch shrinks at high rates", "`tilt_rate` without bound", |c| c.tilt_rate = 1e6),
     ("force is summed for 30 ms before it is used", "`tilt_window` 0", |c| c.tilt_window = 0.0),
@@ -23,7 +24,9 @@ const MECHANISMS: &[Off] = &[
     ("... faster while it is unknown", "`bias.tilt_boost` 0", |c| c.bias.tilt_boost = 0.0),
     ("bias is learnt from the heading while moving", "`bias.heading_gain` 0", |c| c.bias.heading_gain = 0.0),
     ("... faster while it is unknown", "`bias.heading_boost` 0", |c| c.bias.heading_boost = 0.0),
+    ("motion makes the bias known", "`bias.motion_tau` without end", |c| c.bias.motion_tau = 1e9),
     ("corrections are seen through an averaged attitude", "`bias.lag` 0.02 s", |c| c.bias.lag = 0.02),
+    ("the heading is averaged", "`heading_tau` 0.1 s", |c| c.heading_tau = 0.1),
     ("fields are averaged for 35 ms before they are used", "`field.window` 0", |c| c.field.window = 0.0),
     ("a field that differs is refused", "`field.norm`, `field.dip` without bound", |c| {
         c.field.norm = 1e9;
@@ -31,6 +34,7 @@ const MECHANISMS: &[Off] = &[
     }),
     ("... by its dip too", "`field.dip` without bound", |c| c.field.dip = 10.0),
     ("a field that no place has is a magnet's", "`field.strongest` without bound", |c| c.field.strongest = 1e9),
+    ("a field is believed again after a while", "`field.settle` 0", |c| c.field.settle = 0.0),
     ("a new field is taken after a while", "`field.new_time` without end", |c| c.field.new_time = 1e9),
     ("a freeze ends", "`field.longest_freeze` without end", |c| c.field.longest_freeze = 1e9),
     ("hard iron is taken off", "`iron.dead_zone` without bound", |c| c.iron.dead_zone = 1e9),

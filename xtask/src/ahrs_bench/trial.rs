@@ -1,6 +1,6 @@
 //! Recorded trials.
 //!
-//! What it is: reads `broad/*.csv.gz` and `peers-shared.csv`.
+//! What it is: reads `broad/*.csv.gz`.
 //! What can go wrong: a missing folder, a damaged file, a number that is none: one line with file, line and column.
 //! Units: s, rad/s, m/s^2, uT.
 //! Reference: README of the data; BROAD, Laidig et al., Data 6(7):72, 2021, CC BY 4.0.
@@ -76,17 +76,4 @@ fn trial(path: &Path) -> Result<Trial, Failure> {
         .collect();
     let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default().trim_end_matches(".csv.gz").to_owned();
     Ok(Trial { name, samples: samples? })
-}
-
-/// Mean errors of another filter on a variant, degrees: total, heading, inclination.
-pub(crate) fn peer(file: &Path, variant: &str, algorithm: &str, tuning: &str) -> Result<Vec<(String, [f64; 3])>, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|e| Failure(format!("{}: {e}", file.display())))?;
-    let rows = text.lines().skip(1).filter_map(|line| {
-        let f: Vec<&str> = line.split(',').collect();
-        let &[v, trial, a, t, .., total, heading, inclination] = f.as_slice() else { return None };
-        let mine = v == variant && a == algorithm && t == tuning;
-        let numbers = [total.parse().ok()?, heading.parse().ok()?, inclination.parse().ok()?];
-        mine.then(|| (trial.to_owned(), numbers))
-    });
-    Ok(rows.collect())
 }
