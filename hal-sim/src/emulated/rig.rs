@@ -104,6 +104,7 @@ pub enum Action {
 }
 
 /// What an operator learns in a millisecond.
+#[allow(clippy::large_enum_variant, reason = "looked at and dropped within the millisecond, never stored in numbers")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Heard {
     /// The board sent a message.
