@@ -4,7 +4,7 @@
 //! reduce their argument in double precision, which costs this processor 8 KB.
 //! What can go wrong: beyond about a thousand radians the reduction loses digits; what is not finite gives what is not.
 //! Units: rad.
-//! Reference: Cephes `sinf`, `cosf` (Moshier), coefficients and two-part reduction; Abramowitz & Stegun 4.4.49 for the angle.
+//! Reference: Cephes `sinf`, `cosf` (Moshier), coefficients and two-part reduction; Abramowitz & Stegun 4.4.47 for the angle.
 
 use crate::rotation::inverse_sqrt;
 

@@ -154,6 +154,25 @@ fn a_strong_magnet_is_refused_and_forgotten() {
     assert!(like_a_place < 20, "{like_a_place} of them cannot be told from a place");
 }
 
+/// A body that has not moved since the start knows no field to compare with. The one that it started in was turned by 30 degrees for half a
+/// minute: when it is gone, the heading comes to the one that stays.
+#[test]
+fn a_body_that_has_only_rested_follows_the_field() {
+    let (mut dcm, mut body) = (Dcm::new(Config::default()), Body::new([0.004, -0.006, 0.005]));
+    let (east, north) = 30f32.to_radians().sin_cos();
+    let turned = Vec3::new(FIELD[0] * north, FIELD[0] * east, FIELD[2]) - Vec3::from(FIELD);
+    let mut rest = |seconds: f32, field: Vec3| {
+        (0..(seconds / DT) as u32).for_each(|_| {
+            dcm.update(DT, &body.step(false, field));
+        });
+        between(dcm.matrix(), &body.truth)
+    };
+    let before = rest(30.0, turned);
+    assert!(before > 25.0, "{before:.1} degrees off: the first field does not count in this test");
+    let after = rest(180.0, Vec3::zeros());
+    assert!(after < 2.0, "{after:.1} degrees off");
+}
+
 /// In motion beside a magnet whose field and the Earth's together look like a place's: it becomes the reference. Away from it the Earth's
 /// is one again and the heading is set anew.
 #[test]

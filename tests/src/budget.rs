@@ -1,8 +1,8 @@
-//! Instructions a tick against `budgets/tick.toml`.
+//! What the boards may take at run time: `budgets/tick.toml` and `budgets/rig.toml`.
 //!
-//! What it is: the comparison that the emulated boards' tests share, with both numbers printed.
-//! What can go wrong: a budget that is far above the figure hides growth, and is refused like one that is exceeded.
-//! Units: instructions.
+//! What it is: the comparison of instructions that the emulated boards' tests share, with both numbers printed, and the rig board's limits.
+//! What can go wrong: a budget of instructions that is far above the figure hides growth, and is refused like one that is exceeded.
+//! Units: instructions; cycles and bytes as `budgets/rig.toml` says.
 //! Reference: house rule 8.
 
 /// Compares what was `measured` with the budget `key` of `[board]`; `available` is what the tick has.

@@ -9,6 +9,7 @@
 use quadrig_tests::{call, quadrig};
 use serde_json::Value;
 use std::path::Path;
+use std::sync::{PoisonError, RwLock};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -19,11 +20,28 @@ const SEEDS: [&str; 2] = ["1001", "1002"];
 /// Longest that the demonstration may take.
 const MOST: Duration = Duration::from_secs(20);
 
+/// Read by a demonstration in company, written by one alone.
+static COMPANY: RwLock<()> = RwLock::new(());
+
 fn demo(folder: &Path, words: &[&str]) -> String {
     let _built = quadrig(); // no part of the time
-    let begun = Instant::now();
-    let out = call(folder, &[&["demo", "-o", "out"], words].concat()).succeeded().out;
-    assert!(begun.elapsed() < MOST, "{words:?} took {:?}", begun.elapsed());
+    let timed = || {
+        let begun = Instant::now();
+        let out = call(folder, &[&["demo", "-o", "out"], words].concat()).succeeded().out;
+        (out, begun.elapsed())
+    };
+    let in_company = || {
+        let _others = COMPANY.read().unwrap_or_else(PoisonError::into_inner);
+        timed()
+    };
+    let (out, took) = in_company();
+    if took < MOST {
+        return out;
+    }
+    // the limit is that of a demonstration with the machine to itself
+    let _alone = COMPANY.write().unwrap_or_else(PoisonError::into_inner);
+    let (out, took) = timed();
+    assert!(took < MOST, "{words:?} took {took:?}");
     out
 }
 

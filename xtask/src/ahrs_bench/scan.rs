@@ -76,9 +76,9 @@ fn head(shipped: &Errors) -> String {
 
 Written by `cargo xtask ahrs-bench --scan > docs/ahrs-constants.md`, which fails when the rule picks another value.
 
-**The rule.** Six errors count alike: total and inclination, mean over the shared BROAD trials in the eight variants of which VQF's figures
-are published, over the shared trials of the phones with the gyro's bias of the day taken off beforehand, and over the same with it left in. Each constant is replaced by round values
-around it while the others stay. It stays as it is unless the mean of the six errors falls by more than {:.0} % with another value, and none
+**The rule.** Six errors count alike: total and inclination of three sets. The first are the shared BROAD trials in the eight variants of which
+VQF's figures are published. The second are the shared trials of the phones, the gyro's bias of the day taken off beforehand; the third
+are the same with it left in. Each constant is replaced by round values around it while the others stay. It stays as it is unless the mean of the six errors falls by more than {:.0} % with another value, and none
 of the six rises by more than that.
 
 With the default: BROAD {:.3} degrees in total and {:.3} of inclination, phones {:.3} and {:.3}, with the bias {:.3} and {:.3}.
