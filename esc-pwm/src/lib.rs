@@ -1,6 +1,6 @@
 //! From a command to an ESC pulse that is always safe.
 //!
-//! What it is: exact pulse arithmetic ([`timer`]), the arming machine as a table ([`arming`]), throttle schedules as
+//! What it is: exact pulse arithmetic ([`timer`]) and the same throttle as DShot frames ([`dshot`]), the arming machine as a table ([`arming`]), throttle schedules as
 //! pure functions of elapsed time ([`schedule`]) or segments of a host ([`track`]), and the limits that bring the throttle to minimum ([`protection`]).
 //!
 //! What can go wrong: a timer clock that cannot divide the 20 ms period exactly is refused at construction; every
@@ -17,12 +17,14 @@
 extern crate std;
 
 pub mod arming;
+pub mod dshot;
 pub mod protection;
 pub mod schedule;
 pub mod timer;
 pub mod track;
 
 pub use arming::{ArmingEvent, ArmingTimes, Objections, Step, Transition, pulse_for, step, time_out};
+pub use dshot::{EscOutput, FrameTimer, Throttle};
 pub use protection::{Bounds, Limits, Protection, Readings};
 pub use schedule::{Chirp, Schedule, Slew, Staircase, ThrottleCurve};
 pub use timer::{PulseTimer, TimerError};
