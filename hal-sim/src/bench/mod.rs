@@ -1,6 +1,6 @@
 //! The bench: ESC, powerplant, beam and sensors on one clock.
 //!
-//! What it is: the rig as its board meets it. Pulses go in with the time of their end; edges, pin voltages and beeps come out.
+//! What it is: the rig as its board meets it. Pulses or frames go in with the time of their end; edges, pin voltages and beeps come out.
 //! The native run takes it a millisecond at a time ([`Bench::millisecond`]); an emulated board takes it to any instant
 //! ([`Bench::advance_to`]) and asks for edges and voltages.
 //! What can go wrong: nothing here fails; a powerplant that gives a NaN or a negative speed is taken as a resting rotor.
@@ -210,6 +210,11 @@ impl Bench {
     /// A pulse of `width_ns` on the ESC pin ended at `at_ns`.
     pub fn pulse(&mut self, at_ns: u64, width_ns: u32) {
         self.esc.pulse(at_ns, width_ns);
+    }
+
+    /// A DShot frame of 16 bits on the ESC pin ended at `at_ns`.
+    pub fn frame(&mut self, at_ns: u64, word: u16) {
+        self.esc.frame(at_ns, word);
     }
 
     /// Integrates until [`Bench::horizon_ns`] is at least `at_ns`. The look-ahead is less than one step of 0.1 ms.

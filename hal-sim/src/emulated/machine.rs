@@ -9,10 +9,11 @@
 use super::converter::ADC_UNITS;
 use super::crystal::Quartz;
 use super::flash::ProgrammableFlash;
-use super::part::Part;
+use super::part::{PULSE_TIMER, Part};
+use super::pulse::SeenFrame;
 use rigless::{
     chip::{Timeline, uart},
-    device::{Device, Level},
+    device::{Device, Level, RegisterFile},
     emulator::{self, Driver, Host, Settled, Start, Stop},
     image::Image,
     machine::{Board, Target, armv7m},
@@ -24,7 +25,10 @@ use rigless::{
         stm32f427::{
             Stm32f427,
             generated::tim2::Register as TimerRegister,
-            peripherals::gpio::{Gpio, Pin},
+            peripherals::{
+                gpio::{Gpio, Pin},
+                tim::{General, Tim},
+            },
         },
     },
     time::VirtualNanos,
@@ -258,7 +262,9 @@ impl Pins<'_> {
     /// Drives the input of a timer channel (1 to 4). The emulator does not connect pins and timers: ask [`Pins::alternate`].
     pub fn drive_timer(&mut self, timer: GeneralTimer, channel: u8, high: bool) {
         if let Some(channel) = TimerChannel::new(channel) {
-            self.machine.mcu.chip.drive_timer(self.at, timer as usize, |timer, registers, context| {
+            let Part { chip, pulse, .. } = &mut self.machine.mcu;
+            chip.drive_timer(self.at, timer as usize, |own, registers, context| {
+                let timer = if timer as usize == PULSE_TIMER { &mut pulse.inner } else { own };
                 timer.drive_input(channel, level(high), registers, context);
             });
         }
@@ -273,16 +279,29 @@ impl Pins<'_> {
         });
     }
 
+    /// A timer with its registers.
+    fn timer(&mut self, timer: GeneralTimer) -> (&Tim<General>, &RegisterFile) {
+        let Part { chip, pulse, .. } = &mut self.machine.mcu;
+        let (own, registers) = chip.timer(timer as usize);
+        (if timer as usize == PULSE_TIMER { &pulse.inner } else { own }, registers)
+    }
+
+    /// What TIM3 channel 1 carried and has ended since the last call, other than pulses of 1 to 2 ms.
+    pub fn frames(&mut self) -> Vec<SeenFrame> {
+        self.machine.mcu.pulse.frames(self.at)
+    }
+
     /// What a timer's counter reads now.
     pub fn counter(&mut self, timer: GeneralTimer) -> u32 {
-        let (timer, registers) = self.machine.mcu.chip.timer(timer as usize);
-        Device::peek(timer, TimerRegister::Cnt, registers, self.at).unwrap_or_default() as u32
+        let at = self.at;
+        let (timer, registers) = self.timer(timer);
+        Device::peek(timer, TimerRegister::Cnt, registers, at).unwrap_or_default() as u32
     }
 
     /// Output of a timer channel in PWM mode; `None` while the timer does not drive it.
     pub fn pulses(&mut self, timer: GeneralTimer, channel: u8) -> Option<PulseTrain> {
         let channel = TimerChannel::new(channel)?;
-        let (timer, registers) = self.machine.mcu.chip.timer(timer as usize);
+        let (timer, registers) = self.timer(timer);
         let pulse = timer.pulse(channel, registers)?;
         let high = timer.output(channel, registers)? == Level::High;
         Some(PulseTrain { high, width_ns: pulse.width.0, period_ns: pulse.period.0 })

@@ -19,8 +19,10 @@ mod flash;
 mod machine;
 pub mod operator;
 mod part;
+mod pulse;
 pub mod rig;
 
 pub use crystal::Quartz;
 pub use flash::Caches;
 pub use machine::{Accesses, EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
+pub use pulse::SeenFrame;

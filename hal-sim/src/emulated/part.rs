@@ -2,7 +2,8 @@
 //!
 //! What it is: the part as published, with wrappers. I2C1 can be held: SDA is kept low by a chip, BUSY stays set and no start
 //! condition is taken. ADC1 draws noise for every single conversion, and can stop converting ([`super::converter`]). The flash can be
-//! programmed ([`super::flash`]); the crystal can be silent or of another frequency, and is measured by TIM11 ([`super::crystal`]).
+//! programmed ([`super::flash`]); the crystal can be silent or of another frequency, and is measured by TIM11 ([`super::crystal`]). TIM3 is
+//! fed by DMA1, and what it says to the ESC is heard ([`super::pulse`]).
 //! What can go wrong: a reset rebuilds the part; the wrapper carries the chips over.
 //! Units: none.
 //! Reference: RM0090 sections 27.3.3 and 27.6.7 (BUSY); crate rigless 0.4, "what the model leaves out".
@@ -10,6 +11,7 @@
 use super::converter::{BlockDma, NoisyAdc};
 use super::crystal::{Clocks, MeasuringTimer, Quartz};
 use super::flash::ProgrammableFlash;
+use super::pulse::{HeardTimer, controller};
 use rigless::{
     device::{Device, DeviceContext, ErasedDevice, RegisterFile, RequestChange, ResetCause},
     mcu::Mcu,
@@ -88,6 +90,8 @@ impl Device for HeldI2c {
     pass_on_the_rest!();
 }
 
+/// Place of TIM3 among the part's general-purpose timers.
+pub(super) const PULSE_TIMER: usize = 1;
 /// ORE in the status of a USART.
 const ORE: u64 = 1 << 3;
 
@@ -136,6 +140,8 @@ pub(super) struct Part {
     measuring_slot: usize,
     pub(super) stuck: StuckOverrun,
     serial_slot: usize,
+    pub(super) pulse: HeardTimer,
+    pulse_slot: usize,
 }
 
 impl Part {
@@ -149,6 +155,9 @@ impl Part {
         let flash = ProgrammableFlash::new(std::mem::replace(&mut chip.flash, Flash::with_clock(RESET_CLOCK_HZ)));
         let (clocks_slot, measuring_slot) = (chip.bus().slot("RCC")?, chip.bus().slot("TIM11")?);
         let serial_slot = chip.bus().slot("USART1")?;
+        let pulse_slot = chip.bus().slot("TIM3")?;
+        let pulse = HeardTimer::new(&mut chip.tim[PULSE_TIMER]);
+        chip.dma[0] = controller();
         let clocks = Clocks::new(quartz);
         let measuring = clocks.measured();
         let i2c1 = HeldI2c { inner, held: false };
@@ -169,6 +178,8 @@ impl Part {
             measuring_slot,
             stuck,
             serial_slot,
+            pulse,
+            pulse_slot,
         })
     }
 }
@@ -201,6 +212,9 @@ impl Mcu for Part {
         if slot == self.serial_slot && self.stuck.up {
             return (self.chip.bus_mut(), Some(&mut self.stuck));
         }
+        if slot == self.pulse_slot {
+            return (self.chip.bus_mut(), Some(&mut self.pulse));
+        }
         if slot == self.measuring_slot {
             return (self.chip.bus_mut(), Some(&mut self.measuring));
         }
@@ -217,6 +231,8 @@ impl Mcu for Part {
         self.flash.restart();
         self.clocks.take(std::mem::take(&mut self.chip.rcc));
         self.measuring = self.clocks.measured();
+        self.pulse.restart(at, &mut self.chip.tim[PULSE_TIMER]);
+        self.chip.dma[0] = controller();
     }
 
     fn poll(&mut self, now: VirtualNanos) {

@@ -1,6 +1,6 @@
 //! The motor rig on the emulator: the flash image against the same bench as the native run.
 //!
-//! What it is: a [`World`] in which the image's pulses drive the bench's ESC, the bench's sensors drive the capture pins at
+//! What it is: a [`World`] in which the image's pulses or DShot frames drive the bench's ESC, the bench's sensors drive the capture pins at
 //! exact instants and set the ADC codes, and an [`Operator`] talks to the board over its serial line.
 //! What can go wrong: a pin that is not switched to its timer carries nothing, here as on the board. The first two pulses of a
 //! train are noticed at most 0.1 ms after their edge (the bench's step), the others within a microsecond; every width is exact.
@@ -9,6 +9,7 @@
 
 use super::flash::Caches;
 use super::machine::{EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
+use super::pulse::SeenFrame;
 use crate::bench::{Bench, STEP_NS, Truth};
 use crate::fault::Mishap;
 use crate::native::PLUGS;
@@ -39,6 +40,10 @@ const ENCODER: u8 = 3;
 const CONVERSION_NOISE: f64 = 1.2;
 /// Board supply below the voltage detector's highest level and above the reset level, mV.
 const DIP_MV: u32 = 2600;
+/// Longest slot of a DShot frame, ns: a reload register of 16 bits at 84 MHz.
+const SLOT_NS: u64 = 781_000;
+/// Time from one DShot frame to the next, ns.
+const FRAME_NS: u64 = MS;
 /// How finely the start of a pulse is looked for, ns.
 const LOOK_NS: u64 = 1000;
 const MS: u64 = 1_000_000;
@@ -56,7 +61,7 @@ pub enum Action {
     StopKey(bool),
     /// Unplugs the stop loop's wire, for good.
     UnplugStop,
-    /// A stop by key or by command so many nanoseconds before a pulse starts: the next pulse that is far enough away.
+    /// A stop by key or by command so many nanoseconds before a pulse or a frame starts: the next that is far enough away.
     StopBeforePulse {
         /// By key; otherwise a command whose first bit leaves the host at that instant.
         key: bool,
@@ -82,6 +87,8 @@ pub enum Action {
     },
     /// The core's next look at the stop key's port ends in a bus error.
     FailAccess,
+    /// Each DShot frame reaches the ESC with one bit turned over (true), or as it is again.
+    GarbleFrames(bool),
     /// Something goes wrong at the pins, and stays so.
     Mishap(Mishap),
     /// The rotor turns the other way round, as channel B of the encoder shows it.
@@ -163,6 +170,10 @@ pub struct RigWorld<O> {
     resets: Vec<u64>,
     running_pulse: Option<PulseTrain>,
     pulses: Vec<SeenPulse>,
+    frames: Vec<SeenFrame>,
+    garbles: bool,
+    /// The pulse's pin had its function at the last look.
+    muxed: bool,
     truth: Vec<(u64, Truth)>,
     messages: Vec<(Ticks, Message)>,
     mishap: Option<Mishap>,
@@ -199,6 +210,9 @@ impl<O: Operator> RigWorld<O> {
             resets: Vec::new(),
             running_pulse: None,
             pulses: Vec::new(),
+            frames: Vec::new(),
+            garbles: false,
+            muxed: false,
             truth: Vec::new(),
             messages: Vec::new(),
             mishap: None,
@@ -215,10 +229,20 @@ impl<O: Operator> RigWorld<O> {
         }
     }
 
-    /// Passes the ESC pulse from the pin to the bench when it has ended.
+    /// Passes frames and pulses for the ESC from the pin to the bench when they have ended.
     fn watch_pulse(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
         let muxed = pins.alternate(Port::A, PULSE_PIN.0) == Some(PULSE_PIN.1);
-        let train = pins.pulses(GeneralTimer::Tim3, 1).filter(|train| muxed && train.high);
+        // a frame that ends with a reset is heard when the pin has lost its function already
+        let was = std::mem::replace(&mut self.muxed, muxed);
+        for frame in pins.frames().into_iter().filter(|_| muxed || was) {
+            if let Some(word) = frame.word {
+                let garbled = if self.garbles { word ^ 1 << (self.frames.len() % 16) } else { word };
+                self.bench.frame(frame.ended_ns, garbled);
+            }
+            self.frames.push(frame);
+        }
+        // a slot of a frame is none
+        let train = pins.pulses(GeneralTimer::Tim3, 1).filter(|train| muxed && train.high && train.period_ns > SLOT_NS);
         match (train, self.running_pulse) {
             (Some(train), None) => {
                 self.running_pulse = Some(train);
@@ -340,6 +364,7 @@ impl<O: Operator> RigWorld<O> {
                         pins.say(&wire[..used]);
                     }
                 }
+                Action::GarbleFrames(garbles) => self.garbles = garbles,
                 Action::Backwards(backwards) => self.backwards = backwards,
                 Action::Mishap(mishap) => {
                     self.mishap = Some(mishap);
@@ -369,7 +394,9 @@ impl<O: Operator> RigWorld<O> {
                     let mut wire = [0; MAX_WIRE];
                     let used = self.encoder.encode(Ticks::from_ms(ms), &Command::Stop, &mut wire).unwrap_or(0);
                     let bytes = (!key).then(|| wire[..used].to_vec());
-                    let (last, period) = self.pulses.last().map_or((ms * MS, 20 * MS), |p| (p.at_ns, p.period_ns));
+                    let pulse = self.pulses.last().map(|p| (p.at_ns, p.period_ns));
+                    let frame = self.frames.last().map(|f| (f.at_ns, FRAME_NS));
+                    let (last, period) = pulse.max(frame).unwrap_or((ms * MS, 20 * MS));
                     let mut start = last + period;
                     while start < ns + (ms + 1) * MS {
                         start += period;
@@ -467,6 +494,8 @@ pub struct RigRun<O> {
     pub resets: Vec<u64>,
     /// Every pulse on the ESC pin.
     pub pulses: Vec<SeenPulse>,
+    /// Everything else that it carried: DShot frames.
+    pub frames: Vec<SeenFrame>,
     /// When the stops of [`Action::StopBeforePulse`] came, ns.
     pub stops: Vec<u64>,
     /// What was really there, every millisecond.
@@ -519,6 +548,7 @@ pub fn rig_from<O: Operator + 'static>(
         link: world.decoder.stats(),
         resets: world.resets,
         pulses: world.pulses,
+        frames: world.frames,
         stops: world.stops,
         truth: world.truth,
         stores: machine.mcu.flash.stores,

@@ -1,14 +1,18 @@
 //! Electronic speed controller: start-up dialogue, throttle range, loss of signal.
 //!
 //! What it is: what the ESC of Appendix C does between power-on and "ready", its beeps as events, and the throttle that it
-//! passes on to the motor, limited by its protections.
+//! passes on to the motor, limited by its protections. It takes pulses or DShot frames: the form that it hears first after power-on,
+//! until its power is cut. Frames have no throttle range and no programming mode.
 //! What can go wrong: no signal (it beeps without end), a throttle that is neither low nor high at power-on (the same), a
-//! failed self-test (twenty beeps), maximum throttle held for 6 s (programming mode until power is cut).
+//! failed self-test (twenty beeps), maximum throttle held for 6 s (programming mode until power is cut). A frame with a wrong checksum is
+//! none. When frames cease the motor stops, and only frames of throttle 0 make it ready again.
 //! Units: pulse width in ns, time in ns, throttle 0..1.
-//! Reference: Beharie 2013 Appendix C (start-up, throttle range, protections B and D) and Figure 3.10. Tone lengths are assumed.
+//! Reference: Beharie 2013 Appendix C (start-up, throttle range, protections B and D) and Figure 3.10. Tone lengths are assumed. Frames:
+//! BLHeli_S manual ("DShot", arming at zero throttle, loss of signal).
 
 use super::esc_guard::{Guard, GuardState};
 use super::esc_program::{Menu, Outcome, Settings};
+use esc_pwm::dshot::{Frame, Throttle};
 use frame::message::Beep;
 use std::collections::VecDeque;
 
@@ -26,6 +30,10 @@ const NO_PULSE: u64 = 100 * MS;
 const SIGNAL_LOST: u64 = 1000 * MS;
 /// Output after loss of signal (protection B).
 const LOST_THROTTLE: f64 = 0.2;
+/// Without a frame for this long the motor stops, and the signal counts as absent (assumed).
+const FRAMES_LOST: u64 = 250 * MS;
+/// Shortest pulse that counts as maximum throttle, ns.
+const OPEN_NS: u32 = 1_900_000;
 /// Maximum held this long after its two beeps opens the programming mode.
 const PROGRAMMING: u64 = 6000 * MS;
 
@@ -75,6 +83,15 @@ pub enum EscState {
     Failed,
 }
 
+/// What the ESC heard last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Heard {
+    /// A pulse of so many nanoseconds.
+    Pulse(u32),
+    /// A frame.
+    Frame(Throttle),
+}
+
 /// The ESC's dialogue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EscDialogue {
@@ -83,8 +100,10 @@ pub struct EscDialogue {
     state: EscState,
     since: u64,
     now: u64,
-    pulse_ns: u32,
-    pulse_at: Option<u64>,
+    heard: Heard,
+    heard_at: Option<u64>,
+    /// The form that it has heard first since power-on: frames, or pulses.
+    digital: Option<bool>,
     beeps: VecDeque<(u64, Beep)>,
     guard: GuardState,
     allowed: f64,
@@ -106,8 +125,9 @@ impl EscDialogue {
             state: EscState::Off,
             since: 0,
             now: 0,
-            pulse_ns: 0,
-            pulse_at: None,
+            heard: Heard::Pulse(0),
+            heard_at: None,
+            digital: None,
             beeps: VecDeque::new(),
         }
     }
@@ -159,6 +179,7 @@ impl EscDialogue {
     /// Connects or cuts the power.
     pub fn set_power(&mut self, on: bool) {
         if on && self.state == EscState::Off {
+            self.digital = None;
             self.enter(EscState::SelfTest);
         } else if !on {
             self.enter(EscState::Off);
@@ -168,9 +189,24 @@ impl EscDialogue {
     /// A pulse of `width_ns` ended at `at_ns`. Widths outside 0.8..2.2 ms are no pulses.
     pub fn pulse(&mut self, at_ns: u64, width_ns: u32) {
         if (800_000..=2_200_000).contains(&width_ns) {
-            self.pulse_ns = width_ns;
-            self.pulse_at = Some(at_ns);
+            self.hear(at_ns, Heard::Pulse(width_ns));
         }
+    }
+
+    /// A DShot frame of 16 bits ended at `at_ns`. What does not check is no frame, and special commands are none to this ESC.
+    pub fn frame(&mut self, at_ns: u64, word: u16) {
+        if let Some(frame) = Frame::from_word(word) {
+            self.hear(at_ns, Heard::Frame(frame.throttle));
+        }
+    }
+
+    /// Takes what is of the form that it has recognised; without power it recognises none.
+    fn hear(&mut self, at_ns: u64, heard: Heard) {
+        let digital = matches!(heard, Heard::Frame(_));
+        if self.powered() && *self.digital.get_or_insert(digital) != digital {
+            return;
+        }
+        (self.heard, self.heard_at) = (heard, Some(at_ns));
     }
 
     /// The next beep pattern that has ended, with the time of its end, ns.
@@ -188,15 +224,31 @@ impl EscDialogue {
     }
 
     fn silence(&self) -> u64 {
-        self.pulse_at.map_or(u64::MAX, |at| self.now.saturating_sub(at))
+        self.heard_at.map_or(u64::MAX, |at| self.now.saturating_sub(at))
     }
 
-    fn heard(&self) -> bool {
+    fn is_heard(&self) -> bool {
         self.silence() < NO_PULSE
     }
 
     fn is_min(&self) -> bool {
-        self.heard() && self.pulse_ns <= self.esc.range_min_ns.saturating_add(30_000)
+        let low = match self.heard {
+            Heard::Pulse(ns) => ns <= self.esc.range_min_ns.saturating_add(30_000),
+            Heard::Frame(throttle) => throttle == Throttle::STOP,
+        };
+        self.is_heard() && low
+    }
+
+    /// The pulse that is heard now, ns; `None` of frames.
+    fn pulse_ns(&self) -> Option<u32> {
+        match self.heard {
+            Heard::Pulse(ns) if self.is_heard() => Some(ns),
+            _ => None,
+        }
+    }
+
+    fn is_max(&self) -> bool {
+        self.pulse_ns().is_some_and(|ns| ns >= OPEN_NS)
     }
 
     /// Steps the dialogue to `now_ns` (call it at least every few milliseconds).
@@ -204,9 +256,12 @@ impl EscDialogue {
         self.now = now_ns;
         let age = now_ns.saturating_sub(self.since);
         match self.state {
+            EscState::Running if matches!(self.heard, Heard::Frame(_)) && self.silence() >= FRAMES_LOST => {
+                self.enter(EscState::NoSignal);
+            }
             EscState::Off | EscState::Running => {}
             EscState::Programming => {
-                let (closed, open) = (self.is_min(), self.heard() && self.pulse_ns >= 1_900_000);
+                let (closed, open) = (self.is_min(), self.is_max());
                 if self.menu.step(&mut self.settings, now_ns, closed, open) == Outcome::Leaves {
                     self.enter(EscState::SelfTest);
                 }
@@ -218,7 +273,7 @@ impl EscDialogue {
                     self.enter(EscState::Failed);
                 } else if self.is_min() {
                     self.enter(EscState::Long);
-                } else if self.heard() && self.pulse_ns >= 1_900_000 {
+                } else if self.is_max() {
                     self.enter(EscState::Double);
                 } else {
                     self.enter(EscState::NoSignal);
@@ -246,13 +301,15 @@ impl EscDialogue {
                 self.enter(EscState::Running);
             }
             EscState::Double if age >= TONE => {
-                self.esc.range_max_ns = self.pulse_ns;
+                if let Heard::Pulse(ns) = self.heard {
+                    self.esc.range_max_ns = ns;
+                }
                 self.sound(Beep::Double);
                 self.enter(EscState::WaitMinimum);
             }
             EscState::WaitMinimum => {
-                if self.heard() && self.pulse_ns <= 1_200_000 {
-                    self.esc.range_min_ns = self.pulse_ns;
+                if let Some(ns) = self.pulse_ns().filter(|ns| *ns <= 1_200_000) {
+                    self.esc.range_min_ns = ns;
                     self.enter(EscState::Long);
                 } else if age >= PROGRAMMING {
                     self.sound(Beep::Programming);
@@ -270,17 +327,20 @@ impl EscDialogue {
 
     /// Pulse that the output stage follows now, us; 1000 whenever the motor is not to turn.
     ///
-    /// After a second without signal it is 20 % of the range (protection B). In between the last pulse holds.
+    /// After a second without pulses it is 20 % of the range (protection B); in between the last pulse holds. Without frames the motor
+    /// stops.
     #[must_use]
     pub fn output_us(&self) -> f64 {
         if self.state != EscState::Running {
             return 1000.0;
         }
-        let throttle = if self.silence() > SIGNAL_LOST {
-            LOST_THROTTLE
-        } else {
-            let (low, high) = (f64::from(self.esc.range_min_ns), f64::from(self.esc.range_max_ns));
-            ((f64::from(self.pulse_ns) - low) / (high - low)).clamp(0.0, 1.0)
+        let throttle = match self.heard {
+            Heard::Frame(throttle) => (throttle.pulse().as_us() - 1000.0) / 1000.0,
+            Heard::Pulse(_) if self.silence() > SIGNAL_LOST => LOST_THROTTLE,
+            Heard::Pulse(ns) => {
+                let (low, high) = (f64::from(self.esc.range_min_ns), f64::from(self.esc.range_max_ns));
+                ((f64::from(ns) - low) / (high - low)).clamp(0.0, 1.0)
+            }
         };
         1000.0 + 1000.0 * throttle.min(self.allowed)
     }
@@ -293,131 +353,4 @@ impl EscDialogue {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Runs for `ms` with a pulse every 20 ms (none where `pulse_ns` is 0) and gives the beeps.
-    fn run(esc: &mut EscDialogue, from_ms: u64, ms: u64, pulse_ns: u32) -> Vec<Beep> {
-        let mut out = Vec::new();
-        for t in from_ms..from_ms + ms {
-            if t % 20 == 0 && pulse_ns > 0 {
-                esc.pulse(t * MS, pulse_ns);
-            }
-            esc.advance_to(t * MS);
-            out.extend(esc.beep().map(|b| b.1));
-        }
-        out
-    }
-
-    #[test]
-    fn a_normal_start_gives_its_three_patterns_and_then_follows_the_pulse() {
-        let mut esc = EscDialogue::new(Esc::default(), 3);
-        run(&mut esc, 0, 100, 1_000_000);
-        esc.set_power(true);
-        assert_eq!(run(&mut esc, 100, 5000, 1_000_000), [Beep::Long, Beep::Cells(3), Beep::Ready]);
-        assert_eq!(esc.output_us(), 1000.0);
-        run(&mut esc, 5100, 40, 1_500_000);
-        assert_eq!(esc.output_us(), 1500.0);
-        run(&mut esc, 5140, 900, 0);
-        assert_eq!(esc.output_us(), 1500.0, "speed holds for a second");
-        run(&mut esc, 6040, 200, 0);
-        assert_eq!(esc.output_us(), 1200.0, "then 20 %");
-        run(&mut esc, 6240, 40, 1_000_000);
-        assert_eq!(esc.output_us(), 1000.0, "and recovers");
-    }
-
-    #[test]
-    fn without_signal_or_at_half_throttle_it_never_runs() {
-        for pulse in [0, 1_500_000] {
-            let mut esc = EscDialogue::new(Esc::default(), 3);
-            esc.set_power(true);
-            let beeps = run(&mut esc, 0, 5000, pulse);
-            assert!(beeps.len() >= 4 && beeps.iter().all(|b| *b == Beep::NoSignal), "{beeps:?}");
-            assert_eq!(esc.output_us(), 1000.0);
-        }
-    }
-
-    #[test]
-    fn range_calibration_stores_and_programming_mode_traps() {
-        let mut esc = EscDialogue::new(Esc::default(), 3);
-        run(&mut esc, 0, 100, 1_950_000);
-        esc.set_power(true);
-        assert_eq!(run(&mut esc, 100, 2000, 1_950_000), [Beep::Double]);
-        assert_eq!(run(&mut esc, 2100, 4000, 1_050_000), [Beep::Long, Beep::Cells(3), Beep::Ready]);
-        assert_eq!(esc.range_ns(), (1_050_000, 1_950_000));
-        run(&mut esc, 6100, 40, 1_500_000);
-        assert_eq!(esc.output_us(), 1500.0);
-
-        let mut esc = EscDialogue::new(Esc::default(), 3);
-        run(&mut esc, 0, 100, 2_000_000);
-        esc.set_power(true);
-        assert_eq!(run(&mut esc, 100, 9000, 2_000_000), [Beep::Double, Beep::Programming]);
-        assert!(run(&mut esc, 9100, 5000, 1_000_000).is_empty());
-        assert_eq!(esc.output_us(), 1000.0);
-    }
-
-    #[test]
-    fn a_failed_self_test_never_runs() {
-        let mut esc = EscDialogue::new(Esc { self_test_fails: true, ..Esc::default() }, 3);
-        run(&mut esc, 0, 100, 1_000_000);
-        esc.set_power(true);
-        let beeps = run(&mut esc, 100, 6000, 1_000_000);
-        assert!(!beeps.is_empty() && beeps.iter().all(|b| *b == Beep::SelfTestFailed));
-        assert_eq!(esc.output_us(), 1000.0);
-    }
-
-    /// Up to "ready" with a pulse of minimum, on a supply that stands.
-    fn ready() -> EscDialogue {
-        let mut esc = EscDialogue::new(Esc::default(), 3);
-        run(&mut esc, 0, 100, 1_000_000);
-        esc.set_power(true);
-        run(&mut esc, 100, 5000, 1_000_000);
-        assert_eq!(esc.state(), EscState::Running);
-        esc
-    }
-
-    #[test]
-    fn low_voltage_and_heat_limit_the_output() {
-        let mut esc = ready();
-        run(&mut esc, 5100, 40, 2_000_000);
-        (0..3000).for_each(|_| esc.feel(8.0, 7.0, 1e-3));
-        assert_eq!(esc.output_us(), 1500.0, "protection A leaves half");
-        (0..100).for_each(|_| esc.feel(11.0, 7.0, 1e-3));
-        assert_eq!(esc.output_us(), 1500.0, "until the throttle is closed");
-        run(&mut esc, 5140, 40, 1_000_000);
-        esc.feel(11.0, 0.1, 1e-3);
-        run(&mut esc, 5180, 40, 2_000_000);
-        assert_eq!(esc.output_us(), 2000.0);
-        (0..300_000).for_each(|_| esc.feel(11.0, 30.0, 1e-3));
-        assert!(esc.temperature_c() > 200.0);
-        assert_eq!(esc.output_us(), 1350.0, "protection C leaves 35 %");
-        (0..300_000).for_each(|_| esc.feel(11.0, 3.0, 1e-3));
-        assert_eq!(esc.output_us(), 2000.0, "and gives it back");
-    }
-
-    #[test]
-    fn what_is_programmed_outlives_the_power() {
-        let mut esc = EscDialogue::new(Esc::default(), 3);
-        run(&mut esc, 0, 100, 2_000_000);
-        esc.set_power(true);
-        let beeps = run(&mut esc, 100, 9_000, 2_000_000);
-        assert_eq!(beeps, [Beep::Double, Beep::Programming]);
-        let mut at = 9_100;
-        // hold maximum until the cut-off mode sounds, close for its second option, open to store
-        while esc.programming().map(|p| p.0) != Some(super::super::esc_program::Item::CutOffMode) {
-            run(&mut esc, at, 100, 2_000_000);
-            at += 100;
-        }
-        run(&mut esc, at, 4_000, 1_000_000);
-        run(&mut esc, at + 4_000, 500, 2_000_000);
-        esc.set_power(false);
-        assert_eq!(esc.settings().cutoff(), super::super::esc_guard::CutOff::CutOff);
-        run(&mut esc, at + 4_500, 500, 1_000_000);
-        esc.set_power(true);
-        run(&mut esc, at + 5_000, 6_000, 1_000_000);
-        run(&mut esc, at + 11_000, 40, 1_800_000);
-        assert_eq!(esc.output_us(), 1800.0);
-        (0..5000).for_each(|_| esc.feel(8.0, 1.0, 1e-3));
-        assert_eq!(esc.output_us(), 1000.0, "it cuts off now");
-    }
-}
+mod tests;
