@@ -134,8 +134,12 @@ const ARM_UNLESS: u16 = Refusals::FAULT_LATCHED
     | Refusals::NO_LOW_INTERVAL
     | Refusals::ROTOR_TURNING
     | Refusals::STOP_OPEN;
-const CALIBRATE_UNLESS: u16 =
-    ARM_UNLESS | Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED | Refusals::SUPPLY_UNPROVEN | Refusals::NO_WITNESS;
+const CALIBRATE_UNLESS: u16 = ARM_UNLESS
+    | Refusals::ESC_POWERED
+    | Refusals::NOT_CONFIRMED
+    | Refusals::SUPPLY_UNPROVEN
+    | Refusals::NO_WITNESS
+    | Refusals::NO_RANGE;
 const RUN_UNLESS: u16 = Refusals::FAULT_LATCHED | Refusals::OUT_OF_RANGE | Refusals::EMPTY_SCHEDULE | Refusals::SHORT_STREAM;
 
 const fn row(from: RigState, on: ArmingEvent, unless: u16, to: RigState) -> Transition {

@@ -1,6 +1,7 @@
 //! The arming machine, explored: every state, event and combination of objections.
 
 use esc_pwm::arming::{STATES, TABLE, message};
+use esc_pwm::dshot::{Frame, Throttle};
 use esc_pwm::{ArmingEvent, ArmingTimes, Objections, Step, pulse_for, step, time_out};
 use frame::rig::{Refusals, RigState};
 use frame::units::PulseWidth;
@@ -15,16 +16,17 @@ const CALIBRATE_UNLESS: u16 = Refusals::FAULT_LATCHED
     | Refusals::ESC_POWERED
     | Refusals::NOT_CONFIRMED
     | Refusals::SUPPLY_UNPROVEN
-    | Refusals::NO_WITNESS;
+    | Refusals::NO_WITNESS
+    | Refusals::NO_RANGE;
 
 /// Every combination of the objections that some row of the table knows, and one that none does.
 fn objections() -> impl Iterator<Item = Objections> {
     let known = TABLE.iter().fold(Refusals::REPLAYED, |mask, row| mask | row.unless);
-    (0..1u16 << WIDTH).map(Refusals).filter(move |objections| objections.0 & !known == 0)
+    (0..=u16::MAX).map(Refusals).filter(move |objections| objections.0 & !known == 0)
 }
 
-/// Bits of [`Refusals`].
-const WIDTH: usize = Refusals::WORDS.len();
+/// Every bit of [`Refusals`] has its words.
+const _: () = assert!(Refusals::WORDS.len() == 16);
 
 /// States reachable from reset, with one way each was reached.
 fn reachable() -> BTreeSet<u8> {
@@ -84,6 +86,7 @@ fn live_pulses_in_two_states_only() {
             assert!(pulse >= PulseWidth::MIN && pulse <= PulseWidth::MAX);
             if !matches!(state, RigState::Running | RigState::CalibrateHoldMax) {
                 assert_eq!(pulse, PulseWidth::MIN, "{state:?}");
+                assert_eq!(Throttle::of(pulse), Throttle::STOP, "{state:?}");
             }
         }
     }
@@ -96,6 +99,7 @@ fn stop_and_trip_give_minimum_from_every_state() {
             for event in [ArmingEvent::Stop, ArmingEvent::Trip] {
                 let Step::To(next) = step(state, event, guard) else { panic!("{event:?} in {state:?} was not taken") };
                 assert_eq!(pulse_for(next, PulseWidth::MAX), PulseWidth::MIN);
+                assert_eq!(Frame { throttle: Throttle::of(pulse_for(next, PulseWidth::MAX)), telemetry: false }, Frame::STOP);
                 assert!(matches!(next, RigState::Faulted | RigState::ProgrammingEscape));
             }
         }
@@ -115,7 +119,9 @@ fn live_states_are_entered_by_their_own_command_only() {
                     }
                     Step::To(RigState::CalibrateHoldMax) => {
                         assert!(state == RigState::Disarmed && event == ArmingEvent::Calibrate);
-                        assert_eq!(guard.0 & (Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED | Refusals::FAULT_LATCHED), 0);
+                        let never =
+                            Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED | Refusals::FAULT_LATCHED | Refusals::NO_RANGE;
+                        assert_eq!(guard.0 & never, 0);
                     }
                     Step::To(RigState::Armed) => assert!(
                         matches!(event, ArmingEvent::Ready | ArmingEvent::Finished),
@@ -146,7 +152,7 @@ fn faults_latch() {
 
 #[test]
 fn a_refusal_lists_every_reason() {
-    let all = Refusals((1 << WIDTH) - 1);
+    let all = Refusals(u16::MAX);
     assert_eq!(step(RigState::Disarmed, ArmingEvent::Calibrate, all), Step::Refused(Refusals(CALIBRATE_UNLESS)));
     assert_eq!(
         step(RigState::Running, ArmingEvent::Arm, Refusals(Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW)),

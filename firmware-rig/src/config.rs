@@ -7,7 +7,7 @@
 
 use crate::rig_config::{Answers, Calibrated};
 use crate::strain::StrainChannel;
-use esc_pwm::{ArmingTimes, Bounds, Limits, Slew, ThrottleCurve};
+use esc_pwm::{ArmingTimes, Bounds, EscOutput, Limits, Slew, ThrottleCurve};
 use frame::calibration::{AdcScale, Calibration};
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::units::{Ampere, Newton, PulseWidth, RevPerMin, Ticks, Volt};
@@ -132,6 +132,8 @@ pub struct Config {
     pub slew: Slew,
     /// Throttle curve.
     pub curve: ThrottleCurve,
+    /// In which form the ESC is told its throttle.
+    pub output: EscOutput,
 }
 
 impl Config {
@@ -182,6 +184,7 @@ impl Config {
             highest: PulseWidth::MAX,
             slew: Slew { ns_per_ms: 10_000 }, // full range in 0.1 s: a step stays a step to a motor of 50 ms
             curve: ThrottleCurve::Linear,
+            output: EscOutput::Pwm,
         }
     }
 

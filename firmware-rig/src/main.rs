@@ -28,13 +28,14 @@ mod app {
     use core::mem::MaybeUninit;
     use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
+    use esc_pwm::EscOutput;
     use firmware_rig::{Config, Conversions, Delivered, RigConfig, RigConsole, Start, burst};
     use frame::message::{Event, SettingsNews, Trial};
     use frame::units::PulseWidth;
     use safe_start::stm32f4::{clock, crash};
     use settings_store::stm32f4::{self as flash, SettingsFlash};
-    use stm32f4xx_hal::gpio::{Input, PB12};
-    use stm32f4xx_hal::pac::{ADC1, DMA2, PWR, TIM1, TIM2, TIM3, TIM4, USART1};
+    use stm32f4xx_hal::gpio::{Input, PB12, Speed};
+    use stm32f4xx_hal::pac::{ADC1, DMA1, DMA2, PWR, TIM1, TIM2, TIM3, TIM4, USART1};
     use stm32f4xx_hal::prelude::*;
     use stm32f4xx_hal::rcc::{self, Enable, Reset};
 
@@ -115,6 +116,8 @@ mod app {
         TIM4::enable(&mut rcc);
         TIM4::reset(&mut rcc);
         ADC1::enable(&mut rcc);
+        DMA1::enable(&mut rcc);
+        DMA1::reset(&mut rcc);
         DMA2::enable(&mut rcc);
         DMA2::reset(&mut rcc);
         USART1::enable(&mut rcc);
@@ -123,8 +126,11 @@ mod app {
         let a = device.GPIOA.split(&mut rcc);
         let b = device.GPIOB.split(&mut rcc);
         let c = device.GPIOC.split(&mut rcc);
-        let pulse = PulseOutput::start(device.TIM3);
-        let _ = a.pa6.into_alternate::<2>();
+        let mut flash = SettingsFlash(device.FLASH);
+        let (stored, news): (Option<RigConfig>, _) = settings_store::load(&mut flash, flash::RANGE);
+        let output = stored.as_ref().map_or(EscOutput::Pwm, |config| config.output);
+        let pulse = PulseOutput::start(device.TIM3, device.DMA1, output);
+        let _ = a.pa6.into_alternate::<2>().speed(Speed::Medium); // edges of 20 ns at the most: a bit of DShot600 lasts 1667
         // an open input reads high: no edges, and an open-collector sensor needs nothing more
         let _ = (a.pa0.into_alternate::<1>().internal_pull_up(true), a.pa1.into_alternate::<1>().internal_pull_up(true));
         let _ = (a.pa2.into_alternate::<1>().internal_pull_up(true), a.pa3.into_alternate::<1>().internal_pull_up(true));
@@ -137,8 +143,6 @@ mod app {
         let dma = device.DMA2;
         device.TIM1.ccmr1_input().write(|w| w.cc1s().ti1().ic1f().fck_int_n8());
         device.TIM1.ccer().write(|w| w.cc1e().set_bit());
-        let mut flash = SettingsFlash(device.FLASH);
-        let (stored, news) = settings_store::load(&mut flash, flash::RANGE);
         let mut clock = Clock::default();
         let now = clock.now(device.TIM2.cnt().read().bits());
         let start = Start { reset_cause, clock: clock_news, stored, news, ended: crash::take() };
@@ -271,6 +275,12 @@ mod app {
         };
         let orders = board.console.tick(&delivered, |pulse| board.pulse.set(pulse));
         board.watchdog.feed();
+        // a tick that came too late is no time to begin a train of frames
+        let on_time = board.tick_timer.sr().read().uif().bit_is_clear();
+        if on_time {
+            let since_us = board.tick_timer.cnt().read().cnt().bits();
+            board.pulse.select(board.console.rig().config().output, board.console.rig().is_live(), since_us);
+        }
         let conversions =
             Conversions { codes: whole.then_some(board.codes.as_slice()), rate_hz: converter::rate_hz(*board.sampling) };
         board.console.record(now, &conversions, board.burst.as_mut_slice());

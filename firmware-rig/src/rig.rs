@@ -160,6 +160,12 @@ impl Rig {
         self.state
     }
 
+    /// A pulse above minimum is being given.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        self.live_since.is_some()
+    }
+
     /// Latched faults.
     #[must_use]
     pub fn faults(&self) -> FaultSet {
@@ -407,6 +413,7 @@ impl Rig {
             .and(Refusals::ROTOR_TURNING, self.bank.is_turning())
             .and(Refusals::NO_WITNESS, self.bank.fitted() == 0 && !current)
             .and(Refusals::STOP_OPEN, self.stop_loop.open)
+            .and(Refusals::NO_RANGE, self.config.output.is_digital())
     }
 
     /// Puts `event` to the arming machine and does what follows from it.

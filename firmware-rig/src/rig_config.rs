@@ -9,7 +9,7 @@
 use crate::config::{Config, CurrentChannel, TemperatureChannel, TorqueChannel, VoltageChannel};
 use crate::strain::StrainChannel;
 use crate::transfer::CRC;
-use esc_pwm::{Bounds, Slew, ThrottleCurve};
+use esc_pwm::{Bounds, EscOutput, Slew, ThrottleCurve};
 use frame::calibration::AdcScale;
 use frame::message::Setting;
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
@@ -126,6 +126,8 @@ pub struct RigConfig {
     pub limits: ChannelLimits,
     /// Scales that were calibrated, in place of the design's.
     pub calibrated: [Option<Calibrated>; ADC_CHANNELS],
+    /// In which form the ESC is told its throttle.
+    pub output: EscOutput,
 }
 
 impl RigConfig {
@@ -165,6 +167,7 @@ impl RigConfig {
                 temperature: limits.temperature,
             },
             calibrated: config.calibrated,
+            output: config.output,
         }
     }
 
@@ -264,6 +267,7 @@ impl RigConfig {
         config.limits.temperature = self.limits.temperature;
         config.limits.link_ms = u32::from(self.link_ms);
         config.calibrated = self.calibrated;
+        config.output = self.output;
         config
     }
 
@@ -321,7 +325,7 @@ impl Calibrated {
 }
 
 impl Stored for RigConfig {
-    const VERSION: u8 = 3;
+    const VERSION: u8 = 4;
 
     fn write(&self, content: &mut [u8]) -> Option<usize> {
         Some(postcard::to_slice(self, content).ok()?.len())

@@ -2,6 +2,7 @@
 //! appears. Rules are checked on every tick of every walk.
 
 use esc_pwm::ArmingTimes;
+use esc_pwm::dshot::{EscOutput, Frame, Throttle};
 use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig, StopWatch};
 use frame::message::{Beep, Command};
 use frame::rig::{FaultSet, RigState};
@@ -21,6 +22,9 @@ const EDGE_MS: u64 = 10;
 const TURNING_MS: u64 = 3 * EDGE_MS;
 /// Longest time from the beginning of a tick to its pulse in the timer, us: the tick's whole budget of 40 000 cycles at 168 MHz.
 const TICK_US: u64 = 239;
+/// When a DShot frame starts after the beginning of the tick, and when the DMA fetches its first bit, us: `board/pulse.rs`.
+const FRAME_US: u64 = 926;
+const FETCH_US: u64 = 760;
 /// Steps of the phase at which a stop comes, us.
 const PHASE_US: usize = 50;
 
@@ -141,8 +145,8 @@ struct Walk {
 type Key = (u8, [bool; 8]);
 
 impl Walk {
-    fn new() -> Self {
-        let mut config = Config { times: TIMES, ..Config::thesis_570kv() };
+    fn new(output: EscOutput) -> Self {
+        let mut config = Config { times: TIMES, output, ..Config::thesis_570kv() };
         config.limits.analogue_ms = ANALOGUE_MS as u32;
         config.limits.current.ms = ANALOGUE_MS as u16;
         config.limits.voltage.ms = ANALOGUE_MS as u16;
@@ -204,6 +208,9 @@ impl Walk {
         let (before, now) = (self.state, self.rig.state());
         (self.state, self.pulse) = (now, outputs.pulse);
         assert_eq!(outputs.pulse, outputs.pulse.clamped(), "pulses never cease and never leave their range");
+        let frame = Frame { throttle: Throttle::of(outputs.pulse), telemetry: false };
+        assert_eq!(frame == Frame::STOP, !outputs.pulse.is_live(), "a frame says what the pulse says");
+        assert_eq!(Frame::from_word(frame.word()), Some(frame));
         if outputs.pulse.is_live() {
             assert!(matches!(now, RigState::Running | RigState::CalibrateHoldMax), "{:?} in {now:?}", outputs.pulse);
             assert!(self.rig.faults().is_empty(), "{:?} with {:?}", outputs.pulse, self.rig.faults());
@@ -323,6 +330,11 @@ impl Walk {
             }
         }
         assert!(!register.last().is_some_and(|(_, pulse)| pulse.is_live()), "{:?} is not stopped for good", self.state);
+        // a frame is what the words in memory said when the DMA fetched its first bit
+        for frame in (0..40u64).map(|tick| 1000 * tick).filter(|tick| tick + FRAME_US > event + 1000) {
+            let fetched = register.iter().rev().find(|(at, _)| *at <= frame + FETCH_US).map_or(PulseWidth::MAX, |(_, p)| *p);
+            assert_eq!(Throttle::of(fetched), Throttle::STOP, "key {key}, stop {event} us, frame {frame}");
+        }
         assert!(
             live_until <= 1000,
             "{:?}, key {key}, stop {event} us after a tick: live until {live_until} us after it",
@@ -334,8 +346,19 @@ impl Walk {
 
 #[test]
 fn every_state_and_event_of_the_whole_rig() {
+    assert_eq!(explored(EscOutput::Pwm), 10, "every state of the arming machine is reached");
+}
+
+/// What is sent as numbers obeys the same rules, and there is no range calibration: neither of its states is ever reached.
+#[test]
+fn every_state_and_event_of_a_rig_that_speaks_dshot() {
+    assert_eq!(explored(EscOutput::DShot300), 8);
+}
+
+/// Explores everything; how many states of the arming machine were reached.
+fn explored(output: EscOutput) -> usize {
     let list = happenings();
-    let first = Walk::new();
+    let first = Walk::new(output);
     let mut seen: BTreeMap<Key, usize> = BTreeMap::from([(first.key(), 0)]);
     let mut open = VecDeque::from([first]);
     let (mut transitions, mut states, mut worst_stop) = (0usize, std::collections::BTreeSet::new(), 0);
@@ -353,9 +376,9 @@ fn every_state_and_event_of_the_whole_rig() {
             }
         }
     }
-    println!("{} arming states, {} states of the rig, {transitions} transitions", states.len(), seen.len());
+    println!("{output:?}: {} arming states, {} states of the rig, {transitions} transitions", states.len(), seen.len());
     println!("a stop is in the pulse timer {worst_stop} us after it came, at most");
     assert!((400..=1000).contains(&worst_stop), "some state was live, and none for longer than a millisecond: {worst_stop}");
-    assert_eq!(states.len(), 10, "every state of the arming machine is reached");
     assert!(seen.len() >= 40, "{} states", seen.len());
+    states.len()
 }

@@ -1,8 +1,8 @@
 //! Rigs with some of the channels: what is not fitted raises no fault, what is fitted still does; ESCs that say little or nothing.
 
-use esc_pwm::Bounds;
+use esc_pwm::{Bounds, EscOutput};
 use firmware_rig::rig_config::Answers;
-use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig};
+use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig, RigConfig};
 use frame::message::{Beep, Command, ConfigPart, Event};
 use frame::rig::{AdcVerdict, CaptureVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::units::{Ampere, Celsius, NewtonMetre, PulseWidth, RevPerMin, Ticks, Volt};
@@ -194,6 +194,50 @@ fn the_range_calibration_needs_a_witness_and_a_measured_supply() {
     let mut desk = Desk::new(config, [2, 1, 2, 25]);
     desk.run(500);
     assert_eq!(desk.say(ask), Some(Event::Refused(Refusals(Refusals::SUPPLY_UNPROVEN))));
+}
+
+#[test]
+fn dshot_has_no_range_to_calibrate() {
+    let ask = Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM };
+    for output in EscOutput::ALL {
+        let mut desk = Desk::new(Config { output, ..Config::thesis_570kv() }, [2, 1, 2, 25]);
+        desk.counts = POWERED;
+        desk.run(200);
+        desk.counts = UNPOWERED;
+        desk.run(200);
+        let refused = output.is_digital().then_some(Event::Refused(Refusals(Refusals::NO_RANGE)));
+        assert_eq!(desk.say(ask), refused.or(Some(Event::Accepted)), "{output:?}");
+        assert_eq!(desk.pulse == PulseWidth::MAX, refused.is_none(), "{output:?}");
+    }
+}
+
+#[test]
+fn the_output_changes_while_disarmed_and_never_else() {
+    let say = |desk: &mut Desk, output| {
+        let wanted = RigConfig { output, ..desk.rig.settings() };
+        let parts: Vec<ConfigPart> = wanted.parts().collect();
+        parts.iter().for_each(|part| assert_eq!(desk.say(Command::ConfigPart(*part)), Some(Event::Accepted)));
+        desk.say(Command::ConfigApply { length: parts[0].length, crc: wanted.digest() })
+    };
+    let mut desk = Desk::new(Config::thesis_570kv(), [2, 1, 2, 25]);
+    assert_eq!(say(&mut desk, EscOutput::DShot300), Some(Event::Accepted));
+    assert_eq!(desk.rig.config().output, EscOutput::DShot300);
+    let refused = Some(Event::Refused(Refusals(Refusals::WRONG_STATE)));
+    assert_eq!(desk.say(Command::Arm), Some(Event::Accepted));
+    assert_eq!(say(&mut desk, EscOutput::Pwm), refused, "while arming");
+    desk.power();
+    for beep in [Beep::Long, Beep::Cells(3), Beep::Ready] {
+        desk.say(Command::Beep(beep));
+    }
+    assert_eq!(desk.rig.state(), RigState::Armed);
+    assert_eq!(say(&mut desk, EscOutput::Pwm), refused, "armed");
+    desk.say(Command::SetPulse(PulseWidth::from_us(1400)));
+    assert_eq!(say(&mut desk, EscOutput::DShot600), refused, "running");
+    desk.say(Command::Stop);
+    assert_eq!(say(&mut desk, EscOutput::Pwm), refused, "with a fault");
+    assert_eq!(desk.rig.config().output, EscOutput::DShot300);
+    assert_eq!(desk.say(Command::ClearFaults), Some(Event::Accepted));
+    assert_eq!(say(&mut desk, EscOutput::Pwm), Some(Event::Accepted));
 }
 
 /// A biased divider: off is believed as it stands, and an open wire, which reads less than that, is never taken for it.

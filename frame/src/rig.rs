@@ -228,9 +228,11 @@ impl Refusals {
     pub const STOP_OPEN: u16 = 1 << 13;
     /// Of a schedule that is still to be sent too little is there to begin with.
     pub const SHORT_STREAM: u16 = 1 << 14;
+    /// The ESC is told its throttle as numbers: it has no throttle range.
+    pub const NO_RANGE: u16 = 1 << 15;
 
     /// Every reason and its words, for people.
-    pub const WORDS: [(u16, &'static str); 15] = [
+    pub const WORDS: [(u16, &'static str); 16] = [
         (Self::WRONG_STATE, "not in this state"),
         (Self::FAULT_LATCHED, "a fault is latched: clear it first"),
         (Self::THROTTLE_NOT_LOW, "throttle is not at minimum"),
@@ -246,6 +248,7 @@ impl Refusals {
         (Self::NO_WITNESS, "neither a speed sensor nor the current is fitted: nothing would see the rotor turn"),
         (Self::STOP_OPEN, "the stop loop is open: let the key go, check plug and wire"),
         (Self::SHORT_STREAM, "too little of the schedule is there to begin with"),
+        (Self::NO_RANGE, "DShot has no throttle range to calibrate"),
     ];
 
     /// The reasons in words.

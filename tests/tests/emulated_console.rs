@@ -1,13 +1,15 @@
 //! One script of bytes and pins, given to the flash image and to the native board: the same frames in the same order.
 //!
 //! What it is: constant codes at the ADC pins, the stop loop opened and closed, and the bytes of a host with everything a line can bring
-//! (commands, beeps, a damaged frame, one that comes twice), the same for the emulated board and for `hal_sim::native::Board`.
+//! (commands, beeps, a damaged frame, one that comes twice), the same for the emulated board and for `hal_sim::native::Board`. Once with
+//! pulses, and once with DShot from the board's first configuration on: then every word on the ESC's line is compared as well.
 //! What can go wrong: the image starts some milliseconds after power-up: times on the board's clock may differ by that, nothing else.
 //! Build the image first: `cargo xtask image`
 #![cfg(feature = "emulated")]
 
-use firmware_rig::{AdcBlock, Config};
-use frame::message::{Beep, Command, Event, Message, Setting};
+use esc_pwm::dshot::{EscOutput, Frame, Throttle};
+use firmware_rig::{AdcBlock, Config, RigConfig};
+use frame::message::{Beep, Command, ConfigPart, Event, Message, Setting};
 use frame::rig::{ADC_CHANNELS, AdcVerdict};
 use frame::units::{PulseWidth, Ticks};
 use frame::wire::{Decoder, Encoder, MAX_WIRE};
@@ -24,7 +26,7 @@ const ADC_INPUTS: [u8; ADC_CHANNELS] = [10, 11, 12, 13, 14];
 const STOP_PIN: u8 = 12;
 /// The image runs this long after power-up, ms, at most.
 const START_MS: u64 = 30;
-const END_MS: u64 = 5_400;
+const END_MS: u64 = 6_200;
 
 /// What happens at a millisecond.
 #[derive(Debug, Clone)]
@@ -34,7 +36,7 @@ enum Step {
 }
 
 /// The script: each step 40 ms behind a sample, so that a start that takes a few milliseconds moves none across one.
-fn script() -> Vec<(u64, Step)> {
+fn script(output: EscOutput) -> Vec<(u64, Step)> {
     let mut encoder = Encoder::default();
     let mut wire = |ms: u64, command: Command| {
         let mut bytes = [0; MAX_WIRE];
@@ -63,6 +65,15 @@ fn script() -> Vec<(u64, Step)> {
     ];
     let mut steps = Vec::new();
     let mut ms = 140;
+    let config = RigConfig { output, ..RigConfig::of(&Config::thesis_570kv()) };
+    let parts: Vec<ConfigPart> = config.parts().collect();
+    for part in &parts {
+        steps.push((ms, Step::Say(wire(ms, Command::ConfigPart(*part)))));
+        ms += 4;
+    }
+    let apply = Command::ConfigApply { length: parts[0].length, crc: config.digest() };
+    steps.push((ms, Step::Say(wire(ms, apply))));
+    ms = 340;
     for command in commands {
         steps.push((ms, Step::Say(wire(ms, command))));
         ms += 200;
@@ -81,6 +92,8 @@ struct AtThePins {
     steps: Vec<(u64, Step)>,
     next: usize,
     ms: u64,
+    /// Words of the ESC's line, each once until another comes.
+    words: Vec<u16>,
 }
 
 impl World for AtThePins {
@@ -89,6 +102,8 @@ impl World for AtThePins {
             ADC_INPUTS.iter().zip(CODES).for_each(|(input, code)| pins.set_adc(*input, f64::from(code)));
             pins.drive(Port::B, STOP_PIN, false);
         }
+        self.words.extend(pins.frames().iter().map(|frame| frame.word.expect("a frame")));
+        self.words.dedup();
         while let Some((_, step)) = self.steps.get(self.next).filter(|(at, _)| *at <= self.ms) {
             match step {
                 Step::Say(bytes) => pins.say(bytes),
@@ -101,14 +116,16 @@ impl World for AtThePins {
     }
 }
 
-fn on_the_image(steps: Vec<(u64, Step)>) -> Vec<u8> {
+fn on_the_image(steps: Vec<(u64, Step)>) -> (Vec<u8>, Vec<u16>) {
     let elf = firmware("firmware-rig").unwrap_or_else(|e| panic!("{e}"));
     let machine = Machine::new().unwrap_or_else(|e| panic!("{e}"));
-    let (outcome, _) = run(&elf, machine, AtThePins { steps, next: 0, ms: 0 }, END_MS * MS).unwrap_or_else(|e| panic!("{e}"));
-    outcome.telemetry
+    let world = AtThePins { steps, next: 0, ms: 0, words: Vec::new() };
+    let (outcome, _) = run(&elf, machine, world, END_MS * MS).unwrap_or_else(|e| panic!("{e}"));
+    (outcome.telemetry, outcome.world.words)
 }
 
-fn natively(steps: &[(u64, Step)]) -> Vec<u8> {
+fn natively(steps: &[(u64, Step)]) -> (Vec<u8>, Vec<u16>) {
+    let mut words = Vec::new();
     let mut board = Board::new(Config::thesis_570kv());
     let mut sent = board.sent();
     let mut wires = Wires::SOUND;
@@ -127,8 +144,10 @@ fn natively(steps: &[(u64, Step)]) -> Vec<u8> {
         }
         board.millisecond(Ticks::from_ms(ms), &gathered, wires);
         sent.append(&mut board.sent());
+        words.extend(board.frame().map(Frame::word));
+        words.dedup();
     }
-    sent
+    (sent, words)
 }
 
 /// A message without what the two hosts cannot share: the instant of the start, how many conversions there were, what a processor measures
@@ -170,8 +189,23 @@ fn told(bytes: &[u8]) -> Vec<(Option<Ticks>, String)> {
 
 #[test]
 fn the_same_bytes_and_pins_give_the_same_frames_natively_and_on_the_image() {
-    let steps = script();
-    let (image, native) = (told(&on_the_image(steps.clone())), told(&natively(&steps)));
+    let (_, words) = judge(EscOutput::Pwm);
+    assert!(words.is_empty(), "pulses are no frames");
+}
+
+#[test]
+fn with_dshot_the_words_on_the_line_are_the_same_too() {
+    let (native, image) = judge(EscOutput::DShot300);
+    assert_eq!(image, native);
+    let level = Frame { throttle: Throttle::of(PulseWidth::from_us(1200)), telemetry: false }.word();
+    assert_eq!(image, [Frame::STOP.word(), level, Frame::STOP.word()], "zero, the run at once, and the stop");
+}
+
+/// Plays the script to both; the words on their lines, the native board's first.
+fn judge(output: EscOutput) -> (Vec<u16>, Vec<u16>) {
+    let steps = script(output);
+    let ((image, heard), (native, given)) = (on_the_image(steps.clone()), natively(&steps));
+    let (image, native) = (told(&image), told(&native));
     for (n, ((at, a), (then, b))) in image.iter().zip(&native).enumerate() {
         assert_eq!(a, b, "message {n}: the image says the first, the native board the second");
         if let (Some(at), Some(then)) = (at, then) {
@@ -186,4 +220,5 @@ fn the_same_bytes_and_pins_give_the_same_frames_natively_and_on_the_image() {
         assert!(all(word) > 0, "the script shows no {word}");
     }
     assert!(image.iter().any(|(_, m)| m.contains(&format!("{:?}", AdcVerdict::Nominal))), "conversions were read");
+    (given, heard)
 }

@@ -27,11 +27,28 @@ struct Preset {
     columns: &'static [&'static str],
 }
 
-const PRESETS: [Preset; 5] = [
+const PRESETS: [Preset; 6] = [
     Preset {
         name: "thesis",
         propeller: "11x4.7",
         cells: true,
+        rate_hz: 10.0,
+        columns: &[
+            "rpm_beam",
+            "rpm_opto",
+            "rpm_hall",
+            "rpm_encoder",
+            "thrust_n",
+            "torque_nm",
+            "current_a",
+            "voltage_v",
+            "temp_c",
+        ],
+    },
+    Preset {
+        name: "dshot",
+        propeller: "11x4.7",
+        cells: false,
         rate_hz: 10.0,
         columns: &[
             "rpm_beam",

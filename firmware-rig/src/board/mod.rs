@@ -13,6 +13,7 @@
 //! |---|---|---|---|
 //! | crystal, 8 or 12 MHz, measured against the internal oscillator before it is used ([`safe_start::crystal`]) | PH0, PH1 | HSE, TIM11 CH1 for the measurement | NMI when it fails |
 //! | ESC pulse, 50 Hz, active high, 3 MHz counter (PSC 27, ARR 59 999, CCR1 3000-6000, both preloaded) | PA6, AF2 | TIM3 CH1 | none |
+//! | the same as DShot, 1 kHz, active high, 84 MHz counter (PSC 0, ARR 279 or 139 for a bit, CCR1 of the bit, both preloaded; two slots of pause) | PA6, AF2 | TIM3 CH1, update | DMA1 stream 2 channel 5, circular, 16 bit, bursts of 3 from ARR on |
 //! | capture: IR beam, rising edge | PA0, AF1 | TIM2 CH1, 84 MHz, 32 bits, filter of 8 samples (95 ns), pull-up | TIM2 interrupt |
 //! | capture: reflective opto, rising edge, filter and pull-up as above | PA1, AF1 | TIM2 CH2 | TIM2 interrupt |
 //! | capture: hall, rising edge, filter and pull-up as above | PA2, AF1 | TIM2 CH3 | TIM2 interrupt |

@@ -30,6 +30,7 @@ fn fullest() -> RigConfig {
             points: 255,
             day: u16::MAX,
         }); 5],
+        output: EscOutput::DShot600,
         ..factory()
     };
     full.esc = EscProfile {

@@ -8,6 +8,7 @@
 
 use super::sectors::Sectors;
 use crate::bench::{CONVERSION_HZ, Millisecond};
+use esc_pwm::dshot::{Frame, Throttle};
 use firmware_rig::burst;
 use firmware_rig::queue::CAPACITY;
 use firmware_rig::{Config, Conversions, Delivered, Rig, RigConfig, RigConsole, Start};
@@ -115,6 +116,13 @@ impl Board {
     #[must_use]
     pub fn pulse(&self) -> PulseWidth {
         self.pulse
+    }
+
+    /// The DShot frame that the next millisecond carries; `None` while the ESC is told by pulses.
+    #[must_use]
+    pub fn frame(&self) -> Option<Frame> {
+        let digital = self.rig().config().output.is_digital();
+        digital.then(|| Frame { throttle: Throttle::of(self.pulse), telemetry: false })
     }
 
     /// Takes the bytes that arrived on the line.

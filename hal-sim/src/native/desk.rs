@@ -163,6 +163,7 @@ impl RigDesk {
     }
 
     /// The plant's next millisecond. The timer takes a new pulse at the start of a frame; the pulse has ended 2 ms later at the latest.
+    /// A DShot frame goes out in each millisecond, with what the tick before it gave.
     pub fn turn(&mut self) {
         self.ms += 1;
         let dark = self.on(|k| matches!(k, FaultKind::BrownOut)).is_some();
@@ -170,7 +171,9 @@ impl RigDesk {
             self.dark = dark;
             self.bench.set_power(self.switched_on && !dark);
         }
+        let frame = self.board.frame();
         match self.ms % FRAME_MS {
+            _ if frame.is_some() => self.frame_pulse = PulseWidth::MIN,
             0 => self.frame_pulse = self.board.pulse(),
             PULSE_MS if !dark => {
                 let began_ns = (self.ms - PULSE_MS) * 1_000_000;
@@ -180,6 +183,9 @@ impl RigDesk {
         }
         self.gathered.watched = self.board.wanted();
         self.bench.millisecond(&mut self.gathered);
+        if let Some(frame) = frame.filter(|_| !dark) {
+            self.bench.frame(self.ms * 1_000_000, frame.word()); // it ends just before the next tick
+        }
         self.disturb();
     }
 

@@ -7,7 +7,7 @@
 
 use super::date;
 use crate::Failure;
-use esc_pwm::Bounds;
+use esc_pwm::{Bounds, EscOutput};
 use firmware_rig::config::{CurrentChannel, TemperatureChannel, TorqueChannel, VoltageChannel};
 use firmware_rig::rig_config::{Answers, Calibrated, EscProfile};
 use firmware_rig::strain::{Beam, Bridge, StrainChannel};
@@ -144,6 +144,15 @@ struct Esc {
     power_ms: Number,
     cells_ms: Number,
     ready_ms: Number,
+    output: Option<OutputName>,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "lowercase")]
+enum OutputName {
+    Pwm,
+    DShot300,
+    DShot600,
 }
 
 #[derive(Deserialize, Clone, Copy, PartialEq, Eq)]
@@ -261,6 +270,11 @@ impl File {
         to.temperature = bounds(&l.temperature_c, to.temperature, Celsius, 500.0, 60_000.0)?;
         if let Some(esc) = &self.esc {
             config.esc = esc.profile()?;
+            config.output = match esc.output {
+                None | Some(OutputName::Pwm) => EscOutput::Pwm,
+                Some(OutputName::DShot300) => EscOutput::DShot300,
+                Some(OutputName::DShot600) => EscOutput::DShot600,
+            };
         }
         if let Some(scales) = &self.calibrated {
             config.calibrated = scales.all()?;
@@ -531,7 +545,12 @@ pub(crate) fn text(config: &RigConfig) -> String {
         Answers::LongReady => ("long-ready", None),
         Answers::Silent { hold_ms } => ("silent", Some(hold_ms)),
     };
-    line(format!("[esc]\nanswers = {answers:?}"));
+    let output = match config.output {
+        EscOutput::Pwm => "pwm",
+        EscOutput::DShot300 => "dshot300",
+        EscOutput::DShot600 => "dshot600",
+    };
+    line(format!("[esc]\noutput = {output:?}\nanswers = {answers:?}"));
     if let Some(hold) = hold {
         line(format!("hold_ms = {hold}"));
     }

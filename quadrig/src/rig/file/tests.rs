@@ -28,8 +28,10 @@ fn what_is_written_reads_back_the_same() {
     });
     full.curve = Some([1000, 1250, 1400, 1700, 2000].map(PulseWidth::from_us));
     full.esc.answers = Answers::Silent { hold_ms: 4_000 };
+    full.output = EscOutput::DShot600;
     full.limits.torque = Bounds { low: Some(NewtonMetre(-0.1)), high: None, ms: 250 };
-    for config in [factory(), full, preset("beam-only.toml"), preset("load-cell-only.toml")] {
+    let half = RigConfig { output: EscOutput::DShot300, ..factory() };
+    for config in [factory(), full, half, preset("beam-only.toml"), preset("load-cell-only.toml")] {
         let (again, scales) = parsed(&text(&config)).unwrap_or_else(|e| panic!("{e}\n{}", text(&config)));
         assert_eq!(again, config, "{}", text(&config));
         assert!(scales && again.digest() == config.digest());
@@ -39,6 +41,9 @@ fn what_is_written_reads_back_the_same() {
 #[test]
 fn the_presets_are_what_their_names_say() {
     assert_eq!(preset("thesis.toml"), factory());
+    let digital = preset("dshot.toml");
+    assert_eq!((digital.output, digital.esc.answers), (EscOutput::DShot600, Answers::LongReady));
+    assert_eq!(RigConfig { output: EscOutput::Pwm, esc: factory().esc, ..digital }, factory());
     let fitted = |name: &str| {
         let config = preset(name);
         (config.marks, config.fitted)
@@ -65,6 +70,7 @@ fn refusals_name_file_line_and_column() {
         (format!("{rate}[limits.voltage_v]\nlow = 12\nms = 0\n"), "rig.toml:6:6: ", "whole number"),
         (format!("{rate}[limits.speed_rpm]\nhigh = 1e9\nms = 12\n"), "rig.toml:5:8: ", "30000"),
         (format!("{rate}[esc]\nanswers = \"loud\"\n"), "rig.toml:5:11: ", "long-cells-ready"),
+        (format!("{rate}[esc]\noutput = \"dshot1200\"\n"), "rig.toml:5:10: ", "dshot600"),
         (
             format!(
                 "{rate}[calibrated.thrust]\nzero_counts = 1\nper_count = 1\nresidual = 0\nworst = 0\npoints = 2\ndate = \"soon\"\n"
