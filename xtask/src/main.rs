@@ -13,6 +13,7 @@
 mod ahrs_bench;
 mod callgraph;
 mod emulator;
+mod hazards;
 mod image;
 mod peers;
 mod place;
@@ -29,6 +30,8 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   setup            Rust target of the boards, Python environment of the verdict checker
+  hazards [LINE]...  breaks each mend of tests/hazards.toml in a copy and sees its test fail
+  hazards --page   writes docs/hazards.md
   image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
                    interrupts reach no panic, and its stack is bounded (budgets/rig.toml)
   program          the command line with the emulator in it, for --image: target/quadrig-emulated
@@ -56,6 +59,8 @@ fn main() -> ExitCode {
     let done = match words.as_slice() {
         ["setup"] => setup::target(&place).and_then(|()| setup::python(&place).map(|_| ())),
         ["image"] => image::image(&place, false),
+        ["hazards", "--page"] => hazards::write_page(&place),
+        ["hazards", lines @ ..] => hazards::break_each(&place, lines),
         ["program"] => emulator::program(&place),
         ["image", "--bless"] => image::image(&place, true),
         ["test"] => test::everything(&place),

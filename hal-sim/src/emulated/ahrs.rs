@@ -134,7 +134,7 @@ impl World for ImuWorld {
         self.held
     }
 
-    fn accessed(&mut self, pins: &mut Pins<'_>) {
+    fn accessed(&mut self, _: Option<(u64, u64)>, pins: &mut Pins<'_>) {
         let high = pins.level(Port::B, SCL);
         self.clocks_seen += u32::from(high && !self.clock_high);
         self.clock_high = high;

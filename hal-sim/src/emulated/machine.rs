@@ -14,7 +14,7 @@ use super::pulse::SeenFrame;
 use rigless::{
     chip::{Timeline, uart},
     device::{Device, Level, RegisterFile},
-    emulator::{self, Driver, Host, Settled, Start, Stop},
+    emulator::{self, AccessKind, Driver, Host, Settled, Start, Stop},
     image::Image,
     machine::{Board, Target, armv7m},
     mcu::{Mcu, Operate},
@@ -409,8 +409,8 @@ pub trait World: Send {
     /// Called at the instant asked for before (first a microsecond after power-up); returns the next instant to be called at.
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64;
 
-    /// Called after every register access of the firmware, if [`World::watches`].
-    fn accessed(&mut self, _pins: &mut Pins<'_>) {}
+    /// Called after every register access of the firmware, if [`World::watches`]; `written` is the address of a register and what was written to it.
+    fn accessed(&mut self, _written: Option<(u64, u64)>, _pins: &mut Pins<'_>) {}
 
     /// Whether the world wants to hear of accesses now.
     fn watches(&self) -> bool {
@@ -477,7 +477,8 @@ impl<W: World> Driver<Machine> for Clockwork<W> {
     fn on_settled(&mut self, session: &mut Session<Machine>, _: &mut dyn Host, settled: Settled) {
         if let (true, Settled::Access { access, .. }) = (self.world.watches(), settled) {
             let mut pins = Pins { machine: session.board_mut(), at: access.virtual_time, reset: false, fault: false };
-            self.world.accessed(&mut pins);
+            let written = (access.kind == AccessKind::Write).then_some((access.address, access.value));
+            self.world.accessed(written, &mut pins);
         }
     }
 

@@ -47,8 +47,8 @@ const FRAME_NS: u64 = MS;
 /// How finely the start of a pulse is looked for, ns.
 const LOOK_NS: u64 = 1000;
 const MS: u64 = 1_000_000;
-/// Time between two changes of an input that screams, ns: a rising edge in every microsecond.
-const SCREAM_NS: u64 = 500;
+/// Time between two changes of an input that screams, ns: 2.5 rising edges in a microsecond, which come faster than they can be served.
+const SCREAM_NS: u64 = 200;
 
 /// What an operator does.
 #[derive(Debug, Clone, Copy, PartialEq)]

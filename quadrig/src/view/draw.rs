@@ -248,7 +248,10 @@ fn table(screen: &Screen, ink: Ink, width: usize) -> Vec<Line<'static>> {
     if widths.limits {
         head += &format!("{:<16}", "limits");
     }
-    head += &format!("{:<bar$} trend, 1 s a column", if widths.bar < 10 { "used" } else { "of its limit" }, bar = widths.bar + 2);
+    let used = if widths.bar < 10 { "used" } else { "of its limit" };
+    let trend =
+        ["trend, 1 s a column", "trend, 1 s", "trend"].into_iter().find(|words| words.len() <= widths.trend).unwrap_or("");
+    head += &format!("{used:<bar$} {trend}", bar = widths.bar + 2);
     let mut lines = vec![Line::from(Span::styled(
         format!("{:<width$}", cut(&head, width)),
         Style::new().add_modifier(Modifier::UNDERLINED | Modifier::DIM),
