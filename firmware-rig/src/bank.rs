@@ -2,7 +2,7 @@
 //!
 //! What it is: the bank of [`CaptureChannel`]s that compares them: consensus, channels that are lost, that disagree, a blade that twists.
 //! What can go wrong: a channel 1 % off the median twice running is flagged `Disagrees`; a twisted blade shows as a pattern of the beam
-//! that changes with the speed (`BladeTwist`).
+//! that changes with the speed (`BladeTwist`). A channel that fails now and then counts as bad until it has been good for 0.3 s.
 //! Units: ticks of the capture timer, rev/min.
 //! Reference: specification `rig.md`, "Four RPM capture channels"; Beharie 2013, sections 5.4 and 5.7.2.
 
@@ -23,6 +23,10 @@ const TWIST: f32 = 0.02;
 /// long as the time-out to zero (0.25 s), so that channels read zero one after the other.
 const SLOWEST_JUDGED: u64 = 300;
 
+/// How long a channel counts as bad after it was: less than a disagreement must last (0.5 s) by more than the time between two samples, so
+/// that one bad sample stops nobody. It bridges readings in which a mark that is missed now and then was there by chance.
+const HELD: Ticks = Ticks::from_ms(300);
+
 /// The four channels together.
 #[derive(Debug, Clone)]
 pub struct CaptureBank {
@@ -32,6 +36,8 @@ pub struct CaptureBank {
     /// Two earlier medians and their times, each at least a revolution and a half after the other.
     before: [Option<(Ticks, f32)>; 2],
     flagged: u8,
+    /// When each channel was last bad.
+    bad: [Option<Ticks>; CAPTURE_CHANNELS],
     /// Unevenness of the blades at low speed.
     straight: Option<f32>,
 }
@@ -43,7 +49,15 @@ impl CaptureBank {
         let [a, b, c, d] = config.marks;
         let channel = |marks| CaptureChannel::new(marks, config.timer_hz, config.capture);
         let channels = [channel(a), channel(b), channel(c), channel(d)]; // made where they stay: `map` would hold two of each on the stack
-        Self { channels, timer_hz: config.timer_hz, turning_since: None, before: [None; 2], flagged: 0, straight: None }
+        Self {
+            channels,
+            timer_hz: config.timer_hz,
+            turning_since: None,
+            before: [None; 2],
+            flagged: 0,
+            bad: [None; CAPTURE_CHANNELS],
+            straight: None,
+        }
     }
 
     /// Takes the captures since the last tick.
@@ -54,7 +68,7 @@ impl CaptureBank {
         let turning = self.channels.iter().any(|c| c.is_turning(now));
         self.turning_since = turning.then(|| self.turning_since.unwrap_or(now));
         if !turning {
-            self.flagged = 0; // they were lost one after the other because the rotor stopped
+            (self.flagged, self.bad) = (0, [None; CAPTURE_CHANNELS]); // lost one after the other because the rotor stopped
         }
     }
 
@@ -158,7 +172,11 @@ impl CaptureBank {
         }
         let middle = median(speeds);
         let tolerance = self.tolerance(now, middle);
-        for ((channel, code), speed) in self.channels.iter_mut().zip(&mut codes).zip(speeds) {
+        for (channel, code) in self.channels.iter_mut().zip(&mut codes) {
+            // uneven marks do not change the speed over whole revolutions: one that is off is off for another reason
+            let whole =
+                matches!(code.verdict, CaptureVerdict::Nominal | CaptureVerdict::Alternating | CaptureVerdict::BladeTwist);
+            let speed = channel.speed().filter(|_| whole).map(|v| v.0);
             let apart = match (speed, middle) {
                 (Some(speed), Some(middle)) => (speed - middle).abs() > tolerance * middle,
                 _ => false,
@@ -170,13 +188,16 @@ impl CaptureBank {
             // An over-capture is told once, and on until a whole span has been seen again or the rotor stands.
             channel.overwritten &= channel.reading.is_none() && now.since(channel.last).0 <= channel.stop_after();
         }
-        let bad = |code: &&CaptureCode| match code.verdict {
+        let is_bad = |code: &CaptureCode| match code.verdict {
             CaptureVerdict::Disagrees | CaptureVerdict::Doubled | CaptureVerdict::Missed => true,
             CaptureVerdict::Lost => others.is_some(), // all together: the rotor stops
             _ => false,
         };
         let slow = others.is_some_and(|(revolution, _)| self.is_slow(revolution));
-        self.flagged = if slow { 0 } else { codes.iter().filter(bad).count() as u8 };
+        for (bad, code) in self.bad.iter_mut().zip(&codes) {
+            *bad = if !slow && is_bad(code) { Some(now) } else { bad.filter(|then| !slow && now.since(*then).0 < HELD.0) };
+        }
+        self.flagged = self.bad.iter().flatten().count() as u8;
         codes
     }
 

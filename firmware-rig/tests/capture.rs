@@ -25,7 +25,10 @@ struct Rotor {
 
 impl Rotor {
     fn new(start: u64) -> Self {
-        let config = Config::thesis_570kv();
+        Self::with(Config::thesis_570kv(), start)
+    }
+
+    fn with(config: Config, start: u64) -> Self {
         let bank = CaptureBank::new(&config);
         Self { bank, config, now: start, revolution: 0, last: [start; 4], alive: [true; 4], skew: [1000; 4] }
     }
@@ -35,7 +38,8 @@ impl Rotor {
             self.now += MS;
             let mut edges: [Vec<u32>; 4] = Default::default();
             for (c, list) in edges.iter_mut().enumerate() {
-                let period = self.revolution * self.skew[c] / 1000 / u64::from(self.config.marks[c]);
+                let marks = u64::from(self.config.marks[c]);
+                let period = (self.revolution * self.skew[c] / 1000).checked_div(marks).unwrap_or(0);
                 if period == 0 {
                     self.last[c] = self.now;
                     continue;
@@ -108,6 +112,28 @@ fn a_constant_speed_is_read_by_all_four() {
     let codes = rotor.sample();
     for (c, code) in codes.iter().enumerate() {
         assert_eq!(rotor.rpm(c, code), Some(4000.0), "channel {c}");
+    }
+}
+
+/// The board's own speed, by which it judges limits and silence: of any number of marks, blade by blade.
+#[test]
+fn the_board_itself_reads_a_propeller_of_any_number_of_blades() {
+    for blades in 1..=6u16 {
+        let config = Config { marks: [blades, 0, 0, 0], ..Config::thesis_570kv() };
+        let mut rotor = Rotor::with(config, 0);
+        rotor.revolution = 84_000_000 * 60 / 4000 / 60 * 60;
+        rotor.run(500);
+        let channel = &rotor.bank.channels()[0];
+        assert_eq!(channel.speed().map(|v| v.0), Some(4000.0), "{blades} blades");
+        assert_eq!(channel.revolution(), Some(rotor.revolution), "{blades} blades");
+        let now = Ticks(rotor.now);
+        assert_eq!(rotor.bank.consensus(now).map(|v| v.0), Some(4000.0), "{blades} blades");
+        assert_eq!(rotor.bank.judged_speed(now).map(|v| v.0.round()), Some(4000.0), "{blades} blades");
+        // three of its periods and the margin: silent for a blade longer, it does not turn any more
+        let period = rotor.revolution / u64::from(blades);
+        let silent = 3 * period + 20 * MS;
+        let turns = |after: u64| channel.is_turning(Ticks(rotor.last[0] + after));
+        assert!(turns(silent) && !turns(silent + u64::from(blades)), "{blades} blades");
     }
 }
 

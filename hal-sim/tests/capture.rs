@@ -227,3 +227,74 @@ fn a_blade_that_is_straight_at_low_speed_is_not_called_twisted() {
         assert!(after.iter().all(|s| s[0].verdict == CaptureVerdict::Nominal), "seed {seed}");
     }
 }
+
+/// How marks are missed.
+#[derive(Debug, Clone, Copy)]
+enum Missing {
+    /// Each of so many in turn.
+    Every(u32),
+    /// That share of them, by chance.
+    Share(f64),
+}
+
+/// A rotor at `rpm` of which beam and hall, two marks each, both miss marks from the first on: what hall is told, and how many channels the
+/// board counts as bad, sample by sample from 0.3 s after the speed was reached.
+fn both_miss(seed: u64, rpm: f64, missing: Missing) -> Vec<(CaptureVerdict, u8)> {
+    let mut draw = Stream::new(seed, Source::Phase, 7);
+    let mut angle = draw.uniform();
+    let mut tachometers = Tachometers::new(&Geometry::default(), EdgeDetail::Captured, seed, angle);
+    let mut bank = CaptureBank::new(&Config::thesis_570kv());
+    let mut passed = [(draw.uniform() * 5.0) as u32, (draw.uniform() * 5.0) as u32];
+    let mut told = Vec::new();
+    for ms in 1..=3_000u64 {
+        let speed = rpm / 60.0 * (ms as f64 / 600.0).min(1.0);
+        let mut edges: [Vec<u32>; 4] = Default::default();
+        for step in 0..10u64 {
+            let next = angle + speed * 1e-4;
+            tachometers.step(angle, next, speed, |channel: u8, _: bool, fraction: f64| {
+                let c = usize::from(channel);
+                if let Some(passed) = [Some(0), None, Some(1), None][c].map(|place: usize| &mut passed[place]) {
+                    *passed += 1;
+                    let unseen = match missing {
+                        Missing::Every(n) => passed.is_multiple_of(n),
+                        Missing::Share(share) => draw.uniform() < share,
+                    };
+                    if unseen {
+                        return;
+                    }
+                }
+                edges[c].push(((((ms - 1) * 10 + step) as f64 + fraction) * (MS as f64 / 10.0)) as u64 as u32);
+            });
+            angle = next;
+        }
+        bank.take(Ticks(ms * MS), &edges.each_ref().map(Vec::as_slice), &[false; 4]);
+        if ms % LOG_MS == 0 {
+            let codes = bank.sample(Ticks(ms * MS));
+            if ms > 900 {
+                told.push((codes[2].verdict, bank.flagged()));
+            }
+        }
+    }
+    told
+}
+
+/// Missed marks of two are never taken for magnets that are not opposite, and two such channels stop a run: both count as bad for longer
+/// than a disagreement must last.
+#[test]
+fn two_channels_of_two_marks_that_miss_some_are_bad_and_stay_so() {
+    use CaptureVerdict::{Disagrees, Doubled, Missed};
+    for missing in [Missing::Every(5), Missing::Every(4), Missing::Every(3), Missing::Every(2), Missing::Share(0.2)] {
+        for seed in 0..SEEDS {
+            let told = both_miss(seed, speed_of(seed), missing);
+            let longest = told.split(|(_, bad)| *bad < 2).map(<[_]>::len).max().unwrap_or(0);
+            assert!(longest >= 5, "{missing:?}, seed {seed}: two bad channels for {longest} samples: {told:?}");
+            // of one in four, two whole periods between two long ones look like a mark seen twice
+            let name = |verdict: &CaptureVerdict| match missing {
+                Missing::Every(4) => matches!(verdict, Missed | Disagrees | Doubled),
+                Missing::Every(_) => matches!(verdict, Missed | Disagrees),
+                Missing::Share(_) => true, // by chance each pattern comes once
+            };
+            assert!(told.iter().all(|(hall, _)| name(hall)), "{missing:?}, seed {seed}: {told:?}");
+        }
+    }
+}
