@@ -247,6 +247,7 @@ impl RigConsole {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use frame::rig::RigState;
     use frame::wire::Decoder;
 
     fn started() -> RigConsole {
@@ -324,6 +325,20 @@ mod tests {
         console.look(false);
         console.tick(&delivered(2, &adc()), |_| ());
         assert!(console.rig().faults().contains(Fault::OperatorStop));
+    }
+
+    /// Crossed wires, or an adapter that echoes: nothing of its own telemetry is obeyed, least of all as `Arm`.
+    #[test]
+    fn a_board_that_hears_itself_obeys_nothing() {
+        let mut console = started();
+        for ms in 1..3_000 {
+            for byte in console.queued().to_vec() {
+                console.hear(byte);
+            }
+            console.sent();
+            console.tick(&delivered(ms, &adc()), |pulse| assert_eq!(pulse, PulseWidth::MIN));
+            assert_eq!(console.rig().state(), RigState::Disarmed, "{ms} ms");
+        }
     }
 
     #[test]

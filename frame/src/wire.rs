@@ -190,7 +190,10 @@ impl Decoder {
             return Some(Err(()));
         }
         let at = Ticks(u64::from_le_bytes(time.try_into().ok()?));
-        let message = postcard::from_bytes(payload).ok()?;
+        let (message, rest) = postcard::take_from_bytes(payload).ok()?;
+        if !rest.is_empty() {
+            return None; // it only begins as one of ours: a board that hears itself must not obey
+        }
         Some(Ok(Received { sequence: u16::from_le_bytes([*s0, *s1]), at, message }))
     }
 }
@@ -201,6 +204,19 @@ mod tests {
     use crate::message::{Command, Message};
     use crate::rig::RigSample;
     use proptest::prelude::*;
+
+    /// A sample begins as `Arm` does, an event as a beep.
+    #[test]
+    fn what_a_board_says_is_no_command() {
+        let (mut encoder, mut decoder) = (Encoder::default(), Decoder::default());
+        let state = crate::message::Event::State { from: Default::default(), to: Default::default(), at: Ticks(9) };
+        for message in [Message::Rig(RigSample::default()), Message::Event(state), Message::Health(Default::default())] {
+            let mut out = [0; MAX_WIRE];
+            let len = encoder.encode(Ticks(1), &message, &mut out).unwrap();
+            assert!(out[..len].iter().all(|byte| decoder.push::<Command>(*byte).is_none()), "{message:?}");
+        }
+        assert_eq!((decoder.stats().good, decoder.stats().damaged), (0, 3));
+    }
 
     fn stream(n: u16) -> (Vec<u8>, Vec<usize>) {
         let mut encoder = Encoder::default();
