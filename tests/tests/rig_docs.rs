@@ -4,16 +4,22 @@
 
 use firmware_rig::Config;
 use frame::rig::{CaptureCode, CaptureVerdict};
-use hal_sim::fault::{Mishap, REACTION_MS};
+use hal_sim::fault::{Answer, Mishap, Plan, REACTION_MS, Rule};
 use std::fmt::Write;
 
 fn faults() -> String {
-    let marks = Config::thesis_570kv().marks;
     let mut table = String::from("| at the pins | detectable after | by | latched as |\n| --- | --- | --- | --- |\n");
-    for mishap in Mishap::all() {
-        let detection = mishap.detection(4000.0, marks);
-        let latched = mishap.fault().map_or("reset, disarmed", frame::Fault::words);
-        let _ = writeln!(table, "| {} | {:.0} ms | {} | {latched} |", mishap.words(), detection.ms, detection.why);
+    // one pair of sensors stands for all
+    let pair = |mishap: Mishap| mishap.lines().count_ones() < 2 || mishap.lines() == 0b0101;
+    for mishap in Mishap::all().into_iter().filter(|mishap| pair(*mishap)) {
+        let plan = Plan::factory(mishap);
+        let rule = Rule::of(&plan, 4000.0, 4000.0);
+        let latched = match rule.answer {
+            Answer::Stops(named) => named.iter().map(frame::Fault::words).collect::<Vec<_>>().join(" or "),
+            Answer::Resets => "reset, disarmed".to_owned(),
+            _ => continue,
+        };
+        let _ = writeln!(table, "| {} | {:.0} ms | {} | {latched} |", mishap.words(), rule.within_ms, rule.why);
     }
     assert_eq!(REACTION_MS, 40.0, "as the text says");
     table

@@ -48,6 +48,7 @@ usage: cargo xtask COMMAND
   test --quick     format, lints and tests of the host, nothing else
   test --lints     format and lints, those of the code behind the emulator included (its crates take 140 s of processor time once)
   blind [ARGS]     the blind campaign (docs/blind.md), on messy rigs with --messy; ARGS go to it, --help lists them
+  faults [--runs N] [--page FILE]  the fault campaign on the native board (docs/faults.md)
   test --emulated  the images on emulated boards, nothing else
   test --verdicts  the verdict contract on recorded and simulated logs, nothing else
 ";
@@ -68,6 +69,10 @@ fn main() -> ExitCode {
         ["test", "--lints"] => test::lints(&place),
         ["blind", rest @ ..] => {
             let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "blind", "--"];
+            run::run(&mut run::cargo(&place, &[&head, rest].concat()))
+        }
+        ["faults", rest @ ..] => {
+            let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "faults", "--"];
             run::run(&mut run::cargo(&place, &[&head, rest].concat()))
         }
         ["ahrs-bench", "--vqf"] => peers::vqf(&place),

@@ -181,6 +181,11 @@ impl Bench {
         self.esc.set_power(on);
     }
 
+    /// The ESC was switched on and ready before the board started.
+    pub fn esc_is_ready(&mut self) {
+        self.esc.set_ready();
+    }
+
     /// Hangs a mass on the load cell, gram; it pulls the beam down. 0 takes it off.
     pub fn hang(&mut self, mass_g: f64) {
         self.by_hand.0 = -mass_g * 1.0e-3 * G;

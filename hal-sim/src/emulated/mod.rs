@@ -16,9 +16,11 @@ mod converter;
 pub mod cost;
 mod crystal;
 mod flash;
+mod harm;
 mod machine;
 pub mod operator;
 mod part;
+pub mod pilot;
 mod pulse;
 pub mod rig;
 

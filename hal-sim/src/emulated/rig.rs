@@ -8,10 +8,11 @@
 //! Reference: pin table in `firmware-rig/src/board/mod.rs`, written down here again on purpose.
 
 use super::flash::Caches;
+use super::harm::Harm;
 use super::machine::{EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
 use super::pulse::SeenFrame;
 use crate::bench::{Bench, STEP_NS, Truth};
-use crate::fault::Mishap;
+use crate::fault::{Mishap, Plan, by_hand};
 use crate::native::PLUGS;
 use crate::scenario::Scenario;
 use crate::sensor::EdgeDetail;
@@ -89,8 +90,8 @@ pub enum Action {
     FailAccess,
     /// Each DShot frame reaches the ESC with one bit turned over (true), or as it is again.
     GarbleFrames(bool),
-    /// Something goes wrong at the pins, and stays so.
-    Mishap(Mishap),
+    /// The ESC was on and ready before the board.
+    EscReady,
     /// The rotor turns the other way round, as channel B of the encoder shows it.
     Backwards(bool),
     /// Hangs a mass on the load cell, gram; 0 takes it off.
@@ -134,6 +135,11 @@ pub trait Operator: Send {
     /// Called after a millisecond in which the board stored something, with what its settings' sectors hold now.
     fn stored(&mut self, _sectors: &[u8]) {}
 
+    /// Called every millisecond: a plan whose mishap comes now, and stays.
+    fn strikes(&mut self) -> Option<Plan> {
+        None
+    }
+
     /// Whether messages and truth are kept for [`RigRun`]: whoever plays for hours has no room for them.
     fn keeps_record(&self) -> bool {
         true
@@ -176,7 +182,7 @@ pub struct RigWorld<O> {
     muxed: bool,
     truth: Vec<(u64, Truth)>,
     messages: Vec<(Ticks, Message)>,
-    mishap: Option<Mishap>,
+    harm: Option<Harm>,
     backwards: bool,
     last_frame: Vec<u8>,
     /// When the start of a pulse is looked for next, apart from the bench's steps.
@@ -215,7 +221,7 @@ impl<O: Operator> RigWorld<O> {
             muxed: false,
             truth: Vec::new(),
             messages: Vec::new(),
-            mishap: None,
+            harm: None,
             backwards: false,
             last_frame: Vec::new(),
             rise_at: u64::MAX,
@@ -254,7 +260,9 @@ impl<O: Operator> RigWorld<O> {
             }
             (None, Some(train)) => {
                 self.running_pulse = None;
-                self.bench.pulse(now_ns, train.width_ns as u32);
+                if !self.suffers(Mishap::PulseWire) {
+                    self.bench.pulse(now_ns, train.width_ns as u32);
+                }
             }
             _ => {}
         }
@@ -292,14 +300,55 @@ impl<O: Operator> RigWorld<O> {
     fn drive_edges(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
         while let Some(edge) = self.bench.edge_until(now_ns) {
             let (_, channel) = CAPTURE_PINS[usize::from(edge.channel)];
-            let stuck = self.mishap == Some(Mishap::StuckLine { channel: edge.channel });
-            let stuck = stuck || self.plugs_out[usize::from(edge.channel)];
+            let stuck = self.plugs_out[usize::from(edge.channel)];
+            let stuck = stuck || self.harm.as_mut().is_some_and(|harm| harm.hides(edge.channel, edge.rising));
             if self.connected && edge.channel == ENCODER {
                 pins.drive(Port::A, ENCODER_B_PIN, edge.rising == self.backwards); // B is 90 deg behind A, or ahead of it
             }
             if self.connected && !stuck {
                 pins.drive_timer(GeneralTimer::Tim2, channel, edge.rising);
             }
+        }
+    }
+
+    /// Edges of a speed that a sensor reads in the place of the rotor's.
+    fn drive_trains(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
+        let rpm = self.bench.truth().plant.rpm;
+        let Some(harm) = &mut self.harm else { return };
+        while let Some((channel, high)) = harm.train_edge(now_ns, rpm) {
+            let (_, input) = CAPTURE_PINS[usize::from(channel)];
+            pins.drive_timer(GeneralTimer::Tim2, input, high);
+        }
+    }
+
+    /// Whether this goes wrong now.
+    fn suffers(&self, mishap: Mishap) -> bool {
+        self.harm.as_ref().is_some_and(|harm| harm.mishap() == mishap)
+    }
+
+    /// A plan's mishap comes: what is done to the board itself, to the bench and to the line.
+    fn strike(&mut self, ms: u64, plan: &Plan, pins: &mut Pins<'_>) {
+        self.harm = Some(Harm::new(plan, ms));
+        match plan.mishap {
+            Mishap::SupplyDip => pins.set_supply(DIP_MV),
+            Mishap::Replay => pins.say(&self.last_frame),
+            Mishap::StopOpen | Mishap::StopBlink => self.stop_open = true, // driven with the next millisecond
+            Mishap::StopHeld => {
+                self.unplugged = true;
+                pins.release(Port::B, STOP_PIN);
+            }
+            Mishap::Hang => pins.hold_tick(true),
+            Mishap::LateTick { ms: late } => {
+                pins.hold_tick(true);
+                self.tick_back = Some(ms + u64::from(late));
+            }
+            Mishap::ResetKey => self.reset(ms, pins),
+            Mishap::HardFault => pins.fail_access(),
+            Mishap::CrystalFails => pins.fail_crystal(),
+            Mishap::Screams { channel } => self.scream = Some((channel, u64::MAX, ms * MS)),
+            Mishap::Overwritten { channel } => self.scream = Some((channel, (ms + 1) * MS, ms * MS)),
+            Mishap::FloatingLine { channel } => self.scream = Some((channel, (ms + 100) * MS, ms * MS)),
+            _ => by_hand(plan, &mut self.bench),
         }
     }
 
@@ -343,6 +392,9 @@ impl<O: Operator> RigWorld<O> {
         }
         let mut say = Vec::new();
         self.operator.line(&bytes[self.read.min(bytes.len())..], &mut say);
+        if let Some(harm) = &mut self.harm {
+            say.extend(harm.noise(&bytes[self.read.min(bytes.len())..]));
+        }
         self.read = bytes.len();
         pins.say(&say);
         while let Some((_, beep)) = self.bench.beep() {
@@ -350,37 +402,26 @@ impl<O: Operator> RigWorld<O> {
         }
         let mut actions = Vec::new();
         self.operator.millisecond(ms, &heard, &mut actions);
+        if let Some(plan) = self.operator.strikes() {
+            self.strike(ms, &plan, pins);
+        }
         for action in actions {
             match action {
                 Action::Send(command) => {
                     let mut wire = [0; MAX_WIRE];
                     if let Ok(used) = self.encoder.encode(Ticks::from_ms(ms), &command, &mut wire) {
-                        match self.mishap {
-                            Some(Mishap::Silence) => continue,
-                            Some(Mishap::CorruptFrames) => wire[used / 2] ^= 0x5a,
-                            _ => {}
-                        }
                         self.last_frame = wire[..used].to_vec();
-                        pins.say(&wire[..used]);
+                        let bytes = wire[..used].to_vec();
+                        let bytes = match &mut self.harm {
+                            Some(harm) => harm.line(bytes),
+                            None => bytes,
+                        };
+                        pins.say(&bytes);
                     }
                 }
                 Action::GarbleFrames(garbles) => self.garbles = garbles,
                 Action::Backwards(backwards) => self.backwards = backwards,
-                Action::Mishap(mishap) => {
-                    self.mishap = Some(mishap);
-                    match mishap {
-                        Mishap::NoConversions => pins.stop_adc(true),
-                        Mishap::SupplyDip => pins.set_supply(DIP_MV),
-                        Mishap::Replay => pins.say(&self.last_frame),
-                        Mishap::StopOpen => self.stop_open = true, // driven with the next millisecond
-                        Mishap::Hang => pins.hold_tick(true),
-                        Mishap::LateTick { ms: late } => {
-                            pins.hold_tick(true);
-                            self.tick_back = Some(ms + u64::from(late));
-                        }
-                        _ => {}
-                    }
-                }
+                Action::EscReady => self.bench.esc_is_ready(),
                 Action::Power(on) => self.bench.set_power(on),
                 Action::StopKey(pressed) => {
                     self.stop_open = pressed;
@@ -427,18 +468,17 @@ impl<O: Operator> RigWorld<O> {
 impl<O: Operator> World for RigWorld<O> {
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
         self.drive_edges(now_ns, pins);
+        self.drive_trains(now_ns, pins);
         self.drive_scream(now_ns, pins);
         self.stop_when_due(now_ns, pins);
         self.await_pulse(now_ns, pins);
         if now_ns >= self.bench.horizon_ns() {
             self.watch_pulse(now_ns, pins);
             for (n, input) in ADC_INPUTS.iter().enumerate() {
-                let counts = match self.mishap {
-                    Some(Mishap::Saturated { channel, high }) if usize::from(channel) == n => {
-                        f64::from(u8::from(high)) * 5000.0 - 400.0
-                    }
-                    _ if self.plugs_out[CAPTURE_CHANNELS + n] => -400.0, // pulled down
-                    _ => self.bench.voltages()[n] * (CODES / REFERENCE_V),
+                let counts = match self.harm.as_ref().and_then(|harm| harm.counts(n)) {
+                    Some(counts) => counts,
+                    None if self.plugs_out[CAPTURE_CHANNELS + n] => -400.0, // pulled down
+                    None => self.bench.voltages()[n] * (CODES / REFERENCE_V),
                 };
                 pins.set_adc(*input, counts);
             }
@@ -449,6 +489,11 @@ impl<O: Operator> World for RigWorld<O> {
                 }
                 if self.tick_back.take_if(|at| self.next_ms >= *at).is_some() {
                     pins.hold_tick(false);
+                }
+                if let Some(harm) = &mut self.harm {
+                    harm.millisecond(self.next_ms);
+                    pins.stop_adc(harm.converter_rests());
+                    self.stop_open &= !harm.stop_closes();
                 }
                 self.connect(pins);
                 self.converse(self.next_ms, pins);
@@ -473,7 +518,8 @@ impl<O: Operator> World for RigWorld<O> {
         let stop = self.stop_at.as_ref().map_or(u64::MAX, |(at, _)| *at);
         let edge = self.bench.next_edge_ns().unwrap_or(u64::MAX);
         let scream = self.scream.map_or(u64::MAX, |(_, _, next)| next);
-        self.bench.horizon_ns().min(edge).min(rise).min(stop).min(scream)
+        let train = self.harm.as_ref().map_or(u64::MAX, Harm::next_train);
+        self.bench.horizon_ns().min(edge).min(rise).min(stop).min(scream).min(train)
     }
 
     fn is_over(&self) -> bool {

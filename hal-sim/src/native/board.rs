@@ -12,7 +12,7 @@ use esc_pwm::dshot::{Frame, Throttle};
 use firmware_rig::burst;
 use firmware_rig::queue::CAPACITY;
 use firmware_rig::{Config, Conversions, Delivered, Rig, RigConfig, RigConsole, Start};
-use frame::message::{ClockNews, Event, SettingsNews, Trial};
+use frame::message::{ClockNews, Crash, CrashCause, Event, SettingsNews, Trial};
 use frame::units::{PulseWidth, Ticks};
 
 /// Reset cause after power-on: power-on, brown-out and pin flags (RM0090 section 7.3.21).
@@ -25,6 +25,8 @@ pub const SOFTWARE: u8 = 0x14;
 pub const PIN: u8 = 0x04;
 /// The crystal of a board on a desk, Hz.
 const CRYSTAL: ClockNews = ClockNews { crystal_hz: 8_000_000, measured_hz: 8_000_000 };
+/// A crystal that does not oscillate.
+const NO_CRYSTAL: ClockNews = ClockNews { crystal_hz: 0, measured_hz: 0 };
 /// Ticks that the self-test's trial holds up.
 const LATE_TICKS: u32 = 8;
 
@@ -47,6 +49,7 @@ pub struct Board {
     console: RigConsole,
     factory: Config,
     flash: Flash,
+    clock: ClockNews,
     stored: Option<SettingsNews>,
     pulse: PulseWidth,
     late: u32,
@@ -85,25 +88,39 @@ impl Board {
     /// A board that is switched on, with nothing in its flash.
     #[must_use]
     pub fn new(factory: Config) -> Self {
-        Self::start(Ticks(0), factory, Flash::ERASED, POWER_ON, None)
+        Self::start(Ticks(0), factory, Flash::ERASED, CRYSTAL, POWER_ON, None)
+    }
+
+    /// A board whose crystal cannot be trusted when it is switched on: it runs from its internal oscillator.
+    #[must_use]
+    pub fn without_crystal(factory: Config) -> Self {
+        Self::start(Ticks(0), factory, Flash::ERASED, NO_CRYSTAL, POWER_ON, None)
     }
 
     /// A board that is switched on, with `sectors` in the place of its own.
     #[must_use]
     pub fn with_flash(factory: Config, sectors: Sectors) -> Self {
-        Self::start(Ticks(0), factory, Flash::holding(sectors), POWER_ON, None)
+        Self::start(Ticks(0), factory, Flash::holding(sectors), CRYSTAL, POWER_ON, None)
     }
 
-    fn start(now: Ticks, factory: Config, flash: Flash, reset_cause: u8, ended: Option<Event>) -> Self {
-        let start = Start { reset_cause, clock: CRYSTAL, stored: flash.found, news: flash.news, ended };
+    fn start(now: Ticks, factory: Config, flash: Flash, clock: ClockNews, reset_cause: u8, ended: Option<Event>) -> Self {
+        let start = Start { reset_cause, clock, stored: flash.found, news: flash.news, ended };
         let console = RigConsole::start(now, factory.clone(), &start);
-        Self { console, factory, flash, stored: None, pulse: PulseWidth::MIN, late: 0, burst: Vec::new() }
+        Self { console, factory, flash, clock, stored: None, pulse: PulseWidth::MIN, late: 0, burst: Vec::new() }
     }
 
     /// The same board after a reset of the given cause: its flash is what it was.
     #[must_use]
     pub fn after_reset(&self, now: Ticks, reset_cause: u8) -> Self {
-        Self::start(now, self.factory.clone(), self.flash.clone(), reset_cause, None)
+        Self::start(now, self.factory.clone(), self.flash.clone(), self.clock, reset_cause, None)
+    }
+
+    /// The same board after the last resort has reset it, which tells what `ended` the program.
+    #[must_use]
+    pub fn after_end(&self, now: Ticks, ended: Event) -> Self {
+        let failed = matches!(ended, Event::Crashed(Crash { cause: CrashCause::ClockFailed, .. }));
+        let clock = if failed { NO_CRYSTAL } else { self.clock };
+        Self::start(now, self.factory.clone(), self.flash.clone(), clock, SOFTWARE, Some(ended))
     }
 
     /// The portable firmware, for reading.

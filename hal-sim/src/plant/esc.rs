@@ -186,6 +186,11 @@ impl EscDialogue {
         }
     }
 
+    /// Goes on as an ESC that was switched on and ready before: only its board has just started.
+    pub fn set_ready(&mut self) {
+        self.enter(EscState::Running);
+    }
+
     /// A pulse of `width_ns` ended at `at_ns`. Widths outside 0.8..2.2 ms are no pulses.
     pub fn pulse(&mut self, at_ns: u64, width_ns: u32) {
         if (800_000..=2_200_000).contains(&width_ns) {
