@@ -106,7 +106,10 @@ impl CaptureBank {
     pub fn judged_speed(&self, now: Ticks) -> Option<RevPerMin> {
         let (mut first, mut second) = (None, None);
         for channel in &self.channels {
-            let Some(speed) = channel.latest_speed(now) else { continue };
+            // after an over-capture the first period may not be one of two marks: a whole reading comes first
+            let Some(speed) = channel.latest_speed(now).filter(|_| !channel.overwritten || channel.reading.is_some()) else {
+                continue;
+            };
             if first.is_none_or(|fastest| speed > fastest) {
                 (first, second) = (Some(speed), first);
             } else if second.is_none_or(|next| speed > next) {

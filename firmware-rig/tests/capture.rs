@@ -137,6 +137,26 @@ fn the_board_itself_reads_a_propeller_of_any_number_of_blades() {
     }
 }
 
+/// What is left of a burst of noise is no mark: the time from it to the next mark is no speed by which a limit is judged.
+#[test]
+fn an_edge_that_is_left_of_an_over_capture_makes_no_overspeed() {
+    let config = Config { marks: [0, 1, 0, 0], ..Config::thesis_570kv() };
+    let mut bank = CaptureBank::new(&config);
+    let period = 15 * MS; // 4000 rev/min
+    let mut highest = 0.0f32;
+    for ms in 1..400u64 {
+        let mut edges: Vec<u32> = if (ms * MS).is_multiple_of(period) { vec![(ms * MS) as u32] } else { vec![] };
+        let noise = ms == 205; // 5 ms before a mark
+        if noise {
+            edges = vec![(ms * MS) as u32];
+        }
+        bank.take(Ticks(ms * MS), &[&[], &edges, &[], &[]], &[false, noise, false, false]);
+        highest = highest.max(bank.judged_speed(Ticks(ms * MS)).map_or(0.0, |v| v.0));
+    }
+    assert!((3999.0..4001.0).contains(&highest), "{highest} rev/min");
+    assert!(bank.judged_speed(Ticks(391 * MS)).is_some(), "a reading later it is judged again");
+}
+
 /// The turn of the 32-bit counter, edge by edge: one mark a revolution, the last edge before the turn, on it and after it at every
 /// place near the turn, and the span of each reading against 64-bit time.
 #[test]
