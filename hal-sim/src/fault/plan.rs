@@ -125,7 +125,6 @@ fn phases(mishap: Mishap) -> &'static [Phase] {
         Mishap::Saturated { .. }
         | Mishap::Contact { .. }
         | Mishap::Overload { .. }
-        | Mishap::Twist { .. }
         | Mishap::Temperature { .. }
         | Mishap::StuckLine { .. }
         | Mishap::Overwritten { .. }

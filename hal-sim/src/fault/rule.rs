@@ -103,8 +103,8 @@ impl Rule {
             | Mishap::Contact { .. }
             | Mishap::Gap
             | Mishap::PulseWire
-            | Mishap::OneCorrupt
-            | Mishap::LateHost => goes_on(900.0, "it is none of the faults"),
+            | Mishap::OneCorrupt => goes_on(600.0, "it is none of the faults"),
+            Mishap::LateHost => goes_on(f64::from(plan.config.link_ms) + 100.0, "the host comes back in time"),
             other => of_board(plan, other),
         }
     }
@@ -130,7 +130,9 @@ fn of_speed(plan: &Plan, rpm: f64, slowest: f64) -> Rule {
     };
     let none = |rule: Rule| Rule { may: FaultSet::NONE, ..rule };
     let fast = f64::from(plan.config.limits.speed.ms) + 60_000.0 / (1.2 * 10_000.0) + 2.0;
-    let differ = settle + 500.0 + 4.0 * log + 5.0;
+    // what the speed changed lately is allowed for: two medians before this one, each a revolution and a half after the other
+    let turn = 60_000.0 / slowest;
+    let differ = settle.max(50.0 + turn) + 3.0 * turn + 500.0 + 4.0 * log + 5.0;
     match plan.mishap {
         Mishap::StuckLine { channel } if fitted > 1 => {
             let why = "3 expected periods and 20 ms of silence, then 50 ms";
@@ -142,13 +144,15 @@ fn of_speed(plan: &Plan, rpm: f64, slowest: f64) -> Rule {
         Mishap::Doubles { channel } => tells(channel, &[Doubled, Missed, Disagrees]),
         Mishap::Uneven { channel } => none(tells(channel, &[Alternating, BladeTwist])),
         Mishap::Skewed { .. } if fitted == 1 => goes_on(700.0, "alone it is believed"),
-        Mishap::Skewed { .. } if fitted == 2 => stops(Fault::SensorDisagreement, differ, "two samples, then 500 ms"),
+        Mishap::Skewed { .. } if fitted == 2 => {
+            stops(Fault::SensorDisagreement, differ, "one reading, three revolutions and two samples, then 500 ms")
+        }
         Mishap::Skewed { channel } => none(tells(channel, &[Disagrees])),
         Mishap::Fast { .. } if fitted < 3 => stops(Fault::Overspeed, fast, "one revolution and the limit's time"),
         Mishap::Fast { channel } => none(tells(channel, &[Disagrees, Missed, Doubled, Alternating])),
         Mishap::Screams { channel } | Mishap::Overwritten { channel } => none(tells(channel, &[OverCapture])),
         Mishap::TwoFast { .. } => stops(Fault::Overspeed, fast, "one revolution and the limit's time"),
-        _ if rpm > 0.0 => stops(Fault::SensorDisagreement, differ, "one reading and two samples, then 500 ms"),
+        _ if rpm > 0.0 => stops(Fault::SensorDisagreement, differ, "one reading, three revolutions and two samples, then 500 ms"),
         _ => goes_on(0.0, "the rotor stands"),
     }
 }
@@ -219,10 +223,13 @@ fn of_line(plan: &Plan) -> Rule {
                 why: "the third damaged frame; the host sends one each 0.2 s",
             }
         }
-        Mishap::Echo => {
-            let why = "three frames of its own";
-            stops(Fault::LinkCorrupt, 3.0 * f64::from(plan.config.log_period_ms.max(30)) + 5.0, why)
-        }
+        Mishap::Echo => Rule {
+            // "accepted" is a beep, byte by byte, and older than the host's last frame
+            answer: Answer::Stops(set(Fault::LinkCorrupt).with(Fault::CommandReplayed)),
+            may: FaultSet::NONE,
+            within_ms: 3.0 * f64::from(plan.config.log_period_ms.max(30)) + 5.0,
+            why: "three frames of its own",
+        },
         Mishap::Replay => stops(Fault::CommandReplayed, 2.0, "the frame's end and one tick"),
         Mishap::Silence => stops(Fault::LinkLost, silent, "the link's time after the last frame"),
         _ => Rule {
