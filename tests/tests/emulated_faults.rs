@@ -8,7 +8,7 @@ use frame::units::PulseWidth;
 use hal_sim::Scenario;
 use hal_sim::emulated::operator::ArmAndRun;
 use hal_sim::emulated::rig::{Action, Heard, Operator, RigRun, rig};
-use hal_sim::fault::{Mishap, Plan};
+use hal_sim::fault::Mishap;
 use quadrig_tests::budget;
 
 /// Level of every run.
@@ -21,26 +21,21 @@ const AFTER_MS: u64 = 500;
 struct Unlucky {
     inner: ArmAndRun,
     met: Option<u64>,
-    due: bool,
 }
 
 impl Operator for Unlucky {
     fn millisecond(&mut self, ms: u64, heard: &[Heard], actions: &mut Vec<Action>) {
         self.inner.millisecond(ms, heard, actions);
         if self.met.is_none() && self.inner.started.is_some_and(|at| ms >= at + AFTER_MS) {
-            (self.met, self.due) = (Some(ms), true);
-            actions.push(Action::Backwards(true));
+            self.met = Some(ms);
+            actions.extend([Action::Mishap(Mishap::Replay), Action::Backwards(true)]);
         }
-    }
-
-    fn strikes(&mut self) -> Option<Plan> {
-        std::mem::take(&mut self.due).then(|| Plan::factory(Mishap::Replay))
     }
 }
 
 fn fly(watch_ms: u64) -> RigRun<Unlucky> {
     let level = Command::SetPulse(PulseWidth::from_us(PULSE_US));
-    let operator = Unlucky { inner: ArmAndRun::new([level], None), met: None, due: false };
+    let operator = Unlucky { inner: ArmAndRun::new([level], None), met: None };
     let run = rig(&Scenario::default(), operator, 4_200 + watch_ms).unwrap_or_else(|error| panic!("{error}"));
     let met = run.operator.met.expect("the rig ran") * 1_000_000;
     let live = |p: &&hal_sim::emulated::rig::SeenPulse| p.at_ns < met && p.width_ns == u64::from(PULSE_US) * 1000;

@@ -90,6 +90,8 @@ pub enum Action {
     FailAccess,
     /// Each DShot frame reaches the ESC with one bit turned over (true), or as it is again.
     GarbleFrames(bool),
+    /// Something goes wrong at the pins, and stays so: as it would on the rig that leaves the factory.
+    Mishap(Mishap),
     /// The ESC was on and ready before the board.
     EscReady,
     /// The rotor turns the other way round, as channel B of the encoder shows it.
@@ -421,6 +423,7 @@ impl<O: Operator> RigWorld<O> {
                 }
                 Action::GarbleFrames(garbles) => self.garbles = garbles,
                 Action::Backwards(backwards) => self.backwards = backwards,
+                Action::Mishap(mishap) => self.strike(ms, &Plan { mishap, ..Plan::factory(mishap) }, pins),
                 Action::EscReady => self.bench.esc_is_ready(),
                 Action::Power(on) => self.bench.set_power(on),
                 Action::StopKey(pressed) => {
