@@ -113,11 +113,6 @@ impl Graph {
         self.0.range(..=address).next_back().filter(|(_, f)| address < f.end).map(|(start, _)| *start)
     }
 
-    /// Whether the image holds the logger at all.
-    fn logs(&self) -> bool {
-        self.0.values().any(|function| is_logger(&function.name))
-    }
-
     /// Everything that `root` reaches. In a `strict` root no way may lead to a panic or through a register.
     pub(crate) fn reach(&self, root: &str, strict: bool) -> Result<Reach, Failure> {
         let start = self.named(root).ok_or_else(|| Failure(format!("the image has no function {root}")))?;
@@ -174,6 +169,14 @@ impl Graph {
     }
 }
 
+/// Whether the image holds a message that is no error: defmt keeps each as a symbol that says its level.
+fn informs(path: &Path) -> Result<bool, Failure> {
+    let wrong = |e: &dyn std::fmt::Display| Failure(format!("{}: {e}", path.display()));
+    let bytes = std::fs::read(path).map_err(|e| wrong(&e))?;
+    let file = object::File::parse(&*bytes).map_err(|e| wrong(&e))?;
+    Ok(file.symbols().any(|symbol| symbol.name().is_ok_and(|name| name.contains("\"tag\":\"defmt_info\""))))
+}
+
 /// Whether a function is the log's beginning of a frame, by which every message goes (defmt's own interface to its logger).
 fn is_logger(name: &str) -> bool {
     name == "_defmt_acquire"
@@ -182,8 +185,8 @@ fn is_logger(name: &str) -> bool {
 /// Both images log, but never from an interrupt: encoding a message takes its time with interrupts off.
 pub(crate) fn quiet(path: &Path, roots: &[&str]) -> Result<(), Failure> {
     let graph = Graph::read(path)?;
-    if !graph.logs() {
-        return Err(Failure(format!("{}: holds no log at all: is DEFMT_LOG set (.cargo/config.toml)?", path.display())));
+    if !informs(path)? {
+        return Err(Failure(format!("{}: holds no log of its own: is DEFMT_LOG set (.cargo/config.toml)?", path.display())));
     }
     for root in roots {
         let start = graph.named(root).ok_or_else(|| Failure(format!("{}: no function {root}", path.display())))?;
