@@ -250,6 +250,6 @@ mod tests {
         let ask = |root: &str| g.never_logs(g.named(root).unwrap(), &mut Vec::new(), &mut BTreeSet::new());
         let failure = ask("TIM4").unwrap_err().to_string();
         assert!(failure.contains("TIM4 -> a -> _defmt_acquire"), "{failure}");
-        assert!(ask("b").is_ok() && g.logs());
+        assert!(ask("b").is_ok());
     }
 }
