@@ -65,8 +65,9 @@ impl Harm {
         self.counts[channel]
     }
 
+    /// The converter delivers nothing any more.
     pub(super) fn converter_rests(&self) -> bool {
-        self.injury.converter_rests(self.since)
+        self.injury.mishap() == Mishap::NoConversions
     }
 
     /// A stop loop that opened for a millisecond closes again.

@@ -51,6 +51,9 @@ const MS: u64 = 1_000_000;
 /// Time between two changes of an input that screams, ns: 2.5 rising edges in a microsecond, which come faster than they can be served.
 const SCREAM_NS: u64 = 200;
 
+/// How long an input of a plan screams, ms: each of its edges costs the emulator time.
+const SCREAM_MS: u64 = 150;
+
 /// What an operator does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Action {
@@ -347,9 +350,10 @@ impl<O: Operator> RigWorld<O> {
             Mishap::ResetKey => self.reset(ms, pins),
             Mishap::HardFault => pins.fail_access(),
             Mishap::CrystalFails => pins.fail_crystal(),
-            Mishap::Screams { channel } => self.scream = Some((channel, u64::MAX, ms * MS)),
+            Mishap::Gap => pins.overrun_adc(), // the next tick starts the scan anew
+            Mishap::Screams { channel } => self.scream = Some((channel, (ms + SCREAM_MS) * MS, ms * MS)),
             Mishap::Overwritten { channel } => self.scream = Some((channel, (ms + 1) * MS, ms * MS)),
-            Mishap::FloatingLine { channel } => self.scream = Some((channel, (ms + 100) * MS, ms * MS)),
+            Mishap::FloatingLine { channel } => self.scream = Some((channel, (ms + SCREAM_MS / 4) * MS, ms * MS)),
             _ => by_hand(plan, &mut self.bench),
         }
     }
