@@ -8,6 +8,8 @@ use std::time::Instant;
 
 /// Longest time that a flight is watched after its mishap, ms: the emulator takes about as long as the board.
 const WATCHED_MS: f64 = 900.0;
+/// Latest mishap after its phase began, ms: the rotor has reached its speed.
+const EARLY_MS: u64 = 520;
 /// Schedules at the least.
 const LEAST: usize = 100;
 
@@ -18,7 +20,8 @@ fn plan((n, mishap): (u64, Mishap)) -> Option<Plan> {
         let log = f64::from(plan.config.log_period_ms);
         slow || (Rule::of(plan, 2500.0, 2500.0).within_ms <= WATCHED_MS && log < 300.0)
     };
-    (0..500).map(|k| Plan::with(1000 * n + k, mishap)).find(short)
+    let early = |plan: Plan| Plan { after_ms: plan.after_ms.min(EARLY_MS), ..plan };
+    (0..500).map(|k| Plan::with(1000 * n + k, mishap)).find(short).map(early)
 }
 
 #[test]
