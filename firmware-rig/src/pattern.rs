@@ -80,7 +80,7 @@ pub fn judge(marks: u16, periods: impl Iterator<Item = u32>) -> CaptureVerdict {
     let mut window = Window::default();
     let mut by_turns = marks == 2;
     // how far a period stands out between the two beside it: a steady change of speed has no part in it
-    let (mut least, mut most) = (u64::MAX, 0u64);
+    let (mut least, mut most) = (1u64 << 34, 0u64); // none of three periods of 32 bits bends by so much
     let mut sums = [0u64; 2];
     let mut found = CaptureVerdict::Nominal;
     for period in periods {
