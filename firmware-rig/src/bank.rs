@@ -40,6 +40,8 @@ pub struct CaptureBank {
     bad: [Option<Ticks>; CAPTURE_CHANNELS],
     /// Unevenness of the blades at low speed.
     straight: Option<f32>,
+    /// Median of the healthy channels in the last sample, rev/min, and the relative deviation from it that was still agreement.
+    agreed: Option<(f32, f32)>,
 }
 
 impl CaptureBank {
@@ -57,6 +59,7 @@ impl CaptureBank {
             flagged: 0,
             bad: [None; CAPTURE_CHANNELS],
             straight: None,
+            agreed: None,
         }
     }
 
@@ -157,6 +160,16 @@ impl CaptureBank {
         median(known).map(|r| r as u64).zip(self.turning_since)
     }
 
+    /// The same where they are fast enough to judge another by.
+    pub(crate) fn turning_others(&self, now: Ticks) -> Option<(u64, Ticks)> {
+        self.others(now).filter(|(revolution, _)| !self.is_slow(*revolution))
+    }
+
+    /// Median of the healthy channels in the last sample, rev/min, and the relative deviation that was still agreement.
+    pub(crate) fn agreed(&self) -> Option<(f32, f32)> {
+        self.agreed
+    }
+
     fn is_slow(&self, revolution: u64) -> bool {
         revolution > 60 * u64::from(self.timer_hz) / SLOWEST_JUDGED
     }
@@ -175,6 +188,7 @@ impl CaptureBank {
         }
         let middle = median(speeds);
         let tolerance = self.tolerance(now, middle);
+        self.agreed = middle.map(|middle| (middle, tolerance));
         for (channel, code) in self.channels.iter_mut().zip(&mut codes) {
             // uneven marks do not change the speed over whole revolutions: one that is off is off for another reason
             let whole =
@@ -188,8 +202,7 @@ impl CaptureBank {
                 code.verdict = CaptureVerdict::Disagrees;
             }
             channel.deviations = u8::from(apart);
-            // An over-capture is told once, and on until a whole span has been seen again or the rotor stands.
-            channel.overwritten &= channel.reading.is_none() && now.since(channel.last).0 <= channel.stop_after();
+            channel.told(now);
         }
         let is_bad = |code: &CaptureCode| match code.verdict {
             CaptureVerdict::Disagrees | CaptureVerdict::Doubled | CaptureVerdict::Missed => true,

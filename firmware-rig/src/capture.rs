@@ -240,6 +240,11 @@ impl CaptureChannel {
         (span > 0 && fresh).then(|| RevPerMin(60.0 * self.timer_hz as f32 / span as f32))
     }
 
+    /// What the channel reports has been told. An over-capture is told on until a whole span has been seen again or the rotor stands.
+    pub(crate) fn told(&mut self, now: Ticks) {
+        self.overwritten &= self.reading.is_none() && now.since(self.last).0 <= self.stop_after();
+    }
+
     /// Silent for more than three expected periods and the margin, when the others turn with (ticks a revolution, since when).
     pub(crate) fn is_lost(&self, now: Ticks, (revolution, since): (u64, Ticks)) -> bool {
         let silent = now.since(self.last.max(since)).0;

@@ -5,7 +5,7 @@
 //! Units: on each field.
 //! Reference: errata "Figures that the text states"; Beharie 2013, Tables 6-8 and Eq. 5.57.
 
-use crate::rig_config::{Answers, Calibrated};
+use crate::rig_config::{Answers, Calibrated, EscTelemetry};
 use crate::strain::StrainChannel;
 use esc_pwm::{ArmingTimes, Bounds, EscOutput, Limits, Slew, ThrottleCurve};
 use frame::calibration::{AdcScale, Calibration};
@@ -134,6 +134,10 @@ pub struct Config {
     pub curve: ThrottleCurve,
     /// In which form the ESC is told its throttle.
     pub output: EscOutput,
+    /// Telemetry of the ESC, where it is fitted.
+    pub esc_telemetry: Option<EscTelemetry>,
+    /// Pole pairs by which the back-EMF meter counts; 0 where none is fitted.
+    pub back_emf: u16,
 }
 
 impl Config {
@@ -185,6 +189,8 @@ impl Config {
             slew: Slew { ns_per_ms: 10_000 }, // full range in 0.1 s: a step stays a step to a motor of 50 ms
             curve: ThrottleCurve::Linear,
             output: EscOutput::Pwm,
+            esc_telemetry: None,
+            back_emf: 0,
         }
     }
 
@@ -236,7 +242,8 @@ impl Config {
             scale(self.voltage.zero.0, self.voltage.divider),
             scale(self.temperature.zero.0, self.temperature.volts_per_kelvin),
         ];
-        Calibration { timer_hz: self.timer_hz, marks: self.marks, adc }
+        let pole_pairs = [self.esc_telemetry.map_or(0, |esc| esc.pole_pairs), self.back_emf];
+        Calibration { timer_hz: self.timer_hz, marks: self.marks, adc, pole_pairs }
     }
 
     /// Largest load either way that the strain channel can express, for the operator's information.

@@ -9,6 +9,7 @@
 
 use crate::burst::{Burst, Conversions};
 use crate::config::Config;
+use crate::cross::Beside;
 use crate::health::{HealthWatch, Vitals};
 use crate::line::CommandLine;
 use crate::rig::{Inputs, Rig};
@@ -53,6 +54,8 @@ pub struct Delivered<'a> {
     pub over_capture: [bool; CAPTURE_CHANNELS],
     /// What the converter delivered since the last tick.
     pub adc: &'a [AdcBlock; ADC_CHANNELS],
+    /// What arrived for the cross-checks: the ESC's telemetry, the back-EMF meter.
+    pub beside: Beside<'a>,
     /// The voltage detector sees the board's own supply too low.
     pub brown_out: bool,
     /// The board itself held the tick up since the last one (it erased flash, which stops the processor).
@@ -72,6 +75,8 @@ pub struct Orders {
     pub trial: Option<Trial>,
     /// What was told, for the host's own log.
     pub event: Option<Event>,
+    /// Ask the ESC for a frame of telemetry with the next command that can ask: a DShot frame's telemetry bit.
+    pub ask_esc: bool,
 }
 
 /// The board from a reset on.
@@ -146,6 +151,7 @@ impl RigConsole {
             edges: delivered.edges,
             over_capture: delivered.over_capture,
             adc: delivered.adc,
+            beside: delivered.beside,
             command,
             line,
             stop_input: self.stops.take(),
@@ -159,7 +165,7 @@ impl RigConsole {
         if let Some(news) = delivered.stored {
             self.say(now, &Message::Event(Event::Settings(news)));
         }
-        if let Some(health) = self.health.tick(now, self.frames(), delivered.vitals.as_ref()) {
+        if let Some(health) = self.health.tick(now, self.frames(), self.rig.esc_counts(), delivered.vitals.as_ref()) {
             self.say(now, &Message::Health(health));
         }
         if let Some(sample) = outputs.sample {
@@ -176,7 +182,7 @@ impl RigConsole {
         } else if command == Some(Command::Tare) || self.rig.calibration() != self.told {
             self.tell_calibration(now);
         }
-        Orders { store: outputs.store, trial: outputs.trial, event: outputs.event }
+        Orders { store: outputs.store, trial: outputs.trial, event: outputs.event, ask_esc: outputs.ask_esc }
     }
 
     /// The analogue channel of which every single conversion is wanted: see [`RigConsole::record`].
@@ -277,6 +283,7 @@ mod tests {
             edges: [&[]; CAPTURE_CHANNELS],
             over_capture: [false; CAPTURE_CHANNELS],
             adc,
+            beside: Beside::UNWIRED,
             brown_out: false,
             paused: false,
             stored: None,

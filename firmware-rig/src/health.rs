@@ -5,6 +5,7 @@
 //! Units: core cycles, timer ticks, bytes.
 //! Reference: specification `rig.md`, "jitter measured and reported".
 
+use crate::esc_line::EscCounts;
 use frame::message::Health;
 use frame::units::Ticks;
 
@@ -36,7 +37,7 @@ pub(crate) struct HealthWatch {
 
 impl HealthWatch {
     /// Notes a tick; a report once a second. Without `vitals` their figures are 0.
-    pub(crate) fn tick(&mut self, now: Ticks, frames: [u16; 3], vitals: Option<&Vitals>) -> Option<Health> {
+    pub(crate) fn tick(&mut self, now: Ticks, frames: [u16; 3], esc: EscCounts, vitals: Option<&Vitals>) -> Option<Health> {
         if let Some(last) = self.last.replace(now) {
             let span = now.since(last).0 as u32;
             self.span = Some(self.span.map_or([span; 2], |[low, high]| [low.min(span), high.max(span)]));
@@ -56,6 +57,7 @@ impl HealthWatch {
             frames,
             steps: [forward.wrapping_sub(f) as u16, backward.wrapping_sub(b) as u16],
             index: vitals.index,
+            esc: [esc.good, esc.damaged, esc.errors],
         })
     }
 }
@@ -71,10 +73,11 @@ mod tests {
         for ms in 0..=2_000u32 {
             let late = if ms == 1_500 { 84 } else { 0 };
             let vitals = Vitals { steps: [3 * ms, 1], ..Vitals::default() };
-            reports.extend(watch.tick(Ticks(u64::from(ms) * 84_000 + late), [0; 3], Some(&vitals)));
+            let esc = EscCounts { good: ms as u16, ..EscCounts::default() };
+            reports.extend(watch.tick(Ticks(u64::from(ms) * 84_000 + late), [0; 3], esc, Some(&vitals)));
         }
         assert_eq!(reports.len(), 3);
-        assert_eq!((reports[1].tick_span, reports[1].steps), ([84_000; 2], [3_000, 0]));
+        assert_eq!((reports[1].tick_span, reports[1].steps, reports[1].esc), ([84_000; 2], [3_000, 0], [1_000, 0, 0]));
         assert_eq!((reports[2].tick_span, reports[2].steps), ([83_916, 84_084], [3_000, 0]));
     }
 }

@@ -29,7 +29,7 @@ mod app {
     use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
     use defmt_rtt as _;
     use esc_pwm::EscOutput;
-    use firmware_rig::{Config, Conversions, Delivered, RigConfig, RigConsole, Start, burst};
+    use firmware_rig::{Beside, Config, Conversions, Delivered, RigConfig, RigConsole, Start, burst};
     use frame::message::{Event, SettingsNews, Trial};
     use frame::units::PulseWidth;
     use safe_start::stm32f4::{clock, crash};
@@ -268,6 +268,7 @@ mod app {
             edges: board.edges.each_ref().map(|edges| edges.as_slice()),
             over_capture,
             adc: &adc,
+            beside: Beside::UNWIRED,
             brown_out: board.supply.is_low(),
             paused: flash::PAUSED.swap(false, Ordering::Acquire),
             stored: cx.shared.stored.lock(Option::take),

@@ -9,7 +9,9 @@
 use crate::bank::CaptureBank;
 use crate::config::Config;
 use crate::course::Course;
+use crate::cross::{Beside, CrossChecks};
 use crate::elapsed::Elapsed;
+use crate::esc_line::EscCounts;
 use crate::hold_max::{HoldWatch, SupplyProof};
 use crate::line::LineNews;
 use crate::rig_config::{Answers, RigConfig};
@@ -34,6 +36,8 @@ pub struct Inputs<'a> {
     pub over_capture: [bool; CAPTURE_CHANNELS],
     /// What the converter delivered since the last tick.
     pub adc: &'a [AdcBlock; ADC_CHANNELS],
+    /// What arrived for the cross-checks since the last tick.
+    pub beside: Beside<'a>,
     /// At most one decoded command of the host.
     pub command: Option<Command>,
     /// What went wrong on the host's line since the last tick.
@@ -61,6 +65,8 @@ pub struct Outputs {
     pub trial: Option<Trial>,
     /// The operator asks for every conversion of this channel.
     pub burst: Option<u8>,
+    /// The ESC is to be asked for a frame of telemetry with the next command that can ask (a DShot frame's telemetry bit).
+    pub ask_esc: bool,
 }
 
 /// The rig.
@@ -79,6 +85,7 @@ pub struct Rig {
     pub(crate) began: Ticks,
     pub(crate) track: Track,
     pub(crate) bank: CaptureBank,
+    cross: CrossChecks,
     pub(crate) codes: [AdcCode; ADC_CHANNELS],
     pub(crate) factory: Config,
     pub(crate) settings: RigConfig,
@@ -127,6 +134,7 @@ impl Rig {
             revision: 0,
             live_since: None,
             bank: CaptureBank::new(&config),
+            cross: CrossChecks::new(&config),
             calibration: untared,
             untared,
             state: RigState::Disarmed,
@@ -196,6 +204,9 @@ impl Rig {
         if config.marks != self.config.marks {
             self.bank = CaptureBank::new(&config);
         }
+        if (config.esc_telemetry, config.back_emf) != (self.config.esc_telemetry, self.config.back_emf) {
+            self.cross = CrossChecks::new(&config);
+        }
         let untared = config.calibration();
         if untared != self.untared {
             self.untared = untared;
@@ -226,7 +237,7 @@ impl Rig {
             firmware: VERSION,
             core_hz: self.config.core_hz,
             reset_cause,
-            present: self.fitted(),
+            present: self.fitted() | self.cross.fitted(),
             analogue: self.config.fitted.iter().rev().fold(0, |mask, fitted| mask << 1 | u8::from(*fitted)),
             config: self.settings.digest(),
         }
@@ -251,6 +262,9 @@ impl Rig {
             self.tell(Event::Refused(Refusals(Refusals::REPLAYED)));
         }
         self.bank.take(now, &inputs.edges, &inputs.over_capture);
+        if let Some(verdict) = self.cross.take(now, &inputs.beside) {
+            self.tell(Event::EscTelemetry { verdict, at: now });
+        }
         for (whole, part) in self.blocks.iter_mut().zip(inputs.adc) {
             whole.add(part);
         }
@@ -269,7 +283,8 @@ impl Rig {
         let sample = (now >= self.next_sample).then(|| self.sample(now, pulse));
         let store = core::mem::take(&mut self.store);
         let (trial, burst) = (self.trial.take(), self.burst.take());
-        Outputs { pulse, sample, event: self.events.pop_front(), store, trial, burst }
+        let ask_esc = self.cross.asks(now);
+        Outputs { pulse, sample, event: self.events.pop_front(), store, trial, burst, ask_esc }
     }
 
     /// The state has lasted longer than it may: since it was entered, or at maximum since the supply came on.
@@ -342,8 +357,7 @@ impl Rig {
             self.hold.take(now, self.bank.taken(), voltage.is_some_and(|v| v >= powered));
         }
         let readings = Readings {
-            // no edges at all: the rotor stands, where anything would see it turn
-            speed: self.bank.judged_speed(now).or((self.bank.fitted() > 0).then_some(RevPerMin(0.0))),
+            speed: self.judged_speed(now),
             stirs: self.hold.stirs(),
             current: self.value(2, adc).map(Ampere),
             voltage,
@@ -367,6 +381,21 @@ impl Rig {
             self.latch(now, tripped);
             self.apply(now, ArmingEvent::Trip, Refusals::default());
         }
+    }
+
+    /// Speed that limits are judged by. No edges at all: the rotor stands, where a sensor would see it turn. Without any, what the back-EMF
+    /// meter sees.
+    fn judged_speed(&self, now: Ticks) -> Option<RevPerMin> {
+        if self.bank.fitted() == 0 {
+            return self.cross.speed(now);
+        }
+        Some(self.bank.judged_speed(now).unwrap_or(RevPerMin(0.0)))
+    }
+
+    /// What the ESC's telemetry line has heard.
+    #[must_use]
+    pub fn esc_counts(&self) -> EscCounts {
+        self.cross.counts()
     }
 
     pub(crate) fn latch(&mut self, now: Ticks, faults: FaultSet) {
@@ -455,7 +484,8 @@ impl Rig {
             *code = if fitted { block.code(top, live) } else { ABSENT };
         }
         let rpm = self.bank.sample(now);
-        RigSample { at: now, pulse, state: self.state, faults: self.faults, rpm, adc: self.codes }
+        let (esc, back_emf) = self.cross.sample(now, &self.bank);
+        RigSample { at: now, pulse, state: self.state, faults: self.faults, rpm, adc: self.codes, esc, back_emf }
     }
 }
 

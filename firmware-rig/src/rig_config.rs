@@ -24,9 +24,14 @@ pub struct OutOfRange;
 /// Bytes that the line carries in a second: 2 Mbaud at ten bits a byte.
 pub const LINE_BYTES_S: u32 = 200_000;
 /// Longest frame of a sample without its channels; of a capture channel that is fitted, or not; of an analogue channel likewise.
-const FRAME_BYTES: u32 = 32;
+const FRAME_BYTES: u32 = 34;
 const CAPTURE_BYTES: [u32; 2] = [4, 9];
 const ADC_BYTES: [u32; 2] = [4, 10];
+/// What the ESC's telemetry and the back-EMF meter add where they are fitted; a byte each, among those of the frame, says that they are not.
+const ESC_BYTES: u32 = 17;
+const BACK_EMF_BYTES: u32 = 9;
+/// Most pole pairs of a motor.
+pub const MOST_POLE_PAIRS: u16 = 100;
 
 /// Limits of every channel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -93,6 +98,15 @@ pub struct Calibrated {
     pub day: u16,
 }
 
+/// The ESC's serial telemetry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EscTelemetry {
+    /// Pole pairs of the motor: the ESC counts electrical turns.
+    pub pole_pairs: u16,
+    /// The ESC sends a frame only when it is asked for one (by a DShot frame); otherwise by itself.
+    pub asked: bool,
+}
+
 /// Everything that can be configured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RigConfig {
@@ -128,6 +142,10 @@ pub struct RigConfig {
     pub calibrated: [Option<Calibrated>; ADC_CHANNELS],
     /// In which form the ESC is told its throttle.
     pub output: EscOutput,
+    /// Telemetry of the ESC, where it is fitted.
+    pub esc_telemetry: Option<EscTelemetry>,
+    /// Pole pairs by which the back-EMF meter counts; 0 where none is fitted.
+    pub back_emf: u16,
 }
 
 impl RigConfig {
@@ -168,6 +186,8 @@ impl RigConfig {
             },
             calibrated: config.calibrated,
             output: config.output,
+            esc_telemetry: config.esc_telemetry,
+            back_emf: config.back_emf,
         }
     }
 
@@ -197,7 +217,9 @@ impl RigConfig {
         let captures: u32 = self.marks.iter().map(|m| if *m > 0 { present } else { absent }).sum();
         let [absent, present] = ADC_BYTES;
         let analogue: u32 = self.fitted.iter().map(|f| if *f { present } else { absent }).sum();
-        FRAME_BYTES + captures + analogue
+        let esc = if self.esc_telemetry.is_some() { ESC_BYTES } else { 0 };
+        let back_emf = if self.back_emf > 0 { BACK_EMF_BYTES } else { 0 };
+        FRAME_BYTES + captures + analogue + esc + back_emf
     }
 
     /// Whether every value is possible. A NaN is in no range.
@@ -217,6 +239,8 @@ impl RigConfig {
             && self.analogue_in_range()
             && self.limits.in_range()
             && self.calibrated.iter().flatten().all(Calibrated::in_range)
+            && self.esc_telemetry.is_none_or(|esc| (1..=MOST_POLE_PAIRS).contains(&esc.pole_pairs))
+            && self.back_emf <= MOST_POLE_PAIRS
     }
 
     fn analogue_in_range(&self) -> bool {
@@ -268,6 +292,8 @@ impl RigConfig {
         config.limits.link_ms = u32::from(self.link_ms);
         config.calibrated = self.calibrated;
         config.output = self.output;
+        config.esc_telemetry = self.esc_telemetry;
+        config.back_emf = self.back_emf;
         config
     }
 
@@ -325,7 +351,7 @@ impl Calibrated {
 }
 
 impl Stored for RigConfig {
-    const VERSION: u8 = 4;
+    const VERSION: u8 = 5;
 
     fn write(&self, content: &mut [u8]) -> Option<usize> {
         Some(postcard::to_slice(self, content).ok()?.len())

@@ -3,7 +3,7 @@
 
 use esc_pwm::ArmingTimes;
 use esc_pwm::dshot::{EscOutput, Frame, Throttle};
-use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig, StopWatch};
+use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Rig, StopWatch};
 use frame::message::{Beep, Command};
 use frame::rig::{FaultSet, RigState};
 use frame::schedule::{Segment, SegmentBatch, Shape, Steer};
@@ -191,6 +191,7 @@ impl Walk {
             edges: [&[], if turn { &edge } else { &[] }, &[], &[]],
             over_capture: [false; 4],
             adc: &[AdcBlock::default(); 5],
+            beside: Beside::UNWIRED,
             command,
             line: LineNews::default(),
             stop_input: false,

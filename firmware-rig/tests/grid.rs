@@ -1,6 +1,6 @@
 //! The grid of the samples: a tick that comes some cycles early or late, as interrupts make it, moves no sample by a whole tick.
 
-use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig};
+use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Rig};
 use frame::units::Ticks;
 
 #[test]
@@ -15,6 +15,7 @@ fn ticks_that_jitter_by_interrupts_leave_the_samples_evenly_spaced() {
             edges: [&[]; 4],
             over_capture: [false; 4],
             adc: &[AdcBlock::default(); 5],
+            beside: Beside::UNWIRED,
             command: None,
             line: LineNews::default(),
             stop_input: false,

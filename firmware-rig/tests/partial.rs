@@ -2,7 +2,7 @@
 
 use esc_pwm::{Bounds, EscOutput};
 use firmware_rig::rig_config::Answers;
-use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig, RigConfig};
+use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Rig, RigConfig};
 use frame::message::{Beep, Command, ConfigPart, Event};
 use frame::rig::{AdcVerdict, CaptureVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::units::{Ampere, Celsius, NewtonMetre, PulseWidth, RevPerMin, Ticks, Volt};
@@ -68,6 +68,7 @@ impl Desk {
             edges: edges.each_ref().map(Vec::as_slice),
             over_capture: [false; 4],
             adc: &adc,
+            beside: Beside::UNWIRED,
             command: command.or(self.ms.is_multiple_of(100).then_some(Command::Ping)),
             line: LineNews::default(),
             stop_input: false,

@@ -1,6 +1,6 @@
 //! A fault that the board found at its start stands: no command brings the rig above minimum.
 
-use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Rig};
+use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Rig};
 use frame::message::{Command, Event};
 use frame::rig::{Fault, Refusals, RigState};
 use frame::units::{PulseWidth, Ticks};
@@ -20,6 +20,7 @@ fn say(rig: &mut Rig, commands: &[Command]) -> Vec<Event> {
             edges: [&[]; 4],
             over_capture: [false; 4],
             adc: &adc,
+            beside: Beside::UNWIRED,
             command,
             line: LineNews::default(),
             stop_input: false,

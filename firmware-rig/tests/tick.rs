@@ -1,6 +1,6 @@
 //! The rig through its one door, `Rig::tick`, at 1 kHz with a host that answers.
 
-use firmware_rig::{AdcBlock, Config, Inputs, LineNews, Outputs, Rig};
+use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Outputs, Rig};
 use frame::message::{Beep, Command, Event, Trial};
 use frame::rig::{AdcVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::schedule::{ScheduleNews, Segment, SegmentBatch, Shape, Steer};
@@ -62,6 +62,7 @@ impl Bench {
             edges,
             over_capture: [false; 4],
             adc: &adc,
+            beside: Beside::UNWIRED,
             command: command.or(keep_alive),
             line: LineNews::default(),
             stop_input: self.stop_line,

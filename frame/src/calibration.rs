@@ -29,6 +29,8 @@ pub struct Calibration {
     pub marks: [u16; CAPTURE_CHANNELS],
     /// Scales of strain (N), torque (N.m), current (A), voltage (V), temperature (degC).
     pub adc: [AdcScale; ADC_CHANNELS],
+    /// Pole pairs of the motor as the ESC's telemetry and as the back-EMF meter count by them; 0 where it is not fitted.
+    pub pole_pairs: [u16; 2],
 }
 
 /// Physical values of one sample; `None` where there is no trustworthy code.
@@ -46,6 +48,10 @@ pub struct Converted {
     pub thrust_rms_n: Option<f64>,
     /// Angle by which the two marks of a capture channel stand off their opposite places, deg; of channels with two marks only.
     pub uneven_deg: [Option<f64>; CAPTURE_CHANNELS],
+    /// What the ESC tells, in the order of [`crate::esc::ESC_NAMES`].
+    pub esc: [Option<f64>; 5],
+    /// Rotor speed by the back-EMF meter, rev/min.
+    pub rpm_bemf: Option<f64>,
 }
 
 impl Calibration {
@@ -55,7 +61,11 @@ impl Calibration {
     /// channels give none.
     #[must_use]
     pub fn speed(&self, channel: usize, code: &CaptureCode) -> Option<f64> {
-        let marks = *self.marks.get(channel)?;
+        self.turning(*self.marks.get(channel)?, code)
+    }
+
+    /// Rotor speed by `marks` equal marks a revolution, rev/min.
+    fn turning(&self, marks: u16, code: &CaptureCode) -> Option<f64> {
         match code.verdict {
             CaptureVerdict::Stopped => (marks > 0).then_some(0.0),
             CaptureVerdict::Lost | CaptureVerdict::OverCapture | CaptureVerdict::Absent => None,
@@ -111,6 +121,9 @@ impl Calibration {
             let gain = if scale.gain < 0.0 { -scale.gain } else { scale.gain };
             out.thrust_rms_n = Some(f64::from(code.rms_q8) / 256.0 * f64::from(gain));
         }
+        let [esc, back_emf] = self.pole_pairs;
+        out.esc = sample.esc.map_or([None; 5], |code| code.values(esc));
+        out.rpm_bemf = sample.back_emf.and_then(|code| self.turning(back_emf, &code));
         out
     }
 }

@@ -6,6 +6,7 @@
 //! Units: none. Numbers and not words, because every field of a log is a number: any reader of such tables takes it.
 //! Reference: specification `formats.md`, "Rig log".
 
+use crate::esc::EscVerdict;
 use crate::rig::{AdcVerdict, CaptureVerdict};
 
 /// End of the name of a column of flags, after the name of its channel.
@@ -32,9 +33,11 @@ impl Flag {
     const OPEN: Self = Self { code: 12, words: "open" };
     const MISSING: Self = Self { code: 13, words: "no conversion" };
     const SHORT: Self = Self { code: 14, words: "short" };
+    const SILENT: Self = Self { code: 21, words: "nothing heard" };
+    const GARBLED: Self = Self { code: 22, words: "no frame checks" };
 
-    /// Every flag, by its number: those of speed sensors below 10, of analogue channels above.
-    pub const ALL: [Self; 11] = [
+    /// Every flag, by its number: those of speed sensors below 10, of analogue channels below 20, of the ESC's telemetry above.
+    pub const ALL: [Self; 13] = [
         Self::LOST,
         Self::OVERWRITTEN,
         Self::MISSED,
@@ -46,6 +49,8 @@ impl Flag {
         Self::OPEN,
         Self::MISSING,
         Self::SHORT,
+        Self::SILENT,
+        Self::GARBLED,
     ];
 
     /// The flag of a number; `None` of one that this version does not know.
@@ -86,6 +91,18 @@ impl AdcVerdict {
     }
 }
 
+impl EscVerdict {
+    /// What a log says of it; `None` of a frame that checked.
+    #[must_use]
+    pub const fn flag(self) -> Option<Flag> {
+        match self {
+            Self::Nominal => None,
+            Self::Silent => Some(Flag::SILENT),
+            Self::Garbled => Some(Flag::GARBLED),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,13 +112,14 @@ mod tests {
     fn every_verdict_that_is_not_nominal_has_a_number_of_its_own() {
         assert!(Flag::ALL.windows(2).all(|w| w[0].code < w[1].code));
         assert!(Flag::ALL.iter().all(|flag| Flag::of(flag.code) == Some(*flag) && !flag.words.is_empty()));
-        use {AdcVerdict as A, CaptureVerdict as C};
+        use {AdcVerdict as A, CaptureVerdict as C, EscVerdict as E};
         let captures = [C::Lost, C::OverCapture, C::Missed, C::Doubled, C::Alternating, C::Disagrees, C::BladeTwist];
         let analogue = [A::Saturated, A::Open, A::Missing, A::Short];
         let told = captures.iter().map(|v| v.flag()).chain(analogue.iter().map(|v| v.flag()));
+        let told = told.chain([E::Silent, E::Garbled].iter().map(|v| v.flag()));
         assert!(told.eq(Flag::ALL.into_iter().map(Some)));
         assert!([C::Nominal, C::Stopped, C::Absent].iter().all(|v| v.flag().is_none()));
-        assert!([A::Nominal, A::Absent].iter().all(|v| v.flag().is_none()));
+        assert!([A::Nominal, A::Absent].iter().all(|v| v.flag().is_none()) && E::Nominal.flag().is_none());
         assert_eq!(Flag::of(0), None);
     }
 }

@@ -16,6 +16,7 @@
 
 pub mod calibration;
 pub mod consensus;
+pub mod esc;
 pub mod flag;
 pub mod imu;
 pub mod imu_command;
@@ -27,6 +28,7 @@ pub mod wire;
 
 pub use calibration::{AdcScale, Calibration, Converted};
 pub use consensus::Consensus;
+pub use esc::{EscCode, EscVerdict};
 pub use flag::Flag;
 pub use imu::ImuSample;
 pub use imu_command::{

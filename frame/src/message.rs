@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`, "Telemetry"; `rig.md`, "Acquisition".
 
 use crate::calibration::Calibration;
+use crate::esc::EscVerdict;
 use crate::imu::ImuSample;
 use crate::imu_command::{ImuCommand, ImuReport, ImuValues, TestAccel};
 use crate::rig::{FaultSet, Refusals, RigSample, RigState};
@@ -35,7 +36,8 @@ pub struct Hello {
     pub core_hz: u32,
     /// Reset cause: bits 31..24 of RCC_CSR (RM0090 section 7.3.21), shifted down.
     pub reset_cause: u8,
-    /// IMU board: bit 0 gyro, 1 accelerometer, 2 magnetometer, 3 test accelerometer identified. Rig board: bit mask of fitted capture channels.
+    /// IMU board: bit 0 gyro, 1 accelerometer, 2 magnetometer, 3 test accelerometer identified. Rig board: bit mask of
+    /// fitted capture channels; bit 4 the ESC's telemetry, bit 5 the back-EMF meter.
     pub present: u8,
     /// Rig board: bit mask of fitted analogue channels.
     pub analogue: u8,
@@ -95,6 +97,13 @@ pub enum Event {
     /// How the host's schedule stands: the answer to [`Command::Segments`] and [`Command::Steer`], in the place of `Accepted` and
     /// `Refused`.
     Schedule(ScheduleNews),
+    /// The ESC's telemetry is heard, or is heard no more.
+    EscTelemetry {
+        /// What is to be said of it now.
+        verdict: EscVerdict,
+        /// When.
+        at: Ticks,
+    },
 }
 
 /// What ended the program before the last reset.
@@ -171,6 +180,9 @@ pub struct Health {
     pub steps: [u16; 2],
     /// Index marks of the encoder since reset, modulo 65 536.
     pub index: u16,
+    /// Frames of the ESC's telemetry that checked, those that did not, and bytes that came with a framing, noise or overrun error, since reset,
+    /// modulo 65 536.
+    pub esc: [u16; 3],
 }
 
 /// Board to host.

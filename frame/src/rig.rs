@@ -5,6 +5,7 @@
 //! Units: capture-timer ticks, ADC counts, nanoseconds of pulse.
 //! Reference: specification `rig.md`, "Four RPM capture channels" and "Acquisition".
 
+use crate::esc::EscCode;
 use crate::units::{PulseWidth, Ticks};
 use serde::{Deserialize, Serialize};
 
@@ -371,4 +372,8 @@ pub struct RigSample {
     pub rpm: [CaptureCode; CAPTURE_CHANNELS],
     /// ADC channels: strain, torque, current, voltage, temperature.
     pub adc: [AdcCode; ADC_CHANNELS],
+    /// What the ESC tells of itself; `None` where its telemetry is not fitted.
+    pub esc: Option<EscCode>,
+    /// Back-EMF meter: `edges` electrical turns passed in `span`. A cross-check: no consensus has it in. `None` where it is not fitted.
+    pub back_emf: Option<CaptureCode>,
 }

@@ -10,10 +10,10 @@ use crate::units::Ticks;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// Version of the frame layout and of the message sets; before it there were 1, 31 and 0xF4. Not printable, no line end, and longer than any frame
+/// Version of the frame layout and of the message sets; before it there were 1, 31, 0xF4 and 0xF5. Not printable, no line end, and longer than any frame
 /// (the first byte of a stuffed frame is at most its length): so a board that takes typed lines as well tells a frame that begins without a
 /// stuffing byte from one that begins with it.
-pub const VERSION: u8 = 0xF5;
+pub const VERSION: u8 = 0xF6;
 /// Longest frame before stuffing, bytes.
 pub const MAX_FRAME: usize = 240;
 /// Longest frame on the wire: COBS adds one byte in 254, plus the delimiter.
@@ -201,6 +201,7 @@ impl Decoder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::esc::{EscCode, EscVerdict};
     use crate::message::{Command, Message};
     use crate::rig::RigSample;
     use proptest::prelude::*;
@@ -254,7 +255,17 @@ mod tests {
     fn the_fullest_sample_fits() {
         let code = crate::rig::AdcCode { sum: u32::MAX, count: u16::MAX, rms_q8: u32::MAX, verdict: Default::default() };
         let capture = crate::rig::CaptureCode { edges: u16::MAX, span: u32::MAX, verdict: Default::default(), uneven: u16::MAX };
-        let sample = RigSample { at: Ticks(u64::MAX), rpm: [capture; 4], adc: [code; 5], ..RigSample::default() };
+        let esc = EscCode {
+            verdict: EscVerdict::Garbled,
+            temperature: u8::MAX,
+            voltage: u16::MAX,
+            current: u16::MAX,
+            charge: u16::MAX,
+            speed: u16::MAX,
+            age_ms: u16::MAX,
+        };
+        let beside = RigSample { esc: Some(esc), back_emf: Some(capture), ..RigSample::default() };
+        let sample = RigSample { at: Ticks(u64::MAX), rpm: [capture; 4], adc: [code; 5], ..beside };
         let mut out = [0; MAX_WIRE];
         assert!(Encoder::default().encode(Ticks(u64::MAX), &Message::Rig(sample), &mut out).is_ok());
     }

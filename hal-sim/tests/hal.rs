@@ -7,7 +7,7 @@ use embedded_io::{Read, ReadReady, Write};
 use esc_pwm::PulseTimer;
 use firmware_ahrs::{SensorError, lis3dh};
 use firmware_rig::queue::{CAPACITY, EdgeQueue};
-use firmware_rig::{Config, Delivered, RigConsole, Start};
+use firmware_rig::{Beside, Config, Delivered, RigConsole, Start};
 use frame::calibration::Converted;
 use frame::message::{ClockNews, Command, Event, Hello, Message, SettingsNews};
 use frame::rig::{CAPTURE_CHANNELS, Fault, RigSample, RigState};
@@ -75,6 +75,7 @@ impl Program {
             edges: edges.each_ref().map(Vec::as_slice),
             over_capture,
             adc: &self.converter.drain(),
+            beside: Beside::UNWIRED,
             brown_out: false,
             paused: false,
             stored: None,

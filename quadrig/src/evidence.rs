@@ -140,7 +140,11 @@ pub(crate) fn raw_codes(fitted: &Fitted, sample: &RigSample) -> Vec<u32> {
 /// When something happened on the board's clock; `None` where the event does not say.
 pub(crate) fn instant(event: &Event) -> Option<Ticks> {
     match event {
-        Event::State { at, .. } | Event::Faults { at, .. } | Event::ScheduleDone { at } | Event::StopLoop { at, .. } => Some(*at),
+        Event::State { at, .. }
+        | Event::Faults { at, .. }
+        | Event::ScheduleDone { at }
+        | Event::StopLoop { at, .. }
+        | Event::EscTelemetry { at, .. } => Some(*at),
         _ => None,
     }
 }
@@ -170,6 +174,7 @@ pub(crate) fn words(event: &Event, before: FaultSet, sample: Option<&RigSample>)
         Event::Clock(news) if news.crystal_hz == 0 => {
             format!("no crystal: the internal oscillator is in use ({} Hz measured)", news.measured_hz)
         }
+        Event::EscTelemetry { verdict, .. } => verdict.words().to_owned(),
         Event::StopLoop { open, .. } => format!("stop loop {}", if *open { "opened" } else { "closed" }),
         Event::Clock(_) | Event::Accepted | Event::Schedule(_) => return None,
     })

@@ -7,7 +7,7 @@
 //! Build the image first: `cargo xtask image`
 #![cfg(feature = "emulated")]
 
-use firmware_rig::{AdcBlock, Config, Inputs, Rig};
+use firmware_rig::{AdcBlock, Beside, Config, Inputs, Rig};
 use frame::message::Message;
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS, CAPTURE_NAMES, CaptureVerdict, RigSample};
 use frame::units::Ticks;
@@ -132,6 +132,7 @@ fn native(samples: &[RigSample], captures: &[Vec<u64>; CAPTURE_CHANNELS]) -> Vec
             edges: core::array::from_fn(|c| taken[c].as_slice()),
             over_capture: [false; CAPTURE_CHANNELS],
             adc: &adc,
+            beside: Beside::UNWIRED,
             command: None,
             line: Default::default(),
             stop_input: false,

@@ -1,5 +1,6 @@
 use super::*;
 use crate::transfer::LONGEST;
+use frame::esc::{EscCode, EscVerdict};
 use frame::message::Message;
 use frame::rig::{AdcCode, AdcVerdict, CaptureCode, CaptureVerdict, FaultSet, RigSample, RigState};
 use frame::wire::{Encoder, MAX_WIRE};
@@ -31,6 +32,8 @@ fn fullest() -> RigConfig {
             day: u16::MAX,
         }); 5],
         output: EscOutput::DShot600,
+        esc_telemetry: Some(EscTelemetry { pole_pairs: 100, asked: true }),
+        back_emf: 100,
         ..factory()
     };
     full.esc = EscProfile {
@@ -85,19 +88,28 @@ fn impossible_settings_change_nothing() {
         assert_eq!(factory().with(&bad, &factory()), Err(OutOfRange), "{bad:?}");
     }
     let nothing = RigConfig { marks: [0; 4], fitted: [false; 5], ..factory() };
-    let mut nonsense = [nothing, factory(), factory(), factory(), factory()];
+    let mut nonsense = [nothing, factory(), factory(), factory(), factory(), factory(), factory()];
     nonsense[1].strain.gain = f32::NAN;
     nonsense[2].esc.highest = PulseWidth::MIN;
     nonsense[3].limits.voltage = Bounds { low: Some(Volt(12.0)), high: Some(Volt(11.0)), ms: 100 };
     nonsense[4].current.shunt_ohm = 0.0;
+    nonsense[5].esc_telemetry = Some(EscTelemetry { pole_pairs: 0, asked: false });
+    nonsense[6].back_emf = 101;
     assert!(nonsense.iter().all(|config| !config.in_range()));
 }
 
 /// The arithmetic of the line is that of the codec: no sample is longer than what was reckoned with.
 #[test]
 fn no_sample_is_longer_than_the_arithmetic_says() {
-    for (marks, fitted) in [([2, 1, 2, 25], [true; 5]), ([2, 0, 0, 0], [false; 5]), ([0; 4], [true, false, false, true, false])] {
-        let config = RigConfig { marks, fitted, ..factory() };
+    let rigs = [
+        ([2, 1, 2, 25], [true; 5], (false, false)),
+        ([2, 1, 2, 25], [true; 5], (true, true)),
+        ([2, 0, 0, 0], [false; 5], (true, false)),
+        ([0; 4], [true, false, false, true, false], (false, true)),
+    ];
+    for (marks, fitted, (telemetry, meter)) in rigs {
+        let esc_telemetry = telemetry.then_some(EscTelemetry { pole_pairs: 11, asked: false });
+        let config = RigConfig { marks, fitted, esc_telemetry, back_emf: if meter { 11 } else { 0 }, ..factory() };
         let capture =
             CaptureCode { edges: u16::MAX >> 2, span: u32::MAX >> 4, verdict: CaptureVerdict::Disagrees, uneven: 10_000 };
         let code = AdcCode { sum: u32::MAX >> 4, count: u16::MAX >> 2, rms_q8: 2047 * 256, verdict: AdcVerdict::Short };
@@ -109,6 +121,16 @@ fn no_sample_is_longer_than_the_arithmetic_says() {
             faults: FaultSet((1 << 21) - 1),
             rpm: marks.map(|m| if m > 0 { capture } else { CaptureCode::default() }),
             adc: fitted.map(|f| if f { code } else { absent }),
+            esc: telemetry.then_some(EscCode {
+                verdict: EscVerdict::Nominal,
+                temperature: u8::MAX,
+                voltage: u16::MAX,
+                current: u16::MAX,
+                charge: u16::MAX,
+                speed: u16::MAX,
+                age_ms: 250,
+            }),
+            back_emf: meter.then_some(capture),
         };
         let mut wire = [0; MAX_WIRE];
         let used = Encoder::default().encode(Ticks(1 << 48), &Message::Rig(sample), &mut wire).unwrap();
@@ -120,9 +142,12 @@ fn no_sample_is_longer_than_the_arithmetic_says() {
 /// The whole rig a thousand times a second, and room beside it for events, health and a burst.
 #[test]
 fn a_thousand_samples_a_second_of_every_channel_fit_the_line() {
+    let esc_telemetry = Some(EscTelemetry { pole_pairs: 11, asked: false });
     let whole = RigConfig { log_period_ms: 1, ..factory() };
     assert!(whole.in_range() && whole.fitted == [true; 5] && whole.marks.iter().all(|marks| *marks > 0));
     assert!(whole.sample_bytes() * 1000 < LINE_BYTES_S * 2 / 3, "{} bytes a sample", whole.sample_bytes());
+    let crossed = RigConfig { esc_telemetry, back_emf: 11, ..whole };
+    assert!(crossed.sample_bytes() * 1000 < LINE_BYTES_S * 3 / 4, "{} bytes a sample", crossed.sample_bytes());
 }
 
 proptest! {

@@ -289,7 +289,7 @@ impl Bench {
     /// The calibration that fits this bench exactly.
     #[must_use]
     pub fn calibration(&self) -> Calibration {
-        Calibration { timer_hz: Ticks::HZ, marks: self.geometry.marks(), adc: self.front.scales() }
+        Calibration { timer_hz: Ticks::HZ, marks: self.geometry.marks(), adc: self.front.scales(), pole_pairs: [0; 2] }
     }
 }
 

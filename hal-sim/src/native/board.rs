@@ -11,7 +11,7 @@ use crate::bench::{CONVERSION_HZ, Millisecond};
 use esc_pwm::dshot::{Frame, Throttle};
 use firmware_rig::burst;
 use firmware_rig::queue::CAPACITY;
-use firmware_rig::{Config, Conversions, Delivered, Rig, RigConfig, RigConsole, Start};
+use firmware_rig::{Beside, Config, Conversions, Delivered, Rig, RigConfig, RigConsole, Start};
 use frame::message::{ClockNews, Crash, CrashCause, Event, SettingsNews, Trial};
 use frame::units::{PulseWidth, Ticks};
 
@@ -171,6 +171,7 @@ impl Board {
             edges: core::array::from_fn(|n| &seen(n)[..seen(n).len().min(CAPACITY)]),
             over_capture: core::array::from_fn(|n| seen(n).len() > CAPACITY),
             adc: &gathered.adc,
+            beside: Beside::UNWIRED,
             brown_out: wires.brown_out,
             paused: false, // the flash of a desk takes no time
             stored: self.stored.take(),

@@ -77,7 +77,7 @@ mod tests {
     const MARKS: [u16; 4] = [2, 1, 2, 25];
 
     fn calibration() -> Calibration {
-        Calibration { timer_hz: 84_000_000, marks: MARKS, adc: [AdcScale { zero: 0.0, gain: 1.0 }; 5] }
+        Calibration { timer_hz: 84_000_000, marks: MARKS, adc: [AdcScale { zero: 0.0, gain: 1.0 }; 5], pole_pairs: [0; 2] }
     }
 
     fn told(columns: &Columns, samples: &[RigSample]) -> Log {

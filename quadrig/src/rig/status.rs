@@ -165,6 +165,7 @@ mod tests {
             frames: [12, 3, 1],
             steps: [1_708, 2],
             index: 77,
+            esc: [320, 2, 5],
         };
         let sample = RigSample { at: Ticks(0), ..RigSample::default() };
         let heed = Heed {

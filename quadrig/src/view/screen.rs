@@ -9,6 +9,7 @@ use super::channel::{CHANNELS, Channel, adc_words, capture_words};
 use super::keys::Prompt;
 use firmware_rig::RigConfig;
 use frame::calibration::Calibration;
+use frame::esc::EscVerdict;
 use frame::message::{BoardId, Event, Message, SettingsNews};
 use frame::rig::{CAPTURE_CHANNELS, Fault, FaultSet, RigSample, RigState};
 use frame::units::Ticks;
@@ -240,6 +241,9 @@ impl Screen {
                     if *open { (Tone::Bad, "the stop loop is open") } else { (Tone::Plain, "the stop loop is closed") };
                 self.tell(tone, words);
             }
+            Event::EscTelemetry { verdict, .. } => {
+                self.tell(if *verdict == EscVerdict::Nominal { Tone::Dim } else { Tone::Warn }, verdict.words());
+            }
             Event::Settings(SettingsNews::Damaged) => {
                 self.tell(Tone::Warn, "the board's stored settings are damaged: factory settings are in force")
             }
@@ -330,7 +334,7 @@ mod tests {
 
     fn calibration() -> Message {
         let adc = [AdcScale { zero: 100.0, gain: 0.5 }; 5];
-        Message::Calibration(Calibration { timer_hz: 84_000_000, marks: [2, 1, 2, 25], adc })
+        Message::Calibration(Calibration { timer_hz: 84_000_000, marks: [2, 1, 2, 25], adc, pole_pairs: [0; 2] })
     }
 
     fn sample(ms: u64) -> RigSample {
@@ -343,6 +347,8 @@ mod tests {
             faults: FaultSet::NONE,
             rpm: [turning, CaptureCode { verdict: CaptureVerdict::Lost, ..turning }, turning, turning],
             adc: [code, AdcCode { verdict: AdcVerdict::Open, ..code }, code, code, code],
+            esc: None,
+            back_emf: None,
         }
     }
 

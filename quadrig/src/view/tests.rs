@@ -19,7 +19,7 @@ fn running() -> Screen {
     let mut screen = Screen::new("/dev/ttyUSB0".to_owned());
     screen.configured(&RigConfig::of(&Config::thesis_570kv()));
     let adc = [AdcScale { zero: 100.0, gain: 0.02 }; 5];
-    screen.take(&Message::Calibration(Calibration { timer_hz: 84_000_000, marks: [2, 1, 2, 25], adc }));
+    screen.take(&Message::Calibration(Calibration { timer_hz: 84_000_000, marks: [2, 1, 2, 25], adc, pole_pairs: [0; 2] }));
     let turning = CaptureCode { edges: 2, span: 84_000_000 / 50, verdict: CaptureVerdict::Nominal, uneven: 0 };
     let code = AdcCode { sum: 2000, count: 10, rms_q8: 0, verdict: AdcVerdict::Nominal };
     screen.take(&Message::Event(Event::State { from: RigState::Armed, to: RigState::Running, at: Ticks(0) }));
@@ -33,6 +33,8 @@ fn running() -> Screen {
             faults: FaultSet::NONE,
             rpm: [CaptureCode { verdict: CaptureVerdict::Lost, ..turning }, turning, turning, turning],
             adc: [AdcCode { sum, ..code }; 5],
+            esc: None,
+            back_emf: None,
         }));
     }
     screen.course = Some(Course {

@@ -1,0 +1,105 @@
+//! What is measured of the rotor and its supply a second time: by the ESC itself, and by a back-EMF meter.
+//!
+//! What it is: [`CrossChecks`], the telemetry line ([`crate::esc_line`]) and a capture channel of the motor's electrical turns. Both are told
+//! beside the four speed sensors and the analogue channels.
+//! What can go wrong: a dead or garbled line, a meter that is silent or disagrees: told by their verdicts, and no reason for a stop. The
+//! consensus of the speed sensors, and what protections judge by, never have them in: the ESC's word is some 30 ms old and comes from the very part
+//! that is to be protected against, and below its threshold the meter does not see a rotor that turns. One exception: where no speed sensor is
+//! fitted, a limit of the speed is judged by the meter, which can only stop a run that nothing would have stopped.
+//! Units: ticks of the capture timer, rev/min.
+//! Reference: Beharie 2013 section 5.4.7 (back-EMF meter as a cross-check); specification `rig.md`, "Four RPM capture channels".
+
+use crate::bank::CaptureBank;
+use crate::capture::CaptureChannel;
+use crate::config::Config;
+use crate::esc_line::{EscCounts, EscLine};
+use frame::esc::{EscCode, EscVerdict};
+use frame::rig::{CaptureCode, CaptureVerdict};
+use frame::units::{RevPerMin, Ticks};
+
+/// What arrived for the cross-checks since the last tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside<'a> {
+    /// Bytes of the ESC's telemetry, with [`crate::esc_line::LINE_ERROR`] where one came damaged.
+    pub esc: &'a [u16],
+    /// Captures of the back-EMF meter, one an electrical turn, in ticks of the capture timer modulo 2^32.
+    pub back_emf: &'a [u32],
+    /// One of these was overwritten, or their queue was full.
+    pub over_capture: bool,
+}
+
+impl Beside<'_> {
+    /// Neither wire is there.
+    pub const UNWIRED: Self = Self { esc: &[], back_emf: &[], over_capture: false };
+}
+
+/// The two cross-checks.
+#[derive(Debug, Clone)]
+pub(crate) struct CrossChecks {
+    line: Option<EscLine>,
+    asked: bool,
+    told: EscVerdict,
+    meter: CaptureChannel,
+}
+
+impl CrossChecks {
+    /// Those of `config`.
+    pub(crate) fn new(config: &Config) -> Self {
+        Self {
+            line: config.esc_telemetry.map(|_| EscLine::default()),
+            asked: config.esc_telemetry.is_some_and(|esc| esc.asked),
+            told: EscVerdict::default(),
+            meter: CaptureChannel::new(config.back_emf, config.timer_hz, config.capture),
+        }
+    }
+
+    /// Which are fitted: bit 4 the telemetry, bit 5 the meter, as [`frame::Hello::present`] has them.
+    pub(crate) fn fitted(&self) -> u8 {
+        u8::from(self.line.is_some()) << 4 | u8::from(self.meter.marks > 0) << 5
+    }
+
+    /// Takes what arrived since the last tick; gives the telemetry's verdict where it is another than before.
+    pub(crate) fn take(&mut self, now: Ticks, beside: &Beside<'_>) -> Option<EscVerdict> {
+        self.meter.take(now, beside.back_emf, beside.over_capture);
+        let line = self.line.as_mut()?;
+        line.take(now, beside.esc);
+        let verdict = line.verdict(now);
+        (core::mem::replace(&mut self.told, verdict) != verdict).then_some(verdict)
+    }
+
+    /// What a sample tells of them; to be called behind [`CaptureBank::sample`].
+    pub(crate) fn sample(&mut self, now: Ticks, bank: &CaptureBank) -> (Option<EscCode>, Option<CaptureCode>) {
+        (self.line.as_ref().map(|line| line.code(now)), (self.meter.marks > 0).then(|| self.metered(now, bank)))
+    }
+
+    fn metered(&mut self, now: Ticks, bank: &CaptureBank) -> CaptureCode {
+        let meter = &mut self.meter;
+        let mut code = meter.code(now, bank.turning_others(now));
+        let speed = meter.speed().filter(|_| code.verdict == CaptureVerdict::Nominal);
+        let apart = match (speed, bank.agreed()) {
+            (Some(speed), Some((middle, tolerance))) => (speed.0 - middle).abs() > tolerance * middle,
+            _ => false,
+        };
+        if apart && meter.deviations > 0 {
+            code.verdict = CaptureVerdict::Disagrees;
+        }
+        meter.deviations = u8::from(apart);
+        meter.told(now);
+        code
+    }
+
+    /// Speed over the last revolution by the back-EMF meter, for a limit that nothing else could judge.
+    pub(crate) fn speed(&self, now: Ticks) -> Option<RevPerMin> {
+        self.meter.latest_speed(now)
+    }
+
+    /// What the telemetry line has heard.
+    pub(crate) fn counts(&self) -> EscCounts {
+        self.line.as_ref().map_or(EscCounts::default(), EscLine::counts)
+    }
+
+    /// Whether the ESC is to be asked for a frame in this tick.
+    pub(crate) fn asks(&mut self, now: Ticks) -> bool {
+        self.asked && self.line.as_mut().is_some_and(|line| line.asks(now))
+    }
+}
