@@ -63,6 +63,15 @@ impl CaptureBank {
         }
     }
 
+    /// Channels of `config` in the place of those so far, with nothing seen yet.
+    pub(crate) fn refit(&mut self, config: &Config) {
+        for (channel, marks) in self.channels.iter_mut().zip(config.marks) {
+            channel.refit(marks);
+        }
+        (self.turning_since, self.before, self.flagged) = (None, [None; 2], 0);
+        (self.straight, self.agreed) = (None, None);
+    }
+
     /// Takes the captures since the last tick.
     pub fn take(&mut self, now: Ticks, edges: &[&[u32]; CAPTURE_CHANNELS], over_capture: &[bool; CAPTURE_CHANNELS]) {
         for ((channel, edges), over) in self.channels.iter_mut().zip(edges).zip(over_capture) {

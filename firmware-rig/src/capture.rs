@@ -45,6 +45,13 @@ struct Turn {
     speed: Option<f32>,
 }
 
+/// Longest silence that is bridged, and the shortest time between two edges, ticks.
+fn ends(marks: u16, timer_hz: u32) -> (u64, u64) {
+    let ceiling = timer_hz.saturating_mul(LONGEST_S).min(u32::MAX / (u32::from(marks) + 1));
+    let floor = (60 * u64::from(timer_hz) / FASTEST / SPIKE).checked_div(u64::from(marks)).unwrap_or(0);
+    (u64::from(ceiling), floor)
+}
+
 /// One capture channel.
 #[derive(Debug, Clone)]
 pub struct CaptureChannel {
@@ -72,13 +79,13 @@ impl CaptureChannel {
     /// A channel that sees `marks` equal marks a revolution; 0 where none is fitted.
     #[must_use]
     pub fn new(marks: u16, timer_hz: u32, times: CaptureTimes) -> Self {
-        let ceiling = timer_hz.saturating_mul(LONGEST_S).min(u32::MAX / (u32::from(marks) + 1));
+        let (ceiling, floor) = ends(marks, timer_hz);
         Self {
             marks,
             timer_hz,
             times,
-            ceiling: u64::from(ceiling),
-            floor: (60 * u64::from(timer_hz) / FASTEST / SPIKE).checked_div(u64::from(marks)).unwrap_or(0),
+            ceiling,
+            floor,
             rejected: 0,
             taken: 0,
             ring: [0; DEPTH],
@@ -91,6 +98,16 @@ impl CaptureChannel {
             turn: None,
             deviations: 0,
         }
+    }
+
+    /// The channel with another number of marks, and nothing seen yet: as [`CaptureChannel::new`], where it stays.
+    pub(crate) fn refit(&mut self, marks: u16) {
+        self.marks = marks;
+        (self.ceiling, self.floor) = ends(marks, self.timer_hz);
+        (self.rejected, self.taken, self.deviations) = (0, 0, 0);
+        (self.primed, self.overwritten) = (false, false);
+        self.last = Ticks(0);
+        self.forget();
     }
 
     /// Edge `back` places before the latest.

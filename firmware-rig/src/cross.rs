@@ -53,6 +53,14 @@ impl CrossChecks {
         }
     }
 
+    /// Those of `config` in the place of those so far, with nothing heard yet.
+    pub(crate) fn refit(&mut self, config: &Config) {
+        self.line = config.esc_telemetry.map(|_| EscLine::default());
+        self.asked = config.esc_telemetry.is_some_and(|esc| esc.asked);
+        self.told = EscVerdict::default();
+        self.meter.refit(config.back_emf);
+    }
+
     /// Which are fitted: bit 4 the telemetry, bit 5 the meter, as [`frame::Hello::present`] has them.
     pub(crate) fn fitted(&self) -> u8 {
         u8::from(self.line.is_some()) << 4 | u8::from(self.meter.marks > 0) << 5

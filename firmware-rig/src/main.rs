@@ -18,8 +18,10 @@ fn main() {
 #[cfg(target_os = "none")]
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
+    use crate::board::back_emf;
     use crate::board::captures::{self, Clock, Edges, EncoderB};
     use crate::board::converter::{self, Codes, Converter};
+    use crate::board::esc_line;
     use crate::board::health;
     use crate::board::link::Link;
     use crate::board::pulse::PulseOutput;
@@ -35,7 +37,7 @@ mod app {
     use safe_start::stm32f4::{clock, crash};
     use settings_store::stm32f4::{self as flash, SettingsFlash};
     use stm32f4xx_hal::gpio::{Input, PB12, Speed};
-    use stm32f4xx_hal::pac::{ADC1, DMA1, DMA2, PWR, TIM1, TIM2, TIM3, TIM4, USART1};
+    use stm32f4xx_hal::pac::{ADC1, DMA1, DMA2, PWR, TIM1, TIM2, TIM3, TIM4, USART1, USART3};
     use stm32f4xx_hal::prelude::*;
     use stm32f4xx_hal::rcc::{self, Enable, Reset};
 
@@ -55,6 +57,9 @@ mod app {
     #[shared]
     struct Shared {
         capture_timer: TIM2,
+        /// The encoder's index, and the back-EMF meter.
+        cross_timer: TIM1,
+        esc_port: USART3,
         to_store: Option<RigConfig>,
         stored: Option<SettingsNews>,
         /// The latest event, for the log: the idle loop writes it, never the tick.
@@ -75,10 +80,11 @@ mod app {
         /// In memory of its own: moved about, it would lie on the stack several times over.
         console: &'static mut RigConsole,
         encoder_b: EncoderB,
-        index: TIM1,
         supply: SupplyWatch,
         flash: SettingsFlash,
         index_marks: u16,
+        words: esc_line::Words,
+        turns: back_emf::Edges,
         sampling: u16,
         codes: Codes,
         burst: &'static mut [u16; burst::LENGTH],
@@ -122,6 +128,8 @@ mod app {
         DMA2::reset(&mut rcc);
         USART1::enable(&mut rcc);
         USART1::reset(&mut rcc);
+        USART3::enable(&mut rcc);
+        USART3::reset(&mut rcc);
 
         let a = device.GPIOA.split(&mut rcc);
         let b = device.GPIOB.split(&mut rcc);
@@ -137,12 +145,13 @@ mod app {
         let encoder_b = a.pa7.into_pull_down_input();
         let _ = a.pa8.into_alternate::<1>().internal_pull_up(true);
         let _ = (a.pa9.into_alternate::<7>(), a.pa10.into_alternate::<7>().internal_pull_up(true));
+        let _ = (a.pa11.into_alternate::<1>().internal_pull_up(true), b.pb11.into_alternate::<7>().internal_pull_up(true));
         let _ = (c.pc0.into_analog(), c.pc1.into_analog(), c.pc2.into_analog(), c.pc3.into_analog(), c.pc4.into_analog());
         let stop = b.pb12.into_pull_up_input(); // closed to ground while the rig may run: a broken wire reads as a stop
 
         let dma = device.DMA2;
-        device.TIM1.ccmr1_input().write(|w| w.cc1s().ti1().ic1f().fck_int_n8());
-        device.TIM1.ccer().write(|w| w.cc1e().set_bit());
+        back_emf::start(&device.TIM1);
+        esc_line::start(&device.USART3);
         let mut clock = Clock::default();
         let now = clock.now(device.TIM2.cnt().read().bits());
         let start = Start { reset_cause, clock: clock_news, stored, news, ended: crash::take() };
@@ -174,15 +183,24 @@ mod app {
             watchdog,
             console,
             encoder_b,
-            index: device.TIM1,
             supply: SupplyWatch::start(device.PWR),
             flash,
             index_marks: 0,
+            words: esc_line::Words::new(),
+            turns: back_emf::Edges::new(),
             sampling,
             codes: Codes::new(),
             burst: cx.local.recorded,
         };
-        (Shared { capture_timer: device.TIM2, to_store: None, stored: None, to_log: None }, local)
+        let shared = Shared {
+            capture_timer: device.TIM2,
+            cross_timer: device.TIM1,
+            esc_port: device.USART3,
+            to_store: None,
+            stored: None,
+            to_log: None,
+        };
+        (shared, local)
     }
 
     /// Everything that may take its time.
@@ -232,9 +250,21 @@ mod app {
         health::capture_took(start);
     }
 
-    #[task(binds = TIM4, priority = 2, shared = [capture_timer, to_store, stored, to_log], local = [
-        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, console, index, index_marks, supply, sampling, codes,
-        burst
+    /// An electrical turn of the motor. Of one priority with the captures: neither comes between what the other reads.
+    #[task(binds = TIM1_CC, priority = 3, shared = [capture_timer, cross_timer])]
+    fn turn(cx: turn::Context) {
+        (cx.shared.cross_timer, cx.shared.capture_timer).lock(|timer, clock| back_emf::serve(timer, clock));
+    }
+
+    /// A byte of the ESC's telemetry.
+    #[task(binds = USART3, priority = 3, shared = [esc_port])]
+    fn esc_byte(mut cx: esc_byte::Context) {
+        cx.shared.esc_port.lock(|port| esc_line::serve(port));
+    }
+
+    #[task(binds = TIM4, priority = 2, shared = [capture_timer, cross_timer, esc_port, to_store, stored, to_log], local = [
+        edges, clock, converter, link, dma, pulse, stop, tick_timer, watchdog, console, index_marks, supply, sampling, codes,
+        burst, words, turns
     ])]
     fn tick(mut cx: tick::Context) {
         let start = health::cycles();
@@ -251,6 +281,8 @@ mod app {
         }
         crash::look_at_clock();
         let over_capture = captures::drain(board.edges);
+        let turns_lost = back_emf::drain(board.turns);
+        esc_line::drain(board.words);
         let fitted = board.console.rig().fitted();
         let counter = cx.shared.capture_timer.lock(|timer| {
             captures::arm(timer, fitted);
@@ -258,17 +290,21 @@ mod app {
         });
         let now = board.clock.now(counter);
         MILLIS.store(now.as_ms() as u32, Ordering::Relaxed);
-        if board.index.sr().read().cc1if().bit() {
-            let _ = board.index.ccr1().read(); // reading takes the flag down
-            *board.index_marks = board.index_marks.wrapping_add(1);
-        }
+        let config = board.console.rig().config();
+        let (telemetry, meter) = (config.esc_telemetry.is_some(), config.back_emf > 0);
+        let index = cx.shared.cross_timer.lock(|timer| {
+            back_emf::arm(timer, meter);
+            captures::index(timer)
+        });
+        *board.index_marks = board.index_marks.wrapping_add(u16::from(index));
+        cx.shared.esc_port.lock(|port| esc_line::arm(port, telemetry));
         let (adc, whole) = board.converter.drain(board.dma, board.console.wanted(), board.codes);
         let delivered = Delivered {
             now,
             edges: board.edges.each_ref().map(|edges| edges.as_slice()),
             over_capture,
             adc: &adc,
-            beside: Beside::UNWIRED,
+            beside: Beside { esc: board.words, back_emf: board.turns, over_capture: turns_lost },
             brown_out: board.supply.is_low(),
             paused: flash::PAUSED.swap(false, Ordering::Acquire),
             stored: cx.shared.stored.lock(Option::take),

@@ -202,10 +202,10 @@ impl Rig {
     pub(crate) fn put_in_force(&mut self, settings: RigConfig) {
         let config = settings.apply(&self.factory);
         if config.marks != self.config.marks {
-            self.bank = CaptureBank::new(&config);
+            self.bank.refit(&config);
         }
         if (config.esc_telemetry, config.back_emf) != (self.config.esc_telemetry, self.config.back_emf) {
-            self.cross = CrossChecks::new(&config);
+            self.cross.refit(&config);
         }
         let untared = config.calibration();
         if untared != self.untared {

@@ -71,7 +71,7 @@ fn the_imu_boards_pins_are_those_of_its_image() {
 }
 
 /// Pin of the package, DS8626 table 7 (LQFP64).
-const LQFP64: [(&str, u8); 19] = [
+const LQFP64: [(&str, u8); 21] = [
     ("PC0", 8),
     ("PC1", 9),
     ("PC2", 10),
@@ -83,10 +83,12 @@ const LQFP64: [(&str, u8); 19] = [
     ("PA6", 22),
     ("PA7", 23),
     ("PC4", 24),
+    ("PB11", 30),
     ("PB12", 33),
     ("PA8", 41),
     ("PA9", 42),
     ("PA10", 43),
+    ("PA11", 44),
     ("PA13", 46),
     ("PA14", 49),
     ("PB6", 58),

@@ -61,7 +61,7 @@ pub(crate) fn image(place: &Place, bless: bool) -> Result<(), Failure> {
     compare(&sizes, &limits)?;
     filters(place)?;
     stack(place)?;
-    callgraph::quiet(&place.images().join("firmware-rig"), &["TIM4", "TIM2"])?;
+    callgraph::quiet(&place.images().join("firmware-rig"), &["TIM4", "TIM2", "TIM1_CC", "USART3"])?;
     callgraph::quiet(&place.images().join("firmware-ahrs"), &["TIM4", "USART1"])
 }
 

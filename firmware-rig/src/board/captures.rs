@@ -18,7 +18,7 @@ use frame::rig::CAPTURE_CHANNELS;
 use frame::units::Ticks;
 use heapless::Vec;
 use stm32f4xx_hal::gpio::{Input, PA7};
-use stm32f4xx_hal::pac::TIM2;
+use stm32f4xx_hal::pac::{TIM1, TIM2};
 
 /// Channel B of the encoder, read at the captured edges of A.
 pub(crate) type EncoderB = PA7<Input>;
@@ -97,6 +97,15 @@ pub(crate) fn serve(timer: &TIM2, encoder_b: &EncoderB) {
     if lost != 0 {
         OVERRUN.fetch_or(lost, Ordering::Relaxed);
     }
+}
+
+/// Whether the encoder's index has passed since the last look.
+pub(crate) fn index(timer: &TIM1) -> bool {
+    let passed = timer.sr().read().cc1if().bit();
+    if passed {
+        let _ = timer.ccr1().read(); // reading takes the flag down
+    }
+    passed
 }
 
 /// Edges of one tick.

@@ -20,6 +20,7 @@
 //! | capture: encoder A, every fourth rising edge (prescaler 4), filter and pull-up as above | PA3, AF1 | TIM2 CH4 | TIM2 interrupt |
 //! | encoder B, its level at the captured edges of A gives the direction, pull-down | PA7 | GPIO, read in the TIM2 interrupt | none |
 //! | encoder index N, rising edge, counted, filter and pull-up as above | PA8, AF1 | TIM1 CH1, polled each tick | none |
+//! | back-EMF meter, rising edge, one an electrical turn, filter of 8 samples (48 ns), pull-up | PA11, AF1 | TIM1 CH4, 10.5 MHz (PSC 15), its count put on the scale of TIM2 | TIM1_CC interrupt, where it is fitted |
 //! | strain (as the four below: 1 MOhm to ground outside, so that an open wire reads 0) | PC0 | ADC1 IN10, first of the scan | DMA2 stream 0 channel 0, circular, 16 bit |
 //! | torque | PC1 | ADC1 IN11 | same |
 //! | current | PC2 | ADC1 IN12 | same |
@@ -27,6 +28,7 @@
 //! | temperature | PC4 | ADC1 IN14, last of the scan | same |
 //! | telemetry out, 2 Mbaud 8N1 | PA9, AF7 | USART1 TX | DMA2 stream 7 channel 4 |
 //! | commands in | PA10, AF7 | USART1 RX | DMA2 stream 2 channel 4, circular, polled |
+//! | ESC telemetry in, 115 200 baud 8N1, pull-up | PB11, AF7 | USART3 RX | USART3 interrupt, a byte each, where it is fitted |
 //! | stop loop, normally closed to ground: high (pressed, broken, unplugged) is a stop, pull-up (drive it low in an emulator) | PB12 | GPIO, polled twice a tick | none |
 //! | board supply below 2.9 V | - | PVD, polled each tick | none |
 //! | settings | flash sectors 10 and 11 | FLASH, from the idle loop | none |
@@ -35,12 +37,14 @@
 //!
 //! ADC clock 21 MHz, 56 + 12 cycles a conversion: 308.8 kconv/s in all, 61.8 kconv/s a channel; 15 + 12 cycles at log rates above
 //! 25 Hz: 155.6 kconv/s a channel; reference 3.3 V.
-//! Interrupt priorities: TIM2 (captures, budget 400 cycles) above TIM4 (tick, budget 84 000 cycles = half of its period); both
+//! Interrupt priorities: TIM2 (captures, budget 400 cycles), TIM1_CC and USART3 above TIM4 (tick, budget 84 000 cycles = half of its period); both
 //! budgets stand in `budgets/rig.toml` and are held on the emulated board. Idle is WFI, stores settings and measures the stack. defmt messages go to RTT from
 //! the start-up and the idle loop, never from the tick (`cargo xtask image` follows every call), and never wait for a probe.
 
+pub(crate) mod back_emf;
 pub(crate) mod captures;
 pub(crate) mod converter;
+pub(crate) mod esc_line;
 pub(crate) mod health;
 pub(crate) mod link;
 pub(crate) mod panic;
