@@ -70,6 +70,7 @@ impl CaptureBank {
         }
         (self.turning_since, self.before, self.flagged) = (None, [None; 2], 0);
         (self.straight, self.agreed) = (None, None);
+        self.bad = [None; CAPTURE_CHANNELS];
     }
 
     /// Takes the captures since the last tick.

@@ -270,6 +270,11 @@ impl CaptureChannel {
 
     /// What the channel reports, when the others turn with `others` = (ticks a revolution, since when), if they do.
     pub(crate) fn code(&self, now: Ticks, others: Option<(u64, Ticks)>) -> CaptureCode {
+        self.code_by(now, others, DEPTH)
+    }
+
+    /// The same, with a look at so many of the latest periods at the most.
+    pub(crate) fn code_by(&self, now: Ticks, others: Option<(u64, Ticks)>, most: usize) -> CaptureCode {
         let bare = |verdict| CaptureCode { verdict, ..CaptureCode::default() };
         let full = |verdict| match self.reading {
             Some((edges, span)) => CaptureCode { edges, span, verdict, uneven: 0 },
@@ -284,7 +289,7 @@ impl CaptureChannel {
         if self.is_turning(now) {
             // a slow reading holds too few periods to show a pattern of two: the ones before it are looked at as well
             let edges = self.reading.map_or(0, |(edges, _)| usize::from(edges)).max(PATTERN);
-            return full(judge(self.marks, self.periods().take(edges)));
+            return full(judge(self.marks, self.periods().take(edges.min(most))));
         }
         match others {
             Some(others) => {

@@ -82,7 +82,9 @@ impl CrossChecks {
 
     fn metered(&mut self, now: Ticks, bank: &CaptureBank) -> CaptureCode {
         let meter = &mut self.meter;
-        let mut code = meter.code(now, bank.turning_others(now));
+        // an edge too few or too many in an earlier revolution shows as disagreement; a look at each period of the reading takes its time
+        let latest = usize::from(meter.marks) + 2;
+        let mut code = meter.code_by(now, bank.turning_others(now), latest);
         let speed = meter.speed().filter(|_| code.verdict == CaptureVerdict::Nominal);
         let apart = match (speed, bank.agreed()) {
             (Some(speed), Some((middle, tolerance))) => (speed.0 - middle).abs() > tolerance * middle,

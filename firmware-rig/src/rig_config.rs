@@ -8,12 +8,12 @@
 
 use crate::config::{Config, CurrentChannel, TemperatureChannel, TorqueChannel, VoltageChannel};
 use crate::strain::StrainChannel;
-use crate::transfer::CRC;
 use esc_pwm::{Bounds, EscOutput, Slew, ThrottleCurve};
 use frame::calibration::AdcScale;
 use frame::message::Setting;
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::units::{Ampere, Celsius, Newton, NewtonMetre, PulseWidth, RevPerMin, Ticks, Volt};
+use frame::wire::checksum;
 use serde::{Deserialize, Serialize};
 use settings_store::Stored;
 
@@ -302,7 +302,7 @@ impl RigConfig {
     pub fn digest(&self) -> u32 {
         let mut content = [0; crate::transfer::LONGEST];
         let used = self.write(&mut content).unwrap_or(0);
-        CRC.checksum(content.get(..used).unwrap_or(&[]))
+        checksum(content.get(..used).unwrap_or(&[]))
     }
 }
 

@@ -8,13 +8,12 @@
 
 use crate::rig_config::{OutOfRange, RigConfig};
 use frame::message::{CONFIG_PART, ConfigPart};
+use frame::wire::checksum;
 use heapless::Vec;
 use settings_store::Stored;
 
 /// Longest configuration, bytes.
 pub const LONGEST: usize = 448;
-/// Checksum of a configuration.
-pub(crate) const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Parts so far.
 #[derive(Debug, Clone, Default)]
@@ -37,7 +36,7 @@ impl Incoming {
     /// The whole, if it is one.
     pub(crate) fn finish(&mut self, length: u16, crc: u32) -> Result<RigConfig, OutOfRange> {
         let whole = self.parts.get(..usize::from(length)).ok_or(OutOfRange)?;
-        let config = if CRC.checksum(whole) == crc { RigConfig::read(whole) } else { None };
+        let config = if checksum(whole) == crc { RigConfig::read(whole) } else { None };
         self.parts.clear();
         config.ok_or(OutOfRange)
     }

@@ -23,6 +23,12 @@ const TRAILER: usize = 4;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
+/// CRC-32/ISO-HDLC of `bytes`, by the table that the frames' own checksum has.
+#[must_use]
+pub fn checksum(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
 /// Why a message could not be put on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -54,7 +60,7 @@ impl Encoder {
         let payload = rest.get_mut(..room).ok_or(EncodeError::TooLong)?;
         let used = postcard::to_slice(message, payload).map_err(|_| EncodeError::TooLong)?.len();
         let body = HEADER + used;
-        let crc = CRC.checksum(raw.get(..body).ok_or(EncodeError::TooLong)?);
+        let crc = checksum(raw.get(..body).ok_or(EncodeError::TooLong)?);
         raw.get_mut(body..body + TRAILER).ok_or(EncodeError::TooLong)?.copy_from_slice(&crc.to_le_bytes());
         let n =
             cobs::try_encode(raw.get(..body + TRAILER).ok_or(EncodeError::TooLong)?, out).map_err(|_| EncodeError::TooLong)?;
@@ -181,7 +187,7 @@ impl Decoder {
         let frame = plain.get(..report.frame_size())?;
         let body = frame.len().checked_sub(TRAILER)?;
         let (content, crc) = frame.split_at_checked(body)?;
-        if CRC.checksum(content).to_le_bytes() != *crc {
+        if checksum(content).to_le_bytes() != *crc {
             return None;
         }
         let (head, payload) = content.split_at_checked(HEADER)?;
@@ -240,6 +246,11 @@ mod tests {
         let mut decoder = Decoder::default();
         let got = bytes.iter().filter_map(|b| decoder.push(*b)).collect();
         (got, decoder.stats())
+    }
+
+    #[test]
+    fn the_checksum_is_the_published_one() {
+        assert_eq!(checksum(b"123456789"), 0xCBF4_3926, "check value of CRC-32/ISO-HDLC");
     }
 
     #[test]
