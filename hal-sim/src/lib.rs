@@ -29,7 +29,7 @@ pub mod plant;
 pub mod scenario;
 pub mod sensor;
 
-pub use bench::{Bench, Millisecond, Truth};
+pub use bench::{Bench, Listens, Millisecond, Truth};
 pub use native::{RunRecord, SimError, run};
 pub use plant::{PlantState, Powerplant};
 pub use scenario::{Scenario, ScenarioError};

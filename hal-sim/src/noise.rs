@@ -30,6 +30,10 @@ pub enum Source {
     Wind = 70,
     /// Noise of the three chips of the IMU board; three sub-streams, and one for what is drawn of them.
     Imu = 90,
+    /// What a noisy line makes of the ESC's telemetry.
+    EscLine = 100,
+    /// Jitter of the back-EMF comparator.
+    BackEmf = 110,
     /// Start angle of the rotor and phase of the imbalance.
     Phase = 60,
 }

@@ -52,7 +52,7 @@ fn a_damaged_record_is_refused_in_one_line() {
     let (pins, _) = recorded(&scenario(""));
     let mut bytes = Vec::new();
     pins.write(&mut bytes).unwrap();
-    for (cut, word) in [(&bytes[..bytes.len() - 3], "one more millisecond"), (&bytes[1..40], "quadrig pins 2")] {
+    for (cut, word) in [(&bytes[..bytes.len() - 3], "one more millisecond"), (&bytes[1..40], "quadrig pins 3")] {
         std::fs::write(&path, cut).unwrap();
         let message = PinRecord::read(&path).unwrap_err().to_string();
         assert!(message.contains(word) && message.contains("byte") && !message.contains('\n'), "{message}");

@@ -63,7 +63,7 @@ fn truth_goes_to_a_side_file_and_pins_play_back() {
 
     call(at, &["sim", "run.toml", "-o", "again.csv", "--replay", "pins.bin"]).succeeded();
     assert_eq!(rows(at, "again.csv"), log, "the firmware alone on the recorded pins");
-    std::fs::write(at.join("pins.bin"), b"quadrig pins 2\n").expect("a stub");
+    std::fs::write(at.join("pins.bin"), b"quadrig pins 3\n").expect("a stub");
     call(at, &["sim", "run.toml", "-o", "never.csv", "--replay", "pins.bin"]).refused(&["pins.bin"]);
     assert!(!at.join("never.csv").exists());
 }

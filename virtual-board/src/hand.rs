@@ -5,6 +5,7 @@
 //! Units: gram, N.m, V.
 //! Reference: docs/virtual.md.
 
+use frame::esc::{BACK_EMF_NAME, ESC_NAMES};
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES};
 
 /// A deed.
@@ -25,7 +26,7 @@ pub enum Hand {
     Draw(f64),
     /// Sets the bench supply, V.
     Supply(f64),
-    /// Pulls a plug, or puts it back: capture channels first, then analogue ones.
+    /// Pulls a plug, or puts it back: capture channels first, then analogue ones, the ESC's telemetry, the back-EMF meter.
     Plug {
         /// Which.
         plug: usize,
@@ -38,6 +39,12 @@ pub enum Hand {
 
 /// Every word.
 const WORDS: &str = "power on|off; stop, release (the emergency stop); hang GRAMS (on the load cell); twist NM (the torque arm); draw AMPERES (a load of one's own); supply VOLTS; unplug CHANNEL, plug CHANNEL; reset (key)";
+
+/// Names of the plugs, by their columns in the log.
+fn plugs() -> impl Iterator<Item = &'static str> {
+    let [telemetry, ..] = ESC_NAMES;
+    CAPTURE_NAMES.into_iter().chain(ADC_NAMES).chain([telemetry, BACK_EMF_NAME])
+}
 
 impl Hand {
     /// Every word, for people.
@@ -55,9 +62,8 @@ impl Hand {
             value.ok_or_else(|| format!("{line:?}: a number is needed, found {word:?}"))
         };
         let plug = |name: &str| -> Result<usize, String> {
-            let names = || CAPTURE_NAMES.into_iter().chain(ADC_NAMES);
-            let found = names().position(|n| n == name);
-            found.ok_or_else(|| format!("{name:?}: no such channel; there are {}", names().collect::<Vec<_>>().join(", ")))
+            let found = plugs().position(|n| n == name);
+            found.ok_or_else(|| format!("{name:?}: no such channel; there are {}", plugs().collect::<Vec<_>>().join(", ")))
         };
         match both {
             ("power", Some("on")) => Ok(Self::Power(true)),
@@ -81,7 +87,7 @@ impl Hand {
     /// What was done, for people.
     #[must_use]
     pub fn words(&self) -> String {
-        let name = |plug: usize| CAPTURE_NAMES.into_iter().chain(ADC_NAMES).nth(plug).unwrap_or("?");
+        let name = |plug: usize| plugs().nth(plug).unwrap_or("?");
         match *self {
             Self::Power(true) => "the ESC's supply is on".to_owned(),
             Self::Power(false) => "the ESC's supply is off".to_owned(),
@@ -111,6 +117,7 @@ mod tests {
         assert_eq!(Hand::parse("  hang   200.5 "), Ok(Hand::Hang(200.5)));
         assert_eq!(Hand::parse("unplug rpm_hall"), Ok(Hand::Plug { plug: 2, out: true }));
         assert_eq!(Hand::parse("plug thrust_n"), Ok(Hand::Plug { plug: 4, out: false }));
+        assert_eq!(Hand::parse("unplug rpm_bemf"), Ok(Hand::Plug { plug: 10, out: true }));
         assert!(Hand::parse("unplug beam").is_err_and(|e| e.contains("rpm_beam")));
         assert!(Hand::parse("supply 230").is_err_and(|e| e.contains("60 V")));
         assert!(Hand::parse("dance").is_err_and(|e| e.contains("power on|off")));

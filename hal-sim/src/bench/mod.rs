@@ -26,7 +26,7 @@ mod imbalance;
 mod parts;
 mod steps;
 
-pub use parts::{BenchParts, CONVERSION_HZ, Millisecond, Truth};
+pub use parts::{BenchParts, CONVERSION_HZ, Listens, Millisecond, Truth};
 
 use crate::effect::{Levers, Scheduled};
 use crate::noise::{Source, Stream};
@@ -37,7 +37,10 @@ use crate::plant::powerplant::STEPS_PER_MS;
 use crate::plant::{Beam, EscDialogue, EscState, Mount, PlantBlock, Powerplant, RigPlant};
 use crate::scenario::Scenario;
 use crate::sensor::back_emf::BackEmfState;
-use crate::sensor::{AnalogFront, BackEmfMeter, Converter, Edge, EdgeDetail, Geometry, Logger, Tachometers};
+use crate::sensor::{
+    AnalogFront, BackEmf, BackEmfMeter, Comparator, Converter, Edge, EdgeDetail, EscTelemetry, EscWire, Geometry, Logger,
+    Tachometers,
+};
 use frame::calibration::Calibration;
 use frame::message::Beep;
 use frame::rig::ADC_CHANNELS;
@@ -91,6 +94,13 @@ pub struct Bench {
     drawn_v: f64,
     output_us: f64,
     edges: VecDeque<Edge>,
+    listens: Listens,
+    telemetry: EscTelemetry,
+    comparator: Comparator,
+    /// What the windings gave as this millisecond began.
+    emf: Option<BackEmf>,
+    /// Changes of its output.
+    turns: VecDeque<Edge>,
     truth: Truth,
     /// What hands put on the load cell (as lift, N) and on the torque arm, N.m.
     by_hand: (f64, f64),
@@ -109,6 +119,7 @@ impl Bench {
         let mut phase = Stream::new(seed, Source::Phase, 0);
         let angle_rev = phase.uniform();
         let cells = parts.plant.supply.cells();
+        let pole_pairs = parts.plant.motor.pole_pairs;
         let front = AnalogFront::new(&parts.bridge);
         let plant = plant.unwrap_or_else(|| Box::new(RigPlant::new(parts.plant, seed)));
         Self {
@@ -145,6 +156,11 @@ impl Bench {
             front,
             output_us: 1000.0,
             edges: VecDeque::new(),
+            listens: Listens::default(),
+            telemetry: EscTelemetry::new(parts.esc_errors, pole_pairs, parts.telemetry_asked, seed),
+            comparator: Comparator::new(BackEmfMeter::default(), seed),
+            emf: None,
+            turns: VecDeque::new(),
             truth: Truth::default(),
             by_hand: (0.0, 0.0),
         }
@@ -250,6 +266,37 @@ impl Bench {
         if self.next_edge_ns()? <= at_ns { self.edges.pop_front() } else { None }
     }
 
+    /// What the board's wires to the cross-checks are good for from here on. Nothing, before it is called.
+    pub fn listen(&mut self, listens: Listens) {
+        self.listens = listens;
+    }
+
+    /// Something becomes of the line of the ESC's telemetry.
+    pub fn set_esc_wire(&mut self, wire: EscWire) {
+        self.telemetry.set_wire(wire);
+    }
+
+    /// The ESC is asked for a frame of telemetry.
+    pub fn ask_esc(&mut self) {
+        self.telemetry.ask();
+    }
+
+    /// The next byte of the ESC's telemetry that has ended by `until_ns`, marked where it came with an error of the line.
+    pub fn esc_word(&mut self, until_ns: u64) -> Option<u16> {
+        self.telemetry.word(until_ns)
+    }
+
+    /// Time of the earliest change of the back-EMF meter's output that was not fetched yet.
+    #[must_use]
+    pub fn next_turn_ns(&self) -> Option<u64> {
+        self.turns.front().map(|e| e.at_ns)
+    }
+
+    /// Fetches it if it is due at or before `at_ns`.
+    pub fn turn_until(&mut self, at_ns: u64) -> Option<Edge> {
+        if self.next_turn_ns()? <= at_ns { self.turns.pop_front() } else { None }
+    }
+
     /// Level of a capture pin after the edges made so far (with [`EdgeDetail::Pins`]); for set-up after a reset.
     #[must_use]
     pub fn level(&self, channel: usize) -> bool {
@@ -289,7 +336,12 @@ impl Bench {
     /// The calibration that fits this bench exactly.
     #[must_use]
     pub fn calibration(&self) -> Calibration {
-        Calibration { timer_hz: Ticks::HZ, marks: self.geometry.marks(), adc: self.front.scales(), pole_pairs: [0; 2] }
+        Calibration {
+            timer_hz: Ticks::HZ,
+            marks: self.geometry.marks(),
+            adc: self.front.scales(),
+            pole_pairs: [self.base.plant.motor.pole_pairs as u16; 2],
+        }
     }
 }
 
@@ -312,9 +364,11 @@ mod tests {
             };
             let (mut fast, mut slow) = (bench(), bench());
             let mut out = Millisecond::default();
+            let mut turned = 0;
             for ms in 0..12_000u64 {
                 let width = if ms < 5_000 { 1_000_000 } else { 1_700_000 };
                 for bench in [&mut fast, &mut slow] {
+                    bench.listen(Listens { esc: true, back_emf: true });
                     if ms == 5_500 {
                         bench.start_run();
                     }
@@ -329,10 +383,19 @@ mod tests {
                     edges[usize::from(edge.channel)].push(edge.at_ticks as u32);
                 }
                 assert_eq!(out.edges, edges, "{effect:?} {ms} ms");
+                let turns = std::iter::from_fn(|| slow.turn_until(u64::MAX));
+                turned += out.back_emf.len();
+                assert!(
+                    turns.filter(|e| e.rising).map(|e| e.at_ticks as u32).eq(out.back_emf.iter().copied()),
+                    "{effect:?} {ms} ms"
+                );
+                let words: Vec<u16> = std::iter::from_fn(|| slow.esc_word((ms + 1) * 1_000_000)).collect();
+                assert_eq!(out.esc, words, "{effect:?} {ms} ms");
                 assert_eq!(fast.truth(), slow.truth(), "{effect:?} {ms} ms");
                 assert_eq!(fast.voltages(), slow.voltages(), "{effect:?} {ms} ms");
             }
             assert!(fast.truth().plant.rpm > 1000.0);
+            assert!(turned > 1000, "{turned} electrical turns");
         }
     }
 }

@@ -7,7 +7,7 @@
 
 use crate::effect::Scheduled;
 use crate::plant::{Beam, Bridge, Esc, Mount, Parts, PlantState};
-use crate::sensor::Geometry;
+use crate::sensor::{EscErrors, Geometry};
 use firmware_rig::AdcBlock;
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 
@@ -26,6 +26,10 @@ pub struct BenchParts {
     pub mount: Mount,
     /// Speed sensors.
     pub geometry: Geometry,
+    /// The ESC's own sensors.
+    pub esc_errors: EscErrors,
+    /// It sends its telemetry only when it is asked.
+    pub telemetry_asked: bool,
     /// Standard deviation of the mean over 0.1 s of each analogue channel, in its unit.
     pub noise: [f64; ADC_CHANNELS],
 }
@@ -41,7 +45,7 @@ pub struct Truth {
     pub plant: PlantState,
     /// Force that the gauges see, N.
     pub beam_n: f64,
-    /// What the back-EMF meter shows, rev/min; the rig's board is not wired to it.
+    /// What the back-EMF meter shows, rev/min; a board counts its comparator's edges itself.
     pub back_emf_rpm: Option<f64>,
 }
 
@@ -56,6 +60,19 @@ pub struct Millisecond {
     pub watched: Option<usize>,
     /// Those conversions, in order.
     pub codes: Vec<u16>,
+    /// Bytes of the ESC's telemetry that have ended, as [`firmware_rig::Beside::esc`] has them.
+    pub esc: Vec<u16>,
+    /// Rising edges of the back-EMF meter, ticks modulo 2^32.
+    pub back_emf: Vec<u32>,
+}
+
+/// What of the cross-checks a board listens to: the rest is not reckoned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Listens {
+    /// The ESC's telemetry.
+    pub esc: bool,
+    /// The back-EMF meter.
+    pub back_emf: bool,
 }
 
 /// Conversions of a channel in a second of a native run: eight and nine in a millisecond by turns.

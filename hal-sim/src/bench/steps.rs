@@ -9,11 +9,12 @@ use super::imbalance::{SPEEDS, turn_cosine};
 use super::parts::open;
 use super::{Bench, Millisecond, STEP_NS, STEP_S, Truth};
 use crate::effect::Levers;
-use crate::plant::Beam;
 use crate::plant::bridge::Load;
 use crate::plant::powerplant::STEPS_PER_MS;
+use crate::plant::{Beam, EscState};
 use crate::sensor::Edge;
 use core::f64::consts::TAU;
+use frame::rig::CAPTURE_CHANNELS;
 
 /// Ticks of 84 MHz in a step.
 const STEP_TICKS: u64 = 8_400;
@@ -21,7 +22,7 @@ const STEP_TICKS: u64 = 8_400;
 impl Bench {
     /// One millisecond of a native run. Call it at whole milliseconds only, and not together with [`Bench::advance_to`].
     pub fn millisecond(&mut self, out: &mut Millisecond) {
-        for edges in &mut out.edges {
+        for edges in out.edges.iter_mut().chain([&mut out.back_emf]) {
             edges.clear();
         }
         self.each_millisecond();
@@ -40,7 +41,10 @@ impl Bench {
                     out.edges[usize::from(edge.channel)].push(edge.at_ticks as u32);
                 }
             }
+            out.back_emf.extend(self.turns.drain(..).filter(|e| e.rising).map(|e| e.at_ticks as u32));
         }
+        out.esc.clear();
+        out.esc.extend(std::iter::from_fn(|| self.telemetry.word(self.steps * STEP_NS)));
         let pins_v = self.pins_v();
         if self.levers.spike_v[0] != 0.0 {
             self.strain_v.iter_mut().for_each(|v| *v += self.levers.spike_v[0]);
@@ -84,9 +88,14 @@ impl Bench {
         self.plant.adjust(&self.levers.plant);
         self.truth.run_s = run_s;
         let turned = (self.metered_rev, self.angle_rev);
-        self.meter.pass(turned, self.plant.back_emf(), self.steps as f64 * STEP_S, 1.0e-3);
+        self.emf = self.plant.back_emf();
+        self.meter.pass(turned, self.emf, self.steps as f64 * STEP_S, 1.0e-3);
         self.metered_rev = self.angle_rev;
         self.truth.back_emf_rpm = self.meter.rpm();
+        if self.listens.esc {
+            let awake = self.esc.powered() && self.esc.state() != EscState::SelfTest;
+            self.telemetry.millisecond(self.horizon_ns(), awake, &self.truth.plant, self.esc.temperature_c());
+        }
     }
 
     /// Ten steps at once, part by part instead of step by step: the same numbers, for what comes later in a step never acts on what
@@ -111,6 +120,17 @@ impl Bench {
                 out.edges[usize::from(channel)].push(ticks as u32);
             }
         });
+
+        if self.listens.back_emf {
+            let emf = self.emf;
+            for (step, pair) in whirl.turned[..=STEPS_PER_MS].windows(2).enumerate() {
+                self.comparator.turn((pair[0], pair[1]), emf, |rising, share| {
+                    if rising {
+                        out.back_emf.push((start_ticks + step as u64 * STEP_TICKS + (share * STEP_TICKS as f64) as u64) as u32);
+                    }
+                });
+            }
+        }
 
         whirl.shake(self.shake_n, self.heavy_spot_rev);
         let load = Load {
@@ -156,6 +176,17 @@ impl Bench {
             edges.make_contiguous()[before..].sort_by_key(|e| (e.at_ns, e.channel));
         }
         self.angle_rev = to;
+        if self.listens.back_emf {
+            let turns = &mut self.turns;
+            self.comparator.turn((from, to), self.emf, |rising, share| {
+                turns.push_back(Edge {
+                    channel: CAPTURE_CHANNELS as u8,
+                    rising,
+                    at_ns: start_ns + (share * STEP_NS as f64) as u64,
+                    at_ticks: start_ticks + (share * STEP_TICKS as f64) as u64,
+                });
+            });
+        }
 
         let (mut lift_n, mut torque_nm) = (state.thrust_n, state.torque_nm);
         if !self.rigid {

@@ -82,9 +82,9 @@ pub fn firmware(package: &str) -> Result<PathBuf, EmulatedError> {
 
 /// Far end of the serial line: keeps what it hears, says what it was given.
 #[derive(Debug, Default)]
-struct FarEnd {
+pub(super) struct FarEnd {
     heard: Vec<u8>,
-    to_say: VecDeque<u16>,
+    pub(super) to_say: VecDeque<u16>,
 }
 
 impl Store for FarEnd {}
@@ -157,6 +157,7 @@ impl Machine {
             converter.set_reference(ADC_REFERENCE);
         }
         chip.usart[0].attach(FarEnd::default());
+        chip.usart[super::cross::ESC_PORT].attach(FarEnd::default());
         Ok(Self { mcu: Part::new(chip, quartz).map_err(EmulatedError::emulator)? })
     }
 
@@ -221,8 +222,8 @@ pub enum GeneralTimer {
 
 /// What a [`World`] may do to the board at one instant.
 pub struct Pins<'a> {
-    machine: &'a mut Machine,
-    at: VirtualNanos,
+    pub(super) machine: &'a mut Machine,
+    pub(super) at: VirtualNanos,
     reset: bool,
     fault: bool,
 }
@@ -230,7 +231,7 @@ pub struct Pins<'a> {
 /// Addresses of GPIOB. RM0090 section 2.3, table 1.
 const PORT_B: std::ops::Range<u64> = 0x4002_0400..0x4002_0800;
 
-fn level(high: bool) -> Level {
+pub(super) fn level(high: bool) -> Level {
     if high { Level::High } else { Level::Low }
 }
 

@@ -14,6 +14,7 @@
 pub mod ahrs;
 mod converter;
 pub mod cost;
+mod cross;
 mod crystal;
 mod flash;
 mod harm;

@@ -11,12 +11,12 @@ use super::flash::Caches;
 use super::harm::Harm;
 use super::machine::{EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
 use super::pulse::SeenFrame;
-use crate::bench::{Bench, STEP_NS, Truth};
+use crate::bench::{Bench, Listens, STEP_NS, Truth};
 use crate::fault::{Mishap, Plan, by_hand};
 use crate::native::PLUGS;
 use crate::scenario::Scenario;
-use crate::sensor::EdgeDetail;
 use crate::sensor::adc::{CODES, REFERENCE_V};
+use crate::sensor::{EdgeDetail, EscWire};
 use frame::message::{Beep, Command, Message};
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::units::Ticks;
@@ -33,6 +33,12 @@ const ADC_INPUTS: [u8; ADC_CHANNELS] = [10, 11, 12, 13, 14];
 const PULSE_PIN: (u8, u8) = (6, 2);
 /// Stop loop: pin of port B, closed to ground while the rig may run.
 const STOP_PIN: u8 = 12;
+/// ESC telemetry: pin of port B with AF7, USART3. Back-EMF meter: pin of port A with AF1, TIM1 channel 4.
+const ESC_PIN: (u8, u8) = (11, 7);
+const METER_PIN: (u8, u8) = (11, 1);
+/// Plugs of the two, behind the analogue channels.
+const ESC_PLUG: usize = CAPTURE_CHANNELS + ADC_CHANNELS;
+const METER_PLUG: usize = ESC_PLUG + 1;
 /// Encoder's channel B: pin of port A.
 const ENCODER_B_PIN: u8 = 7;
 /// The capture channel of the encoder.
@@ -107,7 +113,9 @@ pub enum Action {
     Draw(f64),
     /// Sets the bench supply, V.
     Supply(f64),
-    /// Pulls a plug (capture channels first, then analogue ones), or puts it back.
+    /// Something becomes of the line of the ESC's telemetry.
+    EscWire(EscWire),
+    /// Pulls a plug (capture channels first, then analogue ones, the ESC's telemetry, the back-EMF meter), or puts it back.
     Plug {
         /// Which.
         plug: usize,
@@ -358,6 +366,26 @@ impl<O: Operator> RigWorld<O> {
         }
     }
 
+    /// Changes of the back-EMF meter's output that are due.
+    fn drive_meter(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
+        while let Some(edge) = self.bench.turn_until(now_ns) {
+            if !self.plugs_out[METER_PLUG] {
+                pins.drive_meter(edge.rising);
+            }
+        }
+    }
+
+    /// What the ESC has said since the last millisecond, and what of the cross-checks the image listens to now.
+    fn pass_on_telemetry(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
+        let words: Vec<u16> = std::iter::from_fn(|| self.bench.esc_word(now_ns)).collect();
+        if !self.plugs_out[ESC_PLUG] {
+            pins.say_to_esc_port(&words);
+        }
+        let esc = pins.esc_port_listens() && pins.alternate(Port::B, ESC_PIN.0) == Some(ESC_PIN.1);
+        let back_emf = pins.meter_listens() && pins.alternate(Port::A, METER_PIN.0) == Some(METER_PIN.1);
+        self.bench.listen(Listens { esc, back_emf });
+    }
+
     /// Edges of the input that screams.
     fn drive_scream(&mut self, now_ns: u64, pins: &mut Pins<'_>) {
         let Some((channel, until, next)) = self.scream.filter(|(_, _, next)| *next <= now_ns) else { return };
@@ -462,6 +490,7 @@ impl<O: Operator> RigWorld<O> {
                 Action::Twist(torque_nm) => self.bench.twist(torque_nm),
                 Action::Draw(current_a) => self.bench.draw(current_a),
                 Action::Supply(voltage_v) => self.bench.set_supply(voltage_v),
+                Action::EscWire(wire) => self.bench.set_esc_wire(wire),
                 Action::Plug { plug, out } => {
                     if let Some(is_out) = self.plugs_out.get_mut(plug) {
                         *is_out = out;
@@ -476,6 +505,7 @@ impl<O: Operator> World for RigWorld<O> {
     fn wake(&mut self, now_ns: u64, pins: &mut Pins<'_>) -> u64 {
         self.drive_edges(now_ns, pins);
         self.drive_trains(now_ns, pins);
+        self.drive_meter(now_ns, pins);
         self.drive_scream(now_ns, pins);
         self.stop_when_due(now_ns, pins);
         self.await_pulse(now_ns, pins);
@@ -503,6 +533,7 @@ impl<O: Operator> World for RigWorld<O> {
                     self.stop_open &= !harm.stop_closes();
                 }
                 self.connect(pins);
+                self.pass_on_telemetry(now_ns, pins);
                 self.converse(self.next_ms, pins);
                 if pins.has_failed() {
                     self.reset(self.next_ms, pins);
@@ -523,7 +554,8 @@ impl<O: Operator> World for RigWorld<O> {
         }
         let rise = if self.running_pulse.is_none() { self.rise_at } else { u64::MAX };
         let stop = self.stop_at.as_ref().map_or(u64::MAX, |(at, _)| *at);
-        let edge = self.bench.next_edge_ns().unwrap_or(u64::MAX);
+        let next = |at: Option<u64>| at.unwrap_or(u64::MAX);
+        let edge = next(self.bench.next_edge_ns()).min(next(self.bench.next_turn_ns()));
         let scream = self.scream.map_or(u64::MAX, |(_, _, next)| next);
         let train = self.harm.as_ref().map_or(u64::MAX, Harm::next_train);
         self.bench.horizon_ns().min(edge).min(rise).min(stop).min(scream).min(train)

@@ -7,7 +7,7 @@
 //! Reference: house rules 1 (ticks without I/O) and 12 (one shell, many hosts).
 
 use super::sectors::Sectors;
-use crate::bench::{CONVERSION_HZ, Millisecond};
+use crate::bench::{CONVERSION_HZ, Listens, Millisecond};
 use esc_pwm::dshot::{Frame, Throttle};
 use firmware_rig::burst;
 use firmware_rig::queue::CAPACITY;
@@ -153,6 +153,13 @@ impl Board {
         self.console.wanted()
     }
 
+    /// What of the cross-checks it listens to: give it to [`crate::Bench::listen`].
+    #[must_use]
+    pub fn listens(&self) -> Listens {
+        let config = self.rig().config();
+        Listens { esc: config.esc_telemetry.is_some(), back_emf: config.back_emf > 0 }
+    }
+
     /// The millisecond that ends at `now`: two looks for a stop, and the control tick.
     pub fn millisecond(&mut self, now: Ticks, gathered: &Millisecond, wires: Wires) {
         if self.late > 0 {
@@ -166,12 +173,18 @@ impl Board {
         }
         let fitted = self.console.rig().fitted();
         let seen = |channel: usize| if fitted >> channel & 1 == 0 { &[][..] } else { gathered.edges[channel].as_slice() };
+        let listens = self.listens();
+        let turns: &[u32] = if listens.back_emf { &gathered.back_emf } else { &[] };
         let delivered = Delivered {
             now,
             edges: core::array::from_fn(|n| &seen(n)[..seen(n).len().min(CAPACITY)]),
             over_capture: core::array::from_fn(|n| seen(n).len() > CAPACITY),
             adc: &gathered.adc,
-            beside: Beside::UNWIRED,
+            beside: Beside {
+                esc: if listens.esc { &gathered.esc } else { &[] },
+                back_emf: &turns[..turns.len().min(CAPACITY)],
+                over_capture: turns.len() > CAPACITY,
+            },
             brown_out: wires.brown_out,
             paused: false, // the flash of a desk takes no time
             stored: self.stored.take(),

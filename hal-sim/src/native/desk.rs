@@ -13,13 +13,13 @@ use crate::bench::{Bench, Millisecond, Truth};
 use crate::noise::{Source, Stream};
 use crate::plant::Powerplant;
 use crate::scenario::{FaultKind, Scenario, ScheduledFault};
-use crate::sensor::EdgeDetail;
+use crate::sensor::{EdgeDetail, EscWire};
 use frame::message::Beep;
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::units::{PulseWidth, Ticks};
 
-/// Plugs that a hand can pull: the capture channels, then the analogue ones.
-pub const PLUGS: usize = CAPTURE_CHANNELS + ADC_CHANNELS;
+/// Plugs that a hand can pull: the capture channels, then the analogue ones, then the ESC's telemetry and the back-EMF meter.
+pub const PLUGS: usize = CAPTURE_CHANNELS + ADC_CHANNELS + 2;
 
 /// Frame of the pulse timer, ms.
 const FRAME_MS: u64 = 20;
@@ -140,7 +140,7 @@ impl RigDesk {
         self.bench.set_supply(voltage_v);
     }
 
-    /// Pulls a plug (capture channels first, then analogue ones), or puts it back: an open capture input gives no edges, an open analogue input
+    /// Pulls a plug (capture channels first, then analogue ones, the ESC's telemetry, the back-EMF meter), or puts it back: an open capture input gives no edges, an open analogue input
     /// reads zero.
     pub fn unplug(&mut self, plug: usize, out: bool) {
         if let Some(unplugged) = self.unplugged.get_mut(plug) {
@@ -182,11 +182,29 @@ impl RigDesk {
             _ => {}
         }
         self.gathered.watched = self.board.wanted();
+        let listens = self.board.listens();
+        self.bench.listen(listens);
+        if listens.esc {
+            self.bench.set_esc_wire(self.esc_wire());
+        }
         self.bench.millisecond(&mut self.gathered);
         if let Some(frame) = frame.filter(|_| !dark) {
             self.bench.frame(self.ms * 1_000_000, frame.word()); // it ends just before the next tick
         }
         self.disturb();
+    }
+
+    /// What becomes of the line of the ESC's telemetry now.
+    fn esc_wire(&self) -> EscWire {
+        let [.., telemetry, _] = self.unplugged;
+        let wire = |kind: &FaultKind| match *kind {
+            FaultKind::EscTelemetryCut => Some(EscWire::Cut),
+            FaultKind::EscTelemetryNoisy { probability } => Some(EscWire::Noisy { probability }),
+            FaultKind::EscTelemetryBaud { baud } => Some(EscWire::Baud(baud)),
+            _ => None,
+        };
+        let faulty = self.on(|kind| wire(kind).is_some()).and_then(|kind| wire(&kind));
+        if telemetry { EscWire::Cut } else { faulty.unwrap_or_default() }
     }
 
     /// Stuck pins and pulled plugs.
@@ -205,6 +223,10 @@ impl RigDesk {
         }
         for (block, _) in self.gathered.adc.iter_mut().zip(analogue).filter(|(_, out)| **out) {
             *block = stuck(block.count, false);
+        }
+        let [.., meter] = self.unplugged;
+        if meter || self.on(|kind| matches!(kind, FaultKind::BackEmfCut)).is_some() {
+            self.gathered.back_emf.clear();
         }
         if self.gathered.watched.is_some_and(|channel| analogue.get(channel) == Some(&true)) {
             self.gathered.codes.fill(0);

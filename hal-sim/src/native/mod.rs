@@ -25,7 +25,7 @@ pub use sectors::{Refused, Sectors};
 use crate::bench::Truth;
 use crate::plant::Powerplant;
 use crate::scenario::Scenario;
-use firmware_rig::{AdcBlock, Config};
+use firmware_rig::{AdcBlock, Config, EscTelemetry};
 use frame::message::Message;
 use frame::rig::RigSample;
 use frame::units::{PulseWidth, Ticks};
@@ -39,7 +39,16 @@ const OVERHEAD_MS: u64 = 90_000;
 #[must_use]
 pub fn firmware_config(scenario: &Scenario) -> Config {
     let period = Ticks::from_ms(1000 / u64::from(scenario.log.rate_hz));
-    let mut config = Config { marks: scenario.parts().geometry.marks(), log_period: period, ..Config::thesis_570kv() };
+    let parts = scenario.parts();
+    let pole_pairs = parts.plant.motor.pole_pairs as u16;
+    let telemetry = EscTelemetry { pole_pairs, asked: scenario.esc.telemetry_asked };
+    let mut config = Config {
+        marks: parts.geometry.marks(),
+        log_period: period,
+        esc_telemetry: scenario.sensors.esc_telemetry.then_some(telemetry),
+        back_emf: if scenario.sensors.back_emf { pole_pairs } else { 0 },
+        ..Config::thesis_570kv()
+    };
     if scenario.effects.iter().any(|e| e.takes_a_sensor_off()) {
         config.limits.lost_ms = u32::MAX; // the operator has announced it; otherwise the run would end there
     }

@@ -19,7 +19,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// First bytes of a record.
-const MAGIC: &[u8; 15] = b"quadrig pins 2\n";
+const MAGIC: &[u8; 15] = b"quadrig pins 3\n";
 
 /// Why a record was refused.
 #[derive(Debug, thiserror::Error)]
@@ -51,6 +51,9 @@ struct Traffic {
     edges: [Vec<u32>; CAPTURE_CHANNELS],
     /// Sum, sum of squares, count, lowest, highest.
     adc: [(u32, u64, u16, u16, u16); ADC_CHANNELS],
+    /// Bytes of the ESC's telemetry, and edges of the back-EMF meter.
+    esc: Vec<u16>,
+    back_emf: Vec<u32>,
     /// What the host sent.
     line: Vec<u8>,
     reset: bool,
@@ -70,7 +73,8 @@ impl PinRecord {
 
     pub(super) fn take(&mut self, gathered: &Millisecond, line: &[u8], reset: bool) {
         let adc = gathered.adc.map(|b| (b.sum, b.sum_sq, b.count, b.min, b.max));
-        self.traffic.push(Traffic { edges: gathered.edges.clone(), adc, line: line.to_vec(), reset });
+        let Millisecond { edges, esc, back_emf, .. } = gathered.clone();
+        self.traffic.push(Traffic { edges, adc, esc, back_emf, line: line.to_vec(), reset });
     }
 
     /// Milliseconds that it covers.
@@ -115,7 +119,7 @@ impl PinRecord {
         open.read_to_end(&mut bytes).map_err(|source| PinsError::File { file: file.to_owned(), source })?;
         let damaged = |at, expected| PinsError::Damaged { file: file.to_owned(), at, expected };
         let rest =
-            bytes.strip_prefix(MAGIC).ok_or_else(|| damaged(0, "expected the line \"quadrig pins 2\" of a record of pins"))?;
+            bytes.strip_prefix(MAGIC).ok_or_else(|| damaged(0, "expected the line \"quadrig pins 3\" of a record of pins"))?;
         let place = |rest: &[u8]| bytes.len() - rest.len();
         let (scenario, mut rest) =
             postcard::take_from_bytes::<String>(rest).map_err(|_| damaged(MAGIC.len(), "expected the scenario"))?;
@@ -138,6 +142,8 @@ impl PinRecord {
         for (i, one) in self.traffic.iter().enumerate() {
             let now = Ticks::from_ms(i as u64 + 1);
             gathered.edges.clone_from(&one.edges);
+            gathered.esc.clone_from(&one.esc);
+            gathered.back_emf.clone_from(&one.back_emf);
             gathered.adc = one.adc.map(|(sum, sum_sq, count, min, max)| AdcBlock { sum, sum_sq, count, min, max });
             board.pass(now, &gathered, &one.line, Wires::SOUND, one.reset);
             if !one.reset {

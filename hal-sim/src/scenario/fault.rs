@@ -51,6 +51,20 @@ pub enum FaultKind {
     },
     /// A chip of the IMU board holds SDA low.
     I2cStuck,
+    /// The line of the ESC's telemetry is cut.
+    EscTelemetryCut,
+    /// Bytes of the ESC's telemetry come as others.
+    EscTelemetryNoisy {
+        /// Probability of each byte.
+        probability: f64,
+    },
+    /// The ESC sends its telemetry at another rate.
+    EscTelemetryBaud {
+        /// Which.
+        baud: u32,
+    },
+    /// The back-EMF meter is unplugged.
+    BackEmfCut,
 }
 
 impl ScheduledFault {

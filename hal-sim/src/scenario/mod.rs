@@ -23,7 +23,7 @@ use crate::plant::{
     Air, Beam, Blade, Bridge, Commutation, Esc, Flux, Guard, Limiter, Motor, Mount, Parts, Propeller, RoomAir, Supply, Thermal,
     supply,
 };
-use crate::sensor::Geometry;
+use crate::sensor::{EscErrors, Geometry};
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::PulseWidth;
 pub(crate) use section::{not_negative, positive};
@@ -220,6 +220,8 @@ impl Scenario {
                     ..Guard::default()
                 },
             },
+            esc_errors: EscErrors::default(),
+            telemetry_asked: self.esc.telemetry_asked,
             beam: Beam::default(),
             mount: Mount::default(),
             bridge: Bridge { zero_temperature_c: self.air.temperature_c, ..Bridge::default() },

@@ -186,6 +186,10 @@ pub struct SensorSection {
     pub fitted: Vec<SpeedSensor>,
     /// Deviation of the hall sensor's second magnet from 180 degrees, deg.
     pub magnet_error_deg: f64,
+    /// The board listens to the ESC's telemetry.
+    pub esc_telemetry: bool,
+    /// The board counts the edges of a back-EMF meter.
+    pub back_emf: bool,
 }
 
 /// The four speed sensors.
@@ -231,6 +235,8 @@ pub struct EscSection {
     pub rise_k_per_a2: f64,
     /// Its self-test fails.
     pub self_test_fails: bool,
+    /// It sends its telemetry only when it is asked, as by DShot; otherwise by itself.
+    pub telemetry_asked: bool,
 }
 
 impl Default for EscSection {
@@ -243,6 +249,7 @@ impl Default for EscSection {
             cutoff: g.cutoff,
             rise_k_per_a2: g.rise_k_per_a2,
             self_test_fails: false,
+            telemetry_asked: false,
         }
     }
 }
@@ -284,7 +291,7 @@ impl Default for AirSection {
 impl Default for SensorSection {
     fn default() -> Self {
         let fitted = vec![SpeedSensor::Beam, SpeedSensor::Opto, SpeedSensor::Hall, SpeedSensor::Encoder];
-        Self { fitted, magnet_error_deg: 0.0 }
+        Self { fitted, magnet_error_deg: 0.0, esc_telemetry: false, back_emf: false }
     }
 }
 

@@ -8,6 +8,8 @@
 //! Reference: Beharie 2013 section 5.4.7, Eq. 5.11-5.12 and errata 5.11 (no-load only: rpm = KV (V - I R)). The threshold and the gate of
 //! the K1 are not stated: 0.15 V and 0.5 s are assumed.
 
+use crate::noise::{Source, Stream};
+
 /// What the windings give at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BackEmf {
@@ -86,6 +88,67 @@ impl BackEmfState {
     }
 }
 
+/// The meter's comparator alone, as a board sees its output: high for one half of each electrical turn.
+#[derive(Debug, Clone)]
+pub struct Comparator {
+    meter: BackEmfMeter,
+    jitter: Stream,
+    /// Half turns up to the next change; a change to high at even ones.
+    half: i64,
+    /// Where it comes, electrical turns.
+    at: f64,
+    level: bool,
+}
+
+/// Standard deviation of the angle at which the comparator changes, electrical turns: 1 degree. What is left of the ESC's pulse-width modulation
+/// behind the filter is assumed to be so much.
+const JITTER: f64 = 1.0 / 360.0;
+/// Most of it, so that changes keep their order.
+const MOST: f64 = 0.2;
+
+impl Comparator {
+    /// At a rotor at rest.
+    #[must_use]
+    pub fn new(meter: BackEmfMeter, seed: u64) -> Self {
+        Self { meter, jitter: Stream::new(seed, Source::BackEmf, 0), half: i64::MIN, at: f64::NEG_INFINITY, level: false }
+    }
+
+    /// Level of the output.
+    #[must_use]
+    pub fn level(&self) -> bool {
+        self.level
+    }
+
+    /// The rotor turned evenly from `from` to `to` revolutions with `emf` at the windings: each change of the output, with the share of the step
+    /// that has passed.
+    pub fn turn(&mut self, (from, to): (f64, f64), emf: Option<BackEmf>, mut change: impl FnMut(bool, f64)) {
+        let Some(emf) = emf.filter(|e| e.amplitude_v >= self.meter.threshold_v && to > from) else {
+            self.half = i64::MIN; // it sees nothing, and begins anew where it sees something again
+            return;
+        };
+        let pairs = f64::from(emf.pole_pairs);
+        let (begin, end) = (from * pairs, to * pairs);
+        if self.half == i64::MIN {
+            self.half = (2.0 * begin) as i64;
+            self.await_next();
+        }
+        while self.at <= end {
+            let high = self.half % 2 == 0;
+            if high != self.level {
+                self.level = high;
+                // one whose jitter puts it before this step comes with its beginning
+                change(high, ((self.at - begin) / (end - begin)).max(0.0));
+            }
+            self.await_next();
+        }
+    }
+
+    fn await_next(&mut self) {
+        self.half += 1;
+        self.at = 0.5 * self.half as f64 + (JITTER * self.jitter.normal()).clamp(-MOST, MOST);
+    }
+}
+
 /// Even turning between two angles, electrical turns, in the time up to an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Turning {
@@ -129,6 +192,34 @@ mod tests {
         assert!((rpm / 4321.0 - 1.0).abs() < 1e-9, "{rpm}");
         let wrong = after(BackEmfMeter { pole_pairs: Some(7), ..BackEmfMeter::default() }, 4200.0, 7.0).unwrap();
         assert!((wrong / 6600.0 - 1.0).abs() < 1e-9, "11 pairs counted as 7: {wrong}");
+    }
+
+    #[test]
+    fn the_comparator_gives_an_edge_an_electrical_turn_and_none_where_it_sees_too_little() {
+        let edges = |rpm: f64, volts: f64| {
+            let mut comparator = Comparator::new(BackEmfMeter::default(), 3);
+            let (mut angle, mut rises, mut last) = (0.37, Vec::new(), false);
+            for ms in 0..1000 {
+                let next = angle + rpm / 60.0 * 1e-3;
+                let emf = BackEmf { amplitude_v: volts, pole_pairs: 11 };
+                comparator.turn((angle, next), Some(emf), |high, share| {
+                    assert!(high != last && (0.0..=1.0).contains(&share));
+                    last = high;
+                    rises.extend(high.then_some(f64::from(ms) + share));
+                });
+                angle = next;
+            }
+            rises
+        };
+        let rises = edges(4_321.0, 7.0);
+        let turns = 4_321.0 / 60.0 * 11.0;
+        assert!((rises.len() as f64 - turns).abs() <= 1.0, "{} edges in {turns} turns", rises.len());
+        let mean = (rises[rises.len() - 1] - rises[0]) / (rises.len() - 1) as f64;
+        assert!((mean * turns / 1000.0 - 1.0).abs() < 1e-4, "{mean} ms a turn");
+        let spread = rises.windows(2).map(|w| (w[1] - w[0] - mean).powi(2)).sum::<f64>() / rises.len() as f64;
+        let expected = 2.0f64.sqrt() * JITTER * mean;
+        assert!((spread.sqrt() / expected - 1.0).abs() < 0.1, "{} and {expected} ms", spread.sqrt());
+        assert!(edges(4_321.0, 0.14).is_empty());
     }
 
     #[test]

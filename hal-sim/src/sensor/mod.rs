@@ -10,11 +10,13 @@ pub mod back_emf;
 mod channel;
 mod conversions;
 pub mod edge;
+pub mod esc_telemetry;
 pub mod logger;
 pub mod tachometers;
 
 pub use adc::{AnalogFront, Converter};
-pub use back_emf::{BackEmf, BackEmfMeter};
+pub use back_emf::{BackEmf, BackEmfMeter, Comparator};
 pub use edge::{Edge, EdgeDetail, Geometry};
+pub use esc_telemetry::{EscErrors, EscTelemetry, EscWire};
 pub use logger::Logger;
 pub use tachometers::Tachometers;
