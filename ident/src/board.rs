@@ -18,9 +18,13 @@ const RAW: &str = "raw_";
 /// that twist leave the time of a whole revolution as it is.
 const WRONG: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 7.0];
 
-/// Whether a column tells of the board's readings and is none itself.
+/// Speed, current, voltage and charge as an ESC tells them, speed of a back-EMF meter: second readings of what is measured already. As a
+/// cause they would explain their own channel's residual by itself. The ESC's temperature is none of these.
+const SECOND: [&str; 5] = ["rpm_esc", "current_esc_a", "voltage_esc_v", "charge_esc_mah", "rpm_bemf"];
+
+/// Whether a column tells of the board's readings, or tells one of them again, and is none itself.
 pub(crate) fn is_of_the_board(column: &str) -> bool {
-    column.ends_with(FLAG) || column.starts_with(RAW)
+    column.ends_with(FLAG) || column.starts_with(RAW) || SECOND.contains(&column)
 }
 
 /// Whether a key of a log's head belongs to the evidence of its recording, and not to the rig that a model is of.
@@ -68,7 +72,8 @@ impl fmt::Display for Flagged {
 #[must_use]
 pub fn flagged(log: &Log) -> Vec<Flagged> {
     let mut all: Vec<Flagged> = Vec::new();
-    for channel in MODELLED.into_iter().chain(["temp_c"]) {
+    let [telemetry, .., meter] = SECOND;
+    for channel in MODELLED.into_iter().chain(["temp_c", telemetry, meter]) {
         let Some(flags) = flags(log, channel) else { continue };
         let begun = all.len();
         for (t, flag) in log.t.iter().zip(flags).filter(|(_, flag)| flag.is_finite()) {
@@ -126,6 +131,22 @@ mod tests {
         let context = Context::new(&log(), None);
         assert!(context.covariates.is_empty(), "{:?}", context.covariates.iter().map(|c| &c.0).collect::<Vec<_>>());
         assert!(!context.targets.iter().any(|t| is_of_the_board(t.name)));
+    }
+
+    /// What an ESC and a back-EMF meter say again is no cause; how warm the ESC is may be one. A flag on them is told.
+    #[test]
+    fn a_second_reading_explains_nothing() {
+        let mut text = String::from("# quadrig-log 1\n# flags = { 21 = \"nothing heard\" }\n");
+        text += "t_s,pulse_us,rpm_hall,rpm_esc,current_esc_a,voltage_esc_v,temp_esc_c,charge_esc_mah,rpm_bemf,rpm_esc_flag\n";
+        for n in 0..200 {
+            let flag = if n == 9 { "21" } else { "" };
+            text += &format!("{},1500,3000,3005,{},11.4,{},{n},3001,{flag}\n", f64::from(n) * 0.1, n % 7, 30 + n / 50);
+        }
+        let log = Log::parse("run.csv", text.as_bytes()).unwrap();
+        let context = Context::new(&log, None);
+        assert_eq!(context.covariates.iter().map(|c| c.0.as_str()).collect::<Vec<_>>(), ["temp_esc_c"]);
+        assert_eq!(context.targets.iter().map(|t| t.name).collect::<Vec<_>>(), ["rpm_hall"]);
+        assert_eq!(told(&log), ["rpm_esc: nothing heard in a sample at 0.900 s"]);
     }
 
     /// Of two channels that disagree none can be outvoted: the board's word decides.
