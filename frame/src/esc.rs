@@ -6,6 +6,8 @@
 //! Units: as the ESC sends them; degC, V, A, mAh and rev/min after [`EscCode::values`].
 //! Reference: KISS ESC telemetry protocol (also of BLHeli_32 and AM32): ten bytes at 115 200 baud 8N1.
 
+use crate::rig::RigSample;
+use crate::units::Ticks;
 use serde::{Deserialize, Serialize};
 
 /// Log columns of what the ESC tells: speed, current, voltage, temperature, charge drawn since its start.
@@ -74,9 +76,45 @@ impl EscCode {
     }
 }
 
+/// Two frames are further apart than that, ms; the same frame's age is known to one.
+const APART_MS: u64 = 2;
+
+impl RigSample {
+    /// Whether the ESC has sent a frame since the sample `before`: between its frames nothing is known, and what is told again is no new reading.
+    #[must_use]
+    pub fn esc_is_new(&self, before: Option<&Self>) -> bool {
+        let came = |sample: &Self| {
+            let code = sample.esc.filter(|code| code.verdict == EscVerdict::Nominal)?;
+            Some(Ticks(sample.at.0.saturating_sub(Ticks::from_ms(u64::from(code.age_ms)).0)))
+        };
+        match (came(self), before.filter(|before| before.at <= self.at).and_then(came)) {
+            (Some(now), Some(then)) => now.since(then) > Ticks::from_ms(APART_MS),
+            (now, None) => now.is_some(),
+            (None, _) => false,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_frame_is_new_once() {
+        let sample = |at_ms: u64, age_ms: u16, verdict| {
+            let esc = Some(EscCode { verdict, age_ms, ..EscCode::default() });
+            RigSample { at: Ticks::from_ms(at_ms), esc, ..RigSample::default() }
+        };
+        let nominal = |at_ms, age_ms| sample(at_ms, age_ms, EscVerdict::Nominal);
+        assert!(nominal(100, 2).esc_is_new(None));
+        assert!(!nominal(101, 3).esc_is_new(Some(&nominal(100, 2))));
+        assert!(!nominal(130, 31).esc_is_new(Some(&nominal(100, 2))), "the same, known to a millisecond");
+        assert!(nominal(133, 4).esc_is_new(Some(&nominal(100, 2))));
+        assert!(nominal(10, 4).esc_is_new(Some(&nominal(5_000, 2))), "after a reset");
+        assert!(nominal(700, 2).esc_is_new(Some(&sample(600, 400, EscVerdict::Silent))));
+        assert!(!sample(700, 400, EscVerdict::Silent).esc_is_new(Some(&nominal(600, 300))));
+        assert!(!RigSample::default().esc_is_new(None));
+    }
 
     #[test]
     fn figures_have_their_units_and_those_of_no_frame_are_none() {

@@ -9,7 +9,8 @@
 use crate::rig::{date, file};
 use firmware_rig::rig_config::Calibrated;
 use firmware_rig::{Config, RigConfig};
-use frame::calibration::Calibration;
+use frame::calibration::{Calibration, Converted};
+use frame::esc::{BACK_EMF_NAME, ESC_NAMES};
 use frame::flag::{FLAG_SUFFIX, Flag};
 use frame::message::{Event, Hello, SettingsNews};
 use frame::rig::{ADC_NAMES, AdcVerdict, CAPTURE_NAMES, CaptureVerdict, Fault, FaultSet, RigSample};
@@ -35,6 +36,11 @@ pub(crate) fn head(hello: Option<&Hello>, calibration: &Calibration, config: Opt
             format!("calibration_{name}"),
             Value::Table(Table::from_iter([("marks".to_owned(), Value::Integer(marks.into()))])),
         ));
+    }
+    let [esc, meter] = calibration.pole_pairs;
+    for (name, pairs) in [(ESC_NAMES[0], esc), (BACK_EMF_NAME, meter)].into_iter().filter(|(_, pairs)| *pairs > 0) {
+        let pairs = Table::from_iter([("pole_pairs".to_owned(), Value::Integer(pairs.into()))]);
+        lines.push((format!("calibration_{name}"), Value::Table(pairs)));
     }
     for (channel, name) in ADC_NAMES.iter().enumerate().filter(|(n, _)| config.is_none_or(|c| c.fitted[*n])) {
         lines.push((format!("calibration_{name}"), Value::Table(scale(channel, calibration, config))));
@@ -92,6 +98,8 @@ pub(crate) fn flag_columns(fitted: &Fitted) -> Vec<String> {
 pub(crate) struct Fitted {
     captures: [bool; 4],
     analogue: [bool; 5],
+    /// The ESC's telemetry, and the back-EMF meter.
+    cross: [bool; 2],
 }
 
 impl Fitted {
@@ -99,7 +107,7 @@ impl Fitted {
     pub(crate) fn of(hello: Option<&Hello>, calibration: &Calibration) -> Self {
         let captures = calibration.marks.map(|marks| marks > 0);
         let analogue = hello.map_or([true; 5], |hello| std::array::from_fn(|n| hello.analogue >> n & 1 == 1));
-        Self { captures, analogue }
+        Self { captures, analogue, cross: calibration.pole_pairs.map(|pairs| pairs > 0) }
     }
 
     fn captures(&self) -> impl Iterator<Item = usize> {
@@ -113,13 +121,32 @@ impl Fitted {
     }
 
     fn names(&self) -> impl Iterator<Item = &'static str> {
-        self.captures().map(|n| CAPTURE_NAMES[n]).chain(self.analogue().map(|n| ADC_NAMES[n]))
+        // the verdict on a frame of the ESC stands beside its speed
+        let [esc, meter] = self.cross;
+        let cross = [(esc, ESC_NAMES[0]), (meter, BACK_EMF_NAME)].into_iter().filter_map(|(fitted, name)| fitted.then_some(name));
+        self.captures().map(|n| CAPTURE_NAMES[n]).chain(self.analogue().map(|n| ADC_NAMES[n])).chain(cross)
+    }
+
+    /// Columns of the cross-checks that are fitted.
+    pub(crate) fn cross_columns(&self) -> impl Iterator<Item = &'static str> {
+        let [esc, meter] = self.cross;
+        ESC_NAMES.into_iter().filter(move |_| esc).chain([BACK_EMF_NAME].into_iter().filter(move |_| meter))
+    }
+
+    /// What they read, under [`Fitted::cross_columns`]. Of the ESC only what is `new`: between its frames nothing is known.
+    pub(crate) fn cross<'s>(&self, values: &'s Converted, new: bool) -> impl Iterator<Item = Option<f64>> + 's {
+        let [esc, meter] = self.cross;
+        let told = values.esc.iter().map(move |value| value.filter(|_| new)).filter(move |_| esc);
+        told.chain([values.rpm_bemf].into_iter().filter(move |_| meter))
     }
 
     /// The flags of a sample, under [`flag_columns`].
     pub(crate) fn flags<'s>(&'s self, sample: &'s RigSample) -> impl Iterator<Item = Option<Flag>> + 's {
         let captures = self.captures().map(|n| sample.rpm[n].verdict.flag());
-        captures.chain(self.analogue().map(|n| sample.adc[n].verdict.flag()))
+        let [esc, meter] = self.cross;
+        let esc = esc.then(|| sample.esc.and_then(|code| code.verdict.flag()));
+        let meter = meter.then(|| sample.back_emf.and_then(|code| code.verdict.flag()));
+        captures.chain(self.analogue().map(|n| sample.adc[n].verdict.flag())).chain(esc).chain(meter)
     }
 }
 
@@ -127,14 +154,20 @@ impl Fitted {
 pub(crate) fn raw_columns(fitted: &Fitted) -> Vec<String> {
     let captures = fitted.captures().flat_map(|n| ["edges", "span"].map(|what| format!("raw_{}_{what}", CAPTURE_NAMES[n])));
     let analogue = fitted.analogue().flat_map(|n| ["sum", "count", "rms_q8"].map(|what| format!("raw_{}_{what}", ADC_NAMES[n])));
-    captures.chain(analogue).collect()
+    let [esc, meter] = fitted.cross;
+    let esc = esc.then(|| format!("raw_{}_speed", ESC_NAMES[0]));
+    let meter = meter.then(|| ["edges", "span"].map(|what| format!("raw_{BACK_EMF_NAME}_{what}")));
+    captures.chain(analogue).chain(esc).chain(meter.into_iter().flatten()).collect()
 }
 
 /// The raw codes of a sample, under [`raw_columns`].
 pub(crate) fn raw_codes(fitted: &Fitted, sample: &RigSample) -> Vec<u32> {
     let captures = fitted.captures().flat_map(|n| [u32::from(sample.rpm[n].edges), sample.rpm[n].span]);
     let analogue = fitted.analogue().flat_map(|n| [sample.adc[n].sum, u32::from(sample.adc[n].count), sample.adc[n].rms_q8]);
-    captures.chain(analogue).collect()
+    let [esc, meter] = fitted.cross;
+    let esc = esc.then(|| sample.esc.map_or(0, |code| code.speed.into()));
+    let meter = meter.then(|| sample.back_emf.map_or([0; 2], |code| [code.edges.into(), code.span]));
+    captures.chain(analogue).chain(esc).chain(meter.into_iter().flatten()).collect()
 }
 
 /// When something happened on the board's clock; `None` where the event does not say.

@@ -25,6 +25,7 @@ use crate::record;
 use crate::view;
 use assistant::Assistant;
 use clap::Subcommand;
+use frame::esc::{BACK_EMF_NAME, ESC_NAMES};
 use frame::message::{BoardId, Command, Event, Hello, Message, Setting};
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES};
 use frame::units::PulseWidth;
@@ -293,7 +294,8 @@ pub(super) fn fitted(hello: &Hello) -> String {
     let named = |mask: u8, names: &[&'static str]| -> Vec<&'static str> {
         names.iter().enumerate().filter(|(n, _)| mask >> n & 1 == 1).map(|(_, name)| *name).collect()
     };
-    [named(hello.present, &CAPTURE_NAMES), named(hello.analogue, &ADC_NAMES)].concat().join(", ")
+    let cross = named(hello.present >> CAPTURE_NAMES.len(), &[ESC_NAMES[0], BACK_EMF_NAME]);
+    [named(hello.present, &CAPTURE_NAMES), named(hello.analogue, &ADC_NAMES), cross].concat().join(", ")
 }
 
 /// Bits 31..24 of RCC_CSR in words (RM0090 section 7.3.21); power-on and brown-out set further flags, so the rarest is told first.

@@ -48,6 +48,12 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: b
         push(name, rows.iter().map(|r| r.uneven_deg[i].unwrap_or(f64::NAN)).collect());
     }
     let fitted = Fitted::of(Some(&record.hello), &record.calibration);
+    let new: Vec<bool> = record.samples.iter().scan(None, |before, s| Some(s.esc_is_new(before.replace(s)))).collect();
+    let cross: Vec<Vec<f64>> =
+        rows.iter().zip(&new).map(|(row, new)| fitted.cross(row, *new).map(|v| v.unwrap_or(f64::NAN)).collect()).collect();
+    for (i, name) in fitted.cross_columns().enumerate() {
+        push(name, cross.iter().map(|row| row[i]).collect());
+    }
     let mut beside = |names: Vec<String>, cells: &dyn Fn(&RigSample) -> Vec<f64>| {
         let mut columns: Vec<Column> = names.into_iter().map(|name| Column { name, values: Vec::new() }).collect();
         for sample in &record.samples {

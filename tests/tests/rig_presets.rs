@@ -4,6 +4,7 @@
 //! truth of the plant judges what the log says.
 //! What can go wrong: these rigs move in real time, all at once; a machine that is stopped for a second makes them latch.
 
+use frame::esc::{BACK_EMF_NAME, ESC_NAMES};
 use frame::message::Beep;
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES};
 use hal_sim::Scenario;
@@ -27,7 +28,7 @@ struct Preset {
     columns: &'static [&'static str],
 }
 
-const PRESETS: [Preset; 6] = [
+const PRESETS: [Preset; 7] = [
     Preset {
         name: "thesis",
         propeller: "11x4.7",
@@ -77,6 +78,22 @@ const PRESETS: [Preset; 6] = [
         cells: true,
         rate_hz: 100.0,
         columns: &["rpm_hall", "thrust_n", "current_a", "voltage_v"],
+    },
+    Preset {
+        name: "esc-telemetry",
+        propeller: "11x4.7",
+        cells: true,
+        rate_hz: 100.0,
+        columns: &[
+            "rpm_hall",
+            "thrust_n",
+            "rpm_esc",
+            "current_esc_a",
+            "voltage_esc_v",
+            "temp_esc_c",
+            "charge_esc_mah",
+            "rpm_bemf",
+        ],
     },
 ];
 
@@ -132,14 +149,21 @@ fn judged(preset: &Preset, desk: &Desk, folder: &Path) {
         "current_a" => (truth.current_a, 0.05 + 0.02 * truth.current_a),
         "voltage_v" => (truth.voltage_v, 0.1),
         "temp_c" => (truth.temp_c, 1.0),
+        // an ESC's own sensors: 3 % and 0.25 A off, the temperature of its own transistors, and what was drawn since its start
+        "current_esc_a" => (0.25 + 1.03 * truth.current_a, 0.05 + 0.02 * truth.current_a),
+        "voltage_esc_v" => (0.995 * truth.voltage_v, 0.1),
+        "temp_esc_c" => (25.0, 15.0),
+        "charge_esc_mah" => (2.5, 2.5),
         _ => (truth.rpm, 0.005 * truth.rpm),
     };
     let last: Vec<usize> = (0..log["t_s"].len()).filter(|row| log["pulse_us"][*row] == f64::from(LEVEL)).collect();
     let rows = &last[last.len() - (0.5 * preset.rate_hz) as usize..]; // half a second of the settled level
-    for column in CAPTURE_NAMES.into_iter().chain(ADC_NAMES) {
+    for column in CAPTURE_NAMES.into_iter().chain(ADC_NAMES).chain(ESC_NAMES).chain([BACK_EMF_NAME]) {
         let values: Vec<f64> = log.get(column).map(|v| rows.iter().map(|row| v[*row]).collect()).unwrap_or_default();
         if preset.columns.contains(&column) {
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            // the ESC's frames are rarer than the samples
+            let told: Vec<f64> = values.into_iter().filter(|v| v.is_finite() || !ESC_NAMES.contains(&column)).collect();
+            let mean = told.iter().sum::<f64>() / told.len() as f64;
             let (wanted, off) = there(column);
             assert!((mean - wanted).abs() < off, "{name}: {column} reads {mean}, {wanted} is there");
         } else {

@@ -34,6 +34,7 @@ impl Columns {
             ["t_s", "pulse_us"].into_iter().chain(CAPTURE_NAMES).chain(ADC_NAMES).map(str::to_owned).collect();
         names.push("thrust_rms_n".to_owned());
         names.extend(self.paired.iter().map(|i| UNEVEN_NAMES[*i].to_owned()));
+        names.extend(self.fitted.cross_columns().map(str::to_owned));
         names.extend(flag_columns(&self.fitted));
         if self.raw {
             names.extend(raw_columns(&self.fitted));
@@ -41,11 +42,12 @@ impl Columns {
         names.join(",") + "\n"
     }
 
-    /// One row.
-    pub(super) fn cells(&self, t_s: f64, sample: &RigSample, values: &Converted) -> String {
+    /// One row. `before` is the sample of the row before it.
+    pub(super) fn cells(&self, t_s: f64, sample: &RigSample, values: &Converted, before: Option<&RigSample>) -> String {
         let mut line = format!("{t_s:.4},{:.3}", values.pulse_us);
         let uneven = self.paired.iter().map(|i| &values.uneven_deg[*i]);
-        for value in values.rpm.iter().chain(&values.adc).chain([&values.thrust_rms_n]).chain(uneven) {
+        let own = values.rpm.iter().chain(&values.adc).chain([&values.thrust_rms_n]).chain(uneven).copied();
+        for value in own.chain(self.fitted.cross(values, sample.esc_is_new(before))) {
             line.push(',');
             if let Some(value) = value.filter(|v| v.is_finite()) {
                 let _ = write!(line, "{value:.6}");
@@ -71,7 +73,9 @@ impl Columns {
 mod tests {
     use super::*;
     use frame::calibration::AdcScale;
+    use frame::esc::{EscCode, EscVerdict};
     use frame::rig::{AdcCode, AdcVerdict, CaptureCode, CaptureVerdict};
+    use frame::units::Ticks;
     use ident::log::Log;
 
     const MARKS: [u16; 4] = [2, 1, 2, 25];
@@ -83,7 +87,8 @@ mod tests {
     fn told(columns: &Columns, samples: &[RigSample]) -> Log {
         let mut text = format!("# quadrig-log 1\n{}", columns.names());
         for (k, sample) in samples.iter().enumerate() {
-            text.push_str(&columns.cells(0.1 * k as f64, sample, &calibration().convert(sample)));
+            let before = k.checked_sub(1).map(|k| &samples[k]);
+            text.push_str(&columns.cells(0.1 * k as f64, sample, &calibration().convert(sample), before));
         }
         Log::parse("run.csv", text.as_bytes()).expect("a log")
     }
@@ -107,6 +112,42 @@ mod tests {
             "these have no pair of marks"
         );
         assert_eq!(cells(&log, "rpm_encoder").map(|v| v.len()), Some(3));
+    }
+
+    #[test]
+    fn the_cross_checks_stand_under_their_names_and_a_frame_of_the_esc_in_one_row() {
+        let calibration = Calibration { pole_pairs: [11, 11], ..calibration() };
+        let columns = Columns::of(None, &calibration, true);
+        let code = EscCode { temperature: 41, voltage: 1148, current: 1234, charge: 77, speed: 451, ..EscCode::default() };
+        let sample = |ms: u64, verdict, age_ms| RigSample {
+            at: Ticks::from_ms(ms),
+            esc: Some(EscCode { verdict, age_ms, ..code }),
+            back_emf: Some(CaptureCode { edges: 33, span: 84_000_000 / 20, verdict: CaptureVerdict::Disagrees, uneven: 0 }),
+            ..RigSample::default()
+        };
+        use EscVerdict::{Garbled, Nominal};
+        let samples = [sample(100, Nominal, 2), sample(110, Nominal, 12), sample(133, Nominal, 4), sample(500, Garbled, 370)];
+        let mut text = format!("# quadrig-log 1\n{}", columns.names());
+        for (k, sample) in samples.iter().enumerate() {
+            let before = k.checked_sub(1).map(|k| &samples[k]);
+            text.push_str(&columns.cells(0.1 * k as f64, sample, &calibration.convert(sample), before));
+        }
+        let log = Log::parse("run.csv", text.as_bytes()).expect("a log");
+        for (name, value) in [
+            ("rpm_esc", 4100.0),
+            ("current_esc_a", 12.34),
+            ("voltage_esc_v", 11.48),
+            ("temp_esc_c", 41.0),
+            ("charge_esc_mah", 77.0),
+        ] {
+            assert_eq!(cells(&log, name), Some(vec![Some(value), None, Some(value), None]), "{name}");
+        }
+        assert_eq!(cells(&log, "rpm_bemf"), Some(vec![Some(3600.0); 4]));
+        assert_eq!(cells(&log, "rpm_esc_flag"), Some(vec![None, None, None, Some(22.0)]));
+        assert_eq!(cells(&log, "rpm_bemf_flag"), Some(vec![Some(7.0); 4]));
+        assert_eq!(cells(&log, "raw_rpm_esc_speed").map(|v| v[0]), Some(Some(451.0)));
+        assert_eq!(cells(&log, "raw_rpm_bemf_edges").map(|v| v[0]), Some(Some(33.0)));
+        assert!(!Columns::of(None, &self::calibration(), true).names().contains("esc"), "nothing of it where it is not fitted");
     }
 
     #[test]

@@ -49,6 +49,8 @@ pub(crate) struct Recorder {
     first: Option<Ticks>,
     offset_s: f64,
     last_s: f64,
+    /// The sample of the last row.
+    before: Option<RigSample>,
     latched: FaultSet,
     pending: Vec<Pending>,
     /// Rows so far.
@@ -74,6 +76,7 @@ impl Recorder {
             first: None,
             offset_s: 0.0,
             last_s: -1.0,
+            before: None,
             latched: FaultSet::NONE,
             pending: Vec::new(),
             rows: 0,
@@ -229,7 +232,7 @@ impl Recorder {
         }
         let t_s = self.offset_s + sample.at.since(self.first.unwrap_or(first)).as_s();
         let values = calibration.convert(sample);
-        let cells = columns.cells(t_s, sample, &values);
+        let cells = columns.cells(t_s, sample, &values, self.before.replace(*sample).as_ref());
         if let Some(news) = news {
             self.notes.push(news.to_owned());
             self.latched = FaultSet::NONE;

@@ -9,7 +9,7 @@ use super::date;
 use crate::Failure;
 use esc_pwm::{Bounds, EscOutput};
 use firmware_rig::config::{CurrentChannel, TemperatureChannel, TorqueChannel, VoltageChannel};
-use firmware_rig::rig_config::{Answers, Calibrated, EscProfile};
+use firmware_rig::rig_config::{Answers, Calibrated, EscProfile, EscTelemetry, MOST_POLE_PAIRS};
 use firmware_rig::strain::{Beam, Bridge, StrainChannel};
 use firmware_rig::{Config, RigConfig};
 use frame::calibration::AdcScale;
@@ -44,6 +44,21 @@ struct File {
     limits: Limits,
     esc: Option<Esc>,
     calibrated: Option<Scales>,
+    esc_telemetry: Option<Telemetry>,
+    back_emf: Option<BackEmf>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Telemetry {
+    pole_pairs: Number,
+    asked: Option<bool>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BackEmf {
+    pole_pairs: Number,
 }
 
 #[derive(Deserialize)]
@@ -279,6 +294,10 @@ impl File {
         if let Some(scales) = &self.calibrated {
             config.calibrated = scales.all()?;
         }
+        let pairs = |n: &Number| whole(n, 1.0, f64::from(MOST_POLE_PAIRS)).map(|pairs| pairs as u16);
+        let telemetry = |t: &Telemetry| Ok(EscTelemetry { pole_pairs: pairs(&t.pole_pairs)?, asked: t.asked.unwrap_or(false) });
+        config.esc_telemetry = self.esc_telemetry.as_ref().map(telemetry).transpose()?;
+        config.back_emf = self.back_emf.as_ref().map_or(Ok(0), |meter| pairs(&meter.pole_pairs))?;
         if config.marks == [0; 4] && config.fitted == [false; 5] {
             return Err((0..0, "nothing is fitted: expected a section [speed], [thrust] or another channel".to_owned()));
         }
@@ -530,6 +549,14 @@ pub(crate) fn text(config: &RigConfig) -> String {
     let sections = [thrust(config), torque(config), current(config), voltage(config), temperature(config)];
     for (n, section) in sections.into_iter().enumerate().filter(|(n, _)| config.fitted[*n]) {
         line(format!("\n[{}]\n{section}live_zero = {}", ANALOGUE[n], config.live_zero[n]));
+    }
+    if let Some(EscTelemetry { pole_pairs, asked }) = config.esc_telemetry {
+        line(format!(
+            "\n# the ESC's own word; asked: it sends only when it is asked (DShot)\n[esc_telemetry]\npole_pairs = {pole_pairs}\nasked = {asked}"
+        ));
+    }
+    if config.back_emf > 0 {
+        line(format!("\n[back_emf]\npole_pairs = {}", config.back_emf));
     }
     line(String::new());
     let l = &config.limits;

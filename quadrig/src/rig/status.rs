@@ -9,7 +9,8 @@ use super::{configure, date, fitted, reset_cause};
 use crate::Failure;
 use crate::board::{Board, Heard};
 use firmware_rig::RigConfig;
-use frame::calibration::Calibration;
+use frame::calibration::{Calibration, Converted};
+use frame::esc::{BACK_EMF_NAME, ESC_NAMES, ESC_UNITS};
 use frame::message::{Command, Health, Hello, Message};
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES, Fault, RigSample};
 use frame::units::Ticks;
@@ -70,7 +71,16 @@ fn text(heed: &Heed) -> String {
     }
     scales(&mut out, heed);
     match &heed.health {
-        Some(health) => condition(&mut out, health, core_hz),
+        Some(health) => {
+            condition(&mut out, health, core_hz);
+            let [good, damaged, errors] = health.esc;
+            if heed.config.esc_telemetry.is_some() {
+                let _ = writeln!(
+                    out,
+                    "ESC          {good} frames heard, {damaged} damaged, {errors} bytes with an error of the line"
+                );
+            }
+        }
         None => out.push_str("\nno report of its health arrived\n"),
     }
     out
@@ -93,6 +103,24 @@ fn readings(out: &mut String, heed: &Heed, sample: &RigSample) {
         let mean = f64::from(code.sum) / f64::from(code.count.max(1));
         let flag = code.verdict.flag().map_or("", |flag| flag.words);
         let _ = writeln!(out, "{name:<12} {value:>18}  {mean:>9.3} counts, rms {:.2}  {flag}", f64::from(code.rms_q8) / 256.0);
+    }
+    second(out, sample, &values);
+}
+
+/// What the ESC and the back-EMF meter say, where they are fitted.
+fn second(out: &mut String, sample: &RigSample, values: &Converted) {
+    if let Some(code) = &sample.esc {
+        for ((name, unit), value) in ESC_NAMES.iter().zip(ESC_UNITS).zip(values.esc) {
+            let value = value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2} {unit}"));
+            let age = if code.age_ms < u16::MAX { format!("{} ms ago", code.age_ms) } else { "never heard".to_owned() };
+            let flag = code.verdict.flag().map_or("", |flag| flag.words);
+            let _ = writeln!(out, "{name:<14} {value:>16}  {age:>11}  {flag}");
+        }
+    }
+    if let Some(code) = &sample.back_emf {
+        let value = values.rpm_bemf.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} rev/min"));
+        let flag = code.verdict.flag().map_or("", |flag| flag.words);
+        let _ = writeln!(out, "{BACK_EMF_NAME:<12} {value:>18}  {:>5} edges in {} ticks  {flag}", code.edges, code.span);
     }
 }
 
@@ -151,7 +179,9 @@ fn condition(out: &mut String, health: &Health, core_hz: u32) {
 mod tests {
     use super::*;
     use crate::evidence::HELLO;
-    use firmware_rig::Config;
+    use firmware_rig::{Config, EscTelemetry};
+    use frame::esc::{EscCode, EscVerdict};
+    use frame::rig::CaptureCode;
 
     #[test]
     fn everything_of_the_boards_health_is_shown() {
@@ -167,11 +197,14 @@ mod tests {
             index: 77,
             esc: [320, 2, 5],
         };
-        let sample = RigSample { at: Ticks(0), ..RigSample::default() };
+        let esc = EscCode { verdict: EscVerdict::Nominal, voltage: 1148, speed: 451, age_ms: 7, ..EscCode::default() };
+        let sample = RigSample { at: Ticks(0), esc: Some(esc), back_emf: Some(CaptureCode::default()), ..RigSample::default() };
+        let telemetry = EscTelemetry { pole_pairs: 11, asked: false };
+        let config = RigConfig { esc_telemetry: Some(telemetry), back_emf: 11, ..RigConfig::of(&factory) };
         let heed = Heed {
             hello: HELLO,
-            calibration: factory.calibration(),
-            config: RigConfig::of(&factory),
+            calibration: config.apply(&factory).calibration(),
+            config,
             sample: Some(sample),
             health: Some(health),
         };
@@ -186,6 +219,10 @@ mod tests {
             "configuration deadbeef",
             "no fault is latched",
             "thrust_n     as designed",
+            "voltage_esc_v           11.48 V     7 ms ago",
+            "rpm_esc         4100.00 rev/min     7 ms ago",
+            "rpm_bemf            0.0 rev/min",
+            "320 frames heard, 2 damaged, 5 bytes with an error",
         ] {
             assert!(said.contains(word), "{word:?} is not in\n{said}");
         }

@@ -8,7 +8,9 @@
 use super::screen::Tone;
 use super::trend::Trend;
 use firmware_rig::RigConfig;
-use frame::rig::{ADC_CHANNELS, ADC_NAMES, AdcVerdict, CAPTURE_CHANNELS, CAPTURE_NAMES, CaptureVerdict};
+use frame::calibration::Converted;
+use frame::esc::ESC_UNITS;
+use frame::rig::{ADC_CHANNELS, ADC_NAMES, AdcVerdict, CAPTURE_CHANNELS, CAPTURE_NAMES, CaptureVerdict, RigSample};
 
 /// Channels of a rig: the capture channels, then the analogue ones.
 pub(crate) const CHANNELS: usize = CAPTURE_CHANNELS + ADC_CHANNELS;
@@ -109,6 +111,34 @@ pub(crate) fn capture_words(verdict: CaptureVerdict) -> (&'static str, Tone) {
         CaptureVerdict::Absent => ("not fitted", Tone::Dim),
         CaptureVerdict::BladeTwist => ("twist", Tone::Warn),
     }
+}
+
+/// What the ESC and the back-EMF meter say, in a line; `None` where neither is fitted.
+pub(crate) fn second_words(sample: &RigSample, values: &Converted) -> Option<(Tone, String)> {
+    let (mut tone, mut parts) = (Tone::Plain, Vec::new());
+    if let Some(code) = &sample.esc {
+        match code.verdict.flag() {
+            None => {
+                let digits = |unit: &str| if unit == "A" || unit == "V" { 2 } else { 0 };
+                let told =
+                    values.esc.iter().zip(ESC_UNITS).filter_map(|(v, unit)| Some(format!("{:.*} {unit}", digits(unit), (*v)?)));
+                parts.push(format!("ESC {}", told.collect::<Vec<_>>().join(" ")));
+            }
+            Some(flag) => {
+                tone = Tone::Warn;
+                parts.push(format!("ESC: {}", flag.words));
+            }
+        }
+    }
+    if let Some(code) = &sample.back_emf {
+        let (words, own) = capture_words(code.verdict);
+        if matches!(own, Tone::Warn | Tone::Bad) {
+            tone = Tone::Warn;
+        }
+        let value = values.rpm_bemf.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
+        parts.push(format!("back-EMF {value} rev/min {words}"));
+    }
+    (!parts.is_empty()).then(|| (tone, parts.join("; ")))
 }
 
 /// An analogue channel's verdict in a word.

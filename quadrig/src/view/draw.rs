@@ -257,6 +257,9 @@ fn table(screen: &Screen, ink: Ink, width: usize) -> Vec<Line<'static>> {
         Style::new().add_modifier(Modifier::UNDERLINED | Modifier::DIM),
     ))];
     lines.extend(screen.channels.iter().map(|channel| row(channel, ink, &widths)));
+    if let Some((tone, words)) = &screen.second {
+        lines.push(Line::from(Span::styled(cut(words, width), ink.style(*tone))));
+    }
     lines
 }
 

@@ -5,7 +5,7 @@
 //! Units: the log's; times are those of the port, from its opening.
 //! Reference: specification `rig.md`, "The operator's side".
 
-use super::channel::{CHANNELS, Channel, adc_words, capture_words};
+use super::channel::{CHANNELS, Channel, adc_words, capture_words, second_words};
 use super::keys::Prompt;
 use firmware_rig::RigConfig;
 use frame::calibration::Calibration;
@@ -122,6 +122,8 @@ pub(crate) struct Screen {
     pub(crate) wanted_us: Option<f64>,
     /// Channels.
     pub(crate) channels: [Channel; CHANNELS],
+    /// What the ESC and the back-EMF meter say, in a line, where they are fitted.
+    pub(crate) second: Option<(Tone, String)>,
     /// Counters of the line.
     pub(crate) link: LinkStats,
     /// When the board was heard last.
@@ -160,6 +162,7 @@ impl Screen {
             pulse_us: None,
             wanted_us: None,
             channels: Channel::all(),
+            second: None,
             link: LinkStats::default(),
             heard: None,
             gone: None,
@@ -283,6 +286,7 @@ impl Screen {
         self.faults = sample.faults;
         self.pulse_us = Some(sample.pulse.as_us());
         let values = self.calibration.map(|c| c.convert(sample));
+        self.second = values.and_then(|values| second_words(sample, &values));
         let t_s = sample.at.as_s();
         let codes = sample
             .rpm

@@ -6,6 +6,7 @@ use super::keys::{Prompt, Question};
 use super::screen::{Course, Live, Recorded, Screen, Tone, Under};
 use firmware_rig::{Config, RigConfig};
 use frame::calibration::{AdcScale, Calibration};
+use frame::esc::{EscCode, EscVerdict};
 use frame::message::{Event, Message};
 use frame::rig::{AdcCode, AdcVerdict, CaptureCode, CaptureVerdict, Fault, FaultSet, RigSample, RigState};
 use frame::units::{PulseWidth, Ticks};
@@ -94,6 +95,25 @@ fn everything_is_there_at_80_by_24_and_at_120_by_40() {
     let wide = drawn(&running(), 120, 40, Glyphs::Blocks).join("\n");
     let limit = Config::thesis_570kv().limits.speed.high.expect("a limit").0;
     assert!(wide.contains("limits") && wide.contains(&format!("{limit:.0}")), "limits where there is room:\n{wide}");
+}
+
+#[test]
+fn a_second_opinion_stands_under_the_channels_and_says_when_it_fails() {
+    let mut screen = running();
+    assert_eq!(screen.second, None, "neither is fitted");
+    let adc = [AdcScale { zero: 100.0, gain: 0.02 }; 5];
+    let pole_pairs = [11; 2];
+    screen.take(&Message::Calibration(Calibration { timer_hz: 84_000_000, marks: [2, 1, 2, 25], adc, pole_pairs }));
+    let esc = EscCode { temperature: 41, voltage: 1148, current: 1234, charge: 77, speed: 451, ..EscCode::default() };
+    let meter = CaptureCode { edges: 33, span: 84_000_000 / 20, verdict: CaptureVerdict::Nominal, uneven: 0 };
+    let mut line = |verdict| {
+        let esc = Some(EscCode { verdict, ..esc });
+        screen.take(&Message::Rig(RigSample { at: Ticks::from_ms(40_000), esc, back_emf: Some(meter), ..RigSample::default() }));
+        let lines = drawn(&screen, 80, 24, Glyphs::Blocks);
+        lines.into_iter().find(|l| l.starts_with("ESC")).expect("a line of its own").trim_end().to_owned()
+    };
+    assert_eq!(line(EscVerdict::Nominal), "ESC 4100 rev/min 12.34 A 11.48 V 41 degC 77 mAh; back-EMF 3600.0 rev/min ok");
+    assert_eq!(line(EscVerdict::Silent), "ESC: nothing heard; back-EMF 3600.0 rev/min ok");
 }
 
 #[test]

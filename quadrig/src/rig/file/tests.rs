@@ -29,9 +29,12 @@ fn what_is_written_reads_back_the_same() {
     full.curve = Some([1000, 1250, 1400, 1700, 2000].map(PulseWidth::from_us));
     full.esc.answers = Answers::Silent { hold_ms: 4_000 };
     full.output = EscOutput::DShot600;
+    full.esc_telemetry = Some(EscTelemetry { pole_pairs: 11, asked: true });
+    full.back_emf = 7;
     full.limits.torque = Bounds { low: Some(NewtonMetre(-0.1)), high: None, ms: 250 };
     let half = RigConfig { output: EscOutput::DShot300, ..factory() };
-    for config in [factory(), full, half, preset("beam-only.toml"), preset("load-cell-only.toml")] {
+    let presets = ["beam-only.toml", "load-cell-only.toml", "esc-telemetry.toml"].map(preset);
+    for config in [factory(), full, half].into_iter().chain(presets) {
         let (again, scales) = parsed(&text(&config)).unwrap_or_else(|e| panic!("{e}\n{}", text(&config)));
         assert_eq!(again, config, "{}", text(&config));
         assert!(scales && again.digest() == config.digest());
@@ -52,6 +55,9 @@ fn the_presets_are_what_their_names_say() {
     assert_eq!(fitted("load-cell-only.toml"), ([0; 4], [true, false, false, false, false]));
     assert_eq!(fitted("hall-only.toml").0, [0, 0, 2, 0]);
     assert_eq!(fitted("three-blade.toml").0[0], 3);
+    let second = preset("esc-telemetry.toml");
+    assert_eq!((second.esc_telemetry, second.back_emf), (Some(EscTelemetry { pole_pairs: 11, asked: false }), 11));
+    assert_eq!((factory().esc_telemetry, factory().back_emf), (None, 0));
 }
 
 #[test]
@@ -78,6 +84,8 @@ fn refusals_name_file_line_and_column() {
             "rig.toml:10:8: ",
             "2026-01-31",
         ),
+        (format!("{rate}[esc_telemetry]\npole_pairs = 0\n"), "rig.toml:5:14: ", "1 to 100"),
+        (format!("{rate}[back_emf]\npole_pairs = 7.5\n"), "rig.toml:5:14: ", "whole number"),
         ("rate_hz = \n".to_owned(), "rig.toml:1:", ""),
     ] {
         let message = parsed(&text).expect_err(&text);
