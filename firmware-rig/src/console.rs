@@ -75,8 +75,6 @@ pub struct Orders {
     pub trial: Option<Trial>,
     /// What was told, for the host's own log.
     pub event: Option<Event>,
-    /// Ask the ESC for a frame of telemetry with the next command that can ask: a DShot frame's telemetry bit.
-    pub ask_esc: bool,
 }
 
 /// The board from a reset on.
@@ -142,8 +140,9 @@ impl RigConsole {
         self.stops.half(open, self.line.stop_waits())
     }
 
-    /// One control tick. `give` takes the pulse for the ESC's next frame before anything is told.
-    pub fn tick(&mut self, delivered: &Delivered<'_>, give: impl FnOnce(PulseWidth)) -> Orders {
+    /// One control tick. `give` takes the pulse for the ESC's next frame, and whether a DShot frame asks for telemetry with
+    /// it, before anything is told.
+    pub fn tick(&mut self, delivered: &Delivered<'_>, give: impl FnOnce(PulseWidth, bool)) -> Orders {
         let now = delivered.now;
         let (command, line) = self.line.next_command();
         let outputs = self.rig.tick(&Inputs {
@@ -158,7 +157,7 @@ impl RigConsole {
             brown_out: delivered.brown_out,
             paused: delivered.paused,
         });
-        give(outputs.pulse);
+        give(outputs.pulse, outputs.ask_esc);
         if let Some(channel) = outputs.burst {
             self.burst.begin(channel);
         }
@@ -182,7 +181,7 @@ impl RigConsole {
         } else if command == Some(Command::Tare) || self.rig.calibration() != self.told {
             self.tell_calibration(now);
         }
-        Orders { store: outputs.store, trial: outputs.trial, event: outputs.event, ask_esc: outputs.ask_esc }
+        Orders { store: outputs.store, trial: outputs.trial, event: outputs.event }
     }
 
     /// The analogue channel of which every single conversion is wanted: see [`RigConsole::record`].
@@ -312,12 +311,12 @@ mod tests {
         let mut wire = [0; MAX_WIRE];
         let used = Encoder::default().encode(Ticks(1), &Command::Stop, &mut wire).unwrap();
         assert!(!console.look(false).minimum && console.look(false).tick);
-        console.tick(&delivered(1, &adc()), |_| ());
+        console.tick(&delivered(1, &adc()), |_, _| ());
         wire[..used].iter().for_each(|b| console.hear(*b));
         assert!(console.look(false).minimum);
         assert!(console.look(false).tick);
         let mut given = None;
-        console.tick(&delivered(2, &adc()), |pulse| given = Some(pulse));
+        console.tick(&delivered(2, &adc()), |pulse, _| given = Some(pulse));
         assert_eq!(given, Some(PulseWidth::MIN));
         assert!(console.rig().faults().contains(Fault::OperatorStop));
     }
@@ -327,10 +326,10 @@ mod tests {
         let mut console = started();
         console.look(false);
         console.look(false);
-        console.tick(&delivered(1, &adc()), |_| ());
+        console.tick(&delivered(1, &adc()), |_, _| ());
         assert!(console.look(true).minimum, "seen half a millisecond before the tick");
         console.look(false);
-        console.tick(&delivered(2, &adc()), |_| ());
+        console.tick(&delivered(2, &adc()), |_, _| ());
         assert!(console.rig().faults().contains(Fault::OperatorStop));
     }
 
@@ -343,7 +342,7 @@ mod tests {
                 console.hear(byte);
             }
             console.sent();
-            console.tick(&delivered(ms, &adc()), |pulse| assert_eq!(pulse, PulseWidth::MIN));
+            console.tick(&delivered(ms, &adc()), |pulse, _| assert_eq!(pulse, PulseWidth::MIN));
             assert_eq!(console.rig().state(), RigState::Disarmed, "{ms} ms");
         }
     }
@@ -352,7 +351,7 @@ mod tests {
     fn a_full_queue_drops_whole_frames() {
         let mut console = started();
         for ms in 1..3_000 {
-            console.tick(&delivered(ms, &adc()), |_| ());
+            console.tick(&delivered(ms, &adc()), |_, _| ());
         }
         assert!(console.queued().len() <= QUEUED);
         assert_eq!(console.queued().last(), Some(&0), "it ends with a frame's end");

@@ -274,7 +274,7 @@ mod app {
         board.link.listen(board.dma, board.console);
         let half = board.console.look(board.stop.is_high());
         if half.minimum {
-            board.pulse.set(PulseWidth::MIN);
+            board.pulse.set(PulseWidth::MIN, false);
         }
         if !half.tick {
             return;
@@ -310,7 +310,7 @@ mod app {
             stored: cx.shared.stored.lock(Option::take),
             vitals: Some(health::vitals(*board.index_marks)),
         };
-        let orders = board.console.tick(&delivered, |pulse| board.pulse.set(pulse));
+        let orders = board.console.tick(&delivered, |pulse, ask| board.pulse.set(pulse, ask));
         board.watchdog.feed();
         // a tick that came too late is no time to begin a train of frames
         let on_time = board.tick_timer.sr().read().uif().bit_is_clear();

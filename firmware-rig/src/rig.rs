@@ -65,7 +65,7 @@ pub struct Outputs {
     pub trial: Option<Trial>,
     /// The operator asks for every conversion of this channel.
     pub burst: Option<u8>,
-    /// The ESC is to be asked for a frame of telemetry with the next command that can ask (a DShot frame's telemetry bit).
+    /// The ESC is to be asked for a frame of telemetry, where its next command can ask: by a DShot frame's telemetry bit.
     pub ask_esc: bool,
 }
 

@@ -103,7 +103,7 @@ pub struct Calibrated {
 pub struct EscTelemetry {
     /// Pole pairs of the motor: the ESC counts electrical turns.
     pub pole_pairs: u16,
-    /// The ESC sends a frame only when it is asked for one (by a DShot frame); otherwise by itself.
+    /// The ESC sends a frame only when it is asked for one, by a DShot frame; otherwise by itself.
     pub asked: bool,
 }
 
@@ -239,7 +239,7 @@ impl RigConfig {
             && self.analogue_in_range()
             && self.limits.in_range()
             && self.calibrated.iter().flatten().all(Calibrated::in_range)
-            && self.esc_telemetry.is_none_or(|esc| (1..=MOST_POLE_PAIRS).contains(&esc.pole_pairs))
+            && self.esc_telemetry.is_none_or(|esc| esc.in_range(self.output))
             && self.back_emf <= MOST_POLE_PAIRS
     }
 
@@ -309,6 +309,13 @@ impl RigConfig {
 /// Whether a number lies between two sizes, on either side of zero.
 fn size_within(number: f32, least: f32, most: f32) -> bool {
     (least..=most).contains(&libm::fabsf(number))
+}
+
+impl EscTelemetry {
+    /// Only a frame can ask: pulses have no way to.
+    fn in_range(&self, output: EscOutput) -> bool {
+        (1..=MOST_POLE_PAIRS).contains(&self.pole_pairs) && (output.is_digital() || !self.asked)
+    }
 }
 
 impl EscProfile {

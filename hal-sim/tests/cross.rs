@@ -1,9 +1,15 @@
 //! The ESC's telemetry and the back-EMF meter in native runs: they agree with what is really there, and what happens to their lines stops nothing.
 
+use esc_pwm::EscOutput;
+use firmware_rig::{Config, EscTelemetry};
 use frame::Converted;
 use frame::esc::EscVerdict;
+use frame::message::Message;
 use frame::rig::{CaptureVerdict, FaultSet, RigSample};
-use hal_sim::scenario::{FaultKind, Schedule, ScheduledFault, SensorSection};
+use frame::units::Ticks;
+use frame::wire::Decoder;
+use hal_sim::native::{Board, RigDesk};
+use hal_sim::scenario::{EscSection, FaultKind, Schedule, ScheduledFault, SensorSection};
 use hal_sim::{RunRecord, Scenario, Truth, run};
 
 fn scenario(faults: &[(f64, f64, FaultKind)]) -> Scenario {
@@ -98,6 +104,33 @@ fn nothing_that_happens_to_their_lines_stops_a_run() {
     for (sample, row, truth) in rows(&record, 1.0, 11.0) {
         let voltage = row.esc[2];
         assert!(voltage.is_none_or(|v| (v - 0.995 * truth.plant.voltage_v).abs() < 0.6), "{voltage:?} in {:?}", sample.esc);
+    }
+}
+
+/// An ESC that sends only when it is asked: by the telemetry bit of a DShot frame it is, by pulses nobody asks.
+#[test]
+fn an_esc_that_has_to_be_asked_is_asked_by_frames() {
+    let esc = EscSection { telemetry_asked: true, ..EscSection::default() };
+    let scenario = Scenario { esc, ..Scenario::default() };
+    for (output, answers) in [(EscOutput::DShot600, true), (EscOutput::Pwm, false)] {
+        let esc_telemetry = Some(EscTelemetry { pole_pairs: 11, asked: true });
+        let config = Config { output, esc_telemetry, log_period: Ticks::from_ms(20), ..Config::thesis_570kv() };
+        let mut desk = RigDesk::new(&scenario, None, Board::new(config));
+        desk.power(true);
+        let (mut decoder, mut samples, mut asked) = (Decoder::default(), Vec::new(), 0);
+        for _ in 0..2_000 {
+            desk.turn();
+            asked += usize::from(desk.board().frame().is_some_and(|frame| frame.telemetry));
+            for byte in desk.tick(&[]) {
+                if let Some(Message::Rig(sample)) = decoder.push::<Message>(byte).map(|r| r.message) {
+                    samples.push(sample);
+                }
+            }
+        }
+        assert_eq!(asked, if answers { 100 } else { 0 }, "a frame in twenty");
+        let last: Vec<_> = samples.iter().rev().take(20).map(|s| s.esc.expect("fitted")).collect();
+        let wanted = if answers { EscVerdict::Nominal } else { EscVerdict::Silent };
+        assert!(last.iter().all(|code| code.verdict == wanted && (code.age_ms <= 25) == answers), "{output:?}: {last:?}");
     }
 }
 

@@ -82,7 +82,7 @@ impl Program {
             vitals: None,
         };
         let pin = &mut self.pulse;
-        self.console.tick(&delivered, |pulse| pin.set_duty_cycle(timer().ticks(pulse) as u16).unwrap());
+        self.console.tick(&delivered, |pulse, _| pin.set_duty_cycle(timer().ticks(pulse) as u16).unwrap());
         self.watchdog.feed();
         let _ = self.line.write_all(self.console.queued()); // a cut line hears nothing
         self.console.sent();

@@ -6,6 +6,7 @@
 //! Build the image first: `cargo xtask image`
 #![cfg(feature = "emulated")]
 
+use esc_pwm::dshot::{EscOutput, Frame};
 use firmware_rig::{Config, EscTelemetry, RigConfig};
 use frame::esc::EscVerdict;
 use frame::message::{Command, Event, Health, Message, SettingsNews};
@@ -15,6 +16,7 @@ use hal_sim::emulated::Machine;
 use hal_sim::emulated::operator::ArmAndRun;
 use hal_sim::emulated::rig::{Action, Heard, Operator, RigRun, rig_on};
 use hal_sim::native::{PLUGS, Sectors};
+use hal_sim::scenario::EscSection;
 use hal_sim::sensor::EscWire;
 use hal_sim::{Scenario, Truth};
 use quadrig_tests::budget;
@@ -55,6 +57,10 @@ enum From {
 }
 
 fn fly(from: From, script: Vec<(u64, Action)>, milliseconds: u64) -> RigRun<Scripted> {
+    fly_with(&Scenario::default(), from, script, milliseconds)
+}
+
+fn fly_with(scenario: &Scenario, from: From, script: Vec<(u64, Action)>, milliseconds: u64) -> RigRun<Scripted> {
     let mut machine = Machine::new().unwrap_or_else(|error| panic!("{error}"));
     let mut commands = Vec::new();
     match from {
@@ -75,7 +81,7 @@ fn fly(from: From, script: Vec<(u64, Action)>, milliseconds: u64) -> RigRun<Scri
     }
     let level = Command::SetPulse(PulseWidth::from_us(PULSE_US));
     let operator = Scripted { inner: ArmAndRun::new([level], None), config: commands, script };
-    let run = rig_on(machine, &Scenario::default(), operator, milliseconds).unwrap_or_else(|error| panic!("{error}"));
+    let run = rig_on(machine, scenario, operator, milliseconds).unwrap_or_else(|error| panic!("{error}"));
     run.outcome.accesses.only(&[]).unwrap();
     assert_eq!((run.link.damaged, run.link.missing), (0, 0));
     run
@@ -182,6 +188,27 @@ fn a_thousand_samples_a_second_with_all_of_it_fit_the_tick_and_the_line() {
         assert!(health.tick_cycles <= budget::rig(key), "{health:?}");
         assert!(health.stack_size - health.stack_free <= budget::rig("stack_bytes"), "{health:?}");
     }
+}
+
+/// An ESC that sends only when it is asked, by a frame in twenty of DShot600.
+#[test]
+fn an_esc_that_has_to_be_asked_is_asked_by_frames() {
+    let esc_telemetry = Some(EscTelemetry { pole_pairs: POLE_PAIRS, asked: true });
+    let config = RigConfig { output: EscOutput::DShot600, esc_telemetry, ..fitted(20) };
+    let esc = EscSection { telemetry_asked: true, ..EscSection::default() };
+    let run = fly_with(&Scenario { esc, ..Scenario::default() }, From::Flash(config), vec![], 6_000);
+    let calibration = run.operator.inner.calibration.expect("its scales");
+    let told = samples(&run, 800, 1_400);
+    assert!(told.len() > 20, "{} samples", told.len());
+    for sample in &told {
+        let (plant, row) = (truth(&run, sample).plant, calibration.convert(sample));
+        let (code, rpm) = (sample.esc.expect("fitted"), row.esc[0]);
+        assert!(rpm.is_some_and(|rpm| (rpm - plant.rpm).abs() < 12.0 + 0.005 * plant.rpm), "{code:?}, {} there", plant.rpm);
+        assert!(code.age_ms <= 25, "{code:?}");
+    }
+    let asked = run.frames.iter().filter_map(|f| Frame::from_word(f.word?)).filter(|f| f.telemetry).count();
+    assert!(asked.abs_diff(run.frames.len() / 20) <= 1, "{asked} of {} frames ask", run.frames.len());
+    println!("{asked} of {} frames ask; {:?} good, damaged, errors", run.frames.len(), last_health(&run).esc);
 }
 
 /// A configuration that comes over the line switches their receivers on, and off again. The tick that takes it reckons its checksum twice: longer

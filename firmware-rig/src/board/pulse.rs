@@ -129,20 +129,20 @@ impl PulseOutput {
         this
     }
 
-    /// Gives `pulse` from the next period or frame on.
-    pub(crate) fn set(&mut self, pulse: PulseWidth) {
+    /// Gives `pulse` from the next period or frame on. A frame asks for telemetry where `ask` says so; a pulse cannot.
+    pub(crate) fn set(&mut self, pulse: PulseWidth, ask: bool) {
         match self.running {
             Some(EscOutput::Pwm) => {
                 self.timer.ccr1().write(|w| w.ccr().set(TIMER.ticks(pulse) as u16));
             }
-            Some(EscOutput::DShot300) => self.send(FRAMES_300, pulse),
-            Some(EscOutput::DShot600) => self.send(FRAMES_600, pulse),
+            Some(EscOutput::DShot300) => self.send(FRAMES_300, pulse, ask),
+            Some(EscOutput::DShot600) => self.send(FRAMES_600, pulse, ask),
             None => {}
         }
     }
 
-    fn send(&mut self, frames: FrameTimer, pulse: PulseWidth) {
-        let word = Frame { throttle: Throttle::of(pulse), telemetry: false }.word();
+    fn send(&mut self, frames: FrameTimer, pulse: PulseWidth, telemetry: bool) {
+        let word = Frame { throttle: Throttle::of(pulse), telemetry }.word();
         let highs = core::array::from_fn(|bit| frames.slot(word << bit & 0x8000 != 0).high);
         // a bus error has ended the stream, or it does not come round any more: begin anew, with zero
         if self.dma.st(2).cr().read().en().bit_is_clear() || !put(&self.timer, &self.dma, &highs) {

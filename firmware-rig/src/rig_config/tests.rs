@@ -88,13 +88,14 @@ fn impossible_settings_change_nothing() {
         assert_eq!(factory().with(&bad, &factory()), Err(OutOfRange), "{bad:?}");
     }
     let nothing = RigConfig { marks: [0; 4], fitted: [false; 5], ..factory() };
-    let mut nonsense = [nothing, factory(), factory(), factory(), factory(), factory(), factory()];
+    let mut nonsense = [nothing, factory(), factory(), factory(), factory(), factory(), factory(), factory()];
     nonsense[1].strain.gain = f32::NAN;
     nonsense[2].esc.highest = PulseWidth::MIN;
     nonsense[3].limits.voltage = Bounds { low: Some(Volt(12.0)), high: Some(Volt(11.0)), ms: 100 };
     nonsense[4].current.shunt_ohm = 0.0;
     nonsense[5].esc_telemetry = Some(EscTelemetry { pole_pairs: 0, asked: false });
     nonsense[6].back_emf = 101;
+    nonsense[7].esc_telemetry = Some(EscTelemetry { pole_pairs: 11, asked: true }); // pulses cannot ask
     assert!(nonsense.iter().all(|config| !config.in_range()));
 }
 

@@ -41,6 +41,7 @@ use crate::sensor::{
     AnalogFront, BackEmf, BackEmfMeter, Comparator, Converter, Edge, EdgeDetail, EscTelemetry, EscWire, Geometry, Logger,
     Tachometers,
 };
+use esc_pwm::dshot::Frame;
 use frame::calibration::Calibration;
 use frame::message::Beep;
 use frame::rig::ADC_CHANNELS;
@@ -233,9 +234,12 @@ impl Bench {
         self.esc.pulse(at_ns, width_ns);
     }
 
-    /// A DShot frame of 16 bits on the ESC pin ended at `at_ns`.
+    /// A DShot frame of 16 bits on the ESC pin ended at `at_ns`. One that asks for telemetry is answered within the next millisecond.
     pub fn frame(&mut self, at_ns: u64, word: u16) {
         self.esc.frame(at_ns, word);
+        if Frame::from_word(word).is_some_and(|frame| frame.telemetry) {
+            self.telemetry.ask();
+        }
     }
 
     /// Integrates until [`Bench::horizon_ns`] is at least `at_ns`. The look-ahead is less than one step of 0.1 ms.
@@ -274,11 +278,6 @@ impl Bench {
     /// Something becomes of the line of the ESC's telemetry.
     pub fn set_esc_wire(&mut self, wire: EscWire) {
         self.telemetry.set_wire(wire);
-    }
-
-    /// The ESC is asked for a frame of telemetry.
-    pub fn ask_esc(&mut self) {
-        self.telemetry.ask();
     }
 
     /// The next byte of the ESC's telemetry that has ended by `until_ns`, marked where it came with an error of the line.

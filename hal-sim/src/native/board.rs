@@ -52,6 +52,8 @@ pub struct Board {
     clock: ClockNews,
     stored: Option<SettingsNews>,
     pulse: PulseWidth,
+    /// Its frame asks the ESC for telemetry.
+    asks: bool,
     late: u32,
     /// Memory of a burst.
     burst: Vec<u16>,
@@ -106,7 +108,7 @@ impl Board {
     fn start(now: Ticks, factory: Config, flash: Flash, clock: ClockNews, reset_cause: u8, ended: Option<Event>) -> Self {
         let start = Start { reset_cause, clock, stored: flash.found, news: flash.news, ended };
         let console = RigConsole::start(now, factory.clone(), &start);
-        Self { console, factory, flash, clock, stored: None, pulse: PulseWidth::MIN, late: 0, burst: Vec::new() }
+        Self { console, factory, flash, clock, stored: None, pulse: PulseWidth::MIN, asks: false, late: 0, burst: Vec::new() }
     }
 
     /// The same board after a reset of the given cause: its flash is what it was.
@@ -139,7 +141,7 @@ impl Board {
     #[must_use]
     pub fn frame(&self) -> Option<Frame> {
         let digital = self.rig().config().output.is_digital();
-        digital.then(|| Frame { throttle: Throttle::of(self.pulse), telemetry: false })
+        digital.then(|| Frame { throttle: Throttle::of(self.pulse), telemetry: self.asks })
     }
 
     /// Takes the bytes that arrived on the line.
@@ -191,7 +193,7 @@ impl Board {
             vitals: None,
         };
         let wanted = self.console.wanted();
-        let orders = self.console.tick(&delivered, |pulse| self.pulse = pulse);
+        let orders = self.console.tick(&delivered, |pulse, ask| (self.pulse, self.asks) = (pulse, ask));
         if wanted.is_some() {
             self.burst.resize(burst::LENGTH, 0);
         }

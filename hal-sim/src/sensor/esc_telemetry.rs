@@ -120,7 +120,7 @@ impl EscTelemetry {
         self.volts += share * (plant.voltage_v - self.volts);
         self.amps += share * (plant.current_a - self.amps);
         self.charge_as += self.told_a() * 1.0e-3;
-        let due = if self.by_request { std::mem::take(&mut self.asked) } else { now_ns >= self.next_ns };
+        let due = std::mem::take(&mut self.asked) || !self.by_request && now_ns >= self.next_ns;
         if !due {
             return;
         }

@@ -52,7 +52,7 @@ struct File {
 #[serde(deny_unknown_fields)]
 struct Telemetry {
     pole_pairs: Number,
-    asked: Option<bool>,
+    asked: Option<Spanned<bool>>,
 }
 
 #[derive(Deserialize)]
@@ -295,7 +295,16 @@ impl File {
             config.calibrated = scales.all()?;
         }
         let pairs = |n: &Number| whole(n, 1.0, f64::from(MOST_POLE_PAIRS)).map(|pairs| pairs as u16);
-        let telemetry = |t: &Telemetry| Ok(EscTelemetry { pole_pairs: pairs(&t.pole_pairs)?, asked: t.asked.unwrap_or(false) });
+        let output = config.output;
+        let telemetry = |t: &Telemetry| match &t.asked {
+            Some(asked) if *asked.get_ref() && !output.is_digital() => {
+                Err((asked.span(), "pulses cannot ask: expected an output of dshot300 or dshot600 in [esc]".to_owned()))
+            }
+            asked => {
+                let asked = asked.as_ref().is_some_and(|asked| *asked.get_ref());
+                Ok(EscTelemetry { pole_pairs: pairs(&t.pole_pairs)?, asked })
+            }
+        };
         config.esc_telemetry = self.esc_telemetry.as_ref().map(telemetry).transpose()?;
         config.back_emf = self.back_emf.as_ref().map_or(Ok(0), |meter| pairs(&meter.pole_pairs))?;
         if config.marks == [0; 4] && config.fitted == [false; 5] {

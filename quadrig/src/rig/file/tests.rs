@@ -85,6 +85,7 @@ fn refusals_name_file_line_and_column() {
             "2026-01-31",
         ),
         (format!("{rate}[esc_telemetry]\npole_pairs = 0\n"), "rig.toml:5:14: ", "1 to 100"),
+        (format!("{rate}[esc_telemetry]\npole_pairs = 7\nasked = true\n"), "rig.toml:6:9: ", "dshot"),
         (format!("{rate}[back_emf]\npole_pairs = 7.5\n"), "rig.toml:5:14: ", "whole number"),
         ("rate_hz = \n".to_owned(), "rig.toml:1:", ""),
     ] {
