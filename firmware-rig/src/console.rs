@@ -140,6 +140,12 @@ impl RigConsole {
         self.stops.half(open, self.line.stop_waits())
     }
 
+    /// Whether the next [`RigConsole::look`] is followed by a control tick: its time and captures are taken first.
+    #[must_use]
+    pub fn tick_is_next(&self) -> bool {
+        self.stops.tick_is_next()
+    }
+
     /// One control tick. `give` takes the pulse for the ESC's next frame, and whether a DShot frame asks for telemetry with
     /// it, before anything is told.
     pub fn tick(&mut self, delivered: &Delivered<'_>, give: impl FnOnce(PulseWidth, bool)) -> Orders {
@@ -310,7 +316,8 @@ mod tests {
         messages(&mut console);
         let mut wire = [0; MAX_WIRE];
         let used = Encoder::default().encode(Ticks(1), &Command::Stop, &mut wire).unwrap();
-        assert!(!console.look(false).minimum && console.look(false).tick);
+        assert!(!console.tick_is_next() && !console.look(false).minimum);
+        assert!(console.tick_is_next() && console.look(false).tick);
         console.tick(&delivered(1, &adc()), |_, _| ());
         wire[..used].iter().for_each(|b| console.hear(*b));
         assert!(console.look(false).minimum);

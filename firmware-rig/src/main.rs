@@ -270,24 +270,27 @@ mod app {
         let start = health::cycles();
         let board = cx.local;
         board.tick_timer.sr().write(|w| w.uif().clear());
+        // the tick's own time comes before the host's bytes, of which a whole frame takes 35 us to read
+        let taken = if board.console.tick_is_next() {
+            let (over_capture, turns_lost) = (captures::drain(board.edges), back_emf::drain(board.turns));
+            let fitted = board.console.rig().fitted();
+            let counter = cx.shared.capture_timer.lock(|timer| {
+                captures::arm(timer, fitted);
+                timer.cnt().read().bits()
+            });
+            Some((over_capture, turns_lost, counter))
+        } else {
+            None
+        };
         // a stop acts here already; the rig latches it in its next tick and gives minimum from then on
         board.link.listen(board.dma, board.console);
         let half = board.console.look(board.stop.is_high());
         if half.minimum {
             board.pulse.set(PulseWidth::MIN, false);
         }
-        if !half.tick {
-            return;
-        }
+        let (Some((over_capture, turns_lost, counter)), true) = (taken, half.tick) else { return };
         crash::look_at_clock();
-        let over_capture = captures::drain(board.edges);
-        let turns_lost = back_emf::drain(board.turns);
         esc_line::drain(board.words);
-        let fitted = board.console.rig().fitted();
-        let counter = cx.shared.capture_timer.lock(|timer| {
-            captures::arm(timer, fitted);
-            timer.cnt().read().bits()
-        });
         let now = board.clock.now(counter);
         MILLIS.store(now.as_ms() as u32, Ordering::Relaxed);
         let config = board.console.rig().config();

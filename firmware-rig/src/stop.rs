@@ -43,6 +43,11 @@ impl StopWatch {
         Half { minimum: self.seen || waits, tick: !self.between }
     }
 
+    /// Whether the next look is that of a control tick.
+    pub(crate) fn tick_is_next(&self) -> bool {
+        self.between
+    }
+
     /// Whether the loop was open at some look since the last tick.
     pub fn take(&mut self) -> bool {
         core::mem::take(&mut self.seen)
