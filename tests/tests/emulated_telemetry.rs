@@ -178,7 +178,7 @@ fn values_arrive_and_agree_and_what_happens_to_the_lines_is_told_and_stops_nothi
 /// Everything fitted, ten and a thousand samples a second: the longest tick and the line.
 #[test]
 fn a_thousand_samples_a_second_with_all_of_it_fit_the_tick_and_the_line() {
-    for (log_ms, key) in [(100u16, "tick_cycles"), (1, "tick_cycles_at_1_khz")] {
+    for (log_ms, key) in [(100u16, "tick_cycles_with_all"), (1, "tick_cycles_at_1_khz")] {
         let run = fly(From::Flash(fitted(log_ms)), vec![], 6_500);
         let told = samples(&run, 1_000, 1_900);
         assert!(told.len() + 5 >= 900 / usize::from(log_ms), "{} samples in 900 ms", told.len());
