@@ -44,23 +44,23 @@ pub fn load<T: Stored, F: NorFlash>(flash: &mut F, range: Range<u32>) -> (Option
     }
 }
 
-/// Stores `settings` in `range` of `flash` and reads them back. What a power cut left half programmed may hide the item that follows it: it
-/// is then stored once more, behind that. Content that takes no item at all is erased once.
+/// Stores `settings` in `range` of `flash` and reads them back. Damaged content is erased once.
 pub fn save<T: Stored, F: NorFlash>(flash: &mut F, range: Range<u32>, settings: &T) -> SettingsNews {
     let mut form = [0; MAX_STORED];
     let Some(stored) = seal(settings, &mut form) else { return SettingsNews::Failed };
-    let mut refused = false;
-    for _ in 0..2 {
+    for attempt in 0..2 {
         let Ok(config) = MapConfig::try_new(range.clone()) else { return SettingsNews::Failed };
         let mut storage = MapStorage::<u8, _, _>::new(&mut *flash, config, Cache::new_uncached());
         let mut buffer = [0; BUFFER];
-        if refused && !matches!(at_once(storage.erase_all()), Some(Ok(()))) {
+        if attempt > 0 && !matches!(at_once(storage.erase_all()), Some(Ok(()))) {
             return SettingsNews::Failed;
         }
-        refused = !matches!(at_once(storage.store_item(&mut buffer, &KEY, &stored)), Some(Ok(())));
-        if matches!(load::<T, F>(flash, range.clone()), (Some(read), SettingsNews::Loaded) if &read == settings) {
-            return SettingsNews::Saved;
+        if matches!(at_once(storage.store_item(&mut buffer, &KEY, &stored)), Some(Ok(()))) {
+            break;
         }
     }
-    SettingsNews::Failed
+    match load::<T, F>(flash, range) {
+        (Some(read), SettingsNews::Loaded) if &read == settings => SettingsNews::Saved,
+        _ => SettingsNews::Failed,
+    }
 }
