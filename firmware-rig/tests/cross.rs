@@ -1,17 +1,16 @@
 //! The ESC's telemetry and the back-EMF meter beside the rig's own sensors: told, and never a reason to stop where a speed sensor is fitted.
 
+mod desk;
+
+use desk::{BEEPS, MS, POWERED, UNPOWERED, blocks, passes};
 use firmware_rig::esc_line::{LINE_ERROR, crc8};
-use firmware_rig::{AdcBlock, Beside, Config, EscTelemetry, Inputs, LineNews, Rig, RigConfig};
+use firmware_rig::{Beside, Config, EscTelemetry, Inputs, LineNews, Rig, RigConfig};
 use frame::esc::EscVerdict;
-use frame::message::{Beep, Command, Event};
+use frame::message::{Command, Event};
 use frame::rig::{CaptureVerdict, Fault, FaultSet, RigSample, RigState};
 use frame::units::{PulseWidth, Ticks};
 
-const MS: u64 = 84_000;
 const POLE_PAIRS: u16 = 11;
-/// Codes of thrust, torque, current, voltage and temperature: 11.5 V, 2 A; without the ESC's supply.
-const POWERED: [u16; 5] = [1427, 2048, 372, 2379, 900];
-const UNPOWERED: [u16; 5] = [1427, 2048, 248, 0, 900];
 
 /// What is wired up, and what goes wrong with it.
 #[derive(Clone, Copy, PartialEq)]
@@ -62,9 +61,7 @@ impl Desk {
 
     /// Instants at which `marks` a revolution pass in this millisecond, ticks.
     fn edges(&self, marks: f64) -> Vec<u32> {
-        let (from, to) = (self.turned * marks, (self.turned + self.rpm / 60_000.0) * marks);
-        let at = |mark: f64| (((self.ms - 1) as f64 + (mark - from) / (to - from)) * MS as f64) as u64 as u32;
-        (from.floor() as u64 + 1..=to.floor() as u64).map(|mark| at(mark as f64)).collect()
+        passes(self.ms, self.turned * marks, (self.turned + self.rpm / 60_000.0) * marks)
     }
 
     /// What the ESC's line brings in this millisecond: a frame each 31 ms.
@@ -85,11 +82,7 @@ impl Desk {
         let back_emf = self.edges(self.wires.meter);
         let esc = self.telemetry();
         self.turned += self.rpm / 60_000.0;
-        let adc = self.counts.map(|code| {
-            let mut block = AdcBlock::default();
-            (0..8).for_each(|_| block.push(code));
-            block
-        });
+        let adc = blocks(self.counts);
         let outputs = self.rig.tick(&Inputs {
             now: Ticks(self.ms * MS),
             edges: edges.each_ref().map(Vec::as_slice),
@@ -116,7 +109,7 @@ impl Desk {
         self.run(20);
         self.tick(Some(Command::Arm));
         self.counts = POWERED;
-        for beep in [Beep::Long, Beep::Cells(3), Beep::Ready] {
+        for beep in BEEPS {
             self.run(300);
             self.tick(Some(Command::Beep(beep)));
         }

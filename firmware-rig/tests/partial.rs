@@ -1,17 +1,15 @@
 //! Rigs with some of the channels: what is not fitted raises no fault, what is fitted still does; ESCs that say little or nothing.
 
+mod desk;
+
+use desk::{BEEPS, MS, POWERED, UNPOWERED, blocks, passes};
 use esc_pwm::{Bounds, EscOutput};
 use firmware_rig::rig_config::Answers;
-use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Rig, RigConfig};
+use firmware_rig::{Beside, Config, Inputs, LineNews, Rig, RigConfig};
 use frame::message::{Beep, Command, ConfigPart, Event};
 use frame::rig::{AdcVerdict, CaptureVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::units::{Ampere, Celsius, NewtonMetre, PulseWidth, RevPerMin, Ticks, Volt};
 
-const MS: u64 = 84_000;
-/// Codes of thrust, torque, current, voltage and temperature: 11.5 V, 2 A.
-const POWERED: [u16; 5] = [1427, 2048, 372, 2379, 900];
-/// The same without the ESC's battery.
-const UNPOWERED: [u16; 5] = [1427, 2048, 248, 0, 900];
 /// An unplugged input, pulled down.
 const OPEN: u16 = 0;
 
@@ -49,20 +47,11 @@ impl Desk {
         self.ms += 1;
         let mut edges: [Vec<u32>; 4] = Default::default();
         for ((edges, turned), marks) in edges.iter_mut().zip(&mut self.turned).zip(self.wired) {
-            let per_ms = f64::from(marks) * self.rpm / 60_000.0;
-            let (from, to) = (*turned, *turned + per_ms);
-            let mut mark = from.floor() + 1.0;
-            while mark <= to {
-                edges.push((((self.ms - 1) as f64 + (mark - from) / per_ms) * MS as f64) as u64 as u32);
-                mark += 1.0;
-            }
-            *turned = to;
+            let from = *turned;
+            *turned += f64::from(marks) * self.rpm / 60_000.0;
+            *edges = passes(self.ms, from, *turned);
         }
-        let adc = self.counts.map(|code| {
-            let mut block = AdcBlock::default();
-            (0..8).for_each(|_| block.push(code));
-            block
-        });
+        let adc = blocks(self.counts);
         let outputs = self.rig.tick(&Inputs {
             now: Ticks(self.ms * MS),
             edges: edges.each_ref().map(Vec::as_slice),
@@ -103,7 +92,7 @@ impl Desk {
     fn running(mut self, rpm: f64) -> Self {
         assert_eq!(self.say(Command::Arm), Some(Event::Accepted));
         self.power();
-        for beep in [Beep::Long, Beep::Cells(3), Beep::Ready] {
+        for beep in BEEPS {
             self.run(300);
             self.tick(Some(Command::Beep(beep)));
         }
@@ -227,7 +216,7 @@ fn the_output_changes_while_disarmed_and_never_else() {
     assert_eq!(desk.say(Command::Arm), Some(Event::Accepted));
     assert_eq!(say(&mut desk, EscOutput::Pwm), refused, "while arming");
     desk.power();
-    for beep in [Beep::Long, Beep::Cells(3), Beep::Ready] {
+    for beep in BEEPS {
         desk.say(Command::Beep(beep));
     }
     assert_eq!(desk.rig.state(), RigState::Armed);

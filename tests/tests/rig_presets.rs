@@ -28,41 +28,13 @@ struct Preset {
     columns: &'static [&'static str],
 }
 
+/// Columns of a rig with everything fitted.
+const ALL: [&str; 9] =
+    ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder", "thrust_n", "torque_nm", "current_a", "voltage_v", "temp_c"];
+
 const PRESETS: [Preset; 7] = [
-    Preset {
-        name: "thesis",
-        propeller: "11x4.7",
-        cells: true,
-        rate_hz: 10.0,
-        columns: &[
-            "rpm_beam",
-            "rpm_opto",
-            "rpm_hall",
-            "rpm_encoder",
-            "thrust_n",
-            "torque_nm",
-            "current_a",
-            "voltage_v",
-            "temp_c",
-        ],
-    },
-    Preset {
-        name: "dshot",
-        propeller: "11x4.7",
-        cells: false,
-        rate_hz: 10.0,
-        columns: &[
-            "rpm_beam",
-            "rpm_opto",
-            "rpm_hall",
-            "rpm_encoder",
-            "thrust_n",
-            "torque_nm",
-            "current_a",
-            "voltage_v",
-            "temp_c",
-        ],
-    },
+    Preset { name: "thesis", propeller: "11x4.7", cells: true, rate_hz: 10.0, columns: &ALL },
+    Preset { name: "dshot", propeller: "11x4.7", cells: false, rate_hz: 10.0, columns: &ALL },
     Preset { name: "beam-only", propeller: "11x4.7", cells: true, rate_hz: 10.0, columns: &["rpm_beam"] },
     Preset { name: "load-cell-only", propeller: "11x4.7", cells: true, rate_hz: 100.0, columns: &["thrust_n"] },
     Preset {

@@ -7,21 +7,25 @@
 //! Units: ns since power-up of the board; counts; ns of pulse.
 //! Reference: pin table in `firmware-rig/src/board/mod.rs`, written down here again on purpose.
 
-use super::flash::Caches;
+mod hand;
+mod run;
+
+pub use hand::{Action, Heard, Operator};
+pub use run::{RigRun, rig, rig_from, rig_on};
+
 use super::harm::Harm;
-use super::machine::{EmulatedError, GeneralTimer, Machine, Outcome, Pins, Port, PulseTrain, World, firmware, run};
+use super::machine::{GeneralTimer, Pins, Port, PulseTrain, World};
 use super::pulse::SeenFrame;
 use crate::bench::{Bench, Listens, STEP_NS, Truth};
 use crate::fault::{Mishap, Plan, by_hand};
 use crate::native::PLUGS;
 use crate::scenario::Scenario;
+use crate::sensor::EdgeDetail;
 use crate::sensor::adc::{CODES, REFERENCE_V};
-use crate::sensor::{EdgeDetail, EscWire};
-use frame::message::{Beep, Command, Message};
+use frame::message::{Command, Message};
 use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::units::Ticks;
-use frame::wire::{Decoder, Encoder, LinkStats, MAX_WIRE};
-use std::path::Path;
+use frame::wire::{Decoder, Encoder, MAX_WIRE};
 
 /// Capture channels: pin of port A with AF1, and channel of TIM2.
 const CAPTURE_PINS: [(u8, u8); CAPTURE_CHANNELS] = [(0, 1), (1, 2), (2, 3), (3, 4)];
@@ -59,110 +63,6 @@ const SCREAM_NS: u64 = 200;
 
 /// How long an input of a plan screams, ms: each of its edges costs the emulator time.
 const SCREAM_MS: u64 = 150;
-
-/// What an operator does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Action {
-    /// Sends a command to the board.
-    Send(Command),
-    /// Throws the ESC's power switch.
-    Power(bool),
-    /// Opens the stop loop by its key (true), or closes it again.
-    StopKey(bool),
-    /// Unplugs the stop loop's wire, for good.
-    UnplugStop,
-    /// A stop by key or by command so many nanoseconds before a pulse or a frame starts: the next that is far enough away.
-    StopBeforePulse {
-        /// By key; otherwise a command whose first bit leaves the host at that instant.
-        key: bool,
-        /// Time before the start of the pulse, ns.
-        ns: u64,
-    },
-    /// Presses the board's reset key.
-    Reset,
-    /// The board's supply fails at so many stores to its flash from now, and comes back a little later: a reset.
-    FailAtStore(u32),
-    /// The run of the schedule begins: effects count their time from here.
-    StartRun,
-    /// The crystal stops oscillating.
-    FailCrystal,
-    /// The DMA misses a conversion.
-    OverrunAdc,
-    /// An input of the capture timer (channel 0 to 3) gets an edge in every microsecond, for so many milliseconds.
-    Scream {
-        /// Channel, from 0.
-        channel: u8,
-        /// How long, ms.
-        ms: u64,
-    },
-    /// The core's next look at the stop key's port ends in a bus error.
-    FailAccess,
-    /// Each DShot frame reaches the ESC with one bit turned over (true), or as it is again.
-    GarbleFrames(bool),
-    /// Something goes wrong at the pins, and stays so: as it would on the rig that leaves the factory.
-    Mishap(Mishap),
-    /// The ESC was on and ready before the board.
-    EscReady,
-    /// The rotor turns the other way round, as channel B of the encoder shows it.
-    Backwards(bool),
-    /// Hangs a mass on the load cell, gram; 0 takes it off.
-    Hang(f64),
-    /// Twists the torque arm, N.m; 0 lets it go.
-    Twist(f64),
-    /// Draws a current through the shunt with a load of one's own, A; 0 takes it off.
-    Draw(f64),
-    /// Sets the bench supply, V.
-    Supply(f64),
-    /// Something becomes of the line of the ESC's telemetry.
-    EscWire(EscWire),
-    /// Pulls a plug (capture channels first, then analogue ones, the ESC's telemetry, the back-EMF meter), or puts it back.
-    Plug {
-        /// Which.
-        plug: usize,
-        /// Out.
-        out: bool,
-    },
-}
-
-/// What an operator learns in a millisecond.
-#[allow(clippy::large_enum_variant, reason = "looked at and dropped within the millisecond, never stored in numbers")]
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Heard {
-    /// The board sent a message.
-    Board(Message),
-    /// The ESC beeped.
-    Esc(Beep),
-}
-
-/// Who sits at the host.
-pub trait Operator: Send {
-    /// Called every millisecond; does something by pushing onto `actions`.
-    fn millisecond(&mut self, ms: u64, heard: &[Heard], actions: &mut Vec<Action>);
-
-    /// Called every millisecond with the bytes that the board has sent since; what is pushed onto `say` goes to the board as it is.
-    fn line(&mut self, _heard: &[u8], _say: &mut Vec<u8>) {}
-
-    /// Called every millisecond with what is really there.
-    fn see(&mut self, _truth: &Truth) {}
-
-    /// Called after a millisecond in which the board stored something, with what its settings' sectors hold now.
-    fn stored(&mut self, _sectors: &[u8]) {}
-
-    /// Called every millisecond: a plan whose mishap comes now, and stays.
-    fn strikes(&mut self) -> Option<Plan> {
-        None
-    }
-
-    /// Whether messages and truth are kept for [`RigRun`]: whoever plays for hours has no room for them.
-    fn keeps_record(&self) -> bool {
-        true
-    }
-
-    /// Whether the board is switched off now, before its time.
-    fn is_over(&self) -> bool {
-        false
-    }
-}
 
 /// One pulse seen on the ESC pin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -534,10 +434,11 @@ impl<O: Operator> World for RigWorld<O> {
                 }
                 self.connect(pins);
                 self.pass_on_telemetry(now_ns, pins);
-                self.converse(self.next_ms, pins);
                 if pins.has_failed() {
+                    self.read = pins.heard().len(); // a board without a supply says nothing
                     self.reset(self.next_ms, pins);
                 }
+                self.converse(self.next_ms, pins);
                 let truth = self.bench.truth();
                 self.operator.see(&truth);
                 let (sectors, stores) = pins.settings();
@@ -564,80 +465,4 @@ impl<O: Operator> World for RigWorld<O> {
     fn is_over(&self) -> bool {
         self.operator.is_over()
     }
-}
-
-/// What a rig run leaves behind.
-#[derive(Debug)]
-pub struct RigRun<O> {
-    /// The operator as the run left them.
-    pub operator: O,
-    /// Every decoded message with the board's time of sending.
-    pub messages: Vec<(Ticks, Message)>,
-    /// Counters of the host's decoder.
-    pub link: LinkStats,
-    /// When the reset key was pressed, ns.
-    pub resets: Vec<u64>,
-    /// Every pulse on the ESC pin.
-    pub pulses: Vec<SeenPulse>,
-    /// Everything else that it carried: DShot frames.
-    pub frames: Vec<SeenFrame>,
-    /// When the stops of [`Action::StopBeforePulse`] came, ns.
-    pub stops: Vec<u64>,
-    /// What was really there, every millisecond.
-    pub truth: Vec<(u64, Truth)>,
-    /// Stores to the settings' flash.
-    pub stores: u32,
-    /// Its erases, and the caches in front of it.
-    pub caches: Caches,
-    /// The run itself.
-    pub outcome: Outcome<()>,
-}
-
-/// Runs the rig image for `milliseconds` on the bench of `scenario` with `operator` at the host.
-///
-/// # Errors
-/// [`EmulatedError`] when there is no image or the emulator gives up.
-pub fn rig<O: Operator + 'static>(scenario: &Scenario, operator: O, milliseconds: u64) -> Result<RigRun<O>, EmulatedError> {
-    rig_on(Machine::new()?, scenario, operator, milliseconds)
-}
-
-/// The same on a given machine.
-///
-/// # Errors
-/// As [`rig`].
-pub fn rig_on<O: Operator + 'static>(
-    machine: Machine,
-    scenario: &Scenario,
-    operator: O,
-    milliseconds: u64,
-) -> Result<RigRun<O>, EmulatedError> {
-    rig_from(&firmware("firmware-rig")?, machine, scenario, operator, milliseconds)
-}
-
-/// The same with the image at `elf`.
-///
-/// # Errors
-/// As [`rig`].
-pub fn rig_from<O: Operator + 'static>(
-    elf: &Path,
-    machine: Machine,
-    scenario: &Scenario,
-    operator: O,
-    milliseconds: u64,
-) -> Result<RigRun<O>, EmulatedError> {
-    let (outcome, machine) = run(elf, machine, RigWorld::new(scenario, operator), milliseconds * MS)?;
-    let Outcome { world, telemetry, now_ns, instructions, accesses } = outcome;
-    Ok(RigRun {
-        operator: world.operator,
-        messages: world.messages,
-        link: world.decoder.stats(),
-        resets: world.resets,
-        pulses: world.pulses,
-        frames: world.frames,
-        stops: world.stops,
-        truth: world.truth,
-        stores: machine.mcu.flash.stores,
-        caches: machine.mcu.flash.caches,
-        outcome: Outcome { world: (), telemetry, now_ns, instructions, accesses },
-    })
 }
