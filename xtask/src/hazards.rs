@@ -11,7 +11,8 @@
 //! Reference: specification `rig.md`, "On a real bench".
 
 use crate::emulator;
-use crate::place::{BOARD, Place};
+use crate::image::images;
+use crate::place::Place;
 use crate::run::{Failure, cargo};
 use crate::setup;
 use std::fmt::Write as _;
@@ -209,13 +210,6 @@ fn broken(copy: &Place, mend: &Mend) -> Result<Result<(), String>, Failure> {
     let noticed = !passed && output.contains(&mend.test.says());
     let end: Vec<&str> = output.lines().rev().take(30).collect();
     Ok(if noticed { Ok(()) } else { Err(end.into_iter().rev().collect::<Vec<_>>().join("\n")) })
-}
-
-/// The build of the images in the copy, whatever their size.
-fn images(copy: &Place) -> Command {
-    let mut command = cargo(copy, &["build", "--config", ".cargo/image.toml", "--release", "--target", BOARD]);
-    command.args(["-p", "firmware-rig", "-p", "firmware-ahrs", "--target-dir", "target/fw"]);
-    command
 }
 
 /// Whether a command succeeds, and all that it says.

@@ -16,6 +16,7 @@ use object::elf::SHF_ALLOC;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind};
 use std::fmt::Write;
 use std::path::Path;
+use std::process::Command;
 
 /// The packages whose binaries are flash images.
 pub(crate) const PACKAGES: [&str; 2] = ["firmware-rig", "firmware-ahrs"];
@@ -103,11 +104,16 @@ fn filters(place: &Place) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The build command of both images.
+/// Builds both images.
 pub(crate) fn build(place: &Place) -> Result<(), Failure> {
+    run(&mut images(place))
+}
+
+/// The build command of both images: never in pieces, which come out larger than what is flashed.
+pub(crate) fn images(place: &Place) -> Command {
     let mut command = cargo(place, &["build", "--config", ".cargo/image.toml", "--release", "--target", BOARD]);
-    command.args(PACKAGES.iter().flat_map(|p| ["-p", p])).arg("--target-dir").arg("target/fw");
-    run(&mut command)
+    command.args(PACKAGES.iter().flat_map(|p| ["-p", p])).args(["--target-dir", "target/fw"]).env("CARGO_INCREMENTAL", "0");
+    command
 }
 
 pub(crate) fn measure(path: &Path) -> Result<Size, Failure> {

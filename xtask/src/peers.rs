@@ -35,6 +35,7 @@ pub(crate) fn peers(place: &Place) -> Result<(), Failure> {
     let own = over_empty(place, &place.images(), "cost-empty", &ours.map(|(name, ..)| name))?;
     let target = place.root.join("target/peers");
     let mut build = cargo(place, &["build", "--release", "--locked", "--target", BOARD, "--target-dir"]);
+    build.env("CARGO_INCREMENTAL", "0");
     run(build.arg(&target).current_dir(place.root.join("firmware-ahrs/peers")))?;
     let others = over_empty(place, &target.join(BOARD).join("release"), "empty", &PEERS.map(|(name, _)| name))?;
     println!("{:<26} {:>12} {:>8} {:>8}", "filter", "instructions", "flash", "RAM");
