@@ -14,6 +14,7 @@ mod sheet;
 mod shift;
 mod style;
 mod svg;
+pub(crate) mod told;
 
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
 pub use figure::{Figure, Layer, Mark};
@@ -23,6 +24,7 @@ pub use selection::selection;
 pub use sheet::{Sheet, write_figures};
 pub use shift::{filter_figures, study_figures};
 pub use svg::{Chart, Series};
+pub use told::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal};
 
 /// A number with five significant digits, as tables print it.
 #[must_use]
