@@ -46,9 +46,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             println!("{line}");
         }
     };
-    say(format!(
-        "seed {seed}: a 570 KV motor with an 11x4.7 propeller, and one effect hidden in the rig (repeat with --seed {seed})"
-    ));
+    say(format!("seed {seed}: a 570 KV motor with an 11x4.7 propeller; one effect is hidden (repeat with --seed {seed})"));
     let log = fly(&scenario, None, "run.csv", "flying", quiet)?;
     std::fs::create_dir_all(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
     let path = args.output.join("run.csv");

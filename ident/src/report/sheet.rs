@@ -38,7 +38,14 @@ impl Sheet {
 
     /// An empty page that begins with a sentence.
     pub(crate) fn told(title: &str, sentence: &str) -> Self {
-        Self { title: title.to_owned(), body: format!("<h1>{}</h1>\n", escape(sentence)), told: true, ..Self::default() }
+        // what was found stands large, how much that is and what is left beneath
+        let (found, rest) = sentence.split_once(". ").map_or((sentence, ""), |(found, rest)| (found, rest));
+        let dot = if rest.is_empty() { "" } else { "." };
+        let mut body = format!("<h1>{}{dot}</h1>\n", escape(found));
+        if !rest.is_empty() {
+            body += &format!("<p class=\"lead\">{}</p>\n", escape(rest));
+        }
+        Self { title: title.to_owned(), body, told: true, ..Self::default() }
     }
 
     /// A line in the second rank.

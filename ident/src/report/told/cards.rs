@@ -79,7 +79,9 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(scope(e.scope))));
     sheet.html_part(&html);
     let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
+    sheet.html_part("<div class=\"split\">\n");
     sheet.figures(figures);
+    sheet.html_part("<div>\n");
     parameters(sheet, e);
     let mut html =
         format!("<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n", escape(&e.equation), escape(&upper(&e.evidence)));
@@ -87,7 +89,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     if let Some(how) = settle(v, e) {
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
     }
-    sheet.html_part(&format!("{html}</article>\n"));
+    sheet.html_part(&format!("{html}</div></div></article>\n"));
 }
 
 fn equals(text: &str) -> String {

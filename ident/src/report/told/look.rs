@@ -7,7 +7,7 @@
 
 /// The style sheet.
 pub(crate) const LOOK: &str = "
-.told h1{font-size:1.5rem;font-weight:650;max-width:60rem;margin:.6rem 0}
+.told h1{font-size:1.55rem;font-weight:650;max-width:64rem;margin:.6rem 0 .4rem}.told .lead{font-size:1.08rem;max-width:60rem}
 .told h3{font-size:1.05rem;margin:0 0 .3rem}.told p{margin:.4rem 0}
 .told h2 a,.told h3 a{color:inherit;text-decoration:none}.told h2 a:hover::after{content:' #';color:var(--soft)}
 .told a{color:var(--a)}
@@ -21,11 +21,12 @@ b.after.after{background:var(--a);border-color:var(--a)}.key b{position:static;d
 .state .why{grid-column:2/-1;color:var(--soft)}.state code{color:var(--soft);font-size:.75rem}
 .card{border:1px solid var(--grid);border-left:6px solid var(--a);border-radius:4px;background:var(--card);padding:.8rem 1rem;margin:.8rem 0}.card.likely{border-left-style:double}.card.unsure{border-left-style:dashed;border-left-color:var(--b)}
 .chip{border:1.5px solid var(--a);border-radius:1rem;padding:.05rem .6rem;font-size:.85rem;white-space:nowrap}.chip.unsure{border-style:dashed;border-color:var(--b)}.nr{display:inline-block;min-width:1.5rem;text-align:center;border:1px solid var(--soft);border-radius:50%;font-size:.85rem}
-.card code{overflow-wrap:anywhere;white-space:normal}.card .figs{margin:.6rem 0}
+.split{display:grid;grid-template-columns:minmax(0,33rem) minmax(0,1fr);gap:0 1.4rem;align-items:start}.split>div:only-child{grid-column:1/-1}.split .figs{grid-template-columns:1fr;margin:.4rem 0}.card code{overflow-wrap:anywhere;white-space:normal}.card .figs{margin:.6rem 0}
 .told .fig .b.dots{stroke-linecap:square;stroke-width:2.8}.told .fig path.b:not(.dots):not(.band){opacity:.75}
 .tab{margin:.5rem 0 1rem}.tools{font-size:.85rem;margin:.1rem 0}.tools a,.tools button{margin-right:.8rem}.tools button{font:inherit;color:var(--a);background:none;border:0;padding:0;text-decoration:underline;cursor:pointer}
 .told details{border-top:1px solid var(--grid);padding:.5rem 0}.told summary{cursor:pointer;font-weight:600}.told td{overflow-wrap:anywhere}
-@media(max-width:700px){.told h1{font-size:1.2rem}.state .head{display:block}.state .head span{display:none}.state .head .axis{display:block}.state .row{grid-template-columns:repeat(4,auto);gap:.15rem .6rem}.state .name,.state .track,.state .why{grid-column:1/-1}.state .num{text-align:left;white-space:normal}.state .num::before{content:attr(data-of) ' ';color:var(--soft);display:block;font-size:.8rem}.card{padding:.6rem .6rem}.tools a,.tools button{display:inline-block;padding:.5rem 0}.told td{min-width:3.4rem}}
+@media(max-width:960px){.split{grid-template-columns:minmax(0,1fr)}}
+@media(max-width:700px){.card th,.card td{padding:.2rem .3rem}.told h1{font-size:1.2rem}.state .head{display:block}.state .head span{display:none}.state .head .axis{display:block}.state .row{grid-template-columns:repeat(4,auto);gap:.15rem .6rem}.state .name,.state .track,.state .why{grid-column:1/-1}.state .num{text-align:left;white-space:normal}.state .num::before{content:attr(data-of) ' ';color:var(--soft);display:block;font-size:.8rem}.card{padding:.6rem .6rem}.tools a,.tools button{display:inline-block;padding:.5rem 0}.told td{min-width:3.4rem}}
 @media print{.tools,.told summary::marker{display:none}.card,.state .row{break-inside:avoid}.told details:not([open]){display:none}}
 ";
 

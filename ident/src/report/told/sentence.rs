@@ -17,6 +17,8 @@ const WAYS: usize = 3;
 const CLOSE: f64 = 0.5;
 /// Shares that lie within so much of each other are told as one.
 const ALIKE: f64 = 0.1;
+/// Share from which on all is explained but the noise.
+const ALL: f64 = 0.995;
 /// Noise floors up to which what is left is not worth a word.
 const QUIET: f64 = 1.5;
 
@@ -50,7 +52,10 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         out += " Every rig has that; nothing of this rig's own was named.";
     }
     if !more.is_empty() {
-        out += &format!(" {} smaller {} below.", more.len(), if more.len() == 1 { "cause is" } else { "causes are" });
+        out += &match more.len() {
+            1 => " A smaller cause is told below.".to_owned(),
+            n => format!(" {n} smaller causes are told below."),
+        };
     }
     [out, explained(verdict, told), left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
 }
@@ -203,7 +208,7 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
         (false, 1) => "That explains",
         (false, _) => "Together they explain",
     };
-    let per_cent = |share: f64| format!("{:.0} %", (100.0 * share).min(if share < 1.0 { 99.0 } else { 100.0 }));
+    let per_cent = |share: f64| if share >= ALL { "all".to_owned() } else { format!("{:.0} %", 100.0 * share) };
     let names: Vec<String> = shares.iter().map(|s| channel(s.0)).collect();
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;

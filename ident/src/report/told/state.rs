@@ -43,9 +43,10 @@ pub(super) fn figures(unit: &str, floor: f64, before: f64, after: f64) -> [Strin
 }
 
 /// What is said of a channel in a word.
-pub(super) fn word(floors: f64, left: bool) -> &'static str {
-    match floors {
+pub(super) fn word([before, after]: [f64; 2], left: bool) -> &'static str {
+    match after {
         f if !f.is_finite() => "not known",
+        f if f <= EXPLAINED && before <= EXPLAINED && !left => "only noise",
         f if f <= EXPLAINED && !left => "explained",
         f if f <= 3.0 => "little left",
         _ => "unexplained rest",
@@ -92,7 +93,7 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
             out,
             "</span><span class=\"num\" role=\"cell\" data-of=\"before\">{before}</span><span class=\"num\" role=\"cell\" data-of=\"after\">{after}</span><span class=\"num\" role=\"cell\" data-of=\"factor\">{}</span><span class=\"word\" role=\"cell\">{}</span></div>",
             factor(c.before.heldout_rms, c.after.heldout_rms),
-            word(floors[1], left),
+            word(floors, left),
         );
     }
     for (name, reason) in &channels.not_predicted {

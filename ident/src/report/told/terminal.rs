@@ -64,7 +64,7 @@ fn channels(verdict: &Verdict) -> String {
         format!("\n{:<16}{:>16}{:>16}{:>16}{:>9}  {}\n", "held-out error", "noise floor", "before", "after", "factor", "state");
     for (name, c) in &verdict.channels {
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
-        let floors = c.after.heldout_rms / c.noise_floor_rms;
+        let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
         let left = verdict.unexplained.iter().any(|u| u.channel == *name);
         let times = factor(c.before.heldout_rms, c.after.heldout_rms);
         out += &format!("{name:<16}{floor:>16}{before:>16}{after:>16}{times:>9}  {}\n", word(floors, left));
