@@ -163,6 +163,9 @@ pub fn channel(name: &str) -> String {
         "t_s" => "time",
         "charge" => "charge drawn",
         "time_since_step" => "time since the last step",
+        "rpm_rate" => "change of speed",
+        "heat" => "heat",
+        "direction" => "direction of the load",
         other => other,
     };
     said.to_owned()
@@ -210,7 +213,7 @@ pub fn scaled(value: f64, unit: &str) -> (f64, &str) {
 #[must_use]
 pub fn sized(p: &Parameter) -> Option<String> {
     let half = 0.5 * (p.ci95[1] - p.ci95[0]).abs();
-    if !p.value.is_finite() || !half.is_finite() || half > 0.5 * p.value.abs() {
+    if p.value == 0.0 || !p.value.is_finite() || !half.is_finite() || half > 0.5 * p.value.abs() {
         return None;
     }
     let (factor, unit) = scaled(p.value, &p.unit);

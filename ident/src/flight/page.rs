@@ -54,6 +54,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
             .map(|figure| figure.into_iter().collect())
             .collect(),
         left: v.unexplained.iter().filter_map(|u| of(&u.channel)).map(|t| over_time(t, "left", PAIR)).collect(),
+        speeds: Vec::new(),
     };
     let mut sheet = told::begin(&page);
     sheet.fold("Every channel in figures", |sheet| sheet.figures(figures(closed).into_iter().map(told::thinned).collect()));

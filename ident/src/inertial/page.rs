@@ -56,6 +56,7 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
             .map(|figure| figure.into_iter().collect())
             .collect(),
         left: v.unexplained.iter().filter_map(|u| of(&u.channel)).map(|t| over_time(t, "left", PAIR)).collect(),
+        speeds: Vec::new(),
     };
     let mut sheet = told::begin(&page);
     sheet.fold("Every channel in figures", |sheet| {

@@ -37,10 +37,10 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         hero: hero(closed),
         cards: cards(closed),
         left: left(closed),
+        speeds: speeds(log, closed),
     };
     let mut sheet = told::begin(&page);
     sheet.fold("Every channel in figures", |sheet| sheet.figures(every_channel(closed)));
-    speeds(&mut sheet, log, closed);
     identified(&mut sheet, log);
     told::candidates(&mut sheet, &closed.diagnosis);
     told::aside(&mut sheet, v);
@@ -166,7 +166,10 @@ fn left(closed: &Closed) -> Vec<Figure> {
             None => over_time(&trace, "left", PAIR),
         })
     };
-    closed.verdict.unexplained.iter().filter_map(figure).collect()
+    // several speed sensors have a figure together
+    let several = SPEED.iter().filter(|c| target(closed, c).is_some()).count() > 1;
+    let own = |u: &&crate::verdict::Unexplained| !(several && SPEED.contains(&u.channel.as_str()));
+    closed.verdict.unexplained.iter().filter(own).filter_map(figure).collect()
 }
 
 /// Residual, and measured beside predicted, of every channel.
@@ -196,26 +199,32 @@ fn every_channel(closed: &Closed) -> Vec<Figure> {
     out
 }
 
-/// All speed channels in one figure, and what each reads beyond the others beneath.
-fn speeds(sheet: &mut Sheet, log: &Log, closed: &Closed) {
-    let Some(together) = run::overlaid(log) else { return };
-    let names = SPEED.iter().filter(|c| log.column(c).is_some());
-    let contrast = |(channel, class): (&&str, &'static str)| {
-        let target = target(closed, &format!("{channel} - others"))?;
-        let trace = trace(closed, target)?;
-        let (x, y) = (trace.t, trace.after);
-        Some(Layer::Dots { name: crate::words::channel(channel), class, x, y })
-    };
-    let layers: Vec<Layer> = names.zip(run::CLASSES).filter_map(contrast).collect();
-    let contrasts = Figure {
-        id: "speed-contrasts".into(),
-        title: "What each speed sensor reads beyond the others".into(),
-        x_label: time_label(&closed.context),
-        y_label: "rev/min".into(),
-        layers,
-        ..Figure::default()
-    };
-    sheet.fold("Speed sensors together", |sheet| sheet.figures(vec![thinned(together), thinned(contrasts)]));
+/// All speed channels in one figure, what is left of them in a second, and what each reads beyond the others beneath; none where there is
+/// one sensor.
+fn speeds(log: &Log, closed: &Closed) -> Vec<Figure> {
+    let Some(together) = run::overlaid(log) else { return Vec::new() };
+    let mut figures = vec![thinned(together)];
+    for (id, title, of_contrast) in [
+        ("speeds-left", "Speed left over after, every sensor", false),
+        ("speed-contrasts", "What each speed sensor reads beyond the others", true),
+    ] {
+        let layer = |(name, class): (&str, &'static str)| {
+            let asked = if of_contrast { format!("{name} - others") } else { name.to_owned() };
+            let trace = trace(closed, target(closed, &asked)?)?;
+            let (name, x, y) = (channel(name), trace.t, trace.after);
+            Some(if of_contrast { Layer::Dots { name, class, x, y } } else { Layer::Line { name, class, x, y } })
+        };
+        let present = SPEED.into_iter().filter(|c| log.column(c).is_some());
+        figures.push(thinned(Figure {
+            id: id.into(),
+            title: title.into(),
+            x_label: time_label(&closed.context),
+            y_label: "rev/min".into(),
+            layers: present.zip(run::CLASSES).filter_map(layer).collect(),
+            ..Figure::default()
+        }));
+    }
+    figures
 }
 
 /// Plateaus, fits and constants, as `identify` has them.
@@ -223,7 +232,7 @@ fn identified(sheet: &mut Sheet, log: &Log) {
     let Ok(found) = identify(log) else { return };
     sheet.fold("Plateaus, fits and constants", |sheet| {
         run::constants(sheet, &found);
-        sheet.figures(found.curves.iter().map(run::relation).collect());
+        sheet.figures(found.curves.iter().map(run::relation).map(thinned).collect());
         run::coefficients(sheet, &found);
         run::plateaus(sheet, log, &found);
     });

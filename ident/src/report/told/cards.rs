@@ -32,7 +32,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     for (k, (heading, lead)) in [
         ("What this rig has", ""),
         ("What every rig has", "A rotor has inertia and takes time: no rig is without these."),
-        ("Corrected without a name", "A smooth function that predicts rows it has not seen. It names no cause."),
+        ("Without a name", "What no known effect explains. Where a smooth function predicts rows it has not seen, it corrects the model; it names no cause."),
     ]
     .into_iter()
     .enumerate()

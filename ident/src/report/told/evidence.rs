@@ -6,7 +6,7 @@
 //! Reference: component-plus-residual plots: Larsen & McCleary 1972, Technometrics 14:781.
 
 use crate::noise::median;
-use crate::report::figure::{Figure, Layer};
+use crate::report::figure::{Figure, Layer, Mark};
 use crate::verdict::{Kind, Verdict};
 use crate::words::{channel, upper};
 
@@ -14,6 +14,8 @@ use crate::words::{channel, upper};
 const COLUMNS: usize = 440;
 /// Most dots of a cloud.
 const DOTS: usize = 1600;
+/// Most read-outs of a layer.
+const READ_OUTS: usize = 120;
 /// Parts of a run of which the most telling one is enlarged.
 const PARTS: f64 = 12.0;
 /// Usual steps from which on a gap lifts the pen.
@@ -170,6 +172,7 @@ pub(crate) fn thinned(mut figure: Figure) -> Figure {
         match layer {
             Layer::Line { x, y, .. } => (*x, *y) = line(x, y),
             Layer::Dots { x, y, .. } => (*x, *y) = cloud(x, y),
+            Layer::Marks { marks, .. } => *marks = apart(marks),
             _ => {}
         }
     }
@@ -206,11 +209,29 @@ fn line(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (out_x, out_y)
 }
 
+/// Read-outs that lie apart, of which there are no more than a finger can find.
+fn apart(marks: &[Mark]) -> Vec<Mark> {
+    if marks.len() <= READ_OUTS {
+        return marks.to_vec();
+    }
+    let (x, y): (Vec<f64>, Vec<f64>) = marks.iter().map(|m| (m.x, m.y)).unzip();
+    let (x, y) = cells(&x, &y, READ_OUTS);
+    let kept = |m: &&Mark| x.iter().zip(&y).any(|(x, y)| *x == m.x && *y == m.y);
+    let mut out: Vec<Mark> = marks.iter().filter(kept).cloned().collect();
+    out.dedup_by(|a, b| a.x == b.x && a.y == b.y);
+    out.truncate(2 * READ_OUTS);
+    out
+}
+
 /// A cloud with one dot in every cell, of cells as small as the number of dots allows: what lies apart stays.
 fn cloud(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    cells(x, y, DOTS)
+}
+
+fn cells(x: &[f64], y: &[f64], most: usize) -> (Vec<f64>, Vec<f64>) {
     let points: Vec<(f64, f64)> =
         x.iter().copied().zip(y.iter().copied()).filter(|p| p.0.is_finite() && p.1.is_finite()).collect();
-    if points.len() <= DOTS {
+    if points.len() <= most {
         return points.into_iter().unzip();
     }
     let ends = |of: fn(&(f64, f64)) -> f64| {
@@ -223,7 +244,7 @@ fn cloud(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut seen = std::collections::BTreeSet::new();
         let kept: Vec<(f64, f64)> =
             points.iter().copied().filter(|p| seen.insert((at(p.0, x0, x1, cells), at(p.1, y0, y1, cells / 2.0)))).collect();
-        if kept.len() <= DOTS || cells < 12.0 {
+        if kept.len() <= most || cells < 6.0 {
             return kept.into_iter().unzip();
         }
         cells /= 1.25;

@@ -21,7 +21,7 @@ b.after.after{background:var(--a);border-color:var(--a)}.key b{position:static;d
 .state .why{grid-column:2/-1;color:var(--soft)}.state code{color:var(--soft);font-size:.75rem}
 .card{border:1px solid var(--grid);border-left:6px solid var(--a);border-radius:4px;background:var(--card);padding:.8rem 1rem;margin:.8rem 0}.card.likely{border-left-style:double}.card.unsure{border-left-style:dashed;border-left-color:var(--b)}
 .chip{border:1.5px solid var(--a);border-radius:1rem;padding:.05rem .6rem;font-size:.85rem;white-space:nowrap}.chip.unsure{border-style:dashed;border-color:var(--b)}.nr{display:inline-block;min-width:1.5rem;text-align:center;border:1px solid var(--soft);border-radius:50%;font-size:.85rem}
-.split{display:grid;grid-template-columns:minmax(0,33rem) minmax(0,1fr);gap:0 1.4rem;align-items:start}.split>div:only-child{grid-column:1/-1}.split .figs{grid-template-columns:1fr;margin:.4rem 0}.card code{overflow-wrap:anywhere;white-space:normal}.card .figs{margin:.6rem 0}
+.split{display:grid;grid-template-columns:minmax(0,33rem) minmax(0,1fr);gap:0 1.4rem;align-items:start}.split>div:only-child{grid-column:1/-1}.split .figs{grid-template-columns:1fr;margin:.4rem 0}.card p{max-width:none}.card code{overflow-wrap:anywhere;white-space:normal}.card .figs{margin:.6rem 0}
 .told .fig .b.dots{stroke-linecap:square;stroke-width:2.8}.told .fig path.b:not(.dots):not(.band){opacity:.75}
 .tab{margin:.5rem 0 1rem}.tools{font-size:.85rem;margin:.1rem 0}.tools a,.tools button{margin-right:.8rem}.tools button{font:inherit;color:var(--a);background:none;border:0;padding:0;text-decoration:underline;cursor:pointer}
 .told details{border-top:1px solid var(--grid);padding:.5rem 0}.told summary{cursor:pointer;font-weight:600}.told td{overflow-wrap:anywhere}

@@ -31,6 +31,8 @@ pub(crate) struct Page<'p> {
     pub(crate) cards: Vec<Vec<Figure>>,
     /// Figures of what is left.
     pub(crate) left: Vec<Figure>,
+    /// Figures of several speed sensors together, and their contrasts.
+    pub(crate) speeds: Vec<Figure>,
 }
 
 /// The page up to where the folds begin.
@@ -49,6 +51,10 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     cards::cards(&mut sheet, page);
     left::left(&mut sheet, page);
     left::settle(&mut sheet, page);
+    if !page.speeds.is_empty() {
+        sheet.section("Speed sensors");
+        sheet.figures(page.speeds.clone());
+    }
     runs(&mut sheet, v);
     provenance(&mut sheet, &page.origin, v, page.words);
     sheet.section("More");

@@ -7,10 +7,12 @@
 
 use super::vocabulary::Vocabulary;
 use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
-use crate::words::{Clause, adverb, amount, channel, list, upper};
+use crate::words::{adverb, amount, channel, list, upper};
 
 /// Most effects that the sentence names; the cards have all.
 const MOST: usize = 3;
+/// Share of its channel's error below which an effect is a smaller cause.
+const SMALL: f64 = 0.02;
 /// Most ways in which an open question is put.
 const WAYS: usize = 3;
 /// Share of the first alternative's probability from which on a further one is put beside it.
@@ -45,19 +47,25 @@ fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&Effec
 fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let (own, common) = named(verdict, words);
     let all = if own.is_empty() { &common } else { &own };
-    let (told, more) = all.split_at(all.len().min(MOST));
+    // what takes next to nothing stands on its card alone, unless there is nothing else
+    let large = |e: &&&EffectEntry| e.heldout_error_reduction >= SMALL || all.len() == 1;
+    let mut told: Vec<&EffectEntry> = all.iter().filter(large).take(MOST).copied().collect();
+    if told.is_empty() {
+        told = all.iter().take(1).copied().collect();
+    }
+    let more = all.len() - told.len();
     let clauses: Vec<String> = told.iter().map(|e| (words.clause)(e).with(adverb(e.probability))).collect();
     let mut out = format!("{}{}.", since(news), joined(&clauses));
     if own.is_empty() {
         out += " Every rig has that; nothing of this rig's own was named.";
     }
-    if !more.is_empty() {
-        out += &match more.len() {
+    if more > 0 {
+        out += &match more {
             1 => " A smaller cause is told below.".to_owned(),
             n => format!(" {n} smaller causes are told below."),
         };
     }
-    [out, explained(verdict, told), left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+    [out, explained(verdict, &told), left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
@@ -69,23 +77,27 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     // what the first alternative does without is what the question is about
     let disputed: Vec<&EffectEntry> = first.map_or(best.clone(), |a| without(&best, &a.ids));
     let mut ways = vec![disputed.iter().map(|e| (words.clause)(e).with("")).collect::<Vec<_>>()];
-    for other in close {
-        let instead: Vec<String> = instead(&best, &other.ids)
-            .iter()
-            .map(|id| words.of_another(id, disputed.first().copied()))
-            .map(|c: Clause| c.with(""))
-            .collect();
+    // a hypothesis that differs elsewhere is another question
+    let same = |ids: &[String]| without(&best, ids).iter().map(|e| &e.id).eq(disputed.iter().map(|e| &e.id));
+    for other in close.filter(|a| same(&a.ids)) {
+        let clause = |id: &String| words.of_another(id, disputed.first().copied()).with("");
+        let instead: Vec<String> = instead(&best, &other.ids).iter().map(clause).collect();
         if !ways.contains(&instead) {
             ways.push(instead);
         }
     }
     ways.retain(|w| !w.is_empty());
+    let doubt = if verdict.next_experiment.is_some() {
+        "this run cannot tell, the run proposed below can"
+    } else {
+        "this run cannot tell"
+    };
     let question = match ways.as_slice() {
         [] => "The causes named below are not sure on this run".to_owned(),
-        [one] => format!("Perhaps {}; this run cannot tell", list(one)),
+        [one] => format!("Perhaps {}: {doubt}", list(one)),
         [first, rest @ ..] => {
             let rest: Vec<String> = rest.iter().map(|w| format!("or {}", list(w))).collect();
-            format!("Either {}, {}: this run cannot tell which", list(first), rest.join(", "))
+            format!("Either {}, {}: {doubt}", list(first), rest.join(", "))
         }
     };
     let sure: Vec<String> = own
@@ -98,9 +110,6 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let mut out = format!("{}{question}.", since(news));
     if !sure.is_empty() {
         out += &format!(" Beside that {}.", joined_lower(&sure));
-    }
-    if verdict.next_experiment.is_some() {
-        out += " The run proposed below would.";
     }
     let left = left(verdict);
     if left.is_empty() { out } else { format!("{out} {left}") }
@@ -119,7 +128,7 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
         corrections.iter().filter(|e| e.heldout_error_reduction > 0.0).flat_map(|e| &e.depends_on).map(|v| channel(v)).collect();
     goes.dedup();
     if goes.is_empty() {
-        out += " Nothing that was tried predicts it.";
+        out += " Nothing that was tried predicts it, so nothing was corrected.";
     } else {
         out += &format!(" It goes with {}; a correction without a name was fitted.", list(&goes));
     }

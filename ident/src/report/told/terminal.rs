@@ -27,8 +27,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     let (named, nameless): (Vec<&EffectEntry>, Vec<&EffectEntry>) = verdict.effects.iter().partition(|e| e.id != "unknown");
     let (own, common): (Vec<&EffectEntry>, Vec<&EffectEntry>) = named.into_iter().partition(|e| !(words.of_every_rig)(&e.id));
-    for (heading, members) in [("what this rig has", own), ("what every rig has", common), ("corrected without a name", nameless)]
-    {
+    for (heading, members) in [("what this rig has", own), ("what every rig has", common), ("without a name", nameless)] {
         if !members.is_empty() {
             out += &format!("\n{heading}\n");
             members.iter().for_each(|e| out += &effect(verdict, words, e));
