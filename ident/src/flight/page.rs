@@ -9,14 +9,14 @@
 use super::close::Closed;
 use super::windows::LENGTH_S;
 use crate::effects::airframe;
-use crate::report::told::{self, Page, Trace, enlarged, over_time};
+use crate::report::closed::{self as parts, Page, Trace, enlarged, over_time};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::words::Clause;
 
 /// The words of the flight's library.
 pub const VOCABULARY: Vocabulary = Vocabulary {
     about: airframe::about,
-    clause: |found| airframe::about(&found.id).map_or_else(|| told::bare(found), |a| Clause::titled(a.title, found)),
+    clause: |found| airframe::about(&found.id).map_or_else(|| parts::bare(found), |a| Clause::titled(a.title, found)),
     of_every_rig: |id| id == "spinup_lag",
 };
 
@@ -42,7 +42,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         declared: format!(
             "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged."
         ),
-        hero: told::most(v, &traces),
+        hero: parts::most(v, &traces),
         cards: v
             .effects
             .iter()
@@ -56,8 +56,8 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         left: v.unexplained.iter().filter_map(|u| of(&u.channel)).map(|t| over_time(t, "left", PAIR)).collect(),
         speeds: Vec::new(),
     };
-    let mut sheet = told::begin(&page);
-    sheet.fold("Every channel in figures", |sheet| sheet.figures(figures(closed).into_iter().map(told::thinned).collect()));
+    let mut sheet = parts::begin(&page);
+    sheet.fold("Every channel in figures", |sheet| sheet.figures(figures(closed).into_iter().map(parts::thinned).collect()));
     sheet.fold("What this flight can show", |sheet| {
         sheet.say("For each cause: the share of its signal that nothing in the declared model can stand for, and the signal over noise that it would have at its usual size. Where these are not enough it is not named, whatever the residual.");
         let shown: Vec<Vec<String>> = closed
@@ -70,7 +70,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
             .collect();
         sheet.data("causes", &["cause", "share of its own", "signal over noise", "can be named"], &shown, None);
     });
-    told::aside(&mut sheet, v);
+    parts::aside(&mut sheet, v);
     sheet.html()
 }
 

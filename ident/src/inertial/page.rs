@@ -8,7 +8,7 @@
 use super::Recording;
 use super::account::{Closed, Sensor};
 use crate::effects::airframe;
-use crate::report::told::{self, Page, Trace, enlarged, over_time};
+use crate::report::closed::{self as parts, Page, Trace, enlarged, over_time};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;
 use crate::words::{Clause, list};
@@ -24,7 +24,7 @@ fn clause(found: &EffectEntry) -> Clause {
         "stationary_magnet" => "a magnet that stands beside the board disturbs the field".to_owned(),
         "vibration" => format!("vibration is in {on}"),
         "linear_acceleration" => "the unit itself is accelerated".to_owned(),
-        id => return airframe::about(id).map_or_else(|| told::bare(found), |a| Clause::titled(a.title, found)),
+        id => return airframe::about(id).map_or_else(|| parts::bare(found), |a| Clause::titled(a.title, found)),
     };
     Clause::new("", does)
 }
@@ -44,7 +44,7 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         news: false,
         origin,
         declared: "Declared: a field that is constant in earth axes, gravity and a constant offset, a constant offset of the gyro at rest. The attitude comes from gyro and accelerometer alone.".to_owned(),
-        hero: told::most(v, &traces),
+        hero: parts::most(v, &traces),
         cards: v
             .effects
             .iter()
@@ -58,14 +58,14 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         left: v.unexplained.iter().filter_map(|u| of(&u.channel)).map(|t| over_time(t, "left", PAIR)).collect(),
         speeds: Vec::new(),
     };
-    let mut sheet = told::begin(&page);
+    let mut sheet = parts::begin(&page);
     sheet.fold("Every channel in figures", |sheet| {
         for s in &closed.sensors {
-            sheet.figures((0..3).map(|k| told::thinned(figure(recording, s, k))).collect());
+            sheet.figures((0..3).map(|k| parts::thinned(figure(recording, s, k))).collect());
         }
     });
-    sheet.fold("The run", |sheet| sheet.figures(closed.sensors.iter().map(|s| told::thinned(overview(recording, s))).collect()));
-    told::aside(&mut sheet, v);
+    sheet.fold("The run", |sheet| sheet.figures(closed.sensors.iter().map(|s| parts::thinned(overview(recording, s))).collect()));
+    parts::aside(&mut sheet, v);
     sheet.html()
 }
 

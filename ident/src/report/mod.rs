@@ -6,6 +6,7 @@
 //! Reference: specification `identification.md`, item 5.
 
 mod beam;
+pub(crate) mod closed;
 mod figure;
 mod page;
 mod run;
@@ -14,9 +15,9 @@ mod sheet;
 mod shift;
 mod style;
 mod svg;
-pub(crate) mod told;
 
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
+pub use closed::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal};
 pub use figure::{Figure, Layer, Mark};
 pub use page::closed_loop;
 pub use run::run;
@@ -24,7 +25,6 @@ pub use selection::selection;
 pub use sheet::{Sheet, write_figures};
 pub use shift::{filter_figures, study_figures};
 pub use svg::{Chart, Series};
-pub use told::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal};
 
 /// A number with five significant digits, as tables print it.
 #[must_use]

@@ -6,10 +6,10 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
+use super::closed::{self as parts, Origin, Page, Trace, Vocabulary, against, enlarged, over_time, thinned};
 use super::figure::{Figure, Layer};
 use super::run;
 use super::sheet::Sheet;
-use super::told::{self, Origin, Page, Trace, Vocabulary, against, enlarged, over_time, thinned};
 use crate::close::Closed;
 use crate::context::{Context, DIFFERENCES, Target, unit_of};
 use crate::effects::unknown::variable;
@@ -39,11 +39,11 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         left: left(closed),
         speeds: speeds(log, closed),
     };
-    let mut sheet = told::begin(&page);
+    let mut sheet = parts::begin(&page);
     sheet.fold("Every channel in figures", |sheet| sheet.figures(every_channel(closed)));
     identified(&mut sheet, log);
-    told::candidates(&mut sheet, &closed.diagnosis);
-    told::aside(&mut sheet, v);
+    parts::candidates(&mut sheet, &closed.diagnosis);
+    parts::aside(&mut sheet, v);
     sheet.html()
 }
 
@@ -100,7 +100,7 @@ fn hero(closed: &Closed) -> Vec<Figure> {
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> =
         targets.filter(|t| named.is_empty() || named.contains(&t.name)).filter_map(|t| trace(closed, t)).collect();
-    told::most(&closed.verdict, &traces)
+    parts::most(&closed.verdict, &traces)
 }
 
 /// Figures of each effect: what its first channel leaves over without it and with it.
@@ -183,7 +183,7 @@ fn every_channel(closed: &Closed) -> Vec<Figure> {
         let predicted = |left: &[f64]| -> Vec<f64> { measured.iter().zip(left).map(|(m, r)| m - r).collect() };
         let line = |name: &str, class, y| Layer::Line { name: name.to_owned(), class, x: trace.t.clone(), y };
         out.push(thinned(Figure {
-            id: format!("measured-{}", told::slug(target.name)),
+            id: format!("measured-{}", parts::slug(target.name)),
             title: format!("{} as measured and as predicted", upper(&channel(target.name))),
             x_label: trace.time_label.clone(),
             y_label: axis(target.name),

@@ -5,11 +5,11 @@
 //! Units: none.
 //! Reference: specification `identification.md`, item 5.
 
+use super::closed::{LOOK, SCRIPT};
 use super::figure::Figure;
 use super::number;
 use super::style::{COLOURS, DRAWING, PAGE};
 use super::svg::escape;
-use super::told::{LOOK, SCRIPT};
 use crate::log::write_whole;
 use crate::verdict::Channels;
 use std::path::{Path, PathBuf};
@@ -95,7 +95,7 @@ impl Sheet {
 
     /// An anchor that no other part has.
     fn anchor(&mut self, heading: &str) -> String {
-        let base = super::told::slug(heading);
+        let base = super::closed::slug(heading);
         let taken = self.anchors.iter().filter(|a| **a == base).count();
         self.anchors.push(base.clone());
         if taken == 0 { base } else { format!("{base}-{}", taken + 1) }
