@@ -199,10 +199,12 @@ fn line(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
                     out_y.push(y[k]);
                 }
             }
-            _ => {
-                out_x.push(x[i]);
-                out_y.push(f64::NAN);
-            }
+            _ => {}
+        }
+        // a gap lifts the pen
+        if !y[end - 1].is_finite() {
+            out_x.push(x[end - 1]);
+            out_y.push(f64::NAN);
         }
         i = end;
     }

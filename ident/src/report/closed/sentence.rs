@@ -39,9 +39,11 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     [vec![said], without].concat().join(" ")
 }
 
-/// The effects with a name, those of this rig before those of every rig.
+/// The effects with a name, what removes most first: those of this rig, and those of every rig.
 fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&EffectEntry>) {
-    verdict.effects.iter().filter(|e| e.id != "unknown").partition(|e| !(words.of_every_rig)(&e.id))
+    let mut all: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
+    all.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
+    all.into_iter().partition(|e| !(words.of_every_rig)(&e.id))
 }
 
 fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
@@ -55,17 +57,16 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     let more = all.len() - told.len();
     let clauses: Vec<String> = told.iter().map(|e| (words.clause)(e).with(adverb(e.probability))).collect();
-    let mut out = format!("{}{}.", since(news), joined(&clauses));
+    let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
     if own.is_empty() {
         out += " Every rig has that; nothing of this rig's own was named.";
     }
-    if more > 0 {
-        out += &match more {
-            1 => " A smaller cause is told below.".to_owned(),
-            n => format!(" {n} smaller causes are told below."),
-        };
-    }
-    [out, explained(verdict, &told), left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+    let smaller = match more {
+        0 => String::new(),
+        1 => "A smaller cause is told below.".to_owned(),
+        n => format!("{n} smaller causes are told below."),
+    };
+    [out, explained(verdict, &told), smaller, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
@@ -93,11 +94,11 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         "this run cannot tell"
     };
     let question = match ways.as_slice() {
-        [] => "The causes named below are not sure on this run".to_owned(),
-        [one] => format!("Perhaps {}: {doubt}", list(one)),
+        [] => "the causes named below are not sure on this run".to_owned(),
+        [one] => format!("perhaps {}: {doubt}", list(one)),
         [first, rest @ ..] => {
             let rest: Vec<String> = rest.iter().map(|w| format!("or {}", list(w))).collect();
-            format!("Either {}, {}: {doubt}", list(first), rest.join(", "))
+            format!("either {}, {}: {doubt}", list(first), rest.join(", "))
         }
     };
     let sure: Vec<String> = own
@@ -107,7 +108,7 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         .take(MOST)
         .map(|e| (words.clause)(e).with(adverb(e.probability)))
         .collect();
-    let mut out = format!("{}{question}.", since(news));
+    let mut out = format!("{}.", since(news, &question));
     if !sure.is_empty() {
         out += &format!(" Beside that {}.", joined_lower(&sure));
     }
@@ -123,7 +124,7 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
     }
     on.dedup();
     let place = if on.is_empty() { String::new() } else { format!(" on {}", list(&on)) };
-    let mut out = format!("{}Something is left{place} that no known effect explains.", since(news));
+    let mut out = since(news, &format!("something is left{place} that no known effect explains."));
     let mut goes: Vec<String> =
         corrections.iter().filter(|e| e.heldout_error_reduction > 0.0).flat_map(|e| &e.depends_on).map(|v| channel(v)).collect();
     goes.dedup();
@@ -147,15 +148,12 @@ fn none(verdict: &Verdict, news: bool) -> String {
     if left.is_empty() { said.to_owned() } else { format!("{said} {left}") }
 }
 
-fn since(news: bool) -> &'static str {
-    if news { "New since the declared model: " } else { "" }
+/// What was found; against a declared model it is new since then.
+fn since(news: bool, found: &str) -> String {
+    if news { format!("New since the declared model: {found}") } else { upper(found) }
 }
 
 /// Clauses as one sentence.
-fn joined(clauses: &[String]) -> String {
-    upper(&joined_lower(clauses))
-}
-
 fn joined_lower(clauses: &[String]) -> String {
     match clauses {
         [] => String::new(),
@@ -249,11 +247,9 @@ pub(super) fn size_left(verdict: &Verdict, u: &Unexplained) -> String {
 
 fn left(verdict: &Verdict) -> String {
     let Some(loudest) = loudest(verdict) else {
-        return if verdict.unexplained.is_empty() {
-            "What is left is noise.".to_owned()
-        } else {
-            "Little is left beyond the noise.".to_owned()
-        };
+        let over = verdict.channels.values().any(|c| c.after.heldout_rms > QUIET * c.noise_floor_rms);
+        let noise = verdict.unexplained.is_empty() && !over;
+        return if noise { "What is left is noise." } else { "Little is left beyond the noise." }.to_owned();
     };
     let others = verdict.unexplained.iter().filter(|u| u.over_floor > QUIET).count() - 1;
     let (size, on) = (size_left(verdict, loudest), channel(&loudest.channel));

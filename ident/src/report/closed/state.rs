@@ -53,6 +53,12 @@ pub(super) fn word([before, after]: [f64; 2], left: bool) -> &'static str {
     }
 }
 
+/// A channel as people say it, with its column's name where that is another word.
+fn spoken(name: &str) -> String {
+    let said = channel(name);
+    if said == name { escape(name) } else { format!("{} <code>{}</code>", escape(&upper(&said)), escape(name)) }
+}
+
 /// The bars.
 pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
     let scale = Scale::of(channels);
@@ -71,9 +77,8 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
         let label = format!("{}: before {:.1}, after {:.1} noise floors", channel(name), floors[0], floors[1]);
         let _ = write!(
             out,
-            "<div class=\"row\" role=\"row\"><span class=\"name\" role=\"cell\">{} <code>{}</code></span><span class=\"track\" role=\"img\" aria-label=\"{}\" title=\"{}; floor {floor}\">",
-            upper(&escape(&channel(name))),
-            escape(name),
+            "<div class=\"row\" role=\"row\"><span class=\"name\" role=\"cell\">{}</span><span class=\"track\" role=\"img\" aria-label=\"{}\" title=\"{}; floor {floor}\">",
+            spoken(name),
             escape(&label),
             escape(&label),
         );
@@ -99,9 +104,8 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
     for (name, reason) in &channels.not_predicted {
         let _ = writeln!(
             out,
-            "<div class=\"row none\" role=\"row\"><span class=\"name\" role=\"cell\">{} <code>{}</code></span><span class=\"why\" role=\"cell\">not predicted: {}</span></div>",
-            upper(&escape(&channel(name))),
-            escape(name),
+            "<div class=\"row none\" role=\"row\"><span class=\"name\" role=\"cell\">{}</span><span class=\"why\" role=\"cell\">not predicted: {}</span></div>",
+            spoken(name),
             escape(reason)
         );
     }
