@@ -1,6 +1,6 @@
 //! Reports that a person looks at: one self-contained HTML page with SVG figures.
 //!
-//! What it is: the verdict, the figures that convince, and the parameters, in a page without network or script.
+//! What it is: the verdict, the figures that convince, and the parameters, in a page without network; its only script copies tables.
 //! What can go wrong: nothing; missing channels leave their figures out.
 //! Units: on the axes.
 //! Reference: specification `identification.md`, item 5.
@@ -24,7 +24,6 @@ pub use run::run;
 pub use selection::selection;
 pub use sheet::{Sheet, write_figures};
 pub use shift::{filter_figures, study_figures};
-pub use svg::{Chart, Series};
 
 /// A number with five significant digits, as tables print it.
 #[must_use]
