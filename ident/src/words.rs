@@ -171,6 +171,13 @@ pub fn channel(name: &str) -> String {
     said.to_owned()
 }
 
+/// A channel at the head of something: with a large letter, or as its column where it has no other word.
+#[must_use]
+pub fn heading(name: &str) -> String {
+    let said = channel(name);
+    if said == name { said } else { upper(&said) }
+}
+
 /// The meter behind a channel.
 #[must_use]
 pub fn meter(name: &str) -> String {

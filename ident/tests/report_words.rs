@@ -32,7 +32,7 @@ fn effect(id: &str, on: &str, p: f64, removes: f64, parameters: Vec<Parameter>) 
 }
 
 fn filter(p: f64) -> EffectEntry {
-    effect("channel_filter", "thrust_n", p, 0.72, vec![parameter("window", 0.5, 0.02, "s")])
+    effect("channel_filter", "thrust_n", p, 0.9, vec![parameter("window", 0.5, 0.02, "s")])
 }
 
 fn sag(p: f64) -> EffectEntry {

@@ -17,7 +17,7 @@ use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
 use crate::verdict::EffectEntry;
-use crate::words::{channel, upper};
+use crate::words::{channel, heading};
 
 /// What stands before and after in most figures.
 const PAIR: [&str; 2] = ["declared, before", "corrected, after"];
@@ -184,7 +184,7 @@ fn every_channel(closed: &Closed) -> Vec<Figure> {
         let line = |name: &str, class, y| Layer::Line { name: name.to_owned(), class, x: trace.t.clone(), y };
         out.push(thinned(Figure {
             id: format!("measured-{}", parts::slug(target.name)),
-            title: format!("{} as measured and as predicted", upper(&channel(target.name))),
+            title: format!("{} as measured and as predicted", heading(target.name)),
             x_label: trace.time_label.clone(),
             y_label: axis(target.name),
             layers: vec![

@@ -8,7 +8,7 @@
 use crate::noise::median;
 use crate::report::figure::{Figure, Layer, Mark};
 use crate::verdict::{Kind, Verdict};
-use crate::words::{channel, upper};
+use crate::words::{channel, heading};
 
 /// Columns of pixels of a drawing.
 const COLUMNS: usize = 440;
@@ -87,7 +87,7 @@ pub(crate) fn slug(name: &str) -> String {
 
 /// Over the whole run.
 pub(crate) fn over_time(trace: &Trace, id: &str, names: [&str; 2]) -> Figure {
-    let title = format!("{} left over, whole run", upper(&channel(&trace.channel)));
+    let title = format!("{} left over, whole run", heading(&trace.channel));
     trace.figure(id, title, trace.time_label.clone(), trace.pair(0..trace.t.len(), names))
 }
 
@@ -118,7 +118,7 @@ pub(crate) fn enlarged(trace: &Trace, id: &str, names: [&str; 2]) -> Option<Figu
     let margin = range.len() / 6;
     let range = range.start.saturating_sub(margin)..(range.end + margin).min(trace.t.len());
     (range.len() > 8).then(|| {
-        let title = format!("{} left over, where most was explained", upper(&channel(&trace.channel)));
+        let title = format!("{} left over, where most was explained", heading(&trace.channel));
         trace.figure(&format!("{id}-enlarged"), title, trace.time_label.clone(), trace.pair(range, names))
     })
 }
@@ -145,7 +145,7 @@ pub(crate) fn against(trace: &Trace, id: &str, (variable, unit): (&str, &str), x
         layers.push(Layer::Dots { name: name.to_owned(), class, x: x.to_vec(), y: y.clone() });
     }
     let said = channel(variable);
-    let title = format!("{} left over, against {said}", upper(&channel(&trace.channel)));
+    let title = format!("{} left over, against {said}", heading(&trace.channel));
     let x_label = if unit.is_empty() { said } else { format!("{said}, {unit}") };
     trace.figure(&format!("{id}-against-{}", slug(variable)), title, x_label, layers)
 }
@@ -192,14 +192,11 @@ fn line(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let end = (i + 1..x.len()).find(|k| column(x[*k]) != column(x[i])).unwrap_or(x.len());
         let finite = || (i..end).filter(|k| y[*k].is_finite());
         let (low, high) = (finite().min_by(|a, b| y[*a].total_cmp(&y[*b])), finite().max_by(|a, b| y[*a].total_cmp(&y[*b])));
-        match (low, high) {
-            (Some(a), Some(b)) => {
-                for k in if a == b { vec![a] } else { vec![a.min(b), a.max(b)] } {
-                    out_x.push(x[k]);
-                    out_y.push(y[k]);
-                }
+        if let (Some(a), Some(b)) = (low, high) {
+            for k in if a == b { vec![a] } else { vec![a.min(b), a.max(b)] } {
+                out_x.push(x[k]);
+                out_y.push(y[k]);
             }
-            _ => {}
         }
         // a gap lifts the pen
         if !y[end - 1].is_finite() {

@@ -9,7 +9,7 @@ use super::page::Page;
 use super::sentence::size_left;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
-use crate::words::{channel, upper};
+use crate::words::{channel, heading, upper};
 
 /// What is left.
 pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
@@ -22,7 +22,7 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     let cells = |u: &crate::verdict::Unexplained| {
         let with: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
         let with = if with.is_empty() { "nothing in the log".to_owned() } else { with.join(", ") };
-        vec![upper(&channel(&u.channel)), format!("{:.1}", u.over_floor), size_left(v, u), u.looks_like.clone(), with]
+        vec![heading(&u.channel), format!("{:.1}", u.over_floor), size_left(v, u), u.looks_like.clone(), with]
     };
     let rows: Vec<Vec<String>> = v.unexplained.iter().map(cells).collect();
     sheet.data("unexplained", &["channel", "noise floors", "size", "looks like", "goes with"], &rows, None);

@@ -12,10 +12,10 @@ pub(crate) const LOOK: &str = "
 .told h2 a,.told h3 a{color:inherit;text-decoration:none}.told h2 a:hover::after{content:' #';color:var(--soft)}
 .told a{color:var(--a)}
 .state{margin:1.2rem 0 .4rem;border-top:1px solid var(--grid)}
-.state .row,.state .head{display:grid;grid-template-columns:13.5rem minmax(8rem,1fr) 6.6rem 6.6rem 4.2rem 8.4rem;gap:.7rem;align-items:center;border-bottom:1px solid var(--grid);padding:.3rem 0}
+.state .row,.state .head{display:grid;grid-template-columns:12.5rem minmax(8rem,1fr) 8.1rem 8.1rem 4rem 8.4rem;gap:.7rem;align-items:center;border-bottom:1px solid var(--grid);padding:.3rem 0}
 .state .head{color:var(--soft);font-size:.85rem}.state .head span:nth-child(n+3):nth-child(-n+5),.state .num{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .state .axis{position:relative;height:1.2rem}.state .axis i{position:absolute;font-style:normal;transform:translateX(-50%);white-space:nowrap}
-.state .track{position:relative;height:1.7rem;display:block}.state .track i{position:absolute;top:-.3rem;bottom:-.3rem;border-left:1px solid var(--grid)}.state .track i.floor{border-left:2px solid var(--fg)}
+.state .axis i.end{transform:translateX(-100%)}.state .track{position:relative;height:1.7rem;display:block}.state .track i{position:absolute;top:-.3rem;bottom:-.3rem;border-left:1px solid var(--grid)}.state .track i.floor{border-left:2px solid var(--fg)}
 .state .track b,.key b{position:absolute;height:.6rem;border:1.5px solid var(--b);border-radius:2px;print-color-adjust:exact;-webkit-print-color-adjust:exact}.state .track b.before{top:.1rem}.state .track b.after{top:.95rem}
 b.after.after{background:var(--a);border-color:var(--a)}.key b{position:static;display:inline-block;width:1.4rem;margin:0 .2rem 0 .6rem;vertical-align:middle}
 .state .why{grid-column:2/-1;color:var(--soft)}.state code{color:var(--soft);font-size:.75rem}

@@ -11,7 +11,7 @@ use super::{cards, fold, left, sentence, state};
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::verdict::Verdict;
-use crate::words::{channel, upper};
+use crate::words::heading;
 
 /// What a page is made of.
 pub(crate) struct Page<'p> {
@@ -86,7 +86,7 @@ fn runs(sheet: &mut Sheet, v: &Verdict) {
                     format!("{before} to {after}, {}", state::factor(b.before, b.after))
                 })
             };
-            std::iter::once(upper(&channel(name))).chain(v.validation.iter().map(cell)).collect()
+            std::iter::once(heading(name)).chain(v.validation.iter().map(cell)).collect()
         })
         .collect();
     let head: Vec<&str> = head.iter().map(String::as_str).collect();

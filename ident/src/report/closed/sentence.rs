@@ -7,7 +7,7 @@
 
 use super::vocabulary::Vocabulary;
 use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
-use crate::words::{adverb, amount, channel, list, upper};
+use crate::words::{adverb, amount, channel, heading, list, upper};
 
 /// Most effects that the sentence names; the cards have all.
 const MOST: usize = 3;
@@ -33,10 +33,11 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         Kind::Unattributed => unattributed(verdict, news),
         Kind::None => none(verdict, news),
     };
-    let missing = &verdict.channels.not_predicted;
-    let without: Vec<String> =
-        missing.iter().map(|(name, reason)| format!("{} has no model: {reason}.", upper(&channel(name)))).collect();
-    [vec![said], without].concat().join(" ")
+    let without = verdict.channels.not_predicted.iter().map(|(name, reason)| match reason.contains(':') {
+        true => format!("{} has no model ({reason}).", heading(name)),
+        false => format!("{} has no model: {reason}.", heading(name)),
+    });
+    std::iter::once(said).chain(without).collect::<Vec<_>>().join(" ")
 }
 
 /// The effects with a name, what removes most first: those of this rig, and those of every rig.
@@ -215,7 +216,12 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
         (false, 1) => "That explains",
         (false, _) => "Together they explain",
     };
-    let per_cent = |share: f64| if share >= ALL { "all".to_owned() } else { format!("{:.0} %", 100.0 * share) };
+    // nothing is all as long as something is told of what is left
+    let rest = verdict.unexplained.iter().any(|u| shares.iter().any(|s| s.0 == u.channel));
+    let per_cent = |share: f64| match share {
+        s if s >= ALL && !rest => "all".to_owned(),
+        s => format!("{:.0} %", (100.0 * s).min(99.0)),
+    };
     let names: Vec<String> = shares.iter().map(|s| channel(s.0)).collect();
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;

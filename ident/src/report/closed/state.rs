@@ -67,7 +67,8 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
         "<div class=\"head\" role=\"row\"><span role=\"columnheader\">channel</span><span class=\"axis\" role=\"columnheader\">";
     for tick in scale.ticks() {
         let name = if tick == 1.0 { "noise floor".to_owned() } else { format!("{tick:.0}") };
-        let _ = write!(out, "<i style=\"left:{:.1}%\">{name}</i>", scale.at(tick));
+        let (at, end) = (scale.at(tick), if scale.at(tick) > 94.0 { " class=\"end\"" } else { "" });
+        let _ = write!(out, "<i{end} style=\"left:{at:.1}%\">{name}</i>");
     }
     out += "</span><span role=\"columnheader\">before</span><span role=\"columnheader\">after</span><span role=\"columnheader\">factor</span><span role=\"columnheader\">state</span></div>\n";
     for (name, c) in channels {
@@ -114,7 +115,10 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
 
 /// A factor to three digits at the most.
 pub(super) fn factor(before: f64, after: f64) -> String {
-    let factor = before / after.max(1e-300);
+    if before == 0.0 || !(before / after).is_finite() {
+        return "-".to_owned();
+    }
+    let factor = before / after;
     format!("{}x", digits(factor, 0.01 * factor.abs()))
 }
 
