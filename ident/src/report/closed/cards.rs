@@ -76,7 +76,10 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
         escape(&list(&e.channels.iter().map(|c| channel(c)).collect::<Vec<_>>())),
         escape(&removes(v, e)),
     );
-    let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(scope(e.scope))));
+    // what has no name belongs to nothing that is known
+    if e.id != "unknown" {
+        let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(scope(e.scope))));
+    }
     sheet.html_part(&html);
     let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
     sheet.html_part("<div class=\"split\">\n");

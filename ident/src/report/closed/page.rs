@@ -10,7 +10,7 @@ use super::vocabulary::Vocabulary;
 use super::{cards, fold, left, sentence, state};
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
-use crate::verdict::Verdict;
+use crate::verdict::{Kind, Verdict};
 use crate::words::heading;
 
 /// What a page is made of.
@@ -45,7 +45,10 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         sheet.warn(&format!("{l}."));
     }
     if !page.hero.is_empty() {
-        sheet.section("The figure that convinces most");
+        sheet.section(match v.verdict {
+            Kind::Attributed | Kind::Ambiguous => "The figure that convinces most",
+            Kind::Unattributed | Kind::None => "The channel on which most is left",
+        });
         sheet.figures(page.hero.clone());
     }
     cards::cards(&mut sheet, page);
