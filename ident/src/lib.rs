@@ -63,3 +63,4 @@ pub mod unexplained;
 pub mod verdict;
 pub mod watch;
 mod weather;
+pub mod words;

@@ -317,6 +317,11 @@ impl Write for Digesting {
     }
 }
 
+/// SHA-256 of a text, as `sha256sum` prints it.
+pub(crate) fn digest_of(text: &str) -> String {
+    hexadecimal(Sha256::new_with_prefix(text))
+}
+
 fn hexadecimal(digest: Sha256) -> String {
     digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }

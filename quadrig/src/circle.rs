@@ -8,7 +8,7 @@
 //! Reference: specification `closing-the-loop.md`, step 9.
 
 use crate::Failure;
-use crate::close_loop::{table, write_folder};
+use crate::close_loop::write_folder;
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
 use hal_sim::Scenario;
@@ -16,6 +16,7 @@ use hal_sim::scenario::{Schedule, Step};
 use ident::circle::{Circle, circle};
 use ident::close::close;
 use ident::log::{Log, write_whole};
+use ident::report::{Origin, Vocabulary, terminal};
 use ident::runs::{Run, Standing, model, next, rival, standings};
 use ident::verdict::{Kind, NextExperiment};
 use serde_json::{Value, json};
@@ -73,7 +74,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             let bar = Bar::new("searching", quiet);
             close(&log, None, &[], &mut |share| bar.set(share))?
         };
-        say(format!("\n{}", table(&closed.verdict)));
+        say(format!("\n{}", terminal(&closed.verdict, Vocabulary::RIG, false)));
         runs.push(Run { log, closed });
         let standing = standings(&runs);
         let open = question(&runs, &standing);
@@ -103,7 +104,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(folder) = &args.output {
         for (k, run) in runs.iter().enumerate() {
             let own = folder.join(format!("run-{}", k + 1));
-            write_folder(&own, &run.log, &run.closed, &serde_json::to_string_pretty(&run.closed.verdict)?)?;
+            write_folder(&own, &run.log, &run.closed, &serde_json::to_string_pretty(&run.closed.verdict)?, Origin::of(&run.log))?;
             run.log.write(&own.join("run.csv")).map_err(|e| format!("{}: {e}", own.display()))?;
         }
         let text = corrected(&runs, &standing).to_toml();

@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, `quadrig demo`.
 
 use crate::Failure;
-use crate::close_loop::{table, write_folder};
+use crate::close_loop::write_folder;
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
 use hal_sim::Scenario;
@@ -14,7 +14,7 @@ use ident::close::close;
 use ident::context::Context;
 use ident::log::Log;
 use ident::plateau::plateaus;
-use ident::report::number;
+use ident::report::{Hidden, Origin, Vocabulary, number, terminal};
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -46,9 +46,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             println!("{line}");
         }
     };
-    say(format!(
-        "seed {seed}: a 570 KV motor with an 11x4.7 propeller, and one effect hidden in the rig (repeat with --seed {seed})"
-    ));
+    say(format!("seed {seed}: a 570 KV motor with an 11x4.7 propeller; one effect is hidden (repeat with --seed {seed})"));
     let log = fly(&scenario, None, "run.csv", "flying", quiet)?;
     std::fs::create_dir_all(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
     let path = args.output.join("run.csv");
@@ -65,8 +63,13 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         let bar = Bar::new("searching", quiet);
         close(&log, None, &[], &mut |share| bar.set(share))?
     };
-    write_folder(&args.output, &log, &closed, &serde_json::to_string_pretty(&closed.verdict)?)?;
-    say(table(&closed.verdict));
+    let truth = &scenario.effects[0];
+    let parameters = truth.parameters().iter().map(|(n, v, u)| format!("{n} = {} {u}", number(*v))).collect();
+    let hidden = Hidden { seed, id: truth.id().to_owned(), parameters };
+    let judged = hidden.judged(&closed.verdict, Vocabulary::RIG);
+    let origin = Origin { hidden: Some(hidden), ..Origin::of(&log) };
+    write_folder(&args.output, &log, &closed, &serde_json::to_string_pretty(&closed.verdict)?, origin)?;
+    say(terminal(&closed.verdict, Vocabulary::RIG, false));
 
     match fly_model(&scenario, &closed.model, &log, "again.csv", quiet) {
         Ok(again) => {
@@ -77,10 +80,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Err(e) => say(format!("the corrected model as the plant: the firmware stopped the run ({e})\n")),
     }
 
-    let truth = &scenario.effects[0];
-    let named = closed.verdict.effects.iter().any(|e| e.id == truth.id());
-    let parameters: Vec<String> = truth.parameters().iter().map(|(n, v, u)| format!("{n} = {} {u}", number(*v))).collect();
-    say(format!("hidden was {} ({}): {}", truth.id(), parameters.join(", "), if named { "found" } else { "NOT FOUND" }));
+    judged.into_iter().for_each(&say);
     say(format!("the page to look at: {}", args.output.join("report.html").display()));
     Ok(())
 }

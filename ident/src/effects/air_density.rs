@@ -7,7 +7,7 @@
 //! Reference: ideal gas, ISO 2533 (287.05 J/(kg.K)); thrust and torque proportional to density, Beharie 2013, Eq. 2.17-2.18.
 
 use super::speed_channel::expected;
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -31,6 +31,10 @@ impl Effect for AirDensity {
             signature: "thrust and torque at a speed fall together as the air gets warmer or thinner",
             look_alikes: &["thermal_zero", "blade_damage", "gain_change"],
         }
+    }
+
+    fn said(&self, _: &EffectEntry) -> Clause {
+        Clause::new("the air's density", "changes what the propeller delivers")
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -8,7 +8,7 @@
 
 use super::pulses::{HELD, against_the_others, held};
 use super::speed_channel::{difference, instances};
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -41,6 +41,17 @@ impl Effect for AlternatingPeriod {
             signature: "one speed channel jumps between two values about the others, in proportion to the speed",
             look_alikes: &["missed_pulses", "double_pulses"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the magnets",
+            found.tell(
+                "angle",
+                |v| format!("sit {v} off, so that the period of {} alternates", found.meter()),
+                &format!("sit unequally, so that the period of {} alternates", found.meter()),
+            ),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -5,7 +5,7 @@
 //! Units: N.
 //! Reference: output swing of instrumentation amplifiers; Beharie 2013, section 4.4 (bridge and amplifier).
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::context::{Context, STANDSTILL, Target};
 use crate::design::{Label, TargetDesign};
 use std::sync::Arc;
@@ -27,6 +27,10 @@ impl Effect for AmplifierSaturation {
             signature: "above one speed the thrust reads one and the same value while torque goes on growing",
             look_alikes: &["stall", "blade_flex"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the load cell's amplifier", found.tell("level", |v| format!("saturates at {v}"), "saturates"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

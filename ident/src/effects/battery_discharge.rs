@@ -7,7 +7,7 @@
 //! Reference: open-circuit voltage of lithium-polymer cells falls by 0.65 V +- 15 % per unit of charge between full and the
 //! knee: 4.20 V full, 3.87 V at 50 % (Chen & Rincon-Mora 2006, Fig. 8, and common discharge tables).
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present, speeds};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present, speeds};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -33,6 +33,17 @@ impl Effect for BatteryDischarge {
             signature: "voltage and speed at the same pulse fall together, fastest at high current, and never come back",
             look_alikes: &["supply_sag", "thermal_derate"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the battery",
+            found.tell(
+                "slope",
+                |v| format!("loses {v} as it empties").replace("V/Ah", "V per ampere hour"),
+                "runs down during the run",
+            ),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -5,7 +5,7 @@
 //! Units: Hz, 1; bump, scatter and vibration amplitude in N.
 //! Reference: rotating imbalance on a one-degree-of-freedom oscillator, Den Hartog 1956, section 2.11; Beharie 2013, section 5.7.1.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, geometric, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, present};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -26,6 +26,10 @@ impl Effect for BeamResonance {
             signature: "scatter, rms and a small bump of the thrust around one speed, whenever that speed is visited",
             look_alikes: &["unknown"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the load cell's beam", found.tell("natural_frequency", |v| format!("resonates at {v}"), "resonates"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -9,7 +9,7 @@
 //! brushless motor with winding loss R Q^2/Kt^2, Drela 2007, *First-Order DC Electric Motor Model*.
 
 use super::blade_damage::STANDSTILL;
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, load_channels};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, load_channels};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 use crate::solve::Normal;
@@ -31,6 +31,10 @@ impl Effect for BearingFriction {
             signature: "from one instant on more current and less speed at the same pulse; thrust(rpm) holds",
             look_alikes: &["encoder_drag", "blade_damage", "thermal_derate"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("friction", found.tell("t0", |t| format!("sets in on the rotor at {t}"), "sets in on the rotor"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

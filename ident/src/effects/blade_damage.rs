@@ -5,7 +5,7 @@
 //! Units: 1, s; internally N/krpm2, N.m/krpm2, A/krpm3, A/krpm4, rev/min/kus, rev/min/kus2.
 //! Reference: thrust and torque coefficients, Beharie 2013, Eq. 2.17-2.18; step at an unknown instant, Basseville & Nikiforov 1993.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, load_channels, throttle};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, load_channels, throttle};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -25,6 +25,19 @@ impl Effect for BladeDamage {
             depends_on: &["t_s", "rpm"],
             signature: "thrust, torque, current and speed all change at one instant, in proportion to the load",
             look_alikes: &["gain_change", "bearing_friction", "air_density"],
+        }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        {
+            let at = found.tell("t0", |t| format!(" at {t}"), "");
+            let does = found.tell_in(
+                "thrust_change",
+                "%",
+                |v| format!("changes the thrust by {v}{at}"),
+                &format!("changes the thrust{at}"),
+            );
+            Clause::new("damage to a blade", does)
         }
     }
 

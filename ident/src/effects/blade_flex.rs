@@ -7,7 +7,7 @@
 //! Reference: aeroelastic washout of light propellers, Brandt & Selig 2011 (AIAA 2011-1255), static data at high speed.
 
 use super::speed_channel::expected;
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, geometric, present, speeds};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, present, speeds};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -28,6 +28,10 @@ impl Effect for BladeFlex {
             signature: "thrust and torque fall short of the square law above one speed, whenever that speed is visited",
             look_alikes: &["stall", "reynolds_thrust", "amplifier_saturation"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the blades", found.tell("onset", |v| format!("bend above {v}"), "bend at high speed"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -10,7 +10,7 @@
 use super::blade_flex::upper_speeds;
 use super::pulses::{SCATTERED, struck_readings, struck_speeds};
 use super::speed_channel::{HINGE, LEAST, add_hinge, hinge_at_top, instance};
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -31,6 +31,13 @@ impl Effect for BladeTwist {
             signature: "rpm_beam leaves the other speed channels upwards above one speed",
             look_alikes: &["double_pulses"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the light beam",
+            found.tell("onset", |v| format!("reads too much above {v}"), "reads too much at high speed"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -6,7 +6,8 @@
 //! Reference: pure transport delay of a logger.
 
 use super::{
-    About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, lone_speed, meters, operator, reads_meter, through_meter,
+    About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, lone_speed, meters, operator,
+    reads_meter, through_meter,
 };
 use crate::context::Context;
 use crate::design::TargetDesign;
@@ -28,6 +29,10 @@ impl Effect for ChannelDelay {
             signature: "rectangular spikes of the residual at every change of the load, as long as the delay",
             look_alikes: &["channel_filter", "clock_drift"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(found.meter(), found.tell("delay", |v| format!("answers {v} late"), "answers late"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -6,8 +6,8 @@
 //! Reference: boxcar and RC filters; RCbenchmark load cells average over about half a second.
 
 use super::{
-    About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, geometric, lone_speed, meters, operator, reads_meter,
-    through_meter,
+    About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, lone_speed, meters,
+    operator, reads_meter, through_meter,
 };
 use crate::context::{CALM_US, Context};
 use crate::design::TargetDesign;
@@ -35,6 +35,13 @@ impl Effect for ChannelFilter {
             depends_on: &["t_s", "time_since_step"],
             signature: "the residual spikes at every change of the load, with the sign of the change, and is flat elsewhere",
             look_alikes: &["channel_delay", "spinup_lag", "creep"],
+        }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        {
+            let lag = found.tell("tau", |v| format!("follows the truth with a lag of {v}"), "answers slowly");
+            Clause::new(found.meter(), found.tell("window", |v| format!("reads the mean of its last {v}"), &lag))
         }
     }
 

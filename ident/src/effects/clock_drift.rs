@@ -5,7 +5,7 @@
 //! Units: 1 (seconds late a second), positive falls behind.
 //! Reference: frequency tolerance of two free-running oscillators.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, operator, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -26,6 +26,13 @@ impl Effect for ClockDrift {
             signature: "spikes of the thrust and torque residual at every change of the load, wider and wider with time",
             look_alikes: &["channel_delay", "channel_filter"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "thrust and torque",
+            found.tell_in("rate", "%", |v| format!("come from a clock that is off by {v}"), "come from a clock that is off"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

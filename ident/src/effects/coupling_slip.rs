@@ -7,7 +7,7 @@
 
 use super::blade_flex::upper_speeds;
 use super::speed_channel::{HINGE, LEAST, add_hinge, hinge_at_top, instance};
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -28,6 +28,10 @@ impl Effect for CouplingSlip {
             signature: "rpm_encoder leaves the other speed channels downwards above one speed",
             look_alikes: &["missed_pulses"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the encoder's coupling", found.tell("onset", |v| format!("slips above {v}"), "slips at high speed"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

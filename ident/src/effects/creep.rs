@@ -5,7 +5,9 @@
 //! Units: 1, s.
 //! Reference: Hoffmann, *An Introduction to Stress Analysis using Strain Gauges*, section 3.3 (creep).
 
-use super::{About, Amplitude, Effect, Instance, Scope, Shape, Stage, geometric, operator, thrust_over_time};
+use super::{
+    About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, geometric, operator, thrust_over_time,
+};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -26,6 +28,17 @@ impl Effect for Creep {
             signature: "after each step the thrust residual relaxes exponentially, in proportion to the step",
             look_alikes: &["channel_filter", "hysteresis", "zero_drift"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the load cell",
+            found.tell(
+                "tau",
+                |v| format!("creeps after each change of the load, within {v}"),
+                "creeps after each change of the load",
+            ),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

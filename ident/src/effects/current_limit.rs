@@ -6,7 +6,7 @@
 //! Units: A; internally us.
 //! Reference: constant-current limit of bench supplies and of speed controllers' firmware.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, speeds};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
 use crate::context::Context;
 use crate::design::{Label, TargetDesign};
 use std::sync::Arc;
@@ -33,6 +33,10 @@ impl Effect for CurrentLimit {
             signature: "above one pulse speed and current stand still; thrust, torque and current go on following the speed",
             look_alikes: &["thermal_derate", "throttle_quantisation"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the current", found.tell("limit", |v| format!("is held to {v}"), "is limited"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

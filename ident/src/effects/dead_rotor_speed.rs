@@ -6,7 +6,7 @@
 //! Reference: sensor disagreement, specification `rig.md`; Beharie 2013, section 5.7.1.
 
 use super::speed_channel::instances;
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -27,6 +27,13 @@ impl Effect for DeadRotorSpeed {
             signature: "one speed channel reads a fixed, far-off multiple of what all others read",
             look_alikes: &["missed_pulses", "double_pulses"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            found.meter(),
+            found.tell("factor", |v| format!("reads {v} times the speed"), "reads a wrong multiple of the speed"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

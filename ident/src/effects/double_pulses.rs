@@ -8,7 +8,7 @@
 //! Reference: Beharie 2013, section 5.7.1 (edges that ring).
 
 use super::pulses::{apply_pulses, is_of_single_readings, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -32,6 +32,13 @@ impl Effect for DoublePulses {
             signature: "one speed channel reads high against the others, by one share of the speed or in scattered samples",
             look_alikes: &["blade_twist", "dead_rotor_speed", "alternating_period"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            found.meter(),
+            found.tell_in("probability", "%", |v| format!("counts {v} of its pulses twice"), "counts pulses twice"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

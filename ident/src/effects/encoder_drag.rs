@@ -7,7 +7,7 @@
 //! Reference: Beharie 2013, section 5.7.1 (the four speed sensors compared); power balance as `bearing_friction`.
 
 use super::bearing_friction::{AMPLITUDES, CONSTANT, SEEN, TURNING, brakes, costs, drag, with_share};
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, load_channels};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, load_channels};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -28,6 +28,10 @@ impl Effect for EncoderDrag {
             signature: "exactly while the encoder is coupled: more current and less speed at the same pulse; thrust(rpm) holds",
             look_alikes: &["bearing_friction"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the encoder", found.tell("constant", |v| format!("brakes the rotor with {v}"), "brakes the rotor"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -6,7 +6,7 @@
 //! Reference: Beharie 2013, Eq. 5.34-5.35 (two calibrations differ by 9.7 % in slope).
 
 use super::tare_shift::{BEFORE, coarse_onset, step, with_first_instant};
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -26,6 +26,16 @@ impl Effect for GainChange {
             depends_on: &["t_s", "thrust_n"],
             signature: "the thrust residual grows with the thrust, after an instant or with time; torque(rpm) holds",
             look_alikes: &["blade_damage", "air_density", "creep"],
+        }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        {
+            let at = found.tell("t0", |t| format!(" at {t}"), "");
+            let at = if found.is_since_before() { " before the run" } else { at.as_str() };
+            let step = found.tell_in("gain_change", "%", |v| format!("changes by {v}{at}"), &format!("changes{at}"));
+            let drift = found.tell("rate", |_| "drifts with time".to_owned(), &step);
+            Clause::new("the load cell's gain", drift)
         }
     }
 

@@ -8,7 +8,7 @@
 
 use super::pulses::PULSES;
 use super::quantisation;
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;
 use crate::noise::median;
@@ -37,6 +37,13 @@ impl Effect for GlitchRows {
             signature: "single readings leave their neighbours by many times the scatter and come back",
             look_alikes: &["missed_pulses", "double_pulses"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            found.meter(),
+            found.tell_in("count", "rows", |v| format!("holds absurd values in {v}"), "holds absurd values in single rows"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

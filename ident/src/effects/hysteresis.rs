@@ -6,7 +6,7 @@
 //! Units: N, at mid range.
 //! Reference: OIML R 60 (load cells), hysteresis error.
 
-use super::{About, Amplitude, Effect, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -27,6 +27,17 @@ impl Effect for Hysteresis {
             signature: "the thrust residual of the way up and of the way down bend apart in the middle and meet at the ends",
             look_alikes: &["creep", "zero_drift"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the load cell",
+            found.tell(
+                "width",
+                |v| format!("reads up to {v} apart on the way up and down"),
+                "reads otherwise on the way up than down",
+            ),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -8,7 +8,7 @@
 //! Reference: Beharie 2013, section 5.7.1 (blade that the beam does not see).
 
 use super::pulses::{apply_pulses, is_of_single_readings, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -32,6 +32,10 @@ impl Effect for MissedPulses {
             signature: "one speed channel reads low against the others, by one share of the speed or in scattered samples",
             look_alikes: &["coupling_slip", "dead_rotor_speed", "alternating_period"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(found.meter(), found.tell_in("probability", "%", |v| format!("misses {v} of its pulses"), "misses pulses"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -49,6 +49,8 @@ mod zero_drift;
 
 use crate::context::{Context, DIFFERENCES, Relation};
 use crate::design::TargetDesign;
+pub(crate) use crate::verdict::EffectEntry;
+pub(crate) use crate::words::Clause;
 pub(crate) use amplifier_saturation::Rail;
 pub(crate) use current_limit::Draw;
 pub(crate) use tare_shift::BEFORE;
@@ -180,6 +182,14 @@ pub trait Effect: Sync {
     fn id(&self) -> &'static str;
     /// What it is.
     fn about(&self) -> About;
+    /// What it does here, in the words of a lab, with its size.
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::titled(self.about().title, found)
+    }
+    /// Whether every rig has it (a rotor takes time): it is told apart from what this rig has.
+    fn is_of_every_rig(&self) -> bool {
+        false
+    }
     /// What it belongs to.
     fn scope(&self, instance: &Instance) -> Scope;
     /// Whether what an event left behind holds for later runs of the rig: a damaged blade does, a zero that slipped is set anew.

@@ -6,7 +6,7 @@
 //! Units: the channel's.
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;
 use crate::solve::Normal;
@@ -30,6 +30,13 @@ impl Effect for Quantisation {
             signature: "all readings are multiples of one step, or gather about the lines of a grid; the residual is a saw-tooth of the reading",
             look_alikes: &["sample_hold", "throttle_quantisation"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            found.meter(),
+            found.tell_in("step", found.unit(), |v| format!("shows only steps of {v}"), "shows only coarse steps"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -5,7 +5,7 @@
 //! Units: 1.
 //! Reference: Deters, Ananda & Selig 2014 (AIAA 2014-2151), Reynolds number effects on small propellers.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::{Label, TargetDesign};
 use std::sync::Arc;
@@ -27,6 +27,17 @@ impl Effect for ReynoldsThrust {
             signature: "thrust(rpm) follows a power other than two from standstill to full speed; torque(rpm) holds",
             look_alikes: &["blade_flex", "torque_crosstalk"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the thrust",
+            found.tell(
+                "exponent",
+                |v| format!("grows faster than the speed squared, by an exponent of {v}"),
+                "follows another power of the speed, as small propellers do",
+            ),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -6,7 +6,7 @@
 //! Units: kg.m2, A.s2/rad.
 //! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt).
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -27,6 +27,17 @@ impl Effect for RotorInertia {
             signature: "spikes of torque and current at each step, with the sign of the step; thrust(rpm) holds",
             look_alikes: &["channel_delay", "channel_filter"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the rotor",
+            found.tell("inertia", |v| format!("takes torque to speed up (inertia {v})"), "takes torque to speed up"),
+        )
+    }
+
+    fn is_of_every_rig(&self) -> bool {
+        true
     }
 
     fn scope(&self, _: &Instance) -> Scope {

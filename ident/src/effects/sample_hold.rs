@@ -6,7 +6,7 @@
 //! Units: s.
 //! Reference: zero-order hold; asynchronous telemetry of speed controllers.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, through_meter};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, through_meter};
 use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::design::TargetDesign;
 use crate::noise::median;
@@ -30,6 +30,10 @@ impl Effect for SampleHold {
             signature: "exact repeats at even intervals, and steps of the load arrive late by up to one period",
             look_alikes: &["channel_delay", "quantisation"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(found.meter(), found.tell("period", |v| format!("gives a new value only every {v}"), "repeats old values"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -8,7 +8,7 @@
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
 
 use super::coasting::{Coasting, Rotor};
-use super::{About, Amplitude, Effect, Instance, Scope, Shape, Stage, operator, speeds};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, operator, speeds};
 use crate::context::{CALM_US, Context};
 use crate::design::TargetDesign;
 
@@ -43,6 +43,14 @@ impl Effect for SpinupLag {
             signature: "rpm(pulse) is off for a moment after every step and right before the next; thrust(rpm) holds throughout",
             look_alikes: &["channel_filter", "channel_delay"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the rotor", found.tell("tau_up", |v| format!("takes {v} to follow the command"), "follows the command late"))
+    }
+
+    fn is_of_every_rig(&self) -> bool {
+        true
     }
 
     fn scope(&self, _: &Instance) -> Scope {

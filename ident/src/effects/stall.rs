@@ -7,7 +7,7 @@
 
 use super::blade_flex::upper_speeds;
 use super::speed_channel::expected;
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -28,6 +28,10 @@ impl Effect for Stall {
             signature: "above one speed thrust stops growing while torque grows faster",
             look_alikes: &["blade_flex", "amplifier_saturation"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the blades", found.tell("onset", |v| format!("stall above {v}"), "stall at high speed"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

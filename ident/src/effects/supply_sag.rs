@@ -6,7 +6,7 @@
 //! Units: ohm.
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 use crate::noise::median;
@@ -31,6 +31,13 @@ impl Effect for SupplySag {
             signature: "the voltage residual mirrors the current; thrust(rpm) and torque(rpm) hold",
             look_alikes: &["battery_discharge"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the supply lead",
+            found.tell_in("resistance", "V", |v| format!("drops {v} per ampere"), "sags with the current"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -6,7 +6,7 @@
 //! Units: N, s.
 //! Reference: step change with unknown instant, Basseville & Nikiforov 1993, section 2.2.
 
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, thrust_over_time};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, thrust_over_time};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -26,6 +26,15 @@ impl Effect for TareShift {
             depends_on: &["t_s"],
             signature: "the thrust residual has one step in time and is flat on both sides",
             look_alikes: &["zero_drift", "gain_change"],
+        }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        {
+            let at = found.tell("t0", |t| format!(" at {t}"), "");
+            let at = if found.is_since_before() { " before the run" } else { at.as_str() };
+            let does = found.tell("offset", |v| format!("jumps by {v}{at}"), &format!("jumps{at}"));
+            Clause::new(format!("the zero of {}", found.meter()), does)
         }
     }
 

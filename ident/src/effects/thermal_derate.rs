@@ -6,7 +6,7 @@
 //! Reference: first-order thermal model of a winding, tau = R_th C_th; Hanselman 2006, *Brushless Permanent Magnet Motor Design*.
 
 use super::speed_channel::expected;
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, geometric, present, speeds};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, present, speeds};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -38,6 +38,13 @@ impl Effect for ThermalDerate {
             signature: "after a step to high current the speed sags slowly, and recovers while the current is low; thrust(rpm) holds",
             look_alikes: &["battery_discharge", "bearing_friction", "spinup_lag"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the motor",
+            found.tell("tau", |v| format!("slows down as it heats up, within {v}"), "slows down as it heats up"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

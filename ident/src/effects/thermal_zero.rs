@@ -5,7 +5,7 @@
 //! Units: N/K.
 //! Reference: Beharie 2013, Table 6 (temperature coefficients of gauge and beam).
 
-use super::{About, Amplitude, Effect, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -29,6 +29,17 @@ impl Effect for ThermalZero {
             signature: "the thrust residual follows temp_c, at every level alike",
             look_alikes: &["zero_drift", "air_density"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the load cell's zero",
+            found.tell(
+                "coefficient",
+                |v| format!("moves by {v} with the temperature").replace("N/K", "N per kelvin"),
+                "moves with the temperature",
+            ),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

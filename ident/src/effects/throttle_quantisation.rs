@@ -6,7 +6,7 @@
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*; timer resolution of speed controllers.
 
 use super::speed_channel::expected_at as curve;
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, speeds};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
 use crate::context::{Context, STILL_US};
 use crate::design::TargetDesign;
 use crate::noise::median;
@@ -29,6 +29,10 @@ impl Effect for ThrottleQuantisation {
             signature: "rpm(pulse) is a staircase: the residual is a saw-tooth of the pulse; thrust(rpm) holds",
             look_alikes: &["current_limit"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the pulse", found.tell("step", |v| format!("acts in steps of {v}"), "acts in coarse steps"))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

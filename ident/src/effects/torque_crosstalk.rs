@@ -12,7 +12,7 @@
 //! regression calibration, Carroll et al. 2006, *Measurement Error in Nonlinear Models*, ch. 4.
 
 use super::tare_shift::{coarse_onset, step};
-use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::context::{Context, Relation, Target};
 use crate::design::TargetDesign;
 use crate::solve::Normal;
@@ -34,6 +34,17 @@ impl Effect for TorqueCrosstalk {
             signature: "the thrust residual repeats what torque does beyond its own polynomial",
             look_alikes: &["blade_damage", "channel_filter", "reynolds_thrust"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the thrust cell",
+            found.tell(
+                "coefficient",
+                |v| format!("reads {v} of the torque").replace("N/(N.m)", "N per N.m"),
+                "reads a part of the torque",
+            ),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

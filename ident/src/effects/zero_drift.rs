@@ -5,7 +5,7 @@
 //! Units: N/s; time since the first row, s.
 //! Reference: Beharie 2013, section 5.7.1 (drift of the strain channel).
 
-use super::{About, Amplitude, Effect, Instance, Scope, Shape, Stage, thrust_over_time};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, thrust_over_time};
 use crate::context::Context;
 use crate::design::TargetDesign;
 
@@ -26,6 +26,13 @@ impl Effect for ZeroDrift {
             signature: "the thrust residual is a straight line over time and the same at every level",
             look_alikes: &["thermal_zero", "creep", "tare_shift"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the load cell's zero",
+            found.tell_times("rate", 60.0, "N", |v| format!("drifts by {v} a minute"), "drifts with time"),
+        )
     }
 
     fn scope(&self, _: &Instance) -> Scope {

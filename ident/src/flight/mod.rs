@@ -28,7 +28,7 @@ mod words;
 pub use almanac::almanac;
 pub use close::{Closed, Shown, close, told};
 pub use model::{FORMAT as MODEL_FORMAT, FlightModel};
-pub use page::{figures, page};
+pub use page::{VOCABULARY, figures, page};
 
 /// Standard gravity, m/s^2.
 pub(crate) const G: f64 = 9.806_65;

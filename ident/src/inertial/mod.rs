@@ -26,7 +26,7 @@ mod vibration;
 
 pub use account::{Closed, Sensor};
 pub use model::{Added, FORMAT as MODEL_FORMAT, InertialModel, Part, Predicted};
-pub use page::page;
+pub use page::{VOCABULARY, page};
 
 use nalgebra::{Matrix3, Vector3};
 

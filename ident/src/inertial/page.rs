@@ -1,54 +1,87 @@
 //! The page of an inertial log's closed loop.
 //!
-//! What it is: verdict, table before and after, parameters with intervals, and the residual of every channel before and after.
+//! What it is: the traces of the three sensors handed to the page that every closed loop has, and the run itself.
 //! What can go wrong: nothing; sensors that were not predicted have no figure.
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
 use super::Recording;
 use super::account::{Closed, Sensor};
-use crate::report::{Figure, Layer, Sheet, number};
-use crate::verdict::Kind;
+use crate::effects::airframe;
+use crate::report::closed::{self as parts, Page, Trace, enlarged, over_time};
+use crate::report::{Figure, Layer, Origin, Vocabulary};
+use crate::verdict::EffectEntry;
+use crate::words::{Clause, list};
 use nalgebra::Vector3;
+
+/// The words of an inertial unit's causes.
+pub const VOCABULARY: Vocabulary = Vocabulary { about: airframe::about, clause, of_every_rig: |_| false };
+
+/// Causes that have no page in the flight's library.
+fn clause(found: &EffectEntry) -> Clause {
+    let on = list(&found.channels);
+    let does = match found.id.as_str() {
+        "stationary_magnet" => "a magnet that stands beside the board disturbs the field".to_owned(),
+        "vibration" => format!("vibration is in {on}"),
+        "linear_acceleration" => "the unit itself is accelerated".to_owned(),
+        id => return airframe::about(id).map_or_else(|| parts::bare(found), |a| Clause::titled(a.title, found)),
+    };
+    Clause::new("", does)
+}
+
+/// What stands before and after in the figures.
+const PAIR: [&str; 2] = ["declared, before", "corrected, after"];
 
 /// The report as one self-contained page.
 #[must_use]
-pub fn page(recording: &Recording, closed: &Closed) -> String {
+pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
     let v = &closed.verdict;
-    let mut sheet = Sheet::new(&format!("Closing the loop on {}", v.run));
-    let ids: Vec<&str> = v.effects.iter().map(|e| e.id.as_str()).collect();
-    sheet.say(&match v.verdict {
-        Kind::Attributed => format!("Attributed: the declared model lacks {}.", ids.join(" and ")),
-        Kind::Ambiguous => format!("Ambiguous: {} explains the residual, and so do others.", ids.join(" and ")),
-        Kind::Unattributed => "Unattributed: no known cause explains what is left over.".to_owned(),
-        Kind::None => "Nothing significant is left over.".to_owned(),
-    });
-    sheet.say("Declared: a field that is constant in earth axes, gravity and a constant offset, a constant offset of the gyro at rest. The attitude comes from gyro and accelerometer alone. Held-out: stretches of the run predicted by a fit that did not see them.");
-    sheet.errors(&v.channels);
-    for e in &v.effects {
-        sheet.section(&format!("{} (p = {:.2})", e.id, e.probability));
-        sheet.say(&e.equation);
-        sheet.say(&format!("{}.", e.evidence));
-        let rows: Vec<Vec<String>> = e
-            .parameters
+    let traces: Vec<Trace> = closed.sensors.iter().flat_map(|s| (0..3).map(move |k| trace(recording, s, k))).collect();
+    let of = |name: &str| traces.iter().find(|t| t.channel == name);
+    let page = Page {
+        verdict: v,
+        words: VOCABULARY,
+        news: false,
+        origin,
+        declared: "Declared: a field that is constant in earth axes, gravity and a constant offset, a constant offset of the gyro at rest. The attitude comes from gyro and accelerometer alone.".to_owned(),
+        hero: parts::most(v, &traces),
+        cards: v
+            .effects
             .iter()
-            .map(|p| {
-                vec![p.name.clone(), number(p.value), format!("{} to {}", number(p.ci95[0]), number(p.ci95[1])), p.unit.clone()]
+            .enumerate()
+            .map(|(k, e)| {
+                let trace = e.channels.first().and_then(|c| of(c));
+                trace.map(|t| enlarged(t, &format!("effect-{}", k + 1), PAIR).unwrap_or_else(|| over_time(t, "effect", PAIR)))
             })
-            .collect();
-        sheet.table(&["parameter", "value", "95 % interval", "unit"], &rows, |_| false);
-    }
-    if let Some(next) = &v.next_experiment {
-        sheet.section("Next experiment");
-        sheet.say(&next.why);
-    }
-    sheet.section("What was left over, and what is left now");
-    for s in &closed.sensors {
-        sheet.figures((0..3).map(|k| figure(recording, s, k)).collect());
-    }
-    sheet.section("The run");
-    sheet.figures(closed.sensors.iter().map(|s| overview(recording, s)).collect());
+            .map(|figure| figure.into_iter().collect())
+            .collect(),
+        left: v.unexplained.iter().filter_map(|u| of(&u.channel)).map(|t| over_time(t, "left", PAIR)).collect(),
+        speeds: Vec::new(),
+    };
+    let mut sheet = parts::begin(&page);
+    sheet.fold("Every channel in figures", |sheet| {
+        for s in &closed.sensors {
+            sheet.figures((0..3).map(|k| parts::thinned(figure(recording, s, k))).collect());
+        }
+    });
+    sheet.fold("The run", |sheet| sheet.figures(closed.sensors.iter().map(|s| parts::thinned(overview(recording, s))).collect()));
+    parts::aside(&mut sheet, v);
     sheet.html()
+}
+
+fn trace(recording: &Recording, sensor: &Sensor, axis: usize) -> Trace {
+    let measured = sensor.measured(recording);
+    let left =
+        |predicted: &[Vector3<f64>]| -> Vec<f64> { measured.iter().zip(predicted).map(|(m, p)| m[axis] - p[axis]).collect() };
+    Trace {
+        channel: sensor.channels[axis].to_owned(),
+        unit: sensor.unit.to_owned(),
+        floor: sensor.floor[axis],
+        time_label: "time, s".to_owned(),
+        t: recording.t.clone(),
+        before: left(&sensor.declared),
+        after: left(&sensor.corrected),
+    }
 }
 
 fn figure(recording: &Recording, sensor: &Sensor, axis: usize) -> Figure {

@@ -1,11 +1,12 @@
 //! Reports that a person looks at: one self-contained HTML page with SVG figures.
 //!
-//! What it is: the verdict, the figures that convince, and the parameters, in a page without network or script.
+//! What it is: the verdict, the figures that convince, and the parameters, in a page without network; its only script copies tables.
 //! What can go wrong: nothing; missing channels leave their figures out.
 //! Units: on the axes.
 //! Reference: specification `identification.md`, item 5.
 
 mod beam;
+pub(crate) mod closed;
 mod figure;
 mod page;
 mod run;
@@ -16,13 +17,13 @@ mod style;
 mod svg;
 
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
+pub use closed::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal};
 pub use figure::{Figure, Layer, Mark};
 pub use page::closed_loop;
 pub use run::run;
 pub use selection::selection;
 pub use sheet::{Sheet, write_figures};
 pub use shift::{filter_figures, study_figures};
-pub use svg::{Chart, Series};
 
 /// A number with five significant digits, as tables print it.
 #[must_use]

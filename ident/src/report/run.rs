@@ -20,7 +20,7 @@ use crate::plateau::Plateau;
 use crate::shift::{Settings, filters};
 
 /// Colours of the speed channels.
-const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];
+pub(super) const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];
 
 /// The page of a run; `other` is a second run to be laid beside it (with and without the encoder, Figures 5.22 to 5.25).
 #[must_use]
@@ -72,7 +72,7 @@ fn lead(log: &Log, found: &Identified) -> String {
     )
 }
 
-fn constants(sheet: &mut Sheet, found: &Identified) {
+pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
     if found.constants.is_empty() {
         return;
     }
@@ -84,7 +84,7 @@ fn constants(sheet: &mut Sheet, found: &Identified) {
             vec![c.name.to_owned(), number(c.value), number(c.se), interval, c.unit.to_owned()]
         })
         .collect();
-    sheet.table(&["constant", "value", "standard error", "95 % interval", "unit"], &rows, |_| false);
+    sheet.listed("constants", &["constant", "value", "standard error", "95 % interval", "unit"], &rows);
 }
 
 fn label(channel: &str) -> String {
@@ -152,7 +152,7 @@ fn over_time(log: &Log, found: &Identified, channel: &str) -> Option<Figure> {
 }
 
 /// Every speed channel in one drawing (Figure 5.62); `None` with fewer than two.
-fn overlaid(log: &Log) -> Option<Figure> {
+pub(super) fn overlaid(log: &Log) -> Option<Figure> {
     let channels: Vec<(&str, &[f64])> = SPEED.into_iter().filter_map(|c| Some((c, log.column(c)?))).collect();
     let layers = channels.iter().zip(CLASSES).map(|((name, values), class)| {
         let (x, y) = present(&log.t, values);
@@ -250,7 +250,7 @@ fn unscaled(x: &str, value: f64) -> f64 {
     if x == "pulse_us" { 1000.0 + 1000.0 * value } else { 1000.0 * value }
 }
 
-fn relation(f: &Fitted) -> Figure {
+pub(super) fn relation(f: &Fitted) -> Figure {
     let (low, high) = f.curve.range();
     let grid: Vec<f64> = (0..=120).map(|k| low + (high - low) * f64::from(k) / 120.0).collect();
     let x: Vec<f64> = grid.iter().map(|g| unscaled(f.x, *g)).collect();
@@ -367,7 +367,7 @@ fn side_by_side(a: (&Log, &Identified), b: (&Log, &Identified)) -> Vec<Figure> {
     out
 }
 
-fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
+pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
     let mut header =
         vec!["plateau".to_owned(), "from, s".to_owned(), "to, s".to_owned(), "settling, s".to_owned(), "rows".to_owned()];
     header.extend(log.columns.iter().map(|c| label(&c.name)));
@@ -388,10 +388,10 @@ fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
         })
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    sheet.table(&header, &rows, |_| false);
+    sheet.listed("plateaus", &header, &rows);
 }
 
-fn coefficients(sheet: &mut Sheet, found: &Identified) {
+pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
     sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. Half widths of 95 % intervals. Chi2 is the scatter of the plateaus about the curve over what their own errors promise: far above 1 the order does not suffice.");
     let rows: Vec<Vec<String>> = found
         .curves
@@ -405,5 +405,5 @@ fn coefficients(sheet: &mut Sheet, found: &Identified) {
             })
         })
         .collect();
-    sheet.table(&["relation", "coefficient", "value", "+-", "chi2", "order by AICc"], &rows, |_| false);
+    sheet.listed("coefficients", &["relation", "coefficient", "value", "+-", "chi2", "order by AICc"], &rows);
 }

@@ -5,6 +5,7 @@
 //! Units: none.
 //! Reference: specification `identification.md`, item 5.
 
+use super::closed::{LOOK, SCRIPT};
 use super::figure::Figure;
 use super::number;
 use super::style::{COLOURS, DRAWING, PAGE};
@@ -13,24 +14,102 @@ use crate::log::write_whole;
 use crate::verdict::Channels;
 use std::path::{Path, PathBuf};
 
+/// Most rows of a table on a closed loop's page.
+const LONGEST: usize = 300;
+
 /// A page under construction.
 #[derive(Debug, Clone, Default)]
 pub struct Sheet {
     title: String,
     body: String,
     figures: Vec<Figure>,
+    /// A closed loop's page: its own look, and tables that can be copied.
+    told: bool,
+    /// Anchors that are taken.
+    anchors: Vec<String>,
 }
 
 impl Sheet {
     /// An empty page with a heading.
     #[must_use]
     pub fn new(title: &str) -> Self {
-        Self { title: title.to_owned(), body: format!("<h1>{}</h1>\n", escape(title)), figures: Vec::new() }
+        Self { title: title.to_owned(), body: format!("<h1>{}</h1>\n", escape(title)), ..Self::default() }
+    }
+
+    /// An empty page that begins with a sentence.
+    pub(crate) fn told(title: &str, sentence: &str) -> Self {
+        // what was found stands large, how much that is and what is left beneath
+        let (found, rest) = sentence.split_once(". ").map_or((sentence, ""), |(found, rest)| (found, rest));
+        let dot = if rest.is_empty() { "" } else { "." };
+        let mut body = format!("<h1>{}{dot}</h1>\n", escape(found));
+        if !rest.is_empty() {
+            body += &format!("<p class=\"lead\">{}</p>\n", escape(rest));
+        }
+        Self { title: title.to_owned(), body, told: true, ..Self::default() }
+    }
+
+    /// A line in the second rank.
+    pub(crate) fn soft(&mut self, text: &str) {
+        self.body += &format!("<p class=\"soft\">{}</p>\n", escape(text));
+    }
+
+    /// Markup as it is.
+    pub(crate) fn html_part(&mut self, markup: &str) {
+        self.body += markup;
+    }
+
+    /// A part that is folded away until the reader opens it.
+    pub(crate) fn fold(&mut self, heading: &str, fill: impl FnOnce(&mut Self)) {
+        let anchor = self.anchor(heading);
+        self.body += &format!("<details id=\"{anchor}\"><summary>{}</summary>\n", escape(heading));
+        fill(self);
+        self.body += "</details>\n";
+    }
+
+    /// A table that can be copied, and downloaded as CSV: `raw` with all digits where it is given, else what is seen.
+    pub(crate) fn data(&mut self, name: &str, header: &[&str], rows: &[Vec<String>], raw: Option<(&[&str], &[Vec<String>])>) {
+        let (head, lines) = raw.unwrap_or((header, rows));
+        let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
+        let csv: String = std::iter::once(&head).chain(lines).map(|row| csv_line(row)).collect();
+        self.body += "<div class=\"tab\">";
+        self.table(header, rows, |_| false);
+        self.body += &format!(
+            "<p class=\"tools\"><a download=\"{}.csv\" href=\"{}\">CSV</a><button class=\"copy\" hidden>copy</button></p></div>\n",
+            escape(name),
+            data_uri("text/csv", &csv)
+        );
+    }
+
+    /// A long table: on a closed loop's page it can be copied, and is cut where it is very long.
+    pub(crate) fn listed(&mut self, name: &str, header: &[&str], rows: &[Vec<String>]) {
+        if !self.told {
+            self.table(header, rows, |_| false);
+            return;
+        }
+        let shown = &rows[..rows.len().min(LONGEST)];
+        self.data(name, header, shown, None);
+        if rows.len() > shown.len() {
+            self.say(&format!("The first {LONGEST} of {}.", rows.len()));
+        }
+    }
+
+    /// An anchor that no other part has.
+    fn anchor(&mut self, heading: &str) -> String {
+        let base = super::closed::slug(heading);
+        let taken = self.anchors.iter().filter(|a| **a == base).count();
+        self.anchors.push(base.clone());
+        if taken == 0 { base } else { format!("{base}-{}", taken + 1) }
     }
 
     /// A section's heading.
     pub fn section(&mut self, heading: &str) {
-        self.body += &format!("<h2>{}</h2>\n", escape(heading));
+        let anchor = self.anchor(heading);
+        let heading = escape(heading);
+        self.body += &if self.told {
+            format!("<h2 id=\"{anchor}\"><a href=\"#{anchor}\">{heading}</a></h2>\n")
+        } else {
+            format!("<h2 id=\"{anchor}\">{heading}</h2>\n")
+        };
     }
 
     /// A paragraph.
@@ -98,9 +177,12 @@ impl Sheet {
     #[must_use]
     pub fn html(&self) -> String {
         format!(
-            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{}</title><style>{COLOURS}{DRAWING}{PAGE}</style></head><body>\n{}</body></html>\n",
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{}</title><style>{COLOURS}{DRAWING}{PAGE}{}</style></head><body{}>\n{}{}</body></html>\n",
             escape(&self.title),
-            self.body
+            if self.told { LOOK } else { "" },
+            if self.told { " class=\"told\"" } else { "" },
+            self.body,
+            if self.told { SCRIPT } else { "" }
         )
     }
 
@@ -109,6 +191,27 @@ impl Sheet {
     pub fn drawn(&self) -> &[Figure] {
         &self.figures
     }
+}
+
+/// A line of CSV.
+fn csv_line(cells: &[String]) -> String {
+    let quoted = |c: &String| {
+        if c.contains([',', '"', '\n']) { format!("\"{}\"", c.replace('"', "\"\"")) } else { c.clone() }
+    };
+    cells.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n"
+}
+
+/// Text as an address that holds it, so that a link downloads it without a network.
+pub(crate) fn data_uri(kind: &str, text: &str) -> String {
+    let mut out = format!("data:{kind};charset=utf-8,");
+    for byte in text.bytes() {
+        if byte.is_ascii_alphanumeric() || b",.-_:+()/=;".contains(&byte) {
+            out.push(char::from(byte));
+        } else {
+            out += &format!("%{byte:02X}");
+        }
+    }
+    out
 }
 
 /// Writes each figure as `ID.svg` into a folder, which is made where it is missing.

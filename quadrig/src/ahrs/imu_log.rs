@@ -76,6 +76,11 @@ impl ImuLog {
         Ok(Self { text, times, rows })
     }
 
+    /// The file's text.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
     /// A further column by its name, where the log has it; an empty field is not a number.
     pub(crate) fn column(&self, name: &str) -> Option<Vec<f64>> {
         let mut lines = self.text.lines().filter(|l| !l.starts_with('#') && !l.trim().is_empty());

@@ -5,15 +5,16 @@
 //! Units: as the channels state.
 //! Reference: specification `flight.md`, "The loop on flights".
 
-use super::{Args, table};
+use super::Args;
 use crate::Failure;
 use crate::progress::Bar;
 use ident::flight::columns::Flight;
 use ident::flight::library::FlightLibrary;
 use ident::flight::predict::{columns, is_by_row, is_own, over_windows, seen_by};
-use ident::flight::{Closed, FlightModel, MODEL_FORMAT, close, page};
+use ident::flight::{Closed, FlightModel, MODEL_FORMAT, VOCABULARY, close, page};
 use ident::flight_log;
 use ident::log::write_whole;
+use ident::report::{Origin, terminal};
 use std::fmt::Write;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -36,12 +37,13 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     };
     let json = serde_json::to_string_pretty(&closed.verdict)?;
     if let Some(folder) = &args.output {
-        write_folder(folder, &closed, &json)?;
+        let origin = Origin { model: args.model.as_ref().map(|m| m.display().to_string()), ..Origin::of(&log) };
+        write_folder(folder, &closed, &json, origin)?;
     }
     if args.json {
         println!("{json}");
     } else if !quiet {
-        print!("{}", table(&closed.verdict));
+        print!("{}", terminal(&closed.verdict, VOCABULARY, model.is_some()));
     }
     Ok(())
 }
@@ -51,14 +53,14 @@ fn read_model(path: &Path) -> Result<FlightModel, Failure> {
     Ok(FlightModel::parse(&path.display().to_string(), &text)?)
 }
 
-fn write_folder(folder: &Path, closed: &Closed, json: &str) -> Result<(), Failure> {
+fn write_folder(folder: &Path, closed: &Closed, json: &str, origin: Origin) -> Result<(), Failure> {
     let say = |e: std::io::Error| format!("{}: {e}", folder.display());
     std::fs::create_dir_all(folder).map_err(say)?;
     let write = |name: &str, text: &str| write_whole(&folder.join(name), |out| out.write_all(text.as_bytes())).map_err(say);
     write("verdict.json", &format!("{json}\n"))?;
     write("model.toml", &closed.model.to_toml(&closed.parameters))?;
     write("channels.csv", &channels(&closed.flight))?;
-    write("report.html", &page(closed))?;
+    write("report.html", &page(closed, origin))?;
     Ok(())
 }
 

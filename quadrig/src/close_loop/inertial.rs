@@ -6,13 +6,14 @@
 //! Units: rad/s, m/s^2, uT.
 //! Reference: specification `formats.md`, "Attitude log" and "Verdict".
 
-use super::{Args, table};
+use super::Args;
 use crate::Failure;
 use crate::ahrs::imu_log::{ImuLog, Row};
 use crate::progress::Bar;
 use dcm::{Config, Dcm, Measurement, Vec3};
-use ident::inertial::{Attitude, InertialModel, MODEL_FORMAT, Predicted, Recording, Sensor, close, page};
+use ident::inertial::{Attitude, InertialModel, MODEL_FORMAT, Predicted, Recording, Sensor, VOCABULARY, close, page};
 use ident::log::write_whole;
+use ident::report::{Origin, terminal};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
 use std::io::{BufRead, BufReader};
@@ -52,12 +53,15 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             let predicted: Vec<Predicted> = closed.sensors.iter().map(of).collect();
             write_whole(&folder.join(name), |out| out.write_all(predictions(&log, &predicted).as_bytes())).map_err(say)?;
         }
-        write_whole(&folder.join("report.html"), |out| out.write_all(page(&recording, &closed).as_bytes())).map_err(say)?;
+        let seconds = recording.t.first().zip(recording.t.last()).map(|(a, b)| b - a);
+        let origin = Origin::of_text(&recording.name, log.text(), recording.t.len(), seconds);
+        write_whole(&folder.join("report.html"), |out| out.write_all(page(&recording, &closed, origin).as_bytes()))
+            .map_err(say)?;
     }
     if args.json {
         println!("{json}");
     } else if !quiet {
-        print!("{}", table(&closed.verdict));
+        print!("{}", terminal(&closed.verdict, VOCABULARY, false));
     }
     Ok(())
 }

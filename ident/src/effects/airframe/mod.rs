@@ -134,6 +134,12 @@ pub trait AirframeEffect: Sync {
     fn report(&self, found: &Found<'_>) -> Vec<Parameter>;
 }
 
+/// What an effect of a flight is.
+#[must_use]
+pub fn about(id: &str) -> Option<About> {
+    library().iter().find(|e| e.id() == id).map(|e| e.about())
+}
+
 /// Every effect.
 #[must_use]
 pub fn library() -> &'static [&'static dyn AirframeEffect] {

@@ -1,0 +1,194 @@
+//! One card an effect: what it does, how sure it is, what it removes, its parameters, what else it could be, and its figures.
+//!
+//! What it is: the cards in the order of what they remove; sure and unsure ones look different, and say so.
+//! What can go wrong: an effect without a figure of its own (a board told it) has a card without one.
+//! Units: as the parameters state.
+//! Reference: specification `formats.md`, "Verdict" (`effects`, `alternatives`).
+
+use super::page::Page;
+use super::sentence::instead;
+use super::state::figures;
+use crate::report::figure::Figure;
+use crate::report::sheet::Sheet;
+use crate::report::svg::escape;
+use crate::verdict::{EffectEntry, Parameter, Verdict};
+use crate::words::{channel, digits, list, probability, scaled, scope, sized, sureness, upper};
+use std::fmt::Write;
+
+/// Probability below which the card says how to settle it.
+const SETTLED: f64 = 0.85;
+
+/// The cards: those of this rig, those of every rig, and corrections without a name.
+pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
+    let v = page.verdict;
+    let mut order: Vec<usize> = (0..v.effects.len()).collect();
+    let removed = |k: &usize| v.effects[*k].heldout_error_reduction;
+    order.sort_by(|a, b| removed(b).total_cmp(&removed(a)).then(a.cmp(b)));
+    let group = |e: &EffectEntry| match e.id.as_str() {
+        "unknown" => 2,
+        id if (page.words.of_every_rig)(id) => 1,
+        _ => 0,
+    };
+    for (k, (heading, lead)) in [
+        ("What this rig has", ""),
+        ("What every rig has", "A rotor has inertia and takes time: no rig is without these."),
+        ("Without a name", "What no known effect explains. Where a smooth function predicts rows it has not seen, it corrects the model; it names no cause."),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let members: Vec<usize> = order.iter().copied().filter(|i| group(&v.effects[*i]) == k).collect();
+        if members.is_empty() {
+            continue;
+        }
+        sheet.section(heading);
+        if !lead.is_empty() {
+            sheet.say(lead);
+        }
+        for (place, i) in members.into_iter().enumerate() {
+            let number = (k == 0).then_some(place + 1);
+            card(sheet, page, i, number);
+        }
+    }
+}
+
+fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
+    let (v, e) = (page.verdict, &page.verdict.effects[k]);
+    let sure = sureness(e.probability);
+    let title = if e.id == "unknown" {
+        let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
+        let with: Vec<String> = e.depends_on.iter().map(|c| channel(c)).collect();
+        if with.is_empty() {
+            format!("Something on {} that nothing predicts.", list(&on))
+        } else {
+            format!("Something on {} that goes with {}.", list(&on), list(&with))
+        }
+    } else {
+        (page.words.clause)(e).sentence()
+    };
+    let number = number.map(|n| format!("<span class=\"nr\">{n}</span> ")).unwrap_or_default();
+    let mut html = format!(
+        "<article class=\"card {sure}\" id=\"effect-{}\"><h3>{number}{}</h3>\n<p class=\"facts\"><span class=\"chip {sure}\">{sure}: p {}</span> <code>{}</code> on {}. {}</p>\n",
+        anchor(v, k),
+        escape(&title),
+        escape(&equals(&probability(e.probability))),
+        escape(&e.id),
+        escape(&list(&e.channels.iter().map(|c| channel(c)).collect::<Vec<_>>())),
+        escape(&removes(v, e)),
+    );
+    // what has no name belongs to nothing that is known
+    if e.id != "unknown" {
+        let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(scope(e.scope))));
+    }
+    sheet.html_part(&html);
+    let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
+    sheet.html_part("<div class=\"split\">\n");
+    sheet.figures(figures);
+    sheet.html_part("<div>\n");
+    parameters(sheet, e);
+    let mut html =
+        format!("<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n", escape(&e.equation), escape(&upper(&e.evidence)));
+    let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
+    if let Some(how) = settle(v, e) {
+        let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
+    }
+    sheet.html_part(&format!("{html}</div></div></article>\n"));
+}
+
+fn equals(text: &str) -> String {
+    if text.starts_with(['<', '>']) { text.to_owned() } else { format!("= {text}") }
+}
+
+/// An anchor of its own for each effect.
+fn anchor(v: &Verdict, k: usize) -> String {
+    let before = v.effects[..k].iter().filter(|e| e.id == v.effects[k].id).count();
+    let id = v.effects[k].id.replace('_', "-");
+    if before == 0 { id } else { format!("{id}-{}", before + 1) }
+}
+
+/// What would be left on its first channel without it.
+pub(super) fn removes(v: &Verdict, e: &EffectEntry) -> String {
+    let (first, reduction) = (e.channels.first().map_or("", String::as_str), e.heldout_error_reduction);
+    let Some(c) = v.channels.get(first) else { return String::new() };
+    if e.id == "unknown" && e.depends_on.is_empty() {
+        return "No correction was fitted.".to_owned();
+    }
+    if reduction <= 0.0 || !c.after.heldout_rms.is_finite() {
+        return format!("It removes nothing of the error of {}.", channel(first));
+    }
+    let without = c.after.heldout_rms / (1.0 - reduction).max(1e-9);
+    let [_, without, with] = figures(&c.unit, c.noise_floor_rms, without, c.after.heldout_rms);
+    format!("Without it the error of {} is {without}, with it {with}.", channel(first))
+}
+
+/// A parameter's value and interval, with one digit more than the interval supports.
+pub(super) fn value(p: &Parameter) -> [String; 3] {
+    let (factor, unit) = scaled(p.value, &p.unit);
+    let half = factor * 0.5 * (p.ci95[1] - p.ci95[0]).abs();
+    let fine = |v: f64| digits(factor * v, if half > 0.0 { 0.1 * half } else { 0.0 });
+    let unit = if unit == "1" { "" } else { unit };
+    [fine(p.value), format!("{} to {}", fine(p.ci95[0]), fine(p.ci95[1])), unit.to_owned()]
+}
+
+fn parameters(sheet: &mut Sheet, e: &EffectEntry) {
+    let shown = |p: &&Parameter| p.name != "phase";
+    let rows: Vec<Vec<String>> = e
+        .parameters
+        .iter()
+        .filter(shown)
+        .map(|p| {
+            let [v, interval, unit] = value(p);
+            let note = if sized(p).is_some() { "" } else { "not well known" };
+            vec![p.name.replace('_', " "), v, interval, unit, note.to_owned()]
+        })
+        .collect();
+    let raw: Vec<Vec<String>> = e
+        .parameters
+        .iter()
+        .map(|p| vec![p.name.clone(), p.value.to_string(), p.ci95[0].to_string(), p.ci95[1].to_string(), p.unit.clone()])
+        .collect();
+    if !rows.is_empty() {
+        let notes = rows.iter().any(|r| !r[4].is_empty());
+        let width = if notes { 5 } else { 4 };
+        let rows: Vec<Vec<String>> = rows.into_iter().map(|r| r[..width].to_vec()).collect();
+        let head = &["parameter", "value", "95 % interval", "unit", ""][..width];
+        sheet.data(&format!("{}-parameters", e.id), head, &rows, Some((&["parameter", "value", "low", "high", "unit"], &raw)));
+    }
+}
+
+/// What would stand in its place, with probabilities, and what it is easily taken for.
+pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
+    let v = page.verdict;
+    let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
+    let mut found: Vec<String> = Vec::new();
+    for a in &v.alternatives {
+        let lacks = a.ids.iter().filter(|id| **id == e.id).count() < best.iter().filter(|b| b.id == e.id).count();
+        let instead = instead(&best, &a.ids);
+        if lacks || e.id == "unknown" {
+            let what = if instead.is_empty() { "nothing in its place".to_owned() } else { instead.join(" + ") };
+            found.push(format!("{what} ({})", probability(a.probability)));
+        }
+    }
+    let alike: Vec<&str> = (page.words.about)(&e.id).map(|a| a.look_alikes.to_vec()).unwrap_or_default();
+    let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join(", ")) };
+    let found =
+        if found.is_empty() { "nothing else that was tried came close.".to_owned() } else { format!("{}.", found.join(", ")) };
+    format!("{found}{alike}")
+}
+
+/// What would settle an effect that is not sure.
+fn settle(v: &Verdict, e: &EffectEntry) -> Option<String> {
+    if e.probability >= SETTLED {
+        return None;
+    }
+    if v.next_experiment.is_some() {
+        return Some("<a href=\"#what-would-settle-it\">the run that is proposed below</a>.".to_owned());
+    }
+    Some(match e.scope {
+        crate::effects::Scope::Rig => {
+            "another run of this rig: what belongs to the rig is there again (<code>--validate OTHER.csv</code>).".to_owned()
+        }
+        crate::effects::Scope::Run => "the same schedule once more: what belongs to this run is another size then.".to_owned(),
+        crate::effects::Scope::Event => "the same schedule once more: what happened once is not there again.".to_owned(),
+    })
+}

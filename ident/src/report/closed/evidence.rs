@@ -1,0 +1,278 @@
+//! The figures that convince: a residual before and after, over time or over the variable that it depends on.
+//!
+//! What it is: traces of a channel, and the drawings made of them, thinned to what a pixel shows.
+//! What can go wrong: a long gap lifts the pen; a trace without finite values gives an empty figure, which no page shows.
+//! Units: the channel's.
+//! Reference: component-plus-residual plots: Larsen & McCleary 1972, Technometrics 14:781.
+
+use crate::noise::median;
+use crate::report::figure::{Figure, Layer, Mark};
+use crate::verdict::{Kind, Verdict};
+use crate::words::{channel, heading};
+
+/// Columns of pixels of a drawing.
+const COLUMNS: usize = 440;
+/// Most dots of a cloud.
+const DOTS: usize = 1600;
+/// Most read-outs of a layer.
+const READ_OUTS: usize = 120;
+/// Parts of a run of which the most telling one is enlarged.
+const PARTS: f64 = 12.0;
+/// Usual steps from which on a gap lifts the pen.
+const GAP: f64 = 20.0;
+
+/// What a channel left over before and after.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Trace {
+    /// Channel.
+    pub(crate) channel: String,
+    /// Unit.
+    pub(crate) unit: String,
+    /// Noise floor.
+    pub(crate) floor: f64,
+    /// Label of the time axis.
+    pub(crate) time_label: String,
+    /// Time.
+    pub(crate) t: Vec<f64>,
+    /// Measured less predicted, declared model.
+    pub(crate) before: Vec<f64>,
+    /// Measured less predicted, corrected model.
+    pub(crate) after: Vec<f64>,
+}
+
+impl Trace {
+    /// The same with another model's residual as what was before.
+    pub(crate) fn with_before(&self, before: Vec<f64>) -> Self {
+        Self { before, ..self.clone() }
+    }
+
+    fn band(&self, from: f64, to: f64) -> Option<Layer> {
+        (self.floor > 0.0).then(|| Layer::Band {
+            name: "noise floor".into(),
+            class: "d",
+            x: vec![from, to],
+            lower: vec![-self.floor; 2],
+            upper: vec![self.floor; 2],
+        })
+    }
+
+    fn figure(&self, id: &str, title: String, x_label: String, layers: Vec<Layer>) -> Figure {
+        let y_label = if self.unit.is_empty() { "left over".into() } else { format!("left over, {}", self.unit) };
+        thinned(Figure {
+            id: format!("{id}-{}", slug(&self.channel)),
+            title,
+            x_label,
+            y_label,
+            layers,
+            height: 280.0,
+            ..Figure::default()
+        })
+    }
+
+    fn pair(&self, rows: std::ops::Range<usize>, names: [&str; 2]) -> Vec<Layer> {
+        let t = &self.t[rows.clone()];
+        let mut layers: Vec<Layer> = t.first().zip(t.last()).and_then(|(a, b)| self.band(*a, *b)).into_iter().collect();
+        for ((name, class), y) in names.into_iter().zip(["b", "a"]).zip([&self.before, &self.after]) {
+            let (x, y) = lifted(t, &y[rows.clone()]);
+            layers.push(Layer::Line { name: name.to_owned(), class, x, y });
+        }
+        layers
+    }
+}
+
+/// An identifier from a channel's name.
+pub(crate) fn slug(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
+}
+
+/// Over the whole run.
+pub(crate) fn over_time(trace: &Trace, id: &str, names: [&str; 2]) -> Figure {
+    let title = format!("{} left over, whole run", heading(&trace.channel));
+    trace.figure(id, title, trace.time_label.clone(), trace.pair(0..trace.t.len(), names))
+}
+
+/// The part of the run in which most was taken away, enlarged.
+pub(crate) fn enlarged(trace: &Trace, id: &str, names: [&str; 2]) -> Option<Figure> {
+    let (first, last) = (trace.t.first()?, trace.t.last()?);
+    let wide = (last - first) / PARTS;
+    if trace.t.len() < 60 || wide <= 0.0 {
+        return None;
+    }
+    let gone = |i: usize| {
+        let d = trace.before[i].powi(2) - trace.after[i].powi(2);
+        if d.is_finite() { d } else { 0.0 }
+    };
+    let (mut sum, mut from, mut best) = (0.0, 0, (0.0, 0..0));
+    for i in 0..trace.t.len() {
+        sum += gone(i);
+        while trace.t[i] - trace.t[from] > wide {
+            sum -= gone(from);
+            from += 1;
+        }
+        if sum > best.0 {
+            best = (sum, from..i + 1);
+        }
+    }
+    let range = best.1;
+    // a little before and after, so that the quiet beside it is seen
+    let margin = range.len() / 6;
+    let range = range.start.saturating_sub(margin)..(range.end + margin).min(trace.t.len());
+    (range.len() > 8).then(|| {
+        let title = format!("{} left over, where most was explained", heading(&trace.channel));
+        trace.figure(&format!("{id}-enlarged"), title, trace.time_label.clone(), trace.pair(range, names))
+    })
+}
+
+/// The channel on which most was taken away, over time and enlarged; where nothing was, the loudest.
+pub(crate) fn most(verdict: &Verdict, traces: &[Trace]) -> Vec<Figure> {
+    let weight = |t: &&Trace| {
+        verdict.channels.get(&t.channel).map_or(0.0, |c| match verdict.verdict {
+            Kind::Attributed | Kind::Ambiguous => c.before.heldout_rms / c.after.heldout_rms.max(1e-300),
+            Kind::Unattributed | Kind::None => c.after.heldout_rms / c.noise_floor_rms,
+        })
+    };
+    let Some(trace) = traces.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))) else { return Vec::new() };
+    let names = ["declared, before", "corrected, after"];
+    std::iter::once(over_time(trace, "most", names)).chain(enlarged(trace, "most", names)).collect()
+}
+
+/// Over a variable.
+pub(crate) fn against(trace: &Trace, id: &str, (variable, unit): (&str, &str), x: &[f64], names: [&str; 2]) -> Figure {
+    let ends =
+        x.iter().copied().filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    let mut layers: Vec<Layer> = if ends.0 < ends.1 { trace.band(ends.0, ends.1).into_iter().collect() } else { Vec::new() };
+    for ((name, class), y) in names.into_iter().zip(["b", "a"]).zip([&trace.before, &trace.after]) {
+        layers.push(Layer::Dots { name: name.to_owned(), class, x: x.to_vec(), y: y.clone() });
+    }
+    let said = channel(variable);
+    let title = format!("{} left over, against {said}", heading(&trace.channel));
+    let x_label = if unit.is_empty() { said } else { format!("{said}, {unit}") };
+    trace.figure(&format!("{id}-against-{}", slug(variable)), title, x_label, layers)
+}
+
+/// Values over time, with a hole where samples are missing for long.
+fn lifted(t: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    let usual = if steps.is_empty() { 0.0 } else { median(&mut steps) };
+    let (mut x, mut out) = (Vec::with_capacity(t.len()), Vec::with_capacity(t.len()));
+    for i in 0..t.len() {
+        if i > 0 && t[i] - t[i - 1] > GAP * usual {
+            x.push(t[i - 1]);
+            out.push(f64::NAN);
+        }
+        x.push(t[i]);
+        out.push(y[i]);
+    }
+    (x, out)
+}
+
+/// A figure whose lines and clouds hold no more points than its pixels show.
+pub(crate) fn thinned(mut figure: Figure) -> Figure {
+    for layer in &mut figure.layers {
+        match layer {
+            Layer::Line { x, y, .. } => (*x, *y) = line(x, y),
+            Layer::Dots { x, y, .. } => (*x, *y) = cloud(x, y),
+            Layer::Marks { marks, .. } => *marks = apart(marks),
+            _ => {}
+        }
+    }
+    figure
+}
+
+/// A line with the two extremes of every column of pixels.
+fn line(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    if x.len() <= 3 * COLUMNS {
+        return (x.to_vec(), y.to_vec());
+    }
+    let (first, last) = (x[0], x[x.len() - 1]);
+    let column = |v: f64| ((v - first) / (last - first) * COLUMNS as f64) as i64;
+    let (mut out_x, mut out_y) = (Vec::new(), Vec::new());
+    let mut i = 0;
+    while i < x.len() {
+        let end = (i + 1..x.len()).find(|k| column(x[*k]) != column(x[i])).unwrap_or(x.len());
+        let finite = || (i..end).filter(|k| y[*k].is_finite());
+        let (low, high) = (finite().min_by(|a, b| y[*a].total_cmp(&y[*b])), finite().max_by(|a, b| y[*a].total_cmp(&y[*b])));
+        if let (Some(a), Some(b)) = (low, high) {
+            for k in if a == b { vec![a] } else { vec![a.min(b), a.max(b)] } {
+                out_x.push(x[k]);
+                out_y.push(y[k]);
+            }
+        }
+        // a gap lifts the pen
+        if !y[end - 1].is_finite() {
+            out_x.push(x[end - 1]);
+            out_y.push(f64::NAN);
+        }
+        i = end;
+    }
+    (out_x, out_y)
+}
+
+/// Read-outs that lie apart, of which there are no more than a finger can find.
+fn apart(marks: &[Mark]) -> Vec<Mark> {
+    if marks.len() <= READ_OUTS {
+        return marks.to_vec();
+    }
+    let (x, y): (Vec<f64>, Vec<f64>) = marks.iter().map(|m| (m.x, m.y)).unzip();
+    let (x, y) = cells(&x, &y, READ_OUTS);
+    let kept = |m: &&Mark| x.iter().zip(&y).any(|(x, y)| *x == m.x && *y == m.y);
+    let mut out: Vec<Mark> = marks.iter().filter(kept).cloned().collect();
+    out.dedup_by(|a, b| a.x == b.x && a.y == b.y);
+    out.truncate(2 * READ_OUTS);
+    out
+}
+
+/// A cloud with one dot in every cell, of cells as small as the number of dots allows: what lies apart stays.
+fn cloud(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    cells(x, y, DOTS)
+}
+
+fn cells(x: &[f64], y: &[f64], most: usize) -> (Vec<f64>, Vec<f64>) {
+    let points: Vec<(f64, f64)> =
+        x.iter().copied().zip(y.iter().copied()).filter(|p| p.0.is_finite() && p.1.is_finite()).collect();
+    if points.len() <= most {
+        return points.into_iter().unzip();
+    }
+    let ends = |of: fn(&(f64, f64)) -> f64| {
+        points.iter().map(of).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+    };
+    let ((x0, x1), (y0, y1)) = (ends(|p| p.0), ends(|p| p.1));
+    let mut cells = COLUMNS as f64;
+    loop {
+        let at = |v: f64, a: f64, b: f64, n: f64| ((v - a) / (b - a).max(f64::MIN_POSITIVE) * n) as u32;
+        let mut seen = std::collections::BTreeSet::new();
+        let kept: Vec<(f64, f64)> =
+            points.iter().copied().filter(|p| seen.insert((at(p.0, x0, x1, cells), at(p.1, y0, y1, cells / 2.0)))).collect();
+        if kept.len() <= most || cells < 6.0 {
+            return kept.into_iter().unzip();
+        }
+        cells /= 1.25;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_what_stands_out() {
+        let x: Vec<f64> = (0..600_000).map(f64::from).collect();
+        let mut y: Vec<f64> = x.iter().map(|v| (v * 0.7).sin()).collect();
+        y[123_456] = 50.0;
+        let (lx, ly) = line(&x, &y);
+        assert!(lx.len() <= 2 * COLUMNS + 2 && ly.contains(&50.0));
+        let (cx, cy) = cloud(&x, &y);
+        assert!(cx.len() <= DOTS && cy.contains(&50.0));
+        assert_eq!(cloud(&x, &y), (cx, cy), "the same every time");
+    }
+
+    #[test]
+    fn the_enlarged_part_holds_what_was_explained() {
+        let t: Vec<f64> = (0..1200).map(|i| 0.1 * f64::from(i)).collect();
+        let before: Vec<f64> = (0..1200).map(|i| if (600..620).contains(&i) { 5.0 } else { 0.0 }).collect();
+        let trace = Trace { channel: "thrust_n".into(), t, before, after: vec![0.0; 1200], ..Trace::default() };
+        let figure = enlarged(&trace, "x", ["before", "after"]).expect("a part");
+        let Some(Layer::Line { x, .. }) = figure.layers.first() else { panic!("a line") };
+        assert!(x[0] <= 60.0 && x[x.len() - 1] >= 61.9 && x[x.len() - 1] - x[0] < 15.0);
+    }
+}

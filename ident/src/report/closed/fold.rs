@@ -1,0 +1,100 @@
+//! What is folded away: every channel, candidates that lost, what was set aside.
+//!
+//! What it is: sections that a reader opens who wants to know why.
+//! What can go wrong: long lists are cut, and say so; the verdict's file has them whole.
+//! Units: as stated.
+//! Reference: specification `report.md`.
+
+use super::state::figures;
+use crate::diagnose::Diagnosis;
+use crate::report::number;
+use crate::report::sheet::Sheet;
+use crate::verdict::Verdict;
+use crate::words::channel;
+
+/// Most lines of a list on a page.
+const MOST: usize = 100;
+
+/// The errors of every channel in numbers.
+pub(crate) fn channels(sheet: &mut Sheet, verdict: &Verdict) {
+    let rows: Vec<Vec<String>> = verdict
+        .channels
+        .iter()
+        .map(|(name, c)| {
+            let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
+            let [_, rms_before, rms_after] = figures(&c.unit, c.noise_floor_rms, c.before.rms, c.after.rms);
+            let white = |p: f64| if p < 0.001 { "< 0.001".to_owned() } else { format!("{p:.3}") };
+            vec![channel(name), floor, before, after, rms_before, rms_after, white(c.after.whiteness_p)]
+        })
+        .collect();
+    let raw: Vec<Vec<String>> = verdict
+        .channels
+        .iter()
+        .map(|(name, c)| {
+            let values =
+                [c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms, c.before.rms, c.after.rms, c.after.whiteness_p];
+            [name.clone(), c.unit.clone()].into_iter().chain(values.map(|v| v.to_string())).collect()
+        })
+        .collect();
+    let head = ["channel", "noise floor", "held-out before", "held-out after", "rms before", "rms after", "whiteness after, p"];
+    let raw_head = [
+        "channel",
+        "unit",
+        "noise_floor_rms",
+        "before_heldout_rms",
+        "after_heldout_rms",
+        "before_rms",
+        "after_rms",
+        "after_whiteness_p",
+    ];
+    sheet.say("Held-out: five time blocks and every second interior level, each predicted by a fit that did not see it. The share that the sentence states is that of the squared held-out error above the noise floor.");
+    sheet.data("channels", &head, &rows, Some((&raw_head, &raw)));
+}
+
+/// Samples and channels that took no part.
+pub(crate) fn aside(sheet: &mut Sheet, verdict: &Verdict) {
+    let mut lines: Vec<Vec<String>> = verdict.left_out.iter().map(|l| vec![l.to_string()]).collect();
+    lines.extend(verdict.set_aside.iter().map(|a| vec![a.to_string()]));
+    if lines.is_empty() {
+        return;
+    }
+    let all = lines.len();
+    lines.truncate(MOST);
+    if all > MOST {
+        lines.push(vec![format!("and {} more, listed in verdict.json", all - MOST)]);
+    }
+    sheet.fold("What took no part", |sheet| sheet.data("set-aside", &["what, and why"], &lines, None));
+}
+
+/// The candidates of each round, with their evidence.
+pub(crate) fn candidates(sheet: &mut Sheet, diagnosis: &Diagnosis) {
+    let best = diagnosis.best.ids();
+    let rows: Vec<Vec<String>> = diagnosis
+        .candidates
+        .iter()
+        .enumerate()
+        .flat_map(|(round, list)| {
+            let best = &best;
+            list.iter().filter_map(move |c| {
+                let placed = c.fit.placed.last()?;
+                let on: Vec<String> = placed.instance.channels.iter().map(|c| channel(c)).collect();
+                let fate = if best.iter().any(|id| id == placed.effect.id()) { "kept" } else { "lost" };
+                Some(vec![
+                    (round + 1).to_string(),
+                    placed.effect.id().to_owned(),
+                    number(c.evidence),
+                    fate.to_owned(),
+                    on.join(", "),
+                ])
+            })
+        })
+        .take(MOST)
+        .collect();
+    if rows.is_empty() {
+        return;
+    }
+    sheet.fold("Candidates that were asked", |sheet| {
+        sheet.say("Each round asks every effect beside what was found before. Evidence in nats over the declared model.");
+        sheet.data("candidates", &["round", "effect", "evidence", "", "channels"], &rows, None);
+    });
+}

@@ -1,0 +1,50 @@
+//! What is left beside the names, each with its figure, and what would settle what is open.
+//!
+//! What it is: `unexplained` of the verdict as a table and pictures; the next experiment with its schedule as a file.
+//! What can go wrong: nothing; a verdict that leaves nothing says so.
+//! Units: the channels' and noise floors.
+//! Reference: specification `formats.md`, "Verdict" (`unexplained`, `next_experiment`).
+
+use super::page::Page;
+use super::sentence::size_left;
+use crate::report::sheet::{Sheet, data_uri};
+use crate::report::svg::escape;
+use crate::words::{channel, heading, upper};
+
+/// What is left.
+pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
+    let v = page.verdict;
+    sheet.section("What is left");
+    if v.unexplained.is_empty() {
+        sheet.say("Nothing: no channel is left with more than its noise.");
+        return;
+    }
+    let cells = |u: &crate::verdict::Unexplained| {
+        let with: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
+        let with = if with.is_empty() { "nothing in the log".to_owned() } else { with.join(", ") };
+        vec![heading(&u.channel), format!("{:.1}", u.over_floor), size_left(v, u), u.looks_like.clone(), with]
+    };
+    let rows: Vec<Vec<String>> = v.unexplained.iter().map(cells).collect();
+    sheet.data("unexplained", &["channel", "noise floors", "size", "looks like", "goes with"], &rows, None);
+    sheet.figures(page.left.clone());
+}
+
+/// The run that would tell what is open.
+pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
+    let Some(next) = &page.verdict.next_experiment else { return };
+    sheet.section("What would settle it");
+    sheet.say(&format!("{}.", upper(next.why.trim_end_matches('.'))));
+    if next.schedule.is_empty() {
+        return;
+    }
+    let rows: Vec<Vec<String>> = next.schedule.iter().map(|s| vec![s.pulse_us.to_string(), s.hold_s.to_string()]).collect();
+    sheet.data("next-experiment", &["pulse, us", "hold, s"], &rows, None);
+    let steps: Vec<String> =
+        next.schedule.iter().map(|s| format!("  {{ pulse_us = {}, hold_s = {} }},\n", s.pulse_us, s.hold_s)).collect();
+    let file = format!("name = \"what would settle it\"\n\n[[part]]\nkind = \"steps\"\nsteps = [\n{}]\n", steps.concat());
+    sheet.html_part(&format!(
+        "<p><a download=\"next.toml\" href=\"{}\">Download the schedule</a>, or fly it from the verdict: <code>{}</code></p>\n",
+        data_uri("application/toml", &file),
+        escape("quadrig rig run --next verdict.json -o next.csv")
+    ));
+}

@@ -1,0 +1,29 @@
+//! The page and the terminal text of a closed loop, whatever kind of log it was closed on.
+//!
+//! What it is: one file a subject: sentence, state bars, cards, evidence, what is left, provenance, folds, terminal. Each turns values of the
+//! verdict into text.
+//! What can go wrong: nothing; what a log does not hold is left out.
+//! Units: told to the digits that the intervals support.
+//! Reference: specification `formats.md`, "Verdict".
+
+mod cards;
+mod evidence;
+mod fold;
+mod left;
+mod look;
+mod page;
+mod provenance;
+mod sentence;
+mod state;
+mod terminal;
+mod vocabulary;
+
+pub(crate) use evidence::{Trace, against, enlarged, most, over_time, slug, thinned};
+pub(crate) use fold::{aside, candidates};
+pub(crate) use look::{LOOK, SCRIPT};
+pub(crate) use page::{Page, begin};
+pub use provenance::{Hidden, Origin};
+pub use sentence::sentence;
+pub use terminal::{WIDEST, terminal};
+pub use vocabulary::Vocabulary;
+pub(crate) use vocabulary::bare;

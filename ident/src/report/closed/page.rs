@@ -1,0 +1,97 @@
+//! The page itself: the order of the questions.
+//!
+//! What it is: sentence, state, the figure that convinces most, cards, what is left, what would settle it; then the folds.
+//! What can go wrong: nothing; each part leaves out what is not there.
+//! Units: on the axes.
+//! Reference: specification `report.md`.
+
+use super::provenance::{Origin, provenance};
+use super::vocabulary::Vocabulary;
+use super::{cards, fold, left, sentence, state};
+use crate::report::figure::Figure;
+use crate::report::sheet::Sheet;
+use crate::verdict::{Kind, Verdict};
+use crate::words::heading;
+
+/// What a page is made of.
+pub(crate) struct Page<'p> {
+    /// The verdict.
+    pub(crate) verdict: &'p Verdict,
+    /// The words of its library.
+    pub(crate) words: Vocabulary,
+    /// Whether a declared model was given, so that what was found is new since then.
+    pub(crate) news: bool,
+    /// Where it comes from.
+    pub(crate) origin: Origin,
+    /// What the declared model is, in a paragraph.
+    pub(crate) declared: String,
+    /// The figures that convince most.
+    pub(crate) hero: Vec<Figure>,
+    /// Figures of each effect of the verdict, in its order.
+    pub(crate) cards: Vec<Vec<Figure>>,
+    /// Figures of what is left.
+    pub(crate) left: Vec<Figure>,
+    /// Figures of several speed sensors together, and their contrasts.
+    pub(crate) speeds: Vec<Figure>,
+}
+
+/// The page up to where the folds begin.
+pub(crate) fn begin(page: &Page<'_>) -> Sheet {
+    let v = page.verdict;
+    let mut sheet = Sheet::told(&format!("{}: what the model lacks", v.run), &sentence(v, page.words, page.news));
+    sheet.soft(&page.origin.line());
+    sheet.html_part(&state::bars(&v.channels, &v.unexplained));
+    for l in &v.left_out {
+        sheet.warn(&format!("{l}."));
+    }
+    if !page.hero.is_empty() {
+        sheet.section(match v.verdict {
+            Kind::Attributed | Kind::Ambiguous => "The figure that convinces most",
+            Kind::Unattributed | Kind::None => "The channel on which most is left",
+        });
+        sheet.figures(page.hero.clone());
+    }
+    cards::cards(&mut sheet, page);
+    left::left(&mut sheet, page);
+    left::settle(&mut sheet, page);
+    if !page.speeds.is_empty() {
+        sheet.section("Speed sensors");
+        sheet.figures(page.speeds.clone());
+    }
+    runs(&mut sheet, v);
+    provenance(&mut sheet, &page.origin, v, page.words);
+    sheet.section("More");
+    sheet.fold("Every channel in numbers", |sheet| {
+        sheet.say(&page.declared);
+        fold::channels(sheet, v);
+    });
+    sheet
+}
+
+/// Before and after on other runs of the rig, a column each run.
+fn runs(sheet: &mut Sheet, v: &Verdict) {
+    if v.validation.is_empty() {
+        return;
+    }
+    sheet.section("On other runs of the rig");
+    sheet.say("Predicted from this run's model alone: what belongs to the rig carries over. Before and after, rms.");
+    let mut names: Vec<&String> = v.validation.iter().flat_map(|r| r.channels.keys()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let head: Vec<String> = std::iter::once("channel".to_owned()).chain(v.validation.iter().map(|r| r.run.clone())).collect();
+    let rows: Vec<Vec<String>> = names
+        .into_iter()
+        .map(|name| {
+            let unit = v.channels.get(name).map_or("", |c| c.unit.as_str());
+            let cell = |r: &crate::verdict::Validation| {
+                r.channels.get(name).map_or_else(String::new, |b| {
+                    let [_, before, after] = state::figures(unit, b.before, b.before, b.after);
+                    format!("{before} to {after}, {}", state::factor(b.before, b.after))
+                })
+            };
+            std::iter::once(heading(name)).chain(v.validation.iter().map(cell)).collect()
+        })
+        .collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    sheet.data("other-runs", &head, &rows, None);
+}

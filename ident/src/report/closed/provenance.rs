@@ -1,0 +1,154 @@
+//! Where a page comes from: program, log, rig, and of a demonstration what was hidden.
+//!
+//! What it is: a short table, and the judgement of the names where the truth is known.
+//! What can go wrong: what the log does not state is not told.
+//! Units: none.
+//! Reference: specification `report.md`.
+
+use super::vocabulary::Vocabulary;
+use crate::log::{Log, digest_of};
+use crate::model::FittedTo;
+use crate::report::sheet::Sheet;
+use crate::report::svg::escape;
+use crate::verdict::Verdict;
+use crate::words::{list, upper};
+use std::collections::BTreeMap;
+
+/// What was hidden in a simulated rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hidden {
+    /// Seed that repeats it.
+    pub seed: u64,
+    /// Identifier of the effect.
+    pub id: String,
+    /// Its parameters with units, as text.
+    pub parameters: Vec<String>,
+}
+
+impl Hidden {
+    /// What is true and what is false of the names, a sentence each.
+    #[must_use]
+    pub fn judged(&self, verdict: &Verdict, words: Vocabulary) -> Vec<String> {
+        let sizes = if self.parameters.is_empty() { String::new() } else { format!(" ({})", self.parameters.join(", ")) };
+        let names: Vec<&str> = verdict.effects.iter().map(|e| e.id.as_str()).filter(|id| *id != "unknown").collect();
+        let found = names.contains(&self.id.as_str());
+        let mut out = vec![format!("hidden was {}{sizes}: {}", self.id, if found { "found" } else { "NOT FOUND" })];
+        if found {
+            out.push(format!("true of the names: {}", self.id));
+        }
+        let told = |of_every: bool| -> Vec<String> {
+            let mut ids: Vec<String> = names
+                .iter()
+                .filter(|id| **id != self.id && (words.of_every_rig)(id) == of_every)
+                .map(|id| (*id).to_owned())
+                .collect();
+            ids.dedup();
+            ids
+        };
+        let (common, false_names) = (told(true), told(false));
+        if !common.is_empty() {
+            out.push(format!("true of every rig, the simulated one too: {}", list(&common)));
+        }
+        if !false_names.is_empty() {
+            out.push(format!("false of the names, nobody hid it: {}", list(&false_names)));
+        }
+        out
+    }
+}
+
+/// Where a run comes from.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Origin {
+    /// The log: name, digest, rows, date.
+    pub log: FittedTo,
+    /// Its length, s, where time is time.
+    pub seconds: Option<f64>,
+    /// What the log states of the rig, by key.
+    pub states: BTreeMap<String, String>,
+    /// The declared model's file, where one was given.
+    pub model: Option<String>,
+    /// What was hidden, of a demonstration.
+    pub hidden: Option<Hidden>,
+}
+
+/// What a log states of its rig, in the order in which it is told.
+const STATED: [&str; 12] =
+    ["motor", "esc", "propeller", "blades", "supply", "date", "board", "firmware", "schedule", "sample_hz", "source", "note"];
+
+impl Origin {
+    /// Of a rig's log.
+    #[must_use]
+    pub fn of(log: &Log) -> Self {
+        let text = |v: &toml::Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
+        let short = |v: &toml::Value| !v.is_table() && !v.is_array();
+        let states = log
+            .meta
+            .iter()
+            .filter(|(k, v)| STATED.contains(&k.as_str()) && short(v))
+            .map(|(k, v)| (k.clone(), text(v)))
+            .collect();
+        let seconds = log.t.first().zip(log.t.last()).map(|(a, b)| b - a).filter(|_| !log.time_is_row());
+        Self { log: FittedTo::of(log), seconds, states, ..Self::default() }
+    }
+
+    /// Of a recording that is known by its text.
+    #[must_use]
+    pub fn of_text(name: &str, text: &str, rows: usize, seconds: Option<f64>) -> Self {
+        let log = FittedTo { name: name.to_owned(), sha256: digest_of(text), rows, date: None };
+        Self { log, seconds, ..Self::default() }
+    }
+
+    /// The line under the sentence: log, rig, date, rows.
+    pub(super) fn line(&self) -> String {
+        let mut parts: Vec<String> = vec![self.log.name.clone()];
+        parts.extend(["motor", "propeller", "supply"].iter().filter_map(|k| self.states.get(*k).cloned()));
+        parts.extend(self.log.date.clone());
+        parts.push(match self.seconds {
+            Some(s) => format!("{} rows in {s:.0} s", self.log.rows),
+            None => format!("{} rows", self.log.rows),
+        });
+        parts.join(" - ")
+    }
+
+    /// The command that writes the page again.
+    pub(super) fn command(&self) -> String {
+        let model = self.model.as_ref().map(|m| format!(" --model {m}")).unwrap_or_default();
+        match &self.hidden {
+            Some(h) => format!("quadrig demo --seed {} --effect {}", h.seed, h.id),
+            None => format!("quadrig close-loop {}{model} -o out", self.log.name),
+        }
+    }
+}
+
+/// The section.
+pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict, words: Vocabulary) {
+    if let Some(hidden) = &origin.hidden {
+        sheet.section("What was hidden");
+        let lines: Vec<String> =
+            hidden.judged(verdict, words).iter().map(|l| format!("<li>{}.</li>", escape(&upper(l)))).collect();
+        sheet.html_part(&format!("<ul>{}</ul>\n", lines.concat()));
+    }
+    sheet.section("Where this comes from");
+    let mut rows = vec![vec!["program".to_owned(), format!("quadrig {}", env!("CARGO_PKG_VERSION"))]];
+    let mut row = |name: &str, value: String| {
+        if !value.is_empty() {
+            rows.push(vec![name.to_owned(), value]);
+        }
+    };
+    row("log", origin.log.name.clone());
+    row("SHA-256", origin.log.sha256.clone());
+    row("rows", origin.log.rows.to_string());
+    for key in STATED {
+        row(&key.replace('_', " "), origin.states.get(key).cloned().unwrap_or_default());
+    }
+    for key in ["motor", "propeller", "supply", "date"] {
+        if !origin.states.contains_key(key) {
+            row(key, "not stated in the log".to_owned());
+        }
+    }
+    row("declared model", origin.model.clone().unwrap_or_default());
+    row("seed", origin.hidden.as_ref().map_or_else(String::new, |h| h.seed.to_string()));
+    row("again", origin.command());
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|r| vec![upper(&r[0]), r[1].clone()]).collect();
+    sheet.data("provenance", &["what", "value"], &rows, None);
+}

@@ -1,0 +1,272 @@
+//! The one sentence that heads page and terminal.
+//!
+//! What it is: what was found, in words that a lab uses, with sizes; how much of the error it takes; what is left.
+//! What can go wrong: it must never claim more than the verdict. Each kind of verdict has its own wording, and what is not sure says so.
+//! Units: each size carries its own.
+//! Reference: specification `formats.md`, "Verdict".
+
+use super::vocabulary::Vocabulary;
+use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
+use crate::words::{adverb, amount, channel, heading, list, upper};
+
+/// Most effects that the sentence names; the cards have all.
+const MOST: usize = 3;
+/// Share of its channel's error below which an effect is a smaller cause.
+const SMALL: f64 = 0.02;
+/// Most ways in which an open question is put.
+const WAYS: usize = 3;
+/// Share of the first alternative's probability from which on a further one is put beside it.
+const CLOSE: f64 = 0.5;
+/// Shares that lie within so much of each other are told as one.
+const ALIKE: f64 = 0.1;
+/// Share from which on all is explained but the noise.
+const ALL: f64 = 0.995;
+/// Noise floors up to which what is left is not worth a word.
+const QUIET: f64 = 1.5;
+
+/// The sentence. `news`: the loop was closed against a declared model, so that what was found is new since then.
+#[must_use]
+pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
+    let said = match verdict.verdict {
+        Kind::Attributed => attributed(verdict, words, news),
+        Kind::Ambiguous => ambiguous(verdict, words, news),
+        Kind::Unattributed => unattributed(verdict, news),
+        Kind::None => none(verdict, news),
+    };
+    let without = verdict.channels.not_predicted.iter().map(|(name, reason)| match reason.contains(':') {
+        true => format!("{} has no model ({reason}).", heading(name)),
+        false => format!("{} has no model: {reason}.", heading(name)),
+    });
+    std::iter::once(said).chain(without).collect::<Vec<_>>().join(" ")
+}
+
+/// The effects with a name, what removes most first: those of this rig, and those of every rig.
+fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&EffectEntry>) {
+    let mut all: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
+    all.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
+    all.into_iter().partition(|e| !(words.of_every_rig)(&e.id))
+}
+
+fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
+    let (own, common) = named(verdict, words);
+    let all = if own.is_empty() { &common } else { &own };
+    // what takes next to nothing stands on its card alone, unless there is nothing else
+    let large = |e: &&&EffectEntry| e.heldout_error_reduction >= SMALL || all.len() == 1;
+    let mut told: Vec<&EffectEntry> = all.iter().filter(large).take(MOST).copied().collect();
+    if told.is_empty() {
+        told = all.iter().take(1).copied().collect();
+    }
+    let more = all.len() - told.len();
+    let clauses: Vec<String> = told.iter().map(|e| (words.clause)(e).with(adverb(e.probability))).collect();
+    let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
+    if own.is_empty() {
+        out += " Every rig has that; nothing of this rig's own was named.";
+    }
+    let smaller = match more {
+        0 => String::new(),
+        1 => "A smaller cause is told below.".to_owned(),
+        n => format!("{n} smaller causes are told below."),
+    };
+    [out, explained(verdict, &told), smaller, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
+    let (own, common) = named(verdict, words);
+    let best: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
+    let first = verdict.alternatives.first();
+    let floor = CLOSE * first.map_or(0.0, |a| a.probability);
+    let close = verdict.alternatives.iter().filter(|a| a.probability >= floor).take(WAYS - 1);
+    // what the first alternative does without is what the question is about
+    let disputed: Vec<&EffectEntry> = first.map_or(best.clone(), |a| without(&best, &a.ids));
+    let mut ways = vec![disputed.iter().map(|e| (words.clause)(e).with("")).collect::<Vec<_>>()];
+    // a hypothesis that differs elsewhere is another question
+    let same = |ids: &[String]| without(&best, ids).iter().map(|e| &e.id).eq(disputed.iter().map(|e| &e.id));
+    for other in close.filter(|a| same(&a.ids)) {
+        let clause = |id: &String| words.of_another(id, disputed.first().copied()).with("");
+        let instead: Vec<String> = instead(&best, &other.ids).iter().map(clause).collect();
+        if !ways.contains(&instead) {
+            ways.push(instead);
+        }
+    }
+    ways.retain(|w| !w.is_empty());
+    let doubt = if verdict.next_experiment.is_some() {
+        "this run cannot tell, the run proposed below can"
+    } else {
+        "this run cannot tell"
+    };
+    let question = match ways.as_slice() {
+        [] => "the causes named below are not sure on this run".to_owned(),
+        [one] => format!("perhaps {}: {doubt}", list(one)),
+        [first, rest @ ..] => {
+            let rest: Vec<String> = rest.iter().map(|w| format!("or {}", list(w))).collect();
+            format!("either {}, {}: {doubt}", list(first), rest.join(", "))
+        }
+    };
+    let sure: Vec<String> = own
+        .iter()
+        .chain(if own.is_empty() { common.iter() } else { [].iter() })
+        .filter(|e| !disputed.iter().any(|d| std::ptr::eq(*d, **e)))
+        .take(MOST)
+        .map(|e| (words.clause)(e).with(adverb(e.probability)))
+        .collect();
+    let mut out = format!("{}.", since(news, &question));
+    if !sure.is_empty() {
+        out += &format!(" Beside that {}.", joined_lower(&sure));
+    }
+    let left = left(verdict);
+    if left.is_empty() { out } else { format!("{out} {left}") }
+}
+
+fn unattributed(verdict: &Verdict, news: bool) -> String {
+    let corrections: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id == "unknown").collect();
+    let mut on: Vec<String> = corrections.iter().flat_map(|e| e.channels.iter().map(|c| channel(c))).collect();
+    if on.is_empty() {
+        on = verdict.unexplained.iter().map(|u| channel(&u.channel)).collect();
+    }
+    on.dedup();
+    let place = if on.is_empty() { String::new() } else { format!(" on {}", list(&on)) };
+    let mut out = since(news, &format!("something is left{place} that no known effect explains."));
+    let mut goes: Vec<String> =
+        corrections.iter().filter(|e| e.heldout_error_reduction > 0.0).flat_map(|e| &e.depends_on).map(|v| channel(v)).collect();
+    goes.dedup();
+    if goes.is_empty() {
+        out += " Nothing that was tried predicts it, so nothing was corrected.";
+    } else {
+        out += &format!(" It goes with {}; a correction without a name was fitted.", list(&goes));
+    }
+    let left = left(verdict);
+    if left.is_empty() { out } else { format!("{out} {left}") }
+}
+
+fn none(verdict: &Verdict, news: bool) -> String {
+    let said = match (news, loudest(verdict)) {
+        (true, None) => "Nothing is new since the declared model: no channel is left with more than its noise.",
+        (false, None) => "Nothing is left to explain: no channel is left with more than its noise.",
+        (true, Some(_)) => "Nothing that could be named is new since the declared model.",
+        (false, Some(_)) => "Nothing that could be named is left over.",
+    };
+    let left = if loudest(verdict).is_some() { left(verdict) } else { String::new() };
+    if left.is_empty() { said.to_owned() } else { format!("{said} {left}") }
+}
+
+/// What was found; against a declared model it is new since then.
+fn since(news: bool, found: &str) -> String {
+    if news { format!("New since the declared model: {found}") } else { upper(found) }
+}
+
+/// Clauses as one sentence.
+fn joined_lower(clauses: &[String]) -> String {
+    match clauses {
+        [] => String::new(),
+        [one] => one.clone(),
+        [rest @ .., last] => format!("{}, and {last}", rest.join(", ")),
+    }
+}
+
+/// Effects of the best hypothesis that another one lacks.
+fn without<'e>(best: &[&'e EffectEntry], ids: &[String]) -> Vec<&'e EffectEntry> {
+    let mut ids: Vec<&String> = ids.iter().collect();
+    let mut out = Vec::new();
+    for e in best {
+        match ids.iter().position(|id| **id == e.id) {
+            Some(at) => drop(ids.remove(at)),
+            None => out.push(*e),
+        }
+    }
+    out
+}
+
+/// Identifiers of a hypothesis that the best one lacks.
+pub(super) fn instead(best: &[&EffectEntry], ids: &[String]) -> Vec<String> {
+    let mut own: Vec<&str> = best.iter().map(|e| e.id.as_str()).collect();
+    ids.iter()
+        .filter(|id| match own.iter().position(|o| o == id) {
+            Some(at) => {
+                own.remove(at);
+                false
+            }
+            None => id.as_str() != "unknown",
+        })
+        .cloned()
+        .collect()
+}
+
+/// Share of what a channel had left over its noise that is gone, as squares.
+pub(super) fn share(verdict: &Verdict, name: &str) -> Option<f64> {
+    let c = verdict.channels.get(name)?;
+    let over = |rms: f64| (rms * rms - c.noise_floor_rms * c.noise_floor_rms).max(0.0);
+    let (before, after) = (over(c.before.heldout_rms), over(c.after.heldout_rms));
+    (before > 0.0 && after.is_finite()).then(|| (1.0 - after / before).max(0.0))
+}
+
+/// How much the effects explain of what their first channels had left over.
+fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
+    let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).map(String::as_str).collect();
+    on.sort_unstable();
+    on.dedup();
+    let shares: Vec<(&str, f64)> = on.into_iter().filter_map(|c| Some((c, share(verdict, c)?))).collect();
+    let Some(least) = shares.iter().map(|s| s.1).min_by(f64::total_cmp) else { return String::new() };
+    let most = shares.iter().map(|s| s.1).fold(least, f64::max);
+    // what else was added on these channels has its part in the figure
+    let others = verdict.effects.iter().any(|e| {
+        !told.iter().any(|t| std::ptr::eq(*t, e)) && e.channels.iter().any(|c| shares.iter().any(|s| s.0 == c.as_str()))
+    });
+    let subject = match (others, told.len()) {
+        (true, _) => "With all that is named below the model explains",
+        (false, 1) => "That explains",
+        (false, _) => "Together they explain",
+    };
+    // nothing is all as long as something is told of what is left
+    let rest = verdict.unexplained.iter().any(|u| shares.iter().any(|s| s.0 == u.channel));
+    let per_cent = |share: f64| match share {
+        s if s >= ALL && !rest => "all".to_owned(),
+        s => format!("{:.0} %", (100.0 * s).min(99.0)),
+    };
+    let names: Vec<String> = shares.iter().map(|s| channel(s.0)).collect();
+    if most - least <= ALIKE {
+        let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
+        return format!("{subject} {} of what {} had left over.", per_cent(mean), list(&names));
+    }
+    let parts: Vec<String> = shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), channel(s.0))).collect();
+    let short: Vec<String> = std::iter::once(parts[0].clone())
+        .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), channel(s.0))))
+        .collect();
+    format!("{subject} {}.", list(&short))
+}
+
+/// What is loudest among what is left.
+fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
+    let loud = verdict.unexplained.iter().filter(|u| u.over_floor > QUIET);
+    loud.max_by(|a, b| a.over_floor.total_cmp(&b.over_floor))
+}
+
+/// The error that is left on a channel beyond its noise, with unit.
+pub(super) fn size_left(verdict: &Verdict, u: &Unexplained) -> String {
+    match verdict.channels.get(&u.channel) {
+        Some(c) => {
+            let over = (c.after.heldout_rms.powi(2) - c.noise_floor_rms.powi(2)).max(0.0).sqrt();
+            amount(if over > 0.0 { over } else { c.after.heldout_rms }, &c.unit)
+        }
+        None => format!("{:.1} times the noise", u.over_floor),
+    }
+}
+
+fn left(verdict: &Verdict) -> String {
+    let Some(loudest) = loudest(verdict) else {
+        let over = verdict.channels.values().any(|c| c.after.heldout_rms > QUIET * c.noise_floor_rms);
+        let noise = verdict.unexplained.is_empty() && !over;
+        return if noise { "What is left is noise." } else { "Little is left beyond the noise." }.to_owned();
+    };
+    let others = verdict.unexplained.iter().filter(|u| u.over_floor > QUIET).count() - 1;
+    let (size, on) = (size_left(verdict, loudest), channel(&loudest.channel));
+    let what = if others > 0 {
+        format!("Most is left on {on}: {size} ({})", loudest.looks_like)
+    } else {
+        format!("On {on} {size} is left ({})", loudest.looks_like)
+    };
+    match others {
+        0 => format!("{what}."),
+        1 => format!("{what}; something is left on one more channel."),
+        n => format!("{what}; something is left on {n} more channels."),
+    }
+}

@@ -1,0 +1,148 @@
+//! The state of every channel: what is left over before and after, as bars in noise floors.
+//!
+//! What it is: one scale for all channels, logarithmic, with the floor drawn, so that unlike channels can be compared.
+//! What can go wrong: a channel below its floor ends left of the floor's line.
+//! Units: noise floors; the figures beside the bars carry the channel's own.
+//! Reference: none.
+
+use crate::report::svg::escape;
+use crate::verdict::{Channels, Unexplained};
+use crate::words::{channel, digits, scaled, upper};
+use std::fmt::Write;
+
+/// Left end of the scale, noise floors.
+const FROM: f64 = 0.5;
+/// Noise floors up to which a channel counts as explained.
+const EXPLAINED: f64 = 1.5;
+
+/// The scale that all bars share.
+struct Scale {
+    to: f64,
+}
+
+impl Scale {
+    fn of(channels: &Channels) -> Self {
+        let most = channels.values().flat_map(|c| [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms));
+        Self { to: 1.25 * most.filter(|v| v.is_finite()).fold(8.0, f64::max) }
+    }
+
+    /// Place on the scale, per cent of its length.
+    fn at(&self, floors: f64) -> f64 {
+        (100.0 * (floors.max(FROM) / FROM).ln() / (self.to / FROM).ln()).clamp(0.0, 100.0)
+    }
+
+    fn ticks(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..7).map(|k| 10f64.powi(k)).take_while(|v| *v <= self.to)
+    }
+}
+
+/// The figures of a channel in one unit: floor, before, after.
+pub(super) fn figures(unit: &str, floor: f64, before: f64, after: f64) -> [String; 3] {
+    let (factor, unit) = scaled(before.max(after), unit);
+    [floor, before, after].map(|v| format!("{} {unit}", digits(factor * v, 0.005 * (factor * v).abs())))
+}
+
+/// What is said of a channel in a word.
+pub(super) fn word([before, after]: [f64; 2], left: bool) -> &'static str {
+    match after {
+        f if !f.is_finite() => "not known",
+        f if f <= EXPLAINED && before <= EXPLAINED && !left => "only noise",
+        f if f <= EXPLAINED && !left => "explained",
+        f if f <= 3.0 => "little left",
+        _ => "unexplained rest",
+    }
+}
+
+/// A channel as people say it, with its column's name where that is another word.
+fn spoken(name: &str) -> String {
+    let said = channel(name);
+    if said == name { escape(name) } else { format!("{} <code>{}</code>", escape(&upper(&said)), escape(name)) }
+}
+
+/// The bars.
+pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
+    let scale = Scale::of(channels);
+    let mut out = String::from("<div class=\"state\" role=\"table\" aria-label=\"error of each channel before and after\">\n");
+    out +=
+        "<div class=\"head\" role=\"row\"><span role=\"columnheader\">channel</span><span class=\"axis\" role=\"columnheader\">";
+    for tick in scale.ticks() {
+        let name = if tick == 1.0 { "noise floor".to_owned() } else { format!("{tick:.0}") };
+        let (at, end) = (scale.at(tick), if scale.at(tick) > 94.0 { " class=\"end\"" } else { "" });
+        let _ = write!(out, "<i{end} style=\"left:{at:.1}%\">{name}</i>");
+    }
+    out += "</span><span role=\"columnheader\">before</span><span role=\"columnheader\">after</span><span role=\"columnheader\">factor</span><span role=\"columnheader\">state</span></div>\n";
+    for (name, c) in channels {
+        let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
+        let left = unexplained.iter().any(|u| u.channel == *name);
+        let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
+        let label = format!("{}: before {:.1}, after {:.1} noise floors", channel(name), floors[0], floors[1]);
+        let _ = write!(
+            out,
+            "<div class=\"row\" role=\"row\"><span class=\"name\" role=\"cell\">{}</span><span class=\"track\" role=\"img\" aria-label=\"{}\" title=\"{}; floor {floor}\">",
+            spoken(name),
+            escape(&label),
+            escape(&label),
+        );
+        for tick in scale.ticks() {
+            let _ = write!(
+                out,
+                "<i class=\"{}\" style=\"left:{:.1}%\"></i>",
+                if tick == 1.0 { "floor" } else { "tick" },
+                scale.at(tick)
+            );
+        }
+        for (class, value) in [("before", floors[0]), ("after", floors[1])] {
+            let (a, b) = (scale.at(value.min(1.0)), scale.at(value.max(1.0)));
+            let _ = write!(out, "<b class=\"{class}\" style=\"left:{a:.1}%;width:{:.1}%\"></b>", (b - a).max(0.6));
+        }
+        let _ = writeln!(
+            out,
+            "</span><span class=\"num\" role=\"cell\" data-of=\"before\">{before}</span><span class=\"num\" role=\"cell\" data-of=\"after\">{after}</span><span class=\"num\" role=\"cell\" data-of=\"factor\">{}</span><span class=\"word\" role=\"cell\">{}</span></div>",
+            factor(c.before.heldout_rms, c.after.heldout_rms),
+            word(floors, left),
+        );
+    }
+    for (name, reason) in &channels.not_predicted {
+        let _ = writeln!(
+            out,
+            "<div class=\"row none\" role=\"row\"><span class=\"name\" role=\"cell\">{}</span><span class=\"why\" role=\"cell\">not predicted: {}</span></div>",
+            spoken(name),
+            escape(reason)
+        );
+    }
+    out + "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: corrected model, after. Logarithmic, in noise floors of each channel. Error on rows that no fit saw.</p>\n"
+}
+
+/// A factor to three digits at the most.
+pub(super) fn factor(before: f64, after: f64) -> String {
+    if before == 0.0 || !(before / after).is_finite() {
+        return "-".to_owned();
+    }
+    let factor = before / after;
+    format!("{}x", digits(factor, 0.01 * factor.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verdict::{Channel, Figures};
+
+    #[test]
+    fn bars_share_a_scale_and_end_at_the_floor() {
+        let of = |rms: f64| Figures { rms, heldout_rms: rms, whiteness_p: 0.5 };
+        let mut channels = Channels::default();
+        for (name, before) in [("thrust_n", 1.0), ("current_a", 0.1)] {
+            let c = Channel { unit: "N".into(), noise_floor_rms: 0.01, before: of(before), after: of(0.01) };
+            channels.predicted.insert(name.into(), c);
+        }
+        channels.not_predicted.insert("rpm".into(), "no command was logged".into());
+        let html = bars(&channels, &[]);
+        let scale = Scale::of(&channels);
+        assert!(scale.at(1.0) > 0.0 && scale.at(100.0) < 100.0 && scale.at(0.1) == 0.0);
+        assert!((scale.at(100.0) - scale.at(10.0) - (scale.at(10.0) - scale.at(1.0))).abs() < 1e-9, "logarithmic");
+        assert!(
+            html.contains("noise floor") && html.contains("not predicted: no command was logged") && html.contains("explained")
+        );
+        assert_eq!(html.matches("<div").count(), html.matches("</div>").count());
+    }
+}

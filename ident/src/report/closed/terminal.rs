@@ -1,0 +1,157 @@
+//! The verdict as a terminal shows it: the sentence first, then tables that fit into 100 columns.
+//!
+//! What it is: the same order as on the page, as text.
+//! What can go wrong: a long word (a file's name) is wider than a line and stands alone on it.
+//! Units: as told.
+//! Reference: specification `report.md`.
+
+use super::cards::{removes, value};
+use super::sentence::{sentence, size_left};
+use super::state::{factor, figures, word};
+use super::vocabulary::Vocabulary;
+use crate::verdict::{EffectEntry, Verdict};
+use crate::words::{channel, list, probability, upper};
+
+/// Columns of the widest line.
+pub const WIDEST: usize = 100;
+/// Most lines about samples that were set aside; the verdict's file has them all.
+const ASIDE: usize = 5;
+
+/// The text.
+#[must_use]
+pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
+    let mut out = format!("{}\n{}\n", wrapped(&sentence(verdict, words, news), 0), wrapped(&verdict.run, 0));
+    out += &channels(verdict);
+    for left_out in &verdict.left_out {
+        out += &format!("{}\n", wrapped(&left_out.to_string(), 2));
+    }
+    let (named, nameless): (Vec<&EffectEntry>, Vec<&EffectEntry>) = verdict.effects.iter().partition(|e| e.id != "unknown");
+    let (own, common): (Vec<&EffectEntry>, Vec<&EffectEntry>) = named.into_iter().partition(|e| !(words.of_every_rig)(&e.id));
+    for (heading, members) in [("what this rig has", own), ("what every rig has", common), ("without a name", nameless)] {
+        if !members.is_empty() {
+            out += &format!("\n{heading}\n");
+            members.iter().for_each(|e| out += &effect(verdict, words, e));
+        }
+    }
+    out += &left(verdict);
+    out += &set_aside(verdict);
+    if !verdict.alternatives.is_empty() {
+        let all: Vec<String> =
+            verdict.alternatives.iter().map(|a| format!("{} ({})", a.ids.join(" + "), probability(a.probability))).collect();
+        out += &format!("\n{}\n", wrapped(&format!("alternatives: {}", all.join(", ")), 2));
+    }
+    if let Some(next) = &verdict.next_experiment {
+        let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us {} s", s.pulse_us, s.hold_s)).collect();
+        out += &format!("\n{}\n", wrapped(&format!("what would settle it: {}", next.why), 2));
+        if !steps.is_empty() {
+            out += &format!("  {}\n", wrapped(&steps.join(", "), 2));
+        }
+    }
+    for v in &verdict.validation {
+        out += &format!("\n{}\n", wrapped(&format!("on {}, which took no part:", v.run), 2));
+        for (name, b) in &v.channels {
+            let unit = verdict.channels.get(name).map_or("", |c| c.unit.as_str());
+            let [_, before, after] = figures(unit, b.before, b.before, b.after);
+            out += &format!("  {name:<14}{before:>18}{after:>18}{:>10}\n", factor(b.before, b.after));
+        }
+    }
+    out
+}
+
+fn channels(verdict: &Verdict) -> String {
+    let mut out =
+        format!("\n{:<16}{:>16}{:>16}{:>16}{:>9}  {}\n", "held-out error", "noise floor", "before", "after", "factor", "state");
+    for (name, c) in &verdict.channels {
+        let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
+        let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
+        let left = verdict.unexplained.iter().any(|u| u.channel == *name);
+        let times = factor(c.before.heldout_rms, c.after.heldout_rms);
+        out += &format!("{name:<16}{floor:>16}{before:>16}{after:>16}{times:>9}  {}\n", word(floors, left));
+    }
+    for (name, reason) in &verdict.channels.not_predicted {
+        out += &format!("{name:<16}not predicted: {reason}\n");
+    }
+    out
+}
+
+fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
+    let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
+    let p = probability(e.probability);
+    let mut out = format!("{}\n", wrapped(&format!("  {} (p {p}) on {}, {}", e.id, list(&on), e.scope.word()), 4));
+    if e.id != "unknown" {
+        out += &format!("    {}\n", wrapped(&(words.clause)(e).sentence(), 4));
+    }
+    for parameter in e.parameters.iter().filter(|p| p.name != "phase") {
+        let [v, interval, unit] = value(parameter);
+        out += &format!("    {} = {}  (95 %: {interval})\n", parameter.name, format!("{v} {unit}").trim_end());
+    }
+    let removes = removes(verdict, e);
+    if !removes.is_empty() {
+        out += &format!("    {}\n", wrapped(&removes, 4));
+    }
+    out + &format!("    {}\n", wrapped(&format!("evidence: {}", e.evidence), 4))
+}
+
+fn left(verdict: &Verdict) -> String {
+    if verdict.unexplained.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from("\nwhat is left\n");
+    for u in &verdict.unexplained {
+        let on: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
+        let on = if on.is_empty() { String::new() } else { format!(", goes with {}", list(&on)) };
+        let size = size_left(verdict, u);
+        out += &format!(
+            "  {}\n",
+            wrapped(&format!("{}: {size}, {:.1} noise floors, {}{on}", u.channel, u.over_floor, u.looks_like), 4)
+        );
+    }
+    out
+}
+
+/// The samples that took no part.
+fn set_aside(verdict: &Verdict) -> String {
+    let all = &verdict.set_aside;
+    if all.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from("\nset aside\n");
+    all.iter().take(ASIDE).for_each(|aside| out += &format!("  {}\n", wrapped(&upper(&aside.to_string()), 4)));
+    if all.len() > ASIDE {
+        out += &format!("  and {} more stretches like these, listed in verdict.json and in the report\n", all.len() - ASIDE);
+    }
+    out
+}
+
+/// Text in lines of at most [`WIDEST`] columns; further lines are set in by `indent`.
+fn wrapped(text: &str, indent: usize) -> String {
+    let lead = text.len() - text.trim_start().len();
+    let mut out = " ".repeat(lead);
+    // the caller may have set in the first line by as much
+    let mut column = lead.max(indent);
+    for (k, word) in text.split_whitespace().enumerate() {
+        let wide = word.chars().count();
+        if k > 0 && column + 1 + wide > WIDEST {
+            out += &format!("\n{}", " ".repeat(indent));
+            column = indent;
+        } else if k > 0 {
+            out.push(' ');
+            column += 1;
+        }
+        out += word;
+        column += wide;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_broken_between_words() {
+        let text = wrapped(&"twelve words ".repeat(40), 4);
+        assert!(text.lines().all(|l| l.chars().count() <= WIDEST) && text.lines().count() > 4);
+        assert!(text.lines().skip(1).all(|l| l.starts_with("    t") || l.starts_with("    w")));
+    }
+}

@@ -1,0 +1,51 @@
+//! Which words a library has for its effects.
+//!
+//! What it is: three look-ups, so that sentence, cards and terminal are the same for rig, flight and attitude logs.
+//! What can go wrong: an identifier that no library knows is told by itself.
+//! Units: none.
+//! Reference: specification `closing-the-loop.md`, lists of effects.
+
+use crate::effects::{About, by_id};
+use crate::verdict::EffectEntry;
+use crate::words::Clause;
+
+/// The words of a library of effects.
+#[derive(Debug, Clone, Copy)]
+pub struct Vocabulary {
+    /// What an effect is.
+    pub about: fn(&str) -> Option<About>,
+    /// What a found effect does.
+    pub clause: fn(&EffectEntry) -> Clause,
+    /// Whether every rig has it.
+    pub of_every_rig: fn(&str) -> bool,
+}
+
+impl Vocabulary {
+    /// Of a rig's log.
+    pub const RIG: Self = Self {
+        about: |id| by_id(id).map(|e| e.about()),
+        clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
+        of_every_rig: |id| by_id(id).is_some_and(crate::effects::Effect::is_of_every_rig),
+    };
+
+    /// What an effect that was not found would do, on the channels of one that was.
+    pub(crate) fn of_another(self, id: &str, beside: Option<&EffectEntry>) -> Clause {
+        let entry = EffectEntry {
+            id: id.to_owned(),
+            scope: beside.map_or(crate::effects::Scope::Rig, |e| e.scope),
+            channels: beside.map(|e| e.channels.clone()).unwrap_or_default(),
+            depends_on: Vec::new(),
+            equation: String::new(),
+            probability: 0.0,
+            parameters: Vec::new(),
+            heldout_error_reduction: 0.0,
+            evidence: String::new(),
+        };
+        (self.clause)(&entry)
+    }
+}
+
+/// The words for an effect of which only the identifier is known.
+pub(crate) fn bare(found: &EffectEntry) -> Clause {
+    Clause::titled(&found.id.replace('_', " "), found)
+}

@@ -1,0 +1,333 @@
+//! Plain words: clauses, numbers with the digits that they support, and names of channels as a lab says them.
+//!
+//! What it is: the vocabulary of sentence, page and terminal. Each effect says its own clause with it.
+//! What can go wrong: a number that its interval does not support is left out of a clause.
+//! Units: scaled to a size that one reads at a glance (0.041 ohm is 41 mohm).
+//! Reference: GUM, clause 7.2.6 (digits of a result).
+
+use crate::effects::Scope;
+use crate::verdict::{EffectEntry, Parameter};
+
+/// What a cause does, in two parts: an adverb fits between them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Clause {
+    /// Subject: "the load cell". Empty where the second part is a sentence by itself.
+    pub who: String,
+    /// Predicate: "answers half a second late".
+    pub does: String,
+}
+
+impl Clause {
+    /// From both parts.
+    #[must_use]
+    pub fn new(who: impl Into<String>, does: impl Into<String>) -> Self {
+        Self { who: who.into(), does: does.into() }
+    }
+
+    /// From a title that is a sentence already, with the largest known parameter behind it.
+    #[must_use]
+    pub fn titled(title: &str, found: &EffectEntry) -> Self {
+        let size = found.parameters.iter().find_map(|p| Some((p, sized(p)?)));
+        let size = size.map(|(p, v)| format!(" ({} {v})", p.name.replace('_', " "))).unwrap_or_default();
+        Self::new("", format!("{}{size}", lower(title)))
+    }
+
+    /// In one piece, with an adverb that may be empty.
+    #[must_use]
+    pub fn with(&self, adverb: &str) -> String {
+        let parts = [self.who.as_str(), adverb, self.does.as_str()];
+        parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join(" ")
+    }
+
+    /// As a sentence.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        format!("{}.", upper(&self.with("")))
+    }
+}
+
+impl EffectEntry {
+    /// A parameter.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
+        self.parameters.iter().find(|p| p.name == name)
+    }
+
+    /// `with` the size of a parameter, or `without` where the run does not show it.
+    #[must_use]
+    pub fn tell(&self, name: &str, with: impl Fn(&str) -> String, without: &str) -> String {
+        self.parameter(name).and_then(sized).map_or_else(|| without.to_owned(), |v| with(&v))
+    }
+
+    /// The same in another unit that means as much: `V` (each ampere) for `ohm`; `%` for a share.
+    #[must_use]
+    pub fn tell_in(&self, name: &str, unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
+        self.tell_times(name, if unit == "%" { 100.0 } else { 1.0 }, unit, with, without)
+    }
+
+    /// The same times a factor.
+    #[must_use]
+    pub fn tell_times(&self, name: &str, factor: f64, unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
+        let scaled = self.parameter(name).map(|p| Parameter {
+            name: p.name.clone(),
+            value: factor * p.value,
+            unit: unit.to_owned(),
+            ci95: p.ci95.map(|v| factor * v),
+        });
+        scaled.as_ref().and_then(sized).map_or_else(|| without.to_owned(), |v| with(&v))
+    }
+
+    /// The meter of its first channel: "the load cell".
+    #[must_use]
+    pub fn meter(&self) -> String {
+        self.channels.first().map_or_else(|| "a meter".to_owned(), |c| meter(c))
+    }
+
+    /// Unit of its first channel.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        self.channels.first().map_or("", |c| crate::context::unit_of(c))
+    }
+
+    /// Whether it was there before the run began.
+    #[must_use]
+    pub fn is_since_before(&self) -> bool {
+        self.equation.contains("since before the run")
+    }
+}
+
+/// What a scope means to the reader.
+#[must_use]
+pub fn scope(scope: Scope) -> &'static str {
+    match scope {
+        Scope::Rig => "of the rig: it is there on every run",
+        Scope::Run => "of this run: another run has a value of its own",
+        Scope::Event => "of one instant: it does not recur by itself",
+    }
+}
+
+/// Probability from which on a cause is told without an adverb. Where nothing else explains a channel the search still keeps a tenth for causes
+/// that the library lacks, so that hardly a name stands above 0.9.
+const SURE: f64 = 0.85;
+
+/// How sure a probability is, as an adverb; empty where nothing needs to be said.
+#[must_use]
+pub fn adverb(probability: f64) -> &'static str {
+    match probability {
+        p if p >= SURE => "",
+        p if p >= 0.6 => "probably",
+        _ => "perhaps",
+    }
+}
+
+/// How sure a probability is, as a word of its own.
+#[must_use]
+pub fn sureness(probability: f64) -> &'static str {
+    match probability {
+        p if p >= SURE => "sure",
+        p if p >= 0.6 => "likely",
+        _ => "unsure",
+    }
+}
+
+/// A probability: never 1.00 by rounding alone.
+#[must_use]
+pub fn probability(p: f64) -> String {
+    match p {
+        p if p >= 0.995 => "> 0.99".to_owned(),
+        p if p < 0.005 => "< 0.01".to_owned(),
+        p => format!("{p:.2}"),
+    }
+}
+
+/// A channel as people say it.
+#[must_use]
+pub fn channel(name: &str) -> String {
+    if let Some(one) = name.strip_suffix(" - others") {
+        return format!("{} against the other sensors", channel(one));
+    }
+    let said = match name {
+        "thrust_n" => "thrust",
+        "thrust_rms_n" => "thrust scatter",
+        "torque_nm" => "torque",
+        "current_a" => "current",
+        "voltage_v" => "voltage",
+        "rpm" => "speed",
+        "rpm_beam" => "speed (beam)",
+        "rpm_opto" => "speed (optical)",
+        "rpm_hall" => "speed (Hall)",
+        "rpm_encoder" => "speed (encoder)",
+        "rpm_esc" => "speed (ESC)",
+        "temp_c" => "temperature",
+        "pulse_us" => "pulse",
+        "t_s" => "time",
+        "charge" => "charge drawn",
+        "time_since_step" => "time since the last step",
+        "rpm_rate" => "change of speed",
+        "heat" => "heat",
+        "direction" => "direction of the load",
+        other => other,
+    };
+    said.to_owned()
+}
+
+/// A channel at the head of something: with a large letter, or as its column where it has no other word.
+#[must_use]
+pub fn heading(name: &str) -> String {
+    let said = channel(name);
+    if said == name { said } else { upper(&said) }
+}
+
+/// The meter behind a channel.
+#[must_use]
+pub fn meter(name: &str) -> String {
+    let said = match name {
+        "thrust_n" | "thrust_rms_n" => "the load cell",
+        "torque_nm" => "the torque cell",
+        "current_a" => "the current meter",
+        "voltage_v" => "the voltmeter",
+        "rpm" => "the speed sensor",
+        "rpm_beam" => "the light beam",
+        "rpm_opto" => "the optical sensor",
+        "rpm_hall" => "the Hall sensor",
+        "rpm_encoder" => "the encoder",
+        other => return format!("channel {other}"),
+    };
+    said.to_owned()
+}
+
+/// Smallest size at which a unit is used as it is; below it the finer one, a thousandth, is.
+const FINER: [(&str, &str, f64); 7] = [
+    ("ohm", "mohm", 0.1),
+    ("V", "mV", 0.1),
+    ("s", "ms", 0.1),
+    ("N.m", "mN.m", 0.1),
+    ("A", "mA", 0.01),
+    ("N", "mN", 0.002),
+    ("m", "mm", 0.1),
+];
+
+/// The factor and the unit in which a size is told.
+#[must_use]
+pub fn scaled(value: f64, unit: &str) -> (f64, &str) {
+    match FINER.into_iter().find(|f| f.0 == unit) {
+        Some((_, finer, least)) if value != 0.0 && value.abs() < least => (1000.0, finer),
+        _ => (1.0, unit),
+    }
+}
+
+/// A parameter with unit, to the digits that its interval supports; `None` where the interval is wider than half of the value.
+#[must_use]
+pub fn sized(p: &Parameter) -> Option<String> {
+    let half = 0.5 * (p.ci95[1] - p.ci95[0]).abs();
+    if p.value == 0.0 || !p.value.is_finite() || !half.is_finite() || half > 0.5 * p.value.abs() {
+        return None;
+    }
+    let (factor, unit) = scaled(p.value, &p.unit);
+    Some(with_unit(&digits(factor * p.value, factor * half), unit))
+}
+
+/// An amount with unit to two significant digits.
+#[must_use]
+pub fn amount(value: f64, unit: &str) -> String {
+    let (factor, unit) = scaled(value, unit);
+    with_unit(&digits(factor * value, 0.05 * (factor * value).abs()), unit)
+}
+
+fn with_unit(number: &str, unit: &str) -> String {
+    match unit {
+        "" | "1" => number.to_owned(),
+        "rpm" => format!("{number} rev/min"),
+        "%" => format!("{number} %"),
+        unit => format!("{number} {unit}"),
+    }
+}
+
+/// A number to the first digit of its half width, three significant ones at the most.
+#[must_use]
+pub fn digits(value: f64, half: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".to_owned() } else { "-".to_owned() };
+    }
+    let size = value.abs().log10().floor();
+    let known = if half > 0.0 { -half.log10().floor() } else { 2.0 - size };
+    let places = known.min(2.0 - size).max(-size);
+    if !(-3.0..5.0).contains(&size) {
+        return format!("{value:.*e}", (places + size).clamp(0.0, 2.0) as usize);
+    }
+    if places < 0.0 {
+        // a speed of 8437 that is known to 30: 8440
+        let unit = 10f64.powf(-places);
+        return format!("{:.0}", (value / unit).round() * unit);
+    }
+    format!("{value:.*}", places as usize)
+}
+
+/// Words in a row: "a", "a and b", "a, b and c".
+#[must_use]
+pub fn list(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+/// With a large first letter.
+#[must_use]
+pub fn upper(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// With a small first letter, unless the first word is a name in capitals.
+#[must_use]
+pub fn lower(text: &str) -> String {
+    if text.chars().nth(1).is_some_and(char::is_uppercase) {
+        return text.to_owned();
+    }
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameter(value: f64, half: f64, unit: &str) -> Parameter {
+        Parameter { name: "x".into(), value, unit: unit.into(), ci95: [value - half, value + half] }
+    }
+
+    #[test]
+    fn numbers_have_the_digits_that_they_support() {
+        for (value, half, unit, said) in [
+            (0.04113, 0.00122, "ohm", "41 mohm"),
+            (0.43048, 0.038, "s", "0.43 s"),
+            (8437.0, 30.0, "rpm", "8440 rev/min"),
+            (6.83e-5, 2e-6, "kg.m2", "6.8e-5 kg.m2"),
+            (-0.25, 0.004, "N", "-0.250 N"),
+            (12.0, 0.0, "rows", "12.0 rows"),
+        ] {
+            assert_eq!(sized(&parameter(value, half, unit)).as_deref(), Some(said), "{value} +- {half}");
+        }
+        assert_eq!(sized(&parameter(0.04, 0.03, "ohm")), None, "an interval this wide supports no number");
+        assert_eq!(amount(0.0237, "N"), "0.024 N");
+        assert_eq!(amount(0.35241, "A"), "0.35 A");
+    }
+
+    #[test]
+    fn an_adverb_stands_between_subject_and_predicate() {
+        let clause = Clause::new("the load cell", "creeps");
+        assert_eq!(clause.with("probably"), "the load cell probably creeps");
+        assert_eq!(clause.sentence(), "The load cell creeps.");
+        assert_eq!(Clause::new("", "the body drags").with("perhaps"), "perhaps the body drags");
+    }
+
+    #[test]
+    fn no_rounding_makes_certain() {
+        assert_eq!(
+            (probability(0.9999), probability(0.001), probability(0.88)),
+            ("> 0.99".into(), "< 0.01".into(), "0.88".into())
+        );
+    }
+}

@@ -1,0 +1,232 @@
+//! Sentence and terminal text say what the verdict says, and no more.
+//!
+//! What it is: a verdict of each kind, made by hand, with the words that must and must not stand at its head.
+//! What can go wrong: a wording that claims more than the verdict.
+//! Units: as stated.
+//! Reference: specification `formats.md`, "Verdict".
+
+use ident::effects::Scope;
+use ident::report::{Hidden, Vocabulary, WIDEST, sentence, terminal};
+use ident::verdict::{
+    Alternative, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, NextExperiment, Parameter, ScheduleStep, Unexplained,
+    Verdict,
+};
+
+fn parameter(name: &str, value: f64, half: f64, unit: &str) -> Parameter {
+    Parameter { name: name.into(), value, unit: unit.into(), ci95: [value - half, value + half] }
+}
+
+fn effect(id: &str, on: &str, p: f64, removes: f64, parameters: Vec<Parameter>) -> EffectEntry {
+    EffectEntry {
+        id: id.into(),
+        scope: Scope::Rig,
+        channels: vec![on.into()],
+        depends_on: vec!["t_s".into()],
+        equation: "reading = truth".into(),
+        probability: p,
+        parameters,
+        heldout_error_reduction: removes,
+        evidence: "a long account of what the residual looks like, which the terminal must break into several lines of its own"
+            .into(),
+    }
+}
+
+fn filter(p: f64) -> EffectEntry {
+    effect("channel_filter", "thrust_n", p, 0.9, vec![parameter("window", 0.5, 0.02, "s")])
+}
+
+fn sag(p: f64) -> EffectEntry {
+    effect("supply_sag", "voltage_v", p, 0.85, vec![parameter("resistance", 0.041, 0.0012, "ohm")])
+}
+
+fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
+    let of = |rms: f64| Figures { rms, heldout_rms: rms, whiteness_p: 0.2 };
+    let channel = |unit: &str, floor: f64, before: f64, after: f64| Channel {
+        unit: unit.into(),
+        noise_floor_rms: floor,
+        before: of(before),
+        after: of(after),
+    };
+    let mut channels = Channels::default();
+    channels.predicted.insert("thrust_n".into(), channel("N", 0.01, 0.3, 0.03));
+    channels.predicted.insert("voltage_v".into(), channel("V", 0.01, 0.5, 0.08));
+    Verdict {
+        format: FORMAT,
+        run: "run.csv".into(),
+        verdict: kind,
+        channels,
+        effects,
+        unexplained: vec![],
+        alternatives: vec![],
+        next_experiment: None,
+        left_out: vec![],
+        set_aside: vec![],
+        validation: vec![],
+    }
+}
+
+fn left(channel: &str, over_floor: f64) -> Unexplained {
+    Unexplained { channel: channel.into(), over_floor, depends_on: vec!["temp_c".into()], looks_like: "slow".into() }
+}
+
+fn alternative(ids: &[&str], probability: f64) -> Alternative {
+    Alternative { ids: ids.iter().map(|i| (*i).to_owned()).collect(), probability }
+}
+
+/// Verdict, whether a model was declared, words at the head, words that must not stand there.
+fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static str])> {
+    let both = || vec![filter(0.99), sag(0.99)];
+    let with_left = |v: Verdict| Verdict { unexplained: vec![left("thrust_n", 3.0)], ..v };
+    let open = |p: f64| Verdict {
+        alternatives: vec![
+            alternative(&["channel_delay", "supply_sag"], p),
+            alternative(&["channel_filter", "battery_discharge"], 0.01),
+        ],
+        ..verdict(Kind::Ambiguous, vec![filter(0.5), sag(0.99)])
+    };
+    let schedule = vec![ScheduleStep { pulse_us: 1500.0, hold_s: 30.0 }];
+    let next = NextExperiment { why: "they differ most on long holds".into(), schedule };
+    vec![
+        (
+            verdict(Kind::Attributed, both()),
+            false,
+            &[
+                "The load cell reads the mean of its last 0.50 s, and the supply lead drops 41 mV per ampere. Together they explain",
+                "thrust and voltage had left over",
+                "Little is left beyond the noise.",
+            ],
+            &["probably", "perhaps", "New since"],
+        ),
+        (
+            with_left(verdict(Kind::Attributed, vec![filter(0.7)])),
+            true,
+            &[
+                "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.028 N is left (slow).",
+            ],
+            &["noise."],
+        ),
+        (verdict(Kind::Attributed, vec![filter(0.41)]), false, &["The load cell perhaps reads"], &["probably"]),
+        (
+            verdict(Kind::Attributed, vec![sag(0.9), effect("creep", "thrust_n", 0.9, 0.001, vec![])]),
+            false,
+            &[
+                "The supply lead drops 41 mV per ampere. That explains 97 % of what voltage had left over. A smaller cause is told below.",
+            ],
+            &["creeps", "thrust"],
+        ),
+        (
+            verdict(
+                Kind::Attributed,
+                vec![effect("spinup_lag", "thrust_n", 0.99, 0.5, vec![parameter("tau_up", 0.037, 0.001, "s")])],
+            ),
+            false,
+            &["The rotor takes 37 ms to follow the command. Every rig has that; nothing of this rig's own was named."],
+            &[],
+        ),
+        (
+            open(0.45),
+            false,
+            &[
+                "Either the load cell reads the mean of its last 0.50 s, or the load cell answers late: this run cannot tell. Beside that the supply lead drops 41 mV per ampere.",
+            ],
+            &["explain", "battery", "proposed"],
+        ),
+        (
+            Verdict { next_experiment: Some(next), ..open(0.45) },
+            false,
+            &["this run cannot tell, the run proposed below can."],
+            &["explain"],
+        ),
+        (
+            Verdict {
+                unexplained: vec![left("thrust_n", 3.0)],
+                ..verdict(Kind::Unattributed, vec![effect("unknown", "thrust_n", 0.9, 0.4, vec![])])
+            },
+            false,
+            &[
+                "Something is left on thrust that no known effect explains. It goes with time; a correction without a name was fitted. On thrust 0.028 N is left (slow).",
+            ],
+            &["explains thrust", "%"],
+        ),
+        (
+            verdict(Kind::Unattributed, vec![effect("unknown", "thrust_n", 0.9, 0.0, vec![])]),
+            true,
+            &["New since the declared model: something is left on thrust", "nothing was corrected"],
+            &["was fitted"],
+        ),
+        (
+            verdict(Kind::None, vec![]),
+            false,
+            &["Nothing is left to explain: no channel is left with more than its noise."],
+            &["The load cell", "lacks"],
+        ),
+        (verdict(Kind::None, vec![]), true, &["Nothing is new since the declared model"], &[]),
+        (
+            with_left(verdict(Kind::None, vec![])),
+            false,
+            &["Nothing that could be named is left over. On thrust 0.028 N is left (slow)."],
+            &["more than its noise"],
+        ),
+    ]
+}
+
+#[test]
+fn the_sentence_never_claims_more_than_the_verdict() {
+    let mut faults = Vec::new();
+    for (v, news, words, never) in cases() {
+        let said = sentence(&v, Vocabulary::RIG, news);
+        for word in words.iter().filter(|w| !said.contains(**w)) {
+            faults.push(format!("'{said}' lacks '{word}'"));
+        }
+        for word in never.iter().filter(|w| said.contains(**w)) {
+            faults.push(format!("'{said}' holds '{word}'"));
+        }
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
+#[test]
+fn a_channel_without_a_model_is_told() {
+    let mut v = verdict(Kind::Attributed, vec![sag(0.99)]);
+    v.channels.not_predicted.insert("rpm".into(), "no command was logged".into());
+    assert!(sentence(&v, Vocabulary::RIG, false).ends_with("Speed has no model: no command was logged."));
+}
+
+#[test]
+fn the_terminal_begins_with_the_sentence_and_keeps_to_its_width() {
+    for (v, news, ..) in cases() {
+        let text = terminal(&v, Vocabulary::RIG, news);
+        let head = text.split("\nrun.csv\n").next().expect("a head").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(head, sentence(&v, Vocabulary::RIG, news));
+        let widest = text.lines().max_by_key(|l| l.chars().count()).expect("lines");
+        assert!(widest.chars().count() <= WIDEST, "{widest}");
+        assert!(v.unexplained.is_empty() || text.contains("what is left"), "{text}");
+    }
+}
+
+/// Every effect of the library says its clause with and without numbers.
+#[test]
+fn every_effect_has_words() {
+    let verb = |text: &str| text.split_whitespace().count() >= 2;
+    for e in ident::effects::library() {
+        let clause = e.said(&effect(e.id(), "thrust_n", 0.9, 0.5, vec![]));
+        assert!(verb(&clause.with("")) && !clause.with("").contains('_'), "{}: {clause:?}", e.id());
+        assert!(!clause.who.is_empty(), "{}: an adverb needs a place", e.id());
+    }
+}
+
+#[test]
+fn a_demonstration_judges_its_names() {
+    let hidden = |id: &str| Hidden { seed: 7, id: id.into(), parameters: vec!["resistance = 0.041 ohm".into()] };
+    let lag = effect("spinup_lag", "rpm", 0.9, 0.5, vec![]);
+    let v = verdict(Kind::Attributed, vec![sag(0.9), lag, filter(0.9)]);
+    let said = hidden("supply_sag").judged(&v, Vocabulary::RIG).join("\n");
+    for word in [
+        "hidden was supply_sag (resistance = 0.041 ohm): found",
+        "true of every rig, the simulated one too: spinup_lag",
+        "false of the names, nobody hid it: channel_filter",
+    ] {
+        assert!(said.contains(word), "{said}");
+    }
+    assert!(hidden("creep").judged(&v, Vocabulary::RIG)[0].ends_with("NOT FOUND"));
+}
