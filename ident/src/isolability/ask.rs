@@ -14,14 +14,14 @@ use crate::beside::ask;
 use crate::context::{Context, Facts};
 use crate::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, choose, offers, round_of};
 use crate::heldout;
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, is_plausible, part_of};
 use crate::together::Ground;
 
 /// A log's schedule, sensors and noise.
 pub(crate) struct Rig {
     pub(crate) context: Context,
-    /// Declared part of the best hypothesis.
-    pub(crate) healthy: Fit,
+    /// The best hypothesis of the log as it is: what it holds stays in the log.
+    pub(crate) best: Fit,
     /// What that hypothesis leaves of each sample of each target.
     pub(crate) noise: Vec<Vec<f64>>,
     pub(crate) folds: Vec<Vec<bool>>,
@@ -44,27 +44,43 @@ pub(crate) struct Answer {
 #[derive(Clone, Copy)]
 pub(crate) struct Question<'q> {
     pub(crate) line: &'q Line,
-    /// Every cause with its name.
+    /// Every cause: its name, and one way in which it may be there.
     pub(crate) names: &'q [(String, Placed)],
     pub(crate) own: &'q str,
 }
 
-/// Name of a cause: the effect, its form, and its channels where it comes on several sets of them.
-pub(crate) fn name_of(placed: &Placed, names: &[(String, Placed)]) -> Option<String> {
-    let same = |p: &Placed| p.effect.id() == placed.effect.id() && p.instance == placed.instance;
-    names.iter().find(|(_, p)| same(p)).map(|(name, _)| name.clone())
+/// Name of the cause that an effect belongs to: one for each effect, kind of channel, and scope.
+pub(crate) fn name_of<'n>(placed: &Placed, names: &'n [(String, Placed)]) -> Option<&'n str> {
+    names.iter().find(|(_, p)| is_one_cause(p, placed)).map(|(name, _)| name.as_str())
+}
+
+/// Whether two effects are one cause.
+pub(crate) fn is_one_cause(a: &Placed, b: &Placed) -> bool {
+    let scope = |p: &Placed| p.effect.scope(&p.instance);
+    let kind = |p: &Placed| p.instance.channels.first().map(|c| if c.starts_with("rpm") { "rpm".to_owned() } else { c.clone() });
+    a.effect.id() == b.effect.id() && kind(a) == kind(b) && scope(a) == scope(b)
 }
 
 impl Rig {
+    /// What stays in the log beside a cause: all that was found but the cause itself.
+    fn beside(&self, id: &str) -> Vec<Placed> {
+        self.best.placed.iter().filter(|p| p.effect.id() != id).cloned().collect()
+    }
+
     /// The log as it would have been with a cause of some size in it; `sign` turns the noise.
     fn with(&self, line: &Line, place: f64, sign: f64) -> Context {
         let mut context = self.context.clone();
         context.facts = Facts::default();
-        let healthy = heldout::residuals(&self.context, Declared::default(), &self.healthy);
-        for (target, (left, noise)) in context.targets.iter_mut().zip(healthy.iter().zip(&self.noise)) {
-            target.y.iter_mut().zip(left.iter().zip(noise)).for_each(|(y, (l, e))| *y += sign * e - l);
+        let id = line.placed(place).effect.id();
+        for (i, target) in context.targets.iter_mut().enumerate() {
+            let noise = &self.noise[i];
+            target.y.iter_mut().zip(noise).for_each(|(y, e)| *y += (sign - 1.0) * e);
+            for k in (0..self.best.placed.len()).filter(|k| self.best.placed[*k].effect.id() == id) {
+                let part = part_of(&self.context, Declared::default(), &self.best, k, i);
+                target.y.iter_mut().zip(part).for_each(|(y, part)| *y -= part);
+            }
         }
-        for part in line.parts(&self.context, &self.healthy, place) {
+        for part in line.parts(&self.context, &self.best, place) {
             let target = &mut context.targets[part.target];
             target.y.iter_mut().zip(&part.change).for_each(|(y, change)| *y += change);
             let (levelled, noise) = (&target.levelled, &self.noise[part.target]);
@@ -74,12 +90,15 @@ impl Rig {
         context
     }
 
-    /// Whether an effect makes sense to the search where it is all that is there.
+    /// Whether an effect of this size makes sense to the search where it is there.
     pub(crate) fn makes_sense(&self, line: &Line, place: f64) -> bool {
         let context = self.with(line, place, 1.0);
-        let placed = [line.placed(place)];
+        let there = line.placed(place);
+        let mut placed = self.beside(there.effect.id());
+        placed.push(there);
+        let last = placed.len() - 1;
         fit(&context, Declared::default(), &placed, None, Rows::All)
-            .is_some_and(|f| plausible(&context, Declared::default(), &f))
+            .is_some_and(|f| is_plausible(&context, Declared::default(), &f, last))
     }
 
     /// The two answers; whether the cause would be named is looked at where `naming` asks for it.
@@ -91,36 +110,38 @@ impl Rig {
         let Question { line, names, own } = *question;
         let context = self.with(line, place, sign);
         let declared = Declared::default();
-        let start = fit(&context, declared, &[], None, Rows::All)?;
         let there = line.placed(place);
+        let base = fit(&context, declared, &self.beside(there.effect.id()), None, Rows::All)?;
+        let known = Candidate { fit: base, evidence: 0.0 };
         let shares = |s: &Scanned| s.instance.channels.iter().any(|c| there.instance.touches(c));
         let mut all: Vec<Scanned> = offers(&context).into_iter().filter(shares).collect();
         let mut offered: Vec<&mut Scanned> = all.iter_mut().collect();
-        let nothing = Candidate { fit: start.clone(), evidence: 0.0 };
-        let ranked = round_of(&context, declared, &nothing, &mut offered, &mut |_| {});
+        let ranked = round_of(&context, declared, &known, &mut offered, &mut |_| {});
         let mut answer = Answer { named: false, own: None, others: Vec::new() };
         for candidate in &ranked {
             let Some(name) = candidate.fit.placed.last().and_then(|p| name_of(p, names)) else { continue };
             if name == own {
                 answer.own = answer.own.or_else(|| Some(candidate.clone()));
             } else if !answer.others.iter().any(|o| o.0 == name) {
-                answer.others.push((name, candidate.clone()));
+                answer.others.push((name.to_owned(), candidate.clone()));
             }
         }
         let enough = answer.own.as_ref().is_some_and(|c| c.evidence > NEEDED_EVIDENCE);
-        answer.named = naming && enough && self.is_named(&context, &start, &ranked, &there);
+        answer.named = naming && enough && self.is_named(&context, &known, &ranked, &there);
         Some(answer)
     }
 
-    /// Whether the search would name this effect, whatever form of it comes first.
-    fn is_named(&self, context: &Context, start: &Fit, ranked: &[Candidate], there: &Placed) -> bool {
+    /// Whether the search would name this cause beside what was known, were it the only one that is offered.
+    fn is_named(&self, context: &Context, known: &Candidate, ranked: &[Candidate], there: &Placed) -> bool {
         let (declared, folds) = (Declared::default(), self.folds.as_slice());
-        let before = heldout::errors(context, declared, start, folds);
-        let nothing = Candidate { fit: start.clone(), evidence: 0.0 };
-        let own: Vec<Candidate> =
-            ranked.iter().filter(|c| c.fit.placed.last().is_some_and(|p| p.effect.id() == there.effect.id())).cloned().collect();
-        let Some(chosen) = choose(context, declared, &own, &nothing, &before, folds) else { return false };
-        let ground = Ground { context, declared, start, folds };
-        ask(ground, &before, &chosen.winner, &chosen.held).taken_back.is_empty()
+        let Some(start) = fit(context, declared, &[], None, Rows::All) else { return false };
+        let own = |c: &&Candidate| c.fit.placed.last().is_some_and(|p| is_one_cause(p, there));
+        let own: Vec<Candidate> = ranked.iter().filter(own).cloned().collect();
+        let errors = heldout::errors(context, declared, &known.fit, folds);
+        let Some(chosen) = choose(context, declared, &own, known, &errors, folds) else { return false };
+        let before = if known.fit.placed.is_empty() { errors } else { heldout::errors(context, declared, &start, folds) };
+        let ground = Ground { context, declared, start: &start, folds };
+        let newest = chosen.winner.fit.placed.len() - 1;
+        !ask(ground, &before, &chosen.winner, &chosen.held).taken_back.contains(&newest)
     }
 }

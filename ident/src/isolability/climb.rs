@@ -67,6 +67,18 @@ impl Climbed {
         Some((below * below + share * (size * size - below * below)).sqrt())
     }
 
+    /// Whether another cause stands beside this one at the largest size at which the search can fit this one at all.
+    pub(crate) fn stays_alike(&self, other: &str) -> bool {
+        let fitted = |t: &&Trial| t.answers.iter().all(|a| a.own.is_some());
+        let stands = |t: &Trial| t.answers.iter().any(|a| a.others.iter().any(|o| o.0 == other));
+        self.trials.iter().rfind(fitted).is_some_and(|t| stands(t) && t.lead(other) <= needed_lead())
+    }
+
+    /// Whether the search could fit the cause at some size.
+    pub(crate) fn is_sensible(&self) -> bool {
+        self.trials.iter().any(|t| t.answers.iter().all(|a| a.own.is_some()))
+    }
+
     /// The cause and another one at the largest size at which both stand.
     pub(crate) fn side_by_side(&self, other: &str) -> Option<(&Candidate, &Candidate)> {
         self.trials.iter().rev().find_map(|t| {
@@ -79,12 +91,12 @@ impl Climbed {
 /// Asks about a cause at one size after another.
 pub(crate) fn climb(rig: &Rig, question: &Question<'_>, rivals: &[&str]) -> Climbed {
     let line = question.line;
-    let most = line.most(&rig.context, &rig.healthy);
+    let most = line.most(&rig.context, &rig.best);
     let mut trials: Vec<Trial> = Vec::new();
     let mut ask = |floors: f64, naming: bool| -> bool {
         let floors = floors.min(most);
-        let place = line.place(&rig.context, &rig.healthy, floors);
-        let floors = line.size(&rig.context, &rig.healthy, place);
+        let place = line.place(&rig.context, &rig.best, floors);
+        let floors = line.size(&rig.context, &rig.best, place);
         let Some(answers) = rig.ask(question, place, naming) else { return false };
         let named = answers.iter().all(|a| a.named);
         let at = trials.partition_point(|t| t.floors < floors);
@@ -121,8 +133,8 @@ pub(crate) fn climb(rig: &Rig, question: &Question<'_>, rivals: &[&str]) -> Clim
             break;
         }
         if size > top {
-            let place = line.place(&rig.context, &rig.healthy, size.min(most));
-            let floors = line.size(&rig.context, &rig.healthy, place);
+            let place = line.place(&rig.context, &rig.best, size.min(most));
+            let floors = line.size(&rig.context, &rig.best, place);
             let Some(answers) = rig.ask(question, place, false) else { break };
             above.trials.push(Trial { floors, named: true, answers });
         }

@@ -33,7 +33,7 @@ impl Group {
 
 /// The groups, largest first.
 pub(crate) fn groups(context: &Context, causes: &[Cause], climbed: &[Climbed]) -> Vec<Group> {
-    let alike = |a: usize, b: usize| a != b && (causes[a].apart[b] == Apart::Never || causes[b].apart[a] == Apart::Never);
+    let alike = |a: usize, b: usize| stay_alike(causes, climbed, a, b) || stay_alike(causes, climbed, b, a);
     let mut free: Vec<bool> = vec![true; causes.len()];
     let mut out: Vec<Group> = Vec::new();
     for first in 0..causes.len() {
@@ -59,10 +59,15 @@ pub(crate) fn groups(context: &Context, causes: &[Cause], climbed: &[Climbed]) -
     out
 }
 
+/// Whether one cause is not told from another one at any size.
+fn stay_alike(causes: &[Cause], climbed: &[Climbed], a: usize, b: usize) -> bool {
+    causes[a].apart[b] == Apart::Never && climbed[a].stays_alike(&causes[b].name)
+}
+
 /// The run on which two members of a group differ most: the first pair that stood side by side.
 fn next(context: &Context, causes: &[Cause], climbed: &[Climbed], members: &[usize]) -> Option<NextExperiment> {
     let pairs = members.iter().flat_map(|a| members.iter().map(move |b| (*a, *b)));
-    let alike = pairs.filter(|(a, b)| causes[*a].apart[*b] == Apart::Never);
+    let alike = pairs.filter(|(a, b)| stay_alike(causes, climbed, *a, *b));
     alike.into_iter().find_map(|(a, b)| {
         let (own, other) = climbed[a].side_by_side(&causes[b].name)?;
         let models = [own, other].map(|c| model_of(context, Declared::default(), &c.fit));

@@ -17,15 +17,15 @@ mod size;
 pub use climb::FURTHEST;
 pub use group::Group;
 
+use crate::attribution::candidates::LEAST_ANGLE;
 use crate::close::{CloseError, Closed, close};
-use crate::context::Context;
 use crate::diagnose::offers;
 use crate::effects::library;
 use crate::heldout;
 use crate::hypothesis::{Declared, Placed};
 use crate::log::Log;
 use crate::long::{kept, thinned};
-use ask::{Question, Rig};
+use ask::{Question, Rig, is_one_cause};
 use climb::{Climbed, climb};
 use size::Line;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -64,6 +64,15 @@ pub enum Apart {
     Never,
 }
 
+impl Cause {
+    /// Whether the declared model takes up so much of it that the rest is within what its form is off by (see
+    /// [`crate::attribution::candidates::LEAST_ANGLE`]).
+    #[must_use]
+    pub fn is_hidden(&self) -> bool {
+        self.free < LEAST_ANGLE
+    }
+}
+
 /// A cause that the channels of the log could hold.
 #[derive(Debug, Clone)]
 pub struct Cause {
@@ -83,6 +92,8 @@ pub struct Cause {
     pub held: Vec<Quantity>,
     /// Size from which on the search names it; `None` where it does at no size.
     pub seen: Option<Size>,
+    /// Whether the search could fit it at some size with values that make sense; else nothing is said of it.
+    pub sensible: bool,
     /// Largest size that was tried.
     pub tried: Size,
     /// Towards each cause of the list, in its order.
@@ -106,7 +117,7 @@ pub struct Isolability {
     pub groups: Vec<Group>,
     /// Effects that the channels of the log cannot hold, or that readings must show first.
     pub not_offered: Vec<&'static str>,
-    /// What the search named on the log as it is: taken out before anything was asked.
+    /// What the search names on the log as it is: it stays in the log, beside every cause but itself.
     pub found: Vec<String>,
 }
 
@@ -148,24 +159,40 @@ fn rig_of(closed: Closed) -> Rig {
         noise: heldout::residuals(&closed.context, Declared::default(), &best.fit),
         found: best.names(),
         folds: closed.diagnosis.folds.clone(),
-        healthy: closed.diagnosis.best.fit,
+        best: closed.diagnosis.best.fit,
         context: closed.context,
     }
 }
 
-/// The causes that the log could hold, each with its name.
+/// The causes that the log could hold, each with its name: the first way in which each may be there.
 fn causes_of(rig: &Rig) -> Vec<(String, Line)> {
-    let offered = offers(&rig.context);
-    let name = |k: usize| {
-        let (own, id) = (&offered[k].instance, offered[k].effect.id());
-        let alike: Vec<usize> = (0..offered.len()).filter(|j| offered[*j].effect.id() == id).collect();
-        let several = |differs: &dyn Fn(usize) -> bool| alike.iter().any(|j| differs(*j));
-        let form = if several(&|j| offered[j].instance.form != own.form) { format!(" {}", own.form) } else { String::new() };
-        let on = own.channels.iter().map(|c| short(c)).collect::<Vec<&str>>().join("+");
-        let on = if several(&|j| offered[j].instance.channels != own.channels) { format!(" {on}") } else { String::new() };
-        format!("{id}{form}{on}")
+    let mut lines: Vec<(Placed, Line)> = Vec::new();
+    for offer in offers(&rig.context) {
+        let new = Placed { effect: offer.effect, instance: offer.instance.clone(), shape: Vec::new() };
+        if lines.iter().any(|(p, _)| is_one_cause(p, &new)) {
+            continue;
+        }
+        lines.extend(Line::new(&rig.context, &rig.best, offer.effect, offer.instance).map(|line| (new, sensible(rig, line))));
+    }
+    let name = |own: &Placed| {
+        let alike: Vec<&Placed> = lines.iter().map(|l| &l.0).filter(|p| p.effect.id() == own.effect.id()).collect();
+        let several = |of: &dyn Fn(&Placed) -> String| alike.iter().any(|p| of(p) != of(own));
+        let first = |p: &Placed| p.instance.channels.first().map_or_else(String::new, |c| short(c).to_owned());
+        let scope = |p: &Placed| p.effect.scope(&p.instance).word().to_owned();
+        let on = if several(&first) { format!(" {}", first(own)) } else { String::new() };
+        let form = if several(&scope) { format!(" {}", own.instance.form) } else { String::new() };
+        format!("{}{form}{on}", own.effect.id())
     };
-    (0..offered.len()).filter_map(|k| Some((name(k), Line::new(&rig.context, &rig.healthy, offered[k].effect, offered[k].instance.clone())?))).collect()
+    lines.iter().map(|(own, line)| (name(own), line.clone())).collect()
+}
+
+/// Size, noise floors, at which the signs of a cause's parts are tried: well above all that the search needs.
+const LOUD: f64 = 16.0;
+
+/// The line with the first signs of its parts that make sense together.
+fn sensible(rig: &Rig, line: Line) -> Line {
+    let makes_sense = |l: &Line| rig.makes_sense(l, l.place(&rig.context, &rig.best, LOUD));
+    line.turned().into_iter().find(makes_sense).unwrap_or(line)
 }
 
 /// A channel without its unit.
@@ -215,7 +242,7 @@ fn shares_channel(a: &Placed, b: &Placed) -> bool {
 
 /// A row of the matrix.
 fn cause(rig: &Rig, line: &Line, climbed: &Climbed, names: &[(String, Placed)], k: usize) -> Cause {
-    let (context, healthy) = (&rig.context, &rig.healthy);
+    let (context, healthy) = (&rig.context, &rig.best);
     let size = |floors: f64| {
         let place = line.place(context, healthy, floors);
         Size { floors, quantity: line.quantities(context, place).0 }
@@ -242,6 +269,7 @@ fn cause(rig: &Rig, line: &Line, climbed: &Climbed, names: &[(String, Placed)], 
         free: loudest.map_or(0.0, |p| (p.beside / p.whole).powi(2).min(1.0)),
         held: line.quantities(context, shown).1,
         seen: climbed.seen.map(size),
+        sensible: climbed.is_sensible(),
         tried: size(climbed.tried),
         apart: apart.collect(),
     }

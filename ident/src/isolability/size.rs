@@ -74,9 +74,14 @@ impl Line {
         Some(line)
     }
 
-    /// The same with amplitudes of the other sign; shapes stay.
-    pub(crate) fn turned(&self) -> Option<Self> {
-        self.linear.then(|| Self { unit: self.unit.iter().map(|u| -u).collect(), ..self.clone() })
+    /// The same with every pattern of signs of its amplitudes, as it is first; shapes keep theirs.
+    pub(crate) fn turned(&self) -> Vec<Self> {
+        let moved: Vec<usize> = (0..self.unit.len()).filter(|k| self.unit[*k] != 0.0).collect();
+        let pattern = |bits: u32| {
+            let sign = |k: usize| moved.iter().position(|m| *m == k).map_or(1.0, |b| if bits >> b & 1 == 1 { -1.0 } else { 1.0 });
+            Self { unit: self.unit.iter().enumerate().map(|(k, u)| sign(k) * u).collect(), ..self.clone() }
+        };
+        (0..1_u32 << moved.len()).map(pattern).collect()
     }
 
     /// The amplitude of the first column of each channel: one noise floor of it, root mean square.
@@ -222,7 +227,7 @@ impl Line {
 
 /// Shapes that say when or where something happens, and not how much of it there is.
 fn is_place(name: &str) -> bool {
-    matches!(name, "t0" | "phase" | "offset" | "spread" | "reference")
+    matches!(name, "t0" | "phase" | "offset" | "spread" | "reference" | "onset" | "half_speed" | "natural_frequency" | "damping_ratio")
 }
 
 /// The prediction with the declared coefficients of the healthy rig and amplitudes of the effect.
