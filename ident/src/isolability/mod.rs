@@ -13,9 +13,11 @@ mod ask;
 mod climb;
 mod group;
 mod size;
+mod words;
 
 pub use climb::FURTHEST;
 pub use group::Group;
+pub use words::{Standing, short};
 
 use crate::attribution::candidates::LEAST_ANGLE;
 use crate::close::{CloseError, Closed, close};
@@ -177,7 +179,7 @@ fn causes_of(rig: &Rig) -> Vec<(String, Line)> {
     let name = |own: &Placed| {
         let alike: Vec<&Placed> = lines.iter().map(|l| &l.0).filter(|p| p.effect.id() == own.effect.id()).collect();
         let several = |of: &dyn Fn(&Placed) -> String| alike.iter().any(|p| of(p) != of(own));
-        let first = |p: &Placed| p.instance.channels.first().map_or_else(String::new, |c| short(c).to_owned());
+        let first = |p: &Placed| p.instance.channels.first().map_or_else(String::new, |c| bare(c).to_owned());
         let scope = |p: &Placed| p.effect.scope(&p.instance).word().to_owned();
         let on = if several(&first) { format!(" {}", first(own)) } else { String::new() };
         let form = if several(&scope) { format!(" {}", own.instance.form) } else { String::new() };
@@ -196,7 +198,7 @@ fn sensible(rig: &Rig, line: Line) -> Line {
 }
 
 /// A channel without its unit.
-fn short(channel: &str) -> &str {
+fn bare(channel: &str) -> &str {
     channel.rsplit_once('_').filter(|(_, unit)| ["n", "nm", "a", "v"].contains(unit)).map_or(channel, |(name, _)| name)
 }
 

@@ -170,10 +170,14 @@ impl Line {
     fn part(&self, context: &Context, healthy: &Fit, placed: &[Placed], (i, place): (usize, f64)) -> Part {
         let target = &context.targets[i];
         let (without, with) = (plain(context, Declared::default(), target), design(context, Declared::default(), placed, target));
-        let (before, after) = (predicted(context, healthy, i, &without, &[]), predicted(context, healthy, i, &with, &self.at(place)));
+        let (before, after) =
+            (predicted(context, healthy, i, &without, &[]), predicted(context, healthy, i, &with, &self.at(place)));
         let change: Vec<f64> = target.rows.iter().map(|row| after[*row] - before[*row]).collect();
-        let scatter: Vec<f64> =
-            if with.extra_variance.is_empty() { Vec::new() } else { target.rows.iter().map(|r| with.extra_variance[*r]).collect() };
+        let scatter: Vec<f64> = if with.extra_variance.is_empty() {
+            Vec::new()
+        } else {
+            target.rows.iter().map(|r| with.extra_variance[*r]).collect()
+        };
         let gained = scatter.iter().sum::<f64>() / scatter.len().max(1) as f64;
         let floor = target.noise.rms;
         let left = left_beside(&without, &target.rows, &change, &target.levelled);
@@ -213,7 +217,8 @@ impl Line {
         let at = self.placed(place).shape;
         let of_shape = |k: usize| Quantity { name: shapes[k].name.to_owned(), unit: shapes[k].unit.to_owned(), value: at[k] };
         let moves = |k: &usize| !self.linear && self.from[*k] != self.to[*k];
-        let fixed = (0..shapes.len()).filter(|k| !moves(k) && shapes[*k].range.1 > shapes[*k].range.0 && !shapes[*k].is_nuisance());
+        let fixed =
+            (0..shapes.len()).filter(|k| !moves(k) && shapes[*k].range.1 > shapes[*k].range.0 && !shapes[*k].is_nuisance());
         let still: Vec<Quantity> = fixed.map(of_shape).collect();
         let amplitude = || {
             let k = self.unit.iter().position(|u| *u != 0.0)?;
@@ -227,7 +232,10 @@ impl Line {
 
 /// Shapes that say when or where something happens, and not how much of it there is.
 fn is_place(name: &str) -> bool {
-    matches!(name, "t0" | "phase" | "offset" | "spread" | "reference" | "onset" | "half_speed" | "natural_frequency" | "damping_ratio")
+    matches!(
+        name,
+        "t0" | "phase" | "offset" | "spread" | "reference" | "onset" | "half_speed" | "natural_frequency" | "damping_ratio"
+    )
 }
 
 /// The prediction with the declared coefficients of the healthy rig and amplitudes of the effect.

@@ -7,6 +7,7 @@
 
 mod beam;
 mod figure;
+mod isolability;
 mod page;
 mod run;
 mod selection;
@@ -17,6 +18,7 @@ mod svg;
 
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
 pub use figure::{Figure, Layer, Mark};
+pub use isolability::{isolability, isolability_csv, isolability_svg};
 pub use page::closed_loop;
 pub use run::run;
 pub use selection::selection;

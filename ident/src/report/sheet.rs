@@ -94,6 +94,11 @@ impl Sheet {
         self.body += "</div>\n";
     }
 
+    /// A drawing of its own kind, as wide as the page.
+    pub(crate) fn drawing(&mut self, id: &str, svg: &str) {
+        self.body += &format!("<figure id=\"{}\">{svg}</figure>\n", escape(id));
+    }
+
     /// The page.
     #[must_use]
     pub fn html(&self) -> String {
