@@ -1,6 +1,6 @@
 //! Causes that stay alike.
 //!
-//! What it is: two causes are alike where one of them is not told from the other at any size that was tried; groups are what that connects.
+//! What it is: two causes are alike where one of them is named and yet not told from the other at any size that was tried; groups are what that connects.
 //! What can go wrong: a chain of likenesses makes a group whose ends may well be told apart; the matrix has the pairs.
 //! Units: none.
 //! Reference: equivalence classes of faults, Krysander & Frisk 2008, IEEE Trans. SMC-A 38:1183.
@@ -59,9 +59,9 @@ pub(crate) fn groups(context: &Context, causes: &[Cause], climbed: &[Climbed]) -
     out
 }
 
-/// Whether one cause is not told from another one at any size.
+/// Whether one cause that is named is not told from another one at any size. What is never named shows too little to be like anything.
 fn stay_alike(causes: &[Cause], climbed: &[Climbed], a: usize, b: usize) -> bool {
-    causes[a].apart[b] == Apart::Never && climbed[a].stays_alike(&causes[b].name)
+    causes[a].seen.is_some() && causes[a].apart[b] == Apart::Never && climbed[a].stays_alike(&causes[b].name)
 }
 
 /// The run on which two members of a group differ most: the first pair that stood side by side.

@@ -71,13 +71,13 @@ impl Isolability {
             count(Standing::Clear)
         );
         let rest = [
-            (count(Standing::Alike), "look like another one at any size"),
-            (count(Standing::Hidden), "are hidden in the declared model"),
-            (count(Standing::Unshown), "are named at no size"),
+            (count(Standing::Alike), "alike with another one at any size"),
+            (count(Standing::Hidden), "hidden in the declared model"),
+            (count(Standing::Unshown), "named at no size"),
         ];
         let rest: Vec<String> = rest.iter().filter(|r| r.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
         if !rest.is_empty() {
-            out += &format!(" {}.", rest.join(", "));
+            out += &format!(" Of the others: {}.", rest.join(", "));
         }
         out
     }

@@ -14,8 +14,8 @@ use std::fmt::Write;
 /// Width of the drawing in its own units, as of every figure.
 const WIDTH: f64 = 560.0;
 /// Room for the names of the rows.
-const LEFT: f64 = 218.0;
-const TOP: f64 = 76.0;
+const LEFT: f64 = 240.0;
+const TOP: f64 = 84.0;
 /// Height of a row: a line of a phone's letters.
 const ROW: f64 = 19.0;
 
@@ -179,9 +179,11 @@ fn draw_cell(out: &mut String, found: &Isolability, (k, other): (usize, usize), 
     };
     let (class, share, _) = LOOKS[look];
     let tall = (ROW - 3.0) * share;
+    // what cannot meet is there to complete the grid, and no more
+    let faint = if look == 3 { " opacity=\"0.35\"" } else { "" };
     let _ = write!(
         out,
-        "<rect class=\"{class} col\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{tall:.1}\"><title>{} for {}: {text}</title></rect>",
+        "<rect class=\"{class} col\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{tall:.1}\"{faint}><title>{} for {}: {text}</title></rect>",
         x + 0.08 * cell,
         y + 0.5 * (ROW - tall),
         0.84 * cell,

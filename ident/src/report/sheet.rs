@@ -94,9 +94,9 @@ impl Sheet {
         self.body += "</div>\n";
     }
 
-    /// A drawing of its own kind, as wide as the page.
+    /// A drawing of its own kind, as wide as the text.
     pub(crate) fn drawing(&mut self, id: &str, svg: &str) {
-        self.body += &format!("<figure id=\"{}\">{svg}</figure>\n", escape(id));
+        self.body += &format!("<figure id=\"{}\" style=\"max-width:48rem\">{svg}</figure>\n", escape(id));
     }
 
     /// The page.
