@@ -32,6 +32,11 @@ struct Trial {
 }
 
 impl Trial {
+    /// Whether the search fits the cause with values that make sense.
+    fn is_fitted(&self) -> bool {
+        self.answers.iter().all(|a| a.own.is_some())
+    }
+
     /// Lead of the cause over another one in evidence, the mean of both signs of the noise.
     fn lead(&self, other: &str) -> f64 {
         let lead = |a: &Answer| {
@@ -55,7 +60,9 @@ pub(crate) struct Climbed {
 impl Climbed {
     /// Size from which on the cause is told from another one.
     pub(crate) fn apart(&self, other: &str) -> Option<f64> {
-        let leads: Vec<(f64, f64)> = self.trials.iter().map(|t| (t.floors, t.lead(other))).collect();
+        // where a range ends the search cannot fit the cause itself: such a size says nothing of others
+        let fitted = self.trials.iter().filter(|t| t.is_fitted());
+        let leads: Vec<(f64, f64)> = fitted.map(|t| (t.floors, t.lead(other))).collect();
         let told = |lead: f64| lead > needed_lead();
         let first = leads.iter().rposition(|(_, lead)| !told(*lead)).map_or(0, |k| k + 1);
         let (size, lead) = *leads.get(first)?;
@@ -69,14 +76,14 @@ impl Climbed {
 
     /// Whether another cause stands beside this one at the largest size at which the search can fit this one at all.
     pub(crate) fn stays_alike(&self, other: &str) -> bool {
-        let fitted = |t: &&Trial| t.answers.iter().all(|a| a.own.is_some());
+        let fitted = |t: &&Trial| t.is_fitted();
         let stands = |t: &Trial| t.answers.iter().any(|a| a.others.iter().any(|o| o.0 == other));
         self.trials.iter().rfind(fitted).is_some_and(|t| stands(t) && t.lead(other) <= needed_lead())
     }
 
     /// Whether the search could fit the cause at some size.
     pub(crate) fn is_sensible(&self) -> bool {
-        self.trials.iter().any(|t| t.answers.iter().all(|a| a.own.is_some()))
+        self.trials.iter().any(Trial::is_fitted)
     }
 
     /// The cause and another one at the largest size at which both stand.
