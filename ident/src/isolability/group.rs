@@ -43,9 +43,9 @@ pub(crate) fn groups(context: &Context, causes: &[Cause], climbed: &[Climbed]) -
         let mut members = vec![first];
         let mut at = 0;
         while at < members.len() {
-            for k in 0..causes.len() {
-                if free[k] && alike(members[at], k) {
-                    free[k] = false;
+            for (k, free) in free.iter_mut().enumerate() {
+                if *free && alike(members[at], k) {
+                    *free = false;
                     members.push(k);
                 }
             }
