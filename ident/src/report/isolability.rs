@@ -37,7 +37,7 @@ pub fn isolability(found: &Isolability) -> Sheet {
     sheet.say("A row is a cause that is there, a column what it could be taken for. Touch a cell for its size.");
     sheet.drawing("matrix", &drawn(found, ""));
     sheet.section("From which size on");
-    sheet.say("Size is the root mean square of what the declared model cannot take up, in noise floors of the channel. At it the search names the cause in about every second run.");
+    sheet.say("Size is the root mean square of what the declared model cannot take up, in noise floors of the channel. From it on the search names the cause, right to a factor of about two.");
     let head = [
         "cause",
         "channel",
