@@ -49,7 +49,7 @@ const SKETCH: usize = 2700;
 /// Candidates of a round that are kept for those who want to look.
 const SHOWN: usize = 10;
 /// Share of the winner's probability at which a second hypothesis makes the verdict ambiguous.
-const RIVAL: f64 = 0.5;
+pub(crate) const RIVAL: f64 = 0.5;
 
 /// Share of the winner's probability from which on a rival of an ambiguous verdict must be considered.
 const CONSIDERED: f64 = 0.1;
@@ -492,16 +492,16 @@ pub(crate) fn evidence_over(context: &Context, new: &Fit, start: &Fit) -> f64 {
 }
 
 /// What one round chose.
-struct Chosen {
-    winner: Candidate,
-    held: Vec<Held>,
+pub(crate) struct Chosen {
+    pub(crate) winner: Candidate,
+    pub(crate) held: Vec<Held>,
     probability: f64,
     rivals: Vec<(Candidate, f64)>,
 }
 
 /// The first candidate in the ranking that brings enough evidence, predicts held-out rows better, and is either clearly itself
 /// or large: a small further effect that could as well be another one is left unnamed.
-fn choose(
+pub(crate) fn choose(
     context: &Context,
     declared: Declared<'_>,
     ranked: &[Candidate],
@@ -553,7 +553,7 @@ pub(crate) fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64
 }
 
 /// Distance between a channel's lowest and highest reading.
-fn span(target: &Target) -> f64 {
+pub(crate) fn span(target: &Target) -> f64 {
     let (low, high) = target.y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
     high - low
 }

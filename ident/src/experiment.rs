@@ -9,7 +9,7 @@
 
 use crate::context::Context;
 use crate::diagnose::Diagnosis;
-use crate::hypothesis::Declared;
+use crate::hypothesis::{Declared, Fit};
 use crate::log::Log;
 use crate::model::Model;
 use crate::simulate::from_command;
@@ -37,14 +37,24 @@ fn families(top: f64) -> Vec<(&'static str, Vec<ScheduleStep>)> {
 #[must_use]
 pub fn next(context: &Context, declared: Declared<'_>, model: &Model, diagnosis: &Diagnosis) -> Option<NextExperiment> {
     let rival = diagnosis.rivals.first()?;
+    let names = [diagnosis.best.ids().join(" + "), rival.ids.join(" + ")];
+    between(context, model, &model_of(context, declared, &rival.fit), &names)
+}
+
+/// The model that a fit of a log makes.
+pub(crate) fn model_of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Model {
     let source = Log { name: context.name.clone(), ..Log::default() };
-    let other = Model::from_fit(context, &source, declared, &rival.fit);
+    Model::from_fit(context, &source, declared, fit)
+}
+
+/// The best of the families for two models of one log, each with the names that it holds.
+pub(crate) fn between(context: &Context, model: &Model, other: &Model, [own, rival]: &[String; 2]) -> Option<NextExperiment> {
     let top = context.pulse.as_ref().map_or(2000.0, |p| p.iter().copied().fold(1000.0, f64::max));
-    let both = format!("{} and {} explain this run about equally well", diagnosis.best.ids().join(" + "), rival.ids.join(" + "));
+    let both = format!("{own} and {rival} explain this run about equally well");
     let mut families = families(top);
-    let weather = uncontrolled(context, model, &other);
+    let weather = uncontrolled(context, model, other);
     let moved = |schedule: &[ScheduleStep]| {
-        size(&less(difference(context, model, &other, schedule), difference(context, model, &other, &at_rest(schedule))))
+        size(&less(difference(context, model, other, schedule), difference(context, model, other, &at_rest(schedule))))
     };
     if !weather.is_empty() && families.iter().all(|(_, schedule)| moved(schedule) < TOLD) {
         // what the rig does in a long rest is the one thing that a schedule can still give
@@ -62,7 +72,7 @@ pub fn next(context: &Context, declared: Declared<'_>, model: &Model, diagnosis:
     }
     let best = families
         .into_iter()
-        .map(|(why, schedule)| (size(&difference(context, model, &other, &schedule)), why, schedule))
+        .map(|(why, schedule)| (size(&difference(context, model, other, &schedule)), why, schedule))
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(NextExperiment {
         why: format!("{both}; {}: their predictions then differ by {:.1} times the noise (rms)", best.1, best.0),

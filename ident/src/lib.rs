@@ -32,6 +32,7 @@ pub mod identify;
 pub mod import;
 pub mod inertial;
 pub mod inspect;
+pub mod isolability;
 pub mod leftover;
 pub mod log;
 pub mod long;

@@ -10,7 +10,7 @@ use crate::diagnose::{Candidate, NEEDED_EVIDENCE};
 use crate::hypothesis::Fit;
 
 /// Softmax temperature from evidence to probability.
-const TEMPERATURE: f64 = 4.0;
+pub(crate) const TEMPERATURE: f64 = 4.0;
 /// Another hypothesis: one effect of the winner replaced.
 #[derive(Debug, Clone)]
 pub struct Rival {

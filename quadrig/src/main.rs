@@ -21,6 +21,7 @@ mod fly;
 mod identify;
 mod import;
 mod imu;
+mod isolability;
 mod live;
 mod measured;
 mod plateaus;
@@ -90,6 +91,8 @@ enum Command {
     Flash(flash::Args),
     /// The loop on every recorded set; writes the pages that say what came of it.
     Measured(measured::Args),
+    /// Which causes a schedule can tell apart and from which size on, before a run is flown or after.
+    Isolability(isolability::Args),
     /// One step of the loop on its own.
     Step(step::Args),
     /// Records from the rig board, with a live view.
@@ -128,6 +131,7 @@ fn main() -> ExitCode {
         Command::Fly(args) => fly::run(args, cli.quiet),
         Command::Flash(args) => flash::run(args),
         Command::Measured(args) => measured::run(args, cli.quiet),
+        Command::Isolability(args) => isolability::run(args, cli.quiet),
         Command::Step(args) => step::run(args, cli.quiet),
         Command::Log(args) => record::run(args, cli.quiet),
         Command::Rig(args) => rig::run(args, cli.quiet),

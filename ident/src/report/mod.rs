@@ -8,6 +8,7 @@
 mod beam;
 pub(crate) mod closed;
 mod figure;
+mod isolability;
 mod page;
 mod run;
 mod selection;
@@ -19,6 +20,7 @@ mod svg;
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
 pub use closed::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal};
 pub use figure::{Figure, Layer, Mark};
+pub use isolability::{isolability, isolability_csv, isolability_svg};
 pub use page::closed_loop;
 pub use run::run;
 pub use selection::selection;

@@ -173,6 +173,11 @@ impl Sheet {
         self.body += "</div>\n";
     }
 
+    /// A drawing of its own kind, as wide as the text.
+    pub(crate) fn drawing(&mut self, id: &str, svg: &str) {
+        self.body += &format!("<figure id=\"{}\" style=\"max-width:48rem\">{svg}</figure>\n", escape(id));
+    }
+
     /// The page.
     #[must_use]
     pub fn html(&self) -> String {

@@ -20,7 +20,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// Whether a file begins as a flight log does.
-pub(super) fn is_flight_log(path: &Path) -> bool {
+pub(crate) fn is_flight_log(path: &Path) -> bool {
     let Ok(file) = std::fs::File::open(path) else { return false };
     let first = BufReader::new(file).lines().map_while(Result::ok).find(|l| !l.trim().is_empty());
     first.is_some_and(|l| l.trim_start_matches('#').trim() == flight_log::FORMAT)

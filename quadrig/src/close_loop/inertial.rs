@@ -20,7 +20,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// Whether the first line that is no comment names a gyro's three axes.
-pub(super) fn is_attitude_log(path: &Path) -> bool {
+pub(crate) fn is_attitude_log(path: &Path) -> bool {
     let Ok(file) = std::fs::File::open(path) else { return false };
     let header = BufReader::new(file).lines().map_while(Result::ok).find(|l| !l.starts_with('#') && !l.trim().is_empty());
     let header = header.unwrap_or_default();

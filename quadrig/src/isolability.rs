@@ -1,0 +1,186 @@
+//! `quadrig isolability`: which causes a schedule can tell apart, before it is flown as well as after.
+//!
+//! What it is: the matrix of [`ident::isolability`] on a log, or on a scenario that is flown here first, without what it hides.
+//! What can go wrong: refused input; a log on which nothing can be fitted; a folder that cannot be written.
+//! Units: noise floors, and each cause's own.
+//! Reference: docs/isolability.md.
+
+use crate::Failure;
+use crate::close_loop::{flight, inertial};
+use crate::progress::Bar;
+use crate::sim::fly;
+use hal_sim::Scenario;
+use hal_sim::scenario::AnyScenario;
+use ident::isolability::{Apart, Cause, Isolability, Standing, isolability, short};
+use ident::log::{Log, write_whole};
+use ident::report;
+use std::path::{Path, PathBuf};
+
+/// Arguments.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub(crate) struct Args {
+    /// A rig log (.csv), or a scenario (.toml), which is flown first, without the effects that it hides.
+    input: PathBuf,
+    /// Folder for isolability.html, matrix.svg and matrix.csv.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+const EXAMPLE: &str = "Sizes are in noise floors of a cause's main channel (root mean square), and in the unit of its own parameter\n(ohm, N, N/s, s, ...). Nothing is fitted to your liking: the search that gives verdicts is asked itself.\n\nExample:\n  quadrig isolability examples/sagging-lead.toml -o out/isolability";
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let (log, hidden) = log_of(&args.input, quiet)?;
+    let found = {
+        let bar = Bar::new("asking", quiet);
+        isolability(&log, &mut |share| bar.set(share))?
+    };
+    if let Some(folder) = &args.output {
+        write_folder(folder, &found)?;
+    }
+    if !quiet {
+        print!("{}{}", flown(&hidden), text(&found));
+    }
+    Ok(())
+}
+
+/// The log, and the effects that a scenario would have hidden in it.
+fn log_of(input: &Path, quiet: bool) -> Result<(Log, Vec<String>), Failure> {
+    if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        let AnyScenario::Rig(scenario) = AnyScenario::load(input)? else {
+            return Err(format!("{}: describes the IMU board; expected a scenario of the rig", input.display()).into());
+        };
+        let hidden = scenario.effects.iter().map(|e| e.id().to_owned()).collect();
+        let healthy = Scenario { effects: Vec::new(), ..*scenario };
+        let name = input.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        return Ok((fly(&healthy, None, &name, "flying", quiet)?, hidden));
+    }
+    if inertial::is_attitude_log(input) || flight::is_flight_log(input) {
+        return Err(format!("{}: an attitude or flight log; expected a rig log or a scenario", input.display()).into());
+    }
+    Ok((Log::read(input)?, Vec::new()))
+}
+
+fn write_folder(folder: &Path, found: &Isolability) -> Result<(), Failure> {
+    let say = |e: std::io::Error| format!("{}: {e}", folder.display());
+    std::fs::create_dir_all(folder).map_err(say)?;
+    let write = |name: &str, text: String| write_whole(&folder.join(name), |out| out.write_all(text.as_bytes())).map_err(say);
+    write("isolability.html", report::isolability(found).html())?;
+    write("matrix.svg", report::isolability_svg(found))?;
+    write("matrix.csv", report::isolability_csv(found))?;
+    Ok(())
+}
+
+fn flown(hidden: &[String]) -> String {
+    if hidden.is_empty() { String::new() } else { format!("flown without what it hides: {}\n", hidden.join(", ")) }
+}
+
+/// The matrix as a person reads it.
+fn text(found: &Isolability) -> String {
+    let mut out = format!("{}: {} rows, {:.0} s\n{}", found.run, found.rows, found.duration_s, wrapped(&found.summary(), ""));
+    if !found.found.is_empty() {
+        out += &wrapped(&format!("The log as it is holds {}; they stay in it.", found.found.join(", ")), "");
+    }
+    out += &table(found);
+    out += &matrix(found);
+    out += &groups(found);
+    for (standing, words) in [(Standing::Unshown, "named at no size"), (Standing::Unjudged, "not judged, no fit makes sense")] {
+        let names = found.names(standing);
+        if !names.is_empty() {
+            out += &wrapped(&format!("{words}: {}", names.join(", ")), "  ");
+        }
+    }
+    out += &wrapped(&format!("not offered by these channels: {}", found.not_offered.join(", ")), "  ");
+    out
+}
+
+fn table(found: &Isolability) -> String {
+    let mut out =
+        format!("\n{:<26} {:<12} {:>6} {:>7}  {}\n", "named from this size on", "channel", "floors", "beside", "in its own unit");
+    for (k, cause) in found.causes.iter().enumerate() {
+        let Some(seen) = &cause.seen else { continue };
+        let own = clipped(&cause.in_words(), 43);
+        let beside = format!("{:.1} %", 100.0 * cause.free);
+        let name = format!("{:>2} {}", k + 1, cause.name);
+        out += &format!("{name:<26} {:<12} {:>6} {beside:>7}  {own}\n", clipped(&cause.main, 12), short(seen.floors));
+    }
+    out += &wrapped(
+        "floors: root mean square of what the declared model cannot take up. beside: share of its squares that is. Under 1 % a cause is named only if it is exactly as the library has it.",
+        "",
+    );
+    out
+}
+
+/// One sign a cell.
+fn sign(cause: &Cause, other: usize) -> char {
+    let named = cause.seen.as_ref().map_or(0.0, |s| s.floors * std::f64::consts::SQRT_2);
+    match &cause.apart[other] {
+        Apart::SameName => '=',
+        Apart::Elsewhere => ' ',
+        Apart::From(size) if size.floors <= named => '.',
+        Apart::From(_) => '+',
+        Apart::Never => '#',
+    }
+}
+
+fn matrix(found: &Isolability) -> String {
+    let shown: Vec<usize> = (0..found.causes.len()).filter(|k| found.causes[*k].sensible).collect();
+    let mut out = String::from("\nrow is there, column is what it could be taken for:\n");
+    for (words, digit) in [("", 10), ("", 1)] {
+        let head: String = shown.iter().map(|k| char::from(b'0' + (((k + 1) / digit) % 10) as u8)).collect();
+        out += &format!("{words:<30} {head}\n");
+    }
+    for k in &shown {
+        let cells: String = shown.iter().map(|other| sign(&found.causes[*k], *other)).collect();
+        out += &format!("{:<30} {}\n", format!("{:>2} {}", k + 1, found.causes[*k].name), cells.trim_end());
+    }
+    out += ". told apart once named, + when larger, # alike at any size, = one name, blank no common channel\n";
+    for cause in &found.causes {
+        let later: Vec<String> =
+            found.later(cause).iter().filter_map(|(name, at)| Some(format!("{name} from {} floors", short((*at)?)))).collect();
+        if !later.is_empty() {
+            out += &wrapped(&format!("{} is told from {}", cause.name, later.join(", ")), "  ");
+        }
+    }
+    out
+}
+
+fn groups(found: &Isolability) -> String {
+    let mut out = String::new();
+    for group in &found.groups {
+        out += &wrapped(&format!("\ncannot be told apart: {}", found.members(group)), "  ");
+        if let Some(next) = &group.next {
+            out += &wrapped(&format!("  a run that would: {}", next.why), "  ");
+            let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us x {} s", s.pulse_us, s.hold_s)).collect();
+            out += &wrapped(&format!("  {}", steps.join(", ")), "  ");
+        }
+    }
+    if found.groups.is_empty() { out } else { out + "\n" }
+}
+
+/// Columns of a terminal.
+const COLUMNS: usize = 100;
+
+/// Lines of at most [`COLUMNS`], further ones indented.
+fn wrapped(text: &str, indent: &str) -> String {
+    let start = text.len() - text.trim_start_matches([' ', '\n']).len();
+    let mut lines = vec![text[..start].to_owned()];
+    for word in text.split_whitespace() {
+        let line = lines.last().map_or(0, |l| l.trim_start_matches('\n').chars().count());
+        if line + 1 + word.chars().count() > COLUMNS {
+            lines.push(indent.to_owned());
+        }
+        if let Some(line) = lines.last_mut() {
+            if !line.is_empty() && !line.ends_with([' ', '\n']) {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+fn clipped(text: &str, most: usize) -> String {
+    if text.chars().count() <= most { text.to_owned() } else { text.chars().take(most - 2).chain("..".chars()).collect() }
+}
