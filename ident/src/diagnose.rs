@@ -11,6 +11,7 @@
 use crate::beside::{NEEDED, ask, is_named, left_of, with_rests};
 use crate::conclude::{Errors, is_nothing, quoted, untenable};
 use crate::context::{Context, Relation, Target};
+pub(crate) use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::{self, Effect, Estimate, Instance};
 use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
@@ -27,9 +28,6 @@ use std::collections::BTreeSet;
 const MOST_ON_A_CHANNEL: usize = 3;
 /// Most effects in one hypothesis, over all channels.
 const MOST_EFFECTS: usize = 6;
-/// Net evidence, nats, that an effect must bring beyond its penalty: a library of about fifty instances then raises a false
-/// alarm in about one clean run of a hundred.
-pub(crate) const NEEDED_EVIDENCE: f64 = 7.0;
 /// Share of the held-out error on its first channel that an effect must remove to be worth a name.
 pub(crate) const NEEDED_REDUCTION: f64 = 0.05;
 /// Effects that are named with small errors removed; a further one must remove much, because small misfits of the declared

@@ -56,6 +56,10 @@ pub(crate) use current_limit::Draw;
 pub(crate) use tare_shift::BEFORE;
 pub(crate) use throttle_quantisation::Best as SawTooth;
 
+/// Net evidence, nats, that an effect must bring beyond its penalty: a library of about fifty instances then raises a false
+/// alarm in about one clean run of a hundred.
+pub(crate) const NEEDED_EVIDENCE: f64 = 7.0;
+
 /// Where in the causal chain an effect acts; effects are applied in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {

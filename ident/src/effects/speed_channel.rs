@@ -15,6 +15,14 @@ use crate::solve::Normal;
 /// rigs agree (specification `rig.md`).
 pub(super) const LEAST: f64 = 0.0033;
 
+/// Prior standard deviation of a healthy sensor's own gain: [`LEAST`] is that of the difference of two.
+pub(super) const GAIN_SD: f64 = LEAST * std::f64::consts::FRAC_1_SQRT_2;
+
+/// Evidence, nats, that a constant share of the speed is more than a healthy sensor's own gain: what the gain's prior leaves of it.
+pub(super) fn beyond_a_gain(share: f64) -> f64 {
+    0.5 * (share / GAIN_SD).powi(2)
+}
+
 /// The instance that touches a speed channel and its difference from the consensus.
 pub(super) fn instance(context: &Context, channel: &str, form: &str) -> Option<Instance> {
     let difference = DIFFERENCES.iter().find(|d| d.0 == channel)?.1;
