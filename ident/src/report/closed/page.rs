@@ -42,7 +42,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     sheet.soft(&page.origin.line());
     sheet.html_part(&state::bars(&v.channels, &v.unexplained));
     for l in &v.left_out {
-        sheet.warn(&format!("{l}."));
+        sheet.warn(&format!("Left out: {l}."));
     }
     if !page.hero.is_empty() {
         sheet.section(match v.verdict {
