@@ -76,7 +76,8 @@ pub fn resumed<L: Line>(out: &Path, wanted: &[u64], threads: usize, score: impl 
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} left");
     bar.set_style(style.map_err(|e| e.to_string())?);
     bar.set_position((wanted.len() - left.len()) as u64);
-    std::panic::set_hook(Box::new(|_| {})); // a panic of the tool is a figure of the campaign
+    // a panic of the tool is a figure of the campaign; one of the campaign itself must not end it without a word
+    std::panic::set_hook(Box::new(|panic| eprintln!("blind: {panic}")));
     let (next, sink) = (AtomicUsize::new(0), Mutex::new((file, Vec::new())));
     std::thread::scope(|scope| {
         for _ in 0..threads {
