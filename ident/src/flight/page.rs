@@ -120,5 +120,6 @@ fn residual(closed: &Closed, channel: usize) -> Figure {
         layers: vec![line("before", "b", before), line("after", "a", after)],
         height: 260.0,
         categories: Vec::new(),
+        captioned: false,
     }
 }

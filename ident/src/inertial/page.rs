@@ -97,6 +97,7 @@ fn figure(recording: &Recording, sensor: &Sensor, axis: usize) -> Figure {
         layers: vec![line("before", "b", left(&sensor.declared)), line("after", "a", left(&sensor.corrected))],
         height: 260.0,
         categories: Vec::new(),
+        captioned: false,
     }
 }
 
@@ -116,5 +117,6 @@ fn overview(recording: &Recording, sensor: &Sensor) -> Figure {
         layers: (0..3).map(line).collect(),
         height: 260.0,
         categories: Vec::new(),
+        captioned: false,
     }
 }

@@ -7,16 +7,22 @@
 //! without a script; each also stands in a `<title>` for readers that speak.
 
 use super::style::COLOURS;
-use super::svg::{escape, label, line_path, span, ticks};
+use super::svg::{escape, label, line_path, short_label, span, ticks};
 use std::fmt::Write;
 
 /// Width of the drawing in its own units: two figures side by side on a desk, one on a phone.
 const WIDTH: f64 = 560.0;
 const LEFT: f64 = 80.0;
+/// The same where the letters of a phone are large.
+const LEFT_CAPTIONED: f64 = 100.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 48.0;
 /// Height of a further row of the legend.
 const ROW: f64 = 17.0;
+/// The same for larger letters.
+const ROW_CAPTIONED: f64 = 24.0;
+/// What a caption beside the drawing saves at its upper edge.
+const NO_TITLE: f64 = 20.0;
 const BOTTOM: f64 = 46.0;
 
 /// One layer, first drawn at the bottom.
@@ -130,11 +136,15 @@ pub struct Figure {
     pub height: f64,
     /// Names of the categories of [`Layer::Columns`]; empty for an axis of numbers.
     pub categories: Vec<String>,
+    /// The page says the title beside the drawing, which has room for the larger letters of a phone.
+    pub captioned: bool,
 }
 
 struct Frame {
     x: (f64, f64),
     y: (f64, f64),
+    /// Left edge of the axes.
+    left: f64,
     /// Upper edge of the axes, under the legend's rows.
     top: f64,
     height: f64,
@@ -142,7 +152,7 @@ struct Frame {
 
 impl Frame {
     fn px(&self, x: f64) -> f64 {
-        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - LEFT - RIGHT)
+        self.left + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - self.left - RIGHT)
     }
 
     fn py(&self, y: f64) -> f64 {
@@ -226,15 +236,35 @@ impl Figure {
         let height = if self.height > 0.0 { self.height } else { 330.0 };
         let low = if self.categories.is_empty() { y.0 - margin } else { y.0 };
         let rows = self.entries().last().map_or(0, |e| e.row);
-        Frame { x, y: (low, y.1 + margin), top: TOP + ROW * rows as f64, height: height + ROW * rows as f64 }
+        let legend = self.row() * rows as f64;
+        let left = if self.captioned { LEFT_CAPTIONED } else { LEFT };
+        Frame { x, y: (low, y.1 + margin), left, top: TOP + legend, height: height + legend }
+    }
+
+    /// Height of a row of the legend.
+    fn row(&self) -> f64 {
+        if self.captioned { ROW_CAPTIONED } else { ROW }
+    }
+
+    /// Label of a tick among those that stand on its axis.
+    fn tick(&self, v: f64, all: &[f64], wide: f64) -> String {
+        match all {
+            [a, b, ..] if self.captioned => short_label(v, b - a),
+            _ => label(v, wide),
+        }
     }
 
     fn draw(&self, head: &str) -> String {
         let f = self.frame();
+        let t = escape(&self.title);
+        let (from, title) = if self.captioned {
+            (NO_TITLE, String::new())
+        } else {
+            (0.0, format!("<text class=\"title\" x=\"10\" y=\"18\">{t}</text>"))
+        };
         let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"fig\" viewBox=\"0 0 {WIDTH} {}\" role=\"img\" aria-label=\"{t}\">{head}<text class=\"title\" x=\"10\" y=\"18\">{t}</text>",
-            f.height,
-            t = escape(&self.title)
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"fig\" viewBox=\"0 {from} {WIDTH} {}\" role=\"img\" aria-label=\"{t}\">{head}{title}",
+            f.height - from
         );
         self.axes(&mut out, &f);
         for layer in &self.layers {
@@ -262,40 +292,44 @@ impl Figure {
 
     fn axes(&self, out: &mut String, f: &Frame) {
         let (floor, right) = (f.height - BOTTOM, WIDTH - RIGHT);
+        let left = f.left;
+        let under = floor + if self.captioned { 18.0 } else { 16.0 };
         for (k, name) in self.categories.iter().enumerate() {
             let _ = write!(
                 out,
                 "<text class=\"tick\" text-anchor=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
                 f.px(k as f64),
-                floor + 16.0,
+                under,
                 escape(name)
             );
         }
-        let numbers = if self.categories.is_empty() { ticks(f.x.0, f.x.1, 6) } else { Vec::new() };
-        for v in numbers {
+        let numbers =
+            if self.categories.is_empty() { ticks(f.x.0, f.x.1, if self.captioned { 5 } else { 6 }) } else { Vec::new() };
+        for &v in &numbers {
             let x = f.px(v);
             let _ = write!(
                 out,
                 "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{floor:.1}\"/><text class=\"tick\" text-anchor=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>",
                 f.top,
-                floor + 16.0,
-                label(v, f.x.1 - f.x.0)
+                under,
+                self.tick(v, &numbers, f.x.1 - f.x.0)
             );
         }
-        for v in ticks(f.y.0, f.y.1, 5) {
+        let numbers = ticks(f.y.0, f.y.1, 5);
+        for &v in &numbers {
             let y = f.py(v);
             let _ = write!(
                 out,
-                "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{right:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/><text class=\"tick\" text-anchor=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-                LEFT - 6.0,
+                "<line class=\"grid\" x1=\"{left}\" x2=\"{right:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/><text class=\"tick\" text-anchor=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                left - 6.0,
                 y + 4.0,
-                label(v, f.y.1 - f.y.0)
+                self.tick(v, &numbers, f.y.1 - f.y.0)
             );
         }
         let _ = write!(
             out,
             "<text class=\"axis\" text-anchor=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text><text class=\"axis\" text-anchor=\"middle\" transform=\"translate(16 {:.1}) rotate(-90)\">{}</text>",
-            (LEFT + right) / 2.0,
+            (left + right) / 2.0,
             f.height - 8.0,
             escape(&self.x_label),
             (f.top + floor) / 2.0,
@@ -306,7 +340,9 @@ impl Figure {
     /// The legend's entries, laid out in as many rows as they need.
     fn entries(&self) -> Vec<Entry<'_>> {
         let mut out: Vec<Entry<'_>> = Vec::new();
-        let (mut at, mut row) = (LEFT, 0);
+        // wide enough for the larger letters of a phone
+        let (first, letter) = if self.captioned { (10.0, 10.6) } else { (LEFT, 8.8) };
+        let (mut at, mut row) = (first, 0);
         for layer in &self.layers {
             let (name, class, key) = match layer {
                 Layer::Line { name, class, .. } => (name, *class, "key"),
@@ -319,10 +355,9 @@ impl Figure {
             if name.is_empty() {
                 continue;
             }
-            // wide enough for the larger letters of a phone
-            let wide = 21.0 + 8.8 * name.chars().count() as f64;
-            if at > LEFT && at + wide > WIDTH {
-                (at, row) = (LEFT, row + 1);
+            let wide = 21.0 + letter * name.chars().count() as f64;
+            if at > first && at + wide > WIDTH {
+                (at, row) = (first, row + 1);
             }
             out.push(Entry { name, class, key, at, row });
             at += wide + 12.0;
@@ -332,7 +367,7 @@ impl Figure {
 
     fn legend(&self, out: &mut String) {
         for Entry { name, class, key, at, row } in self.entries() {
-            let y = 34.0 + ROW * row as f64;
+            let y = 34.0 + self.row() * row as f64;
             let _ = match key {
                 "key" => {
                     write!(out, "<line class=\"{class} key\" x1=\"{at:.1}\" x2=\"{:.1}\" y1=\"{y}\" y2=\"{y}\"/>", at + 16.0)

@@ -167,7 +167,14 @@ impl Sheet {
         }
         self.body += "<div class=\"figs\">\n";
         for f in figures {
-            self.body += &format!("<figure id=\"{}\">{}</figure>\n", escape(&f.id), f.svg());
+            let id = escape(&f.id);
+            self.body += &if self.told {
+                // letters beside a drawing wrap and keep their size on a phone
+                let drawn = Figure { captioned: true, ..f.clone() }.svg();
+                format!("<figure id=\"{id}\"><figcaption>{}</figcaption>{drawn}</figure>\n", escape(&f.title))
+            } else {
+                format!("<figure id=\"{id}\">{}</figure>\n", f.svg())
+            };
             self.figures.push(f);
         }
         self.body += "</div>\n";

@@ -65,6 +65,18 @@ pub(crate) fn label(v: f64, span: f64) -> String {
     format!("{:.digits$}", if v.abs() < 1e-9 * span { 0.0 } else { v })
 }
 
+/// Label of a tick with no more digits than its distance to the next one needs.
+pub(crate) fn short_label(v: f64, step: f64) -> String {
+    if v.abs() < 1e-6 * step {
+        "0".to_owned()
+    } else if step < 9e-5 {
+        format!("{v:.1e}")
+    } else {
+        let digits = (-step.log10() - 1e-9).ceil().clamp(0.0, 5.0) as usize;
+        format!("{v:.digits$}")
+    }
+}
+
 /// Text that is safe inside markup.
 #[must_use]
 pub(crate) fn escape(text: &str) -> String {
@@ -79,6 +91,12 @@ mod tests {
     fn ticks_are_round_and_inside() {
         assert_eq!(ticks(0.0, 10.0, 5), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
         assert!(ticks(-0.013, 0.017, 5).iter().all(|v| (-0.013..=0.017).contains(v)));
+    }
+
+    #[test]
+    fn short_labels_have_the_digits_of_their_step() {
+        let said = [(0.02, 0.01), (-0.5, 0.5), (150.0, 50.0), (-5e-6, 5e-6), (1e-12, 0.1)].map(|(v, step)| short_label(v, step));
+        assert_eq!(said, ["0.02", "-0.5", "150", "-5.0e-6", "0"]);
     }
 
     #[test]

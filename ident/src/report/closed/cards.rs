@@ -59,7 +59,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
         let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
         let with: Vec<String> = e.depends_on.iter().map(|c| channel(c)).collect();
         if with.is_empty() {
-            format!("Something on {} that nothing predicts.", list(&on))
+            format!("Something on {} that nothing tried here predicts.", list(&on))
         } else {
             format!("Something on {} that goes with {}.", list(&on), list(&with))
         }
@@ -160,11 +160,12 @@ fn parameters(sheet: &mut Sheet, e: &EffectEntry) {
 pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
     let v = page.verdict;
     let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
+    let here = v.effects.iter().filter(|b| b.id == e.id).count();
     let mut found: Vec<String> = Vec::new();
     for a in &v.alternatives {
-        let lacks = a.ids.iter().filter(|id| **id == e.id).count() < best.iter().filter(|b| b.id == e.id).count();
+        let lacks = a.ids.iter().filter(|id| **id == e.id).count() < here;
         let instead = instead(&best, &a.ids);
-        if lacks || e.id == "unknown" {
+        if lacks {
             let what = if instead.is_empty() { "nothing in its place".to_owned() } else { instead.join(" + ") };
             found.push(format!("{what} ({})", probability(a.probability)));
         }

@@ -12,7 +12,7 @@ pub(crate) const LOOK: &str = "
 .told h2 a,.told h3 a{color:inherit;text-decoration:none}.told h2 a:hover::after{content:' #';color:var(--soft)}
 .told a{color:var(--a)}
 .state{margin:1.2rem 0 .4rem;border-top:1px solid var(--grid)}
-.state .row,.state .head{display:grid;grid-template-columns:12.5rem minmax(8rem,1fr) 8.1rem 8.1rem 4rem 8.4rem;gap:.7rem;align-items:center;border-bottom:1px solid var(--grid);padding:.3rem 0}
+.state .row,.state .head{display:grid;grid-template-columns:12.5rem minmax(7rem,1fr) 9rem 9rem 4rem 8.4rem;gap:.7rem;align-items:center;border-bottom:1px solid var(--grid);padding:.3rem 0}
 .state .head{color:var(--soft);font-size:.85rem}.state .head span:nth-child(n+3):nth-child(-n+5),.state .num{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .state .axis{position:relative;height:1.2rem}.state .axis i{position:absolute;font-style:normal;transform:translateX(-50%);white-space:nowrap}
 .state .axis i.end{transform:translateX(-100%)}.state .track{position:relative;height:1.7rem;display:block}.state .track i{position:absolute;top:-.3rem;bottom:-.3rem;border-left:1px solid var(--grid)}.state .track i.floor{border-left:2px solid var(--fg)}
@@ -22,12 +22,13 @@ b.after.after{background:var(--a);border-color:var(--a)}.key b{position:static;d
 .card{border:1px solid var(--grid);border-left:6px solid var(--a);border-radius:4px;background:var(--card);padding:.8rem 1rem;margin:.8rem 0}.card.likely{border-left-style:double}.card.unsure{border-left-style:dashed;border-left-color:var(--b)}
 .chip{border:1.5px solid var(--a);border-radius:1rem;padding:.05rem .6rem;font-size:.85rem;white-space:nowrap}.chip.unsure{border-style:dashed;border-color:var(--b)}.nr{display:inline-block;min-width:1.5rem;text-align:center;border:1px solid var(--soft);border-radius:50%;font-size:.85rem}
 .split{display:grid;grid-template-columns:minmax(0,33rem) minmax(0,1fr);gap:0 1.4rem;align-items:start}.split>div:only-child{grid-column:1/-1}.split .figs{grid-template-columns:1fr;margin:.4rem 0}.card p{max-width:none}.card code{overflow-wrap:anywhere;white-space:normal}.card .figs{margin:.6rem 0}
+figcaption{font-weight:600;font-size:.95rem;line-height:1.3;margin-bottom:.1rem}.told .fig .tick{font-size:13px}.card td:last-child{white-space:normal}
 .told .fig .b.dots{stroke-linecap:square;stroke-width:2.8}.told .fig path.b:not(.dots):not(.band){opacity:.75}
 .tab{margin:.5rem 0 1rem}.tools{font-size:.85rem;margin:.1rem 0}.tools a,.tools button{margin-right:.8rem}.tools button{font:inherit;color:var(--a);background:none;border:0;padding:0;text-decoration:underline;cursor:pointer}
 .told details{border-top:1px solid var(--grid);padding:.5rem 0}.told summary{cursor:pointer;font-weight:600}.told td{overflow-wrap:break-word}.told td:nth-child(2):last-child{overflow-wrap:anywhere}
 @media(max-width:960px){.split{grid-template-columns:minmax(0,1fr)}}
-@media(max-width:700px){.card th,.card td{padding:.2rem .3rem}.told h1{font-size:1.2rem}.state .head{display:block}.state .head span{display:none}.state .head .axis{display:block}.state .row{grid-template-columns:minmax(0,1fr) minmax(0,1fr) 3.4rem 5.4rem;gap:.1rem .5rem;align-items:start}.state .word{font-size:.85rem;line-height:1.3}.told .fig text{font-size:18px}.told .fig .title{font-size:20px}.told .fig .tick{font-size:16px}.card td,.card th{white-space:normal}.told table{font-size:.93rem}.state .name,.state .track,.state .why{grid-column:1/-1}.state .num{text-align:left;white-space:normal}.state .num::before{content:attr(data-of) ' ';color:var(--soft);display:block;font-size:.8rem}.card{padding:.6rem .6rem}.tools a,.tools button{display:inline-block;padding:.5rem 0}.told td{min-width:3.4rem}}
-@media print{.tools,.told summary::marker{display:none}.card,.state .row{break-inside:avoid}.told details:not([open]){display:none}}
+@media(max-width:700px){.card th,.card td{padding:.2rem .3rem}.told h1{font-size:1.2rem}.state .head{display:block}.state .head span{display:none}.state .head .axis{display:block}.state .row{grid-template-columns:minmax(0,1fr) minmax(0,1fr) 3.4rem 5.4rem;gap:.1rem .5rem;align-items:start}.state .word{font-size:.85rem;line-height:1.3}.told .fig text,.told .fig .tick{font-size:20px}.told .fig .tip text{font-size:15px}.card td,.card th{white-space:normal}.told table{font-size:.93rem}.state .name,.state .track,.state .why{grid-column:1/-1}.state .num{text-align:left;white-space:normal}.state .num::before{content:attr(data-of) ' ';color:var(--soft);display:block;font-size:.8rem}.card{padding:.6rem .6rem}.tools a,.tools button{display:inline-block;padding:.5rem 0}.told td{min-width:3.4rem}.told>.tab td,.told>.tab th{white-space:normal}}
+@media print{.tools,.told summary::marker{display:none}#more{display:none}.card,.state .row,figure{break-inside:avoid}figcaption{break-after:avoid}.told details:not([open]){display:none}}
 ";
 
 /// The script: copies a table as tab-separated text.

@@ -47,7 +47,8 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     if !page.hero.is_empty() {
         sheet.section(match v.verdict {
             Kind::Attributed | Kind::Ambiguous => "The figure that convinces most",
-            Kind::Unattributed | Kind::None => "The channel on which most is left",
+            Kind::Unattributed => "The channel on which most is left",
+            Kind::None => "The loudest channel",
         });
         sheet.figures(page.hero.clone());
     }

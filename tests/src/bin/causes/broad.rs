@@ -84,6 +84,7 @@ fn draw(log: &str, folder: &Path) {
         layers: vec![line("declared model", "b", "declared.csv"), line("with the named causes", "a", "pred.csv")],
         height: 260.0,
         categories: Vec::new(),
+        captioned: false,
     };
     let file = quadrig_tests::root().join("docs/ahrs-causes.svg");
     write_whole(&file, |out| out.write_all(figure.file().as_bytes())).expect("docs/ can be written");
