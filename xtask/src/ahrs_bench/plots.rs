@@ -140,6 +140,7 @@ fn figure(trial: &Trial, course: &Course, k: usize) -> Figure {
         ],
         height: 0.0,
         categories: Vec::new(),
+        captioned: false,
     }
 }
 
@@ -154,6 +155,7 @@ fn of_time(trial: &Trial, what: &str, title: &str, y_label: &str, layers: Vec<(&
         layers: layers.into_iter().map(line).collect(),
         height: 0.0,
         categories: Vec::new(),
+        captioned: false,
     }
 }
 
@@ -188,6 +190,7 @@ fn summary(id: &str, what: &str, names: &[&str], courses: &[Course]) -> Figure {
         layers: vec![columns("ours", "a", 0, &|c| rms(&c.ours[0])), columns("classic, tuned", "b", 1, &|c| rms(&c.classic[0]))],
         height: 0.0,
         categories: names.iter().enumerate().map(|(i, name)| label(i, name, names.len())).collect(),
+        captioned: false,
     }
 }
 
