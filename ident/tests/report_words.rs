@@ -134,7 +134,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         (
             Verdict { next_experiment: Some(next), ..open(0.45) },
             false,
-            &["this run cannot tell, the run proposed below can."],
+            &["this run cannot tell, the run proposed below may."],
             &["explain"],
         ),
         (

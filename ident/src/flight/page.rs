@@ -9,7 +9,7 @@
 use super::close::Closed;
 use super::windows::LENGTH_S;
 use crate::effects::airframe;
-use crate::report::closed::{self as parts, Page, Trace, enlarged, over_time};
+use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::words::Clause;
 
@@ -19,9 +19,6 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     clause: |found| airframe::about(&found.id).map_or_else(|| parts::bare(found), |a| Clause::titled(a.title, found)),
     of_every_rig: |id| id == "spinup_lag",
 };
-
-/// What stands before and after in the figures.
-const PAIR: [&str; 2] = ["declared, before", "corrected, after"];
 
 /// The report as one self-contained page.
 #[must_use]
@@ -33,7 +30,6 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
             closed.flight.windows.bounds.first().map_or(0.0, |(a, b)| closed.flight.record.t[b - 1] - closed.flight.record.t[*a]),
         );
     let traces: Vec<Trace> = (0..closed.predicted.len()).map(|k| trace(closed, k)).collect();
-    let of = |name: &str| traces.iter().find(|t| t.channel == name);
     let page = Page {
         verdict: v,
         words: VOCABULARY,
@@ -43,17 +39,8 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
             "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged."
         ),
         hero: parts::most(v, &traces),
-        cards: v
-            .effects
-            .iter()
-            .enumerate()
-            .map(|(k, e)| {
-                let trace = e.channels.first().and_then(|c| of(c));
-                trace.map(|t| enlarged(t, &format!("effect-{}", k + 1), PAIR).unwrap_or_else(|| over_time(t, "effect", PAIR)))
-            })
-            .map(|figure| figure.into_iter().collect())
-            .collect(),
-        left: v.unexplained.iter().filter_map(|u| of(&u.channel)).map(|t| over_time(t, "left", PAIR)).collect(),
+        cards: parts::each(v, &traces),
+        left: parts::rest(v, &traces),
         speeds: Vec::new(),
     };
     let mut sheet = parts::begin(&page);

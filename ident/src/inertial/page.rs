@@ -8,7 +8,7 @@
 use super::Recording;
 use super::account::{Closed, Sensor};
 use crate::effects::airframe;
-use crate::report::closed::{self as parts, Page, Trace, enlarged, over_time};
+use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;
 use crate::words::{Clause, list};
@@ -29,15 +29,11 @@ fn clause(found: &EffectEntry) -> Clause {
     Clause::new("", does)
 }
 
-/// What stands before and after in the figures.
-const PAIR: [&str; 2] = ["declared, before", "corrected, after"];
-
 /// The report as one self-contained page.
 #[must_use]
 pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
     let v = &closed.verdict;
     let traces: Vec<Trace> = closed.sensors.iter().flat_map(|s| (0..3).map(move |k| trace(recording, s, k))).collect();
-    let of = |name: &str| traces.iter().find(|t| t.channel == name);
     let page = Page {
         verdict: v,
         words: VOCABULARY,
@@ -45,17 +41,8 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         origin,
         declared: "Declared: a field that is constant in earth axes, gravity and a constant offset, a constant offset of the gyro at rest. The attitude comes from gyro and accelerometer alone.".to_owned(),
         hero: parts::most(v, &traces),
-        cards: v
-            .effects
-            .iter()
-            .enumerate()
-            .map(|(k, e)| {
-                let trace = e.channels.first().and_then(|c| of(c));
-                trace.map(|t| enlarged(t, &format!("effect-{}", k + 1), PAIR).unwrap_or_else(|| over_time(t, "effect", PAIR)))
-            })
-            .map(|figure| figure.into_iter().collect())
-            .collect(),
-        left: v.unexplained.iter().filter_map(|u| of(&u.channel)).map(|t| over_time(t, "left", PAIR)).collect(),
+        cards: parts::each(v, &traces),
+        left: parts::rest(v, &traces),
         speeds: Vec::new(),
     };
     let mut sheet = parts::begin(&page);

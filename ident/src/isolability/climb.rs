@@ -15,7 +15,7 @@ use crate::rivals::TEMPERATURE;
 /// Sizes beyond the one at which a cause is named at which it is still asked about, in doublings.
 const DOUBLINGS: usize = 4;
 /// The same as a factor.
-pub const FURTHEST: f64 = 16.0;
+pub const FURTHEST: f64 = (1_u32 << DOUBLINGS) as f64;
 /// Halvings of one noise floor at which the search for the smallest size ends.
 const HALVINGS: usize = 6;
 
@@ -95,57 +95,78 @@ impl Climbed {
     }
 }
 
+/// The questions asked about one cause so far, smallest size first.
+struct Asked<'q> {
+    rig: &'q Rig,
+    question: &'q Question<'q>,
+    /// Largest size of the cause.
+    most: f64,
+    trials: Vec<Trial>,
+}
+
+impl Asked<'_> {
+    /// Asks at one size more: whether the cause is named there, where `naming` wants to know.
+    fn at(&mut self, floors: f64, naming: bool) -> bool {
+        let (context, healthy, line) = (&self.rig.context, &self.rig.best, self.question.line);
+        let place = line.place(context, healthy, floors.min(self.most));
+        let floors = line.size(context, healthy, place);
+        let Some(answers) = self.rig.ask(self.question, place, naming) else { return false };
+        let named = answers.iter().all(|a| a.named);
+        let at = self.trials.partition_point(|t| t.floors < floors);
+        self.trials.insert(at, Trial { floors, named, answers });
+        named
+    }
+
+    /// The size from which on the cause is named.
+    fn seen(&mut self) -> Option<f64> {
+        let mut size = self.most.min(1.0);
+        let mut seen = self.at(size, true);
+        if seen {
+            for _ in 0..HALVINGS {
+                if !self.at(0.5 * size, true) {
+                    break;
+                }
+                size *= 0.5;
+            }
+        } else {
+            while !seen && size < self.most {
+                size *= 2.0;
+                seen = self.at(size, true);
+            }
+        }
+        if seen {
+            self.at(size.min(self.most) / std::f64::consts::SQRT_2, true);
+        }
+        let first = self.trials.iter().rposition(|t| !t.named).map_or(0, |k| k + 1);
+        self.trials.get(first).map(|t| t.floors)
+    }
+
+    /// Asks at larger sizes until every rival is left behind.
+    fn leave_behind(&mut self, from: f64, rivals: &[&str]) {
+        for k in 1..=DOUBLINGS {
+            let size = from * f64::from(1_u32 << k);
+            let Some(last) = self.trials.last() else { return };
+            if last.floors >= self.most || rivals.iter().all(|r| last.lead(r) > needed_lead()) {
+                return;
+            }
+            if size > last.floors {
+                self.at(size, false);
+            }
+        }
+    }
+}
+
 /// Asks about a cause at one size after another.
 pub(crate) fn climb(rig: &Rig, question: &Question<'_>, rivals: &[&str]) -> Climbed {
-    let line = question.line;
-    let most = line.most(&rig.context, &rig.best);
-    let mut trials: Vec<Trial> = Vec::new();
-    let mut ask = |floors: f64, naming: bool| -> bool {
-        let floors = floors.min(most);
-        let place = line.place(&rig.context, &rig.best, floors);
-        let floors = line.size(&rig.context, &rig.best, place);
-        let Some(answers) = rig.ask(question, place, naming) else { return false };
-        let named = answers.iter().all(|a| a.named);
-        let at = trials.partition_point(|t| t.floors < floors);
-        trials.insert(at, Trial { floors, named, answers });
-        named
+    let most = question.line.most(&rig.context, &rig.best);
+    let mut asked = Asked { rig, question, most, trials: Vec::new() };
+    let seen = asked.seen();
+    let tried = match seen {
+        Some(from) => {
+            asked.leave_behind(from, rivals);
+            asked.trials.last().map_or(most, |t| t.floors)
+        }
+        None => most,
     };
-    let mut size = most.min(1.0);
-    let mut seen = ask(size, true);
-    if seen {
-        for _ in 0..HALVINGS {
-            if !ask(0.5 * size, true) {
-                break;
-            }
-            size *= 0.5;
-        }
-    } else {
-        while !seen && size < most {
-            size *= 2.0;
-            seen = ask(size, true);
-        }
-    }
-    if seen {
-        ask(size.min(most) / std::f64::consts::SQRT_2, true);
-    }
-    let seen = trials.iter().rposition(|t| !t.named).map_or(0, |k| k + 1);
-    let seen = trials.get(seen).map(|t| t.floors);
-    let mut above = Climbed { seen, tried: most, trials };
-    let Some(from) = seen else { return above };
-    for k in 1..=DOUBLINGS {
-        let size = from * f64::from(1_u32 << k);
-        let top = above.trials.last().map_or(0.0, |t| t.floors);
-        let open = rivals.iter().any(|r| above.trials.last().is_some_and(|t| t.lead(r) <= needed_lead()));
-        if !open || top >= most {
-            break;
-        }
-        if size > top {
-            let place = line.place(&rig.context, &rig.best, size.min(most));
-            let floors = line.size(&rig.context, &rig.best, place);
-            let Some(answers) = rig.ask(question, place, false) else { break };
-            above.trials.push(Trial { floors, named: true, answers });
-        }
-    }
-    above.tried = above.trials.last().map_or(most, |t| t.floors);
-    above
+    Climbed { seen, tried, trials: asked.trials }
 }

@@ -6,7 +6,7 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
-use super::closed::{self as parts, Origin, Page, Trace, Vocabulary, against, enlarged, over_time, thinned};
+use super::closed::{self as parts, Origin, PAIR, Page, Trace, Vocabulary, against, enlarged, over_time, thinned};
 use super::figure::{Figure, Layer};
 use super::run;
 use super::sheet::Sheet;
@@ -19,8 +19,6 @@ use crate::model::Model;
 use crate::verdict::EffectEntry;
 use crate::words::{channel, heading};
 
-/// What stands before and after in most figures.
-const PAIR: [&str; 2] = ["declared, before", "corrected, after"];
 /// What stands before and after in the figure of one effect.
 const ALONE: [&str; 2] = ["without it", "with it"];
 

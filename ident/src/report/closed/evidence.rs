@@ -7,7 +7,7 @@
 
 use crate::noise::median;
 use crate::report::figure::{Figure, Layer, Mark};
-use crate::verdict::{Kind, Verdict};
+use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
 use crate::words::{channel, heading};
 
 /// Columns of pixels of a drawing.
@@ -132,8 +132,25 @@ pub(crate) fn most(verdict: &Verdict, traces: &[Trace]) -> Vec<Figure> {
         })
     };
     let Some(trace) = traces.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))) else { return Vec::new() };
-    let names = ["declared, before", "corrected, after"];
-    std::iter::once(over_time(trace, "most", names)).chain(enlarged(trace, "most", names)).collect()
+    std::iter::once(over_time(trace, "most", PAIR)).chain(enlarged(trace, "most", PAIR)).collect()
+}
+
+/// Names of a pair of residuals.
+pub(crate) const PAIR: [&str; 2] = ["declared, before", "corrected, after"];
+
+/// For each effect of a verdict its first channel where most was taken away; where that cannot be told, whole.
+pub(crate) fn each(verdict: &Verdict, traces: &[Trace]) -> Vec<Vec<Figure>> {
+    let figure = |(k, e): (usize, &EffectEntry)| {
+        let trace = traces.iter().find(|t| e.channels.first() == Some(&t.channel))?;
+        Some(enlarged(trace, &format!("effect-{}", k + 1), PAIR).unwrap_or_else(|| over_time(trace, "effect", PAIR)))
+    };
+    verdict.effects.iter().enumerate().map(|e| figure(e).into_iter().collect()).collect()
+}
+
+/// The channels of which something is left, over the whole run.
+pub(crate) fn rest(verdict: &Verdict, traces: &[Trace]) -> Vec<Figure> {
+    let trace = |u: &Unexplained| traces.iter().find(|t| t.channel == u.channel);
+    verdict.unexplained.iter().filter_map(trace).map(|t| over_time(t, "left", PAIR)).collect()
 }
 
 /// Over a variable.

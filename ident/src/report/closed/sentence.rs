@@ -90,7 +90,7 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     ways.retain(|w| !w.is_empty());
     let doubt = if verdict.next_experiment.is_some() {
-        "this run cannot tell, the run proposed below can"
+        "this run cannot tell, the run proposed below may"
     } else {
         "this run cannot tell"
     };

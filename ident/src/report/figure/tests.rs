@@ -1,0 +1,64 @@
+use super::*;
+
+fn example() -> Figure {
+    Figure {
+        id: "t".into(),
+        title: "thrust & speed".into(),
+        x_label: "rev/min".into(),
+        y_label: "N".into(),
+        layers: vec![
+            Layer::Spans { name: "plateaus".into(), ranges: vec![(0.0, 1.0)] },
+            Layer::Band { name: "95 %".into(), class: "a", x: vec![0.0, 2.0], lower: vec![0.0, 1.0], upper: vec![1.0, 2.0] },
+            Layer::Line { name: "fit".into(), class: "a", x: vec![0.0, 1.0, 2.0], y: vec![0.5, f64::NAN, 1.5] },
+            Layer::Marks {
+                name: "means".into(),
+                class: "b",
+                marks: vec![Mark { x: 1.0, y: 1.0, error: 0.1, text: "1.0 < 2".into() }],
+            },
+        ],
+        ..Figure::default()
+    }
+}
+
+#[test]
+fn markup_is_balanced_and_escaped() {
+    for text in [example().svg(), example().file()] {
+        assert!(text.contains("thrust &amp; speed") && text.contains("1.0 &lt; 2") && !text.contains("NaN"));
+        for tag in ["g", "text", "title"] {
+            let open = text.matches(&format!("<{tag} ")).count() + text.matches(&format!("<{tag}>")).count();
+            assert_eq!(open, text.matches(&format!("</{tag}>")).count(), "{tag}");
+        }
+    }
+    assert!(example().file().contains("prefers-color-scheme:dark"), "a file of its own carries its colours");
+    assert!(!example().svg().contains("<style>"));
+}
+
+/// A line that stands still beside one that moves by a hundredth: both fill the height.
+#[test]
+fn a_level_line_leaves_the_scale_to_the_others() {
+    let line = |y: [f64; 2]| Layer::Line { name: String::new(), class: "a", x: vec![0.0, 1.0], y: y.to_vec() };
+    let figure = Figure { layers: vec![line([8.5, 8.5]), line([8.5, 8.51])], ..Figure::default() };
+    let (low, high) = figure.frame().y;
+    assert!(low > 8.49 && high < 8.52, "{low} {high}");
+    let alone = Figure { layers: vec![line([8.5, 8.5])], ..Figure::default() }.frame().y;
+    assert!(alone.0 < 8.0 && alone.1 > 9.0, "{alone:?}");
+}
+
+#[test]
+fn nothing_to_show_is_said() {
+    assert!(Figure::default().is_empty());
+    assert!(!example().is_empty());
+}
+
+/// A read-out near an edge must not be cut off.
+#[test]
+fn read_outs_stay_inside() {
+    let mut out = String::new();
+    let f = Frame { x: (0.0, 1.0), y: (0.0, 1.0), left: LEFT, top: TOP, height: 330.0 };
+    mark(&mut out, "a", &Mark { x: 1.0, y: 1.0, error: 0.0, text: "a read-out of forty characters, about so".into() }, &f);
+    let number = |key: &str| -> f64 {
+        out.split("class=\"tip\"").nth(1).unwrap().split(key).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+    };
+    assert!(number("x=\"") >= 0.0 && number("x=\"") + number("width=\"") <= WIDTH);
+    assert!(number("y=\"") >= 0.0);
+}
