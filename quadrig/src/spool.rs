@@ -29,11 +29,14 @@ pub(crate) struct Spool {
 }
 
 impl Spool {
-    /// Creates the part beside `target`.
+    /// Creates the part beside `target`, and the folder where it is not there yet.
     pub(crate) fn create(target: &Path) -> Result<Self, Failure> {
         let mut name = target.file_name().ok_or("-o needs the name of a file")?.to_owned();
         name.push(".part");
         let part = target.with_file_name(name);
+        if let Some(folder) = target.parent() {
+            std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        }
         let file = OpenOptions::new().write(true).create(true).truncate(true).open(&part);
         let file = file.map_err(|e| format!("{}: cannot be written ({e})", part.display()))?;
         Ok(Self { target: target.to_owned(), part, file, written: 0, waiting: Vec::new(), failed: None })
