@@ -12,6 +12,8 @@ mod board;
 mod calibrate;
 mod circle;
 mod close_loop;
+#[cfg(test)]
+mod command_page;
 mod demo;
 mod effects;
 mod end;
