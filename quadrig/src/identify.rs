@@ -6,6 +6,7 @@
 //! Reference: specification `identification.md`.
 
 use crate::Failure;
+use crate::open::{Columns, Names, open};
 use ident::identify::{Identified, identify};
 use ident::log::{Log, write_whole};
 use ident::report::number;
@@ -15,7 +16,7 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The run.
+    /// The run: a rig log, or a stand's or ESC's own export.
     log: PathBuf,
     /// Where the model goes.
     #[arg(short, long)]
@@ -29,11 +30,15 @@ pub(crate) struct Args {
     /// A second run to lay beside it on the page.
     #[arg(long, value_name = "LOG")]
     beside: Option<PathBuf>,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    names: Names,
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let log = Log::read(&args.log)?;
+    let log = open(&args.log, &args.columns.options(&args.names), quiet)?;
     let found = identify(&log)?;
     write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes()))
         .map_err(|e| format!("{}: {e}", args.output.display()))?;
@@ -55,7 +60,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
     let second = match &args.beside {
         Some(path) => {
-            let log = Log::read(path)?;
+            let log = open(path, &args.columns.options(&args.names), true)?;
             let found = identify(&log)?;
             Some((log, found))
         }

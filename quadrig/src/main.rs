@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod ahrs;
+mod batch;
 mod beam;
 mod board;
 mod calibrate;
@@ -24,8 +25,10 @@ mod identify;
 mod import;
 mod imu;
 mod isolability;
+mod join;
 mod live;
 mod measured;
+mod open;
 mod plateaus;
 mod port;
 mod predict;
@@ -67,7 +70,7 @@ enum Command {
     Sim(sim::Args),
     /// All thirty-six motor-propeller pairs of the thesis on all cores, a log each.
     Runs(runs::Args),
-    /// A thrust stand's export becomes a rig log; what was repaired is reported.
+    /// A thrust stand's, ESC's or flight's export becomes a log; every conversion is said.
     Import(import::Args),
     /// Plateaus, fits and quality figures of a log.
     Identify(identify::Args),
@@ -75,6 +78,8 @@ enum Command {
     Plateaus(plateaus::Args),
     /// Residual, cause, corrected model, error before and after.
     CloseLoop(close_loop::Args),
+    /// The loop on every log of a folder: a row a run; goes on where it stopped, shared among machines by --shard.
+    Batch(batch::Args),
     /// Motor, propeller and battery choice.
     Select(select::Args),
     /// Design of the load cell's beam, with a warning of resonance.
@@ -124,6 +129,7 @@ fn main() -> ExitCode {
         Command::Identify(args) => identify::run(args, cli.quiet),
         Command::Plateaus(args) => plateaus::run(args, cli.quiet),
         Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
+        Command::Batch(args) => batch::run(args, cli.quiet),
         Command::Select(args) => select::run(args, cli.quiet),
         Command::Beam(args) => beam::run(args, cli.quiet),
         Command::Calibrate(args) => calibrate::run(args, cli.quiet),

@@ -7,6 +7,7 @@
 
 use crate::Failure;
 use crate::close_loop::{flight, inertial};
+use crate::open::{Columns, Names, open};
 use clap::ValueEnum;
 use ident::context::Context;
 use ident::log::{Column, Log, write_whole};
@@ -41,6 +42,10 @@ pub(crate) struct Args {
     /// carries over: effects of the rig, what events left behind, and the mean of the rest.
     #[arg(long)]
     events: bool,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    names: Names,
 }
 
 /// Runs the command.
@@ -64,7 +69,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         return flight::predict(&args.model, &text, &args.log, &args.output);
     }
     let model = Model::read(&args.model)?;
-    let log = Log::read(&args.log)?;
+    let log = open(&args.log, &args.columns.options(&args.names), false)?;
     let model = if args.events { Cow::Borrowed(&model) } else { model.on(&log) };
     let columns = match args.from {
         From::Relations => by_relations(&model, &log),

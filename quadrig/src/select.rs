@@ -7,31 +7,37 @@
 //! Reference: specification `identification.md`, item 4; Beharie 2013, section 6.1.
 
 use crate::Failure;
+use crate::open::{Columns, open};
 use crate::progress::Bar;
 use crate::run_log::to_log;
 use hal_sim::Scenario;
 use hal_sim::plant::{Propeller, motor};
 use hal_sim::scenario::Schedule;
 use ident::context::Context;
-use ident::log::{FORMAT, Log, write_whole};
+use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::report::{selection, write_figures};
 use ident::select::{Airframe, Need, Pair, Row, choose, from_log, read_table, row, thesis};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Rig logs, or tables `motor,propeller,thrust_n,current_a`; none: the figures that the thesis states.
+    /// Rig logs or exports, or tables `motor,propeller,thrust_n,current_a`; none: the figures that the thesis states.
     files: Vec<PathBuf>,
     /// Flies every pair of the simulator's catalogue.
     #[arg(long, conflicts_with = "files")]
     simulated: bool,
-    /// Only this motor.
+    /// Only this motor; a run that names none is taken for its.
     #[arg(long)]
     motor: Option<String>,
+    /// Name of the propeller of runs that name none.
+    #[arg(long)]
+    propeller: Option<String>,
+    #[command(flatten)]
+    columns: Columns,
     /// Least thrust of all four motors together, N.
     #[arg(long, default_value_t = 19.62)]
     thrust: f64,
@@ -82,7 +88,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut pairs = match (&args.files[..], args.simulated) {
         ([], true) => fly_catalogue(quiet),
         ([], false) => thesis(),
-        (files, _) => read(files)?,
+        (files, _) => read(files, args, quiet)?,
     };
     // 390KV before 1000KV
     let number =
@@ -122,12 +128,16 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Logs and tables, told apart by their first line.
-fn read(files: &[PathBuf]) -> Result<Vec<Pair>, Failure> {
+/// Runs and tables, told apart by their first line.
+fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure> {
     let mut pairs = Vec::new();
     for path in files {
-        if is_log(path)? {
-            let log = Log::read(path)?;
+        if !is_table(path)? {
+            let mut log = open(path, &args.columns.named(None, None), quiet)?;
+            let given = [("motor", &args.motor), ("propeller", &args.propeller)];
+            for (key, value) in given.into_iter().filter_map(|(k, v)| Some((k, v.as_ref()?))) {
+                log.meta.entry(key.to_owned()).or_insert_with(|| toml::Value::String(value.clone()));
+            }
             let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
             if pair.maximum.is_none() {
                 return Err(format!("{}: no plateau with thrust and current; expected a run with thrust_n and current_a on levels of at least 5 rows", path.display()).into());
@@ -141,11 +151,14 @@ fn read(files: &[PathBuf]) -> Result<Vec<Pair>, Failure> {
     Ok(pairs)
 }
 
-fn is_log(path: &Path) -> Result<bool, Failure> {
+/// Whether the first line that is no comment names motors.
+fn is_table(path: &Path) -> Result<bool, Failure> {
     let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let mut first = Vec::new();
-    std::io::Read::take(BufReader::new(file), 64).read_until(b'\n', &mut first)?;
-    Ok(String::from_utf8_lossy(&first).contains(FORMAT))
+    let mut head = Vec::new();
+    std::io::Read::take(file, 4096).read_to_end(&mut head)?;
+    let head = String::from_utf8_lossy(&head).into_owned();
+    let own = head.starts_with("# quadrig-");
+    Ok(!own && head.lines().find(|l| !l.starts_with('#') && !l.trim().is_empty()).is_some_and(|l| l.trim().starts_with("motor")))
 }
 
 /// Every motor with every propeller that the simulator knows, on a short staircase.

@@ -79,7 +79,11 @@ fn maximum(thrust: &str, current: &str, place: &Place<'_>) -> Result<Option<Maxi
 /// The pair that a run measured: its plateaus, the one with most thrust, names from the log's metadata.
 #[must_use]
 pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
-    let named = |key: &str| log.meta.get(key).and_then(toml::Value::as_str).unwrap_or("?").to_owned();
+    // a run that names neither is told from others by its file
+    let named = |key: &str| {
+        let name = log.meta.get(key).and_then(toml::Value::as_str).filter(|n| !n.trim().is_empty());
+        name.map_or_else(|| format!("{key} of {}", log.name), str::to_owned)
+    };
     let index = |name: &str| log.columns.iter().position(|c| c.name == name);
     let levels: Vec<Maximum> = match (index("thrust_n"), index("current_a")) {
         (Some(t), Some(i)) => plateaus
