@@ -102,6 +102,7 @@ fn case(seed: u64, hz: f64, seconds: f64) -> (Truth, Log, Log) {
 
 /// Right, refused and wrong of so many cases, and how often the truth lies in the stated interval.
 fn tally(seeds: std::ops::Range<u64>, hz: f64, seconds: f64) -> (usize, usize, Vec<String>, usize) {
+    let mut ratios = Vec::new();
     let (mut right, mut refused, mut wrong, mut inside) = (0, 0, Vec::new(), 0);
     for seed in seeds {
         let (truth, stand, esc) = case(seed, hz, seconds);
@@ -114,6 +115,7 @@ fn tally(seeds: std::ops::Range<u64>, hz: f64, seconds: f64) -> (usize, usize, V
                 let off = truth.error(&joint, joint.pivot_s);
                 let ppm = joint.drift_ppm.0 - (1e6 / (1.0 + 1e-6 * truth.ppm) - 1e6);
                 inside += usize::from(off.abs() <= joint.offset_s.1);
+                ratios.push([off.abs() / joint.offset_s.1, ppm.abs() / joint.drift_ppm.1]);
                 let ends = [stand.t[0], stand.t[stand.t.len() - 1]].map(|t| truth.error(&joint, truth.esc(t)).abs());
                 if ends.iter().all(|e| *e < 0.010) && ppm.abs() < 50.0 {
                     right += 1;
@@ -128,6 +130,12 @@ fn tally(seeds: std::ops::Range<u64>, hz: f64, seconds: f64) -> (usize, usize, V
                 }
             }
         }
+    }
+    for k in 0..2 {
+        let mut sorted: Vec<f64> = ratios.iter().map(|r| r[k]).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| sorted.get((share * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
+        println!("{}: error over half width: median {:.2}, 95 % below {:.2}", ["offset", "drift"][k], at(0.5), at(0.95));
     }
     (right, refused, wrong, inside)
 }

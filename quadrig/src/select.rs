@@ -205,8 +205,12 @@ fn fly(motor: &str, propeller: &str) -> Pair {
 }
 
 fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
-    let mut out =
-        format!("{:<8} {:<9} {:>8} {:>8} {:>5} {:>7} {:>9}", "motor", "propeller", "thrust N", "A", "N/A", "hovers", "resultant");
+    let wide = |name: &dyn Fn(&Pair) -> usize, least: usize| pairs.iter().map(name).max().unwrap_or(0).max(least);
+    let (motor, propeller) = (wide(&|p| p.motor.chars().count(), 8), wide(&|p| p.propeller.chars().count(), 9));
+    let mut out = format!(
+        "{:<motor$} {:<propeller$} {:>8} {:>8} {:>5} {:>7} {:>9}",
+        "motor", "propeller", "thrust N", "A", "N/A", "hovers", "resultant"
+    );
     let counts: Vec<u32> = rows.first().map_or_else(Vec::new, |r| r.with_batteries.iter().map(|w| w.batteries).collect());
     for n in &counts {
         out += &format!(" {:>7}", format!("min x{n}"));
@@ -217,7 +221,7 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         let clipped = if r.pair.clipped { "  thrust reading clipped: a lower bound" } else { "" };
         let with = r.with_batteries.iter().find(|w| w.batteries == need.batteries);
         out += &format!(
-            "{:<8} {:<9} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
+            "{:<motor$} {:<propeller$} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
             r.pair.motor,
             r.pair.propeller,
             r.total_thrust_n.0 / 4.0,
@@ -234,7 +238,7 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         out.push('\n');
     }
     for p in pairs.iter().filter(|p| p.maximum.is_none()) {
-        out += &format!("{:<8} {:<9} no result\n", p.motor, p.propeller);
+        out += &format!("{:<motor$} {:<propeller$} no result\n", p.motor, p.propeller);
     }
     match chosen.first() {
         Some(best) => out += &format!("choice: {} with {}\n", best.pair.motor, best.pair.propeller),

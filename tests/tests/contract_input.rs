@@ -411,7 +411,7 @@ fn exports_are_taken_directly() {
     let [direct, imported] = twice(&[&["close-loop", "LOG", "--json"], &named[..]].concat());
     assert_eq!(direct.out.replace("export.csv", "imported.csv"), imported.out);
     // nobody's name is made up, and two runs stay apart
-    let said = bench.call(&["select", "export.csv"]).succeeded();
+    let said = bench.call(&["select", "export.csv", "--thrust", "4"]).succeeded();
     assert!(
         said.out.contains("choice: motor of export.csv with propeller of export.csv") && !said.out.contains("? with"),
         "{}",

@@ -19,8 +19,9 @@ const ROUNDS: usize = 12;
 const PIECES: usize = 24;
 /// Tukey's constant.
 const TUKEY: f64 = 4.685;
-/// Half width of a 95 % interval in standard errors, with so many pieces.
-const STUDENT: f64 = 2.07;
+/// Half width of a 95 % interval in standard errors. Pieces are few and their steps differ in size: in simulation the truth scatters 1.6 times as
+/// wide as they say, so that Student's 2.07 held it in four cases of five (`two_hundred_clocks`).
+const STUDENT: f64 = 3.2;
 /// Largest drift that is looked for.
 const DRIFT: f64 = 0.003;
 

@@ -22,7 +22,7 @@ pub fn page(stand: &Log, joined: &[(&Log, &Joint)]) -> String {
     );
     for (k, (other, joint)) in joined.iter().enumerate() {
         sheet.section(&other.name);
-        sheet.say(&joint.sentence());
+        sheet.say(&format!("{}.", crate::words::upper(&joint.sentence())));
         let rows: Vec<Vec<String>> = joint
             .seen
             .iter()
@@ -31,10 +31,10 @@ pub fn page(stand: &Log, joined: &[(&Log, &Joint)]) -> String {
                 vec![channel(s.channel), format!("{:.4}", s.correlation), later]
             })
             .collect();
-        sheet.table(&["channel", "correlation", "later than the joint, ms"], &rows, |i| i == 0);
+        sheet.table(&["channel", "correlation", "later by, ms"], &rows, |i| i == 0);
         sheet.figures(figures(stand, other, joint, k));
     }
-    sheet.say("A sensor that reads late looks like a clock that is late: its delay is in the offset.");
+    sheet.say("A sensor that reads late looks like a clock that is late: the first channel's delay is in the offset, the others' are told against it.");
     sheet.html()
 }
 
@@ -49,7 +49,7 @@ fn figures(stand: &Log, other: &Log, joint: &Joint, k: usize) -> Vec<Figure> {
     if let Some(pair) = joint.seen.first().and_then(|s| pairs.iter().find(|p| p.channel == s.channel)) {
         let b = Signal { t: pair.other.t.iter().map(|t| joint.to_stand(*t)).collect(), ..pair.other.clone() };
         let (from, to) = joint.overlap_s;
-        let at = steepest(&pair.stand, joint.overlap_s);
+        let at = steepest(&pair.stand, &b, joint.overlap_s);
         let near = 12.0 * pair.stand.step.max(pair.other.step);
         let label = format!("{}, {}", channel(pair.channel), unit_of(pair.channel));
         for (id, title, from, to) in [
@@ -65,7 +65,7 @@ fn figures(stand: &Log, other: &Log, joint: &Joint, k: usize) -> Vec<Figure> {
                 title,
                 x_label: "time, s".into(),
                 y_label: label.clone(),
-                layers: vec![line(&stand.name, "a", &pair.stand), line(&other.name, "b", &b)],
+                layers: vec![line("the stand", "a", &pair.stand), line("the second log", "b", &b)],
                 ..Figure::default()
             });
         }
@@ -90,10 +90,14 @@ fn figures(stand: &Log, other: &Log, joint: &Joint, k: usize) -> Vec<Figure> {
     out
 }
 
-/// Time of the largest change between neighbours within a span.
-fn steepest(s: &Signal, (from, to): (f64, f64)) -> f64 {
-    let width = s.step;
-    let slope = |t: f64| s.at(t, width).map_or(0.0, |(_, slope)| slope.abs());
-    let inside = s.t.iter().copied().filter(|t| (from..=to).contains(t));
-    inside.map(|t| (slope(t), t)).max_by(|a, b| a.0.total_cmp(&b.0)).map_or(from, |(_, t)| t)
+/// Time of the steepest change within a span that both saw: a probe that loses its mark is alone.
+fn steepest(a: &Signal, b: &Signal, (from, to): (f64, f64)) -> f64 {
+    let width = a.step.max(b.step);
+    let slope = |s: &Signal, t: f64| s.at(t, width).map_or(0.0, |(_, slope)| slope);
+    let both = |t: f64| {
+        let (a, b) = (slope(a, t), slope(b, t));
+        if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 }
+    };
+    let inside = a.t.iter().copied().filter(|t| (from..=to).contains(t));
+    inside.map(|t| (both(t), t)).max_by(|a, b| a.0.total_cmp(&b.0)).map_or(from, |(_, t)| t)
 }
