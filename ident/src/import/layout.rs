@@ -89,7 +89,7 @@ fn first(content: &str, separator: u8) -> Vec<Line> {
 pub(super) fn find<'t>(file: &str, text: &'t Text, options: &Options, report: &mut Report) -> Result<Layout<'t>, ReadError> {
     let refuse = |line: u64, found: &str, expected: &str| Err(Place { file, line: line as usize }.refuse(None, found, expected));
     let known = |cells: &[String]| {
-        let mapped = options.mappings.iter().filter(|m| cells.iter().any(|c| *c == m.source)).count();
+        let mapped = options.mappings.iter().filter(|m| cells.contains(&m.source)).count();
         header::known(cells) + mapped
     };
     let (content, separator) = separated(&text.content, &known);

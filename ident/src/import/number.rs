@@ -125,11 +125,7 @@ impl Evidence {
                 Some(false) => self.comma = self.comma.or(Some(line)),
                 None => {}
             },
-            (0, 1) => {
-                if alone(POINT) == Some(false) {
-                    self.point = self.point.or(Some(line));
-                }
-            }
+            (0, 1) if alone(POINT) == Some(false) => self.point = self.point.or(Some(line)),
             (1.., 1..) if of_marks(text, COMMA).is_some() => self.comma = self.comma.or(Some(line)),
             (1.., 1..) if of_marks(text, POINT).is_some() => self.point = self.point.or(Some(line)),
             _ => {}
