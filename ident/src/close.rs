@@ -110,6 +110,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         left_out,
         set_aside: context.set_aside.clone(),
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
+        runs: Vec::new(),
     };
     marks::tell(&mut verdict, &mut after_model, &marks);
     if verdict.verdict == Kind::Ambiguous {
@@ -162,7 +163,7 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Channel
                 let t: Vec<f64> = target.rows.iter().filter(|i| target.claims(**i)).map(|i| context.t[*i]).collect();
                 let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
                 let heldout_rms = if held.claimed.is_finite() { held.claimed } else { of_its_own(context, declared, fit, i) };
-                Figures { rms, heldout_rms, whiteness_p: whiteness(&t, &r) }
+                Figures { rms, heldout_rms, across_runs_rms: None, whiteness_p: whiteness(&t, &r) }
             })
             .collect()
     };
@@ -278,7 +279,8 @@ pub(crate) fn parameter(e: &Estimate, shapes: &[Shape]) -> Parameter {
 }
 
 /// Both models on another run of the same rig, as far as they carry over.
-pub(crate) fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
+#[must_use]
+pub fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
     let (before, after) = (&*before.on(other), &*after.on(other));
     let context = Context::new(other, Some(after.start_pulse_us));
     let error = |model: &Model, name: &'static str| -> Option<f64> {

@@ -27,6 +27,9 @@ mod stretches;
 pub use consensus::Consensus;
 pub(crate) use stretches::{CALM_US, GAP, STILL_US, starts};
 
+/// Time after which a rotor of this size has arrived at its new speed, s: five time constants of 0.05 s.
+const ARRIVED: f64 = 0.25;
+
 /// Efficiency of ESC and motor at work: 0.65 to 0.85 for motors of this size.
 const EFFICIENCY: f64 = 0.75;
 
@@ -557,6 +560,14 @@ impl Context {
             let mut d: Vec<f64> = self.t.windows(2).map(|w| w[1] - w[0]).collect();
             if d.is_empty() { 1.0 } else { noise::median(&mut d) }
         })
+    }
+
+    /// Whether each row stands for a level of its own: the command jumps at most rows, and they lie farther apart than a rotor takes to
+    /// arrive. What a lag, a filter or a delay does within a level is not in such a table.
+    #[must_use]
+    pub fn is_table(&self) -> bool {
+        let Some(pulse) = self.pulse.as_ref().filter(|_| !self.time_is_row && self.step() > ARRIVED) else { return false };
+        pulse.windows(2).filter(|w| (w[1] - w[0]).abs() > CALM_US).count() * 2 > pulse.len()
     }
 
     /// Length of the run, s.

@@ -52,6 +52,7 @@ pub mod runs;
 mod samples;
 pub mod search;
 pub mod select;
+pub mod several;
 pub mod shift;
 pub mod simulate;
 pub mod solve;

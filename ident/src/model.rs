@@ -18,9 +18,10 @@ use crate::steps::Steps;
 use toml::{Table, Value};
 
 mod read;
+mod run;
 mod scope;
 
-pub use scope::FittedTo;
+pub use scope::{FittedTo, RunLevel};
 
 /// First key of the format.
 pub const FORMAT: &str = "quadrig-model 1";
@@ -56,6 +57,8 @@ pub struct Model {
     pub source: String,
     /// The runs that it was fitted to; a model that names none stands as it is on every run.
     pub runs: Vec<FittedTo>,
+    /// What belongs to each of them, where the model was fitted to several; empty where it was fitted to one.
+    pub own: Vec<RunLevel>,
     /// Motor, propeller, ... as the log states them.
     pub meta: Table,
     /// Pulse at which the motor starts, us.
@@ -297,7 +300,7 @@ impl Model {
         if let Some(air) = self.air {
             root.insert("air_density_ratio".into(), air.into());
         }
-        let runs: Vec<Value> = self.runs.iter().map(|r| Value::Table(run_table(r))).collect();
+        let runs = run::tables(&self.runs, &self.own);
         if !runs.is_empty() {
             root.insert("run".into(), runs.into());
         }
@@ -376,17 +379,6 @@ impl AddedEffect {
         t.insert("parameter".into(), parameters.into());
         t
     }
-}
-
-fn run_table(run: &FittedTo) -> Table {
-    let mut t = Table::new();
-    t.insert("log".into(), run.name.clone().into());
-    t.insert("sha256".into(), run.sha256.clone().into());
-    t.insert("rows".into(), (run.rows as i64).into());
-    if let Some(date) = &run.date {
-        t.insert("date".into(), date.clone().into());
-    }
-    t
 }
 
 fn relation_text(channel: &str, has_pulse: bool) -> &'static str {

@@ -28,6 +28,9 @@ pub struct Solution {
     pub rss: f64,
 }
 
+/// Share of a column's square below which what others leave of it is rounding.
+const NOTHING: f64 = 1e-10;
+
 impl Normal {
     /// For `k` columns.
     #[must_use]
@@ -108,11 +111,42 @@ impl Normal {
     }
 
     /// Adds what went into another of the same columns.
-    fn absorb(&mut self, other: &Self) {
+    pub(crate) fn absorb(&mut self, other: &Self) {
         self.gram += &other.gram;
         self.rhs += &other.rhs;
         self.yy += other.yy;
         self.count += other.count;
+    }
+
+    /// The equations of the other columns once the first `k` have been solved for whatever those are; `None` when the numbers are not finite.
+    /// The Schur complement of the first block.
+    pub(crate) fn without_first(&self, k: usize) -> Option<Self> {
+        let n = self.rhs.len() - k;
+        let head = Self {
+            gram: self.gram.view((0, 0), (k, k)).into_owned(),
+            rhs: self.rhs.rows(0, k).into_owned(),
+            yy: self.yy,
+            count: self.count,
+        };
+        let factor = head.factor()?;
+        let beside: Vec<Vec<f64>> = (0..n).map(|j| (0..k).map(|l| self.gram[(k + j, l)]).collect()).collect();
+        let own = factor.solve(&(0..k).map(|l| self.rhs[l]).collect::<Vec<f64>>())?;
+        let mut out = Self { yy: self.yy - dot(&own, head.rhs.as_slice()), count: self.count, ..Self::new(n) };
+        for j in 0..n {
+            let explained = factor.solve(&beside[j])?;
+            for (l, other) in beside.iter().enumerate().take(j + 1) {
+                out.gram[(j, l)] = self.gram[(k + j, k + l)] - dot(&explained, other);
+            }
+            out.rhs[j] = self.rhs[k + j] - dot(&own, &beside[j]);
+        }
+        // a column that the first ones make up says nothing
+        let made_up: Vec<usize> = (0..n).filter(|j| out.gram[(*j, *j)] <= NOTHING * self.gram[(k + *j, k + *j)]).collect();
+        for j in made_up {
+            (0..=j).for_each(|l| out.gram[(j, l)] = 0.0);
+            (j..n).for_each(|l| out.gram[(l, j)] = 0.0);
+            out.rhs[j] = 0.0;
+        }
+        Some(out)
     }
 
     /// Less a `share` of what another of the same columns holds: rows that went into both then weigh so much less.

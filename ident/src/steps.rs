@@ -41,7 +41,9 @@ impl Step {
 impl Steps {
     /// The effects of a hypothesis that touch the design's target, applied in causal order.
     pub(crate) fn apply(&mut self, context: &Context, placed: &[Placed], mut design: TargetDesign) -> TargetDesign {
-        let mut order: Vec<usize> = (0..placed.len()).filter(|i| placed[*i].instance.touches(design.name)).collect();
+        let in_a_row = |p: &Placed| p.stage() == Stage::Output && context.is_table();
+        let acts = |i: &usize| placed[*i].instance.touches(design.name) && !in_a_row(&placed[*i]);
+        let mut order: Vec<usize> = (0..placed.len()).filter(acts).collect();
         order.sort_by_key(|i| placed[*i].stage());
         let meters = order.partition_point(|i| placed[*i].stage() < Stage::Output);
         let mut last = std::mem::take(&mut self.steps);

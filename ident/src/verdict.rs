@@ -37,6 +37,9 @@ pub struct Figures {
     pub rms: f64,
     /// Over rows that the fit did not see.
     pub heldout_rms: f64,
+    /// Each of several runs predicted whole by a fit to the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub across_runs_rms: Option<f64>,
     /// Ljung-Box.
     pub whiteness_p: f64,
 }
@@ -222,4 +225,7 @@ pub struct Verdict {
     /// Other runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub validation: Vec<Validation>,
+    /// Each of several runs of the rig, predicted whole by a fit to the others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub runs: Vec<Validation>,
 }

@@ -40,7 +40,7 @@ fn sag(p: f64) -> EffectEntry {
 }
 
 fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
-    let of = |rms: f64| Figures { rms, heldout_rms: rms, whiteness_p: 0.2 };
+    let of = |rms: f64| Figures { rms, heldout_rms: rms, across_runs_rms: None, whiteness_p: 0.2 };
     let channel = |unit: &str, floor: f64, before: f64, after: f64| Channel {
         unit: unit.into(),
         noise_floor_rms: floor,
@@ -62,6 +62,7 @@ fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
         left_out: vec![],
         set_aside: vec![],
         validation: vec![],
+        runs: vec![],
     }
 }
 

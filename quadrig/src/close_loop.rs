@@ -8,6 +8,7 @@
 
 pub(crate) mod flight;
 pub(crate) mod inertial;
+mod several;
 
 use crate::Failure;
 use crate::open::{Columns, Names, open};
@@ -21,8 +22,9 @@ use std::path::{Path, PathBuf};
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The run: a rig log, or a stand's or ESC's own export.
-    log: PathBuf,
+    /// The run: a rig log, or a stand's or ESC's own export. Several are runs of one rig, each predicted by a fit to the others.
+    #[arg(required = true, value_name = "RUN")]
+    logs: Vec<PathBuf>,
     /// A declared model that stands as it is, instead of the thesis baseline.
     #[arg(long)]
     model: Option<PathBuf>,
@@ -41,16 +43,26 @@ pub(crate) struct Args {
     names: Names,
 }
 
+impl Args {
+    /// The first run.
+    fn log(&self) -> &Path {
+        self.logs.first().map_or(Path::new(""), PathBuf::as_path)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    if inertial::is_attitude_log(&args.log) {
+    if args.logs.len() > 1 {
+        return several::run(args, quiet);
+    }
+    if inertial::is_attitude_log(args.log()) {
         return inertial::run(args, quiet);
     }
-    if flight::is_flight_log(&args.log) {
+    if flight::is_flight_log(args.log()) {
         return flight::run(args, quiet);
     }
     let options = args.columns.options(&args.names);
-    let log = open(&args.log, &options, quiet)?;
+    let log = open(args.log(), &options, quiet)?;
     let model = args.model.as_deref().map(Model::read).transpose()?;
     let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
     let closed = {
@@ -58,7 +70,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         close(&log, model.as_ref(), &others, &mut |share| bar.set(share))?
     };
     if !quiet {
-        closed.verdict.left_out.iter().for_each(|l| eprintln!("{}: {l}", args.log.display()));
+        closed.verdict.left_out.iter().for_each(|l| eprintln!("{}: {l}", args.log().display()));
     }
     let json = serde_json::to_string_pretty(&closed.verdict)?;
     if let Some(folder) = &args.output {

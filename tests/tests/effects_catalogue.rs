@@ -34,11 +34,12 @@ fn every_effect_that_the_specification_names_is_simulated() {
     assert_eq!(missing, [""; 0], "named by the specification, not in the library");
 }
 
-/// Whatever else the library knows, the simulator has as well, or is by itself: a rotor has inertia without any effect.
+/// Whatever else the library knows, the simulator has as well, or is by itself: without any effect a rotor has inertia and a motor follows its
+/// supply.
 #[test]
 fn what_the_library_knows_is_simulated() {
     let rest: Vec<&str> = known().difference(&simulated()).copied().collect();
-    assert_eq!(rest, ["rotor_inertia"]);
+    assert_eq!(rest, ["rotor_inertia", "supply_voltage"]);
 }
 
 #[test]

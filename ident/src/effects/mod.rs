@@ -39,6 +39,7 @@ mod speed_channel;
 mod spinup_lag;
 mod stall;
 mod supply_sag;
+mod supply_voltage;
 mod tare_shift;
 mod thermal_derate;
 mod thermal_zero;
@@ -209,6 +210,10 @@ pub trait Effect: Sync {
     }
     /// The ways in which this log could hold it; none where the log lacks what it needs.
     fn instances(&self, context: &Context) -> Vec<Instance>;
+    /// The ways in which several runs of one rig could hold it, each with the shapes to start from: for effects that show between runs only.
+    fn among(&self, _runs: &[&Context]) -> Vec<(Instance, Vec<f64>)> {
+        Vec::new()
+    }
     /// The ways in which this log may hold it without being able to show it: never named, but listed with an unknown cause where
     /// they explain it (see [`crate::suspects`]).
     fn suspects(&self, _context: &Context) -> Vec<Instance> {
@@ -265,6 +270,7 @@ pub trait Effect: Sync {
 pub fn library() -> &'static [&'static dyn Effect] {
     &[
         &supply_sag::SupplySag,
+        &supply_voltage::SupplyVoltage,
         &battery_discharge::BatteryDischarge,
         &spinup_lag::SpinupLag,
         &rotor_inertia::RotorInertia,

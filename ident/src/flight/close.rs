@@ -304,6 +304,7 @@ impl<'w> Whole<'w> {
             set_aside: aside.collect(),
             left_out: Vec::new(),
             validation: Vec::new(),
+            runs: Vec::new(),
             channels,
             effects,
             unexplained,
@@ -319,7 +320,7 @@ impl<'w> Whole<'w> {
             let by_row = rows.of.iter().find(|r| r.channel == k);
             let figures = |e: crate::attribution::conclude::Errors, row: Option<[f64; 2]>, whiteness_p: f64| {
                 let [rms, heldout_rms] = row.unwrap_or([e.rms, e.held_out]);
-                Figures { rms, heldout_rms, whiteness_p }
+                Figures { rms, heldout_rms, across_runs_rms: None, whiteness_p }
             };
             let entry = Channel {
                 unit: channel.unit.to_owned(),

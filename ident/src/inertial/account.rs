@@ -122,6 +122,7 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         left_out: Vec::new(),
         set_aside: Vec::new(),
         validation: Vec::new(),
+        runs: Vec::new(),
     };
     let model = InertialModel {
         format: MODEL_FORMAT.to_owned(),
@@ -169,7 +170,12 @@ fn channel(recording: &Recording, sensor: &Sensor, axis: usize) -> Option<Channe
         let (t, r) = left(predicted);
         let rms = (Readings::square(&r) / r.len().max(1) as f64).sqrt();
         let p = whiteness(&t, &r);
-        (!r.is_empty()).then_some(Figures { rms, heldout_rms: heldout, whiteness_p: if p.is_finite() { p } else { 1.0 } })
+        (!r.is_empty()).then_some(Figures {
+            rms,
+            heldout_rms: heldout,
+            across_runs_rms: None,
+            whiteness_p: if p.is_finite() { p } else { 1.0 },
+        })
     };
     Some(Channel {
         unit: sensor.unit.to_owned(),

@@ -6,7 +6,7 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Powerplant model".
 
-use super::{AddedEffect, FORMAT, FittedTo, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys};
+use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys, run};
 use crate::context::{Context, Relation};
 use crate::course::{COURSE_KEYS, Course};
 use crate::effects::{self, Effect, Estimate, Instance};
@@ -17,7 +17,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 /// Key, what stands there, what should.
-type Refusal = (String, String, String);
+pub(super) type Refusal = (String, String, String);
 
 impl Model {
     /// Reads a model.
@@ -69,16 +69,7 @@ impl Model {
             model.consensus =
                 strings(channels).ok_or_else(|| refusal("consensus.channels", Some(channels), "a list of channels"))?;
         }
-        model.runs = match root.get("run") {
-            None => Vec::new(),
-            Some(list) => list
-                .as_array()
-                .ok_or_else(|| refusal("run", Some(list), "a list of tables, [[run]]"))?
-                .iter()
-                .enumerate()
-                .map(|(i, value)| fitted_to(value).map_err(|refusal| within(&format!("run[{i}]"), refusal)))
-                .collect::<Result<_, _>>()?,
-        };
+        (model.runs, model.own) = run::read(root.get("run"))?;
         let channels = root.get("channel");
         let channels =
             channels.and_then(Value::as_table).ok_or_else(|| refusal("channel", channels, "one table for each channel"))?;
@@ -100,23 +91,6 @@ impl Model {
         }
         Ok(model)
     }
-}
-
-/// A run that the model was fitted to.
-fn fitted_to(value: &Value) -> Result<FittedTo, Refusal> {
-    let text = |key: &str| value.get(key).and_then(Value::as_str).map(str::to_owned);
-    let wanted = |key: &str, expected: &str| refusal(key, value.get(key), expected);
-    let is_digest = |d: &String| d.len() == 64 && d.bytes().all(|b| b.is_ascii_hexdigit());
-    Ok(FittedTo {
-        name: text("log").ok_or_else(|| wanted("log", "the name of a log"))?,
-        sha256: text("sha256").filter(is_digest).ok_or_else(|| wanted("sha256", "64 hexadecimal digits, as sha256sum prints"))?,
-        rows: value
-            .get("rows")
-            .and_then(Value::as_integer)
-            .and_then(|n| usize::try_from(n).ok())
-            .ok_or_else(|| wanted("rows", "a number of rows"))?,
-        date: text("date"),
-    })
 }
 
 /// What the model is off by row for row: lists of finite numbers that are as long as they must be.
@@ -199,7 +173,7 @@ fn leftover(channel: &str, value: &Value) -> Result<Option<Leftover>, Refusal> {
 }
 
 impl AddedEffect {
-    fn from_table(value: &Value) -> Result<Self, Refusal> {
+    pub(super) fn from_table(value: &Value) -> Result<Self, Refusal> {
         let at = |k: &str| value.get(k);
         let id = at("id").and_then(Value::as_str).ok_or_else(|| refusal("id", at("id"), "the id of an effect"))?;
         let effect = effects::by_id(id).ok_or_else(|| {
@@ -311,7 +285,7 @@ fn number(v: &Value) -> Option<f64> {
     v.as_float().or_else(|| v.as_integer().map(|i| i as f64))
 }
 
-fn finite(v: &Value) -> Option<f64> {
+pub(super) fn finite(v: &Value) -> Option<f64> {
     number(v).filter(|v| v.is_finite())
 }
 
@@ -319,7 +293,7 @@ fn strings(v: &Value) -> Option<Vec<String>> {
     v.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
 }
 
-fn refusal(key: &str, found: Option<&Value>, expected: &str) -> Refusal {
+pub(super) fn refusal(key: &str, found: Option<&Value>, expected: &str) -> Refusal {
     let found = match found {
         None => "missing".to_owned(),
         Some(Value::Table(_)) => "a table".to_owned(),
@@ -328,11 +302,11 @@ fn refusal(key: &str, found: Option<&Value>, expected: &str) -> Refusal {
     (key.to_owned(), found, expected.to_owned())
 }
 
-fn no_channel(key: &str, name: &str) -> Refusal {
+pub(super) fn no_channel(key: &str, name: &str) -> Refusal {
     let speeds = "rpm_beam, rpm_opto, rpm_hall, rpm_encoder, rpm";
     (key.to_owned(), format!("no channel '{name}'"), format!("{speeds}, thrust_n, torque_nm, current_a or voltage_v"))
 }
 
-fn within(place: &str, (key, found, expected): Refusal) -> Refusal {
+pub(super) fn within(place: &str, (key, found, expected): Refusal) -> Refusal {
     (if key.is_empty() { place.to_owned() } else { format!("{place}.{key}") }, found, expected)
 }

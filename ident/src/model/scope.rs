@@ -29,6 +29,15 @@ pub struct FittedTo {
     pub date: Option<String>,
 }
 
+/// What belongs to one of several runs.
+#[derive(Debug, Clone, Default)]
+pub struct RunLevel {
+    /// For each channel the coefficients of its polynomial that stand on this run, from the constant up, as far as they differ from the rig's.
+    pub polynomials: Vec<(String, Vec<f64>)>,
+    /// Its own drifts and events.
+    pub effects: Vec<AddedEffect>,
+}
+
 impl FittedTo {
     /// A log as the model names it.
     #[must_use]
@@ -69,10 +78,35 @@ impl Model {
         self.runs.iter().any(|r| r.rows == log.len()) && own(&log.digest())
     }
 
-    /// The model for the rows of a log: as it stands on a run that it was fitted to, else what carries over to it.
+    /// The model for the rows of a log: as it stands on a run that it was fitted to, with what belongs to that run, else what carries over
+    /// to it.
     #[must_use]
     pub fn on(&self, log: &Log) -> Cow<'_, Self> {
-        if self.runs.is_empty() || self.is_of(log) { Cow::Borrowed(self) } else { Cow::Owned(self.elsewhere()) }
+        if self.runs.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        if !self.is_of(log) {
+            return Cow::Owned(self.elsewhere());
+        }
+        if self.own.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let digest = log.digest();
+        match self.runs.iter().zip(&self.own).find(|(run, _)| run.sha256 == digest) {
+            Some((_, own)) => Cow::Owned(self.with(own)),
+            None => Cow::Borrowed(self),
+        }
+    }
+
+    /// The model with what belongs to one run.
+    fn with(&self, own: &RunLevel) -> Self {
+        let mut out = self.clone();
+        for (channel, coefficients) in &own.polynomials {
+            let polynomial = out.polynomials.iter_mut().find(|p| p.channel == *channel);
+            polynomial.into_iter().flat_map(|p| p.coefficients.iter_mut().zip(coefficients)).for_each(|(c, own)| *c = *own);
+        }
+        out.effects.extend(own.effects.iter().cloned());
+        out
     }
 
     /// The model for another run of its rig: effects of the rig, what events left behind, and the mean of the rest.

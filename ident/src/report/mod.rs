@@ -12,6 +12,7 @@ mod isolability;
 mod page;
 mod run;
 mod selection;
+mod several;
 mod sheet;
 mod shift;
 mod style;
@@ -24,6 +25,7 @@ pub use isolability::{isolability, isolability_csv, isolability_svg};
 pub use page::closed_loop;
 pub use run::run;
 pub use selection::selection;
+pub use several::several;
 pub use sheet::{Sheet, write_figures};
 pub use shift::{filter_figures, study_figures};
 

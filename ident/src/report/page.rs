@@ -16,6 +16,7 @@ use crate::effects::unknown::variable;
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
+use crate::several::Shown;
 use crate::verdict::EffectEntry;
 use crate::words::{channel, heading};
 
@@ -101,8 +102,22 @@ fn hero(closed: &Closed) -> Vec<Figure> {
     parts::most(&closed.verdict, &traces)
 }
 
+/// What is left of one of several runs, predicted by a fit to the others.
+pub(super) fn over_runs(shown: &Shown) -> Vec<Figure> {
+    let trace = Trace {
+        channel: shown.channel.to_owned(),
+        unit: unit_of(shown.channel).to_owned(),
+        floor: shown.floor,
+        time_label: format!("time on {}, s", shown.name),
+        t: shown.t.clone(),
+        before: shown.before.clone(),
+        after: shown.after.clone(),
+    };
+    std::iter::once(over_time(&trace, "most", PAIR)).chain(enlarged(&trace, "most", PAIR)).collect()
+}
+
 /// Figures of each effect: what its first channel leaves over without it and with it.
-fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
+pub(super) fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
     let mut used = vec![false; closed.model.effects.len()];
     closed
         .verdict

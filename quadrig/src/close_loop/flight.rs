@@ -28,7 +28,7 @@ pub(crate) fn is_flight_log(path: &Path) -> bool {
 
 /// Runs the command.
 pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let log = flight_log::read(&args.log)?;
+    let log = flight_log::read(args.log())?;
     let model = args.model.as_deref().map(read_model).transpose()?;
     let others = args.validate.iter().map(|p| flight_log::read(p)).collect::<Result<Vec<_>, _>>()?;
     let closed = {

@@ -31,10 +31,10 @@ pub(crate) fn is_attitude_log(path: &Path) -> bool {
 /// Runs the command.
 pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if args.model.is_some() || !args.validate.is_empty() {
-        return Err(format!("{}: an attitude log; --model and --validate are for rig logs", args.log.display()).into());
+        return Err(format!("{}: an attitude log; --model and --validate are for rig logs", args.log().display()).into());
     }
-    let log = ImuLog::read(&args.log)?;
-    let recording = recording(&log, &args.log);
+    let log = ImuLog::read(args.log())?;
+    let recording = recording(&log, args.log());
     let closed = {
         let bar = Bar::new("searching", quiet);
         close(&recording, &|rates| attitude(&log, rates), &mut |share| bar.set(share))?

@@ -11,6 +11,7 @@ mod flights;
 mod page;
 mod set;
 mod table;
+mod together;
 mod transfer;
 
 use crate::Failure;
@@ -21,6 +22,7 @@ use ident::log::{Log, write_whole};
 use ident::report::write_figures;
 use set::{SETS, Set};
 use std::path::PathBuf;
+use together::Together;
 use transfer::Transfer;
 
 /// Arguments.
@@ -60,6 +62,8 @@ pub(crate) struct Outcome {
     pub(crate) tried: Vec<Tried>,
     /// Each run's model on the rig's other runs.
     pub(crate) transfer: Transfer,
+    /// The runs of each rig together.
+    pub(crate) together: Together,
 }
 
 /// Runs the command.
@@ -88,6 +92,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             println!("{}: {} runs, {}", set.folder, outcome.runs.len(), file.display());
             if !outcome.transfer.is_empty() {
                 println!("{}", table::line(set.folder, &outcome.transfer));
+                println!("{}", table::line(&format!("{} together", set.folder), &outcome.together.fitted));
+                println!("{}", table::line(&format!("{} together, blind", set.folder), &outcome.together.blind));
             }
         }
         outcomes.push(outcome);
@@ -127,6 +133,7 @@ fn work(set: &'static Set, folder: &std::path::Path, quiet: bool) -> Result<Outc
     drop(bar);
     let bar = Bar::new("other runs", quiet);
     let tried = across(&runs, &mut |p| bar.set(0.5 * p));
-    let transfer = transfer::of(&runs, &mut |p| bar.set(0.5 + 0.5 * p));
-    Ok(Outcome { set, runs, tried, transfer })
+    let transfer = transfer::of(&runs, &mut |p| bar.set(0.5 + 0.1 * p));
+    let together = together::of(&runs, &mut |p| bar.set(0.6 + 0.4 * p));
+    Ok(Outcome { set, runs, tried, transfer, together })
 }

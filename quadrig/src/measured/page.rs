@@ -66,6 +66,7 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     }
     out.push_str("\nA cause holds on another run where the model corrected on the first predicts it better than the same model refitted without the cause: by 2 % or more, on a channel that the effect touches, one constant a channel apart. A cause that the readings show by themselves (a grid that they lie on) predicts nothing better. It holds where the other run's readings show it too, and is counted apart. An ambiguous verdict stands for what its hypotheses share, those that are a tenth as probable as the first included; what they differ by is left open, and counted apart.\n");
     out.push_str(&super::table::index(outcomes));
+    out.push_str(&super::table::together(outcomes));
     let absent: Vec<&str> = SETS
         .iter()
         .filter(|s| outcomes.iter().any(|o| o.set.folder == s.folder && o.runs.is_empty()))

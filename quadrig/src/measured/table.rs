@@ -80,6 +80,30 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     out
 }
 
+/// The section on several runs in one fit.
+pub(crate) fn together(outcomes: &[Outcome]) -> String {
+    let with_runs = |of: &dyn Fn(&Outcome) -> Transfer| -> Vec<(&str, Transfer)> {
+        outcomes.iter().map(|o| (o.set.folder, of(o))).filter(|(_, t)| !t.is_empty()).collect()
+    };
+    let (blind, fitted) = (with_runs(&|o| o.together.blind.clone()), with_runs(&|o| o.together.fitted.clone()));
+    if fitted.is_empty() {
+        return String::new();
+    }
+    let head = "| set | rigs | predictions | above three floors | factor | worse by more than 5 % | of the others | then within three floors | names that come back |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+    let rows = |list: &[(&str, Transfer)]| {
+        let mut out = String::new();
+        list.iter().for_each(|(name, t)| out += &format!("{}\n", line(name, t)));
+        let all = list.iter().fold(Transfer::default(), |sum, (_, t)| sum.and(t));
+        out + &format!("{}\n", line("**all**", &all))
+    };
+    format!(
+        "\n## Several runs together\n\n`quadrig close-loop RUN...` fits the runs of a rig at once. Here names and values come from all runs but one, and predict that one, which nothing had seen. Rigs with three runs or more.\n\n{head}{}\nNames: each name and channel of such a set, sought in the sets without another run.\n\nOf all rigs with two runs or more: names that were found on all runs, their values from all but the one that is predicted. This is what the verdict quotes. The names had seen the run.\n\n{head}{}",
+        rows(&blind),
+        rows(&fitted)
+    )
+}
+
 /// The section of a set's page.
 pub(crate) fn pairs(t: &Transfer) -> String {
     if t.is_empty() {

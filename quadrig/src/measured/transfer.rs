@@ -122,8 +122,13 @@ pub(crate) fn of(runs: &[Recorded], progress: &mut dyn FnMut(f64)) -> Transfer {
 
 /// Each channel of a log by the models of another run.
 fn predicted(closed: &Closed, log: &Log) -> Vec<Prediction> {
-    let context = Context::new(log, Some(closed.model.start_pulse_us));
-    let [declared, corrected] = [&closed.declared, &closed.model].map(|model| model.on(log));
+    predicted_by([&closed.declared, &closed.model], log)
+}
+
+/// The same by a declared and a corrected model.
+pub(crate) fn predicted_by(models: [&Model; 2], log: &Log) -> Vec<Prediction> {
+    let context = Context::new(log, Some(models[1].start_pulse_us));
+    let [declared, corrected] = models.map(|model| model.on(log));
     let of_channel = |channel: &'static str| {
         let before = error(&declared, &context, channel)?;
         let after = error(&corrected, &context, channel)?;

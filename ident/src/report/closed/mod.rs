@@ -24,6 +24,7 @@ pub(crate) use look::{LOOK, SCRIPT};
 pub(crate) use page::{Page, begin};
 pub use provenance::{Hidden, Origin};
 pub use sentence::sentence;
+pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal};
 pub use vocabulary::Vocabulary;
 pub(crate) use vocabulary::bare;

@@ -10,7 +10,7 @@ use super::vocabulary::Vocabulary;
 use super::{cards, fold, left, sentence, state};
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
-use crate::verdict::{Kind, Verdict};
+use crate::verdict::{Kind, Validation, Verdict};
 use crate::words::heading;
 
 /// What a page is made of.
@@ -38,7 +38,8 @@ pub(crate) struct Page<'p> {
 /// The page up to where the folds begin.
 pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     let v = page.verdict;
-    let mut sheet = Sheet::told(&format!("{}: what the model lacks", v.run), &sentence(v, page.words, page.news));
+    let of_what = if v.runs.is_empty() { v.run.clone() } else { format!("{} runs of one rig", v.runs.len()) };
+    let mut sheet = Sheet::told(&format!("{of_what}: what the model lacks"), &sentence(v, page.words, page.news));
     sheet.soft(&page.origin.line());
     sheet.html_part(&state::bars(&v.channels, &v.unexplained));
     for l in &v.left_out {
@@ -59,7 +60,16 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         sheet.section("Speed sensors");
         sheet.figures(page.speeds.clone());
     }
-    runs(&mut sheet, v);
+    if !v.runs.is_empty() {
+        sheet.section("Each run, predicted by the others");
+        sheet.say("Predicted whole by a fit to the other runs, one constant a channel apart. Before and after, rms.");
+        runs(&mut sheet, v, &v.runs, "each-run");
+    }
+    if !v.validation.is_empty() {
+        sheet.section("On other runs of the rig");
+        sheet.say("Predicted from this run's model alone: what belongs to the rig carries over. Before and after, rms.");
+        runs(&mut sheet, v, &v.validation, "other-runs");
+    }
     provenance(&mut sheet, &page.origin, v, page.words);
     sheet.section("More");
     sheet.fold("Every channel in numbers", |sheet| {
@@ -69,30 +79,25 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     sheet
 }
 
-/// Before and after on other runs of the rig, a column each run.
-fn runs(sheet: &mut Sheet, v: &Verdict) {
-    if v.validation.is_empty() {
-        return;
-    }
-    sheet.section("On other runs of the rig");
-    sheet.say("Predicted from this run's model alone: what belongs to the rig carries over. Before and after, rms.");
-    let mut names: Vec<&String> = v.validation.iter().flat_map(|r| r.channels.keys()).collect();
+/// Before and after on runs of the rig, a column each run.
+fn runs(sheet: &mut Sheet, v: &Verdict, list: &[Validation], name: &str) {
+    let mut names: Vec<&String> = list.iter().flat_map(|r| r.channels.keys()).collect();
     names.sort_unstable();
     names.dedup();
-    let head: Vec<String> = std::iter::once("channel".to_owned()).chain(v.validation.iter().map(|r| r.run.clone())).collect();
+    let head: Vec<String> = std::iter::once("channel".to_owned()).chain(list.iter().map(|r| r.run.clone())).collect();
     let rows: Vec<Vec<String>> = names
         .into_iter()
-        .map(|name| {
-            let unit = v.channels.get(name).map_or("", |c| c.unit.as_str());
-            let cell = |r: &crate::verdict::Validation| {
-                r.channels.get(name).map_or_else(String::new, |b| {
+        .map(|channel| {
+            let unit = v.channels.get(channel).map_or("", |c| c.unit.as_str());
+            let cell = |r: &Validation| {
+                r.channels.get(channel).map_or_else(String::new, |b| {
                     let [_, before, after] = state::figures(unit, b.before, b.before, b.after);
                     format!("{before} to {after}, {}", state::factor(b.before, b.after))
                 })
             };
-            std::iter::once(heading(name)).chain(v.validation.iter().map(cell)).collect()
+            std::iter::once(heading(channel)).chain(list.iter().map(cell)).collect()
         })
         .collect();
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    sheet.data("other-runs", &head, &rows, None);
+    sheet.data(name, &head, &rows, None);
 }

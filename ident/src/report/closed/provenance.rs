@@ -69,6 +69,8 @@ pub struct Origin {
     pub model: Option<String>,
     /// What was hidden, of a demonstration.
     pub hidden: Option<Hidden>,
+    /// The other logs, where the page is of several runs.
+    pub others: Vec<FittedTo>,
 }
 
 /// What a log states of its rig, in the order in which it is told.
@@ -91,6 +93,20 @@ impl Origin {
         Self { log: FittedTo::of(log), seconds, states, ..Self::default() }
     }
 
+    /// Of several logs of one rig: what they all state.
+    pub(crate) fn of_several(logs: &[&Log]) -> Self {
+        let all: Vec<Self> = logs.iter().map(|log| Self::of(log)).collect();
+        let mut of_all = all.iter();
+        let Some(first) = of_all.next() else { return Self::default() };
+        let mut out = first.clone();
+        for other in of_all {
+            out.states.retain(|key, value| other.states.get(key) == Some(value));
+            out.seconds = out.seconds.zip(other.seconds).map(|(a, b)| a + b);
+            out.others.push(other.log.clone());
+        }
+        out
+    }
+
     /// Of a recording that is known by its text.
     #[must_use]
     pub fn of_text(name: &str, text: &str, rows: usize, seconds: Option<f64>) -> Self {
@@ -98,14 +114,22 @@ impl Origin {
         Self { log, seconds, ..Self::default() }
     }
 
+    /// Every log.
+    fn logs(&self) -> impl Iterator<Item = &FittedTo> {
+        std::iter::once(&self.log).chain(&self.others)
+    }
+
     /// The line under the sentence: log, rig, date, rows.
     pub(super) fn line(&self) -> String {
-        let mut parts: Vec<String> = vec![self.log.name.clone()];
+        let mut parts: Vec<String> = vec![match self.others.len() {
+            0 => self.log.name.clone(),
+            _ => list(&self.logs().map(|l| l.name.clone()).collect::<Vec<_>>()),
+        }];
         parts.extend(["motor", "propeller", "supply"].iter().filter_map(|k| self.states.get(*k).cloned()));
         parts.extend(self.log.date.clone());
         parts.push(match self.seconds {
-            Some(s) => format!("{} rows in {s:.0} s", self.log.rows),
-            None => format!("{} rows", self.log.rows),
+            Some(s) => format!("{} rows in {s:.0} s", self.logs().map(|l| l.rows).sum::<usize>()),
+            None => format!("{} rows", self.logs().map(|l| l.rows).sum::<usize>()),
         });
         parts.join(" - ")
     }
@@ -115,7 +139,10 @@ impl Origin {
         let model = self.model.as_ref().map(|m| format!(" --model {m}")).unwrap_or_default();
         match &self.hidden {
             Some(h) => format!("quadrig demo --seed {} --effect {}", h.seed, h.id),
-            None => format!("quadrig close-loop {}{model} -o out", self.log.name),
+            None => {
+                let logs: Vec<&str> = self.logs().map(|l| l.name.as_str()).collect();
+                format!("quadrig close-loop {}{model} -o out", logs.join(" "))
+            }
         }
     }
 }
@@ -135,9 +162,11 @@ pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict, 
             rows.push(vec![name.to_owned(), value]);
         }
     };
-    row("log", origin.log.name.clone());
-    row("SHA-256", origin.log.sha256.clone());
-    row("rows", origin.log.rows.to_string());
+    for log in origin.logs() {
+        row("log", log.name.clone());
+        row("SHA-256", log.sha256.clone());
+        row("rows", log.rows.to_string());
+    }
     for key in STATED {
         row(&key.replace('_', " "), origin.states.get(key).cloned().unwrap_or_default());
     }

@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn bars_share_a_scale_and_end_at_the_floor() {
-        let of = |rms: f64| Figures { rms, heldout_rms: rms, whiteness_p: 0.5 };
+        let of = |rms: f64| Figures { rms, heldout_rms: rms, across_runs_rms: None, whiteness_p: 0.5 };
         let mut channels = Channels::default();
         for (name, before) in [("thrust_n", 1.0), ("current_a", 0.1)] {
             let c = Channel { unit: "N".into(), noise_floor_rms: 0.01, before: of(before), after: of(0.01) };

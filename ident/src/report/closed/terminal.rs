@@ -20,7 +20,7 @@ const ASIDE: usize = 5;
 /// The text.
 #[must_use]
 pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
-    let mut out = format!("{}\n{}\n", wrapped(&sentence(verdict, words, news), 0), wrapped(&verdict.run, 0));
+    let mut out = format!("{}\n{}\n", wrapped(&sentence(verdict, words, news), 0), wrapped(&whose(verdict), 0));
     out += &channels(verdict);
     for left_out in &verdict.left_out {
         out += &format!("{}\n", wrapped(&left_out.to_string(), 2));
@@ -47,8 +47,10 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
             out += &format!("  {}\n", wrapped(&steps.join(", "), 2));
         }
     }
-    for v in &verdict.validation {
-        out += &format!("\n{}\n", wrapped(&format!("on {}, which took no part:", v.run), 2));
+    let took_no_part = verdict.validation.iter().map(|v| (v, format!("on {}, which took no part:", v.run)));
+    let of_several = verdict.runs.iter().map(|v| (v, format!("{}, predicted by a fit to the others:", v.run)));
+    for (v, heading) in of_several.chain(took_no_part) {
+        out += &format!("\n{}\n", wrapped(&heading, 2));
         for (name, b) in &v.channels {
             let unit = verdict.channels.get(name).map_or("", |c| c.unit.as_str());
             let [_, before, after] = figures(unit, b.before, b.before, b.after);
@@ -58,9 +60,18 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     out
 }
 
+/// The run, or the runs.
+fn whose(verdict: &Verdict) -> String {
+    let names: Vec<String> = verdict.runs.iter().map(|r| r.run.clone()).collect();
+    match names.len() {
+        0 => verdict.run.clone(),
+        n => format!("{n} runs of one rig: {}", list(&names)),
+    }
+}
+
 fn channels(verdict: &Verdict) -> String {
-    let mut out =
-        format!("\n{:<16}{:>16}{:>16}{:>16}{:>9}  {}\n", "held-out error", "noise floor", "before", "after", "factor", "state");
+    let error = if verdict.runs.is_empty() { "held-out error" } else { "across runs" };
+    let mut out = format!("\n{:<16}{:>16}{:>16}{:>16}{:>9}  {}\n", error, "noise floor", "before", "after", "factor", "state");
     for (name, c) in &verdict.channels {
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
         let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);

@@ -1,0 +1,106 @@
+//! `supply_voltage`: speed and current follow the voltage that the supply gives.
+//!
+//! What it is: at one pulse an ESC gives a share of its supply to the motor, so the speed goes with the measured voltage; the same power
+//! from a higher voltage is less current.
+//! What can go wrong: on one run a voltage falls with the load, and nobody can tell it from what the load does: asked of several runs only.
+//! Units: exponent 1; reference V.
+//! Reference: brushless motor at a fixed duty, V = k omega + R I: the exponent is one without load and falls to two thirds where R I matters.
+
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
+use crate::context::Context;
+use crate::design::TargetDesign;
+use crate::noise::median;
+
+/// See the module.
+pub(crate) struct SupplyVoltage;
+
+/// Least spread of the runs' voltages, as a share, that can tell an exponent.
+const LEAST_SPREAD: f64 = 0.005;
+/// Exponents that a motor can have, of the speed, and of the current less one.
+const EXPONENTS: (f64, f64) = (0.05, 2.0);
+
+impl Effect for SupplyVoltage {
+    fn id(&self) -> &'static str {
+        "supply_voltage"
+    }
+
+    fn about(&self) -> About {
+        About {
+            title: "Speed or current follows the supply's voltage",
+            equation: "rpm *= (voltage_v / reference)^exponent; current_a *= (voltage_v / reference)^-exponent",
+            source: "brushless motor at a fixed duty, V = k omega + R I",
+            depends_on: &["voltage_v"],
+            signature: "runs at another supply voltage turn at another speed for the same pulse",
+            look_alikes: &["supply_sag", "battery_discharge"],
+        }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let of_current = found.channels.iter().any(|c| c == "current_a");
+        Clause::new(if of_current { "the current" } else { "the speed" }, "follows the supply's voltage")
+    }
+
+    fn is_of_every_rig(&self) -> bool {
+        true
+    }
+
+    fn scope(&self, _: &Instance) -> Scope {
+        Scope::Rig
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Gain
+    }
+
+    fn instances(&self, _: &Context) -> Vec<Instance> {
+        Vec::new()
+    }
+
+    fn among(&self, runs: &[&Context]) -> Vec<(Instance, Vec<f64>)> {
+        let of_run = |c: &&Context| c.voltage.as_ref().map(|v| median(&mut v.clone()));
+        let Some(mut voltages) = runs.iter().map(of_run).collect::<Option<Vec<f64>>>() else { return Vec::new() };
+        let (lo, hi) = voltages.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
+        let Some(first) = runs.first().filter(|_| hi > (1.0 + LEAST_SPREAD) * lo && lo > 0.0) else { return Vec::new() };
+        let shape = vec![0.8, median(&mut voltages)];
+        let mut out = Vec::new();
+        if first.pulse.is_some() && !speeds(first).is_empty() {
+            out.push((Instance::new(&speeds(first), ""), shape.clone()));
+        }
+        if first.target("current_a").is_some() {
+            out.push((Instance::new(&["current_a"], OF_CURRENT), shape));
+        }
+        out
+    }
+
+    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
+        let usual = context.voltage.as_ref().map_or(1.0, |v| median(&mut v.clone()));
+        vec![
+            Shape { name: "exponent", unit: "1", range: EXPONENTS, starts: vec![0.8] },
+            // known, not fitted: it stands in the model with the rest
+            Shape { name: "reference", unit: "V", range: (usual, usual), starts: vec![usual] },
+        ]
+    }
+
+    fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
+        Vec::new()
+    }
+
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
+        let (Some(voltage), [exponent, reference]) = (&context.voltage, shape) else { return };
+        let exponent = if instance.form == OF_CURRENT { -exponent } else { *exponent };
+        let factor: Vec<f64> = voltage.iter().map(|v| (v / reference).max(0.1).powf(exponent)).collect();
+        design.scale(&factor);
+    }
+
+    /// The reference is no finding.
+    fn report(&self, _: &Context, _: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
+        fitted.into_iter().filter(|e| e.name != "reference").collect()
+    }
+
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        fitted.iter().any(|e| e.name == "exponent" && e.value > 0.0)
+    }
+}
+
+/// Form of the current.
+const OF_CURRENT: &str = "current";

@@ -1,0 +1,100 @@
+//! The page of several runs of one rig.
+//!
+//! What it is: the page that every closed loop has, on what the runs share; then each run, predicted by a fit to the others, with a link to its
+//! own page, and each parameter run by run.
+//! What can go wrong: a run that cannot tell of an effect has no value of it.
+//! Units: as told.
+//! Reference: specification `formats.md`, `across_runs_rms`.
+
+use super::closed::{self as parts, Origin, Page, Vocabulary};
+use super::page::{cards, over_runs};
+use super::sheet::Sheet;
+use super::svg::escape;
+use crate::close::Closed;
+use crate::effects::Estimate;
+use crate::several::{Outcome, Run};
+use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Validation};
+use crate::words::digits;
+
+/// The report of several runs as one self-contained page; `links` are the pages of the runs, in their order.
+#[must_use]
+pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
+    let v = &outcome.verdict;
+    let shown = shown(runs, outcome);
+    let page = Page {
+        verdict: v,
+        words: Vocabulary::RIG,
+        news: false,
+        origin: Origin::of_several(&runs.iter().map(|r| &r.log).collect::<Vec<_>>()),
+        declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as a geometric mean over the runs.".to_owned(),
+        hero: outcome.shown.as_ref().map(over_runs).unwrap_or_default(),
+        cards: shown.map(|closed| cards(&closed)).unwrap_or_default(),
+        left: Vec::new(),
+        speeds: Vec::new(),
+    };
+    let mut sheet = parts::begin(&page);
+    parameters(&mut sheet, outcome);
+    for (run, of) in v.runs.iter().enumerate() {
+        sheet.fold(&of.run, |sheet| {
+            if let Some(link) = links.get(run) {
+                sheet.html_part(&format!("<p><a href=\"{}\">The run alone</a>, with its own verdict.</p>\n", escape(link)));
+            }
+            sheet.html_part(&parts::bars(&channels(v, outcome, run, of), &[]));
+        });
+    }
+    sheet.html()
+}
+
+/// The run whose figures stand on the cards: the one that the figure that convinces most is of.
+fn shown(runs: &[Run], outcome: &Outcome) -> Option<Closed> {
+    let run = outcome.shown.as_ref()?.run;
+    let log = &runs[run].log;
+    Some(Closed {
+        context: outcome.contexts[run].clone(),
+        diagnosis: runs[run].closed.diagnosis.clone(),
+        declared: outcome.declared.on(log).into_owned(),
+        model: outcome.model.on(log).into_owned(),
+        verdict: outcome.verdict.clone(),
+    })
+}
+
+/// Each parameter of the rig's effects as all runs share it, and as each run alone has it.
+fn parameters(sheet: &mut Sheet, outcome: &Outcome) {
+    let value = |e: &Estimate| digits(e.value, if e.se.is_finite() && e.se > 0.0 { e.se } else { 0.005 * e.value.abs() });
+    let mut rows = Vec::new();
+    for (added, alone) in outcome.model.effects.iter().zip(&outcome.alone) {
+        let context = &outcome.contexts[0];
+        let reported = added.placed.effect.report(context, &added.placed.instance, added.estimates.clone());
+        for e in reported.iter().filter(|e| e.name != "phase") {
+            let mut row = vec![format!("{} {}", added.placed.effect.id(), e.name), e.unit.clone(), value(e)];
+            for run in alone {
+                let run = added.placed.effect.report(context, &added.placed.instance, run.clone());
+                row.push(run.iter().find(|own| own.name == e.name).map_or_else(|| "-".to_owned(), value));
+            }
+            rows.push(row);
+        }
+    }
+    if rows.is_empty() {
+        return;
+    }
+    sheet.section("Each parameter, run by run");
+    sheet.say("All runs together, then each run alone with the same effects. A value that a run alone does not know wanders.");
+    let head: Vec<&str> =
+        ["parameter", "unit", "all runs"].into_iter().chain(outcome.verdict.runs.iter().map(|r| r.run.as_str())).collect();
+    sheet.data("run-by-run", &head, &rows, None);
+}
+
+/// The channels of one run, as the bars have them.
+fn channels(v: &crate::verdict::Verdict, outcome: &Outcome, run: usize, of: &Validation) -> Channels {
+    let mut out = Channels::default();
+    let context = &outcome.contexts[run];
+    for (name, BeforeAfter { before, after }) in &of.channels {
+        let (Some(whole), Some(target)) = (v.channels.get(name), context.target(name)) else { continue };
+        let figures = |rms: f64| Figures { rms, heldout_rms: rms, across_runs_rms: Some(rms), whiteness_p: 1.0 };
+        let floor = context.targets[target].noise.rms;
+        let channel =
+            Channel { unit: whole.unit.clone(), noise_floor_rms: floor, before: figures(*before), after: figures(*after) };
+        out.predicted.insert(name.clone(), channel);
+    }
+    out
+}

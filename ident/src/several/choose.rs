@@ -1,0 +1,221 @@
+//! Which effects the rig has: those without which its runs predict each other worse.
+//!
+//! What it is: effects of the rig that stood, or came close, on any of the runs join one at a time, the one first by which the runs predict
+//! each other best. Then each is asked again beside the others.
+//! What can go wrong: what no single run had among its candidates is not asked.
+//! Units: scores in nats.
+//! Reference: forward selection by cross-validation over groups, Hastie et al. 2009, section 7.10.
+
+use super::joint::{Across, Joint, Shared};
+use super::{FEWEST, Member};
+use crate::close::Closed;
+use crate::context::Context;
+use crate::diagnose::NEEDED_REDUCTION;
+use crate::effects::{self, Amplitude, Estimate, NEEDED_EVIDENCE, Scope};
+use crate::hypothesis::Placed;
+use crate::unexplained::LOUD;
+
+/// Samples of a channel of one run that the shapes are sought on.
+pub(super) const SOUGHT: usize = 1500;
+/// Evaluations for the shapes of a newcomer.
+pub(super) const EVALUATIONS: usize = 30;
+/// Share by which the error of no channel of a run may grow (specification `closing-the-loop.md`, "Real measurements").
+const TOLERANCE: f64 = 0.05;
+/// Candidates of a round whose shapes are sought on all runs together.
+const REFINED: usize = 7;
+/// Candidates of a round of a run that take part.
+const OF_A_ROUND: usize = 4;
+
+/// An effect that the rig has.
+#[derive(Debug, Clone)]
+pub(super) struct Named {
+    /// The effect, with the shapes that all runs share.
+    pub(super) placed: Placed,
+    /// By how much worse the runs predict each other without it, nats.
+    pub(super) score: f64,
+}
+
+/// Candidates: every effect of the rig that stood on a run or came close, with the shapes that it had there.
+fn pool(joint: &Joint<'_, '_>, runs: &[&Closed]) -> Vec<Vec<Placed>> {
+    let mut out: Vec<Vec<Placed>> = Vec::new();
+    let mut add = |p: &Placed| {
+        // what one run alone can tell stays with that run
+        if p.effect.id() == "unknown" || p.effect.scope(&p.instance) != Scope::Rig || joint.tellers(p) < FEWEST {
+            return;
+        }
+        match out.iter_mut().find(|o| is_same(&o[0], p)) {
+            Some(known) => known.push(p.clone()),
+            None => out.push(vec![p.clone()]),
+        }
+    };
+    let contexts: Vec<&Context> = runs.iter().map(|r| &r.context).collect();
+    for effect in effects::library().iter().copied() {
+        effect.among(&contexts).into_iter().for_each(|(instance, shape)| add(&Placed { effect, instance, shape }));
+    }
+    for run in runs {
+        let d = &run.diagnosis;
+        d.best.fit.placed.iter().for_each(&mut add);
+        d.rivals.iter().filter_map(|r| r.fit.placed.last()).for_each(&mut add);
+        d.candidates
+            .iter()
+            .flat_map(|round| round.iter().take(OF_A_ROUND))
+            .filter_map(|c| c.fit.placed.last())
+            .for_each(&mut add);
+    }
+    out
+}
+
+fn is_same(a: &Placed, b: &Placed) -> bool {
+    a.effect.id() == b.effect.id() && a.instance == b.instance
+}
+
+/// The effects that the runs share.
+pub(super) fn choose(runs: &[&Closed], members: &[Member<'_>], progress: &mut dyn FnMut(f64)) -> Vec<Named> {
+    let joint = Joint::of(members);
+    let mut pool = pool(&joint, runs);
+    let mut rig: Vec<Placed> = Vec::new();
+    let mut now = joint.across(&rig, None);
+    for round in 0.. {
+        progress(1.0 - 0.6_f64.powi(round));
+        let Some((at, placed, gain, then)) = best(&joint, &rig, &now, &pool) else { break };
+        rig.push(placed);
+        pool.swap_remove(at);
+        now = then;
+        if gain < NEEDED_EVIDENCE {
+            break;
+        }
+        drop_useless(&joint, &mut rig, &mut now);
+    }
+    let scores: Vec<f64> = (0..rig.len()).map(|k| gain_of(&joint, &rig, &now, k).0).collect();
+    rig.into_iter().zip(scores).map(|(placed, score)| Named { placed, score }).collect()
+}
+
+type Joined = (usize, Placed, f64, Vec<Across>);
+
+/// The candidate by which the runs predict each other best, its shapes sought on all of them; `None` where none helps enough.
+fn best(joint: &Joint<'_, '_>, rig: &[Placed], now: &[Across], pool: &[Vec<Placed>]) -> Option<Joined> {
+    let sketch = |(at, starts): (usize, &Vec<Placed>)| {
+        let gains = starts.iter().map(|p| (at, p.clone(), tried(joint, rig, now, p).0));
+        gains.max_by(|a, b| a.2.total_cmp(&b.2))
+    };
+    let free = pool.iter().enumerate().filter(|(_, starts)| may_stand_beside(rig, &starts[0]));
+    let mut sketched: Vec<(usize, Placed, f64)> = free.filter_map(sketch).collect();
+    sketched.sort_by(|a, b| b.2.total_cmp(&a.2));
+    for (at, start, _) in sketched.into_iter().take(REFINED) {
+        let mut with = rig.to_vec();
+        with.push(start);
+        let with = joint.refined(&with, &[rig.len()], SOUGHT, EVALUATIONS);
+        let newest = &with[rig.len()];
+        let (gain, then) = tried(joint, rig, now, newest);
+        if gain > NEEDED_EVIDENCE && is_worth(now, &then) && harms(now, &then).is_none() && is_plausible(joint, &with) {
+            return Some((at, newest.clone(), gain, then));
+        }
+    }
+    None
+}
+
+/// Whether no other form of the effect stands on one of its channels.
+fn may_stand_beside(rig: &[Placed], newcomer: &Placed) -> bool {
+    let same =
+        |p: &&Placed| p.effect.id() == newcomer.effect.id() && p.instance.channels.iter().any(|c| newcomer.instance.touches(c));
+    !rig.iter().any(|p| same(&p))
+}
+
+/// Whether it takes enough off the error of one of its channels, on average over the runs, to be worth a name.
+fn is_worth(before: &[Across], after: &[Across]) -> bool {
+    let gone = |channel: &str| {
+        let own = before.iter().zip(after).filter(|(b, _)| b.channel == channel);
+        let (sum, n) = own.fold((0.0, 0.0), |(s, n), (b, a)| (s + (b.rms.max(b.floor) / a.rms.max(a.floor)).ln(), n + 1.0));
+        1.0 - f64::exp(-sum / n)
+    };
+    before.iter().any(|b| gone(b.channel) > NEEDED_REDUCTION)
+}
+
+/// What a newcomer adds to how well the runs predict each other, and their errors then.
+fn tried(joint: &Joint<'_, '_>, rig: &[Placed], now: &[Across], newest: &Placed) -> (f64, Vec<Across>) {
+    let touched: Vec<&'static str> = now.iter().map(|a| a.channel).filter(|c| newest.instance.touches(c)).collect();
+    let mut channels = touched;
+    channels.dedup();
+    let with: Vec<Placed> = rig.iter().chain([newest]).cloned().collect();
+    let changed = joint.across(&with, Some(&channels));
+    merged(now, &changed)
+}
+
+/// The errors with those of some channels made anew, and the gain in score.
+fn merged(now: &[Across], changed: &[Across]) -> (f64, Vec<Across>) {
+    let of = |a: &Across| changed.iter().find(|c| c.run == a.run && c.channel == a.channel).copied().unwrap_or(*a);
+    let then: Vec<Across> = now.iter().map(of).collect();
+    let gain = then.iter().map(Across::score).sum::<f64>() - now.iter().map(Across::score).sum::<f64>();
+    (gain, then)
+}
+
+/// A channel whose error on a run grows: by more than days differ where it is loud, or until it is.
+pub(super) fn harms(before: &[Across], after: &[Across]) -> Option<&'static str> {
+    let worse = |(b, a): &(&Across, &Across)| a.rms > ((1.0 + TOLERANCE) * b.rms).max(LOUD * a.floor);
+    before.iter().zip(after).find(worse).map(|(b, _)| b.channel)
+}
+
+/// Whether no shape lies on its bound, and each effect makes sense on one of the runs at least.
+fn is_plausible(joint: &Joint<'_, '_>, rig: &[Placed]) -> bool {
+    let shared = joint.shared(rig);
+    let makes_sense = |(k, p): (usize, &Placed)| {
+        let ranges = joint.ranges(p);
+        let inside = ranges.iter().zip(&p.shape).all(|(range, v)| {
+            let margin = 1e-3 * (range.1 - range.0);
+            range.1 <= range.0 || (*v > range.0 + margin && *v < range.1 - margin)
+        });
+        let estimates = estimates(joint, rig, k, &shared);
+        inside && joint.members.iter().any(|m| p.effect.plausible(m.context, &p.instance, &estimates))
+    };
+    rig.iter().enumerate().all(makes_sense)
+}
+
+/// Parameters of one of the rig's effects, errors as all runs together leave them; those of shapes are not a number.
+pub(super) fn estimates(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, shared: &[Shared]) -> Vec<Estimate> {
+    let p = &rig[k];
+    let Some(member) = joint.members.first() else { return Vec::new() };
+    let shapes = p.effect.shapes(member.context, &p.instance);
+    let shapes = shapes.iter().zip(&p.shape);
+    let mut out: Vec<Estimate> =
+        shapes.map(|(s, v)| Estimate { name: s.name.into(), unit: s.unit.into(), value: *v, se: f64::NAN }).collect();
+    for (i, Amplitude { name, unit }) in p.effect.amplitudes(&p.instance).into_iter().enumerate() {
+        let label = crate::design::Label::Effect { effect: k, amplitude: i };
+        let of = |s: &Shared| {
+            // a channel that the amplitude does not reach has nothing of it
+            let j = s.labels.iter().position(|l| *l == label).filter(|j| s.coefficients[*j] != 0.0)?;
+            Some(Estimate {
+                name: name.into(),
+                unit: unit.into(),
+                value: s.coefficients[j],
+                se: s.covariance[(j, j)].max(0.0).sqrt(),
+            })
+        };
+        out.extend(shared.iter().find_map(of));
+    }
+    out
+}
+
+/// What an effect is worth beside the others, and the errors without it.
+fn gain_of(joint: &Joint<'_, '_>, rig: &[Placed], now: &[Across], k: usize) -> (f64, Vec<Across>) {
+    let mut others = rig.to_vec();
+    let left = others.remove(k);
+    let mut channels: Vec<&'static str> = now.iter().map(|a| a.channel).filter(|c| left.instance.touches(c)).collect();
+    channels.dedup();
+    let (gain, then) = merged(now, &joint.across(&others, Some(&channels)));
+    (-gain, then)
+}
+
+/// Effects that the later ones have made needless go.
+fn drop_useless(joint: &Joint<'_, '_>, rig: &mut Vec<Placed>, now: &mut Vec<Across>) {
+    loop {
+        let worth = |k: usize| (k, gain_of(joint, rig, now, k));
+        let least = (0..rig.len()).map(worth).min_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        match least {
+            Some((k, (gain, then))) if gain < NEEDED_EVIDENCE && rig.len() > 1 => {
+                rig.remove(k);
+                *now = then;
+            }
+            _ => return,
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The entries of a verdict on several runs.
+//!
+//! What it is: each effect of the rig with the parameters that all runs share and what it takes off the error of a run that no fit saw; each
+//! run's own drifts and events; what is left.
+//! What can go wrong: what is left on one run only is told with that run's name.
+//! Units: as the channels.
+//! Reference: specification `formats.md`, "Verdict".
+
+use super::choose::Named;
+use super::joint::{Across, Joint};
+use super::outcome::{Run, is_contrast, typical};
+use super::own::Worth;
+use crate::close::parameter;
+use crate::context::Context;
+use crate::effects::{EffectEntry, Estimate, Scope};
+use crate::hypothesis::Placed;
+use crate::model::{AddedEffect, RunLevel};
+use crate::unexplained::LOUD;
+use crate::verdict::Unexplained;
+use crate::words::channel as spoken;
+
+/// Nats of score that are one nat of probability: a score counts samples as far as the residual's colour leaves them independent, but not the
+/// misfit that all models share.
+const TEMPERATURE: f64 = 4.0;
+
+/// An effect of the rig.
+pub(super) fn entry(joint: &Joint<'_, '_>, named: &[Named], k: usize, after: &[Across], estimates: &[Estimate]) -> EffectEntry {
+    let (p, score) = (&named[k].placed, named[k].score);
+    let others: Vec<Placed> = named.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, n)| n.placed.clone()).collect();
+    let without = joint.across(&others, None);
+    let taken = |channel: &str| {
+        let pooled = |list: &[Across]| typical(list.iter().filter(|a| a.channel == channel).map(|a| a.rms));
+        1.0 - pooled(after) / pooled(&without)
+    };
+    let mut channels: Vec<String> = p.instance.channels.iter().filter(|c| !is_contrast(c)).cloned().collect();
+    channels.sort_by(|a, b| or_nothing(taken(b)).total_cmp(&or_nothing(taken(a))));
+    let first = channels.first().cloned().unwrap_or_default();
+    let reduction = or_nothing(taken(&first));
+    let shapes = joint.members.first().map(|m| p.effect.shapes(m.context, &p.instance)).unwrap_or_default();
+    let reported =
+        joint.members.first().map_or_else(|| estimates.to_vec(), |m| p.effect.report(m.context, &p.instance, estimates.to_vec()));
+    let about = p.effect.about();
+    let better = |a: &&Across| without.iter().any(|w| w.run == a.run && w.channel == a.channel && w.rms > a.rms);
+    let helped = after.iter().filter(|a| a.channel == first).filter(better).count();
+    EffectEntry {
+        id: p.effect.id().to_owned(),
+        scope: p.effect.scope(&p.instance),
+        depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
+        equation: equation(p),
+        probability: probability(score),
+        parameters: reported.iter().map(|e| parameter(e, &shapes)).collect(),
+        heldout_error_reduction: reduction,
+        evidence: format!(
+            "{}; learnt from the other runs it makes {} smaller on {helped} of {} runs, {:.2} times over all",
+            about.signature,
+            spoken(&first),
+            after.iter().filter(|a| a.channel == first).count(),
+            1.0 / (1.0 - reduction).max(1e-6)
+        ),
+        channels,
+    }
+}
+
+fn or_nothing(reduction: f64) -> f64 {
+    if reduction.is_finite() { reduction.max(0.0) } else { 0.0 }
+}
+
+/// The drifts and events of one run.
+pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -> Vec<EffectEntry> {
+    let told = |(added, worth): (&AddedEffect, &Worth)| {
+        let p = &added.placed;
+        let (first, reduction) = worth
+            .reduction
+            .iter()
+            .copied()
+            .filter(|(c, _)| !is_contrast(c))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or(("", 0.0));
+        let mut channels: Vec<String> = p.instance.channels.iter().filter(|c| !is_contrast(c)).cloned().collect();
+        if let Some(at) = channels.iter().position(|c| c == first) {
+            channels.swap(0, at);
+        }
+        let shapes = p.effect.shapes(context, &p.instance);
+        let reported = p.effect.report(context, &p.instance, added.estimates.clone());
+        let scope = match p.effect.scope(&p.instance) {
+            Scope::Rig => Scope::Run,
+            own => own,
+        };
+        let times = 1.0 / (1.0 - or_nothing(reduction)).max(1e-6);
+        EffectEntry {
+            id: p.effect.id().to_owned(),
+            scope,
+            depends_on: p.effect.about().depends_on.iter().map(|v| (*v).to_owned()).collect(),
+            equation: equation(p),
+            probability: probability(worth.gain),
+            parameters: reported.iter().map(|e| parameter(e, &shapes)).collect(),
+            heldout_error_reduction: or_nothing(reduction),
+            evidence: format!(
+                "on {} alone; {}; without it the error of {} there is {times:.2} times as large",
+                context.name,
+                p.effect.about().signature,
+                spoken(first)
+            ),
+            channels,
+        }
+    };
+    own.effects.iter().zip(worths).map(told).collect()
+}
+
+fn equation(p: &Placed) -> String {
+    let about = p.effect.about();
+    if p.instance.form.is_empty() { about.equation.to_owned() } else { format!("{} [{}]", about.equation, p.instance.form) }
+}
+
+fn probability(score: f64) -> f64 {
+    1.0 / (1.0 + (-score / TEMPERATURE).exp())
+}
+
+/// Every channel that is loud on a run after all, once, with the run on which it is loudest; and every contrast of a speed sensor that a run
+/// alone left unexplained.
+pub(super) fn unexplained(runs: &[Run], after: &[Across]) -> Vec<Unexplained> {
+    let mut loud: Vec<&Across> = after.iter().filter(|a| a.rms > LOUD * a.floor && !is_contrast(a.channel)).collect();
+    loud.sort_by(|a, b| (b.rms / b.floor).total_cmp(&(a.rms / a.floor)));
+    let mut out: Vec<Unexplained> = Vec::new();
+    for a in loud {
+        if out.iter().any(|u| u.channel == a.channel) {
+            continue;
+        }
+        let run = &runs[a.run].closed.verdict;
+        let told = run.unexplained.iter().find(|u| u.channel == a.channel);
+        let looks_like = match told {
+            Some(told) => format!("loudest on {}: {}", run.run, told.looks_like),
+            None => format!("loudest on {}, which alone is explained: it differs from run to run", run.run),
+        };
+        let depends_on = told.map(|t| t.depends_on.clone()).unwrap_or_default();
+        out.push(Unexplained { channel: a.channel.to_owned(), over_floor: a.rms / a.floor, depends_on, looks_like });
+    }
+    for run in runs.iter().map(|r| &r.closed.verdict) {
+        for told in run.unexplained.iter().filter(|u| u.channel.ends_with(" - others")) {
+            if !out.iter().any(|u| u.channel == told.channel) {
+                out.push(Unexplained { looks_like: format!("on {}: {}", run.run, told.looks_like), ..told.clone() });
+            }
+        }
+    }
+    out
+}
+
+/// Where something is left and nothing has a name.
+pub(super) fn unnamed(left: &Unexplained) -> EffectEntry {
+    EffectEntry {
+        id: "unknown".to_owned(),
+        scope: Scope::Run,
+        channels: vec![left.channel.trim_end_matches(" - others").to_owned()],
+        depends_on: left.depends_on.clone(),
+        equation: "none: nothing that was tried predicts the other runs".to_owned(),
+        probability: 1.0,
+        parameters: Vec::new(),
+        heldout_error_reduction: 0.0,
+        evidence: left.looks_like.clone(),
+    }
+}

@@ -1,0 +1,80 @@
+//! Several runs of one rig, in one fit.
+//!
+//! What it is: what belongs to the rig (its declared polynomials, effects of scope `rig`) has one set of values for all runs; the constant of
+//! each channel, and drifts and events, belong to a run. Each run is predicted whole by a fit to the others, and what predicts them best
+//! is named.
+//! What can go wrong: runs of two rigs have no common model: every name fails on the other's runs.
+//! Units: as the channels.
+//! Reference: specification `formats.md`, "Scope" and `across_runs_rms`; cross-validation over groups, Roberts et al. 2017, Ecography 40:913.
+
+mod alone;
+mod choose;
+mod entries;
+mod equations;
+mod joint;
+mod outcome;
+mod own;
+
+use crate::close::Closed;
+use crate::context::{Context, Relation};
+use crate::effects::{Scope, Stage};
+use crate::hypothesis::{Declared, Placed, Rows, design};
+use crate::samples::Samples;
+
+pub use alone::{RunsError, close_each};
+pub use outcome::{FEWEST, Outcome, Run, Shown, close_together};
+
+/// A run with what a joint fit knows of it.
+#[derive(Debug, Clone)]
+struct Member<'a> {
+    /// The run made ready.
+    context: &'a Context,
+    /// Its own drifts and events, and what no other run can tell of, as it alone has them.
+    own: Vec<Placed>,
+    /// For each target and sample its weight, in independent samples of unit variance.
+    weights: Vec<Vec<f64>>,
+    /// For each target how many independent samples it holds.
+    independent: Vec<f64>,
+}
+
+impl<'a> Member<'a> {
+    /// A run on which the loop was closed alone. Its weights are one over the variance that its own best hypothesis leaves, less what the
+    /// colour of the residual takes.
+    fn of(closed: &Closed, context: &'a Context, all: &[Context]) -> Option<Self> {
+        let best = &closed.diagnosis.best.fit;
+        let of_one = |p: &Placed| all.iter().filter(|c| tells(c, p)).count() < FEWEST;
+        let is_own =
+            |p: &&Placed| p.effect.id() != "unknown" && (p.effect.scope(&p.instance) != Scope::Rig || of_one(p)) && !p.is_tare();
+        let own = best.placed.iter().filter(is_own).cloned().collect();
+        let weights = (0..context.targets.len()).map(|k| weights(context, &best.placed, k, best.targets[k].share));
+        let independent = context.targets.iter().zip(&best.targets).map(|(t, fit)| t.rows.len() as f64 * fit.share).collect();
+        Some(Self { context, own, weights: weights.collect::<Option<_>>()?, independent })
+    }
+
+    fn tells(&self, p: &Placed) -> bool {
+        tells(self.context, p)
+    }
+}
+
+/// Whether a run can tell of an effect: it has one of its channels, and is no table of levels where the effect acts between two levels.
+fn tells(context: &Context, p: &Placed) -> bool {
+    let acts = p.stage() != Stage::Output || !context.is_table();
+    acts && p.instance.channels.iter().any(|c| context.target(c).is_some())
+}
+
+fn weights(context: &Context, placed: &[Placed], k: usize, share: f64) -> Option<Vec<f64>> {
+    let target = &context.targets[k];
+    let design = design(context, Declared::default(), placed, target);
+    let samples = Samples::new(target, Rows::All, context.len());
+    let (solution, _, kept) = samples.solve(&design, false)?;
+    let excess = |i: usize| kept.jumps.map_or(1.0, |(unsettled, excess)| if unsettled[i] { excess } else { 1.0 });
+    let residual = kept.residual(&solution.coefficients);
+    let weighted = residual.iter().zip(&target.levelled).enumerate().map(|(i, (r, v))| r * r / (v * excess(i)));
+    let scale = (weighted.sum::<f64>() / residual.len() as f64).max(target.least_scale());
+    Some(target.levelled.iter().enumerate().map(|(i, v)| share / (v * excess(i) * scale)).collect())
+}
+
+/// Whether a channel is one that a prediction of another run is judged on.
+fn is_judged(relation: Relation) -> bool {
+    !matches!(relation, Relation::ThrustRms | Relation::SpeedAlone)
+}

@@ -1,0 +1,81 @@
+//! `quadrig close-loop` on several runs of one rig.
+//!
+//! What it is: each run closed alone, then all in one fit; the folder holds the rig's model, verdict and page, and below `runs` those of each run.
+//! What can go wrong: an attitude or flight log among them, a log twice, or a run that cannot be closed is refused by name.
+//! Units: as the channels state.
+//! Reference: specification `formats.md`, "Command line".
+
+use super::{Args, flight, inertial, write_folder};
+use crate::Failure;
+use crate::open::open;
+use crate::progress::Bar;
+use ident::close::validation;
+use ident::log::write_whole;
+use ident::report::{Origin, Vocabulary, several, terminal};
+use ident::several::{Outcome, Run, close_each, close_together};
+use std::path::Path;
+
+/// Runs the command.
+pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    if let Some(path) = args.logs.iter().find(|p| inertial::is_attitude_log(p) || flight::is_flight_log(p)) {
+        return Err(
+            format!("{}: no log of a rig; several logs are several runs of one rig: give it alone", path.display()).into()
+        );
+    }
+    if let Some(model) = &args.model {
+        let asked = "--model asks what is new on one run; give one log, or leave --model out";
+        return Err(format!("{}: {asked}", model.display()).into());
+    }
+    let options = args.columns.options(&args.names);
+    let logs = args.logs.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    let (runs, mut outcome) = {
+        let bar = Bar::new("searching", quiet);
+        let runs = close_each(logs, &|share| bar.set(0.7 * share))?;
+        let outcome = close_together(&runs, &mut |share| bar.set(0.7 + 0.3 * share));
+        (runs, outcome)
+    };
+    outcome.verdict.validation = others.iter().map(|other| validation(other, &outcome.declared, &outcome.model)).collect();
+    let json = serde_json::to_string_pretty(&outcome.verdict)?;
+    if let Some(folder) = &args.output {
+        write(folder, &runs, &outcome, &json)?;
+    }
+    if args.json {
+        println!("{json}");
+    } else if !quiet {
+        print!("{}", terminal(&outcome.verdict, Vocabulary::RIG, false));
+    }
+    Ok(())
+}
+
+/// The rig's files, and a folder for each run.
+fn write(folder: &Path, runs: &[Run], outcome: &Outcome, json: &str) -> Result<(), Failure> {
+    let names = names(runs);
+    for (run, name) in runs.iter().zip(&names) {
+        let json = serde_json::to_string_pretty(&run.closed.verdict)?;
+        write_folder(&folder.join("runs").join(name), &run.log, &run.closed, &json, Origin::of(&run.log))?;
+    }
+    let links: Vec<String> = names.iter().map(|name| format!("runs/{name}/report.html")).collect();
+    let say = |e: std::io::Error| format!("{}: {e}", folder.display());
+    write_whole(&folder.join("model.toml"), |out| out.write_all(outcome.model.to_toml().as_bytes())).map_err(say)?;
+    write_whole(&folder.join("verdict.json"), |out| writeln!(out, "{json}")).map_err(say)?;
+    let page = several(runs, outcome, &links);
+    write_whole(&folder.join("report.html"), |out| out.write_all(page.as_bytes())).map_err(say)?;
+    Ok(())
+}
+
+/// A folder's name for each run: its file's without the ending, numbered where two are alike.
+fn names(runs: &[Run]) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for run in runs {
+        let stem = Path::new(&run.log.name).file_stem().map_or_else(|| "run".to_owned(), |s| s.to_string_lossy().into_owned());
+        let mut name = stem.clone();
+        let mut n = 2;
+        while out.contains(&name) {
+            name = format!("{stem}-{n}");
+            n += 1;
+        }
+        out.push(name);
+    }
+    out
+}

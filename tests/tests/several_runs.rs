@@ -1,0 +1,153 @@
+//! `quadrig close-loop` on several runs of one rig: what the rig has is shared, what one run has is dated, and each run is predicted whole by
+//! a fit to the others.
+//!
+//! What it is: simulated rigs with two hidden effects on other schedules, one of them with a slipped zero or at another supply voltage; the
+//! recorded lever rig; the command's files and refusals.
+//! What can go wrong: a rig that is simulated well is easier than a real one: the recorded runs are the judge.
+//! Reference: specification `formats.md`, "Scope" and `across_runs_rms`; `closing-the-loop.md`, "Real measurements".
+
+use ident::close::{close, validation};
+use ident::effects::Scope;
+use ident::log::Log;
+use ident::model::Model;
+use ident::several::{Outcome, Run, close_each, close_together};
+use ident::verdict::EffectEntry;
+use quadrig_tests::{call, data, files};
+use std::path::Path;
+use tempfile::TempDir;
+
+const LEAD_OHM: f64 = 0.05;
+const LEAD: &str = "[[effect]]\nid = \"supply_sag\"\nresistance_ohm = 0.05\n";
+const SLOW_CELL: &str = "[[effect]]\nid = \"channel_filter\"\ntau_s = 0.3\n";
+const SLIPPED: &str = "[[effect]]\nid = \"tare_shift\"\noffset_n = 0.15\nt0_s = 40.0\n";
+const ONE_SENSOR: &str = "[sensors]\nfitted = [\"opto\"]\n";
+
+/// A run of the simulated rig, every one on another schedule.
+fn flown(folder: &Path, number: u32, supply: &str, effects: &str) -> Log {
+    let (step, top) = (80 + 20 * number, (1800 + 60 * number).min(2000));
+    let schedule = format!("schedule = {{ kind = \"up_down\", step_us = {step}, hold_s = 4, top_us = {top} }}\n");
+    let text = format!("seed = {}\n{schedule}{supply}{ONE_SENSOR}{effects}", 20 + number);
+    let name = format!("r{number}");
+    std::fs::write(folder.join(format!("{name}.toml")), text).unwrap();
+    call(folder, &["--quiet", "sim", &format!("{name}.toml"), "-o", &format!("{name}.csv")]).succeeded();
+    Log::read(&folder.join(format!("{name}.csv"))).unwrap()
+}
+
+fn together(logs: Vec<Log>) -> (Vec<Run>, Outcome) {
+    let runs = close_each(logs, &|_| {}).unwrap();
+    let outcome = close_together(&runs, &mut |_| {});
+    (runs, outcome)
+}
+
+fn entry<'o>(outcome: &'o Outcome, id: &str) -> &'o EffectEntry {
+    let effects = &outcome.verdict.effects;
+    effects
+        .iter()
+        .find(|e| e.id == id)
+        .unwrap_or_else(|| panic!("no {id} among {:?}", effects.iter().map(|e| &e.id).collect::<Vec<_>>()))
+}
+
+#[test]
+fn what_the_rig_has_is_shared_and_what_one_run_has_is_dated() {
+    let folder = TempDir::new().unwrap();
+    let both = format!("{LEAD}{SLOW_CELL}");
+    let logs: Vec<Log> =
+        (1..=3).map(|n| flown(folder.path(), n, "", &if n == 2 { format!("{both}{SLIPPED}") } else { both.clone() })).collect();
+    let (runs, outcome) = together(logs);
+
+    for id in ["supply_sag", "channel_filter"] {
+        let e = entry(&outcome, id);
+        assert_eq!(e.scope, Scope::Rig, "{id}");
+        assert!(e.probability > 0.9 && e.evidence.contains("3 of 3 runs"), "{id}: {}", e.evidence);
+    }
+    let ohm = &entry(&outcome, "supply_sag").parameters[0];
+    assert!(ohm.ci95[0] < LEAD_OHM && LEAD_OHM < ohm.ci95[1] && ohm.ci95[1] - ohm.ci95[0] < 0.01, "{ohm:?}");
+    let slip = entry(&outcome, "tare_shift");
+    assert!(slip.scope == Scope::Event && slip.evidence.contains("r2.csv alone"), "{slip:?}");
+
+    // nothing gets worse, and most goes
+    let v = &outcome.verdict;
+    assert_eq!(v.runs.len(), 3);
+    for run in &v.runs {
+        assert!(run.channels.values().all(|b| b.after < 1.05 * b.before), "{run:?}");
+    }
+    for (channel, factor) in [("thrust_n", 3.0), ("voltage_v", 5.0)] {
+        let c = &v.channels[channel];
+        let across = [c.before, c.after].map(|f| f.across_runs_rms.unwrap());
+        assert!(across[0] > factor * across[1], "{channel}: {across:?}");
+    }
+
+    // the file knows the event on its own run only: the run itself is predicted with it, a fresh run without
+    let model = Model::parse("model.toml", &outcome.model.to_toml()).unwrap();
+    assert_eq!(model.to_toml(), outcome.model.to_toml(), "the file reads back as it was");
+    let fresh = flown(folder.path(), 4, "", &both);
+    let error = |log: &Log| validation(log, &outcome.declared, &model).channels["thrust_n"];
+    let on_its_run = error(&runs[1].log);
+    assert!(on_its_run.after < 0.05, "{on_its_run:?}: a slip of 0.15 N would leave more");
+    let elsewhere = error(&fresh);
+    assert!(elsewhere.after < 0.05 && elsewhere.before > 3.0 * elsewhere.after, "{elsewhere:?}");
+}
+
+#[test]
+fn runs_at_other_supply_voltages_are_one_rig() {
+    let folder = TempDir::new().unwrap();
+    let supply = |volts: f64| format!("supply = {{ kind = \"bench\", voltage_v = {volts} }}\n");
+    let logs: Vec<Log> = (1..=3).map(|n| flown(folder.path(), n, &supply(10.0 + f64::from(n)), "")).collect();
+    let (_, outcome) = together(logs);
+    let exponent = |channel: &str| {
+        let of = outcome.verdict.effects.iter().find(|e| e.id == "supply_voltage" && e.channels.iter().any(|c| c == channel));
+        of.unwrap_or_else(|| panic!("{channel} does not follow the supply")).parameters[0].value
+    };
+    let speed = exponent("rpm_opto");
+    assert!((0.6..1.05).contains(&speed), "V = k omega + R I: {speed}");
+    let c = &outcome.verdict.channels["rpm_opto"];
+    assert!(c.before.heldout_rms > 2.0 * c.after.heldout_rms, "{c:?}");
+    // one run alone cannot tell
+    let alone = close(&flown(folder.path(), 5, &supply(12.0), ""), None, &[], &mut |_| {}).unwrap();
+    assert!(alone.verdict.effects.iter().all(|e| e.id != "supply_voltage"));
+}
+
+#[test]
+fn the_command_writes_the_rig_and_each_run_and_refuses_what_is_no_set_of_runs() {
+    let folder = TempDir::new().unwrap();
+    let at = folder.path();
+    (1..=2).for_each(|n| drop(flown(at, n, "", LEAD)));
+    call(at, &["--quiet", "close-loop", "r1.csv", "r2.csv", "-o", "out"]).succeeded();
+    let verdict: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(at.join("out/verdict.json")).unwrap()).unwrap();
+    assert_eq!(verdict["runs"].as_array().map(Vec::len), Some(2));
+    assert!(verdict["channels"]["voltage_v"]["after"]["across_runs_rms"].is_f64());
+    let page = std::fs::read_to_string(at.join("out/report.html")).unwrap();
+    for said in ["The supply lead drops", "Each run, predicted by the others", "runs/r1/report.html", "runs/r2/report.html"] {
+        assert!(page.contains(said), "the page does not say {said}");
+    }
+    assert!(at.join("out/runs/r2/verdict.json").is_file() && at.join("out/model.toml").is_file());
+
+    std::fs::write(at.join("imu.csv"), "t_s,gx,gy,gz,ax,ay,az\n0,0,0,0,0,0,9.8\n").unwrap();
+    for (words, said) in [
+        (["close-loop", "r1.csv", "r1.csv"], "are the same log"),
+        (["close-loop", "r1.csv", "imu.csv"], "imu.csv: no log of a rig"),
+        (["close-loop", "r1.csv", "nothing.csv"], "nothing.csv"),
+    ] {
+        let refused = call(at, &words);
+        let _ = refused.refused(&[said]);
+    }
+}
+
+/// Four runs of one rig at four supply voltages, that nobody here made: every error falls on a run that took no part, by three times on
+/// average, and none grows.
+#[test]
+fn the_recorded_lever_rig_predicts_each_of_its_runs_from_the_others() {
+    let Some(data) = data("the recorded lever rig, four runs together") else { return };
+    let logs = files(&data.join("rig/lever-rig-10x45/tidy"), |name| name.ends_with(".csv"));
+    let logs = logs.iter().map(|f| ident::import::import(f, &[]).unwrap().0).collect();
+    let (_, outcome) = together(logs);
+    let pairs: Vec<_> = outcome.verdict.runs.iter().flat_map(|r| r.channels.values()).collect();
+    let factor = f64::exp(pairs.iter().map(|b| (b.before / b.after).ln()).sum::<f64>() / pairs.len() as f64);
+    println!("{} predictions, {factor:.2} times smaller", pairs.len());
+    assert!(pairs.len() == 16 && factor > 3.0, "{factor}");
+    assert!(pairs.iter().all(|b| b.after < 1.05 * b.before));
+    for id in ["channel_filter", "supply_sag", "spinup_lag"] {
+        assert_eq!(entry(&outcome, id).scope, Scope::Rig);
+    }
+}
