@@ -12,6 +12,7 @@ mod number;
 mod text;
 
 use crate::Failure;
+use crate::apart::Paths;
 use dcm::calibration::Calibration;
 use dcm::{Classic, ClassicConfig, Config, Dcm, Earth, Fresh, Mat3, Measurement, euler_of, quaternion_of};
 use ident::log::write_whole;
@@ -50,6 +51,13 @@ enum Preset {
     Default,
     Classic,
     Razor,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.input]).reads(&self.calibration).writes("OUTPUT", [&self.output])
+    }
 }
 
 /// Either filter.

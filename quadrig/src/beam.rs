@@ -6,12 +6,14 @@
 //! Reference: Beharie 2013, Eq. 5.53 to 5.56 as corrected in the errata.
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::figures;
 use ident::beam::Beam;
 use ident::context::Context;
 use ident::log::{Log, write_whole};
 use ident::plateau::plateaus;
 use ident::quantity::{Density, Kilogram, Metre, Newton, Pascal, RevPerMin, Volt};
-use ident::report::{beam, beam_figures, beam_warning, write_figures};
+use ident::report::{beam, beam_figures, beam_warning};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -77,6 +79,13 @@ pub(crate) struct Args {
     json: bool,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.run).writes("-o", &self.output).fills("--svg", &self.svg)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let design = design(args)?;
@@ -87,7 +96,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     if let Some(folder) = &args.svg {
-        write_figures(folder, sheet.drawn()).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
+        figures(folder, sheet.drawn())?;
     }
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -6,6 +6,8 @@
 //! Reference: specification `identification.md`.
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::figures;
 use ident::identify::{Identified, identify};
 use ident::log::{Log, write_whole};
 use ident::report::number;
@@ -29,6 +31,18 @@ pub(crate) struct Args {
     /// A second run to lay beside it on the page.
     #[arg(long, value_name = "LOG")]
     beside: Option<PathBuf>,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default()
+            .reads([&self.log])
+            .reads(&self.beside)
+            .writes("-o", [&self.output])
+            .writes("--report", &self.report)
+            .fills("--svg", &self.svg)
+    }
 }
 
 /// Runs the command.
@@ -66,7 +80,7 @@ fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     if let Some(folder) = &args.svg {
-        ident::report::write_figures(folder, sheet.drawn()).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
+        figures(folder, sheet.drawn())?;
     }
     Ok(())
 }
@@ -103,7 +117,7 @@ fn text(found: &Identified) -> String {
     for f in &found.curves {
         let chosen = f.orders.iter().find(|o| o.chosen).map_or_else(String::new, |o| format!(", order by AICc {}", o.degree));
         let left_out =
-            if f.curve.outliers.is_empty() { String::new() } else { format!(", left out: plateaus {:?}", f.curve.outliers) };
+            if f.curve.outliers.is_empty() { String::new() } else { format!(", left out: points {}", listed(&f.curve.outliers)) };
         let coefficients = (0..=f.degree).map(|k| f.curve.coefficient(k));
         out += &format!(
             "{:<14} {}; chi2 {:.2}{chosen}{left_out}\n",
@@ -127,6 +141,11 @@ fn text(found: &Identified) -> String {
         );
     }
     out
+}
+
+/// Places with a comma between them, counted from 1.
+fn listed(places: &[usize]) -> String {
+    places.iter().map(|n| (n + 1).to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// What the board told of the run, where it told anything.

@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`.
 
 use crate::Failure;
+use crate::apart::Paths;
 use ident::import::Mapping;
 use std::path::PathBuf;
 
@@ -41,6 +42,13 @@ impl std::str::FromStr for Meta {
         }
         let read = format!("v = {value}").parse::<toml::Table>().ok().and_then(|mut table| table.remove("v"));
         Ok(Self(key.to_owned(), read.unwrap_or_else(|| toml::Value::String(value.to_owned()))))
+    }
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.file]).writes("-o", [&self.output])
     }
 }
 

@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod ahrs;
+mod apart;
 mod beam;
 mod board;
 mod calibrate;
@@ -18,6 +19,7 @@ mod end;
 mod evidence;
 mod flash;
 mod fly;
+mod folder;
 mod identify;
 mod import;
 mod imu;
@@ -40,6 +42,7 @@ mod step;
 mod view;
 mod virtual_port;
 
+use apart::Paths;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -112,35 +115,68 @@ enum Command {
 /// What went wrong, as one line.
 type Failure = Box<dyn std::error::Error>;
 
+impl Command {
+    /// What it reads and writes.
+    fn paths(&self) -> Paths<'_> {
+        match self {
+            Self::Demo(args) => args.paths(),
+            Self::Sim(args) => args.paths(),
+            Self::Runs(args) => args.paths(),
+            Self::Import(args) => args.paths(),
+            Self::Identify(args) => args.paths(),
+            Self::Plateaus(args) => args.paths(),
+            Self::CloseLoop(args) => args.paths(),
+            Self::Select(args) => args.paths(),
+            Self::Beam(args) => args.paths(),
+            Self::Calibrate(args) => args.paths(),
+            Self::Recalibrate(args) => args.paths(),
+            Self::Ahrs(args) => args.paths(),
+            Self::Loop(args) => args.paths(),
+            Self::Fly(args) => args.paths(),
+            Self::Measured(args) => args.paths(),
+            Self::Isolability(args) => args.paths(),
+            Self::Log(args) => args.paths(),
+            Self::Rig(args) => args.paths(),
+            Self::Effects(args) => args.paths(),
+            Self::Predict(args) => args.paths(),
+            Self::Step(_) | Self::Flash(_) | Self::Imu(_) | Self::Virtual(_) => Paths::default(),
+        }
+    }
+
+    fn run(&self, quiet: bool) -> Result<(), Failure> {
+        self.paths().check()?;
+        match self {
+            Self::Demo(args) => demo::run(args, quiet),
+            Self::Sim(args) => sim::run(args, quiet),
+            Self::Runs(args) => runs::run(args, quiet),
+            Self::Import(args) => import::run(args, quiet),
+            Self::Identify(args) => identify::run(args, quiet),
+            Self::Plateaus(args) => plateaus::run(args, quiet),
+            Self::CloseLoop(args) => close_loop::run(args, quiet),
+            Self::Select(args) => select::run(args, quiet),
+            Self::Beam(args) => beam::run(args, quiet),
+            Self::Calibrate(args) => calibrate::run(args, quiet),
+            Self::Recalibrate(args) => recalibrate::run(args, quiet),
+            Self::Ahrs(args) => ahrs::run(args, quiet),
+            Self::Loop(args) => circle::run(args, quiet),
+            Self::Fly(args) => fly::run(args, quiet),
+            Self::Flash(args) => flash::run(args),
+            Self::Measured(args) => measured::run(args, quiet),
+            Self::Isolability(args) => isolability::run(args, quiet),
+            Self::Step(args) => step::run(args, quiet),
+            Self::Log(args) => record::run(args, quiet),
+            Self::Rig(args) => rig::run(args, quiet),
+            Self::Imu(args) => imu::run(args, quiet),
+            Self::Virtual(args) => virtual_port::run(args, quiet),
+            Self::Effects(args) => effects::run(args, quiet),
+            Self::Predict(args) => predict::run(args),
+        }
+    }
+}
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let done = match &cli.command {
-        Command::Demo(args) => demo::run(args, cli.quiet),
-        Command::Sim(args) => sim::run(args, cli.quiet),
-        Command::Runs(args) => runs::run(args, cli.quiet),
-        Command::Import(args) => import::run(args, cli.quiet),
-        Command::Identify(args) => identify::run(args, cli.quiet),
-        Command::Plateaus(args) => plateaus::run(args, cli.quiet),
-        Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
-        Command::Select(args) => select::run(args, cli.quiet),
-        Command::Beam(args) => beam::run(args, cli.quiet),
-        Command::Calibrate(args) => calibrate::run(args, cli.quiet),
-        Command::Recalibrate(args) => recalibrate::run(args, cli.quiet),
-        Command::Ahrs(args) => ahrs::run(args, cli.quiet),
-        Command::Loop(args) => circle::run(args, cli.quiet),
-        Command::Fly(args) => fly::run(args, cli.quiet),
-        Command::Flash(args) => flash::run(args),
-        Command::Measured(args) => measured::run(args, cli.quiet),
-        Command::Isolability(args) => isolability::run(args, cli.quiet),
-        Command::Step(args) => step::run(args, cli.quiet),
-        Command::Log(args) => record::run(args, cli.quiet),
-        Command::Rig(args) => rig::run(args, cli.quiet),
-        Command::Imu(args) => imu::run(args, cli.quiet),
-        Command::Virtual(args) => virtual_port::run(args, cli.quiet),
-        Command::Effects(args) => effects::run(args, cli.quiet),
-        Command::Predict(args) => predict::run(args),
-    };
-    match done {
+    match cli.command.run(cli.quiet) {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             let line = e.to_string().replace('\n', " ");

@@ -10,7 +10,7 @@ use crate::Failure;
 use frame::message::Beep;
 use serialport::SerialPort;
 use std::io::{Error, ErrorKind, Read, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use virtual_board::{Hand, Kind, Order, Pace, VirtualBoard, switch_on};
 
@@ -40,6 +40,12 @@ pub(crate) struct PortArgs {
 }
 
 impl PortArgs {
+    /// The files that a virtual board reads.
+    pub(crate) fn reads(&self) -> impl Iterator<Item = &Path> {
+        let scenario = self.port.strip_prefix(VIRTUAL).and_then(|rest| rest.strip_prefix(':')).map(Path::new);
+        scenario.into_iter().chain(self.flash.as_deref()).chain(self.image.as_deref())
+    }
+
     /// Whether one was named.
     pub(crate) fn is_given(&self) -> bool {
         !self.port.is_empty()

@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`.
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
 use clap::ValueEnum;
 use ident::context::Context;
@@ -41,6 +42,13 @@ pub(crate) struct Args {
     /// carries over: effects of the rig, what events left behind, and the mean of the rest.
     #[arg(long)]
     events: bool,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.model, &self.log]).writes("-o", [&self.output])
+    }
 }
 
 /// Runs the command.

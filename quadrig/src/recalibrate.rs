@@ -7,6 +7,7 @@
 //! Reference: specification `formats.md`, "Rig log" ("so that a better calibration can be replayed").
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::rig::{date, file};
 use firmware_rig::Config;
 use firmware_rig::rig_config::Calibrated;
@@ -32,6 +33,13 @@ pub(crate) struct Args {
     output: PathBuf,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.log, &self.with]).writes("-o", [&self.output])
+    }
+}
+
 /// A new scale, and how it was found, where it was.
 #[derive(Debug, Clone, Copy)]
 struct Better {
@@ -48,11 +56,6 @@ struct News {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    for input in [&args.log, &args.with] {
-        if same_file(input, &args.output) {
-            return Err(format!("{}: it is an input of this command; write to another file", args.output.display()).into());
-        }
-    }
     let mut log = Log::read(&args.log)?;
     let news = read(&args.with)?;
     let changed = apply(&mut log, &news).map_err(|e| format!("{}: {e}", args.log.display()))?;
@@ -66,10 +69,6 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         changed.iter().for_each(|line| println!("{line}"));
     }
     Ok(())
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// A calibration's scales; of a whole configuration everything.

@@ -13,6 +13,7 @@ mod recorder;
 pub(crate) use recorder::Recorder;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::board::Board;
 use crate::end::Ended;
 use crate::port::PortArgs;
@@ -53,6 +54,13 @@ pub(crate) struct Args {
     under: overseer::Args,
     #[command(flatten)]
     rig: Rig,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.under.model).reads(self.port.reads()).writes("-o", [&self.output])
+    }
 }
 
 /// What only the operator knows of a rig, and how much of it is recorded.

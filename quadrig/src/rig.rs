@@ -19,6 +19,7 @@ mod status;
 mod typed;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::board::Board;
 use crate::port::PortArgs;
 use crate::record;
@@ -256,6 +257,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 }
 
 impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        let paths = Paths::default().reads(self.port.reads());
+        match &self.order {
+            Order::View { session } | Order::Arm { session } | Order::Calibrate { session, .. } => session.paths(paths),
+            Order::Run { schedule, next, session, .. } => session.paths(paths.reads(schedule).reads(next)),
+            Order::Configure { output, .. } => paths.writes("-o", output),
+            Order::Burst(args) => args.paths(paths),
+            _ => paths,
+        }
+    }
+
     /// Whether a session is shown on the terminal.
     fn view(&self, quiet: bool) -> bool {
         !quiet && !self.plain && view::is_there()
@@ -263,6 +276,10 @@ impl Args {
 }
 
 impl Session {
+    fn paths<'a>(&'a self, paths: Paths<'a>) -> Paths<'a> {
+        paths.reads(&self.under.model).writes("-o", &self.output)
+    }
+
     /// Holds a session at a board.
     fn hold(&self, board: Board, args: &Args, errand: Errand, quiet: bool) -> Result<(), Failure> {
         let overseer = Overseer::new(&self.under, board.is_virtual())?;
@@ -281,7 +298,7 @@ impl Session {
 fn identify(board: &mut Board) -> Result<(), Failure> {
     let hello = board.ask(Command::Identify, |_| {}, |m| if let Message::Hello(hello) = m { Some(*hello) } else { None })?;
     let [major, minor, patch] = hello.firmware;
-    println!("{:?} board, firmware {major}.{minor}.{patch}, core {} MHz", hello.board, hello.core_hz / 1_000_000);
+    println!("{} board, firmware {major}.{minor}.{patch}, core {} MHz", hello.board.words(), hello.core_hz / 1_000_000);
     println!("last reset: {}", reset_cause(hello.reset_cause));
     if hello.board == BoardId::Rig {
         println!("fitted: {}; configuration {:08x}", fitted(&hello), hello.config);

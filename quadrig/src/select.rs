@@ -7,6 +7,8 @@
 //! Reference: specification `identification.md`, item 4; Beharie 2013, section 6.1.
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::figures;
 use crate::progress::Bar;
 use crate::run_log::to_log;
 use hal_sim::Scenario;
@@ -16,7 +18,7 @@ use ident::context::Context;
 use ident::log::{FORMAT, Log, write_whole};
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
-use ident::report::{selection, write_figures};
+use ident::report::selection;
 use ident::select::{Airframe, Need, Pair, Row, choose, from_log, read_table, row, thesis};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -64,6 +66,13 @@ pub(crate) struct Args {
     json: bool,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.files).writes("-o", &self.output).fills("--svg", &self.svg)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     for (name, value) in [("--bare", args.bare), ("--battery", args.battery), ("--capacity", args.capacity)] {
@@ -109,7 +118,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     if let Some(folder) = &args.svg {
-        write_figures(folder, sheet.drawn()).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
+        figures(folder, sheet.drawn())?;
     }
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -10,8 +10,9 @@
 mod imu;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::live;
-use crate::progress::Bar;
+use crate::progress::{Bar, foretell};
 use crate::run_log::{IdentifiedPlant, to_log};
 use crate::view;
 use hal_sim::native::{PinRecord, Session};
@@ -21,6 +22,7 @@ use ident::log::{Log, write_whole};
 use ident::model::Model;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Arguments.
 #[derive(clap::Args)]
@@ -57,12 +59,27 @@ pub(crate) struct Args {
     speed: f64,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default()
+            .reads([&self.scenario])
+            .reads(&self.model)
+            .reads(&self.replay)
+            .writes("-o", [&self.output])
+            .writes("--truth", &self.truth)
+            .writes("--readings", &self.readings)
+            .writes("--pins", &self.pins)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let scenario = match AnyScenario::load(&args.scenario)? {
         AnyScenario::Rig(scenario) => *scenario,
         AnyScenario::Imu(scenario) => return imu::run(args, &scenario, quiet),
     };
+    args.paths().reads(&scenario.schedule.file(&args.scenario)).check()?;
     if args.readings.is_some() {
         return Err(format!("{}: describes the rig; --readings is for the IMU board", args.scenario.display()).into());
     }
@@ -97,6 +114,7 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
     if args.pins.is_some() {
         session.record_pins(scenario);
     }
+    foretell(scenario.run_s(), if args.live && args.speed > 0.0 { args.speed } else { pace(scenario, 1.0) }, quiet);
     if args.live && !quiet && view::is_there() {
         live::view(&mut session, scenario, args.speed)?;
     } else if args.live {
@@ -111,6 +129,21 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
         write_whole(path, |mut out| pins.write(&mut out)).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     Ok(session.finish()?)
+}
+
+/// Length of a run from which on its pace is tried before it starts, s.
+const TRIED_FROM_S: f64 = 600.0;
+/// How long the trial takes.
+const TRIAL: Duration = Duration::from_millis(150);
+
+/// Times real time at which `runs` simulations like this one go on side by side, by a short trial; boundless for one that is over at once anyway.
+pub(crate) fn pace(scenario: &Scenario, runs: f64) -> f64 {
+    if runs * scenario.run_s() < TRIED_FROM_S {
+        return f64::INFINITY;
+    }
+    let (mut trial, begun) = (Session::new(scenario, None), Instant::now());
+    while begun.elapsed() < TRIAL && trial.step().unwrap_or(false) {}
+    trial.now_s() / begun.elapsed().as_secs_f64()
 }
 
 /// The firmware of `scenario` alone on the pins of `path`.
@@ -152,6 +185,7 @@ pub(crate) fn fly(
     word: &str,
     quiet: bool,
 ) -> Result<Log, Failure> {
+    foretell(scenario.run_s(), pace(scenario, 1.0), quiet);
     let bar = Bar::new(word, quiet);
     let record = hal_sim::run(scenario, plant, &mut |share| bar.set(share))?;
     Ok(to_log(scenario, &record, name, false))

@@ -17,7 +17,7 @@ use frame::wire::{Decoder, LinkStats};
 #[non_exhaustive]
 pub enum SimError {
     /// The firmware refused a command of the host.
-    #[error("the rig refused {command:?} while it was {phase}: reasons {reasons:?}")]
+    #[error("the rig refused \"{}\" while it was {phase}: {reasons}", command.words())]
     Refused {
         /// What was asked.
         command: Box<Command>,
@@ -27,7 +27,7 @@ pub enum SimError {
         reasons: Refusals,
     },
     /// Faults latched.
-    #[error("the rig latched faults {faults:?} while it was {phase}, {at_s:.3} s after reset")]
+    #[error("the rig stopped itself while it was {phase}, {at_s:.3} s after reset: {faults}")]
     Faulted {
         /// Which.
         faults: FaultSet,
@@ -37,7 +37,7 @@ pub enum SimError {
         at_s: f64,
     },
     /// A phase lasted longer than it can.
-    #[error("the rig was still {phase} (state {state:?}) {at_s:.0} s after reset")]
+    #[error("the rig was still {phase} {at_s:.0} s after reset ({})", state.words())]
     Stuck {
         /// What the host was doing.
         phase: &'static str,

@@ -6,6 +6,7 @@
 //! Units: each key carries its own.
 //! Reference: specification `rig.md`, "The simulator"; `docs/scenario.md` lists every key.
 
+mod blame;
 mod fault;
 mod imu;
 mod section;
@@ -261,8 +262,12 @@ pub(crate) fn text_of(file: &Path) -> Result<String, ScenarioError> {
 /// What `text` describes, or where it does not.
 pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ScenarioError> {
     toml::from_str(text).map_err(|error| {
-        let (line, column) = place_of(text, error.span().map_or(0, |s| s.start));
-        let reason = error.message().replace('\n', " ");
+        let (byte, key) = blame::blame::<T>(text, &error);
+        let (line, column) = place_of(text, byte);
+        let mut reason = error.message().replace('\n', " ");
+        if let Some(key) = key.filter(|key| !reason.contains(&format!("`{key}`"))) {
+            reason = format!("{key}: {reason}");
+        }
         ScenarioError::Refused { file: file.to_owned(), line, column, reason }
     })
 }
@@ -326,7 +331,24 @@ mod tests {
             ("seed = 1\nmotor = \"571KV\"\n", "run.toml:2:9: ", "570KV"),
             ("[log]\nrate_hz = 7\n", "run.toml:2:11: ", "divides 1000"),
             ("[air]\ntemperature_c = \"warm\"\n", "run.toml:2:17: ", "f64"),
-            ("rest_s = -1.0\n", "run.toml:1:10: ", "above 0"),
+            ("rest_s = -1.0\n", "run.toml:1:10: ", "rest_s: expected a number above 0"),
+            // keys of a table of several kinds, whose places the parser loses
+            (
+                "[schedule]\nkind = \"staircase\"\nstep_us = 5\nhold_s = -3\ntop_us = 2000\n",
+                "run.toml:4:10: hold_s: ",
+                "found -3",
+            ),
+            ("[schedule]\nkind = \"stairs\"\nstep_us = 5\n", "run.toml:2:8: kind: ", "stairs"),
+            ("seed = 1\n[[effect]]\nid = \"nonsense\"\n", "run.toml:3:6: id: ", "nonsense"),
+            ("[[effect]]\nid = \"supply_sag\"\nresistance_ohm = \"x\"\n", "run.toml:3:18: resistance_ohm: ", "f64"),
+            ("[[effect]]\nid = \"supply_sag\"\nresistance_ohm = 0.1\nohm = 3\n", "run.toml:4:1: ", "`ohm`"),
+            (
+                "[schedule]\nkind = \"steps\"\nsteps = [\n{ pulse_us = 1200, hold_s = 3 },\n{ hold_s = 3, pulse_us = 12000 },\n]\n",
+                "run.toml:5:26: pulse_us: ",
+                "found 12000",
+            ),
+            ("[supply]\nkind = \"lipo\"\ncells = 3\ncapacity_ah = -1e1\n", "run.toml:4:15: capacity_ah: ", "found -10"),
+            ("seed = 1\n[schedule]\nkind = \"staircase\"\nhold_s = 3\ntop_us = 2000\n", "run.toml:2:1: ", "step_us"),
             ("[[effect]]\nid = \"supply_sag\"\n", "run.toml:1:1: ", "resistance_ohm"),
             ("seed = \n", "run.toml:1:", ""),
         ] {

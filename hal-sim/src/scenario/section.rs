@@ -321,6 +321,13 @@ impl Schedule {
         }
     }
 
+    /// The file that it names, of the scenario in `scenario`.
+    #[must_use]
+    pub fn file(&self, scenario: &Path) -> Option<PathBuf> {
+        let (Self::File { file, .. } | Self::Replay(ReplaySection { file, .. })) = self else { return None };
+        Some(scenario.parent().unwrap_or(Path::new("")).join(file))
+    }
+
     /// Reads the files that it names, from `folder`.
     ///
     /// # Errors

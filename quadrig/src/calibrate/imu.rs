@@ -79,7 +79,7 @@ fn explain(error: CalibrationError) -> String {
             let axis = ["+x", "-x", "+y", "-y", "+z", "-z"].get(usize::from(index)).unwrap_or(&"?");
             format!("no rest with {axis} up")
         }
-        other => format!("no fit ({other:?}): is the sensor saturated, or iron moving about?"),
+        _ => "no fit: is the sensor saturated, or iron moving about?".to_owned(),
     }
 }
 

@@ -59,7 +59,10 @@ impl Settling {
 /// Scales are taken with the rig disarmed and the rotor at rest; otherwise, why they are not.
 pub(super) fn at_rest(sample: &RigSample) -> Result<(), String> {
     if sample.state != RigState::Disarmed {
-        return Err(format!("the rig is {:?}; a channel is calibrated while it is disarmed; nothing was stored", sample.state));
+        return Err(format!(
+            "the rig is {}; a channel is calibrated while it is disarmed; nothing was stored",
+            sample.state.words()
+        ));
     }
     let turns =
         |verdict: CaptureVerdict| !matches!(verdict, CaptureVerdict::Stopped | CaptureVerdict::Absent | CaptureVerdict::Lost);

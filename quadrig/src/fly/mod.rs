@@ -6,15 +6,15 @@
 //! Units: as the files state.
 //! Reference: docs/mission.md; specification `flight.md`, "Missions".
 
-mod folder;
 mod page;
 mod record;
 mod rotor;
 mod summary;
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::Folder;
 use crate::progress::Bar;
-use folder::Folder;
 use hal_sim::Powerplant;
 use hal_sim::flight::Airframe;
 use hal_sim::mission::{AirframeFile, Catalogue, Flight, Mission, RotorCurves, catalogue_plants, fly_whole};
@@ -41,6 +41,13 @@ pub(crate) struct Args {
     json: bool,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.mission]).reads(&self.model).fills("-o", &self.output)
+    }
+}
+
 /// The files of a flight.
 const FILES: [&str; 4] = ["states.csv", "flight.csv", "attitude.csv", "flight.html"];
 
@@ -53,10 +60,8 @@ enum Rotors {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let (mission, file) = Mission::load(&args.mission)?;
-    let mut inputs = vec![args.mission.clone()];
-    inputs.extend(mission.files(&args.mission).into_iter().flatten());
-    inputs.extend(args.model.clone());
-    let folder = args.output.as_deref().map(|path| Folder::new(path, &FILES, &inputs)).transpose()?;
+    args.paths().reads(mission.files(&args.mission).iter().flatten()).check()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, |name| FILES.contains(&name))).transpose()?;
     let airframe = file.airframe();
     if airframe.body().is_none() {
         return Err(format!("{}: the airframe's masses make no body", args.mission.display()).into());

@@ -14,6 +14,7 @@ mod table;
 mod transfer;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::progress::Bar;
 use cross::{Tried, across};
 use ident::close::{Closed, close};
@@ -34,6 +35,13 @@ pub(crate) struct Args {
     /// Only this set, without `measured.md`; may be given more than once.
     #[arg(long)]
     set: Vec<String>,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.data]).writes("-o", [&self.output])
+    }
 }
 
 /// A recorded run and what came of it.

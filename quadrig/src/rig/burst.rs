@@ -8,6 +8,7 @@
 
 use super::configure;
 use crate::Failure;
+use crate::apart::Paths;
 use crate::board::{Board, Heard};
 use firmware_rig::burst::LENGTH;
 use frame::Consensus;
@@ -43,6 +44,13 @@ pub(super) struct Args {
     /// Highest frequency of the spectrum, Hz.
     #[arg(long, default_value_t = 1000.0)]
     to: f64,
+}
+
+impl Args {
+    /// What it writes.
+    pub(super) fn paths<'a>(&'a self, paths: Paths<'a>) -> Paths<'a> {
+        paths.writes("-o", &self.output).writes("--spectrum", &self.spectrum)
+    }
 }
 
 /// A whole burst.
