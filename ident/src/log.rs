@@ -29,7 +29,7 @@ pub const SPEED: [&str; 5] = ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder",
 #[non_exhaustive]
 pub enum ReadError {
     /// The file could not be opened or read.
-    #[error("{file}: {source}")]
+    #[error("{file}: cannot be read ({source}); expected a file: check name and folder")]
     Io {
         /// The file as it was named.
         file: String,
@@ -434,6 +434,11 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
 fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError> {
     let names: Vec<String> = line.split(',').map(|n| n.trim().to_owned()).collect();
     if names.first().map(String::as_str) != Some("t_s") {
+        if let Some((_, word)) = [(';', "semicolons"), ('\t', "tabs")].iter().find(|(c, _)| names.len() == 1 && line.contains(*c))
+        {
+            let expected = "commas (and points in the numbers); save it so, or use `quadrig import`";
+            return Err(place.refuse(None, format!("{word} between the columns"), expected));
+        }
         return Err(place.refuse(names.first().map(String::as_str), "not the time column", "t_s (seconds) as the first column"));
     }
     for (i, name) in names.iter().enumerate() {
@@ -481,7 +486,9 @@ fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> 
         ));
     }
     if fields > header.len() {
-        return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header", header.len())));
+        let commas = fields + 1 >= 2 * header.len();
+        let reason = if commas { ": a decimal comma? Write decimal points" } else { "" };
+        return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header{reason}", header.len())));
     }
     for ((i, text), name) in line.split(',').enumerate().zip(header) {
         let text = text.trim();

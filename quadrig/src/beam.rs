@@ -8,6 +8,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::figures;
+use crate::trouble::unwritten;
 use ident::beam::Beam;
 use ident::context::Context;
 use ident::log::{Log, write_whole};
@@ -93,7 +94,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let met = design.crossings(args.blades, &speeds, args.near / 100.0);
     let sheet = beam(&design, args.blades, &met);
     if let Some(path) = &args.output {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
     if let Some(folder) = &args.svg {
         figures(folder, sheet.drawn())?;

@@ -7,6 +7,7 @@
 //! Reference: specification `formats.md`: outputs are written whole or not at all.
 
 use crate::Failure;
+use crate::trouble::unwritten;
 use ident::report::Figure;
 use std::fs;
 use std::io;
@@ -46,7 +47,7 @@ impl<'a> Folder<'a> {
     /// Writes them.
     pub(crate) fn write(self) -> Result<(), Failure> {
         self.is_ours()?;
-        self.place().map_err(|e| format!("{}: {e}", self.path.display()).into())
+        self.place().map_err(|e| unwritten(self.path)(e).into())
     }
 
     /// Nothing in the folder is anyone else's.

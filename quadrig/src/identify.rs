@@ -8,6 +8,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::figures;
+use crate::trouble::unwritten;
 use ident::identify::{Identified, identify};
 use ident::log::{Log, write_whole};
 use ident::report::number;
@@ -49,8 +50,7 @@ impl Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let log = Log::read(&args.log)?;
     let found = identify(&log)?;
-    write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes()))
-        .map_err(|e| format!("{}: {e}", args.output.display()))?;
+    write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes())).map_err(unwritten(&args.output))?;
     if args.report.is_some() || args.svg.is_some() {
         draw(args, &log, &found)?;
     }
@@ -77,7 +77,7 @@ fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
     };
     let sheet = ident::report::run(log, found, second.as_ref().map(|(log, found)| (log, found)));
     if let Some(path) = &args.report {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
     if let Some(folder) = &args.svg {
         figures(folder, sheet.drawn())?;

@@ -7,6 +7,7 @@
 
 use crate::Failure;
 use crate::apart::Paths;
+use crate::trouble::unwritten;
 use ident::import::Mapping;
 use std::path::PathBuf;
 
@@ -65,7 +66,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     } else {
         log.write(&args.output)
     }
-    .map_err(|e| format!("{}: {e}", args.output.display()))?;
+    .map_err(unwritten(&args.output))?;
     if !quiet {
         print!("{}", report.table());
         println!(

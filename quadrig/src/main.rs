@@ -39,6 +39,7 @@ mod select;
 mod sim;
 mod spool;
 mod step;
+mod trouble;
 mod view;
 mod virtual_port;
 

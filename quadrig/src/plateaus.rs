@@ -9,6 +9,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::Folder;
+use crate::trouble::unread;
 use ident::import::import;
 use ident::log::{FORMAT, Log, SPEED};
 use ident::plateau::score::Score;
@@ -90,7 +91,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         threshold: args.threshold,
         offset: args.offset,
     };
-    let mut folder = args.output.as_deref().map(Folder::of_added);
+    let mut folder = args
+        .output
+        .as_deref()
+        .map(|path| {
+            let known = |name: &str| name == "README.md" || name.ends_with(".svg") || name.ends_with("-filters.csv");
+            Folder::new(path, known).map(|_| Folder::of_added(path)) // what cannot be of a run like this is refused before it begins
+        })
+        .transpose()?;
     let (mut page, mut pictures) = (String::from(HEAD), String::new());
     for path in &args.logs {
         let log = read(path)?;
@@ -125,7 +133,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 /// A rig log as it is; anything else through the import.
 fn read(path: &Path) -> Result<Log, Failure> {
     let mut first = String::new();
-    let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let file = std::fs::File::open(path).map_err(unread(&path))?;
     let _ = std::io::Read::take(BufReader::new(file), 64).read_line(&mut first); // what is no text the readers refuse
     Ok(if first.contains(FORMAT) { Log::read(path)? } else { import(path, &[])?.0 })
 }

@@ -69,10 +69,10 @@ impl PortArgs {
                 ("--assist", self.assist),
             ];
             if let Some((option, _)) = virtual_only.iter().find(|(_, given)| *given) {
-                return Err(format!("{option} belongs to a virtual board: --port sim").into());
+                return Err(format!("{option} belongs to a virtual board; expected --port sim").into());
             }
             if self.port.is_empty() {
-                return Err("--port is needed: the serial port of the board, or sim for a virtual one".into());
+                return Err("no port; expected --port with the serial port of the board, or sim for a virtual one".into());
             }
             return Port::serial(&self.port, baud);
         };
@@ -137,7 +137,7 @@ impl Port {
             let known: Vec<String> = serialport::available_ports().unwrap_or_default().into_iter().map(|p| p.port_name).collect();
             let known =
                 if known.is_empty() { "no serial port is there".to_owned() } else { format!("there are {}", known.join(", ")) };
-            format!("{name}: cannot be opened ({e}); {known}; --port sim is a virtual board")
+            format!("{name}: cannot be opened ({e}); expected a serial port ({known}), or sim for a virtual board")
         })?;
         Ok(Self::Serial { name: name.to_owned(), baud, port, opened: Instant::now() })
     }

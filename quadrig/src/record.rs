@@ -158,7 +158,9 @@ impl Vigil {
                         "its frames are of another version than this program's: flash the board with the image of the same release"
                     }
                 };
-                return Err(Ending::Nobody(format!("{}: no calibration from the board; {cause}", seat.board.name()).into()));
+                return Err(Ending::Nobody(
+                    format!("{}: no calibration from the board; expected one within 3 s: {cause}", seat.board.name()).into(),
+                ));
             }
             if seat.now() > self.asked + ASK_AGAIN {
                 self.asked = seat.now();

@@ -11,6 +11,7 @@ use crate::apart::Paths;
 use crate::folder::figures;
 use crate::progress::Bar;
 use crate::run_log::to_log;
+use crate::trouble::{unread, unwritten};
 use hal_sim::Scenario;
 use hal_sim::plant::{Propeller, motor};
 use hal_sim::scenario::Schedule;
@@ -105,9 +106,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         ))
     });
     if let Some(motor) = &args.motor {
+        let mut there: Vec<String> = pairs.iter().map(|p| p.motor.clone()).collect();
+        there.dedup();
         pairs.retain(|p| p.motor == *motor);
         if pairs.is_empty() {
-            return Err(format!("--motor {motor}: no pair has this motor").into());
+            return Err(format!("--motor {motor}: no pair has this motor; expected one of {}", there.join(", ")).into());
         }
     }
     let batteries = args.batteries.max(3);
@@ -115,7 +118,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let chosen = choose(&rows, &need);
     let sheet = selection(&pairs, &rows, &airframe, &need, batteries);
     if let Some(path) = &args.output {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
     if let Some(folder) = &args.svg {
         figures(folder, sheet.drawn())?;
@@ -143,7 +146,7 @@ fn read(files: &[PathBuf]) -> Result<Vec<Pair>, Failure> {
             }
             pairs.push(pair);
         } else {
-            let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+            let file = std::fs::File::open(path).map_err(unread(&path))?;
             pairs.extend(read_table(&path.display().to_string(), BufReader::new(file))?);
         }
     }
@@ -151,7 +154,7 @@ fn read(files: &[PathBuf]) -> Result<Vec<Pair>, Failure> {
 }
 
 fn is_log(path: &Path) -> Result<bool, Failure> {
-    let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let file = std::fs::File::open(path).map_err(unread(&path))?;
     let mut first = Vec::new();
     std::io::Read::take(BufReader::new(file), 64).read_until(b'\n', &mut first)?;
     Ok(String::from_utf8_lossy(&first).contains(FORMAT))

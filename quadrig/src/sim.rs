@@ -14,6 +14,7 @@ use crate::apart::Paths;
 use crate::live;
 use crate::progress::{Bar, foretell};
 use crate::run_log::{IdentifiedPlant, to_log};
+use crate::trouble::unwritten;
 use crate::view;
 use hal_sim::native::{PinRecord, Session};
 use hal_sim::scenario::AnyScenario;
@@ -81,7 +82,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     };
     args.paths().reads(&scenario.schedule.file(&args.scenario)).check()?;
     if args.readings.is_some() {
-        return Err(format!("{}: describes the rig; --readings is for the IMU board", args.scenario.display()).into());
+        return Err(format!(
+            "{}: describes the rig; expected a scenario of the IMU board with --readings",
+            args.scenario.display()
+        )
+        .into());
     }
     let name = args.output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     if !(args.speed.is_finite() && args.speed >= 0.0) {
@@ -92,16 +97,16 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         None => flown(args, &scenario, quiet)?,
     };
     if let Some(path) = &args.truth {
-        write_whole(path, |out| write_truth(out, &record.truth)).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| write_truth(out, &record.truth)).map_err(unwritten(&path))?;
     }
     let mut log = to_log(&scenario, &record, &name, args.raw);
     if log.is_empty() {
-        return Err("the run ended before its first sample; no log was written".into());
+        return Err("the run ended before its first sample; no log was written; expected to run on until the rig is armed".into());
     }
     if let Some(path) = &args.model {
         log = fly_model(&scenario, &Model::read(path)?, &log, &name, quiet)?;
     }
-    log.write(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    log.write(&args.output).map_err(unwritten(&args.output))?;
     if !quiet {
         println!("{}: {} samples over {:.1} s", args.output.display(), log.len(), log.t[log.len() - 1]);
     }
@@ -126,7 +131,7 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
         }
     }
     if let (Some(path), Some(pins)) = (&args.pins, session.pins()) {
-        write_whole(path, |mut out| pins.write(&mut out)).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |mut out| pins.write(&mut out)).map_err(unwritten(&path))?;
     }
     Ok(session.finish()?)
 }

@@ -31,7 +31,7 @@ pub(crate) struct Spool {
 impl Spool {
     /// Creates the part beside `target`.
     pub(crate) fn create(target: &Path) -> Result<Self, Failure> {
-        let mut name = target.file_name().ok_or("-o needs the name of a file")?.to_owned();
+        let mut name = target.file_name().ok_or("-o: expected the name of a file")?.to_owned();
         name.push(".part");
         let part = target.with_file_name(name);
         if std::fs::metadata(&part).is_ok_and(|found| found.len() > 0) {
@@ -39,7 +39,9 @@ impl Spool {
             return Err(format!("{}: left by a recording that was cut off; {expected}", part.display()).into());
         }
         let file = OpenOptions::new().write(true).create(true).truncate(true).open(&part);
-        let file = file.map_err(|e| format!("{}: cannot be written ({e})", part.display()))?;
+        let file = file.map_err(|e| {
+            format!("{}: cannot be written ({e}); expected a folder that is there, with rights and room", part.display())
+        })?;
         Ok(Self { target: target.to_owned(), part, file, written: 0, waiting: Vec::new(), failed: None })
     }
 

@@ -63,6 +63,15 @@ pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
     steps.sort_by(f64::total_cmp);
     let middle = steps[steps.len() / 2];
     let stated = log.meta.get("sample_hz").and_then(|v| v.as_float().or_else(|| v.as_integer().map(|n| n as f64)));
+    if stated.is_none()
+        && let Some(found) = log.meta.get("sample_hz")
+    {
+        return Err(Place { file: place.file, line: 1 }.refuse(
+            None,
+            format!("sample_hz = {found}"),
+            "a number of rows a second in the head",
+        ));
+    }
     let refuse = |found: String, expected: String| Err(place.refuse(Some("t_s"), found, expected));
     match stated.filter(|hz| hz.is_finite() && *hz > 0.0) {
         Some(hz) => {
@@ -157,6 +166,11 @@ mod tests {
         let whole = log("", 1000.0, |_| true).expect_err("milliseconds");
         assert!(whole.contains("whole numbers, 100 apart, up to 29900") && whole.contains("# sample_hz = 0.01"), "{whole}");
         log("# sample_hz = 0.01\n", 1000.0, |_| true).expect("it says that rows are 100 s apart");
+        assert!(
+            log("# sample_hz = \"ten\"\n", 1.0, |_| true)
+                .expect_err("a word")
+                .contains("run.csv:1: sample_hz = \"ten\"; expected a number")
+        );
         log("# time = \"row\"\n", 10_000.0, |_| true).expect("a table without time");
     }
 

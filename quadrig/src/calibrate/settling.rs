@@ -60,14 +60,14 @@ impl Settling {
 pub(super) fn at_rest(sample: &RigSample) -> Result<(), String> {
     if sample.state != RigState::Disarmed {
         return Err(format!(
-            "the rig is {}; a channel is calibrated while it is disarmed; nothing was stored",
+            "the rig is {}; expected it disarmed: a channel is calibrated at rest; nothing was stored",
             sample.state.words()
         ));
     }
     let turns =
         |verdict: CaptureVerdict| !matches!(verdict, CaptureVerdict::Stopped | CaptureVerdict::Absent | CaptureVerdict::Lost);
     if sample.rpm.iter().any(|code| turns(code.verdict)) {
-        return Err("the rotor turns; a channel is calibrated at rest; nothing was stored".to_owned());
+        return Err("the rotor turns; expected it at rest; nothing was stored".to_owned());
     }
     Ok(())
 }

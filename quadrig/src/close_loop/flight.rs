@@ -9,6 +9,7 @@ use super::{Args, is_result};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::progress::Bar;
+use crate::trouble::unread;
 use ident::flight::columns::Flight;
 use ident::flight::library::FlightLibrary;
 use ident::flight::predict::{columns, is_by_row, is_own, over_windows, seen_by};
@@ -55,7 +56,7 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 }
 
 fn read_model(path: &Path) -> Result<FlightModel, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let text = std::fs::read_to_string(path).map_err(unread(&path))?;
     Ok(FlightModel::parse(&path.display().to_string(), &text)?)
 }
 

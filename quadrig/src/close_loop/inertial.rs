@@ -32,7 +32,7 @@ pub(crate) fn is_attitude_log(path: &Path) -> bool {
 /// Runs the command.
 pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if args.model.is_some() || !args.validate.is_empty() {
-        return Err(format!("{}: an attitude log; --model and --validate are for rig logs", args.log.display()).into());
+        return Err(format!("{}: an attitude log; expected a rig log with --model and --validate", args.log.display()).into());
     }
     let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
     let log = ImuLog::read(&args.log)?;

@@ -64,7 +64,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let folder = args.output.as_deref().map(|path| Folder::new(path, |name| FILES.contains(&name))).transpose()?;
     let airframe = file.airframe();
     if airframe.body().is_none() {
-        return Err(format!("{}: the airframe's masses make no body", args.mission.display()).into());
+        return Err(format!(
+            "{}: the airframe's masses make no body; expected masses above 0 at more than one place (docs/mission.md)",
+            args.mission.display()
+        )
+        .into());
     }
     let model = args.model.as_deref().map(Model::read).transpose()?;
     let rotors = rotors_of(model.as_ref(), args.model.as_deref(), &airframe)?;
@@ -96,8 +100,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 
 fn rotors_of(model: Option<&Model>, path: Option<&Path>, airframe: &Airframe) -> Result<Rotors, Failure> {
     let (Some(model), Some(path)) = (model, path) else { return Ok(Rotors::Catalogue) };
-    let rotor = ModelRotor::new(model, airframe.rotor_inertia_kgm2)
-        .map_err(|why| format!("{}: the model predicts {why}", path.display()))?;
+    let rotor = ModelRotor::new(model, airframe.rotor_inertia_kgm2).map_err(|why| {
+        format!("{}: the model predicts {why}; expected one identified from a log with pulse_us and thrust_n", path.display())
+    })?;
     Ok(Rotors::Model(Box::new(rotor)))
 }
 
@@ -146,7 +151,9 @@ fn planned(mission: &Mission, file: &AirframeFile, rotor: &ModelRotor) -> Result
             Some((_, plan)) => plan.clone(),
             None => {
                 let plan = rotor.planned(|t| mission.pulse_us(i, t), mission.length_s(), mission.start.spun_up);
-                plan.ok_or("the model predicts no speed from a command")?
+                plan.ok_or(
+                    "the model predicts no speed from a command; expected one identified from a log with pulse_us and a speed",
+                )?
             }
         };
         plants.push(Box::new(plan.clone()));

@@ -284,7 +284,7 @@ impl Recorder {
         }
         if self.rows == 0 {
             self.spool.discard();
-            return Err("no sample arrived; nothing was recorded".into());
+            return Err("no sample arrived; nothing was recorded; expected samples: is the board powered?".into());
         }
         self.spool.finish()
     }
