@@ -9,7 +9,8 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::figures;
 use crate::trouble::unwritten;
-use ident::identify::{Identified, identify};
+use ident::fit::power::csv;
+use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
 use ident::report::number;
 use std::io::Write;
@@ -29,6 +30,15 @@ pub(crate) struct Args {
     /// Writes each figure as a file into this folder.
     #[arg(long, value_name = "FOLDER")]
     svg: Option<PathBuf>,
+    /// Writes the plateaus with power, efficiencies and coefficients, each with its standard error (CSV; SI units in the names).
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    /// Writes thrust over throttle and supply voltage with its 95 % band (CSV: us, %, V, N).
+    #[arg(long, value_name = "FILE")]
+    surface: Option<PathBuf>,
+    /// Density of the air, kg/m^3, where the log does not tell it.
+    #[arg(long, value_name = "KG_M3")]
+    air: Option<f64>,
     /// A second run to lay beside it on the page.
     #[arg(long, value_name = "LOG")]
     beside: Option<PathBuf>,
@@ -42,6 +52,8 @@ impl Args {
             .reads(&self.beside)
             .writes("-o", [&self.output])
             .writes("--report", &self.report)
+            .writes("--table", &self.table)
+            .writes("--surface", &self.surface)
             .fills("--svg", &self.svg)
     }
 }
@@ -49,7 +61,21 @@ impl Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let log = Log::read(&args.log)?;
-    let found = identify(&log)?;
+    if let Some(air) = args.air.filter(|air| !(0.1..=10.0).contains(air)) {
+        return Err(format!("--air {air}: expected a density in kg/m^3, such as 1.2").into());
+    }
+    let found = identify_in(&log, args.air)?;
+    let surface = match (&args.surface, &found.surface) {
+        (Some(_), Err(why)) => {
+            return Err(format!("{}: --surface: {why}; expected a log that tells it", args.log.display()).into());
+        }
+        (Some(path), Ok(surface)) => Some((path, surface.csv())),
+        (None, _) => None,
+    };
+    let table = args.table.as_ref().map(|path| (path, csv(&found.plateaus, &found.levels)));
+    for (path, text) in table.into_iter().chain(surface) {
+        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
+    }
     write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes())).map_err(unwritten(&args.output))?;
     if args.report.is_some() || args.svg.is_some() {
         draw(args, &log, &found)?;
@@ -131,16 +157,54 @@ fn text(found: &Identified) -> String {
     }
     for c in &found.constants {
         out += &format!(
-            "{:<9} {} +- {} {} (95 %: {} to {})\n",
+            "{:<9} {} +- {} {} (95 %: {} to {}){}\n",
             c.name,
             number(c.value),
             number(c.se),
             c.unit,
             number(c.value - c.half),
-            number(c.value + c.half)
+            number(c.value + c.half),
+            c.law.map_or_else(String::new, |law| format!("; {}", law.words()))
         );
     }
-    out
+    out + &asked(found)
+}
+
+/// What a designer asks of each plateau, in 100 columns.
+fn asked(found: &Identified) -> String {
+    const SHOWN: [(&str, &str, usize); 9] = [
+        ("pulse_us", "us", 0),
+        ("thrust_n", "N", 3),
+        ("electrical_w", "W in", 1),
+        ("shaft_w", "W shaft", 1),
+        ("g_per_w", "g/W", 2),
+        ("motor_efficiency", "motor", 3),
+        ("figure_of_merit", "merit", 3),
+        ("c_t", "C_T", 4),
+        ("c_p", "C_P", 4),
+    ];
+    if found.levels.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from("\npower, efficiency, coefficients (\"motor\" with its controller; - is not known)\n");
+    out += &SHOWN.map(|(_, head, _)| format!("{head:>9}")).concat();
+    for level in &found.levels {
+        let cell = |(name, _, digits): (&str, &str, usize)| {
+            level.of(name).map_or_else(|| format!("{:>9}", "-"), |(v, _)| format!("{v:>9.digits$}"))
+        };
+        out += &format!("\n{}", SHOWN.map(cell).concat());
+    }
+    out.push('\n');
+    found.disc.lacks().iter().for_each(|lack| out += &format!("{lack}\n"));
+    match &found.surface {
+        Ok(s) => {
+            out + &format!(
+                "thrust over throttle and voltage: --surface FILE; measured {:.2} to {:.2} V\n",
+                s.measured.0, s.measured.1
+            )
+        }
+        Err(why) => out + &format!("thrust over throttle and voltage: {why}\n"),
+    }
 }
 
 /// Places with a comma between them, counted from 1.

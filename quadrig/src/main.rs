@@ -17,6 +17,7 @@ mod demo;
 mod effects;
 mod end;
 mod evidence;
+mod export;
 mod flash;
 mod fly;
 mod folder;
@@ -111,6 +112,8 @@ enum Command {
     Effects(effects::Args),
     /// A model's prediction of every measured channel, row for row.
     Predict(predict::Args),
+    /// A model as the file of a flight controller or of a simulator: thrust curve, motor constants, battery, delay.
+    Export(export::Args),
 }
 
 /// What went wrong, as one line.
@@ -140,6 +143,7 @@ impl Command {
             Self::Rig(args) => args.paths(),
             Self::Effects(args) => args.paths(),
             Self::Predict(args) => args.paths(),
+            Self::Export(args) => args.paths(),
             Self::Step(_) | Self::Flash(_) | Self::Imu(_) | Self::Virtual(_) => Paths::default(),
         }
     }
@@ -171,6 +175,7 @@ impl Command {
             Self::Virtual(args) => virtual_port::run(args, quiet),
             Self::Effects(args) => effects::run(args, quiet),
             Self::Predict(args) => predict::run(args),
+            Self::Export(args) => export::run(args, quiet),
         }
     }
 }

@@ -20,7 +20,7 @@ use ident::log::{FORMAT, Log, write_whole};
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::report::selection;
-use ident::select::{Airframe, Need, Pair, Row, choose, from_log, read_table, row, thesis};
+use ident::select::{Airframe, Need, Pair, Row, choose, from_log, misses, read_table, row, thesis, why};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
@@ -89,9 +89,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         full_throttle_min: Minute(args.minutes),
         resultant_n: Newton(args.resultant),
     };
-    let mut pairs = match (&args.files[..], args.simulated) {
-        ([], true) => fly_catalogue(quiet),
-        ([], false) => thesis(),
+    let (mut pairs, left_out) = match (&args.files[..], args.simulated) {
+        ([], true) => (fly_catalogue(quiet), Vec::new()),
+        ([], false) => (thesis(), Vec::new()),
         (files, _) => read(files)?,
     };
     // 390KV before 1000KV
@@ -126,31 +126,48 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     if args.json {
         let names: Vec<String> = chosen.iter().map(|r| format!("{} {}", r.pair.motor, r.pair.propeller)).collect();
-        let json = serde_json::json!({"airframe": airframe, "need": need, "rows": rows, "chosen": names});
+        let json = serde_json::json!({"airframe": airframe, "need": need, "rows": rows, "chosen": names, "why": why(&rows, &chosen, &need), "left_out": left_out});
         writeln!(out, "{}", serde_json::to_string_pretty(&json)?)?;
     } else if !quiet {
         write!(out, "{}", table(&pairs, &rows, &chosen, &need))?;
     }
+    drop(out);
+    if !quiet {
+        left_out.iter().for_each(|why| eprintln!("left out: {why}"));
+    }
     Ok(())
 }
 
-/// Logs and tables, told apart by their first line.
-fn read(files: &[PathBuf]) -> Result<Vec<Pair>, Failure> {
-    let mut pairs = Vec::new();
+/// Logs and tables, told apart by their first line, and why others are left out; refused only where none is left.
+fn read(files: &[PathBuf]) -> Result<(Vec<Pair>, Vec<String>), Failure> {
+    let (mut pairs, mut left_out) = (Vec::new(), Vec::new());
     for path in files {
-        if is_log(path)? {
-            let log = Log::read(path)?;
-            let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
-            if pair.maximum.is_none() {
-                return Err(format!("{}: no plateau with thrust and current; expected a run with thrust_n and current_a on levels of at least 5 rows", path.display()).into());
-            }
-            pairs.push(pair);
-        } else {
-            let file = std::fs::File::open(path).map_err(unread(&path))?;
-            pairs.extend(read_table(&path.display().to_string(), BufReader::new(file))?);
+        match pairs_of(path) {
+            Ok(found) => pairs.extend(found),
+            Err(why) => left_out.push(why.to_string()),
         }
     }
-    Ok(pairs)
+    match left_out.first() {
+        Some(only) if files.len() == 1 => Err(only.clone().into()),
+        Some(first) if pairs.is_empty() => {
+            Err(format!("none of the {} files holds a pair; the first: {first}", files.len()).into())
+        }
+        _ => Ok((pairs, left_out)),
+    }
+}
+
+fn pairs_of(path: &Path) -> Result<Vec<Pair>, Failure> {
+    if !is_log(path)? {
+        let file = std::fs::File::open(path).map_err(unread(path))?;
+        return Ok(read_table(&path.display().to_string(), BufReader::new(file))?);
+    }
+    let log = Log::read(path)?;
+    let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
+    if pair.maximum.is_none() {
+        let expected = "expected a run with thrust_n and current_a on levels of at least 5 rows";
+        return Err(format!("{}: no plateau with thrust and current; {expected}", path.display()).into());
+    }
+    Ok(vec![pair])
 }
 
 fn is_log(path: &Path) -> Result<bool, Failure> {
@@ -204,19 +221,24 @@ fn fly(motor: &str, propeller: &str) -> Pair {
 }
 
 fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
-    let mut out =
-        format!("{:<8} {:<9} {:>8} {:>8} {:>5} {:>7} {:>9}", "motor", "propeller", "thrust N", "A", "N/A", "hovers", "resultant");
+    let width = |of: fn(&Pair) -> &str, least: usize| pairs.iter().map(|p| of(p).chars().count()).fold(least, usize::max);
+    let (m, p) = (width(|p| &p.motor, 8), width(|p| &p.propeller, 9));
+    let mut out = format!(
+        "{:<m$} {:<p$} {:>8} {:>8} {:>5} {:>7} {:>9}",
+        "motor", "propeller", "thrust N", "A", "N/A", "hovers", "resultant"
+    );
     let counts: Vec<u32> = rows.first().map_or_else(Vec::new, |r| r.with_batteries.iter().map(|w| w.batteries).collect());
     for n in &counts {
         out += &format!(" {:>7}", format!("min x{n}"));
     }
     out.push('\n');
     for r in rows {
-        let mark = if chosen.iter().any(|c| std::ptr::eq(*c, r)) { "  meets the need" } else { "" };
+        let misses = misses(r, need);
+        let mark = if misses.is_empty() { "  meets the need".to_owned() } else { format!("  {}", misses.join(", ")) };
         let clipped = if r.pair.clipped { "  thrust reading clipped: a lower bound" } else { "" };
         let with = r.with_batteries.iter().find(|w| w.batteries == need.batteries);
         out += &format!(
-            "{:<8} {:<9} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
+            "{:<m$} {:<p$} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
             r.pair.motor,
             r.pair.propeller,
             r.total_thrust_n.0 / 4.0,
@@ -228,16 +250,13 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         for w in &r.with_batteries {
             out += &format!(" {:>7.1}", w.full_throttle_min.0);
         }
-        out += mark;
+        out += &mark;
         out += clipped;
         out.push('\n');
     }
-    for p in pairs.iter().filter(|p| p.maximum.is_none()) {
-        out += &format!("{:<8} {:<9} no result\n", p.motor, p.propeller);
+    for pair in pairs.iter().filter(|p| p.maximum.is_none()) {
+        out += &format!("{:<m$} {:<p$} no result\n", pair.motor, pair.propeller);
     }
-    match chosen.first() {
-        Some(best) => out += &format!("choice: {} with {}\n", best.pair.motor, best.pair.propeller),
-        None => out += &format!("choice: none gives {:.2} N in total under these needs\n", need.total_thrust_n.0),
-    }
+    out += &format!("{}\n", why(rows, chosen, need));
     out
 }

@@ -8,7 +8,7 @@
 
 mod page;
 mod record;
-mod rotor;
+pub(crate) mod rotor;
 mod summary;
 
 use crate::Failure;
