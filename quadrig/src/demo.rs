@@ -11,7 +11,8 @@ use crate::close_loop::{is_result, results};
 use crate::folder::Folder;
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
-use hal_sim::Scenario;
+use clap::builder::PossibleValuesParser;
+use hal_sim::{Scenario, effect};
 use ident::close::close;
 use ident::context::Context;
 use ident::log::Log;
@@ -29,8 +30,8 @@ pub(crate) struct Args {
     /// Draws the hidden effect and every noise; from the clock when not given.
     #[arg(long)]
     seed: Option<u64>,
-    /// Hides this effect instead of drawing one.
-    #[arg(long)]
+    /// Hides this effect instead of drawing one of six.
+    #[arg(long, value_parser = PossibleValuesParser::new(effect::catalogue().iter().map(|e| e.id)))]
     effect: Option<String>,
     /// Folder for log, model, verdict and report.
     #[arg(short, long, default_value = "out/demo")]
@@ -120,7 +121,6 @@ fn mixed(seed: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hal_sim::effect;
 
     #[test]
     fn the_simulator_knows_what_the_demonstration_hides() {

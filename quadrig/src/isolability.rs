@@ -20,7 +20,6 @@ use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLE)]
 pub(crate) struct Args {
     /// A rig log (.csv), or a scenario (.toml), which is flown first, without the effects that it hides.
     input: PathBuf,
@@ -38,8 +37,6 @@ impl Args {
 
 /// The files of the folder.
 const FILES: [&str; 3] = ["isolability.html", "matrix.svg", "matrix.csv"];
-
-const EXAMPLE: &str = "Sizes are in noise floors of a cause's main channel (root mean square), and in the unit of its own parameter\n(ohm, N, N/s, s, ...). Nothing is fitted to your liking: the search that gives verdicts is asked itself.\n\nExample:\n  quadrig isolability examples/sagging-lead.toml -o out/isolability";
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {

@@ -21,11 +21,13 @@ mod export;
 mod flash;
 mod fly;
 mod folder;
+mod help;
 mod identify;
 mod import;
 mod imu;
 mod isolability;
 mod live;
+mod man;
 mod measured;
 mod plateaus;
 mod port;
@@ -45,7 +47,7 @@ mod view;
 mod virtual_port;
 
 use apart::Paths;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Rig controller, simulator, identification: from a motor command to a named effect on measured data.
@@ -114,6 +116,10 @@ enum Command {
     Predict(predict::Args),
     /// A model as the file of a flight controller or of a simulator: thrust curve, motor constants, battery, delay.
     Export(export::Args),
+    /// Completions of the command line for a shell, on standard output.
+    Completions(man::Completions),
+    /// Manual pages of the command line.
+    Man(man::Args),
 }
 
 /// What went wrong, as one line.
@@ -144,7 +150,8 @@ impl Command {
             Self::Effects(args) => args.paths(),
             Self::Predict(args) => args.paths(),
             Self::Export(args) => args.paths(),
-            Self::Step(_) | Self::Flash(_) | Self::Imu(_) | Self::Virtual(_) => Paths::default(),
+            Self::Man(args) => args.paths(),
+            Self::Step(_) | Self::Completions(_) | Self::Flash(_) | Self::Imu(_) | Self::Virtual(_) => Paths::default(),
         }
     }
 
@@ -176,12 +183,15 @@ impl Command {
             Self::Effects(args) => effects::run(args, quiet),
             Self::Predict(args) => predict::run(args),
             Self::Export(args) => export::run(args, quiet),
+            Self::Completions(args) => man::completions(args),
+            Self::Man(args) => man::run(args, quiet),
         }
     }
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = help::taught(Cli::command()).get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     match cli.command.run(cli.quiet) {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {

@@ -22,7 +22,11 @@ fn bench() -> PathBuf {
         std::fs::write(folder.path().join("rig.toml"), scenario).expect("a scenario");
         call(folder.path(), &["--quiet", "sim", "rig.toml", "-o", "run.csv"]).succeeded();
         let log = std::fs::read_to_string(folder.path().join("run.csv")).expect("a log");
-        std::fs::write(folder.path().join("run.csv"), log.replacen("# quadrig-log 1\n", "# quadrig-log 1\n# pole_pairs = 7\n", 1)).expect("a log");
+        std::fs::write(
+            folder.path().join("run.csv"),
+            log.replacen("# quadrig-log 1\n", "# quadrig-log 1\n# pole_pairs = 7\n", 1),
+        )
+        .expect("a log");
         call(folder.path(), &["--quiet", "identify", "run.csv", "-o", "model.toml"]).succeeded();
         folder
     });
@@ -45,7 +49,8 @@ impl Model {
 
     fn rpm(&self, signal: f64) -> f64 {
         let start = self.0["start_pulse_us"].as_float().expect("a pulse");
-        let speeds: Vec<&str> = self.0["consensus"]["channels"].as_array().expect("channels").iter().filter_map(|c| c.as_str()).collect();
+        let speeds: Vec<&str> =
+            self.0["consensus"]["channels"].as_array().expect("channels").iter().filter_map(|c| c.as_str()).collect();
         if 1000.0 + 1000.0 * signal <= start {
             return 0.0;
         }
@@ -110,12 +115,17 @@ fn px4_reads_it_back() {
     let factor = keys["THR_MDL_FAC"];
     let full = keys["CA_ROTOR0_CT"];
     compare(&text, 5.0, |u| full * (factor * u * u + (1.0 - factor) * u));
-    assert_eq!((keys["CA_ROTOR_COUNT"], keys.contains_key("CA_ROTOR3_KM"), keys.contains_key("CA_ROTOR4_CT")), (4.0, true, false));
+    assert_eq!(
+        (keys["CA_ROTOR_COUNT"], keys.contains_key("CA_ROTOR3_KM"), keys.contains_key("CA_ROTOR4_CT")),
+        (4.0, true, false)
+    );
     let model = Model::read(&bench().join("model.toml"));
     let torque = model.polynomial("torque_nm");
     let arm = (value(&torque, model.rpm(1.0) / 1000.0) - torque[0]) / model.thrust(1.0);
     assert!((keys["CA_ROTOR0_KM"] / arm - 1.0).abs() < 0.03, "{} m, the model's {arm}", keys["CA_ROTOR0_KM"]);
-    assert!((after(&text, "motorConstant") / (full / (model.rpm(1.0) * std::f64::consts::TAU / 60.0).powi(2)) - 1.0).abs() < 0.02);
+    assert!(
+        (after(&text, "motorConstant") / (full / (model.rpm(1.0) * std::f64::consts::TAU / 60.0).powi(2)) - 1.0).abs() < 0.02
+    );
     assert_eq!(px4(&exported("px4", &["--rotors", "6"]))["CA_ROTOR_COUNT"], 6.0);
 }
 
@@ -169,7 +179,11 @@ fn crazyflie_reads_it_back() {
     let log = std::fs::read_to_string(bench().join("run.csv")).expect("a log").replace("voltage_v", "other_v");
     std::fs::write(bench().join("no-voltage.csv"), log).expect("a log");
     call(&bench(), &["--quiet", "identify", "no-voltage.csv", "-o", "no-voltage.toml"]).succeeded();
-    call(&bench(), &["export", "no-voltage.toml", "--to", "crazyflie", "-o", "x.h"]).refused(&["no-voltage.toml", "no voltage", "expected"]);
+    call(&bench(), &["export", "no-voltage.toml", "--to", "crazyflie", "-o", "x.h"]).refused(&[
+        "no-voltage.toml",
+        "no voltage",
+        "expected",
+    ]);
     assert!(!bench().join("x.h").exists());
 }
 
@@ -201,7 +215,8 @@ fn every_peer_has_its_links() {
     let page = std::fs::read_to_string(root().join("docs/export.md")).expect("docs/export.md");
     for peer in PEERS {
         let text = exported(peer, &[]);
-        let links: Vec<&str> = text.split_whitespace().filter(|w| w.starts_with("https://")).map(|w| w.trim_end_matches(',')).collect();
+        let links: Vec<&str> =
+            text.split_whitespace().filter(|w| w.starts_with("https://")).map(|w| w.trim_end_matches(',')).collect();
         assert!(!links.is_empty(), "{peer}");
         for link in links {
             assert!(page.contains(link), "docs/export.md lacks {link} of {peer}");

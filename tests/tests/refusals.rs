@@ -343,11 +343,6 @@ fn scenarios() -> Vec<Case> {
         ),
         alone("a scenario that is not there", "loop nowhere.toml", &["nowhere.toml: cannot be read"]),
         alone("a log in the place of pins", "sim empty.toml --replay good.csv -o out.csv", &["good.csv", "quadrig pins"]),
-        alone(
-            "an effect that nobody can hide",
-            "demo --effect gremlin -o out",
-            &["no effect is called \"gremlin\"", "supply_sag"],
-        ),
     ]
 }
 
