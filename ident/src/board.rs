@@ -7,6 +7,7 @@
 //! Units: s.
 //! Reference: specification `formats.md`, "Rig log".
 
+use crate::join::is_second_reading;
 use crate::log::{Log, MODELLED};
 use std::fmt;
 
@@ -24,7 +25,7 @@ const SECOND: [&str; 5] = ["rpm_esc", "current_esc_a", "voltage_esc_v", "charge_
 
 /// Whether a column tells of the board's readings, or tells one of them again, and is none itself.
 pub(crate) fn is_of_the_board(column: &str) -> bool {
-    column.ends_with(FLAG) || column.starts_with(RAW) || SECOND.contains(&column)
+    column.ends_with(FLAG) || column.starts_with(RAW) || SECOND.contains(&column) || is_second_reading(column)
 }
 
 /// Whether a key of a log's head belongs to the evidence of its recording, and not to the rig that a model is of.

@@ -33,6 +33,7 @@ pub mod import;
 pub mod inertial;
 pub mod inspect;
 pub mod isolability;
+pub mod join;
 pub mod leftover;
 pub mod log;
 pub mod long;

@@ -256,7 +256,7 @@ pub fn event_line(text: &str) -> String {
 }
 
 /// The event that a comment tells, if it tells one.
-fn event(comment: &str) -> Option<String> {
+pub(crate) fn event(comment: &str) -> Option<String> {
     let table = comment.strip_prefix("event").and_then(|_| comment.parse::<toml::Table>().ok())?;
     table.get("event")?.as_str().map(str::to_owned)
 }
@@ -307,7 +307,6 @@ pub(crate) struct Lines<'a, R> {
     file: &'a str,
     source: R,
     number: usize,
-    unterminated: bool,
     /// Of every byte that was read.
     digest: Sha256,
 }
@@ -326,6 +325,12 @@ impl Write for Digesting {
     }
 }
 
+/// SHA-256 of bytes, as `sha256sum` prints it.
+#[must_use]
+pub fn digest(bytes: &[u8]) -> String {
+    hexadecimal(Sha256::new_with_prefix(bytes))
+}
+
 /// SHA-256 of a text, as `sha256sum` prints it.
 pub(crate) fn digest_of(text: &str) -> String {
     hexadecimal(Sha256::new_with_prefix(text))
@@ -337,16 +342,11 @@ fn hexadecimal(digest: Sha256) -> String {
 
 impl<'a, R: BufRead> Lines<'a, R> {
     pub(crate) fn new(file: &'a str, source: R) -> Self {
-        Self { file, source, number: 0, unterminated: false, digest: Sha256::new() }
+        Self { file, source, number: 0, digest: Sha256::new() }
     }
 
     pub(crate) fn place(&self) -> Place<'a> {
         Place { file: self.file, line: self.number.max(1) }
-    }
-
-    /// Whether the last line that was read ended without a line feed: the mark of a truncated file.
-    pub(crate) fn unterminated(&self) -> bool {
-        self.unterminated
     }
 
     /// The next line in a string of its own; `None` at the end.
@@ -375,7 +375,6 @@ impl<'a, R: BufRead> Lines<'a, R> {
                 "a text file with one short line a sample",
             ));
         }
-        self.unterminated = bytes.last() != Some(&b'\n');
         while matches!(bytes.last(), Some(b'\n' | b'\r')) {
             bytes.pop();
         }

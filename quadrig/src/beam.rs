@@ -8,10 +8,12 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::figures;
+use crate::open::open;
 use crate::trouble::unwritten;
 use ident::beam::Beam;
 use ident::context::Context;
-use ident::log::{Log, write_whole};
+use ident::import::Options;
+use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{Density, Kilogram, Metre, Newton, Pascal, RevPerMin, Volt};
 use ident::report::{beam, beam_figures, beam_warning};
@@ -156,7 +158,7 @@ fn design(args: &Args) -> Result<Beam, Failure> {
 
 fn speeds(args: &Args) -> Result<Vec<RevPerMin>, Failure> {
     let Some(path) = &args.run else { return Ok(args.speeds.iter().map(|s| RevPerMin(*s)).collect()) };
-    let log = Log::read(path)?;
+    let log = open(path, &Options::default(), true)?;
     let context = Context::new(&log, None);
     if context.rpm.is_empty() {
         return Err(format!(

@@ -12,6 +12,7 @@ pub(crate) mod inertial;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::Folder;
+use crate::open::{Columns, Names, open};
 use crate::progress::Bar;
 use ident::close::{Closed, close};
 use ident::log::Log;
@@ -22,7 +23,7 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The run.
+    /// The run: a rig log, or a stand's or ESC's own export.
     log: PathBuf,
     /// A declared model that stands as it is, instead of the thesis baseline.
     #[arg(long)]
@@ -36,6 +37,10 @@ pub(crate) struct Args {
     /// The verdict on stdout and nothing else.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    names: Names,
 }
 
 impl Args {
@@ -54,9 +59,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         return flight::run(args, quiet);
     }
     let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
-    let log = Log::read(&args.log)?;
+    let options = args.columns.options(&args.names);
+    let log = open(&args.log, &options, quiet)?;
     let model = args.model.as_deref().map(Model::read).transpose()?;
-    let others = args.validate.iter().map(|p| Log::read(p)).collect::<Result<Vec<_>, _>>()?;
+    let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
     let closed = {
         let bar = Bar::new("searching", quiet);
         close(&log, model.as_ref(), &others, &mut |share| bar.set(share))?

@@ -8,6 +8,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::figures;
+use crate::open::{Columns, Names, open};
 use crate::trouble::unwritten;
 use ident::fit::power::csv;
 use ident::identify::{Identified, identify, identify_in};
@@ -19,7 +20,7 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The run.
+    /// The run: a rig log, or a stand's or ESC's own export.
     log: PathBuf,
     /// Where the model goes.
     #[arg(short, long)]
@@ -42,6 +43,10 @@ pub(crate) struct Args {
     /// A second run to lay beside it on the page.
     #[arg(long, value_name = "LOG")]
     beside: Option<PathBuf>,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    names: Names,
 }
 
 impl Args {
@@ -60,7 +65,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let log = Log::read(&args.log)?;
+    let log = open(&args.log, &args.columns.options(&args.names), quiet)?;
     if let Some(air) = args.air.filter(|air| !(0.1..=10.0).contains(air)) {
         return Err(format!("--air {air}: expected a density in kg/m^3, such as 1.2").into());
     }
@@ -95,7 +100,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
     let second = match &args.beside {
         Some(path) => {
-            let log = Log::read(path)?;
+            let log = open(path, &args.columns.options(&args.names), true)?;
             let found = identify(&log)?;
             Some((log, found))
         }

@@ -7,21 +7,31 @@
 
 use crate::Failure;
 use crate::apart::Paths;
+use crate::join::{With, join};
+use crate::open::{Columns, Names, as_written};
 use crate::trouble::unwritten;
-use ident::import::Mapping;
+use ident::log::write_whole;
 use std::path::PathBuf;
 
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The export: RCbenchmark or Tyto CSV, a tidy CSV, any CSV with --map, or a decoded flight of a Crazyflie.
+    /// The export: CSV of RCbenchmark, Tyto Flight Stand, VESC Tool, ESC telemetry or any other with --map; a flight (Crazyflie, PX4, Betaflight).
     file: PathBuf,
     /// Where the log goes.
     #[arg(short, long)]
     output: PathBuf,
-    /// A column's meaning, TARGET=SOURCE or TARGET=SOURCE*FACTOR; may be given more than once.
-    #[arg(long = "map", value_name = "TARGET=SOURCE*FACTOR")]
-    mappings: Vec<Mapping>,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    names: Names,
+    /// Of a PX4 or Betaflight flight this rotor's ESC alone, as a rig log.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=12))]
+    rotor: Option<u32>,
+    /// Another logger of the same run (ESC, flight controller, board), put on this one's clock by what both saw; its channels are named after
+    /// it (rpm_esc, current_esc_a, ...), and a page beside the output shows the joint. May be given more than once.
+    #[arg(long = "with", value_name = "[esc|fc|board|stand2=]FILE")]
+    with: Vec<With>,
     /// Metadata of a flight, such as mass_kg=0.037; may be given more than once.
     #[arg(long = "meta", value_name = "KEY=VALUE")]
     meta: Vec<Meta>,
@@ -49,26 +59,54 @@ impl std::str::FromStr for Meta {
 impl Args {
     /// What it reads and writes.
     pub(crate) fn paths(&self) -> Paths<'_> {
-        Paths::default().reads([&self.file]).writes("-o", [&self.output])
+        Paths::default().reads([&self.file]).reads(self.with.iter().map(With::file)).writes("-o", [&self.output])
     }
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let flight = if args.mappings.is_empty() { ident::import::flight(&args.file)? } else { None };
+    let options = args.columns.options(&args.names);
+    let flight = match args.rotor {
+        Some(_) => None,
+        None if options.mappings.is_empty() => ident::import::flight(&args.file)?,
+        None => None,
+    };
     let is_flight = flight.is_some();
-    let (mut log, report) = flight.map_or_else(|| ident::import::import(&args.file, &args.mappings), Ok)?;
+    let (mut log, report) = match (flight, args.rotor) {
+        (Some(found), _) => found,
+        (None, Some(n)) => ident::import::rotor(&args.file, n as usize)?
+            .ok_or_else(|| format!("--rotor {n}: {} is no PX4 ULog and no Betaflight Blackbox log", args.file.display()))?,
+        (None, None) => ident::import::import_as(&args.file, &options)?,
+    };
+    options.name(&mut log);
+    let (mut shown, mut joints) = (None, Vec::new());
+    if is_flight && !args.with.is_empty() {
+        return Err(format!("--with: {} is a flight; expected a stand's log", args.file.display()).into());
+    }
+    if !args.with.is_empty() {
+        log = as_written(&log)?;
+        log.sha256 = None;
+        let (page, reports) = join(&mut log, &args.file, &args.with, &options, quiet)?;
+        (shown, joints) = (Some(page), reports);
+    }
     if is_flight {
         args.meta.iter().for_each(|Meta(key, value)| drop(log.meta.insert(key.clone(), value.clone())));
         ident::flight_log::write(&log, &args.output)
     } else if let Some(Meta(key, _)) = args.meta.first() {
         return Err(format!("--meta {key}: {} is no flight; expected a flight", args.file.display()).into());
     } else {
+        // what every reader takes, or nothing
+        as_written(&log)?;
         log.write(&args.output)
     }
     .map_err(unwritten(&args.output))?;
+    if let Some(page) = &shown {
+        let path = args.output.with_extension("joint.html");
+        write_whole(&path, |out| out.write_all(page.as_bytes())).map_err(unwritten(&path))?;
+    }
     if !quiet {
         print!("{}", report.table());
+        joints.iter().for_each(|r| print!("{}", r.table()));
         println!(
             "{} rows, {:.3} s, columns t_s {}",
             log.len(),

@@ -9,10 +9,12 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
 use crate::folder::Folder;
+use crate::open::open;
 use crate::progress::Bar;
 use crate::sim::fly;
 use hal_sim::Scenario;
 use hal_sim::scenario::AnyScenario;
+use ident::import::Options;
 use ident::isolability::{Apart, Cause, Isolability, Standing, isolability, short};
 use ident::log::Log;
 use ident::report;
@@ -71,7 +73,7 @@ fn log_of(input: &Path, quiet: bool) -> Result<(Log, Vec<String>), Failure> {
     if inertial::is_attitude_log(input) || flight::is_flight_log(input) {
         return Err(format!("{}: an attitude or flight log; expected a rig log or a scenario", input.display()).into());
     }
-    Ok((Log::read(input)?, Vec::new()))
+    Ok((open(input, &Options::default(), quiet)?, Vec::new()))
 }
 
 fn flown(hidden: &[String]) -> String {

@@ -8,11 +8,14 @@
 
 mod ahrs;
 mod apart;
+mod batch;
 mod beam;
 mod board;
 mod calibrate;
 mod circle;
 mod close_loop;
+#[cfg(test)]
+mod command_page;
 mod demo;
 mod effects;
 mod end;
@@ -26,9 +29,11 @@ mod identify;
 mod import;
 mod imu;
 mod isolability;
+mod join;
 mod live;
 mod man;
 mod measured;
+mod open;
 mod plateaus;
 mod port;
 mod predict;
@@ -72,7 +77,7 @@ enum Command {
     Sim(sim::Args),
     /// All thirty-six motor-propeller pairs of the thesis on all cores, a log each.
     Runs(runs::Args),
-    /// A thrust stand's export becomes a rig log; what was repaired is reported.
+    /// A thrust stand's, ESC's or flight's export becomes a log; every conversion is said.
     Import(import::Args),
     /// Plateaus, fits and quality figures of a log.
     Identify(identify::Args),
@@ -80,6 +85,8 @@ enum Command {
     Plateaus(plateaus::Args),
     /// Residual, cause, corrected model, error before and after.
     CloseLoop(close_loop::Args),
+    /// The loop on every log of a folder: a row a run; goes on where it stopped, shared among machines by --shard.
+    Batch(batch::Args),
     /// Motor, propeller and battery choice.
     Select(select::Args),
     /// Design of the load cell's beam, with a warning of resonance.
@@ -136,6 +143,7 @@ impl Command {
             Self::Identify(args) => args.paths(),
             Self::Plateaus(args) => args.paths(),
             Self::CloseLoop(args) => args.paths(),
+            Self::Batch(args) => args.paths(),
             Self::Select(args) => args.paths(),
             Self::Beam(args) => args.paths(),
             Self::Calibrate(args) => args.paths(),
@@ -165,6 +173,7 @@ impl Command {
             Self::Identify(args) => identify::run(args, quiet),
             Self::Plateaus(args) => plateaus::run(args, quiet),
             Self::CloseLoop(args) => close_loop::run(args, quiet),
+            Self::Batch(args) => batch::run(args, quiet),
             Self::Select(args) => select::run(args, quiet),
             Self::Beam(args) => beam::run(args, quiet),
             Self::Calibrate(args) => calibrate::run(args, quiet),

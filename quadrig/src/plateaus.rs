@@ -64,13 +64,16 @@ enum PaddingName {
 const HEAD: &str = "\
 # Plateau detectors on recorded runs
 
-Written by `quadrig plateaus LOG... -o FOLDER`. The levels are those that each run's own command marks (held for 30 rows and more), from the
-row at which the speed answers a step to the row at which it answers the next; the value of a level is a line through the means of its
-third and its fourth quarter without glitches, with its standard error; a level is found where one stretch covers a third of its second
-half and reaches into no other level. *Ours, speed alone* and both binary shift forms do
-not see the command; *ours* does. The published form is given the threshold and the offset that score best on the run, which only who
-knows the levels can choose; the mended one finds them by itself. *Right*: found with a mean within three standard errors (of the mean and
-of the level's value together), speed / thrust. *Error*: root mean square over the found levels, in per cent of the highest level.
+Written by `quadrig plateaus LOG... -o FOLDER`. The levels are those that each run's own command marks, held for 30 rows and more. A level lasts from the
+row at which the speed answers a step to the row at which it answers the next. Its value is a line through the means of its
+third and its fourth quarter without glitches, with its standard error. It is found where one stretch covers a third of its second
+half and reaches into no other level.
+
+*Ours, speed alone* and both binary shift forms do not see the command; *ours* does. The published form is given the threshold and the offset that score
+best on the run, which only who knows the levels can choose. The mended one finds them by itself.
+
+*Right*: found with a mean within three standard errors (of the mean and of the level's value together), speed / thrust. *Error*: root mean square over the
+found levels, in per cent of the highest level.
 
 | run | levels | detector | found | right | wrong | error, % |
 | --- | --- | --- | --- | --- | --- | --- |

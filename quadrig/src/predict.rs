@@ -8,6 +8,8 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
+use crate::open::{Columns, Names, open};
+use crate::trouble::unwritten;
 use clap::ValueEnum;
 use ident::context::Context;
 use ident::log::{Column, Log, write_whole};
@@ -42,6 +44,10 @@ pub(crate) struct Args {
     /// carries over: effects of the rig, what events left behind, and the mean of the rest.
     #[arg(long)]
     events: bool,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    names: Names,
 }
 
 impl Args {
@@ -74,7 +80,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         return flight::predict(&args.model, &text, &args.log, &args.output);
     }
     let model = Model::read(&args.model)?;
-    let log = Log::read(&args.log)?;
+    let log = open(&args.log, &args.columns.options(&args.names), false)?;
     let model = if args.events { Cow::Borrowed(&model) } else { model.on(&log) };
     let columns = match args.from {
         From::Relations => by_relations(&model, &log),
@@ -100,7 +106,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
         Ok(())
     })
-    .map_err(|e| format!("{}: {e}", args.output.display()).into())
+    .map_err(|e| unwritten(&args.output)(e).into())
 }
 
 fn by_relations(model: &Model, log: &Log) -> Vec<Column> {

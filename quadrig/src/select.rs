@@ -9,6 +9,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::figures;
+use crate::open::{Columns, open};
 use crate::progress::Bar;
 use crate::run_log::to_log;
 use crate::trouble::{unread, unwritten};
@@ -16,25 +17,30 @@ use hal_sim::Scenario;
 use hal_sim::plant::{Propeller, motor};
 use hal_sim::scenario::Schedule;
 use ident::context::Context;
-use ident::log::{FORMAT, Log, write_whole};
+use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::report::selection;
 use ident::select::{Airframe, Need, Pair, Row, choose, from_log, misses, read_table, row, thesis, why};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Rig logs, or tables `motor,propeller,thrust_n,current_a`; none: the figures that the thesis states.
+    /// Rig logs or exports, or tables `motor,propeller,thrust_n,current_a`; none: the figures that the thesis states.
     files: Vec<PathBuf>,
     /// Flies every pair of the simulator's catalogue.
     #[arg(long, conflicts_with = "files")]
     simulated: bool,
-    /// Only this motor.
+    /// Only this motor; a run that names none is taken for its.
     #[arg(long)]
     motor: Option<String>,
+    /// Name of the propeller of runs that name none.
+    #[arg(long)]
+    propeller: Option<String>,
+    #[command(flatten)]
+    columns: Columns,
     /// Least thrust of all four motors together, N.
     #[arg(long, default_value_t = 19.62)]
     thrust: f64,
@@ -92,7 +98,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let (mut pairs, left_out) = match (&args.files[..], args.simulated) {
         ([], true) => (fly_catalogue(quiet), Vec::new()),
         ([], false) => (thesis(), Vec::new()),
-        (files, _) => read(files)?,
+        (files, _) => read(files, args, quiet)?,
     };
     // 390KV before 1000KV
     let number =
@@ -139,10 +145,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 }
 
 /// Logs and tables, told apart by their first line, and why others are left out; refused only where none is left.
-fn read(files: &[PathBuf]) -> Result<(Vec<Pair>, Vec<String>), Failure> {
+fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<(Vec<Pair>, Vec<String>), Failure> {
     let (mut pairs, mut left_out) = (Vec::new(), Vec::new());
     for path in files {
-        match pairs_of(path) {
+        match pairs_of(path, args, quiet) {
             Ok(found) => pairs.extend(found),
             Err(why) => left_out.push(why.to_string()),
         }
@@ -156,12 +162,16 @@ fn read(files: &[PathBuf]) -> Result<(Vec<Pair>, Vec<String>), Failure> {
     }
 }
 
-fn pairs_of(path: &Path) -> Result<Vec<Pair>, Failure> {
-    if !is_log(path)? {
+fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure> {
+    if is_table(path)? {
         let file = std::fs::File::open(path).map_err(unread(path))?;
         return Ok(read_table(&path.display().to_string(), BufReader::new(file))?);
     }
-    let log = Log::read(path)?;
+    let mut log = open(path, &args.columns.named(None, None), quiet)?;
+    let given = [("motor", &args.motor), ("propeller", &args.propeller)];
+    for (key, value) in given.into_iter().filter_map(|(k, v)| Some((k, v.as_ref()?))) {
+        log.meta.entry(key.to_owned()).or_insert_with(|| toml::Value::String(value.clone()));
+    }
     let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
     if pair.maximum.is_none() {
         let expected = "expected a run with thrust_n and current_a on levels of at least 5 rows";
@@ -170,11 +180,14 @@ fn pairs_of(path: &Path) -> Result<Vec<Pair>, Failure> {
     Ok(vec![pair])
 }
 
-fn is_log(path: &Path) -> Result<bool, Failure> {
-    let file = std::fs::File::open(path).map_err(unread(&path))?;
-    let mut first = Vec::new();
-    std::io::Read::take(BufReader::new(file), 64).read_until(b'\n', &mut first)?;
-    Ok(String::from_utf8_lossy(&first).contains(FORMAT))
+/// Whether the first line that is no comment names motors.
+fn is_table(path: &Path) -> Result<bool, Failure> {
+    let file = std::fs::File::open(path).map_err(unread(path))?;
+    let mut head = Vec::new();
+    std::io::Read::take(file, 4096).read_to_end(&mut head)?;
+    let head = String::from_utf8_lossy(&head).into_owned();
+    let own = head.starts_with("# quadrig-");
+    Ok(!own && head.lines().find(|l| !l.starts_with('#') && !l.trim().is_empty()).is_some_and(|l| l.trim().starts_with("motor")))
 }
 
 /// Every motor with every propeller that the simulator knows, on a short staircase.

@@ -8,6 +8,7 @@
 //! Reference: specification `formats.md` ("nothing half-written").
 
 use crate::Failure;
+use crate::trouble::unwritten;
 use ident::log::write_whole;
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
@@ -29,7 +30,7 @@ pub(crate) struct Spool {
 }
 
 impl Spool {
-    /// Creates the part beside `target`.
+    /// Creates the part beside `target`, and the folder where it is not there yet.
     pub(crate) fn create(target: &Path) -> Result<Self, Failure> {
         let mut name = target.file_name().ok_or("-o: expected the name of a file")?.to_owned();
         name.push(".part");
@@ -37,6 +38,9 @@ impl Spool {
         if std::fs::metadata(&part).is_ok_and(|found| found.len() > 0) {
             let expected = "it is a log: expected another name for it, or for the new one, before anything more is recorded here";
             return Err(format!("{}: left by a recording that was cut off; {expected}", part.display()).into());
+        }
+        if let Some(folder) = target.parent() {
+            std::fs::create_dir_all(folder).map_err(unwritten(folder))?;
         }
         let file = OpenOptions::new().write(true).create(true).truncate(true).open(&part);
         let file = file.map_err(|e| {

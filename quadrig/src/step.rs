@@ -6,10 +6,10 @@
 //! Reference: specification `closing-the-loop.md`, "The steps".
 
 use crate::Failure;
+use crate::open::{Columns, Names, open};
 use crate::progress::Bar;
 use clap::builder::PossibleValuesParser;
 use ident::inspect::{STEPS, Table, step};
-use ident::log::Log;
 use std::path::PathBuf;
 
 /// Arguments.
@@ -23,11 +23,15 @@ pub(crate) struct Args {
     /// The table as JSON and nothing else.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    names: Names,
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let log = Log::read(&args.log)?;
+    let log = open(&args.log, &args.columns.options(&args.names), quiet)?;
     let found = {
         let bar = Bar::new(&args.step, quiet);
         step(&args.step, &log, &mut |share| bar.set(share))

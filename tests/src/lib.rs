@@ -9,6 +9,7 @@
 
 pub mod bench;
 pub mod blind;
+pub mod book;
 pub mod budget;
 pub mod desk;
 pub mod flights;

@@ -5,6 +5,7 @@
 //! What can go wrong: a command that was renamed, a word that the page shows and the program does not say.
 #![cfg(unix)]
 
+use quadrig_tests::book::{Block, blocks};
 use quadrig_tests::screen::Screen;
 use quadrig_tests::{quadrig, root};
 use std::io::{BufRead, BufReader, Write};
@@ -14,24 +15,6 @@ use std::time::Duration;
 
 /// How the page calls the command line.
 const CALL: &str = "cargo run --release -- ";
-
-/// Blocks of a page: the words behind the fence, and the lines.
-fn blocks(markdown: &str) -> Vec<(String, Vec<String>)> {
-    let mut found: Vec<(String, Vec<String>)> = Vec::new();
-    let mut inside = false;
-    for line in markdown.lines() {
-        match (line.strip_prefix("```"), inside) {
-            (Some(words), false) => {
-                found.push((words.trim().to_owned(), Vec::new()));
-                inside = true;
-            }
-            (Some(_), true) => inside = false,
-            (None, true) => found.last_mut().expect("a block").1.push(line.to_owned()),
-            (None, false) => {}
-        }
-    }
-    found
-}
 
 /// The first terminal.
 struct Bench {
@@ -80,7 +63,7 @@ fn every_line_of_the_first_hour_works() {
     let page = std::fs::read_to_string(root().join("docs/first-hour.md")).expect("the page");
     let (mut bench, mut view, mut said) = (None, None::<Screen>, String::new());
     let mut counted = [0; 3];
-    for (kind, lines) in blocks(&page) {
+    for Block { kind, lines, .. } in blocks(&page) {
         println!("--- {kind}: {lines:?}");
         let words = |line: &str| line.strip_prefix(CALL).unwrap_or_else(|| panic!("{line}")).to_owned();
         match kind.as_str() {

@@ -148,6 +148,17 @@ fn a_ulog_holds_the_flight_that_was_written() {
     }
     let vehicle = ident::flight::vehicle::Vehicle::of(&seen).expect("a vehicle");
     assert!(vehicle.rotors.iter().zip(&places).all(|(r, p)| (r.x - p[0]).abs() < 1e-6 && r.turns == p[2]));
+    // one rotor as a rig: the ESC's own voltage, its own time stamps
+    let said = call(at, &["import", "flight.ulg", "--rotor", "3", "--motor", "M", "-o", "rotor.csv"]).succeeded();
+    assert!(said.out.contains("rotor 3 of a flight as a rig: no thrust, no torque"), "{}", said.out);
+    let rotor = Log::read(&at.join("rotor.csv")).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(rotor.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["pulse_us", "rpm", "voltage_v"]);
+    for (ours, theirs, most) in [("rpm", "rpm_3", 0.6), ("pulse_us", "pulse_us_3", 1e-3)] {
+        let (difference, share) = apart(log.column(theirs).expect(theirs), rotor.column(ours).expect(ours));
+        assert!(difference <= most && share > 0.95, "{ours}: {difference} on {share}");
+    }
+    assert!(rotor.column("voltage_v").expect("a voltage").iter().all(|v| (v - 11.1).abs() < 1e-3));
+    call(at, &["import", "flight.ulg", "--rotor", "9", "-o", "never.csv"]).refused(&["flight.ulg", "no speed of rotor 9"]);
     std::fs::write(at.join("cut.ulg"), &bytes[..bytes.len() / 2]).expect("a file");
     let said = call(at, &["import", "cut.ulg", "-o", "cut.csv"]).succeeded();
     assert!(said.out.contains("breaks off"), "{}", said.out);
@@ -180,6 +191,11 @@ fn a_blackbox_log_holds_the_flight_that_was_written() {
         let (difference, share) = apart(log.column(name).expect(name), seen.column(name).expect(name));
         assert!(difference <= most && share > 0.99, "{name}: {difference} on {share}");
     }
+    call(at, &["import", "flight.bbl", "--rotor", "2", "-o", "rotor.csv"]).succeeded();
+    let rotor = Log::read(&at.join("rotor.csv")).unwrap_or_else(|e| panic!("{e}"));
+    let names: Vec<&str> = rotor.columns.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["pulse_us", "rpm", "voltage_v", "current_of_all_a"]);
+    assert!(apart(log.column("rpm_2").expect("a speed"), rotor.column("rpm").expect("a speed")).0 <= 7.2);
     let text = String::from_utf8_lossy(&bytes);
     let text = text.split("H motorOutput").next().expect("headers").replace("Data version:2", "Data version:9");
     std::fs::write(at.join("old.bbl"), text).expect("a file");

@@ -115,8 +115,8 @@ that is none, a value that no option takes) is status 2, and `--help` says what 
 /// Writes the page.
 pub(crate) fn write(place: &Place) -> Result<(), Failure> {
     let path = place.root.join("docs/errors.md");
-    std::fs::write(&path, page(&place.root)?).map_err(|e| format!("{}: {e}", path.display()))?;
-    Ok(())
+    let text = page(&place.root).map_err(Failure)?;
+    std::fs::write(&path, text).map_err(|e| Failure(format!("{}: {e}", path.display())))
 }
 
 fn page(root: &Path) -> Result<String, String> {
@@ -180,8 +180,15 @@ fn refusals(source: &str) -> Vec<(String, String)> {
     // place.refuse(column, found, expected): the word itself stands in the type's own text
     for (at, call) in code.match_indices(".refuse(") {
         let end = closing(code, at + call.len());
-        let inside: Vec<&str> =
-            literals.iter().filter(|l| l.start > at && l.start < end).map(|l| l.text.as_str()).filter(|t| t.len() > 2).collect();
+        // the column's name is no part of what is said
+        let is_column = |l: &Literal| code[..l.start].ends_with("Some(");
+        let inside: Vec<&str> = literals
+            .iter()
+            .filter(|l| !is_column(l))
+            .filter(|l| l.start > at && l.start < end)
+            .map(|l| l.text.as_str())
+            .filter(|t| t.len() > 2)
+            .collect();
         match inside[..] {
             [] => {}
             [expected] if !expected.contains("expected ") => out.push((String::new(), expected.to_owned())),

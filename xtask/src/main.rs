@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod ahrs_bench;
+mod book;
 mod callgraph;
 mod emulator;
 mod errors;
@@ -30,9 +31,10 @@ use std::process::ExitCode;
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
-  setup            Rust target of the boards, Python environment of the verdict checker
+  setup            Rust target of the boards, Python environment of the verdict checker, mdBook
   hazards [LINE]...  breaks each mend of tests/hazards.toml in a copy and sees its test fail
   hazards --page   writes docs/hazards.md
+  book             builds docs/ with mdBook into target/book and checks every link of what comes out
   errors           writes docs/errors.md: every refusal of the command line, from the source
   image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
                    interrupts reach no panic, and its stack is bounded (budgets/rig.toml)
@@ -46,7 +48,7 @@ usage: cargo xtask COMMAND
   ahrs-bench --vqf  VQF's Rust port on every variant, those included of which nothing is published (fetches it once)
   ahrs-peers       instructions, flash and RAM of other attitude filters beside ours (fetches them once)
   ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)
-  test             everything: format, lints, images, tests, emulated boards, verdicts
+  test             everything: format, lints, the book, images, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
   test --lints     format and lints, those of the code behind the emulator included (its crates take 140 s of processor time once)
   blind [ARGS]     the blind campaign (docs/blind.md), on messy rigs with --messy; ARGS go to it, --help lists them
@@ -60,11 +62,12 @@ fn main() -> ExitCode {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let place = Place::find();
     let done = match words.as_slice() {
-        ["setup"] => setup::target(&place).and_then(|()| setup::python(&place).map(|_| ())),
+        ["setup"] => setup::target(&place).and_then(|()| setup::python(&place)).and_then(|_| setup::mdbook(&place).map(|_| ())),
         ["image"] => image::image(&place, false),
         ["hazards", "--page"] => hazards::write_page(&place),
         ["hazards", lines @ ..] => hazards::break_each(&place, lines),
         ["errors"] => errors::write(&place),
+        ["book"] => book::book(&place),
         ["program"] => emulator::program(&place),
         ["image", "--bless"] => image::image(&place, true),
         ["test"] => test::everything(&place),

@@ -9,6 +9,7 @@
 //! Reference: `.ci/run` calls exactly this.
 
 use crate::ahrs_bench;
+use crate::book;
 use crate::emulator;
 use crate::image;
 use crate::place::{BOARD, Place};
@@ -64,6 +65,7 @@ pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
             ]);
             run(&mut clippy)
         })?;
+        steps.step("the book and its links", |_| book::book(place))?;
         images(place, &mut steps)?;
         host_tests(place, &mut steps)?;
         steps.step("the attitude filter on recordings", |_| ahrs_bench::bench(place, &[]))?;

@@ -1,410 +1,257 @@
-//! The table itself: read, mapped, repaired, counted.
+//! The table itself: columns planned, rows read.
 //!
-//! What it is: a foreign CSV becomes a [`Log`] by the dictionary of [`super::header`] and four repair rules.
-//! What can go wrong: no time column (row index is taken and said), repeated or backward stamps (dropped, counted), text in
-//! a numeric column (refused with its place), fewer than two related channels (refused).
+//! What it is: a foreign CSV becomes columns of numbers by the dictionary of [`super::header`].
+//! What can go wrong: text in a column of numbers (refused with its place; a further column that holds mostly text is left out), fields
+//! missing or too many (refused), a quantity without a unit (its values may tell, else refused).
 //! Units: the contract's.
 //! Reference: specification `formats.md`, `quadrig import`.
 
-use super::Report;
-use super::header::{Target, sort};
-use crate::log::{Column, Lines, Log, MODELLED, Place, ReadError, SPEED, short};
-use std::fs::File;
-use std::io::{BufRead, BufReader};
-use std::path::Path;
-
-/// A user's own mapping of one column: `target = source * factor`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Mapping {
-    /// Column of the contract.
-    pub target: String,
-    /// Header cell of the file.
-    pub source: String,
-    /// Multiplied in.
-    pub factor: f64,
-    /// Added after that.
-    pub offset: f64,
-}
-
-impl std::str::FromStr for Mapping {
-    type Err = String;
-
-    /// `target=source`, `target=source*factor` or `target=source*factor+offset`.
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let wanted =
-            "expected TARGET=SOURCE, TARGET=SOURCE*FACTOR or TARGET=SOURCE*FACTOR+OFFSET, such as thrust_n=Load*0.00980665";
-        let (target, rest) = text.split_once('=').ok_or(wanted)?;
-        let (rest, offset) = match rest.rsplit_once('+') {
-            Some((s, o)) if s.contains('*') => (s, o.trim().parse::<f64>().map_err(|_| wanted)?),
-            _ => (rest, 0.0),
-        };
-        let (source, factor) = match rest.rsplit_once('*') {
-            Some((s, f)) => (s, f.trim().parse::<f64>().map_err(|_| wanted)?),
-            None => (rest, 1.0),
-        };
-        Ok(Self { target: target.trim().to_owned(), source: source.trim().to_owned(), factor, offset })
-    }
-}
-
-struct Plan {
-    /// For each field of the file: destination in `names`, and how its text becomes a number.
-    route: Vec<Option<(usize, Reading)>>,
-    names: Vec<String>,
-    /// What stands between the fields.
-    separator: char,
-    /// The first line already held numbers.
-    headless: bool,
-}
+use super::clock::{Stamp, stamp};
+use super::header::{ELECTRICAL, Target, clean, sort_all};
+use super::layout::{Layout, Records};
+use super::number::{Cell, cell};
+use super::{Options, Report};
+use crate::log::{Place, ReadError, short};
 
 /// How a field becomes a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Reading {
+pub(super) enum Reading {
     /// A decimal number times a factor plus an offset.
     Number(f64, f64),
-    /// Date and time of day, to seconds.
+    /// Date, time of day, or a number whose unit its size tells.
     Stamp,
+    /// Electrical turns a minute, times this.
+    Electrical(f64),
+    /// A number whose unit is asked of the values.
+    Unitless(&'static str),
 }
 
-/// Imports a file.
-///
-/// # Errors
-/// [`ReadError`] with file, line and column.
-pub fn import(path: &Path, mappings: &[Mapping]) -> Result<(Log, Report), ReadError> {
-    let file = path.display().to_string();
-    let handle = File::open(path).map_err(|source| ReadError::Io { file: file.clone(), source })?;
-    let (mut log, report) = import_from(&file, BufReader::new(handle), mappings)?;
-    log.name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or(file);
-    log.meta.insert("source".into(), toml::Value::String(log.name.clone()));
-    Ok((log, report))
+/// A column while it is read.
+#[derive(Debug, Clone)]
+pub(super) struct Field {
+    /// Name in the log.
+    pub(super) name: String,
+    /// Header cell.
+    pub(super) cell: String,
+    /// How it is read.
+    pub(super) reading: Reading,
+    /// Whether the user said so.
+    pub(super) mapped: bool,
+    /// Whether it is none of the contract's.
+    further: bool,
+    /// One value a row; of stamps the seconds.
+    pub(super) values: Vec<f64>,
+    /// How many cells were stamps with a colon, and whether all of them had a date.
+    pub(super) stamps: (usize, bool),
+    /// Words for a missing value.
+    missing: usize,
+    /// Cells of text, and the first of them.
+    text: (usize, Option<(u64, String)>),
 }
 
-/// Imports from any source; `file` is the name for messages.
-///
-/// # Errors
-/// As [`import`].
-pub fn import_from(file: &str, source: impl BufRead, mappings: &[Mapping]) -> Result<(Log, Report), ReadError> {
-    let mut lines = Lines::new(file, source);
-    let mut report = Report::default();
-    let header = loop {
-        match lines.next_line()? {
-            None => {
-                return Err(lines.place().refuse(
-                    None,
-                    "the file is empty or ends before its header",
-                    "a CSV with one header line",
-                ));
-            }
-            Some(line) if line.trim().is_empty() || line.starts_with('#') => {}
-            Some(line) => break line,
+/// Plans the columns of a layout: for each header cell the place of its field, or nothing.
+pub(super) fn plan(
+    file: &str,
+    layout: &Layout<'_>,
+    options: &Options,
+    report: &mut Report,
+) -> Result<(Vec<Option<usize>>, Vec<Field>), ReadError> {
+    let place = Place { file, line: layout.line as usize };
+    for m in &options.mappings {
+        if !layout.cells.contains(&m.source) {
+            return Err(place.refuse(
+                Some(&m.source),
+                "no such column in the file",
+                format!("one of: {}", layout.cells.join(", ")),
+            ));
         }
-    };
-    let plan = plan(&header, mappings, &lines.place(), &mut report)?;
-    let rows = read_rows(&mut lines, &header, &plan, &mut report)?;
-    let log = assemble(plan.names, rows, &mut report);
-    if log.is_empty() {
-        return Err(lines.place().refuse(None, "no data rows", "at least one line of numbers under the header"));
     }
-    let related = log.measured().count() + usize::from(log.column("pulse_us").is_some());
-    if related < 2 {
-        return Err(Place { file, line: 1 }.refuse(
+    let sorted = sort_all(&layout.cells);
+    let sides = || sorted.iter().filter_map(|s| s.side);
+    let wanted = options.side.or(sides().min()).unwrap_or(1);
+    if options.side.is_some() && !sides().any(|s| s == wanted) {
+        return Err(place.refuse(
             None,
-            format!("{related} known channel(s)"),
-            "at least two of pulse, rpm, thrust, torque, current, voltage (name them with --map TARGET=SOURCE*FACTOR)",
+            format!("no column of side {wanted}"),
+            "headers such as 'Thrust B (kgf)'; leave out --side",
         ));
     }
-    Ok((log, report))
-}
-
-fn plan(header: &str, mappings: &[Mapping], place: &Place<'_>, report: &mut Report) -> Result<Plan, ReadError> {
-    let separator = [',', '\t', ';'].into_iter().find(|s| header.contains(*s)).unwrap_or(',');
-    let numbers: Vec<String> = (1..=header.split(separator).count()).map(|k| k.to_string()).collect();
-    let mut cells: Vec<&str> =
-        header.split(separator).map(|c| c.trim().trim_start_matches('\u{feff}').trim_matches('"')).collect();
-    let headless = cells.iter().all(|c| c.parse::<f64>().is_ok());
-    if headless {
-        if mappings.is_empty() {
-            return Err(place.refuse(
-                None,
-                "numbers where a header should stand",
-                format!("a header line, or columns named by their position (1 to {}), such as --map rpm=5*65", cells.len()),
-            ));
-        }
-        report.add("(file)", "no header line: columns are called by their position; those without --map are left out", 1);
-        cells = numbers.iter().map(String::as_str).collect();
-    }
-    for m in mappings {
-        if !cells.contains(&m.source.as_str()) {
-            return Err(place.refuse(Some(&m.source), "no such column in the file", format!("one of: {}", cells.join(", "))));
-        }
-    }
-    let mut plan = Plan { route: Vec::new(), names: Vec::new(), separator, headless };
-    let mut skipped = 0;
-    for cell in &cells {
-        let (name, reading) = match mappings.iter().find(|m| m.source == *cell) {
-            Some(m) => (m.target.clone(), Reading::Number(m.factor, m.offset)),
-            None if headless => {
+    let (mut route, mut fields, mut skipped) = (Vec::new(), Vec::<Field>::new(), 0);
+    for (cell, sorted) in layout.cells.iter().zip(&sorted) {
+        let mapping = options.mappings.iter().find(|m| m.source == *cell);
+        let own = sorted.side.is_none_or(|s| s == wanted);
+        let further = |name: String| (name, Reading::Number(1.0, 0.0), true);
+        let (mut name, mut reading, mut extra) = match (mapping, sorted.target.clone()) {
+            (Some(m), _) => (m.target.clone(), Reading::Number(m.factor, m.offset), false),
+            (None, _) if layout.headless => {
                 skipped += 1;
-                plan.route.push(None);
+                route.push(None);
                 continue;
             }
-            None => match sort(cell) {
-                Target::Keep(name, factor) => (name.to_owned(), Reading::Number(factor, 0.0)),
-                Target::Covariate(name) => (name, Reading::Number(1.0, 0.0)),
-                Target::Stamp => ("t_s".to_owned(), Reading::Stamp),
-                Target::Command(full) => ("pulse_us".to_owned(), Reading::Number(1000.0 / full, 1000.0)),
-                Target::Skip => {
-                    skipped += 1;
-                    plan.route.push(None);
-                    continue;
-                }
-                Target::UnknownUnit(name) => {
-                    return Err(place.refuse(
-                        Some(cell),
-                        format!("no known unit for {name}"),
-                        format!("a unit in parentheses that can be converted, or --map {name}={cell}*FACTOR"),
-                    ));
-                }
-            },
+            (None, Target::Skip) => {
+                skipped += 1;
+                route.push(None);
+                continue;
+            }
+            (None, _) if !own => further(clean(cell)),
+            (None, Target::Covariate(name)) => further(name),
+            (None, Target::Keep(name, factor, offset)) => (name.to_owned(), Reading::Number(factor, offset), false),
+            (None, Target::Stamp) => ("t_s".to_owned(), Reading::Stamp, false),
+            (None, Target::Electrical(factor)) => (ELECTRICAL.to_owned(), Reading::Electrical(factor), false),
+            (None, Target::Command(full)) => ("pulse_us".to_owned(), Reading::Number(1000.0 / full, 1000.0), false),
+            (None, Target::Unitless("t_s")) => ("t_s".to_owned(), Reading::Stamp, false),
+            (None, Target::Unitless(what)) => {
+                let name = if ["pwm", "duty"].contains(&what) { "pulse_us" } else { what };
+                (name.to_owned(), Reading::Unitless(what), false)
+            }
+            (None, Target::UnknownUnit(name)) => {
+                return Err(place.refuse(
+                    Some(cell),
+                    format!("no known unit for {name}"),
+                    format!("a unit in parentheses that can be converted, or --map {name}={cell}*FACTOR"),
+                ));
+            }
         };
-        if plan.names.contains(&name) {
-            return Err(place.refuse(
-                Some(cell),
-                format!("a second column for {name}"),
-                "one column for each channel (choose with --map)",
-            ));
+        if let Some(before) = fields.iter().find(|f| f.name == name) {
+            let expected = "one column for each channel (choose with --map)";
+            if before.cell == *cell || mapping.is_some() || clean(cell) == name || extra {
+                return Err(place.refuse(Some(cell), format!("a second column for {name}"), expected));
+            }
+            report.add(&name, format!("column '{}' is taken; '{cell}' is kept as a further column", before.cell), 1);
+            (name, reading, extra) = further(clean(cell));
         }
-        match reading {
-            Reading::Stamp => {
-                report.add(&name, format!("column '{cell}': date and time of day, as seconds since the first row"), 1)
-            }
-            Reading::Number(factor, 0.0) if factor != 1.0 => {
-                report.add(&name, format!("column '{cell}' converted, times {factor}"), 1);
-            }
-            Reading::Number(factor, offset) if offset != 0.0 => {
-                report.add(&name, format!("column '{cell}' converted, times {factor:.6} plus {offset}"), 1);
-            }
-            Reading::Number(..) => {}
-        }
-        plan.route.push(Some((plan.names.len(), reading)));
-        plan.names.push(name);
+        said(&name, cell, reading, report);
+        route.push(Some(fields.len()));
+        let (mapped, cell) = (mapping.is_some(), cell.clone());
+        fields.push(Field {
+            name,
+            cell,
+            reading,
+            mapped,
+            further: extra,
+            values: Vec::new(),
+            stamps: (0, true),
+            missing: 0,
+            text: (0, None),
+        });
+    }
+    if sides().any(|s| s != wanted) {
+        report.add(
+            "(file)",
+            format!("more than one powertrain: side {wanted} is the rig (--side); the others are further columns"),
+            1,
+        );
     }
     report.add("(file)", "columns left out: derived from others, or text", skipped);
-    Ok(plan)
+    Ok((route, fields))
 }
 
-fn read_rows<R: BufRead>(
-    lines: &mut Lines<'_, R>,
-    header: &str,
-    plan: &Plan,
+/// Says a conversion whose factor is known from the header.
+fn said(name: &str, cell: &str, reading: Reading, report: &mut Report) {
+    let factor = |f: f64| {
+        let text = format!("{f}");
+        if text.len() > 12 { format!("{f:.6}") } else { text }
+    };
+    let what = match reading {
+        Reading::Number(f, 0.0) if f != 1.0 => format!("column '{cell}' converted, times {}", factor(f)),
+        Reading::Number(f, offset) if offset != 0.0 => format!("column '{cell}' converted, times {f:.6} plus {}", factor(offset)),
+        _ => return,
+    };
+    report.add(name, what, 1);
+}
+
+/// Reads every row into the fields.
+pub(super) fn read_rows(
+    file: &str,
+    layout: &Layout<'_>,
+    route: &[Option<usize>],
+    fields: &mut Vec<Field>,
     report: &mut Report,
-) -> Result<Vec<Vec<f64>>, ReadError> {
-    let cells: Vec<&str> = header.split(plan.separator).collect();
-    let width = cells.len();
-    let mut columns = vec![Vec::new(); plan.names.len()];
-    let mut cut = 0;
-    let mut first = plan.headless.then(|| header.to_owned());
-    while let Some(line) = first.take().map_or_else(|| lines.next_line(), |line| Ok(Some(line)))? {
-        if line.trim().is_empty() {
+) -> Result<(), ReadError> {
+    let width = layout.cells.len();
+    let lines = layout.content.lines().count() as u64;
+    let (mut cut, mut records) = (0, Records::new(&layout.content, layout.separator));
+    while let Some((line, record)) = records.next() {
+        if line < layout.data_from || record.iter().all(str::is_empty) {
             continue;
         }
-        let place = lines.place();
-        let found = line.split(plan.separator).count();
-        if found != width {
-            if lines.unterminated() {
-                cut += 1;
+        let place = Place { file, line: line as usize };
+        let needed = route.iter().rposition(Option::is_some).map_or(0, |k| k + 1);
+        let surplus = record.iter().skip(width).any(|c| !c.is_empty());
+        if record.len() < needed || surplus {
+            if !layout.whole && line == lines {
+                cut = 1;
                 break;
             }
-            let missing = cells.get(found).copied();
-            return Err(place.refuse(missing, format!("{found} fields"), format!("{width} as in the header")));
+            let commas = if surplus && layout.separator == b',' { " (decimal commas? then export with semicolons)" } else { "" };
+            let missing = layout.cells.get(record.len()).map(String::as_str);
+            return Err(place.refuse(missing, format!("{} fields", record.len()), format!("{width} as in the header{commas}")));
         }
-        for ((text, route), cell) in line.split(plan.separator).zip(&plan.route).zip(&cells) {
-            let Some((index, reading)) = route else { continue };
-            let text = text.trim();
-            let value = match reading {
-                _ if text.is_empty() => f64::NAN,
-                Reading::Number(factor, offset) => {
-                    text.parse::<f64>().ok().filter(|v| v.is_finite()).map(|v| v * factor + offset).ok_or_else(|| {
-                        place.refuse(Some(cell), format!("'{}'", short(text)), "a finite decimal number or an empty field")
-                    })?
-                }
-                Reading::Stamp => seconds(text).ok_or_else(|| {
-                    place.refuse(Some(cell), format!("'{}'", short(text)), "a date and time such as 2019-11-05 17:14:08.947")
-                })?,
-            };
-            columns[*index].push(value);
+        for (text, k) in record.iter().zip(route) {
+            let Some(field) = k.and_then(|k| fields.get_mut(k)) else { continue };
+            let value = field.read(text, line, layout, &place)?;
+            field.values.push(value);
         }
     }
     report.add("(file)", "last line cut short without a line feed: dropped", cut);
-    Ok(columns)
-}
-
-/// Seconds of a date and time of day, `YYYY-MM-DD HH:MM:SS` with a fraction after a point or a third colon.
-fn seconds(text: &str) -> Option<f64> {
-    let (date, time) = text.split_once([' ', 'T'])?;
-    let date: Vec<i64> = date.split('-').map(|p| p.parse().ok()).collect::<Option<_>>()?;
-    let &[year, month, day] = date.as_slice() else { return None };
-    let mut parts = time.trim_end_matches('Z').splitn(3, ':');
-    let (hour, minute) = (parts.next()?.parse::<i64>().ok()?, parts.next()?.parse::<i64>().ok()?);
-    let second: f64 = parts.next()?.replacen(':', ".", 1).parse().ok()?;
-    // days since 1 March of year 0 (Richards 1998)
-    let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
-    let days = 365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + day;
-    ((1..=12).contains(&month) && second.is_finite()).then(|| (days * 86_400 + hour * 3600 + minute * 60) as f64 + second)
-}
-
-fn assemble(mut names: Vec<String>, mut columns: Vec<Vec<f64>>, report: &mut Report) -> Log {
-    let mut log = Log::default();
-    let rows = columns.first().map_or(0, Vec::len);
-    let t = match names.iter().position(|n| n == "t_s") {
-        Some(i) => {
-            names.remove(i);
-            columns.remove(i)
-        }
-        None => {
-            report.add("t_s", "no time column: the row index stands for it, and no effect of time is offered", rows);
-            log.meta.insert("time".into(), toml::Value::String("row".into()));
-            (0..rows).map(|i| i as f64).collect()
-        }
-    };
-    let keep = increasing(&t, report);
-    log.t = keep.iter().map(|i| t[*i]).collect();
-    if let Some(first) = log.t.first().copied().filter(|t| *t > 1e9) {
-        log.t.iter_mut().for_each(|t| *t = ((*t - first) * 1e6).round() / 1e6);
+    for field in fields.iter().filter(|f| f.missing > 0) {
+        report.add(&field.name, "words or signs for no value (NaN, inf, -, n/a), kept as missing", field.missing);
     }
-    for (name, values) in names.into_iter().zip(columns) {
-        let values: Vec<f64> = keep.iter().map(|i| values[*i]).collect();
-        let blanks = values.iter().filter(|v| v.is_nan()).count();
-        if blanks == values.len() {
-            report.add(&name, "holds no sample: column left out", blanks);
-            continue;
-        }
-        if name == "rpm_optical_probe" && values.iter().all(|v| v.is_nan() || *v == 0.0) {
-            report.add(&name, "reads zero throughout (no probe): column left out", values.len());
-            continue;
-        }
-        report.add(&name, "blank samples, kept as missing", blanks);
-        report.add(&name, "samples that repeat the one before (sample and hold, or coarse steps), kept", repeats(&values));
-        log.columns.push(Column { name, values });
-    }
-    one_speed(&mut log, report);
-    orient(&mut log, report);
-    super::findings::inspect(&log, report);
-    log
+    settle_text(file, fields, report)
 }
 
-/// Four rotors of one machine and no speed of its own: the median of those that turn stands for it, as the tidy sets do.
-fn one_speed(log: &mut Log, report: &mut Report) {
-    let rotors: Vec<&Vec<f64>> =
-        (1..=8).filter_map(|k| log.columns.iter().find(|c| c.name == format!("rpm{k}"))).map(|c| &c.values).collect();
-    if rotors.len() < 2 || log.columns.iter().any(|c| SPEED.contains(&c.name.as_str())) {
-        return;
-    }
-    let count = rotors.len();
-    let values: Vec<f64> = (0..log.t.len())
-        .map(|i| {
-            let mut turning: Vec<f64> = rotors.iter().map(|r| r[i]).filter(|v| v.is_finite() && *v != 0.0).collect();
-            if turning.is_empty() { 0.0 } else { crate::noise::median(&mut turning) }
-        })
-        .collect();
-    log.columns.push(Column { name: "rpm".into(), values });
-    report.add("rpm", "rotors without a common speed: median of those that turn (thrust and current are of all together)", count);
-}
-
-/// Rows whose time moves on. A stamp that repeats or steps back loses its row.
-fn increasing(t: &[f64], report: &mut Report) -> Vec<usize> {
-    let (mut keep, mut last) = (Vec::with_capacity(t.len()), f64::NEG_INFINITY);
-    let (mut equal, mut back, mut blank) = (0, 0, 0);
-    for (i, v) in t.iter().enumerate() {
-        if v.is_nan() {
-            blank += 1;
-        } else if *v > last {
-            keep.push(i);
-            last = *v;
-        } else if *v == last {
-            equal += 1;
-        } else {
-            back += 1;
-        }
-    }
-    report.add("t_s", "time stamps that repeat the row before: row dropped", equal);
-    report.add("t_s", "time stamps that step back: row dropped", back);
-    report.add("t_s", "blank time stamps: row dropped", blank);
-    keep
-}
-
-fn repeats(values: &[f64]) -> usize {
-    values.windows(2).filter(|w| w[0] == w[1] && w[0] != 0.0).count()
-}
-
-/// Thrust and torque count positive: a sign that depends on the direction of rotation is turned round, and said.
-fn orient(log: &mut Log, report: &mut Report) {
-    let speed = log.columns.iter().find(|c| SPEED.contains(&c.name.as_str())).map(|c| c.values.clone());
-    for name in ["thrust_n", "torque_nm"] {
-        let Some(column) = log.columns.iter_mut().find(|c| c.name == name) else { continue };
-        let extreme = column
-            .values
-            .iter()
-            .zip(speed.iter().flatten().chain(std::iter::repeat(&1.0)))
-            .filter(|(v, s)| v.is_finite() && **s > 0.0)
-            .map(|(v, _)| *v)
-            .fold(0.0_f64, |m, v| if v.abs() > m.abs() { v } else { m });
-        if extreme < 0.0 {
-            for v in &mut column.values {
-                *v = -*v;
+impl Field {
+    fn read(&mut self, text: &str, line: u64, layout: &Layout<'_>, place: &Place<'_>) -> Result<f64, ReadError> {
+        match cell(text, layout.marks) {
+            Cell::Number(v) => Ok(match self.reading {
+                Reading::Number(factor, offset) => v * factor + offset,
+                _ => v,
+            }),
+            Cell::Empty => Ok(f64::NAN),
+            Cell::Missing => {
+                self.missing += 1;
+                Ok(f64::NAN)
             }
-            report.add(name, "negative under load (direction of rotation or mounting): sign turned round", column.values.len());
+            Cell::Text if self.reading == Reading::Stamp => match stamp(text) {
+                Some(Stamp { seconds, dated }) => {
+                    self.stamps = (self.stamps.0 + 1, self.stamps.1 && dated);
+                    Ok(seconds)
+                }
+                None => {
+                    let expected = "seconds with a unit in the header, or a date and time such as 2019-11-05 17:14:08.947";
+                    Err(place.refuse(Some(&self.cell), format!("'{}'", short(text)), expected))
+                }
+            },
+            Cell::Text if self.further => {
+                self.text.0 += 1;
+                self.text.1.get_or_insert_with(|| (line, text.to_owned()));
+                Ok(f64::NAN)
+            }
+            Cell::Text => Err(not_a_number(place, &self.cell, text)),
         }
     }
-    debug_assert!(log.columns.iter().all(|c| !MODELLED.contains(&c.name.as_str()) || c.values.len() == log.t.len()));
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+fn not_a_number(place: &Place<'_>, cell: &str, text: &str) -> ReadError {
+    place.refuse(Some(cell), format!("'{}'", short(text)), "a decimal number, or an empty field for a missing sample")
+}
 
-    #[test]
-    fn rcbenchmark_rows_are_repaired_and_counted() {
-        let text = "\u{feff}Time (s),ESC signal (\u{b5}s),Torque (N\u{b7}m),Thrust (gf),Voltage (V),Motor Electrical Speed (RPM),App message,\n\
-                    0,1000,,,16,0,,\n0,1000,,,16,0,,\n0.5,1100,-0.1,1000,16,5000,,\n0.4,1100,-0.1,,16,5000,,\n0.9,1100,-0.2,2000,16,70";
-        let (log, report) = import_from("x.csv", text.as_bytes(), &[]).unwrap();
-        assert_eq!(log.t, [0.0, 0.5]);
-        assert!((log.column("thrust_n").unwrap()[1] - 9.80665).abs() < 1e-9);
-        assert_eq!(log.column("torque_nm").unwrap()[1], 0.1);
-        let table = report.table();
-        for wanted in ["repeat the row before", "step back", "cut short", "sign turned round", "times 0.00980665"] {
-            assert!(table.contains(wanted), "{table}");
+/// A further column of words is left out; one of numbers with a word in it is refused.
+fn settle_text(file: &str, fields: &mut Vec<Field>, report: &mut Report) -> Result<(), ReadError> {
+    let mut refused = None;
+    fields.retain(|f| {
+        let numbers = f.values.iter().filter(|v| v.is_finite()).count();
+        match &f.text {
+            (0, _) | (_, None) => true,
+            (words, Some((line, text))) if 2 * words < numbers => {
+                refused.get_or_insert_with(|| not_a_number(&Place { file, line: *line as usize }, &f.cell, text));
+                true
+            }
+            (words, _) => {
+                report.add(&f.name, "cells of text: column left out", *words);
+                false
+            }
         }
-    }
-
-    #[test]
-    fn a_table_without_time_counts_rows() {
-        let (log, _) = import_from("x.csv", "rpm,thrust_n\n1000,1\n2000,4\n".as_bytes(), &[]).unwrap();
-        assert!(log.time_is_row());
-        assert_eq!(log.t, [0.0, 1.0]);
-    }
-
-    #[test]
-    fn a_mapping_serves_any_csv() {
-        let map: Mapping = "thrust_n=Load cell*0.00980665".parse().unwrap();
-        let rpm: Mapping = "rpm=n".parse().unwrap();
-        let (log, _) = import_from("x.csv", "t_s,Load cell,n\n0,100,1\n1,200,2\n".as_bytes(), &[map, rpm]).unwrap();
-        assert!((log.column("thrust_n").unwrap()[1] - 1.96133).abs() < 1e-9);
-        assert!("thrust".parse::<Mapping>().is_err());
-    }
-
-    #[test]
-    fn faults_name_their_place() {
-        for (text, wanted) in [
-            ("", "x.csv:1: the file is empty"),
-            ("t_s,thrust_n\n", "no data rows"),
-            ("t_s,a\n0,1\n", "0 known channel(s)"),
-            ("t_s,rpm,thrust_n\n0,1,zz\n", "x.csv:2: column thrust_n: 'zz'"),
-            ("t_s,rpm,thrust_n\n0,1\n1,2,3\n", "x.csv:2: column thrust_n: 2 fields; expected 3"),
-            ("t_s,rpm,Thrust (stone)\n0,1,2\n", "column Thrust (stone): no known unit"),
-            ("t_s,rpm,thrust_n\n0,1,nan\n", "'nan'"),
-        ] {
-            let message = import_from("x.csv", text.as_bytes(), &[]).unwrap_err().to_string();
-            assert!(message.contains(wanted), "{message} lacks {wanted}");
-        }
-    }
+    });
+    refused.map_or(Ok(()), Err)
 }

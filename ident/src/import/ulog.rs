@@ -133,6 +133,53 @@ pub(super) fn ulog(path: &Path) -> Result<Option<(Log, Report)>, ReadError> {
     Ok(Some((log, report)))
 }
 
+/// One rotor's ESC (from 1) on its own time stamps; nothing where the file is no ULog.
+///
+/// # Errors
+/// [`ReadError`] with the file and what it lacks.
+pub(super) fn rotor(path: &Path, n: usize) -> Result<Option<(Log, Report)>, ReadError> {
+    let file = path.display().to_string();
+    let failed = |source| ReadError::Io { file: file.clone(), source };
+    if !begins(path, &MAGIC).map_err(failed)? {
+        return Ok(None);
+    }
+    let (topics, broken) = parse(&file, &std::fs::read(path).map_err(failed)?)?;
+    let (mut log, mut report) = (Log::default(), Report::default());
+    report.add(
+        "(file)",
+        format!("breaks off: {}; what came before is kept", broken.clone().unwrap_or_default()),
+        usize::from(broken.is_some()),
+    );
+    let esc = |field: &str| topics.get("esc_status", &format!("esc[{}].{field}", n.wrapping_sub(1)));
+    let Some(speed) = esc("esc_rpm") else { return Ok(Some((log, report))) };
+    log.t.clone_from(&speed.t);
+    if let Some(pulse) = pulse(&topics, n.wrapping_sub(1), &log.t) {
+        log.columns.push(Column { name: "pulse_us".into(), values: pulse });
+        report.add("pulse_us", "motor command 0..1 as 1000..2000 us, or the output in us, as it stood", 1);
+    }
+    log.columns.push(Column { name: "rpm".into(), values: speed.v.iter().map(|v| v.abs()).collect() });
+    for (field, name) in [("esc_current", "current_a"), ("esc_voltage", "voltage_v"), ("esc_temperature", "temp_c")] {
+        if let Some(stream) = esc(field).filter(|s| s.v.iter().any(|v| *v != 0.0)) {
+            log.columns.push(Column { name: name.into(), values: stream.onto(&log.t, Between::Hold) });
+        }
+    }
+    if let (None, Some(battery)) = (log.column("voltage_v"), topics.get("battery_status", "voltage_v")) {
+        log.columns.push(Column { name: "voltage_v".into(), values: battery.onto(&log.t, Between::Hold) });
+        report.add("voltage_v", "the ESC tells none: the battery's, as it stood", 1);
+    }
+    report.add("t_s", "the ESC's own time stamps (esc_status), s since the board started", 1);
+    Ok(Some((log, report)))
+}
+
+/// Command of a rotor (from 0) as it stood, us.
+fn pulse(topics: &Topics, i: usize, t: &[f64]) -> Option<Vec<f64>> {
+    let motor = topics.get("actuator_motors", &format!("control[{i}]")).map(|s| (s, 1000.0, 1000.0));
+    let output = topics.get("actuator_outputs", &format!("output[{i}]")).map(|s| (s, 0.0, 1.0));
+    let (stream, offset, factor) = motor.or_else(|| output.filter(|o| o.0.v.iter().any(|v| *v > 0.0)))?;
+    let held = stream.onto(t, Between::Hold).into_iter();
+    Some(held.map(|v| offset + factor * v).map(|v| if (500.0..=2500.0).contains(&v) { v } else { f64::NAN }).collect())
+}
+
 fn parse(file: &str, bytes: &[u8]) -> Result<(Topics, Option<String>), ReadError> {
     let (mut topics, mut parameters) = (Topics::default(), BTreeMap::new());
     let mut add = |m: &DataMessage<'_>| topics.add(m);
@@ -197,21 +244,17 @@ fn flight(file: &str, topics: &Topics, report: &mut Report) -> Result<Log, ReadE
 fn rotors(topics: &Topics, log: &mut Log, report: &mut Report) {
     let mut count = 0;
     for i in 0..ROTORS {
-        let motor = topics.get("actuator_motors", &format!("control[{i}]")).map(|s| (s, 1000.0, 1000.0));
-        let output = topics.get("actuator_outputs", &format!("output[{i}]")).map(|s| (s, 0.0, 1.0));
-        let pulse = motor.or_else(|| output.filter(|o| o.0.v.iter().any(|v| *v > 0.0)));
+        let pulse = pulse(topics, i, &log.t);
         let speed = topics.get("esc_status", &format!("esc[{i}].esc_rpm")).filter(|s| s.v.iter().any(|v| *v != 0.0));
-        if let Some((stream, offset, factor)) = pulse {
-            let held = stream.onto(&log.t, Between::Hold);
-            let values =
-                held.into_iter().map(|v| offset + factor * v).map(|v| if (500.0..=2500.0).contains(&v) { v } else { f64::NAN });
-            log.columns.push(Column { name: format!("pulse_us_{}", i + 1), values: values.collect() });
+        let has_pulse = pulse.is_some();
+        if let Some(values) = pulse {
+            log.columns.push(Column { name: format!("pulse_us_{}", i + 1), values });
         }
         if let Some(stream) = speed {
             let values = stream.onto(&log.t, Between::Line).into_iter().map(f64::abs).collect();
             log.columns.push(Column { name: format!("rpm_{}", i + 1), values });
         }
-        count += usize::from(pulse.is_some() || speed.is_some());
+        count += usize::from(has_pulse || speed.is_some());
     }
     report.add("pulse_us", "motor command 0..1 as 1000..2000 us, or the output in us", count);
     let place = |i: usize| -> Option<toml::Value> {

@@ -79,9 +79,11 @@ fn maximum(thrust: &str, current: &str, place: &Place<'_>) -> Result<Option<Maxi
 /// The pair that a run measured: its plateaus, the one with most thrust, names from the log's metadata.
 #[must_use]
 pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
-    // a run without names is known by its file
-    let stem = log.name.rsplit_once('.').map_or(log.name.as_str(), |(stem, _)| stem);
-    let named = |key: &str, absent: &str| log.meta.get(key).and_then(toml::Value::as_str).unwrap_or(absent).to_owned();
+    // a run that names neither is told from others by its file
+    let named = |key: &str| {
+        let name = log.meta.get(key).and_then(toml::Value::as_str).filter(|n| !n.trim().is_empty());
+        name.map_or_else(|| format!("{key} of {}", log.name), str::to_owned)
+    };
     let index = |name: &str| log.columns.iter().position(|c| c.name == name);
     let levels: Vec<Maximum> = match (index("thrust_n"), index("current_a")) {
         (Some(t), Some(i)) => plateaus
@@ -93,8 +95,8 @@ pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
     };
     let maximum = levels.iter().copied().filter(|m| m.current_a.0 > 0.0 && m.thrust_n.0 > 0.0);
     Pair {
-        motor: named("motor", stem),
-        propeller: named("propeller", "propeller not named"),
+        motor: named("motor"),
+        propeller: named("propeller"),
         clipped: clipped(log, plateaus),
         maximum: maximum.max_by(|a, b| a.thrust_n.0.total_cmp(&b.thrust_n.0)),
         levels,

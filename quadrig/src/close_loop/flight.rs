@@ -9,7 +9,7 @@ use super::{Args, is_result};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::progress::Bar;
-use crate::trouble::unread;
+use crate::trouble::{unread, unwritten};
 use ident::flight::columns::Flight;
 use ident::flight::library::FlightLibrary;
 use ident::flight::predict::{columns, is_by_row, is_own, over_windows, seen_by};
@@ -72,7 +72,7 @@ pub(crate) fn predict(model: &Path, text: &str, path: &Path, output: &Path) -> R
     let model = FlightModel::parse(&model.display().to_string(), text)?;
     let log = flight_log::read(path)?;
     let predicted = predictions(&model, &seen_by(&model, &log)?);
-    write_whole(output, |out| out.write_all(predicted.as_bytes())).map_err(|e| format!("{}: {e}", output.display()).into())
+    write_whole(output, |out| out.write_all(predicted.as_bytes())).map_err(|e| unwritten(&output)(e).into())
 }
 
 /// One line a row of the log: speeds and voltage as logged, all else as the mean of its window; empty where there is no claim.

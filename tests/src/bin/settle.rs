@@ -217,16 +217,16 @@ fn report(lines: &[Line], wanted: u64, from: u64) -> String {
     let share = |hits: usize, of: usize| Rate { hits, of }.text();
     let stopped = lines.iter().filter(|l| l.first == "stopped").count();
     let mut out = format!(
-        "# The circle\n\n`quadrig loop SCENARIO` flies a scenario, closes the loop on its log, puts the corrected model in the plant's place, flies the same \
+        "# The circle\n\n`quadrig loop SCENARIO` flies a scenario, closes the loop on its log and puts the corrected model in the plant's place. It flies the same \
          schedule again and judges what is left against the model as it stands: each channel's size over its noise floor, its whiteness, and what the search \
          still finds. `tests/tests/circle.rs` holds that nothing is left for effects of the drive, the supply and the load cell, and that a wrong model is found out.\n\n\
          What is not judged there, because a static model makes no claim: the half second after each change of the command (longer where the model's speed lags), \
          and speeds below 300 rev/min with the two seconds after them, where a mark passes less often than the log is written. Each run has its own tare.\n\n\
-         ## Its own next experiments\n\nWith `--auto` the tool flies the schedule that its verdict asks for, with fresh noise, and judges every hypothesis that stood on any run by how its fit to \
-         one run predicts the others (one constant a channel, the tare, is each run's own), until no other explanation is half as probable as the leader.\n\n\
-         ```sh\ncargo run --release -p quadrig-tests --bin settle -- --ambiguous {wanted} --from {from} --page docs/loop.md\n```\n\n\
-         One effect a scenario, in turn: {}; at the end of the run it is {} to {} times the thrust's noise floor of {NOISE_N} N. The room warms or cools by 0.02 to 0.05 K/s in every scenario, \
-         the schedule is an upward staircase of eleven levels of 6 or 10 s, on which time, load and heat rise together, and the log has 2 or 5 rows a second, \
+         ## Its own next experiments\n\nWith `--auto` the tool flies the schedule that its verdict asks for, with fresh noise. It judges every hypothesis that stood on any run by how its fit to \
+         one run predicts the others; one constant a channel, the tare, is each run's own. It ends when no other explanation is half as probable as the leader.\n\n\
+         ```sh long\ncargo run --release -p quadrig-tests --bin settle -- --ambiguous {wanted} --from {from} --page docs/loop.md\n```\n\n\
+         One effect a scenario, in turn: {}. At the end of the run it is {} to {} times the thrust's noise floor of {NOISE_N} N. The room warms or cools by 0.02 to 0.05 K/s in every scenario. \
+         The schedule is an upward staircase of eleven levels of 6 or 10 s, on which time, load and heat rise together. The log has 2 or 5 rows a second, \
          so that what the meters do between rows is a question too. Two extra runs at most. Counted are the scenarios whose first verdict is `ambiguous`.\n\n| | |\n| --- | --- |\n",
         EFFECTS.join(", "),
         SIZES.0,
@@ -240,22 +240,22 @@ fn report(lines: &[Line], wanted: u64, from: u64) -> String {
     let _ = writeln!(out, "| stopped by the firmware | {stopped} |");
     out.push_str(
         "\nWhat is settled is the question between the hypotheses that stood. The hidden effect is often below what is left of the rig's own transients at so few \
-         rows, and then it is not named, before or after: that row is no success, and settling does not mend it. Where the first verdict is sure of the wrong name, no \
+         rows. Then it is not named, before or after: that is no success, and settling does not mend it. Where the first verdict is sure of the wrong name, no \
          further run is asked for.\n\n\
-         Up to commit 3463e13 a moving average of less than a row and a delay of half of it were two hypotheses; over straight lines they are one, so that no schedule \
-         told them apart: on these seeds 75 of the first 87 verdicts were ambiguous, nearly all for that reason, and 23 of the 75 stayed so. Now an average has to be two rows long.\n",
+         Of the first verdicts that were ambiguous:\n",
     );
-    out.push_str("\n| seed | hidden | after the extra runs | extra runs | named |\n| --- | --- | --- | --- | --- |\n");
-    for l in open {
+    out.push_str("\n| hidden | ambiguous | settled | with one extra run | named | another of the four named |\n| --- | --- | --- | --- | --- | --- |\n");
+    for id in EFFECTS {
+        let of: Vec<&&Line> = open.iter().filter(|l| l.hidden == id).collect();
+        let count = |what: &dyn Fn(&Line) -> bool| of.iter().filter(|l| what(l)).count();
         let _ = writeln!(
             out,
-            "| {} | {}{} | {} | {} | {} |",
-            l.seed,
-            l.hidden,
-            if l.hit() { "" } else { " (not named)" },
-            l.last,
-            l.extra,
-            l.named.replace('+', ", ")
+            "| {id} | {} | {} | {} | {} | {} |",
+            of.len(),
+            count(&|l| l.last == "attributed"),
+            count(&|l| l.last == "attributed" && l.extra == 1),
+            count(&Line::hit),
+            count(&|l| !l.hit() && l.named.split('+').any(|n| EFFECTS.contains(&n))),
         );
     }
     out

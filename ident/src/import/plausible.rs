@@ -1,0 +1,167 @@
+//! What a rig can do: sample rate, thrust for its speed and its power, voltage, current.
+//!
+//! What it is: a look at an imported log for a wrong unit or swapped columns.
+//! What can go wrong: beyond what any rig does the file is refused with the likely reason; what is only unusual is a line of the report. A
+//! column that the user mapped is never refused here, and said all the same.
+//! Units: SI; thrust coefficient in N/(rev/min)^2.
+//! Reference: T = C_T rho n^2 D^4 with C_T 0.02 to 0.2 and D 0.02 to 2 m spans 1e-12 to 1.1e-3 N/(rev/min)^2; static thrust for electrical power:
+//! 0.01 to 0.5 N/W from a 46 mm to a 1 m propeller at load (UIUC and maker's tables); momentum theory bounds it by the disc.
+
+use super::Report;
+use crate::log::{Log, Place, ReadError, SPEED};
+use crate::noise::median;
+
+/// One doubt: column, what is odd with the likely reason, and whether no rig does it.
+struct Doubt {
+    column: &'static str,
+    what: String,
+    never: bool,
+}
+
+/// Looks at a log. `mapped` are the columns that the user vouches for.
+pub(super) fn judge(place: &Place<'_>, log: &Log, mapped: &[String], report: &mut Report) -> Result<(), ReadError> {
+    for doubt in [rate(log), speed(log), supply(log), swapped(log), thrust(log), torque(log)].into_iter().flatten() {
+        if doubt.never && !mapped.iter().any(|m| m == doubt.column) {
+            let expected = format!("what a rig can do; if it is right, say so with --map {}=COLUMN*FACTOR", doubt.column);
+            return Err(place.refuse(Some(doubt.column), doubt.what, expected));
+        }
+        report.add(doubt.column, format!("in doubt: {}", doubt.what), 1);
+    }
+    Ok(())
+}
+
+fn doubt(column: &'static str, never: bool, what: String) -> Option<Doubt> {
+    Some(Doubt { column, what, never })
+}
+
+/// Median of a column over rows, where it has samples.
+fn typical(log: &Log, name: &str, rows: &[usize]) -> Option<f64> {
+    let values = log.column(name)?;
+    let mut present: Vec<f64> = rows.iter().map(|i| values[*i]).filter(|v| v.is_finite()).collect();
+    (present.len() >= 3).then(|| median(&mut present))
+}
+
+/// Value that one sample in a hundred exceeds.
+fn high(values: &[f64]) -> Option<f64> {
+    let mut present: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    present.sort_unstable_by(f64::total_cmp);
+    present.get((present.len() * 99 / 100).min(present.len().saturating_sub(1))).copied()
+}
+
+fn rotor(log: &Log) -> Option<&[f64]> {
+    SPEED.into_iter().find_map(|s| log.column(s))
+}
+
+/// Rows of the upper load: speed, or else thrust, or else current above 70 % of its highest. And rows at rest.
+fn loaded(log: &Log) -> (Vec<usize>, Vec<usize>) {
+    let Some(load) = rotor(log).or_else(|| log.column("thrust_n")).or_else(|| log.column("current_a")) else {
+        return (Vec::new(), Vec::new());
+    };
+    let top = high(load).unwrap_or(0.0);
+    let rows = |of: &dyn Fn(f64) -> bool| (0..load.len()).filter(|i| of(load[*i])).collect::<Vec<_>>();
+    if top > 0.0 { (rows(&|v| v > 0.7 * top), rows(&|v| v <= 0.02 * top)) } else { (Vec::new(), Vec::new()) }
+}
+
+fn rate(log: &Log) -> Option<Doubt> {
+    let mut steps: Vec<f64> = log.t.windows(2).map(|w| w[1] - w[0]).collect();
+    if log.time_is_row() || steps.len() < 10 {
+        return None;
+    }
+    let (step, whole) = (median(&mut steps), log.t[log.t.len() - 1] - log.t[0]);
+    let said = |likely: &str| format!("rows {step} s apart, {whole:.0} s in all: {likely}");
+    match step {
+        s if s > 60.0 || (s >= 2.0 && whole > 6.0 * 3600.0) => doubt("t_s", true, said("milliseconds?")),
+        s if s > 10.0 => doubt("t_s", false, said("milliseconds?")),
+        s if s < 1e-5 => doubt("t_s", true, said("seconds, read as milliseconds or microseconds?")),
+        s if s < 1e-4 => doubt("t_s", false, said("a unit too small?")),
+        _ => None,
+    }
+}
+
+fn speed(log: &Log) -> Option<Doubt> {
+    let name = SPEED.into_iter().find(|s| log.column(s).is_some())?;
+    let top = high(rotor(log)?)?;
+    let (rows, _) = loaded(log);
+    let current = typical(log, "current_a", &rows).unwrap_or(0.0);
+    match top {
+        v if v > 300_000.0 => doubt(name, true, format!("{v:.0} rev/min: electrical turns?")),
+        v if v > 60_000.0 => doubt(name, false, format!("{v:.0} rev/min: electrical turns?")),
+        v if v > 0.0 && v < 200.0 && current > 0.5 => {
+            doubt(name, v < 60.0, format!("{v:.1} rev/min at {current:.1} A: rev/s, or thousands?"))
+        }
+        _ => None,
+    }
+}
+
+fn supply(log: &Log) -> Option<Doubt> {
+    if let Some(top) = log.column("voltage_v").and_then(high) {
+        if top > 1000.0 {
+            return doubt("voltage_v", true, format!("{top:.0} V: millivolts?"));
+        }
+        if top > 130.0 {
+            return doubt("voltage_v", top > 500.0, format!("{top:.0} V: hundredths of a volt?"));
+        }
+    }
+    let top = log.column("current_a").and_then(high)?;
+    (top > 400.0).then(|| Doubt { column: "current_a", what: format!("{top:.0} A: milliamperes?"), never: top > 1000.0 })
+}
+
+/// A supply falls a little under load; a current rises from next to nothing.
+fn swapped(log: &Log) -> Option<Doubt> {
+    let (load, rest) = loaded(log);
+    let of = |name| Some((typical(log, name, &rest)?, typical(log, name, &load)?));
+    let ((v_rest, v_load), (i_rest, i_load)) = (of("voltage_v")?, of("current_a")?);
+    let odd = v_load > 0.5 && v_rest.abs() < 0.2 * v_load && i_rest > 0.6 * i_load && i_load > 2.0;
+    let what = format!("{v_rest:.2} V and {i_rest:.2} A at rest, {v_load:.2} V and {i_load:.2} A under load: columns swapped?");
+    odd.then_some(Doubt { column: "voltage_v", what, never: true })
+}
+
+fn thrust(log: &Log) -> Option<Doubt> {
+    let (rows, _) = loaded(log);
+    let thrust = typical(log, "thrust_n", &rows)?;
+    if thrust <= 0.0 {
+        return None;
+    }
+    if let Some(n) = rotor(log).and_then(|_| typical(log, SPEED.into_iter().find(|s| log.column(s).is_some())?, &rows)) {
+        let k = thrust / (n * n);
+        let said = |likely: &str| format!("{thrust:.3} N at {n:.0} rev/min: {likely}");
+        if k > 1.1e-3 {
+            return doubt("thrust_n", true, said("grams? speed in rev/s or rad/s?"));
+        }
+        if k < 1e-12 {
+            return doubt("thrust_n", true, said("kilograms? electrical turns?"));
+        }
+    }
+    let power = typical(log, "voltage_v", &rows)? * typical(log, "current_a", &rows)?;
+    if power < 0.5 {
+        return None;
+    }
+    let per_watt = thrust / power;
+    let said = |likely: &str| format!("{thrust:.3} N for {power:.1} W: {likely}");
+    match per_watt {
+        p if p > 1.5 => doubt("thrust_n", true, said("grams? milliamperes?")),
+        p if p > 0.6 => doubt("thrust_n", false, said("grams? a current of another unit?")),
+        p if p < 0.001 => doubt("thrust_n", true, said("kilograms? columns swapped?")),
+        p if p < 0.008 => doubt("thrust_n", false, said("kilograms?")),
+        _ => None,
+    }
+}
+
+fn torque(log: &Log) -> Option<Doubt> {
+    let (rows, _) = loaded(log);
+    let name = SPEED.into_iter().find(|s| log.column(s).is_some())?;
+    let (torque, n) = (typical(log, "torque_nm", &rows)?, typical(log, name, &rows)?);
+    let power = typical(log, "voltage_v", &rows)? * typical(log, "current_a", &rows)?;
+    let shaft = torque * n * std::f64::consts::TAU / 60.0;
+    if power < 0.5 || torque <= 0.0 {
+        return None;
+    }
+    let said = |likely: &str| format!("{shaft:.1} W at the shaft of {power:.1} W from the supply: {likely}");
+    match shaft / power {
+        p if p > 5.0 => doubt("torque_nm", true, said("N.cm or N.mm? columns swapped?")),
+        p if p > 1.1 => doubt("torque_nm", false, said("torque of another unit, or a gain that is off?")),
+        p if p < 0.01 => doubt("torque_nm", true, said("columns swapped?")),
+        p if p < 0.1 => doubt("torque_nm", false, said("torque of another unit?")),
+        _ => None,
+    }
+}

@@ -1,0 +1,69 @@
+//! `quadrig import STAND --with ESC`: several loggers of one run on the stand's clock.
+//!
+//! What it is: each further log is opened like any other, joined to the stand's by what both saw, and its channels go onto the stand's rows;
+//! a page beside the output shows the joint.
+//! What can go wrong: logs that cannot be joined for certain are refused, and nothing is written.
+//! Units: s, ppm; the channels'.
+//! Reference: specification `formats.md`, `quadrig import`; `ident/src/join`.
+
+use crate::Failure;
+use crate::open::open;
+use ident::import::{Options, Report};
+use ident::join::{Joint, LABELS, align, merge, page};
+use ident::log::Log;
+use std::path::{Path, PathBuf};
+
+/// A further logger's file and what it is called.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct With {
+    label: String,
+    file: PathBuf,
+}
+
+impl With {
+    /// Its file.
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
+    }
+}
+
+impl std::str::FromStr for With {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once('=') {
+            Some((label, file)) if LABELS.contains(&label) => Ok(Self { label: label.to_owned(), file: file.into() }),
+            Some((label, _)) if !label.contains(['/', '.']) => Err(format!("{label}: expected one of {}", LABELS.join(", "))),
+            _ => Ok(Self { label: LABELS[0].to_owned(), file: text.into() }),
+        }
+    }
+}
+
+/// Joins further logs to a stand's: the page, and what is to be said.
+pub(crate) fn join(
+    stand: &mut Log,
+    file: &Path,
+    with: &[With],
+    options: &Options,
+    quiet: bool,
+) -> Result<(String, Vec<Report>), Failure> {
+    let alone = stand.clone();
+    let options = Options { mappings: Vec::new(), motor: None, propeller: None, side: None, ..options.clone() };
+    let (mut logs, mut reports): (Vec<(Log, Joint)>, Vec<Report>) = (Vec::new(), Vec::new());
+    for (k, w) in with.iter().enumerate() {
+        if with[..k].iter().any(|b| b.label == w.label) {
+            return Err(format!(
+                "--with: two loggers called {}; name them LABEL=FILE with one of {}",
+                w.label,
+                LABELS.join(", ")
+            )
+            .into());
+        }
+        let log = open(&w.file, &options, quiet)?;
+        let joint = align(&alone, &log).map_err(|e| format!("{} and {}: {e}", file.display(), w.file.display()))?;
+        reports.push(merge(stand, &log, &joint, &w.label));
+        logs.push((log, joint));
+    }
+    let joined: Vec<(&Log, &Joint)> = logs.iter().map(|(log, joint)| (log, joint)).collect();
+    Ok((page(&alone, &joined), reports))
+}

@@ -1,0 +1,105 @@
+//! A run from whatever file holds it: a rig log, or another program's export.
+//!
+//! What it is: the one door of the commands that take exports directly. What is no rig log goes through the importer, every conversion is
+//! said on stderr, and what comes out is what `quadrig import` would have written.
+//! What can go wrong: what reader or importer refuse; a mapping for a file that needs none.
+//! Units: the contract's.
+//! Reference: specification `formats.md`, "Command line".
+
+use crate::Failure;
+use crate::trouble::unread;
+use ident::import::{Mapping, Options, Report, import_as};
+use ident::log::Log;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// How the columns of an export are to be read.
+#[derive(clap::Args, Clone, Default)]
+pub(crate) struct Columns {
+    /// A column of an export, TARGET=SOURCE, TARGET=SOURCE*FACTOR or TARGET=SOURCE*FACTOR+OFFSET; may be given more than once.
+    #[arg(long = "map", value_name = "TARGET=SOURCE*FACTOR")]
+    mappings: Vec<Mapping>,
+    /// Pole pairs of the motor (half its magnets), for speeds in electrical turns.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=60))]
+    pole_pairs: Option<u32>,
+    /// Which powertrain of a stand with two is the rig: 1 or A, 2 or B.
+    #[arg(long, value_name = "A|B", value_parser = side)]
+    side: Option<u32>,
+}
+
+/// What the rig is made of; it travels with the log.
+#[derive(clap::Args, Clone, Default)]
+pub(crate) struct Names {
+    /// Name of the motor; travels with the log.
+    #[arg(long)]
+    motor: Option<String>,
+    /// Name of the propeller; travels with the log.
+    #[arg(long)]
+    propeller: Option<String>,
+}
+
+fn side(text: &str) -> Result<u32, String> {
+    match text.to_ascii_uppercase().as_str() {
+        "1" | "A" => Ok(1),
+        "2" | "B" => Ok(2),
+        _ => Err("expected A, B, 1 or 2".to_owned()),
+    }
+}
+
+impl Columns {
+    /// With the rig's names, what the importer is told.
+    pub(crate) fn options(&self, names: &Names) -> Options {
+        self.named(names.motor.clone(), names.propeller.clone())
+    }
+
+    /// The same where the names come from elsewhere.
+    pub(crate) fn named(&self, motor: Option<String>, propeller: Option<String>) -> Options {
+        let pole_pairs = self.pole_pairs.map(f64::from);
+        Options { mappings: self.mappings.clone(), motor, propeller, pole_pairs, side: self.side }
+    }
+}
+
+/// Whether a file calls itself one of this program's own logs.
+pub(crate) fn is_own(path: &Path) -> Result<bool, Failure> {
+    let file = std::fs::File::open(path).map_err(unread(path))?;
+    let mut first = Vec::new();
+    // what cannot be read the reader refuses in its own words
+    let _ = BufReader::new(file.take(64)).read_until(b'\n', &mut first);
+    let first = String::from_utf8_lossy(&first).into_owned();
+    Ok(first.trim_start_matches('\u{feff}').strip_prefix('#').is_some_and(|l| l.trim_start().starts_with("quadrig-")))
+}
+
+/// Reads a run.
+pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, Failure> {
+    if is_own(path)? {
+        if let Some(m) = options.mappings.first() {
+            return Err(format!("--map {}=...: {} is a rig log, which needs none", m.target, path.display()).into());
+        }
+        let mut log = Log::read(path)?;
+        options.name(&mut log);
+        return Ok(log);
+    }
+    let (log, report) = import_as(path, options)?;
+    let log = as_written(&log)?;
+    if !quiet {
+        say(path, &report);
+    }
+    Ok(log)
+}
+
+/// Says what was found, one line each.
+pub(crate) fn say(path: &Path, report: &Report) {
+    for note in &report.notes {
+        let count = if note.count > 1 { format!(" ({})", note.count) } else { String::new() };
+        eprintln!("{}: {}: {}{count}", path.display(), note.column, note.what);
+    }
+}
+
+/// The log as it reads once it is written: numbers to their digits, the digest of the file.
+pub(crate) fn as_written(log: &Log) -> Result<Log, Failure> {
+    let mut text = Vec::new();
+    log.write_to(&mut text)?;
+    let mut read = Log::parse(&log.name, text.as_slice())?;
+    read.name.clone_from(&log.name);
+    Ok(read)
+}
