@@ -167,7 +167,7 @@ mod tests {
         for (path, command) in &commands {
             let text = command.get_after_help().unwrap_or_else(|| panic!("quadrig {path} teaches nothing")).to_string();
             let units = text.strip_prefix("Units: ").unwrap_or_else(|| panic!("quadrig {path} says no units"));
-            assert!(units.find('.').is_some_and(|end| end > 3), "quadrig {path}: {text}");
+            assert!(units.find('.').is_some_and(|end| end >= 3), "quadrig {path}: {text}");
             let example =
                 text.lines().skip_while(|l| *l != "Example:").nth(1).unwrap_or_else(|| panic!("quadrig {path}: no example"));
             assert!(example.trim().starts_with("quadrig "), "quadrig {path}: {example}");

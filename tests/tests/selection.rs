@@ -97,8 +97,8 @@ fn a_bad_file_costs_its_own_row_alone() {
         "{}",
         said.out
     );
-    let row = said.out.lines().find(|l| l.starts_with("no-names")).expect("the run by its file's name");
-    assert!(row.contains("propeller not named") && row.contains("of 19.62 N in total"), "{row}");
+    let row = said.out.lines().find(|l| l.starts_with("motor of no-names.csv")).expect("the run by its file's name");
+    assert!(row.contains("propeller of no-names.csv") && row.contains("of 19.62 N in total"), "{row}");
     let left_out: Vec<&str> = said.err.lines().collect();
     assert_eq!(left_out.len(), 2, "{}", said.err);
     assert!(left_out[0].starts_with("left out: bad.csv:2: column thrust_n: 'x'"), "{}", said.err);

@@ -7,7 +7,7 @@
 //!
 //! Units: none.
 //!
-//! Reference: docs/errors.md; `tests/tests/refusals.rs` provokes 130 of them.
+//! Reference: docs/errors.md; `tests/tests/refusals.rs` provokes more than a hundred of them.
 
 use crate::place::Place;
 use crate::run::Failure;

@@ -37,6 +37,18 @@ pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figu
     }
 }
 
+/// Channels that the table of plateaus shows.
+const ELSEWHERE: [&str; 4] = ["rpm", "torque_nm", "current_a", "voltage_v"];
+
+/// A value to the digits that its error supports.
+fn paired(value: f64, error: f64) -> String {
+    if !(error.is_finite() && error > 0.0) {
+        return format!("{value}");
+    }
+    let places = (1 - error.log10().floor() as i32).clamp(0, 7) as usize;
+    format!("{value:.places$} \u{b1} {error:.places$}")
+}
+
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
@@ -44,15 +56,14 @@ fn capital(text: &str) -> String {
 
 fn table(sheet: &mut Sheet, found: &Identified) {
     // a column that is not known at any level is told above, and takes no room
-    let known: Vec<usize> = (0..ASKED.len()).filter(|k| found.levels.iter().any(|l| l.figures[*k].is_some())).collect();
+    let shown = |k: &usize| !ELSEWHERE.contains(&ASKED[*k].name) && found.levels.iter().any(|l| l.figures[*k].is_some());
+    let known: Vec<usize> = (0..ASKED.len()).filter(shown).collect();
     let head = |k: &usize| {
         let a = ASKED[*k];
         if a.unit.is_empty() { a.heading.to_owned() } else { format!("{}, {}", a.heading, a.unit) }
     };
     let header: Vec<String> = std::iter::once("plateau".to_owned()).chain(known.iter().map(head)).collect();
-    let cell = |level: &Level, k: &usize| {
-        level.figures[*k].map_or_else(|| "-".to_owned(), |(v, se)| format!("{} \u{b1} {}", number(v), number(se)))
-    };
+    let cell = |level: &Level, k: &usize| level.figures[*k].map_or_else(|| "-".to_owned(), |(v, se)| paired(v, se));
     let rows: Vec<Vec<String>> = found
         .levels
         .iter()
@@ -149,11 +160,23 @@ fn listed(sheet: &mut Sheet, surface: &Surface) {
     let rows: Vec<Vec<String>> = (0..surface.pulses.len())
         .step_by(2)
         .map(|k| {
-            let cell = |row: &Vec<(f64, f64)>| format!("{} \u{b1} {}", number(row[k].0), number(row[k].1));
+            let cell = |row: &Vec<(f64, f64)>| paired(row[k].0, row[k].1);
             std::iter::once(format!("{:.0}", surface.pulses[k])).chain(surface.thrust.iter().map(cell)).collect()
         })
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let raw_head: Vec<&str> = raw_head.iter().map(String::as_str).collect();
     sheet.data("thrust-surface", &header, &rows, Some((&raw_head, &raw)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::paired;
+
+    #[test]
+    fn a_value_has_the_digits_of_its_error() {
+        assert_eq!(paired(617.060_68, 0.0482), "617.061 \u{b1} 0.048");
+        assert_eq!(paired(84.7, 12.0), "85 \u{b1} 12");
+        assert_eq!(paired(2000.0, 0.0), "2000");
+    }
 }

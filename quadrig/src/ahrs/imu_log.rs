@@ -206,7 +206,7 @@ mod tests {
             ("gx,gy,gz,ax,ay,az\n".into(), 1, "no column t_s"),
             ("t_s,gx,gy,ax,ay,az\n".into(), 1, "gx,gy,gz"),
             ("t_s,gx,gy,gz\n0,0,0,0\n".into(), 1, "ax,ay,az"),
-            ("t_s,gx,gx,gy,gz,ax,ay,az\n".into(), 1, "gx appears twice"),
+            ("t_s,gx,gx,gy,gz,ax,ay,az\n".into(), 1, "column gx: it stands twice"),
             (head.into(), 1, "no rows"),
             (format!("{head}0,1,2,3,4,5,six\n"), 2, "column az: \"six\""),
             (format!("{head}0,1,2,3,4,5,inf\n"), 2, "column az: \"inf\""),
