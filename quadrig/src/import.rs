@@ -25,7 +25,7 @@ pub(crate) struct Args {
     columns: Columns,
     #[command(flatten)]
     names: Names,
-    /// Of a PX4 or Betaflight flight this rotor's ESC alone, as a rig log.
+    /// Of a PX4 or Betaflight recording this rotor's ESC alone, as a rig log; with --with of such a further logger.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=12))]
     rotor: Option<u32>,
     /// Another logger of the same run (ESC, flight controller, board), put on this one's clock by what both saw; its channels are named after
@@ -66,13 +66,15 @@ impl Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let options = args.columns.options(&args.names);
-    let flight = match args.rotor {
+    // the rotor of a further logger is no word on the stand's own file
+    let rotor = args.rotor.filter(|_| args.with.is_empty());
+    let flight = match rotor {
         Some(_) => None,
         None if options.mappings.is_empty() => ident::import::flight(&args.file)?,
         None => None,
     };
     let is_flight = flight.is_some();
-    let (mut log, report) = match (flight, args.rotor) {
+    let (mut log, report) = match (flight, rotor) {
         (Some(found), _) => found,
         (None, Some(n)) => ident::import::rotor(&args.file, n as usize)?
             .ok_or_else(|| format!("--rotor {n}: {} is no PX4 ULog and no Betaflight Blackbox log", args.file.display()))?,
@@ -86,7 +88,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if !args.with.is_empty() {
         log = as_written(&log)?;
         log.sha256 = None;
-        let (page, reports) = join(&mut log, &args.file, &args.with, &options, quiet)?;
+        let (page, reports) = join(&mut log, &args.file, (&args.with, args.rotor), &options, quiet)?;
         (shown, joints) = (Some(page), reports);
     }
     if is_flight {

@@ -7,8 +7,8 @@
 //! Reference: specification `formats.md`, `quadrig import`; `ident/src/join`.
 
 use crate::Failure;
-use crate::open::open;
-use ident::import::{Options, Report};
+use crate::open::{as_written, open, say};
+use ident::import::{Options, Report, is_recording};
 use ident::join::{Joint, LABELS, align, merge, page};
 use ident::log::Log;
 use std::path::{Path, PathBuf};
@@ -39,11 +39,25 @@ impl std::str::FromStr for With {
     }
 }
 
+/// A further log: of a flight controller's own recording the rotor that is on the stand.
+fn open_further(file: &Path, rotor: Option<u32>, options: &Options, quiet: bool) -> Result<Log, Failure> {
+    if !is_recording(file) {
+        return open(file, options, quiet);
+    }
+    let wanted = || format!("--with: {} records several rotors; expected --rotor N, the one on the stand", file.display());
+    let n = rotor.ok_or_else(wanted)?;
+    let (log, report) = ident::import::rotor(file, n as usize)?.ok_or_else(wanted)?;
+    if !quiet {
+        say(file, &report);
+    }
+    as_written(&log)
+}
+
 /// Joins further logs to a stand's: the page, and what is to be said.
 pub(crate) fn join(
     stand: &mut Log,
     file: &Path,
-    with: &[With],
+    (with, rotor): (&[With], Option<u32>),
     options: &Options,
     quiet: bool,
 ) -> Result<(String, Vec<Report>), Failure> {
@@ -59,7 +73,7 @@ pub(crate) fn join(
             )
             .into());
         }
-        let log = open(&w.file, &options, quiet)?;
+        let log = open_further(&w.file, rotor, &options, quiet)?;
         let joint = align(&alone, &log).map_err(|e| format!("{} and {}: {e}", file.display(), w.file.display()))?;
         reports.push(merge(stand, &log, &joint, &w.label));
         logs.push((log, joint));

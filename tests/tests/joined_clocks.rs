@@ -71,6 +71,42 @@ fn two_logs_of_one_run_become_one() {
     assert_eq!(bench.call(&["import", "stand.csv", "-o", "none.csv", "--with", "radio=esc.csv"]).status, Some(2));
 }
 
+/// A flight controller on the stand records four rotors, one of which turns.
+#[test]
+fn a_flight_controllers_recording_is_joined_too() {
+    let bench = Bench::new();
+    let good = Log::read(&bench.path("good.csv")).unwrap();
+    let zero = vec![0.0; good.len()];
+    let column = |name: &str, values: &[f64]| ident::log::Column { name: name.to_owned(), values: values.to_vec() };
+    let mut flight = Log { t: good.t.iter().map(|t| 7.0 + t).collect(), ..Log::default() };
+    for axis in ["gyro_x", "gyro_y", "gyro_z", "acc_x", "acc_y", "acc_z"] {
+        flight.columns.push(column(axis, &zero));
+    }
+    let (pulse, rpm) = (good.column("pulse_us").unwrap(), good.column("rpm").unwrap());
+    for n in 1..=4 {
+        flight.columns.push(column(&format!("pulse_us_{n}"), if n == 2 { pulse } else { &zero }));
+        flight.columns.push(column(&format!("rpm_{n}"), if n == 2 { rpm } else { &zero }));
+    }
+    flight.columns.push(column("voltage_v", good.column("voltage_v").unwrap()));
+    flight.columns.push(column("current_a", good.column("current_a").unwrap()));
+    fs::write(bench.path("fc.bbl"), quadrig_tests::recorders::blackbox(&flight)).unwrap();
+    let words = ["--quiet", "import", "good.csv", "--with", "fc=fc.bbl", "-o", "run.csv"];
+    bench.call(&words).refused(&["fc.bbl records several rotors; expected --rotor N"]);
+    bench.call(&[&words[..], &["--rotor", "2"]].concat()).succeeded();
+    let log = Log::read(&bench.path("run.csv")).unwrap();
+    assert!(
+        log.column("pulse_fc_us").is_some() && log.column("current_of_all_a_fc").is_some(),
+        "{:?}",
+        log.columns.iter().map(|c| &c.name).collect::<Vec<_>>()
+    );
+    let joint = log.meta["joint_fc"].as_str().unwrap();
+    let offset: f64 = joint.strip_prefix("fc.bbl: offset ").and_then(|r| r.split(' ').next()?.parse().ok()).expect("an offset");
+    assert!((offset + 7.0).abs() < 0.002, "{joint}");
+    let off =
+        log.column("rpm").unwrap().iter().zip(log.column("rpm_fc").unwrap()).filter(|(a, b)| (*a - *b).abs() > 15.0).count();
+    assert!(off < 30, "{off} rows differ");
+}
+
 /// The recorded pair: the command of the ESC's log gets into the stand's, and the speed follows from it.
 #[test]
 fn the_recorded_stand_gets_the_escs_command() {

@@ -19,7 +19,7 @@ use blackbox_log::units::si::electric_potential::volt;
 use std::path::Path;
 
 /// First bytes of a Blackbox log.
-const MAGIC: &[u8] = b"H Product:Blackbox flight data recorder by Nicholas Sherlock";
+pub(super) const MAGIC: &[u8] = b"H Product:Blackbox flight data recorder by Nicholas Sherlock";
 /// Poles of a motor where the log does not say.
 const POLES: f64 = 14.0;
 

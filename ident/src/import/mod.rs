@@ -24,7 +24,7 @@ mod ulog;
 mod unit;
 
 pub use flight::{flight, flight_from};
-pub use rotor::rotor;
+pub use rotor::{is_recording, rotor};
 
 use crate::log::{Log, Place, ReadError};
 use std::fs::File;

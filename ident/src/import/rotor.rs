@@ -11,6 +11,12 @@ use super::{Report, blackbox, ulog};
 use crate::log::{Column, Log, Place, ReadError};
 use std::path::Path;
 
+/// Whether a file is a flight controller's own recording: a PX4 ULog or a Betaflight Blackbox log.
+#[must_use]
+pub fn is_recording(path: &Path) -> bool {
+    [&ulog::MAGIC[..], blackbox::MAGIC].iter().any(|magic| super::begins(path, magic).unwrap_or(false))
+}
+
 /// Imports rotor `n` (from 1) of a flight; nothing where the file is no ULog and no Blackbox log.
 ///
 /// # Errors
