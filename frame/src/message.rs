@@ -24,6 +24,17 @@ pub enum BoardId {
     Ahrs,
 }
 
+impl BoardId {
+    /// Its name for people.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Rig => "rig",
+            Self::Ahrs => "IMU",
+        }
+    }
+}
+
 /// First message after reset and the answer to `Identify`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -134,6 +145,19 @@ pub enum CrashCause {
     Unexpected(i8),
 }
 
+impl CrashCause {
+    /// What it was, for people.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::HardFault => "hard fault",
+            Self::ClockFailed => "failure of the crystal",
+            Self::NonMaskable => "non-maskable interrupt",
+            Self::Unexpected(_) => "interrupt that nobody expected",
+        }
+    }
+}
+
 /// What the board's clock runs from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -158,6 +182,20 @@ pub enum SettingsNews {
     Saved,
     /// Could not be written; the settings in force stay until the reset.
     Failed,
+}
+
+impl SettingsNews {
+    /// What came of them, for people.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Absent => "none were stored, the factory's are in force",
+            Self::Loaded => "the stored ones are in force",
+            Self::Damaged => "the stored ones are damaged, the factory's are in force",
+            Self::Saved => "stored",
+            Self::Failed => "could not be stored",
+        }
+    }
 }
 
 /// How the board is, once a second.
@@ -386,6 +424,39 @@ pub enum Command {
         /// Its place among the analogue channels.
         channel: u8,
     },
+}
+
+impl Command {
+    /// What is asked for, for people.
+    #[must_use]
+    pub const fn words(&self) -> &'static str {
+        match self {
+            Self::Ping => "a sign of life",
+            Self::Identify => "who are you",
+            Self::Arm => "arm",
+            Self::CalibrateRange { .. } => "calibrate the throttle range",
+            Self::Beep(_) => "a beep",
+            Self::ScheduleStep { .. } | Self::Segments(_) => "a part of a schedule",
+            Self::RunSchedule
+            | Self::RunStaircase { .. }
+            | Self::RunVisits { .. }
+            | Self::RunRamp { .. }
+            | Self::RunStep { .. }
+            | Self::RunChirp { .. } => "run",
+            Self::SetPulse(_) => "set the pulse",
+            Self::Stop => "stop",
+            Self::Tare => "tare",
+            Self::ClearFaults => "clear the faults",
+            Self::Configure(_) => "change a setting",
+            Self::SaveSettings => "store the configuration",
+            Self::SelfTest { .. } => "test yourself",
+            Self::Imu(_) => "a command of the IMU board",
+            Self::ConfigPart(_) | Self::ConfigApply { .. } => "a configuration",
+            Self::ConfigRead { .. } => "what is your configuration",
+            Self::Steer { .. } => "go on with the schedule",
+            Self::Burst { .. } => "record a burst",
+        }
+    }
 }
 
 /// What the self-test provokes.

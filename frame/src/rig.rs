@@ -51,6 +51,25 @@ pub enum RigState {
     Faulted,
 }
 
+impl RigState {
+    /// Its name for people.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Disarmed => "disarmed",
+            Self::ArmHoldMin => "arming: waiting for the long beep",
+            Self::ArmCells => "arming: waiting for the cell beeps",
+            Self::ArmReady => "arming: waiting for do re mi",
+            Self::Armed => "armed",
+            Self::Running => "running",
+            Self::CalibrateHoldMax => "range calibration: maximum pulses",
+            Self::CalibrateHoldMin => "range calibration: minimum pulses",
+            Self::ProgrammingEscape => "leaving the ESC's programming",
+            Self::Faulted => "stopped by a fault",
+        }
+    }
+}
+
 /// What stopped the rig. Bits of a [`FaultSet`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -193,10 +212,35 @@ impl FaultSet {
     }
 }
 
+/// The names of its faults, as people read them.
+impl core::fmt::Display for FaultSet {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if self.is_empty() {
+            return f.write_str("no fault");
+        }
+        listed(f, self.iter().map(Fault::words))
+    }
+}
+
+/// Words with a comma between them.
+fn listed<'w>(f: &mut core::fmt::Formatter<'_>, words: impl Iterator<Item = &'w str>) -> core::fmt::Result {
+    words.enumerate().try_for_each(|(n, words)| {
+        f.write_str(if n > 0 { ", " } else { "" })?;
+        f.write_str(words)
+    })
+}
+
 /// All reasons why a command was refused. Bits, so that a refusal lists every one of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Refusals(pub u16);
+
+/// Every reason, as people read it.
+impl core::fmt::Display for Refusals {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        listed(f, self.words())
+    }
+}
 
 impl Refusals {
     /// The command does not belong to this state.

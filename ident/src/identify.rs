@@ -7,7 +7,9 @@
 
 use crate::close::CloseError;
 use crate::context::{Context, unit_of};
-use crate::fit::{Curve, Estimate, Fitted, Spin, declared, motor, relations, speeds, spin, square_law};
+use crate::fit::power::{Disc, Level, levels};
+use crate::fit::surface::{Surface, surface};
+use crate::fit::{Curve, Estimate, Fitted, Law, Spin, declared, motor, relations, speeds, spin, square_law};
 use crate::log::Log;
 use crate::model::{FittedTo, Model};
 use crate::plateau::{Plateau, detect};
@@ -40,11 +42,13 @@ pub struct Constant {
     pub half: f64,
     /// Unit.
     pub unit: &'static str,
+    /// How well its law describes the levels, where it comes from one.
+    pub law: Option<Law>,
 }
 
 impl Constant {
-    fn new(name: &'static str, e: Estimate, unit: &'static str) -> Self {
-        Self { name, value: e.value, se: e.se, half: e.half, unit }
+    fn new(name: &'static str, e: Estimate, unit: &'static str, law: Option<Law>) -> Self {
+        Self { name, value: e.value, se: e.se, half: e.half, unit, law }
     }
 }
 
@@ -67,6 +71,12 @@ pub struct Identified {
     pub square_laws: Vec<(&'static str, Curve)>,
     /// k_T, k_Q, KV, R, I0, spin-up and spin-down time constants, where they can be had.
     pub constants: Vec<Constant>,
+    /// What is known of propeller and air.
+    pub disc: Disc,
+    /// What a designer asks of each plateau.
+    pub levels: Vec<Level>,
+    /// Thrust over throttle and voltage, or why it is not known.
+    pub surface: Result<Surface, &'static str>,
 }
 
 /// Identifies a log.
@@ -74,6 +84,14 @@ pub struct Identified {
 /// # Errors
 /// [`CloseError::NoRelation`] where nothing can be fitted.
 pub fn identify(log: &Log) -> Result<Identified, CloseError> {
+    identify_in(log, None)
+}
+
+/// The same in air whose density is known from elsewhere, kg/m^3.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, CloseError> {
     let context = Context::bare(log, None);
     // the fits over all rows and the plateaus need nothing of each other: one core each
     let (fitted, plateaus) = std::thread::scope(|scope| {
@@ -87,21 +105,31 @@ pub fn identify(log: &Log) -> Result<Identified, CloseError> {
     let curves = relations(log, &plateaus, &speeds);
     let mut constants = Vec::new();
     let mut square_laws = Vec::new();
+    let (mut zeros, mut k_torque) = ([None; 2], None);
     for (name, channel, unit) in [("k_T", "thrust_n", "N.s2"), ("k_Q", "torque_nm", "N.m.s2")] {
-        if let Some((k, curve)) = square_law(log, &plateaus, &speeds, channel) {
-            constants.push(Constant::new(name, k, unit));
+        if let Some((k, curve, law)) = square_law(log, &plateaus, &speeds, channel) {
+            constants.push(Constant::new(name, k, unit, Some(law)));
+            zeros[usize::from(channel == "torque_nm")] = Some(curve.coefficient(0));
+            if channel == "torque_nm" {
+                k_torque = Some(k);
+            }
             square_laws.push((name, curve));
         }
     }
-    if let Some(m) = motor(log, &plateaus, &speeds) {
-        constants.push(Constant::new("KV", m.kv, "rev/min/V"));
-        constants.push(Constant::new("R", m.resistance, "ohm"));
-        constants.push(Constant::new("I0", m.no_load, "A"));
+    let motor = motor(log, &plateaus, &speeds);
+    if let Some(m) = &motor {
+        constants.push(Constant::new("KV", m.kv, "rev/min/V", Some(m.law)));
+        constants.push(Constant::new("R", m.resistance, "ohm", Some(m.law)));
+        constants.push(Constant::new("I0", m.no_load, "A", Some(m.law)));
     }
+    let told = Disc::of(log);
+    let disc = Disc { density_kg_m3: air_kg_m3.or(told.density_kg_m3), ..told };
+    let levels = levels(log, &plateaus, &speeds, zeros, &disc);
+    let surface = surface(log, &plateaus, &speeds, motor.as_ref(), k_torque, &curves);
     // row numbers are no seconds
     let Spin { up, down } = if log.time_is_row() { Spin::default() } else { spin(log, &plateaus, &context.rpm) };
-    constants.extend(up.map(|e| Constant::new("tau_up", e, "s")));
-    constants.extend(down.map(|e| Constant::new("tau_down", e, "s")));
+    constants.extend(up.map(|e| Constant::new("tau_up", e, "s", None)));
+    constants.extend(down.map(|e| Constant::new("tau_down", e, "s", None)));
     Ok(Identified {
         model,
         columns: log.columns.iter().map(|c| c.name.clone()).collect(),
@@ -111,6 +139,9 @@ pub fn identify(log: &Log) -> Result<Identified, CloseError> {
         curves,
         square_laws,
         constants,
+        disc,
+        levels,
+        surface,
     })
 }
 

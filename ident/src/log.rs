@@ -6,6 +6,8 @@
 //! Units: carried by the column names (`thrust_n`, `pulse_us`, ...); a missing sample is NaN in memory, an empty field on disk.
 //! Reference: specification `formats.md`, "Rig log".
 
+mod clock;
+
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -27,7 +29,7 @@ pub const SPEED: [&str; 5] = ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder",
 #[non_exhaustive]
 pub enum ReadError {
     /// The file could not be opened or read.
-    #[error("{file}: {source}")]
+    #[error("{file}: cannot be read ({source}); expected a file: check name and folder")]
     Io {
         /// The file as it was named.
         file: String,
@@ -165,7 +167,7 @@ impl Log {
         for name in header.iter().skip(1) {
             log.columns.push(Column { name: name.clone(), values: Vec::new() });
         }
-        let mut line = String::new();
+        let (mut line, mut first_row) = (String::new(), None);
         while lines.read_into(&mut line)? {
             if line.is_empty() {
                 continue;
@@ -176,10 +178,17 @@ impl Log {
                 continue;
             }
             let place = lines.place();
+            if let Some(t) = clock::first_field(&line).filter(|t| log.t.last().is_some_and(|last| t < last)) {
+                return Err(clock::stepped_back(t, &log, &place, &mut lines)?);
+            }
+            first_row.get_or_insert(place.line);
             read_row(&line, &header, &place, &mut log)?;
         }
         if log.is_empty() {
             return Err(lines.place().refuse(None, "no data rows", "at least one line of numbers under the header"));
+        }
+        if format == FORMAT {
+            clock::check(&log, &Place { file, line: first_row.unwrap_or(1) })?;
         }
         log.sha256 = Some(hexadecimal(lines.digest));
         Ok(log)
@@ -424,6 +433,11 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
 fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError> {
     let names: Vec<String> = line.split(',').map(|n| n.trim().to_owned()).collect();
     if names.first().map(String::as_str) != Some("t_s") {
+        if let Some((_, word)) = [(';', "semicolons"), ('\t', "tabs")].iter().find(|(c, _)| names.len() == 1 && line.contains(*c))
+        {
+            let expected = "commas (and points in the numbers); save it so, or use `quadrig import`";
+            return Err(place.refuse(None, format!("{word} between the columns"), expected));
+        }
         return Err(place.refuse(names.first().map(String::as_str), "not the time column", "t_s (seconds) as the first column"));
     }
     for (i, name) in names.iter().enumerate() {
@@ -471,7 +485,9 @@ fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> 
         ));
     }
     if fields > header.len() {
-        return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header", header.len())));
+        let commas = fields + 1 >= 2 * header.len();
+        let reason = if commas { ": a decimal comma? Write decimal points" } else { "" };
+        return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header{reason}", header.len())));
     }
     for ((i, text), name) in line.split(',').enumerate().zip(header) {
         let text = text.trim();
@@ -515,11 +531,6 @@ fn check_time(value: f64, log: &Log, place: &Place<'_>) -> Result<(), ReadError>
         Some(last) if value == *last => Err(place.refuse(
             Some("t_s"),
             format!("{value} repeats the row before"),
-            "strictly increasing time (`quadrig import` repairs it by a stated rule)",
-        )),
-        Some(last) if value < *last => Err(place.refuse(
-            Some("t_s"),
-            format!("{value} steps back from {last}"),
             "strictly increasing time (`quadrig import` repairs it by a stated rule)",
         )),
         _ => Ok(()),

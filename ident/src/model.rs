@@ -82,7 +82,7 @@ pub struct Model {
 #[non_exhaustive]
 pub enum ModelError {
     /// The file could not be read.
-    #[error("{file}: {source}")]
+    #[error("{file}: cannot be read ({source}); expected a model of `quadrig identify` or `close-loop`: check name and folder")]
     Io {
         /// The file.
         file: String,

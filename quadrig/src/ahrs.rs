@@ -12,6 +12,8 @@ mod number;
 mod text;
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::trouble::unwritten;
 use dcm::calibration::Calibration;
 use dcm::{Classic, ClassicConfig, Config, Dcm, Earth, Fresh, Mat3, Measurement, euler_of, quaternion_of};
 use ident::log::write_whole;
@@ -50,6 +52,13 @@ enum Preset {
     Default,
     Classic,
     Razor,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.input]).reads(&self.calibration).writes("OUTPUT", [&self.output])
+    }
 }
 
 /// Either filter.
@@ -112,7 +121,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             bar.set(n as f64 / log.rows.len() as f64);
         }
     }
-    write_whole(&args.output, |file| file.write_all(out.as_bytes())).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    write_whole(&args.output, |file| file.write_all(out.as_bytes())).map_err(unwritten(&args.output))?;
     if !quiet {
         let has = |name: &str, of: fn(&Row) -> bool| if log.rows.iter().any(of) { "" } else { name }.to_owned();
         let lacks = has(" without gyro", |r| r.gyro.is_some())

@@ -6,14 +6,17 @@
 //! Reference: Beharie 2013, Eq. 5.53 to 5.56 as corrected in the errata.
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::figures;
 use crate::open::open;
+use crate::trouble::unwritten;
 use ident::beam::Beam;
 use ident::context::Context;
 use ident::import::Options;
 use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{Density, Kilogram, Metre, Newton, Pascal, RevPerMin, Volt};
-use ident::report::{beam, beam_figures, beam_warning, write_figures};
+use ident::report::{beam, beam_figures, beam_warning};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -79,6 +82,13 @@ pub(crate) struct Args {
     json: bool,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.run).writes("-o", &self.output).fills("--svg", &self.svg)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let design = design(args)?;
@@ -86,10 +96,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let met = design.crossings(args.blades, &speeds, args.near / 100.0);
     let sheet = beam(&design, args.blades, &met);
     if let Some(path) = &args.output {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
     if let Some(folder) = &args.svg {
-        write_figures(folder, sheet.drawn()).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
+        figures(folder, sheet.drawn())?;
     }
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -66,7 +66,9 @@ impl Board {
 
     /// Why the port is gone, in one line.
     pub(crate) fn gone(&self) -> String {
-        self.gone.clone().unwrap_or_else(|| format!("{}: the port is gone", self.port.name()))
+        self.gone
+            .clone()
+            .unwrap_or_else(|| format!("{}: the port is gone; expected it to stay: check plug and cable", self.port.name()))
     }
 
     /// Name of the port, for people.
@@ -117,7 +119,9 @@ impl Board {
         self.sent = self.port.now();
         // an empty frame first: whatever stood on the line before is not part of ours
         let bytes = [&[0], &wire[..used]].concat();
-        self.port.write_all(&bytes).map_err(|e| format!("{}: cannot be written to ({e})", self.port.name()).into())
+        self.port.write_all(&bytes).map_err(|e| {
+            format!("{}: cannot be written to ({e}); expected the board to stay: check plug and cable", self.port.name()).into()
+        })
     }
 
     /// A sign of life when one is due.
@@ -158,7 +162,7 @@ impl Board {
                         seen(&received.message);
                         if let Message::Event(Event::Refused(reasons)) = received.message {
                             let words: Vec<&str> = reasons.words().collect();
-                            return Err(format!("the board refuses: {}", words.join("; ")).into());
+                            return Err(refused(&words.join("; ")).into());
                         }
                         if let Some(found) = answer(&received.message) {
                             return Ok(found);
@@ -173,11 +177,18 @@ impl Board {
     /// No answer came, in one line.
     pub(crate) fn unanswered(&self) -> Failure {
         let s = ANSWER_TIME.as_secs_f32();
-        format!("{}: no answer from the board in {s} s; is it powered, and a rig board?", self.port.name()).into()
+        format!("{}: no answer from the board; expected one in {s} s: is it powered, and a rig board?", self.port.name()).into()
     }
 
     /// Sends a command that is accepted or refused.
     pub(crate) fn obey(&mut self, command: Command, seen: impl FnMut(&Message)) -> Result<(), Failure> {
         self.ask(command, seen, |m| matches!(m, Message::Event(Event::Accepted)).then_some(()))
     }
+}
+
+/// A refusal of the board, with where its words are explained.
+pub(crate) fn refused(words: &str) -> String {
+    format!(
+        "the board refuses: {words}; expected it ready for this command: `quadrig rig status` says how it is, docs/errors.md what to do"
+    )
 }

@@ -19,6 +19,7 @@ mod settle;
 mod settling;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::port::PortArgs;
 use crate::rig::date;
 use channel::Channel;
@@ -97,6 +98,13 @@ impl What {
             Self::Temperature => Some(Channel::Temperature),
             _ => None,
         }
+    }
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.input).reads(self.port.reads()).writes("-o", &self.output)
     }
 }
 

@@ -8,14 +8,16 @@
 //! Reference: specification `closing-the-loop.md`, step 9.
 
 use crate::Failure;
-use crate::close_loop::write_folder;
+use crate::apart::Paths;
+use crate::close_loop::results;
+use crate::folder::Folder;
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
 use hal_sim::Scenario;
 use hal_sim::scenario::{Schedule, Step};
 use ident::circle::{Circle, circle};
 use ident::close::close;
-use ident::log::{Log, write_whole};
+use ident::log::Log;
 use ident::report::{Origin, Vocabulary, terminal};
 use ident::runs::{Run, Standing, model, next, rival, standings};
 use ident::verdict::{Kind, NextExperiment};
@@ -44,6 +46,13 @@ pub(crate) struct Args {
     json: bool,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.scenario]).fills("-o", &self.output)
+    }
+}
+
 /// How the hypotheses stood after each run.
 struct Round {
     /// Schedule and why it was flown.
@@ -56,6 +65,8 @@ struct Round {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let scenario = Scenario::load(&args.scenario)?;
+    args.paths().reads(&scenario.schedule.file(&args.scenario)).check()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
     let silent = quiet || args.json;
     let say = |line: String| {
         if !silent {
@@ -101,17 +112,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         "circle": closes.as_ref().map(circle_json),
         "hidden": scenario.effects.iter().map(|e| e.id()).collect::<Vec<_>>(),
     });
-    if let Some(folder) = &args.output {
+    if let Some(mut folder) = folder {
         for (k, run) in runs.iter().enumerate() {
-            let own = folder.join(format!("run-{}", k + 1));
-            write_folder(&own, &run.log, &run.closed, &serde_json::to_string_pretty(&run.closed.verdict)?, Origin::of(&run.log))?;
-            run.log.write(&own.join("run.csv")).map_err(|e| format!("{}: {e}", own.display()))?;
+            let own = format!("run-{}", k + 1);
+            let files = results(&run.log, &run.closed, Origin::of(&run.log))?;
+            folder.extend(files.into_iter().map(|(name, bytes)| (format!("{own}/{name}"), bytes)));
+            let mut text = Vec::new();
+            run.log.write_to(&mut text)?;
+            folder.add(format!("{own}/run.csv"), text);
         }
-        let text = corrected(&runs, &standing).to_toml();
-        let refuse = |e: std::io::Error| format!("{}: {e}", folder.display());
-        write_whole(&folder.join("model.toml"), |out| out.write_all(text.as_bytes())).map_err(refuse)?;
-        write_whole(&folder.join("loop.json"), |out| writeln!(out, "{}", serde_json::to_string_pretty(&report)?))
-            .map_err(refuse)?;
+        folder.add("model.toml", corrected(&runs, &standing).to_toml());
+        folder.add("loop.json", serde_json::to_string_pretty(&report)? + "\n");
+        folder.write()?;
     }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
@@ -120,6 +132,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         say(conclusion(&runs, &standing, &scenario));
     }
     Ok(())
+}
+
+/// Names that earlier results may have.
+fn is_result(name: &str) -> bool {
+    let a_run = || name.strip_prefix("run-").is_some_and(|n| n.parse::<usize>().is_ok());
+    ["model.toml", "model.discrepancy.toml", "loop.json"].contains(&name) || a_run()
 }
 
 /// The scenario of a run: the same rig with fresh noise, on the schedule that was asked for.

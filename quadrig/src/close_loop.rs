@@ -11,10 +11,12 @@ pub(crate) mod inertial;
 mod several;
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::Folder;
 use crate::open::{Columns, Names, open};
 use crate::progress::Bar;
 use ident::close::{Closed, close};
-use ident::log::{Log, write_whole};
+use ident::log::Log;
 use ident::model::Model;
 use ident::report::{Origin, Vocabulary, closed_loop, terminal};
 use std::path::{Path, PathBuf};
@@ -48,6 +50,11 @@ impl Args {
     fn log(&self) -> &Path {
         self.logs.first().map_or(Path::new(""), PathBuf::as_path)
     }
+
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.logs).reads(&self.model).reads(&self.validate).fills("-o", &self.output)
+    }
 }
 
 /// Runs the command.
@@ -61,6 +68,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if flight::is_flight_log(args.log()) {
         return flight::run(args, quiet);
     }
+    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
     let options = args.columns.options(&args.names);
     let log = open(args.log(), &options, quiet)?;
     let model = args.model.as_deref().map(Model::read).transpose()?;
@@ -73,9 +81,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         closed.verdict.left_out.iter().for_each(|l| eprintln!("{}: {l}", args.log().display()));
     }
     let json = serde_json::to_string_pretty(&closed.verdict)?;
-    if let Some(folder) = &args.output {
+    if let Some(mut folder) = folder {
         let origin = Origin { model: args.model.as_ref().map(|m| m.display().to_string()), ..Origin::of(&log) };
-        write_folder(folder, &log, &closed, &json, origin)?;
+        folder.extend(results(&log, &closed, origin)?);
+        folder.write()?;
     }
     if args.json {
         println!("{json}");
@@ -85,13 +94,28 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes what the contract promises into a folder.
-pub(crate) fn write_folder(folder: &Path, log: &Log, closed: &Closed, json: &str, origin: Origin) -> Result<(), Failure> {
-    let say = |e: std::io::Error| format!("{}: {e}", folder.display());
-    std::fs::create_dir_all(folder).map_err(say)?;
-    write_whole(&folder.join("model.toml"), |out| out.write_all(closed.model.to_toml().as_bytes())).map_err(say)?;
-    write_whole(&folder.join("verdict.json"), |out| writeln!(out, "{json}")).map_err(say)?;
-    let page = closed_loop(log, closed, origin);
-    write_whole(&folder.join("report.html"), |out| out.write_all(page.as_bytes())).map_err(say)?;
-    Ok(())
+/// Names that the results of any kind of log may have.
+pub(crate) fn is_result(name: &str) -> bool {
+    const NAMES: [&str; 8] = [
+        "runs",
+        "model.toml",
+        "model.discrepancy.toml",
+        "verdict.json",
+        "report.html",
+        "declared.csv",
+        "pred.csv",
+        "channels.csv",
+    ];
+    NAMES.contains(&name)
+}
+
+/// What the contract promises of a run.
+pub(crate) fn results(log: &Log, closed: &Closed, origin: Origin) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    let json = serde_json::to_string_pretty(&closed.verdict)?;
+    let files = [
+        ("model.toml", closed.model.to_toml()),
+        ("verdict.json", json + "\n"),
+        ("report.html", closed_loop(log, closed, origin)),
+    ];
+    Ok(files.map(|(name, text)| (name.to_owned(), text.into_bytes())).into())
 }

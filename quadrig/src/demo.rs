@@ -6,10 +6,13 @@
 //! Reference: specification `formats.md`, `quadrig demo`.
 
 use crate::Failure;
-use crate::close_loop::write_folder;
+use crate::apart::Paths;
+use crate::close_loop::{is_result, results};
+use crate::folder::Folder;
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
-use hal_sim::Scenario;
+use clap::builder::PossibleValuesParser;
+use hal_sim::{Scenario, effect};
 use ident::close::close;
 use ident::context::Context;
 use ident::log::Log;
@@ -27,12 +30,19 @@ pub(crate) struct Args {
     /// Draws the hidden effect and every noise; from the clock when not given.
     #[arg(long)]
     seed: Option<u64>,
-    /// Hides this effect instead of drawing one.
-    #[arg(long)]
+    /// Hides this effect instead of drawing one of six.
+    #[arg(long, value_parser = PossibleValuesParser::new(effect::catalogue().iter().map(|e| e.id)))]
     effect: Option<String>,
     /// Folder for log, model, verdict and report.
     #[arg(short, long, default_value = "out/demo")]
     output: PathBuf,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().fills("-o", [&self.output])
+    }
 }
 
 /// Runs the command.
@@ -41,6 +51,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         args.seed.unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |d| d.as_millis() as u64 % 1_000_000));
     let id = args.effect.clone().unwrap_or_else(|| HIDDEN[(mixed(seed) % HIDDEN.len() as u64) as usize].to_owned());
     let scenario = Scenario::demo(seed, Some(&id))?;
+    let mut folder = Folder::new(&args.output, |name| is_result(name) || ["run.csv", "again.csv"].contains(&name))?;
     let say = |line: String| {
         if !quiet {
             println!("{line}");
@@ -48,9 +59,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     };
     say(format!("seed {seed}: a 570 KV motor with an 11x4.7 propeller; one effect is hidden (repeat with --seed {seed})"));
     let log = fly(&scenario, None, "run.csv", "flying", quiet)?;
-    std::fs::create_dir_all(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
-    let path = args.output.join("run.csv");
-    log.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let mut text = Vec::new();
+    log.write_to(&mut text)?;
     let found = plateaus(&Context::new(&log, None), &log).len();
     say(format!(
         "the rig firmware armed the ESC, flew an up-down staircase and logged {} samples; {found} plateaus\n",
@@ -58,7 +68,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     ));
 
     // from here on only the log is known, as it was written
-    let log = Log::read(&path)?;
+    let log = Log::parse("run.csv", text.as_slice())?;
+    folder.add("run.csv", text);
     let closed = {
         let bar = Bar::new("searching", quiet);
         close(&log, None, &[], &mut |share| bar.set(share))?
@@ -68,18 +79,20 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let hidden = Hidden { seed, id: truth.id().to_owned(), parameters };
     let judged = hidden.judged(&closed.verdict, Vocabulary::RIG);
     let origin = Origin { hidden: Some(hidden), ..Origin::of(&log) };
-    write_folder(&args.output, &log, &closed, &serde_json::to_string_pretty(&closed.verdict)?, origin)?;
+    folder.extend(results(&log, &closed, origin)?);
     say(terminal(&closed.verdict, Vocabulary::RIG, false));
 
     match fly_model(&scenario, &closed.model, &log, "again.csv", quiet) {
         Ok(again) => {
-            let path = args.output.join("again.csv");
-            again.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+            let mut text = Vec::new();
+            again.write_to(&mut text)?;
+            folder.add("again.csv", text);
             say(resimulated(&closed.model, &again));
         }
         Err(e) => say(format!("the corrected model as the plant: the firmware stopped the run ({e})\n")),
     }
 
+    folder.write()?;
     judged.into_iter().for_each(&say);
     say(format!("the page to look at: {}", args.output.join("report.html").display()));
     Ok(())
@@ -108,7 +121,6 @@ fn mixed(seed: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hal_sim::effect;
 
     #[test]
     fn the_simulator_knows_what_the_demonstration_hides() {

@@ -6,10 +6,10 @@
 //! Reference: specification `closing-the-loop.md`, step 5.
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::Folder;
 use ident::almanac::{Page, almanac};
-use ident::log::write_whole;
-use ident::report::write_figures;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments.
 #[derive(clap::Args)]
@@ -19,28 +19,33 @@ pub(crate) struct Args {
     output: PathBuf,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().fills("-o", [&self.output])
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let airframe = args.output.join("airframe");
-    let count = write(&args.output, almanac())? + write(&airframe, ident::flight::almanac())?;
+    let mut folder = Folder::of_added(&args.output);
+    let count = add(&mut folder, "", almanac()) + add(&mut folder, "airframe/", ident::flight::almanac());
+    folder.write()?;
     if !quiet {
-        println!("{count} pages in {} and {}", args.output.display(), airframe.display());
+        println!("{count} pages in {} and {}", args.output.display(), args.output.join("airframe").display());
     }
     Ok(())
 }
 
-/// Writes pages, their figures and their index into a folder; the number of pages.
-fn write(folder: &Path, (pages, index): (Vec<Page>, String)) -> Result<usize, Failure> {
-    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let write = |name: String, text: &str| {
-        let file = folder.join(name);
-        write_whole(&file, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", file.display()))
-    };
-    for page in &pages {
-        write(format!("{}.md", page.id), &page.text)?;
+/// Adds pages, their figures and their index; the number of pages.
+fn add(folder: &mut Folder, within: &str, (pages, index): (Vec<Page>, String)) -> usize {
+    folder.add(format!("{within}README.md"), index);
+    let count = pages.len();
+    for page in pages {
+        if !page.figure.is_empty() {
+            folder.add(format!("{within}{}.svg", page.figure.id), page.figure.file());
+        }
+        folder.add(format!("{within}{}.md", page.id), page.text);
     }
-    write("README.md".to_owned(), &index)?;
-    let drawn: Vec<_> = pages.iter().map(|p| p.figure.clone()).filter(|f| !f.is_empty()).collect();
-    write_figures(folder, &drawn).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
-    Ok(pages.len())
+    count
 }

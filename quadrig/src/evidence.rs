@@ -186,7 +186,7 @@ pub(crate) fn instant(event: &Event) -> Option<Ticks> {
 /// `sample` the sample that came after it: its verdicts say which channel a sensor's fault is about.
 pub(crate) fn words(event: &Event, before: FaultSet, sample: Option<&RigSample>) -> Option<String> {
     Some(match event {
-        Event::State { from, to, .. } => format!("state: {from:?} to {to:?}"),
+        Event::State { from, to, .. } => format!("state: {} to {}", from.words(), to.words()),
         Event::Faults { faults, .. } => {
             let new = faults.iter().filter(|fault| !before.contains(*fault));
             let each: Vec<String> = new.map(|fault| fault_words(fault, sample)).collect();
@@ -198,12 +198,12 @@ pub(crate) fn words(event: &Event, before: FaultSet, sample: Option<&RigSample>)
         Event::Refused(reasons) => format!("refused: {}", reasons.words().collect::<Vec<_>>().join("; ")),
         Event::ScheduleDone { .. } => "schedule done".to_owned(),
         Event::Settings(SettingsNews::Saved) => "settings saved".to_owned(),
-        Event::Settings(news) => format!("settings: {news:?}").to_lowercase(),
+        Event::Settings(news) => format!("settings: {}", news.words()),
         Event::Panicked { line, file } => {
             let file: String = file.iter().take_while(|b| **b != 0).map(|b| char::from(*b)).collect();
             format!("before the last reset: panic at {file}:{line}")
         }
-        Event::Crashed(crash) => format!("before the last reset: {:?} at {:#010x}", crash.cause, crash.pc),
+        Event::Crashed(crash) => format!("before the last reset: {} at {:#010x}", crash.cause.words(), crash.pc),
         Event::Clock(news) if news.crystal_hz == 0 => {
             format!("no crystal: the internal oscillator is in use ({} Hz measured)", news.measured_hz)
         }

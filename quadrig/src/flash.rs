@@ -43,14 +43,18 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         None => build(args.board)?,
     };
     if !elf.is_file() {
-        return Err(format!("{}: no such image", elf.display()).into());
+        return Err(format!("{}: no such image; expected an ELF file: `cargo xtask image` builds it", elf.display()).into());
     }
     let status = Command::new("probe-rs").args(["run", "--chip", CHIP]).arg(&elf).status().map_err(missing)?;
-    if status.success() { Ok(()) } else { Err(format!("probe-rs ended with {status}; nothing more was done").into()) }
+    if status.success() {
+        Ok(())
+    } else {
+        Err(format!("probe-rs ended with {status}; expected it to flash and attach: what it said stands above").into())
+    }
 }
 
 fn missing(e: std::io::Error) -> String {
-    format!("probe-rs cannot be started ({e}); install it with `cargo install probe-rs-tools --locked`")
+    format!("probe-rs cannot be started ({e}); expected it to be installed: `cargo install probe-rs-tools --locked`")
 }
 
 /// Asks probe-rs for its probes, with a bound on the time.
@@ -70,13 +74,13 @@ fn find_probe() -> Result<(), Failure> {
     if listed.contains("[0]") {
         Ok(())
     } else {
-        Err("no debug probe was found; connect an ST-Link, J-Link or CMSIS-DAP probe to the board's SWD port".into())
+        Err("no debug probe was found; expected an ST-Link, J-Link or CMSIS-DAP probe to the board's SWD port".into())
     }
 }
 
 /// Builds the image from the source tree that this program was built from.
 fn build(board: Board) -> Result<PathBuf, Failure> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("no source tree; give --elf")?;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("no source tree; expected --elf IMAGE")?;
     let package = match board {
         Board::Rig => "firmware-rig",
         Board::Ahrs => "firmware-ahrs",
@@ -96,9 +100,11 @@ fn build(board: Board) -> Result<PathBuf, Failure> {
             ".cargo/image.toml",
         ])
         .status()
-        .map_err(|e| format!("cargo cannot be started in {} ({e}); give --elf", root.display()))?;
+        .map_err(|e| format!("cargo cannot be started in {} ({e}); expected cargo, or --elf IMAGE", root.display()))?;
     if !status.success() {
-        return Err(format!("the image was not built ({status}); `cargo xtask setup` adds the target").into());
+        return Err(
+            format!("the image was not built ({status}); expected the target to be there: `cargo xtask setup` adds it").into()
+        );
     }
     Ok(root.join("target/fw").join(TARGET).join("release").join(package))
 }

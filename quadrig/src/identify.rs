@@ -6,8 +6,12 @@
 //! Reference: specification `identification.md`.
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::figures;
 use crate::open::{Columns, Names, open};
-use ident::identify::{Identified, identify};
+use crate::trouble::unwritten;
+use ident::fit::power::csv;
+use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
 use ident::report::number;
 use std::io::Write;
@@ -27,6 +31,15 @@ pub(crate) struct Args {
     /// Writes each figure as a file into this folder.
     #[arg(long, value_name = "FOLDER")]
     svg: Option<PathBuf>,
+    /// Writes the plateaus with power, efficiencies and coefficients, each with its standard error (CSV; SI units in the names).
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    /// Writes thrust over throttle and supply voltage with its 95 % band (CSV: us, %, V, N).
+    #[arg(long, value_name = "FILE")]
+    surface: Option<PathBuf>,
+    /// Density of the air, kg/m^3, where the log does not tell it.
+    #[arg(long, value_name = "KG_M3")]
+    air: Option<f64>,
     /// A second run to lay beside it on the page.
     #[arg(long, value_name = "LOG")]
     beside: Option<PathBuf>,
@@ -36,12 +49,39 @@ pub(crate) struct Args {
     names: Names,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default()
+            .reads([&self.log])
+            .reads(&self.beside)
+            .writes("-o", [&self.output])
+            .writes("--report", &self.report)
+            .writes("--table", &self.table)
+            .writes("--surface", &self.surface)
+            .fills("--svg", &self.svg)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let log = open(&args.log, &args.columns.options(&args.names), quiet)?;
-    let found = identify(&log)?;
-    write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes()))
-        .map_err(|e| format!("{}: {e}", args.output.display()))?;
+    if let Some(air) = args.air.filter(|air| !(0.1..=10.0).contains(air)) {
+        return Err(format!("--air {air}: expected a density in kg/m^3, such as 1.2").into());
+    }
+    let found = identify_in(&log, args.air)?;
+    let surface = match (&args.surface, &found.surface) {
+        (Some(_), Err(why)) => {
+            return Err(format!("{}: --surface: {why}; expected a log that tells it", args.log.display()).into());
+        }
+        (Some(path), Ok(surface)) => Some((path, surface.csv())),
+        (None, _) => None,
+    };
+    let table = args.table.as_ref().map(|path| (path, csv(&found.plateaus, &found.levels)));
+    for (path, text) in table.into_iter().chain(surface) {
+        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
+    }
+    write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes())).map_err(unwritten(&args.output))?;
     if args.report.is_some() || args.svg.is_some() {
         draw(args, &log, &found)?;
     }
@@ -68,10 +108,10 @@ fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
     };
     let sheet = ident::report::run(log, found, second.as_ref().map(|(log, found)| (log, found)));
     if let Some(path) = &args.report {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
     if let Some(folder) = &args.svg {
-        ident::report::write_figures(folder, sheet.drawn()).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
+        figures(folder, sheet.drawn())?;
     }
     Ok(())
 }
@@ -108,7 +148,7 @@ fn text(found: &Identified) -> String {
     for f in &found.curves {
         let chosen = f.orders.iter().find(|o| o.chosen).map_or_else(String::new, |o| format!(", order by AICc {}", o.degree));
         let left_out =
-            if f.curve.outliers.is_empty() { String::new() } else { format!(", left out: plateaus {:?}", f.curve.outliers) };
+            if f.curve.outliers.is_empty() { String::new() } else { format!(", left out: points {}", listed(&f.curve.outliers)) };
         let coefficients = (0..=f.degree).map(|k| f.curve.coefficient(k));
         out += &format!(
             "{:<14} {}; chi2 {:.2}{chosen}{left_out}\n",
@@ -122,16 +162,59 @@ fn text(found: &Identified) -> String {
     }
     for c in &found.constants {
         out += &format!(
-            "{:<9} {} +- {} {} (95 %: {} to {})\n",
+            "{:<9} {} +- {} {} (95 %: {} to {}){}\n",
             c.name,
             number(c.value),
             number(c.se),
             c.unit,
             number(c.value - c.half),
-            number(c.value + c.half)
+            number(c.value + c.half),
+            c.law.map_or_else(String::new, |law| format!("; {}", law.words()))
         );
     }
-    out
+    out + &asked(found)
+}
+
+/// What a designer asks of each plateau, in 100 columns.
+fn asked(found: &Identified) -> String {
+    const SHOWN: [(&str, &str, usize); 9] = [
+        ("pulse_us", "us", 0),
+        ("thrust_n", "N", 3),
+        ("electrical_w", "W in", 1),
+        ("shaft_w", "W shaft", 1),
+        ("g_per_w", "g/W", 2),
+        ("motor_efficiency", "motor", 3),
+        ("figure_of_merit", "merit", 3),
+        ("c_t", "C_T", 4),
+        ("c_p", "C_P", 4),
+    ];
+    if found.levels.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from("\npower, efficiency, coefficients (\"motor\" with its controller; - is not known)\n");
+    out += &SHOWN.map(|(_, head, _)| format!("{head:>9}")).concat();
+    for level in &found.levels {
+        let cell = |(name, _, digits): (&str, &str, usize)| {
+            level.of(name).map_or_else(|| format!("{:>9}", "-"), |(v, _)| format!("{v:>9.digits$}"))
+        };
+        out += &format!("\n{}", SHOWN.map(cell).concat());
+    }
+    out.push('\n');
+    found.disc.lacks().iter().for_each(|lack| out += &format!("{lack}\n"));
+    match &found.surface {
+        Ok(s) => {
+            out + &format!(
+                "thrust over throttle and voltage: --surface FILE; measured {:.2} to {:.2} V\n",
+                s.measured.0, s.measured.1
+            )
+        }
+        Err(why) => out + &format!("thrust over throttle and voltage: {why}\n"),
+    }
+}
+
+/// Places with a comma between them, counted from 1.
+fn listed(places: &[usize]) -> String {
+    places.iter().map(|n| (n + 1).to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// What the board told of the run, where it told anything.

@@ -6,8 +6,10 @@
 //! Reference: specification `formats.md`.
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::join::{With, join};
 use crate::open::{Columns, Names, as_written};
+use crate::trouble::unwritten;
 use ident::log::write_whole;
 use std::path::PathBuf;
 
@@ -54,6 +56,13 @@ impl std::str::FromStr for Meta {
     }
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.file]).reads(self.with.iter().map(With::file)).writes("-o", [&self.output])
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let options = args.columns.options(&args.names);
@@ -92,10 +101,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         as_written(&log)?;
         log.write(&args.output)
     }
-    .map_err(|e| format!("{}: {e}", args.output.display()))?;
+    .map_err(unwritten(&args.output))?;
     if let Some(page) = &shown {
         let path = args.output.with_extension("joint.html");
-        write_whole(&path, |out| out.write_all(page.as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(&path, |out| out.write_all(page.as_bytes())).map_err(unwritten(&path))?;
     }
     if !quiet {
         print!("{}", report.table());

@@ -36,7 +36,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let typed = args.words.join(" ");
     let command = line::command(&typed)
-        .ok_or_else(|| format!("{typed:?} is no command of the IMU board; `quadrig imu --help` lists them"))?;
+        .ok_or_else(|| format!("{typed:?} is no command of the IMU board; expected one of `quadrig imu --help`"))?;
     if !(args.patience.is_finite() && args.patience > 0.0) {
         return Err(format!("--patience {}: expected seconds above 0", args.patience).into());
     }
@@ -100,5 +100,6 @@ fn listen(board: &mut Board, patience: Duration, mut last: impl FnMut(&Message) 
             }
         }
     }
-    Err(format!("no answer from the board in {} s; is it powered, and an IMU board?", patience.as_secs_f64()).into())
+    Err(format!("no answer from the board; expected one in {} s: is it powered, and an IMU board?", patience.as_secs_f64())
+        .into())
 }

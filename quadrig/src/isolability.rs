@@ -6,7 +6,9 @@
 //! Reference: docs/isolability.md.
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
+use crate::folder::Folder;
 use crate::open::open;
 use crate::progress::Bar;
 use crate::sim::fly;
@@ -14,32 +16,42 @@ use hal_sim::Scenario;
 use hal_sim::scenario::AnyScenario;
 use ident::import::Options;
 use ident::isolability::{Apart, Cause, Isolability, Standing, isolability, short};
-use ident::log::{Log, write_whole};
+use ident::log::Log;
 use ident::report;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLE)]
 pub(crate) struct Args {
     /// A rig log (.csv), or a scenario (.toml), which is flown first, without the effects that it hides.
     input: PathBuf,
-    /// Folder for isolability.html, matrix.svg and matrix.csv.
+    /// Folder for isolability.html, matrix.svg and matrix.csv; replaced as a whole.
     #[arg(short, long)]
     output: Option<PathBuf>,
 }
 
-const EXAMPLE: &str = "Sizes are in noise floors of a cause's main channel (root mean square), and in the unit of its own parameter\n(ohm, N, N/s, s, ...). Nothing is fitted to your liking: the search that gives verdicts is asked itself.\n\nExample:\n  quadrig isolability examples/sagging-lead.toml -o out/isolability";
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.input]).fills("-o", &self.output)
+    }
+}
+
+/// The files of the folder.
+const FILES: [&str; 3] = ["isolability.html", "matrix.svg", "matrix.csv"];
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let folder = args.output.as_deref().map(|path| Folder::new(path, |name| FILES.contains(&name))).transpose()?;
     let (log, hidden) = log_of(&args.input, quiet)?;
     let found = {
         let bar = Bar::new("asking", quiet);
         isolability(&log, &mut |share| bar.set(share))?
     };
-    if let Some(folder) = &args.output {
-        write_folder(folder, &found)?;
+    if let Some(mut folder) = folder {
+        let texts = [report::isolability(&found).html(), report::isolability_svg(&found), report::isolability_csv(&found)];
+        FILES.into_iter().zip(texts).for_each(|(name, text)| folder.add(name, text));
+        folder.write()?;
     }
     if !quiet {
         print!("{}{}", flown(&hidden), text(&found));
@@ -62,16 +74,6 @@ fn log_of(input: &Path, quiet: bool) -> Result<(Log, Vec<String>), Failure> {
         return Err(format!("{}: an attitude or flight log; expected a rig log or a scenario", input.display()).into());
     }
     Ok((open(input, &Options::default(), quiet)?, Vec::new()))
-}
-
-fn write_folder(folder: &Path, found: &Isolability) -> Result<(), Failure> {
-    let say = |e: std::io::Error| format!("{}: {e}", folder.display());
-    std::fs::create_dir_all(folder).map_err(say)?;
-    let write = |name: &str, text: String| write_whole(&folder.join(name), |out| out.write_all(text.as_bytes())).map_err(say);
-    write("isolability.html", report::isolability(found).html())?;
-    write("matrix.svg", report::isolability_svg(found))?;
-    write("matrix.csv", report::isolability_csv(found))?;
-    Ok(())
 }
 
 fn flown(hidden: &[String]) -> String {

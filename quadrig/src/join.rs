@@ -20,6 +20,13 @@ pub(crate) struct With {
     file: PathBuf,
 }
 
+impl With {
+    /// Its file.
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
+    }
+}
+
 impl std::str::FromStr for With {
     type Err = String;
 

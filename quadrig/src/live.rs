@@ -1,7 +1,8 @@
 //! The live view of a simulated run.
 //!
 //! What it is: the terminal view of a rig, fed with what the simulated board sends, in step with the clock times a factor; keys pause it, take single
-//! steps, change the speed or end it. Without a terminal one line ten times a simulated second, and lines on the standard input.
+//! steps, change the speed or end it. Without a terminal one line ten times a simulated second, and lines on the standard input. Ctrl-C ends it as
+//! `q` does: what was flown until then is kept.
 //! What can go wrong: a machine that cannot keep up shows a lower factor than asked; nothing else changes, the bytes are the same.
 //! Units: s, rev/min, N, A.
 //! Reference: specification `rig.md`, "The simulator".
@@ -23,6 +24,9 @@ use std::time::{Duration, Instant};
 const REFRESH_MS: u32 = 100;
 /// Simulated milliseconds between two looks at the keys.
 const LOOK_MS: u32 = 10;
+
+/// Longest sleep between two looks at whether an end has come.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// What the viewer asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,20 +101,27 @@ pub(crate) fn view(session: &mut Session, scenario: &Scenario, speed: f64) -> Re
         if live.paused {
             std::thread::sleep(Duration::from_millis(20));
         } else if live.speed > 0.0 {
-            let due = Duration::from_secs_f64((session.now_s() - from_s) / live.speed);
-            std::thread::sleep(due.saturating_sub(begun.elapsed()));
+            until_due((session.now_s() - from_s) / live.speed, begun, &ended);
         }
     }
     Ok(())
 }
 
+/// Waits until so many seconds have gone by since `begun`, or an end has come.
+fn until_due(seconds: f64, begun: Instant, ended: &Ended) {
+    let due = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+    while !ended.now() && begun.elapsed() < due {
+        std::thread::sleep(due.saturating_sub(begun.elapsed()).min(LOOK));
+    }
+}
+
 /// Shows the run to its end or until the viewer has had enough.
 pub(crate) fn watch(session: &mut Session, mut speed: f64) -> Result<(), Failure> {
-    let wishes = wishes();
+    let (wishes, ended) = (wishes(), Ended::watch()?);
     let mut paused = false;
     let mut open = true;
     let (mut from_s, mut begun) = (session.now_s(), Instant::now());
-    loop {
+    while !ended.now() {
         let asked = if paused && open {
             match wishes.recv_timeout(Duration::from_millis(200)) {
                 Ok(wish) => Some(wish),
@@ -143,26 +154,25 @@ pub(crate) fn watch(session: &mut Session, mut speed: f64) -> Result<(), Failure
         for _ in 0..REFRESH_MS {
             if !session.step()? {
                 show(session, speed, false);
-                println!();
+                let _ = writeln!(std::io::stdout()); // a closed view ends nothing
                 return Ok(());
             }
         }
         show(session, speed, paused);
         if speed > 0.0 && !paused {
-            let due = Duration::from_secs_f64((session.now_s() - from_s) / speed);
-            std::thread::sleep(due.saturating_sub(begun.elapsed()));
+            until_due((session.now_s() - from_s) / speed, begun, &ended);
         }
     }
-    println!();
+    let _ = writeln!(std::io::stdout()); // likewise
     Ok(())
 }
 
 fn show(session: &Session, speed: f64, paused: bool) {
     let (truth, now) = (session.truth(), session.now_s());
-    let measured = session.sample().map_or("-".to_owned(), |s| format!("{:?}", s.state));
+    let measured = session.sample().map_or("-".to_owned(), |s| s.state.words().to_owned());
     let mode = if paused { "paused".to_owned() } else { format!("x{speed}") };
     let line = format!(
-        "{now:>8.1} s {mode:>7}  {:<26} {measured:<10} {:>6.0} us {:>6.0} rev/min {:>6.3} N {:>6.2} A {:>6.2} V {:>4.0} %",
+        "{now:>8.1} s {mode:>7}  {:<26} {measured:<18} {:>6.0} us {:>6.0} rev/min {:>6.3} N {:>6.2} A {:>6.2} V {:>4.0} %",
         session.phase(),
         truth.pulse_us,
         truth.plant.rpm,

@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod ahrs;
+mod apart;
 mod batch;
 mod beam;
 mod board;
@@ -19,14 +20,18 @@ mod demo;
 mod effects;
 mod end;
 mod evidence;
+mod export;
 mod flash;
 mod fly;
+mod folder;
+mod help;
 mod identify;
 mod import;
 mod imu;
 mod isolability;
 mod join;
 mod live;
+mod man;
 mod measured;
 mod open;
 mod plateaus;
@@ -42,10 +47,12 @@ mod select;
 mod sim;
 mod spool;
 mod step;
+mod trouble;
 mod view;
 mod virtual_port;
 
-use clap::{Parser, Subcommand};
+use apart::Paths;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Rig controller, simulator, identification: from a motor command to a named effect on measured data.
@@ -114,41 +121,87 @@ enum Command {
     Effects(effects::Args),
     /// A model's prediction of every measured channel, row for row.
     Predict(predict::Args),
+    /// A model as the file of a flight controller or of a simulator: thrust curve, motor constants, battery, delay.
+    Export(export::Args),
+    /// Completions of the command line for a shell, on standard output.
+    Completions(man::Completions),
+    /// Manual pages of the command line.
+    Man(man::Args),
 }
 
 /// What went wrong, as one line.
 type Failure = Box<dyn std::error::Error>;
 
+impl Command {
+    /// What it reads and writes.
+    fn paths(&self) -> Paths<'_> {
+        match self {
+            Self::Demo(args) => args.paths(),
+            Self::Sim(args) => args.paths(),
+            Self::Runs(args) => args.paths(),
+            Self::Import(args) => args.paths(),
+            Self::Identify(args) => args.paths(),
+            Self::Plateaus(args) => args.paths(),
+            Self::CloseLoop(args) => args.paths(),
+            Self::Batch(args) => args.paths(),
+            Self::Select(args) => args.paths(),
+            Self::Beam(args) => args.paths(),
+            Self::Calibrate(args) => args.paths(),
+            Self::Recalibrate(args) => args.paths(),
+            Self::Ahrs(args) => args.paths(),
+            Self::Loop(args) => args.paths(),
+            Self::Fly(args) => args.paths(),
+            Self::Measured(args) => args.paths(),
+            Self::Isolability(args) => args.paths(),
+            Self::Log(args) => args.paths(),
+            Self::Rig(args) => args.paths(),
+            Self::Effects(args) => args.paths(),
+            Self::Predict(args) => args.paths(),
+            Self::Export(args) => args.paths(),
+            Self::Man(args) => args.paths(),
+            Self::Step(_) | Self::Completions(_) | Self::Flash(_) | Self::Imu(_) | Self::Virtual(_) => Paths::default(),
+        }
+    }
+
+    fn run(&self, quiet: bool) -> Result<(), Failure> {
+        self.paths().check()?;
+        match self {
+            Self::Demo(args) => demo::run(args, quiet),
+            Self::Sim(args) => sim::run(args, quiet),
+            Self::Runs(args) => runs::run(args, quiet),
+            Self::Import(args) => import::run(args, quiet),
+            Self::Identify(args) => identify::run(args, quiet),
+            Self::Plateaus(args) => plateaus::run(args, quiet),
+            Self::CloseLoop(args) => close_loop::run(args, quiet),
+            Self::Batch(args) => batch::run(args, quiet),
+            Self::Select(args) => select::run(args, quiet),
+            Self::Beam(args) => beam::run(args, quiet),
+            Self::Calibrate(args) => calibrate::run(args, quiet),
+            Self::Recalibrate(args) => recalibrate::run(args, quiet),
+            Self::Ahrs(args) => ahrs::run(args, quiet),
+            Self::Loop(args) => circle::run(args, quiet),
+            Self::Fly(args) => fly::run(args, quiet),
+            Self::Flash(args) => flash::run(args),
+            Self::Measured(args) => measured::run(args, quiet),
+            Self::Isolability(args) => isolability::run(args, quiet),
+            Self::Step(args) => step::run(args, quiet),
+            Self::Log(args) => record::run(args, quiet),
+            Self::Rig(args) => rig::run(args, quiet),
+            Self::Imu(args) => imu::run(args, quiet),
+            Self::Virtual(args) => virtual_port::run(args, quiet),
+            Self::Effects(args) => effects::run(args, quiet),
+            Self::Predict(args) => predict::run(args),
+            Self::Export(args) => export::run(args, quiet),
+            Self::Completions(args) => man::completions(args),
+            Self::Man(args) => man::run(args, quiet),
+        }
+    }
+}
+
 fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let done = match &cli.command {
-        Command::Demo(args) => demo::run(args, cli.quiet),
-        Command::Sim(args) => sim::run(args, cli.quiet),
-        Command::Runs(args) => runs::run(args, cli.quiet),
-        Command::Import(args) => import::run(args, cli.quiet),
-        Command::Identify(args) => identify::run(args, cli.quiet),
-        Command::Plateaus(args) => plateaus::run(args, cli.quiet),
-        Command::CloseLoop(args) => close_loop::run(args, cli.quiet),
-        Command::Batch(args) => batch::run(args, cli.quiet),
-        Command::Select(args) => select::run(args, cli.quiet),
-        Command::Beam(args) => beam::run(args, cli.quiet),
-        Command::Calibrate(args) => calibrate::run(args, cli.quiet),
-        Command::Recalibrate(args) => recalibrate::run(args, cli.quiet),
-        Command::Ahrs(args) => ahrs::run(args, cli.quiet),
-        Command::Loop(args) => circle::run(args, cli.quiet),
-        Command::Fly(args) => fly::run(args, cli.quiet),
-        Command::Flash(args) => flash::run(args),
-        Command::Measured(args) => measured::run(args, cli.quiet),
-        Command::Isolability(args) => isolability::run(args, cli.quiet),
-        Command::Step(args) => step::run(args, cli.quiet),
-        Command::Log(args) => record::run(args, cli.quiet),
-        Command::Rig(args) => rig::run(args, cli.quiet),
-        Command::Imu(args) => imu::run(args, cli.quiet),
-        Command::Virtual(args) => virtual_port::run(args, cli.quiet),
-        Command::Effects(args) => effects::run(args, cli.quiet),
-        Command::Predict(args) => predict::run(args),
-    };
-    match done {
+    let matches = help::taught(Cli::command()).get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    match cli.command.run(cli.quiet) {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             let line = e.to_string().replace('\n', " ");

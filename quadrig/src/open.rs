@@ -7,6 +7,7 @@
 //! Reference: specification `formats.md`, "Command line".
 
 use crate::Failure;
+use crate::trouble::unread;
 use ident::import::{Mapping, Options, Report, import_as};
 use ident::log::Log;
 use std::io::{BufRead, BufReader, Read};
@@ -60,7 +61,7 @@ impl Columns {
 
 /// Whether a file calls itself one of this program's own logs.
 pub(crate) fn is_own(path: &Path) -> Result<bool, Failure> {
-    let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let file = std::fs::File::open(path).map_err(unread(path))?;
     let mut first = Vec::new();
     // what cannot be read the reader refuses in its own words
     let _ = BufReader::new(file.take(64)).read_until(b'\n', &mut first);

@@ -7,11 +7,14 @@
 //! Reference: specification `identification.md`, items 1 and 2; Beharie 2013, section 5.7.4.
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::Folder;
+use crate::trouble::unread;
 use ident::import::import;
-use ident::log::{FORMAT, Log, SPEED, write_whole};
+use ident::log::{FORMAT, Log, SPEED};
 use ident::plateau::score::Score;
 use ident::plateau::study::{Known, best, ours, threshold_study};
-use ident::report::{filter_figures, study_figures, write_figures};
+use ident::report::{filter_figures, study_figures};
 use ident::shift::{Filters, Form, Padding, Settings, filters};
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Write};
@@ -76,6 +79,13 @@ found levels, in per cent of the highest level.
 | --- | --- | --- | --- | --- | --- | --- |
 ";
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.logs).fills("-o", &self.output)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let settings = Settings {
@@ -84,6 +94,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         threshold: args.threshold,
         offset: args.offset,
     };
+    let mut folder = args
+        .output
+        .as_deref()
+        .map(|path| {
+            let known = |name: &str| name == "README.md" || name.ends_with(".svg") || name.ends_with("-filters.csv");
+            Folder::new(path, known).map(|_| Folder::of_added(path)) // what cannot be of a run like this is refused before it begins
+        })
+        .transpose()?;
     let (mut page, mut pictures) = (String::from(HEAD), String::new());
     for path in &args.logs {
         let log = read(path)?;
@@ -104,14 +122,13 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         if !quiet {
             print!("{rows}");
         }
-        if let Some(folder) = &args.output {
+        if let Some(folder) = &mut folder {
             pictures += &draw(folder, path, &log, channel, &shifted, args.csv)?;
         }
     }
-    if let Some(folder) = &args.output {
-        let file = folder.join("README.md");
-        let whole = format!("{page}\n## Filters and threshold studies\n{pictures}");
-        write_whole(&file, |out| out.write_all(whole.as_bytes())).map_err(|e| format!("{}: {e}", file.display()))?;
+    if let Some(mut folder) = folder {
+        folder.add("README.md", format!("{page}\n## Filters and threshold studies\n{pictures}"));
+        folder.write()?;
     }
     Ok(())
 }
@@ -119,7 +136,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 /// A rig log as it is; anything else through the import.
 fn read(path: &Path) -> Result<Log, Failure> {
     let mut first = String::new();
-    let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let file = std::fs::File::open(path).map_err(unread(&path))?;
     let _ = std::io::Read::take(BufReader::new(file), 64).read_line(&mut first); // what is no text the readers refuse
     Ok(if first.contains(FORMAT) { Log::read(path)? } else { import(path, &[])?.0 })
 }
@@ -187,23 +204,23 @@ fn scores(path: &Path, log: &Log, channel: &str) -> String {
 }
 
 /// Filters and the threshold study of the published form as pictures; what the page says of them.
-fn draw(folder: &Path, path: &Path, log: &Log, channel: &str, f: &Filters, csv: bool) -> Result<String, Failure> {
+fn draw(folder: &mut Folder, path: &Path, log: &Log, channel: &str, f: &Filters, csv: bool) -> Result<String, Failure> {
     let name = stem(path);
-    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     if csv {
-        let file = folder.join(format!("{name}-filters.csv"));
-        write_whole(&file, |out| table(out, log, channel, f)).map_err(|e| format!("{}: {e}", file.display()))?;
+        let mut text = Vec::new();
+        table(&mut text, log, channel, f)?;
+        folder.add(format!("{name}-filters.csv"), text);
     }
     let mut figures = filter_figures(&log.t, f, channel);
     figures.iter_mut().for_each(|figure| figure.id = format!("{name}-{}", figure.id));
     if let (Some([known]), Some(values)) = (Known::from_command(log, [channel]), log.column(channel)) {
         figures.extend(study_figures(&threshold_study(values, &known, Form::Published), channel, &name));
     }
-    let written = write_figures(folder, &figures).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
     let mut out = format!("\n### {name}\n\n");
-    for (figure, path) in figures.iter().zip(&written) {
-        let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    for figure in &figures {
+        let file = format!("{}.svg", figure.id);
         let _ = writeln!(out, "![{}]({file})", figure.title);
+        folder.add(file, figure.file());
     }
     Ok(out)
 }

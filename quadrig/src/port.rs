@@ -10,7 +10,7 @@ use crate::Failure;
 use frame::message::Beep;
 use serialport::SerialPort;
 use std::io::{Error, ErrorKind, Read, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use virtual_board::{Hand, Kind, Order, Pace, VirtualBoard, switch_on};
 
@@ -40,6 +40,12 @@ pub(crate) struct PortArgs {
 }
 
 impl PortArgs {
+    /// The files that a virtual board reads.
+    pub(crate) fn reads(&self) -> impl Iterator<Item = &Path> {
+        let scenario = self.port.strip_prefix(VIRTUAL).and_then(|rest| rest.strip_prefix(':')).map(Path::new);
+        scenario.into_iter().chain(self.flash.as_deref()).chain(self.image.as_deref())
+    }
+
     /// Whether one was named.
     pub(crate) fn is_given(&self) -> bool {
         !self.port.is_empty()
@@ -63,10 +69,10 @@ impl PortArgs {
                 ("--assist", self.assist),
             ];
             if let Some((option, _)) = virtual_only.iter().find(|(_, given)| *given) {
-                return Err(format!("{option} belongs to a virtual board: --port sim").into());
+                return Err(format!("{option} belongs to a virtual board; expected --port sim").into());
             }
             if self.port.is_empty() {
-                return Err("--port is needed: the serial port of the board, or sim for a virtual one".into());
+                return Err("no port; expected --port with the serial port of the board, or sim for a virtual one".into());
             }
             return Port::serial(&self.port, baud);
         };
@@ -131,7 +137,7 @@ impl Port {
             let known: Vec<String> = serialport::available_ports().unwrap_or_default().into_iter().map(|p| p.port_name).collect();
             let known =
                 if known.is_empty() { "no serial port is there".to_owned() } else { format!("there are {}", known.join(", ")) };
-            format!("{name}: cannot be opened ({e}); {known}; --port sim is a virtual board")
+            format!("{name}: cannot be opened ({e}); expected a serial port ({known}), or sim for a virtual board")
         })?;
         Ok(Self::Serial { name: name.to_owned(), baud, port, opened: Instant::now() })
     }

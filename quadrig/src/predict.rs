@@ -6,8 +6,10 @@
 //! Reference: specification `formats.md`.
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
 use crate::open::{Columns, Names, open};
+use crate::trouble::unwritten;
 use clap::ValueEnum;
 use ident::context::Context;
 use ident::log::{Column, Log, write_whole};
@@ -48,20 +50,29 @@ pub(crate) struct Args {
     names: Names,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.model, &self.log]).writes("-o", [&self.output])
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(text) = inertial::model_text(&args.model) {
         if args.from == From::Command {
-            return Err(
-                format!("{}: of an attitude log, which holds no command; only --from relations", args.model.display()).into()
-            );
+            return Err(format!(
+                "{}: of an attitude log, which holds no command; expected --from relations",
+                args.model.display()
+            )
+            .into());
         }
         return inertial::predict(&args.model, &text, &args.log, &args.output);
     }
     if let Some(text) = flight::model_text(&args.model) {
         if args.from == From::Command {
             return Err(format!(
-                "{}: of a flight, whose motion no command alone decides; only --from relations",
+                "{}: of a flight, whose motion no command alone decides; expected --from relations",
                 args.model.display()
             )
             .into());
@@ -95,7 +106,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
         Ok(())
     })
-    .map_err(|e| format!("{}: {e}", args.output.display()).into())
+    .map_err(|e| unwritten(&args.output)(e).into())
 }
 
 fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
@@ -112,7 +123,8 @@ fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
 }
 
 fn by_command(model: &Model, log: &Log) -> Result<Vec<Column>, Failure> {
-    let pulse = log.column("pulse_us").ok_or_else(|| format!("{}: no column pulse_us; --from command needs one", log.name))?;
+    let pulse =
+        log.column("pulse_us").ok_or_else(|| format!("{}: no column pulse_us; expected one with --from command", log.name))?;
     let pulse = ident::context::bridge(&log.t, pulse);
     let predicted = from_command(model, &log.name, &log.t, &pulse, &log.columns);
     Ok(log.measured().filter_map(|name| predicted.columns.iter().find(|c| c.name == name).cloned()).collect())

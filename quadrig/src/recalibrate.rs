@@ -7,7 +7,9 @@
 //! Reference: specification `formats.md`, "Rig log" ("so that a better calibration can be replayed").
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::rig::{date, file};
+use crate::trouble::unwritten;
 use firmware_rig::Config;
 use firmware_rig::rig_config::Calibrated;
 use frame::calibration::AdcScale;
@@ -32,6 +34,13 @@ pub(crate) struct Args {
     output: PathBuf,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.log, &self.with]).writes("-o", [&self.output])
+    }
+}
+
 /// A new scale, and how it was found, where it was.
 #[derive(Debug, Clone, Copy)]
 struct Better {
@@ -48,28 +57,24 @@ struct News {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    for input in [&args.log, &args.with] {
-        if same_file(input, &args.output) {
-            return Err(format!("{}: it is an input of this command; write to another file", args.output.display()).into());
-        }
-    }
     let mut log = Log::read(&args.log)?;
     let news = read(&args.with)?;
     let changed = apply(&mut log, &news).map_err(|e| format!("{}: {e}", args.log.display()))?;
     if changed.is_empty() {
-        return Err(format!("{}: says nothing new of the channels of {}", args.with.display(), args.log.display()).into());
+        return Err(format!(
+            "{}: says nothing new of the channels of {}; expected another scale for one of them",
+            args.with.display(),
+            args.log.display()
+        )
+        .into());
     }
     let words = format!("{} with {}", args.log.display(), args.with.display());
     log.meta.insert("recalibrated".to_owned(), Value::String(words));
-    log.write(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    log.write(&args.output).map_err(unwritten(&args.output))?;
     if !quiet {
         changed.iter().for_each(|line| println!("{line}"));
     }
     Ok(())
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// A calibration's scales; of a whole configuration everything.
@@ -112,7 +117,7 @@ fn raw(log: &Log, name: &str, what: &str) -> Result<Vec<f64>, String> {
     let column = format!("raw_{name}_{what}");
     log.column(&column)
         .map(<[f64]>::to_vec)
-        .ok_or_else(|| format!("no column {column}; only a log that was recorded with --raw can be read anew"))
+        .ok_or_else(|| format!("no column {column}; expected a log that was recorded with --raw"))
 }
 
 /// One analogue channel with another scale; `None` when it is the same.
@@ -122,7 +127,9 @@ fn rescaled(log: &mut Log, channel: usize, better: &Better) -> Result<Option<Str
     let old = log.meta.get(&key).and_then(Value::as_table).cloned();
     let scale = old.as_ref().and_then(|t| Some((number(t, "zero_counts")?, number(t, "per_count")?)));
     let (Some(mut head), Some((zero, gain))) = (old, scale) else {
-        return Err(format!("its head has no {key}: the scale that {name} was recorded with is not known"));
+        return Err(format!(
+            "its head has no {key}; expected the scale that {name} was recorded with: a log of `quadrig log` or `sim`"
+        ));
     };
     let untared = number(&head, "untared_zero_counts").unwrap_or(zero);
     let (new_zero, new_gain) = (f64::from(better.scale.zero), f64::from(better.scale.gain));
@@ -162,11 +169,17 @@ fn remarked(log: &mut Log, channel: usize, marks: u16) -> Result<Option<String>,
     let name = CAPTURE_NAMES[channel];
     let key = format!("calibration_{name}");
     let before = log.meta.get(&key).and_then(|t| t.get("marks")).and_then(Value::as_integer);
-    let before = before.ok_or_else(|| format!("its head has no {key}: the marks that {name} was recorded with are not known"))?;
+    let before = before.ok_or_else(|| {
+        format!("its head has no {key}; expected the marks that {name} was recorded with: a log of `quadrig log` or `sim`")
+    })?;
     if before == i64::from(marks) {
         return Ok(None);
     }
-    let timer_hz = log.meta.get("timer_hz").and_then(Value::as_integer).ok_or("its head has no timer_hz")? as f64;
+    let timer_hz = log
+        .meta
+        .get("timer_hz")
+        .and_then(Value::as_integer)
+        .ok_or("its head has no timer_hz; expected a log of `quadrig log` or `sim`")? as f64;
     let (edges, span) = (raw(log, name, "edges")?, raw(log, name, "span")?);
     let values = column(log, name).ok_or("no such column")?;
     for ((value, edges), span) in values.iter_mut().zip(edges).zip(span).filter(|((value, _), _)| **value > 0.0) {

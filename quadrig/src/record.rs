@@ -13,6 +13,7 @@ mod recorder;
 pub(crate) use recorder::Recorder;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::board::Board;
 use crate::end::Ended;
 use crate::port::PortArgs;
@@ -53,6 +54,13 @@ pub(crate) struct Args {
     under: overseer::Args,
     #[command(flatten)]
     rig: Rig,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.under.model).reads(self.port.reads()).writes("-o", [&self.output])
+    }
 }
 
 /// What only the operator knows of a rig, and how much of it is recorded.
@@ -150,7 +158,9 @@ impl Vigil {
                         "its frames are of another version than this program's: flash the board with the image of the same release"
                     }
                 };
-                return Err(Ending::Nobody(format!("{}: no calibration from the board; {cause}", seat.board.name()).into()));
+                return Err(Ending::Nobody(
+                    format!("{}: no calibration from the board; expected one within 3 s: {cause}", seat.board.name()).into(),
+                ));
             }
             if seat.now() > self.asked + ASK_AGAIN {
                 self.asked = seat.now();

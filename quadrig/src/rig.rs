@@ -19,6 +19,7 @@ mod status;
 mod typed;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::board::Board;
 use crate::port::PortArgs;
 use crate::record;
@@ -163,7 +164,7 @@ fn pulse(us: f64) -> Result<PulseWidth, Failure> {
     if (1000.0..=2000.0).contains(&us) {
         Ok(PulseWidth((us * 1000.0).round() as u32))
     } else {
-        Err(format!("{us} us: a pulse is 1000 to 2000 us").into())
+        Err(format!("{us} us: expected a pulse from 1000 to 2000 us").into())
     }
 }
 
@@ -192,7 +193,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
                     match news {
                         News::Board(Message::Event(Event::Faults { faults, .. })) => {
                             if let Some(words) = own_faults(faults) {
-                                return Err(format!("the rig stopped itself: {words}").into());
+                                return Err(format!("the rig stopped itself: {words}; expected a pulse within its limits: docs/rig.md lists the faults").into());
                             }
                         }
                         News::Gone(why) => return Err(format!("{why}; the board stops the motor by itself within its link time-out").into()),
@@ -216,23 +217,23 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Order::Configure { read: false, what: Some(key), value, output: None } => {
             board.obey(Command::Configure(setting(key, *value)?), silent).map(|()| done("in force until the next reset; `save` keeps it"))
         }
-        Order::Configure { .. } => Err("rig configure takes a file, or --read [-o FILE], or a setting with its value".into()),
+        Order::Configure { .. } => Err("rig configure: expected a file, or --read [-o FILE], or a setting with its value".into()),
         Order::Burst(args) => burst::run(&mut board, args, quiet),
         Order::Save => configure::save(&mut board).map(|()| done("saved, and read back the same")),
-        Order::View { .. } if !view => Err("rig view needs a terminal".into()),
+        Order::View { .. } if !view => Err("rig view: expected a terminal; `quadrig log` needs none".into()),
         Order::View { session } => session.hold(board, args, Errand::default(), quiet),
         Order::Arm { session } => session.hold(board, args, Errand { first: Some(Command::Arm), ..Errand::default() }, quiet),
         Order::Calibrate { esc_is_unpowered: false, .. } => {
-            Err("the board will give MAXIMUM pulses: disconnect the ESC's battery, take the propeller off, and say --esc-is-unpowered".into())
+            Err("the board will give MAXIMUM pulses; expected --esc-is-unpowered: disconnect the ESC's battery and take the propeller off first".into())
         }
         Order::Calibrate { session, .. } => {
             let first = Some(Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM });
             session.hold(board, args, Errand { first, ..Errand::default() }, quiet)
         }
         Order::Run { schedule: None, next: None, step, hold, top, down, visits, session } => {
-            let height = if *step > 0.0 && *step <= 1000.0 { PulseWidth((step * 1000.0).round() as u32) } else { return Err(format!("{step} us: a step is above 0 and up to 1000 us").into()) };
+            let height = if *step > 0.0 && *step <= 1000.0 { PulseWidth((step * 1000.0).round() as u32) } else { return Err(format!("--step {step}: expected a step above 0 and up to 1000 us").into()) };
             if !(*hold > 0.0 && *hold < 86_400.0) {
-                return Err(format!("{hold} s: a level is held for more than 0 and less than 86400 s").into());
+                return Err(format!("--hold {hold}: expected a time above 0 and below 86400 s").into());
             }
             let run = Command::RunVisits { step: height, hold_ms: (hold * 1000.0) as u32, top: pulse(*top)?, down: *down, visits: *visits };
             let levels = 1.0 + ((*top - 1000.0) / *step).floor();
@@ -256,6 +257,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 }
 
 impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        let paths = Paths::default().reads(self.port.reads());
+        match &self.order {
+            Order::View { session } | Order::Arm { session } | Order::Calibrate { session, .. } => session.paths(paths),
+            Order::Run { schedule, next, session, .. } => session.paths(paths.reads(schedule).reads(next)),
+            Order::Configure { output, .. } => paths.writes("-o", output),
+            Order::Burst(args) => args.paths(paths),
+            _ => paths,
+        }
+    }
+
     /// Whether a session is shown on the terminal.
     fn view(&self, quiet: bool) -> bool {
         !quiet && !self.plain && view::is_there()
@@ -263,6 +276,10 @@ impl Args {
 }
 
 impl Session {
+    fn paths<'a>(&'a self, paths: Paths<'a>) -> Paths<'a> {
+        paths.reads(&self.under.model).writes("-o", &self.output)
+    }
+
     /// Holds a session at a board.
     fn hold(&self, board: Board, args: &Args, errand: Errand, quiet: bool) -> Result<(), Failure> {
         let overseer = Overseer::new(&self.under, board.is_virtual())?;
@@ -281,7 +298,7 @@ impl Session {
 fn identify(board: &mut Board) -> Result<(), Failure> {
     let hello = board.ask(Command::Identify, |_| {}, |m| if let Message::Hello(hello) = m { Some(*hello) } else { None })?;
     let [major, minor, patch] = hello.firmware;
-    println!("{:?} board, firmware {major}.{minor}.{patch}, core {} MHz", hello.board, hello.core_hz / 1_000_000);
+    println!("{} board, firmware {major}.{minor}.{patch}, core {} MHz", hello.board.words(), hello.core_hz / 1_000_000);
     println!("last reset: {}", reset_cause(hello.reset_cause));
     if hello.board == BoardId::Rig {
         println!("fitted: {}; configuration {:08x}", fitted(&hello), hello.config);
@@ -321,7 +338,7 @@ fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
     if key == "factory" {
         return Ok(Setting::Factory);
     }
-    let value = value.ok_or_else(|| format!("{key}: a value is needed"))?;
+    let value = value.ok_or_else(|| format!("{key}: expected a value after it"))?;
     let whole = |most: f64| {
         if value.fract() == 0.0 && (0.0..=most).contains(&value) {
             Ok(value)
@@ -338,7 +355,7 @@ fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
         "voltage-limit" => Setting::VoltageLimit(value as f32),
         _ => {
             return Err(format!(
-                "{key}: no such setting; there are log-ms, link-ms, slew, speed-limit, current-limit, voltage-limit, factory"
+                "{key}: no such setting; expected one of log-ms, link-ms, slew, speed-limit, current-limit, voltage-limit, factory"
             )
             .into());
         }

@@ -7,8 +7,11 @@
 //! Reference: errata, "1.8, 6.1, abstract"; specification `rig.md`, "The simulator".
 
 use crate::Failure;
-use crate::progress::Bar;
+use crate::apart::Paths;
+use crate::folder::Folder;
+use crate::progress::{Bar, foretell};
 use crate::run_log::to_log;
+use crate::sim::pace;
 use hal_sim::Scenario;
 use hal_sim::catalogue::{Pair, pairs};
 use hal_sim::scenario::Schedule;
@@ -31,19 +34,28 @@ pub(crate) struct Args {
     threads: Option<usize>,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().fills("-o", [&self.output])
+    }
+}
+
 fn hold(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|h: &f64| (1.0..=600.0).contains(h)).ok_or_else(|| "expected 1 to 600 s".to_owned())
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    std::fs::create_dir_all(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    let mut folder = Folder::new(&args.output, |name| pairs().any(|pair| name == file_name(&pair)))?;
     let all: Vec<Pair> = pairs().collect();
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).clamp(1, all.len());
+    let whole_s: f64 = all.iter().map(|pair| scenario(pair, args).run_s()).sum();
+    foretell(whole_s, threads as f64 * pace(&scenario(&all[0], args), all.len() as f64), quiet);
     let bar = Mutex::new((Bar::new("flying", quiet), vec![0.0; all.len()]));
     let (next, begun) = (AtomicUsize::new(0), Instant::now());
     let told: Mutex<Vec<(usize, String)>> = Mutex::new(Vec::new());
-    let simulated: Mutex<f64> = Mutex::new(0.0);
+    let flown: Mutex<Vec<Flown>> = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
@@ -55,7 +67,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
                         }
                     });
                     match done {
-                        Ok(seconds) => *simulated.lock().unwrap_or_else(std::sync::PoisonError::into_inner) += seconds,
+                        Ok(run) => flown.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(run),
                         Err(why) => told.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((i, why)),
                     }
                 }
@@ -65,7 +77,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     drop(bar);
     let mut told = told.into_inner().unwrap_or_default();
     told.sort();
-    let simulated = simulated.into_inner().unwrap_or_default();
+    let flown = flown.into_inner().unwrap_or_default();
+    let simulated: f64 = flown.iter().map(|run| run.seconds).sum();
+    folder.extend(flown.into_iter().map(|run| (run.file, run.text)));
+    folder.write()?;
     if !quiet {
         told.iter().for_each(|(_, why)| println!("{why}"));
         let wall = begun.elapsed().as_secs_f64();
@@ -79,16 +94,32 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// One run and its log; simulated seconds, or why there is no log.
-fn fly(pair: &Pair, args: &Args, progress: &mut dyn FnMut(f64)) -> Result<f64, String> {
+/// One run and its log.
+struct Flown {
+    file: String,
+    text: Vec<u8>,
+    /// Simulated, s.
+    seconds: f64,
+}
+
+/// The file of a pair's log.
+fn file_name(pair: &Pair) -> String {
+    format!("{}_{}.csv", pair.motor, pair.propeller)
+}
+
+fn scenario(pair: &Pair, args: &Args) -> Scenario {
     let schedule = Schedule::Staircase { step_us: 50.0, hold_s: args.hold, top_us: 2000.0 };
-    let scenario = Scenario { schedule, ..pair.scenario() };
+    Scenario { schedule, ..pair.scenario() }
+}
+
+/// One run, or why there is no log.
+fn fly(pair: &Pair, args: &Args, progress: &mut dyn FnMut(f64)) -> Result<Flown, String> {
+    let scenario = scenario(pair, args);
     let record = hal_sim::run(&scenario, None, progress).map_err(|e| format!("{}: {e}", scenario.name))?;
     if record.truth.iter().all(|t| t.plant.rpm == 0.0) {
         return Err(format!("{}: the motor does not turn the propeller, no result", scenario.name));
     }
-    let path = args.output.join(format!("{}_{}.csv", pair.motor, pair.propeller));
-    let log = to_log(&scenario, &record, &scenario.name, false);
-    log.write(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    Ok(record.samples.last().map_or(0.0, |s| s.at.as_s()))
+    let mut text = Vec::new();
+    to_log(&scenario, &record, &scenario.name, false).write_to(&mut text).map_err(|e| format!("{}: {e}", scenario.name))?;
+    Ok(Flown { file: file_name(pair), text, seconds: record.samples.last().map_or(0.0, |s| s.at.as_s()) })
 }

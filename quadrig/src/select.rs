@@ -7,9 +7,12 @@
 //! Reference: specification `identification.md`, item 4; Beharie 2013, section 6.1.
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::figures;
 use crate::open::{Columns, open};
 use crate::progress::Bar;
 use crate::run_log::to_log;
+use crate::trouble::{unread, unwritten};
 use hal_sim::Scenario;
 use hal_sim::plant::{Propeller, motor};
 use hal_sim::scenario::Schedule;
@@ -17,8 +20,8 @@ use ident::context::Context;
 use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
-use ident::report::{selection, write_figures};
-use ident::select::{Airframe, Need, Pair, Row, choose, from_log, read_table, row, thesis};
+use ident::report::selection;
+use ident::select::{Airframe, Need, Pair, Row, choose, from_log, misses, read_table, row, thesis, why};
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -70,6 +73,13 @@ pub(crate) struct Args {
     json: bool,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads(&self.files).writes("-o", &self.output).fills("--svg", &self.svg)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     for (name, value) in [("--bare", args.bare), ("--battery", args.battery), ("--capacity", args.capacity)] {
@@ -85,9 +95,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         full_throttle_min: Minute(args.minutes),
         resultant_n: Newton(args.resultant),
     };
-    let mut pairs = match (&args.files[..], args.simulated) {
-        ([], true) => fly_catalogue(quiet),
-        ([], false) => thesis(),
+    let (mut pairs, left_out) = match (&args.files[..], args.simulated) {
+        ([], true) => (fly_catalogue(quiet), Vec::new()),
+        ([], false) => (thesis(), Vec::new()),
         (files, _) => read(files, args, quiet)?,
     };
     // 390KV before 1000KV
@@ -102,9 +112,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         ))
     });
     if let Some(motor) = &args.motor {
+        let mut there: Vec<String> = pairs.iter().map(|p| p.motor.clone()).collect();
+        there.dedup();
         pairs.retain(|p| p.motor == *motor);
         if pairs.is_empty() {
-            return Err(format!("--motor {motor}: no pair has this motor").into());
+            return Err(format!("--motor {motor}: no pair has this motor; expected one of {}", there.join(", ")).into());
         }
     }
     let batteries = args.batteries.max(3);
@@ -112,48 +124,65 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let chosen = choose(&rows, &need);
     let sheet = selection(&pairs, &rows, &airframe, &need, batteries);
     if let Some(path) = &args.output {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
     if let Some(folder) = &args.svg {
-        write_figures(folder, sheet.drawn()).map_err(|(p, e)| format!("{}: {e}", p.display()))?;
+        figures(folder, sheet.drawn())?;
     }
     let mut out = std::io::stdout().lock();
     if args.json {
         let names: Vec<String> = chosen.iter().map(|r| format!("{} {}", r.pair.motor, r.pair.propeller)).collect();
-        let json = serde_json::json!({"airframe": airframe, "need": need, "rows": rows, "chosen": names});
+        let json = serde_json::json!({"airframe": airframe, "need": need, "rows": rows, "chosen": names, "why": why(&rows, &chosen, &need), "left_out": left_out});
         writeln!(out, "{}", serde_json::to_string_pretty(&json)?)?;
     } else if !quiet {
         write!(out, "{}", table(&pairs, &rows, &chosen, &need))?;
     }
+    drop(out);
+    if !quiet {
+        left_out.iter().for_each(|why| eprintln!("left out: {why}"));
+    }
     Ok(())
 }
 
-/// Runs and tables, told apart by their first line.
-fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure> {
-    let mut pairs = Vec::new();
+/// Logs and tables, told apart by their first line, and why others are left out; refused only where none is left.
+fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<(Vec<Pair>, Vec<String>), Failure> {
+    let (mut pairs, mut left_out) = (Vec::new(), Vec::new());
     for path in files {
-        if !is_table(path)? {
-            let mut log = open(path, &args.columns.named(None, None), quiet)?;
-            let given = [("motor", &args.motor), ("propeller", &args.propeller)];
-            for (key, value) in given.into_iter().filter_map(|(k, v)| Some((k, v.as_ref()?))) {
-                log.meta.entry(key.to_owned()).or_insert_with(|| toml::Value::String(value.clone()));
-            }
-            let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
-            if pair.maximum.is_none() {
-                return Err(format!("{}: no plateau with thrust and current; expected a run with thrust_n and current_a on levels of at least 5 rows", path.display()).into());
-            }
-            pairs.push(pair);
-        } else {
-            let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
-            pairs.extend(read_table(&path.display().to_string(), BufReader::new(file))?);
+        match pairs_of(path, args, quiet) {
+            Ok(found) => pairs.extend(found),
+            Err(why) => left_out.push(why.to_string()),
         }
     }
-    Ok(pairs)
+    match left_out.first() {
+        Some(only) if files.len() == 1 => Err(only.clone().into()),
+        Some(first) if pairs.is_empty() => {
+            Err(format!("none of the {} files holds a pair; the first: {first}", files.len()).into())
+        }
+        _ => Ok((pairs, left_out)),
+    }
+}
+
+fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure> {
+    if is_table(path)? {
+        let file = std::fs::File::open(path).map_err(unread(path))?;
+        return Ok(read_table(&path.display().to_string(), BufReader::new(file))?);
+    }
+    let mut log = open(path, &args.columns.named(None, None), quiet)?;
+    let given = [("motor", &args.motor), ("propeller", &args.propeller)];
+    for (key, value) in given.into_iter().filter_map(|(k, v)| Some((k, v.as_ref()?))) {
+        log.meta.entry(key.to_owned()).or_insert_with(|| toml::Value::String(value.clone()));
+    }
+    let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
+    if pair.maximum.is_none() {
+        let expected = "expected a run with thrust_n and current_a on levels of at least 5 rows";
+        return Err(format!("{}: no plateau with thrust and current; {expected}", path.display()).into());
+    }
+    Ok(vec![pair])
 }
 
 /// Whether the first line that is no comment names motors.
 fn is_table(path: &Path) -> Result<bool, Failure> {
-    let file = std::fs::File::open(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let file = std::fs::File::open(path).map_err(unread(path))?;
     let mut head = Vec::new();
     std::io::Read::take(file, 4096).read_to_end(&mut head)?;
     let head = String::from_utf8_lossy(&head).into_owned();
@@ -205,10 +234,10 @@ fn fly(motor: &str, propeller: &str) -> Pair {
 }
 
 fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
-    let wide = |name: &dyn Fn(&Pair) -> usize, least: usize| pairs.iter().map(name).max().unwrap_or(0).max(least);
-    let (motor, propeller) = (wide(&|p| p.motor.chars().count(), 8), wide(&|p| p.propeller.chars().count(), 9));
+    let width = |of: fn(&Pair) -> &str, least: usize| pairs.iter().map(|p| of(p).chars().count()).fold(least, usize::max);
+    let (m, p) = (width(|p| &p.motor, 8), width(|p| &p.propeller, 9));
     let mut out = format!(
-        "{:<motor$} {:<propeller$} {:>8} {:>8} {:>5} {:>7} {:>9}",
+        "{:<m$} {:<p$} {:>8} {:>8} {:>5} {:>7} {:>9}",
         "motor", "propeller", "thrust N", "A", "N/A", "hovers", "resultant"
     );
     let counts: Vec<u32> = rows.first().map_or_else(Vec::new, |r| r.with_batteries.iter().map(|w| w.batteries).collect());
@@ -217,11 +246,12 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
     }
     out.push('\n');
     for r in rows {
-        let mark = if chosen.iter().any(|c| std::ptr::eq(*c, r)) { "  meets the need" } else { "" };
+        let misses = misses(r, need);
+        let mark = if misses.is_empty() { "  meets the need".to_owned() } else { format!("  {}", misses.join(", ")) };
         let clipped = if r.pair.clipped { "  thrust reading clipped: a lower bound" } else { "" };
         let with = r.with_batteries.iter().find(|w| w.batteries == need.batteries);
         out += &format!(
-            "{:<motor$} {:<propeller$} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
+            "{:<m$} {:<p$} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
             r.pair.motor,
             r.pair.propeller,
             r.total_thrust_n.0 / 4.0,
@@ -233,16 +263,13 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         for w in &r.with_batteries {
             out += &format!(" {:>7.1}", w.full_throttle_min.0);
         }
-        out += mark;
+        out += &mark;
         out += clipped;
         out.push('\n');
     }
-    for p in pairs.iter().filter(|p| p.maximum.is_none()) {
-        out += &format!("{:<motor$} {:<propeller$} no result\n", p.motor, p.propeller);
+    for pair in pairs.iter().filter(|p| p.maximum.is_none()) {
+        out += &format!("{:<m$} {:<p$} no result\n", pair.motor, pair.propeller);
     }
-    match chosen.first() {
-        Some(best) => out += &format!("choice: {} with {}\n", best.pair.motor, best.pair.propeller),
-        None => out += &format!("choice: none gives {:.2} N in total under these needs\n", need.total_thrust_n.0),
-    }
+    out += &format!("{}\n", why(rows, chosen, need));
     out
 }

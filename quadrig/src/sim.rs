@@ -10,9 +10,11 @@
 mod imu;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::live;
-use crate::progress::Bar;
+use crate::progress::{Bar, foretell};
 use crate::run_log::{IdentifiedPlant, to_log};
+use crate::trouble::unwritten;
 use crate::view;
 use hal_sim::native::{PinRecord, Session};
 use hal_sim::scenario::AnyScenario;
@@ -21,6 +23,7 @@ use ident::log::{Log, write_whole};
 use ident::model::Model;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Arguments.
 #[derive(clap::Args)]
@@ -57,14 +60,33 @@ pub(crate) struct Args {
     speed: f64,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default()
+            .reads([&self.scenario])
+            .reads(&self.model)
+            .reads(&self.replay)
+            .writes("-o", [&self.output])
+            .writes("--truth", &self.truth)
+            .writes("--readings", &self.readings)
+            .writes("--pins", &self.pins)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let scenario = match AnyScenario::load(&args.scenario)? {
         AnyScenario::Rig(scenario) => *scenario,
         AnyScenario::Imu(scenario) => return imu::run(args, &scenario, quiet),
     };
+    args.paths().reads(&scenario.schedule.file(&args.scenario)).check()?;
     if args.readings.is_some() {
-        return Err(format!("{}: describes the rig; --readings is for the IMU board", args.scenario.display()).into());
+        return Err(format!(
+            "{}: describes the rig; expected a scenario of the IMU board with --readings",
+            args.scenario.display()
+        )
+        .into());
     }
     let name = args.output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     if !(args.speed.is_finite() && args.speed >= 0.0) {
@@ -75,16 +97,16 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         None => flown(args, &scenario, quiet)?,
     };
     if let Some(path) = &args.truth {
-        write_whole(path, |out| write_truth(out, &record.truth)).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| write_truth(out, &record.truth)).map_err(unwritten(&path))?;
     }
     let mut log = to_log(&scenario, &record, &name, args.raw);
     if log.is_empty() {
-        return Err("the run ended before its first sample; no log was written".into());
+        return Err("the run ended before its first sample; no log was written; expected to run on until the rig is armed".into());
     }
     if let Some(path) = &args.model {
         log = fly_model(&scenario, &Model::read(path)?, &log, &name, quiet)?;
     }
-    log.write(&args.output).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    log.write(&args.output).map_err(unwritten(&args.output))?;
     if !quiet {
         println!("{}: {} samples over {:.1} s", args.output.display(), log.len(), log.t[log.len() - 1]);
     }
@@ -97,6 +119,7 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
     if args.pins.is_some() {
         session.record_pins(scenario);
     }
+    foretell(scenario.run_s(), if args.live && args.speed > 0.0 { args.speed } else { pace(scenario, 1.0) }, quiet);
     if args.live && !quiet && view::is_there() {
         live::view(&mut session, scenario, args.speed)?;
     } else if args.live {
@@ -108,9 +131,24 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
         }
     }
     if let (Some(path), Some(pins)) = (&args.pins, session.pins()) {
-        write_whole(path, |mut out| pins.write(&mut out)).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |mut out| pins.write(&mut out)).map_err(unwritten(&path))?;
     }
     Ok(session.finish()?)
+}
+
+/// Length of a run from which on its pace is tried before it starts, s.
+const TRIED_FROM_S: f64 = 600.0;
+/// How long the trial takes.
+const TRIAL: Duration = Duration::from_millis(150);
+
+/// Times real time at which `runs` simulations like this one go on side by side, by a short trial; boundless for one that is over at once anyway.
+pub(crate) fn pace(scenario: &Scenario, runs: f64) -> f64 {
+    if runs * scenario.run_s() < TRIED_FROM_S {
+        return f64::INFINITY;
+    }
+    let (mut trial, begun) = (Session::new(scenario, None), Instant::now());
+    while begun.elapsed() < TRIAL && trial.step().unwrap_or(false) {}
+    trial.now_s() / begun.elapsed().as_secs_f64()
 }
 
 /// The firmware of `scenario` alone on the pins of `path`.
@@ -152,6 +190,7 @@ pub(crate) fn fly(
     word: &str,
     quiet: bool,
 ) -> Result<Log, Failure> {
+    foretell(scenario.run_s(), pace(scenario, 1.0), quiet);
     let bar = Bar::new(word, quiet);
     let record = hal_sim::run(scenario, plant, &mut |share| bar.set(share))?;
     Ok(to_log(scenario, &record, name, false))

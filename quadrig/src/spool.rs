@@ -8,6 +8,7 @@
 //! Reference: specification `formats.md` ("nothing half-written").
 
 use crate::Failure;
+use crate::trouble::unwritten;
 use ident::log::write_whole;
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
@@ -31,14 +32,20 @@ pub(crate) struct Spool {
 impl Spool {
     /// Creates the part beside `target`, and the folder where it is not there yet.
     pub(crate) fn create(target: &Path) -> Result<Self, Failure> {
-        let mut name = target.file_name().ok_or("-o needs the name of a file")?.to_owned();
+        let mut name = target.file_name().ok_or("-o: expected the name of a file")?.to_owned();
         name.push(".part");
         let part = target.with_file_name(name);
+        if std::fs::metadata(&part).is_ok_and(|found| found.len() > 0) {
+            let expected = "it is a log: expected another name for it, or for the new one, before anything more is recorded here";
+            return Err(format!("{}: left by a recording that was cut off; {expected}", part.display()).into());
+        }
         if let Some(folder) = target.parent() {
-            std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+            std::fs::create_dir_all(folder).map_err(unwritten(folder))?;
         }
         let file = OpenOptions::new().write(true).create(true).truncate(true).open(&part);
-        let file = file.map_err(|e| format!("{}: cannot be written ({e})", part.display()))?;
+        let file = file.map_err(|e| {
+            format!("{}: cannot be written ({e}); expected a folder that is there, with rights and room", part.display())
+        })?;
         Ok(Self { target: target.to_owned(), part, file, written: 0, waiting: Vec::new(), failed: None })
     }
 
@@ -164,6 +171,17 @@ fn lifted(part: &Path, target: &Path) -> std::io::Result<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_cut_off_is_not_written_over() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let target = folder.path().join("run.csv");
+        std::fs::write(folder.path().join("run.csv.part"), "# quadrig-log 1\n").expect("a part");
+        let Err(why) = Spool::create(&target) else { panic!("it was written over") };
+        assert!(why.to_string().contains("run.csv.part: left by a recording that was cut off"), "{why}");
+        std::fs::write(folder.path().join("run.csv.part"), "").expect("a part");
+        Spool::create(&target).expect("there is nothing in it");
+    }
 
     #[test]
     fn what_happened_in_mid_run_stands_in_the_head() {

@@ -34,7 +34,7 @@ pub(crate) struct Args {
 /// Runs the command.
 #[cfg(not(unix))]
 pub(crate) fn run(_: &Args, _: bool) -> Result<(), Failure> {
-    Err("this system has no pseudo-terminals; --port sim needs none".into())
+    Err("this system has no pseudo-terminals; expected --port sim, which needs none".into())
 }
 
 /// Runs the command.
@@ -60,7 +60,9 @@ mod pty {
             let Some(place) = place else { return Ok(Self(None)) };
             let taken = std::fs::symlink_metadata(place).is_ok_and(|found| !found.is_symlink());
             if taken {
-                return Err(format!("--link {}: something is there that is no link", place.display()).into());
+                return Err(
+                    format!("--link {}: something is there that is no link; expected another name", place.display()).into()
+                );
             }
             let _ = std::fs::remove_file(place); // one that a board before left behind
             std::os::unix::fs::symlink(port, place).map_err(|e| format!("--link {}: {e}", place.display()))?;

@@ -19,7 +19,7 @@ pub enum ScheduleError {
         reason: String,
     },
     /// The file cannot be read.
-    #[error("{}: cannot be read ({source})", file.display())]
+    #[error("{}: cannot be read ({source}); expected a file: check name and folder", file.display())]
     Unreadable {
         /// File that was to be read.
         file: PathBuf,

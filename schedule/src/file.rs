@@ -77,7 +77,7 @@ fn one(table: &DeTable<'_>, entry: &Spanned<DeValue<'_>>, path: &Path) -> Result
     let kind = keys.text("kind")?;
     let place = keys.place_of("kind");
     let Some((kind, what)) = KINDS.into_iter().find(|(name, _)| *name == kind) else {
-        return Err((place, format!("no kind of part is called {kind:?}; there are {}", kinds())).into());
+        return Err((place, format!("no kind of part is called {kind:?}; expected one of {}", kinds())).into());
     };
     let mut keys = Keys::new(table, what, place);
     keys.value("kind");
@@ -162,7 +162,10 @@ fn visits(keys: &mut Keys<'_>) -> Result<Part, Refused> {
     let between = keys.pulse_if("between_us")?.map(|us| Ok::<_, Refused>((us, keys.time_if("between_s")?.unwrap_or(hold))));
     let between = between.transpose()?;
     if between.is_none() && keys.time_if("between_s")?.is_some() {
-        return Err((keys.place_of("between_s"), "between_s: needs between_us, the level that it is held at".to_owned()));
+        return Err((
+            keys.place_of("between_s"),
+            "between_s: expected between_us beside it, the level that it is held at".to_owned(),
+        ));
     }
     Ok(part::visits(&list, between, keys.times("times", 1000.0)?))
 }

@@ -58,7 +58,7 @@ pub(crate) fn parse(text: &str, path: &Path) -> Result<Plan, ScheduleError> {
         return Err(refused(
             1,
             1,
-            "this verdict proposes no next experiment: nothing is left open that a run would settle".to_owned(),
+            "this verdict proposes no next experiment; expected one that leaves open what a run would settle".to_owned(),
         ));
     };
     let levels: Vec<(part::Level, bool)> =

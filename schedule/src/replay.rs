@@ -68,7 +68,10 @@ fn rows(text: &str, path: &Path, what: &Replay) -> Result<Vec<Row>, ScheduleErro
     let find = |name: &str| {
         let there = names.iter().filter(|n| n.starts_with("pulse_us")).copied().collect::<Vec<_>>().join(", ");
         let there = if there.is_empty() { "it has no pulses".to_owned() } else { format!("its pulses are {there}") };
-        names.iter().position(|n| *n == name).ok_or_else(|| refuse(head_line, 1, format!("no column {name:?}; {there}")))
+        names
+            .iter()
+            .position(|n| *n == name)
+            .ok_or_else(|| refuse(head_line, 1, format!("no column {name:?}; expected a column of pulses; {there}")))
     };
     let (time, pulse) = (find("t_s")?, find(&what.column)?);
     let mut rows: Vec<Row> = Vec::new();
@@ -105,7 +108,14 @@ fn rows(text: &str, path: &Path, what: &Replay) -> Result<Vec<Row>, ScheduleErro
         }
     }
     if rows.is_empty() {
-        return Err(refuse(head_line, 1, format!("no pulse of {:?} lies in the time that is asked for", what.column)));
+        return Err(refuse(
+            head_line,
+            1,
+            format!(
+                "no pulse of {:?} lies in the time that is asked for; expected from_s and until_s within the log",
+                what.column
+            ),
+        ));
     }
     Ok(rows)
 }

@@ -36,7 +36,7 @@ impl<'t> Keys<'t> {
     }
 
     fn needed<T>(&self, key: &str, value: Option<T>) -> Result<T, Refused> {
-        value.ok_or_else(|| (self.place.clone(), format!("{} needs {key}", self.what)))
+        value.ok_or_else(|| (self.place.clone(), format!("{}: expected {key}, which is missing", self.what)))
     }
 
     /// A number within a range, if it is there.
@@ -129,7 +129,7 @@ impl<'t> Keys<'t> {
                 known.sort_unstable();
                 known.dedup();
                 let name = key.get_ref();
-                Err((key.span(), format!("{} has no {name:?}; its keys are {}", self.what, known.join(", "))))
+                Err((key.span(), format!("{} has no {name:?}; expected one of {}", self.what, known.join(", "))))
             }
         }
     }

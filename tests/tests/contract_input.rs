@@ -284,6 +284,9 @@ fn wrong_usage_is_status_two() {
         &["predict", "model.toml", "good.csv", "-o", "out.csv", "--from", "nowhere"],
         &["import", "good.csv", "-o", "out.csv", "--map", "thrust"],
         &["import", "good.csv", "-o", "out.csv", "--map", "thrust_n=Load*heavy"],
+        &["demo", "--effect", "gremlin"],
+        &["export", "model.toml", "--to", "nowhere"],
+        &["completions", "nosuchshell"],
     ] {
         let said = bench.call(words);
         assert_eq!(said.status, Some(2), "`quadrig {}`: {}", said.words, said.err);

@@ -128,7 +128,7 @@ fn the_command_line_speaks_with_the_flash_image() {
 
     let rig = |words: &[&str]| call(folder.path(), &[&["rig", "--port", &port], words].concat());
     let said = rig(&["identify"]).succeeded();
-    assert!(said.out.contains("Rig board, firmware"), "{}", said.out);
+    assert!(said.out.contains("rig board, firmware"), "{}", said.out);
     rig(&["set", "1300"]).refused(&["not in this state"]);
     rig(&["configure", "link-ms", "5000"]).succeeded(); // a host that is kept waiting for seconds loses nothing here
     rig(&["configure", "log-ms", "50"]).succeeded();

@@ -84,6 +84,40 @@ fn every_command_of_the_readme_runs() {
             .expect("a shell");
         assert!(done.status.success(), "`{command}`: {}\n{}", done.status, String::from_utf8_lossy(&done.stderr));
     }
+    names_what_it_hides_and_nothing_else(folder.path(), &markdown);
+}
+
+/// The verdict of the README's own example: what its scenario hides, and beside it what every rig has.
+fn names_what_it_hides_and_nothing_else(folder: &Path, markdown: &str) {
+    const EVERY_RIG: [&str; 2] = ["rotor_inertia", "spinup_lag"];
+    let verdict = std::fs::read_to_string(folder.join("out/closed/verdict.json")).expect("close-loop writes its verdict");
+    let verdict: serde_json::Value = serde_json::from_str(&verdict).expect("JSON");
+    let scenario = markdown.lines().find_map(|l| l.split("-- sim ").nth(1)?.split(' ').next()).expect("a line that simulates");
+    let scenario: toml::Table = std::fs::read_to_string(root().join(scenario)).expect("the scenario").parse().expect("TOML");
+    let ids = |list: Vec<&str>| -> std::collections::BTreeSet<String> { list.into_iter().map(str::to_owned).collect() };
+    let hidden = ids(scenario["effect"].as_array().expect("effects").iter().filter_map(|e| e["id"].as_str()).collect());
+    let named = ids(verdict["effects"].as_array().expect("effects").iter().filter_map(|e| e["id"].as_str()).collect());
+    let own: std::collections::BTreeSet<String> = named.into_iter().filter(|id| !EVERY_RIG.contains(&id.as_str())).collect();
+    assert_eq!(own, hidden, "{verdict:#}");
+    assert_eq!(verdict["verdict"], "attributed");
+}
+
+/// Every command of the program has its row in the README.
+#[test]
+fn every_command_stands_in_the_readme() {
+    let markdown = std::fs::read_to_string(root().join("README.md")).expect("the project has a README.md");
+    let rows: Vec<&str> = markdown.lines().filter(|line| line.starts_with("| `")).collect();
+    let help = quadrig_tests::call(root(), &["--help"]).succeeded().out;
+    let listed = help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
+    let names: Vec<&str> =
+        listed.filter(|l| l.starts_with("  ") && !l.starts_with("   ")).filter_map(|l| l.split_whitespace().next()).collect();
+    assert!(names.len() > 25, "{names:?}");
+    for name in names.iter().filter(|name| **name != "help") {
+        let told = rows
+            .iter()
+            .any(|row| row.split('`').skip(1).step_by(2).any(|code| code.split([' ', '\\', '|']).next() == Some(name)));
+        assert!(told, "README.md has no row for `{name}`");
+    }
 }
 
 /// In the workspace `cargo run` finds the command line among all programs, as every line of the README takes for granted.

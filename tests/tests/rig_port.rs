@@ -48,7 +48,7 @@ fn one_command_each() {
     let desk = Desk::new(Line::Clean);
     let rig = |words: &[&str]| call(folder.path(), &[&["rig", "--port", &desk.port], words].concat());
     let said = rig(&["identify"]).succeeded();
-    assert!(said.out.contains("Rig board, firmware") && said.out.contains("power-on"), "{}", said.out);
+    assert!(said.out.contains("rig board, firmware") && said.out.contains("power-on"), "{}", said.out);
     std::thread::sleep(Duration::from_millis(150)); // a whole log interval, for the tare
     assert!(rig(&["tare"]).succeeded().out.contains("tared"));
     rig(&["set", "1300"]).refused(&["not in this state"]);

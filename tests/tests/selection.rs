@@ -74,3 +74,37 @@ fn bad_pairs_are_refused_with_their_place() {
     assert!(!folder.path().join("page.html").exists());
     call(folder.path(), &["select", "--motor", "1KV"]).refused(&["--motor 1KV: no pair has this motor"]);
 }
+
+/// One bad file costs its own row alone; every row has a name; the choice has its reason.
+#[test]
+fn a_bad_file_costs_its_own_row_alone() {
+    let folder = TempDir::new().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let head = "motor,propeller,thrust_n,current_a\n";
+    write("good.csv", &format!("{head}A,10x5,6,8\nB,11x5,7,9\nC,9x5,4,3\n"));
+    write("bad.csv", &format!("{head}D,10x5,x,8\n"));
+    let run = quadrig_tests::bench::good_log();
+    write("no-names.csv", &run);
+    let words = ["select", "good.csv", "bad.csv", "nowhere.csv", "no-names.csv"];
+    let said = call(folder.path(), &words).succeeded();
+    assert!(
+        said.out.contains("choice: B with 11x5: 0.78 N/A, most thrust for each ampere of the 2 that meet every need"),
+        "{}",
+        said.out
+    );
+    assert!(
+        said.out.contains("next A with 10x5, 0.75 N/A") && said.out.contains("C with 9x5 gives 1.33 N/A but 16.00 N of 19.62 N"),
+        "{}",
+        said.out
+    );
+    let row = said.out.lines().find(|l| l.starts_with("motor of no-names.csv")).expect("the run by its file's name");
+    assert!(row.contains("propeller of no-names.csv") && row.contains("of 19.62 N in total"), "{row}");
+    let left_out: Vec<&str> = said.err.lines().collect();
+    assert_eq!(left_out.len(), 2, "{}", said.err);
+    assert!(left_out[0].starts_with("left out: bad.csv:2: column thrust_n: 'x'"), "{}", said.err);
+    assert!(left_out[1].starts_with("left out: nowhere.csv: cannot be read"), "{}", said.err);
+    let json: Value = serde_json::from_str(&call(folder.path(), &[&words[..], &["--json"]].concat()).succeeded().out).unwrap();
+    assert_eq!((json["left_out"].as_array().unwrap().len(), json["rows"].as_array().unwrap().len()), (2, 4));
+    assert!(json["why"].as_str().unwrap().starts_with("choice: B with 11x5"));
+    call(folder.path(), &["select", "bad.csv", "nowhere.csv"]).refused(&["none of the 2 files holds a pair", "bad.csv:2"]);
+}

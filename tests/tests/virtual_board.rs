@@ -144,7 +144,7 @@ fn other_programs_find_it_behind_a_pseudo_terminal() {
     let port = bench.hears("/dev/").trim().to_owned();
     assert_eq!(std::fs::read_link(folder.path().join("board")).expect("a link").to_string_lossy(), port);
     let rig = |words: &[&str]| call(folder.path(), &[&["rig", "--port", "board"], words].concat());
-    assert!(rig(&["identify"]).succeeded().out.contains("Rig board, firmware"));
+    assert!(rig(&["identify"]).succeeded().out.contains("rig board, firmware"));
     let interval = || std::thread::sleep(Duration::from_millis(250)); // a whole log interval
     let (mut counts, masses) = (Vec::new(), ["0", "100", "200", "300"]);
     for mass in masses {

@@ -75,7 +75,7 @@ pub enum BoardError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The settings' file could not be read or written.
-    #[error("{file}: {source}")]
+    #[error("{file}: cannot be read or written ({source}); expected a file: check name and folder")]
     File {
         /// The file.
         file: PathBuf,
@@ -96,11 +96,11 @@ pub enum BoardError {
     },
     /// This program was built without the emulator.
     #[error(
-        "--image needs the emulator: `cargo run --release --features emulated --ignore-rust-version -- ...` builds a program with it"
+        "--image: expected a program with the emulator: `cargo run --release --features emulated --ignore-rust-version -- ...` builds a program with it"
     )]
     NoEmulator,
     /// The image is that of a board which the emulator is not wired for.
-    #[error("{scenario}: describes the IMU board; --image runs the rig board's image")]
+    #[error("{scenario}: describes the IMU board; expected a scenario of the rig with --image")]
     NoImuImage {
         /// The scenario.
         scenario: PathBuf,

@@ -14,6 +14,7 @@ mod ahrs_bench;
 mod book;
 mod callgraph;
 mod emulator;
+mod errors;
 mod hazards;
 mod image;
 mod peers;
@@ -34,6 +35,7 @@ usage: cargo xtask COMMAND
   hazards [LINE]...  breaks each mend of tests/hazards.toml in a copy and sees its test fail
   hazards --page   writes docs/hazards.md
   book             builds docs/ with mdBook into target/book and checks every link of what comes out
+  errors           writes docs/errors.md: every refusal of the command line, from the source
   image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
                    interrupts reach no panic, and its stack is bounded (budgets/rig.toml)
   program          the command line with the emulator in it, for --image: target/quadrig-emulated
@@ -64,6 +66,7 @@ fn main() -> ExitCode {
         ["image"] => image::image(&place, false),
         ["hazards", "--page"] => hazards::write_page(&place),
         ["hazards", lines @ ..] => hazards::break_each(&place, lines),
+        ["errors"] => errors::write(&place),
         ["book"] => book::book(&place),
         ["program"] => emulator::program(&place),
         ["image", "--bless"] => image::image(&place, true),

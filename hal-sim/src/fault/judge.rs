@@ -44,12 +44,20 @@ pub struct Observed {
     pub end: f64,
 }
 
+fn faults(faults: &[Fault]) -> String {
+    if faults.is_empty() { "no fault".to_owned() } else { faults.iter().map(|f| f.words()).collect::<Vec<_>>().join(", ") }
+}
+
+fn verdicts(verdicts: &[CaptureVerdict]) -> String {
+    verdicts.iter().map(|v| v.flag().map_or("nominal", |flag| flag.words)).collect::<Vec<_>>().join(", ")
+}
+
 /// What is wrong with a flight.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Wrong {
     /// The mishap's instant was never reached.
-    #[error("it never came to the mishap: state {0:?}, faults {1:?}")]
+    #[error("it never came to the mishap: {}, {}", .0.words(), .1)]
     NeverReached(RigState, FaultSet),
     /// A pulse above minimum in a state that gives none.
     #[error("a pulse above minimum at {0:.0} ms in a state that gives none")]
@@ -58,13 +66,13 @@ pub enum Wrong {
     #[error("a pulse above minimum {0:.1} ms after the latest allowed instant")]
     Live(f64),
     /// The fault is not named in the telemetry.
-    #[error("telemetry names {0:?}")]
+    #[error("telemetry names {}", faults(.0))]
     Unnamed(Vec<Fault>),
     /// A fault is named that nothing justifies.
-    #[error("a fault without a cause: {0:?}")]
+    #[error("a fault without a cause: {}", faults(.0))]
     Unjustified(Vec<Fault>),
     /// The state at the end is not the one that the rule asks for.
-    #[error("it ends in {0:?}")]
+    #[error("it ends {}", .0.words())]
     State(RigState),
     /// The throttle ceased although nothing asked for it.
     #[error("the throttle ceased {0:.0} ms before the end")]
@@ -73,13 +81,13 @@ pub enum Wrong {
     #[error("the request was not refused")]
     NotRefused,
     /// The channel was not told to be unwell.
-    #[error("the channel was not told: {0:?}")]
+    #[error("the channel was not told: {}", verdicts(.0))]
     Untold(Vec<CaptureVerdict>),
     /// A channel that is well was told not to be.
-    #[error("channel {0} is blamed: {1:?}")]
+    #[error("channel {} is blamed: {}", .0, verdicts(&[*.1]))]
     Blamed(u8, CaptureVerdict),
     /// After a reset the first minimum pulse came late, or never.
-    #[error("first pulse {0:?} ms after the reset")]
+    #[error("first pulse {} after the reset", .0.map_or("never".to_owned(), |ms| format!("{ms:.1} ms")))]
     LateTrain(Option<f64>),
     /// What ended the program was not told.
     #[error("what ended the program was not told")]

@@ -209,9 +209,9 @@ impl Session {
     /// # Errors
     /// [`SimError::Stuck`] when nothing was recorded.
     pub fn finish(self) -> Result<RunRecord, SimError> {
-        let host = self.host;
+        let (host, at_s) = (self.host, self.desk.ms() as f64 * 1.0e-3);
         let (Some(hello), Some(calibration), Some(start)) = (host.hello, host.calibration, host.start) else {
-            return Err(SimError::Stuck { phase: host.phase.name(), state: host.state, at_s: 0.0 });
+            return Err(SimError::Stuck { phase: host.phase.name(), state: host.state, at_s });
         };
         Ok(RunRecord {
             telemetry: self.telemetry,

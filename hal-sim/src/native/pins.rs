@@ -26,7 +26,7 @@ const MAGIC: &[u8; 15] = b"quadrig pins 3\n";
 #[non_exhaustive]
 pub enum PinsError {
     /// The file cannot be read or written.
-    #[error("{}: {source}", file.display())]
+    #[error("{}: cannot be read or written ({source}); expected a file: check name and folder", file.display())]
     File {
         /// Which.
         file: PathBuf,

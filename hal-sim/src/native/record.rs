@@ -17,7 +17,7 @@ use frame::wire::{Decoder, LinkStats};
 #[non_exhaustive]
 pub enum SimError {
     /// The firmware refused a command of the host.
-    #[error("the rig refused {command:?} while it was {phase}: reasons {reasons:?}")]
+    #[error("the rig refused \"{}\" while it was {phase}: {reasons}; expected a scenario in which it does not (docs/scenario.md)", command.words())]
     Refused {
         /// What was asked.
         command: Box<Command>,
@@ -27,7 +27,9 @@ pub enum SimError {
         reasons: Refusals,
     },
     /// Faults latched.
-    #[error("the rig latched faults {faults:?} while it was {phase}, {at_s:.3} s after reset")]
+    #[error(
+        "the rig stopped itself while it was {phase}, {at_s:.3} s after reset: {faults}; expected a run within the firmware's limits: a smaller schedule, or less of what is hidden"
+    )]
     Faulted {
         /// Which.
         faults: FaultSet,
@@ -37,7 +39,7 @@ pub enum SimError {
         at_s: f64,
     },
     /// A phase lasted longer than it can.
-    #[error("the rig was still {phase} (state {state:?}) {at_s:.0} s after reset")]
+    #[error("the rig was still {phase} {at_s:.0} s after reset ({}); expected it to be done: has the ESC power, and does it answer?", state.words())]
     Stuck {
         /// What the host was doing.
         phase: &'static str,
@@ -47,13 +49,13 @@ pub enum SimError {
         at_s: f64,
     },
     /// The schedule cannot be played to its end.
-    #[error("the schedule was not played to its end: {reason}")]
+    #[error("the schedule was not played to its end: {reason}; expected to play it whole")]
     Schedule {
         /// Why not.
         reason: String,
     },
     /// A message did not fit its frame.
-    #[error("a message did not fit its frame")]
+    #[error("a message did not fit its frame; expected it to: this is a defect of the program, please report it")]
     Codec,
 }
 

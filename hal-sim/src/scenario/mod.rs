@@ -6,6 +6,7 @@
 //! Units: each key carries its own.
 //! Reference: specification `rig.md`, "The simulator"; `docs/scenario.md` lists every key.
 
+mod blame;
 mod fault;
 mod imu;
 mod section;
@@ -47,7 +48,7 @@ pub enum ScenarioError {
         reason: String,
     },
     /// The file cannot be read.
-    #[error("{}: {source}", file.display())]
+    #[error("{}: cannot be read ({source}); expected a file: check name and folder", file.display())]
     Unreadable {
         /// File that was to be read.
         file: PathBuf,
@@ -58,7 +59,7 @@ pub enum ScenarioError {
     #[error(transparent)]
     Schedule(#[from] schedule::ScheduleError),
     /// No effect has this id.
-    #[error("no effect is called {0:?}; there are: {list}", list = effect_ids())]
+    #[error("no effect is called {0:?}; expected one of {list}", list = effect_ids())]
     UnknownEffect(String),
 }
 
@@ -261,10 +262,29 @@ pub(crate) fn text_of(file: &Path) -> Result<String, ScenarioError> {
 /// What `text` describes, or where it does not.
 pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ScenarioError> {
     toml::from_str(text).map_err(|error| {
-        let (line, column) = place_of(text, error.span().map_or(0, |s| s.start));
-        let reason = error.message().replace('\n', " ");
+        let (byte, key) = blame::blame::<T>(text, &error);
+        let (line, column) = place_of(text, byte);
+        let mut reason = in_words(&error.message().replace('\n', " "));
+        if let Some(key) = key.filter(|key| !reason.contains(&format!("`{key}`"))) {
+            reason = format!("{key}: {reason}");
+        }
         ScenarioError::Refused { file: file.to_owned(), line, column, reason }
     })
+}
+
+/// The parser's names of kinds of numbers, as people say them.
+fn in_words(message: &str) -> String {
+    let Some((before, kind)) = message.rsplit_once("expected ") else {
+        return format!("{message}; expected TOML, as in docs/scenario.md");
+    };
+    let kind = match kind {
+        "f64" | "f32" => "a number",
+        "u64" | "u32" | "u16" | "usize" => "a whole number from 0",
+        "i64" | "i32" => "a whole number",
+        "a boolean" | "bool" => "true or false",
+        other => other,
+    };
+    format!("{before}expected {kind}")
 }
 
 /// Line and column of a byte of `text`, from 1.
@@ -325,8 +345,33 @@ mod tests {
             ("seed = 1\nmoter = \"570KV\"\n", "run.toml:2:1: ", "moter"),
             ("seed = 1\nmotor = \"571KV\"\n", "run.toml:2:9: ", "570KV"),
             ("[log]\nrate_hz = 7\n", "run.toml:2:11: ", "divides 1000"),
-            ("[air]\ntemperature_c = \"warm\"\n", "run.toml:2:17: ", "f64"),
-            ("rest_s = -1.0\n", "run.toml:1:10: ", "above 0"),
+            ("[air]\ntemperature_c = \"warm\"\n", "run.toml:2:17: ", "expected a number"),
+            ("rest_s = -1.0\n", "run.toml:1:10: ", "rest_s: expected a number above 0"),
+            // keys of a table of several kinds, whose places the parser loses
+            (
+                "[schedule]\nkind = \"staircase\"\nstep_us = 5\nhold_s = -3\ntop_us = 2000\n",
+                "run.toml:4:10: hold_s: ",
+                "found -3",
+            ),
+            ("[schedule]\nkind = \"stairs\"\nstep_us = 5\n", "run.toml:2:8: kind: ", "stairs"),
+            ("seed = 1\n[[effect]]\nid = \"nonsense\"\n", "run.toml:3:6: id: ", "nonsense"),
+            ("[[effect]]\nid = \"supply_sag\"\nresistance_ohm = \"x\"\n", "run.toml:3:18: resistance_ohm: ", "expected a number"),
+            ("seed = -1\n", "run.toml:1:8: seed: ", "expected a whole number from 0"),
+            ("seed = 1\nseed = 2\n", "run.toml:2:1: ", "duplicate key; expected TOML"),
+            ("[supply]\nkind = \"lipo\"\ncells = 0\n", "run.toml:3:9: cells: ", "1 to 14"),
+            (
+                "[schedule]\nkind = \"staircase\"\nstep_us = 5\nhold_s = 1e9\ntop_us = 2000\n",
+                "run.toml:4:10: hold_s: ",
+                "up to 86400 s",
+            ),
+            ("[[effect]]\nid = \"supply_sag\"\nresistance_ohm = 0.1\nohm = 3\n", "run.toml:4:1: ", "`ohm`"),
+            (
+                "[schedule]\nkind = \"steps\"\nsteps = [\n{ pulse_us = 1200, hold_s = 3 },\n{ hold_s = 3, pulse_us = 12000 },\n]\n",
+                "run.toml:5:26: pulse_us: ",
+                "found 12000",
+            ),
+            ("[supply]\nkind = \"lipo\"\ncells = 3\ncapacity_ah = -1e1\n", "run.toml:4:15: capacity_ah: ", "found -10"),
+            ("seed = 1\n[schedule]\nkind = \"staircase\"\nhold_s = 3\ntop_us = 2000\n", "run.toml:2:1: ", "step_us"),
             ("[[effect]]\nid = \"supply_sag\"\n", "run.toml:1:1: ", "resistance_ohm"),
             ("seed = \n", "run.toml:1:", ""),
         ] {

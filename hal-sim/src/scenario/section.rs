@@ -24,6 +24,7 @@ pub enum SupplySection {
     /// Battery.
     Lipo {
         /// Cells in series.
+        #[serde(deserialize_with = "cells")]
         cells: u32,
         /// Charge from full to empty, A.h.
         #[serde(deserialize_with = "positive")]
@@ -54,7 +55,7 @@ pub struct Step {
     #[serde(deserialize_with = "pulse")]
     pub pulse_us: f64,
     /// How long to hold it, s.
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "duration")]
     pub hold_s: f64,
     /// Ramp to it during the hold instead of stepping.
     #[serde(default)]
@@ -71,7 +72,7 @@ pub enum Schedule {
         #[serde(deserialize_with = "positive")]
         step_us: f64,
         /// Hold of each level, s.
-        #[serde(deserialize_with = "positive")]
+        #[serde(deserialize_with = "duration")]
         hold_s: f64,
         /// Highest level, us.
         #[serde(deserialize_with = "pulse")]
@@ -83,7 +84,7 @@ pub enum Schedule {
         #[serde(deserialize_with = "positive")]
         step_us: f64,
         /// Hold of each level, s.
-        #[serde(deserialize_with = "positive")]
+        #[serde(deserialize_with = "duration")]
         hold_s: f64,
         /// Highest level, us.
         #[serde(deserialize_with = "pulse")]
@@ -136,7 +137,7 @@ struct ChirpKeys {
     from_hz: f64,
     #[serde(deserialize_with = "frequency")]
     to_hz: f64,
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "duration")]
     length_s: f64,
 }
 
@@ -321,6 +322,13 @@ impl Schedule {
         }
     }
 
+    /// The file that it names, of the scenario in `scenario`.
+    #[must_use]
+    pub fn file(&self, scenario: &Path) -> Option<PathBuf> {
+        let (Self::File { file, .. } | Self::Replay(ReplaySection { file, .. })) = self else { return None };
+        Some(scenario.parent().unwrap_or(Path::new("")).join(file))
+    }
+
     /// Reads the files that it names, from `folder`.
     ///
     /// # Errors
@@ -366,6 +374,18 @@ pub(crate) fn positive<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error>
 
 pub(crate) fn not_negative<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
     checked(d, |v| v >= 0.0 && v.is_finite(), "a number not below 0")
+}
+
+/// Longest time that a schedule may name, s; that of schedule files.
+const LONGEST_S: f64 = 86_400.0;
+
+fn duration<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    checked(d, |v| v > 0.0 && v <= LONGEST_S, "a time above 0 and up to 86400 s")
+}
+
+fn cells<'de, D: Deserializer<'de>>(d: D) -> Result<u32, D::Error> {
+    let cells = u32::deserialize(d)?;
+    if (1..=14).contains(&cells) { Ok(cells) } else { Err(D::Error::custom(format!("expected 1 to 14 cells, found {cells}"))) }
 }
 
 fn celsius<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {

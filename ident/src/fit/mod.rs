@@ -9,7 +9,9 @@
 mod curve;
 mod declared;
 mod motor;
+pub mod power;
 mod spin;
+pub mod surface;
 
 pub(crate) use declared::declared;
 
@@ -19,6 +21,7 @@ pub use spin::{Spin, spin};
 
 use crate::log::{Log, SPEED};
 use crate::plateau::Plateau;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// A value with its standard error and the half width of its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,9 +119,47 @@ pub fn relations(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) 
         .collect()
 }
 
-/// Coefficient of omega^2 with a free zero: k_T for thrust, k_Q for torque.
+/// How well a law describes its levels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Law {
+    /// Scatter of the levels about it over what their errors promise, squared; 1 where both agree.
+    pub chi2: f64,
+    /// Levels less coefficients.
+    pub freedom: usize,
+    /// Whether chance alone could make them scatter so (p of 0.01 and more).
+    pub holds: bool,
+}
+
+/// Probability below which a law is said not to hold.
+const HOLDS: f64 = 0.01;
+
+impl Law {
+    /// Of a reduced chi-squared.
+    #[must_use]
+    pub fn of(chi2: f64, freedom: usize) -> Self {
+        let freely = freedom.max(1) as f64;
+        let holds = ChiSquared::new(freely).is_ok_and(|law| law.sf(chi2 * freely) >= HOLDS);
+        Self { chi2, freedom, holds }
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let law =
+            if self.holds { "the law holds" } else { "the law does not hold, the interval is widened to what the levels show" };
+        format!("chi2 {:.2} of {}, {law}", self.chi2, self.freedom)
+    }
+}
+
+/// Coefficient of omega^2 with a free zero: k_T for thrust, k_Q for torque. Where the square is not the law, its interval is as wide as the
+/// levels' own quotients ask for, their errors aside.
 #[must_use]
-pub fn square_law(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>], channel: &str) -> Option<(Estimate, Curve)> {
+pub fn square_law(
+    log: &Log,
+    plateaus: &[Plateau],
+    speed: &[Option<(f64, f64)>],
+    channel: &str,
+) -> Option<(Estimate, Curve, Law)> {
     let points: Vec<Point> = plateaus
         .iter()
         .zip(speed)
@@ -131,11 +172,29 @@ pub fn square_law(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>],
         })
         .collect();
     let curve = Curve::fit(&points, 1)?;
+    let law = Law::of(curve.chi2, curve.freedom);
     let mut k = curve.coefficient(1);
+    if !law.holds {
+        let wide = farthest(&curve).max(k.half);
+        k.se *= wide / k.half;
+        k.half = wide;
+    }
     for v in [&mut k.value, &mut k.se, &mut k.half] {
         *v /= 1e5;
     }
-    Some((k, curve))
+    Some((k, curve, law))
+}
+
+/// How far the farthest level's own quotient stands from the slope, its 95 % error aside; the levels that were left out say nothing.
+fn farthest(curve: &Curve) -> f64 {
+    let (zero, slope) = (curve.coefficient(0), curve.coefficients[1]);
+    let turning = curve.points.iter().enumerate().filter(|(i, p)| p.x > 0.0 && !curve.outliers.contains(i));
+    turning
+        .map(|(_, p)| {
+            let error = p.y_error.hypot(slope * p.x_error).hypot(zero.se) / p.x;
+            ((p.y - zero.value) / p.x - slope).abs() - 1.96 * error
+        })
+        .fold(0.0, f64::max)
 }
 
 /// Thrust coefficient C_T = T/(rho n^2 D^4) of a k_T, n in revolutions a second (UIUC's definition).

@@ -6,7 +6,7 @@
 //! Units: SI; KV in rev/min per volt.
 //! Reference: Beharie 2013, Eq. 5.11 corrected (rpm = KV (V - I R)); errors by the delta method over the plateaus' means.
 
-use super::{Estimate, square_law};
+use super::{Estimate, Law, square_law};
 use crate::log::Log;
 use crate::noise::median;
 use crate::plateau::Plateau;
@@ -26,6 +26,8 @@ pub struct Motor {
     pub resistance: Estimate,
     /// No-load current, A.
     pub no_load: Estimate,
+    /// How well the power balance describes the levels.
+    pub law: Law,
 }
 
 /// Speed rad/s, torque N.m, current A, voltage V, and whether the throttle is full.
@@ -40,7 +42,7 @@ struct Level {
 #[must_use]
 pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> Option<Motor> {
     // a torque arm that is not tared would pose as friction: what the square law leaves at rest is its zero
-    let zero = square_law(log, plateaus, speed, "torque_nm").map(|(_, curve)| curve.coefficient(0))?;
+    let zero = square_law(log, plateaus, speed, "torque_nm").map(|(_, curve, _)| curve.coefficient(0))?;
     let levels: Vec<Level> = plateaus
         .iter()
         .zip(speed)
@@ -81,6 +83,11 @@ pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> O
     for (v, (a, b)) in variance.iter_mut().zip(there.iter().zip(&centre)) {
         *v += (a - b).powi(2);
     }
+    let law = balance_law(&levels)?;
+    if !law.holds {
+        // what the levels scatter beyond their errors they scatter for the constants too
+        variance.iter_mut().for_each(|v| *v *= law.chi2);
+    }
     // three constants from so many levels, each with an estimated error
     let quantile = StudentsT::new(0.0, 1.0, (levels.len() - 3) as f64).map_or(1.96, |t| t.inverse_cdf(0.975));
     let estimate = |i: usize| {
@@ -88,7 +95,18 @@ pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> O
         Estimate { value: centre[i], se, half: quantile * se }
     };
     let physical = centre.iter().all(|v| v.is_finite()) && centre[0] > 0.0 && centre[1] > 0.0;
-    physical.then(|| Motor { kv: estimate(0), resistance: estimate(1), no_load: estimate(2) })
+    physical.then(|| Motor { kv: estimate(0), resistance: estimate(1), no_load: estimate(2), law })
+}
+
+/// How well the balance describes the levels.
+fn balance_law(levels: &[Level]) -> Option<Law> {
+    let (friction, ratio, own) = balance(levels)?;
+    let off = |l: &Level| {
+        let [w, q, i, v] = l.values;
+        (v * i - w * q - friction * w - ratio * (q + friction).powi(2) - own) / balance_error(l, friction, ratio)
+    };
+    let freedom = levels.len().checked_sub(3).filter(|f| *f > 0)?;
+    Some(Law::of(levels.iter().map(|l| off(l).powi(2)).sum::<f64>() / freedom as f64, freedom))
 }
 
 /// Standard error of a level's electric power less its mechanical power.

@@ -43,7 +43,7 @@ pub const SHORTEST_S: f64 = 4.0;
 #[non_exhaustive]
 pub enum FlightError {
     /// It lacks a column.
-    #[error("{name}: holds {reason}; the loop on a flight needs one of them")]
+    #[error("{name}: holds {reason}; expected one of them at least")]
     Lacks {
         /// Log.
         name: String,
@@ -68,7 +68,7 @@ pub enum FlightError {
     },
     /// Too short.
     #[error(
-        "{name}: {seconds:.1} s in the air with all its readings; at least {SHORTEST_S} s are needed to leave stretches out and predict them"
+        "{name}: {seconds:.1} s in the air with all its readings; expected at least {SHORTEST_S} s, to leave stretches out and predict them"
     )]
     Short {
         /// Log.

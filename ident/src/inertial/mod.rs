@@ -69,7 +69,7 @@ pub const SHORTEST_S: f64 = 20.0;
 #[non_exhaustive]
 pub enum InertialError {
     /// Too short.
-    #[error("{name}: {seconds:.1} s long; at least {SHORTEST_S} s are needed to leave stretches out and predict them")]
+    #[error("{name}: {seconds:.1} s long; expected at least {SHORTEST_S} s, to leave stretches out and predict them")]
     Short {
         /// Log.
         name: String,
@@ -77,7 +77,7 @@ pub enum InertialError {
         seconds: f64,
     },
     /// The filter never started.
-    #[error("{name}: no attitude: columns ax,ay,az hold no usable reading")]
+    #[error("{name}: no attitude; expected usable readings in columns ax,ay,az")]
     NoAttitude {
         /// Log.
         name: String,
@@ -91,7 +91,7 @@ pub enum InertialError {
         reason: String,
     },
     /// Another recording than the model's.
-    #[error("{name}: not the recording of the model ({source_name}); its heading and drift are that recording's own")]
+    #[error("{name}: not the recording of the model; expected {source_name}: heading and drift are that recording's own")]
     Other {
         /// Log.
         name: String,

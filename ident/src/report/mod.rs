@@ -7,6 +7,7 @@
 
 mod beam;
 pub(crate) mod closed;
+mod designer;
 mod figure;
 mod isolability;
 mod page;

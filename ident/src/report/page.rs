@@ -7,6 +7,7 @@
 //! Reference: specification `closing-the-loop.md`, step 8.
 
 use super::closed::{self as parts, Origin, PAIR, Page, Trace, Vocabulary, against, enlarged, over_time, thinned};
+use super::designer::designer;
 use super::figure::{Figure, Layer};
 use super::run;
 use super::sheet::Sheet;
@@ -249,6 +250,7 @@ fn identified(sheet: &mut Sheet, log: &Log) {
         run::coefficients(sheet, &found);
         run::plateaus(sheet, log, &found);
     });
+    sheet.fold("Power, efficiency, coefficients", |sheet| designer(sheet, &found, thinned));
 }
 
 fn time_label(context: &Context) -> String {

@@ -6,13 +6,14 @@
 //! Units: on the axes.
 //! Reference: Beharie 2013, Figures 5.22 to 5.25, 5.56 to 5.79.
 
+use super::designer::designer;
 use super::figure::{Figure, Layer, Mark};
 use super::number;
 use super::sheet::Sheet;
 use super::shift::filter_figures;
 use crate::board;
 use crate::context::unit_of;
-use crate::fit::Fitted;
+use crate::fit::{Fitted, Law};
 use crate::identify::Identified;
 use crate::log::{Log, SPEED};
 use crate::noise::median;
@@ -42,6 +43,8 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
         sheet.say("Dark band: where the curve lies. Light band: where a further plateau would lie. Rings: plateau means with their 95 % intervals; point at one to read it.");
     }
     sheet.figures(found.curves.iter().map(relation).collect());
+    sheet.section("Power, efficiency, coefficients");
+    designer(&mut sheet, found, |figure| figure);
     if let Some((log_b, found_b)) = other {
         sheet.section(&format!("Beside {}", log_b.name));
         sheet.figures(side_by_side((log, found), (log_b, found_b)));
@@ -81,10 +84,11 @@ pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
         .iter()
         .map(|c| {
             let interval = format!("{} to {}", number(c.value - c.half), number(c.value + c.half));
-            vec![c.name.to_owned(), number(c.value), number(c.se), interval, c.unit.to_owned()]
+            let law = c.law.map_or_else(|| "-".to_owned(), |law| law.words());
+            vec![c.name.to_owned(), number(c.value), number(c.se), interval, c.unit.to_owned(), law]
         })
         .collect();
-    sheet.listed("constants", &["constant", "value", "standard error", "95 % interval", "unit"], &rows);
+    sheet.listed("constants", &["constant", "value", "standard error", "95 % interval", "unit", "its law"], &rows);
 }
 
 fn label(channel: &str) -> String {
@@ -391,8 +395,14 @@ pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
     sheet.listed("plateaus", &header, &rows);
 }
 
+/// Chi-squared of a curve, and whether it holds.
+fn said(f: &Fitted) -> String {
+    let law = Law::of(f.curve.chi2, f.curve.freedom);
+    format!("{:.2} of {}{}", law.chi2, law.freedom, if law.holds { "" } else { ", does not hold" })
+}
+
 pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
-    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. Half widths of 95 % intervals. Chi2 is the scatter of the plateaus about the curve over what their own errors promise: far above 1 the order does not suffice.");
+    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. Half widths of 95 % intervals. Chi2 is the scatter of the plateaus about the curve over what their own errors promise, of so many degrees of freedom; where chance does not explain it (p below 0.01) the curve does not hold, and the interval is as much wider.");
     let rows: Vec<Vec<String>> = found
         .curves
         .iter()
@@ -400,7 +410,7 @@ pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
             let chosen = f.orders.iter().find(|o| o.chosen).map_or_else(|| "-".to_owned(), |o| o.degree.to_string());
             (0..=f.degree).map(move |k| {
                 let c = f.curve.coefficient(k);
-                let (chi2, chosen) = if k == 0 { (format!("{:.2}", f.curve.chi2), chosen.clone()) } else { Default::default() };
+                let (chi2, chosen) = if k == 0 { (said(f), chosen.clone()) } else { Default::default() };
                 vec![f.name.to_owned(), format!("c{k}"), number(c.value), number(c.half), chi2, chosen]
             })
         })

@@ -8,8 +8,10 @@
 //! Reference: Beharie 2013, Eq. 2.91 (resultant = 4 T - m g), 5.59 (endurance) and 6.1 (efficiency), Tables 8 and 9.
 
 mod pairs;
+mod why;
 
 pub use pairs::{from_log, read_table, thesis};
+pub use why::{misses, why};
 
 use crate::quantity::{Ampere, AmpereHour, GRAVITY, Kilogram, Minute, Newton};
 use serde::Serialize;

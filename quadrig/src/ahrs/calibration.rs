@@ -5,6 +5,7 @@
 //! Units: rad/s, m/s^2, uT.
 //! Reference: `dcm::calibration`.
 
+use crate::trouble::unread;
 use dcm::calibration::Calibration;
 use dcm::{Mat3, Vec3};
 use std::path::Path;
@@ -14,7 +15,7 @@ const FORMAT: &str = "# quadrig-imu-calibration 1";
 
 /// Reads a calibration.
 pub(crate) fn read(path: &Path) -> Result<Calibration, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let text = std::fs::read_to_string(path).map_err(unread(&path))?;
     parse(&text).map_err(|e| format!("{}: {e}", path.display()))
 }
 

@@ -8,6 +8,7 @@
 
 use super::number;
 use crate::Failure;
+use crate::trouble::unread;
 use dcm::Vec3;
 use std::path::Path;
 
@@ -48,7 +49,11 @@ impl Columns {
         let find = |name: &str| -> Result<Option<usize>, String> {
             let mut places = names.iter().enumerate().filter(|(_, n)| **n == name).map(|(i, _)| i);
             let first = places.next();
-            if places.next().is_some() { Err(format!("column {name} appears twice")) } else { Ok(first) }
+            if places.next().is_some() {
+                Err(format!("column {name}: it stands twice; expected each column once"))
+            } else {
+                Ok(first)
+            }
         };
         let time = find("t_s")?.ok_or("no column t_s; expected t_s,gx,gy,gz,ax,ay,az[,mx,my,mz]")?;
         let mut sensors = [None; 3];
@@ -57,11 +62,11 @@ impl Columns {
             *slot = match found {
                 [Some(x), Some(y), Some(z)] => Some([x, y, z]),
                 [None, None, None] => None,
-                _ => return Err(format!("some of the columns {} are missing", axes.join(","))),
+                _ => return Err(format!("some of the columns are missing; expected all of {}", axes.join(","))),
             };
         }
         if sensors[0].is_none() || sensors[1].is_none() {
-            return Err("columns gx,gy,gz and ax,ay,az are needed (m/s^2 and rad/s); mx,my,mz may be absent".to_owned());
+            return Err("no attitude log; expected columns t_s, gx,gy,gz (rad/s) and ax,ay,az (m/s^2), and mx,my,mz (uT) where there are any".to_owned());
         }
         let last = sensors.iter().flatten().flatten().copied().chain([time]).max().unwrap_or(0);
         Ok(Self { time, sensors, last })
@@ -71,7 +76,7 @@ impl Columns {
 impl ImuLog {
     /// Reads a file.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let text = std::fs::read_to_string(path).map_err(unread(&path))?;
         let (times, rows) = parse(&text).map_err(|(line, what)| format!("{}:{line}: {what}", path.display()))?;
         Ok(Self { text, times, rows })
     }
@@ -109,7 +114,7 @@ type Parsed = (Vec<(u32, u32)>, Vec<Row>);
 
 fn parse(text: &str) -> Result<Parsed, (usize, String)> {
     if u32::try_from(text.len()).is_err() {
-        return Err((1, "longer than 4 GB: cut it".to_owned()));
+        return Err((1, "longer than 4 GB; expected less: cut it".to_owned()));
     }
     let mut lines = text.lines().enumerate().filter(|(_, l)| !l.starts_with('#') && !l.trim().is_empty());
     let (n, header) = lines.next().ok_or((1, "empty file; expected t_s,gx,gy,gz,ax,ay,az[,mx,my,mz]".to_owned()))?;
@@ -126,16 +131,24 @@ fn parse(text: &str) -> Result<Parsed, (usize, String)> {
         let word = |at: usize| line[fields[at].0..fields[at].1].trim();
         let time = word(columns.time);
         let t = number::parse(time.as_bytes()).filter(|t| t.is_finite());
-        let t = t.ok_or_else(|| fail(format!("column t_s: {time:?} is no time")))?;
+        let t = t.ok_or_else(|| fail(format!("column t_s: {time:?} is no time; expected seconds")))?;
         if let Some(before) = rows.last().filter(|r| r.t >= t) {
-            return Err(fail(format!("column t_s: {time} does not come after {}; time must increase", before.t)));
+            return Err(fail(format!(
+                "column t_s: {time} does not come after {}; expected strictly increasing time: sort the rows, or cut the run there",
+                before.t
+            )));
         }
         let mut sensors = [None; 3];
         for ((slot, place), names) in sensors.iter_mut().zip(columns.sensors).zip(SENSORS) {
             let Some(place) = place else { continue };
             let mut v = [0.0f32; 3];
             for ((v, at), name) in v.iter_mut().zip(place).zip(names) {
-                *v = reading(word(at)).ok_or_else(|| fail(format!("column {name}: {:?} is no number", word(at))))?;
+                *v = reading(word(at)).ok_or_else(|| {
+                    fail(format!(
+                        "column {name}: {:?} is no number; expected one, or an empty field for a missing reading",
+                        word(at)
+                    ))
+                })?;
             }
             *slot = v.iter().all(|c| c.is_finite()).then(|| Vec3::from(v));
         }
@@ -145,7 +158,7 @@ fn parse(text: &str) -> Result<Parsed, (usize, String)> {
         rows.push(Row { t, gyro, accel, mag });
     }
     if rows.is_empty() {
-        return Err((n + 1, "no rows after the header".to_owned()));
+        return Err((n + 1, "no rows after the header; expected at least one".to_owned()));
     }
     Ok((times, rows))
 }
@@ -193,7 +206,7 @@ mod tests {
             ("gx,gy,gz,ax,ay,az\n".into(), 1, "no column t_s"),
             ("t_s,gx,gy,ax,ay,az\n".into(), 1, "gx,gy,gz"),
             ("t_s,gx,gy,gz\n0,0,0,0\n".into(), 1, "ax,ay,az"),
-            ("t_s,gx,gx,gy,gz,ax,ay,az\n".into(), 1, "gx appears twice"),
+            ("t_s,gx,gx,gy,gz,ax,ay,az\n".into(), 1, "column gx: it stands twice"),
             (head.into(), 1, "no rows"),
             (format!("{head}0,1,2,3,4,5,six\n"), 2, "column az: \"six\""),
             (format!("{head}0,1,2,3,4,5,inf\n"), 2, "column az: \"inf\""),

@@ -12,8 +12,10 @@ mod shard;
 mod table;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::open::{Columns, Names, is_own, open};
 use crate::progress::Bar;
+use crate::trouble::{unread, unwritten};
 use ident::log::write_whole;
 use result::{Done, close_one, key};
 use shard::Shard;
@@ -51,6 +53,13 @@ pub(crate) struct Args {
     names: Names,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.folder]).writes("-o", [&self.output])
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let all = files(&args.folder, &args.output)?;
@@ -59,7 +68,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         None => Shard::of_slurm(&|name| std::env::var(name).ok())?.unwrap_or_default(),
     };
     let own: Vec<&String> = all.iter().enumerate().filter(|(k, _)| shard.takes(*k)).map(|(_, f)| f).collect();
-    std::fs::create_dir_all(args.output.join("runs")).map_err(|e| format!("{}: {e}", args.output.display()))?;
+    std::fs::create_dir_all(args.output.join("runs")).map_err(unwritten(&args.output))?;
     let threads = args
         .jobs
         .map(|n| n as usize)
@@ -124,8 +133,8 @@ fn files(folder: &Path, output: &Path) -> Result<Vec<String>, Failure> {
     let output = std::fs::canonicalize(output).ok();
     let (mut found, mut open) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(at) = open.pop() {
-        for entry in std::fs::read_dir(&at).map_err(|e| format!("{}: {e}", at.display()))? {
-            let path = entry.map_err(|e| format!("{}: {e}", at.display()))?.path();
+        for entry in std::fs::read_dir(&at).map_err(unread(&at))? {
+            let path = entry.map_err(unread(&at))?.path();
             if path.is_dir() {
                 if std::fs::canonicalize(&path).ok() != output || output.is_none() {
                     open.push(path);
@@ -165,10 +174,10 @@ fn one(args: &Args, file: &str) -> Result<Option<Done>, Failure> {
         open(&path, &if own { ident::import::Options { mappings: Vec::new(), ..options.clone() } } else { options.clone() }, true)
     });
     if let Some(parent) = kept.parent() {
-        std::fs::create_dir_all(parent).map_err(|e| format!("{}: {e}", parent.display()))?;
+        std::fs::create_dir_all(parent).map_err(unwritten(&parent))?;
     }
     let text = done.to_json()?;
-    write_whole(&kept, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", kept.display()))?;
+    write_whole(&kept, |out| out.write_all(text.as_bytes())).map_err(unwritten(&kept))?;
     Ok(Some(done))
 }
 
@@ -180,7 +189,7 @@ fn gather(args: &Args, all: &[String]) -> Result<usize, Failure> {
     }
     for (name, text) in [("manifest.csv", table::manifest(&done)?), ("effects.csv", table::effects(&done)?)] {
         let path = args.output.join(name);
-        write_whole(&path, |out| out.write_all(&text)).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(&path, |out| out.write_all(&text)).map_err(unwritten(&path))?;
     }
     Ok(0)
 }

@@ -6,7 +6,8 @@
 //! Reference: specification `formats.md`, "Verdict".
 
 use crate::Failure;
-use crate::close_loop::write_folder;
+use crate::close_loop::{is_result, results};
+use crate::folder::Folder;
 use ident::close::{Closed, close};
 use ident::identify::identify;
 use ident::log::Log;
@@ -118,8 +119,9 @@ pub(super) fn close_one(file: &str, key: String, folder: Option<&Path>, read: &d
         let log = read()?;
         let closed = close(&log, None, &[], &mut |_| {})?;
         if let Some(folder) = folder {
-            let json = serde_json::to_string_pretty(&closed.verdict)?;
-            write_folder(folder, &log, &closed, &json, Origin::of(&log))?;
+            let mut own = Folder::new(folder, is_result)?;
+            own.extend(results(&log, &closed, Origin::of(&log))?);
+            own.write()?;
         }
         Ok(brief(&log, &closed))
     });

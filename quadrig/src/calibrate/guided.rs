@@ -15,6 +15,7 @@ use super::settling::{Settling, at_rest};
 use crate::Failure;
 use crate::board::{Board, Heard};
 use crate::rig::{configure, lines};
+use crate::trouble::unwritten;
 use firmware_rig::Config;
 use frame::message::Message;
 use frame::rig::RigSample;
@@ -39,12 +40,16 @@ pub(super) fn run(channel: Channel, points: Option<&str>, day: u16, args: &Args,
     let mut config = configure::in_force(&mut board)?;
     let place = channel.place();
     if !config.fitted[place] {
-        return Err(format!("{} is not fitted on this board; configure it first", channel.column()).into());
+        return Err(format!(
+            "{} is not fitted on this board; expected it in its configuration: `quadrig rig configure`",
+            channel.column()
+        )
+        .into());
     }
     let arm_m = args.arm.unwrap_or_else(|| f64::from(config.torque.arm_m));
     let wanted = points.map(|text| list(channel, text, arm_m)).transpose()?;
     if let Some(timed) = wanted.iter().flatten().find(|p| p.window.is_some()) {
-        return Err(format!("{}: a time belongs to a recording (-i)", timed.said).into());
+        return Err(format!("{}: a time belongs to a recording; expected values alone, or -i RECORDING", timed.said).into());
     }
     let whole = config.apply(&Config::thesis_570kv());
     let [design, now] = [whole.design(), whole.calibration()].map(|scales| f64::from(scales.adc[place].gain));
@@ -58,13 +63,12 @@ pub(super) fn run(channel: Channel, points: Option<&str>, day: u16, args: &Args,
         println!("{}in force so far: {now:.8} {} a count", found.table(), channel.unit());
     }
     if !args.yes && !talk.agrees()? {
-        return Err("nothing was stored".into());
+        return Err("nothing was stored: expected y to store; calibrate again, or with --yes".into());
     }
     config.calibrated[place] = Some(found.calibrated());
     configure::send(&mut board, &config)?;
     if let Some(output) = &args.output {
-        write_whole(output, |out| out.write_all(found.toml(&board.name()).as_bytes()))
-            .map_err(|e| format!("{}: {e}", output.display()))?;
+        write_whole(output, |out| out.write_all(found.toml(&board.name()).as_bytes())).map_err(unwritten(&output))?;
     }
     if !quiet {
         println!("in force and stored; tare anew before the next run");
@@ -79,7 +83,8 @@ impl Talk<'_> {
         for point in points {
             loop {
                 println!("{}: {} on, then press enter", self.channel.column(), point.said);
-                self.line()?.ok_or("the input ended before all points were taken; nothing was stored")?;
+                self.line()?
+                    .ok_or("the input ended before all points were taken; nothing was stored; expected a line for each point")?;
                 if let Some(reading) = self.settled(&point.said)? {
                     taken.push(Taken { point, reading });
                     break;
@@ -136,7 +141,11 @@ impl Talk<'_> {
     /// The samples that came.
     fn hear(&mut self) -> Result<Vec<RigSample>, Failure> {
         let Heard::Messages(messages) = self.board.hear() else {
-            return Err(format!("{}; nothing was stored", self.board.gone()).into());
+            return Err(format!(
+                "{}; nothing was stored; expected the port to stay: plug it in and begin again",
+                self.board.gone()
+            )
+            .into());
         };
         let samples = messages.iter().filter_map(|m| if let Message::Rig(sample) = m.message { Some(sample) } else { None });
         let samples: Vec<RigSample> = samples.collect();

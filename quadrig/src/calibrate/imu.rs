@@ -10,6 +10,7 @@ mod rest;
 
 use crate::Failure;
 use crate::ahrs::imu_log::ImuLog;
+use crate::trouble::unwritten;
 use dcm::calibration::{Calibration, CalibrationError, Collector, GyroZero, alignment, ellipsoid, six_positions};
 use dcm::{Mat3, Vec3};
 use ident::log::write_whole;
@@ -60,7 +61,7 @@ pub(super) fn run(sensors: &[Sensor], input: &Path, output: &Path, quiet: bool) 
         let section = done.map_err(|e| format!("{}: {}: {e}", input.display(), sensor.name()))?;
         let _ = write!(text, "\n[{}]\n{section}", sensor.name());
     }
-    write_whole(output, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", output.display()))?;
+    write_whole(output, |out| out.write_all(text.as_bytes())).map_err(unwritten(&output))?;
     if !quiet {
         print!("{text}");
     }
@@ -70,16 +71,16 @@ pub(super) fn run(sensors: &[Sensor], input: &Path, output: &Path, quiet: bool) 
 /// What to do about a refusal.
 fn explain(error: CalibrationError) -> String {
     match error {
-        CalibrationError::TooFew { found, needed } => format!("{found} readings, at least {needed} are needed: record longer"),
-        CalibrationError::Moving { scatter } => format!("it moved (scatter {scatter:.4}): leave it at rest"),
+        CalibrationError::TooFew { found, needed } => format!("{found} readings; expected at least {needed}: record longer"),
+        CalibrationError::Moving { scatter } => format!("it moved (scatter {scatter:.4}); expected rest: leave it alone"),
         CalibrationError::Coverage { found } => {
-            format!("{:.0} % of what is needed was seen: turn it into every direction", 100.0 * found)
+            format!("{:.0} % of what is needed was seen; expected every direction: turn it further", 100.0 * found)
         }
         CalibrationError::Position { index } => {
             let axis = ["+x", "-x", "+y", "-y", "+z", "-z"].get(usize::from(index)).unwrap_or(&"?");
-            format!("no rest with {axis} up")
+            format!("no rest with {axis} up; expected a rest in each of the six positions")
         }
-        other => format!("no fit ({other:?}): is the sensor saturated, or iron moving about?"),
+        _ => "no fit; expected readings on an ellipsoid: is the sensor saturated, or iron moving about?".to_owned(),
     }
 }
 
@@ -131,7 +132,7 @@ fn mag(log: &ImuLog, calibration: &mut Calibration) -> Result<String, String> {
     let fields = || log.rows.iter().filter_map(|r| r.mag);
     let count = fields().count();
     if count == 0 {
-        return Err("no readings of mx,my,mz".to_owned());
+        return Err("no readings of mx,my,mz; expected a recording with the magnetometer".to_owned());
     }
     let mean = fields().sum::<Vec3>() / count as f32;
     let size = (fields()

@@ -14,6 +14,7 @@ use super::settle::{LENGTH_S, Reading, Sample, reading};
 use crate::Failure;
 use crate::board::Board;
 use crate::rig::{configure, file};
+use crate::trouble::unwritten;
 use frame::flag::{FLAG_SUFFIX, Flag};
 use ident::log::{Log, write_whole};
 use std::path::Path;
@@ -35,8 +36,7 @@ pub(super) fn run(channel: Channel, input: &Path, points: &str, day: u16, args: 
         super::usage("a calibration from a recording goes to -o FILE, or to the board at --port");
     }
     if let Some(output) = &args.output {
-        write_whole(output, |out| out.write_all(found.toml(&name).as_bytes()))
-            .map_err(|e| format!("{}: {e}", output.display()))?;
+        write_whole(output, |out| out.write_all(found.toml(&name).as_bytes())).map_err(unwritten(&output))?;
     }
     if args.port.is_given() {
         let mut board = Board::open(&args.port)?;
@@ -61,7 +61,7 @@ fn arm(channel: Channel, log: &Log, said: Option<f64>) -> Result<f64, String> {
     match said.or_else(configured) {
         Some(arm) if arm.is_finite() && arm > 0.0 => Ok(arm),
         Some(arm) => Err(format!("--arm {arm}: expected a length above 0 m")),
-        None if channel == Channel::Torque => Err("its head tells no arm; say --arm METRES".to_owned()),
+        None if channel == Channel::Torque => Err("its head tells no arm; expected --arm METRES".to_owned()),
         None => Ok(1.0),
     }
 }
@@ -86,7 +86,7 @@ fn samples(channel: Channel, log: &Log) -> Result<Vec<Sample>, String> {
                 ));
             };
             if log.events.iter().any(|e| e.contains("tared:") || e.contains("recalibrated:")) {
-                return Err(format!("column {name}: it was tared in mid-run; record it with --raw"));
+                return Err(format!("column {name}: it was tared in mid-run; expected raw codes: record it with --raw"));
             }
             values.iter().map(|value| zero + value / gain).collect()
         }

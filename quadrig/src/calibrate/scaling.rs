@@ -64,11 +64,14 @@ impl Scaling {
             _ => (self.by_unit(typed), typed),
         };
         if !config.fitted[channel.place()] {
-            return Err(format!("{} is not fitted on this board; configure it first", channel.column()));
+            return Err(format!(
+                "{} is not fitted on this board; expected it in its configuration: `quadrig rig configure`",
+                channel.column()
+            ));
         }
         let point = point(channel, value, self.arm_m())?;
         if let Some((from, to)) = point.window {
-            return Err(format!("{value:?}: the time {from} to {to} s belongs to a recording"));
+            return Err(format!("{value:?}: the time {from} to {to} s belongs to a recording; expected the value alone"));
         }
         let dropped = if channel == self.channel { 0 } else { self.taken.len() };
         if channel != self.channel {
@@ -123,7 +126,7 @@ impl Scaling {
     /// The line through the values taken, `day` days after 1970; lines for the operator.
     pub(crate) fn fit(&mut self, day: u16) -> Result<Vec<String>, String> {
         if self.settling.is_some() {
-            return Err("the last value has not settled yet".to_owned());
+            return Err("the last value has not settled yet; expected it to: wait a moment".to_owned());
         }
         let config = self.config.ok_or("the board has not told its configuration yet; try again")?;
         let design = config.apply(&Config::thesis_570kv()).design().adc[self.channel.place()].gain;

@@ -59,12 +59,15 @@ impl Settling {
 /// Scales are taken with the rig disarmed and the rotor at rest; otherwise, why they are not.
 pub(super) fn at_rest(sample: &RigSample) -> Result<(), String> {
     if sample.state != RigState::Disarmed {
-        return Err(format!("the rig is {:?}; a channel is calibrated while it is disarmed; nothing was stored", sample.state));
+        return Err(format!(
+            "the rig is {}; expected it disarmed: a channel is calibrated at rest; nothing was stored",
+            sample.state.words()
+        ));
     }
     let turns =
         |verdict: CaptureVerdict| !matches!(verdict, CaptureVerdict::Stopped | CaptureVerdict::Absent | CaptureVerdict::Lost);
     if sample.rpm.iter().any(|code| turns(code.verdict)) {
-        return Err("the rotor turns; a channel is calibrated at rest; nothing was stored".to_owned());
+        return Err("the rotor turns; expected it at rest; nothing was stored".to_owned());
     }
     Ok(())
 }

@@ -5,13 +5,15 @@
 //! Units: as the channels state.
 //! Reference: specification `flight.md`, "The loop on flights".
 
-use super::Args;
+use super::{Args, is_result};
 use crate::Failure;
+use crate::folder::Folder;
 use crate::progress::Bar;
+use crate::trouble::{unread, unwritten};
 use ident::flight::columns::Flight;
 use ident::flight::library::FlightLibrary;
 use ident::flight::predict::{columns, is_by_row, is_own, over_windows, seen_by};
-use ident::flight::{Closed, FlightModel, MODEL_FORMAT, VOCABULARY, close, page};
+use ident::flight::{FlightModel, MODEL_FORMAT, VOCABULARY, close, page};
 use ident::flight_log;
 use ident::log::write_whole;
 use ident::report::{Origin, terminal};
@@ -28,6 +30,7 @@ pub(crate) fn is_flight_log(path: &Path) -> bool {
 
 /// Runs the command.
 pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
     let log = flight_log::read(args.log())?;
     let model = args.model.as_deref().map(read_model).transpose()?;
     let others = args.validate.iter().map(|p| flight_log::read(p)).collect::<Result<Vec<_>, _>>()?;
@@ -36,9 +39,13 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         close(&log, model.as_ref(), &others, &mut |share| bar.set(share))?
     };
     let json = serde_json::to_string_pretty(&closed.verdict)?;
-    if let Some(folder) = &args.output {
+    if let Some(mut folder) = folder {
         let origin = Origin { model: args.model.as_ref().map(|m| m.display().to_string()), ..Origin::of(&log) };
-        write_folder(folder, &closed, &json, origin)?;
+        folder.add("verdict.json", format!("{json}\n"));
+        folder.add("model.toml", closed.model.to_toml(&closed.parameters));
+        folder.add("channels.csv", channels(&closed.flight));
+        folder.add("report.html", page(&closed, origin));
+        folder.write()?;
     }
     if args.json {
         println!("{json}");
@@ -49,19 +56,8 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 }
 
 fn read_model(path: &Path) -> Result<FlightModel, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let text = std::fs::read_to_string(path).map_err(unread(&path))?;
     Ok(FlightModel::parse(&path.display().to_string(), &text)?)
-}
-
-fn write_folder(folder: &Path, closed: &Closed, json: &str, origin: Origin) -> Result<(), Failure> {
-    let say = |e: std::io::Error| format!("{}: {e}", folder.display());
-    std::fs::create_dir_all(folder).map_err(say)?;
-    let write = |name: &str, text: &str| write_whole(&folder.join(name), |out| out.write_all(text.as_bytes())).map_err(say);
-    write("verdict.json", &format!("{json}\n"))?;
-    write("model.toml", &closed.model.to_toml(&closed.parameters))?;
-    write("channels.csv", &channels(&closed.flight))?;
-    write("report.html", &page(closed, origin))?;
-    Ok(())
 }
 
 /// The text of a flight model, where `path` is one.
@@ -76,7 +72,7 @@ pub(crate) fn predict(model: &Path, text: &str, path: &Path, output: &Path) -> R
     let model = FlightModel::parse(&model.display().to_string(), text)?;
     let log = flight_log::read(path)?;
     let predicted = predictions(&model, &seen_by(&model, &log)?);
-    write_whole(output, |out| out.write_all(predicted.as_bytes())).map_err(|e| format!("{}: {e}", output.display()).into())
+    write_whole(output, |out| out.write_all(predicted.as_bytes())).map_err(|e| unwritten(&output)(e).into())
 }
 
 /// One line a row of the log: speeds and voltage as logged, all else as the mean of its window; empty where there is no claim.

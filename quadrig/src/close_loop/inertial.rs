@@ -6,10 +6,12 @@
 //! Units: rad/s, m/s^2, uT.
 //! Reference: specification `formats.md`, "Attitude log" and "Verdict".
 
-use super::Args;
+use super::{Args, is_result};
 use crate::Failure;
 use crate::ahrs::imu_log::{ImuLog, Row};
+use crate::folder::Folder;
 use crate::progress::Bar;
+use crate::trouble::unwritten;
 use dcm::{Config, Dcm, Measurement, Vec3};
 use ident::inertial::{Attitude, InertialModel, MODEL_FORMAT, Predicted, Recording, Sensor, VOCABULARY, close, page};
 use ident::log::write_whole;
@@ -31,8 +33,9 @@ pub(crate) fn is_attitude_log(path: &Path) -> bool {
 /// Runs the command.
 pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if args.model.is_some() || !args.validate.is_empty() {
-        return Err(format!("{}: an attitude log; --model and --validate are for rig logs", args.log().display()).into());
+        return Err(format!("{}: an attitude log; expected a rig log with --model and --validate", args.log().display()).into());
     }
+    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
     let log = ImuLog::read(args.log())?;
     let recording = recording(&log, args.log());
     let closed = {
@@ -40,23 +43,20 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         close(&recording, &|rates| attitude(&log, rates), &mut |share| bar.set(share))?
     };
     let json = serde_json::to_string_pretty(&closed.verdict)?;
-    if let Some(folder) = &args.output {
-        let say = |e: std::io::Error| format!("{}: {e}", folder.display());
-        std::fs::create_dir_all(folder).map_err(say)?;
-        write_whole(&folder.join("verdict.json"), |out| writeln!(out, "{json}")).map_err(say)?;
-        let model = closed.model.to_toml();
-        write_whole(&folder.join("model.toml"), |out| out.write_all(model.as_bytes())).map_err(say)?;
+    if let Some(mut folder) = folder {
+        folder.add("verdict.json", format!("{json}\n"));
+        folder.add("model.toml", closed.model.to_toml());
         type Rows = fn(&Sensor) -> &Vec<Vector3<f64>>;
         let files: [(&str, Rows); 2] = [("declared.csv", |s| &s.declared), ("pred.csv", |s| &s.corrected)];
         for (name, rows) in files {
             let of = |s: &Sensor| Predicted { channels: s.channels.map(str::to_owned).to_vec(), rows: rows(s).clone() };
             let predicted: Vec<Predicted> = closed.sensors.iter().map(of).collect();
-            write_whole(&folder.join(name), |out| out.write_all(predictions(&log, &predicted).as_bytes())).map_err(say)?;
+            folder.add(name, predictions(&log, &predicted));
         }
         let seconds = recording.t.first().zip(recording.t.last()).map(|(a, b)| b - a);
         let origin = Origin::of_text(&recording.name, log.text(), recording.t.len(), seconds);
-        write_whole(&folder.join("report.html"), |out| out.write_all(page(&recording, &closed, origin).as_bytes()))
-            .map_err(say)?;
+        folder.add("report.html", page(&recording, &closed, origin));
+        folder.write()?;
     }
     if args.json {
         println!("{json}");
@@ -111,8 +111,7 @@ pub(crate) fn predict(model: &Path, text: &str, path: &Path, output: &Path) -> R
     let model = InertialModel::parse(&model.display().to_string(), text)?;
     let log = ImuLog::read(path)?;
     let predicted = model.predict(&recording(&log, path), &|rates| attitude(&log, rates))?;
-    write_whole(output, |out| out.write_all(predictions(&log, &predicted).as_bytes()))
-        .map_err(|e| format!("{}: {e}", output.display()).into())
+    write_whole(output, |out| out.write_all(predictions(&log, &predicted).as_bytes())).map_err(|e| unwritten(&output)(e).into())
 }
 
 /// The corrected model's prediction of every channel, row for row; empty where it makes no claim.

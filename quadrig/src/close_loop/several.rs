@@ -5,12 +5,12 @@
 //! Units: as the channels state.
 //! Reference: specification `formats.md`, "Command line".
 
-use super::{Args, flight, inertial, write_folder};
+use super::{Args, flight, inertial, is_result, results};
 use crate::Failure;
+use crate::folder::Folder;
 use crate::open::open;
 use crate::progress::Bar;
 use ident::close::validation;
-use ident::log::write_whole;
 use ident::report::{Origin, Vocabulary, several, terminal};
 use ident::several::{Outcome, Run, close_each, close_together};
 use std::path::Path;
@@ -18,14 +18,14 @@ use std::path::Path;
 /// Runs the command.
 pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(path) = args.logs.iter().find(|p| inertial::is_attitude_log(p) || flight::is_flight_log(p)) {
-        return Err(
-            format!("{}: no log of a rig; several logs are several runs of one rig: give it alone", path.display()).into()
-        );
+        return Err(format!("{}: no log of a rig; expected several runs of one rig: give it alone", path.display()).into());
     }
     if let Some(model) = &args.model {
-        let asked = "--model asks what is new on one run; give one log, or leave --model out";
-        return Err(format!("{}: {asked}", model.display()).into());
+        return Err(
+            format!("{}: --model with several logs; expected one log with --model, or several without", model.display()).into()
+        );
     }
+    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
     let options = args.columns.options(&args.names);
     let logs = args.logs.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
     let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
@@ -37,8 +37,9 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     };
     outcome.verdict.validation = others.iter().map(|other| validation(other, &outcome.declared, &outcome.model)).collect();
     let json = serde_json::to_string_pretty(&outcome.verdict)?;
-    if let Some(folder) = &args.output {
-        write(folder, &runs, &outcome, &json)?;
+    if let Some(mut folder) = folder {
+        fill(&mut folder, &runs, &outcome, &json)?;
+        folder.write()?;
     }
     if args.json {
         println!("{json}");
@@ -49,18 +50,16 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 }
 
 /// The rig's files, and a folder for each run.
-fn write(folder: &Path, runs: &[Run], outcome: &Outcome, json: &str) -> Result<(), Failure> {
+fn fill(folder: &mut Folder<'_>, runs: &[Run], outcome: &Outcome, json: &str) -> Result<(), Failure> {
     let names = names(runs);
     for (run, name) in runs.iter().zip(&names) {
-        let json = serde_json::to_string_pretty(&run.closed.verdict)?;
-        write_folder(&folder.join("runs").join(name), &run.log, &run.closed, &json, Origin::of(&run.log))?;
+        let files = results(&run.log, &run.closed, Origin::of(&run.log))?;
+        folder.extend(files.into_iter().map(|(file, bytes)| (format!("runs/{name}/{file}"), bytes)));
     }
     let links: Vec<String> = names.iter().map(|name| format!("runs/{name}/report.html")).collect();
-    let say = |e: std::io::Error| format!("{}: {e}", folder.display());
-    write_whole(&folder.join("model.toml"), |out| out.write_all(outcome.model.to_toml().as_bytes())).map_err(say)?;
-    write_whole(&folder.join("verdict.json"), |out| writeln!(out, "{json}")).map_err(say)?;
-    let page = several(runs, outcome, &links);
-    write_whole(&folder.join("report.html"), |out| out.write_all(page.as_bytes())).map_err(say)?;
+    folder.add("model.toml", outcome.model.to_toml());
+    folder.add("verdict.json", format!("{json}\n"));
+    folder.add("report.html", several(runs, outcome, &links));
     Ok(())
 }
 

@@ -6,15 +6,15 @@
 //! Units: as the files state.
 //! Reference: docs/mission.md; specification `flight.md`, "Missions".
 
-mod folder;
 mod page;
 mod record;
-mod rotor;
+pub(crate) mod rotor;
 mod summary;
 
 use crate::Failure;
+use crate::apart::Paths;
+use crate::folder::Folder;
 use crate::progress::Bar;
-use folder::Folder;
 use hal_sim::Powerplant;
 use hal_sim::flight::Airframe;
 use hal_sim::mission::{AirframeFile, Catalogue, Flight, Mission, RotorCurves, catalogue_plants, fly_whole};
@@ -41,6 +41,13 @@ pub(crate) struct Args {
     json: bool,
 }
 
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.mission]).reads(&self.model).fills("-o", &self.output)
+    }
+}
+
 /// The files of a flight.
 const FILES: [&str; 4] = ["states.csv", "flight.csv", "attitude.csv", "flight.html"];
 
@@ -53,13 +60,15 @@ enum Rotors {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let (mission, file) = Mission::load(&args.mission)?;
-    let mut inputs = vec![args.mission.clone()];
-    inputs.extend(mission.files(&args.mission).into_iter().flatten());
-    inputs.extend(args.model.clone());
-    let folder = args.output.as_deref().map(|path| Folder::new(path, &FILES, &inputs)).transpose()?;
+    args.paths().reads(mission.files(&args.mission).iter().flatten()).check()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, |name| FILES.contains(&name))).transpose()?;
     let airframe = file.airframe();
     if airframe.body().is_none() {
-        return Err(format!("{}: the airframe's masses make no body", args.mission.display()).into());
+        return Err(format!(
+            "{}: the airframe's masses make no body; expected masses above 0 at more than one place (docs/mission.md)",
+            args.mission.display()
+        )
+        .into());
     }
     let model = args.model.as_deref().map(Model::read).transpose()?;
     let rotors = rotors_of(model.as_ref(), args.model.as_deref(), &airframe)?;
@@ -91,8 +100,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 
 fn rotors_of(model: Option<&Model>, path: Option<&Path>, airframe: &Airframe) -> Result<Rotors, Failure> {
     let (Some(model), Some(path)) = (model, path) else { return Ok(Rotors::Catalogue) };
-    let rotor = ModelRotor::new(model, airframe.rotor_inertia_kgm2)
-        .map_err(|why| format!("{}: the model predicts {why}", path.display()))?;
+    let rotor = ModelRotor::new(model, airframe.rotor_inertia_kgm2).map_err(|why| {
+        format!("{}: the model predicts {why}; expected one identified from a log with pulse_us and thrust_n", path.display())
+    })?;
     Ok(Rotors::Model(Box::new(rotor)))
 }
 
@@ -141,7 +151,9 @@ fn planned(mission: &Mission, file: &AirframeFile, rotor: &ModelRotor) -> Result
             Some((_, plan)) => plan.clone(),
             None => {
                 let plan = rotor.planned(|t| mission.pulse_us(i, t), mission.length_s(), mission.start.spun_up);
-                plan.ok_or("the model predicts no speed from a command")?
+                plan.ok_or(
+                    "the model predicts no speed from a command; expected one identified from a log with pulse_us and a speed",
+                )?
             }
         };
         plants.push(Box::new(plan.clone()));

@@ -158,6 +158,11 @@ impl ModelRotor {
         Following { rpm: 0.0, rotor: self.clone(), lag_s: lag_ms as f64 * 1.0e-3, density: 1.0 }
     }
 
+    /// Time in which a rotor comes to 63 % of a small step about the middle of the range, s.
+    pub(crate) fn lag_s(&self) -> f64 {
+        self.following().lag_s
+    }
+
     /// The settled state of a speed.
     fn turning(&self, rpm: f64) -> PlantState {
         let after = self.settled.partition_point(|s| s.rpm < rpm).clamp(1, self.settled.len() - 1);

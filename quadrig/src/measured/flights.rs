@@ -9,6 +9,7 @@
 use super::page::{three, word};
 use crate::Failure;
 use crate::progress::Bar;
+use crate::trouble::unwritten;
 use ident::flight::{Closed, close};
 use ident::import::flight;
 use ident::log::{Column, Log, write_whole};
@@ -82,7 +83,7 @@ pub(crate) fn work(set: &'static Flights, data: &Path, folder: &Path, quiet: boo
     drop(bar);
     let page = Page { set, flown };
     let path = folder.join(format!("{}.md", set.folder));
-    write_whole(&path, |out| out.write_all(page.text().as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+    write_whole(&path, |out| out.write_all(page.text().as_bytes())).map_err(unwritten(&path))?;
     write_figures(folder, &page.figures()).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
     Ok(page)
 }

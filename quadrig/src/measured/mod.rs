@@ -15,7 +15,9 @@ mod together;
 mod transfer;
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::progress::Bar;
+use crate::trouble::unwritten;
 use cross::{Tried, across};
 use ident::close::{Closed, close};
 use ident::log::{Log, write_whole};
@@ -36,6 +38,13 @@ pub(crate) struct Args {
     /// Only this set, without `measured.md`; may be given more than once.
     #[arg(long)]
     set: Vec<String>,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.data]).writes("-o", [&self.output])
+    }
 }
 
 /// A recorded run and what came of it.
@@ -71,7 +80,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let known = || SETS.iter().map(|s| s.folder).chain(flights::SETS.iter().map(|s| s.folder));
     if let Some(unknown) = args.set.iter().find(|n| !known().any(|s| s == n.as_str())) {
         let names: Vec<&str> = known().collect();
-        return Err(format!("no set is called {unknown}; there are: {}", names.join(", ")).into());
+        return Err(format!("no set is called {unknown}; expected one of {}", names.join(", ")).into());
     }
     let rig = args.data.join("rig");
     if !rig.is_dir() {
@@ -80,13 +89,13 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let wanted: Vec<&'static Set> =
         SETS.iter().filter(|s| args.set.is_empty() || args.set.iter().any(|n| n == s.folder)).collect();
     let folder = args.output.join("measured");
-    std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    std::fs::create_dir_all(&folder).map_err(unwritten(&folder))?;
     let mut outcomes = Vec::new();
     for set in wanted {
         let outcome = work(set, &rig.join(set.folder), quiet)?;
         let (text, figures) = page::set(&outcome);
         let file = folder.join(format!("{}.md", set.folder));
-        write_whole(&file, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", file.display()))?;
+        write_whole(&file, |out| out.write_all(text.as_bytes())).map_err(unwritten(&file))?;
         write_figures(&folder, &figures).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
         if !quiet {
             println!("{}: {} runs, {}", set.folder, outcome.runs.len(), file.display());
@@ -109,7 +118,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if args.set.is_empty() {
         let file = args.output.join("measured.md");
         let text = page::index(&outcomes) + &flights::summary(&flown);
-        write_whole(&file, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", file.display()))?;
+        write_whole(&file, |out| out.write_all(text.as_bytes())).map_err(unwritten(&file))?;
     }
     Ok(())
 }

@@ -5,6 +5,7 @@
 //! Units: converted on import.
 //! Reference: the `README.md` of each set.
 
+use crate::trouble::unread;
 use ident::import::import;
 use ident::log::Log;
 use std::path::{Path, PathBuf};
@@ -137,7 +138,7 @@ impl Set {
         let wanted =
             |name: &str| name.contains(self.holds) && name.ends_with(".csv") && !name.ends_with(".mocap.csv") && !left_out(name);
         let mut out = Vec::new();
-        for entry in std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))? {
+        for entry in std::fs::read_dir(&folder).map_err(unread(&folder))? {
             let path = entry.map_err(|e| format!("{}: {e}", folder.display()))?.path();
             if path.file_name().is_some_and(|n| wanted(&n.to_string_lossy())) {
                 out.push(path);

@@ -26,6 +26,9 @@ use std::time::Duration;
 /// Samples before the head is written: they tell the rate.
 const HEAD_AFTER: usize = 3;
 
+/// Time between two samples from which on it is told, s: the longest that a board can be set to, and more.
+const GAP_S: f64 = 2.0;
+
 /// An event that waits for the sample after it, which says which channels it is about.
 #[derive(Debug)]
 struct Pending {
@@ -237,6 +240,8 @@ impl Recorder {
             self.notes.push(news.to_owned());
             self.latched = FaultSet::NONE;
             self.tell(t_s, "the board was reset");
+        } else if self.rows > 0 && t_s - self.last_s > GAP_S {
+            self.tell(t_s, &format!("no sample for {:.1} s before this one", t_s - self.last_s));
         }
         self.tell_pending(Some(sample));
         self.write(&cells);
@@ -279,7 +284,7 @@ impl Recorder {
         }
         if self.rows == 0 {
             self.spool.discard();
-            return Err("no sample arrived; nothing was recorded".into());
+            return Err("no sample arrived; nothing was recorded; expected samples: is the board powered?".into());
         }
         self.spool.finish()
     }

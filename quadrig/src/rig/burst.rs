@@ -8,7 +8,9 @@
 
 use super::configure;
 use crate::Failure;
-use crate::board::{Board, Heard};
+use crate::apart::Paths;
+use crate::board::{Board, Heard, refused};
+use crate::trouble::unwritten;
 use firmware_rig::burst::LENGTH;
 use frame::Consensus;
 use frame::calibration::Calibration;
@@ -45,6 +47,13 @@ pub(super) struct Args {
     to: f64,
 }
 
+impl Args {
+    /// What it writes.
+    pub(super) fn paths<'a>(&'a self, paths: Paths<'a>) -> Paths<'a> {
+        paths.writes("-o", &self.output).writes("--spectrum", &self.spectrum)
+    }
+}
+
 /// A whole burst.
 struct Burst {
     rate_hz: f64,
@@ -59,12 +68,14 @@ pub(super) fn run(board: &mut Board, args: &Args, quiet: bool) -> Result<(), Fai
     let place = super::file::ANALOGUE
         .iter()
         .position(|n| *n == args.channel)
-        .ok_or_else(|| format!("{:?}: no such channel; there are {}", args.channel, super::file::ANALOGUE.join(", ")))?;
+        .ok_or_else(|| format!("{:?}: no such channel; expected one of {}", args.channel, super::file::ANALOGUE.join(", ")))?;
     if !(args.to.is_finite() && args.to > 0.0) {
         return Err(format!("--to {}: expected a frequency above 0 Hz", args.to).into());
     }
     if !configure::in_force(board)?.fitted[place] {
-        return Err(format!("{} is not fitted on this board", ADC_NAMES[place]).into());
+        return Err(
+            format!("{} is not fitted on this board; expected a channel of `quadrig rig identify`", ADC_NAMES[place]).into()
+        );
     }
     let burst = recorded(board, place)?;
     let scale = burst.calibration.adc[place];
@@ -72,14 +83,14 @@ pub(super) fn run(board: &mut Board, args: &Args, quiet: bool) -> Result<(), Fai
     let lines = spectrum(&values, burst.rate_hz, args.to);
     if let Some(path) = &args.output {
         let text = conversions(place, &burst, &values);
-        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?;
     }
     if let Some(path) = &args.spectrum {
         let mut text = format!("frequency_hz,{}\n", ADC_NAMES[place]);
         for (hz, amplitude) in &lines {
             let _ = writeln!(text, "{hz:.3},{amplitude:.7}");
         }
-        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?;
     }
     if !quiet {
         print!("{}", shown(place, &burst, &values, &lines));
@@ -95,13 +106,16 @@ fn recorded(board: &mut Board, place: usize) -> Result<Burst, Failure> {
         |_| {},
         |m| if let Message::Calibration(told) = m { calibration.replace(*told).or(Some(*told)).map(|_| ()) } else { None },
     )?;
-    let calibration = calibration.ok_or("the board tells no calibration")?;
+    let calibration = calibration.ok_or("the board tells no calibration; expected a rig board: `quadrig rig identify`")?;
     for _ in 0..TRIES {
         if let Some((rate_hz, codes, rpm)) = once(board, place, &calibration)? {
             return Ok(Burst { rate_hz, codes, calibration, rpm });
         }
     }
-    Err(format!("parts of the burst were lost on the line, {TRIES} times; look at the line's counters (`rig status`)").into())
+    Err(format!(
+        "parts of the burst were lost on the line, {TRIES} times; expected a sound line: `quadrig rig status` counts its damage"
+    )
+    .into())
 }
 
 type Whole = (f64, Vec<u16>, Option<f64>);
@@ -117,7 +131,7 @@ fn once(board: &mut Board, place: usize, calibration: &Calibration) -> Result<Op
         for received in messages {
             match received.message {
                 Message::Event(Event::Refused(reasons)) => {
-                    return Err(format!("the board refuses: {}", reasons.words().collect::<Vec<_>>().join("; ")).into());
+                    return Err(refused(&reasons.words().collect::<Vec<_>>().join("; ")).into());
                 }
                 Message::Rig(sample) => speeds.extend(speed(calibration, &sample)),
                 Message::BurstPart(part) if usize::from(part.channel) == place => {

@@ -9,6 +9,7 @@
 use super::file;
 use crate::Failure;
 use crate::board::Board;
+use crate::trouble::unwritten;
 use firmware_rig::RigConfig;
 use frame::message::{Command, Event, Message, SettingsNews};
 use ident::log::write_whole;
@@ -28,7 +29,7 @@ pub(crate) fn in_force(board: &mut Board) -> Result<RigConfig, Failure> {
         let length = usize::from(part.length);
         if form.len() >= length {
             form.truncate(length);
-            return RigConfig::from_form(&form).ok_or_else(|| "the board's configuration is none that this program knows".into());
+            return RigConfig::from_form(&form).ok_or_else(|| "the board's configuration is none that this program knows; expected a board with the image of the same release: `quadrig flash rig`".into());
         }
     }
 }
@@ -52,7 +53,7 @@ pub(crate) fn save(board: &mut Board) -> Result<(), Failure> {
     };
     match board.ask(Command::SaveSettings, |_| {}, news)? {
         SettingsNews::Saved => Ok(()),
-        _ => Err("the board could not store its configuration; it stays in force until the next reset".into()),
+        _ => Err("the board could not store its configuration; it stays in force until the next reset; expected to store: `quadrig rig save` tries again".into()),
     }
 }
 
@@ -77,9 +78,7 @@ pub(crate) fn from_file(board: &mut Board, path: &Path) -> Result<u32, Failure> 
 pub(crate) fn to_file(board: &mut Board, path: Option<&Path>) -> Result<(), Failure> {
     let text = file::text(&in_force(board)?);
     match path {
-        Some(path) => {
-            Ok(write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", path.display()))?)
-        }
+        Some(path) => Ok(write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?),
         None => {
             print!("{text}");
             Ok(())

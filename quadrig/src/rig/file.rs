@@ -7,6 +7,7 @@
 
 use super::date;
 use crate::Failure;
+use crate::trouble::unread;
 use esc_pwm::{Bounds, EscOutput};
 use firmware_rig::config::{CurrentChannel, TemperatureChannel, TorqueChannel, VoltageChannel};
 use firmware_rig::rig_config::{Answers, Calibrated, EscProfile, EscTelemetry, MOST_POLE_PAIRS};
@@ -312,7 +313,7 @@ impl File {
         if config.in_range() {
             Ok((config, self.calibrated.is_some()))
         } else {
-            Err((0..0, "a value is out of its range".to_owned()))
+            Err((0..0, "a value is out of its range; expected the ranges of docs/configuration.md".to_owned()))
         }
     }
 
@@ -442,9 +443,11 @@ impl Esc {
                 Answers::Silent { hold_ms: whole(hold, 2000.0, most)? as u16 }
             }
             (AnswersName::Silent, None) => {
-                return Err((self.power_ms.span(), "an ESC that is silent needs hold_ms beside power_ms".to_owned()));
+                return Err((self.power_ms.span(), "an ESC that is silent: expected hold_ms beside power_ms".to_owned()));
             }
-            (_, Some(hold)) => return Err((hold.span(), "only an ESC that is silent has hold_ms".to_owned())),
+            (_, Some(hold)) => {
+                return Err((hold.span(), "hold_ms: expected with an ESC that is silent only; take it out".to_owned()));
+            }
         };
         let highest = PulseWidth((f64::from(within(&self.highest_us, 1100.0, 2000.0)?) * 1000.0).round() as u32);
         Ok(EscProfile { answers, highest, hold_min_ms, cells_ms: time(&self.cells_ms)?, ready_ms: time(&self.ready_ms)? })
@@ -486,7 +489,7 @@ impl Scale {
 
 /// Reads a file. The second value says whether it names calibrated scales: without, a board keeps its own.
 pub(crate) fn read(path: &Path) -> Result<(RigConfig, bool), Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let text = std::fs::read_to_string(path).map_err(unread(&path))?;
     parse(&text, path).map_err(Into::into)
 }
 
@@ -514,11 +517,11 @@ struct ScalesAlone {
 
 /// The calibrated scales of a file: of a configuration, or of one that `quadrig calibrate` wrote.
 pub(crate) fn scales(path: &Path) -> Result<[Option<Calibrated>; 5], Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let text = std::fs::read_to_string(path).map_err(unread(&path))?;
     let file: ScalesAlone = section(&text, path)?;
     let found = file.calibrated.as_ref().map_or(Ok([None; 5]), Scales::all).map_err(|reason| placed(&text, path, reason))?;
     if found == [None; 5] {
-        return Err(format!("{}: no section [calibrated.X]; `quadrig calibrate` writes one", path.display()).into());
+        return Err(format!("{}: no section [calibrated.X]; expected a file of `quadrig calibrate`", path.display()).into());
     }
     Ok(found)
 }

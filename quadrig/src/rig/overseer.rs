@@ -25,7 +25,7 @@ const TOLD_AT: f64 = 8.0;
 pub(crate) struct Args {
     /// Hold the run against this model while it goes on: each channel's residual in noise floors, and the row where the run leaves it.
     #[arg(long, value_name = "MODEL")]
-    model: Option<PathBuf>,
+    pub(crate) model: Option<PathBuf>,
     /// Stop the motor when the run leaves its model by so many noise floors.
     #[arg(long, value_name = "FLOORS", requires = "model")]
     stop_at: Option<f64>,

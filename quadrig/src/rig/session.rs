@@ -11,6 +11,7 @@ use super::seat::{News, Seat};
 use super::stage::Stage;
 use super::typed::{Typed, typed};
 use crate::Failure;
+use crate::board::refused;
 use crate::end::Ended;
 use crate::view::Course;
 use crate::view::keys::Wish;
@@ -61,13 +62,16 @@ impl Going {
     /// How the session ends.
     fn verdict(&self) -> Result<(), Failure> {
         if let Some(words) = &self.departed {
-            return Err(format!("{words}; the motor was stopped").into());
+            return Err(format!("{words}; the motor was stopped; expected a run that stays with its model (--stop-at)").into());
         }
         if let Some(why) = &self.unplayed {
-            return Err(format!("the schedule was not played to its end: {why}").into());
+            return Err(format!(
+                "the schedule was not played to its end: {why}; expected to play it whole: what was recorded is kept"
+            )
+            .into());
         }
         match &self.faulted {
-            Some(words) => Err(format!("the rig stopped itself: {words}").into()),
+            Some(words) => Err(format!("the rig stopped itself: {words}; expected a run within the limits: docs/rig.md lists the faults, `quadrig rig clear` takes the latch off").into()),
             None => Ok(()),
         }
     }
@@ -172,7 +176,7 @@ fn line_by_line(
                 News::Beep(beep) => say(&format!("the ESC: {}   ({})", sound::heard(beep), sound::meaning(beep))),
                 News::Accepted(command) => going.asked |= Some(command) == errand.first,
                 News::Refused(words) if !going.asked && errand.first.is_some() => {
-                    return Err(Ending::Refused(format!("the board refuses: {words}").into()));
+                    return Err(Ending::Refused(refused(&words).into()));
                 }
                 News::Refused(words) => eprintln!("the board refuses: {words}"),
                 News::Silent(_) if !going.asked && errand.first.is_some() => {

@@ -52,7 +52,7 @@ impl Stage {
                 screen.wanted_us = None;
                 screen.tell(Tone::Warn, format!("the board refuses: {words}"));
             }
-            News::Silent(command) => screen.tell(Tone::Bad, format!("no answer to {command:?}")),
+            News::Silent(command) => screen.tell(Tone::Bad, format!("no answer to \"{}\"", command.words())),
             News::Unplayed(why) => screen.tell(Tone::Bad, format!("the schedule cannot be played to its end: {why}; stopped")),
             News::Recording(words) => screen.tell(Tone::Bad, words.clone()),
             News::Gone(why) => {

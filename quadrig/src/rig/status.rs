@@ -52,7 +52,7 @@ pub(super) fn run(board: &mut Board) -> Result<(), Failure> {
             }
         }
     }
-    let calibration = calibration.ok_or("the board tells no calibration; is it a rig board?")?;
+    let calibration = calibration.ok_or("the board tells no calibration; expected a rig board: `quadrig rig identify`")?;
     print!("{}", text(&Heed { hello, calibration, config, sample, health }));
     Ok(())
 }
@@ -89,7 +89,7 @@ fn text(heed: &Heed) -> String {
 fn readings(out: &mut String, heed: &Heed, sample: &RigSample) {
     let faults: Vec<&str> = sample.faults.iter().map(Fault::words).collect();
     let faults = if faults.is_empty() { "no fault is latched".to_owned() } else { format!("latched: {}", faults.join(", ")) };
-    let _ = writeln!(out, "{:?} at {:.0} us; {faults}", sample.state, sample.pulse.as_us());
+    let _ = writeln!(out, "{} at {:.0} us; {faults}", sample.state.words(), sample.pulse.as_us());
     let values = heed.calibration.convert(sample);
     let speeds = CAPTURE_NAMES.iter().zip(heed.calibration.marks).zip(values.rpm.iter().zip(&sample.rpm));
     for ((name, _), (value, code)) in speeds.filter(|((_, marks), _)| *marks > 0) {

@@ -24,7 +24,8 @@ pub(crate) enum Typed {
 pub(crate) fn typed(line: &str, hands: bool) -> Result<Typed, Failure> {
     let mut words = line.split_whitespace();
     let (word, value) = (words.next().unwrap_or(""), words.next());
-    let number = || value.and_then(|v| v.parse::<f64>().ok()).ok_or_else(|| format!("{line:?}: a number is needed"));
+    let number =
+        || value.and_then(|v| v.parse::<f64>().ok()).ok_or_else(|| format!("{line:?}: expected a number after the word"));
     Ok(Typed::Command(match word {
         "" => Command::Ping,
         "long" => Command::Beep(Beep::Long),

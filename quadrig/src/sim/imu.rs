@@ -10,6 +10,7 @@ use super::Args;
 use crate::Failure;
 use crate::ahrs;
 use crate::progress::Bar;
+use crate::trouble::unwritten;
 use dcm::{Mat3, STANDARD_GRAVITY};
 use firmware_ahrs::itg3200::GyroReading;
 use firmware_ahrs::{ACCEL, GYRO, MAG, adxl345, hmc5883l, itg3200};
@@ -32,7 +33,11 @@ pub(super) fn run(args: &Args, scenario: &ImuScenario, quiet: bool) -> Result<()
     let of_the_rig = [("--model", args.model.is_some()), ("--pins", args.pins.is_some()), ("--replay", args.replay.is_some())];
     for (flag, given) in of_the_rig.into_iter().chain([("--live", args.live)]) {
         if given {
-            return Err(format!("{}: describes the IMU board; {flag} is for a run of the rig", args.scenario.display()).into());
+            return Err(format!(
+                "{}: describes the IMU board; expected a scenario of the rig with {flag}",
+                args.scenario.display()
+            )
+            .into());
         }
     }
     let rig = scenario.rig();
@@ -40,11 +45,9 @@ pub(super) fn run(args: &Args, scenario: &ImuScenario, quiet: bool) -> Result<()
     let run = fly(&rig, scenario.milliseconds(), &mut |share| bar.set(share)).map_err(|_| "a message did not fit its frame")?;
     drop(bar);
     if run.samples.is_empty() {
-        return Err("no sensor of the board answered; no log was written".into());
+        return Err("no sensor of the board answered; no log was written; expected one sensor at least without a fault".into());
     }
-    let write = |path: &Path, text: String| {
-        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|e| format!("{}: {e}", path.display()))
-    };
+    let write = |path: &Path, text: String| write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path));
     if let Some(path) = &args.truth {
         write(path, truth(&run.samples, &rig.motion))?;
     }

@@ -257,7 +257,7 @@ impl Screen {
             }
             Event::Crashed(crash) => self.tell(
                 Tone::Bad,
-                format!("the board's program crashed before its reset: {:?} at {:#010x}", crash.cause, crash.pc),
+                format!("the board's program crashed before its reset: {} at {:#010x}", crash.cause.words(), crash.pc),
             ),
             _ => {}
         }

@@ -30,7 +30,7 @@ fn is_gone() -> Result<bool, Failure> {
     let mut ends = [PollFd::new(&stdin, PollFlags::IN)];
     let asked = poll(&mut ends, Some(&Timespec { tv_sec: 0, tv_nsec: 0 }));
     if asked.is_ok() && ends.iter().any(|end| end.revents().intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL)) {
-        return Err("the terminal is gone".into());
+        return Err("the terminal is gone; expected it to stay: what was recorded is kept".into());
     }
     Ok(false)
 }
@@ -52,7 +52,8 @@ pub(crate) struct Terminal {
 impl Terminal {
     /// Takes the terminal over.
     pub(crate) fn take() -> Result<Self, Failure> {
-        let terminal = ratatui::try_init().map_err(|e| format!("the terminal cannot be taken over ({e}); --plain needs none"))?;
+        let terminal =
+            ratatui::try_init().map_err(|e| format!("the terminal cannot be taken over ({e}); expected one, or --plain"))?;
         Ok(Self { terminal: Some(terminal), ink: Ink::of_environment(), drawn: None })
     }
 

@@ -1,0 +1,298 @@
+//! What a designer asks of each level: power in and out, thrust for each watt, efficiencies, and the propeller's coefficients.
+//!
+//! What it is: quotients of plateau means with the standard errors that follow from theirs; thrust and torque less what the square law leaves
+//! at rest, which is the zero of their channel.
+//! What can go wrong: a channel that is missing, a propeller whose diameter is not known, air whose density is not: what needs them is not known
+//! either, and is not guessed.
+//! Units: SI; g for each W with standard gravity.
+//! Reference: UIUC propeller data base (C_T = T/(rho n^2 D^4), C_P = P/(rho n^3 D^5), n in rev/s); Leishman 2006, "Principles of Helicopter
+//! Aerodynamics", 2.8 (figure of merit = T^1.5 / (sqrt(2 rho A) P)).
+
+use super::Estimate;
+use crate::log::Log;
+use crate::plateau::Plateau;
+use std::f64::consts::{PI, TAU};
+
+/// Standard gravity, m/s^2 (ISO 80000-3).
+const STANDARD_GRAVITY: f64 = 9.806_65;
+/// Specific gas constant of dry air, J/(kg.K) (ISO 2533).
+const AIR_GAS: f64 = 287.05;
+/// Metres in an inch.
+const INCH_M: f64 = 0.0254;
+/// Share of the largest value below which a quotient says nothing but its own error.
+const TOO_SMALL: f64 = 0.02;
+
+/// A value and its standard error.
+pub type Valued = (f64, f64);
+
+/// What is known of propeller and air beside the log's channels.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Disc {
+    /// Diameter of the propeller, m.
+    pub diameter_m: Option<f64>,
+    /// Density of the air, kg/m^3.
+    pub density_kg_m3: Option<f64>,
+}
+
+impl Disc {
+    /// As the log tells: `diameter_m` or the number before the x of `propeller` (inches); `air_density_kg_m3` in the head, or temperature and
+    /// pressure in columns or in the head (`temp_c`, `pressure_hpa`, `pressure_pa`).
+    #[must_use]
+    pub fn of(log: &Log) -> Self {
+        let number = |key: &str| log.meta.get(key).and_then(|v| v.as_float().or_else(|| v.as_integer().map(|n| n as f64)));
+        let positive = |v: &f64| v.is_finite() && *v > 0.0;
+        let inches = || {
+            let name = log.meta.get("propeller")?.as_str()?;
+            let (diameter, pitch) = name.trim().split_once(['x', 'X'])?;
+            // "11x4.7", "9x4.5x3": a name that only happens to hold an x has no numbers about it
+            pitch.trim().starts_with(|c: char| c.is_ascii_digit()).then_some(())?;
+            diameter.trim().parse::<f64>().ok().map(|d| d * INCH_M)
+        };
+        let mean = |name: &str| {
+            let there: Vec<f64> = log.column(name)?.iter().copied().filter(|v| v.is_finite()).collect();
+            (!there.is_empty()).then(|| there.iter().sum::<f64>() / there.len() as f64)
+        };
+        let told = |name: &str| mean(name).or_else(|| number(name));
+        let gas = || {
+            let pressure_pa = told("pressure_pa").or_else(|| told("pressure_hpa").map(|p| 100.0 * p))?;
+            Some(pressure_pa / (AIR_GAS * (told("temp_c")? + 273.15)))
+        };
+        Self {
+            diameter_m: number("diameter_m").or_else(inches).filter(positive),
+            density_kg_m3: number("air_density_kg_m3").or_else(gas).filter(positive),
+        }
+    }
+
+    /// What is not known, and how to say it; nothing where both are.
+    #[must_use]
+    pub fn lacks(&self) -> Vec<&'static str> {
+        let diameter = self
+            .diameter_m
+            .is_none()
+            .then_some("diameter of the propeller: not known (head: propeller = \"11x4.7\" in inches, or diameter_m)");
+        let density = self.density_kg_m3.is_none().then_some(
+            "density of the air: not known (head: air_density_kg_m3, or temp_c with pressure_hpa, in the head or as columns; or `identify --air`)",
+        );
+        diameter.into_iter().chain(density).collect()
+    }
+
+    fn area_m2(&self) -> Option<f64> {
+        self.diameter_m.map(|d| PI * d * d / 4.0)
+    }
+}
+
+/// One figure of a level: its name, its unit, and what it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asked {
+    /// Name of the column of the table.
+    pub name: &'static str,
+    /// For people.
+    pub heading: &'static str,
+    /// Unit, empty for a number.
+    pub unit: &'static str,
+}
+
+const fn asked(name: &'static str, heading: &'static str, unit: &'static str) -> Asked {
+    Asked { name, heading, unit }
+}
+
+/// The figures of a level, in the order of [`Level::figures`].
+pub const ASKED: [Asked; 14] = [
+    asked("pulse_us", "pulse", "us"),
+    asked("rpm", "speed", "rev/min"),
+    asked("thrust_n", "thrust", "N"),
+    asked("torque_nm", "torque", "N.m"),
+    asked("current_a", "current", "A"),
+    asked("voltage_v", "voltage", "V"),
+    asked("electrical_w", "electrical power", "W"),
+    asked("shaft_w", "shaft power", "W"),
+    asked("g_per_w", "thrust for electrical power", "g/W"),
+    asked("g_per_shaft_w", "thrust for shaft power", "g/W"),
+    asked("motor_efficiency", "motor and controller efficiency", ""),
+    asked("figure_of_merit", "figure of merit", ""),
+    asked("c_t", "C_T", ""),
+    asked("c_p", "C_P", ""),
+];
+
+/// A level with its figures; `None` is what is not known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Level {
+    /// Place among the plateaus, from 0.
+    pub plateau: usize,
+    /// Each of [`ASKED`].
+    pub figures: [Option<Valued>; ASKED.len()],
+}
+
+impl Level {
+    /// A figure by its name.
+    #[must_use]
+    pub fn of(&self, name: &str) -> Option<Valued> {
+        self.figures[ASKED.iter().position(|a| a.name == name)?]
+    }
+}
+
+/// A product of powers and its error, of what is measured independently.
+fn product(constant: f64, factors: &[(Option<Valued>, f64)]) -> Option<Valued> {
+    let (mut value, mut relative) = (constant, 0.0);
+    for (factor, power) in factors {
+        let (v, se) = (*factor)?;
+        if v <= 0.0 {
+            return None; // a quotient of a resting rotor
+        }
+        value *= v.powf(*power);
+        relative += (power * se / v).powi(2);
+    }
+    Some((value, value * relative.sqrt()))
+}
+
+/// The figures of every plateau; `zeros` are what thrust and torque read at rest.
+#[must_use]
+pub fn levels(
+    log: &Log,
+    plateaus: &[Plateau],
+    speed: &[Option<Valued>],
+    zeros: [Option<Estimate>; 2],
+    disc: &Disc,
+) -> Vec<Level> {
+    let less =
+        |v: Option<Valued>, zero: Option<Estimate>| v.map(|(v, se)| zero.map_or((v, se), |z| (v - z.value, se.hypot(z.se))));
+    let raw: Vec<[Option<Valued>; 6]> = plateaus
+        .iter()
+        .zip(speed)
+        .map(|(p, rpm)| {
+            let of = |name: &str| p.of(log, name);
+            [
+                of("pulse_us"),
+                *rpm,
+                less(of("thrust_n"), zeros[0]),
+                less(of("torque_nm"), zeros[1]),
+                of("current_a"),
+                of("voltage_v"),
+            ]
+        })
+        .collect();
+    // near rest a quotient is noise over noise
+    let top = |k: usize| raw.iter().filter_map(|r| r[k]).map(|v| v.0).fold(0.0, f64::max);
+    let least = [0, 1, 2, 3, 4, 5].map(|k| TOO_SMALL * top(k));
+    raw.iter().enumerate().map(|(plateau, raw)| Level { plateau, figures: figures(raw, &least, disc) }).collect()
+}
+
+fn figures(raw: &[Option<Valued>; 6], least: &[f64; 6], disc: &Disc) -> [Option<Valued>; ASKED.len()] {
+    let loud = |k: usize| raw[k].filter(|v| v.0 > least[k]);
+    let [_, rpm, thrust, torque, current, voltage] = [0, 1, 2, 3, 4, 5].map(loud);
+    let exact = |v: Option<f64>| v.map(|v| (v, 0.0));
+    let [rho, diameter] = [exact(disc.density_kg_m3), exact(disc.diameter_m)];
+    let electrical = product(1.0, &[(voltage, 1.0), (current, 1.0)]);
+    let shaft = product(TAU / 60.0, &[(rpm, 1.0), (torque, 1.0)]);
+    let grams = 1000.0 / STANDARD_GRAVITY;
+    let turns = 1.0 / 60.0_f64;
+    [
+        raw[0],
+        raw[1],
+        raw[2],
+        raw[3],
+        raw[4],
+        raw[5],
+        electrical,
+        shaft,
+        product(grams, &[(thrust, 1.0), (voltage, -1.0), (current, -1.0)]),
+        product(grams * 60.0 / TAU, &[(thrust, 1.0), (rpm, -1.0), (torque, -1.0)]),
+        product(TAU / 60.0, &[(rpm, 1.0), (torque, 1.0), (voltage, -1.0), (current, -1.0)]),
+        product(
+            60.0 / TAU / 2.0_f64.sqrt(),
+            &[(thrust, 1.5), (rpm, -1.0), (torque, -1.0), (rho, -0.5), (exact(disc.area_m2()), -0.5)],
+        ),
+        product(turns.powi(-2), &[(thrust, 1.0), (rho, -1.0), (rpm, -2.0), (diameter, -4.0)]),
+        product(TAU * turns.powi(-2), &[(torque, 1.0), (rho, -1.0), (rpm, -2.0), (diameter, -5.0)]),
+    ]
+}
+
+/// The table of plateaus as CSV: each figure and its standard error; an empty field is what is not known.
+#[must_use]
+pub fn csv(plateaus: &[Plateau], levels: &[Level]) -> String {
+    let names: Vec<String> = ASKED.iter().map(|a| format!("{0},{0}_se", a.name)).collect();
+    let mut out = format!("plateau,from_s,to_s,rows,{}\n", names.join(","));
+    for level in levels {
+        let p = &plateaus[level.plateau];
+        let cell = |v: &Option<Valued>| v.map_or_else(|| ",".to_owned(), |(v, se)| format!("{},{}", digits(v), digits(se)));
+        let cells: Vec<String> = level.figures.iter().map(cell).collect();
+        out += &format!("{},{:.3},{:.3},{},{}\n", level.plateau + 1, p.from_s, p.to_s, p.rows, cells.join(","));
+    }
+    out
+}
+
+/// Seven digits: more than any plateau holds.
+fn digits(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return "0".to_owned();
+    }
+    let places = (6 - value.abs().log10().floor() as i32).clamp(0, 15) as usize;
+    let text = format!("{value:.places$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Column;
+
+    fn log(head: &str) -> Log {
+        Log::parse("run.csv", format!("# quadrig-log 1\n{head}t_s,rpm,temp_c,pressure_hpa\n0,1,20,1013.25\n").as_bytes())
+            .expect("a log")
+    }
+
+    #[test]
+    fn what_the_log_tells_of_propeller_and_air() {
+        let found = |head: &str| Disc::of(&log(head));
+        let disc = found("# propeller = \"11x4.7\"\n");
+        assert!((disc.diameter_m.expect("11 inches") - 0.2794).abs() < 1e-9);
+        assert!((disc.density_kg_m3.expect("temperature and pressure") - 1.2041).abs() < 1e-3);
+        assert_eq!(found("# propeller = \"9x4.5x3\"\n").diameter_m.map(|d| (1e4 * d).round()), Some(2286.0));
+        assert_eq!(found("# propeller = \"T7056\"\n").diameter_m, None);
+        assert_eq!(found("# propeller = \"xoar\"\n").diameter_m, None);
+        assert_eq!(found("# propeller = \"T7056\"\n# diameter_m = 0.1778\n").diameter_m, Some(0.1778));
+        assert_eq!(found("# air_density_kg_m3 = 1.1\n").density_kg_m3, Some(1.1));
+        let mut warm = log("");
+        warm.columns.retain(|c| c.name != "pressure_hpa");
+        assert_eq!(Disc::of(&warm).density_kg_m3, None, "a temperature alone is no density");
+        assert_eq!(Disc::of(&warm).lacks().len(), 2);
+    }
+
+    /// By hand: 8000 rev/min, 5 N, 0.08 N.m, 9 A at 11 V, 11 inches in air of 1.2 kg/m^3.
+    #[test]
+    fn figures_as_by_hand() {
+        let names = ["pulse_us", "thrust_n", "torque_nm", "current_a", "voltage_v"];
+        let log =
+            Log { columns: names.iter().map(|n| Column { name: (*n).into(), values: vec![0.0] }).collect(), ..Log::default() };
+        let plateau = Plateau {
+            from_s: 1.0,
+            to_s: 2.0,
+            first: 0,
+            rows: 10,
+            settling_s: 0.0,
+            means: vec![Some((1800.0, 0.0)), Some((5.1, 0.05)), Some((0.08, 0.0)), Some((9.0, 0.0)), Some((11.0, 0.0))],
+        };
+        let disc = Disc { diameter_m: Some(0.2794), density_kg_m3: Some(1.2) };
+        let zero = Estimate { value: 0.1, se: 0.0, half: 0.0 };
+        let found = levels(&log, &[plateau.clone()], &[Some((8000.0, 0.0))], [Some(zero), None], &disc);
+        let near = |name: &str, wanted: f64| {
+            let (v, _) = found[0].of(name).unwrap_or_else(|| panic!("{name}"));
+            assert!((v / wanted - 1.0).abs() < 1e-3, "{name}: {v}, by hand {wanted}");
+        };
+        near("electrical_w", 99.0);
+        near("shaft_w", 67.02);
+        near("motor_efficiency", 0.677);
+        near("g_per_w", 5.150);
+        near("g_per_shaft_w", 7.607);
+        near("c_t", 5.0 / (1.2 * (8000.0_f64 / 60.0).powi(2) * 0.2794_f64.powi(4)));
+        near("c_p", 67.02 / (1.2 * (8000.0_f64 / 60.0).powi(3) * 0.2794_f64.powi(5)));
+        near("figure_of_merit", 5.0_f64.powf(1.5) / ((2.0 * 1.2 * PI * 0.1397 * 0.1397_f64).sqrt() * 67.02));
+        let (g_per_w, se) = found[0].of("g_per_w").expect("known");
+        assert!((se / g_per_w - 0.01).abs() < 1e-6, "one per cent of thrust is one per cent of it");
+        let unknown = levels(&log, &[plateau.clone()], &[Some((8000.0, 0.0))], [None; 2], &Disc::default());
+        assert_eq!(["c_t", "c_p", "figure_of_merit"].map(|n| unknown[0].of(n)), [None; 3]);
+        let text = csv(&[plateau], &unknown);
+        assert!(text.starts_with("plateau,from_s,to_s,rows,pulse_us,pulse_us_se,rpm,rpm_se,"), "{text}");
+        assert!(text.ends_with(",,,,,,\n") && text.contains("\n1,1.000,2.000,10,1800,0,8000,0,5.1,0.05,"), "{text}");
+    }
+}

@@ -1,0 +1,195 @@
+//! Time stamps that cannot be what they say, with the likely reason.
+//!
+//! What it is: rows that are shuffled, rows that were dropped, seconds that are milliseconds, judged by the log's own time and by the
+//! `sample_hz` of its head.
+//! What can go wrong: uneven sampling is allowed: a log without `sample_hz` is judged by its order and its length alone, and one hole that the
+//! recorder has told (`no sample for ...`, a reset) counts as told.
+//! Units: s.
+//! Reference: specification `formats.md`, "Rig log".
+
+use super::{Lines, Log, Place, ReadError, trimmed};
+use std::io::BufRead;
+
+/// Share of rows that step back from which on they are shuffled rather than a clock that was set.
+const SHUFFLED: f64 = 0.2;
+/// Share of missing rows, and of holes among the steps, from which on rows were dropped.
+const DROPPED: [f64; 2] = [0.1, 0.08];
+/// Share of missing rows in one hole that nobody told of.
+const UNTOLD: f64 = 0.19;
+/// Rows below which no rate is judged.
+const ENOUGH: usize = 20;
+/// Step between whole numbers, s, and length of a run with such steps, s, above which they are no seconds.
+const NO_SECONDS: [f64; 2] = [5.0, 10_800.0];
+
+/// Why time steps back at `place`: the rest of the file says whether it is one row, another run, or every other row.
+pub(super) fn stepped_back<R: BufRead>(
+    value: f64,
+    log: &Log,
+    place: &Place<'_>,
+    rest: &mut Lines<'_, R>,
+) -> Result<ReadError, ReadError> {
+    let (mut last, mut rows, mut back) = (value, log.len() + 1, 1);
+    let mut line = String::new();
+    while rest.read_into(&mut line)? {
+        let Some(t) = first_field(&line) else { continue };
+        rows += 1;
+        back += usize::from(t < last);
+        last = t;
+    }
+    let before = log.t.last().copied().unwrap_or(value);
+    let start = log.t.first().copied().unwrap_or(value);
+    let reason = if back >= 3 && back as f64 >= SHUFFLED * rows as f64 {
+        format!("strictly increasing time; {back} of {rows} rows step back: the rows look shuffled, sort them by t_s")
+    } else if back == 1 && log.len() >= ENOUGH && value - start < 0.1 * (before - start) {
+        "strictly increasing time; a second run, or a clock that began anew: give each run a file of its own".to_owned()
+    } else {
+        let rows = if back == 1 { "one row steps".to_owned() } else { format!("{back} of {rows} rows step") };
+        format!("strictly increasing time; {rows} back (`quadrig import` repairs it by a stated rule)")
+    };
+    Ok(place.refuse(Some("t_s"), format!("{value} steps back from {before}"), reason))
+}
+
+/// The time stamp of a row.
+pub(super) fn first_field(line: &str) -> Option<f64> {
+    line.split(',').next()?.trim().parse().ok()
+}
+
+/// Refuses time stamps that contradict the log's own rate, or that are no seconds.
+pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
+    if log.time_is_row() || log.len() < 3 {
+        return Ok(());
+    }
+    let mut steps: Vec<f64> = log.t.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let middle = steps[steps.len() / 2];
+    let stated = log.meta.get("sample_hz").and_then(|v| v.as_float().or_else(|| v.as_integer().map(|n| n as f64)));
+    if stated.is_none()
+        && let Some(found) = log.meta.get("sample_hz")
+    {
+        return Err(Place { file: place.file, line: 1 }.refuse(
+            None,
+            format!("sample_hz = {found}"),
+            "a number of rows a second in the head",
+        ));
+    }
+    let refuse = |found: String, expected: String| Err(place.refuse(Some("t_s"), found, expected));
+    match stated.filter(|hz| hz.is_finite() && *hz > 0.0) {
+        Some(hz) => {
+            for (times, unit) in [(1e3, "milliseconds"), (1e6, "microseconds")] {
+                if (0.8 * times..1.25 * times).contains(&(middle * hz)) {
+                    let found = format!("rows {} s apart, where sample_hz says {} s", number(middle), number(1.0 / hz));
+                    return refuse(found, format!("seconds; these look like {unit}: divide t_s by {times}"));
+                }
+            }
+            if let Some(found) = dropped(log, &steps, hz) {
+                let expected =
+                    format!("a row each {} s; rows were dropped (a bad line, a filter, a thinned export)", number(1.0 / hz));
+                return refuse(found, format!("{expected}: use the whole log, or take sample_hz out of its head"));
+            }
+        }
+        None if no_seconds(log, middle) => {
+            let found = format!("whole numbers, {} apart, up to {}", number(middle), number(log.t[log.len() - 1]));
+            let way_out = format!("if they are seconds, say so in the head: # sample_hz = {}", number(1.0 / middle));
+            return refuse(found, format!("seconds; these look like milliseconds: divide t_s by 1000 ({way_out})"));
+        }
+        None => {}
+    }
+    Ok(())
+}
+
+/// Whole numbers so far apart, or so long, that no run was recorded like that.
+fn no_seconds(log: &Log, middle: f64) -> bool {
+    let length = log.t[log.len() - 1] - log.t[0];
+    log.t.iter().all(|t| t.fract() == 0.0) && (middle >= NO_SECONDS[0] || length >= NO_SECONDS[1])
+}
+
+/// What is missing of the rows that the rate promises, if it is much.
+fn dropped(log: &Log, steps: &[f64], hz: f64) -> Option<String> {
+    if log.len() < ENOUGH {
+        return None;
+    }
+    let holes: Vec<f64> = steps.iter().map(|step| (step * hz).round() - 1.0).filter(|missing| *missing >= 1.0).collect();
+    let missing: f64 = holes.iter().sum();
+    let promised = missing + log.len() as f64;
+    let scattered = missing >= DROPPED[0] * promised && holes.len() as f64 >= DROPPED[1] * steps.len() as f64;
+    let told = log.events.iter().any(|event| event.contains("no sample for") || event.contains("was reset"));
+    let largest = holes.iter().copied().fold(0.0, f64::max);
+    let untold = largest >= UNTOLD * promised && !told;
+    (scattered || untold).then(|| {
+        let holes = if holes.len() == 1 { "one hole".to_owned() } else { format!("{} holes", holes.len()) };
+        format!("{missing} of the {promised} rows are missing that sample_hz = {} promises, in {holes}", number(hz))
+    })
+}
+
+fn number(value: f64) -> String {
+    trimmed(value, 6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A log at 10 rows a second of which `keep` keeps some rows, with times multiplied by `scale`.
+    fn log(head: &str, scale: f64, keep: impl Fn(usize) -> bool) -> Result<Log, String> {
+        let rows: String =
+            (0..300).filter(|n| keep(*n)).map(|n| format!("{},1000,{n}\n", trimmed(0.1 * n as f64 * scale, 3))).collect();
+        let text = format!("# quadrig-log 1\n{head}t_s,pulse_us,rpm\n{rows}");
+        Log::parse("run.csv", text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    const RATE: &str = "# sample_hz = 10.0\n";
+
+    #[test]
+    fn dropped_rows_are_refused_where_a_rate_is_stated() {
+        let fifth = log(RATE, 1.0, |n| n % 5 != 3).expect_err("every fifth row is gone");
+        assert!(fifth.contains("column t_s: 60 of the 300 rows are missing"), "{fifth}");
+        assert!(fifth.contains("in 60 holes; expected a row each 0.1 s; rows were dropped"), "{fifth}");
+        let block = log(RATE, 1.0, |n| !(100..160).contains(&n)).expect_err("a fifth is gone");
+        assert!(block.contains("60 of the 300 rows are missing") && block.contains("one hole"), "{block}");
+        let thinned = log(RATE, 1.0, |n| n % 2 == 0).expect_err("every other row is gone");
+        assert!(thinned.contains("149 of the 299 rows"), "{thinned}");
+        // what the line loses now and then, a hole that the recorder has told, and a log that states no rate
+        log(RATE, 1.0, |n| n % 50 != 3).expect("a few rows");
+        log(&format!("{RATE}# event = \"16.000 s: no sample for 6.1 s before this one\"\n"), 1.0, |n| !(100..160).contains(&n))
+            .expect("it is told");
+        log("", 1.0, |n| n % 5 != 3).expect("uneven sampling is allowed");
+    }
+
+    #[test]
+    fn milliseconds_are_no_seconds() {
+        let stated = log(RATE, 1000.0, |_| true).expect_err("milliseconds");
+        assert!(stated.contains("rows 100 s apart, where sample_hz says 0.1 s; expected seconds"), "{stated}");
+        assert!(stated.contains("these look like milliseconds: divide t_s by 1000"), "{stated}");
+        assert!(
+            log(RATE, 1e6, |_| true).expect_err("microseconds").contains("these look like microseconds: divide t_s by 1000000")
+        );
+        let whole = log("", 1000.0, |_| true).expect_err("milliseconds");
+        assert!(whole.contains("whole numbers, 100 apart, up to 29900") && whole.contains("# sample_hz = 0.01"), "{whole}");
+        log("# sample_hz = 0.01\n", 1000.0, |_| true).expect("it says that rows are 100 s apart");
+        assert!(
+            log("# sample_hz = \"ten\"\n", 1.0, |_| true)
+                .expect_err("a word")
+                .contains("run.csv:1: sample_hz = \"ten\"; expected a number")
+        );
+        log("# time = \"row\"\n", 10_000.0, |_| true).expect("a table without time");
+    }
+
+    #[test]
+    fn steps_back_say_why() {
+        let text = |times: &[f64]| {
+            let rows: String = times.iter().map(|t| format!("{},1000,1\n", trimmed(*t, 3))).collect();
+            let text = format!("# quadrig-log 1\nt_s,pulse_us,rpm\n{rows}");
+            Log::parse("run.csv", text.as_bytes()).expect_err("it steps back").to_string()
+        };
+        let shuffled: Vec<f64> = (0..60).map(|n| f64::from(n * 7 % 60) / 10.0).collect();
+        assert!(text(&shuffled).contains("rows look shuffled, sort them by t_s"), "{}", text(&shuffled));
+        let twice: Vec<f64> = (0..40).chain(0..40).map(|n| f64::from(n) / 10.0).collect();
+        assert!(
+            text(&twice).contains("run.csv:43: column t_s: 0 steps back from 3.9") && text(&twice).contains("a second run"),
+            "{}",
+            text(&twice)
+        );
+        let once: Vec<f64> = (0..40).map(|n| if n == 20 { 1.95 } else { f64::from(n) / 10.0 }).chain([3.85]).collect();
+        assert!(text(&once).contains("one row steps back (`quadrig import`"), "{}", text(&once));
+    }
+}

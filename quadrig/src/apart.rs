@@ -1,0 +1,112 @@
+//! What a command reads and what it writes, kept apart.
+//!
+//! What it is: every command names its files before it begins ([`Paths`]); an output in the place of an input, or of another output, is
+//! refused, and nothing has been read or written yet.
+//! What can go wrong: files that lie in the same place under two names (a link, `./`) are the same file.
+//! Units: none.
+//! Reference: specification `formats.md`: no command writes over one of its own inputs.
+
+use crate::Failure;
+use std::path::{Path, PathBuf};
+
+/// The files and folders of one call.
+#[derive(Default)]
+pub(crate) struct Paths<'a> {
+    inputs: Vec<&'a Path>,
+    files: Vec<(&'static str, &'a Path)>,
+    folders: Vec<(&'static str, &'a Path)>,
+}
+
+impl<'a> Paths<'a> {
+    /// Files that are read.
+    pub(crate) fn reads<T: AsRef<Path> + ?Sized + 'a>(mut self, files: impl IntoIterator<Item = &'a T>) -> Self {
+        self.inputs.extend(files.into_iter().map(AsRef::as_ref));
+        self
+    }
+
+    /// A file that is written, under the name of its option.
+    pub(crate) fn writes(mut self, option: &'static str, file: impl IntoIterator<Item = &'a PathBuf>) -> Self {
+        self.files.extend(file.into_iter().map(|f| (option, f.as_path())));
+        self
+    }
+
+    /// A folder whose files are replaced.
+    pub(crate) fn fills(mut self, option: &'static str, folder: impl IntoIterator<Item = &'a PathBuf>) -> Self {
+        self.folders.extend(folder.into_iter().map(|f| (option, f.as_path())));
+        self
+    }
+
+    /// Refuses an output in the place of an input or of another output.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        for (n, (option, file)) in self.files.iter().enumerate() {
+            if self.inputs.iter().any(|input| is_same(input, file)) {
+                return Err(format!("{}: is an input of this command; expected another file for {option}", file.display()).into());
+            }
+            if let Some((other, _)) = self.files[..n].iter().find(|(_, other)| is_same(other, file)) {
+                return Err(format!("{}: stands for {other} and for {option}; expected a file for each", file.display()).into());
+            }
+        }
+        for (n, (option, folder)) in self.folders.iter().enumerate() {
+            let lies_in = |path: &Path| place(path).zip(place(folder)).is_some_and(|(path, folder)| path.starts_with(folder));
+            if let Some(input) = self.inputs.iter().find(|input| lies_in(input)) {
+                let expected = format!("expected another folder for {option}");
+                return Err(format!("{}: is an input and lies in the folder of the results; {expected}", input.display()).into());
+            }
+            let others = self.files.iter().chain(&self.folders[..n]);
+            if let Some((other, path)) = others.into_iter().find(|(_, path)| lies_in(path)) {
+                let expected = format!("expected another place for {other}");
+                return Err(format!(
+                    "{}: lies in the folder of {option}, which is replaced as a whole; {expected}",
+                    path.display()
+                )
+                .into());
+            }
+        }
+        Ok(())
+    }
+}
+
+fn is_same(a: &Path, b: &Path) -> bool {
+    place(a).zip(place(b)).is_some_and(|(a, b)| a == b)
+}
+
+/// Where a path leads, links followed; the last parts need not be there yet.
+fn place(path: &Path) -> Option<PathBuf> {
+    if let Ok(there) = path.canonicalize() {
+        return Some(there);
+    }
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Some(place_of_folder(parent)?.join(path.file_name()?))
+}
+
+fn place_of_folder(folder: &Path) -> Option<PathBuf> {
+    if folder == Path::new(".") { std::env::current_dir().ok() } else { place(folder) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn one_place_has_many_names() {
+        let at = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| at.path().join(name);
+        fs::create_dir(path("in")).expect("a folder");
+        fs::write(path("in/run.csv"), "").expect("a file");
+        let (run, round, new) = (path("in/run.csv"), path("in/../in/run.csv"), path("in/new.csv"));
+        let refusal = |paths: Paths| paths.check().expect_err("to be refused").to_string();
+        assert!(refusal(Paths::default().reads([&run]).writes("-o", [&round])).contains("is an input of this command"));
+        let twice = Paths::default().writes("-o", [&new]).writes("--truth", [&path("in/./new.csv")]).check();
+        assert!(twice.expect_err("to be refused").to_string().contains("for -o and for --truth"));
+        let (inside, outside, deep) = (path("in"), path("out"), path("out/a/b.csv"));
+        assert!(refusal(Paths::default().reads([&run]).fills("-o", [&inside])).contains("lies in the folder of the results"));
+        assert!(refusal(Paths::default().writes("--page", [&deep]).fills("-o", [&outside])).contains("replaced as a whole"));
+        Paths::default().reads([&run]).writes("-o", [&new]).fills("--svg", [&outside]).check().expect("all apart");
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(&run, path("link.csv")).expect("a link");
+            assert!(refusal(Paths::default().reads([&run]).writes("-o", [&path("link.csv")])).contains("is an input"));
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! What a model says of a powerplant from the command alone, as every peer needs it.
+//!
+//! What it is: settled speed, thrust, torque, current and voltage over the pulse; the rotor's lag; the quotients that peers ask for.
+//! What can go wrong: a model without thrust or without a command has no curve; a channel that it lacks is not known and is not made up.
+//! Units: SI, rev/min, us; `signal` is the share of the range from 1000 to 2000 us.
+//! Reference: specification `formats.md`, "Powerplant model".
+
+use crate::Failure;
+use crate::fly::rotor::ModelRotor;
+use hal_sim::mission::RotorCurves;
+use ident::model::Model;
+use std::f64::consts::TAU;
+use std::path::Path;
+
+/// Points of the curve.
+const POINTS: usize = 101;
+/// Share of full thrust at which thrust has begun.
+const BEGUN: f64 = 0.002;
+
+/// One settled state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Point {
+    /// Share of the pulse's range.
+    pub(super) signal: f64,
+    pub(super) rpm: f64,
+    pub(super) thrust_n: f64,
+    pub(super) torque_nm: Option<f64>,
+    pub(super) current_a: Option<f64>,
+    pub(super) voltage_v: Option<f64>,
+}
+
+/// The powerplant.
+#[derive(Debug, Clone)]
+pub(super) struct Powerplant {
+    /// From 1000 to 2000 us.
+    pub(super) points: Vec<Point>,
+    /// Time in which the rotor comes to 63 % of a small step about 1500 us, s.
+    pub(super) lag_s: f64,
+    /// The log that the model is from.
+    pub(super) source: String,
+    /// Motor and propeller, as the log's head named them.
+    pub(super) named: [Option<String>; 2],
+    /// Pairs of poles, where the head told them.
+    pub(super) pole_pairs: Option<i64>,
+    /// Resistance of the supply's lead, ohm, where the model holds one.
+    pub(super) lead_ohm: Option<f64>,
+}
+
+impl Powerplant {
+    /// Of a model file.
+    pub(super) fn of(path: &Path, model: &Model) -> Result<Self, Failure> {
+        let rotor = ModelRotor::new(model, 0.0).map_err(|why| format!("{}: the model predicts {why}", path.display()))?;
+        let has = |channel: &str| model.polynomials.iter().any(|p| p.channel == channel);
+        let [torque, current, voltage] = ["torque_nm", "current_a", "voltage_v"].map(has);
+        let point = |k: usize| {
+            let signal = k as f64 / (POINTS - 1) as f64;
+            let s = rotor.settled(1000.0 + 1000.0 * signal, 1.0);
+            Point {
+                signal,
+                rpm: s.rpm,
+                thrust_n: if s.rpm > 0.0 { s.thrust_n.max(0.0) } else { 0.0 },
+                torque_nm: torque.then_some(s.torque_nm),
+                current_a: current.then_some(s.current_a),
+                voltage_v: voltage.then_some(s.voltage_v),
+            }
+        };
+        let text = |key: &str| model.meta.get(key).and_then(toml::Value::as_str).map(str::to_owned);
+        let lead = model.effects.iter().find(|e| e.placed.effect.id() == "supply_sag");
+        let lead_ohm = lead.and_then(|e| e.estimates.iter().find(|e| e.name == "resistance")).map(|e| e.value);
+        let found = Self {
+            points: (0..POINTS).map(point).collect(),
+            lag_s: rotor.lag_s(),
+            source: model.source.clone(),
+            named: ["motor", "propeller"].map(text),
+            pole_pairs: model.meta.get("pole_pairs").and_then(toml::Value::as_integer),
+            lead_ohm,
+        };
+        if found.full_n() <= 0.0 {
+            return Err(format!(
+                "{}: the model gives no thrust at full throttle; expected one identified from a run that lifts",
+                path.display()
+            )
+            .into());
+        }
+        Ok(found)
+    }
+
+    /// Thrust at full throttle, N.
+    pub(super) fn full_n(&self) -> f64 {
+        self.points.last().map_or(0.0, |p| p.thrust_n)
+    }
+
+    /// Signal at which thrust begins.
+    pub(super) fn begins(&self) -> f64 {
+        let still = self.points.partition_point(|p| p.thrust_n <= BEGUN * self.full_n());
+        self.points[still.saturating_sub(1)].signal
+    }
+
+    /// Share of full thrust at a signal, between the points linearly.
+    pub(super) fn share(&self, signal: f64) -> f64 {
+        let place = signal.clamp(0.0, 1.0) * (POINTS - 1) as f64;
+        let k = (place as usize).min(POINTS - 2);
+        let (a, b) = (self.points[k].thrust_n, self.points[k + 1].thrust_n);
+        (a + (b - a) * (place - k as f64)) / self.full_n()
+    }
+
+    /// Share e of the square in thrust = (1 - e) x + e x^2, where x goes from 0 at `from` to 1 at full signal; least squares, within 0 to 1.
+    pub(super) fn square_share(&self, from: f64) -> f64 {
+        let (mut top, mut bottom) = (0.0, 0.0);
+        for p in self.points.iter().filter(|p| p.signal > from) {
+            let x = (p.signal - from) / (1.0 - from);
+            top += (p.thrust_n / self.full_n() - x) * (x * x - x);
+            bottom += (x * x - x).powi(2);
+        }
+        if bottom > 0.0 { (top / bottom).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
+    /// Farthest distance of a peer's curve (share of full thrust over signal) from the model's, per cent of full thrust.
+    pub(super) fn off_percent(&self, peer: impl Fn(f64) -> f64) -> f64 {
+        let off = |p: &Point| (peer(p.signal) - p.thrust_n / self.full_n()).abs();
+        100.0 * self.points.iter().map(off).fold(0.0, f64::max)
+    }
+
+    /// Thrust over the square of the angular speed, N.s^2, and torque over thrust, m, both at full throttle.
+    pub(super) fn quotients(&self) -> (f64, Option<f64>) {
+        let Some(top) = self.points.last() else { return (0.0, None) };
+        (top.thrust_n / (top.rpm * TAU / 60.0).powi(2), top.torque_nm.map(|q| q / top.thrust_n))
+    }
+
+    /// Supply at full throttle, V.
+    pub(super) fn supply_v(&self) -> Option<f64> {
+        self.points.last()?.voltage_v
+    }
+
+    /// Who turned what, for a head.
+    pub(super) fn title(&self) -> String {
+        let named = |k: usize, absent: &str| self.named[k].clone().unwrap_or_else(|| absent.to_owned());
+        let supply = self.supply_v().map_or_else(|| "supply not known".to_owned(), |v| format!("{v:.2} V at full throttle"));
+        format!("{} with {}, {supply}; model of {}", named(0, "motor not named"), named(1, "propeller not named"), self.source)
+    }
+
+    /// What most peers have no key for.
+    pub(super) fn beside(&self) -> Vec<String> {
+        let lag = format!("time constant of the rotor {:.4} s", self.lag_s);
+        let lead = self.lead_ohm.map(|r| format!("resistance of the supply's lead {r:.4} ohm"));
+        std::iter::once(lag).chain(lead).collect()
+    }
+}

@@ -1,0 +1,111 @@
+//! `quadrig export`: a model as the file of another program.
+//!
+//! What it is: thrust curve, motor constants, battery and delay as PX4, ArduPilot, Betaflight, Crazyflie, Simulink or a spreadsheet has them; each
+//! file says where its keys are defined, how far the peer's curve is from the model's, and what the model does not tell.
+//! What can go wrong: a model without thrust or command, or without what the peer cannot do without: refused, and nothing is written.
+//! Units: as the peer's.
+//! Reference: docs/export.md, with a link to each definition.
+
+mod ardupilot;
+mod betaflight;
+mod crazyflie;
+mod curve;
+mod px4;
+mod simulink;
+mod table;
+
+use crate::Failure;
+use crate::apart::Paths;
+use crate::trouble::unwritten;
+use clap::ValueEnum;
+use curve::Powerplant;
+use ident::log::write_whole;
+use ident::model::Model;
+use std::path::PathBuf;
+
+/// Whose file.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Peer {
+    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM.
+    Px4,
+    /// Parameter file: MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX, with --cells MOT_BAT_VOLT_MAX and _MIN.
+    Ardupilot,
+    /// Lines for the command line: thrust_linear, motor_kv, motor_poles, dshot_idle_value.
+    Betaflight,
+    /// C header: thrust over motor voltage, thrust_min and _max, torque over thrust.
+    Crazyflie,
+    /// MATLAB script with a structure of tables for lookup blocks.
+    Simulink,
+    /// Table of settled states over the pulse.
+    Csv,
+}
+
+/// Arguments.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The model.
+    model: PathBuf,
+    /// Whose file it is to be.
+    #[arg(long, value_enum)]
+    to: Peer,
+    /// Where it goes; standard output without it.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Cells in series of the battery that will fly, for the peers that ask; the model knows its own supply alone.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=14))]
+    cells: Option<u32>,
+    /// Rotors of the vehicle, for the peers that name each.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
+    rotors: u32,
+}
+
+impl Args {
+    /// What it reads and writes.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.model]).writes("-o", &self.output)
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let model = Model::read(&args.model)?;
+    let plant = Powerplant::of(&args.model, &model)?;
+    let text = match args.to {
+        Peer::Px4 => px4::text(&plant, args.rotors),
+        Peer::Ardupilot => ardupilot::text(&plant, args.cells),
+        Peer::Betaflight => betaflight::text(&plant),
+        Peer::Crazyflie => crazyflie::text(&plant).map_err(|why| format!("{}: {why}", args.model.display()))?,
+        Peer::Simulink => simulink::text(&plant),
+        Peer::Csv => table::text(&plant),
+    };
+    match &args.output {
+        Some(path) => {
+            write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
+            if !quiet {
+                println!("{}: {}", path.display(), plant.title());
+            }
+        }
+        None => print!("{text}"),
+    }
+    Ok(())
+}
+
+/// Lines of a head behind a comment sign.
+fn comments(sign: &str, lines: &[String]) -> String {
+    lines.iter().map(|line| format!("{sign} {line}\n")).collect()
+}
+
+/// How far the peer's curve is from the model's.
+fn off(percent: f64) -> String {
+    format!("its curve is within {percent:.2} % of full thrust of the model's")
+}
+
+/// Full thrust, for who reads the curve back.
+fn full(plant: &Powerplant) -> String {
+    format!("full thrust {:.5} N", plant.full_n())
+}
+
+/// What the peer has no key for, or the model no answer to.
+fn untold(lines: impl IntoIterator<Item = String>) -> Vec<String> {
+    lines.into_iter().map(|line| format!("not in this file: {line}")).collect()
+}

@@ -1,0 +1,55 @@
+//! PX4: a parameter file as QGroundControl writes and reads it.
+//!
+//! What it is: THR_MDL_FAC (thrust over signal), thrust and moment coefficients of each rotor, the output's range; the figures of Gazebo's motor
+//! model beside them as comments.
+//! What can go wrong: a model without torque has no moment coefficient.
+//! Units: PX4's: CT in N at full signal, KM in m.
+//! Reference: PX4 parameter reference; QGroundControl, file format of parameters.
+
+use super::{Powerplant, comments, full, off, untold};
+
+const DEFINED: [&str; 2] = [
+    "keys: https://docs.px4.io/main/en/advanced_config/parameter_reference.html",
+    "file: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/parameters.html",
+];
+/// Types of the file's last column (MAV_PARAM_TYPE).
+const INT32: u32 = 6;
+const REAL32: u32 = 9;
+
+/// The file.
+pub(super) fn text(plant: &Powerplant, rotors: u32) -> String {
+    let factor = plant.square_share(0.0);
+    let curve = |u: f64| (1.0 - factor) * u + factor * u * u;
+    let (k_thrust, arm) = plant.quotients();
+    let top_rad_s = plant.points.last().map_or(0.0, |p| p.rpm * std::f64::consts::TAU / 60.0);
+    let mut head = vec!["Onboard parameters".to_owned(), String::new(), plant.title(), full(plant)];
+    head.extend(DEFINED.map(str::to_owned));
+    head.push(format!(
+        "thrust = THR_MDL_FAC u^2 + (1 - THR_MDL_FAC) u, u the signal from 1000 to 2000 us; {}",
+        off(plant.off_percent(curve))
+    ));
+    let moment = arm.map_or_else(|| "not known".to_owned(), |arm| format!("{arm:.6}"));
+    head.push(format!(
+        "Gazebo MulticopterMotorModel: motorConstant {k_thrust:.6e}, momentConstant {moment}, maxRotVelocity {top_rad_s:.1}, timeConstantUp {:.4}",
+        plant.lag_s
+    ));
+    let no_moment = arm.is_none().then(|| "CA_ROTORn_KM: the model predicts no torque".to_owned());
+    let sign = "CA_ROTORn_KM is positive for rotors that turn counter-clockwise; turn the sign for the others".to_owned();
+    head.extend(arm.map(|_| sign));
+    head.extend(untold(no_moment.into_iter().chain(plant.beside())));
+    head.extend([String::new(), "Vehicle-Id Component-Id Name Value Type".to_owned()]);
+    let line = |name: &str, value: &str, kind: u32| format!("1\t1\t{name}\t{value}\t{kind}\n");
+    let mut out = comments("#", &head);
+    out += &line("CA_ROTOR_COUNT", &rotors.to_string(), INT32);
+    for k in 0..rotors {
+        out += &line(&format!("CA_ROTOR{k}_CT"), &format!("{:.6}", plant.full_n()), REAL32);
+        if let Some(arm) = arm {
+            out += &line(&format!("CA_ROTOR{k}_KM"), &format!("{arm:.6}"), REAL32);
+        }
+    }
+    for k in 1..=rotors {
+        out += &line(&format!("PWM_MAIN_MAX{k}"), "2000", INT32);
+        out += &line(&format!("PWM_MAIN_MIN{k}"), "1000", INT32);
+    }
+    out + &line("THR_MDL_FAC", &format!("{factor:.6}"), REAL32)
+}

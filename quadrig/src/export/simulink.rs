@@ -1,0 +1,49 @@
+//! Simulink: a MATLAB script that makes a structure of tables.
+//!
+//! What it is: settled states over the signal for one-dimensional lookup tables, the rotor's time constant for a first-order lag, quotients.
+//! What can go wrong: a channel that the model lacks is an empty matrix, and a comment says so.
+//! Units: in the names of the fields.
+//! Reference: MathWorks, block "1-D Lookup Table"; "Transfer Fcn".
+
+use super::curve::Point;
+use super::{Powerplant, comments, full, off, untold};
+
+const DEFINED: [&str; 2] = [
+    "table: https://www.mathworks.com/help/simulink/slref/1dlookuptable.html",
+    "lag: https://www.mathworks.com/help/simulink/slref/transferfcn.html, 1/(tau_s s + 1)",
+];
+
+/// The script.
+pub(super) fn text(plant: &Powerplant) -> String {
+    let mut head = vec![plant.title(), full(plant)];
+    head.extend(DEFINED.map(str::to_owned));
+    head.push(format!("linear between the points; {}", off(plant.off_percent(|u| plant.share(u)))));
+    let (k_thrust, arm) = plant.quotients();
+    let column = |of: fn(&Point) -> Option<f64>, digits: usize| {
+        let values: Option<Vec<String>> = plant.points.iter().map(|p| of(p).map(|v| format!("{v:.digits$}"))).collect();
+        values.map_or_else(|| "[]".to_owned(), |values| format!("[{}]", values.join(" ")))
+    };
+    type Of = fn(&Point) -> Option<f64>;
+    let fields: [(&str, Of, usize); 7] = [
+        ("signal", |p| Some(p.signal), 4),
+        ("pulse_us", |p| Some(1000.0 + 1000.0 * p.signal), 1),
+        ("rpm", |p| Some(p.rpm), 3),
+        ("thrust_n", |p| Some(p.thrust_n), 6),
+        ("torque_nm", |p| p.torque_nm, 7),
+        ("current_a", |p| p.current_a, 5),
+        ("voltage_v", |p| p.voltage_v, 5),
+    ];
+    let absent: Vec<String> = fields
+        .iter()
+        .filter(|(_, of, _)| plant.points.iter().any(|p| of(p).is_none()))
+        .map(|(name, ..)| format!("{name}: the model does not predict it"))
+        .collect();
+    head.extend(untold(absent));
+    let mut out = comments("%", &head) + "powerplant = struct();\n";
+    for (name, of, digits) in fields {
+        out += &format!("powerplant.{name} = {};\n", column(of, digits));
+    }
+    out += &format!("powerplant.tau_s = {:.5};\npowerplant.k_thrust_ns2 = {k_thrust:.6e};\n", plant.lag_s);
+    out += &format!("powerplant.torque_per_thrust_m = {};\n", arm.map_or_else(|| "[]".to_owned(), |arm| format!("{arm:.6}")));
+    out + &format!("powerplant.lead_ohm = {};\n", plant.lead_ohm.map_or_else(|| "[]".to_owned(), |r| format!("{r:.5}")))
+}

@@ -1,0 +1,229 @@
+//! A model exported to each peer and read back as that peer reads it.
+//!
+//! What it is: the built program on the model of a simulated run; each file's own formula gives thrust over the signal again, which is compared
+//! with the model's polynomials, evaluated here from `model.toml`.
+//! What can go wrong: a key that holds something else, a curve farther off than the file says, a figure that the model does not tell.
+//! Units: N, s, us.
+//! Reference: docs/export.md.
+
+use quadrig_tests::{call, root};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+const PEERS: [&str; 6] = ["px4", "ardupilot", "betaflight", "crazyflie", "simulink", "csv"];
+
+/// A folder with the model of a run, made once.
+fn bench() -> PathBuf {
+    static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let folder = MADE.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let scenario = "seed = 3\n[schedule]\nkind = \"staircase\"\nstep_us = 50\nhold_s = 5\ntop_us = 2000\n";
+        std::fs::write(folder.path().join("rig.toml"), scenario).expect("a scenario");
+        call(folder.path(), &["--quiet", "sim", "rig.toml", "-o", "run.csv"]).succeeded();
+        let log = std::fs::read_to_string(folder.path().join("run.csv")).expect("a log");
+        std::fs::write(
+            folder.path().join("run.csv"),
+            log.replacen("# quadrig-log 1\n", "# quadrig-log 1\n# pole_pairs = 7\n", 1),
+        )
+        .expect("a log");
+        call(folder.path(), &["--quiet", "identify", "run.csv", "-o", "model.toml"]).succeeded();
+        folder
+    });
+    folder.path().to_owned()
+}
+
+/// The model's thrust over the signal, from its polynomials alone.
+struct Model(toml::Table);
+
+impl Model {
+    fn read(path: &Path) -> Self {
+        Self(std::fs::read_to_string(path).expect("a model").parse().expect("TOML"))
+    }
+
+    fn polynomial(&self, channel: &str) -> Vec<f64> {
+        let table = self.0["channel"][channel].as_table().unwrap_or_else(|| panic!("{channel}"));
+        let of = |k: usize| table.iter().find(|(key, _)| key.starts_with(&format!("c{k}_")) && !key.ends_with("_se"));
+        (0..).map_while(of).map(|(_, v)| v.as_float().expect("a number")).collect()
+    }
+
+    fn rpm(&self, signal: f64) -> f64 {
+        let start = self.0["start_pulse_us"].as_float().expect("a pulse");
+        let speeds: Vec<&str> =
+            self.0["consensus"]["channels"].as_array().expect("channels").iter().filter_map(|c| c.as_str()).collect();
+        if 1000.0 + 1000.0 * signal <= start {
+            return 0.0;
+        }
+        let each = speeds.iter().map(|c| value(&self.polynomial(c), signal)).collect::<Vec<f64>>();
+        each.iter().sum::<f64>() / each.len() as f64
+    }
+
+    fn thrust(&self, signal: f64) -> f64 {
+        let polynomial = self.polynomial("thrust_n");
+        let rpm = self.rpm(signal);
+        if rpm <= 0.0 { 0.0 } else { value(&polynomial, rpm / 1000.0) - polynomial[0] }
+    }
+}
+
+fn value(polynomial: &[f64], x: f64) -> f64 {
+    polynomial.iter().rev().fold(0.0, |sum, c| sum * x + c)
+}
+
+fn exported(peer: &str, more: &[&str]) -> String {
+    call(&bench(), &[&["export", "model.toml", "--to", peer], more].concat()).succeeded().out
+}
+
+/// The number after a mark in a text.
+fn after(text: &str, mark: &str) -> f64 {
+    let rest = text.split(mark).nth(1).unwrap_or_else(|| panic!("{mark} in\n{text}"));
+    let number: String = rest.trim_start().chars().take_while(|c| c.is_ascii_digit() || ".-+e".contains(*c)).collect();
+    number.parse().unwrap_or_else(|_| panic!("{mark} {number:?}"))
+}
+
+/// The peer's curve against the model's: within what the file says of itself, and within `most` per cent of full thrust.
+#[track_caller]
+fn compare(text: &str, most: f64, thrust: impl Fn(f64) -> f64) {
+    let model = Model::read(&bench().join("model.toml"));
+    let full = model.thrust(1.0);
+    let said = after(text, "its curve is within");
+    assert!((after(text, "full thrust") / full - 1.0).abs() < 0.01, "{} N, the model's {full}", after(text, "full thrust"));
+    let worst = (0..=100)
+        .map(|k| f64::from(k) / 100.0)
+        .map(|u| (100.0 * (thrust(u) - model.thrust(u)).abs() / full, u))
+        .fold((0.0, 0.0), |a: (f64, f64), b| if b.0 > a.0 { b } else { a });
+    println!("within {:.2} % of full thrust at most (at {}), {said} said, {most} allowed", worst.0, worst.1);
+    // a percent for the discrepancy of the run, which the export carries and the bare polynomials do not
+    assert!(worst.0 <= said + 1.0 && said <= most, "{worst:?}, {said} said");
+}
+
+fn px4(text: &str) -> BTreeMap<String, f64> {
+    text.lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|line| {
+            let cells: Vec<&str> = line.split('\t').collect();
+            assert_eq!((cells.len(), cells[0], cells[1]), (5, "1", "1"), "{line}");
+            assert!(["6", "9"].contains(&cells[4]) && (cells[4] == "9" || cells[3].parse::<i64>().is_ok()), "{line}");
+            (cells[2].to_owned(), cells[3].parse().expect("a number"))
+        })
+        .collect()
+}
+
+#[test]
+fn px4_reads_it_back() {
+    let text = exported("px4", &[]);
+    let keys = px4(&text);
+    let factor = keys["THR_MDL_FAC"];
+    let full = keys["CA_ROTOR0_CT"];
+    compare(&text, 5.0, |u| full * (factor * u * u + (1.0 - factor) * u));
+    assert_eq!(
+        (keys["CA_ROTOR_COUNT"], keys.contains_key("CA_ROTOR3_KM"), keys.contains_key("CA_ROTOR4_CT")),
+        (4.0, true, false)
+    );
+    let model = Model::read(&bench().join("model.toml"));
+    let torque = model.polynomial("torque_nm");
+    let arm = (value(&torque, model.rpm(1.0) / 1000.0) - torque[0]) / model.thrust(1.0);
+    assert!((keys["CA_ROTOR0_KM"] / arm - 1.0).abs() < 0.03, "{} m, the model's {arm}", keys["CA_ROTOR0_KM"]);
+    assert!(
+        (after(&text, "motorConstant") / (full / (model.rpm(1.0) * std::f64::consts::TAU / 60.0).powi(2)) - 1.0).abs() < 0.02
+    );
+    assert_eq!(px4(&exported("px4", &["--rotors", "6"]))["CA_ROTOR_COUNT"], 6.0);
+}
+
+#[test]
+fn ardupilot_reads_it_back() {
+    let read = |text: &str| -> BTreeMap<String, f64> {
+        let lines = text.lines().filter(|l| !l.starts_with('#')).filter_map(|l| l.split_once(','));
+        lines.map(|(key, v)| (key.to_owned(), v.parse().expect("a number"))).collect()
+    };
+    let text = exported("ardupilot", &[]);
+    let keys = read(&text);
+    let (expo, from, to) = (keys["MOT_THST_EXPO"], keys["MOT_SPIN_MIN"], keys["MOT_SPIN_MAX"]);
+    compare(&text, 5.0, |u| {
+        let x = ((u - from) / (to - from)).clamp(0.0, 1.0);
+        after(&text, "full thrust") * ((1.0 - expo) * x + expo * x * x)
+    });
+    assert!(!keys.contains_key("MOT_BAT_VOLT_MAX") && text.contains("not in this file: MOT_BAT_VOLT_MAX"), "{text}");
+    let keys = read(&exported("ardupilot", &["--cells", "4"]));
+    assert_eq!((keys["MOT_BAT_VOLT_MAX"], keys["MOT_BAT_VOLT_MIN"]), (16.8, 13.2));
+}
+
+#[test]
+fn betaflight_reads_it_back() {
+    let text = exported("betaflight", &[]);
+    let set: BTreeMap<&str, f64> = text
+        .lines()
+        .filter_map(|l| l.strip_prefix("set ")?.split_once(" = "))
+        .map(|(key, v)| (key, v.parse().expect("a number")))
+        .collect();
+    let linear = set["thrust_linear"] / 100.0;
+    // the demand whose signal this is, by a fine search of its own
+    let demand = |u: f64| {
+        (0..=20_000).map(|k| f64::from(k) / 20_000.0).find(|x| x * (1.0 + linear * (1.0 - x) * (1.0 - x)) >= u).unwrap_or(1.0)
+    };
+    compare(&text, 10.0, |u| after(&text, "full thrust") * demand(u));
+    assert_eq!((set["motor_kv"], set["motor_poles"]), (570.0, 14.0));
+    assert!(text.ends_with("save\n") && (300.0..2000.0).contains(&set["dshot_idle_value"]), "{text}");
+}
+
+#[test]
+fn crazyflie_reads_it_back() {
+    let text = exported("crazyflie", &[]);
+    let define = |name: &str| after(&text, &format!("#define {name} "));
+    let coefficients: Vec<f64> = (0..4).map(|k| define(&format!("VMOTOR2THRUST{k}"))).collect();
+    let least = define("THRUST_MIN");
+    let supply = Model::read(&bench().join("model.toml")).polynomial("voltage_v")[0];
+    let model = Model::read(&bench().join("model.toml"));
+    compare(&text, 5.0, |u| if model.rpm(u) > 0.0 { value(&coefficients, u * supply) } else { 0.0 });
+    assert!(least > 0.0 && least < 0.2 * define("THRUST_MAX") && define("THRUST2TORQUE") > 0.0);
+    // a model without voltage cannot say it
+    let log = std::fs::read_to_string(bench().join("run.csv")).expect("a log").replace("voltage_v", "other_v");
+    std::fs::write(bench().join("no-voltage.csv"), log).expect("a log");
+    call(&bench(), &["--quiet", "identify", "no-voltage.csv", "-o", "no-voltage.toml"]).succeeded();
+    call(&bench(), &["export", "no-voltage.toml", "--to", "crazyflie", "-o", "x.h"]).refused(&[
+        "no-voltage.toml",
+        "no voltage",
+        "expected",
+    ]);
+    assert!(!bench().join("x.h").exists());
+}
+
+#[test]
+fn simulink_and_the_table_read_back() {
+    let text = exported("simulink", &[]);
+    let field = |name: &str| -> Vec<f64> {
+        let line = text.lines().find(|l| l.starts_with(&format!("powerplant.{name} = "))).unwrap_or_else(|| panic!("{name}"));
+        let inside = line.split('[').nth(1).and_then(|t| t.split(']').next()).unwrap_or_default();
+        inside.split_whitespace().map(|v| v.parse().expect("a number")).collect()
+    };
+    let (signal, thrust) = (field("signal"), field("thrust_n"));
+    assert_eq!((signal.len(), thrust.len(), field("torque_nm").len()), (101, 101, 101));
+    compare(&text, 0.01, |u| thrust[(u * 100.0).round() as usize]);
+    assert!(after(&text, "powerplant.tau_s =") > 0.0);
+    let table = exported("csv", &[]);
+    let rows: Vec<Vec<f64>> = table
+        .lines()
+        .filter(|l| !l.starts_with('#') && !l.starts_with("pulse_us"))
+        .map(|l| l.split(',').map(|c| c.parse().expect("a number")).collect())
+        .collect();
+    assert!(table.contains("\npulse_us,signal,rpm,thrust_n,torque_nm,current_a,voltage_v\n") && rows.len() == 101);
+    compare(&table, 0.01, |u| rows[(u * 100.0).round() as usize][3]);
+}
+
+/// Every file links to its peer's definition, twice gives the same bytes, and a file is written whole.
+#[test]
+fn every_peer_has_its_links() {
+    let page = std::fs::read_to_string(root().join("docs/export.md")).expect("docs/export.md");
+    for peer in PEERS {
+        let text = exported(peer, &[]);
+        let links: Vec<&str> =
+            text.split_whitespace().filter(|w| w.starts_with("https://")).map(|w| w.trim_end_matches(',')).collect();
+        assert!(!links.is_empty(), "{peer}");
+        for link in links {
+            assert!(page.contains(link), "docs/export.md lacks {link} of {peer}");
+        }
+        call(&bench(), &["--quiet", "export", "model.toml", "--to", peer, "-o", "out"]).succeeded();
+        assert_eq!(std::fs::read_to_string(bench().join("out")).expect("a file"), text, "{peer}");
+    }
+    call(&bench(), &["export", "run.csv", "--to", "px4"]).refused(&["run.csv:", "expected"]);
+    call(&bench(), &["export", "model.toml", "--to", "px4", "-o", "model.toml"]).refused(&["model.toml: is an input"]);
+}

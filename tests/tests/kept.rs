@@ -1,0 +1,92 @@
+//! Ctrl-C keeps what was recorded: `sim --live`, `rig run` and `log` are interrupted in mid-run.
+//!
+//! What it is: the built program is sent the signal that a terminal sends; the log that it leaves is whole, and a reader takes it.
+//! What can go wrong: a run that ends without a log, half a row, a part that is left beside it, a long run that starts without a word.
+//! Units: s.
+//! Reference: signal(7); specification `formats.md` ("nothing half-written").
+#![cfg(unix)]
+
+use quadrig_tests::{Said, call, quadrig};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+fn start(folder: &Path, words: &[&str]) -> Child {
+    let mut command = Command::new(quadrig());
+    command.args(words).current_dir(folder).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().expect("quadrig starts")
+}
+
+/// Waits for a line of the output that `wanted` knows, sends SIGINT, and waits for the end.
+fn interrupted(folder: &Path, words: &[&str], wanted: impl Fn(&str) -> bool) -> Said {
+    let mut child = start(folder, words);
+    let input = child.stdin.take(); // open, as a terminal's is
+    let mut lines = BufReader::new(child.stdout.take().expect("a pipe")).lines().map_while(Result::ok);
+    assert!(lines.any(|line| wanted(&line)), "it never came to the instant");
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
+    let rest: Vec<String> = lines.collect();
+    drop(input);
+    let said = Said::new(words, child.wait_with_output().expect("it ends"));
+    Said { out: rest.join("\n"), ..said }
+}
+
+/// Rows of the log; every other command reads it.
+fn rows(folder: &Path, name: &str) -> usize {
+    let log = ident::log::Log::read(&folder.join(name)).unwrap_or_else(|e| panic!("{e}"));
+    let names: Vec<_> = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").file_name()).collect();
+    assert!(!names.iter().any(|n| n.to_string_lossy().ends_with(".part")), "{names:?}");
+    log.len()
+}
+
+#[test]
+fn an_interrupted_live_run_keeps_its_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(
+        at.join("run.toml"),
+        "rest_s = 1.0\nschedule = { kind = \"staircase\", step_us = 500, hold_s = 300, top_us = 2000 }\n",
+    )
+    .expect("a scenario");
+    let words = ["sim", "run.toml", "-o", "run.csv", "--live", "--speed", "50", "--truth", "truth.csv"];
+    let second = |line: &str| line.split_whitespace().next().and_then(|s| s.parse::<f64>().ok()).unwrap_or(0.0);
+    let said = interrupted(at, &words, |line| line.contains("running") && second(line) > 20.0).succeeded();
+    assert!((50..5000).contains(&rows(at, "run.csv")), "{} rows of 902 s: {}", rows(at, "run.csv"), said.err);
+    assert!(at.join("truth.csv").is_file());
+    // it was announced before it began: 902 s at 50 times real time
+    assert!(said.err.contains("15 min of a run, at 50 times real time: about 18 s"), "{}", said.err);
+}
+
+#[test]
+fn an_interrupted_session_keeps_its_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let words = ["rig", "--port", "sim", "--speed", "20", "--assist", "run", "--hold", "60", "-o", "run.csv"];
+    let said = interrupted(at, &words, |line| line.contains("Running")).succeeded();
+    assert!(rows(at, "run.csv") > 10, "{}", said.err);
+    let words = ["log", "--port", "sim", "--speed", "20", "-o", "listened.csv"];
+    let mut child = start(at, &words);
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    drop(child.stdin.take());
+    assert!(sent.success() && child.wait().expect("it ends").success());
+    assert!(rows(at, "listened.csv") > 10);
+}
+
+/// A run of a day says how long it will take before it starts; a short one says nothing.
+#[test]
+fn a_long_simulation_is_announced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let scenario = |hold: f64| format!("schedule = {{ kind = \"steps\", steps = [{{ pulse_us = 1300, hold_s = {hold} }}] }}\n");
+    std::fs::write(at.join("day.toml"), scenario(86_400.0)).expect("a scenario");
+    let mut child = start(at, &["sim", "day.toml", "-o", "day.csv"]);
+    let mut line = String::new();
+    BufReader::new(child.stderr.take().expect("a pipe")).read_line(&mut line).expect("a line");
+    child.kill().expect("it ends");
+    let _ = child.wait();
+    assert!(line.starts_with("24.0 h of a run, at ") && line.contains(" times real time: about "), "{line}");
+    assert!(!at.join("day.csv").exists());
+    std::fs::write(at.join("short.toml"), scenario(5.0)).expect("a scenario");
+    assert_eq!(call(at, &["sim", "short.toml", "-o", "short.csv"]).succeeded().err, "");
+}

@@ -1,0 +1,559 @@
+//! Malformed input of every kind, in one table: logs, models, scenarios, missions, schedules, configurations, calibrations, arguments, outputs.
+//!
+//! What it is: each case is a call that must end with status 1 and one line, which says where, what, and what was expected; what lay in the
+//! folder before lies there after, byte for byte, and nothing else.
+//! What can go wrong: a fault that is accepted, a place that is wrong, an input that is written over, a file that is left behind.
+//! Units: as the columns and keys state.
+//! Reference: specification `formats.md`; docs/errors.md.
+
+use quadrig_tests::bench::{Bench, HEAD, good_log};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// One malformed input, and a call that meets it.
+struct Case {
+    name: &'static str,
+    /// The file that is wrong, and what stands in it; none where the call itself is.
+    file: Option<(&'static str, Vec<u8>)>,
+    words: &'static str,
+    /// What the line must hold beside what was expected.
+    said: &'static [&'static str],
+}
+
+fn with(
+    name: &'static str,
+    file: &'static str,
+    text: impl Into<Vec<u8>>,
+    words: &'static str,
+    said: &'static [&'static str],
+) -> Case {
+    Case { name, file: Some((file, text.into())), words, said }
+}
+
+fn alone(name: &'static str, words: &'static str, said: &'static [&'static str]) -> Case {
+    Case { name, file: None, words, said }
+}
+
+/// The good log, its rows changed.
+fn rows(change: impl Fn(Vec<String>) -> Vec<String>) -> String {
+    let text = good_log();
+    let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let (head, rows) = lines.split_at(HEAD);
+    [head.to_vec(), change(rows.to_vec())].concat().join("\n") + "\n"
+}
+
+fn row(n: usize, change: impl Fn(&str) -> String) -> String {
+    rows(|mut rows| {
+        rows[n] = change(&rows[n]);
+        rows
+    })
+}
+
+fn times(change: impl Fn(f64) -> String) -> String {
+    let changed = |row: &String| {
+        let (t, rest) = row.split_once(',').expect("a row has commas");
+        format!("{},{rest}", change(t.parse().expect("a time")))
+    };
+    rows(|rows| rows.iter().map(changed).collect())
+}
+
+const IDENTIFY: &str = "identify bad.csv -o out.toml";
+
+fn logs() -> Vec<Case> {
+    let head = |from: &str, to: &str| good_log().replacen(from, to, 1);
+    let shuffled = rows(|rows| (0..rows.len()).map(|n| rows[n * 131 % rows.len()].clone()).collect());
+    let twice = rows(|rows| [rows.clone(), rows].concat());
+    vec![
+        with("shuffled rows", "bad.csv", shuffled, IDENTIFY, &["bad.csv:8: column t_s", "rows look shuffled, sort them by t_s"]),
+        with("two runs in one", "bad.csv", twice, IDENTIFY, &["bad.csv:424: column t_s: 0 steps back from 41.9", "a second run"]),
+        with(
+            "every fifth row dropped",
+            "bad.csv",
+            rows(|rows| rows.into_iter().enumerate().filter(|(n, _)| n % 5 != 2).map(|(_, r)| r).collect()),
+            IDENTIFY,
+            &["bad.csv:4: column t_s: 84 of the 420 rows are missing", "rows were dropped"],
+        ),
+        with(
+            "a fifth of the rows dropped",
+            "bad.csv",
+            rows(|rows| rows.into_iter().enumerate().filter(|(n, _)| n * 7919 % 97 >= 20).map(|(_, r)| r).collect()),
+            "close-loop bad.csv -o out",
+            &["bad.csv:4: column t_s", "rows are missing that sample_hz = 10 promises"],
+        ),
+        with(
+            "the third fifth dropped",
+            "bad.csv",
+            rows(|rows| [&rows[..168], &rows[252..]].concat()),
+            "plateaus bad.csv",
+            &["bad.csv:4: column t_s: 84 of the 420 rows", "in one hole"],
+        ),
+        with(
+            "thinned without a word",
+            "bad.csv",
+            rows(|rows| rows.into_iter().step_by(2).collect()),
+            "step residual bad.csv",
+            &["bad.csv:4: column t_s: 209 of the 419 rows"],
+        ),
+        with(
+            "milliseconds",
+            "bad.csv",
+            times(|t| format!("{:.0}", 1000.0 * t)),
+            IDENTIFY,
+            &["bad.csv:4: column t_s: rows 100 s apart", "these look like milliseconds: divide t_s by 1000"],
+        ),
+        with(
+            "microseconds",
+            "bad.csv",
+            times(|t| format!("{:.0}", 1e6 * t)),
+            "predict model.toml bad.csv -o out.csv",
+            &["these look like microseconds"],
+        ),
+        with(
+            "milliseconds without a rate",
+            "bad.csv",
+            times(|t| format!("{:.0}", 1000.0 * t)).replace("# sample_hz = 10.0\n", ""),
+            IDENTIFY,
+            &["bad.csv:3: column t_s: whole numbers, 100 apart", "milliseconds"],
+        ),
+        with("a rate in words", "bad.csv", head("10.0", "\"ten\""), IDENTIFY, &["bad.csv:1: sample_hz = \"ten\""]),
+        with(
+            "semicolons",
+            "bad.csv",
+            good_log().replace(',', ";"),
+            IDENTIFY,
+            &["bad.csv:3: semicolons between the columns", "`quadrig import`"],
+        ),
+        with("tabs", "bad.csv", good_log().replace(',', "\t"), IDENTIFY, &["bad.csv:3: tabs between the columns"]),
+        with("decimal commas", "bad.csv", good_log().replace('.', ","), IDENTIFY, &["bad.csv:4: ", "decimal points"]),
+        with("bytes", "bad.csv", (0..=255_u8).cycle().take(4096).collect::<Vec<u8>>(), IDENTIFY, &["bad.csv"]),
+        with("nothing", "bad.csv", "", IDENTIFY, &["bad.csv"]),
+        with("no rows", "bad.csv", rows(|_| Vec::new()), IDENTIFY, &["bad.csv:", "no data rows"]),
+        with("another version", "bad.csv", head("log 1", "log 9"), IDENTIFY, &["bad.csv:1: '# quadrig-log 9'"]),
+        with(
+            "time is not first",
+            "bad.csv",
+            head("t_s,pulse_us", "pulse_us,t_s"),
+            IDENTIFY,
+            &["bad.csv:3: column pulse_us: not the time column"],
+        ),
+        with("a column twice", "bad.csv", head("current_a", "rpm"), IDENTIFY, &["bad.csv:3: column rpm: it stands twice"]),
+        with("a column without a name", "bad.csv", head("current_a", ""), IDENTIFY, &["bad.csv:3: column 5 has no name"]),
+        with(
+            "grams",
+            "bad.csv",
+            head("thrust_n", "thrust_g"),
+            IDENTIFY,
+            &["bad.csv:3: column thrust_g", "thrust_n; convert the values"],
+        ),
+        with(
+            "milliamperes",
+            "bad.csv",
+            head("current_a", "current_ma"),
+            IDENTIFY,
+            &["bad.csv:3: column current_ma", "current_a"],
+        ),
+        with(
+            "pulses in ms",
+            "bad.csv",
+            row(100, |row| row.replacen(",1200.0,", ",1.2,", 1).replacen(",1350.0,", ",1.35,", 1)),
+            IDENTIFY,
+            &["bad.csv:104: column pulse_us: 1.2", "500 to 2500 us"],
+        ),
+        with(
+            "not a number",
+            "bad.csv",
+            row(50, |row| row.replacen(",1000.0,", ",NaN,", 1)),
+            IDENTIFY,
+            &["bad.csv:54: column pulse_us: 'NaN'"],
+        ),
+        with("a word", "bad.csv", row(60, |row| format!("{}x", row)), IDENTIFY, &["bad.csv:64: column voltage_v: '"]),
+        with(
+            "a row cut short",
+            "bad.csv",
+            row(70, |row| row[..row.len() - 8].to_owned()),
+            IDENTIFY,
+            &["bad.csv:74: column voltage_v: the row ends before it"],
+        ),
+        with("a field too many", "bad.csv", row(70, |row| format!("{row},1")), IDENTIFY, &["bad.csv:74: 7 fields"]),
+        with(
+            "a time without a value",
+            "bad.csv",
+            row(80, |row| row[row.find(',').expect("a comma")..].to_owned()),
+            IDENTIFY,
+            &["bad.csv:84: column t_s: an empty field"],
+        ),
+        with(
+            "a time twice",
+            "bad.csv",
+            row(80, |row| row.replacen("8.0,", "7.9,", 1)),
+            IDENTIFY,
+            &["bad.csv:84: column t_s: 7.9 repeats the row before"],
+        ),
+        with(
+            "a time that steps back",
+            "bad.csv",
+            row(80, |row| row.replacen("8.0,", "7.0,", 1)),
+            IDENTIFY,
+            &["bad.csv:84: column t_s: 7 steps back from 7.9", "one row steps back"],
+        ),
+        with("two rows", "bad.csv", rows(|rows| rows[..2].to_vec()), IDENTIFY, &["bad.csv", "more than 8 common samples"]),
+        with(
+            "channels without values",
+            "bad.csv",
+            rows(|rows| rows.iter().map(|r| format!("{},,,,,", r.split(',').next().expect("a time"))).collect()),
+            IDENTIFY,
+            &["bad.csv"],
+        ),
+        alone("a log that is not there", "close-loop nowhere.csv", &["nowhere.csv: cannot be read", "check name and folder"]),
+        alone("a folder in the place of a log", "identify . -o out.toml", &[".: "]),
+        with(
+            "an attitude log in the place of a rig log",
+            "bad.csv",
+            "t_s,gx,gy,gz,ax,ay,az\n0,0,0,0,0,0,9.8\n",
+            IDENTIFY,
+            &["bad.csv"],
+        ),
+        alone("a rig log in the place of an attitude log", "ahrs good.csv out.csv", &["good.csv:3: ", "gx,gy,gz"]),
+        with(
+            "an attitude log without its accelerometer",
+            "bad.csv",
+            "t_s,gx,gy,gz,ax,ay\n0,0,0,0,0,0\n",
+            "ahrs bad.csv out.csv",
+            &["bad.csv:1: ", "ax,ay,az"],
+        ),
+        with(
+            "attitude times that step back",
+            "bad.csv",
+            "t_s,gx,gy,gz,ax,ay,az\n0,0,0,0,0,0,9.8\n1,0,0,0,0,0,9.8\n0.5,0,0,0,0,0,9.8\n",
+            "ahrs bad.csv out.csv",
+            &["bad.csv:4: column t_s: 0.5 does not come after 1"],
+        ),
+        with(
+            "a table of pairs with a word",
+            "bad.csv",
+            "motor,propeller,thrust_n,current_a\nA,B,x,1\n",
+            "select bad.csv",
+            &["bad.csv:2: column thrust_n: 'x'"],
+        ),
+    ]
+}
+
+fn models() -> Vec<Case> {
+    const PREDICT: &str = "predict bad.toml good.csv -o out.csv";
+    vec![
+        alone(
+            "a log in the place of a model",
+            "predict good.csv good.csv -o out.csv",
+            &["good.csv:3: ", "a model written by `quadrig identify`"],
+        ),
+        alone("a model that is not there", "close-loop good.csv --model nowhere.toml", &["nowhere.toml: cannot be read"]),
+        with("a model of another format", "bad.toml", "format = \"mine 1\"\n", PREDICT, &["bad.toml"]),
+        with("a model cut short", "bad.toml", "format = \"quadrig-model 1\"\n[channel.rpm", PREDICT, &["bad.toml:2"]),
+        with("a flight that is no flight", "bad.toml", "duration_s = 2\n", "fly bad.toml --model good.csv", &["good.csv:3: "]),
+    ]
+}
+
+fn scenarios() -> Vec<Case> {
+    const SIM: &str = "sim bad.toml -o out.csv";
+    let case = |name, text: &str, said| with(name, "bad.toml", text, SIM, said);
+    vec![
+        case("no TOML", "seed = \n", &["bad.toml:1:8: "]),
+        case("a key that is none", "seed = 1\nmoter = \"570KV\"\n", &["bad.toml:2:1: unknown field `moter`", "`motor`"]),
+        case("a key twice", "seed = 1\nseed = 2\n", &["bad.toml:2:1: duplicate key"]),
+        case("a seed below 0", "\nseed = -1\n", &["bad.toml:2:8: seed: ", "a whole number from 0"]),
+        case("a motor that is none", "motor = \"571KV\"\n", &["bad.toml:1:9: motor: ", "570KV"]),
+        case("a rate that does not divide", "[log]\nrate_hz = 7\n", &["bad.toml:2:11: rate_hz: ", "divides 1000, found 7"]),
+        case(
+            "a hold below 0",
+            "[schedule]\nkind = \"staircase\"\nstep_us = 50\nhold_s = -3\ntop_us = 2000\n",
+            &["bad.toml:4:10: hold_s: ", "found -3"],
+        ),
+        case(
+            "a hold without an end",
+            "[schedule]\nkind = \"steps\"\nsteps = [\n  { pulse_us = 1200, hold_s = 5 },\n  { pulse_us = 1500, hold_s = 1e9 },\n]\n",
+            &["bad.toml:5:31: hold_s: ", "up to 86400 s"],
+        ),
+        case(
+            "a pulse in per cent",
+            "[schedule]\nkind = \"steps\"\nsteps = [\n  { pulse_us = 1200, hold_s = 5 },\n  { pulse_us = 7.5, hold_s = 5 },\n]\n",
+            &["bad.toml:5:16: pulse_us: ", "1000 to 2000 us, found 7.5"],
+        ),
+        case("no steps", "[schedule]\nkind = \"steps\"\nsteps = []\n", &["bad.toml:3:9: steps: ", "at least one step"]),
+        case(
+            "a schedule of no kind",
+            "[schedule]\nkind = \"stairs\"\n",
+            &["bad.toml:2:8: kind: unknown variant `stairs`", "`staircase`"],
+        ),
+        case(
+            "a schedule without its step",
+            "seed = 1\n[schedule]\nkind = \"staircase\"\nhold_s = 3\ntop_us = 2000\n",
+            &["bad.toml:2:1: missing field `step_us`"],
+        ),
+        case(
+            "a schedule file that is not there",
+            "schedule = { kind = \"file\", file = \"nowhere.toml\" }\n",
+            &["nowhere.toml: cannot be read"],
+        ),
+        case(
+            "an effect that is none",
+            "seed = 1\n[[effect]]\nid = \"gremlin\"\n",
+            &["bad.toml:3:6: id: unknown variant `gremlin`", "`supply_sag`"],
+        ),
+        case(
+            "an effect without its size",
+            "\n[[effect]]\nid = \"supply_sag\"\n",
+            &["bad.toml:2:1: missing field `resistance_ohm`"],
+        ),
+        case(
+            "an effect with a word for its size",
+            "[[effect]]\nid = \"supply_sag\"\nresistance_ohm = \"much\"\n",
+            &["bad.toml:3:18: resistance_ohm: ", "a number"],
+        ),
+        case(
+            "no cells",
+            "[supply]\nkind = \"lipo\"\ncells = 0\ncapacity_ah = 4\nresistance_ohm = 0.01\n",
+            &["bad.toml:3:9: cells: ", "1 to 14"],
+        ),
+        case("a rest that is no number", "rest_s = nan\n", &["bad.toml:1:10: rest_s: "]),
+        case(
+            "a run that the firmware stops",
+            "[schedule]\nkind = \"steps\"\nsteps = [{ pulse_us = 2000, hold_s = 5 }]\n[[effect]]\nid = \"supply_sag\"\nresistance_ohm = 3.0\n",
+            &["the rig stopped itself while it was running", "under-voltage"],
+        ),
+        with(
+            "a scenario of the other board",
+            "bad.toml",
+            "[imu]\n",
+            "isolability bad.toml",
+            &["bad.toml: describes the IMU board"],
+        ),
+        alone("a scenario that is not there", "loop nowhere.toml", &["nowhere.toml: cannot be read"]),
+        alone("a log in the place of pins", "sim empty.toml --replay good.csv -o out.csv", &["good.csv", "quadrig pins"]),
+    ]
+}
+
+fn missions() -> Vec<Case> {
+    let case = |name, text: &str, said| with(name, "bad.toml", text, "fly bad.toml -o out", said);
+    vec![
+        case("a mission with a key that is none", "nme = \"x\"\n", &["bad.toml:1:1: unknown field `nme`", "`name`"]),
+        case("a mission that ends before it begins", "duration_s = -1\n", &["bad.toml:1:14: duration_s: "]),
+        case(
+            "a fifth rotor",
+            "duration_s = 2\n[[command]]\nrotors = [1, 5]\nsteps = [{ pulse_us = 1700, hold_s = 1 }]\n",
+            &["bad.toml:3:14: ", "a rotor from 1 to 4, found 5"],
+        ),
+        case(
+            "a pulse out of range",
+            "duration_s = 2\n[[command]]\nrotors = [1]\nsteps = [\n  { pulse_us = 1700, hold_s = 1 },\n  { pulse_us = 170, hold_s = 1 },\n]\n",
+            &["bad.toml:6:16: pulse_us: ", "found 170"],
+        ),
+        case("an airframe that is not there", "airframe = \"nowhere.toml\"\n", &["nowhere.toml: cannot be read"]),
+        case("pulses that are not there", "pulses = \"nowhere.csv\"\n", &["nowhere.csv: cannot be read"]),
+    ]
+}
+
+fn schedules() -> Vec<Case> {
+    let case = |name, text: &str, said| with(name, "bad.toml", text, "rig --port sim --speed 0 run bad.toml -o out.csv", said);
+    vec![
+        case(
+            "a schedule with a pulse out of range",
+            "[[part]]\nkind = \"hold\"\npulse_us = 2500\nhold_s = 1\n",
+            &["bad.toml:3:12: pulse_us: ", "found 2500"],
+        ),
+        case("a part of no kind", "[[part]]\nkind = \"hld\"\n", &["bad.toml:2:8: ", "\"hld\"", "hold, staircase"]),
+        case(
+            "a part with a key that is none",
+            "[[part]]\nkind = \"hold\"\npulse_us = 1500\nhold_s = 1\nhld = 2\n",
+            &["bad.toml:5:1: ", "\"hld\"", "hold_s"],
+        ),
+        case(
+            "a part without its hold",
+            "[[part]]\nkind = \"hold\"\npulse_us = 1500\n",
+            &["bad.toml:2:8: a hold: expected hold_s"],
+        ),
+        case("a schedule of no parts", "name = \"x\"\n", &["bad.toml:1:1: ", "part"]),
+        alone(
+            "a schedule that is not there",
+            "rig --port sim --speed 0 run nowhere.toml -o out.csv",
+            &["nowhere.toml: cannot be read"],
+        ),
+        with(
+            "a verdict that proposes nothing",
+            "bad.json",
+            "{}",
+            "rig --port sim --speed 0 run --next bad.json -o out.csv",
+            &["bad.json:1:1: ", "no next experiment"],
+        ),
+    ]
+}
+
+fn boards() -> Vec<Case> {
+    vec![
+        alone("no port", "rig status", &["--port with the serial port of the board"]),
+        alone("a port that is not there", "rig --port /dev/nothing status", &["/dev/nothing", "or sim for a virtual board"]),
+        alone("a pulse for no ESC", "rig --port sim --speed 0 set 5000", &["5000 us", "1000 to 2000 us"]),
+        alone(
+            "a pulse before arming",
+            "rig --port sim --speed 0 set 1500",
+            &["the board refuses: not in this state", "`quadrig rig status`"],
+        ),
+        alone("a setting that is none", "rig --port sim --speed 0 configure colour 5", &["colour: no such setting", "log-ms"]),
+        with(
+            "a configuration with a key that is none",
+            "bad.toml",
+            "rate_hz = 10\nfoo = 1\n",
+            "rig --port sim --speed 0 configure bad.toml",
+            &["bad.toml:2:1: unknown field `foo`", "`rate_hz`"],
+        ),
+        with(
+            "an ESC of no kind",
+            "bad.toml",
+            "[esc]\noutput = \"x\"\n",
+            "rig --port sim --speed 0 configure bad.toml",
+            &["bad.toml:2:10: ", "`pwm`"],
+        ),
+        alone(
+            "a range calibration without a word",
+            "rig --port sim --speed 0 calibrate",
+            &["MAXIMUM pulses", "--esc-is-unpowered"],
+        ),
+        alone(
+            "a word that the IMU board does not know",
+            "imu --port sim --speed 0 dance",
+            &["\"dance\" is no command", "`quadrig imu --help`"],
+        ),
+        alone(
+            "a virtual board's option at a serial port",
+            "log --port /dev/nothing --assist -o out.csv",
+            &["--assist belongs to a virtual board", "--port sim"],
+        ),
+        with(
+            "a recording that was cut off",
+            "out.csv.part",
+            "# quadrig-log 1\n",
+            "log --port sim --speed 0 --seconds 1 -o out.csv",
+            &["out.csv.part: left by a recording that was cut off"],
+        ),
+        alone("values that are none", "calibrate loadcell -i good.csv --points 0_x -o out.toml", &["\"0_x\"", "200 g"]),
+        alone("a log without codes", "recalibrate good.csv --with model.toml -o out.csv", &["model.toml"]),
+    ]
+}
+
+fn arguments() -> Vec<Case> {
+    vec![
+        alone("a beam without width", "beam --width 0", &["--width 0", "a positive number"]),
+        alone("a beam of no number", "beam --modulus nan", &["--modulus NaN"]),
+        alone("a motor that nobody measured", "select --motor 1KV", &["--motor 1KV", "570KV"]),
+        alone("a battery without charge", "select --capacity 0", &["--capacity 0", "a positive number"]),
+        alone("a declination beyond the pole", "ahrs good.csv out.csv --declination 700", &["--declination 700", "-180 to 180"]),
+        alone("a channel that is none", "plateaus good.csv --channel thrust", &["no column thrust", "thrust_n"]),
+        alone("data that are not there", "measured nowhere -o out", &["nowhere", "no such folder"]),
+        alone(
+            "from a command that was not logged",
+            "predict model.toml no-command.csv -o out.csv --from command",
+            &["no-command.csv: no column pulse_us"],
+        ),
+    ]
+}
+
+fn outputs() -> Vec<Case> {
+    vec![
+        alone("identify over its log", "identify good.csv -o good.csv", &["good.csv: is an input of this command"]),
+        alone("by another name", "identify good.csv -o ./full/../good.csv", &["good.csv: is an input of this command"]),
+        alone("predict over its model", "predict model.toml good.csv -o model.toml", &["model.toml: is an input"]),
+        alone("import over its export", "import good.csv -o good.csv", &["good.csv: is an input"]),
+        alone("sim over its scenario", "sim empty.toml -o empty.toml", &["empty.toml: is an input"]),
+        alone("sim over its model", "sim empty.toml --model model.toml -o model.toml", &["model.toml: is an input"]),
+        alone("sim over its schedule", "sim on-file.toml -o plan.toml", &["plan.toml: is an input"]),
+        alone("a page over the log", "identify good.csv -o out.toml --report good.csv", &["good.csv: is an input", "--report"]),
+        alone("a page over the pairs", "select good.csv -o good.csv", &["good.csv: is an input"]),
+        alone("a page over the run", "beam --run good.csv -o good.csv", &["good.csv: is an input"]),
+        alone("an attitude over its readings", "ahrs good.csv good.csv", &["good.csv: is an input"]),
+        alone("recalibrated in place", "recalibrate good.csv --with model.toml -o good.csv", &["good.csv: is an input"]),
+        alone(
+            "a recording over its schedule",
+            "rig --port sim --speed 0 run plan.toml -o plan.toml",
+            &["plan.toml: is an input"],
+        ),
+        alone("a recording over its board", "log --port sim:empty.toml --speed 0 -o empty.toml", &["empty.toml: is an input"]),
+        alone(
+            "two outputs in one file",
+            "sim empty.toml -o out.csv --truth out.csv",
+            &["out.csv: stands for -o and for --truth"],
+        ),
+        alone(
+            "results among their inputs",
+            "close-loop good.csv -o .",
+            &["good.csv: is an input and lies in the folder of the results"],
+        ),
+        alone("results among the notes of somebody", "close-loop good.csv -o full", &["full: holds notes.txt"]),
+        alone("a demonstration among notes", "demo --seed 1 -o full", &["full: holds notes.txt"]),
+        alone("isolability among notes", "isolability good.csv -o full", &["full: holds notes.txt"]),
+        alone("a loop among notes", "loop empty.toml -o full", &["full: holds notes.txt"]),
+        alone("a flight among notes", "fly short.toml -o full", &["full: holds notes.txt"]),
+        alone("runs among notes", "runs -o full", &["full: holds notes.txt"]),
+        alone("detectors among notes", "plateaus good.csv -o full", &["full: holds notes.txt"]),
+        alone("pages of effects among notes", "effects -o full", &["full: holds notes.txt"]),
+        alone("figures among notes", "select --svg full", &["full: holds notes.txt"]),
+        alone("a folder that is a file", "close-loop good.csv -o model.toml", &["model.toml: ", "a folder"]),
+        alone("a folder that is not there", "identify good.csv -o absent/out.toml", &["absent/out.toml: cannot be written"]),
+    ]
+}
+
+/// Everything in a folder, with its bytes.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if path.is_dir() {
+            found.extend(contents(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
+        } else {
+            found.insert(name, std::fs::read(&path).expect("a file"));
+        }
+    }
+    found
+}
+
+#[test]
+fn malformed_input_is_refused_in_one_line_that_teaches() {
+    let bench = Bench::new();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(bench.path(name), bytes).expect("a file");
+    std::fs::create_dir(bench.path("full")).expect("a folder");
+    write("full/notes.txt", b"mine");
+    write("empty.toml", b"");
+    write("short.toml", b"duration_s = 1\n");
+    write("plan.toml", b"[[part]]\nkind = \"hold\"\npulse_us = 1200\nhold_s = 1\n");
+    write("on-file.toml", b"schedule = { kind = \"file\", file = \"plan.toml\" }\n");
+    let without_command = |line: &str| match line.split(',').collect::<Vec<_>>()[..] {
+        [t, _, ref rest @ ..] if !line.starts_with('#') => format!("{t},{}\n", rest.join(",")),
+        _ => format!("{line}\n"),
+    };
+    write("no-command.csv", good_log().lines().map(without_command).collect::<String>().as_bytes());
+    let lists = [logs(), models(), scenarios(), missions(), schedules(), boards(), arguments(), outputs()];
+    let cases: Vec<Case> = lists.into_iter().flatten().collect();
+    assert!(cases.len() >= 70, "{} cases", cases.len());
+    let mut wrong = Vec::new();
+    for case in &cases {
+        if let Some((file, bytes)) = &case.file {
+            write(file, bytes);
+        }
+        let before = contents(bench.folder());
+        let words: Vec<&str> = case.words.split(' ').collect();
+        let said = bench.call(&words);
+        let lacks: Vec<&str> = case.said.iter().chain(&["expected"]).copied().filter(|text| !said.err.contains(text)).collect();
+        if said.status != Some(1) || said.err.lines().count() != 1 || !said.out.is_empty() || !lacks.is_empty() {
+            wrong.push(format!(
+                "{}: `quadrig {}`: status {:?}, lacks {lacks:?}\n  {}{}",
+                case.name, case.words, said.status, said.err, said.out
+            ));
+        }
+        if contents(bench.folder()) != before {
+            wrong.push(format!("{}: `quadrig {}` changed the folder", case.name, case.words));
+        }
+        if let Some((file, _)) = &case.file {
+            std::fs::remove_file(bench.path(file)).expect("it is there");
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {} cases:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}

@@ -1,0 +1,334 @@
+//! `cargo xtask errors`: docs/errors.md, every refusal of the command line, from the source that says it.
+//!
+//! What it is: the texts that hold "expected", and the arguments of every `refuse(...)`, gathered area by area; what stands in braces in the source is
+//! a place for a value (`...`). For the board's refusals what to do is written here.
+//!
+//! What can go wrong: an area without a refusal, a reason of the board without advice; the page that is not the source's: a test fails.
+//!
+//! Units: none.
+//!
+//! Reference: docs/errors.md; `tests/tests/refusals.rs` provokes more than a hundred of them.
+
+use crate::place::Place;
+use crate::run::Failure;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// What a part of the page is called, and the files or folders whose refusals stand in it.
+const AREAS: [(&str, &[&str]); 11] = [
+    (
+        "Any file and folder",
+        &[
+            "quadrig/src/trouble.rs",
+            "quadrig/src/apart.rs",
+            "quadrig/src/folder.rs",
+            "quadrig/src/spool.rs",
+            "quadrig/src/end.rs",
+        ],
+    ),
+    (
+        "Rig logs",
+        &["ident/src/log.rs", "ident/src/log", "ident/src/close.rs", "quadrig/src/identify.rs", "quadrig/src/plateaus.rs"],
+    ),
+    ("Imports", &["ident/src/import", "quadrig/src/import.rs"]),
+    ("Models and exports", &["ident/src/model.rs", "ident/src/model", "quadrig/src/predict.rs", "quadrig/src/export"]),
+    (
+        "Attitude logs and flights",
+        &[
+            "ident/src/flight_log.rs",
+            "ident/src/flight",
+            "ident/src/inertial",
+            "quadrig/src/ahrs.rs",
+            "quadrig/src/ahrs",
+            "quadrig/src/close_loop",
+        ],
+    ),
+    (
+        "Scenarios, missions, simulation",
+        &[
+            "hal-sim/src/scenario",
+            "hal-sim/src/mission",
+            "hal-sim/src/native",
+            "quadrig/src/sim.rs",
+            "quadrig/src/sim",
+            "quadrig/src/fly",
+            "quadrig/src/isolability.rs",
+        ],
+    ),
+    ("Schedules", &["schedule/src"]),
+    (
+        "Boards and ports",
+        &[
+            "quadrig/src/rig.rs",
+            "quadrig/src/rig",
+            "quadrig/src/record.rs",
+            "quadrig/src/record",
+            "quadrig/src/board.rs",
+            "quadrig/src/port.rs",
+            "quadrig/src/imu.rs",
+            "quadrig/src/virtual_port.rs",
+            "quadrig/src/view",
+            "quadrig/src/flash.rs",
+            "virtual-board/src",
+        ],
+    ),
+    ("Calibration", &["quadrig/src/calibrate.rs", "quadrig/src/calibrate", "quadrig/src/recalibrate.rs"]),
+    ("Selection and beam", &["ident/src/select", "quadrig/src/select.rs", "quadrig/src/beam.rs"]),
+    ("Recorded sets", &["quadrig/src/measured"]),
+];
+
+/// What to do about each reason of the board, in the order of its bits.
+const BOARD: [(&str, &str); 16] = [
+    ("not in this state", "`quadrig rig status` says the state; arm first, or stop first"),
+    ("a fault is latched: clear it first", "mend its cause, then `quadrig rig clear`"),
+    ("throttle is not at minimum", "`quadrig rig stop`, then ask again"),
+    ("no low-throttle interval since the last run", "leave it at minimum for a moment, then ask again"),
+    ("the ESC is powered", "disconnect the ESC's battery first"),
+    ("confirmation is missing", "use this program's command, which confirms"),
+    ("a value is out of range", "see the ranges in configuration.md"),
+    ("the schedule is empty", "give it a part; see schedule.md"),
+    ("the rotor turns", "wait until it stands"),
+    ("the frame is not newer than the last one", "set the clock of the computer, or reset the board"),
+    ("the settings could not be stored", "try `quadrig rig save` again; if it stays, the flash is worn out"),
+    (
+        "the supply reads off but was never seen on: switch the ESC on and off once, then ask again",
+        "as it says: the board must have seen its voltage channel work",
+    ),
+    (
+        "neither a speed sensor nor the current is fitted: nothing would see the rotor turn",
+        "fit one, and configure it; see configuration.md",
+    ),
+    ("the stop loop is open: let the key go, check plug and wire", "as it says; see wiring.md"),
+    ("too little of the schedule is there to begin with", "a line that loses much: `quadrig rig status` counts it"),
+    ("DShot has no throttle range to calibrate", "nothing is to be done"),
+];
+
+const HEAD: &str = "\
+# Refusals
+
+Written by `cargo xtask errors` from the source. A refusal is one line on standard error: `quadrig: FILE:LINE: what is there; expected what should be`, with what
+to try where it is not plain; exit status 1. Nothing is written then, and what was there stays. `...` stands for a name, a place or a value. Wrong usage (an option
+that is none, a value that no option takes) is status 2, and `--help` says what there is.
+";
+
+/// Writes the page.
+pub(crate) fn write(place: &Place) -> Result<(), Failure> {
+    let path = place.root.join("docs/errors.md");
+    let text = page(&place.root).map_err(Failure)?;
+    std::fs::write(&path, text).map_err(|e| Failure(format!("{}: {e}", path.display())))
+}
+
+fn page(root: &Path) -> Result<String, String> {
+    let mut out = HEAD.to_owned();
+    for (heading, places) in AREAS {
+        let mut rows = BTreeSet::new();
+        for file in places.iter().flat_map(|place| sources(&root.join(place))) {
+            let text = std::fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+            rows.extend(refusals(&text));
+        }
+        let _ = write!(out, "\n## {heading}\n\n| it says | it expected, and what to try |\n| --- | --- |\n"); // a string takes everything
+        for (found, expected) in rows {
+            let _ = writeln!(out, "| {} | {} |", cell(&found), cell(&expected));
+        }
+    }
+    out += "\n## What a board refuses\n\nThe board gives every reason at once, behind `the board refuses:`.\n\n| it says | what to do |\n| --- | --- |\n";
+    for (says, todo) in BOARD {
+        let _ = writeln!(out, "| {says} | {todo} |");
+    }
+    Ok(out)
+}
+
+/// The source files of a place, in order; tests in files of their own are none.
+fn sources(place: &Path) -> Vec<PathBuf> {
+    if place.is_file() {
+        return vec![place.to_owned()];
+    }
+    let Ok(entries) = std::fs::read_dir(place) else { return Vec::new() };
+    let mut paths: Vec<PathBuf> = entries.filter_map(Result::ok).map(|e| e.path()).collect();
+    paths.sort();
+    let is_source = |p: &PathBuf| p.extension().is_some_and(|e| e == "rs") && p.file_stem().is_some_and(|n| n != "tests");
+    paths
+        .iter()
+        .flat_map(|p| {
+            if p.is_dir() {
+                sources(p)
+            } else if is_source(p) {
+                vec![p.clone()]
+            } else {
+                Vec::new()
+            }
+        })
+        .collect()
+}
+
+/// What a source refuses: what is found, and what was expected.
+fn refusals(source: &str) -> Vec<(String, String)> {
+    let code = source.split("#[cfg(test)]").next().unwrap_or_default();
+    let literals = literals(code);
+    let mut out = Vec::new();
+    for literal in &literals {
+        if let Some((found, expected)) = literal.text.split_once("expected ") {
+            let before = code[..literal.start].trim_end();
+            let of_expect = before.ends_with(".expect(") || before.ends_with("expect_err(");
+            let is_whole = found.is_empty() || found.ends_with([' ', ':', ';', '(']);
+            if !of_expect && is_whole && !expected.is_empty() {
+                out.push((found.trim_end_matches([' ', ';', ':']).to_owned(), expected.to_owned()));
+            }
+        }
+    }
+    // place.refuse(column, found, expected): the word itself stands in the type's own text
+    for (at, call) in code.match_indices(".refuse(") {
+        let end = closing(code, at + call.len());
+        // the column's name is no part of what is said
+        let is_column = |l: &Literal| code[..l.start].ends_with("Some(");
+        let inside: Vec<&str> = literals
+            .iter()
+            .filter(|l| !is_column(l))
+            .filter(|l| l.start > at && l.start < end)
+            .map(|l| l.text.as_str())
+            .filter(|t| t.len() > 2)
+            .collect();
+        match inside[..] {
+            [] => {}
+            [expected] if !expected.contains("expected ") => out.push((String::new(), expected.to_owned())),
+            [found, ref expected @ ..] if !found.contains("expected ") && !expected.is_empty() => {
+                out.push((found.to_owned(), expected.join(" ")));
+            }
+            _ => {}
+        }
+    }
+    out
+}
+
+/// A text of the source.
+struct Literal {
+    start: usize,
+    text: String,
+}
+
+/// The texts of a source, values in braces as three dots; comments hold none.
+fn literals(code: &str) -> Vec<Literal> {
+    let bytes = code.as_bytes();
+    let (mut out, mut at) = (Vec::new(), 0);
+    while at < bytes.len() {
+        match bytes[at] {
+            b'/' if bytes.get(at + 1) == Some(&b'/') => at += code[at..].find('\n').unwrap_or(code.len() - at),
+            b'\'' => at += character(bytes, at),
+            b'"' => {
+                let end = ending(bytes, at + 1);
+                out.push(Literal { start: at, text: plain(&code[at + 1..end]) });
+                at = end + 1;
+            }
+            _ => at += 1,
+        }
+    }
+    out
+}
+
+/// Length of a character in quotes, or of the quote of a lifetime.
+fn character(bytes: &[u8], at: usize) -> usize {
+    match (bytes.get(at + 1), bytes.get(at + 2)) {
+        (Some(b'\\'), _) => 2 + bytes[at + 2..].iter().skip(1).position(|b| *b == b'\'').map_or(1, |k| k + 2),
+        (Some(_), Some(b'\'')) => 3,
+        _ => 1,
+    }
+}
+
+/// Where a text ends.
+fn ending(bytes: &[u8], mut at: usize) -> usize {
+    while at < bytes.len() && bytes[at] != b'"' {
+        at += if bytes[at] == b'\\' { 2 } else { 1 };
+    }
+    at.min(bytes.len())
+}
+
+/// The parenthesis that closes what begins at `from`.
+fn closing(code: &str, from: usize) -> usize {
+    let mut depth = 1;
+    for (k, c) in code[from..].char_indices() {
+        depth += match c {
+            '(' => 1,
+            ')' => -1,
+            _ => 0,
+        };
+        if depth == 0 {
+            return from + k;
+        }
+    }
+    code.len()
+}
+
+/// A text as it is printed, with dots for what is filled in.
+fn plain(literal: &str) -> String {
+    let text = literal.replace("\\\"", "\"").replace("\\n", " ").replace("\\t", " ").replace("{{", "(").replace("}}", ")");
+    let mut out = String::new();
+    let mut depth = 0;
+    for c in text.chars() {
+        match c {
+            '{' => depth += 1,
+            '}' if depth > 0 => {
+                depth -= 1;
+                out.push_str("...");
+            }
+            c if depth == 0 => out.push(c),
+            _ => {}
+        }
+    }
+    out.split_whitespace().filter(|word| *word != "\\").collect::<Vec<_>>().join(" ") + if out.ends_with(' ') { " " } else { "" }
+}
+
+fn cell(text: &str) -> String {
+    let text = text.trim().replace('|', "\\|").replace('<', "&lt;");
+    if text.is_empty() { "...".to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refusals_are_found_as_they_are_printed() {
+        let source = r#"
+            // "a comment; expected nothing"
+            let a = format!("{}: {column} is \"late\"; expected seconds: sort {them}", 1);
+            let b = x.expect("expected as a habit");
+            return Err(place.refuse(Some(name), format!("{n} fields"), "6 as in the header"));
+            let c = ['"', '\'', 'x'];
+            #[error("no effect {0:?}; expected one of {list}")]
+            #[cfg(test)]
+            let d = "in a test; expected nothing";
+        "#;
+        let wanted = [
+            ("...: ... is \"late\"", "seconds: sort ..."),
+            ("no effect ...", "one of ..."),
+            ("... fields", "6 as in the header"),
+        ];
+        let wanted: Vec<(String, String)> = wanted.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect();
+        assert_eq!(refusals(source), wanted);
+    }
+
+    #[test]
+    fn the_page_is_the_sources() {
+        let root = Place::find().root;
+        let page = page(&root).expect("sources");
+        for (heading, _) in AREAS {
+            let part = page.split(&format!("\n## {heading}\n")).nth(1).and_then(|t| t.split("\n## ").next()).unwrap_or_default();
+            assert!(part.lines().count() > 5, "{heading}: {part}");
+        }
+        assert!(page.lines().filter(|l| l.starts_with("| ")).count() > 200);
+        let there = std::fs::read_to_string(root.join("docs/errors.md")).expect("docs/errors.md");
+        assert!(there == page, "docs/errors.md is not what the source says: cargo xtask errors");
+    }
+
+    /// Each reason of the board has its advice, in its own words.
+    #[test]
+    fn every_reason_of_the_board_has_advice() {
+        let source = std::fs::read_to_string(Place::find().root.join("frame/src/rig.rs")).expect("the source");
+        let list =
+            source.split("pub const WORDS: [(u16, &'static str)").nth(1).and_then(|t| t.split("];").next()).expect("its words");
+        let words: Vec<String> = literals(list).into_iter().map(|l| l.text).collect();
+        let told: Vec<&str> = BOARD.iter().map(|b| b.0).collect();
+        assert_eq!(words, told);
+    }
+}
