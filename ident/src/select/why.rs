@@ -78,7 +78,7 @@ mod tests {
             said.contains("N/A, most thrust for each ampere of the 3 that meet every need; next 570KV with 11x4.5"),
             "{said}"
         );
-        assert!(said.contains("570KV with 10x4.5 gives 0.8") && said.contains("of 19.62 N in total"), "{said}");
+        assert!(said.contains("570KV with 9x4.5x3 gives 0.94") && said.contains("of 19.62 N in total"), "{said}");
         let patient = Need { full_throttle_min: Minute(8.8), ..need };
         assert!(why(&rows, &choose(&rows, &patient), &patient).contains("the only one of 6 that meets every need"));
     }
