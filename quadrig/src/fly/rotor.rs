@@ -19,8 +19,9 @@ use ident::model::{AddedEffect, Model};
 use std::sync::Arc;
 
 /// Effects that belong to the rotor, its motor, its ESC or its supply, and fly.
-const FLIES: [&str; 12] = [
+const FLIES: [&str; 13] = [
     "supply_sag",
+    "supply_voltage",
     "battery_discharge",
     "spinup_lag",
     "rotor_inertia",
