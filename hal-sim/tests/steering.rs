@@ -195,7 +195,7 @@ fn refusals_name_the_place() {
         ("[imu]\nrest_s = -1\n", "m.toml:2:10: ", "not below 0"),
         ("[imu]\nchips = \"good\"\n", "m.toml:2:9: ", "calibrated"),
         ("[controller]\nway = []\n", "m.toml:2:7: ", "at least one"),
-        ("[controller]\nway = [{ at_s = 2, up_m = 1 }, { at_s = 2, up_m = 1 }]\n", "m.toml:2:7: ", "after 2 s"),
+        ("[controller]\nway = [{ at_s = 2, up_m = 1 }, { at_s = 2, up_m = 1 }]\n", "m.toml:2:41: ", "after 2 s"),
         ("[controller]\n[controller.gains]\nrate = 3\n", "m.toml:3:1: ", "rate_p"),
         ("[[failure]]\nrotor = 5\nat_s = 1\n", "m.toml:2:9: ", "from 1 to 4"),
         ("[[failure]]\nchip = \"compass\"\nat_s = 1\n", "m.toml:2:8: ", "magnetometer"),

@@ -103,6 +103,6 @@ fn what_cannot_be_traced_is_refused_with_its_reason() {
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(done.status.code() == Some(1) && said.contains("short.csv: 10.0 s long; at least 20"), "{said}");
+    assert!(done.status.code() == Some(1) && said.contains("short.csv: 10.0 s long; expected at least 20"), "{said}");
     assert!(!bench.path().join("out").exists());
 }

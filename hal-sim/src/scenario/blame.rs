@@ -52,12 +52,16 @@ pub(super) fn blame<T: DeserializeOwned>(text: &str, error: &Error) -> (usize, O
             }
         })
         .collect();
-    // the innermost one whose value the refusal quotes; else the innermost one that the table can do without
+    // the innermost one whose value the refusal quotes, the last of several; else the list that it is placed at; else the innermost
+    // one that the table can do without
     let innermost = |wanted: &dyn Fn(&(&Piece, bool)) -> bool| {
-        guilty.iter().filter(|found| wanted(found)).min_by_key(|(piece, _)| piece.whole.len()).map(|(piece, _)| *piece)
+        guilty.iter().rev().filter(|found| wanted(found)).min_by_key(|(piece, _)| piece.whole.len()).map(|(piece, _)| *piece)
     };
-    let found =
-        innermost(&|(piece, _)| told(piece)).or_else(|| innermost(&|(_, needed)| !needed)).or_else(|| innermost(&|_| true));
+    let list = || pieces.iter().find(|p| error.span().is_some_and(|s| s == p.value) && text[p.value.clone()].starts_with('['));
+    let found = innermost(&|(piece, _)| told(piece))
+        .or_else(list)
+        .or_else(|| innermost(&|(_, needed)| !needed))
+        .or_else(|| innermost(&|_| true));
     let unknown = error.message().starts_with("unknown field");
     found.map_or((start, None), |piece| (if unknown { piece.whole.start } else { piece.place }, Some(piece.key.clone())))
 }
