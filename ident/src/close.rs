@@ -7,7 +7,7 @@
 
 use crate::bad;
 use crate::conclude::{Quoted, quoted};
-use crate::context::{Context, DIFFERENCES, Relation, Target, unit_of};
+use crate::context::{Context, DIFFERENCES, Relation, Target, is_contrast, unit_of};
 use crate::correction::without_correction;
 use crate::course;
 use crate::diagnose::Diagnosis;
@@ -183,7 +183,7 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Channel
 }
 
 /// Why a speed has no prediction.
-const NO_COMMAND: &str = "no command was logged";
+pub(crate) const NO_COMMAND: &str = "no command was logged";
 
 /// Held-out error of a channel that was measured in one of the five blocks of the run only, so that no fold predicts it: its own time is
 /// cut into five. Not a number where even that leaves too little; what the fit saw never stands in its place.
@@ -211,8 +211,7 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
             let estimates = p.effect.report(context, &p.instance, estimates);
             let shapes = p.effect.shapes(context, &p.instance);
             let Quoted { channel: first, of_news, reduction } = quoted(context, p, &d.heldout_after, &d.heldout_without[k]);
-            let mut channels: Vec<String> =
-                p.instance.channels.iter().filter(|c| !DIFFERENCES.iter().any(|d| d.1 == *c)).cloned().collect();
+            let mut channels: Vec<String> = p.instance.channels.iter().filter(|c| !is_contrast(c)).cloned().collect();
             if let Some(at) = channels.iter().position(|c| *c == first) {
                 channels.swap(0, at);
             }

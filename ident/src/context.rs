@@ -76,7 +76,7 @@ impl Relation {
             "current_a" => Self::Current,
             "thrust_n" => Self::Thrust,
             "thrust_rms_n" => Self::ThrustRms,
-            c if DIFFERENCES.iter().any(|d| d.1 == c) => Self::SpeedDifference,
+            c if is_contrast(c) => Self::SpeedDifference,
             _ => return None,
         })
     }
@@ -95,6 +95,12 @@ pub const DIFFERENCES: [(&str, &str); 4] = [
     ("rpm_hall", "rpm_hall_difference"),
     ("rpm_encoder", "rpm_encoder_difference"),
 ];
+
+/// Whether a channel is what one speed sensor reads beyond the others.
+#[must_use]
+pub fn is_contrast(channel: &str) -> bool {
+    DIFFERENCES.iter().any(|d| d.1 == channel)
+}
 
 /// Unit of a modelled channel.
 #[must_use]

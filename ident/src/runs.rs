@@ -15,7 +15,7 @@ use crate::experiment;
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::log::Log;
 use crate::model::Model;
-use crate::rivals::Rival;
+use crate::rivals::{Rival, TEMPERATURE};
 use crate::search::refine;
 use crate::verdict::NextExperiment;
 
@@ -23,9 +23,6 @@ use crate::verdict::NextExperiment;
 const RIVALS: usize = 4;
 /// Evaluations that a hypothesis may spend on its shapes on a run that it does not come from.
 const EVALUATIONS: usize = 80;
-/// Softmax temperature from score to probability: scores count samples as far as the residual's colour leaves them independent,
-/// but not the misfit that all models share.
-const TEMPERATURE: f64 = 4.0;
 /// Share of the leader's probability at which another hypothesis keeps the question open.
 const OPEN: f64 = 0.5;
 /// Share of the noise floor below which a smaller residual counts no further.

@@ -107,6 +107,31 @@ fn runs_at_other_supply_voltages_are_one_rig() {
     assert!(alone.verdict.effects.iter().all(|e| e.id != "supply_voltage"));
 }
 
+/// A torque that one run alone has is not predicted, and is said to be so; it moves no other figure to another channel.
+#[test]
+fn a_channel_of_one_run_is_said_to_be_of_one_run() {
+    let folder = TempDir::new().unwrap();
+    let logs: Vec<Log> = (1..=3).map(|n| flown(folder.path(), n, "", LEAD)).collect();
+    let has_torque = |log: &Log| log.columns.iter().any(|c| c.name == "torque_nm");
+    assert!(logs.iter().all(has_torque));
+    let without = |mut log: Log| {
+        log.columns.retain(|c| c.name != "torque_nm");
+        log
+    };
+    let whole = together(logs.clone()).1.verdict;
+    let mut logs = logs.into_iter();
+    let (first, others) = (logs.next().unwrap(), logs.map(without));
+    let v = together(std::iter::once(first).chain(others).collect()).1.verdict;
+    assert_eq!(v.channels.not_predicted.get("torque_nm").map(String::as_str), Some("no second run measured it"));
+    assert!(v.runs.iter().all(|r| !r.channels.contains_key("torque_nm")));
+    for (run, as_whole) in v.runs.iter().zip(&whole.runs) {
+        for (channel, b) in &run.channels {
+            let same = as_whole.channels[channel];
+            assert!((b.before / same.before - 1.0).abs() < 0.1, "{} {channel}: {b:?} {same:?}", run.run);
+        }
+    }
+}
+
 #[test]
 fn the_command_writes_the_rig_and_each_run_and_refuses_what_is_no_set_of_runs() {
     let folder = TempDir::new().unwrap();

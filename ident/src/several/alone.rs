@@ -5,7 +5,8 @@
 //! Units: as the channels.
 //! Reference: specification `closing-the-loop.md`.
 
-use super::outcome::{Run, in_parallel};
+use super::Run;
+use super::parallel::in_parallel;
 use crate::close::{CloseError, close};
 use crate::log::Log;
 use std::sync::Mutex;

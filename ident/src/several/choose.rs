@@ -6,7 +6,8 @@
 //! Units: scores in nats.
 //! Reference: forward selection by cross-validation over groups, Hastie et al. 2009, section 7.10.
 
-use super::joint::{Across, Joint, Shared};
+use super::joint::{Across, Compared, Joint, Shared, compared};
+use super::words::typical;
 use super::{FEWEST, Member};
 use crate::close::Closed;
 use crate::context::Context;
@@ -77,20 +78,17 @@ pub(super) fn choose(runs: &[&Closed], members: &[Member<'_>], progress: &mut dy
     let mut now = joint.across(&rig, None);
     for round in 0.. {
         progress(1.0 - 0.6_f64.powi(round));
-        let Some((at, placed, gain, then)) = best(&joint, &rig, &now, &pool) else { break };
+        let Some((at, placed, then)) = best(&joint, &rig, &now, &pool) else { break };
         rig.push(placed);
         pool.swap_remove(at);
         now = then;
-        if gain < NEEDED_EVIDENCE {
-            break;
-        }
         drop_useless(&joint, &mut rig, &mut now);
     }
     let scores: Vec<f64> = (0..rig.len()).map(|k| gain_of(&joint, &rig, &now, k).0).collect();
     rig.into_iter().zip(scores).map(|(placed, score)| Named { placed, score }).collect()
 }
 
-type Joined = (usize, Placed, f64, Vec<Across>);
+type Joined = (usize, Placed, Vec<Across>);
 
 /// The candidate by which the runs predict each other best, its shapes sought on all of them; `None` where none helps enough.
 fn best(joint: &Joint<'_, '_>, rig: &[Placed], now: &[Across], pool: &[Vec<Placed>]) -> Option<Joined> {
@@ -107,8 +105,9 @@ fn best(joint: &Joint<'_, '_>, rig: &[Placed], now: &[Across], pool: &[Vec<Place
         let with = joint.refined(&with, &[rig.len()], SOUGHT, EVALUATIONS);
         let newest = &with[rig.len()];
         let (gain, then) = tried(joint, rig, now, newest);
-        if gain > NEEDED_EVIDENCE && is_worth(now, &then) && harms(now, &then).is_none() && is_plausible(joint, &with) {
-            return Some((at, newest.clone(), gain, then));
+        let compared = compared(now, &then);
+        if gain > NEEDED_EVIDENCE && is_worth(&compared) && harms(&compared).is_none() && is_plausible(joint, &with) {
+            return Some((at, newest.clone(), then));
         }
     }
     None
@@ -122,13 +121,9 @@ fn may_stand_beside(rig: &[Placed], newcomer: &Placed) -> bool {
 }
 
 /// Whether it takes enough off the error of one of its channels, on average over the runs, to be worth a name.
-fn is_worth(before: &[Across], after: &[Across]) -> bool {
-    let gone = |channel: &str| {
-        let own = before.iter().zip(after).filter(|(b, _)| b.channel == channel);
-        let (sum, n) = own.fold((0.0, 0.0), |(s, n), (b, a)| (s + (b.rms.max(b.floor) / a.rms.max(a.floor)).ln(), n + 1.0));
-        1.0 - f64::exp(-sum / n)
-    };
-    before.iter().any(|b| gone(b.channel) > NEEDED_REDUCTION)
+fn is_worth(compared: &[Compared]) -> bool {
+    let gone = |channel: &str| 1.0 - 1.0 / typical(compared.iter().filter(|c| c.before.channel == channel).map(Compared::times));
+    compared.iter().any(|c| gone(c.before.channel) > NEEDED_REDUCTION)
 }
 
 /// What a newcomer adds to how well the runs predict each other, and their errors then.
@@ -150,9 +145,9 @@ fn merged(now: &[Across], changed: &[Across]) -> (f64, Vec<Across>) {
 }
 
 /// A channel whose error on a run grows: by more than days differ where it is loud, or until it is.
-pub(super) fn harms(before: &[Across], after: &[Across]) -> Option<&'static str> {
-    let worse = |(b, a): &(&Across, &Across)| a.rms > ((1.0 + TOLERANCE) * b.rms).max(LOUD * a.floor);
-    before.iter().zip(after).find(worse).map(|(b, _)| b.channel)
+pub(super) fn harms(compared: &[Compared]) -> Option<&'static str> {
+    let worse = |c: &&Compared| c.after.rms > ((1.0 + TOLERANCE) * c.before.rms).max(LOUD * c.after.floor);
+    compared.iter().find(worse).map(|c| c.before.channel)
 }
 
 /// Whether no shape lies on its bound, and each effect makes sense on one of the runs at least.

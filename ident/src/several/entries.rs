@@ -6,22 +6,20 @@
 //! Units: as the channels.
 //! Reference: specification `formats.md`, "Verdict".
 
+use super::Run;
 use super::choose::Named;
 use super::joint::{Across, Joint};
-use super::outcome::{Run, is_contrast, typical};
 use super::own::Worth;
+use super::words::typical;
 use crate::close::parameter;
-use crate::context::Context;
+use crate::context::{Context, is_contrast};
 use crate::effects::{EffectEntry, Estimate, Scope};
 use crate::hypothesis::Placed;
 use crate::model::{AddedEffect, RunLevel};
+use crate::rivals::TEMPERATURE;
 use crate::unexplained::LOUD;
 use crate::verdict::Unexplained;
 use crate::words::channel as spoken;
-
-/// Nats of score that are one nat of probability: a score counts samples as far as the residual's colour leaves them independent, but not the
-/// misfit that all models share.
-const TEMPERATURE: f64 = 4.0;
 
 /// An effect of the rig.
 pub(super) fn entry(joint: &Joint<'_, '_>, named: &[Named], k: usize, after: &[Across], estimates: &[Estimate]) -> EffectEntry {

@@ -1,12 +1,12 @@
 //! One set of values for all runs, and what it is worth on the run that had no part in it.
 //!
 //! What it is: the equations of all runs added up and solved, channel by channel; for each run the same without it.
-//! What can go wrong: a coefficient that only the run left out could tell is zero there.
+//! What can go wrong: a coefficient that only the run left out could tell is zero there; a channel that only it has is not predicted.
 //! Units: log-likelihood in nats; errors as the channels.
 //! Reference: leave-one-group-out cross-validation; profile likelihood of the shapes, Barndorff-Nielsen & Cox 1994, section 3.4.
 
 use super::equations::{left_on, of_run, rms, shared, solved};
-use super::{Member, is_judged};
+use super::{FEWEST, Member, is_judged};
 use crate::design::Label;
 use crate::effects::Shape;
 use crate::hypothesis::Placed;
@@ -51,6 +51,28 @@ impl Across {
         let floor = FINEST * self.floor;
         -self.samples * (self.rms.max(floor) / floor).ln()
     }
+}
+
+/// A channel of one run, both times predicted by a fit to the others.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Compared {
+    /// Error with fewer effects.
+    pub(super) before: Across,
+    /// Error with more.
+    pub(super) after: Across,
+}
+
+impl Compared {
+    /// How many times smaller the error has become; what lies below the noise floor counts as the floor.
+    pub(super) fn times(&self) -> f64 {
+        self.before.rms.max(self.before.floor) / self.after.rms.max(self.after.floor)
+    }
+}
+
+/// Each channel of each run that stands in both lists.
+pub(super) fn compared(before: &[Across], after: &[Across]) -> Vec<Compared> {
+    let same = |b: &Across| after.iter().find(|a| a.run == b.run && a.channel == b.channel).copied();
+    before.iter().filter_map(|b| Some(Compared { before: *b, after: same(b)? })).collect()
 }
 
 /// Effects of a rig, with shapes, on a set of runs.
@@ -198,12 +220,16 @@ impl<'m, 'a> Joint<'m, 'a> {
         self.channels().into_iter().filter_map(of_channel).collect()
     }
 
-    /// Each run predicted by a fit of these effects, shapes as they are, to the others, on the channels named; on all without a list.
+    /// Each run predicted by a fit of these effects, shapes as they are, to the others, on the channels named; on all without a list. A
+    /// channel that no other run has is not predicted.
     pub(super) fn across(&self, rig: &[Placed], channels: Option<&[&'static str]>) -> Vec<Across> {
         let mut out = Vec::new();
         for channel in channels.map_or_else(|| self.channels(), <[_]>::to_vec) {
             let (labels, normals) = self.equations(channel, rig, usize::MAX);
             let Some(whole) = sum(normals.iter().flatten().map(|n| &n.0)) else { continue };
+            if normals.iter().flatten().count() < FEWEST {
+                continue;
+            }
             for (run, (member, own)) in self.members.iter().zip(&normals).enumerate() {
                 let Some((own, _)) = own else { continue };
                 let Some((coefficients, _)) = solved(&whole.less(own, 1.0)) else { continue };

@@ -11,18 +11,25 @@ mod alone;
 mod choose;
 mod entries;
 mod equations;
+mod folds;
 mod joint;
 mod outcome;
 mod own;
+mod parallel;
+mod words;
 
 use crate::close::Closed;
-use crate::context::{Context, Relation};
+use crate::context::{Context, Relation, Target};
 use crate::effects::{Scope, Stage};
 use crate::hypothesis::{Declared, Placed, Rows, design};
 use crate::samples::Samples;
 
+pub use crate::runs::Run;
 pub use alone::{RunsError, close_each};
-pub use outcome::{FEWEST, Outcome, Run, Shown, close_together};
+pub use outcome::{Outcome, Shown, close_together};
+
+/// Fewest runs that can predict each other.
+pub const FEWEST: usize = 2;
 
 /// A run with what a joint fit knows of it.
 #[derive(Debug, Clone)]
@@ -39,16 +46,21 @@ struct Member<'a> {
 
 impl<'a> Member<'a> {
     /// A run on which the loop was closed alone. Its weights are one over the variance that its own best hypothesis leaves, less what the
-    /// colour of the residual takes.
-    fn of(closed: &Closed, context: &'a Context, all: &[Context]) -> Option<Self> {
+    /// colour of the residual takes; a channel that this hypothesis does not fit says nothing.
+    fn of(closed: &Closed, context: &'a Context, all: &[Context]) -> Self {
         let best = &closed.diagnosis.best.fit;
         let of_one = |p: &Placed| all.iter().filter(|c| tells(c, p)).count() < FEWEST;
         let is_own =
             |p: &&Placed| p.effect.id() != "unknown" && (p.effect.scope(&p.instance) != Scope::Rig || of_one(p)) && !p.is_tare();
         let own = best.placed.iter().filter(is_own).cloned().collect();
-        let weights = (0..context.targets.len()).map(|k| weights(context, &best.placed, k, best.targets[k].share));
-        let independent = context.targets.iter().zip(&best.targets).map(|(t, fit)| t.rows.len() as f64 * fit.share).collect();
-        Some(Self { context, own, weights: weights.collect::<Option<_>>()?, independent })
+        let of_target = |(k, target): (usize, &Target)| {
+            let fit = best.targets.get(k)?;
+            Some((weights(context, &best.placed, k, fit.share)?, target.rows.len() as f64 * fit.share))
+        };
+        let targets = context.targets.iter().enumerate();
+        let silent = |target: &Target| (vec![0.0; target.rows.len()], 0.0);
+        let (weights, independent) = targets.map(|(k, t)| of_target((k, t)).unwrap_or_else(|| silent(t))).unzip();
+        Self { context, own, weights, independent }
     }
 
     fn tells(&self, p: &Placed) -> bool {

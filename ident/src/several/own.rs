@@ -9,7 +9,7 @@
 use super::Member;
 use super::equations::{centring, columns_of, of_run, own_columns, samples_less_fixed, shared};
 use super::joint::{Joint, Shared};
-use super::outcome::in_parallel;
+use super::parallel::in_parallel;
 use crate::context::Target;
 use crate::design::Label;
 use crate::effects::{NEEDED_EVIDENCE, Scope, library};

@@ -1,0 +1,141 @@
+//! A joint fit in the contract's words.
+//!
+//! What it is: the verdict on several runs. Every error that counts is that of a run predicted whole by a fit to the others.
+//! What can go wrong: a channel that only one run has cannot be predicted by another; it is said.
+//! Units: as the channels.
+//! Reference: specification `formats.md`, "Verdict", `across_runs_rms`.
+
+use super::Run;
+use super::entries::{entry, own_entries, unexplained, unnamed};
+use super::folds::Tenable;
+use super::joint::{Across, Compared, Joint};
+use crate::close::{NO_COMMAND, validation};
+use crate::context::{Context, Relation, is_contrast, unit_of};
+use crate::effects::Estimate;
+use crate::model::Model;
+use crate::residual::whiteness;
+use crate::verdict::{BeforeAfter, Channel, Channels, FORMAT, Figures, Kind, Validation, Verdict};
+use std::collections::BTreeMap;
+
+/// A joint fit, to be put into words.
+pub(super) struct Told<'f, 'a> {
+    /// The runs.
+    pub(super) runs: &'f [Run],
+    /// The runs made ready.
+    pub(super) contexts: &'f [Context],
+    /// The names, the runs' own effects, and how each run is predicted.
+    pub(super) tenable: &'f Tenable<'a>,
+    /// Declared model, and the corrected one.
+    pub(super) models: [&'f Model; 2],
+    /// For each name its parameters.
+    pub(super) estimates: &'f [Vec<Estimate>],
+}
+
+/// The contract's words.
+pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
+    let Told { runs, contexts, tenable, models, estimates } = *told;
+    let Tenable { named, members, worths, compared, .. } = tenable;
+    let joint = Joint::of(members);
+    let after: Vec<Across> = compared.iter().map(|c| c.after).collect();
+    let channels = channels(told);
+    let mut effects: Vec<_> = (0..named.len()).map(|k| entry(&joint, named, k, &after, &estimates[k])).collect();
+    effects.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
+    let own = models[1].own.iter().zip(worths).enumerate();
+    effects.extend(own.flat_map(|(run, (own, worths))| own_entries(&contexts[run], own, worths)));
+    let unexplained = unexplained(runs, &after);
+    let kind = match (effects.is_empty(), unexplained.is_empty()) {
+        (false, _) => Kind::Attributed,
+        (true, false) => Kind::Unattributed,
+        (true, true) => Kind::None,
+    };
+    if kind == Kind::Unattributed {
+        effects.extend(unexplained.first().map(unnamed));
+    }
+    Verdict {
+        format: FORMAT,
+        run: runs[0].log.name.clone(),
+        verdict: kind,
+        channels,
+        effects,
+        unexplained,
+        alternatives: Vec::new(),
+        next_experiment: None,
+        left_out: Vec::new(),
+        set_aside: Vec::new(),
+        validation: Vec::new(),
+        runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared)).collect(),
+    }
+}
+
+fn of_run(run: &Run, k: usize, compared: &[Compared]) -> Validation {
+    let own = compared.iter().filter(|c| c.before.run == k && !is_contrast(c.before.channel));
+    let channels: BTreeMap<String, BeforeAfter> =
+        own.map(|c| (c.before.channel.to_owned(), BeforeAfter { before: c.before.rms, after: c.after.rms })).collect();
+    Validation { run: run.log.name.clone(), channels }
+}
+
+/// Each channel over all runs: what is left across runs and the noise floor as geometric means over the runs, so that a run of wild steps does
+/// not stand for all; what the written model leaves as the root of the mean square. A channel that no second run has is not predicted.
+fn channels(told: &Told<'_, '_>) -> Channels {
+    let Told { runs, contexts, tenable, models, .. } = *told;
+    let mut out = Channels::default();
+    let own: Vec<Validation> = runs.iter().map(|r| validation(&r.log, models[0], models[1])).collect();
+    for target in contexts.iter().flat_map(|c| &c.targets).filter(|t| !t.relation.is_evidence()) {
+        let name = target.name;
+        if out.predicted.contains_key(name) || out.not_predicted.contains_key(name) {
+            continue;
+        }
+        if target.relation == Relation::SpeedAlone {
+            out.not_predicted.insert(name.to_owned(), NO_COMMAND.to_owned());
+            continue;
+        }
+        let compared: Vec<&Compared> = tenable.compared.iter().filter(|c| c.before.channel == name).collect();
+        if compared.is_empty() {
+            out.not_predicted.insert(name.to_owned(), "no second run measured it".to_owned());
+            continue;
+        }
+        let pooled = |of: &dyn Fn(&Compared) -> f64| typical(compared.iter().map(|c| of(c)));
+        let figures = |side: usize, across: f64, of: &dyn Fn(&BeforeAfter) -> f64| Figures {
+            rms: root_mean(own.iter().filter_map(|v| v.channels.get(name)).map(of)),
+            heldout_rms: across,
+            across_runs_rms: Some(across),
+            whiteness_p: least_white(runs, contexts, models[side], name),
+        };
+        let channel = Channel {
+            unit: unit_of(name).to_owned(),
+            noise_floor_rms: pooled(&|c| c.before.floor),
+            before: figures(0, pooled(&|c| c.before.rms), &|b| b.before),
+            after: figures(1, pooled(&|c| c.after.rms), &|b| b.after),
+        };
+        out.predicted.insert(name.to_owned(), channel);
+    }
+    for (name, reason) in runs.iter().flat_map(|r| &r.closed.verdict.channels.not_predicted) {
+        if !out.predicted.contains_key(name) {
+            out.not_predicted.entry(name.clone()).or_insert_with(|| reason.clone());
+        }
+    }
+    out
+}
+
+/// Geometric mean.
+pub(super) fn typical(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v.max(f64::MIN_POSITIVE).ln(), n + 1.0));
+    f64::exp(sum / n)
+}
+
+fn root_mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+    f64::sqrt(sum / n)
+}
+
+/// The least whiteness of a channel's residual over the runs.
+fn least_white(runs: &[Run], contexts: &[Context], model: &Model, name: &'static str) -> f64 {
+    let of_run = |(run, context): (&Run, &Context)| {
+        let target = &context.targets[context.target(name)?];
+        let prediction = model.on(&run.log).predict(context, name)?;
+        let claimed = target.rows.iter().zip(&target.y).filter(|(row, _)| target.claims(**row));
+        let (t, r): (Vec<f64>, Vec<f64>) = claimed.map(|(row, y)| (context.t[*row], y - prediction[*row])).unzip();
+        Some(whiteness(&t, &r))
+    };
+    runs.iter().zip(contexts).filter_map(of_run).fold(1.0, f64::min)
+}
