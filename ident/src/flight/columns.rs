@@ -8,6 +8,7 @@
 use super::channels::{Channels, Target};
 use super::record::Record;
 use super::scene::{Scene, delayed};
+use super::vibration::Shaking;
 use super::windows::Windows;
 use crate::attribution::{Column, Owner, Prior, Values};
 use crate::noise::median;
@@ -25,6 +26,8 @@ pub struct Flight {
     pub channels: Channels,
     /// Usual sizes.
     pub usual: Usual,
+    /// How much it shakes; `None` where that hardly changes.
+    pub shaking: Option<Shaking>,
 }
 
 /// Usual sizes of what priors are made of: medians over the flight.
@@ -55,7 +58,8 @@ impl Flight {
         let windows = Windows::new(&record.t, &usable);
         let channels = Channels::of(&record, &windows);
         let usual = Usual::of(&record, &usable);
-        Self { record, windows, channels, usual }
+        let shaking = Shaking::of(&record, &windows);
+        Self { record, windows, channels, usual, shaking }
     }
 
     /// The same flight row by row, for what is told as it was logged: each row whose inputs are known is a window of its own, on the ground too.
@@ -69,7 +73,7 @@ impl Flight {
         let rows: Vec<usize> = (0..record.len()).filter(|i| known(*i)).collect();
         let windows = Windows::each(&record.t, &rows);
         let channels = Channels::of(&record, &windows);
-        Self { windows, channels, usual: self.usual, record }
+        Self { windows, channels, usual: self.usual, shaking: None, record }
     }
 }
 

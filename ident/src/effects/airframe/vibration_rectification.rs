@@ -9,7 +9,7 @@ use super::{About, AirframeEffect, Form, Found, Scope, Sink, by_axis, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
-use crate::flight::vibration::power;
+use crate::flight::vibration::Shaking;
 use crate::verdict::Parameter;
 
 pub(super) struct VibrationRectification;
@@ -27,7 +27,7 @@ impl AirframeEffect for VibrationRectification {
     fn about(&self) -> About {
         About {
             title: "Vibration becomes an offset",
-            equation: "f += per_square * vibration^2, w += rate_per_square * vibration^2, vibration the rms of the specific force from row to row",
+            equation: "f += per_square * vibration^2, w += rate_per_square * vibration^2, vibration the rms of the specific force from row to row, as a function of the rotors' speeds",
             source: "IEEE Std 1293.",
             depends_on: &["vibration"],
             signature: "the offset of specific force or rate grows with the vibration",
@@ -40,11 +40,11 @@ impl AirframeEffect for VibrationRectification {
     }
 
     fn forms(&self, flight: &Flight) -> Vec<Form> {
-        single(power(flight).is_some())
+        single(flight.shaking.is_some())
     }
 
     fn columns(&self, _: &Form, _: &[f64], sink: &mut Sink<'_>) {
-        let Some((square, usual)) = power(sink.flight) else { return };
+        let Some(Shaking { square, usual }) = sink.flight.shaking.clone() else { return };
         for (axis, name) in FORCE.into_iter().enumerate() {
             sink.column(name, Prior::about_zero(USUAL.0 / usual)).window(Target::Force(axis), square.clone());
         }
