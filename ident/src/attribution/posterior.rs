@@ -113,30 +113,41 @@ impl Walk<'_> {
         best
     }
 
-    /// Without what the others have made superfluous, and with each term exchanged for one of those that were close when it joined, where
-    /// that is better.
-    fn revised(&mut self, mut from: Fit, rivals: &[usize]) -> Fit {
+    /// Without what the others have made superfluous, the latest first, and with each term exchanged for one of those that were close when it
+    /// joined, where that is better. Terms without a name (`named` is false) take none away that alone stands on one of its channels.
+    fn revised(&mut self, mut from: Fit, rivals: &[usize], named: bool) -> Fit {
         let all = self.problem.library.candidates();
-        let mut place = 0;
-        while place < from.placed.len() {
+        let mut left = from.placed.len();
+        while left > 0 {
+            let place = left - 1;
+            left = place;
+            if !named && is_alone(all, &from, place) {
+                continue;
+            }
             let rest: Vec<Placed> = without(all, &from.placed, place);
-            let Some(less) = self.look(&rest, Some(&from), 0) else {
-                place += 1;
-                continue;
-            };
-            if self.better(&less, &from) {
-                (from, place) = (less, 0);
-                continue;
-            }
+            let Some(less) = self.look(&rest, Some(&from), 0) else { continue };
             let own = from.placed[place].candidate;
-            let asked = ask(&self.problem, &less, &|k, _| k != own && rivals.contains(&k));
-            match self.best_joined(&less, &asked[..asked.len().min(TRIED / 2)]) {
-                Some(other) if self.better(&other, &from) => (from, place) = (other, 0),
-                _ => place += 1,
+            if self.better(&less, &from) {
+                from = less;
+            } else {
+                let asked = ask(&self.problem, &less, &|k, _| k != own && rivals.contains(&k));
+                match self.best_joined(&less, &asked[..asked.len().min(TRIED / 2)]) {
+                    Some(other) if self.better(&other, &from) => from = other,
+                    _ => continue,
+                }
             }
+            left = from.placed.len();
         }
         from
     }
+}
+
+/// Whether a term has a name and no other one stands on one of its channels.
+fn is_alone(all: &[Candidate], fit: &Fit, place: usize) -> bool {
+    let is_named = |k: usize| all[fit.placed[k].candidate].is_named();
+    let channels = |k: usize| fit.columns_of(k).flat_map(|i| fit.design.columns[i].parts.iter().map(|p| p.0));
+    let beside: Vec<usize> = (0..fit.placed.len()).filter(|k| *k != place && is_named(*k)).flat_map(channels).collect();
+    is_named(place) && channels(place).any(|c| !beside.contains(&c))
 }
 
 /// A hypothesis without the term at `place`, and without what cannot stand alone then.
@@ -166,7 +177,7 @@ pub fn posterior(problem: &Problem<'_>, progress: &mut dyn FnMut(f64)) -> Option
             }
             progress((best.placed.len() as f64 / MOST as f64).min(0.9));
         }
-        best = walk.revised(best, &rivals);
+        best = walk.revised(best, &rivals, named);
     }
     // what could stand beside the best, for the probabilities
     let all = problem.library.candidates();

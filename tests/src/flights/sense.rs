@@ -152,6 +152,18 @@ fn shaking(vehicle: &Vehicle, i: &Instruments, resonant: Option<&Cause>, speeds:
     speeds.iter().zip(&i.shakes).map(|(w, size)| amplitude(vehicle, *size, resonant, *w).powi(2)).sum()
 }
 
+/// Variance that the vibration leaves in the mean of `n` rows of an axis of the specific force, (m/s^2)^2: each rotor's phase is anyone's.
+pub(super) fn shaken_mean(vehicle: &Vehicle, causes: &[Cause], i: &Instruments, speeds: &[f64], axis: usize, n: usize) -> f64 {
+    let resonant = causes.iter().find(|c| c.id == "vibration_rectification");
+    let (share, turns) = if axis == 2 { (0.3, 2.0) } else { (1.0, 1.0) };
+    let of = |(w, size): (&f64, &f64)| {
+        let half = 0.5 * turns * w / i.hz as f64;
+        let kept = if half.sin().abs() < 1e-6 { 1.0 } else { (n as f64 * half).sin() / (n as f64 * half.sin()) };
+        0.5 * (share * kept * amplitude(vehicle, *size, resonant, *w)).powi(2)
+    };
+    speeds.iter().zip(&i.shakes).map(of).sum()
+}
+
 /// Amplitude of one rotor's vibration; with a resonance of the frame it grows much faster than with the square of the speed.
 fn amplitude(vehicle: &Vehicle, size: f64, resonant: Option<&Cause>, w: f64) -> f64 {
     let x = w / vehicle.hover();

@@ -1,13 +1,13 @@
 //! How large a hidden effect is: what the declared model, refitted, leaves over of a flight without noise, in noise floors.
 //!
 //! What it is: for each kind of channel the windows' means (slopes for angular acceleration) less the best multiples of the declared columns,
-//! over what the instruments' noise leaves in such a window.
+//! over what the instruments' noise and the vibration leave in such a window.
 //! What can go wrong: nothing.
 //! Units: noise floors.
 //! Reference: specification `closing-the-loop.md`, "Blind trials" (sizes in the noise of what shows the effect).
 
 use super::cause::Cause;
-use super::sense::{Instruments, Row, rows};
+use super::sense::{Instruments, Row, rows, shaken_mean};
 use super::vehicle::Vehicle;
 use super::world::Track;
 
@@ -34,7 +34,10 @@ pub fn sizes(vehicle: &Vehicle, causes: &[Cause], i: &Instruments, track: &Track
     let mut add = |name: String, y: Vec<f64>, columns: Vec<Vec<f64>>, floor: f64| out.push((name, left(&columns, &y) / floor));
     for axis in 0..3 {
         let columns = if axis == 2 { vec![means(&|r| square(r, &|_| 1.0))] } else { Vec::new() };
-        add(format!("acc_{axis}"), means(&|r| r.force[axis]), columns, i.inertial[0] / root);
+        let shaken = means(&|r| shaken_mean(vehicle, causes, i, &track.speeds[r.step], axis, n));
+        let shaken = shaken.iter().sum::<f64>() / shaken.len().max(1) as f64;
+        let floor = (i.inertial[0].powi(2) / n as f64 + shaken).sqrt();
+        add(format!("acc_{axis}"), means(&|r| r.force[axis]), columns, floor);
     }
     for axis in 0..3 {
         let lever = |k: usize| [-vehicle.hubs[k].y, vehicle.hubs[k].x, -vehicle.hubs[k].turns][axis];
