@@ -1,12 +1,13 @@
 //! Second stage: which hypothesis, and how sure each of its names is.
 //!
-//! What it is: terms join one at a time, those with a name first; whenever one has joined, every other is asked again, and may go or be
-//! exchanged. All hypotheses that were looked at share the probability.
+//! What it is: terms join one at a time, those with a name first; when no more do, every one is asked again, and may go or be exchanged.
+//! Then what has no name joins, and a name that it overshadows goes. All hypotheses that were looked at share the probability.
 //! What can go wrong: a hypothesis that no step leads to is not looked at; probabilities are over those that were.
 //! Units: nats, probabilities 0 to 1.
 //! Reference: Madigan & Raftery 1994, JASA 89:1535 (Occam's window); Hoeting et al. 1999, Statistical Science 14:382 (inclusion).
 
 use super::candidates::{Asked, ask, prior_odds};
+use super::channel::rms;
 use super::fit::{Fit, Problem, fit};
 use super::library::{Candidate, Placed};
 
@@ -113,15 +114,15 @@ impl Walk<'_> {
         best
     }
 
-    /// Without what the others have made superfluous, the latest first, and with each term exchanged for one of those that were close when it
-    /// joined, where that is better. Terms without a name (`named` is false) take none away that alone stands on one of its channels.
+    /// Without what the others of its kind (with a name, or without) have made superfluous, the latest first, and with each of them exchanged
+    /// for one of those that were close when it joined, where that is better.
     fn revised(&mut self, mut from: Fit, rivals: &[usize], named: bool) -> Fit {
         let all = self.problem.library.candidates();
         let mut left = from.placed.len();
         while left > 0 {
             let place = left - 1;
             left = place;
-            if !named && is_alone(all, &from, place) {
+            if all[from.placed[place].candidate].is_named() != named {
                 continue;
             }
             let rest: Vec<Placed> = without(all, &from.placed, place);
@@ -140,14 +141,63 @@ impl Walk<'_> {
         }
         from
     }
+
+    /// With everything of one kind that brings evidence.
+    fn joined(&mut self, from: &Fit, named: bool, progress: &mut dyn FnMut(f64)) -> Fit {
+        let (mut best, mut rivals) = (from.clone(), Vec::new());
+        while best.placed.len() < MOST {
+            let asked = ask(&self.problem, &best, &|_, c| c.is_named() == named);
+            let close = asked.iter().filter(|a| a.can_be_shown() && a.score() > 0.0).take(2 * TRIED);
+            rivals.extend(close.flat_map(|a| a.joins.iter().map(|j| j.candidate)));
+            match self.best_joined(&best, &asked) {
+                Some(next) if self.better(&next, &best) => best = next,
+                _ => break,
+            }
+            progress((best.placed.len() as f64 / MOST as f64).min(0.9));
+        }
+        self.revised(best, &rivals, named)
+    }
+
+    /// What has no name joins the names, as far as they hold beside it: a name goes that brought less than what has no name brings on the
+    /// channel that the name is told by. A function without a name bends to everything; what takes only a part of what that finds is
+    /// the shadow of something else.
+    fn beside(&mut self, mut names: Fit, progress: &mut dyn FnMut(f64)) -> Fit {
+        loop {
+            let with = self.joined(&names, false, progress);
+            let shadow = (0..names.placed.len()).filter_map(|k| self.is_shadow(&names, &with, k).map(|by| (k, by)));
+            let Some((place, _)) = shadow.max_by(|a, b| a.1.total_cmp(&b.1)) else { return with };
+            let rest = without(self.problem.library.candidates(), &names.placed, place);
+            match self.look(&rest, Some(&names), 0) {
+                Some(fewer) => names = fewer,
+                None => return with,
+            }
+        }
+    }
+
+    /// By how much more what has no name brings than a name, on the channel that the name is told by; nothing where it brings less.
+    fn is_shadow(&mut self, names: &Fit, with: &Fit, place: usize) -> Option<f64> {
+        let all = self.problem.library.candidates();
+        let less = self.look(&without(all, &names.placed, place), Some(names), 0)?;
+        let channels = self.problem.channels;
+        let told = |c: &usize| {
+            let error = |fit: &Fit| rms(&fit.residual(channels, *c));
+            channels[*c].len() as f64 * (error(&less) / error(names)).ln()
+        };
+        let channel = (0..channels.len()).max_by(|a, b| told(a).total_cmp(&told(b)))?;
+        let nameless = |k: &usize| !all[with.placed[*k].candidate].is_named() && touches(with, *k, channel);
+        let rest: Vec<Placed> = (0..with.placed.len()).filter(|k| !nameless(k)).map(|k| with.placed[k].clone()).collect();
+        if rest.len() == with.placed.len() {
+            return None;
+        }
+        let bare = self.look(&rest, Some(with), 0)?;
+        let brought = score(all, names) - score(all, &less);
+        Some(score(all, with) - score(all, &bare) - brought).filter(|by| *by > 0.0)
+    }
 }
 
-/// Whether a term has a name and no other one stands on one of its channels.
-fn is_alone(all: &[Candidate], fit: &Fit, place: usize) -> bool {
-    let is_named = |k: usize| all[fit.placed[k].candidate].is_named();
-    let channels = |k: usize| fit.columns_of(k).flat_map(|i| fit.design.columns[i].parts.iter().map(|p| p.0));
-    let beside: Vec<usize> = (0..fit.placed.len()).filter(|k| *k != place && is_named(*k)).flat_map(channels).collect();
-    is_named(place) && channels(place).any(|c| !beside.contains(&c))
+/// Whether a term has a part on a channel.
+fn touches(fit: &Fit, place: usize, channel: usize) -> bool {
+    fit.columns_of(place).any(|i| fit.design.columns[i].parts.iter().any(|p| p.0 == channel))
 }
 
 /// A hypothesis without the term at `place`, and without what cannot stand alone then.
@@ -164,21 +214,8 @@ pub fn posterior(problem: &Problem<'_>, progress: &mut dyn FnMut(f64)) -> Option
     let mut walk = Walk { problem: *problem, seen: Vec::new() };
     let declared = walk.look(&[], None, 0)?;
     let first = ask(problem, &declared, &|_, c| c.is_named());
-    let mut best = declared.clone();
-    for named in [true, false] {
-        let mut rivals: Vec<usize> = Vec::new();
-        while best.placed.len() < MOST {
-            let asked = ask(problem, &best, &|_, c| c.is_named() == named);
-            let close = asked.iter().filter(|a| a.can_be_shown() && a.score() > 0.0).take(2 * TRIED);
-            rivals.extend(close.flat_map(|a| a.joins.iter().map(|j| j.candidate)));
-            match walk.best_joined(&best, &asked) {
-                Some(next) if walk.better(&next, &best) => best = next,
-                _ => break,
-            }
-            progress((best.placed.len() as f64 / MOST as f64).min(0.9));
-        }
-        best = walk.revised(best, &rivals, named);
-    }
+    let names = walk.joined(&declared, true, progress);
+    let best = walk.beside(names, progress);
     // what could stand beside the best, for the probabilities
     let all = problem.library.candidates();
     for a in ask(problem, &best, &|_, c| c.is_named()).iter().filter(|a| a.can_be_shown()) {

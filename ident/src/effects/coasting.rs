@@ -201,24 +201,43 @@ impl Coasting {
         super::operator::carried(self.rows.iter().map(|r| r.left), starts)
     }
 
-    /// What becomes of signals.
+    /// What becomes of signals: four at a time, because each state waits for the one before it.
     pub(super) fn of(&self, signals: &[&[f64]]) -> Vec<Vec<f64>> {
-        signals.iter().map(|x| self.of_one(x)).collect()
+        if self.rows.is_empty() {
+            return signals.iter().map(|x| x.to_vec()).collect();
+        }
+        let some = |few: &[&[f64]]| -> Vec<Vec<f64>> {
+            let four = [0, 1, 2, 3].map(|k| few[k.min(few.len() - 1)]);
+            self.side_by_side(four).into_iter().take(few.len()).collect()
+        };
+        signals.chunks(4).flat_map(some).collect()
     }
 
-    fn of_one(&self, x: &[f64]) -> Vec<f64> {
-        if self.rows.is_empty() {
-            return x.to_vec();
-        }
-        let first = self.first * x.first().copied().unwrap_or(0.0);
-        let mut state = first;
-        let rows = self.rows.iter().map(|row| {
-            let input = row.weights.iter().zip(&x[row.first..]).fold(0.0, |sum, (w, x)| sum + w * x);
-            state = row.left * state + input;
-            state
+    fn side_by_side(&self, signals: [&[f64]; 4]) -> [Vec<f64>; 4] {
+        let mut state = signals.map(|x| self.first * x.first().copied().unwrap_or(0.0));
+        let mut out = state.map(|first| {
+            let mut values = Vec::with_capacity(self.rows.len() + 1);
+            values.push(first);
+            values
         });
-        std::iter::once(first).chain(rows).collect()
+        for row in &self.rows {
+            for ((out, state), x) in out.iter_mut().zip(&mut state).zip(signals) {
+                let x = &x[row.first..];
+                let input = match x.first_chunk::<REACH>() {
+                    Some(x) => sum_of(&row.weights, x),
+                    None => sum_of(&row.weights, x),
+                };
+                *state = row.left * *state + input;
+                out.push(*state);
+            }
+        }
+        out
     }
+}
+
+#[inline]
+fn sum_of(weights: &[f64; REACH], x: &[f64]) -> f64 {
+    weights.iter().zip(x).fold(0.0, |sum, (w, x)| sum + w * x)
 }
 
 #[cfg(test)]
@@ -277,6 +296,21 @@ mod tests {
         let late = |s: f64| at(Rotor { latency: s, ..ROTOR }, true);
         assert!((at(ROTOR, false) - late(0.01)).abs() < 0.03 && late(0.0) > late(0.01) && late(0.01) > late(0.02));
         assert!((late(0.02) - speed(ROTOR, 1200.0, 1900.0, true).1[51]).abs() < 0.02);
+    }
+
+    #[test]
+    fn signals_side_by_side_are_what_each_is_alone() {
+        let t: Vec<f64> = (0..60).map(|i| 0.02 * f64::from(i)).collect();
+        let pulse: Vec<f64> = (0..60).map(|i| 1200.0 + 300.0 * f64::from(i / 13 % 3)).collect();
+        let column = |name: &str, values: Vec<f64>| Column { name: name.to_owned(), values };
+        let log = Log { t, columns: vec![column("rpm", pulse.clone()), column("pulse_us", pulse)], ..Log::default() };
+        let coasting = Coasting::new(&Context::new(&log, Some(1050.0)), ROTOR, true);
+        let signals: Vec<Vec<f64>> = (0..6).map(|k| (0..60).map(|i| f64::from(i * k).sin()).collect()).collect();
+        let all: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();
+        let alone: Vec<Vec<f64>> = all.iter().flat_map(|x| coasting.of(&[x])).collect();
+        for n in 0..=6 {
+            assert_eq!(coasting.of(&all[..n]), alone[..n], "{n}");
+        }
     }
 
     #[test]
