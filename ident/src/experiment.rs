@@ -2,19 +2,20 @@
 //!
 //! What it is: both hypotheses predict each of a few schedules that the rig can fly; the one with the largest squared
 //! difference over the noise is proposed.
-//! What can go wrong: where no schedule separates them the best is still proposed, and the reason says how little it gives, or that
-//! the two differ by something that no schedule commands.
+//! What can go wrong: where no schedule separates them none is proposed (`separates` is false) and the reason says so; where they differ by
+//! something that no schedule commands the reason says what to change. A log without a command lends its speeds to the pulses.
 //! Units: pulse in us, hold in s.
 //! Reference: T-optimal designs, Atkinson & Fedorov 1975, Biometrika 62:57.
 
 use crate::context::Context;
 use crate::diagnose::Diagnosis;
 use crate::hypothesis::{Declared, Fit};
-use crate::log::Log;
+use crate::log::{Column, Log, SPEED};
 use crate::model::Model;
 use crate::simulate::from_command;
 use crate::verdict::{NextExperiment, ScheduleStep};
 use crate::weather::continued;
+use std::borrow::Cow;
 
 /// Schedules that the rig can run, each with the reason for which it is good.
 fn families(top: f64) -> Vec<(&'static str, Vec<ScheduleStep>)> {
@@ -68,16 +69,37 @@ pub(crate) fn between(context: &Context, model: &Model, other: &Model, [own, riv
         let why = format!(
             "{both}, and no schedule tells them apart: they differ by what {names} does, which in this run followed time and not the load; repeat the run while {names} takes another course{how}"
         );
-        return Some(NextExperiment { why, schedule });
+        return Some(NextExperiment { why, separates: true, schedule });
     }
-    let best = families
+    let (apart, good, schedule) = families
         .into_iter()
         .map(|(why, schedule)| (size(&difference(context, model, other, &schedule)), why, schedule))
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(NextExperiment {
-        why: format!("{both}; {}: their predictions then differ by {:.1} times the noise (rms)", best.1, best.0),
-        schedule: best.2,
-    })
+    let separates = apart >= TOLD;
+    let why = if separates {
+        let lent = if context.pulse.is_some() { "" } else { LENT };
+        format!("{both}; {good}: their predictions then differ by {apart:.1} times the noise (rms){lent}")
+    } else {
+        format!(
+            "{both}, and no run at hand separates them: on every schedule that was tried their predictions differ by less than {TOLD} times the noise (rms)"
+        )
+    };
+    Some(NextExperiment { why, separates, schedule })
+}
+
+/// What is said where a log has no command of its own.
+const LENT: &str = ", the speed taken in proportion to the pulse, as no command was logged";
+
+/// A model whose speed is taken as given.
+fn without_speed(model: &Model) -> Model {
+    let polynomials = model.polynomials.iter().filter(|p| !SPEED.contains(&p.channel.as_str())).cloned().collect();
+    Model { polynomials, ..model.clone() }
+}
+
+/// The speed that a command is taken to give where the log had none: in proportion, up to the fastest of the run at full throttle.
+fn lent(context: &Context, pulse: &[f64]) -> Column {
+    let fastest = context.rpm.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    Column { name: "rpm".into(), values: pulse.iter().map(|p| fastest * (p - 1000.0).max(0.0) / 1000.0).collect() }
 }
 
 /// Difference over the noise (rms) that a command must make for a schedule to tell two hypotheses apart.
@@ -112,8 +134,13 @@ fn difference(context: &Context, a: &Model, b: &Model, schedule: &[ScheduleStep]
             pulse.push(s.pulse_us);
         }
     }
-    let weather = continued(context, &t, &pulse);
-    let (la, lb) = (from_command(a, "a", &t, &pulse, &weather), from_command(b, "b", &t, &pulse, &weather));
+    let mut weather = continued(context, &t, &pulse);
+    let mut models = [Cow::Borrowed(a), Cow::Borrowed(b)];
+    if context.pulse.is_none() {
+        weather.push(lent(context, &pulse));
+        models = models.map(|m| Cow::Owned(without_speed(&m)));
+    }
+    let [la, lb] = models.map(|m| from_command(&m, "predicted", &t, &pulse, &weather));
     context
         .targets
         .iter()
@@ -142,7 +169,6 @@ fn size(channels: &[Vec<f64>]) -> f64 {
 mod tests {
     use super::*;
     use crate::close::{Closed, close};
-    use crate::log::Column;
 
     /// A staircase up, on which the thrust drifts by 0.0015 N/s and a thermometer by 0.05 K/s and `warming` at full load.
     fn staircase(warming: f64) -> Log {
@@ -216,6 +242,27 @@ mod tests {
     fn a_temperature_that_follows_the_load_is_asked_by_a_schedule() {
         let closed = close(&staircase(10.0), None, &[], &mut |_| {}).expect("a log");
         let next = asked(&closed, Declared::default());
-        assert!(next.why.contains("times the noise"), "{}", next.why);
+        assert!(next.separates && next.why.contains("times the noise"), "{}", next.why);
+    }
+
+    #[test]
+    fn two_models_that_predict_the_same_on_every_schedule_get_no_run() {
+        let closed = close(&staircase(10.0), None, &[], &mut |_| {}).expect("a log");
+        let names = ["a".to_owned(), "b".to_owned()];
+        let next = between(&closed.context, &closed.model, &closed.model, &names).expect("an answer");
+        assert!(!next.separates && next.why.contains("no run at hand separates them"), "{}", next.why);
+        assert!(!next.schedule.is_empty(), "the contract has a schedule");
+    }
+
+    #[test]
+    fn a_log_without_a_command_lends_its_speeds_to_the_schedules() {
+        let mut log = staircase(0.0);
+        log.columns.retain(|c| !["pulse_us", "temp_c"].contains(&c.name.as_str()));
+        let closed = close(&log, None, &[], &mut |_| {}).expect("a log");
+        let mut other = closed.model.clone();
+        let thrust = other.polynomials.iter_mut().find(|p| p.channel == "thrust_n").expect("a thrust");
+        *thrust.coefficients.last_mut().expect("coefficients") *= 1.2;
+        let next = between(&closed.context, &closed.model, &other, &["a".to_owned(), "b".to_owned()]).expect("an answer");
+        assert!(next.separates && next.why.ends_with(LENT), "{}", next.why);
     }
 }

@@ -174,8 +174,19 @@ pub struct ScheduleStep {
 pub struct NextExperiment {
     /// Reason.
     pub why: String,
+    /// Whether it would; where not, the reason says that no run at hand separates them, and the schedule is that on which they differ most all the
+    /// same, which nothing proposes.
+    pub separates: bool,
     /// Schedule.
     pub schedule: Vec<ScheduleStep>,
+}
+
+impl Verdict {
+    /// The run that is proposed: a next experiment that would settle something.
+    #[must_use]
+    pub fn proposed(&self) -> Option<&NextExperiment> {
+        self.next_experiment.as_ref().filter(|n| n.separates)
+    }
 }
 
 /// Before and after on another run of the rig.

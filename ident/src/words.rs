@@ -77,6 +77,23 @@ impl EffectEntry {
         scaled.as_ref().and_then(sized).map_or_else(|| without.to_owned(), |v| with(&v))
     }
 
+    /// The length of a vector, `NAME_x` to `NAME_z`, with its interval carried along.
+    #[must_use]
+    pub fn tell_length(&self, name: &str, unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
+        let axes = ["x", "y", "z"].map(|axis| format!("{name}_{axis}"));
+        self.tell_length_of(&axes.each_ref().map(String::as_str), unit, with, without)
+    }
+
+    /// The length of a vector from the parameters that are its axes.
+    #[must_use]
+    pub fn tell_length_of(&self, axes: &[&str], unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
+        let axes: Vec<&Parameter> = axes.iter().filter_map(|axis| self.parameter(axis)).collect();
+        let length = axes.iter().map(|p| p.value * p.value).sum::<f64>().sqrt();
+        let half = axes.iter().map(|p| (p.value / length * 0.5 * (p.ci95[1] - p.ci95[0])).powi(2)).sum::<f64>().sqrt();
+        let whole = Parameter { name: String::new(), value: length, unit: unit.to_owned(), ci95: [length - half, length + half] };
+        sized(&whole).map_or_else(|| without.to_owned(), |v| with(&v))
+    }
+
     /// The meter of its first channel: "the load cell".
     #[must_use]
     pub fn meter(&self) -> String {
@@ -146,6 +163,9 @@ pub fn channel(name: &str) -> String {
     if let Some(one) = name.strip_suffix(" - others") {
         return format!("{} against the other sensors", channel(one));
     }
+    if let Some(said) = of_flight(name) {
+        return said;
+    }
     let said = match name {
         "thrust_n" => "thrust",
         "thrust_rms_n" => "thrust scatter",
@@ -169,6 +189,22 @@ pub fn channel(name: &str) -> String {
         other => other,
     };
     said.to_owned()
+}
+
+/// A channel of a flight or attitude log as people say it: a quantity and its axis, or the speed of a rotor.
+fn of_flight(name: &str) -> Option<String> {
+    let (quantity, of) = name.rsplit_once('_')?;
+    if quantity == "rpm" && of.chars().all(|c| c.is_ascii_digit()) {
+        return Some(format!("speed of rotor {of}"));
+    }
+    let said = match quantity {
+        "acc" => "specific force",
+        "ang_acc" => "angular acceleration",
+        "gyro" => "turn rate",
+        "mag" => "field",
+        _ => return None,
+    };
+    ["x", "y", "z"].contains(&of).then(|| format!("{said} ({of})"))
 }
 
 /// A channel at the head of something: with a large letter, or as its column where it has no other word.
@@ -225,6 +261,18 @@ pub fn sized(p: &Parameter) -> Option<String> {
     }
     let (factor, unit) = scaled(p.value, &p.unit);
     Some(with_unit(&digits(factor * p.value, factor * half), unit))
+}
+
+/// Units of what cannot be below zero: durations, resistances, inertias, charges, lengths, areas.
+const POSITIVE: [&str; 7] = ["s", "ohm", "kg.m2", "Ah", "A.h", "m^2", "Hz"];
+
+/// The upper bound of a quantity that cannot be below zero and of which the run shows no more: the interval of a positive value that begins below
+/// zero. An instant has a sign.
+#[must_use]
+pub fn upper_bound(p: &Parameter) -> Option<f64> {
+    let instant = ["t0", "t1"].contains(&p.name.as_str());
+    let open = p.value >= 0.0 && p.ci95[0] < 0.0 && p.ci95[1] > 0.0;
+    (open && !instant && POSITIVE.contains(&p.unit.as_str())).then_some(p.ci95[1])
 }
 
 /// An amount with unit to two significant digits.
@@ -321,6 +369,30 @@ mod tests {
         assert_eq!(clause.with("probably"), "the load cell probably creeps");
         assert_eq!(clause.sentence(), "The load cell creeps.");
         assert_eq!(Clause::new("", "the body drags").with("perhaps"), "perhaps the body drags");
+    }
+
+    #[test]
+    fn what_cannot_be_below_zero_has_an_upper_bound() {
+        assert_eq!(upper_bound(&parameter(0.002, 0.0233, "s")), Some(0.0253));
+        assert_eq!(upper_bound(&parameter(0.02, 0.01, "s")), None, "an interval above zero is one");
+        assert_eq!(upper_bound(&parameter(0.002, 0.02, "N/s")), None, "a drift has a sign");
+        assert_eq!(upper_bound(&parameter(-0.002, 0.02, "s")), None, "what is early is no bound");
+        let instant = Parameter { name: "t0".into(), ..parameter(0.2, 1.0, "s") };
+        assert_eq!(upper_bound(&instant), None);
+    }
+
+    #[test]
+    fn channels_have_words() {
+        for (name, said) in [
+            ("rpm_4", "speed of rotor 4"),
+            ("rpm_hall", "speed (Hall)"),
+            ("ang_acc_x", "angular acceleration (x)"),
+            ("acc_z", "specific force (z)"),
+            ("thrust_n", "thrust"),
+            ("mine_x", "mine_x"),
+        ] {
+            assert_eq!(channel(name), said);
+        }
     }
 
     #[test]

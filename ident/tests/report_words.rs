@@ -86,7 +86,8 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         ..verdict(Kind::Ambiguous, vec![filter(0.5), sag(0.99)])
     };
     let schedule = vec![ScheduleStep { pulse_us: 1500.0, hold_s: 30.0 }];
-    let next = NextExperiment { why: "they differ most on long holds".into(), schedule };
+    let next = NextExperiment { why: "they differ most on long holds".into(), separates: true, schedule };
+    let alike = NextExperiment { why: "no run at hand separates them".into(), separates: false, ..next.clone() };
     vec![
         (
             verdict(Kind::Attributed, both()),
@@ -105,6 +106,12 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
                 "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.028 N is left (slow).",
             ],
             &["noise."],
+        ),
+        (
+            verdict(Kind::Attributed, vec![filter(0.99), effect("unknown", "thrust_n", 0.999, 0.4, vec![])]),
+            false,
+            &["With all that is told below, what has no name included, the model explains 99 % of what thrust had left over."],
+            &["That explains", "named below"],
         ),
         (verdict(Kind::Attributed, vec![filter(0.41)]), false, &["The load cell perhaps reads"], &["probably"]),
         (
@@ -139,20 +146,26 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             &["explain"],
         ),
         (
+            Verdict { next_experiment: Some(alike), ..open(0.45) },
+            false,
+            &["this run cannot tell, nor can any schedule that was tried."],
+            &["proposed"],
+        ),
+        (
             Verdict {
                 unexplained: vec![left("thrust_n", 3.0)],
                 ..verdict(Kind::Unattributed, vec![effect("unknown", "thrust_n", 0.9, 0.4, vec![])])
             },
             false,
             &[
-                "Something is left on thrust that no known effect explains. It goes with time; a correction without a name was fitted. On thrust 0.028 N is left (slow).",
+                "Something is left on thrust that no known effect explains. It goes with time; a smooth term without a name was fitted. On thrust 0.028 N is left (slow).",
             ],
             &["explains thrust", "%"],
         ),
         (
             verdict(Kind::Unattributed, vec![effect("unknown", "thrust_n", 0.9, 0.0, vec![])]),
             true,
-            &["New since the declared model: something is left on thrust", "nothing was corrected"],
+            &["New since the declared model: something is left on thrust", "nothing was added to the model"],
             &["was fitted"],
         ),
         (
@@ -205,6 +218,19 @@ fn the_terminal_begins_with_the_sentence_and_keeps_to_its_width() {
     }
 }
 
+/// What has no name is sure of nothing, and what cannot be below zero has an upper bound.
+#[test]
+fn the_terminal_claims_no_more_than_it_knows() {
+    let lag = effect("spinup_lag", "thrust_n", 0.9, 0.5, vec![parameter("tau_up", 0.002, 0.0233, "s")]);
+    let text = terminal(
+        &verdict(Kind::Attributed, vec![lag, effect("unknown", "thrust_n", 0.999, 0.4, vec![])]),
+        Vocabulary::RIG,
+        false,
+    );
+    assert!(text.contains("unknown (that something is there: p > 0.99) on thrust"), "{text}");
+    assert!(text.contains("tau_up < 25 ms  (95 %)") && !text.contains("-0.02") && !text.contains("-21"), "{text}");
+}
+
 /// Every effect of the library says its clause with and without numbers.
 #[test]
 fn every_effect_has_words() {
@@ -230,4 +256,23 @@ fn a_demonstration_judges_its_names() {
         assert!(said.contains(word), "{said}");
     }
     assert!(hidden("creep").judged(&v, Vocabulary::RIG)[0].ends_with("NOT FOUND"));
+}
+
+/// Every effect of a flight says what it does, with its size where the flight shows it.
+#[test]
+fn every_effect_of_a_flight_has_words() {
+    let words = ident::flight::VOCABULARY;
+    for e in ident::effects::airframe::library() {
+        let clause = (words.clause)(&effect(e.id(), "force_x", 0.9, 0.5, vec![]));
+        assert!(!clause.who.is_empty() && !clause.does.is_empty(), "{}: {clause:?}", e.id());
+    }
+    let offset = |z: f64| {
+        ["x", "y", "z"].map(|axis| parameter(&format!("offset_{axis}"), if axis == "z" { z } else { 12.0 }, 0.5, "uT")).to_vec()
+    };
+    let said = |id: &str, parameters: Vec<Parameter>| (words.clause)(&effect(id, "mag_x", 0.9, 0.5, parameters)).sentence();
+    assert_eq!(said("hard_iron", offset(9.0)), "A magnet on board adds 19.2 uT to the field.");
+    let weaker = vec![parameter("rotor", 3.0, 0.0, "1"), parameter("thrust_change", -0.1, 0.004, "1")];
+    assert_eq!(said("rotor_gain", weaker), "Rotor 3 gives 10.0 % less thrust than its speed says.");
+    let unknown_size = vec![parameter("offset_x", 0.001, 0.01, "m"), parameter("offset_y", 0.002, 0.01, "m")];
+    assert_eq!(said("mass_offset", unknown_size), "The centre of gravity lies off the middle.");
 }

@@ -155,6 +155,10 @@ fn groups(found: &Isolability) -> String {
     for group in &found.groups {
         out += &wrapped(&format!("\ncannot be told apart: {}", found.members(group)), "  ");
         if let Some(next) = &group.next {
+            if !next.separates {
+                out += &wrapped(&format!("  no run would: {}", next.why), "  ");
+                continue;
+            }
             out += &wrapped(&format!("  a run that would: {}", next.why), "  ");
             let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us x {} s", s.pulse_us, s.hold_s)).collect();
             out += &wrapped(&format!("  {}", steps.join(", ")), "  ");

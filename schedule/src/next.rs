@@ -1,7 +1,7 @@
 //! The next experiment of a verdict, as it is.
 //!
 //! What it is: `next_experiment.schedule` of a `quadrig-verdict 2` file: pulses and holds.
-//! What can go wrong: a verdict that proposes none, or one for the IMU board, is refused and says so.
+//! What can go wrong: a verdict that proposes none, or says that none would settle it, or one for the IMU board, is refused and says so.
 //! Units: us, s.
 //! Reference: specification `formats.md`, "Verdict".
 
@@ -21,7 +21,14 @@ struct Verdict {
 #[derive(Deserialize)]
 struct Experiment {
     why: String,
+    #[serde(default = "proposed")]
+    separates: bool,
     schedule: Vec<Step>,
+}
+
+/// A verdict that does not say otherwise proposes its schedule.
+fn proposed() -> bool {
+    true
 }
 
 #[derive(Deserialize)]
@@ -61,6 +68,16 @@ pub(crate) fn parse(text: &str, path: &Path) -> Result<Plan, ScheduleError> {
             "this verdict proposes no next experiment; expected one that leaves open what a run would settle".to_owned(),
         ));
     };
+    if !experiment.separates {
+        return Err(refused(
+            1,
+            1,
+            format!(
+                "this verdict proposes no next experiment: {}; expected one that leaves open what a run would settle",
+                experiment.why
+            ),
+        ));
+    }
     let levels: Vec<(part::Level, bool)> =
         experiment.schedule.iter().map(|s| ((table::pulse(s.pulse_us), table::ms(s.hold_s)), false)).collect();
     let mut steps = part::steps(&levels);

@@ -79,6 +79,10 @@ fn a_verdict_without_an_experiment_is_refused() {
         ("{\"format\": \"quadrig-verdict 2\"}", "proposes no next experiment"),
         ("{\"next_experiment\": {\"why\": \"x\", \"schedule\": [\n{\"pulse_us\": 2500, \"hold_s\": 3}]}}", ":2:17: "),
         ("{\"next_experiment\": {\"why\": \"turn it\", \"motion\": []}}", "missing field `schedule`"),
+        (
+            "{\"next_experiment\": {\"why\": \"no run separates them\", \"separates\": false, \"schedule\": [{\"pulse_us\": 1500, \"hold_s\": 3}]}}",
+            "proposes no next experiment: no run separates them",
+        ),
         ("no json", ":1:"),
     ] {
         std::fs::write(&file, text).unwrap();

@@ -11,12 +11,11 @@ use super::windows::LENGTH_S;
 use crate::effects::airframe;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
-use crate::words::Clause;
 
 /// The words of the flight's library.
 pub const VOCABULARY: Vocabulary = Vocabulary {
     about: airframe::about,
-    clause: |found| airframe::about(&found.id).map_or_else(|| parts::bare(found), |a| Clause::titled(a.title, found)),
+    clause: |found| airframe::said(found).unwrap_or_else(|| parts::bare(found)),
     of_every_rig: |id| id == "spinup_lag",
 };
 

@@ -75,6 +75,7 @@ pub(super) fn next(first: &str, rivals: &[String], usual: &Usual) -> NextExperim
             "{first} and {} explain this flight alike. A flight that holds both still and moves tells them apart: {STRETCH_S:.0} s of hover, the same with the nose turned by 90 degrees, forward and sideways at two speeds, then climb and descent at the mean pulses below",
             rivals.join(" or ")
         ),
+        separates: true,
         schedule: vec![step(0.0), step(0.05), step(-0.05), step(0.0)],
     }
 }

@@ -156,6 +156,7 @@ fn next() -> NextExperiment {
         why: "motors off (1000 us): rest 10 s, turn slowly about each axis for 20 s at one place, rest 10 s, do the same a metre away, rest \
               10 s: what travels with the sensor turns with it at both places, what belongs to the room does not"
             .to_owned(),
+        separates: true,
         schedule: [10.0, 20.0, 10.0, 20.0, 10.0].map(|hold_s| ScheduleStep { pulse_us: 1000.0, hold_s }).to_vec(),
     }
 }

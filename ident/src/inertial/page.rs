@@ -20,13 +20,12 @@ pub const VOCABULARY: Vocabulary = Vocabulary { about: airframe::about, clause, 
 /// Causes that have no page in the flight's library.
 fn clause(found: &EffectEntry) -> Clause {
     let on = list(&found.channels);
-    let does = match found.id.as_str() {
-        "stationary_magnet" => "a magnet that stands beside the board disturbs the field".to_owned(),
-        "vibration" => format!("vibration is in {on}"),
-        "linear_acceleration" => "the unit itself is accelerated".to_owned(),
-        id => return airframe::about(id).map_or_else(|| parts::bare(found), |a| Clause::titled(a.title, found)),
-    };
-    Clause::new("", does)
+    match found.id.as_str() {
+        "stationary_magnet" => Clause::new("a magnet beside the board", "disturbs the field"),
+        "vibration" => Clause::new("vibration", format!("is in {on}")),
+        "linear_acceleration" => Clause::new("the unit itself", "is accelerated"),
+        _ => airframe::said(found).unwrap_or_else(|| parts::bare(found)),
+    }
 }
 
 /// The report as one self-contained page.

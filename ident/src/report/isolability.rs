@@ -82,6 +82,10 @@ fn groups(sheet: &mut Sheet, found: &Isolability) {
     for group in &found.groups {
         sheet.warn(&format!("{}: this run cannot say which of them it is.", found.members(group)));
         if let Some(next) = &group.next {
+            if !next.separates {
+                sheet.say(&format!("No run would: {}.", next.why));
+                continue;
+            }
             let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us for {} s", s.pulse_us, s.hold_s)).collect();
             sheet.say(&format!("A run that would: {}.", next.why));
             sheet.say(&format!("Its schedule: {}.", steps.join(", ")));

@@ -6,7 +6,7 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
-use super::closed::{self as parts, Origin, PAIR, Page, Trace, Vocabulary, against, enlarged, over_time, thinned};
+use super::closed::{self as parts, Origin, Page, Trace, Vocabulary, against, enlarged, over_time, pair, thinned};
 use super::designer::designer;
 use super::figure::{Figure, Layer};
 use super::run;
@@ -18,7 +18,7 @@ use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
 use crate::several::Shown;
-use crate::verdict::EffectEntry;
+use crate::verdict::{EffectEntry, Verdict};
 use crate::words::{channel, heading};
 
 /// What stands before and after in the figure of one effect.
@@ -53,7 +53,10 @@ fn declared(closed: &Closed) -> String {
     } else {
         "Before: the declared baseline, static curves alone: speed over the pulse, thrust, torque and current over the speed, a constant voltage."
     };
-    format!("{what} After: the same with every effect that is named above.")
+    match pair(&closed.verdict)[1] {
+        "" => format!("{what} Nothing was added to it."),
+        _ => format!("{what} After: the same with every effect of the cards above."),
+    }
 }
 
 /// The residual of a target under a model, on the rows of which it claims something.
@@ -104,7 +107,7 @@ fn hero(closed: &Closed) -> Vec<Figure> {
 }
 
 /// What is left of one of several runs, predicted by a fit to the others.
-pub(super) fn over_runs(shown: &Shown) -> Vec<Figure> {
+pub(super) fn over_runs(verdict: &Verdict, shown: &Shown) -> Vec<Figure> {
     let trace = Trace {
         channel: shown.channel.to_owned(),
         unit: unit_of(shown.channel).to_owned(),
@@ -114,7 +117,8 @@ pub(super) fn over_runs(shown: &Shown) -> Vec<Figure> {
         before: shown.before.clone(),
         after: shown.after.clone(),
     };
-    std::iter::once(over_time(&trace, "most", PAIR)).chain(enlarged(&trace, "most", PAIR)).collect()
+    let names = pair(verdict);
+    std::iter::once(over_time(&trace, "most", names)).chain(enlarged(&trace, "most", names)).collect()
 }
 
 /// Figures of each effect: what its first channel leaves over without it and with it.
@@ -176,8 +180,8 @@ fn left(closed: &Closed) -> Vec<Figure> {
         let trace = trace(closed, target)?;
         let over = u.depends_on.iter().find_map(|name| Some((name, values(context, target, name)?)));
         Some(match over {
-            Some((name, x)) => against(&trace, "left", (name, unit_of(name)), &x, PAIR),
-            None => over_time(&trace, "left", PAIR),
+            Some((name, x)) => against(&trace, "left", (name, unit_of(name)), &x, pair(&closed.verdict)),
+            None => over_time(&trace, "left", pair(&closed.verdict)),
         })
     };
     // several speed sensors have a figure together
@@ -192,20 +196,20 @@ fn every_channel(closed: &Closed) -> Vec<Figure> {
     let mut out = Vec::new();
     for target in context.targets.iter().filter(|t| !t.relation.is_evidence()) {
         let Some(trace) = trace(closed, target) else { continue };
-        out.push(over_time(&trace, "every", PAIR));
+        out.push(over_time(&trace, "every", pair(&closed.verdict)));
         let measured: Vec<f64> = claimed(target).map(|k| target.y[k]).collect();
         let predicted = |left: &[f64]| -> Vec<f64> { measured.iter().zip(left).map(|(m, r)| m - r).collect() };
         let line = |name: &str, class, y| Layer::Line { name: name.to_owned(), class, x: trace.t.clone(), y };
+        let after = pair(&closed.verdict)[1].trim_end_matches(", after");
         out.push(thinned(Figure {
             id: format!("measured-{}", parts::slug(target.name)),
             title: format!("{} as measured and as predicted", heading(target.name)),
             x_label: trace.time_label.clone(),
             y_label: axis(target.name),
-            layers: vec![
-                line("measured", "d", measured.clone()),
-                line("declared", "b", predicted(&trace.before)),
-                line("corrected", "a", predicted(&trace.after)),
-            ],
+            layers: [line("measured", "d", measured.clone()), line("declared", "b", predicted(&trace.before))]
+                .into_iter()
+                .chain((!after.is_empty()).then(|| line(after, "a", predicted(&trace.after))))
+                .collect(),
             height: 280.0,
             ..Figure::default()
         }));

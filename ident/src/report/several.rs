@@ -6,7 +6,7 @@
 //! Units: as told.
 //! Reference: specification `formats.md`, `across_runs_rms`.
 
-use super::closed::{self as parts, Origin, Page, Vocabulary};
+use super::closed::{self as parts, Origin, Page, Vocabulary, pair};
 use super::page::{cards, over_runs};
 use super::sheet::Sheet;
 use super::svg::escape;
@@ -27,7 +27,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         news: false,
         origin: Origin::of_several(&runs.iter().map(|r| &r.log).collect::<Vec<_>>()),
         declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as a geometric mean over the runs.".to_owned(),
-        hero: outcome.shown.as_ref().map(over_runs).unwrap_or_default(),
+        hero: outcome.shown.as_ref().map(|shown| over_runs(v, shown)).unwrap_or_default(),
         cards: shown.map(|closed| cards(&closed)).unwrap_or_default(),
         left: Vec::new(),
         speeds: Vec::new(),
@@ -39,7 +39,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
             if let Some(link) = links.get(run) {
                 sheet.html_part(&format!("<p><a href=\"{}\">The run alone</a>, with its own verdict.</p>\n", escape(link)));
             }
-            sheet.html_part(&parts::bars(&channels(v, outcome, run, of), &[]));
+            sheet.html_part(&parts::bars(&channels(v, outcome, run, of), &[], pair(v)));
         });
     }
     sheet.html()

@@ -14,6 +14,10 @@ use crate::log::write_whole;
 use crate::verdict::Channels;
 use std::path::{Path, PathBuf};
 
+/// Most columns of a table that a phone shows as one.
+const NARROW: usize = 4;
+/// Most cells of a wider table whose rows a phone shows one under the other; a longer one keeps its first column in view and scrolls.
+const STACKED: usize = 600;
 /// Most rows of a table on a closed loop's page.
 const LONGEST: usize = 300;
 
@@ -144,7 +148,8 @@ impl Sheet {
         let texts: Vec<bool> =
             (0..header.len()).map(|k| k > 0 && rows.iter().any(|r| r.get(k).is_some_and(|c| c.chars().count() > 34))).collect();
         let class = |k: usize| if texts.get(k) == Some(&true) { " class=\"text\"" } else { "" };
-        self.body += "<div class=\"wide\"><table><thead><tr>";
+        let stacked = self.told && header.len() > NARROW && rows.len() * header.len() <= STACKED;
+        self.body += &format!("<div class=\"wide\"><table{}><thead><tr>", if stacked { " class=\"stack\"" } else { "" });
         for (k, cell) in header.iter().enumerate() {
             self.body += &format!("<th{}>{}</th>", class(k), escape(cell));
         }
@@ -152,7 +157,9 @@ impl Sheet {
         for (i, row) in rows.iter().enumerate() {
             self.body += if chosen(i) { "<tr class=\"chosen\">" } else { "<tr>" };
             for (k, cell) in row.iter().enumerate() {
-                self.body += &format!("<td{}>{}</td>", class(k), escape(cell));
+                let of = if stacked && k > 0 { format!(" data-of=\"{}\"", escape(header[k])) } else { String::new() };
+                let cell = if self.told { unbroken(cell) } else { escape(cell) };
+                self.body += &format!("<td{}{of}>{cell}</td>", class(k));
             }
             self.body += "</tr>";
         }
@@ -203,6 +210,15 @@ impl Sheet {
     pub fn drawn(&self) -> &[Figure] {
         &self.figures
     }
+}
+
+/// A cell in which no number with a sign breaks: browsers break lines after a hyphen.
+fn unbroken(cell: &str) -> String {
+    let word = |word: &str| {
+        let signed = word.len() < 16 && word.contains('-') && word.contains(|c: char| c.is_ascii_digit());
+        if signed { format!("<span class=\"n\">{}</span>", escape(word)) } else { escape(word) }
+    };
+    cell.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// A line of CSV.

@@ -5,7 +5,7 @@
 //! Units: m/s^2.
 //! Reference: IEEE Std 1293, accelerometer bias.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, by_axis, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, by_axis, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -31,6 +31,10 @@ impl AirframeEffect for AccelerometerBias {
             signature: "a constant in the specific force, whatever the motion",
             look_alikes: &["wind", "vibration_rectification"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the accelerometer", found.tell_length("bias", "m/s^2", |v| format!("is off by {v}"), "has an offset"))
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -6,7 +6,7 @@
 //! Reference: Beharie 2013, section 5.4 (endurance); the flat part of a LiPo's curve is a straight line.
 
 use super::supply_sag::follow;
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -31,6 +31,14 @@ impl AirframeEffect for BatteryDischarge {
             signature: "the voltage falls steadily, the speeds follow it at the same pulse",
             look_alikes: &["supply_sag"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let by_time = || found.tell_in("per_second", "V", |v| format!("falls by {v} a second"), "falls during the flight");
+        Clause::new(
+            "the battery's voltage",
+            found.tell_in("per_charge", "V", |v| format!("falls by {v} per ampere-hour"), &by_time()),
+        )
     }
 
     fn scope(&self, _: &Form) -> Scope {

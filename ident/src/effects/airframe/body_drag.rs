@@ -5,7 +5,7 @@
 //! Units: m^2 (drag coefficient times area) at 1.225 kg/m^3.
 //! Reference: Beharie 2013, Eq. 2.37 and 2.42 as corrected in the errata; Hoerner, *Fluid-Dynamic Drag*, 1965.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -32,6 +32,10 @@ impl AirframeEffect for BodyDrag {
             signature: "specific force falls with the square of the speed, in every direction alike",
             look_alikes: &["rotor_drag", "wind", "translational_lift"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the body", found.tell("area", |v| format!("drags like a plate of {v}"), "drags"))
     }
 
     fn scope(&self, _: &Form) -> Scope {

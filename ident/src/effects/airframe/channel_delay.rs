@@ -6,7 +6,7 @@
 //! Units: s, positive is late.
 //! Reference: specification `closing-the-loop.md`, table.
 
-use super::{About, AirframeEffect, Form, Found, Scope};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope};
 use crate::attribution::Shape;
 use crate::attribution::noise::usual_step;
 use crate::flight::columns::Flight;
@@ -35,6 +35,16 @@ impl AirframeEffect for ChannelDelay {
             signature: "the residual goes with the rate of change of what is predicted",
             look_alikes: &["spinup_lag", "lever_arm"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let on = |name: &str| found.channels.iter().any(|c| c.starts_with(name));
+        let (who, verb) = match () {
+            () if on("rpm") => ("the speed channels", "answer"),
+            () if on("ang_acc") || on("gyro") => ("the gyro", "answers"),
+            () => ("the accelerometer", "answers"),
+        };
+        Clause::new(who, found.tell("delay", |v| format!("{verb} {v} late"), &format!("{verb} late")))
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -5,7 +5,7 @@
 //! Units: uT/A.
 //! Reference: law of Biot and Savart: the field of a conductor is proportional to its current.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, by_axis, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, by_axis, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -31,6 +31,13 @@ impl AirframeEffect for CurrentInducedField {
             signature: "the field in body axes goes with the current",
             look_alikes: &["hard_iron"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the motors' current",
+            found.tell_length("per_ampere", "uT", |v| format!("bends the field by {v} per ampere"), "bends the field"),
+        )
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -6,7 +6,7 @@
 //! Units: share; s.
 //! Reference: specification `closing-the-loop.md`, table.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink};
 use crate::attribution::{Prior, Shape};
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -39,6 +39,16 @@ impl AirframeEffect for DeadRotorSpeed {
             signature: "one speed departs from its pulse, and forces and moments follow the pulse",
             look_alikes: &["rotor_gain"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let rotor = found.parameter("channel").map_or_else(|| "a rotor".to_owned(), |p| format!("rotor {:.0}", p.value));
+        let does = match (found.parameter("reads"), found.parameter("factor")) {
+            (Some(_), _) => found.tell("reads", |v| format!("is stuck at {v}"), "is stuck"),
+            (_, Some(_)) => found.tell("factor", |v| format!("reads {v} of what it turns"), "is broken"),
+            _ => "is broken".to_owned(),
+        };
+        Clause::new(format!("the speed channel of {rotor}"), does)
     }
 
     fn scope(&self, form: &Form) -> Scope {

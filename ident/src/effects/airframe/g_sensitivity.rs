@@ -5,7 +5,7 @@
 //! Units: rad/s per m/s^2.
 //! Reference: IEEE Std 952, acceleration-sensitive drift.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -31,6 +31,10 @@ impl AirframeEffect for GSensitivity {
             signature: "the gyro departs from the attitude's turning with the specific force",
             look_alikes: &["gyro_bias"],
         }
+    }
+
+    fn said(&self, _: &EffectEntry) -> Clause {
+        Clause::new("the gyro", "turns with the specific force")
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -5,7 +5,7 @@
 //! Units: m. The radius is that of one rotor with the size of the whole vehicle's footing.
 //! Reference: Cheeseman & Bennett, ARC R&M 3021, 1955.
 
-use super::{About, AirframeEffect, Form, Found, Scope};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope};
 use crate::attribution::Shape;
 use crate::flight::columns::Flight;
 use crate::flight::scene::Scene;
@@ -33,6 +33,10 @@ impl AirframeEffect for GroundEffect {
             signature: "specific force along the rotors grows near the ground, and the same for all speeds",
             look_alikes: &["translational_lift"],
         }
+    }
+
+    fn said(&self, _: &EffectEntry) -> Clause {
+        Clause::new("the ground", "adds thrust close to it")
     }
 
     fn scope(&self, _: &Form) -> Scope {

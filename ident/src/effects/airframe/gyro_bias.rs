@@ -5,7 +5,7 @@
 //! Units: rad/s.
 //! Reference: IEEE Std 952, in-run bias.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, by_axis, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, by_axis, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -31,6 +31,10 @@ impl AirframeEffect for GyroBias {
             signature: "a constant between the gyro and the turning of the attitude",
             look_alikes: &["g_sensitivity", "gyro_temperature"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new("the gyro", found.tell_length("bias", "rad/s", |v| format!("is off by {v}"), "has an offset"))
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -5,7 +5,7 @@
 //! Units: rad/s/K.
 //! Reference: PS-ITG-3200A rev 1.4, table 3.1 (zero-rate output over temperature).
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, by_axis, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, by_axis, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -33,6 +33,13 @@ impl AirframeEffect for GyroTemperature {
             signature: "the gyro drifts against the attitude as the board warms",
             look_alikes: &["gyro_bias"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the gyro's offset",
+            found.tell_length("per_kelvin", "rad/s", |v| format!("moves by {v} per kelvin"), "follows the temperature"),
+        )
     }
 
     fn scope(&self, _: &Form) -> Scope {

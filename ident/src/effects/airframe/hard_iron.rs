@@ -5,7 +5,7 @@
 //! Units: uT.
 //! Reference: Gebre-Egziabher et al., Journal of Aerospace Engineering 19(2), 2006.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, by_axis, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, by_axis, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -31,6 +31,13 @@ impl AirframeEffect for HardIron {
             signature: "a constant in the field that turns with the body",
             look_alikes: &["current_induced_field", "soft_iron"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "a magnet on board",
+            found.tell_length("offset", "uT", |v| format!("adds {v} to the field"), "shifts the field"),
+        )
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -6,7 +6,7 @@
 //! Units: rad/s^2 for each m/s; 1/s; both at the rotors' usual speed.
 //! Reference: Faessler, Franchi & Scaramuzza, IEEE RA-L 3:620, 2018 (the matrices A and B); Huang et al., ICRA 2009 (blade flapping).
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -33,6 +33,10 @@ impl AirframeEffect for HubMoment {
             signature: "angular acceleration about the axis across the motion grows with the speed",
             look_alikes: &["mass_offset", "rotor_gain"],
         }
+    }
+
+    fn said(&self, _: &EffectEntry) -> Clause {
+        Clause::new("air across the rotors", "pitches the body back")
     }
 
     fn scope(&self, _: &Form) -> Scope {

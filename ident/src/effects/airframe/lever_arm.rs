@@ -5,7 +5,7 @@
 //! Units: m, body axes.
 //! Reference: Goldstein, *Classical Mechanics*, section 4.10.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, by_axis, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, by_axis, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -32,6 +32,13 @@ impl AirframeEffect for LeverArm {
             signature: "specific force goes with the angular acceleration and the square of the rate",
             look_alikes: &["rotor_drag"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the accelerometer",
+            found.tell_length("arm", "m", |v| format!("sits {v} off the centre of gravity"), "sits off the centre of gravity"),
+        )
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -6,7 +6,7 @@
 //! Units: m, or arms where no arm is known.
 //! Reference: Beharie 2013, section 2.2 (moments about the centre of gravity).
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -31,6 +31,15 @@ impl AirframeEffect for MassOffset {
             signature: "constant angular acceleration about the level axes that goes with the thrust",
             look_alikes: &["rotor_gain", "hub_moment"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let arm = found.parameters.first().is_some_and(|p| p.unit == "arm");
+        let unit = if arm { "arm lengths" } else { "m" };
+        Clause::new(
+            "the centre of gravity",
+            found.tell_length("offset", unit, |v| format!("lies {v} off the middle"), "lies off the middle"),
+        )
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -28,7 +28,7 @@ mod translational_lift;
 mod vibration_rectification;
 mod wind;
 
-use super::{About, Scope};
+use super::{About, Clause, EffectEntry, Scope};
 use crate::attribution::Shape;
 use crate::flight::columns::{Flight, Sink};
 use crate::flight::scene::Scene;
@@ -110,6 +110,8 @@ pub trait AirframeEffect: Sync {
     fn id(&self) -> &'static str;
     /// What it is.
     fn about(&self) -> About;
+    /// What it does here, in the words of a lab, with its size.
+    fn said(&self, found: &EffectEntry) -> Clause;
     /// What it belongs to.
     fn scope(&self, form: &Form) -> Scope;
     /// The ways in which this flight could hold it.
@@ -138,6 +140,11 @@ pub trait AirframeEffect: Sync {
 #[must_use]
 pub fn about(id: &str) -> Option<About> {
     library().iter().find(|e| e.id() == id).map(|e| e.about())
+}
+
+/// What a found effect of a flight does, in words; `None` where the library lacks it.
+pub(crate) fn said(found: &EffectEntry) -> Option<Clause> {
+    library().iter().find(|e| e.id() == found.id).map(|e| e.said(found))
 }
 
 /// Every effect.

@@ -6,7 +6,7 @@
 //! Units: N/(m/s) with all rotors at their usual speed.
 //! Reference: Martin & Salaun, ICRA 2010; Faessler, Franchi & Scaramuzza, IEEE RA-L 3:620, 2018.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -31,6 +31,12 @@ impl AirframeEffect for RotorDrag {
             signature: "specific force across the rotors falls in proportion to the speed; along them it does not",
             look_alikes: &["body_drag", "wind", "accelerometer_bias"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let unit = found.parameters.first().map_or("N", |p| p.unit.trim_end_matches("/(m/s)"));
+        let with = |v: &str| format!("drag {v} for each m/s across their axes");
+        Clause::new("the rotors", found.tell_in("coefficient", unit, with, "drag across their axes"))
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -5,7 +5,7 @@
 //! Units: share.
 //! Reference: Beharie 2013, section 2.2 (k_T of each rotor).
 
-use super::{About, AirframeEffect, Form, Found, Scope};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope};
 use crate::attribution::Shape;
 use crate::flight::columns::Flight;
 use crate::flight::scene::Scene;
@@ -33,6 +33,19 @@ impl AirframeEffect for RotorGain {
             signature: "constant angular acceleration about both level axes that the speeds do not explain, and one about z",
             look_alikes: &["mass_offset", "dead_rotor_speed"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let rotor = found.parameter("rotor").map_or_else(|| "one rotor".to_owned(), |p| format!("rotor {:.0}", p.value));
+        let gains = found.parameter("thrust_change").is_some_and(|p| p.value > 0.0);
+        let (sign, word) = if gains { (100.0, "more") } else { (-100.0, "less") };
+        let with = |v: &str| format!("gives {v} {word} thrust than its speed says");
+        let without = format!("gives {word} thrust than its speed says");
+        let since = match found.scope {
+            Scope::Event => found.tell("t0", |v| format!(" from {v} on"), ""),
+            _ => String::new(),
+        };
+        Clause::new(rotor, found.tell_times("thrust_change", sign, "%", with, &without) + &since)
     }
 
     fn scope(&self, form: &Form) -> Scope {

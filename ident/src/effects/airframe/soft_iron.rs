@@ -5,7 +5,7 @@
 //! Units: share.
 //! Reference: Gebre-Egziabher et al., Journal of Aerospace Engineering 19(2), 2006.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -33,6 +33,10 @@ impl AirframeEffect for SoftIron {
             signature: "the strength of the field goes with the attitude",
             look_alikes: &["hard_iron"],
         }
+    }
+
+    fn said(&self, _: &EffectEntry) -> Clause {
+        Clause::new("iron on board", "bends the field")
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -5,7 +5,7 @@
 //! Units: s.
 //! Reference: Beharie 2013, section 5.3; Eschmann, Albani & Loianno, 2024 (motor delays of the Crazyflie).
 
-use super::{About, AirframeEffect, Form, Found, Scope};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope};
 use crate::attribution::Shape;
 use crate::flight::columns::Flight;
 use crate::flight::scene::{Scene, followed};
@@ -31,6 +31,13 @@ impl AirframeEffect for SpinupLag {
             signature: "each rotor's speed is behind its pulse; forces and moments hold with the measured speeds",
             look_alikes: &["channel_delay"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        Clause::new(
+            "the rotors",
+            found.tell("tau_up", |v| format!("take {v} to follow their pulses"), "take time to follow their pulses"),
+        )
     }
 
     fn scope(&self, _: &Form) -> Scope {

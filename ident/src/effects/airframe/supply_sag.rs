@@ -6,7 +6,7 @@
 //! Units: ohm, or V at the usual power; the share of a relative change of voltage that the speed follows.
 //! Reference: Ohm's law; Beharie 2013, Eq. 5.11 as corrected.
 
-use super::{About, AirframeEffect, FOLLOWED, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, FOLLOWED, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -47,6 +47,11 @@ impl AirframeEffect for SupplySag {
             signature: "the voltage mirrors the current, the speeds follow the voltage at the same pulse",
             look_alikes: &["battery_discharge"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let by_load = || found.tell("sag", |v| format!("drops {v} under its usual load"), "sags with the load");
+        Clause::new("the supply", found.tell_in("resistance", "V", |v| format!("drops {v} per ampere"), &by_load()))
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -6,7 +6,7 @@
 //! Units: N/(m/s)^2; N/(m/s) with all rotors at their usual speed.
 //! Reference: Leishman, *Principles of Helicopter Aerodynamics*, 2006, section 3.3; Svacha, Mohta & Kumar, ICUAS 2017.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -33,6 +33,10 @@ impl AirframeEffect for TranslationalLift {
             signature: "specific force along the rotors grows with the square of the speed across, and falls with the climb",
             look_alikes: &["body_drag", "ground_effect"],
         }
+    }
+
+    fn said(&self, _: &EffectEntry) -> Clause {
+        Clause::new("thrust", "grows across the air and falls in a climb")
     }
 
     fn scope(&self, _: &Form) -> Scope {

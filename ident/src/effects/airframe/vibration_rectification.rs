@@ -5,7 +5,7 @@
 //! Units: m/s^2 and rad/s, each per (m/s^2)^2.
 //! Reference: IEEE Std 1293, vibration rectification error.
 
-use super::{About, AirframeEffect, Form, Found, Scope, Sink, by_axis, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, by_axis, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -33,6 +33,10 @@ impl AirframeEffect for VibrationRectification {
             signature: "the offset of specific force or rate grows with the vibration",
             look_alikes: &["accelerometer_bias", "gyro_bias"],
         }
+    }
+
+    fn said(&self, _: &EffectEntry) -> Clause {
+        Clause::new("vibration", "shifts what the inertial sensors read")
     }
 
     fn scope(&self, _: &Form) -> Scope {

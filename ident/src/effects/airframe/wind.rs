@@ -5,7 +5,7 @@
 //! Units: m/s, to the north and to the east.
 //! Reference: Beharie 2013, section 2.6 (air-relative velocity).
 
-use super::{About, AirframeEffect, Form, Found, Scope};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope};
 use crate::attribution::Shape;
 use crate::flight::columns::Flight;
 use crate::flight::scene::Scene;
@@ -33,6 +33,11 @@ impl AirframeEffect for Wind {
             signature: "a drag that does not vanish where the vehicle stands still over ground, in earth axes",
             look_alikes: &["accelerometer_bias", "mass_offset"],
         }
+    }
+
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let speed = found.tell_length_of(&["north", "east"], "m/s", |v| format!("blows at {v}"), "blows");
+        Clause::new("a wind", speed)
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -12,7 +12,7 @@ use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
-use crate::words::{channel, digits, list, probability, scaled, scope, sized, sureness, upper};
+use crate::words::{channel, digits, list, probability, scaled, scope, sized, sureness, upper, upper_bound};
 use std::fmt::Write;
 
 /// Probability below which the card says how to settle it.
@@ -32,7 +32,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     for (k, (heading, lead)) in [
         ("What this rig has", ""),
         ("What every rig has", "A rotor has inertia and takes time: no rig is without these."),
-        ("Without a name", "What no known effect explains. Where a smooth function predicts rows it has not seen, it corrects the model; it names no cause."),
+        ("Without a name", "What no known effect explains. Where a smooth function predicts rows it has not seen, it is added to the model; it names no cause."),
     ]
     .into_iter()
     .enumerate()
@@ -54,8 +54,12 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
 
 fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     let (v, e) = (page.verdict, &page.verdict.effects[k]);
-    let sure = sureness(e.probability);
-    let title = if e.id == "unknown" {
+    // what has no name is sure of nothing but that something is there
+    let nameless = e.id == "unknown";
+    let sure = if nameless { "unsure" } else { sureness(e.probability) };
+    let p = format!("p {}", equals(&probability(e.probability)));
+    let chip = if nameless { format!("no name; that something is there: {p}") } else { format!("{sure}: {p}") };
+    let title = if nameless {
         let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
         let with: Vec<String> = e.depends_on.iter().map(|c| channel(c)).collect();
         if with.is_empty() {
@@ -68,10 +72,10 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     };
     let number = number.map(|n| format!("<span class=\"nr\">{n}</span> ")).unwrap_or_default();
     let mut html = format!(
-        "<article class=\"card {sure}\" id=\"effect-{}\"><h3>{number}{}</h3>\n<p class=\"facts\"><span class=\"chip {sure}\">{sure}: p {}</span> <code>{}</code> on {}. {}</p>\n",
+        "<article class=\"card {sure}\" id=\"effect-{}\"><h3>{number}{}</h3>\n<p class=\"facts\"><span class=\"chip {sure}\">{}</span> <code>{}</code> on {}. {}</p>\n",
         anchor(v, k),
         escape(&title),
-        escape(&equals(&probability(e.probability))),
+        escape(&chip),
         escape(&e.id),
         escape(&list(&e.channels.iter().map(|c| channel(c)).collect::<Vec<_>>())),
         escape(&removes(v, e)),
@@ -121,8 +125,13 @@ pub(super) fn removes(v: &Verdict, e: &EffectEntry) -> String {
     format!("Without it the error of {} is {without}, with it {with}.", channel(first))
 }
 
-/// A parameter's value and interval, with one digit more than the interval supports.
+/// A parameter's value and interval, with one digit more than the interval supports; what cannot be below zero and may be zero has a bound alone.
 pub(super) fn value(p: &Parameter) -> [String; 3] {
+    if let Some(bound) = upper_bound(p) {
+        let (factor, unit) = scaled(bound, &p.unit);
+        let bound = digits(factor * bound, 0.05 * factor * bound);
+        return [format!("< {bound}"), format!("up to {bound}"), unit.to_owned()];
+    }
     let (factor, unit) = scaled(p.value, &p.unit);
     let half = factor * 0.5 * (p.ci95[1] - p.ci95[0]).abs();
     let fine = |v: f64| digits(factor * v, if half > 0.0 { 0.1 * half } else { 0.0 });
@@ -182,7 +191,7 @@ fn settle(v: &Verdict, e: &EffectEntry) -> Option<String> {
     if e.probability >= SETTLED {
         return None;
     }
-    if v.next_experiment.is_some() {
+    if v.proposed().is_some() {
         return Some("<a href=\"#what-would-settle-it\">the run that is proposed below</a>.".to_owned());
     }
     Some(match e.scope {

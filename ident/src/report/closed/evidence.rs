@@ -69,10 +69,10 @@ impl Trace {
         })
     }
 
-    fn pair(&self, rows: std::ops::Range<usize>, names: [&str; 2]) -> Vec<Layer> {
+    fn pair(&self, rows: std::ops::Range<usize>, names: [&'static str; 2]) -> Vec<Layer> {
         let t = &self.t[rows.clone()];
         let mut layers: Vec<Layer> = t.first().zip(t.last()).and_then(|(a, b)| self.band(*a, *b)).into_iter().collect();
-        for ((name, class), y) in names.into_iter().zip(["b", "a"]).zip([&self.before, &self.after]) {
+        for ((name, class), y) in shown(names).zip([&self.before, &self.after]) {
             let (x, y) = lifted(t, &y[rows.clone()]);
             layers.push(Layer::Line { name: name.to_owned(), class, x, y });
         }
@@ -86,13 +86,13 @@ pub(crate) fn slug(name: &str) -> String {
 }
 
 /// Over the whole run.
-pub(crate) fn over_time(trace: &Trace, id: &str, names: [&str; 2]) -> Figure {
+pub(crate) fn over_time(trace: &Trace, id: &str, names: [&'static str; 2]) -> Figure {
     let title = format!("{} left over, whole run", heading(&trace.channel));
     trace.figure(id, title, trace.time_label.clone(), trace.pair(0..trace.t.len(), names))
 }
 
 /// The part of the run in which most was taken away, enlarged.
-pub(crate) fn enlarged(trace: &Trace, id: &str, names: [&str; 2]) -> Option<Figure> {
+pub(crate) fn enlarged(trace: &Trace, id: &str, names: [&'static str; 2]) -> Option<Figure> {
     let (first, last) = (trace.t.first()?, trace.t.last()?);
     let wide = (last - first) / PARTS;
     if trace.t.len() < 60 || wide <= 0.0 {
@@ -132,17 +132,34 @@ pub(crate) fn most(verdict: &Verdict, traces: &[Trace]) -> Vec<Figure> {
         })
     };
     let Some(trace) = traces.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))) else { return Vec::new() };
-    std::iter::once(over_time(trace, "most", PAIR)).chain(enlarged(trace, "most", PAIR)).collect()
+    let names = pair(verdict);
+    std::iter::once(over_time(trace, "most", names)).chain(enlarged(trace, "most", names)).collect()
 }
 
-/// Names of a pair of residuals.
-pub(crate) const PAIR: [&str; 2] = ["declared, before", "corrected, after"];
+/// Names of a pair of residuals: what stands after is corrected only by names. A second one that is empty is not drawn.
+pub(crate) fn pair(verdict: &Verdict) -> [&'static str; 2] {
+    let fitted = |e: &EffectEntry| e.heldout_error_reduction > 0.0;
+    let nameless = verdict.effects.iter().any(|e| e.id == "unknown" && fitted(e));
+    match verdict.effects.iter().any(|e| e.id != "unknown") {
+        true => ["declared, before", "corrected, after"],
+        false if nameless => ["declared, before", "with a term without a name, after"],
+        false => ["declared, nothing added", ""],
+    }
+}
+
+/// The names that are drawn, with their classes.
+fn shown(names: [&'static str; 2]) -> impl Iterator<Item = (&'static str, &'static str)> {
+    names.into_iter().zip(["b", "a"]).filter(|(name, _)| !name.is_empty())
+}
 
 /// For each effect of a verdict its first channel where most was taken away; where that cannot be told, whole.
 pub(crate) fn each(verdict: &Verdict, traces: &[Trace]) -> Vec<Vec<Figure>> {
     let figure = |(k, e): (usize, &EffectEntry)| {
         let trace = traces.iter().find(|t| e.channels.first() == Some(&t.channel))?;
-        Some(enlarged(trace, &format!("effect-{}", k + 1), PAIR).unwrap_or_else(|| over_time(trace, "effect", PAIR)))
+        Some(
+            enlarged(trace, &format!("effect-{}", k + 1), pair(verdict))
+                .unwrap_or_else(|| over_time(trace, "effect", pair(verdict))),
+        )
     };
     verdict.effects.iter().enumerate().map(|e| figure(e).into_iter().collect()).collect()
 }
@@ -150,15 +167,15 @@ pub(crate) fn each(verdict: &Verdict, traces: &[Trace]) -> Vec<Vec<Figure>> {
 /// The channels of which something is left, over the whole run.
 pub(crate) fn rest(verdict: &Verdict, traces: &[Trace]) -> Vec<Figure> {
     let trace = |u: &Unexplained| traces.iter().find(|t| t.channel == u.channel);
-    verdict.unexplained.iter().filter_map(trace).map(|t| over_time(t, "left", PAIR)).collect()
+    verdict.unexplained.iter().filter_map(trace).map(|t| over_time(t, "left", pair(verdict))).collect()
 }
 
 /// Over a variable.
-pub(crate) fn against(trace: &Trace, id: &str, (variable, unit): (&str, &str), x: &[f64], names: [&str; 2]) -> Figure {
+pub(crate) fn against(trace: &Trace, id: &str, (variable, unit): (&str, &str), x: &[f64], names: [&'static str; 2]) -> Figure {
     let ends =
         x.iter().copied().filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     let mut layers: Vec<Layer> = if ends.0 < ends.1 { trace.band(ends.0, ends.1).into_iter().collect() } else { Vec::new() };
-    for ((name, class), y) in names.into_iter().zip(["b", "a"]).zip([&trace.before, &trace.after]) {
+    for ((name, class), y) in shown(names).zip([&trace.before, &trace.after]) {
         layers.push(Layer::Dots { name: name.to_owned(), class, x: x.to_vec(), y: y.clone() });
     }
     let said = channel(variable);

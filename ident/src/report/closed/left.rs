@@ -34,7 +34,10 @@ pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
     let Some(next) = &page.verdict.next_experiment else { return };
     sheet.section("What would settle it");
     sheet.say(&format!("{}.", upper(next.why.trim_end_matches('.'))));
-    if next.schedule.is_empty() {
+    if !next.separates {
+        sheet.say("No run is proposed. A sensor that this log lacks, or the rig with one part exchanged, may tell.");
+    }
+    if next.schedule.is_empty() || !next.separates {
         return;
     }
     let rows: Vec<Vec<String>> = next.schedule.iter().map(|s| vec![s.pulse_us.to_string(), s.hold_s.to_string()]).collect();

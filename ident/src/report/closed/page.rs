@@ -7,7 +7,7 @@
 
 use super::provenance::{Origin, provenance};
 use super::vocabulary::Vocabulary;
-use super::{cards, fold, left, sentence, state};
+use super::{cards, fold, left, pair, sentence, state};
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::verdict::{Kind, Validation, Verdict};
@@ -41,7 +41,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     let of_what = if v.runs.is_empty() { v.run.clone() } else { format!("{} runs of one rig", v.runs.len()) };
     let mut sheet = Sheet::told(&format!("{of_what}: what the model lacks"), &sentence(v, page.words, page.news));
     sheet.soft(&page.origin.line());
-    sheet.html_part(&state::bars(&v.channels, &v.unexplained));
+    sheet.html_part(&state::bars(&v.channels, &v.unexplained, pair(v)));
     for l in &v.left_out {
         sheet.warn(&format!("Left out: {l}."));
     }

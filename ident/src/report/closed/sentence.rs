@@ -89,8 +89,10 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         }
     }
     ways.retain(|w| !w.is_empty());
-    let doubt = if verdict.next_experiment.is_some() {
+    let doubt = if verdict.proposed().is_some() {
         "this run cannot tell, the run proposed below may"
+    } else if verdict.next_experiment.is_some() {
+        "this run cannot tell, nor can any schedule that was tried"
     } else {
         "this run cannot tell"
     };
@@ -130,9 +132,9 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
         corrections.iter().filter(|e| e.heldout_error_reduction > 0.0).flat_map(|e| &e.depends_on).map(|v| channel(v)).collect();
     goes.dedup();
     if goes.is_empty() {
-        out += " Nothing that was tried predicts it, so nothing was corrected.";
+        out += " Nothing that was tried predicts it, so nothing was added to the model.";
     } else {
-        out += &format!(" It goes with {}; a correction without a name was fitted.", list(&goes));
+        out += &format!(" It goes with {}; a smooth term without a name was fitted.", list(&goes));
     }
     let left = left(verdict);
     if left.is_empty() { out } else { format!("{out} {left}") }
@@ -211,7 +213,10 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
     let others = verdict.effects.iter().any(|e| {
         !told.iter().any(|t| std::ptr::eq(*t, e)) && e.channels.iter().any(|c| shares.iter().any(|s| s.0 == c.as_str()))
     });
+    let nameless =
+        verdict.effects.iter().any(|e| e.id == "unknown" && e.channels.iter().any(|c| shares.iter().any(|s| s.0 == c.as_str())));
     let subject = match (others, told.len()) {
+        (true, _) if nameless => "With all that is told below, what has no name included, the model explains",
         (true, _) => "With all that is named below the model explains",
         (false, 1) => "That explains",
         (false, _) => "Together they explain",

@@ -60,7 +60,7 @@ fn spoken(name: &str) -> String {
 }
 
 /// The bars.
-pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
+pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained], [_, after]: [&str; 2]) -> String {
     let scale = Scale::of(channels);
     let mut out = String::from("<div class=\"state\" role=\"table\" aria-label=\"error of each channel before and after\">\n");
     out +=
@@ -110,7 +110,17 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained]) -> String {
             escape(reason)
         );
     }
-    out + "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: corrected model, after. Logarithmic, in noise floors of each channel. Error on rows that no fit saw.</p>\n"
+    let after = match after {
+        "" => "the same: nothing was added".to_owned(),
+        "corrected, after" => "corrected model, after".to_owned(),
+        after => after.to_owned(),
+    };
+    let _ = writeln!(
+        out,
+        "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: {}. Logarithmic, in noise floors of each channel. Error on rows that no fit saw.</p>",
+        escape(&after)
+    );
+    out
 }
 
 /// A factor to three digits at the most.
@@ -136,7 +146,8 @@ mod tests {
             channels.predicted.insert(name.into(), c);
         }
         channels.not_predicted.insert("rpm".into(), "no command was logged".into());
-        let html = bars(&channels, &[]);
+        let html = bars(&channels, &[], ["declared, nothing added", ""]);
+        assert!(!html.contains("corrected"), "{html}");
         let scale = Scale::of(&channels);
         assert!(scale.at(1.0) > 0.0 && scale.at(100.0) < 100.0 && scale.at(0.1) == 0.0);
         assert!((scale.at(100.0) - scale.at(10.0) - (scale.at(10.0) - scale.at(1.0))).abs() < 1e-9, "logarithmic");

@@ -10,7 +10,7 @@ use super::sentence::{sentence, size_left};
 use super::state::{factor, figures, word};
 use super::vocabulary::Vocabulary;
 use crate::verdict::{EffectEntry, Verdict};
-use crate::words::{channel, list, probability, upper};
+use crate::words::{channel, list, probability, upper, upper_bound};
 
 /// Columns of the widest line.
 pub const WIDEST: usize = 100;
@@ -43,7 +43,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     if let Some(next) = &verdict.next_experiment {
         let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us {} s", s.pulse_us, s.hold_s)).collect();
         out += &format!("\n{}\n", wrapped(&format!("what would settle it: {}", next.why), 2));
-        if !steps.is_empty() {
+        if !steps.is_empty() && next.separates {
             out += &format!("  {}\n", wrapped(&steps.join(", "), 2));
         }
     }
@@ -87,14 +87,21 @@ fn channels(verdict: &Verdict) -> String {
 
 fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
     let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
-    let p = probability(e.probability);
-    let mut out = format!("{}\n", wrapped(&format!("  {} (p {p}) on {}, {}", e.id, list(&on), e.scope.word()), 4));
+    let p = match e.id.as_str() {
+        "unknown" => format!("that something is there: p {}", probability(e.probability)),
+        _ => format!("p {}", probability(e.probability)),
+    };
+    let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {}", e.id, list(&on), e.scope.word()), 4));
     if e.id != "unknown" {
         out += &format!("    {}\n", wrapped(&(words.clause)(e).sentence(), 4));
     }
     for parameter in e.parameters.iter().filter(|p| p.name != "phase") {
         let [v, interval, unit] = value(parameter);
-        out += &format!("    {} = {}  (95 %: {interval})\n", parameter.name, format!("{v} {unit}").trim_end());
+        let name = &parameter.name;
+        out += &match upper_bound(parameter) {
+            Some(_) => format!("    {name} {v} {unit}  (95 %)\n"),
+            None => format!("    {name} = {}  (95 %: {interval})\n", format!("{v} {unit}").trim_end()),
+        };
     }
     let removes = removes(verdict, e);
     if !removes.is_empty() {
