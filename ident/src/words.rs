@@ -255,12 +255,22 @@ pub fn scaled(value: f64, unit: &str) -> (f64, &str) {
 /// A parameter with unit, to the digits that its interval supports; `None` where the interval is wider than half of the value.
 #[must_use]
 pub fn sized(p: &Parameter) -> Option<String> {
+    if let Some(count) = counted(p) {
+        return Some(with_unit(&count, &p.unit));
+    }
     let half = 0.5 * (p.ci95[1] - p.ci95[0]).abs();
     if p.value == 0.0 || !p.value.is_finite() || !half.is_finite() || half > 0.5 * p.value.abs() {
         return None;
     }
     let (factor, unit) = scaled(p.value, &p.unit);
     Some(with_unit(&digits(factor * p.value, factor * half), unit))
+}
+
+/// A whole number that was counted, not measured: its interval has no width.
+#[must_use]
+pub fn counted(p: &Parameter) -> Option<String> {
+    let exact = p.ci95 == [p.value; 2] && p.value.fract() == 0.0 && p.value != 0.0;
+    exact.then(|| format!("{:.0}", p.value))
 }
 
 /// Units of what cannot be below zero: durations, resistances, inertias, charges, lengths, areas.
@@ -369,6 +379,13 @@ mod tests {
         assert_eq!(clause.with("probably"), "the load cell probably creeps");
         assert_eq!(clause.sentence(), "The load cell creeps.");
         assert_eq!(Clause::new("", "the body drags").with("perhaps"), "perhaps the body drags");
+    }
+
+    #[test]
+    fn what_was_counted_is_a_whole_number() {
+        let rows = parameter(4.0, 0.0, "rows");
+        assert_eq!((counted(&rows).as_deref(), sized(&rows).as_deref()), (Some("4"), Some("4 rows")));
+        assert_eq!(counted(&parameter(4.0, 0.1, "rows")), None);
     }
 
     #[test]

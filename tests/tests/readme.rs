@@ -145,3 +145,28 @@ fn commands_are_found_in_sh_blocks_only() {
     ];
     assert_eq!(commands(markdown), wanted);
 }
+
+/// `CONTRIBUTING.md` names commands of the project's own tasks and files: every one is there.
+#[test]
+fn what_contributing_names_is_there() {
+    let text = std::fs::read_to_string(root().join("CONTRIBUTING.md")).expect("the project has a CONTRIBUTING.md");
+    let tasks = std::fs::read_to_string(root().join("xtask/src/main.rs")).expect("the tasks");
+    let named = text.split("cargo xtask ").skip(1).filter_map(|rest| rest.split(['`', '\n']).next());
+    let mut seen = 0;
+    for command in named {
+        let mut words = command.split_whitespace();
+        let (task, flag) = (words.next().unwrap_or(""), words.next());
+        assert!(tasks.contains(&format!("[\"{task}\"")), "no task {task}");
+        assert!(flag.is_none_or(|f| !f.starts_with("--") || tasks.contains(f)), "no {command}");
+        seen += 1;
+    }
+    assert!(seen >= 8, "{seen}");
+    let links = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    for link in links {
+        assert!(root().join(link).is_file(), "no file {link}");
+    }
+    let folders = text.split('`').filter(|w| w.ends_with('/') && !w.contains(' '));
+    for folder in folders {
+        assert!(root().join(folder).is_dir(), "no folder {folder}");
+    }
+}

@@ -12,7 +12,7 @@ use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
-use crate::words::{channel, digits, list, probability, scaled, scope, sized, sureness, upper, upper_bound};
+use crate::words::{channel, counted, digits, list, probability, scaled, scope, sized, sureness, upper, upper_bound};
 use std::fmt::Write;
 
 /// Probability below which the card says how to settle it.
@@ -132,11 +132,14 @@ pub(super) fn value(p: &Parameter) -> [String; 3] {
         let bound = digits(factor * bound, 0.05 * factor * bound);
         return [format!("< {bound}"), format!("up to {bound}"), unit.to_owned()];
     }
+    let unit_of = |unit: &str| if unit == "1" { String::new() } else { unit.to_owned() };
+    if let Some(count) = counted(p) {
+        return [count.clone(), format!("{count} to {count}"), unit_of(&p.unit)];
+    }
     let (factor, unit) = scaled(p.value, &p.unit);
     let half = factor * 0.5 * (p.ci95[1] - p.ci95[0]).abs();
     let fine = |v: f64| digits(factor * v, if half > 0.0 { 0.1 * half } else { 0.0 });
-    let unit = if unit == "1" { "" } else { unit };
-    [fine(p.value), format!("{} to {}", fine(p.ci95[0]), fine(p.ci95[1])), unit.to_owned()]
+    [fine(p.value), format!("{} to {}", fine(p.ci95[0]), fine(p.ci95[1])), unit_of(unit)]
 }
 
 fn parameters(sheet: &mut Sheet, e: &EffectEntry) {
