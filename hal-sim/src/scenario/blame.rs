@@ -17,6 +17,8 @@ struct Piece {
     place: usize,
     whole: Range<usize>,
     value: Range<usize>,
+    /// Whether it is a list in brackets; tables under a header are none.
+    is_list: bool,
 }
 
 /// Where the refusal belongs, and the key that it is about where that is known.
@@ -57,7 +59,7 @@ pub(super) fn blame<T: DeserializeOwned>(text: &str, error: &Error) -> (usize, O
     let innermost = |wanted: &dyn Fn(&(&Piece, bool)) -> bool| {
         guilty.iter().rev().filter(|found| wanted(found)).min_by_key(|(piece, _)| piece.whole.len()).map(|(piece, _)| *piece)
     };
-    let list = || pieces.iter().find(|p| error.span().is_some_and(|s| s == p.value) && text[p.value.clone()].starts_with('['));
+    let list = || pieces.iter().find(|p| p.is_list && error.span().is_some_and(|s| s == p.value));
     let found = innermost(&|(piece, _)| told(piece))
         .or_else(list)
         .or_else(|| innermost(&|(_, needed)| !needed))
@@ -77,20 +79,17 @@ fn quotes(message: &str, value: &str) -> bool {
 fn gather(table: &DeTable<'_>, pieces: &mut Vec<Piece>) {
     for (key, value) in table {
         let whole = key.span().start..value.span().end;
-        pieces.push(Piece { key: key.get_ref().to_string(), place: value.span().start, whole, value: value.span() });
-        inside(key.get_ref(), value, pieces);
+        add(key.get_ref(), whole, value, pieces);
     }
 }
 
-fn inside(key: &str, value: &Spanned<DeValue<'_>>, pieces: &mut Vec<Piece>) {
+fn add(key: &str, whole: Range<usize>, value: &Spanned<DeValue<'_>>, pieces: &mut Vec<Piece>) {
+    let of_tables = |items: &[Spanned<DeValue<'_>>]| items.iter().any(|i| i.get_ref().is_table());
+    let is_list = matches!(value.get_ref(), DeValue::Array(items) if items.is_empty() || !of_tables(items));
+    pieces.push(Piece { key: key.to_owned(), place: value.span().start, whole, value: value.span(), is_list });
     match value.get_ref() {
         DeValue::Table(table) => gather(table, pieces),
-        DeValue::Array(items) => {
-            for item in items {
-                pieces.push(Piece { key: key.to_owned(), place: item.span().start, whole: item.span(), value: item.span() });
-                inside(key, item, pieces);
-            }
-        }
+        DeValue::Array(items) => items.iter().for_each(|item| add(key, item.span(), item, pieces)),
         _ => {}
     }
 }

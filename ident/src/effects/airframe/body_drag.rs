@@ -5,7 +5,7 @@
 //! Units: m^2 (drag coefficient times area) at 1.225 kg/m^3.
 //! Reference: Beharie 2013, Eq. 2.37 and 2.42 as corrected in the errata; Hoerner, *Fluid-Dynamic Drag*, 1965.
 
-use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, by_axis, single};
+use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
@@ -15,9 +15,6 @@ pub(super) struct BodyDrag;
 
 /// Usual size of 1/2 rho CdS / m, 1/m: terminal speeds of some 15 m/s.
 const USUAL: f64 = 0.04;
-/// How far the area that one axis shows may be off the common one, as a share of the usual: no body is a ball.
-const OFF: f64 = 0.1;
-const OFF_NAMES: [&str; 3] = by_axis!("off");
 /// Density of ISA air at sea level, kg/m^3.
 const DENSITY: f64 = 1.225;
 
@@ -29,7 +26,7 @@ impl AirframeEffect for BodyDrag {
     fn about(&self) -> About {
         About {
             title: "The body drags",
-            equation: "F = -1/2 rho area |v| v, v through the air, area up to a tenth of the usual one off on each axis",
+            equation: "F = -1/2 rho area |v| v, v through the air",
             source: "Beharie 2013, Eq. 2.42 as corrected in the errata; Hoerner 1965.",
             depends_on: &["vel"],
             signature: "specific force falls with the square of the speed, in every direction alike",
@@ -51,20 +48,15 @@ impl AirframeEffect for BodyDrag {
 
     fn columns(&self, _: &Form, _: &[f64], sink: &mut Sink<'_>) {
         let scene = sink.scene;
-        let along = |axis: usize| -> Vec<f64> {
-            let at = |row: usize| {
-                let v = scene.air_at(row);
-                -v.norm() * v[axis]
-            };
-            (0..scene.len()).map(at).collect()
-        };
-        let axes = [0, 1, 2].map(along);
         sink.column("per_mass", Prior::positive(USUAL));
-        for (axis, values) in axes.iter().enumerate() {
-            sink.part(Target::Force(axis), values);
-        }
-        for (axis, values) in axes.iter().enumerate() {
-            sink.column(OFF_NAMES[axis], Prior::about_zero(OFF * USUAL)).part(Target::Force(axis), values);
+        for axis in 0..3 {
+            let values: Vec<f64> = (0..scene.len())
+                .map(|row| {
+                    let v = scene.air_at(row);
+                    -v.norm() * v[axis]
+                })
+                .collect();
+            sink.part(Target::Force(axis), &values);
         }
     }
 
