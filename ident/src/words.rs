@@ -364,7 +364,7 @@ mod tests {
             (8437.0, 30.0, "rpm", "8440 rev/min"),
             (6.83e-5, 2e-6, "kg.m2", "6.8e-5 kg.m2"),
             (-0.25, 0.004, "N", "-0.250 N"),
-            (12.0, 0.0, "rows", "12.0 rows"),
+            (12.0, 0.0, "rows", "12 rows"),
         ] {
             assert_eq!(sized(&parameter(value, half, unit)).as_deref(), Some(said), "{value} +- {half}");
         }
