@@ -112,3 +112,20 @@ fn the_file_says_it_too() {
         assert!(refused.contains(wanted) && refused.lines().count() == 1, "{refused}");
     }
 }
+
+/// A row for each level is a table; rows within a level, or rows that come quicker than a rotor arrives, are none.
+#[test]
+fn a_table_of_levels_is_told_from_a_run() {
+    let is_table = |step: f64, rows_a_level: usize| {
+        let n = 24;
+        let column = |name: &str, values: Vec<f64>| Column { name: name.to_owned(), values };
+        let pulse: Vec<f64> = (0..n).map(|i| 1200.0 + 30.0 * (i / rows_a_level) as f64).collect();
+        let rpm = pulse.iter().map(|p| 7.0 * (p - 1000.0)).collect();
+        let columns = vec![column("pulse_us", pulse), column("rpm", rpm)];
+        let log = Log { t: (0..n).map(|i| step * i as f64).collect(), columns, ..Log::default() };
+        Context::new(&log, Some(1050.0)).is_table()
+    };
+    assert!(is_table(5.0, 1) && is_table(0.5, 1));
+    assert!(!is_table(5.0, 3), "three rows a level show what happens within it");
+    assert!(!is_table(0.1, 1), "a ramp of ten rows a second");
+}
