@@ -96,7 +96,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             open: open.is_some(),
         });
         say(account(&standing, runs.len()));
-        wanted = open.filter(|_| args.auto && number <= args.extra_runs).and_then(|against| next(&runs, &standing[0], against));
+        let may_fly = args.auto && number <= args.extra_runs;
+        let proposed = open.filter(|_| may_fly).and_then(|against| next(&runs, &standing[0], against));
+        wanted = proposed.filter(|next| next.separates);
         if wanted.is_none() {
             break standing;
         }
