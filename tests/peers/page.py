@@ -8,9 +8,17 @@ TIE = 0.02
 
 HEAD = """# Against what people use today
 
-Written by `tests/peers/peers.py` ([how to run it](../tests/peers/README.md)). The same logs, the same declared polynomials, the same rows left out: {logs} runs of the independent generator (tuning seeds, even numbers; one effect, two, one that the library does not know, none; each with a second run of the same rig on another schedule) and {measured} recorded ones (of an RCbenchmark stand, and of a lever rig, whose other run is the same motor at the next supply voltage).
+Written by `tests/peers/peers.py` ([how to run it](../tests/peers/README.md)). The same logs, the same declared polynomials, the same rows left out.
 
-Each peer fits the residual of the declared polynomial on every channel, from time, time since the last step and its direction, temperature, the regressor of the channel's relation and its first-order lags of 0.3, 3 and 30 s; and, where physics offers them, speed's rate, torque (for the thrust), charge drawn, voltage (for the speed).
+- {logs} runs of the independent generator, tuning seeds, even numbers. They hide one effect, two, one that the library does not know, or none. Each has a
+  second run of the same rig on another schedule.
+- {measured} recorded ones, of an RCbenchmark stand and of a lever rig. The other run of the lever rig is the same motor at the next supply voltage.
+
+Each peer fits the residual of the declared polynomial on every channel. It is given:
+
+- time, time since the last step and its direction, temperature;
+- the regressor of the channel's relation and its first-order lags of 0.3, 3 and 30 s;
+- where physics offers them, speed's rate, torque (for the thrust), charge drawn, voltage (for the speed).
 
 * **pysindy** 2.0: STLSQ over all products of two standardised features; the threshold, or no term at all, by blocks of the training rows left out.
 * **gaussian process** (scikit-learn): one length a feature, kernel by the likelihood of 120 rows, prediction from 500.
