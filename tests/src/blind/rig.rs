@@ -26,6 +26,17 @@ pub struct Drive {
     pub load: f64,
 }
 
+/// What a day has of its own, beside the declared state.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Day {
+    /// Supply, V.
+    pub volt: f64,
+    /// Temperature, K.
+    pub temperature: f64,
+    /// Pressure, hPa.
+    pub pressure: f64,
+}
+
 /// Noise of one channel.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ChannelNoise {
@@ -94,6 +105,8 @@ pub struct Rig {
     pub jitter: f64,
     /// Share of missing samples.
     pub missing: f64,
+    /// The day of the run.
+    pub day: Day,
     /// Whether commands change at the instant of a sample, as where one host commands and logs.
     pub aligned: bool,
     /// Head of the log.
@@ -139,6 +152,7 @@ impl Rig {
             hz: c.of(&[10.0, 12.5, 16.0, 20.0, 25.0, 50.0]),
             jitter: if c.happens(0.35) { c.between(0.003, 0.02) } else { 0.0 },
             missing: if c.happens(0.55) { c.between(0.001, 0.015) } else { 0.0 },
+            day: Day::default(),
             aligned: c.happens(0.8),
             meta: Vec::new(),
         };

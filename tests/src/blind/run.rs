@@ -58,8 +58,8 @@ fn surroundings(rig: &Rig, effects: &[Effect], duration: f64, h: f64, n: usize, 
                 _ => 0.5 - 0.5 * (std::f64::consts::TAU * turns * x + phase).cos(),
             };
             Air {
-                temperature: REFERENCE.temperature + reach * course,
-                pressure: REFERENCE.pressure + if rig.pressure { weather * x } else { 0.0 },
+                temperature: REFERENCE.temperature + rig.day.temperature + reach * course,
+                pressure: REFERENCE.pressure + rig.day.pressure + if rig.pressure { weather * x } else { 0.0 },
                 humidity: REFERENCE.humidity + humid * (std::f64::consts::TAU * humid_turns * x + 2.0 * phase).sin(),
             }
         })

@@ -70,7 +70,7 @@ impl<'a> Train<'a> {
     }
 
     fn voltage(&self, amps: f64) -> f64 {
-        let mut v = self.rig.volt;
+        let mut v = self.rig.volt + self.rig.day.volt;
         for e in self.effects {
             match e.id {
                 "supply_sag" => v -= e.strength * amps,
