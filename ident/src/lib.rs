@@ -27,6 +27,7 @@ pub mod fit;
 pub mod flight;
 pub mod flight_log;
 pub mod heldout;
+pub mod history;
 pub mod hypothesis;
 pub mod identify;
 pub mod import;

@@ -24,7 +24,7 @@ const fn entry(path: &'static str, units: &'static str, example: &'static str, p
 const US_S: &str = "pulses in us (1000 to 2000; duty in per cent is us / 200), times in s";
 const LOG: &str = "those of the log's column names: s, us, rev/min, N, N.m, A, V, degC";
 
-const ENTRIES: [Entry; 44] = [
+const ENTRIES: [Entry; 45] = [
     entry("demo", LOG, "demo --seed 7 --effect supply_sag -o out/demo", "README.md"),
     entry("sim", LOG, "sim examples/thin-lead.toml -o out/run.csv", "docs/scenario.md"),
     entry("runs", "hold in s", "runs -o out/runs --hold 30", "docs/scenario.md"),
@@ -48,6 +48,7 @@ const ENTRIES: [Entry; 44] = [
     ),
     entry("close-loop", LOG, "close-loop out/run.csv -o out/closed", "docs/loop.md"),
     entry("batch", LOG, "batch runs -o out/batch", "docs/book/how-to/batch.md"),
+    entry("history", LOG, "history runs -o out/history", "docs/book/how-to/history.md"),
     entry("select", "N, A, kg, A.h, min", "select --motor 570KV --thrust 19.62 -o out/select.html", "docs/identification.md"),
     entry(
         "beam",

@@ -25,6 +25,7 @@ mod flash;
 mod fly;
 mod folder;
 mod help;
+mod history;
 mod identify;
 mod import;
 mod imu;
@@ -87,6 +88,8 @@ enum Command {
     CloseLoop(close_loop::Args),
     /// The loop on every log of a folder: a row a run; goes on where it stopped, shared among machines by --shard.
     Batch(batch::Args),
+    /// A rig's constants run by run, and what changed between which runs.
+    History(history::Args),
     /// Motor, propeller and battery choice.
     Select(select::Args),
     /// Design of the load cell's beam, with a warning of resonance.
@@ -144,6 +147,7 @@ impl Command {
             Self::Plateaus(args) => args.paths(),
             Self::CloseLoop(args) => args.paths(),
             Self::Batch(args) => args.paths(),
+            Self::History(args) => args.paths(),
             Self::Select(args) => args.paths(),
             Self::Beam(args) => args.paths(),
             Self::Calibrate(args) => args.paths(),
@@ -174,6 +178,7 @@ impl Command {
             Self::Plateaus(args) => plateaus::run(args, quiet),
             Self::CloseLoop(args) => close_loop::run(args, quiet),
             Self::Batch(args) => batch::run(args, quiet),
+            Self::History(args) => history::run(args, quiet),
             Self::Select(args) => select::run(args, quiet),
             Self::Beam(args) => beam::run(args, quiet),
             Self::Calibrate(args) => calibrate::run(args, quiet),

@@ -16,7 +16,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// What a part of the page is called, and the files or folders whose refusals stand in it.
-const AREAS: [(&str, &[&str]); 11] = [
+const AREAS: [(&str, &[&str]); 12] = [
     (
         "Any file and folder",
         &[
@@ -76,6 +76,7 @@ const AREAS: [(&str, &[&str]); 11] = [
     ("Calibration", &["quadrig/src/calibrate.rs", "quadrig/src/calibrate", "quadrig/src/recalibrate.rs"]),
     ("Selection and beam", &["ident/src/select", "quadrig/src/select.rs", "quadrig/src/beam.rs"]),
     ("Recorded sets", &["quadrig/src/measured"]),
+    ("A rig's history", &["ident/src/history", "quadrig/src/history.rs"]),
 ];
 
 /// What to do about each reason of the board, in the order of its bits.

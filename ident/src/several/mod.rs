@@ -15,7 +15,7 @@ mod folds;
 mod joint;
 mod outcome;
 mod own;
-mod parallel;
+pub(crate) mod parallel;
 mod words;
 
 use crate::close::Closed;

@@ -8,7 +8,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What a function makes of 0 to `n`, in order, on all cores.
-pub(super) fn in_parallel<T: Send>(n: usize, of: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
+pub(crate) fn in_parallel<T: Send>(n: usize, of: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from).min(n.max(1));
     let next = AtomicUsize::new(0);
     let worker = || {

@@ -25,6 +25,7 @@ pub(crate) use page::{Page, begin};
 pub use provenance::{Hidden, Origin};
 pub use sentence::sentence;
 pub(crate) use state::bars;
+pub(crate) use terminal::wrapped;
 pub use terminal::{WIDEST, terminal};
 pub use vocabulary::Vocabulary;
 pub(crate) use vocabulary::bare;

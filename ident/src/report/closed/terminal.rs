@@ -142,7 +142,7 @@ fn set_aside(verdict: &Verdict) -> String {
 }
 
 /// Text in lines of at most [`WIDEST`] columns; further lines are set in by `indent`.
-fn wrapped(text: &str, indent: usize) -> String {
+pub(crate) fn wrapped(text: &str, indent: usize) -> String {
     let lead = text.len() - text.trim_start().len();
     let mut out = " ".repeat(lead);
     // the caller may have set in the first line by as much

@@ -1,0 +1,129 @@
+//! What a channel of one run may have beside the curve of all runs, as columns.
+//!
+//! What it is: zero, gain and bend; what comes late, by three time constants; what differs between the way up and down; what runs over the
+//! run's time and with its temperature.
+//! What can go wrong: a column that the run does not excite is left out; of a table of levels nothing that needs time is asked.
+//! Units: gain, bend and late shares over one; the others the channel's, of the temperature for each kelvin.
+//! Reference: the library's effects (`effects/`), each in its first order.
+
+use super::curve::Curve;
+use crate::context::Context;
+use crate::noise::median;
+
+/// What a column is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Of {
+    /// Reading without load.
+    Zero,
+    /// Times the curve.
+    Gain,
+    /// Departure halfway up, over the curve's full value.
+    Bend,
+    /// Share that comes late, by a fast, a middle and a slow time constant.
+    Late(usize),
+    /// Half the distance between the way up and the way down.
+    Hysteresis,
+    /// Course over the run, from its first to its last second.
+    Drift,
+    /// With the temperature.
+    Warmth,
+}
+
+/// Time constants of what comes late, s; the first at least as long as the samples ask for.
+pub(super) const LATE_S: [f64; 3] = [0.15, 1.0, 15.0];
+/// Samples that the fastest must hold.
+const FASTEST: f64 = 1.5;
+/// Move of the load that turns its direction, over the top.
+const SLACK: f64 = 0.02;
+/// Least range of the temperature that says something of it, K (standard deviation).
+const WARM_K: f64 = 0.3;
+
+/// A column on every row of a log.
+pub(super) type Column = (Of, Vec<f64>);
+
+/// The columns of a channel on a run: `x` is its regressor.
+pub(super) fn columns(context: &Context, curve: &Curve, x: &[f64]) -> Vec<Column> {
+    let f: Vec<f64> = x.iter().map(|x| curve.at(*x)).collect();
+    let u: Vec<f64> = x.iter().map(|x| (x / curve.top).clamp(0.0, 1.2)).collect();
+    let lens = |u: f64| 4.0 * u * (1.0 - u);
+    let mut out = vec![
+        (Of::Zero, vec![1.0; x.len()]),
+        (Of::Gain, f.clone()),
+        (Of::Bend, u.iter().map(|u| lens(*u) * curve.full).collect()),
+    ];
+    if context.time_is_row || context.is_table() {
+        return out;
+    }
+    let t = &context.t;
+    for (k, tau) in LATE_S.into_iter().enumerate() {
+        let tau = if k == 0 { tau.max(FASTEST * context.step()) } else { tau };
+        out.push((Of::Late(k), late(t, &f, tau)));
+    }
+    let way = direction(&u);
+    out.push((Of::Hysteresis, u.iter().zip(&way).map(|(u, way)| way * lens(u.min(1.0))).collect()));
+    let (from, to) = (t[0], t[t.len() - 1]);
+    out.push((Of::Drift, t.iter().map(|t| (t - from) / (to - from).max(f64::MIN_POSITIVE) - 0.5).collect()));
+    if let Some(warmth) = context.temperature.as_ref().map(|v| smooth(v)) {
+        let mean = warmth.iter().sum::<f64>() / warmth.len() as f64;
+        let square = warmth.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / warmth.len() as f64;
+        if square.sqrt() > WARM_K {
+            out.push((Of::Warmth, warmth.iter().map(|v| v - mean).collect()));
+        }
+    }
+    out
+}
+
+/// What a first-order lag has not followed yet.
+fn late(t: &[f64], f: &[f64], tau: f64) -> Vec<f64> {
+    let mut state = f[0];
+    let mut before = t[0];
+    t.iter()
+        .zip(f)
+        .map(|(t, f)| {
+            state += (f - state) * (1.0 - (-(t - before) / tau).exp());
+            before = *t;
+            state - f
+        })
+        .collect()
+}
+
+/// Whether the load's last move beyond the slack went up (1) or down (-1); 0 before the first.
+fn direction(u: &[f64]) -> Vec<f64> {
+    let (mut play, mut way) = (u[0], 0.0);
+    u.iter()
+        .map(|u| {
+            let next = play.clamp(u - SLACK, u + SLACK);
+            if next != play {
+                way = (next - play).signum();
+            }
+            play = next;
+            way
+        })
+        .collect()
+}
+
+/// A slow channel without its meter's noise: medians of 41 rows.
+fn smooth(v: &[f64]) -> Vec<f64> {
+    const REACH: usize = 20;
+    (0..v.len()).map(|i| median(&mut v[i.saturating_sub(REACH)..(i + REACH + 1).min(v.len())].to_vec())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_direction_is_that_of_the_last_move_beyond_the_slack() {
+        let way = direction(&[0.0, 0.1, 0.099, 0.1, 0.2, 0.1, 0.09]);
+        assert_eq!(way, [0.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0]);
+    }
+
+    #[test]
+    fn what_is_late_dies_away() {
+        let t: Vec<f64> = (0..100).map(|i| 0.1 * f64::from(i)).collect();
+        let f: Vec<f64> = (0..100).map(|i| f64::from(u8::from(i >= 10))).collect();
+        let late = late(&t, &f, 1.0);
+        assert_eq!(late[9], 0.0);
+        assert!(late[10] < -0.85 && late[99].abs() < 1e-3, "{} {}", late[10], late[99]);
+    }
+}

@@ -1,0 +1,120 @@
+//! What a change is called.
+//!
+//! What it is: the loop closed on runs after the gap against a model of the last run before it, by the same library that names causes in one
+//! run. What the loop names on other runs before the gap as well is how days differ, and is taken off.
+//! What can go wrong: an effect that the run before the gap hides is not seen after it; a drift is told by its measure, not by the library.
+//! Units: scores are logarithms of odds, nats.
+//! Reference: specification `closing-the-loop.md`; difference in differences.
+
+use super::History;
+use super::find::{Change, Kind};
+use crate::close::{Closed, close};
+use crate::effects::{self, Effect};
+use crate::log::Log;
+use crate::model::Model;
+use crate::several::parallel::in_parallel;
+use crate::verdict::EffectEntry;
+use crate::words::lower;
+use serde::Serialize;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Runs after a gap that are asked, and runs before it that show how days differ.
+const AFTER: usize = 3;
+const BEFORE: usize = 2;
+/// Odds that one run gives or takes at the most, nats.
+const MOST: f64 = 4.0;
+/// Most names that are kept.
+const KEPT: usize = 4;
+
+/// A name of a change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Name {
+    /// Effect of the library.
+    pub id: String,
+    /// Its title.
+    pub title: String,
+    /// What it does here, with its size.
+    pub words: String,
+    /// Odds that a run after the gap gives it, less those of a run before it, nats.
+    pub score: f64,
+}
+
+/// Names each change of a history; `logs` in the order of its runs. `progress` hears the share that is done. A run that the loop cannot be
+/// closed on takes no part.
+pub fn named(history: &mut History, logs: &[&Log], progress: &(dyn Fn(f64) + Sync)) {
+    let all = history.changes.len().max(1) as f64;
+    for k in 0..history.changes.len() {
+        let names = names(history, &history.changes[k], logs, &|share| progress((k as f64 + share) / all));
+        history.changes[k].names = names;
+    }
+}
+
+/// Runs that are asked about a change: the one that the model is of, others before it, some after it.
+fn chosen(change: &Change) -> (usize, Vec<usize>, Vec<usize>) {
+    let [from, to] = change.among;
+    let gap = if change.kind == Kind::Drift { from + 1 } else { change.first };
+    let last = gap - 1;
+    let before: Vec<usize> = (from..last).rev().take(BEFORE).collect();
+    let after: Vec<usize> = if change.kind == Kind::Drift { (gap..to).rev().take(AFTER).collect() } else { spread(gap, to) };
+    (last, before, after)
+}
+
+/// First, middle and last of some runs.
+fn spread(from: usize, to: usize) -> Vec<usize> {
+    let mut out = vec![from, (from + to) / 2, to - 1];
+    out.dedup();
+    out
+}
+
+fn names(history: &History, change: &Change, logs: &[&Log], progress: &(dyn Fn(f64) + Sync)) -> Vec<Name> {
+    let (last, before, after) = chosen(change);
+    let Ok(own) = close(logs[last], None, &[], &mut |_| {}) else { return Vec::new() };
+    let runs: Vec<usize> = before.iter().chain(&after).copied().collect();
+    let done = AtomicUsize::new(1);
+    let of = |k: usize| {
+        let closed = against(logs[runs[k]], &own.model);
+        progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / (runs.len() + 1) as f64);
+        closed
+    };
+    let closed = in_parallel(runs.len(), &of);
+    let (usual, news) = closed.split_at(before.len());
+    let moved: Vec<&str> = change.moved.iter().map(|m| history.measures[m.measure].channel.as_str()).collect();
+    let mut out: Vec<Name> = effects::library().iter().filter_map(|e| told(*e, usual, news, &moved)).collect();
+    out.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.id.cmp(&b.id)));
+    out.truncate(KEPT);
+    out
+}
+
+fn against(log: &Log, model: &Model) -> Option<Closed> {
+    close(log, Some(model), &[], &mut |_| {}).ok()
+}
+
+/// An effect as a name, where runs after the gap speak for it more than those before.
+fn told(effect: &'static dyn Effect, usual: &[Option<Closed>], news: &[Option<Closed>], moved: &[&str]) -> Option<Name> {
+    let id = effect.id();
+    let mean = |runs: &[Option<Closed>]| {
+        let all: Vec<f64> = runs.iter().flatten().map(|c| odds(c, id)).collect();
+        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+    };
+    let score = mean(news)? - mean(usual).unwrap_or(-MOST);
+    let entry = news.iter().flatten().filter_map(|c| entry(c, id)).find(|e| {
+        moved.is_empty()
+            || e.channels
+                .iter()
+                .any(|c| moved.contains(&c.as_str()) || c.starts_with("rpm") && moved.iter().any(|m| m.starts_with("rpm")))
+    })?;
+    let words = lower(&effect.said(entry).sentence());
+    (score > 0.0).then(|| Name { id: id.to_owned(), title: lower(effect.about().title), words, score })
+}
+
+fn entry<'c>(closed: &'c Closed, id: &str) -> Option<&'c EffectEntry> {
+    closed.verdict.effects.iter().find(|e| e.id == id)
+}
+
+/// Odds that a run gives an effect.
+fn odds(closed: &Closed, id: &str) -> f64 {
+    let named = entry(closed, id).map(|e| e.probability);
+    let beside: f64 = closed.verdict.alternatives.iter().filter(|a| a.ids.iter().any(|i| i == id)).map(|a| a.probability).sum();
+    let p = named.unwrap_or(beside).clamp(1e-9, 1.0 - 1e-9);
+    (p / (1.0 - p)).ln().clamp(-MOST, MOST)
+}

@@ -1,0 +1,66 @@
+//! A rig's history as a person reads it.
+//!
+//! What it is: the text of a terminal; numbers with their interval behind them in brackets.
+//! What can go wrong: nothing; what a run does not tell is a dash.
+//! Units: in the heads of the columns.
+//! Reference: GUM, clause 7.2.2 (a result and its uncertainty in brackets).
+
+mod terminal;
+
+pub use terminal::terminal;
+
+use crate::history::{History, Value};
+
+/// Measures that stand first: what moved, the surest first, then the constants of the thesis.
+fn foremost(history: &History) -> Vec<usize> {
+    let mut moved: Vec<_> = history.changes.iter().flat_map(|c| &c.moved).collect();
+    moved.sort_by(|a, b| b.evidence.total_cmp(&a.evidence).then(a.measure.cmp(&b.measure)));
+    let constants = (0..history.measures.len()).filter(|m| history.measures[*m].channel.is_empty());
+    let mut out: Vec<usize> = Vec::new();
+    for m in moved.iter().map(|m| m.measure).take(MOVED).chain(constants) {
+        if !out.contains(&m) {
+            out.push(m);
+        }
+    }
+    out
+}
+
+/// Most measures that moved among those that stand first.
+const MOVED: usize = 2;
+
+/// A value with the half width of its 95 % interval in brackets, in units of its last digit: `0.0498(5)`.
+fn bracketed(v: Value) -> String {
+    let half = v.half();
+    if !v.value.is_finite() || half <= 0.0 || !half.is_finite() {
+        return "-".to_owned();
+    }
+    // one digit of the interval, two where it begins with a one
+    let size = half.log10().floor();
+    let last = if half / 10f64.powf(size) < 1.95 { size - 1.0 } else { size };
+    let power = if v.value == 0.0 { 0.0 } else { v.value.abs().log10().floor() };
+    let (factor, exponent) =
+        if (-3.0..5.0).contains(&power) || power < last { (0.0, String::new()) } else { (power, format!("e{power}")) };
+    let (value, half, last) = (v.value / 10f64.powf(factor), half / 10f64.powf(factor), last - factor);
+    if last >= 0.0 {
+        let unit = 10f64.powf(last);
+        return format!("{:.0}({:.0}){exponent}", (value / unit).round() * unit, (half / unit).round() * unit);
+    }
+    let places = (-last) as usize;
+    format!("{value:.places$}({:.0}){exponent}", half * 10f64.powf(-last))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_has_its_interval_in_brackets() {
+        let said = |value: f64, half: f64| bracketed(Value { value, se: half / 1.96 });
+        assert_eq!(said(0.049_76, 0.000_51), "0.0498(5)");
+        assert_eq!(said(1.560_16e-5, 1.2e-9), "1.56016(12)e-5");
+        assert_eq!(said(-131.66, 28.0), "-130(30)");
+        assert_eq!(said(569.77, 1.3), "569.8(13)");
+        assert_eq!(said(0.0, 0.02), "0.00(2)");
+        assert_eq!(said(1.0, 0.0), "-");
+    }
+}
