@@ -13,7 +13,7 @@ use crate::progress::Bar;
 use crate::trouble::unread;
 use ident::history::{Change, Chart, Entry, History, Measure, named, summary};
 use ident::log::Log;
-use ident::report::history_terminal;
+use ident::report::{history_page, history_terminal};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -29,7 +29,7 @@ pub(crate) struct Args {
     /// A folder of a rig's logs and exports (.csv, .tsv, .txt, .log), in the order of their names; or the runs themselves in their order. Where every run is dated, their days are their order.
     #[arg(required = true, value_name = "FOLDER|RUN")]
     runs: Vec<PathBuf>,
-    /// Folder for history.csv (a row a run and measure) and history.json (what changed).
+    /// Folder for report.html (control charts), history.csv (a row a run and measure) and history.json (what changed).
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// What changed on stdout and nothing else.
@@ -85,6 +85,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(mut folder) = folder {
         folder.add("history.csv", csv(&history)?);
         folder.add("history.json", format!("{json}\n"));
+        folder.add("report.html", history_page(&history));
         folder.write()?;
     }
     if args.json {

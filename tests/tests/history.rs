@@ -16,6 +16,7 @@ use tempfile::TempDir;
 /// Seeds of the runs; from the fifth on the lead may be bad.
 const SEEDS: std::ops::RangeInclusive<u32> = 1..=6;
 const FIRST_BAD: u32 = 5;
+const FILES: [&str; 3] = ["history.csv", "history.json", "report.html"];
 
 /// A folder `runs` of six runs of a rig, and a folder `alike` of six without the change.
 fn flown() -> &'static Path {
@@ -64,7 +65,7 @@ fn a_change_is_found_in_its_gap_and_has_its_name() {
     assert!(said.out.lines().all(|l| l.chars().count() <= 100), "{}", said.out);
     assert_eq!(said.err, "");
 
-    let files = ["history.csv", "history.json"].map(|name| fs::read(folder.path().join("out").join(name)).unwrap());
+    let files = FILES.map(|name| fs::read(folder.path().join("out").join(name)).unwrap());
     let told: Value = serde_json::from_slice(&files[1]).unwrap();
     let change = &told["changes"][0];
     assert_eq!((&change["first"], &change["kind"], &change["names"][0]["id"]), (&4.into(), &"step".into(), &"supply_sag".into()));
@@ -77,10 +78,15 @@ fn a_change_is_found_in_its_gap_and_has_its_name() {
     assert_eq!(table.lines().next(), Some("run,day,measure,unit,value,se,low95,high95"));
     assert!(of_first.iter().any(|l| l.contains(",k_T,N.s2,1.")) && of_first.len() > 30, "{of_first:?}");
 
+    let page = String::from_utf8(files[2].clone()).unwrap();
+    assert!(
+        page.contains("<h1>Between run 4 and run 5: the supply lead drops") && page.contains("id=\"chart-voltage-v-resistance\"")
+    );
+
     // the same bytes again, over the earlier results
     let again = call(folder.path(), &["history", runs, "-o", "out"]).succeeded();
     assert_eq!(again.out, said.out);
-    assert_eq!(["history.csv", "history.json"].map(|name| fs::read(folder.path().join("out").join(name)).unwrap()), files);
+    assert_eq!(FILES.map(|name| fs::read(folder.path().join("out").join(name)).unwrap()), files);
 }
 
 #[test]

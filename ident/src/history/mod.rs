@@ -27,6 +27,7 @@ pub use find::{Change, Kind, Moved};
 pub use limits::Chart;
 pub use measure::{Measure, Scale, Value};
 pub use name::{Name, named};
+pub(crate) use words::by;
 pub use words::{gap, sentence, summary};
 
 /// Fewest runs that can show a change: one on each side of a gap, and one more that says how days differ.

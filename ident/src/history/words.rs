@@ -22,7 +22,7 @@ pub fn gap(history: &History, change: &Change) -> String {
 }
 
 /// By how much a measure moved.
-fn by(history: &History, moved: &Moved, change: &Change) -> String {
+pub(crate) fn by(history: &History, moved: &Moved) -> String {
     let sign = |v: f64| if v > 0.0 { "+" } else { "-" };
     let per = moved.unit.split_once(' ').map_or(String::new(), |(_, per)| format!(" {per}"));
     match moved.unit.split(' ').next().unwrap_or_default() {
@@ -30,11 +30,7 @@ fn by(history: &History, moved: &Moved, change: &Change) -> String {
         "%" => format!("{}{:.2} %{per}", sign(moved.by), moved.by.abs()),
         unit => {
             let centre = Chart::of(history, moved.measure).map_or(0.0, |c| c.centre);
-            let was = if change.kind == Kind::Step && centre != 0.0 {
-                format!(" from {}", amount(centre, unit))
-            } else {
-                String::new()
-            };
+            let was = if per.is_empty() && centre != 0.0 { format!(" from {}", amount(centre, unit)) } else { String::new() };
             format!("{}{}{per}{was}", sign(moved.by), amount(moved.by.abs(), unit))
         }
     }
@@ -45,10 +41,10 @@ fn by(history: &History, moved: &Moved, change: &Change) -> String {
 pub fn sentence(history: &History, change: &Change) -> String {
     let place = upper(&gap(history, change));
     let first = change.moved.first();
-    let size = first.map(|m| format!("{} {}", m.words, by(history, m, change)));
+    let size = first.map(|m| format!("{} {}", m.words, by(history, m)));
     let what = match (change.names.first(), change.kind) {
         (_, Kind::Drift) => {
-            first.map_or("something drifts".to_owned(), |m| format!("the {} drifts by {}", m.words, by(history, m, change)))
+            first.map_or("something drifts".to_owned(), |m| format!("the {} drifts by {}", m.words, by(history, m)))
         }
         (Some(name), _) => match size {
             Some(size) => format!("{} ({size})", lower(name.words.trim_end_matches('.'))),

@@ -23,7 +23,7 @@ mod svg;
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
 pub use closed::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal};
 pub use figure::{Figure, Layer, Mark};
-pub use history::terminal as history_terminal;
+pub use history::{page as history_page, terminal as history_terminal};
 pub use isolability::{isolability, isolability_csv, isolability_svg};
 pub use page::closed_loop;
 pub use run::run;

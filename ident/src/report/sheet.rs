@@ -168,11 +168,20 @@ impl Sheet {
 
     /// Figures side by side where the page is wide enough; those with nothing to show are left out.
     pub fn figures(&mut self, figures: Vec<Figure>) {
+        self.in_grid("figs", figures);
+    }
+
+    /// Small figures, three side by side where the page is wide enough.
+    pub(crate) fn multiples(&mut self, figures: Vec<Figure>) {
+        self.in_grid("figs multiples", figures);
+    }
+
+    fn in_grid(&mut self, class: &str, figures: Vec<Figure>) {
         let figures: Vec<Figure> = figures.into_iter().filter(|f| !f.is_empty()).collect();
         if figures.is_empty() {
             return;
         }
-        self.body += "<div class=\"figs\">\n";
+        self.body += &format!("<div class=\"{class}\">\n");
         for f in figures {
             let id = escape(&f.id);
             self.body += &if self.told {

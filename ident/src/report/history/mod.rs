@@ -1,23 +1,26 @@
 //! A rig's history as a person reads it.
 //!
-//! What it is: the text of a terminal; numbers with their interval behind them in brackets.
+//! What it is: the text of a terminal, and a page with control charts; numbers with their interval behind them in brackets.
 //! What can go wrong: nothing; what a run does not tell is a dash.
 //! Units: in the heads of the columns.
 //! Reference: GUM, clause 7.2.2 (a result and its uncertainty in brackets).
 
+mod chart;
+mod page;
 mod terminal;
 
+pub use page::page;
 pub use terminal::terminal;
 
 use crate::history::{History, Value};
 
-/// Measures that stand first: what moved, the surest first, then the constants of the thesis.
-fn foremost(history: &History) -> Vec<usize> {
+/// Measures that stand first: at most so many of what moved, the surest first, then the constants of the thesis.
+fn foremost(history: &History, most: usize) -> Vec<usize> {
     let mut moved: Vec<_> = history.changes.iter().flat_map(|c| &c.moved).collect();
     moved.sort_by(|a, b| b.evidence.total_cmp(&a.evidence).then(a.measure.cmp(&b.measure)));
     let constants = (0..history.measures.len()).filter(|m| history.measures[*m].channel.is_empty());
     let mut out: Vec<usize> = Vec::new();
-    for m in moved.iter().map(|m| m.measure).take(MOVED).chain(constants) {
+    for m in moved.iter().map(|m| m.measure).take(most).chain(constants) {
         if !out.contains(&m) {
             out.push(m);
         }
@@ -25,7 +28,7 @@ fn foremost(history: &History) -> Vec<usize> {
     out
 }
 
-/// Most measures that moved among those that stand first.
+/// Most measures that moved at the head of a table.
 const MOVED: usize = 2;
 
 /// A value with the half width of its 95 % interval in brackets, in units of its last digit: `0.0498(5)`.

@@ -5,7 +5,7 @@
 //! Units: in the heads.
 //! Reference: specification `report.md`.
 
-use super::{bracketed, foremost};
+use super::{MOVED, bracketed, foremost};
 use crate::history::{Change, History, Kind, summary};
 use crate::report::closed::{WIDEST, wrapped};
 
@@ -49,7 +49,7 @@ fn short(v: f64) -> String {
 
 /// A row a run, with a line where something changed.
 fn runs(history: &History) -> String {
-    let shown: Vec<usize> = foremost(history).into_iter().take((WIDEST - NAME) / WIDE).collect();
+    let shown: Vec<usize> = foremost(history, MOVED).into_iter().take((WIDEST - NAME) / WIDE).collect();
     let row = |first: &str, cells: &dyn Fn(usize) -> String| {
         let cells: String = shown.iter().map(|m| format!("{:>WIDE$.w$}", cells(*m), w = WIDE - 1)).collect();
         format!("{first:<NAME$.w$}{cells}\n", w = NAME - 1).replace(" \n", "\n")

@@ -1,0 +1,127 @@
+//! A rig's history as one page.
+//!
+//! What it is: what changed as its heading, control charts of what moved and of the constants, each change in numbers; folded away every other
+//! measure, the values run by run, and the logs.
+//! What can go wrong: nothing; a measure without a run before the change has no chart.
+//! Units: on the axes.
+//! Reference: Tufte, "The Visual Display of Quantitative Information" (small multiples).
+
+use super::chart::chart;
+use super::{MOVED, bracketed, foremost};
+use crate::history::{Change, History, gap, sentence, summary};
+use crate::report::number;
+use crate::report::sheet::Sheet;
+use crate::words::{probability, upper};
+
+/// Charts that stand above the fold.
+const ABOVE: usize = 9;
+
+/// The page.
+#[must_use]
+pub fn page(history: &History) -> String {
+    let mut sheet = Sheet::told("A rig's history", &heading(history));
+    sheet.soft(&span(history));
+    let shown = charted(history);
+    let (above, below) = shown.split_at(shown.len().min(ABOVE));
+    sheet.section("Control charts");
+    sheet.say(&key(history));
+    sheet.multiples(above.iter().filter_map(|m| chart(history, *m)).collect());
+    for change in &history.changes {
+        of_change(&mut sheet, history, change);
+    }
+    sheet.section("More");
+    if !below.is_empty() {
+        sheet.fold("Every other measure", |sheet| sheet.multiples(below.iter().filter_map(|m| chart(history, *m)).collect()));
+    }
+    sheet.fold("Constants run by run", |sheet| table(sheet, history));
+    sheet.fold("Logs", |sheet| {
+        let row = |k: usize| vec![history.label(k), history.runs[k].run.clone(), history.runs[k].sha256.clone()];
+        sheet.data("logs", &["run", "log", "SHA-256"], &(0..history.runs.len()).map(row).collect::<Vec<_>>(), None);
+    });
+    sheet.html()
+}
+
+/// What changed first, then over how many runs.
+fn heading(history: &History) -> String {
+    if history.changes.is_empty() {
+        return summary(history);
+    }
+    history.changes.iter().map(|c| sentence(history, c)).collect::<Vec<_>>().join(" ")
+}
+
+fn span(history: &History) -> String {
+    let n = history.runs.len();
+    let order = if history.dated { "in the order of their days" } else { "in the order of their names or as they were given" };
+    format!("{n} runs, {} to {}, {order}.", history.label(0), history.label(n - 1))
+}
+
+fn key(history: &History) -> String {
+    let before = if history.changes.is_empty() { "all runs" } else { "the runs before the first change" };
+    format!(
+        "A ring is a run with its 95 % interval. The line and the band are centre and limits (three standard deviations) of {before}. Orange lies outside, or is the level since a change; a dashed line is a change."
+    )
+}
+
+/// Measures with a chart: what moved and the constants first, then all others that vary.
+fn charted(history: &History) -> Vec<usize> {
+    let mut out = foremost(history, usize::MAX);
+    let varies = |m: &usize| {
+        let series = history.series(*m);
+        let mut values = series.iter().flatten().map(|v| v.value);
+        values.next().is_some_and(|first| values.any(|v| (v - first).abs() > 1e-9 * first.abs()))
+    };
+    let rest: Vec<usize> = (0..history.measures.len()).filter(|m| !out.contains(m)).filter(varies).collect();
+    out.extend(rest);
+    out
+}
+
+/// A change in numbers.
+fn of_change(sheet: &mut Sheet, history: &History, change: &Change) {
+    sheet.section(&upper(&gap(history, change)));
+    sheet.say(&format!(
+        "Probability that something changed: {}. That it lies in this gap: {}.",
+        probability(change.probability),
+        probability(change.gap_probability)
+    ));
+    let row = |m: &crate::history::Moved| {
+        vec![upper(&m.words), number(m.by), format!("{} to {}", number(m.ci95[0]), number(m.ci95[1])), m.unit.clone()]
+    };
+    let rows: Vec<Vec<String>> = change.moved.iter().map(row).collect();
+    sheet.data("moved", &["moved", "by", "95 % interval", "unit"], &rows, None);
+    if !change.names.is_empty() {
+        let row = |n: &crate::history::Name| vec![upper(&n.title), n.id.clone(), format!("{:.1}", n.score)];
+        let rows: Vec<Vec<String>> = change.names.iter().map(row).collect();
+        sheet.data("names", &["name", "effect", "score, nats"], &rows, None);
+    }
+}
+
+fn table(sheet: &mut Sheet, history: &History) {
+    sheet.say("In brackets: half of the 95 % interval, in units of the last digit.");
+    let shown = foremost(history, MOVED);
+    let head: Vec<String> = std::iter::once("run".to_owned())
+        .chain(shown.iter().map(|m| format!("{}, {}", history.measures[*m].name, history.measures[*m].unit)))
+        .collect();
+    let row = |k: usize| {
+        let values = shown.iter().map(|m| history.runs[k].values[*m].map_or_else(|| "-".to_owned(), bracketed));
+        std::iter::once(history.label(k)).chain(values).collect()
+    };
+    let rows: Vec<Vec<String>> = (0..history.runs.len()).map(row).collect();
+    sheet.data("run-by-run", &head.iter().map(String::as_str).collect::<Vec<_>>(), &rows, None);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::tests::stepped;
+
+    #[test]
+    fn the_heading_is_what_changed_and_every_measure_has_a_chart() {
+        let history = stepped(12, 7);
+        let html = page(&history);
+        assert!(html.contains("<h1>Between run 7 and run 8: measure 0 +9"), "{}", &html[html.find("<h1>").unwrap_or(0)..]);
+        assert_eq!(html.matches("<svg").count(), 4);
+        assert!(html.contains("12 runs, run 1 to run 12") && !html.contains("http://www.example"));
+        let quiet = page(&stepped(12, 12));
+        assert!(quiet.contains("<h1>Nothing changed over 12 runs"));
+    }
+}
