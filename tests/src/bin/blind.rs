@@ -8,13 +8,13 @@
 use quadrig_tests::blind::resume::{known, resumed};
 use quadrig_tests::blind::scenario::{CLEAN, Hidden, Scenario};
 use quadrig_tests::blind::score::{Line, score};
-use quadrig_tests::blind::{messy, simulated, tally, write};
+use quadrig_tests::blind::{history, messy, simulated, tally, write};
 use quadrig_tests::flights;
 use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated | --messy | --flights] [--failures] [--table] | blind --dump SEED DIR [--simulated | --messy | --flights] | blind --plan N";
+const USAGE: &str = "usage: blind [--runs N] [--clean M] [--half tuning|judging] [--effect ID] [--kind one|two|unknown] [--seed-from S | --seeds S,S,...] [--out FILE.csv] [--threads T] [--simulated | --messy | --flights | --history] [--failures] [--table] | blind --dump SEED DIR [--simulated | --messy | --flights | --history] | blind --plan N";
 
 struct Options {
     runs: usize,
@@ -30,6 +30,7 @@ struct Options {
     simulated: bool,
     messy: bool,
     flights: bool,
+    history: bool,
     table: bool,
 }
 
@@ -61,6 +62,7 @@ fn command(words: &[String]) -> Result<(), String> {
                 [] => dump(seed, &folder).map_err(|e| e.to_string()),
                 [flag] if flag == "--simulated" => simulated::dump(seed, &folder),
                 [flag] if flag == "--flights" => flights::campaign::dump(seed, &folder),
+                [flag] if flag == "--history" => dump_history(seed, &folder).map_err(|e| e.to_string()),
                 [flag] if flag == "--messy" => dump_messy(seed, &folder).map_err(|e| e.to_string()),
                 _ => Err(USAGE.into()),
             }
@@ -81,6 +83,7 @@ fn command(words: &[String]) -> Result<(), String> {
         _ => {
             let o = options(words)?;
             match (o.messy, o.flights) {
+                _ if o.history => history_campaign(&o),
                 (true, _) => messy_campaign(&o),
                 (_, true) => flights::campaign::run(&flights_of(o)),
                 _ => campaign(&o),
@@ -104,6 +107,7 @@ fn options(words: &[String]) -> Result<Options, String> {
         simulated: false,
         messy: false,
         flights: false,
+        history: false,
         table: false,
     };
     let mut i = words.iter();
@@ -122,6 +126,10 @@ fn options(words: &[String]) -> Result<Options, String> {
         }
         if flag == "--flights" {
             o.flights = true;
+            continue;
+        }
+        if flag == "--history" {
+            o.history = true;
             continue;
         }
         if flag == "--table" {
@@ -202,6 +210,29 @@ fn messy_campaign(o: &Options) -> Result<(), String> {
         println!("{}", messy::tally::failures(&lines));
     }
     Ok(())
+}
+
+/// Rigs over weeks: `--runs` of them change, `--clean` do not.
+fn history_campaign(o: &Options) -> Result<(), String> {
+    let first = o.from / 2 * 2 + u64::from(o.odd);
+    let some = |base: u64, n: usize| (0..n as u64).map(move |k| base + first + 2 * k);
+    let all: Vec<u64> = some(0, o.runs).chain(some(CLEAN, o.clean)).collect();
+    let wanted = if o.seeds.is_empty() { all } else { o.seeds.clone() };
+    let lines = if o.table { known(&o.out, &wanted)? } else { resumed(&o.out, &wanted, o.threads, history::score::score)? };
+    println!("{} of {} rigs\n\n{}", lines.len(), wanted.len(), history::tally::markdown(&lines));
+    if o.failures {
+        println!("{}", history::tally::failures(&lines));
+    }
+    Ok(())
+}
+
+fn dump_history(seed: u64, folder: &std::path::Path) -> std::io::Result<()> {
+    let life = history::life::Life::new(seed);
+    fs::create_dir_all(folder)?;
+    for k in 0..life.days.len() {
+        fs::write(folder.join(format!("run{:02}.csv", k + 1)), life.log(k))?;
+    }
+    fs::write(folder.join("truth.md"), format!("{:#?}\nsize {}\n{:#?}\n", life.fate, life.size, life.change))
 }
 
 fn dump_messy(seed: u64, folder: &std::path::Path) -> std::io::Result<()> {

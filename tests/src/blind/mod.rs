@@ -8,6 +8,7 @@
 pub mod chance;
 pub mod effect;
 pub mod fit;
+pub mod history;
 pub mod messy;
 pub mod resume;
 pub mod rig;
