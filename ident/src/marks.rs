@@ -100,7 +100,14 @@ fn added(channel: &str, angle: f64, se: f64) -> AddedEffect {
     let instance = Instance::new(&[channel], TOLD_BY_THE_BOARD);
     let placed = Placed { effect: &effects::alternating_period::AlternatingPeriod, instance, shape: Vec::new() };
     let estimates = vec![Estimate { name: ANGLE.name.to_owned(), unit: ANGLE.unit.to_owned(), value: angle, se }];
-    AddedEffect { placed, amplitudes: vec![(channel.to_owned(), vec![angle])], estimates, mean: Vec::new() }
+    AddedEffect {
+        placed,
+        amplitudes: vec![(channel.to_owned(), vec![angle])],
+        estimates,
+        mean: Vec::new(),
+        reach: Vec::new(),
+        shape_errors: Vec::new(),
+    }
 }
 
 /// Adds what the board tells to a verdict and to the model that it amounts to, beside what has no name.

@@ -17,10 +17,12 @@ use crate::log::Log;
 use crate::steps::Steps;
 use toml::{Table, Value};
 
+mod reach;
 mod read;
 mod run;
 mod scope;
 
+pub use reach::Reach;
 pub use scope::{FittedTo, RunLevel};
 
 /// First key of the format.
@@ -48,6 +50,10 @@ pub struct AddedEffect {
     pub estimates: Vec<Estimate>,
     /// For each channel the polynomial that stands for it on another run, in the order of the declared coefficients; empty where it acts there.
     pub mean: Vec<(String, Vec<f64>)>,
+    /// What its run has shown of it, channel by channel: how far it is believed beyond ([`reach`]).
+    pub reach: Vec<Reach>,
+    /// Standard errors of its shapes, in their order; empty where they are not known.
+    pub shape_errors: Vec<f64>,
 }
 
 /// A model.
@@ -212,7 +218,10 @@ impl Model {
                 }
             }
             let mean = scope::mean(context, declared, fit, position);
-            model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates, mean });
+            let acts_elsewhere = mean.is_empty();
+            let reach = if acts_elsewhere { reach::of(context, declared, fit, position) } else { Vec::new() };
+            let shape_errors = estimates.iter().take(placed.shape.len()).map(|e| e.se).collect();
+            model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates, mean, reach, shape_errors });
         }
         model
     }
@@ -241,11 +250,15 @@ impl Model {
     #[must_use]
     pub fn predict(&self, context: &Context, channel: &'static str) -> Option<Vec<f64>> {
         let target = context.targets.iter().find(|t| t.name == channel)?;
-        let (design, coefficients) = self.design(context, target)?;
-        Some(design.predict(&coefficients, context.len()))
+        let (design, coefficients) = self.design(context, target, &self.placed())?;
+        let mut out = design.predict(&coefficients, context.len());
+        if let Some(excess) = self.excess(context, target, (&design, &coefficients)) {
+            out.iter_mut().zip(excess).for_each(|(o, e)| *o -= e);
+        }
+        Some(out)
     }
 
-    fn design(&self, context: &Context, target: &Target) -> Option<(TargetDesign, Vec<f64>)> {
+    fn design(&self, context: &Context, target: &Target, placed: &[Placed]) -> Option<(TargetDesign, Vec<f64>)> {
         let polynomial = self.polynomials.iter().find(|p| p.channel == target.name)?;
         let base =
             polynomial.coefficients.iter().enumerate().map(|(k, c)| Told { label: Label::Base(k), value: *c, stands: true });
@@ -257,7 +270,7 @@ impl Model {
         };
         let told = base.chain(self.effects.iter().enumerate().flat_map(of_effect)).collect();
         let baseline = TargetDesign::baseline(context, target.name, target.relation);
-        let design = Steps::default().apply(context, &self.placed(), TargetDesign { told, ..baseline });
+        let design = Steps::default().apply(context, placed, TargetDesign { told, ..baseline });
         let coefficients = design.coefficients(|_| true);
         Some((design, coefficients))
     }
@@ -265,9 +278,11 @@ impl Model {
     /// The model as the known part of a design, for `--model`: nothing of it is refitted.
     #[must_use]
     pub fn pinned(&self, context: &Context, target: &Target) -> TargetDesign {
-        match self.design(context, target) {
+        match self.design(context, target, &self.placed()) {
             Some((design, coefficients)) => {
+                let excess = self.excess(context, target, (&design, &coefficients));
                 let mut design = design.pinned(&coefficients);
+                design.fixed.iter_mut().zip(excess.into_iter().flatten()).for_each(|(f, excess)| *f -= excess);
                 design.fixed.iter_mut().zip(&target.known).for_each(|(f, known)| *f += known);
                 design.rotor = self.rotor(context, target).into();
                 design
@@ -334,7 +349,7 @@ impl Model {
             root.insert("effect".into(), list.into());
         }
         format!(
-            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and about that the scatter, rms, noise included, in each\n# third of the loads, up to 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n# An effect of scope rig acts on every run. One of scope run or event acts on the runs listed here; on_another_run is what is added to the\n# channel's polynomial elsewhere, and what an event left behind acts there from the start.\n{root}{}",
+            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and about that the scatter, rms, noise included, in each\n# third of the loads, up to 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n# An effect of scope rig acts on every run. One of scope run or event acts on the runs listed here; on_another_run is what is added to the\n# channel's polynomial elsewhere, and what an event left behind acts there from the start.\n# `seen` is how little and how much an effect adds to a channel on its own run: beyond that, another run gets it as far as its errors allow.\n{root}{}",
             self.course.as_ref().map(Course::to_toml).unwrap_or_default()
         )
     }
@@ -354,6 +369,12 @@ impl AddedEffect {
         t.insert("scope".into(), p.effect.scope(&p.instance).word().into());
         t.insert("run".into(), source.into());
         t.insert("shape".into(), Value::Array(p.shape.iter().map(|v| (*v).into()).collect()));
+        if !self.shape_errors.is_empty() {
+            t.insert("shape_se".into(), self.shape_errors.clone().into());
+        }
+        if !self.reach.is_empty() {
+            t.insert("seen".into(), Value::Table(self.reach.iter().map(Reach::to_table).collect()));
+        }
         let mut amplitude = Table::new();
         let names = p.effect.amplitudes(&p.instance);
         for (channel, values) in &self.amplitudes {

@@ -7,6 +7,7 @@
 //! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
+use crate::attribution::noise::usual_step;
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
@@ -84,13 +85,36 @@ impl Effect for RotorInertia {
 }
 
 /// Angular acceleration by central differences of the consensus speed, rad/s^2.
+///
+/// The difference spans half a usual interval of the log at least: of two rows that follow each other at once, as a logger writes them that is
+/// asked by hand, a reading's own error would make any acceleration.
 pub(crate) fn acceleration(context: &Context) -> Vec<f64> {
     let (t, rpm) = (&context.t, &context.rpm);
-    let n = t.len();
-    (0..n)
+    let least = 0.5 * usual_step(t);
+    let last = t.len().saturating_sub(1);
+    (0..t.len())
         .map(|i| {
-            let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
-            if b > a { (rpm[b] - rpm[a]) / (t[b] - t[a]) * std::f64::consts::TAU / 60.0 } else { 0.0 }
+            let (mut a, mut b) = (i.saturating_sub(1), (i + 1).min(last));
+            while t[b] - t[a] < least && (a > 0 || b < last) {
+                (a, b) = (a.saturating_sub(1), (b + 1).min(last));
+            }
+            if t[b] > t[a] { (rpm[b] - rpm[a]) / (t[b] - t[a]) * std::f64::consts::TAU / 60.0 } else { 0.0 }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Column, Log};
+
+    #[test]
+    fn two_rows_at_once_make_no_acceleration() {
+        let t = vec![0.0, 1.0, 2.0, 2.00004, 3.0, 4.0, 5.0];
+        let rpm: Vec<f64> = t.iter().enumerate().map(|(i, t)| 600.0 * t + if i == 3 { 50.0 } else { 0.0 }).collect();
+        let log = Log { t, columns: vec![Column { name: "rpm".into(), values: rpm }], ..Log::default() };
+        let found = acceleration(&Context::new(&log, Some(1000.0)));
+        let steady = 600.0 * std::f64::consts::TAU / 60.0;
+        assert!(found.iter().all(|a| (a - steady).abs() < 0.1 * steady), "{found:?}");
+    }
 }

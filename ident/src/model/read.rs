@@ -6,7 +6,7 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Powerplant model".
 
-use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys, run};
+use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys, reach, run};
 use crate::context::{Context, Relation};
 use crate::course::{COURSE_KEYS, Course};
 use crate::effects::{self, Effect, Estimate, Instance};
@@ -199,6 +199,16 @@ impl AddedEffect {
         let shape: Option<Vec<f64>> = list.and_then(|list| list.iter().map(finite).collect());
         let shape = shape.ok_or_else(|| refusal("shape", at("shape"), &wanted()))?;
         let amplitudes = amplitudes(effect, &instance, at("amplitude"))?;
+        let errors =
+            |value: &Value| -> Option<Vec<f64>> { value.as_array()?.iter().map(|v| finite(v).filter(|v| *v >= 0.0)).collect() };
+        let shape_errors = match at("shape_se") {
+            None => Vec::new(),
+            Some(value) => errors(value)
+                .filter(|list| list.len() == shape.len())
+                .ok_or_else(|| refusal("shape_se", Some(value), &format!("{}, none negative", wanted())))?,
+        };
+        let count = effect.amplitudes(&instance).len();
+        let reach = at("seen").map_or(Ok(Vec::new()), |value| reach::read(&instance, count, value))?;
         let estimates = at("parameter").and_then(Value::as_table).map(estimates).unwrap_or_default();
         let scope = effect.scope(&instance).word();
         if at("scope").is_some_and(|s| s.as_str() != Some(scope)) {
@@ -208,7 +218,7 @@ impl AddedEffect {
             None => Vec::new(),
             Some(value) => means(&instance, value)?,
         };
-        Ok(Self { placed: Placed { effect, instance, shape }, amplitudes, estimates, mean })
+        Ok(Self { placed: Placed { effect, instance, shape }, amplitudes, estimates, mean, reach, shape_errors })
     }
 }
 

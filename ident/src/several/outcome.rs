@@ -164,6 +164,8 @@ fn model(
             .collect(),
         estimates: estimates.get(k).cloned().unwrap_or_default(),
         mean: Vec::new(),
+        reach: Vec::new(),
+        shape_errors: Vec::new(),
     };
     let polynomials = shared.iter().map(polynomial).collect();
     Model {

@@ -115,7 +115,14 @@ pub(super) fn of(member: &Member<'_>, rig: &[Placed], all: &[Shared]) -> RunLeve
     let alone = if member.own.is_empty() { None } else { fit(context, declared, &placed, None, Rows::All) };
     let added = |(k, p): (usize, &Placed)| {
         let estimates = alone.as_ref().map(|f| f.profiled_estimates(context, declared, rig.len() + k)).unwrap_or_default();
-        AddedEffect { placed: p.clone(), amplitudes: Vec::new(), estimates, mean: Vec::new() }
+        AddedEffect {
+            placed: p.clone(),
+            amplitudes: Vec::new(),
+            estimates,
+            mean: Vec::new(),
+            reach: Vec::new(),
+            shape_errors: Vec::new(),
+        }
     };
     out.effects = member.own.iter().enumerate().map(added).collect();
     for (k, target) in member.context.targets.iter().enumerate() {

@@ -1,0 +1,255 @@
+//! How far a correction is believed beyond what its run has shown.
+//!
+//! What it is: on its own run an effect adds something between a lowest and a highest value to a channel. On another run it may add more:
+//! a longer run, a higher load, a parabola that goes on. What goes beyond is an extrapolation, and is taken in the measure in which the
+//! parameters carry it. Before the extrapolation is looked at, it may be as large as what was seen, `m`; the parameters say `e` with a
+//! standard error `s`; together they say `e m^2 / (m^2 + s^2)`.
+//! What can go wrong: a form that is wrong may have narrow errors, and then runs on. What lies within the range that was seen is not touched,
+//! however little its parameters are known. Errors of amplitudes and of shapes count as independent.
+//! Units: those of the channel.
+//! Reference: posterior mean of two normal distributions, Gelman et al. 2013, Bayesian Data Analysis, section 2.5.
+
+use super::read::{Refusal, finite, refusal};
+use super::{AddedEffect, Model, keyed};
+use crate::context::{Context, Target, unit_of};
+use crate::design::{Label, TargetDesign};
+use crate::effects::Instance;
+use crate::hypothesis::{Declared, Fit, Placed, part_of};
+use toml::{Table, Value};
+
+/// Key of the covariance.
+const COVARIANCE: &str = "covariance";
+
+/// What a run has shown of an effect on one channel.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Reach {
+    /// Channel.
+    pub channel: String,
+    /// Lowest and highest value that the effect adds on its own run, in the channel's unit.
+    pub seen: [f64; 2],
+    /// Covariance of its amplitudes, in their order, row by row.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+impl Reach {
+    /// Channel and table of `[effect.seen]`.
+    pub(super) fn to_table(&self) -> (String, Value) {
+        let [lowest, highest] = keys(&self.channel);
+        let mut t = Table::new();
+        t.insert(lowest, self.seen[0].into());
+        t.insert(highest, self.seen[1].into());
+        if !self.covariance.is_empty() {
+            t.insert(COVARIANCE.into(), self.covariance.iter().map(|row| Value::from(row.clone())).collect::<Vec<_>>().into());
+        }
+        (self.channel.clone(), Value::Table(t))
+    }
+
+    /// What is to be taken off a contribution with a standard error.
+    fn excess(&self, contribution: f64, error: impl FnOnce() -> f64) -> f64 {
+        let [low, high] = self.seen;
+        let beyond = contribution - contribution.clamp(low, high);
+        if beyond == 0.0 {
+            return 0.0;
+        }
+        let (known, open) = (low.abs().max(high.abs()).powi(2), error().powi(2));
+        if known + open > 0.0 { beyond * open / (known + open) } else { 0.0 }
+    }
+}
+
+/// Keys of the lowest and the highest value.
+fn keys(channel: &str) -> [String; 2] {
+    ["lowest", "highest"].map(|k| keyed(k, unit_of(channel)))
+}
+
+/// `[effect.seen]`, for an effect with so many amplitudes.
+pub(super) fn read(instance: &Instance, amplitudes: usize, value: &Value) -> Result<Vec<Reach>, Refusal> {
+    let table = value.as_table().ok_or_else(|| refusal("seen", Some(value), "one table for each channel"))?;
+    let of_channel = |(channel, own): (&String, &Value)| {
+        let place = |key: &str| format!("seen.{channel}{}{key}", if key.is_empty() { "" } else { "." });
+        if !instance.channels.contains(channel) {
+            return Err(refusal(&place(""), Some(own), &format!("one of {}", instance.channels.join(", "))));
+        }
+        let own = own.as_table().ok_or_else(|| refusal(&place(""), Some(own), "a table"))?;
+        let number = |key: &String| {
+            let value = own.get(key);
+            value.and_then(finite).ok_or_else(|| refusal(&place(key), value, "a finite number"))
+        };
+        let [lowest, highest] = keys(channel);
+        let seen = [number(&lowest)?, number(&highest)?];
+        if seen[0] > seen[1] {
+            return Err(refusal(&place(&lowest), own.get(&lowest), &format!("a number that is not above {highest}")));
+        }
+        let numbers = |value: &Value| -> Option<Vec<f64>> { value.as_array()?.iter().map(finite).collect() };
+        let rows = |value: &Value| -> Option<Vec<Vec<f64>>> { value.as_array()?.iter().map(numbers).collect() };
+        let covariance = match own.get(COVARIANCE) {
+            None => Vec::new(),
+            Some(value) => {
+                rows(value).filter(|rows| rows.len() == amplitudes && rows.iter().all(|r| r.len() == amplitudes)).ok_or_else(
+                    || refusal(&place(COVARIANCE), Some(value), &format!("{amplitudes} lists of {amplitudes} finite numbers")),
+                )?
+            }
+        };
+        Ok(Reach { channel: channel.clone(), seen, covariance })
+    };
+    table.iter().map(of_channel).collect()
+}
+
+/// What its run has shown of the effect at a position, channel by channel.
+pub(super) fn of(context: &Context, declared: Declared<'_>, fit: &Fit, position: usize) -> Vec<Reach> {
+    let placed = &fit.placed[position];
+    let count = placed.effect.amplitudes(&placed.instance).len();
+    let of_target = |(k, target): (usize, &Target)| {
+        let part = part_of(context, declared, fit, position, k);
+        let counted = target.rows.iter().zip(&part).filter(|(row, _)| target.claims(**row));
+        let (low, high) = counted.fold((0.0_f64, 0.0_f64), |(l, h), (_, v)| (l.min(*v), h.max(*v)));
+        let t = &fit.targets[k];
+        let at = |amplitude: usize| t.labels.iter().position(|l| *l == Label::Effect { effect: position, amplitude });
+        let covariance = |a: usize, b: usize| at(a).zip(at(b)).map_or(0.0, |(a, b)| t.covariance[(a, b)]);
+        let covariance = (0..count).map(|a| (0..count).map(|b| covariance(a, b)).collect()).collect();
+        Reach { channel: target.name.to_owned(), seen: [low, high], covariance }
+    };
+    context.targets.iter().enumerate().filter(|(_, t)| placed.instance.touches(t.name)).map(of_target).collect()
+}
+
+impl Model {
+    /// What a prediction of a channel goes too far, row by row; nothing where no effect goes beyond what it has shown.
+    pub(super) fn excess(&self, context: &Context, target: &Target, whole: (&TargetDesign, &[f64])) -> Option<Vec<f64>> {
+        let n = context.len();
+        let all = whole.0.predict(whole.1, n);
+        let mut out: Option<Vec<f64>> = None;
+        for (k, added) in self.effects.iter().enumerate() {
+            let Some(reach) = added.reach.iter().find(|r| r.channel == target.name) else { continue };
+            let rest = self.varied(context, target, |placed| placed[k].instance.channels.clear())?;
+            let part: Vec<f64> = all.iter().zip(&rest).map(|(a, r)| a - r).collect();
+            if part.iter().all(|p| (reach.seen[0]..=reach.seen[1]).contains(p)) {
+                continue;
+            }
+            let moved = added.moved(|i, to| self.varied(context, target, |placed| placed[k].shape[i] = to));
+            let error = |row: usize| {
+                let of_shapes: f64 = moved.iter().map(|m| (m[row] - all[row]).powi(2)).sum();
+                (of_shapes + variance(whole.0, k, &reach.covariance, row)).sqrt()
+            };
+            let out = out.get_or_insert_with(|| vec![0.0; n]);
+            for (row, (o, p)) in out.iter_mut().zip(&part).enumerate() {
+                *o += reach.excess(*p, || error(row));
+            }
+        }
+        out
+    }
+
+    /// The prediction with its effects changed.
+    fn varied(&self, context: &Context, target: &Target, change: impl FnOnce(&mut [Placed])) -> Option<Vec<f64>> {
+        let mut placed = self.placed();
+        change(&mut placed);
+        let (design, coefficients) = self.design(context, target, &placed)?;
+        Some(design.predict(&coefficients, context.len()))
+    }
+}
+
+impl AddedEffect {
+    /// The prediction with each shape moved by its standard error, for those that have one.
+    fn moved(&self, prediction: impl Fn(usize, f64) -> Option<Vec<f64>>) -> Vec<Vec<f64>> {
+        let shapes = self.placed.shape.iter().zip(&self.shape_errors).enumerate();
+        shapes.filter(|(_, (_, se))| **se > 0.0).filter_map(|(i, (value, se))| prediction(i, value + se)).collect()
+    }
+}
+
+/// Variance of what an effect adds to a row, from that of its amplitudes.
+fn variance(design: &TargetDesign, effect: usize, covariance: &[Vec<f64>], row: usize) -> f64 {
+    let own = || {
+        design.columns.iter().filter_map(move |c| match c.label {
+            Label::Effect { effect: e, amplitude } if e == effect => Some((amplitude, c.values[row])),
+            _ => None,
+        })
+    };
+    let product = |a: usize, b: usize| covariance.get(a).and_then(|r| r.get(b)).copied().unwrap_or(0.0);
+    own().map(|(a, x)| own().map(|(b, y)| x * product(a, b) * y).sum::<f64>()).sum::<f64>().max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Column, Log};
+
+    fn reach() -> Reach {
+        Reach { channel: "voltage_v".into(), seen: [-0.5, 0.1], covariance: Vec::new() }
+    }
+
+    #[test]
+    fn what_was_seen_is_not_touched() {
+        for inside in [-0.5, -0.2, 0.0, 0.1] {
+            assert_eq!(reach().excess(inside, || 100.0), 0.0);
+        }
+    }
+
+    #[test]
+    fn an_extrapolation_is_believed_as_far_as_its_parameters_carry_it() {
+        // sure parameters: all of it; as open as what was seen is large: half of it; wide open: next to nothing
+        let beyond = -2.0;
+        let left = |error: f64| beyond - reach().excess(beyond - 0.5, || error);
+        assert_eq!(left(0.0), beyond);
+        assert!((left(0.5) - 0.5 * beyond).abs() < 1e-12);
+        assert!(left(50.0).abs() < 1e-3);
+    }
+
+    /// Constant current, a battery whose parabola turns at 0.1 Ah; on its own run no more than 0.1 Ah were drawn.
+    fn model() -> Model {
+        let text = r#"
+            format = "quadrig-model 1"
+            source = "short.csv"
+            start_pulse_us = 1000.0
+            [consensus]
+            channels = ["rpm"]
+            [channel.voltage_v]
+            c0_v = 16.0
+            [[effect]]
+            id = "battery_discharge"
+            channels = ["voltage_v"]
+            scope = "rig"
+            shape = []
+            [effect.amplitude.voltage_v]
+            slope_v_per_ah = 10.0
+            bend_v_per_ah2 = -50.0
+            [effect.seen.voltage_v]
+            lowest_v = -0.5
+            highest_v = 0.0
+            covariance = [[1.0, -12.0, 0.0], [-12.0, 160.0, 0.0], [0.0, 0.0, 0.0]]
+        "#;
+        Model::parse("m.toml", text).expect("a model")
+    }
+
+    /// A run at 36 A with a row every second: 0.01 Ah a row.
+    fn drawn(rows: usize) -> Vec<f64> {
+        let of = |f: &dyn Fn(usize) -> f64| (0..rows).map(f).collect::<Vec<f64>>();
+        let channels = [("rpm", of(&|_| 5000.0)), ("current_a", of(&|_| 36.0)), ("voltage_v", of(&|i| 16.0 - 0.05 * i as f64))];
+        let log = Log {
+            t: of(&|i| i as f64),
+            columns: channels.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect(),
+            ..Log::default()
+        };
+        model().predict(&Context::new(&log, Some(1000.0)), "voltage_v").expect("a prediction")
+    }
+
+    #[test]
+    fn a_parabola_does_not_run_away_on_a_longer_run() {
+        let near = drawn(10);
+        let charge = 0.01 * 9.0;
+        assert!((near[9] - (16.0 - 10.0 * charge + 50.0 * charge * charge)).abs() < 0.02, "{}", near[9]);
+        // at 1 Ah the parabola says 56 V; what was seen is 0.5 V
+        let far = drawn(100);
+        assert!((far[99] - 16.0).abs() < 1.0, "{}", far[99]);
+    }
+
+    #[test]
+    fn a_model_says_what_was_seen_and_is_read_again() {
+        let written = Model::parse("m.toml", &model().to_toml()).expect("what was written");
+        assert_eq!(written.effects[0].reach, model().effects[0].reach);
+        let refused = |from: &str, to: &str| {
+            let text = model().to_toml().replacen(from, to, 1);
+            Model::parse("m.toml", &text).expect_err(to).to_string()
+        };
+        assert!(refused("lowest_v = -0.5", "lowest_v = 0.5").contains("effect[0].seen.voltage_v.lowest_v"));
+        assert!(refused("[effect.seen.voltage_v]", "[effect.seen.thrust_n]").contains("effect[0].seen.thrust_n"));
+        assert!(refused("[1.0, -12.0, 0.0], ", "").contains("3 lists of 3 finite numbers"));
+    }
+}
