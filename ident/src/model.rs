@@ -17,6 +17,7 @@ use crate::log::Log;
 use crate::steps::Steps;
 use toml::{Table, Value};
 
+mod place;
 mod reach;
 mod read;
 mod run;
@@ -95,10 +96,10 @@ pub enum ModelError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// Not TOML; the message carries line and column.
+    /// Not TOML.
     #[error("{file}: {message}")]
     Syntax {
-        /// The file.
+        /// The file with line and column.
         file: String,
         /// First line of what the parser says.
         message: String,
@@ -106,7 +107,7 @@ pub enum ModelError {
     /// A key is missing or wrong.
     #[error("{file}: key {key}: {found}; expected {expected}")]
     Key {
-        /// The file.
+        /// The file with line and column.
         file: String,
         /// Path of the key.
         key: String,

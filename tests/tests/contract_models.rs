@@ -111,3 +111,36 @@ fn numbers_that_a_prediction_needs_are_refused_by_key() {
         refused(&bench, name, &text, &said);
     }
 }
+
+/// What nothing reads must not look as if it counted: a parameter that says another thing than what predictions use, and a key that is none.
+#[test]
+fn numbers_that_no_prediction_reads_are_refused_where_they_stand() {
+    let bench = Bench::new();
+    let told = "[effect.parameter]\nrate_n_per_s = 0.001\nrate_n_per_s_se = 0.0002\n";
+    let effects = EFFECTS.replacen("rate_n_per_s = 0.001\n", &format!("rate_n_per_s = 0.001\n{told}"), 1);
+    let effects = format!("{effects}[effect.parameter]\ndelay_s = 0.4\n");
+    let model = fs::read_to_string(bench.path("model.toml")).unwrap() + &effects;
+    fs::write(bench.path("good.toml"), &model).unwrap();
+    bench.call(&["predict", "good.toml", "good.csv", "-o", "pred.csv"]).succeeded();
+    // the last line that holds `from` reads `to`; the place of what is wrong is where `to` begins
+    let edited = |name: &str, from: &str, to: &str, said: &[&str]| {
+        let at = model.rfind(from).unwrap_or_else(|| panic!("{from} stands in\n{model}"));
+        let line = model[..at].matches('\n').count() + 1;
+        let column = at - model[..at].rfind('\n').map_or(0, |n| n + 1) + 1;
+        let text = format!("{}{to}{}", &model[..at], &model[at + from.len()..]);
+        let place = format!("bad.toml:{line}:{column}: key ");
+        refused(&bench, name, &text, &[&[place.as_str()], said].concat());
+    };
+    let key = "effect[0].parameter.";
+    edited(
+        "a rate",
+        "rate_n_per_s = 0.001\nrate",
+        "rate_n_per_s = 0.002\nrate",
+        &[key, "0.002", "0.001", "amplitude.thrust_n.rate_n_per_s"],
+    );
+    edited("a delay", "delay_s = 0.4", "delay_s = 0.5", &["effect[1].parameter.delay_s", "0.5", "0.4", "shape[0]"]);
+    edited("an error", "rate_n_per_s_se = 0.0002", "rate_n_per_s_se = \"small\"", &[key, "small", "a number"]);
+    edited("a parameter that is none", "delay_s = 0.4", "window_s = 0.4", &["effect[1].parameter.window_s", "delay"]);
+    edited("a key of an effect", "shape = [0.4]", "shapes = 1\nshape = [0.4]", &["effect[1].shapes", "shape"]);
+    edited("a key of the file", "start_pulse_us = ", "start_us = 1\nstart_pulse_us = ", &["key start_us", "start_pulse_us"]);
+}

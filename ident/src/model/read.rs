@@ -6,7 +6,7 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Powerplant model".
 
-use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys, reach, run};
+use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys, place, reach, run};
 use crate::context::{Context, Relation};
 use crate::course::{COURSE_KEYS, Course};
 use crate::effects::{self, Effect, Estimate, Instance};
@@ -18,6 +18,25 @@ use toml::{Table, Value};
 
 /// Key, what stands there, what should.
 pub(super) type Refusal = (String, String, String);
+
+/// Keys of the file.
+const ROOT: [&str; 10] =
+    ["format", "source", "start_pulse_us", "air_density_ratio", "rig", "consensus", "run", "channel", "effect", "course"];
+/// Keys of `[[effect]]`.
+const EFFECT: [&str; 12] = [
+    "id",
+    "channels",
+    "form",
+    "equation",
+    "scope",
+    "run",
+    "shape",
+    "shape_se",
+    "amplitude",
+    "seen",
+    "on_another_run",
+    "parameter",
+];
 
 impl Model {
     /// Reads a model.
@@ -36,22 +55,26 @@ impl Model {
     /// As [`Model::read`].
     pub fn parse(file: &str, text: &str) -> Result<Self, ModelError> {
         let root: Table = text.parse().map_err(|e: toml::de::Error| {
-            let line = e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
+            let (line, column) = place::of_byte(text, e.span().map_or(0, |s| s.start));
             ModelError::Syntax {
-                file: format!("{file}:{line}"),
+                file: format!("{file}:{line}:{column}"),
                 message: format!(
                     "{}; expected a model written by `quadrig identify` or `close-loop`",
                     e.message().lines().next().unwrap_or("not TOML")
                 ),
             }
         })?;
-        Self::from_table(&root).map_err(|(key, found, expected)| ModelError::Key { file: file.to_owned(), key, found, expected })
+        Self::from_table(&root).map_err(|(key, found, expected)| {
+            let (line, column) = place::of_key(text, &key);
+            ModelError::Key { file: format!("{file}:{line}:{column}"), key, found, expected }
+        })
     }
 
     fn from_table(root: &Table) -> Result<Self, Refusal> {
         if root.get("format").and_then(Value::as_str) != Some(FORMAT) {
             return Err(refusal("format", root.get("format"), &format!("'{FORMAT}'")));
         }
+        only(root, &ROOT)?;
         let start = root.get("start_pulse_us");
         let mut model = Self {
             source: root.get("source").and_then(Value::as_str).unwrap_or_default().to_owned(),
@@ -64,6 +87,10 @@ impl Model {
         if let Some(air) = root.get("air_density_ratio") {
             let ratio = finite(air).filter(|r| *r > 0.0);
             model.air = Some(ratio.ok_or_else(|| refusal("air_density_ratio", Some(air), "a finite number above zero"))?);
+        }
+        if let Some(consensus) = root.get("consensus") {
+            let table = consensus.as_table().ok_or_else(|| refusal("consensus", Some(consensus), "a table"))?;
+            only(table, &["rule", "channels"]).map_err(|refusal| within("consensus", refusal))?;
         }
         if let Some(channels) = root.get("consensus").and_then(|c| c.get("channels")) {
             model.consensus =
@@ -174,6 +201,7 @@ fn leftover(channel: &str, value: &Value) -> Result<Option<Leftover>, Refusal> {
 
 impl AddedEffect {
     pub(super) fn from_table(value: &Value) -> Result<Self, Refusal> {
+        only(value.as_table().ok_or_else(|| refusal("", Some(value), "a table, [[effect]]"))?, &EFFECT)?;
         let at = |k: &str| value.get(k);
         let id = at("id").and_then(Value::as_str).ok_or_else(|| refusal("id", at("id"), "the id of an effect"))?;
         let effect = effects::by_id(id).ok_or_else(|| {
@@ -209,7 +237,10 @@ impl AddedEffect {
         };
         let count = effect.amplitudes(&instance).len();
         let reach = at("seen").map_or(Ok(Vec::new()), |value| reach::read(&instance, count, value))?;
-        let estimates = at("parameter").and_then(Value::as_table).map(estimates).unwrap_or_default();
+        let estimates = match at("parameter") {
+            None => Vec::new(),
+            Some(value) => estimates(&held(effect, &instance, &shape, &amplitudes), value)?,
+        };
         let scope = effect.scope(&instance).word();
         if at("scope").is_some_and(|s| s.as_str() != Some(scope)) {
             return Err(refusal("scope", at("scope"), &format!("'{scope}', which {id} has in this form")));
@@ -281,14 +312,64 @@ fn means(instance: &Instance, value: &Value) -> Result<Vec<(String, Vec<f64>)>, 
     table.iter().map(of_channel).collect()
 }
 
-/// What was estimated, for the reader: no prediction hangs on it.
-fn estimates(parameters: &Table) -> Vec<Estimate> {
-    let own = parameters.iter().filter(|(k, _)| !k.ends_with("_se"));
-    let estimate = |(k, v): (&String, &Value)| {
-        let se = parameters.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0);
-        Some(Estimate { name: k.clone(), unit: String::new(), value: number(v)?, se })
-    };
-    own.filter_map(estimate).collect()
+/// A number that predictions use: its place in the effect's table, its name, its value.
+struct Held {
+    place: String,
+    name: &'static str,
+    value: f64,
+}
+
+/// The numbers of an effect, shapes first.
+fn held(effect: &'static dyn Effect, instance: &Instance, shape: &[f64], amplitudes: &[(String, Vec<f64>)]) -> Vec<Held> {
+    let shapes = shape_names(effect, instance).into_iter().zip(shape).enumerate();
+    let mut out: Vec<Held> = shapes.map(|(k, (name, v))| Held { place: format!("shape[{k}]"), name, value: *v }).collect();
+    for (channel, values) in amplitudes {
+        let own = effect.amplitudes(instance).into_iter().zip(values);
+        let of = |a: effects::Amplitude| format!("amplitude.{channel}.{}", keyed(a.name, a.unit));
+        out.extend(own.map(|(a, v)| Held { place: of(a), name: a.name, value: *v }));
+    }
+    out
+}
+
+/// Share of a number by which two writings of it may differ.
+const SAME_NUMBER: f64 = 1e-6;
+
+/// What was estimated, for the reader. No prediction hangs on it, so that it may not say another thing than what one does hang on.
+fn estimates(held: &[Held], value: &Value) -> Result<Vec<Estimate>, Refusal> {
+    let table = value.as_table().ok_or_else(|| refusal("parameter", Some(value), "a table of numbers"))?;
+    let mut out = Vec::new();
+    for (key, value) in table {
+        let place = format!("parameter.{key}");
+        let read = number(value).ok_or_else(|| refusal(&place, Some(value), "a number"))?;
+        let of = key.strip_suffix("_se").unwrap_or(key);
+        let names = |h: &&Held| of.strip_prefix(h.name).is_some_and(|unit| unit.is_empty() || unit.starts_with('_'));
+        let longest = held.iter().filter(names).map(|h| h.name.len()).max();
+        let own: Vec<&Held> = held.iter().filter(names).filter(|h| Some(h.name.len()) == longest).collect();
+        let Some(first) = own.first() else {
+            let known: Vec<&str> = held.iter().map(|h| h.name).collect();
+            return Err(refusal(&place, Some(value), &format!("a parameter of the effect: {}", known.join(", "))));
+        };
+        if of.len() < key.len() {
+            continue;
+        }
+        let same = |h: &&Held| (h.value - read).abs() <= SAME_NUMBER * h.value.abs().max(read.abs());
+        if !own.iter().any(same) {
+            let wanted =
+                format!("{}, as {} says, which predictions use: edit that one, and this line with it", first.value, first.place);
+            return Err(refusal(&place, Some(value), &wanted));
+        }
+        let se = table.get(&format!("{key}_se")).and_then(number).unwrap_or(0.0);
+        out.push(Estimate { name: key.clone(), unit: String::new(), value: read, se });
+    }
+    Ok(out)
+}
+
+/// Refuses a key that is none of these: what nothing reads must not look as if it counted.
+pub(super) fn only(table: &Table, keys: &[&str]) -> Result<(), Refusal> {
+    match table.iter().find(|(key, _)| !keys.contains(&key.as_str())) {
+        Some((key, value)) => Err(refusal(key, Some(value), &format!("no key but {}", keys.join(", ")))),
+        None => Ok(()),
+    }
 }
 
 fn number(v: &Value) -> Option<f64> {

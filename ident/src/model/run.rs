@@ -6,10 +6,13 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Scope".
 
-use super::read::{Refusal, finite, no_channel, refusal, within};
+use super::read::{Refusal, finite, no_channel, only, refusal, within};
 use super::{AddedEffect, FittedTo, RunLevel, coefficient_key};
 use crate::context::Relation;
 use toml::{Table, Value};
+
+/// Keys of `[[run]]`.
+const KEYS: [&str; 6] = ["log", "sha256", "rows", "date", "channel", "effect"];
 
 /// One table a run.
 pub(super) fn tables(runs: &[FittedTo], own: &[RunLevel]) -> Vec<Value> {
@@ -57,6 +60,7 @@ pub(super) fn read(value: Option<&Value>) -> Result<(Vec<FittedTo>, Vec<RunLevel
 fn fitted_to(value: &Value) -> Result<FittedTo, Refusal> {
     let text = |key: &str| value.get(key).and_then(Value::as_str).map(str::to_owned);
     let wanted = |key: &str, expected: &str| refusal(key, value.get(key), expected);
+    only(value.as_table().ok_or_else(|| refusal("", Some(value), "a table, [[run]]"))?, &KEYS)?;
     let is_digest = |d: &String| d.len() == 64 && d.bytes().all(|b| b.is_ascii_hexdigit());
     Ok(FittedTo {
         name: text("log").ok_or_else(|| wanted("log", "the name of a log"))?,

@@ -113,6 +113,7 @@ pub(super) fn of(member: &Member<'_>, rig: &[Placed], all: &[Shared]) -> RunLeve
     let (context, declared) = (member.context, Declared::default());
     let placed: Vec<Placed> = rig.iter().chain(&member.own).cloned().collect();
     let alone = if member.own.is_empty() { None } else { fit(context, declared, &placed, None, Rows::All) };
+    // errors as the run alone leaves them; the values are those that stand beside the shared ones
     let added = |(k, p): (usize, &Placed)| {
         let estimates = alone.as_ref().map(|f| f.profiled_estimates(context, declared, rig.len() + k)).unwrap_or_default();
         AddedEffect {
@@ -135,7 +136,18 @@ pub(super) fn of(member: &Member<'_>, rig: &[Placed], all: &[Shared]) -> RunLeve
             }
         }
     }
+    out.effects.iter_mut().for_each(tell_what_stands);
     out
+}
+
+/// Tells of each amplitude what the model holds of it: on the first channel that it reaches.
+fn tell_what_stands(added: &mut AddedEffect) {
+    for (i, a) in added.placed.effect.amplitudes(&added.placed.instance).iter().enumerate() {
+        let reached = added.amplitudes.iter().map(|(_, values)| values[i]).find(|v| *v != 0.0);
+        if let (Some(value), Some(e)) = (reached, added.estimates.iter_mut().find(|e| e.name == a.name)) {
+            e.value = value;
+        }
+    }
 }
 
 /// The polynomial that stands on this run, from the constant up as far as it differs from the rig's, and the amplitudes of each own effect.
