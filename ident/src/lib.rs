@@ -18,6 +18,7 @@ mod conclude;
 pub mod context;
 mod correction;
 pub mod course;
+pub mod date;
 pub mod design;
 pub mod diagnose;
 mod drive;

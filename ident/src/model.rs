@@ -24,6 +24,7 @@ mod run;
 mod scope;
 
 pub use reach::Reach;
+pub(crate) use reach::shape_errors;
 pub use scope::{FittedTo, RunLevel};
 
 /// First key of the format.
@@ -219,11 +220,14 @@ impl Model {
                 }
             }
             let mean = scope::mean(context, declared, fit, position);
-            let acts_elsewhere = mean.is_empty();
-            let reach = if acts_elsewhere { reach::of(context, declared, fit, position) } else { Vec::new() };
-            let shape_errors = estimates.iter().take(placed.shape.len()).map(|e| e.se).collect();
+            // what does not act on another run goes nowhere beyond
+            let acting =
+                context.targets.iter().zip(&fit.targets).filter(|(t, _)| mean.is_empty() && placed.instance.touches(t.name));
+            let reach = acting.map(|(target, t)| Reach::fitted(target.name, &t.labels, &t.covariance, position, count)).collect();
+            let shape_errors = shape_errors(&estimates, placed);
             model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates, mean, reach, shape_errors });
         }
+        model.saw(context, model.effects.len() - fit.placed.len());
         model
     }
 

@@ -8,7 +8,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::Folder;
-use crate::open::{Columns, Names, open};
+use crate::open::{Columns, Names, may_be_a_run, no_run_in, open};
 use crate::progress::Bar;
 use crate::trouble::unread;
 use ident::history::{Change, Chart, Entry, History, Measure, named, summary};
@@ -17,8 +17,6 @@ use ident::report::{history_page, history_terminal};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Endings of files that may be runs.
-const ENDINGS: [&str; 4] = ["csv", "txt", "tsv", "log"];
 /// Shares of the time that reading and comparing take; the rest goes into names.
 const READ: f64 = 0.1;
 const COMPARED: f64 = 0.4;
@@ -128,14 +126,12 @@ fn within(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut out = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unread(folder))? {
         let file = entry.map_err(unread(folder))?.path();
-        let ending = file.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if file.is_file() && ending.is_some_and(|e| ENDINGS.contains(&e.as_str())) {
+        if file.is_file() && may_be_a_run(&file) {
             out.push(file);
         }
     }
     if out.is_empty() {
-        let expected = "expected rig logs or exports";
-        return Err(format!("{}: no file ends in .{}; {expected}", folder.display(), ENDINGS.join(", .")).into());
+        return Err(no_run_in(folder));
     }
     out.sort();
     Ok(out)

@@ -13,6 +13,19 @@ use ident::log::Log;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
+/// Endings of files that may be runs.
+const ENDINGS: [&str; 4] = ["csv", "txt", "tsv", "log"];
+
+/// Whether a file of a folder may be a run, by its ending.
+pub(crate) fn may_be_a_run(path: &Path) -> bool {
+    path.extension().is_some_and(|e| ENDINGS.contains(&e.to_string_lossy().to_lowercase().as_str()))
+}
+
+/// Refusal of a folder without such a file.
+pub(crate) fn no_run_in(folder: &Path) -> Failure {
+    format!("{}: no file ends in .{}; expected rig logs or exports", folder.display(), ENDINGS.join(", .")).into()
+}
+
 /// How the columns of an export are to be read.
 #[derive(clap::Args, Clone, Default)]
 pub(crate) struct Columns {

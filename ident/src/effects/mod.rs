@@ -29,7 +29,7 @@ mod gain_change;
 pub(crate) mod glitch_rows;
 mod hysteresis;
 mod missed_pulses;
-mod operator;
+pub(crate) mod operator;
 mod pulses;
 pub(crate) mod quantisation;
 mod reynolds_thrust;

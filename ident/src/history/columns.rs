@@ -8,6 +8,7 @@
 
 use super::curve::Curve;
 use crate::context::Context;
+use crate::effects::operator::{Course, Lag};
 use crate::noise::median;
 
 /// What a column is of.
@@ -73,18 +74,10 @@ pub(super) fn columns(context: &Context, curve: &Curve, x: &[f64]) -> Vec<Column
     out
 }
 
-/// What a first-order lag has not followed yet.
+/// What a first-order lag has not followed yet: the curve jumps between rows.
 fn late(t: &[f64], f: &[f64], tau: f64) -> Vec<f64> {
-    let mut state = f[0];
-    let mut before = t[0];
-    t.iter()
-        .zip(f)
-        .map(|(t, f)| {
-            state += (f - state) * (1.0 - (-(t - before) / tau).exp());
-            before = *t;
-            state - f
-        })
-        .collect()
+    let followed = Lag::new(t, tau, Course::Jump(0.0)).of(&[f]);
+    followed[0].iter().zip(f).map(|(state, f)| state - f).collect()
 }
 
 /// Whether the load's last move beyond the slack went up (1) or down (-1); 0 before the first.

@@ -10,7 +10,6 @@ mod channel;
 mod columns;
 mod constants;
 mod curve;
-mod date;
 mod evidence;
 mod find;
 mod limits;
@@ -19,10 +18,10 @@ mod name;
 mod same;
 mod words;
 
+use crate::date;
 use crate::log::Log;
 use serde::Serialize;
 
-pub use date::{day_of, text_of};
 pub use find::{Change, Kind, Moved};
 pub use limits::Chart;
 pub use measure::{Measure, Scale, Value};
@@ -111,7 +110,7 @@ impl History {
             }
         }
         same::named_alike(logs)?;
-        let days: Vec<Option<f64>> = logs.iter().map(day_of).collect();
+        let days: Vec<Option<f64>> = logs.iter().map(date::of_log).collect();
         let dated = days.iter().all(Option::is_some);
         let mut order: Vec<usize> = (0..logs.len()).collect();
         if dated {
@@ -140,7 +139,7 @@ impl History {
     #[must_use]
     pub fn label(&self, run: usize) -> String {
         match self.runs[run].day {
-            Some(day) if self.dated => text_of(day),
+            Some(day) if self.dated => date::text(day.floor() as i64),
             _ => format!("run {}", run + 1),
         }
     }

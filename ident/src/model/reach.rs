@@ -13,8 +13,9 @@ use super::read::{Refusal, finite, refusal};
 use super::{AddedEffect, Model, keyed};
 use crate::context::{Context, Target, unit_of};
 use crate::design::{Label, TargetDesign};
-use crate::effects::Instance;
-use crate::hypothesis::{Declared, Fit, Placed, part_of};
+use crate::effects::{Estimate, Instance};
+use crate::hypothesis::Placed;
+use nalgebra::DMatrix;
 use toml::{Table, Value};
 
 /// Key of the covariance.
@@ -32,6 +33,14 @@ pub struct Reach {
 }
 
 impl Reach {
+    /// Of a channel that the effect at a position with so many amplitudes touches, from what was fitted of it. Nothing was seen yet.
+    pub(crate) fn fitted(channel: &str, labels: &[Label], covariance: &DMatrix<f64>, position: usize, amplitudes: usize) -> Self {
+        let at = |amplitude: usize| labels.iter().position(|l| *l == Label::Effect { effect: position, amplitude });
+        let of = |a: usize, b: usize| at(a).zip(at(b)).map_or(0.0, |(a, b)| covariance[(a, b)]);
+        let covariance = (0..amplitudes).map(|a| (0..amplitudes).map(|b| of(a, b)).collect()).collect();
+        Self { channel: channel.to_owned(), seen: [0.0; 2], covariance }
+    }
+
     /// Channel and table of `[effect.seen]`.
     pub(super) fn to_table(&self) -> (String, Value) {
         let [lowest, highest] = keys(&self.channel);
@@ -94,24 +103,23 @@ pub(super) fn read(instance: &Instance, amplitudes: usize, value: &Value) -> Res
     table.iter().map(of_channel).collect()
 }
 
-/// What its run has shown of the effect at a position, channel by channel.
-pub(super) fn of(context: &Context, declared: Declared<'_>, fit: &Fit, position: usize) -> Vec<Reach> {
-    let placed = &fit.placed[position];
-    let count = placed.effect.amplitudes(&placed.instance).len();
-    let of_target = |(k, target): (usize, &Target)| {
-        let part = part_of(context, declared, fit, position, k);
-        let counted = target.rows.iter().zip(&part).filter(|(row, _)| target.claims(**row));
-        let (low, high) = counted.fold((0.0_f64, 0.0_f64), |(l, h), (_, v)| (l.min(*v), h.max(*v)));
-        let t = &fit.targets[k];
-        let at = |amplitude: usize| t.labels.iter().position(|l| *l == Label::Effect { effect: position, amplitude });
-        let covariance = |a: usize, b: usize| at(a).zip(at(b)).map_or(0.0, |(a, b)| t.covariance[(a, b)]);
-        let covariance = (0..count).map(|a| (0..count).map(|b| covariance(a, b)).collect()).collect();
-        Reach { channel: target.name.to_owned(), seen: [low, high], covariance }
-    };
-    context.targets.iter().enumerate().filter(|(_, t)| placed.instance.touches(t.name)).map(of_target).collect()
-}
-
 impl Model {
+    /// Widens what was seen of its effects by what they add on a run that they were fitted to; of the first `known` effects nothing.
+    pub(crate) fn saw(&mut self, context: &Context, known: usize) {
+        for target in &context.targets {
+            let Some((design, coefficients)) = self.design(context, target, &self.placed()) else { continue };
+            let all = design.predict(&coefficients, context.len());
+            for k in known..self.effects.len() {
+                let Some(at) = self.effects[k].reach.iter().position(|r| r.channel == target.name) else { continue };
+                let Some(part) = self.part(context, target, &all, k) else { continue };
+                let seen = &mut self.effects[k].reach[at].seen;
+                for row in target.rows.iter().filter(|row| target.claims(**row)) {
+                    *seen = [seen[0].min(part[*row]), seen[1].max(part[*row])];
+                }
+            }
+        }
+    }
+
     /// What a prediction of a channel goes too far, row by row; nothing where no effect goes beyond what it has shown.
     pub(super) fn excess(&self, context: &Context, target: &Target, whole: (&TargetDesign, &[f64])) -> Option<Vec<f64>> {
         let n = context.len();
@@ -119,8 +127,7 @@ impl Model {
         let mut out: Option<Vec<f64>> = None;
         for (k, added) in self.effects.iter().enumerate() {
             let Some(reach) = added.reach.iter().find(|r| r.channel == target.name) else { continue };
-            let rest = self.varied(context, target, |placed| placed[k].instance.channels.clear())?;
-            let part: Vec<f64> = all.iter().zip(&rest).map(|(a, r)| a - r).collect();
+            let part = self.part(context, target, &all, k)?;
             if part.iter().all(|p| (reach.seen[0]..=reach.seen[1]).contains(p)) {
                 continue;
             }
@@ -135,6 +142,12 @@ impl Model {
             }
         }
         out
+    }
+
+    /// What the effect at a position adds to a prediction of all.
+    fn part(&self, context: &Context, target: &Target, all: &[f64], k: usize) -> Option<Vec<f64>> {
+        let rest = self.varied(context, target, |placed| placed[k].instance.channels.clear())?;
+        Some(all.iter().zip(&rest).map(|(a, r)| a - r).collect())
     }
 
     /// The prediction with its effects changed.
@@ -152,6 +165,12 @@ impl AddedEffect {
         let shapes = self.placed.shape.iter().zip(&self.shape_errors).enumerate();
         shapes.filter(|(_, (_, se))| **se > 0.0).filter_map(|(i, (value, se))| prediction(i, value + se)).collect()
     }
+}
+
+/// Standard errors of an effect's shapes, which stand first among its estimates; nothing where one is not known.
+pub(crate) fn shape_errors(estimates: &[Estimate], placed: &Placed) -> Vec<f64> {
+    let own: Vec<f64> = estimates.iter().take(placed.shape.len()).map(|e| e.se).collect();
+    if own.iter().all(|se| se.is_finite()) { own } else { Vec::new() }
 }
 
 /// Variance of what an effect adds to a row, from that of its amplitudes.

@@ -17,7 +17,7 @@ use crate::context::{Context, is_contrast};
 use crate::effects::Estimate;
 use crate::hypothesis::Placed;
 use crate::log::Log;
-use crate::model::{AddedEffect, FittedTo, Model, Polynomial, RunLevel};
+use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors};
 use crate::noise::median;
 use crate::sparse;
 use crate::verdict::Verdict;
@@ -155,25 +155,28 @@ fn model(
         let (coefficients, errors) = std::iter::once((mean, spread)).chain(powers).unzip();
         Polynomial { channel: s.channel.to_owned(), coefficients, errors }
     };
-    let effect = |(k, p): (usize, &Placed)| AddedEffect {
-        placed: p.clone(),
-        amplitudes: shared
-            .iter()
-            .filter(|s| p.instance.touches(s.channel))
-            .map(|s| (s.channel.to_owned(), s.amplitudes(k, p)))
-            .collect(),
-        estimates: estimates.get(k).cloned().unwrap_or_default(),
-        mean: Vec::new(),
-        reach: Vec::new(),
-        shape_errors: Vec::new(),
+    let effect = |(k, p): (usize, &Placed)| {
+        let touched = || shared.iter().filter(|s| p.instance.touches(s.channel));
+        let count = p.effect.amplitudes(&p.instance).len();
+        let estimates = estimates.get(k).cloned().unwrap_or_default();
+        AddedEffect {
+            placed: p.clone(),
+            amplitudes: touched().map(|s| (s.channel.to_owned(), s.amplitudes(k, p))).collect(),
+            mean: Vec::new(),
+            reach: touched().map(|s| Reach::fitted(s.channel, &s.labels, &s.covariance, k, count)).collect(),
+            shape_errors: shape_errors(&estimates, p),
+            estimates,
+        }
     };
     let polynomials = shared.iter().map(polynomial).collect();
-    Model {
+    let mut model = Model {
         runs: runs.iter().map(|r| FittedTo::of(&r.log)).collect(),
         effects: rig.iter().enumerate().map(effect).collect(),
         own,
         ..Model::of(&contexts[0], &runs[0].log, polynomials)
-    }
+    };
+    contexts.iter().for_each(|context| model.saw(context, 0));
+    model
 }
 
 /// Mean of the runs' constants and its standard error.

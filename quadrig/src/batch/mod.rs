@@ -13,7 +13,7 @@ mod table;
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::open::{Columns, Names, is_own, open};
+use crate::open::{Columns, Names, is_own, may_be_a_run, no_run_in, open};
 use crate::progress::Bar;
 use crate::trouble::{unread, unwritten};
 use ident::log::write_whole;
@@ -23,9 +23,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
-
-/// Endings of files that may be runs.
-const ENDINGS: [&str; 4] = ["csv", "txt", "tsv", "log"];
 
 /// Arguments.
 #[derive(clap::Args)]
@@ -139,7 +136,7 @@ fn files(folder: &Path, output: &Path) -> Result<Vec<String>, Failure> {
                 if std::fs::canonicalize(&path).ok() != output || output.is_none() {
                     open.push(path);
                 }
-            } else if path.extension().is_some_and(|e| ENDINGS.contains(&e.to_string_lossy().to_lowercase().as_str())) {
+            } else if may_be_a_run(&path) {
                 let relative = path.strip_prefix(folder).unwrap_or(&path);
                 let parts: Vec<String> = relative.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
                 found.push(parts.join("/"));
@@ -148,9 +145,7 @@ fn files(folder: &Path, output: &Path) -> Result<Vec<String>, Failure> {
     }
     found.sort();
     if found.is_empty() {
-        return Err(
-            format!("{}: no file ends in .{}; expected rig logs or exports", folder.display(), ENDINGS.join(", .")).into()
-        );
+        return Err(no_run_in(folder));
     }
     Ok(found)
 }

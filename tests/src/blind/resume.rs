@@ -24,6 +24,13 @@ pub trait Line: Send + Sized {
     fn seed(&self) -> u64;
 }
 
+/// The fields of a line, as many as the header has; nothing for a line that was cut short.
+#[must_use]
+pub fn fields<'l>(line: &'l str, header: &str) -> Option<Vec<&'l str>> {
+    let fields: Vec<&str> = line.trim_end().split(',').collect();
+    (fields.len() == header.split(',').count()).then_some(fields)
+}
+
 /// Says that a type with these three is a [`Line`].
 macro_rules! is_line {
     ($line:ty, $header:expr) => {

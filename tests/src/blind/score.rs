@@ -8,6 +8,7 @@
 use super::rig::{Rig, poly};
 use super::run::{Run, consensus};
 use super::scenario::{Hidden, Scenario};
+use crate::blind::resume::fields;
 use ident::log::Log;
 use ident::verdict::{Kind, Verdict};
 
@@ -125,10 +126,7 @@ impl Line {
     /// From a line of the file; nothing for a line that was cut short.
     #[must_use]
     pub fn parse(line: &str) -> Option<Self> {
-        let f: Vec<&str> = line.trim_end().split(',').collect();
-        if f.len() != HEADER.split(',').count() {
-            return None;
-        }
+        let f = fields(line, HEADER)?;
         let s = |i: usize| f[i].to_owned();
         Some(Self {
             seed: f[0].parse().ok()?,

@@ -6,6 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, "Blind trials"; `flight.md`, "The loop on flights".
 
 use super::scenario::{Scenario, Trial};
+use crate::blind::resume::fields;
 use ident::flight::{Closed, close, told};
 use ident::flight_log;
 use ident::verdict::{Kind, Validation, Verdict};
@@ -92,10 +93,7 @@ impl Line {
     /// From a line of the file; nothing for one that was cut short.
     #[must_use]
     pub fn parse(line: &str) -> Option<Self> {
-        let f: Vec<&str> = line.trim_end().split(',').collect();
-        if f.len() != HEADER.split(',').count() {
-            return None;
-        }
+        let f = fields(line, HEADER)?;
         let s = |i: usize| f[i].to_owned();
         Some(Self {
             seed: f[0].parse().ok()?,

@@ -6,6 +6,7 @@
 //! Reference: docs/history.md.
 
 use super::life::{Fate, Life};
+use crate::blind::resume::fields;
 use ident::history::{Change, History, Kind, named};
 use ident::log::Log;
 
@@ -74,10 +75,7 @@ impl Line {
     /// From a line of the file; nothing for a line that was cut short.
     #[must_use]
     pub fn parse(line: &str) -> Option<Self> {
-        let f: Vec<&str> = line.trim_end().split(',').collect();
-        if f.len() != HEADER.split(',').count() {
-            return None;
-        }
+        let f = fields(line, HEADER)?;
         let s = |i: usize| f[i].to_owned();
         Some(Self {
             seed: f[0].parse().ok()?,

@@ -9,6 +9,7 @@
 use super::scenario::{Messy, Top};
 use super::size::SHOWN;
 use crate::blind::effect::Effect;
+use crate::blind::resume::fields;
 use crate::blind::rig::poly;
 use crate::blind::run::Run;
 use crate::blind::write::text;
@@ -82,10 +83,7 @@ impl Line {
     /// From a line of the file; nothing for a line that was cut short.
     #[must_use]
     pub fn parse(line: &str) -> Option<Self> {
-        let f: Vec<&str> = line.trim_end().split(',').collect();
-        if f.len() != HEADER.split(',').count() {
-            return None;
-        }
+        let f = fields(line, HEADER)?;
         let s = |i: usize| f[i].to_owned();
         let pair = |i: usize| Some([f[i].parse().ok()?, f[i + 1].parse().ok()?]);
         Some(Self {
