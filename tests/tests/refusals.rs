@@ -244,12 +244,12 @@ fn models() -> Vec<Case> {
         alone(
             "a log in the place of a model",
             "predict good.csv good.csv -o out.csv",
-            &["good.csv:3: ", "a model written by `quadrig identify`"],
+            &["good.csv:3:4: ", "a model written by `quadrig identify`"],
         ),
         alone("a model that is not there", "close-loop good.csv --model nowhere.toml", &["nowhere.toml: cannot be read"]),
         with("a model of another format", "bad.toml", "format = \"mine 1\"\n", PREDICT, &["bad.toml"]),
         with("a model cut short", "bad.toml", "format = \"quadrig-model 1\"\n[channel.rpm", PREDICT, &["bad.toml:2"]),
-        with("a flight that is no flight", "bad.toml", "duration_s = 2\n", "fly bad.toml --model good.csv", &["good.csv:3: "]),
+        with("a flight that is no flight", "bad.toml", "duration_s = 2\n", "fly bad.toml --model good.csv", &["good.csv:3:4: "]),
     ]
 }
 
