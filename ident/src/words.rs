@@ -186,9 +186,36 @@ pub fn channel(name: &str) -> String {
         "rpm_rate" => "change of speed",
         "heat" => "heat",
         "direction" => "direction of the load",
+        // attitude logs
+        "ax" => "specific force (x)",
+        "ay" => "specific force (y)",
+        "az" => "specific force (z)",
+        "gx" => "turn rate (x)",
+        "gy" => "turn rate (y)",
+        "gz" => "turn rate (z)",
+        "mx" => "field (x)",
+        "my" => "field (y)",
+        "mz" => "field (z)",
         other => other,
     };
     said.to_owned()
+}
+
+/// A text whose columns are told as people say them.
+#[must_use]
+pub fn plain(text: &str) -> String {
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(from) = rest.find(is_name) {
+        let name = &rest[from..];
+        let name = &name[..name.find(|c| !is_name(c)).unwrap_or(name.len())];
+        out += &rest[..from];
+        // a word without an underscore is a word
+        out += &if name.contains('_') { channel(name) } else { name.to_owned() };
+        rest = &rest[from + name.len()..];
+    }
+    out + rest
 }
 
 /// A channel of a flight or attitude log as people say it: a quantity and its axis, or the speed of a rotor.

@@ -85,6 +85,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         ],
         ..verdict(Kind::Ambiguous, vec![filter(0.5), sag(0.99)])
     };
+    let small_filter = EffectEntry { heldout_error_reduction: 0.2, ..filter(0.5) };
     let schedule = vec![ScheduleStep { pulse_us: 1500.0, hold_s: 30.0 }];
     let next = NextExperiment { why: "they differ most on long holds".into(), separates: true, schedule };
     let alike = NextExperiment { why: "no run at hand separates them".into(), separates: false, ..next.clone() };
@@ -135,9 +136,18 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             open(0.45),
             false,
             &[
-                "Either the load cell reads the mean of its last 0.50 s, or the load cell answers late: this run cannot tell. Beside that the supply lead drops 41 mV per ampere.",
+                "Either the load cell reads the mean of its last 0.50 s, or the load cell answers late: this run cannot tell. Beside that, the supply lead drops 41 mV per ampere.",
             ],
             &["explain", "battery", "proposed"],
+        ),
+        (
+            // what takes most is told first, although it is no question
+            Verdict { alternatives: open(0.45).alternatives, ..verdict(Kind::Ambiguous, vec![small_filter, sag(0.99)]) },
+            false,
+            &[
+                "The supply lead drops 41 mV per ampere. Either the load cell reads the mean of its last 0.50 s, or the load cell answers late: this run cannot tell.",
+            ],
+            &["Beside"],
         ),
         (
             Verdict { next_experiment: Some(next), ..open(0.45) },
@@ -203,7 +213,13 @@ fn the_sentence_never_claims_more_than_the_verdict() {
 fn a_channel_without_a_model_is_told() {
     let mut v = verdict(Kind::Attributed, vec![sag(0.99)]);
     v.channels.not_predicted.insert("rpm".into(), "no command was logged".into());
-    assert!(sentence(&v, Vocabulary::RIG, false).ends_with("Speed has no model: no command was logged."));
+    // what no model predicts is not told as what a model leaves
+    v.unexplained = vec![left("rpm", 380.0), left("voltage_v", 8.0)];
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.ends_with("On voltage 79 mV is left (slow). Speed has no model: no command was logged."), "{said}");
+    v.unexplained.truncate(1);
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.ends_with("Little is left beyond the noise. Speed has no model: no command was logged."), "{said}");
 }
 
 #[test]
@@ -228,6 +244,12 @@ fn the_terminal_claims_no_more_than_it_knows() {
         false,
     );
     assert!(text.contains("unknown (that something is there: p > 0.99) on thrust"), "{text}");
+    let seen = EffectEntry {
+        evidence: "the residual goes up; without it the held-out error of voltage_v is 6.76 times as large".into(),
+        ..sag(0.9)
+    };
+    let told = terminal(&verdict(Kind::Attributed, vec![seen]), Vocabulary::RIG, false);
+    assert!(told.contains("evidence: the residual goes up\n") && told.contains("Without it the error of voltage is"), "{told}");
     assert!(text.contains("tau_up < 25 ms  (95 %)") && !text.contains("-0.02") && !text.contains("-21"), "{text}");
 }
 
@@ -275,4 +297,14 @@ fn every_effect_of_a_flight_has_words() {
     assert_eq!(said("rotor_gain", weaker), "Rotor 3 gives 10.0 % less thrust than its speed says.");
     let unknown_size = vec![parameter("offset_x", 0.001, 0.01, "m"), parameter("offset_y", 0.002, 0.01, "m")];
     assert_eq!(said("mass_offset", unknown_size), "The centre of gravity lies off the middle.");
+}
+
+/// Names of columns become words; formulas and words stay.
+#[test]
+fn a_text_is_told_without_names_of_columns() {
+    let said = ident::words::plain("the thrust_n residual follows temp_c, as thrust(rpm) holds; time_since_step");
+    assert_eq!(said, "the thrust residual follows temperature, as thrust(rpm) holds; time since the last step");
+    assert_eq!(ident::words::channel("mz"), "field (z)");
+    let late = effect("channel_delay", "mx", 0.9, 0.5, vec![parameter("delay", 0.011, 0.001, "s")]);
+    assert_eq!((ident::flight::VOCABULARY.clause)(&late).sentence(), "The magnetometer answers 11.0 ms late.");
 }

@@ -68,6 +68,9 @@ fn a_page_begins_with_the_sentence_that_heads_the_terminal() {
         let over = format!("{:.1}", u["over_floor"].as_f64().expect("a figure"));
         assert!(read.split("What is left").last().is_some_and(|left| left.contains(&over)), "{u}");
     }
+    // other causes are told by what they are, and a factor is told once
+    assert!(read.contains("Easily taken for: battery discharges during the run."), "{read}");
+    assert!(!read.contains("the held-out error of voltage_v is"), "{read}");
     for part in [
         "id=\"what-this-rig-has\"",
         "id=\"effect-supply-sag\"",

@@ -143,6 +143,12 @@ fn the_command_writes_the_rig_and_each_run_and_refuses_what_is_no_set_of_runs() 
     assert_eq!(verdict["runs"].as_array().map(Vec::len), Some(2));
     assert!(verdict["channels"]["voltage_v"]["after"]["across_runs_rms"].is_f64());
     let page = std::fs::read_to_string(at.join("out/report.html")).unwrap();
+    for card in page.split("<article class=\"card").skip(1) {
+        let card = card.split("</article>").next().unwrap();
+        assert!(card.contains("<svg"), "a card without its figure: {card}");
+    }
+    let left = page.split("id=\"what-is-left\"").nth(1).and_then(|p| p.split("<h2").next()).unwrap();
+    assert!(left.contains("<svg") && left.contains("r1.csv"), "what is left has its figure: {left}");
     for said in ["The supply lead drops", "Each run, predicted by the others", "runs/r1/report.html", "runs/r2/report.html"] {
         assert!(page.contains(said), "the page does not say {said}");
     }

@@ -40,6 +40,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         hero: parts::most(v, &traces),
         cards: parts::each(v, &traces),
         left: parts::rest(v, &traces),
+        parameters: Vec::new(),
         speeds: Vec::new(),
     };
     let mut sheet = parts::begin(&page);

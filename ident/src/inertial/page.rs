@@ -11,7 +11,7 @@ use crate::effects::airframe;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;
-use crate::words::{Clause, list};
+use crate::words::{Clause, channel, list};
 use nalgebra::Vector3;
 
 /// The words of an inertial unit's causes.
@@ -19,7 +19,7 @@ pub const VOCABULARY: Vocabulary = Vocabulary { about: airframe::about, clause, 
 
 /// Causes that have no page in the flight's library.
 fn clause(found: &EffectEntry) -> Clause {
-    let on = list(&found.channels);
+    let on = list(&found.channels.iter().map(|c| channel(c)).collect::<Vec<_>>());
     match found.id.as_str() {
         "stationary_magnet" => Clause::new("a magnet beside the board", "disturbs the field"),
         "vibration" => Clause::new("vibration", format!("is in {on}")),
@@ -42,6 +42,7 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         hero: parts::most(v, &traces),
         cards: parts::each(v, &traces),
         left: parts::rest(v, &traces),
+        parameters: Vec::new(),
         speeds: Vec::new(),
     };
     let mut sheet = parts::begin(&page);

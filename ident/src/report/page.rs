@@ -18,7 +18,7 @@ use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
 use crate::several::Shown;
-use crate::verdict::{EffectEntry, Verdict};
+use crate::verdict::{EffectEntry, Unexplained, Verdict};
 use crate::words::{channel, heading};
 
 /// What stands before and after in the figure of one effect.
@@ -37,6 +37,7 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         hero: hero(closed),
         cards: cards(closed),
         left: left(closed),
+        parameters: Vec::new(),
         speeds: speeds(log, closed),
     };
     let mut sheet = parts::begin(&page);
@@ -172,22 +173,23 @@ fn values(context: &Context, target: &Target, name: &str) -> Option<Vec<f64>> {
     }
 }
 
-/// Figures of what is left: over the variable that it goes with, else over time.
+/// Of a channel on which something is left: over the variable that it goes with, else over time.
+pub(super) fn rest(closed: &Closed, u: &Unexplained) -> Option<Figure> {
+    let target = target(closed, &u.channel)?;
+    let trace = trace(closed, target)?;
+    let over = u.depends_on.iter().find_map(|name| Some((name, values(&closed.context, target, name)?)));
+    Some(match over {
+        Some((name, x)) => against(&trace, "left", (name, unit_of(name)), &x, pair(&closed.verdict)),
+        None => over_time(&trace, "left", pair(&closed.verdict)),
+    })
+}
+
+/// Figures of what is left.
 fn left(closed: &Closed) -> Vec<Figure> {
-    let context = &closed.context;
-    let figure = |u: &crate::verdict::Unexplained| {
-        let target = target(closed, &u.channel)?;
-        let trace = trace(closed, target)?;
-        let over = u.depends_on.iter().find_map(|name| Some((name, values(context, target, name)?)));
-        Some(match over {
-            Some((name, x)) => against(&trace, "left", (name, unit_of(name)), &x, pair(&closed.verdict)),
-            None => over_time(&trace, "left", pair(&closed.verdict)),
-        })
-    };
     // several speed sensors have a figure together
     let several = SPEED.iter().filter(|c| target(closed, c).is_some()).count() > 1;
-    let own = |u: &&crate::verdict::Unexplained| !(several && SPEED.contains(&u.channel.as_str()));
-    closed.verdict.unexplained.iter().filter(own).filter_map(figure).collect()
+    let own = |u: &&Unexplained| !(several && SPEED.contains(&u.channel.as_str()));
+    closed.verdict.unexplained.iter().filter(own).filter_map(|u| rest(closed, u)).collect()
 }
 
 /// Residual, and measured beside predicted, of every channel.

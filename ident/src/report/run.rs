@@ -19,6 +19,7 @@ use crate::log::{Log, SPEED};
 use crate::noise::median;
 use crate::plateau::Plateau;
 use crate::shift::{Settings, filters};
+use crate::words::channel;
 
 /// Colours of the speed channels.
 pub(super) const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];
@@ -160,7 +161,7 @@ pub(super) fn overlaid(log: &Log) -> Option<Figure> {
     let channels: Vec<(&str, &[f64])> = SPEED.into_iter().filter_map(|c| Some((c, log.column(c)?))).collect();
     let layers = channels.iter().zip(CLASSES).map(|((name, values), class)| {
         let (x, y) = present(&log.t, values);
-        Layer::Line { name: (*name).to_owned(), class, x, y }
+        Layer::Line { name: channel(name), class, x, y }
     });
     (channels.len() > 1).then(|| Figure {
         id: "time-speeds".into(),

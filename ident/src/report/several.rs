@@ -7,20 +7,20 @@
 //! Reference: specification `formats.md`, `across_runs_rms`.
 
 use super::closed::{self as parts, Origin, Page, Vocabulary, pair};
-use super::page::{cards, over_runs};
-use super::sheet::Sheet;
+use super::figure::Figure;
+use super::page::{cards, over_runs, rest};
 use super::svg::escape;
 use crate::close::Closed;
 use crate::effects::Estimate;
 use crate::several::{Outcome, Run};
-use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Validation};
+use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Unexplained, Validation};
 use crate::words::digits;
 
 /// The report of several runs as one self-contained page; `links` are the pages of the runs, in their order.
 #[must_use]
 pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
     let v = &outcome.verdict;
-    let shown = shown(runs, outcome);
+    let alone: Vec<Closed> = (0..runs.len()).map(|run| of_run(runs, outcome, run)).collect();
     let page = Page {
         verdict: v,
         words: Vocabulary::RIG,
@@ -28,12 +28,12 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         origin: Origin::of_several(&runs.iter().map(|r| &r.log).collect::<Vec<_>>()),
         declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as a geometric mean over the runs.".to_owned(),
         hero: outcome.shown.as_ref().map(|shown| over_runs(v, shown)).unwrap_or_default(),
-        cards: shown.map(|closed| cards(&closed)).unwrap_or_default(),
-        left: Vec::new(),
+        cards: cards_of(&alone, runs, outcome),
+        left: v.unexplained.iter().filter_map(|u| left_of(&alone, runs, u)).collect(),
+        parameters: parameters(outcome),
         speeds: Vec::new(),
     };
     let mut sheet = parts::begin(&page);
-    parameters(&mut sheet, outcome);
     for (run, of) in v.runs.iter().enumerate() {
         sheet.fold(&of.run, |sheet| {
             if let Some(link) = links.get(run) {
@@ -45,23 +45,50 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
     sheet.html()
 }
 
-/// The run whose figures stand on the cards: the one that the figure that convinces most is of.
-fn shown(runs: &[Run], outcome: &Outcome) -> Option<Closed> {
-    let run = outcome.shown.as_ref()?.run;
+/// One run under the models of all.
+fn of_run(runs: &[Run], outcome: &Outcome, run: usize) -> Closed {
     let log = &runs[run].log;
-    Some(Closed {
+    Closed {
         context: outcome.contexts[run].clone(),
         diagnosis: runs[run].closed.diagnosis.clone(),
         declared: outcome.declared.on(log).into_owned(),
         model: outcome.model.on(log).into_owned(),
         verdict: outcome.verdict.clone(),
-    })
+    }
+}
+
+/// The figure, with the run that it is of.
+fn named(mut figure: Figure, run: &Run) -> Figure {
+    figure.title = format!("{}, {}", figure.title, run.log.name);
+    figure
+}
+
+/// Figures of each effect, of the run that the figure that convinces most is of; what happened on another run alone is shown on that one.
+fn cards_of(alone: &[Closed], runs: &[Run], outcome: &Outcome) -> Vec<Vec<Figure>> {
+    let first = outcome.shown.as_ref().map_or(0, |shown| shown.run);
+    let order = std::iter::once(first).chain((0..runs.len()).filter(|run| *run != first));
+    let mut out = vec![Vec::new(); outcome.verdict.effects.len()];
+    for run in order.filter(|_| !runs.is_empty()) {
+        for (card, figures) in out.iter_mut().zip(cards(&alone[run])) {
+            if card.is_empty() {
+                *card = figures.into_iter().map(|figure| named(figure, &runs[run])).collect();
+            }
+        }
+    }
+    out
+}
+
+/// The figure of what is left on a channel, of the run on which it is loudest.
+fn left_of(alone: &[Closed], runs: &[Run], u: &Unexplained) -> Option<Figure> {
+    let loudest = runs.iter().position(|run| u.looks_like.contains(&run.log.name));
+    loudest.into_iter().chain(0..runs.len()).find_map(|run| Some(named(rest(&alone[run], u)?, &runs[run])))
 }
 
 /// Each parameter of the rig's effects as all runs share it, and as each run alone has it.
-fn parameters(sheet: &mut Sheet, outcome: &Outcome) {
+fn parameters(outcome: &Outcome) -> Vec<Vec<String>> {
     let value = |e: &Estimate| digits(e.value, if e.se.is_finite() && e.se > 0.0 { e.se } else { 0.005 * e.value.abs() });
-    let mut rows = Vec::new();
+    let head = ["parameter", "unit", "all runs"].into_iter().chain(outcome.verdict.runs.iter().map(|r| r.run.as_str()));
+    let mut rows = vec![head.map(str::to_owned).collect()];
     for (added, alone) in outcome.model.effects.iter().zip(&outcome.alone) {
         let context = &outcome.contexts[0];
         let reported = added.placed.effect.report(context, &added.placed.instance, added.estimates.clone());
@@ -74,14 +101,7 @@ fn parameters(sheet: &mut Sheet, outcome: &Outcome) {
             rows.push(row);
         }
     }
-    if rows.is_empty() {
-        return;
-    }
-    sheet.section("Each parameter, run by run");
-    sheet.say("All runs together, then each run alone with the same effects. A value that a run alone does not know wanders.");
-    let head: Vec<&str> =
-        ["parameter", "unit", "all runs"].into_iter().chain(outcome.verdict.runs.iter().map(|r| r.run.as_str())).collect();
-    sheet.data("run-by-run", &head, &rows, None);
+    rows
 }
 
 /// The channels of one run, as the bars have them.

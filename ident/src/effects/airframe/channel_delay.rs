@@ -42,6 +42,7 @@ impl AirframeEffect for ChannelDelay {
         let (who, verb) = match () {
             () if on("rpm") => ("the speed channels", "answer"),
             () if on("ang_acc") || on("gyro") => ("the gyro", "answers"),
+            () if ["mag", "mx", "my", "mz"].into_iter().any(on) => ("the magnetometer", "answers"),
             () => ("the accelerometer", "answers"),
         };
         Clause::new(who, found.tell("delay", |v| format!("{verb} {v} late"), &format!("{verb} late")))

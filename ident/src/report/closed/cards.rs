@@ -12,7 +12,9 @@ use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
-use crate::words::{channel, counted, digits, list, probability, scaled, scope, sized, sureness, upper, upper_bound};
+use crate::words::{
+    channel, counted, digits, list, lower, plain, probability, scaled, scope, sized, sureness, upper, upper_bound,
+};
 use std::fmt::Write;
 
 /// Probability below which the card says how to settle it.
@@ -91,7 +93,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     sheet.html_part("<div>\n");
     parameters(sheet, e);
     let mut html =
-        format!("<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n", escape(&e.equation), escape(&upper(&e.evidence)));
+        format!("<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n", escape(&e.equation), escape(&upper(&plain(signs(e)))));
     let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
     if let Some(how) = settle(v, e) {
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
@@ -108,6 +110,16 @@ fn anchor(v: &Verdict, k: usize) -> String {
     let before = v.effects[..k].iter().filter(|e| e.id == v.effects[k].id).count();
     let id = v.effects[k].id.replace('_', "-");
     if before == 0 { id } else { format!("{id}-{}", before + 1) }
+}
+
+/// What the residual looks like; the factor that the evidence ends with is told by [`removes`].
+pub(super) fn signs(e: &EffectEntry) -> &str {
+    e.evidence.split_once("; without it the held-out error of ").map_or(e.evidence.as_str(), |(signs, _)| signs)
+}
+
+/// An effect's title as a part of a sentence.
+fn title(page: &Page<'_>, id: &str) -> String {
+    (page.words.about)(id).map_or_else(|| id.replace('_', " "), |about| lower(about.title))
 }
 
 /// What would be left on its first channel without it.
@@ -178,14 +190,19 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
         let lacks = a.ids.iter().filter(|id| **id == e.id).count() < here;
         let instead = instead(&best, &a.ids);
         if lacks {
-            let what = if instead.is_empty() { "nothing in its place".to_owned() } else { instead.join(" + ") };
+            let what = if instead.is_empty() {
+                "nothing in its place".to_owned()
+            } else {
+                instead.iter().map(|id| title(page, id)).collect::<Vec<_>>().join(", and ")
+            };
             found.push(format!("{what} ({})", probability(a.probability)));
         }
     }
-    let alike: Vec<&str> = (page.words.about)(&e.id).map(|a| a.look_alikes.to_vec()).unwrap_or_default();
-    let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join(", ")) };
+    let alike: Vec<String> =
+        (page.words.about)(&e.id).map(|a| a.look_alikes.iter().map(|id| title(page, id)).collect()).unwrap_or_default();
+    let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
     let found =
-        if found.is_empty() { "nothing else that was tried came close.".to_owned() } else { format!("{}.", found.join(", ")) };
+        if found.is_empty() { "nothing else that was tried came close.".to_owned() } else { format!("{}.", found.join("; ")) };
     format!("{found}{alike}")
 }
 

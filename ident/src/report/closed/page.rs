@@ -8,6 +8,7 @@
 use super::provenance::{Origin, provenance};
 use super::vocabulary::Vocabulary;
 use super::{cards, fold, left, pair, sentence, state};
+use crate::context::unit_of;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::verdict::{Kind, Validation, Verdict};
@@ -31,6 +32,8 @@ pub(crate) struct Page<'p> {
     pub(crate) cards: Vec<Vec<Figure>>,
     /// Figures of what is left.
     pub(crate) left: Vec<Figure>,
+    /// Of several runs: each parameter run by run, the head first.
+    pub(crate) parameters: Vec<Vec<String>>,
     /// Figures of several speed sensors together, and their contrasts.
     pub(crate) speeds: Vec<Figure>,
 }
@@ -65,6 +68,15 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         sheet.say("Predicted whole by a fit to the other runs, one constant a channel apart. Before and after, rms.");
         runs(&mut sheet, v, &v.runs, "each-run");
     }
+    if let [head, rows @ ..] = page.parameters.as_slice()
+        && !rows.is_empty()
+    {
+        sheet.section("Each parameter, run by run");
+        sheet
+            .say("All runs together, then each run alone with the same effects. A value that a run alone does not know wanders.");
+        let head: Vec<&str> = head.iter().map(String::as_str).collect();
+        sheet.data("run-by-run", &head, rows, None);
+    }
     if !v.validation.is_empty() {
         sheet.section("On other runs of the rig");
         sheet.say("Predicted from this run's model alone: what belongs to the rig carries over. Before and after, rms.");
@@ -88,7 +100,7 @@ fn runs(sheet: &mut Sheet, v: &Verdict, list: &[Validation], name: &str) {
     let rows: Vec<Vec<String>> = names
         .into_iter()
         .map(|channel| {
-            let unit = v.channels.get(channel).map_or("", |c| c.unit.as_str());
+            let unit = v.channels.get(channel).map_or(unit_of(channel), |c| c.unit.as_str());
             let cell = |r: &Validation| {
                 r.channels.get(channel).map_or_else(String::new, |b| {
                     let [_, before, after] = state::figures(unit, b.before, b.before, b.after);

@@ -69,6 +69,8 @@ pub struct Origin {
     pub model: Option<String>,
     /// What was hidden, of a demonstration.
     pub hidden: Option<Hidden>,
+    /// Whether it is of a rig, which has a motor, a propeller and a supply.
+    pub of_a_rig: bool,
     /// The other logs, where the page is of several runs.
     pub others: Vec<FittedTo>,
 }
@@ -90,7 +92,7 @@ impl Origin {
             .map(|(k, v)| (k.clone(), text(v)))
             .collect();
         let seconds = log.t.first().zip(log.t.last()).map(|(a, b)| b - a).filter(|_| !log.time_is_row());
-        Self { log: FittedTo::of(log), seconds, states, ..Self::default() }
+        Self { log: FittedTo::of(log), seconds, states, of_a_rig: true, ..Self::default() }
     }
 
     /// Of several logs of one rig: what they all state.
@@ -168,10 +170,11 @@ pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict, 
         row("rows", log.rows.to_string());
     }
     for key in STATED {
-        row(&key.replace('_', " "), origin.states.get(key).cloned().unwrap_or_default());
+        let label = if key == "sample_hz" { "samples in a second".to_owned() } else { key.replace('_', " ") };
+        row(&label, origin.states.get(key).cloned().unwrap_or_default());
     }
     for key in ["motor", "propeller", "supply", "date"] {
-        if !origin.states.contains_key(key) {
+        if !origin.states.contains_key(key) && (origin.of_a_rig || key == "date") {
             row(key, "not stated in the log".to_owned());
         }
     }

@@ -104,17 +104,19 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
             format!("either {}, {}: {doubt}", list(first), rest.join(", "))
         }
     };
-    let sure: Vec<String> = own
-        .iter()
-        .chain(if own.is_empty() { common.iter() } else { [].iter() })
-        .filter(|e| !disputed.iter().any(|d| std::ptr::eq(*d, **e)))
-        .take(MOST)
-        .map(|e| (words.clause)(e).with(adverb(e.probability)))
-        .collect();
-    let mut out = format!("{}.", since(news, &question));
-    if !sure.is_empty() {
-        out += &format!(" Beside that {}.", joined_lower(&sure));
-    }
+    let all = if own.is_empty() { &common } else { &own };
+    let sure = all.iter().copied().filter(|e| !disputed.iter().any(|d| std::ptr::eq(*d, *e)));
+    // what takes most comes first, be it sure or open
+    let removed = |all: &[&EffectEntry]| all.iter().map(|e| e.heldout_error_reduction).fold(0.0, f64::max);
+    let sure: Vec<&EffectEntry> = sure.take(MOST).collect();
+    let said: Vec<String> = sure.iter().map(|e| (words.clause)(e).with(adverb(e.probability))).collect();
+    let out = if sure.is_empty() {
+        format!("{}.", since(news, &question))
+    } else if removed(&sure) > removed(&disputed) {
+        format!("{}. {}.", since(news, &joined_lower(&said)), upper(&question))
+    } else {
+        format!("{}. Beside that, {}.", since(news, &question), joined_lower(&said))
+    };
     let left = left(verdict);
     if left.is_empty() { out } else { format!("{out} {left}") }
 }
@@ -239,10 +241,15 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
     format!("{subject} {}.", list(&short))
 }
 
+/// What is worth a word among what is left; a channel without a model is told by itself.
+fn loud(verdict: &Verdict) -> impl Iterator<Item = &Unexplained> {
+    let modelled = |u: &&Unexplained| !verdict.channels.not_predicted.contains_key(&u.channel);
+    verdict.unexplained.iter().filter(|u| u.over_floor > QUIET).filter(modelled)
+}
+
 /// What is loudest among what is left.
 fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
-    let loud = verdict.unexplained.iter().filter(|u| u.over_floor > QUIET);
-    loud.max_by(|a, b| a.over_floor.total_cmp(&b.over_floor))
+    loud(verdict).max_by(|a, b| a.over_floor.total_cmp(&b.over_floor))
 }
 
 /// The error that is left on a channel beyond its noise, with unit.
@@ -262,7 +269,7 @@ fn left(verdict: &Verdict) -> String {
         let noise = verdict.unexplained.is_empty() && !over;
         return if noise { "What is left is noise." } else { "Little is left beyond the noise." }.to_owned();
     };
-    let others = verdict.unexplained.iter().filter(|u| u.over_floor > QUIET).count() - 1;
+    let others = loud(verdict).count() - 1;
     let (size, on) = (size_left(verdict, loudest), channel(&loudest.channel));
     let what = if others > 0 {
         format!("Most is left on {on}: {size} ({})", loudest.looks_like)

@@ -5,10 +5,11 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{removes, value};
+use super::cards::{removes, signs, value};
 use super::sentence::{sentence, size_left};
 use super::state::{factor, figures, word};
 use super::vocabulary::Vocabulary;
+use crate::context::unit_of;
 use crate::verdict::{EffectEntry, Verdict};
 use crate::words::{channel, list, probability, upper, upper_bound};
 
@@ -52,7 +53,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     for (v, heading) in of_several.chain(took_no_part) {
         out += &format!("\n{}\n", wrapped(&heading, 2));
         for (name, b) in &v.channels {
-            let unit = verdict.channels.get(name).map_or("", |c| c.unit.as_str());
+            let unit = verdict.channels.get(name).map_or(unit_of(name), |c| c.unit.as_str());
             let [_, before, after] = figures(unit, b.before, b.before, b.after);
             out += &format!("  {name:<14}{before:>18}{after:>18}{:>10}\n", factor(b.before, b.after));
         }
@@ -107,7 +108,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
     if !removes.is_empty() {
         out += &format!("    {}\n", wrapped(&removes, 4));
     }
-    out + &format!("    {}\n", wrapped(&format!("evidence: {}", e.evidence), 4))
+    out + &format!("    {}\n", wrapped(&format!("evidence: {}", signs(e)), 4))
 }
 
 fn left(verdict: &Verdict) -> String {
