@@ -17,12 +17,14 @@ use crate::log::Log;
 use crate::steps::Steps;
 use toml::{Table, Value};
 
+mod discrepancy;
 mod place;
 mod reach;
 mod read;
 mod run;
 mod scope;
 
+pub use discrepancy::beside;
 pub use reach::Reach;
 pub(crate) use reach::shape_errors;
 pub use scope::{FittedTo, RunLevel};
@@ -83,6 +85,8 @@ pub struct Model {
     pub leftovers: Vec<(String, Leftover)>,
     /// What it is off by on that run while the load is on its way, row for row.
     pub course: Option<Course>,
+    /// SHA-256 of the file that holds these two ([`beside`]), as the model's own file states it.
+    pub beside: Option<String>,
 }
 
 /// Why a model was refused.
@@ -116,6 +120,18 @@ pub enum ModelError {
         found: String,
         /// What should.
         expected: String,
+    },
+    /// The file beside it belongs to another model.
+    #[error(
+        "{model}: key discrepancy_sha256: {file} does not belong to this model (its SHA-256 is {found}); expected the file that was written with it: copy both together, or take that one away"
+    )]
+    Pair {
+        /// The model's file with line and column.
+        model: String,
+        /// The file beside it.
+        file: String,
+        /// Its digest.
+        found: String,
     },
 }
 
@@ -307,11 +323,19 @@ impl Model {
         self.effects.iter().map(|e| e.placed.clone()).filter(of_rotor).collect()
     }
 
-    /// The file's text.
+    /// All of it in one text, what it was off by on its own run included; as files: [`Model::files`].
     #[must_use]
     pub fn to_toml(&self) -> String {
+        self.text(true, None)
+    }
+
+    /// The text of the model's file: `whole`, or with the digest of the file beside it.
+    fn text(&self, whole: bool, digest: Option<&str>) -> String {
         let mut root = Table::new();
         root.insert("format".into(), FORMAT.into());
+        if let Some(digest) = digest {
+            root.insert(discrepancy::DIGEST.into(), digest.into());
+        }
         root.insert("source".into(), self.source.clone().into());
         root.insert("start_pulse_us".into(), self.start_pulse_us.into());
         if !self.meta.is_empty() {
@@ -340,11 +364,8 @@ impl Model {
                 t.insert(coefficient_key(&p.channel, k), (*c).into());
                 t.insert(format!("{}_se", coefficient_key(&p.channel, k)), (*e).into());
             }
-            if let Some((_, left)) = self.leftovers.iter().find(|(channel, _)| *channel == p.channel) {
-                let [scatter, at, error] = leftover_keys(&p.channel);
-                t.insert(scatter, left.scatter.iter().map(|part| Value::from(part.to_vec())).collect::<Vec<_>>().into());
-                t.insert(at, left.curve.iter().map(|p| p.0).collect::<Vec<f64>>().into());
-                t.insert(error, left.curve.iter().map(|p| p.1).collect::<Vec<f64>>().into());
+            if let Some((_, left)) = self.leftovers.iter().find(|(channel, _)| whole && *channel == p.channel) {
+                t.extend(discrepancy::channel_keys(&p.channel, left));
             }
             channels.insert(p.channel.clone(), t.into());
         }
@@ -354,8 +375,8 @@ impl Model {
             root.insert("effect".into(), list.into());
         }
         format!(
-            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors,\n# left_* what the model is off by on its own run: where the load is held, and about that the scatter, rms, noise included, in each\n# third of the loads, up to 0.25, 0.5, 1, 2 and 4 s after a jump of the load, later, while it moves evenly, and while the rotor runs down.\n# An effect of scope rig acts on every run. One of scope run or event acts on the runs listed here; on_another_run is what is added to the\n# channel's polynomial elsewhere, and what an event left behind acts there from the start.\n# `seen` is how little and how much an effect adds to a channel on its own run: beyond that, another run gets it as far as its errors allow.\n{root}{}",
-            self.course.as_ref().map(Course::to_toml).unwrap_or_default()
+            "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors.\n# An effect of scope rig acts on every run. One of scope run or event acts on the runs listed here; on_another_run is what is added to the\n# channel's polynomial elsewhere, and what an event left behind acts there from the start.\n# `seen` is how little and how much an effect adds to a channel on its own run: beyond that, another run gets it as far as its errors allow.\n{root}{}",
+            self.course.as_ref().filter(|_| whole).map(Course::to_toml).unwrap_or_default()
         )
     }
 }

@@ -306,5 +306,5 @@ fn a_text_is_told_without_names_of_columns() {
     assert_eq!(said, "the thrust residual follows temperature, as thrust(rpm) holds; time since the last step");
     assert_eq!(ident::words::channel("mz"), "field (z)");
     let late = effect("channel_delay", "mx", 0.9, 0.5, vec![parameter("delay", 0.011, 0.001, "s")]);
-    assert_eq!((ident::flight::VOCABULARY.clause)(&late).sentence(), "The magnetometer answers 11.0 ms late.");
+    assert_eq!((ident::flight::VOCABULARY.clause)(&late).sentence(), "The magnetometer answers 11 ms late.");
 }

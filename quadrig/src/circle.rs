@@ -9,7 +9,7 @@
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::close_loop::results;
+use crate::close_loop::{model_files, results};
 use crate::folder::Folder;
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
@@ -123,7 +123,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             run.log.write_to(&mut text)?;
             folder.add(format!("{own}/run.csv"), text);
         }
-        folder.add("model.toml", corrected(&runs, &standing).to_toml());
+        folder.extend(model_files(&corrected(&runs, &standing)));
         folder.add("loop.json", serde_json::to_string_pretty(&report)? + "\n");
         folder.write()?;
     }

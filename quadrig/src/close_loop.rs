@@ -13,7 +13,7 @@ mod several;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::Folder;
-use crate::open::{Columns, Names, open};
+use crate::open::{Columns, Names, open, read_model};
 use crate::progress::Bar;
 use ident::close::{Closed, close};
 use ident::log::Log;
@@ -33,7 +33,7 @@ pub(crate) struct Args {
     /// Another run of the same rig, for the error before and after.
     #[arg(long)]
     validate: Vec<PathBuf>,
-    /// Folder for model.toml, verdict.json and report.html (attitude logs: pred.csv as well; flights: channels.csv).
+    /// Folder for model.toml (with model.discrepancy.toml beside it), verdict.json and report.html (attitude logs: pred.csv as well; flights: channels.csv).
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// The verdict on stdout and nothing else.
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
     let options = args.columns.options(&args.names);
     let log = open(args.log(), &options, quiet)?;
-    let model = args.model.as_deref().map(Model::read).transpose()?;
+    let model = args.model.as_deref().map(|path| read_model(path, quiet)).transpose()?;
     let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
     let closed = {
         let bar = Bar::new("searching", quiet);
@@ -112,10 +112,14 @@ pub(crate) fn is_result(name: &str) -> bool {
 /// What the contract promises of a run.
 pub(crate) fn results(log: &Log, closed: &Closed, origin: Origin) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let json = serde_json::to_string_pretty(&closed.verdict)?;
-    let files = [
-        ("model.toml", closed.model.to_toml()),
-        ("verdict.json", json + "\n"),
-        ("report.html", closed_loop(log, closed, origin)),
-    ];
-    Ok(files.map(|(name, text)| (name.to_owned(), text.into_bytes())).into())
+    let files = [("verdict.json", json + "\n"), ("report.html", closed_loop(log, closed, origin))];
+    let files = files.map(|(name, text)| (name.to_owned(), text.into_bytes()));
+    Ok(model_files(&closed.model).chain(files).collect())
+}
+
+/// A model's file, and the one beside it.
+pub(crate) fn model_files(model: &Model) -> impl Iterator<Item = (String, Vec<u8>)> {
+    let (text, beside) = model.files();
+    let beside = beside.map(|text| ("model.discrepancy.toml", text));
+    std::iter::once(("model.toml", text)).chain(beside).map(|(name, text)| (name.to_owned(), text.into_bytes()))
 }

@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     for (path, text) in table.into_iter().chain(surface) {
         write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
     }
-    write_whole(&args.output, |out| out.write_all(found.model.to_toml().as_bytes())).map_err(unwritten(&args.output))?;
+    write_whole(&args.output, |out| out.write_all(found.model.files().0.as_bytes())).map_err(unwritten(&args.output))?;
     if args.report.is_some() || args.svg.is_some() {
         draw(args, &log, &found)?;
     }

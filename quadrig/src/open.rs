@@ -10,6 +10,7 @@ use crate::Failure;
 use crate::trouble::unread;
 use ident::import::{Mapping, Options, Report, import_as};
 use ident::log::Log;
+use ident::model::{Model, ModelError, beside};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -115,4 +116,17 @@ pub(crate) fn as_written(log: &Log) -> Result<Log, Failure> {
     let mut read = Log::parse(&log.name, text.as_slice())?;
     read.name.clone_from(&log.name);
     Ok(read)
+}
+
+/// A model of a rig; one that goes without the file beside it is said to.
+pub(crate) fn read_model(path: &Path, quiet: bool) -> Result<Model, ModelError> {
+    let model = Model::read(path)?;
+    if model.goes_without() && !quiet {
+        eprintln!(
+            "{}: {} is not there: what the model was off by on its own run is not known and may pass for something new; it predicts as ever",
+            path.display(),
+            beside(path).display()
+        );
+    }
+    Ok(model)
 }

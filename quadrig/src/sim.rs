@@ -12,6 +12,7 @@ mod imu;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::live;
+use crate::open::read_model;
 use crate::progress::{Bar, foretell};
 use crate::run_log::{IdentifiedPlant, to_log};
 use crate::trouble::unwritten;
@@ -104,7 +105,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         return Err("the run ended before its first sample; no log was written; expected to run on until the rig is armed".into());
     }
     if let Some(path) = &args.model {
-        log = fly_model(&scenario, &Model::read(path)?, &log, &name, quiet)?;
+        log = fly_model(&scenario, &read_model(path, quiet)?, &log, &name, quiet)?;
     }
     log.write(&args.output).map_err(unwritten(&args.output))?;
     if !quiet {

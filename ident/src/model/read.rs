@@ -6,7 +6,9 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Powerplant model".
 
-use super::{AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, keyed, leftover_keys, place, reach, run};
+use super::{
+    AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, discrepancy, keyed, leftover_keys, place, reach, run,
+};
 use crate::context::{Context, Relation};
 use crate::course::{COURSE_KEYS, Course};
 use crate::effects::{self, Effect, Estimate, Instance};
@@ -20,8 +22,19 @@ use toml::{Table, Value};
 pub(super) type Refusal = (String, String, String);
 
 /// Keys of the file.
-const ROOT: [&str; 10] =
-    ["format", "source", "start_pulse_us", "air_density_ratio", "rig", "consensus", "run", "channel", "effect", "course"];
+const ROOT: [&str; 11] = [
+    "format",
+    discrepancy::DIGEST,
+    "source",
+    "start_pulse_us",
+    "air_density_ratio",
+    "rig",
+    "consensus",
+    "run",
+    "channel",
+    "effect",
+    "course",
+];
 /// Keys of `[[effect]]`.
 const EFFECT: [&str; 12] = [
     "id",
@@ -39,35 +52,22 @@ const EFFECT: [&str; 12] = [
 ];
 
 impl Model {
-    /// Reads a model.
+    /// Reads a model, and the file [`super::beside`] it that belongs to it.
     ///
     /// # Errors
     /// [`ModelError`] with file and key.
     pub fn read(path: &Path) -> Result<Self, ModelError> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| ModelError::Io { file: file.clone(), source })?;
-        Self::parse(&file, &text)
+        Self::parse(&file, &text)?.complete(path, &text)
     }
 
-    /// Parses the file's text; `file` is the name for messages.
+    /// Parses the file's text alone; `file` is the name for messages.
     ///
     /// # Errors
     /// As [`Model::read`].
     pub fn parse(file: &str, text: &str) -> Result<Self, ModelError> {
-        let root: Table = text.parse().map_err(|e: toml::de::Error| {
-            let (line, column) = place::of_byte(text, e.span().map_or(0, |s| s.start));
-            ModelError::Syntax {
-                file: format!("{file}:{line}:{column}"),
-                message: format!(
-                    "{}; expected a model written by `quadrig identify` or `close-loop`",
-                    e.message().lines().next().unwrap_or("not TOML")
-                ),
-            }
-        })?;
-        Self::from_table(&root).map_err(|(key, found, expected)| {
-            let (line, column) = place::of_key(text, &key);
-            ModelError::Key { file: format!("{file}:{line}:{column}"), key, found, expected }
-        })
+        Self::from_table(&table_of(file, text)?).map_err(|refusal| place_of(file, text, refusal))
     }
 
     fn from_table(root: &Table) -> Result<Self, Refusal> {
@@ -116,12 +116,38 @@ impl Model {
         if let Some(value) = root.get("course") {
             model.course = Some(course(value).map_err(|refusal| within("course", refusal))?);
         }
+        if let Some(digest) = root.get(discrepancy::DIGEST) {
+            let twice = !model.leftovers.is_empty() || model.course.is_some();
+            let wanted = if twice { "no key, as the same stands in this file" } else { "64 hexadecimal digits" };
+            let text = digest.as_str().filter(|d| !twice && d.len() == 64 && d.bytes().all(|b| b.is_ascii_hexdigit()));
+            model.beside = Some(text.ok_or_else(|| refusal(discrepancy::DIGEST, Some(digest), wanted))?.to_owned());
+        }
         Ok(model)
     }
 }
 
+/// The tables of a file's text.
+pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ModelError> {
+    text.parse().map_err(|e: toml::de::Error| {
+        let (line, column) = place::of_byte(text, e.span().map_or(0, |s| s.start));
+        ModelError::Syntax {
+            file: format!("{file}:{line}:{column}"),
+            message: format!(
+                "{}; expected a model written by `quadrig identify` or `close-loop`",
+                e.message().lines().next().unwrap_or("not TOML")
+            ),
+        }
+    })
+}
+
+/// A refusal with its place in the file.
+pub(super) fn place_of(file: &str, text: &str, (key, found, expected): Refusal) -> ModelError {
+    let (line, column) = place::of_key(text, &key);
+    ModelError::Key { file: format!("{file}:{line}:{column}"), key, found, expected }
+}
+
 /// What the model is off by row for row: lists of finite numbers that are as long as they must be.
-fn course(value: &Value) -> Result<Course, Refusal> {
+pub(super) fn course(value: &Value) -> Result<Course, Refusal> {
     let table = value.as_table().ok_or_else(|| refusal("", Some(value), "a table of lists"))?;
     let list = |key: &str, all: &dyn Fn(f64) -> bool, length: Option<usize>| -> Result<Vec<f64>, Refusal> {
         let numbers = table.get(key).and_then(Value::as_array);
@@ -176,7 +202,7 @@ fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {
 }
 
 /// What the model leaves over of a channel of its own run: all three lists or none.
-fn leftover(channel: &str, value: &Value) -> Result<Option<Leftover>, Refusal> {
+pub(super) fn leftover(channel: &str, value: &Value) -> Result<Option<Leftover>, Refusal> {
     let keys = leftover_keys(channel);
     if keys.iter().all(|key| value.get(key).is_none()) {
         return Ok(None);

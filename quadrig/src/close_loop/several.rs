@@ -5,7 +5,7 @@
 //! Units: as the channels state.
 //! Reference: specification `formats.md`, "Command line".
 
-use super::{Args, flight, inertial, is_result, results};
+use super::{Args, flight, inertial, is_result, model_files, results};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::open::open;
@@ -57,7 +57,7 @@ fn fill(folder: &mut Folder<'_>, runs: &[Run], outcome: &Outcome, json: &str) ->
         folder.extend(files.into_iter().map(|(file, bytes)| (format!("runs/{name}/{file}"), bytes)));
     }
     let links: Vec<String> = names.iter().map(|name| format!("runs/{name}/report.html")).collect();
-    folder.add("model.toml", outcome.model.to_toml());
+    folder.extend(model_files(&outcome.model));
     folder.add("verdict.json", format!("{json}\n"));
     folder.add("report.html", several(runs, outcome, &links));
     Ok(())

@@ -14,6 +14,7 @@ mod summary;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::Folder;
+use crate::open::read_model;
 use crate::progress::Bar;
 use hal_sim::Powerplant;
 use hal_sim::flight::Airframe;
@@ -70,7 +71,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         )
         .into());
     }
-    let model = args.model.as_deref().map(Model::read).transpose()?;
+    let model = args.model.as_deref().map(|path| read_model(path, quiet)).transpose()?;
     let rotors = rotors_of(model.as_ref(), args.model.as_deref(), &airframe)?;
     let curves: &dyn RotorCurves = match &rotors {
         Rotors::Catalogue => &Catalogue(&file),

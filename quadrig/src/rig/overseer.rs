@@ -7,6 +7,7 @@
 //! Reference: specification `rig.md`, "The operator's side" (`--model`, `--stop-at`).
 
 use crate::Failure;
+use crate::open::read_model;
 use crate::view::Under;
 use frame::calibration::{Calibration, Converted};
 use frame::message::Message;
@@ -73,7 +74,7 @@ impl Overseer {
     }
 
     fn with(path: &Path, floors: f64, stops: bool, in_step: bool) -> Result<Self, Failure> {
-        let model = Model::read(path)?;
+        let model = read_model(path, false)?;
         let under = Under { model: model.source.clone(), stops, floors, departure: None };
         let (rows, given) = channel();
         let (said, judged) = channel();
