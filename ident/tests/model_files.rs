@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, "Powerplant model".
 
 use ident::context::Context;
-use ident::log::Log;
+use ident::log::{Column, Log};
 use ident::model::{Model, beside};
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -60,8 +60,12 @@ fn the_first_stands_alone_and_takes_no_strange_second() {
     let path = written(&folder, &model(0.2));
     let second = beside(&path);
     let own = fs::read_to_string(&second).expect("its own");
-    let log =
-        Log { name: "a".into(), t: vec![0.0, 1.0], columns: vec![("voltage_v".into(), vec![11.5, 11.5])], ..Log::default() };
+    let log = Log {
+        name: "a".into(),
+        t: vec![0.0, 1.0],
+        columns: vec![Column { name: "voltage_v".into(), values: vec![11.5, 11.5] }],
+        ..Log::default()
+    };
     let predicted = |model: &Model| model.predict(&Context::new(&log, Some(1075.0)), "voltage_v").expect("a voltage");
     let with = predicted(&Model::read(&path).expect("a model"));
 

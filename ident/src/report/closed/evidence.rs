@@ -8,7 +8,7 @@
 use crate::noise::median;
 use crate::report::figure::{Figure, Layer, Mark};
 use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
-use crate::words::{channel, heading};
+use crate::words::{channel, heading, scaled};
 
 /// Columns of pixels of a drawing.
 const COLUMNS: usize = 440;
@@ -57,7 +57,8 @@ impl Trace {
     }
 
     fn figure(&self, id: &str, title: String, x_label: String, layers: Vec<Layer>) -> Figure {
-        let y_label = if self.unit.is_empty() { "left over".into() } else { format!("left over, {}", self.unit) };
+        let (layers, unit) = in_unit(layers, &self.unit);
+        let y_label = if unit.is_empty() { "left over".into() } else { format!("left over, {unit}") };
         thinned(Figure {
             id: format!("{id}-{}", slug(&self.channel)),
             title,
@@ -78,6 +79,26 @@ impl Trace {
         }
         layers
     }
+}
+
+/// The layers in a unit whose figures are short (mN.m for small torques), and that unit.
+fn in_unit(mut layers: Vec<Layer>, unit: &str) -> (Vec<Layer>, String) {
+    let values = |layer: &Layer| match layer {
+        Layer::Line { y, .. } | Layer::Dots { y, .. } => {
+            y.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()))
+        }
+        _ => 0.0,
+    };
+    let (factor, unit) = scaled(layers.iter().map(values).fold(0.0, f64::max), unit);
+    for layer in layers.iter_mut().filter(|_| factor != 1.0) {
+        let lists = match layer {
+            Layer::Line { y, .. } | Layer::Dots { y, .. } => vec![y],
+            Layer::Band { lower, upper, .. } => vec![lower, upper],
+            _ => Vec::new(),
+        };
+        lists.into_iter().flatten().for_each(|v| *v *= factor);
+    }
+    (layers, unit.to_owned())
 }
 
 /// An identifier from a channel's name.
@@ -298,6 +319,28 @@ mod tests {
         let (cx, cy) = cloud(&x, &y);
         assert!(cx.len() <= DOTS && cy.contains(&50.0));
         assert_eq!(cloud(&x, &y), (cx, cy), "the same every time");
+    }
+
+    #[test]
+    fn small_values_have_a_small_unit() {
+        let t: Vec<f64> = (0..9).map(f64::from).collect();
+        let trace = Trace {
+            channel: "torque_nm".into(),
+            unit: "N.m".into(),
+            floor: 2e-4,
+            t: t.clone(),
+            before: vec![5e-4; 9],
+            after: vec![0.0; 9],
+            ..Trace::default()
+        };
+        let figure = over_time(&trace, "x", ["before", "after"]);
+        assert_eq!(figure.y_label, "left over, mN.m");
+        let [Layer::Band { upper, .. }, Layer::Line { y, .. }, ..] = figure.layers.as_slice() else {
+            panic!("a band and a line")
+        };
+        assert!((upper[0] - 0.2).abs() < 1e-12 && (y[0] - 0.5).abs() < 1e-12);
+        let large = Trace { before: vec![0.5; 9], ..trace };
+        assert_eq!(over_time(&large, "x", ["before", "after"]).y_label, "left over, N.m");
     }
 
     #[test]
