@@ -198,8 +198,10 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
             found.push(format!("{what} ({})", probability(a.probability)));
         }
     }
-    let alike: Vec<String> =
-        (page.words.about)(&e.id).map(|a| a.look_alikes.iter().map(|id| title(page, id)).collect()).unwrap_or_default();
+    let known = (page.words.about)(&e.id).map(|a| a.look_alikes).unwrap_or_default();
+    // what was told with a probability is told
+    let told = |title: &String| found.iter().any(|f| f.starts_with(&format!("{title} (")));
+    let alike: Vec<String> = known.iter().map(|id| title(page, id)).filter(|title| !told(title)).collect();
     let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
     let found =
         if found.is_empty() { "nothing else that was tried came close.".to_owned() } else { format!("{}.", found.join("; ")) };
