@@ -40,5 +40,5 @@ h1{font-size:1.6rem;line-height:1.25;overflow-wrap:anywhere}h2{font-size:1.2rem;
 tr.chosen{background:var(--span);font-weight:600}.warn{border-left:4px solid var(--b);padding:.4rem .8rem;background:var(--card)}
 code{font-size:.92em}
 @media screen and (max-width:600px){body{font-size:15px;padding:.7rem}h1{font-size:1.3rem}.fig text{font-size:16px}.fig .title{font-size:18px}.fig .tick{font-size:15px}.fig .tip text{font-size:13px}th,td{padding:.25rem .45rem}}
-@media print{.fig text{font-size:16px}.fig .title{font-size:18px}.fig .tick{font-size:15px}body{font-size:10.5pt;max-width:none;padding:0}.figs{grid-template-columns:1fr 1fr;gap:.5rem}h2{break-after:avoid}.wide{overflow:visible}table{font-size:7.5pt}th,td{padding:.1rem .3rem;white-space:normal}tr{break-inside:avoid}thead{display:table-header-group}@page{margin:14mm}}
+@media print{body{font-size:10.5pt;max-width:none;padding:0}.figs{grid-template-columns:1fr 1fr;gap:.5rem}h2{break-after:avoid}.wide{overflow:visible}table{font-size:7.5pt}th,td{padding:.1rem .3rem;white-space:normal}tr{break-inside:avoid}thead{display:table-header-group}@page{margin:14mm}}
 ";
