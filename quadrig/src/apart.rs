@@ -7,6 +7,7 @@
 //! Reference: specification `formats.md`: no command writes over one of its own inputs.
 
 use crate::Failure;
+use ident::model::beside;
 use std::path::{Path, PathBuf};
 
 /// The files and folders of one call.
@@ -39,7 +40,8 @@ impl<'a> Paths<'a> {
     /// Refuses an output in the place of an input or of another output.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         for (n, (option, file)) in self.files.iter().enumerate() {
-            if self.inputs.iter().any(|input| is_same(input, file)) {
+            // a model is read with the file beside it
+            if self.inputs.iter().any(|input| is_same(input, file) || is_same(&beside(input), file)) {
                 return Err(format!("{}: is an input of this command; expected another file for {option}", file.display()).into());
             }
             if let Some((other, _)) = self.files[..n].iter().find(|(_, other)| is_same(other, file)) {
@@ -97,6 +99,8 @@ mod tests {
         let (run, round, new) = (path("in/run.csv"), path("in/../in/run.csv"), path("in/new.csv"));
         let refusal = |paths: Paths| paths.check().expect_err("to be refused").to_string();
         assert!(refusal(Paths::default().reads([&run]).writes("-o", [&round])).contains("is an input of this command"));
+        let (model, second) = (path("model.toml"), path("in/../model.discrepancy.toml"));
+        assert!(refusal(Paths::default().reads([&model]).writes("-o", [&second])).contains("is an input of this command"));
         let twice = Paths::default().writes("-o", [&new]).writes("--truth", [&path("in/./new.csv")]).check();
         assert!(twice.expect_err("to be refused").to_string().contains("for -o and for --truth"));
         let (inside, outside, deep) = (path("in"), path("out"), path("out/a/b.csv"));

@@ -463,6 +463,11 @@ fn outputs() -> Vec<Case> {
         alone("predict over its model", "predict model.toml good.csv -o model.toml", &["model.toml: is an input"]),
         alone("import over its export", "import good.csv -o good.csv", &["good.csv: is an input"]),
         alone("sim over its scenario", "sim empty.toml -o empty.toml", &["empty.toml: is an input"]),
+        alone(
+            "predict over the file beside its model",
+            "predict model.toml good.csv -o model.discrepancy.toml",
+            &["model.discrepancy.toml: is an input"],
+        ),
         alone("sim over its model", "sim empty.toml --model model.toml -o model.toml", &["model.toml: is an input"]),
         alone("sim over its schedule", "sim on-file.toml -o plan.toml", &["plan.toml: is an input"]),
         alone("a page over the log", "identify good.csv -o out.toml --report good.csv", &["good.csv: is an input", "--report"]),
