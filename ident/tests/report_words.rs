@@ -308,3 +308,23 @@ fn a_text_is_told_without_names_of_columns() {
     let late = effect("channel_delay", "mx", 0.9, 0.5, vec![parameter("delay", 0.011, 0.001, "s")]);
     assert_eq!((ident::flight::VOCABULARY.clause)(&late).sentence(), "The magnetometer answers 11 ms late.");
 }
+
+/// A flight's text speaks of the vehicle and of its quantities, not of a rig and of columns.
+#[test]
+fn a_flight_is_of_a_vehicle() {
+    let mut lag = effect("spinup_lag", "rpm_1", 0.9, 0.7, vec![]);
+    lag.evidence = "the speed is late; without it the held-out error of acc_x is 3.00 times as large".into();
+    let mut v = verdict(Kind::Attributed, vec![lag]);
+    let one = v.channels.predicted["thrust_n"].clone();
+    v.channels.predicted = [("acc_x".to_owned(), one.clone()), ("rpm_1".to_owned(), one)].into();
+    let text = terminal(&v, ident::flight::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ");
+    for said in ["Every vehicle has that", "what every vehicle has", "on speed of rotor 1, vehicle"] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    assert!(!text.contains("rig"), "{text}");
+    let mut v = verdict(Kind::Attributed, vec![effect("hard_iron", "mx", 0.9, 0.7, vec![])]);
+    let one = v.channels.predicted["thrust_n"].clone();
+    v.channels.predicted = [("mx".to_owned(), one)].into();
+    let text = terminal(&v, ident::flight::VOCABULARY, false);
+    assert!(text.contains("what this board has") && text.contains("on field (x), board"), "{text}");
+}

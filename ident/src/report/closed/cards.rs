@@ -8,13 +8,12 @@
 use super::page::Page;
 use super::sentence::instead;
 use super::state::figures;
+use super::subject::Subject;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
-use crate::words::{
-    channel, counted, digits, list, lower, plain, probability, scaled, scope, sized, sureness, upper, upper_bound,
-};
+use crate::words::{channel, counted, digits, list, lower, plain, probability, scaled, sized, sureness, upper, upper_bound};
 use std::fmt::Write;
 
 /// Probability below which the card says how to settle it.
@@ -31,10 +30,11 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
         id if (page.words.of_every_rig)(id) => 1,
         _ => 0,
     };
+    let noun = Subject::of(v).noun();
     for (k, (heading, lead)) in [
-        ("What this rig has", ""),
-        ("What every rig has", "A rotor has inertia and takes time: no rig is without these."),
-        ("Without a name", "What no known effect explains. Where a smooth function predicts rows it has not seen, it is added to the model; it names no cause."),
+        (format!("What this {noun} has"), String::new()),
+        (format!("What every {noun} has"), format!("A rotor has inertia and takes time: no {noun} is without these.")),
+        ("Without a name".to_owned(), "What no known effect explains. Where a smooth function predicts rows it has not seen, it is added to the model; it names no cause.".to_owned()),
     ]
     .into_iter()
     .enumerate()
@@ -43,9 +43,9 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
         if members.is_empty() {
             continue;
         }
-        sheet.section(heading);
+        sheet.section(&heading);
         if !lead.is_empty() {
-            sheet.say(lead);
+            sheet.say(&lead);
         }
         for (place, i) in members.into_iter().enumerate() {
             let number = (k == 0).then_some(place + 1);
@@ -84,7 +84,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     );
     // what has no name belongs to nothing that is known
     if e.id != "unknown" {
-        let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(scope(e.scope))));
+        let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(&Subject::of(v).scope(e.scope))));
     }
     sheet.html_part(&html);
     let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
@@ -216,9 +216,10 @@ fn settle(v: &Verdict, e: &EffectEntry) -> Option<String> {
     if v.proposed().is_some() {
         return Some("<a href=\"#what-would-settle-it\">the run that is proposed below</a>.".to_owned());
     }
+    let noun = Subject::of(v).noun();
     Some(match e.scope {
         crate::effects::Scope::Rig => {
-            "another run of this rig: what belongs to the rig is there again (<code>--validate OTHER.csv</code>).".to_owned()
+            format!("another run of this {noun}: what belongs to the {noun} is there again (<code>--validate OTHER.csv</code>).")
         }
         crate::effects::Scope::Run => "the same schedule once more: what belongs to this run is another size then.".to_owned(),
         crate::effects::Scope::Event => "the same schedule once more: what happened once is not there again.".to_owned(),

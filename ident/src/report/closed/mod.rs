@@ -15,6 +15,7 @@ mod page;
 mod provenance;
 mod sentence;
 mod state;
+mod subject;
 mod terminal;
 mod vocabulary;
 

@@ -6,6 +6,7 @@
 //! Reference: specification `report.md`.
 
 use super::provenance::{Origin, provenance};
+use super::subject::Subject;
 use super::vocabulary::Vocabulary;
 use super::{cards, fold, left, pair, sentence, state};
 use crate::context::unit_of;
@@ -78,8 +79,11 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         sheet.data("run-by-run", &head, rows, None);
     }
     if !v.validation.is_empty() {
-        sheet.section("On other runs of the rig");
-        sheet.say("Predicted from this run's model alone: what belongs to the rig carries over. Before and after, rms.");
+        let noun = Subject::of(v).noun();
+        sheet.section(&format!("On other runs of the {noun}"));
+        sheet.say(&format!(
+            "Predicted from this run's model alone: what belongs to the {noun} carries over. Before and after, rms."
+        ));
         runs(&mut sheet, v, &v.validation, "other-runs");
     }
     provenance(&mut sheet, &page.origin, v, page.words);

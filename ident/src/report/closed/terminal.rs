@@ -8,6 +8,7 @@
 use super::cards::{removes, signs, value};
 use super::sentence::{sentence, size_left};
 use super::state::{factor, figures, word};
+use super::subject::Subject;
 use super::vocabulary::Vocabulary;
 use crate::context::unit_of;
 use crate::verdict::{EffectEntry, Verdict};
@@ -28,7 +29,9 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     let (named, nameless): (Vec<&EffectEntry>, Vec<&EffectEntry>) = verdict.effects.iter().partition(|e| e.id != "unknown");
     let (own, common): (Vec<&EffectEntry>, Vec<&EffectEntry>) = named.into_iter().partition(|e| !(words.of_every_rig)(&e.id));
-    for (heading, members) in [("what this rig has", own), ("what every rig has", common), ("without a name", nameless)] {
+    let noun = Subject::of(verdict).noun();
+    let [this, every] = [format!("what this {noun} has"), format!("what every {noun} has")];
+    for (heading, members) in [(this.as_str(), own), (every.as_str(), common), ("without a name", nameless)] {
         if !members.is_empty() {
             out += &format!("\n{heading}\n");
             members.iter().for_each(|e| out += &effect(verdict, words, e));
@@ -92,7 +95,8 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
         "unknown" => format!("that something is there: p {}", probability(e.probability)),
         _ => format!("p {}", probability(e.probability)),
     };
-    let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {}", e.id, list(&on), e.scope.word()), 4));
+    let mut out =
+        format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {}", e.id, list(&on), Subject::of(verdict).scope_word(e.scope)), 4));
     if e.id != "unknown" {
         out += &format!("    {}\n", wrapped(&(words.clause)(e).sentence(), 4));
     }
