@@ -40,6 +40,9 @@ pub(super) fn channel_keys(channel: &str, left: &Leftover) -> [(String, Value); 
     ]
 }
 
+/// What the file holds: what each channel had left over, and its course.
+type Parts = (Vec<(String, Leftover)>, Option<Course>);
+
 impl Model {
     /// The texts of its files: `model.toml`, and of the one [`beside`] it where the model knows what it was off by.
     #[must_use]
@@ -88,7 +91,7 @@ impl Model {
         Ok(self)
     }
 
-    fn parts(&self, root: &Table) -> Result<(Vec<(String, Leftover)>, Option<Course>), Refusal> {
+    fn parts(&self, root: &Table) -> Result<Parts, Refusal> {
         if root.get("format").and_then(Value::as_str) != Some(FORMAT) {
             return Err(refusal("format", root.get("format"), &format!("'{FORMAT}'")));
         }
