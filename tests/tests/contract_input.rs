@@ -341,6 +341,7 @@ fn the_same_input_twice_gives_the_same_bytes() {
             "good.csv",
             "imported.csv",
             "model.toml",
+            "out/model.discrepancy.toml",
             "out/model.toml",
             "out/report.html",
             "out/verdict.json",
