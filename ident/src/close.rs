@@ -28,6 +28,7 @@ use crate::unexplained::{LOUD, Left, unexplained};
 use crate::verdict::{
     Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict,
 };
+use crate::words::worth;
 
 /// Why the loop cannot be closed on a log.
 #[derive(Debug, thiserror::Error)]
@@ -251,17 +252,10 @@ fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
     if placed.effect.id() == "unknown" {
         return Words::of(form, first, 1.0 - reduction);
     }
-    let times = 1.0 / (1.0 - reduction).max(1e-6);
-    // a factor of one or below is no evidence for it
-    let helps = if times > 1.0 {
-        format!("without it the held-out error of {first} is {times:.2} times as large")
-    } else {
-        format!("the held-out error of {first} is no smaller with it")
-    };
     Words {
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: if form.is_empty() { about.equation.to_owned() } else { format!("{} [{form}]", about.equation) },
-        evidence: format!("{}; {helps}", about.signature),
+        evidence: format!("{}{}", about.signature, worth(first, reduction)),
     }
 }
 

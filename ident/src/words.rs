@@ -113,14 +113,35 @@ impl EffectEntry {
     }
 }
 
-/// What a scope means to the reader.
+/// What a scope of something that is called so means to the reader.
 #[must_use]
-pub fn scope(scope: Scope) -> &'static str {
+pub fn scope(scope: Scope, noun: &str) -> String {
     match scope {
-        Scope::Rig => "of the rig: it is there on every run",
-        Scope::Run => "of this run: another run has a value of its own",
-        Scope::Event => "of one instant: it does not recur by itself",
+        Scope::Rig => format!("of the {noun}: it is there on every run"),
+        Scope::Run => "of this run: another run has a value of its own".to_owned(),
+        Scope::Event => "of one instant: it does not recur by itself".to_owned(),
     }
+}
+
+/// Where the held-out error stands in an effect's evidence, with and without support.
+const WORTH: [&str; 2] = ["; without it the held-out error of ", "; the held-out error of "];
+
+/// The end of an effect's evidence: how much larger the held-out error of its first channel is without it, which is no support at one and below.
+#[must_use]
+pub(crate) fn worth(channel: &str, reduction: f64) -> String {
+    let times = 1.0 / (1.0 - reduction).max(1e-6);
+    let [helps, helps_not] = WORTH;
+    if times > 1.0 {
+        format!("{helps}{channel} is {times:.2} times as large")
+    } else {
+        format!("{helps_not}{channel} is no smaller with it")
+    }
+}
+
+/// An effect's evidence without its [`worth`]: what the residual looks like.
+#[must_use]
+pub(crate) fn signs(evidence: &str) -> &str {
+    WORTH.iter().find_map(|worth| evidence.split_once(worth)).map_or(evidence, |(signs, _)| signs)
 }
 
 /// Probability from which on a cause is told without an adverb. Where nothing else explains a channel the search still keeps a tenth for causes

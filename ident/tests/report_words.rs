@@ -325,6 +325,6 @@ fn a_flight_is_of_a_vehicle() {
     let mut v = verdict(Kind::Attributed, vec![effect("hard_iron", "mx", 0.9, 0.7, vec![])]);
     let one = v.channels.predicted["thrust_n"].clone();
     v.channels.predicted = [("mx".to_owned(), one)].into();
-    let text = terminal(&v, ident::flight::VOCABULARY, false);
+    let text = terminal(&v, ident::inertial::VOCABULARY, false);
     assert!(text.contains("what this board has") && text.contains("on field (x), board"), "{text}");
 }

@@ -16,7 +16,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// What a part of the page is called, and the files or folders whose refusals stand in it.
-const AREAS: [(&str, &[&str]); 12] = [
+const AREAS: [(&str, &[&str]); 13] = [
     (
         "Any file and folder",
         &[
@@ -25,13 +25,14 @@ const AREAS: [(&str, &[&str]); 12] = [
             "quadrig/src/folder.rs",
             "quadrig/src/spool.rs",
             "quadrig/src/end.rs",
+            "quadrig/src/open.rs",
         ],
     ),
     (
         "Rig logs",
         &["ident/src/log.rs", "ident/src/log", "ident/src/close.rs", "quadrig/src/identify.rs", "quadrig/src/plateaus.rs"],
     ),
-    ("Imports", &["ident/src/import", "quadrig/src/import.rs"]),
+    ("Imports", &["ident/src/import", "ident/src/join", "quadrig/src/import.rs", "quadrig/src/join.rs"]),
     ("Models and exports", &["ident/src/model.rs", "ident/src/model", "quadrig/src/predict.rs", "quadrig/src/export"]),
     (
         "Attitude logs and flights",
@@ -54,6 +55,7 @@ const AREAS: [(&str, &[&str]); 12] = [
             "quadrig/src/sim",
             "quadrig/src/fly",
             "quadrig/src/isolability.rs",
+            "quadrig/src/live.rs",
         ],
     ),
     ("Schedules", &["schedule/src"]),
@@ -76,6 +78,7 @@ const AREAS: [(&str, &[&str]); 12] = [
     ("Calibration", &["quadrig/src/calibrate.rs", "quadrig/src/calibrate", "quadrig/src/recalibrate.rs"]),
     ("Selection and beam", &["ident/src/select", "quadrig/src/select.rs", "quadrig/src/beam.rs"]),
     ("Recorded sets", &["quadrig/src/measured"]),
+    ("Several runs and batches", &["ident/src/several", "quadrig/src/batch", "quadrig/src/runs.rs", "quadrig/src/step.rs"]),
     ("A rig's history", &["ident/src/history", "quadrig/src/history.rs"]),
 ];
 
@@ -320,6 +323,21 @@ mod tests {
         assert!(page.lines().filter(|l| l.starts_with("| ")).count() > 200);
         let there = std::fs::read_to_string(root.join("docs/errors.md")).expect("docs/errors.md");
         assert!(there == page, "docs/errors.md is not what the source says: cargo xtask errors");
+    }
+
+    /// What a program says besides, and refuses nothing by.
+    const NOTES: [&str; 3] = ["hal-sim/src/fault/rule.rs", "ident/src/bad.rs", "ident/src/sparse.rs"];
+
+    #[test]
+    fn every_source_that_refuses_stands_in_an_area() {
+        let root = Place::find().root;
+        let listed: Vec<PathBuf> =
+            AREAS.iter().flat_map(|a| a.1).chain(&NOTES).flat_map(|place| sources(&root.join(place))).collect();
+        let folders = ["quadrig/src", "ident/src", "hal-sim/src", "schedule/src", "virtual-board/src"];
+        let refuses = |file: &PathBuf| !refusals(&std::fs::read_to_string(file).expect("a source")).is_empty();
+        let all = folders.iter().flat_map(|folder| sources(&root.join(folder)));
+        let missing: Vec<PathBuf> = all.filter(|file| !listed.contains(file) && refuses(file)).collect();
+        assert!(missing.is_empty(), "in no area of docs/errors.md: {missing:?}");
     }
 
     /// Each reason of the board has its advice, in its own words.

@@ -14,6 +14,7 @@ use crate::report::{Figure, Layer, Origin, Vocabulary};
 
 /// The words of the flight's library.
 pub const VOCABULARY: Vocabulary = Vocabulary {
+    noun: "vehicle",
     about: airframe::about,
     clause: |found| airframe::said(found).unwrap_or_else(|| parts::bare(found)),
     of_every_rig: |id| id == "spinup_lag",

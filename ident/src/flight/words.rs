@@ -10,6 +10,7 @@ use super::library::Kind;
 use crate::attribution::{Candidate, Channel, Kept, UNKNOWN};
 use crate::effects::Scope;
 use crate::verdict::{EffectEntry, NextExperiment, ScheduleStep, Unexplained};
+use crate::words::worth;
 
 /// Slower than this what is left is slow, s.
 const SLOW_S: f64 = 0.3;
@@ -30,11 +31,8 @@ pub(super) fn evidence(kept: &Kept, kind: &Kind, channels: &[Channel]) -> String
         }
         Kind::Nameless(_) => "no known effect; straight lines between knots".to_owned(),
     };
-    let worth = kept.channels.first().map_or(String::new(), |(c, reduction)| {
-        let factor = 1.0 / (1.0 - reduction).max(1e-9);
-        format!("; without it the held-out error of {} is {factor:.2} times as large", channels[*c].name)
-    });
-    format!("{signature}{worth}; {:.0} nats ahead of everything without it", kept.lead.clamp(0.0, 1e6))
+    let worth = kept.channels.first().map_or(String::new(), |(c, reduction)| worth(&channels[*c].name, *reduction));
+    format!("{signature}; {:.0} nats ahead of everything without it{worth}", kept.lead.clamp(0.0, 1e6))
 }
 
 /// The shape of what is left, from the memory of its wander.

@@ -15,7 +15,7 @@ use crate::words::{Clause, channel, list};
 use nalgebra::Vector3;
 
 /// The words of an inertial unit's causes.
-pub const VOCABULARY: Vocabulary = Vocabulary { about: airframe::about, clause, of_every_rig: |_| false };
+pub const VOCABULARY: Vocabulary = Vocabulary { noun: "board", about: airframe::about, clause, of_every_rig: |_| false };
 
 /// Causes that have no page in the flight's library.
 fn clause(found: &EffectEntry) -> Clause {

@@ -8,12 +8,13 @@
 use super::page::Page;
 use super::sentence::instead;
 use super::state::figures;
-use super::subject::Subject;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
-use crate::words::{channel, counted, digits, list, lower, plain, probability, scaled, sized, sureness, upper, upper_bound};
+use crate::words::{
+    channel, counted, digits, list, lower, plain, probability, scaled, scope, signs, sized, sureness, upper, upper_bound,
+};
 use std::fmt::Write;
 
 /// Probability below which the card says how to settle it.
@@ -30,7 +31,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
         id if (page.words.of_every_rig)(id) => 1,
         _ => 0,
     };
-    let noun = Subject::of(v).noun();
+    let noun = page.words.noun;
     for (k, (heading, lead)) in [
         (format!("What this {noun} has"), String::new()),
         (format!("What every {noun} has"), format!("A rotor has inertia and takes time: no {noun} is without these.")),
@@ -84,7 +85,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     );
     // what has no name belongs to nothing that is known
     if e.id != "unknown" {
-        let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(&Subject::of(v).scope(e.scope))));
+        let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(&scope(e.scope, page.words.noun))));
     }
     sheet.html_part(&html);
     let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
@@ -92,10 +93,13 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     sheet.figures(figures);
     sheet.html_part("<div>\n");
     parameters(sheet, e);
-    let mut html =
-        format!("<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n", escape(&e.equation), escape(&upper(&plain(signs(e)))));
+    let mut html = format!(
+        "<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n",
+        escape(&e.equation),
+        escape(&upper(&plain(signs(&e.evidence))))
+    );
     let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
-    if let Some(how) = settle(v, e) {
+    if let Some(how) = settle(page, e) {
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
     }
     sheet.html_part(&format!("{html}</div></div></article>\n"));
@@ -110,11 +114,6 @@ fn anchor(v: &Verdict, k: usize) -> String {
     let before = v.effects[..k].iter().filter(|e| e.id == v.effects[k].id).count();
     let id = v.effects[k].id.replace('_', "-");
     if before == 0 { id } else { format!("{id}-{}", before + 1) }
-}
-
-/// What the residual looks like; the factor that the evidence ends with is told by [`removes`].
-pub(super) fn signs(e: &EffectEntry) -> &str {
-    e.evidence.split_once("; without it the held-out error of ").map_or(e.evidence.as_str(), |(signs, _)| signs)
 }
 
 /// An effect's title as a part of a sentence.
@@ -209,14 +208,14 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
 }
 
 /// What would settle an effect that is not sure.
-fn settle(v: &Verdict, e: &EffectEntry) -> Option<String> {
+fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
     if e.probability >= SETTLED {
         return None;
     }
-    if v.proposed().is_some() {
+    if page.verdict.proposed().is_some() {
         return Some("<a href=\"#what-would-settle-it\">the run that is proposed below</a>.".to_owned());
     }
-    let noun = Subject::of(v).noun();
+    let noun = page.words.noun;
     Some(match e.scope {
         crate::effects::Scope::Rig => {
             format!("another run of this {noun}: what belongs to the {noun} is there again (<code>--validate OTHER.csv</code>).")

@@ -7,7 +7,6 @@
 
 use super::page::Page;
 use super::sentence::size_left;
-use super::subject::Subject;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
 use crate::words::{channel, heading, upper};
@@ -36,7 +35,7 @@ pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
     sheet.section("What would settle it");
     sheet.say(&format!("{}.", upper(next.why.trim_end_matches('.'))));
     if !next.separates {
-        let noun = Subject::of(page.verdict).noun();
+        let noun = page.words.noun;
         sheet.say(&format!("No run is proposed. A sensor that this log lacks, or the {noun} with one part exchanged, may tell."));
     }
     if next.schedule.is_empty() || !next.separates {

@@ -15,7 +15,6 @@ mod page;
 mod provenance;
 mod sentence;
 mod state;
-mod subject;
 mod terminal;
 mod vocabulary;
 

@@ -6,7 +6,6 @@
 //! Reference: specification `report.md`.
 
 use super::provenance::{Origin, provenance};
-use super::subject::Subject;
 use super::vocabulary::Vocabulary;
 use super::{cards, fold, left, pair, sentence, state};
 use crate::context::unit_of;
@@ -79,7 +78,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         sheet.data("run-by-run", &head, rows, None);
     }
     if !v.validation.is_empty() {
-        let noun = Subject::of(v).noun();
+        let noun = page.words.noun;
         sheet.section(&format!("On other runs of the {noun}"));
         sheet.say(&format!(
             "Predicted from this run's model alone: what belongs to the {noun} carries over. Before and after, rms."

@@ -5,7 +5,6 @@
 //! Units: each size carries its own.
 //! Reference: specification `formats.md`, "Verdict".
 
-use super::subject::Subject;
 use super::vocabulary::Vocabulary;
 use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
 use crate::words::{adverb, amount, channel, heading, list, upper};
@@ -61,7 +60,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let clauses: Vec<String> = told.iter().map(|e| (words.clause)(e).with(adverb(e.probability))).collect();
     let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
     if own.is_empty() {
-        let noun = Subject::of(verdict).noun();
+        let noun = words.noun;
         out += &format!(" Every {noun} has that; nothing of this {noun}'s own was named.");
     }
     let smaller = match more {

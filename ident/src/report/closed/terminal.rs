@@ -5,14 +5,13 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{removes, signs, value};
+use super::cards::{removes, value};
 use super::sentence::{sentence, size_left};
 use super::state::{factor, figures, word};
-use super::subject::Subject;
 use super::vocabulary::Vocabulary;
 use crate::context::unit_of;
 use crate::verdict::{EffectEntry, Verdict};
-use crate::words::{channel, list, probability, upper, upper_bound};
+use crate::words::{channel, list, probability, signs, upper, upper_bound};
 
 /// Columns of the widest line.
 pub const WIDEST: usize = 100;
@@ -29,7 +28,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     let (named, nameless): (Vec<&EffectEntry>, Vec<&EffectEntry>) = verdict.effects.iter().partition(|e| e.id != "unknown");
     let (own, common): (Vec<&EffectEntry>, Vec<&EffectEntry>) = named.into_iter().partition(|e| !(words.of_every_rig)(&e.id));
-    let noun = Subject::of(verdict).noun();
+    let noun = words.noun;
     let [this, every] = [format!("what this {noun} has"), format!("what every {noun} has")];
     for (heading, members) in [(this.as_str(), own), (every.as_str(), common), ("without a name", nameless)] {
         if !members.is_empty() {
@@ -95,8 +94,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
         "unknown" => format!("that something is there: p {}", probability(e.probability)),
         _ => format!("p {}", probability(e.probability)),
     };
-    let mut out =
-        format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {}", e.id, list(&on), Subject::of(verdict).scope_word(e.scope)), 4));
+    let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {}", e.id, list(&on), words.scope_word(e.scope)), 4));
     if e.id != "unknown" {
         out += &format!("    {}\n", wrapped(&(words.clause)(e).sentence(), 4));
     }
@@ -112,7 +110,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
     if !removes.is_empty() {
         out += &format!("    {}\n", wrapped(&removes, 4));
     }
-    out + &format!("    {}\n", wrapped(&format!("evidence: {}", signs(e)), 4))
+    out + &format!("    {}\n", wrapped(&format!("evidence: {}", signs(&e.evidence)), 4))
 }
 
 fn left(verdict: &Verdict) -> String {

@@ -1,17 +1,19 @@
 //! Which words a library has for its effects.
 //!
-//! What it is: three look-ups, so that sentence, cards and terminal are the same for rig, flight and attitude logs.
+//! What it is: what the log is of, and three look-ups, so that sentence, cards and terminal are the same for rig, flight and attitude logs.
 //! What can go wrong: an identifier that no library knows is told by itself.
 //! Units: none.
 //! Reference: specification `closing-the-loop.md`, lists of effects.
 
-use crate::effects::{About, by_id};
+use crate::effects::{About, Scope, by_id};
 use crate::verdict::EffectEntry;
 use crate::words::Clause;
 
 /// The words of a library of effects.
 #[derive(Debug, Clone, Copy)]
 pub struct Vocabulary {
+    /// What the log is of, such as a rig.
+    pub noun: &'static str,
     /// What an effect is.
     pub about: fn(&str) -> Option<About>,
     /// What a found effect does.
@@ -23,16 +25,25 @@ pub struct Vocabulary {
 impl Vocabulary {
     /// Of a rig's log.
     pub const RIG: Self = Self {
+        noun: "rig",
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
         of_every_rig: |id| by_id(id).is_some_and(crate::effects::Effect::is_of_every_rig),
     };
 
+    /// The short word of a scope.
+    pub(crate) const fn scope_word(self, of: Scope) -> &'static str {
+        match of {
+            Scope::Rig => self.noun,
+            other => other.word(),
+        }
+    }
+
     /// What an effect that was not found would do, on the channels of one that was.
     pub(crate) fn of_another(self, id: &str, beside: Option<&EffectEntry>) -> Clause {
         let entry = EffectEntry {
             id: id.to_owned(),
-            scope: beside.map_or(crate::effects::Scope::Rig, |e| e.scope),
+            scope: beside.map_or(Scope::Rig, |e| e.scope),
             channels: beside.map(|e| e.channels.clone()).unwrap_or_default(),
             depends_on: Vec::new(),
             equation: String::new(),
