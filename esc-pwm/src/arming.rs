@@ -7,9 +7,9 @@
 //! Units: milliseconds.
 //! Reference: Beharie 2013, Fig. 3.10 and Appendix C; specification `rig.md`, "ESC pulse and arming".
 
-use frame::message::Beep;
-use frame::rig::{Fault, Refusals, RigState};
-use frame::units::PulseWidth;
+use crate::fault::{Fault, Refusals};
+use crate::state::State;
+use crate::units::PulseWidth;
 
 /// What the machine reacts to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -85,32 +85,18 @@ impl ArmingEvent {
     }
 }
 
-impl From<Beep> for ArmingEvent {
-    fn from(beep: Beep) -> Self {
-        match beep {
-            Beep::Long => Self::Long,
-            Beep::Cells(_) => Self::Cells,
-            Beep::Ready => Self::Ready,
-            Beep::Double => Self::Double,
-            Beep::Programming => Self::Programming,
-            Beep::NoSignal => Self::NoSignal,
-            Beep::SelfTestFailed => Self::SelfTestFailed,
-        }
-    }
-}
-
 /// Every state, for exploration.
-pub const STATES: [RigState; 10] = [
-    RigState::Disarmed,
-    RigState::ArmHoldMin,
-    RigState::ArmCells,
-    RigState::ArmReady,
-    RigState::Armed,
-    RigState::Running,
-    RigState::CalibrateHoldMax,
-    RigState::CalibrateHoldMin,
-    RigState::ProgrammingEscape,
-    RigState::Faulted,
+pub const STATES: [State; 10] = [
+    State::Disarmed,
+    State::ArmHoldMin,
+    State::ArmCells,
+    State::ArmReady,
+    State::Armed,
+    State::Running,
+    State::CalibrateHoldMax,
+    State::CalibrateHoldMin,
+    State::ProgrammingEscape,
+    State::Faulted,
 ];
 
 /// What speaks against commands at this moment: bits of [`Refusals`], each a guard that does not hold.
@@ -120,13 +106,13 @@ pub type Objections = Refusals;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Transition {
     /// State in which the row applies.
-    pub from: RigState,
+    pub from: State,
     /// Event that it answers.
     pub on: ArmingEvent,
     /// Objections that forbid it.
     pub unless: u16,
     /// State that follows.
-    pub to: RigState,
+    pub to: State,
 }
 
 const ARM_UNLESS: u16 = Refusals::FAULT_LATCHED
@@ -142,14 +128,14 @@ const CALIBRATE_UNLESS: u16 = ARM_UNLESS
     | Refusals::NO_RANGE;
 const RUN_UNLESS: u16 = Refusals::FAULT_LATCHED | Refusals::OUT_OF_RANGE | Refusals::EMPTY_SCHEDULE | Refusals::SHORT_STREAM;
 
-const fn row(from: RigState, on: ArmingEvent, unless: u16, to: RigState) -> Transition {
+const fn row(from: State, on: ArmingEvent, unless: u16, to: State) -> Transition {
     Transition { from, on, unless, to }
 }
 
 /// The machine. Stop and Trip lead to `Faulted` from everywhere (see [`step`]) except where the row says otherwise.
 pub const TABLE: &[Transition] = {
     use ArmingEvent as E;
-    use RigState as S;
+    use State as S;
     &[
         row(S::Disarmed, E::Arm, ARM_UNLESS, S::ArmHoldMin),
         row(S::Disarmed, E::Calibrate, CALIBRATE_UNLESS, S::CalibrateHoldMax),
@@ -203,7 +189,7 @@ pub const TABLE: &[Transition] = {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Step {
     /// Taken; the state that follows (it may be the same).
-    To(RigState),
+    To(State),
     /// Does not concern this state.
     Ignored,
     /// A command that was refused, with every reason.
@@ -212,13 +198,13 @@ pub enum Step {
 
 /// One step of the machine: no clock, no memory.
 #[must_use]
-pub fn step(state: RigState, event: ArmingEvent, objections: Objections) -> Step {
+pub fn step(state: State, event: ArmingEvent, objections: Objections) -> Step {
     match TABLE.iter().find(|row| row.from == state && row.on == event) {
         Some(row) => match Refusals(objections.0 & row.unless) {
             refusals if refusals.is_empty() => Step::To(row.to),
             refusals => Step::Refused(refusals),
         },
-        None if matches!(event, ArmingEvent::Stop | ArmingEvent::Trip) => Step::To(RigState::Faulted),
+        None if matches!(event, ArmingEvent::Stop | ArmingEvent::Trip) => Step::To(State::Faulted),
         None if event.is_command() => {
             let elsewhere = TABLE.iter().filter(|row| row.on == event).fold(0, |mask, row| mask | row.unless);
             Step::Refused(Refusals(objections.0 & elsewhere | Refusals::WRONG_STATE))
@@ -229,18 +215,18 @@ pub fn step(state: RigState, event: ArmingEvent, objections: Objections) -> Step
 
 /// The pulse of a state: what the schedule commands only in `Running`, maximum only in `CalibrateHoldMax`, else minimum.
 #[must_use]
-pub const fn pulse_for(state: RigState, commanded: PulseWidth) -> PulseWidth {
+pub const fn pulse_for(state: State, commanded: PulseWidth) -> PulseWidth {
     match state {
-        RigState::Running => commanded.clamped(),
-        RigState::CalibrateHoldMax => PulseWidth::MAX,
-        RigState::Disarmed
-        | RigState::ArmHoldMin
-        | RigState::ArmCells
-        | RigState::ArmReady
-        | RigState::Armed
-        | RigState::CalibrateHoldMin
-        | RigState::ProgrammingEscape
-        | RigState::Faulted => PulseWidth::MIN,
+        State::Running => commanded.clamped(),
+        State::CalibrateHoldMax => PulseWidth::MAX,
+        State::Disarmed
+        | State::ArmHoldMin
+        | State::ArmCells
+        | State::ArmReady
+        | State::Armed
+        | State::CalibrateHoldMin
+        | State::ProgrammingEscape
+        | State::Faulted => PulseWidth::MIN,
     }
 }
 
@@ -291,31 +277,31 @@ pub const DOUBLE_AFTER_POWER_MS: u32 = 2_000;
 
 /// Time-out of a state, if it has one.
 #[must_use]
-pub const fn time_out(state: RigState, times: &ArmingTimes) -> Option<u32> {
+pub const fn time_out(state: State, times: &ArmingTimes) -> Option<u32> {
     match state {
-        RigState::ArmHoldMin => Some(times.hold_min_ms),
-        RigState::ArmCells => Some(times.cells_ms),
-        RigState::ArmReady => Some(times.ready_ms),
-        RigState::Armed => Some(times.armed_ms),
-        RigState::CalibrateHoldMax => Some(times.hold_max_ms),
-        RigState::CalibrateHoldMin => Some(times.calibrate_min_ms),
-        RigState::Disarmed | RigState::Running | RigState::ProgrammingEscape | RigState::Faulted => None,
+        State::ArmHoldMin => Some(times.hold_min_ms),
+        State::ArmCells => Some(times.cells_ms),
+        State::ArmReady => Some(times.ready_ms),
+        State::Armed => Some(times.armed_ms),
+        State::CalibrateHoldMax => Some(times.hold_max_ms),
+        State::CalibrateHoldMin => Some(times.calibrate_min_ms),
+        State::Disarmed | State::Running | State::ProgrammingEscape | State::Faulted => None,
     }
 }
 
 /// What the operator is told in a state.
 #[must_use]
-pub const fn message(state: RigState) -> &'static str {
+pub const fn message(state: State) -> &'static str {
     match state {
-        RigState::Disarmed => "Disarmed: minimum throttle. Arm, or calibrate with the ESC unpowered.",
-        RigState::ArmHoldMin => "Holding minimum: connect the ESC battery and wait for one long beep.",
-        RigState::ArmCells => "Minimum recognised: wait for the beeps that count the cells.",
-        RigState::ArmReady => "Cells counted: wait for 1-2-3.",
-        RigState::Armed => "Armed: keep clear, the rotor will turn on the next setting.",
-        RigState::Running => "Running: keep clear.",
-        RigState::CalibrateHoldMax => "Holding MAXIMUM: connect the ESC battery now and confirm the two beeps at once.",
-        RigState::CalibrateHoldMin => "Maximum stored: wait for one long beep, the cell beeps and 1-2-3.",
-        RigState::ProgrammingEscape => "The ESC is in its programming mode: cut its power, clear, and start again.",
-        RigState::Faulted => "Stopped: minimum throttle. Remove the cause, then clear the faults.",
+        State::Disarmed => "Disarmed: minimum throttle. Arm, or calibrate with the ESC unpowered.",
+        State::ArmHoldMin => "Holding minimum: connect the ESC battery and wait for one long beep.",
+        State::ArmCells => "Minimum recognised: wait for the beeps that count the cells.",
+        State::ArmReady => "Cells counted: wait for 1-2-3.",
+        State::Armed => "Armed: keep clear, the rotor will turn on the next setting.",
+        State::Running => "Running: keep clear.",
+        State::CalibrateHoldMax => "Holding MAXIMUM: connect the ESC battery now and confirm the two beeps at once.",
+        State::CalibrateHoldMin => "Maximum stored: wait for one long beep, the cell beeps and 1-2-3.",
+        State::ProgrammingEscape => "The ESC is in its programming mode: cut its power, clear, and start again.",
+        State::Faulted => "Stopped: minimum throttle. Remove the cause, then clear the faults.",
     }
 }

@@ -9,8 +9,7 @@
 //! and 1.25 us for 1; everything of DShot300 takes twice as long. RM0090 section 18.4.
 
 use crate::timer::TimerError;
-use frame::units::PulseWidth;
-use serde::{Deserialize, Serialize};
+use crate::units::PulseWidth;
 
 /// Bits of a frame, the most significant first.
 pub const BITS: usize = 16;
@@ -24,7 +23,8 @@ const FEWEST_TICKS: u32 = 16;
 const MOST_TICKS: u32 = 1 << 16;
 
 /// In which form the ESC is told its throttle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EscOutput {
     /// Pulses of 1000 to 2000 us, fifty a second.

@@ -18,14 +18,24 @@ extern crate std;
 
 pub mod arming;
 pub mod dshot;
+pub mod fault;
+pub mod output;
 pub mod protection;
 pub mod schedule;
+pub mod segment;
+pub mod state;
 pub mod timer;
 pub mod track;
+pub mod units;
 
 pub use arming::{ArmingEvent, ArmingTimes, Objections, Step, Transition, pulse_for, step, time_out};
 pub use dshot::{EscOutput, FrameTimer, Throttle};
+pub use fault::{Fault, FaultSet, Refusals};
+pub use output::{OutputError, PulseOutput};
 pub use protection::{Bounds, Limits, Protection, Readings};
 pub use schedule::{Chirp, Schedule, Slew, Staircase, ThrottleCurve};
+pub use segment::{Segment, Shape, Steer};
+pub use state::State;
 pub use timer::{PulseTimer, TimerError};
 pub use track::{Played, TRACK, Track};
+pub use units::PulseWidth;

@@ -5,12 +5,13 @@
 //! Units: SI and rev/min; milliseconds.
 //! Reference: specification `rig.md`, "Protection"; beam yield margin Beharie 2013, Eq. 5.53-5.56.
 
-use frame::rig::{Fault, FaultSet, RigState};
-use frame::units::{Ampere, Celsius, Newton, NewtonMetre, RevPerMin, Volt};
-use serde::{Deserialize, Serialize};
+use crate::fault::{Fault, FaultSet};
+use crate::state::State;
+use crate::units::{Ampere, Celsius, Newton, NewtonMetre, RevPerMin, Volt};
 
 /// Lowest and highest value of a channel, and for how long it may be beyond one of them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bounds<T> {
     /// Lowest; `None` for no limit.
@@ -144,14 +145,14 @@ fn lasted(timer: &mut u32, exceeded: bool, tick_ms: u32, limit: u32) -> bool {
 
 impl Protection {
     /// One control tick: which limits are tripped now. Latching them is the caller's state machine.
-    pub fn check(&mut self, state: RigState, readings: &Readings, limits: &Limits) -> FaultSet {
+    pub fn check(&mut self, state: State, readings: &Readings, limits: &Limits) -> FaultSet {
         let tick = readings.tick_ms;
-        let live = matches!(state, RigState::Running | RigState::CalibrateHoldMax);
-        let linked = live || matches!(state, RigState::Armed | RigState::CalibrateHoldMin);
-        let powered = matches!(state, RigState::Running | RigState::Armed);
-        let holds_max = state == RigState::CalibrateHoldMax;
+        let live = matches!(state, State::Running | State::CalibrateHoldMax);
+        let linked = live || matches!(state, State::Armed | State::CalibrateHoldMin);
+        let powered = matches!(state, State::Running | State::Armed);
+        let holds_max = state == State::CalibrateHoldMax;
 
-        let driven = state == RigState::Running && readings.driven;
+        let driven = state == State::Running && readings.driven;
 
         let Limits { speed, thrust, torque, current, voltage, temperature, .. } = limits;
         let fast = lasted(&mut self.speed_ms, speed.is_over(readings.speed), tick, speed.ms.into());
@@ -233,7 +234,7 @@ mod tests {
     }
 
     /// Ticks until `fault` trips, at most two seconds.
-    fn trips_after(state: RigState, readings: Readings, fault: Fault) -> Option<u32> {
+    fn trips_after(state: State, readings: Readings, fault: Fault) -> Option<u32> {
         let mut protection = Protection::default();
         (1..=2000).find(|_| protection.check(state, &readings, &LIMITS).contains(fault))
     }
@@ -242,13 +243,13 @@ mod tests {
     fn good_readings_trip_nothing() {
         let mut protection = Protection::default();
         for _ in 0..5000 {
-            assert!(protection.check(RigState::Running, &good(), &LIMITS).is_empty());
+            assert!(protection.check(State::Running, &good(), &LIMITS).is_empty());
         }
     }
 
     #[test]
     fn each_limit_trips_within_its_time() {
-        use RigState::{Armed, CalibrateHoldMax, Disarmed, Running};
+        use State::{Armed, CalibrateHoldMax, Disarmed, Running};
         let over = Readings { current: Some(Ampere(31.0)), ..good() };
         assert_eq!(trips_after(Running, over, Fault::OverCurrent), Some(50));
         assert_eq!(trips_after(CalibrateHoldMax, good(), Fault::OverCurrent), Some(5), "5 A is more than idle");
@@ -293,7 +294,7 @@ mod tests {
             (0..60_000).find(|ms| {
                 let damaged = u8::from(ms % apart == 0);
                 let readings = Readings { damaged, ..good() };
-                protection.check(RigState::Running, &readings, &LIMITS).contains(Fault::LinkCorrupt)
+                protection.check(State::Running, &readings, &LIMITS).contains(Fault::LinkCorrupt)
             })
         };
         assert_eq!(trips(1), Some(2));
@@ -307,7 +308,7 @@ mod tests {
         let peak = Readings { current: Some(Ampere(60.0)), ..good() };
         for i in 0..1000 {
             let readings = if i % 50 == 49 { good() } else { peak };
-            assert!(protection.check(RigState::Running, &readings, &LIMITS).is_empty());
+            assert!(protection.check(State::Running, &readings, &LIMITS).is_empty());
         }
     }
 }

@@ -6,9 +6,9 @@
 //! Units: milliseconds of elapsed time, nanoseconds of pulse, millihertz.
 //! Reference: Beharie 2013, section 3.2.6 (errata: 21 levels, 20 increments); specification `rig.md`.
 
-use frame::rig::Refusals;
-use frame::schedule::FASTEST_MHZ;
-use frame::units::PulseWidth;
+use crate::fault::Refusals;
+use crate::segment::FASTEST_MHZ;
+use crate::units::PulseWidth;
 
 /// Levels of equal height and equal hold, from minimum throttle upwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -193,7 +193,7 @@ impl Schedule {
                     || out(&PulseWidth(c.centre.0.saturating_sub(c.amplitude.0)))
             }
         };
-        Refusals::default().and(Refusals::OUT_OF_RANGE, bad)
+        Refusals::default().with_if(Refusals::OUT_OF_RANGE, bad)
     }
 }
 

@@ -5,7 +5,7 @@
 //! Units: Hz, ticks, nanoseconds.
 //! Reference: Beharie 2013, section 3.2.3 (errata: 2.5 ns and 600 000 ticks are arithmetic only); RM0090 section 18.4.
 
-use frame::units::PulseWidth;
+use crate::units::PulseWidth;
 
 /// ESC frames a second (Beharie 2013, section 3.2).
 pub const FRAME_HZ: u32 = 50;

@@ -7,10 +7,10 @@
 //! Units: milliseconds since the track was started, nanoseconds of pulse.
 //! Reference: specification `rig.md`, "ESC pulse and arming" (schedules), "The operator's side".
 
+use crate::fault::Refusals;
 use crate::schedule::{Chirp, between};
-use frame::rig::Refusals;
-use frame::schedule::{Segment, SegmentBatch, Shape, Steer};
-use frame::units::PulseWidth;
+use crate::segment::{Segment, Shape, Steer};
+use crate::units::PulseWidth;
 
 /// Segments that a board keeps.
 pub const TRACK: usize = 128;
@@ -70,20 +70,19 @@ impl Track {
         if (self.first..self.next).contains(&number) { self.ring.get(number as usize % TRACK) } else { None }
     }
 
-    /// Takes segments that follow those that are there; what is there already is passed over.
+    /// Takes `segments` that follow those that are there, as numbers `first` and on; what is there already is passed over. `last`: the
+    /// schedule ends with the last of them.
     ///
     /// # Errors
     /// [`Refusals::OUT_OF_RANGE`] when some would be left out, one is impossible, the schedule has ended already, or there is no room.
     /// Those before it are kept.
-    pub fn take(&mut self, batch: &SegmentBatch) -> Result<(), Refusals> {
-        if batch.count == 0 {
-            return Ok(());
-        }
-        let segments = batch.segments.iter().take(usize::from(batch.count));
-        for (number, segment) in (batch.first..).zip(segments) {
+    pub fn take(&mut self, first: u32, segments: &[Segment], last: bool) -> Result<(), Refusals> {
+        let Some(final_one) = segments.len().checked_sub(1) else { return Ok(()) };
+        for (place, segment) in (0..).zip(segments) {
+            let number = first.checked_add(place).ok_or(Refusals(Refusals::OUT_OF_RANGE))?;
             self.put(number, *segment)?;
         }
-        self.whole |= batch.last && u64::from(batch.first) + u64::from(batch.count) == u64::from(self.next);
+        self.whole |= last && u64::from(first) + final_one as u64 + 1 == u64::from(self.next);
         Ok(())
     }
 
@@ -158,7 +157,7 @@ impl Track {
         } else {
             (0..self.next).filter_map(|n| self.segment(n)).map(|s| u64::from(s.length_ms)).sum()
         };
-        Refusals::default().and(Refusals::EMPTY_SCHEDULE, !there).and(Refusals::SHORT_STREAM, there && ahead < AHEAD_MS)
+        Refusals::default().with_if(Refusals::EMPTY_SCHEDULE, !there).with_if(Refusals::SHORT_STREAM, there && ahead < AHEAD_MS)
     }
 
     /// Begins to play it, at time 0.

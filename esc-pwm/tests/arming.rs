@@ -1,10 +1,10 @@
 //! The arming machine, explored: every state, event and combination of objections.
 
+use esc_pwm::PulseWidth;
 use esc_pwm::arming::{STATES, TABLE, message};
 use esc_pwm::dshot::{Frame, Throttle};
 use esc_pwm::{ArmingEvent, ArmingTimes, Objections, Step, pulse_for, step, time_out};
-use frame::rig::{Refusals, RigState};
-use frame::units::PulseWidth;
+use esc_pwm::{Refusals, State};
 use std::collections::BTreeSet;
 
 const RUN_UNLESS: u16 = Refusals::FAULT_LATCHED | Refusals::OUT_OF_RANGE | Refusals::EMPTY_SCHEDULE;
@@ -30,8 +30,8 @@ const _: () = assert!(Refusals::WORDS.len() == 16);
 
 /// States reachable from reset, with one way each was reached.
 fn reachable() -> BTreeSet<u8> {
-    let mut seen = BTreeSet::from([RigState::Disarmed as u8]);
-    let mut open = Vec::from([RigState::Disarmed]);
+    let mut seen = BTreeSet::from([State::Disarmed as u8]);
+    let mut open = Vec::from([State::Disarmed]);
     while let Some(state) = open.pop() {
         for event in ArmingEvent::ALL {
             for guard in objections() {
@@ -84,7 +84,7 @@ fn live_pulses_in_two_states_only() {
         for commanded in [0, 999_999, 1_000_000, 1_000_001, 1_500_000, 2_000_000, u32::MAX] {
             let pulse = pulse_for(state, PulseWidth(commanded));
             assert!(pulse >= PulseWidth::MIN && pulse <= PulseWidth::MAX);
-            if !matches!(state, RigState::Running | RigState::CalibrateHoldMax) {
+            if !matches!(state, State::Running | State::CalibrateHoldMax) {
                 assert_eq!(pulse, PulseWidth::MIN, "{state:?}");
                 assert_eq!(Throttle::of(pulse), Throttle::STOP, "{state:?}");
             }
@@ -100,7 +100,7 @@ fn stop_and_trip_give_minimum_from_every_state() {
                 let Step::To(next) = step(state, event, guard) else { panic!("{event:?} in {state:?} was not taken") };
                 assert_eq!(pulse_for(next, PulseWidth::MAX), PulseWidth::MIN);
                 assert_eq!(Frame { throttle: Throttle::of(pulse_for(next, PulseWidth::MAX)), telemetry: false }, Frame::STOP);
-                assert!(matches!(next, RigState::Faulted | RigState::ProgrammingEscape));
+                assert!(matches!(next, State::Faulted | State::ProgrammingEscape));
             }
         }
     }
@@ -113,17 +113,17 @@ fn live_states_are_entered_by_their_own_command_only() {
         for event in ArmingEvent::ALL {
             for guard in objections() {
                 match step(state, event, guard) {
-                    Step::To(RigState::Running) => {
-                        assert!(matches!(state, RigState::Armed | RigState::Running) && event == ArmingEvent::Run);
+                    Step::To(State::Running) => {
+                        assert!(matches!(state, State::Armed | State::Running) && event == ArmingEvent::Run);
                         assert_eq!(guard.0 & RUN_UNLESS, 0);
                     }
-                    Step::To(RigState::CalibrateHoldMax) => {
-                        assert!(state == RigState::Disarmed && event == ArmingEvent::Calibrate);
+                    Step::To(State::CalibrateHoldMax) => {
+                        assert!(state == State::Disarmed && event == ArmingEvent::Calibrate);
                         let never =
                             Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED | Refusals::FAULT_LATCHED | Refusals::NO_RANGE;
                         assert_eq!(guard.0 & never, 0);
                     }
-                    Step::To(RigState::Armed) => assert!(
+                    Step::To(State::Armed) => assert!(
                         matches!(event, ArmingEvent::Ready | ArmingEvent::Finished),
                         "{state:?} {event:?} armed without the ESC's own answer"
                     ),
@@ -139,11 +139,11 @@ fn live_states_are_entered_by_their_own_command_only() {
 fn faults_latch() {
     for event in ArmingEvent::ALL {
         for guard in objections() {
-            for state in [RigState::Faulted, RigState::ProgrammingEscape] {
+            for state in [State::Faulted, State::ProgrammingEscape] {
                 if let Step::To(next) = step(state, event, guard)
                     && next != state
                 {
-                    assert_eq!((event, next), (ArmingEvent::Clear, RigState::Disarmed));
+                    assert_eq!((event, next), (ArmingEvent::Clear, State::Disarmed));
                 }
             }
         }
@@ -153,9 +153,9 @@ fn faults_latch() {
 #[test]
 fn a_refusal_lists_every_reason() {
     let all = Refusals(u16::MAX);
-    assert_eq!(step(RigState::Disarmed, ArmingEvent::Calibrate, all), Step::Refused(Refusals(CALIBRATE_UNLESS)));
+    assert_eq!(step(State::Disarmed, ArmingEvent::Calibrate, all), Step::Refused(Refusals(CALIBRATE_UNLESS)));
     assert_eq!(
-        step(RigState::Running, ArmingEvent::Arm, Refusals(Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW)),
+        step(State::Running, ArmingEvent::Arm, Refusals(Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW)),
         Step::Refused(Refusals(Refusals::WRONG_STATE | Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW))
     );
 }
@@ -164,15 +164,15 @@ fn a_refusal_lists_every_reason() {
 fn the_two_start_procedures() {
     use ArmingEvent::{Arm, Calibrate, Cells, Double, Long, Ready, Run};
     let walk = |events: &[ArmingEvent]| {
-        events.iter().fold(RigState::Disarmed, |state, event| match step(state, *event, Refusals::default()) {
+        events.iter().fold(State::Disarmed, |state, event| match step(state, *event, Refusals::default()) {
             Step::To(next) => next,
             _ => state,
         })
     };
-    assert_eq!(walk(&[Arm, Long, Cells, Ready]), RigState::Armed);
-    assert_eq!(walk(&[Arm, Cells, Ready]), RigState::ArmHoldMin, "beeps out of order do not arm");
-    assert_eq!(walk(&[Calibrate, Double, Long, Cells, Ready, Run]), RigState::Running);
-    assert_eq!(walk(&[Calibrate, Run]), RigState::CalibrateHoldMax);
+    assert_eq!(walk(&[Arm, Long, Cells, Ready]), State::Armed);
+    assert_eq!(walk(&[Arm, Cells, Ready]), State::ArmHoldMin, "beeps out of order do not arm");
+    assert_eq!(walk(&[Calibrate, Double, Long, Cells, Ready, Run]), State::Running);
+    assert_eq!(walk(&[Calibrate, Run]), State::CalibrateHoldMax);
 }
 
 #[test]

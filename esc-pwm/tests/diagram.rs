@@ -4,7 +4,7 @@
 
 use esc_pwm::arming::{STATES, TABLE};
 use esc_pwm::{ArmingEvent, ArmingTimes, Transition, time_out};
-use frame::rig::{Refusals, RigState};
+use esc_pwm::{Refusals, State};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -12,24 +12,24 @@ const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/arming.svg");
 const BOX: (i32, i32) = (196, 118);
 
 /// Where each state stands: centre of its box.
-fn place(state: RigState) -> (i32, i32) {
+fn place(state: State) -> (i32, i32) {
     match state {
-        RigState::Disarmed => (120, 250),
-        RigState::ArmHoldMin => (400, 90),
-        RigState::ArmCells => (660, 90),
-        RigState::ArmReady => (920, 90),
-        RigState::Armed => (1180, 250),
-        RigState::Running => (1180, 520),
-        RigState::CalibrateHoldMax => (400, 355),
-        RigState::CalibrateHoldMin => (790, 355),
-        RigState::ProgrammingEscape => (400, 520),
-        RigState::Faulted => (120, 520),
+        State::Disarmed => (120, 250),
+        State::ArmHoldMin => (400, 90),
+        State::ArmCells => (660, 90),
+        State::ArmReady => (920, 90),
+        State::Armed => (1180, 250),
+        State::Running => (1180, 520),
+        State::CalibrateHoldMax => (400, 355),
+        State::CalibrateHoldMin => (790, 355),
+        State::ProgrammingEscape => (400, 520),
+        State::Faulted => (120, 520),
     }
 }
 
 /// States that are led to from so many others that an arrow each would hide the rest: named in the boxes instead.
-fn is_sink(state: RigState) -> bool {
-    matches!(state, RigState::Faulted | RigState::ProgrammingEscape)
+fn is_sink(state: State) -> bool {
+    matches!(state, State::Faulted | State::ProgrammingEscape)
 }
 
 /// Rows of one pair of states, in the order of the table, with a guard's number where there is one.
@@ -55,9 +55,9 @@ fn text(svg: &mut String, x: f64, y: f64, class: &str, words: &str) {
     let _ = writeln!(svg, r#"<text x="{x:.0}" y="{y:.0}" class="{class}">{words}</text>"#);
 }
 
-fn draw_box(svg: &mut String, state: RigState, guards: &[u16]) {
+fn draw_box(svg: &mut String, state: State, guards: &[u16]) {
     let (x, y) = place(state);
-    let live = matches!(state, RigState::Running | RigState::CalibrateHoldMax);
+    let live = matches!(state, State::Running | State::CalibrateHoldMax);
     let class = if live { "live" } else { "safe" };
     let (left, top) = (x - BOX.0 / 2, y - BOX.1 / 2);
     let _ = writeln!(svg, r#"<rect x="{left}" y="{top}" width="{}" height="{}" rx="10" class="{class}"/>"#, BOX.0, BOX.1);
@@ -70,20 +70,20 @@ fn draw_box(svg: &mut String, state: RigState, guards: &[u16]) {
     say(
         "small",
         match state {
-            RigState::Running => "pulse: the schedule's".to_owned(),
-            RigState::CalibrateHoldMax => "pulse: MAXIMUM".to_owned(),
+            State::Running => "pulse: the schedule's".to_owned(),
+            State::CalibrateHoldMax => "pulse: MAXIMUM".to_owned(),
             _ => "pulse: minimum".to_owned(),
         },
     );
     if let Some(ms) = time_out(state, &ArmingTimes::default()) {
         say("small", format!("time-out {} s", ms / 1000));
     }
-    for sink in [RigState::ProgrammingEscape, RigState::Faulted] {
+    for sink in [State::ProgrammingEscape, State::Faulted] {
         let rows: Vec<&Transition> = TABLE.iter().filter(|r| r.from == state && r.to == sink && sink != state).collect();
         if rows.is_empty() {
             continue;
         }
-        let name = if sink == RigState::Faulted { "Faulted" } else { "Progr.Escape" };
+        let name = if sink == State::Faulted { "Faulted" } else { "Progr.Escape" };
         let words = label(&rows, guards);
         match words.split_once(", ").filter(|_| words.len() > 22) {
             Some((first, rest)) => {

@@ -1,8 +1,8 @@
 //! DShot: every pulse, every throttle, every word and every damage of a bit.
 
+use esc_pwm::PulseWidth;
 use esc_pwm::dshot::{BITS, EscOutput, FRAME_HZ, Frame, FrameTimer, SLOTS, Slot, Throttle};
 use esc_pwm::timer::TimerError;
-use frame::units::PulseWidth;
 
 /// Timer clock of the board.
 const CLOCK_HZ: u32 = 84_000_000;

@@ -1,8 +1,8 @@
 //! Schedules: the thesis figures, impossible ones refused, and never a pulse out of range.
 
+use esc_pwm::PulseWidth;
+use esc_pwm::Refusals;
 use esc_pwm::{Chirp, Schedule, Slew, Staircase, ThrottleCurve};
-use frame::rig::Refusals;
-use frame::units::PulseWidth;
 use proptest::prelude::*;
 
 fn us(us: u32) -> PulseWidth {

@@ -1,9 +1,9 @@
 //! A host's schedule as the board plays it: exact, ahead of time, and never beyond what was agreed.
 
+use esc_pwm::PulseWidth;
+use esc_pwm::Refusals;
+use esc_pwm::segment::{Segment, Shape, Steer};
 use esc_pwm::track::{AHEAD_MS, Played, TRACK, Track};
-use frame::rig::Refusals;
-use frame::schedule::{BATCH, Segment, SegmentBatch, Shape, Steer};
-use frame::units::PulseWidth;
 use proptest::prelude::*;
 
 fn us(us: u32) -> PulseWidth {
@@ -18,12 +18,14 @@ fn hold(pulse: u32, length_ms: u32) -> Segment {
     segment(pulse, length_ms, Shape::Hold)
 }
 
+/// Segments that a host sends at once.
+const BATCH: usize = 8;
+
 /// Sends the whole list by batches.
 fn loaded(list: &[Segment]) -> Track {
     let mut track = Track::new();
     for (n, part) in list.chunks(BATCH).enumerate() {
-        let batch = SegmentBatch { last: (n + 1) * BATCH >= list.len(), ..SegmentBatch::of((n * BATCH) as u32, part) };
-        track.take(&batch).unwrap();
+        track.take((n * BATCH) as u32, part, (n + 1) * BATCH >= list.len()).unwrap();
     }
     track
 }
@@ -56,7 +58,8 @@ fn gaps_impossible_segments_and_too_much_are_refused() {
     let refused = Err(Refusals(Refusals::OUT_OF_RANGE));
     let mut track = Track::new();
     assert_eq!(track.check(), Refusals(Refusals::EMPTY_SCHEDULE));
-    assert_eq!(track.take(&SegmentBatch::of(1, &[hold(1500, 1)])), refused, "a gap");
+    assert_eq!(track.take(1, &[hold(1500, 1)], true), refused, "a gap");
+    assert_eq!(track.take(u32::MAX, &[hold(1500, 1), hold(1500, 1)], true), refused, "numbers that do not exist");
     for bad in [
         hold(999, 10),
         hold(1500, 0),
@@ -66,12 +69,12 @@ fn gaps_impossible_segments_and_too_much_are_refused() {
         segment(1500, 10, Shape::Steered { low: us(1100), high: us(1400) }),
         segment(1500, 10, Shape::Steered { low: us(1100), high: us(2100) }),
     ] {
-        assert_eq!(track.take(&SegmentBatch::of(0, &[bad])), refused, "{bad:?}");
+        assert_eq!(track.take(0, &[bad], true), refused, "{bad:?}");
     }
     let mut full = loaded(&[hold(1100, 10); TRACK]);
     assert_eq!((full.room(), full.next()), (0, TRACK as u32));
-    assert_eq!(full.take(&SegmentBatch::of(TRACK as u32, &[hold(1100, 10)])), refused, "full");
-    full.take(&SegmentBatch::of(0, &[hold(1300, 1)])).unwrap();
+    assert_eq!(full.take(TRACK as u32, &[hold(1100, 10)], true), refused, "full");
+    full.take(0, &[hold(1300, 1)], true).unwrap();
     assert_eq!(full.next(), 1, "number 0 begins anew");
 }
 
@@ -79,9 +82,9 @@ fn gaps_impossible_segments_and_too_much_are_refused() {
 fn what_is_there_already_is_not_taken_twice() {
     let mut track = loaded(&[hold(1100, 600), hold(1200, 10)]);
     track.start();
-    track.take(&SegmentBatch::of(0, &[hold(1900, 600), hold(1900, 10)])).unwrap();
+    track.take(0, &[hold(1900, 600), hold(1900, 10)], true).unwrap();
     assert_eq!((track.at(0), track.next()), (Played::Pulse(us(1100)), 2), "a frame that was sent again while it is played");
-    assert!(track.take(&SegmentBatch::of(2, &[hold(1300, 10)])).is_err(), "the schedule has ended already");
+    assert!(track.take(2, &[hold(1300, 10)], true).is_err(), "the schedule has ended already");
 }
 
 #[test]
@@ -92,7 +95,7 @@ fn a_longer_schedule_is_streamed_and_runs_dry_when_it_is_not() {
     let mut send = |track: &mut Track, end: u32| {
         while track.room() >= BATCH as u16 && sent < end {
             let part: Vec<Segment> = (sent..(sent + BATCH as u32).min(end)).map(|n| hold(pulse(n), 10)).collect();
-            track.take(&SegmentBatch { last: false, ..SegmentBatch::of(sent, &part) }).unwrap();
+            track.take(sent, &part, false).unwrap();
             sent += part.len() as u32;
         }
     };
@@ -154,7 +157,7 @@ proptest! {
     ) {
         let mut track = Track::new();
         for (first, list, last) in batches {
-            let _ = track.take(&SegmentBatch { last, ..SegmentBatch::of(first, &list) });
+            let _ = track.take(first, &list, last);
         }
         track.start();
         let mut ms = 0;

@@ -53,7 +53,11 @@ impl Rig {
 
     /// Takes segments and tells how the schedule stands.
     pub(crate) fn take_segments(&mut self, batch: &SegmentBatch) {
-        let refused = self.track.take(batch).err().unwrap_or_default();
+        let taken = match batch.segments() {
+            Some(segments) => self.track.take(batch.first, segments, batch.last),
+            None => Err(Refusals(Refusals::OUT_OF_RANGE)),
+        };
+        let refused = taken.err().unwrap_or_default();
         self.tell_schedule(refused);
     }
 

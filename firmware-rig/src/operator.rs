@@ -33,7 +33,7 @@ impl Rig {
             }
             Command::Arm => self.ask(now, ArmingEvent::Arm, Refusals::default()),
             Command::CalibrateRange { confirm } => {
-                let missing = Refusals::default().and(Refusals::NOT_CONFIRMED, confirm != Command::CALIBRATE_CONFIRM);
+                let missing = Refusals::default().with_if(Refusals::NOT_CONFIRMED, confirm != Command::CALIBRATE_CONFIRM);
                 self.ask(now, ArmingEvent::Calibrate, missing)
             }
             Command::ScheduleStep { index, pulse, hold_ms, ramp } => {
@@ -75,7 +75,7 @@ impl Rig {
                 _ => Err(Refusals(Refusals::OUT_OF_RANGE)),
             },
             Command::SelfTest { confirm, trial } => {
-                let missing = Refusals::default().and(Refusals::NOT_CONFIRMED, confirm != Command::SELF_TEST_CONFIRM);
+                let missing = Refusals::default().with_if(Refusals::NOT_CONFIRMED, confirm != Command::SELF_TEST_CONFIRM);
                 let refusals = Refusals(missing.0 | self.at_rest().err().unwrap_or_default().0);
                 if refusals.is_empty() {
                     self.trial = Some(trial);
@@ -104,8 +104,8 @@ impl Rig {
     /// What changes the board itself needs the rig disarmed and the rotor at rest.
     fn at_rest(&self) -> Result<(), Refusals> {
         let refusals = Refusals::default()
-            .and(Refusals::WRONG_STATE, self.state != RigState::Disarmed)
-            .and(Refusals::ROTOR_TURNING, self.bank.is_turning());
+            .with_if(Refusals::WRONG_STATE, self.state != RigState::Disarmed)
+            .with_if(Refusals::ROTOR_TURNING, self.bank.is_turning());
         if refusals.is_empty() { Ok(()) } else { Err(refusals) }
     }
 
@@ -132,9 +132,9 @@ impl Rig {
         let unusable = |code: &AdcCode| !matches!(code.verdict, AdcVerdict::Nominal | AdcVerdict::Absent);
         let nothing = strain.count == 0 && torque.count == 0;
         let refusals = Refusals::default()
-            .and(Refusals::WRONG_STATE, live)
-            .and(Refusals::ROTOR_TURNING, self.bank.is_turning())
-            .and(Refusals::OUT_OF_RANGE, nothing || unusable(strain) || unusable(torque));
+            .with_if(Refusals::WRONG_STATE, live)
+            .with_if(Refusals::ROTOR_TURNING, self.bank.is_turning())
+            .with_if(Refusals::OUT_OF_RANGE, nothing || unusable(strain) || unusable(torque));
         if !refusals.is_empty() {
             return Err(refusals);
         }

@@ -434,15 +434,15 @@ impl Rig {
         let [_, _, current, _, _] = self.config.fitted;
         let recent = self.last_live.is_some_and(|at| self.ms_since(now, at) < low_ms);
         Refusals::default()
-            .and(Refusals::FAULT_LATCHED, !self.faults.is_empty())
-            .and(Refusals::THROTTLE_NOT_LOW, self.setting.is_live())
-            .and(Refusals::NO_LOW_INTERVAL, recent)
-            .and(Refusals::ESC_POWERED, self.supply.is_some_and(|v| v >= self.config.powered))
-            .and(Refusals::SUPPLY_UNPROVEN, !self.proof.is_off(self.config.limits.analogue_ms, live_supply))
-            .and(Refusals::ROTOR_TURNING, self.bank.is_turning())
-            .and(Refusals::NO_WITNESS, self.bank.fitted() == 0 && !current)
-            .and(Refusals::STOP_OPEN, self.stop_loop.open)
-            .and(Refusals::NO_RANGE, self.config.output.is_digital())
+            .with_if(Refusals::FAULT_LATCHED, !self.faults.is_empty())
+            .with_if(Refusals::THROTTLE_NOT_LOW, self.setting.is_live())
+            .with_if(Refusals::NO_LOW_INTERVAL, recent)
+            .with_if(Refusals::ESC_POWERED, self.supply.is_some_and(|v| v >= self.config.powered))
+            .with_if(Refusals::SUPPLY_UNPROVEN, !self.proof.is_off(self.config.limits.analogue_ms, live_supply))
+            .with_if(Refusals::ROTOR_TURNING, self.bank.is_turning())
+            .with_if(Refusals::NO_WITNESS, self.bank.fitted() == 0 && !current)
+            .with_if(Refusals::STOP_OPEN, self.stop_loop.open)
+            .with_if(Refusals::NO_RANGE, self.config.output.is_digital())
     }
 
     /// Puts `event` to the arming machine and does what follows from it.

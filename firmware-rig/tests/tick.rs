@@ -491,6 +491,14 @@ fn a_stream_that_runs_dry_is_minimum_and_a_fault() {
 }
 
 #[test]
+fn a_batch_that_says_more_than_it_holds_is_refused_whole() {
+    let mut bench = Bench::armed();
+    let batch = SegmentBatch { count: 9, ..SegmentBatch::of(0, &[segment(1500, 300, Shape::Hold); 8]) };
+    let told = news(&mut bench, Command::Segments(batch));
+    assert_eq!((told.next, told.refused), (0, Refusals(Refusals::OUT_OF_RANGE)));
+}
+
+#[test]
 fn a_stream_that_is_fed_ends_as_any_schedule_does() {
     let mut bench = Bench::armed();
     let pulse = |n: u32| 1100 + 10 * (n % 40);

@@ -12,6 +12,7 @@ use crate::imu_command::{ImuCommand, ImuReport, ImuValues, TestAccel};
 use crate::rig::{FaultSet, Refusals, RigSample, RigState};
 use crate::schedule::{ScheduleNews, SegmentBatch, Steer};
 use crate::units::{PulseWidth, Ticks};
+use esc_pwm::ArmingEvent;
 use serde::{Deserialize, Serialize};
 
 /// Which board speaks.
@@ -520,4 +521,18 @@ pub enum Beep {
     NoSignal,
     /// Twenty short beeps: self-test failed.
     SelfTestFailed,
+}
+
+impl From<Beep> for ArmingEvent {
+    fn from(beep: Beep) -> Self {
+        match beep {
+            Beep::Long => Self::Long,
+            Beep::Cells(_) => Self::Cells,
+            Beep::Ready => Self::Ready,
+            Beep::Double => Self::Double,
+            Beep::Programming => Self::Programming,
+            Beep::NoSignal => Self::NoSignal,
+            Beep::SelfTestFailed => Self::SelfTestFailed,
+        }
+    }
 }

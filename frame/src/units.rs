@@ -1,108 +1,13 @@
 //! Physical quantities as newtypes.
 //!
-//! What it is: one tuple struct a unit, so that a thrust cannot be passed for a torque.
+//! What it is: one tuple struct a unit, so that a thrust cannot be passed for a torque. What limits and pulses are made of is
+//! [`esc_pwm::units`]'; beside it stands the board's time.
 //! What can go wrong: nothing; these are plain numbers. NaN is kept, and each consumer states what it does with it.
 //! Units: stated on each type.
 //! Reference: SI brochure; rev/min is the field's unit for rotor speed.
 
+pub use esc_pwm::units::{Ampere, Celsius, Newton, NewtonMetre, PulseWidth, RevPerMin, Volt};
 use serde::{Deserialize, Serialize};
-
-macro_rules! quantity {
-    ($(#[$doc:meta])* $name:ident, $unit:literal) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
-        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-        pub struct $name(pub f32);
-
-        impl $name {
-            /// The unit's symbol, as it is printed.
-            pub const UNIT: &'static str = $unit;
-        }
-
-        impl core::fmt::Display for $name {
-            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-                core::fmt::Display::fmt(&self.0, f)?;
-                f.write_str(concat!(" ", $unit))
-            }
-        }
-    };
-}
-
-quantity!(
-    /// Force, newton.
-    Newton, "N"
-);
-quantity!(
-    /// Torque, newton metre.
-    NewtonMetre, "N.m"
-);
-quantity!(
-    /// Electric current, ampere.
-    Ampere, "A"
-);
-quantity!(
-    /// Electric potential, volt.
-    Volt, "V"
-);
-quantity!(
-    /// Temperature, degree Celsius.
-    Celsius, "degC"
-);
-quantity!(
-    /// Rotor speed, revolutions a minute.
-    RevPerMin, "rev/min"
-);
-
-/// Width of an ESC pulse in whole nanoseconds.
-///
-/// An integer, so that schedules, slew limits and timer arithmetic are exact: 1 us is 1000, the thesis'
-/// 0.25 % step of a 20 ms period is 50 000.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PulseWidth(pub u32);
-
-impl PulseWidth {
-    /// Minimum throttle, 1000 us (Beharie 2013, section 3.2: 5 % of 20 ms).
-    pub const MIN: Self = Self(1_000_000);
-    /// Maximum throttle, 2000 us (Beharie 2013, section 3.2: 10 % of 20 ms).
-    pub const MAX: Self = Self(2_000_000);
-
-    /// A pulse of a whole number of microseconds.
-    #[must_use]
-    pub const fn from_us(us: u32) -> Self {
-        Self(us.saturating_mul(1000))
-    }
-
-    /// Width in microseconds, for logs.
-    #[must_use]
-    pub fn as_us(self) -> f64 {
-        f64::from(self.0) / 1000.0
-    }
-
-    /// The nearest pulse that an ESC understands: 1000 to 2000 us.
-    #[must_use]
-    pub const fn clamped(self) -> Self {
-        if self.0 < Self::MIN.0 {
-            Self::MIN
-        } else if self.0 > Self::MAX.0 {
-            Self::MAX
-        } else {
-            self
-        }
-    }
-
-    /// Above minimum throttle: this pulse would turn the rotor.
-    #[must_use]
-    pub const fn is_live(self) -> bool {
-        self.0 > Self::MIN.0
-    }
-}
-
-impl Default for PulseWidth {
-    fn default() -> Self {
-        Self::MIN
-    }
-}
 
 /// An instant on the board: ticks of the capture timer since reset, extended to 64 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]

@@ -38,7 +38,7 @@ fn expected(segments: &[Segment]) -> Vec<PulseWidth> {
     let mut feed = |track: &mut Track| {
         while sent < segments.len() && usize::from(track.room()) >= BATCH {
             let batch = SegmentBatch::of(sent as u32, &segments[sent..]);
-            track.take(&batch).unwrap();
+            track.take(batch.first, batch.segments().unwrap(), batch.last).unwrap();
             sent += usize::from(batch.count);
         }
     };

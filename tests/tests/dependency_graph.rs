@@ -76,3 +76,29 @@ fn neither_side_reaches_the_other() {
     assert!(seen.contains_key("ident") && seen.contains_key("hal-sim"));
     assert_eq!(chain(&reached(&graph, "hal-sim"), "esc-pwm").split(" -> ").next(), Some("hal-sim"));
 }
+
+/// What a crate needs where nothing is switched on, without what its tests need.
+fn needs(package: &str) -> Vec<String> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let out = std::process::Command::new(cargo)
+        .args(["tree", "--locked", "--edges", "normal,build", "--no-default-features", "--prefix", "none", "--format", "{lib}"])
+        .args([
+            "--target",
+            &host(),
+            "--package",
+            package,
+            "--manifest-path",
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml"),
+        ])
+        .output()
+        .expect("cargo runs");
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    String::from_utf8_lossy(&out.stdout).lines().skip(1).map(str::to_owned).collect()
+}
+
+/// A stranger who takes the pulses does not get this project's wire with them.
+#[test]
+fn pulses_need_the_traits_of_a_pin_and_nothing_else() {
+    assert_eq!(needs("esc-pwm"), ["embedded_hal"]);
+    assert!(needs("frame").iter().any(|name| name == "postcard"), "the test sees what there is");
+}
