@@ -45,3 +45,7 @@ pub type Mat3 = nalgebra::Matrix3<f32>;
 
 /// Standard gravity, m/s^2 (ISO 80000-3).
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

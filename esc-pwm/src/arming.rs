@@ -187,7 +187,7 @@ pub const TABLE: &[Transition] = {
 /// What came of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Step {
+pub enum Outcome {
     /// Taken; the state that follows (it may be the same).
     To(State),
     /// Does not concern this state.
@@ -198,18 +198,18 @@ pub enum Step {
 
 /// One step of the machine: no clock, no memory.
 #[must_use]
-pub fn step(state: State, event: ArmingEvent, objections: Objections) -> Step {
+pub fn step(state: State, event: ArmingEvent, objections: Objections) -> Outcome {
     match TABLE.iter().find(|row| row.from == state && row.on == event) {
         Some(row) => match Refusals(objections.0 & row.unless) {
-            refusals if refusals.is_empty() => Step::To(row.to),
-            refusals => Step::Refused(refusals),
+            refusals if refusals.is_empty() => Outcome::To(row.to),
+            refusals => Outcome::Refused(refusals),
         },
-        None if matches!(event, ArmingEvent::Stop | ArmingEvent::Trip) => Step::To(State::Faulted),
+        None if matches!(event, ArmingEvent::Stop | ArmingEvent::Trip) => Outcome::To(State::Faulted),
         None if event.is_command() => {
             let elsewhere = TABLE.iter().filter(|row| row.on == event).fold(0, |mask, row| mask | row.unless);
-            Step::Refused(Refusals(objections.0 & elsewhere | Refusals::WRONG_STATE))
+            Outcome::Refused(Refusals(objections.0 & elsewhere | Refusals::WRONG_STATE))
         }
-        None => Step::Ignored,
+        None => Outcome::Ignored,
     }
 }
 

@@ -28,7 +28,7 @@ pub mod timer;
 pub mod track;
 pub mod units;
 
-pub use arming::{ArmingEvent, ArmingTimes, Objections, Step, Transition, pulse_for, step, time_out};
+pub use arming::{ArmingEvent, ArmingTimes, Objections, Outcome, Transition, pulse_for, step, time_out};
 pub use dshot::{EscOutput, FrameTimer, Throttle};
 pub use fault::{Fault, FaultSet, Refusals};
 pub use output::{OutputError, PulseOutput};
@@ -39,3 +39,7 @@ pub use state::State;
 pub use timer::{PulseTimer, TimerError};
 pub use track::{Played, TRACK, Track};
 pub use units::PulseWidth;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -2,7 +2,7 @@
 //!
 //! What it is: [`PulseOutput`], pulses of 1000 to 2000 us over `embedded_hal`'s [`SetDutyCycle`].
 //! What can go wrong: a channel whose steps are wider than 1 us, or whose period leaves no room for the longest pulse, is refused
-//! ([`TimerError`]); an error of the channel is handed on, and the pulse that was set before goes on.
+//! ([`OutputError`]); an error of the channel is handed on, and the pulse that was set before goes on.
 //! Units: nanoseconds of pulse; Hz.
 //! Reference: embedded-hal 1.0, `pwm`; Beharie 2013, section 3.2.
 
@@ -21,9 +21,26 @@ const FASTEST_HZ: u32 = 250;
 pub enum OutputError<E> {
     /// The channel cannot give ESC pulses.
     Timer(TimerError),
+    /// The channel repeats never, or too often for an ESC.
+    Rate {
+        /// Periods a second.
+        hz: u32,
+    },
     /// The channel did not take the minimum pulse.
     Channel(E),
 }
+
+impl<E: core::fmt::Debug> core::fmt::Display for OutputError<E> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Timer(error) => error.fmt(f),
+            Self::Rate { hz } => write!(f, "the channel repeats {hz} times a second: an ESC takes 1 to {FASTEST_HZ}"),
+            Self::Channel(error) => write!(f, "the channel did not take the minimum pulse: {error:?}"),
+        }
+    }
+}
+
+impl<E: core::fmt::Debug> core::error::Error for OutputError<E> {}
 
 /// An ESC on a PWM channel that repeats at a known rate.
 #[derive(Debug)]
@@ -37,13 +54,13 @@ impl<P: SetDutyCycle> PulseOutput<P> {
     /// its first pulse is then the minimum.
     ///
     /// # Errors
-    /// [`OutputError::Timer`] when the channel has fewer steps than a microsecond each, or repeats more often than 250 times a second or
-    /// never; [`OutputError::Channel`] when the channel refuses the minimum pulse.
+    /// [`OutputError::Rate`] when the channel repeats more often than 250 times a second or never; [`OutputError::Timer`] when its steps are
+    /// wider than a microsecond; [`OutputError::Channel`] when it refuses the minimum pulse.
     pub fn new(channel: P, rate_hz: u32) -> Result<Self, OutputError<P::Error>> {
-        let counter_hz = u32::from(channel.max_duty_cycle()).saturating_mul(rate_hz);
         if rate_hz == 0 || rate_hz > FASTEST_HZ {
-            return Err(OutputError::Timer(TimerError::NoExactPeriod { clock_hz: counter_hz }));
+            return Err(OutputError::Rate { hz: rate_hz });
         }
+        let counter_hz = u32::from(channel.max_duty_cycle()).saturating_mul(rate_hz);
         if counter_hz < 1_000_000 {
             return Err(OutputError::Timer(TimerError::TooCoarse { counter_hz }));
         }

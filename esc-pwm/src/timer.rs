@@ -28,6 +28,21 @@ pub enum TimerError {
     },
 }
 
+impl core::fmt::Display for TimerError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NoExactPeriod { clock_hz } => {
+                write!(f, "no divider of {clock_hz} Hz gives the period exactly: choose another clock")
+            }
+            Self::TooCoarse { counter_hz } => {
+                write!(f, "the counter advances at {counter_hz} Hz: too coarse, choose a faster clock")
+            }
+        }
+    }
+}
+
+impl core::error::Error for TimerError {}
+
 /// A timer set up for 50 Hz pulses: dividing exactly, so pulse and period never drift apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

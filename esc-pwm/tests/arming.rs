@@ -3,7 +3,7 @@
 use esc_pwm::PulseWidth;
 use esc_pwm::arming::{STATES, TABLE, message};
 use esc_pwm::dshot::{Frame, Throttle};
-use esc_pwm::{ArmingEvent, ArmingTimes, Objections, Step, pulse_for, step, time_out};
+use esc_pwm::{ArmingEvent, ArmingTimes, Objections, Outcome, pulse_for, step, time_out};
 use esc_pwm::{Refusals, State};
 use std::collections::BTreeSet;
 
@@ -35,7 +35,7 @@ fn reachable() -> BTreeSet<u8> {
     while let Some(state) = open.pop() {
         for event in ArmingEvent::ALL {
             for guard in objections() {
-                if let Step::To(next) = step(state, event, guard)
+                if let Outcome::To(next) = step(state, event, guard)
                     && seen.insert(next as u8)
                 {
                     open.push(next);
@@ -54,12 +54,12 @@ fn the_whole_table_is_visited() {
         for event in ArmingEvent::ALL {
             for guard in objections() {
                 match step(state, event, guard) {
-                    Step::To(_) => taken += 1,
-                    Step::Refused(reasons) => {
+                    Outcome::To(_) => taken += 1,
+                    Outcome::Refused(reasons) => {
                         refused += 1;
                         assert!(!reasons.is_empty() && event.is_command(), "{state:?} {event:?}");
                     }
-                    Step::Ignored => ignored += 1,
+                    Outcome::Ignored => ignored += 1,
                 }
             }
         }
@@ -97,7 +97,7 @@ fn stop_and_trip_give_minimum_from_every_state() {
     for state in STATES {
         for guard in objections() {
             for event in [ArmingEvent::Stop, ArmingEvent::Trip] {
-                let Step::To(next) = step(state, event, guard) else { panic!("{event:?} in {state:?} was not taken") };
+                let Outcome::To(next) = step(state, event, guard) else { panic!("{event:?} in {state:?} was not taken") };
                 assert_eq!(pulse_for(next, PulseWidth::MAX), PulseWidth::MIN);
                 assert_eq!(Frame { throttle: Throttle::of(pulse_for(next, PulseWidth::MAX)), telemetry: false }, Frame::STOP);
                 assert!(matches!(next, State::Faulted | State::ProgrammingEscape));
@@ -113,17 +113,17 @@ fn live_states_are_entered_by_their_own_command_only() {
         for event in ArmingEvent::ALL {
             for guard in objections() {
                 match step(state, event, guard) {
-                    Step::To(State::Running) => {
+                    Outcome::To(State::Running) => {
                         assert!(matches!(state, State::Armed | State::Running) && event == ArmingEvent::Run);
                         assert_eq!(guard.0 & RUN_UNLESS, 0);
                     }
-                    Step::To(State::CalibrateHoldMax) => {
+                    Outcome::To(State::CalibrateHoldMax) => {
                         assert!(state == State::Disarmed && event == ArmingEvent::Calibrate);
                         let never =
                             Refusals::ESC_POWERED | Refusals::NOT_CONFIRMED | Refusals::FAULT_LATCHED | Refusals::NO_RANGE;
                         assert_eq!(guard.0 & never, 0);
                     }
-                    Step::To(State::Armed) => assert!(
+                    Outcome::To(State::Armed) => assert!(
                         matches!(event, ArmingEvent::Ready | ArmingEvent::Finished),
                         "{state:?} {event:?} armed without the ESC's own answer"
                     ),
@@ -140,7 +140,7 @@ fn faults_latch() {
     for event in ArmingEvent::ALL {
         for guard in objections() {
             for state in [State::Faulted, State::ProgrammingEscape] {
-                if let Step::To(next) = step(state, event, guard)
+                if let Outcome::To(next) = step(state, event, guard)
                     && next != state
                 {
                     assert_eq!((event, next), (ArmingEvent::Clear, State::Disarmed));
@@ -153,10 +153,10 @@ fn faults_latch() {
 #[test]
 fn a_refusal_lists_every_reason() {
     let all = Refusals(u16::MAX);
-    assert_eq!(step(State::Disarmed, ArmingEvent::Calibrate, all), Step::Refused(Refusals(CALIBRATE_UNLESS)));
+    assert_eq!(step(State::Disarmed, ArmingEvent::Calibrate, all), Outcome::Refused(Refusals(CALIBRATE_UNLESS)));
     assert_eq!(
         step(State::Running, ArmingEvent::Arm, Refusals(Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW)),
-        Step::Refused(Refusals(Refusals::WRONG_STATE | Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW))
+        Outcome::Refused(Refusals(Refusals::WRONG_STATE | Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW))
     );
 }
 
@@ -165,7 +165,7 @@ fn the_two_start_procedures() {
     use ArmingEvent::{Arm, Calibrate, Cells, Double, Long, Ready, Run};
     let walk = |events: &[ArmingEvent]| {
         events.iter().fold(State::Disarmed, |state, event| match step(state, *event, Refusals::default()) {
-            Step::To(next) => next,
+            Outcome::To(next) => next,
             _ => state,
         })
     };
@@ -178,7 +178,7 @@ fn the_two_start_procedures() {
 #[test]
 fn every_waiting_state_has_a_time_out_that_is_taken() {
     for state in STATES {
-        let taken = matches!(step(state, ArmingEvent::TimeOut, Refusals::default()), Step::To(_));
+        let taken = matches!(step(state, ArmingEvent::TimeOut, Refusals::default()), Outcome::To(_));
         assert_eq!(time_out(state, &ArmingTimes::default()).is_some(), taken, "{state:?}");
         assert!(!message(state).is_empty());
     }

@@ -31,16 +31,21 @@ fn the_minimum_is_set_before_anything_else() {
 
 #[test]
 fn a_channel_that_cannot_is_refused_and_never_touched() {
-    let refused = |steps: u16, rate_hz: u32| {
+    let coarse = |steps: u16| {
         let mut channel = Mock::new(&[Transaction::max_duty_cycle(steps)]);
-        let error = PulseOutput::new(channel.clone(), rate_hz).unwrap_err();
+        let error = PulseOutput::new(channel.clone(), 50).unwrap_err();
         channel.done();
         error
     };
-    assert_eq!(refused(19_999, 50), OutputError::Timer(TimerError::TooCoarse { counter_hz: 999_950 }));
-    assert_eq!(refused(255, 50), OutputError::Timer(TimerError::TooCoarse { counter_hz: 12_750 }));
-    assert_eq!(refused(BOARD, 0), OutputError::Timer(TimerError::NoExactPeriod { clock_hz: 0 }));
-    assert_eq!(refused(BOARD, 251), OutputError::Timer(TimerError::NoExactPeriod { clock_hz: 15_060_000 }));
+    assert_eq!(coarse(19_999), OutputError::Timer(TimerError::TooCoarse { counter_hz: 999_950 }));
+    assert_eq!(coarse(255), OutputError::Timer(TimerError::TooCoarse { counter_hz: 12_750 }));
+    for hz in [0, 251, u32::MAX] {
+        let mut channel = Mock::new(&[]);
+        let error = PulseOutput::new(channel.clone(), hz).unwrap_err();
+        channel.done();
+        assert_eq!(error, OutputError::Rate { hz });
+        assert_eq!(error.to_string(), format!("the channel repeats {hz} times a second: an ESC takes 1 to 250"));
+    }
 }
 
 #[test]

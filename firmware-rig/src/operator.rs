@@ -7,7 +7,7 @@
 
 use crate::rig::Rig;
 use crate::rig_config::{OutOfRange, RigConfig};
-use esc_pwm::{ArmingEvent, Chirp, Schedule, Staircase, Step};
+use esc_pwm::{ArmingEvent, Chirp, Outcome, Schedule, Staircase};
 use frame::message::{Command, Event, Setting};
 use frame::rig::{AdcCode, AdcVerdict, Refusals, RigState};
 use frame::schedule::{Segment, Shape};
@@ -95,9 +95,9 @@ impl Rig {
     pub(crate) fn ask(&mut self, now: Ticks, event: ArmingEvent, more: Refusals) -> Result<(), Refusals> {
         let objections = Refusals(self.objections(now).0 | more.0);
         match self.apply(now, event, objections) {
-            Step::To(_) => Ok(()),
-            Step::Refused(reasons) => Err(reasons),
-            Step::Ignored => Err(Refusals(Refusals::WRONG_STATE)),
+            Outcome::To(_) => Ok(()),
+            Outcome::Refused(reasons) => Err(reasons),
+            Outcome::Ignored => Err(Refusals(Refusals::WRONG_STATE)),
         }
     }
 

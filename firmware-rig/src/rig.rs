@@ -18,7 +18,7 @@ use crate::rig_config::{Answers, RigConfig};
 use crate::sampling::AdcBlock;
 use crate::stop::StopLoop;
 use crate::transfer::Incoming;
-use esc_pwm::{ArmingEvent, Objections, Protection, Readings, Step, Track, step, time_out};
+use esc_pwm::{ArmingEvent, Objections, Outcome, Protection, Readings, Track, step, time_out};
 use frame::calibration::Calibration;
 use frame::message::{BoardId, Command, Event, Hello, Trial};
 use frame::rig::{ADC_CHANNELS, AdcCode, AdcVerdict, CAPTURE_CHANNELS, Fault, FaultSet, Refusals, RigSample, RigState};
@@ -446,10 +446,10 @@ impl Rig {
     }
 
     /// Puts `event` to the arming machine and does what follows from it.
-    pub(crate) fn apply(&mut self, now: Ticks, event: ArmingEvent, objections: Objections) -> Step {
+    pub(crate) fn apply(&mut self, now: Ticks, event: ArmingEvent, objections: Objections) -> Outcome {
         let from = self.state;
         let answer = step(from, event, objections);
-        if let Step::To(to) = answer {
+        if let Outcome::To(to) = answer {
             if to == RigState::Faulted
                 && let Some(fault) = event.fault()
             {

@@ -37,3 +37,7 @@ pub use imu_command::{
 pub use message::{Command, Event, Hello, Message};
 pub use rig::{AdcCode, AdcVerdict, CaptureCode, CaptureVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 pub use units::*;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

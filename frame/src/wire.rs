@@ -38,6 +38,16 @@ pub enum EncodeError {
     TooLong,
 }
 
+impl core::fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::TooLong => f.write_str("the message is longer than a frame"),
+        }
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
 /// Numbers and stuffs outgoing messages.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Encoder {
