@@ -198,7 +198,8 @@ fn simulink_and_the_table_read_back() {
     let (signal, thrust) = (field("signal"), field("thrust_n"));
     assert_eq!((signal.len(), thrust.len(), field("torque_nm").len()), (101, 101, 101));
     compare(&text, 0.01, |u| thrust[(u * 100.0).round() as usize]);
-    assert!(after(&text, "powerplant.tau_s =") > 0.0);
+    // identify holds no lag, and says so
+    assert!(after(&text, "powerplant.tau_s =") == 0.0 && text.contains("the model holds no lag"), "{text}");
     let table = exported("csv", &[]);
     let rows: Vec<Vec<f64>> = table
         .lines()
@@ -207,6 +208,48 @@ fn simulink_and_the_table_read_back() {
         .collect();
     assert!(table.contains("\npulse_us,signal,rpm,thrust_n,torque_nm,current_a,voltage_v\n") && rows.len() == 101);
     compare(&table, 0.01, |u| rows[(u * 100.0).round() as usize][3]);
+    // the other columns, of both files, are the model's polynomials of the speed, and the supply its constant
+    let model = Model::read(&bench().join("model.toml"));
+    let [torque, current, supply] = ["torque_nm", "current_a", "voltage_v"].map(|channel| model.polynomial(channel));
+    for k in 20..=100 {
+        let krpm = model.rpm(f64::from(k) / 100.0) / 1000.0;
+        let row = &rows[k as usize];
+        let near = |found: f64, expected: f64, of: f64, what: &str| {
+            assert!((found - expected).abs() <= 0.01 * of.abs(), "{what} at row {k}: {found}, the model's {expected}");
+        };
+        near(row[2] / 1000.0, krpm, krpm, "krpm");
+        near(row[4], value(&torque, krpm), value(&torque, krpm), "torque");
+        near(row[5], value(&current, krpm), value(&current, krpm), "current");
+        near(row[6], supply[0], supply[0], "voltage");
+        for (column, name) in ["pulse_us", "signal", "rpm", "thrust_n", "torque_nm", "current_a", "voltage_v"].iter().enumerate()
+        {
+            near(field(name)[k as usize], row[column], row[column], name);
+        }
+    }
+}
+
+/// A lag that the model holds is told as the model tells it; of one that holds none every file says so, and gives no number.
+#[test]
+fn a_lag_is_told_where_there_is_one() {
+    let with_lag = std::fs::read_to_string(bench().join("model.toml")).expect("a model")
+        + "\n[[effect]]\nid = \"spinup_lag\"\nchannels = [\"rpm_beam\", \"rpm_opto\", \"rpm_hall\", \"rpm_encoder\"]\nscope = \"rig\"\nshape = [0.08, 0.08, 0.0]\n[effect.amplitude]\n";
+    std::fs::write(bench().join("lag.toml"), with_lag).expect("a model");
+    let of = |model: &str, peer: &str| call(&bench(), &["export", model, "--to", peer]).succeeded().out;
+    for peer in PEERS {
+        let text = of("model.toml", peer);
+        assert!(text.contains("the model holds no lag") && !text.contains("0.0010 s"), "{peer}: {text}");
+        assert!(!of("lag.toml", peer).contains("no lag"), "{peer}");
+    }
+    assert!(!of("model.toml", "px4").contains("timeConstantUp"));
+    for (peer, mark) in [
+        ("px4", "timeConstantUp"),
+        ("simulink", "powerplant.tau_s ="),
+        ("csv", "time constant of the rotor"),
+        ("ardupilot", "time constant of the rotor"),
+    ] {
+        let tau = after(&of("lag.toml", peer), mark);
+        assert!((tau - 0.08).abs() < 0.004, "{peer}: {tau} s");
+    }
 }
 
 /// Every file links to its peer's definition, twice gives the same bytes, and a file is written whole.

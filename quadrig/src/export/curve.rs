@@ -34,8 +34,8 @@ pub(super) struct Point {
 pub(super) struct Powerplant {
     /// From 1000 to 2000 us.
     pub(super) points: Vec<Point>,
-    /// Time in which the rotor comes to 63 % of a small step about 1500 us, s.
-    pub(super) lag_s: f64,
+    /// Time in which the rotor comes to 63 % of a small step about 1500 us, s; nothing where the model holds no lag.
+    pub(super) lag_s: Option<f64>,
     /// The log that the model is from.
     pub(super) source: String,
     /// Motor and propeller, as the log's head named them.
@@ -139,9 +139,18 @@ impl Powerplant {
         format!("{} with {}, {supply}; model of {}", named(0, "motor not named"), named(1, "propeller not named"), self.source)
     }
 
+    /// What stands in the place of a lag that nobody knows.
+    pub(super) fn no_lag(&self) -> String {
+        "time constant of the rotor: the model holds no lag (identify keeps none, close-loop names it where the run shows it); the speed is taken to be there at once"
+            .to_owned()
+    }
+
     /// What most peers have no key for.
     pub(super) fn beside(&self) -> Vec<String> {
-        let lag = format!("time constant of the rotor {:.4} s", self.lag_s);
+        let lag = match self.lag_s {
+            Some(lag_s) => format!("time constant of the rotor {lag_s:.4} s"),
+            None => self.no_lag(),
+        };
         let lead = self.lead_ohm.map(|r| format!("resistance of the supply's lead {r:.4} ohm"));
         std::iter::once(lag).chain(lead).collect()
     }

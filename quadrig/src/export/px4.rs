@@ -30,8 +30,8 @@ pub(super) fn text(plant: &Powerplant, rotors: u32) -> String {
     ));
     let moment = arm.map_or_else(|| "not known".to_owned(), |arm| format!("{arm:.6}"));
     head.push(format!(
-        "Gazebo MulticopterMotorModel: motorConstant {k_thrust:.6e}, momentConstant {moment}, maxRotVelocity {top_rad_s:.1}, timeConstantUp {:.4}",
-        plant.lag_s
+        "Gazebo MulticopterMotorModel: motorConstant {k_thrust:.6e}, momentConstant {moment}, maxRotVelocity {top_rad_s:.1}{}",
+        plant.lag_s.map_or_else(String::new, |lag_s| format!(", timeConstantUp {lag_s:.4}"))
     ));
     let no_moment = arm.is_none().then(|| "CA_ROTORn_KM: the model predicts no torque".to_owned());
     let sign = "CA_ROTORn_KM is positive for rotors that turn counter-clockwise; turn the sign for the others".to_owned();

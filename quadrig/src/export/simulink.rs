@@ -39,11 +39,15 @@ pub(super) fn text(plant: &Powerplant) -> String {
         .map(|(name, ..)| format!("{name}: the model does not predict it"))
         .collect();
     head.extend(untold(absent));
+    if plant.lag_s.is_none() {
+        head.push(plant.no_lag() + ": tau_s = 0, a first-order lag that passes its input");
+    }
     let mut out = comments("%", &head) + "powerplant = struct();\n";
     for (name, of, digits) in fields {
         out += &format!("powerplant.{name} = {};\n", column(of, digits));
     }
-    out += &format!("powerplant.tau_s = {:.5};\npowerplant.k_thrust_ns2 = {k_thrust:.6e};\n", plant.lag_s);
+    let tau = plant.lag_s.map_or_else(|| "0".to_owned(), |lag_s| format!("{lag_s:.5}"));
+    out += &format!("powerplant.tau_s = {tau};\npowerplant.k_thrust_ns2 = {k_thrust:.6e};\n");
     out += &format!("powerplant.torque_per_thrust_m = {};\n", arm.map_or_else(|| "[]".to_owned(), |arm| format!("{arm:.6}")));
     out + &format!("powerplant.lead_ohm = {};\n", plant.lead_ohm.map_or_else(|| "[]".to_owned(), |r| format!("{r:.5}")))
 }

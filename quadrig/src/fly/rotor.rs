@@ -54,6 +54,8 @@ pub(crate) struct ModelRotor {
 
 /// Steps of the settled states, us.
 const LEVEL_US: f64 = 5.0;
+/// First step at which a rotor is looked at, s, with what arithmetic adds.
+const FIRST_S: f64 = 1.5e-3;
 /// Where the lag of a rotor that follows is taken, us.
 const MIDDLE_US: f64 = 1500.0;
 /// Rows and time that each level is held.
@@ -159,9 +161,10 @@ impl ModelRotor {
         Following { rpm: 0.0, rotor: self.clone(), lag_s: lag_ms as f64 * 1.0e-3, density: 1.0 }
     }
 
-    /// Time in which a rotor comes to 63 % of a small step about the middle of the range, s.
-    pub(crate) fn lag_s(&self) -> f64 {
-        self.following().lag_s
+    /// Time in which a rotor comes to 63 % of a small step about the middle of the range, s; nothing where the model holds no lag, so that it is
+    /// there at the first step of a millisecond.
+    pub(crate) fn lag_s(&self) -> Option<f64> {
+        Some(self.following().lag_s).filter(|lag_s| *lag_s > FIRST_S)
     }
 
     /// The settled state of a speed.
