@@ -7,6 +7,9 @@
 //! Reference: specification `formats.md`, "Rig log".
 
 mod clock;
+mod gaps;
+
+pub use gaps::Gaps;
 
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;

@@ -33,7 +33,8 @@ pub(crate) struct Args {
     /// Another run of the same rig, for the error before and after.
     #[arg(long)]
     validate: Vec<PathBuf>,
-    /// Folder for model.toml (with model.discrepancy.toml beside it), verdict.json and report.html (attitude logs: pred.csv as well; flights: channels.csv).
+    /// Folder for model.toml (with model.discrepancy.toml beside it), verdict.json and report.html (attitude logs: pred.csv as well; flights: channels.csv). Without it
+    /// nothing is written: the verdict is shown and gone.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// The verdict on stdout and nothing else.
@@ -91,7 +92,15 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     } else if !quiet {
         print!("{}", terminal(&closed.verdict, Vocabulary::RIG, model.is_some()));
     }
+    say_unwritten(args, quiet);
     Ok(())
+}
+
+/// Says that what was shown is not kept.
+pub(super) fn say_unwritten(args: &Args, quiet: bool) {
+    if args.output.is_none() && !args.json && !quiet {
+        eprintln!("nothing was written; with -o FOLDER model, verdict and page are kept");
+    }
 }
 
 /// Names that the results of any kind of log may have.

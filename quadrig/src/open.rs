@@ -9,7 +9,7 @@
 use crate::Failure;
 use crate::trouble::unread;
 use ident::import::{Mapping, Options, Report, import_as};
-use ident::log::Log;
+use ident::log::{Gaps, Log};
 use ident::model::{Model, ModelError, beside};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -91,6 +91,9 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
         }
         let mut log = Log::read(path)?;
         options.name(&mut log);
+        if let Some(gaps) = Gaps::of(&log).filter(|_| !quiet) {
+            eprintln!("{}: t_s: {gaps}", path.display());
+        }
         return Ok(log);
     }
     let (log, report) = import_as(path, options)?;

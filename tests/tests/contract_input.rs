@@ -169,6 +169,39 @@ fn the_importer_refuses_what_no_rule_repairs() {
     }
 }
 
+/// Rows that are missing in blocks of seconds are told with the likely reason, on the terminal and on the page; where the head promises a rate they
+/// are refused.
+#[test]
+fn blocks_of_missing_rows_are_told_or_refused() {
+    let bench = Bench::new();
+    let good = good_log();
+    let (head, rows): (Vec<&str>, Vec<&str>) = (good.lines().take(HEAD).collect(), good.lines().skip(HEAD).collect());
+    // five seconds of every twenty
+    let kept: Vec<&str> = rows.iter().enumerate().filter(|(i, _)| i % 200 < 150).map(|(_, row)| *row).collect();
+    let text = [head.clone(), kept].concat().join("\n") + "\n";
+    fs::write(bench.path("holes.csv"), text.replace("# sample_hz", "# rate_was")).unwrap();
+    for words in [
+        vec!["import", "holes.csv", "-o", "out.csv"],
+        vec!["identify", "holes.csv", "-o", "out.toml", "--report", "out.html"],
+        vec!["close-loop", "holes.csv", "-o", "closed"],
+    ] {
+        let said = bench.call(&words).succeeded();
+        let all = said.out + &said.err;
+        assert!(all.contains("of the time has no row") && all.contains("the motor turned"), "{words:?}: {all}");
+    }
+    for page in ["out.html", "closed/report.html"] {
+        assert!(fs::read_to_string(bench.path(page)).unwrap().contains("of the time has no row"), "{page}");
+    }
+    fs::write(bench.path("promised.csv"), text).unwrap();
+    for words in [vec!["identify", "promised.csv", "-o", "p.toml"], vec!["close-loop", "promised.csv", "-o", "p"]] {
+        bench.call(&words).refused(&["promised.csv", "rows are missing that sample_hz = 10 promises", "rows were dropped"]);
+    }
+    // what is shown and not kept is said to be
+    let said = bench.call(&["close-loop", "holes.csv"]).succeeded();
+    assert!(said.err.contains("nothing was written; with -o FOLDER"), "{}", said.err);
+    assert!(bench.call(&["close-loop", "--help"]).succeeded().out.contains("Without it nothing is written"));
+}
+
 #[test]
 fn the_importer_refuses_a_unit_that_it_does_not_know() {
     let bench = Bench::new();

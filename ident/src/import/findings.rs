@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, `quadrig import`; `identification.md`, item 6.
 
 use super::Report;
-use crate::log::Log;
+use crate::log::{Gaps, Log};
 use crate::noise::{median, quantum};
 
 /// A gap is longer than so many usual steps.
@@ -48,6 +48,9 @@ fn time_steps(log: &Log, report: &mut Report) {
     report.add("t_s", format!("time steps more than a fifth off the usual {usual:.4} s: kept as they are"), uneven);
     let gaps = steps.iter().filter(|s| **s > GAP * usual).count();
     report.add("t_s", format!("gaps of more than {GAP:.0} steps, the longest {longest:.3} s: kept, nothing is filled in"), gaps);
+    if let Some(gaps) = Gaps::of(log) {
+        report.add("t_s", gaps.to_string(), 1);
+    }
 }
 
 /// Isolated excursions of one or two samples.

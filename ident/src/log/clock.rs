@@ -2,11 +2,12 @@
 //!
 //! What it is: rows that are shuffled, rows that were dropped, seconds that are milliseconds, judged by the log's own time and by the
 //! `sample_hz` of its head.
-//! What can go wrong: uneven sampling is allowed: a log without `sample_hz` is judged by its order and its length alone, and one hole that the
-//! recorder has told (`no sample for ...`, a reset) counts as told.
+//! What can go wrong: uneven sampling is allowed: a log without `sample_hz` is judged by its order and its length alone ([`super::Gaps`] tells what it lacks),
+//! a hole that the recorder has told (`no sample for ...`, a reset) counts as told, and one on both sides of which the motor stands as a pause.
 //! Units: s.
 //! Reference: specification `formats.md`, "Rig log".
 
+use super::gaps::standing;
 use super::{Lines, Log, Place, ReadError, trimmed};
 use std::io::BufRead;
 
@@ -14,7 +15,7 @@ use std::io::BufRead;
 const SHUFFLED: f64 = 0.2;
 /// Share of missing rows, and of holes among the steps, from which on rows were dropped.
 const DROPPED: [f64; 2] = [0.1, 0.08];
-/// Share of missing rows in one hole that nobody told of.
+/// Share of missing rows in holes that nobody told of, under load: a recorder that is stopped while the motor stands leaves none.
 const UNTOLD: f64 = 0.19;
 /// Rows below which no rate is judged.
 const ENOUGH: usize = 20;
@@ -81,7 +82,7 @@ pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
                     return refuse(found, format!("seconds; these look like {unit}: divide t_s by {times}"));
                 }
             }
-            if let Some(found) = dropped(log, &steps, hz) {
+            if let Some(found) = dropped(log, hz) {
                 let expected =
                     format!("a row each {} s; rows were dropped (a bad line, a filter, a thinned export)", number(1.0 / hz));
                 return refuse(found, format!("{expected}: use the whole log, or take sample_hz out of its head"));
@@ -104,17 +105,21 @@ fn no_seconds(log: &Log, middle: f64) -> bool {
 }
 
 /// What is missing of the rows that the rate promises, if it is much.
-fn dropped(log: &Log, steps: &[f64], hz: f64) -> Option<String> {
+fn dropped(log: &Log, hz: f64) -> Option<String> {
     if log.len() < ENOUGH {
         return None;
     }
-    let holes: Vec<f64> = steps.iter().map(|step| (step * hz).round() - 1.0).filter(|missing| *missing >= 1.0).collect();
+    let steps: Vec<f64> = log.t.windows(2).map(|w| w[1] - w[0]).collect();
+    let missed = |step: &f64| ((step * hz).round() - 1.0).max(0.0);
+    let holes: Vec<f64> = steps.iter().map(missed).filter(|missing| *missing >= 1.0).collect();
     let missing: f64 = holes.iter().sum();
     let promised = missing + log.len() as f64;
     let scattered = missing >= DROPPED[0] * promised && holes.len() as f64 >= DROPPED[1] * steps.len() as f64;
     let told = log.events.iter().any(|event| event.contains("no sample for") || event.contains("was reset"));
-    let largest = holes.iter().copied().fold(0.0, f64::max);
-    let untold = largest >= UNTOLD * promised && !told;
+    let stands = standing(log);
+    let paused = |i: usize| stands.as_ref().is_some_and(|stands| stands[i] && stands[i + 1]);
+    let under_load: f64 = steps.iter().enumerate().filter(|(i, _)| !paused(*i)).map(|(_, step)| missed(step)).sum();
+    let untold = under_load >= UNTOLD * promised && !told;
     (scattered || untold).then(|| {
         let holes = if holes.len() == 1 { "one hole".to_owned() } else { format!("{} holes", holes.len()) };
         format!("{missing} of the {promised} rows are missing that sample_hz = {} promises, in {holes}", number(hz))
@@ -148,6 +153,19 @@ mod tests {
         assert!(block.contains("60 of the 300 rows are missing") && block.contains("one hole"), "{block}");
         let thinned = log(RATE, 1.0, |n| n % 2 == 0).expect_err("every other row is gone");
         assert!(thinned.contains("149 of the 299 rows"), "{thinned}");
+        // blocks of seconds, none of them large
+        let blocks = log(RATE, 1.0, |n| n % 100 < 75 || n > 290).expect_err("a fifth is gone in blocks");
+        assert!(blocks.contains("50 of the 300 rows") || blocks.contains("rows are missing"), "{blocks}");
+        // a recorder that was stopped while the motor stood
+        let rows: String = (0..300)
+            .filter(|n| !(100..180).contains(n))
+            .map(|n| {
+                let rpm = if (80..=200).contains(&n) { 0 } else { 4000 };
+                format!("{},1000,{rpm}\n", trimmed(0.1 * f64::from(n), 3))
+            })
+            .collect();
+        let text = format!("# quadrig-log 1\n{RATE}t_s,pulse_us,rpm\n{rows}");
+        Log::parse("run.csv", text.as_bytes()).expect("a pause");
         // what the line loses now and then, a hole that the recorder has told, and a log that states no rate
         log(RATE, 1.0, |n| n % 50 != 3).expect("a few rows");
         log(&format!("{RATE}# event = \"16.000 s: no sample for 6.1 s before this one\"\n"), 1.0, |n| !(100..160).contains(&n))

@@ -15,7 +15,7 @@ use crate::board;
 use crate::context::unit_of;
 use crate::fit::{Fitted, Law};
 use crate::identify::Identified;
-use crate::log::{Log, SPEED};
+use crate::log::{Gaps, Log, SPEED};
 use crate::noise::median;
 use crate::plateau::Plateau;
 use crate::shift::{Settings, filters};
@@ -29,6 +29,9 @@ pub(super) const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];
 pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) -> Sheet {
     let mut sheet = Sheet::new(&format!("Identification of {}", log.name));
     sheet.say(&lead(log, found));
+    if let Some(gaps) = Gaps::of(log) {
+        sheet.warn(&format!("{gaps}."));
+    }
     constants(&mut sheet, found);
     sheet.section("The run, with its plateaus");
     let time: Vec<Figure> =

@@ -5,7 +5,7 @@
 //! Units: as the channels state.
 //! Reference: specification `flight.md`, "The loop on flights".
 
-use super::{Args, is_result};
+use super::{Args, is_result, say_unwritten};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::progress::Bar;
@@ -52,6 +52,7 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     } else if !quiet {
         print!("{}", terminal(&closed.verdict, VOCABULARY, model.is_some()));
     }
+    say_unwritten(args, quiet);
     Ok(())
 }
 

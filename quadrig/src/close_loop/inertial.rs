@@ -6,7 +6,7 @@
 //! Units: rad/s, m/s^2, uT.
 //! Reference: specification `formats.md`, "Attitude log" and "Verdict".
 
-use super::{Args, is_result};
+use super::{Args, is_result, say_unwritten};
 use crate::Failure;
 use crate::ahrs::imu_log::{ImuLog, Row};
 use crate::folder::Folder;
@@ -63,6 +63,7 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     } else if !quiet {
         print!("{}", terminal(&closed.verdict, VOCABULARY, false));
     }
+    say_unwritten(args, quiet);
     Ok(())
 }
 

@@ -5,7 +5,7 @@
 //! Units: as the channels state.
 //! Reference: specification `formats.md`, "Command line".
 
-use super::{Args, flight, inertial, is_result, model_files, results};
+use super::{Args, flight, inertial, is_result, model_files, results, say_unwritten};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::open::open;
@@ -46,6 +46,7 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     } else if !quiet {
         print!("{}", terminal(&outcome.verdict, Vocabulary::RIG, false));
     }
+    say_unwritten(args, quiet);
     Ok(())
 }
 

@@ -45,6 +45,9 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     let mut sheet = Sheet::told(&format!("{of_what}: what the model lacks"), &sentence(v, page.words, page.news));
     sheet.soft(&page.origin.line());
     sheet.html_part(&state::bars(&v.channels, &v.unexplained, pair(v)));
+    for lack in &page.origin.lacks {
+        sheet.warn(&format!("{lack}."));
+    }
     for l in &v.left_out {
         sheet.warn(&format!("Left out: {l}."));
     }

@@ -6,7 +6,7 @@
 //! Reference: specification `report.md`.
 
 use super::vocabulary::Vocabulary;
-use crate::log::{Log, digest_of};
+use crate::log::{Gaps, Log, digest_of};
 use crate::model::FittedTo;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
@@ -71,6 +71,8 @@ pub struct Origin {
     pub hidden: Option<Hidden>,
     /// Whether it is of a rig, which has a motor, a propeller and a supply.
     pub of_a_rig: bool,
+    /// What the logs lack in time, a sentence each.
+    pub lacks: Vec<String>,
     /// The other logs, where the page is of several runs.
     pub others: Vec<FittedTo>,
 }
@@ -92,7 +94,8 @@ impl Origin {
             .map(|(k, v)| (k.clone(), text(v)))
             .collect();
         let seconds = log.t.first().zip(log.t.last()).map(|(a, b)| b - a).filter(|_| !log.time_is_row());
-        Self { log: FittedTo::of(log), seconds, states, of_a_rig: true, ..Self::default() }
+        let lacks = Gaps::of(log).map(|gaps| format!("{}: {gaps}", log.name)).into_iter().collect();
+        Self { log: FittedTo::of(log), seconds, states, of_a_rig: true, lacks, ..Self::default() }
     }
 
     /// Of several logs of one rig: what they all state.
@@ -105,6 +108,7 @@ impl Origin {
             out.states.retain(|key, value| other.states.get(key) == Some(value));
             out.seconds = out.seconds.zip(other.seconds).map(|(a, b)| a + b);
             out.others.push(other.log.clone());
+            out.lacks.extend(other.lacks.iter().cloned());
         }
         out
     }

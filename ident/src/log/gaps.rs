@@ -1,0 +1,166 @@
+//! Time that a log lacks: holes between its rows, with the likely reason.
+//!
+//! What it is: how much of the run's time has no row, where the longest hole is, and whether the motor stood still on both sides of it. A recorder
+//! that is stopped between two blocks of a run leaves such holes, and that is no fault; rows that are lost while the motor turns are one.
+//! What can go wrong: uneven sampling is allowed, so that of a log without `sample_hz` nothing is refused: it is told. A clock that is coarser than
+//! the rows looks like rows that are missing.
+//! Units: s.
+//! Reference: specification `formats.md`, "Rig log"; docs/book/reference/log.md.
+
+use super::{Log, SPEED, trimmed};
+use crate::noise::median;
+use std::fmt;
+
+/// Usual steps from which on a step is a hole in time, as everywhere in the program.
+const HOLE: f64 = 5.0;
+/// Share of the time, or of the rows, that is worth a line: half of the fifth from which on a run is no longer what it seems.
+const TOLD: f64 = 0.1;
+/// Share of steps that are whole multiples of the shortest, and by how much of it they may be off, of a clock that ticks evenly.
+const EVEN: [f64; 2] = [0.95, 0.15];
+/// Steps below which nothing is judged.
+const ENOUGH: usize = 20;
+/// Share of the highest load at which a motor stands.
+const STANDS: f64 = 0.02;
+
+/// What is missing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gaps {
+    /// Time without a row, s.
+    pub missing_s: f64,
+    /// Length of the run, s.
+    pub whole_s: f64,
+    /// Number of holes.
+    pub holes: usize,
+    /// Longest hole: its beginning and its length, s.
+    pub longest: [f64; 2],
+    /// Of how many holes the motor stood still on both sides; nothing where the log does not tell.
+    pub standing: Option<usize>,
+    /// Whether they are single rows of an even clock.
+    pub single: bool,
+}
+
+impl Gaps {
+    /// Of a log; nothing where it is not worth a line.
+    #[must_use]
+    pub fn of(log: &Log) -> Option<Self> {
+        if log.time_is_row() || log.len() <= ENOUGH {
+            return None;
+        }
+        let steps: Vec<f64> = log.t.windows(2).map(|w| w[1] - w[0]).collect();
+        let usual = median(&mut steps.clone());
+        let in_blocks = Self::among(log, &steps, usual, HOLE);
+        if in_blocks.missing_s >= TOLD * in_blocks.whole_s {
+            return Some(in_blocks);
+        }
+        let mut sorted = steps.clone();
+        sorted.sort_by(f64::total_cmp);
+        let tick = sorted[sorted.len() / 4];
+        let off = |step: f64| (step / tick - (step / tick).round()).abs();
+        let even = steps.iter().filter(|s| off(**s) <= EVEN[1]).count() as f64 >= EVEN[0] * steps.len() as f64;
+        let single = Self { single: true, ..Self::among(log, &steps, tick, 1.5) };
+        (even && single.missing_s >= TOLD * single.whole_s).then_some(single)
+    }
+
+    /// The holes that are longer than so many steps.
+    fn among(log: &Log, steps: &[f64], step: f64, longer: f64) -> Self {
+        let stands = standing(log);
+        let mut out = Self {
+            missing_s: 0.0,
+            whole_s: steps.iter().sum(),
+            holes: 0,
+            longest: [0.0; 2],
+            standing: stands.as_ref().map(|_| 0),
+            single: false,
+        };
+        for (i, hole) in steps.iter().enumerate().filter(|(_, s)| **s > longer * step) {
+            out.missing_s += hole - step;
+            out.holes += 1;
+            if *hole > out.longest[1] {
+                out.longest = [log.t[i], *hole];
+            }
+            if let Some(stands) = &stands {
+                out.standing = out.standing.map(|n| n + usize::from(stands[i] && stands[i + 1]));
+            }
+        }
+        out
+    }
+}
+
+/// Rows on which the motor stands, by the first load that the log has.
+pub(super) fn standing(log: &Log) -> Option<Vec<bool>> {
+    let of = |name: &str| log.column(name);
+    let load = SPEED.into_iter().chain(["thrust_n", "current_a"]).find_map(of)?;
+    let top = load.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    (top > 0.0).then(|| load.iter().map(|v| *v <= STANDS * top).collect())
+}
+
+impl fmt::Display for Gaps {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { missing_s, whole_s, holes, longest: [at, longest], standing, single } = self;
+        let share = 100.0 * missing_s / whole_s;
+        let [missing, whole, longest, at] = [missing_s, whole_s, longest, at].map(|v| trimmed(*v, 2));
+        let plural = if *holes == 1 { "one hole".to_owned() } else { format!("{holes} holes") };
+        write!(
+            f,
+            "{share:.0} % of the time has no row ({missing} of {whole} s, in {plural}, the longest {longest} s from {at} s on): "
+        )?;
+        match standing {
+            _ if *single => {
+                write!(
+                    f,
+                    "single rows of an even clock are missing: dropped by a filter, a bad line or a thinned export, or the clock is coarser than the rows"
+                )
+            }
+            Some(n) if n == holes => {
+                write!(f, "the motor stood still on both sides, as where a recorder is stopped between blocks")
+            }
+            Some(n) => {
+                let of =
+                    if *n == 0 { "the motor turned".to_owned() } else { format!("in {} of them the motor turned", holes - n) };
+                write!(
+                    f,
+                    "{of}, so that rows were lost, dropped by a filter, or the recorder was stopped under load; what happened meanwhile is not known"
+                )
+            }
+            None => write!(f, "the recorder was stopped, or rows were dropped"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Column;
+
+    /// Two minutes at ten rows a second; the motor turns from 20 s to 100 s.
+    fn log(keep: impl Fn(usize) -> bool) -> Log {
+        let rows: Vec<usize> = (0..1200).filter(|n| keep(*n)).collect();
+        let rpm = rows.iter().map(|n| if (200..1000).contains(n) { 4000.0 } else { 0.0 }).collect();
+        let t = rows.iter().map(|n| 0.1 * *n as f64).collect();
+        Log { t, columns: vec![Column { name: "rpm".into(), values: rpm }], ..Log::default() }
+    }
+
+    #[test]
+    fn holes_of_seconds_are_told_with_their_reason() {
+        assert_eq!(Gaps::of(&log(|_| true)), None);
+        let running = Gaps::of(&log(|n| !(200..1000).contains(&n) || n % 250 >= 50)).expect("a fifth is gone").to_string();
+        assert!(
+            running.starts_with("13 % of the time has no row (15 of 119.9 s, in 3 holes") && running.contains("the motor turned"),
+            "{running}"
+        );
+        let paused = Gaps::of(&log(|n| !(20..180).contains(&n))).expect("a pause").to_string();
+        assert!(paused.contains("in one hole, the longest 16.1 s from 1.9 s on"), "{paused}");
+        assert!(paused.contains("as where a recorder is stopped between blocks"), "{paused}");
+        assert_eq!(Gaps::of(&log(|n| !(300..340).contains(&n))), None, "a few seconds of two minutes");
+    }
+
+    #[test]
+    fn single_rows_that_are_missing_are_told() {
+        let single = Gaps::of(&log(|n| n % 5 != 3)).expect("every fifth is gone");
+        assert!(single.single && single.to_string().starts_with("20 % of the time has no row"), "{single}");
+        // steps of any length are uneven sampling, not holes
+        let mut uneven = log(|_| true);
+        uneven.t.iter_mut().enumerate().for_each(|(i, t)| *t += 0.04 * (i as f64 * 2.4).sin());
+        assert_eq!(Gaps::of(&uneven), None);
+    }
+}
