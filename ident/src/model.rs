@@ -17,6 +17,7 @@ use crate::log::Log;
 use crate::steps::Steps;
 use toml::{Table, Value};
 
+pub(crate) mod digits;
 mod discrepancy;
 mod place;
 mod reach;
@@ -337,12 +338,12 @@ impl Model {
             root.insert(discrepancy::DIGEST.into(), digest.into());
         }
         root.insert("source".into(), self.source.clone().into());
-        root.insert("start_pulse_us".into(), self.start_pulse_us.into());
+        root.insert("start_pulse_us".into(), digits::plain(self.start_pulse_us).into());
         if !self.meta.is_empty() {
             root.insert("rig".into(), Value::Table(self.meta.clone()));
         }
         if let Some(air) = self.air {
-            root.insert("air_density_ratio".into(), air.into());
+            root.insert("air_density_ratio".into(), digits::plain(air).into());
         }
         let runs = run::tables(&self.runs, &self.own);
         if !runs.is_empty() {
@@ -361,8 +362,8 @@ impl Model {
             let has_pulse = p.coefficients.len() > 1;
             t.insert("relation".into(), relation_text(&p.channel, has_pulse).into());
             for (k, (c, e)) in p.coefficients.iter().zip(&p.errors).enumerate() {
-                t.insert(coefficient_key(&p.channel, k), (*c).into());
-                t.insert(format!("{}_se", coefficient_key(&p.channel, k)), (*e).into());
+                t.insert(coefficient_key(&p.channel, k), digits::of_value(*c, *e).into());
+                t.insert(format!("{}_se", coefficient_key(&p.channel, k)), digits::of_error(*e).into());
             }
             if let Some((_, left)) = self.leftovers.iter().find(|(channel, _)| whole && *channel == p.channel) {
                 t.extend(discrepancy::channel_keys(&p.channel, left));
@@ -383,6 +384,14 @@ impl Model {
 
 /// Where an effect's numbers are kept: `shape.<name_unit>`, `amplitude.<channel>.<name_unit>`.
 impl AddedEffect {
+    /// Standard error of one of its shapes or amplitudes, as its parameters have it; not a number where none of them is this one.
+    fn error_of(&self, value: f64) -> f64 {
+        let same = |e: &&Estimate| (e.value - value).abs() <= read::SAME_NUMBER * value.abs();
+        let known = self.estimates.iter().filter(same).map(|e| e.se).filter(|se| se.is_finite() && *se > 0.0);
+        // of two that are alike the one that keeps more digits
+        known.fold(f64::NAN, f64::min)
+    }
+
     fn to_table(&self, source: &str) -> Table {
         let mut t = Table::new();
         let p = &self.placed;
@@ -394,9 +403,10 @@ impl AddedEffect {
         t.insert("equation".into(), p.effect.about().equation.into());
         t.insert("scope".into(), p.effect.scope(&p.instance).word().into());
         t.insert("run".into(), source.into());
-        t.insert("shape".into(), Value::Array(p.shape.iter().map(|v| (*v).into()).collect()));
+        let written = |v: &f64| digits::of_value(*v, self.error_of(*v));
+        t.insert("shape".into(), Value::Array(p.shape.iter().map(|v| written(v).into()).collect()));
         if !self.shape_errors.is_empty() {
-            t.insert("shape_se".into(), self.shape_errors.clone().into());
+            t.insert("shape_se".into(), self.shape_errors.iter().map(|se| digits::of_error(*se)).collect::<Vec<_>>().into());
         }
         if !self.reach.is_empty() {
             t.insert("seen".into(), Value::Table(self.reach.iter().map(Reach::to_table).collect()));
@@ -404,15 +414,20 @@ impl AddedEffect {
         let mut amplitude = Table::new();
         let names = p.effect.amplitudes(&p.instance);
         for (channel, values) in &self.amplitudes {
-            let per: Table =
-                names.iter().zip(values).filter(|(_, v)| **v != 0.0).map(|(a, v)| (keyed(a.name, a.unit), (*v).into())).collect();
+            let per: Table = names
+                .iter()
+                .zip(values)
+                .filter(|(_, v)| **v != 0.0)
+                .map(|(a, v)| (keyed(a.name, a.unit), written(v).into()))
+                .collect();
             if !per.is_empty() {
                 amplitude.insert(channel.clone(), per.into());
             }
         }
         t.insert("amplitude".into(), amplitude.into());
         let of_channel = |(channel, mean): &(String, Vec<f64>)| {
-            let coefficients = mean.iter().enumerate().map(|(k, c)| (coefficient_key(channel, k), Value::from(*c))).collect();
+            let coefficients =
+                mean.iter().enumerate().map(|(k, c)| (coefficient_key(channel, k), digits::plain(*c).into())).collect();
             (channel.clone(), Value::Table(coefficients))
         };
         if !self.mean.is_empty() {
@@ -420,8 +435,8 @@ impl AddedEffect {
         }
         let mut parameters = Table::new();
         for e in &self.estimates {
-            parameters.insert(keyed(&e.name, &e.unit), e.value.into());
-            parameters.insert(format!("{}_se", keyed(&e.name, &e.unit)), e.se.into());
+            parameters.insert(keyed(&e.name, &e.unit), digits::of_value(e.value, e.se).into());
+            parameters.insert(format!("{}_se", keyed(&e.name, &e.unit)), digits::of_error(e.se).into());
         }
         t.insert("parameter".into(), parameters.into());
         t

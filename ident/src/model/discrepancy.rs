@@ -7,13 +7,15 @@
 //! Reference: specification `formats.md`, "Powerplant model".
 
 use super::read::{Refusal, course, leftover, no_channel, only, place_of, refusal, table_of, within};
-use super::{Model, ModelError, leftover_keys};
+use super::{Model, ModelError, digits, leftover_keys};
 use crate::course::Course;
 use crate::leftover::Leftover;
 use crate::log::digest_of;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
+/// Significant digits: a scatter is known to a few per cent at best, and errors are of the size of the noise.
+const DIGITS: usize = 6;
 /// First key of the format.
 const FORMAT: &str = "quadrig-discrepancy 1";
 /// Key of the model's file by which it knows the one beside it.
@@ -30,12 +32,14 @@ pub fn beside(model: &Path) -> PathBuf {
 /// The keys of a channel.
 pub(super) fn channel_keys(channel: &str, left: &Leftover) -> [(String, Value); 3] {
     let [scatter, at, error] = leftover_keys(channel);
-    let parts: Vec<Value> = left.scatter.iter().map(|part| Value::from(part.to_vec())).collect();
+    let kept = |v: f64| digits::significant(v, DIGITS);
+    let parts: Vec<Value> =
+        left.scatter.iter().map(|part| part.iter().map(|v| Value::from(kept(*v))).collect::<Vec<_>>().into()).collect();
     // what is nothing to the last digit is nothing
-    let whole = |v: f64| if v.abs() < f64::MIN_POSITIVE.sqrt() { 0.0 } else { v };
+    let whole = |v: f64| if v.abs() < f64::MIN_POSITIVE.sqrt() { 0.0 } else { kept(v) };
     [
         (scatter, parts.into()),
-        (at, left.curve.iter().map(|p| p.0).collect::<Vec<f64>>().into()),
+        (at, left.curve.iter().map(|p| digits::plain(p.0)).collect::<Vec<f64>>().into()),
         (error, left.curve.iter().map(|p| whole(p.1)).collect::<Vec<f64>>().into()),
     ]
 }

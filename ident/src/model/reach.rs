@@ -10,7 +10,7 @@
 //! Reference: posterior mean of two normal distributions, Gelman et al. 2013, Bayesian Data Analysis, section 2.5.
 
 use super::read::{Refusal, finite, refusal};
-use super::{AddedEffect, Model, keyed};
+use super::{AddedEffect, Model, digits, keyed};
 use crate::context::{Context, Target, unit_of};
 use crate::design::{Label, TargetDesign};
 use crate::effects::{Estimate, Instance};
@@ -45,10 +45,18 @@ impl Reach {
     pub(super) fn to_table(&self) -> (String, Value) {
         let [lowest, highest] = keys(&self.channel);
         let mut t = Table::new();
-        t.insert(lowest, self.seen[0].into());
-        t.insert(highest, self.seen[1].into());
+        // outward, so that what the run has shown stays within
+        t.insert(lowest, digits::lowest(self.seen[0]).into());
+        t.insert(highest, (0.0 - digits::lowest(-self.seen[1])).into());
         if !self.covariance.is_empty() {
-            t.insert(COVARIANCE.into(), self.covariance.iter().map(|row| Value::from(row.clone())).collect::<Vec<_>>().into());
+            t.insert(
+                COVARIANCE.into(),
+                self.covariance
+                    .iter()
+                    .map(|row| row.iter().map(|v| Value::from(digits::plain(*v))).collect::<Vec<_>>())
+                    .collect::<Vec<_>>()
+                    .into(),
+            );
         }
         (self.channel.clone(), Value::Table(t))
     }

@@ -358,7 +358,7 @@ fn held(effect: &'static dyn Effect, instance: &Instance, shape: &[f64], amplitu
 }
 
 /// Share of a number by which two writings of it may differ.
-const SAME_NUMBER: f64 = 1e-6;
+pub(super) const SAME_NUMBER: f64 = 1e-6;
 
 /// What was estimated, for the reader. No prediction hangs on it, so that it may not say another thing than what one does hang on.
 fn estimates(held: &[Held], value: &Value) -> Result<Vec<Estimate>, Refusal> {

@@ -7,7 +7,7 @@
 //! Reference: specification `formats.md`, "Scope".
 
 use super::read::{Refusal, finite, no_channel, only, refusal, within};
-use super::{AddedEffect, FittedTo, RunLevel, coefficient_key};
+use super::{AddedEffect, FittedTo, RunLevel, coefficient_key, digits};
 use crate::context::Relation;
 use toml::{Table, Value};
 
@@ -26,7 +26,7 @@ pub(super) fn tables(runs: &[FittedTo], own: &[RunLevel]) -> Vec<Value> {
         }
         if let Some(own) = own.get(k) {
             let of_channel = |(channel, values): &(String, Vec<f64>)| {
-                let all = values.iter().enumerate().map(|(i, v)| (coefficient_key(channel, i), Value::from(*v)));
+                let all = values.iter().enumerate().map(|(i, v)| (coefficient_key(channel, i), Value::from(digits::plain(*v))));
                 (channel.clone(), Value::Table(all.collect()))
             };
             t.insert("channel".into(), Value::Table(own.polynomials.iter().map(of_channel).collect()));
