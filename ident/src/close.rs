@@ -224,10 +224,11 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
             let entry = EffectEntry {
                 id: p.effect.id().to_owned(),
                 scope: p.effect.scope(&p.instance),
+                run: None,
                 depends_on,
                 equation,
                 probability: d.inclusion[k],
-                parameters: estimates.iter().map(|e| parameter(e, &shapes)).collect(),
+                parameters: estimates.iter().map(|e| parameter(e, &shapes, &first)).collect(),
                 heldout_error_reduction: reduction,
                 evidence,
                 channels,
@@ -259,16 +260,20 @@ fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
     }
 }
 
+/// Unit of a parameter that has the unit of whatever channel its effect is on.
+const OF_CHANNEL: &str = "channel";
+
 /// A parameter with its interval. Where its standard error is not known the interval is what is known at all: the range of the shape,
 /// or for an amplitude everything from nothing to twice its size.
-pub(crate) fn parameter(e: &Estimate, shapes: &[Shape]) -> Parameter {
+pub(crate) fn parameter(e: &Estimate, shapes: &[Shape], channel: &str) -> Parameter {
     let range = shapes.iter().find(|s| s.name == e.name && s.range.1 > s.range.0).map(|s| s.range);
     let ci95 = match range {
         _ if e.se.is_finite() => [e.value - 1.96 * e.se, e.value + 1.96 * e.se],
         Some((from, to)) => [from.min(e.value), to.max(e.value)],
         None => [e.value - e.value.abs(), e.value + e.value.abs()],
     };
-    Parameter { name: e.name.clone(), value: e.value, unit: e.unit.clone(), ci95 }
+    let unit = if e.unit == OF_CHANNEL { unit_of(channel).to_owned() } else { e.unit.clone() };
+    Parameter { name: e.name.clone(), value: e.value, unit, ci95 }
 }
 
 /// Both models on another run of the same rig, as far as they carry over.
@@ -302,7 +307,7 @@ mod tests {
     fn an_unknown_error_is_no_sharp_value() {
         let shapes = [Shape { name: "tau", unit: "s", range: (0.5, 9.0), starts: vec![1.0] }];
         let of = |name: &str, value: f64, se: f64| {
-            parameter(&Estimate { name: name.to_owned(), unit: "s".to_owned(), value, se }, &shapes).ci95
+            parameter(&Estimate { name: name.to_owned(), unit: "s".to_owned(), value, se }, &shapes, "").ci95
         };
         for unknown in [f64::NAN, f64::INFINITY] {
             assert_eq!(of("tau", 2.0, unknown), [0.5, 9.0]);

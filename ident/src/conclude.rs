@@ -139,7 +139,7 @@ pub(crate) fn is_nothing(context: &Context, placed: &Placed, estimates: &[Estima
     let reported = effect.report(context, instance, estimates.to_vec());
     let mut sizes = reported.iter().filter(|e| is_size(e)).peekable();
     let held = |e: &Estimate| {
-        let [low, high] = crate::close::parameter(e, &shapes).ci95;
+        let [low, high] = crate::close::parameter(e, &shapes, "").ci95;
         low <= 0.0 && high >= 0.0
     };
     is_named(placed) && !estimates.is_empty() && sizes.peek().is_some() && sizes.all(held)

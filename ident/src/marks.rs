@@ -132,14 +132,16 @@ pub(crate) fn tell(verdict: &mut Verdict, model: &mut Model, told: &[Told]) {
 fn entry(told: &Told) -> EffectEntry {
     let Told { added, .. } = told;
     let about = added.placed.effect.about();
+    let channel = added.placed.instance.channels.first().map_or("", String::as_str);
     EffectEntry {
         id: added.placed.effect.id().to_owned(),
         scope: added.placed.effect.scope(&added.placed.instance),
+        run: None,
         channels: added.placed.instance.channels.clone(),
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: format!("{} [{TOLD_BY_THE_BOARD}]", about.equation),
         probability: CERTAIN,
-        parameters: added.estimates.iter().map(|e| crate::close::parameter(e, &[])).collect(),
+        parameters: added.estimates.iter().map(|e| crate::close::parameter(e, &[], channel)).collect(),
         heldout_error_reduction: 0.0,
         evidence: words(told),
     }

@@ -135,6 +135,9 @@ pub struct EffectEntry {
     pub id: String,
     /// What it belongs to.
     pub scope: Scope,
+    /// With several runs: the one that it is of, where it is of one alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub run: Option<String>,
     /// Channels that it touches, the quoted one first.
     pub channels: Vec<String>,
     /// Variables that it depends on.

@@ -123,6 +123,19 @@ pub fn scope(scope: Scope, noun: &str) -> String {
     }
 }
 
+/// A parameter's name in words.
+#[must_use]
+pub fn parameter(name: &str) -> String {
+    match name {
+        "t0" => "from".to_owned(),
+        "t1" => "until".to_owned(),
+        _ => match name.rsplit_once('_') {
+            Some((of, axis @ ("x" | "y" | "z"))) => format!("{} ({axis})", of.replace('_', " ")),
+            _ => name.replace('_', " "),
+        },
+    }
+}
+
 /// Where the held-out error stands in an effect's evidence, with and without support.
 const WORTH: [&str; 2] = ["; without it the held-out error of ", "; the held-out error of "];
 
@@ -207,6 +220,10 @@ pub fn channel(name: &str) -> String {
         "rpm_rate" => "change of speed",
         "heat" => "heat",
         "direction" => "direction of the load",
+        "vel_forward" => "speed forward through the air",
+        "vel_right" => "speed to the right through the air",
+        "vel_down" => "speed down through the air",
+        "speed_across" => "speed across the rotors",
         // attitude logs
         "ax" => "specific force (x)",
         "ay" => "specific force (y)",

@@ -20,6 +20,7 @@ fn effect(id: &str, on: &str, p: f64, removes: f64, parameters: Vec<Parameter>) 
     EffectEntry {
         id: id.into(),
         scope: Scope::Rig,
+        run: None,
         channels: vec![on.into()],
         depends_on: vec!["t_s".into()],
         equation: "reading = truth".into(),
@@ -295,8 +296,41 @@ fn every_effect_of_a_flight_has_words() {
     assert_eq!(said("hard_iron", offset(9.0)), "A magnet on board adds 19.2 uT to the field.");
     let weaker = vec![parameter("rotor", 3.0, 0.0, "1"), parameter("thrust_change", -0.1, 0.004, "1")];
     assert_eq!(said("rotor_gain", weaker), "Rotor 3 gives 10.0 % less thrust than its speed says.");
+    let sagging = vec![parameter("resistance", 0.02, 0.0002, "ohm")];
+    assert_eq!(said("supply_sag", sagging), "The supply's voltage drops by 20.0 mV for each ampere drawn.");
+    assert_eq!(said("supply_sag", Vec::new()), "The supply's voltage drops with the load.");
     let unknown_size = vec![parameter("offset_x", 0.001, 0.01, "m"), parameter("offset_y", 0.002, 0.01, "m")];
     assert_eq!(said("mass_offset", unknown_size), "The centre of gravity lies off the middle.");
+}
+
+/// Of several runs what happened on one alone names it, on the terminal and at the head.
+#[test]
+fn an_event_of_one_run_names_its_run() {
+    let slip = EffectEntry {
+        scope: Scope::Event,
+        run: Some("day2.csv".into()),
+        ..effect(
+            "tare_shift",
+            "thrust_n",
+            0.95,
+            0.7,
+            vec![parameter("offset", 0.15, 0.002, "N"), parameter("t0", 47.2, 0.4, "s")],
+        )
+    };
+    let v = verdict(Kind::Attributed, vec![slip]);
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.contains("jumps by 0.150 N at 47.2 s in run day2.csv"), "{said}");
+    assert!(terminal(&v, Vocabulary::RIG, false).contains("in run day2.csv"), "{said}");
+}
+
+/// A channel that has no model has nothing left over.
+#[test]
+fn what_is_not_predicted_is_not_left() {
+    let mut v = verdict(Kind::Attributed, vec![sag(0.9)]);
+    v.channels.not_predicted.insert("rpm".into(), "no command was logged".into());
+    v.unexplained = vec![left("rpm", 812.4)];
+    let text = terminal(&v, Vocabulary::RIG, false);
+    assert!(!text.contains("812") && !text.contains("what is left") && text.contains("no command was logged"), "{text}");
 }
 
 /// Names of columns become words; formulas and words stay.

@@ -90,6 +90,10 @@ fn figures_can_be_recomputed_from_the_model() {
     let page = std::fs::read_to_string(bench.path().join("out/report.html")).unwrap();
     assert!(page.contains("hard_iron") && page.contains("residual-mx") && !page.contains("NaN"), "a page with its figures");
     assert_eq!(answer.json["format"], "quadrig-verdict 2");
+    // its card has a figure of its own (it set in at an instant: over time), and its parameters in words with units
+    for words in ["<figure id=\"effect-1-m", "without it", "added to the field (x)", ">uT<"] {
+        assert!(page.contains(words), "{words}");
+    }
 }
 
 #[test]

@@ -64,6 +64,7 @@ fn what_the_rig_has_is_shared_and_what_one_run_has_is_dated() {
     assert!(ohm.ci95[0] < LEAD_OHM && LEAD_OHM < ohm.ci95[1] && ohm.ci95[1] - ohm.ci95[0] < 0.01, "{ohm:?}");
     let slip = entry(&outcome, "tare_shift");
     assert!(slip.scope == Scope::Event && slip.evidence.contains("r2.csv alone"), "{slip:?}");
+    assert_eq!(slip.run.as_deref(), Some("r2.csv"));
 
     // nothing gets worse, and most goes
     let v = &outcome.verdict;

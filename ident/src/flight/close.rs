@@ -345,13 +345,16 @@ impl<'w> Whole<'w> {
                     (effect.scope(form), about.depends_on.iter().map(|d| (*d).to_owned()).collect(), about.equation.to_owned())
                 }
                 Behind::Nameless(n) => {
-                    let heights: Vec<f64> = c.fit.columns_of(k.place).map(|i| c.fit.amplitudes[i]).collect();
+                    // its parameters are its heights
+                    let told = |p: &Parameter| Value { value: p.value, se: (p.ci95[1] - p.ci95[0]) / (2.0 * 1.96) };
+                    let heights: Vec<Value> = parameters[first + k.place].iter().map(told).collect();
                     (n.scope(), vec![n.variable.name().to_owned()], n.equation(&heights))
                 }
             };
             EffectEntry {
                 id: candidate.id.to_owned(),
                 scope,
+                run: None,
                 channels: names,
                 depends_on,
                 equation,

@@ -7,11 +7,12 @@
 
 use super::channels::{Channels, Target};
 use super::record::Record;
-use super::scene::{Scene, delayed};
+use super::scene::{Scene, delayed, followed};
 use super::vibration::Shaking;
 use super::windows::Windows;
 use crate::attribution::{Column, Owner, Prior, Values};
 use crate::noise::median;
+use crate::start::start_pulse;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -46,6 +47,9 @@ pub struct Usual {
     pub rpm: f64,
     /// Middle and spread of the commands, as a share of full.
     pub command: [f64; 2],
+    /// Command at which the motors start, as a share of full: up to it they stand still.
+    #[serde(default)]
+    pub start: f64,
     /// Voltage, V, and current, A; 1 where there is none.
     pub supply: [f64; 2],
 }
@@ -107,12 +111,37 @@ impl Usual {
             arm: vehicle.rotors.first().map_or(1.0, |r| r.x.hypot(r.y)),
             rpm: middle(&|i| record.speed.iter().map(|w| w[i]).sum::<f64>() / rotors * super::RPM, 1.0),
             command: [command, (square / count).sqrt().max(1e-3)],
+            start: start(record),
             supply: [
                 middle(&|i| record.voltage.as_ref().map_or(f64::NAN, |v| v[i]), 1.0),
                 middle(&|i| record.current.as_ref().map_or(f64::NAN, |v| v[i]), 1.0).max(1e-3),
             ],
         }
     }
+}
+
+/// Command at which the motors start, read off the mean of all rotors: the rows on the ground are what shows it. Where no motor stands still it is
+/// that of every speed controller.
+fn start(record: &Record) -> f64 {
+    if record.speed.is_empty() || record.command.is_empty() {
+        return 0.0;
+    }
+    let mean = |of: &[Vec<f64>], row: usize| of.iter().map(|c| c[row]).sum::<f64>() / of.len() as f64;
+    let known = |row: &usize| mean(&record.command, *row).is_finite() && mean(&record.speed, *row).is_finite();
+    let rows: Vec<usize> = (0..record.len()).filter(known).collect();
+    let of = |value: &dyn Fn(usize) -> f64| rows.iter().map(|row| value(*row)).collect::<Vec<f64>>();
+    let pulse = of(&|row| 1000.0 + 1000.0 * mean(&record.command, row));
+    (start_pulse(&of(&|row| record.t[row]), Some(&pulse), &of(&|row| mean(&record.speed, row))) - 1000.0) / 1000.0
+}
+
+/// What drives a rotor by its command, through the rotor's lag if it has one, row by row; and whether it turns at that.
+#[must_use]
+pub fn driven(flight: &Flight, scene: &Scene<'_>, rotor: usize) -> Vec<(f64, bool)> {
+    let record = scene.record;
+    let command = &record.command[rotor];
+    let behind = scene.lag.map(|lag| followed(&record.t, command, lag));
+    let start = flight.usual.start;
+    behind.as_ref().unwrap_or(command).iter().map(|u| (*u, *u > start)).collect()
 }
 
 /// Where the columns of one term come together.

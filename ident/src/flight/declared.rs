@@ -1,14 +1,14 @@
 //! The declared model of a flight.
 //!
 //! What it is: thrust k_T times the sum of the squared speeds along -z, reaction torque, a rigid body that turns; each rotor's speed a cubic of
-//! its pulse, one for all with small differences; a constant voltage; a field that is constant in earth axes. No drag, no offset.
+//! its pulse above the one at which the motors start and nothing below, one for all with small differences; a constant voltage; a field that is constant in earth axes. No drag, no offset.
 //! What can go wrong: without measured speeds thrust and moments go with command and its square.
 //! Units: SI; rev/min for the speeds.
 //! Reference: specification `flight.md`, "The loop on flights"; Beharie 2013, Eq. 2.25 to 2.35 as corrected in the errata.
 
 use super::channels::Target;
-use super::columns::{Flight, Sink};
-use super::scene::{Broken, Scene, followed};
+use super::columns::{Flight, Sink, driven};
+use super::scene::{Broken, Scene};
 use crate::attribution::{Column, Owner, Prior};
 
 /// Thrust coefficients lie this far from what carries the weight in the middle of the flight, as a share.
@@ -105,7 +105,8 @@ fn turning(sink: &mut Sink<'_>) {
     sink.column("spin_up", Prior::positive(SPIN)).window(Target::Turning(2), change);
 }
 
-/// Each rotor's speed, rev/min, from its pulse: powers of the command about its middle, through the rotor's lag if it has one.
+/// Each rotor's speed, rev/min, from its pulse: powers of the command about its middle, through the rotor's lag if it has one; nothing where the
+/// motor stands still.
 fn speeds(sink: &mut Sink<'_>) {
     let (flight, scene) = (sink.flight, sink.scene);
     if flight.record.speed.is_empty() || flight.record.command.is_empty() {
@@ -132,9 +133,8 @@ fn speeds(sink: &mut Sink<'_>) {
 /// What a rotor's speed channel reads for a power of its command about the middle of all commands.
 fn power(flight: &Flight, scene: &Scene<'_>, rotor: usize, power: i32) -> Vec<f64> {
     let [middle, spread] = flight.usual.command;
-    let own = |command: &[f64]| -> Vec<f64> { command.iter().map(|u| ((u - middle) / spread).powi(power)).collect() };
-    let command = &scene.record.command[rotor];
-    let mut out = scene.lag.map_or_else(|| own(command), |lag| own(&followed(&scene.record.t, command, lag)));
+    let value = |(u, turns): (f64, bool)| if turns { ((u - middle) / spread).powi(power) } else { 0.0 };
+    let mut out: Vec<f64> = driven(flight, scene, rotor).into_iter().map(value).collect();
     match scene.broken[rotor] {
         Some(Broken::Factor(factor, from)) => {
             out.iter_mut().zip(&scene.record.t).filter(|(_, t)| **t >= from).for_each(|(v, _)| *v *= factor);

@@ -10,6 +10,7 @@ use super::FlightError;
 use super::columns::Usual;
 use super::vehicle::Vehicle;
 use crate::effects::Scope;
+use crate::model::digits;
 use crate::verdict::Parameter;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -78,7 +79,7 @@ impl FlightModel {
     /// Never: the model is a table of numbers and words.
     #[must_use]
     pub fn to_toml(&self, told: &[Vec<Parameter>]) -> String {
-        let text = toml::to_string(self).expect("a table of numbers and words");
+        let text = toml::to_string(&self.to_its_digits()).expect("a table of numbers and words");
         let mut out = String::new();
         let mut told = told.iter();
         for line in text.lines() {
@@ -93,6 +94,22 @@ impl FlightModel {
             out += line;
             out.push('\n');
         }
+        out
+    }
+
+    /// Each number to the digits that its standard error supports.
+    fn to_its_digits(&self) -> Self {
+        let mut out = self.clone();
+        let of_effects = out.effect.iter_mut().flat_map(|e| e.shape.iter_mut().chain(&mut e.amplitude));
+        for c in out.declared.iter_mut().chain(of_effects) {
+            (c.value, c.se) = (digits::of_value(c.value, c.se), digits::of_error(c.se));
+        }
+        out.effect.iter_mut().flat_map(|e| &mut e.knots).for_each(|k| *k = digits::plain(*k));
+        let usual = &mut out.usual;
+        let [middle, spread] = &mut usual.command;
+        let [volts, amperes] = &mut usual.supply;
+        let sizes = [&mut usual.sum, &mut usual.squares, &mut usual.turning, &mut usual.arm, &mut usual.rpm, &mut usual.start];
+        sizes.into_iter().chain([middle, spread, volts, amperes]).for_each(|v| *v = digits::plain(*v));
         out
     }
 

@@ -12,7 +12,9 @@ use super::scene::Scene;
 use crate::attribution::channel::rms;
 use crate::attribution::{Candidate, Prior, UNKNOWN};
 use crate::effects::Scope;
+use crate::effects::airframe::Told;
 use crate::verdict::Parameter;
+use crate::words::digits;
 
 /// A variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +70,23 @@ impl Variable {
         }
     }
 
+    /// What a value of it is, as people say it, and its unit; `by_command` where no speed of a rotor is known.
+    fn said(self, by_command: bool) -> (&'static str, &'static str) {
+        match self {
+            Self::Air(0) => ("forward through the air", "m/s"),
+            Self::Air(1) => ("to the right through the air", "m/s"),
+            Self::Air(_) => ("down through the air", "m/s"),
+            Self::Across => ("through the air across the rotors", "m/s"),
+            Self::Height => ("of height", "m"),
+            Self::Rate(0) => ("of turn rate (x)", "rad/s"),
+            Self::Rate(1) => ("of turn rate (y)", "rad/s"),
+            Self::Rate(_) => ("of turn rate (z)", "rad/s"),
+            Self::Drive if by_command => ("of full, all commands together", ""),
+            Self::Drive => ("of all rotors together", "rad/s"),
+            Self::Time => ("of the log's time", "s"),
+        }
+    }
+
     /// Its values in each window; `None` where the flight lacks it.
     fn values(self, flight: &Flight, scene: &Scene<'_>) -> Option<Vec<f64>> {
         let windows = &flight.windows;
@@ -94,7 +113,11 @@ pub struct Nameless {
     pub variable: Variable,
     knots: Vec<f64>,
     size: f64,
+    by_command: bool,
 }
+
+/// Share of the range between the outer knots to which a knot is told: where straight lines meet is chosen, not measured.
+const TOLD: f64 = 0.005;
 
 impl Nameless {
     /// All that may be asked of a flight, each with its candidate.
@@ -114,7 +137,8 @@ impl Nameless {
                 let apart = knots.windows(2).all(|w| w[1] > w[0]);
                 if apart {
                     let form = format!("{} by {}", channel.name, variable.name());
-                    let own = Self { target: *target, variable: *variable, knots, size };
+                    let own =
+                        Self { target: *target, variable: *variable, knots, size, by_command: flight.record.speed.is_empty() };
                     let (shapes, starts) = (Vec::new(), vec![Vec::new()]);
                     out.push((Candidate { id: UNKNOWN, form, shapes, starts, needs: Vec::new(), excludes: Vec::new() }, own));
                 }
@@ -138,7 +162,8 @@ impl Nameless {
         let (channel, variable) = form.split_once(" by ")?;
         let target = *flight.channels.targets.iter().find(|t| t.name() == channel)?;
         let variable = *VARIABLES.iter().find(|v| v.name() == variable)?;
-        (knots.len() == KNOTS.len()).then(|| Self { target, variable, knots: knots.to_vec(), size: 1.0 })
+        let by_command = flight.record.speed.is_empty();
+        (knots.len() == KNOTS.len()).then(|| Self { target, variable, knots: knots.to_vec(), size: 1.0, by_command })
     }
 
     /// Where its straight lines meet.
@@ -166,7 +191,7 @@ impl Nameless {
     #[must_use]
     pub fn parameters(&self, heights: &[Coefficient]) -> Vec<Parameter> {
         let one = |(knot, height): (&f64, &Coefficient)| Parameter {
-            name: format!("at {} = {knot:.4}", self.variable.name()),
+            name: self.place(*knot),
             value: height.value,
             unit: self.target.unit().to_owned(),
             ci95: [height.value - 1.96 * height.se, height.value + 1.96 * height.se],
@@ -174,10 +199,25 @@ impl Nameless {
         self.knots.iter().zip(heights).map(one).collect()
     }
 
+    /// A knot to the digits that tell it from its neighbours.
+    fn knot(&self, knot: f64) -> String {
+        let range = self.knots.last().zip(self.knots.first()).map_or(0.0, |(last, first)| last - first);
+        let places = (-(TOLD * range).max(f64::MIN_POSITIVE).log10()).ceil().clamp(0.0, 9.0) as usize;
+        format!("{knot:.places$}")
+    }
+
+    /// Where a height stands: "at 1715.4 rad/s of all rotors together".
+    fn place(&self, knot: f64) -> String {
+        let (said, unit) = self.variable.said(self.by_command);
+        let parts = ["at", &self.knot(knot), unit, said];
+        parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join(" ")
+    }
+
     /// The function in words.
     #[must_use]
-    pub fn equation(&self, heights: &[f64]) -> String {
-        let points: Vec<String> = self.knots.iter().zip(heights).map(|(x, y)| format!("({x:.4}, {y:.4})")).collect();
+    pub fn equation(&self, heights: &[Told]) -> String {
+        let point = |(x, y): (&f64, &Told)| format!("({}, {})", self.knot(*x), digits(y.value, y.se));
+        let points: Vec<String> = self.knots.iter().zip(heights).map(point).collect();
         format!("{} += straight lines over {} through {}", self.target.name(), self.variable.name(), points.join(", "))
     }
 }
@@ -205,7 +245,31 @@ fn hat(knots: &[f64], k: usize, x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::hat;
+    use super::*;
+
+    /// Where the lines meet is told in words, with a unit, and to the digits that tell one from the next.
+    #[test]
+    fn knots_are_told_in_words() {
+        let knots = [1_252.896_8, 1_715.356_6, 1_719.436_5, 1_722.151_6, 1_726.517_2, 1_809.392_4].to_vec();
+        let own = |variable, knots: &[f64]| Nameless {
+            target: Target::Voltage,
+            variable,
+            knots: knots.to_vec(),
+            size: 1.0,
+            by_command: false,
+        };
+        let drive = own(Variable::Drive, &knots);
+        let names: Vec<String> = drive
+            .parameters(&vec![Coefficient { name: String::new(), value: 0.1, se: 0.01 }; 6])
+            .into_iter()
+            .map(|p| p.name)
+            .collect();
+        assert_eq!(names[0], "at 1253 rad/s of all rotors together");
+        assert_eq!(names[2], "at 1719 rad/s of all rotors together");
+        let heights = vec![Told { value: 0.012_345_678, se: 0.001_2 }; 6];
+        assert!(drive.equation(&heights).contains("(1253, 0.012), (1715, 0.012)"), "{}", drive.equation(&heights));
+        assert_eq!(own(Variable::Height, &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0]).place(0.2), "at 0.200 m of height");
+    }
 
     #[test]
     fn hats_add_up_to_one() {

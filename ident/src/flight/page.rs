@@ -11,6 +11,7 @@ use super::windows::LENGTH_S;
 use crate::effects::airframe;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
+use crate::words::parameter;
 
 /// The words of the flight's library.
 pub const VOCABULARY: Vocabulary = Vocabulary {
@@ -18,6 +19,7 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     about: airframe::about,
     clause: |found| airframe::said(found).unwrap_or_else(|| parts::bare(found)),
     of_every_rig: |id| id == "spinup_lag",
+    parameter: |_, name| parameter(name),
 };
 
 /// The report as one self-contained page.

@@ -53,6 +53,7 @@ pub(super) fn no_correction(left: &[Unexplained]) -> EffectEntry {
     EffectEntry {
         id: UNKNOWN.to_owned(),
         scope: Scope::Run,
+        run: None,
         channels: loudest.iter().map(|u| u.channel.clone()).collect(),
         depends_on: Vec::new(),
         equation: "no correction".to_owned(),

@@ -9,6 +9,7 @@
 use super::Recording;
 use super::least::Readings;
 use super::model::{FORMAT as MODEL_FORMAT, InertialModel, Part};
+use super::shown::Shown;
 use crate::residual::whiteness;
 use crate::unexplained::LOUD;
 use crate::verdict::{
@@ -33,6 +34,8 @@ pub struct Sensor {
     pub(crate) heldout_before: [f64; 3],
     pub(crate) heldout_after: [f64; 3],
     pub(crate) effects: Vec<EffectEntry>,
+    /// What convinces of each, by identifier.
+    pub(crate) shown: Vec<Shown>,
     pub(crate) alternatives: Vec<Alternative>,
     pub(crate) kind: Kind,
     /// What is left over, in noise floors, before and after.

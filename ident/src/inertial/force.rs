@@ -13,6 +13,7 @@ use super::least::{Readings, Term};
 use super::model::{Part, linear};
 use super::noise::{axis_level, floor, levels};
 use super::search::{Scene, evidence, parameter};
+use super::shown::Shown;
 use super::trace::{Setting, Traced, trace};
 use super::{Attitude, Recording, effects, smooth, vibration};
 use crate::effects::Scope;
@@ -194,7 +195,10 @@ fn accelerate(
     if nats < NAMED || size < SMOOTH * explained {
         return None;
     }
-    traced.sensor.corrected = carried(recording, to_earth, &traced.sensor.corrected, &t, &back);
+    let with = carried(recording, to_earth, &traced.sensor.corrected, &t, &back);
+    let added: Vec<Vector3<f64>> = with.iter().zip(&traced.sensor.corrected).map(|(w, c)| w - c).collect();
+    traced.sensor.shown.push(Shown::over_time("linear_acceleration", &added));
+    traced.sensor.corrected = with;
     traced.sensor.part.carried_width_s = Some(width);
     let axis = |k: usize| (back.iter().map(|v| v[k] * v[k]).sum::<f64>() / back.len() as f64).sqrt();
     let spread = |v: f64| v / (2.0 * looks / 3.0).sqrt();
@@ -202,6 +206,7 @@ fn accelerate(
     Some(EffectEntry {
         id: "linear_acceleration".to_owned(),
         scope: Scope::Run,
+        run: None,
         channels: setting.channels.map(str::to_owned).to_vec(),
         depends_on: vec!["t_s".to_owned()],
         equation: "f += R^T a(t), a smooth in earth axes with bounded speed".to_owned(),

@@ -19,6 +19,7 @@ mod noise;
 mod page;
 mod rate;
 mod search;
+mod shown;
 mod smooth;
 mod trace;
 mod unknown;

@@ -11,11 +11,42 @@ use crate::effects::airframe;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;
-use crate::words::{Clause, channel, list};
+use crate::words::{Clause, channel, list, parameter};
 use nalgebra::Vector3;
 
 /// The words of an inertial unit's causes.
-pub const VOCABULARY: Vocabulary = Vocabulary { noun: "board", about: airframe::about, clause, of_every_rig: |_| false };
+pub const VOCABULARY: Vocabulary =
+    Vocabulary { noun: "board", about: airframe::about, clause, of_every_rig: |_| false, parameter: named };
+
+/// A parameter in words: what it is, and of which axis.
+fn named(id: &str, name: &str) -> String {
+    let axis = |at: usize| name.get(at..=at).unwrap_or_default();
+    match (id, name) {
+        ("soft_iron", _) if name.starts_with("s_") => format!("share of the field ({}) read as ({})", axis(3), axis(2)),
+        ("g_sensitivity", _) if name.starts_with("g_") => {
+            format!("turn rate ({}) for each specific force ({})", axis(2), axis(3))
+        }
+        ("unknown", _) => match name.split_once('_') {
+            Some((of, "t")) => format!("{}, drift", channel(of)),
+            Some((of, with)) => format!("{} for each {}", channel(of), channel(with)),
+            None => parameter(name),
+        },
+        ("linear_acceleration", "width") => "width of the smoothing bell".to_owned(),
+        ("linear_acceleration", "rms_down") => "acceleration up and down, rms".to_owned(),
+        ("linear_acceleration", _) if name.starts_with("rms_") => {
+            format!("acceleration along {}, rms", name.trim_start_matches("rms_"))
+        }
+        ("vibration", "rms") => "strength, rms".to_owned(),
+        ("vibration", "level_ratio") => "strength over the quietest tenth".to_owned(),
+        ("stationary_magnet", "rms") => "change of the field, rms".to_owned(),
+        ("stationary_magnet", "peak") => "change of the field, largest".to_owned(),
+        ("stationary_magnet", "peak_time") => "time of the largest".to_owned(),
+        ("stationary_magnet", "knots") => "time between knots of the curve".to_owned(),
+        ("hard_iron", _) if name.starts_with("offset_") => format!("added to the field ({})", axis(7)),
+        ("lever_arm", _) if name.starts_with("arm_") => format!("place of the sensor ({})", axis(4)),
+        _ => parameter(name),
+    }
+}
 
 /// Causes that have no page in the flight's library.
 fn clause(found: &EffectEntry) -> Clause {
@@ -40,7 +71,7 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         origin,
         declared: "Declared: a field that is constant in earth axes, gravity and a constant offset, a constant offset of the gyro at rest. The attitude comes from gyro and accelerometer alone.".to_owned(),
         hero: parts::most(v, &traces),
-        cards: parts::each(v, &traces),
+        cards: cards(recording, closed),
         left: parts::rest(v, &traces),
         parameters: Vec::new(),
         speeds: Vec::new(),
@@ -69,6 +100,32 @@ fn trace(recording: &Recording, sensor: &Sensor, axis: usize) -> Trace {
         before: left(&sensor.declared),
         after: left(&sensor.corrected),
     }
+}
+
+/// Figures of each effect: what the axis on which it adds most leaves over without it and with it, over the variable that it goes with.
+fn cards(recording: &Recording, closed: &Closed) -> Vec<Vec<Figure>> {
+    closed.verdict.effects.iter().enumerate().map(|(k, e)| card(recording, closed, k, e).into_iter().collect()).collect()
+}
+
+fn card(recording: &Recording, closed: &Closed, k: usize, e: &EffectEntry) -> Option<Figure> {
+    let first = e.channels.first()?;
+    let sensor = closed.sensors.iter().find(|s| s.channels.contains(&first.as_str()))?;
+    let shown = sensor.shown.iter().find(|s| s.id == e.id)?;
+    let whole = trace(recording, sensor, shown.axis);
+    // alone on its sensor: the declared model is what stands without it
+    let before = match sensor.effects.len() {
+        1 => whole.before.clone(),
+        _ => whole.after.iter().zip(&shown.added).map(|(after, added)| after + added).collect(),
+    };
+    let trace = whole.with_before(before);
+    let id = format!("effect-{}", k + 1);
+    Some(match &shown.over {
+        Some(over) => parts::against(&trace, &id, (&over.name, over.unit), &over.values, parts::ALONE),
+        None => shown
+            .seconds
+            .and_then(|wide| parts::part(&trace, &id, parts::ALONE, wide))
+            .unwrap_or_else(|| parts::over_time(&trace, &id, parts::ALONE)),
+    })
 }
 
 fn figure(recording: &Recording, sensor: &Sensor, axis: usize) -> Figure {

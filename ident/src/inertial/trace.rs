@@ -9,10 +9,12 @@ use super::account::{Sensor, by_axis, judge};
 use super::least::{Readings, Term};
 use super::model::{Added, Part};
 use super::search::{Cause, Found, Outcome, Scene, parameters, predict, search, spoils};
+use super::shown::Shown;
 use super::unknown::correct;
 use crate::effects::Scope;
 use crate::unexplained::LOUD;
 use crate::verdict::{Alternative, EffectEntry, Kind};
+use crate::words::{channel, list};
 use nalgebra::Vector3;
 
 /// What a sensor is and how well it can be predicted at best.
@@ -66,6 +68,7 @@ pub(crate) fn trace<'a>(
         heldout_before: by_axis(&outcome.before.heldout),
         heldout_after: by_axis(&outcome.before.heldout),
         effects: Vec::new(),
+        shown: shown(&outcome, base.len(), scene, claimed),
         alternatives: Vec::new(),
         kind,
         excess: [over(before), over(before)],
@@ -91,6 +94,7 @@ pub(crate) fn trace<'a>(
                 sensor.heldout_after = by_axis(&c.solved.heldout);
                 sensor.excess[1] = over(mean(&c.solved.heldout));
                 sensor.part = part(setting, &c.solved.coefficients[..base.len()], vec![c.added(base.len())]);
+                sensor.shown.push(c.shown(base.len(), scene, claimed));
                 sensor.effects = vec![c.entry];
             }
         }
@@ -115,6 +119,17 @@ pub(crate) fn trace<'a>(
         .map(|(ids, p)| Alternative { ids: ids.iter().map(|i| (*i).to_owned()).collect(), probability: *p })
         .collect();
     Some(Traced { sensor, effect, named })
+}
+
+/// What convinces of each cause that was found.
+fn shown(outcome: &Outcome<'_>, base: usize, scene: &Scene<'_>, claimed: &[bool]) -> Vec<Shown> {
+    let mut at = base;
+    let one = |f: &Found<'_>| {
+        let from = at;
+        at += f.instance.terms.len();
+        Shown::of(f.instance.id, &f.instance.terms, &outcome.after.coefficients[from..at], scene, claimed)
+    };
+    outcome.found.iter().map(one).collect()
 }
 
 fn part(setting: &Setting, declared: &[f64], effect: Vec<Added>) -> Part {
@@ -157,13 +172,18 @@ fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectE
         setting.channels.iter().zip(worse).filter(|(_, w)| *w == bad).map(|(c, _)| (*c).to_owned()).collect()
     };
     let (channels, spoilt) = (of(false), of(true));
-    let but = if spoilt.is_empty() { String::new() } else { format!("; {} is predicted worse with them", spoilt.join(", ")) };
+    let but = if spoilt.is_empty() {
+        String::new()
+    } else {
+        format!("; {} is predicted worse with them", list(&spoilt.iter().map(|c| channel(c)).collect::<Vec<_>>()))
+    };
     let entry = |f: &Found<'_>, at: usize| {
         let count = f.instance.terms.len();
         let (c, s) = (&outcome.after.coefficients[at..at + count], &outcome.after.sigma[at..at + count]);
         EffectEntry {
             id: f.instance.id.to_owned(),
             scope: Scope::Rig,
+            run: None,
             channels: channels.clone(),
             depends_on: f.instance.depends_on.iter().map(|d| (*d).to_owned()).collect(),
             equation: f.instance.equation.to_owned(),

@@ -9,6 +9,7 @@
 use super::least::{Column, Readings, Solved, Term};
 use super::model::Added;
 use super::search::{Scene, parameter, predict};
+use super::shown::Shown;
 use crate::effects::Scope;
 use crate::verdict::EffectEntry;
 use nalgebra::Vector3;
@@ -42,10 +43,23 @@ pub(crate) fn terms<'a>(name: &str, scene: &Scene<'a>, channels: [&'static str; 
     for (i, channel) in channels.iter().enumerate() {
         for (j, axis) in AXES.iter().enumerate().take(axes) {
             let label = if name == "t" { format!("{channel}_t") } else { format!("{channel}_{name}{axis}") };
-            terms.push(Term { prior: 1e3, ..Term::new(&label, "1", move |row| Vector3::ith(i, value(row)[j])) });
+            terms.push(Term { prior: 1e3, ..Term::new(&label, unit(channel, name), move |row| Vector3::ith(i, value(row)[j])) });
         }
     }
     terms
+}
+
+/// Unit of a channel for one of a variable.
+fn unit(channel: &str, variable: &str) -> &'static str {
+    match (&channel[..1], variable) {
+        ("m", "g") => "uT/(rad/s)",
+        ("m", "a") => "uT/(m/s^2)",
+        ("m", _) => "uT/s",
+        ("a", "g") => "m/s^2/(rad/s)",
+        ("a", _) => "m/s^2/s",
+        (_, "a") => "rad/s/(m/s^2)",
+        _ => "rad/s/s",
+    }
 }
 
 /// The best correction on top of the declared model.
@@ -87,6 +101,7 @@ pub(crate) fn correct<'a>(
     let entry = EffectEntry {
         id: "unknown".to_owned(),
         scope: Scope::Run,
+        run: None,
         channels: channels.map(str::to_owned).to_vec(),
         evidence: format!(
             "no known cause takes away half of what is over; linear in {} predicts left-out stretches best",
@@ -113,6 +128,11 @@ impl Correction<'_> {
                 .to_owned(),
             ..self.entry.clone()
         }
+    }
+
+    /// What convinces of it, behind so many coefficients of the declared model.
+    pub(crate) fn shown(&self, base: usize, scene: &Scene<'_>, claimed: &[bool]) -> Shown {
+        Shown::of_correction(self.variable, &self.terms, &self.solved.coefficients[base..], scene, claimed)
     }
 
     /// Its share of the model, behind so many coefficients of the declared one.

@@ -12,6 +12,7 @@ use super::Recording;
 use super::account::Sensor;
 use super::noise::{levels, quantile};
 use super::search::{NAMED, parameter};
+use super::shown::Shown;
 use super::trace::Setting;
 use crate::effects::Scope;
 use crate::verdict::EffectEntry;
@@ -25,6 +26,8 @@ const WINDOW: usize = 64;
 const LEVEL: usize = 64;
 /// Slower than this a body can be carried, Hz.
 const LOWEST_HZ: f64 = 15.0;
+/// Periods of a line that its figure shows.
+const PERIODS: f64 = 30.0;
 /// A line stands this far over the median of the spectrum.
 const LINE: f64 = 6.0;
 /// Mean square of all windows over that of the quietest, and the same for the loudest twentieth, from which it shakes.
@@ -53,10 +56,15 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
     let after: Vec<Vector3<f64>> = left.iter().zip(&wave).map(|(l, w)| l - w).collect();
     let reduction = 1.0 - (square(&after) / square(&left).max(1e-300)).sqrt();
     let predicted = has_line && reduction > 0.02;
+    let mut added = vec![Vector3::repeat(f64::NAN); used.len()];
+    rows.iter().for_each(|i| added[*i] = Vector3::zeros());
     if predicted {
         add(&mut sensor.corrected, &rows, &wave);
+        add(&mut added, &rows, &wave);
         sensor.part.line_hz = Some(frequency);
     }
+    let seconds = predicted.then(|| PERIODS / frequency);
+    sensor.shown.push(Shown { seconds, ..Shown::over_time("vibration", &added) });
     let looks = level.len() as f64;
     // a line's own strength: its prediction does not know the noise of the rows that it predicts; second differences would weigh it
     // by its frequency
@@ -78,6 +86,7 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
     Some(EffectEntry {
         id: "vibration".to_owned(),
         scope: Scope::Run,
+        run: None,
         channels: setting.channels.map(str::to_owned).to_vec(),
         depends_on: vec!["t_s".to_owned()],
         equation: if has_line {

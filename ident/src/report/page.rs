@@ -6,7 +6,7 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
-use super::closed::{self as parts, Origin, Page, Trace, Vocabulary, against, enlarged, over_time, pair, thinned};
+use super::closed::{self as parts, ALONE, Origin, Page, Trace, Vocabulary, against, enlarged, over_time, pair, thinned};
 use super::designer::designer;
 use super::figure::{Figure, Layer};
 use super::run;
@@ -20,9 +20,6 @@ use crate::model::Model;
 use crate::several::Shown;
 use crate::verdict::{EffectEntry, Unexplained, Verdict};
 use crate::words::{channel, heading};
-
-/// What stands before and after in the figure of one effect.
-const ALONE: [&str; 2] = ["without it", "with it"];
 
 /// The report of a closed loop as one self-contained page.
 #[must_use]
@@ -154,13 +151,18 @@ fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<V
     let of_steps = e.depends_on.iter().any(|v| ["time_since_step", "rpm_rate"].contains(&v.as_str()));
     let over = if of_steps { None } else { e.depends_on.iter().find_map(|name| Some((name, values(context, target, name)?))) };
     let figure = match over {
-        Some((name, x)) => against(&trace, id, (name, unit_of(name)), &x, ALONE),
+        Some((name, x)) => against(&trace, id, (name, unit_of_variable(name)), &x, ALONE),
         None => match enlarged(&trace, id, ALONE).filter(|_| of_steps) {
             Some(figure) => figure,
             None => over_time(&trace, id, ALONE),
         },
     };
     Some(vec![figure])
+}
+
+/// Unit of a variable: of a column its own, of what adds up over a run that of the sum.
+fn unit_of_variable(name: &str) -> &'static str {
+    if name == "charge" { "Ah" } else { unit_of(name) }
 }
 
 /// A variable on the rows that count; time has a figure of its own kind.
@@ -179,7 +181,7 @@ pub(super) fn rest(closed: &Closed, u: &Unexplained) -> Option<Figure> {
     let trace = trace(closed, target)?;
     let over = u.depends_on.iter().find_map(|name| Some((name, values(&closed.context, target, name)?)));
     Some(match over {
-        Some((name, x)) => against(&trace, "left", (name, unit_of(name)), &x, pair(&closed.verdict)),
+        Some((name, x)) => against(&trace, "left", (name, unit_of_variable(name)), &x, pair(&closed.verdict)),
         None => over_time(&trace, "left", pair(&closed.verdict)),
     })
 }
@@ -189,7 +191,8 @@ fn left(closed: &Closed) -> Vec<Figure> {
     // several speed sensors have a figure together
     let several = SPEED.iter().filter(|c| target(closed, c).is_some()).count() > 1;
     let own = |u: &&Unexplained| !(several && SPEED.contains(&u.channel.as_str()));
-    closed.verdict.unexplained.iter().filter(own).filter_map(|u| rest(closed, u)).collect()
+    let with_model = |u: &&Unexplained| !closed.verdict.channels.not_predicted.contains_key(&u.channel);
+    closed.verdict.unexplained.iter().filter(own).filter(with_model).filter_map(|u| rest(closed, u)).collect()
 }
 
 /// Residual, and measured beside predicted, of every channel.

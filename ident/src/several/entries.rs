@@ -43,10 +43,11 @@ pub(super) fn entry(joint: &Joint<'_, '_>, named: &[Named], k: usize, after: &[A
     EffectEntry {
         id: p.effect.id().to_owned(),
         scope: p.effect.scope(&p.instance),
+        run: None,
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: equation(p),
         probability: probability(score),
-        parameters: reported.iter().map(|e| parameter(e, &shapes)).collect(),
+        parameters: reported.iter().map(|e| parameter(e, &shapes, &first)).collect(),
         heldout_error_reduction: reduction,
         evidence: format!(
             "{}; learnt from the other runs it makes {} smaller on {helped} of {} runs, {:.2} times over all",
@@ -88,10 +89,11 @@ pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -
         EffectEntry {
             id: p.effect.id().to_owned(),
             scope,
+            run: Some(context.name.clone()),
             depends_on: p.effect.about().depends_on.iter().map(|v| (*v).to_owned()).collect(),
             equation: equation(p),
             probability: probability(worth.gain),
-            parameters: reported.iter().map(|e| parameter(e, &shapes)).collect(),
+            parameters: reported.iter().map(|e| parameter(e, &shapes, first)).collect(),
             heldout_error_reduction: or_nothing(reduction),
             evidence: format!(
                 "on {} alone; {}; without it the error of {} there is {times:.2} times as large",
@@ -148,6 +150,7 @@ pub(super) fn unnamed(left: &Unexplained) -> EffectEntry {
     EffectEntry {
         id: "unknown".to_owned(),
         scope: Scope::Run,
+        run: None,
         channels: vec![left.channel.trim_end_matches(" - others").to_owned()],
         depends_on: left.depends_on.clone(),
         equation: "none: nothing that was tried predicts the other runs".to_owned(),

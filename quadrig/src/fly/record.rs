@@ -88,8 +88,10 @@ pub(super) fn flight_log(rows: &[Flying], airframe: &Airframe, told: &[(&str, St
     for (i, name) in ["qw", "qx", "qy", "qz"].into_iter().enumerate() {
         push(name.to_owned(), &|f| part(f, i));
     }
-    push("voltage_v".to_owned(), &|f| f.rotors.iter().map(|r| r.voltage_v).sum::<f64>() / rotors as f64);
-    push("current_a".to_owned(), &|f| f.rotors.iter().map(|r| r.current_a).sum());
+    // before the first step nothing has been read of the supply; a reading of nothing would pass for one
+    let read = |f: &Flying, value: f64| if f.rotors.iter().all(|r| r.voltage_v == 0.0) { f64::NAN } else { value };
+    push("voltage_v".to_owned(), &|f| read(f, f.rotors.iter().map(|r| r.voltage_v).sum::<f64>() / rotors as f64));
+    push("current_a".to_owned(), &|f| read(f, f.rotors.iter().map(|r| r.current_a).sum()));
     for i in 0..rotors {
         push(format!("thrust_n_{}", i + 1), &|f| f.rotors[i].thrust_n);
     }

@@ -9,7 +9,7 @@
 use super::{About, AirframeEffect, Clause, EffectEntry, FOLLOWED, Form, Found, Scope, Sink, single};
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
-use crate::flight::columns::Flight;
+use crate::flight::columns::{Flight, driven};
 use crate::verdict::Parameter;
 
 pub(super) struct SupplySag;
@@ -28,7 +28,12 @@ pub(super) fn follow(sink: &mut Sink<'_>) {
     sink.column("speed_follows", Prior { mean: 0.5, sd: 0.5, sign: 0.0 });
     for rotor in 0..sink.flight.record.rotors() {
         let rpm = sink.flight.usual.rpm;
-        let values: Vec<f64> = voltage.iter().map(|v| rpm * (v / usual - 1.0)).collect();
+        let mut values: Vec<f64> = voltage.iter().map(|v| rpm * (v / usual - 1.0)).collect();
+        if !sink.flight.record.command.is_empty() {
+            // a motor that stands still follows no voltage
+            let turns = driven(sink.flight, sink.scene, rotor);
+            values.iter_mut().zip(turns).filter(|(_, (_, turns))| !turns).for_each(|(v, _)| *v = 0.0);
+        }
         sink.part(Target::Speed(rotor), &values);
     }
 }
@@ -50,8 +55,9 @@ impl AirframeEffect for SupplySag {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        let by_load = || found.tell("sag", |v| format!("drops {v} under its usual load"), "sags with the load");
-        Clause::new("the supply", found.tell_in("resistance", "V", |v| format!("drops {v} per ampere"), &by_load()))
+        let by_load = || found.tell("sag", |v| format!("drops by {v} under the usual load"), "drops with the load");
+        let does = found.tell_in("resistance", "V", |v| format!("drops by {v} for each ampere drawn"), &by_load());
+        Clause::new("the supply's voltage", does)
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -8,6 +8,7 @@
 use super::page::Page;
 use super::sentence::instead;
 use super::state::figures;
+use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
@@ -71,7 +72,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
             format!("Something on {} that goes with {}.", list(&on), list(&with))
         }
     } else {
-        (page.words.clause)(e).sentence()
+        page.words.said(e).sentence()
     };
     let number = number.map(|n| format!("<span class=\"nr\">{n}</span> ")).unwrap_or_default();
     let mut html = format!(
@@ -92,7 +93,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     sheet.html_part("<div class=\"split\">\n");
     sheet.figures(figures);
     sheet.html_part("<div>\n");
-    parameters(sheet, e);
+    parameters(sheet, page.words, e);
     let mut html = format!(
         "<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n",
         escape(&e.equation),
@@ -153,7 +154,7 @@ pub(super) fn value(p: &Parameter) -> [String; 3] {
     [fine(p.value), format!("{} to {}", fine(p.ci95[0]), fine(p.ci95[1])), unit_of(unit)]
 }
 
-fn parameters(sheet: &mut Sheet, e: &EffectEntry) {
+fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
     let shown = |p: &&Parameter| p.name != "phase";
     let rows: Vec<Vec<String>> = e
         .parameters
@@ -162,7 +163,7 @@ fn parameters(sheet: &mut Sheet, e: &EffectEntry) {
         .map(|p| {
             let [v, interval, unit] = value(p);
             let note = if sized(p).is_some() { "" } else { "not well known" };
-            vec![p.name.replace('_', " "), v, interval, unit, note.to_owned()]
+            vec![(words.parameter)(&e.id, &p.name), v, interval, unit, note.to_owned()]
         })
         .collect();
     let raw: Vec<Vec<String>> = e

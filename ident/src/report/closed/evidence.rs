@@ -16,8 +16,12 @@ const COLUMNS: usize = 440;
 const DOTS: usize = 1600;
 /// Most read-outs of a layer.
 const READ_OUTS: usize = 120;
+/// What stands before and after in the figure of one effect.
+pub(crate) const ALONE: [&str; 2] = ["without it", "with it"];
 /// Parts of a run of which the most telling one is enlarged.
 const PARTS: f64 = 12.0;
+/// Times the size that all but one in two hundred readings keep beyond which a dot is off the scale.
+const OFF: f64 = 3.0;
 /// Usual steps from which on a gap lifts the pen.
 const GAP: f64 = 20.0;
 
@@ -115,7 +119,11 @@ pub(crate) fn over_time(trace: &Trace, id: &str, names: [&'static str; 2]) -> Fi
 /// The part of the run in which most was taken away, enlarged.
 pub(crate) fn enlarged(trace: &Trace, id: &str, names: [&'static str; 2]) -> Option<Figure> {
     let (first, last) = (trace.t.first()?, trace.t.last()?);
-    let wide = (last - first) / PARTS;
+    part(trace, id, names, (last - first) / PARTS)
+}
+
+/// The same of a length of its own, in the unit of the time axis.
+pub(crate) fn part(trace: &Trace, id: &str, names: [&'static str; 2], wide: f64) -> Option<Figure> {
     if trace.t.len() < 60 || wide <= 0.0 {
         return None;
     }
@@ -196,13 +204,27 @@ pub(crate) fn against(trace: &Trace, id: &str, (variable, unit): (&str, &str), x
     let ends =
         x.iter().copied().filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     let mut layers: Vec<Layer> = if ends.0 < ends.1 { trace.band(ends.0, ends.1).into_iter().collect() } else { Vec::new() };
+    // a single absurd reading would press all others into one line
+    let scale = OFF * usual(&trace.before).max(usual(&trace.after)).max(trace.floor);
+    let mut off = 0;
     for ((name, class), y) in shown(names).zip([&trace.before, &trace.after]) {
-        layers.push(Layer::Dots { name: name.to_owned(), class, x: x.to_vec(), y: y.clone() });
+        let beyond = |v: &f64| v.abs() > scale && scale > 0.0;
+        off = off.max(y.iter().filter(|v| beyond(v)).count());
+        let y = y.iter().map(|v| if beyond(v) { f64::NAN } else { *v }).collect();
+        layers.push(Layer::Dots { name: name.to_owned(), class, x: x.to_vec(), y });
     }
     let said = channel(variable);
-    let title = format!("{} left over, against {said}", heading(&trace.channel));
+    let off = if off == 0 { String::new() } else { format!(" ({off} off the scale)") };
+    let title = format!("{} left over, against {said}{off}", heading(&trace.channel));
     let x_label = if unit.is_empty() { said } else { format!("{said}, {unit}") };
     trace.figure(&format!("{id}-against-{}", slug(variable)), title, x_label, layers)
+}
+
+/// Size that all but one in two hundred of the values keep.
+fn usual(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    sizes.get((sizes.len() * 199 / 200).min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
 /// Values over time, with a hole where samples are missing for long.
@@ -319,6 +341,18 @@ mod tests {
         let (cx, cy) = cloud(&x, &y);
         assert!(cx.len() <= DOTS && cy.contains(&50.0));
         assert_eq!(cloud(&x, &y), (cx, cy), "the same every time");
+    }
+
+    #[test]
+    fn an_absurd_reading_does_not_hide_the_others() {
+        let x: Vec<f64> = (0..1000).map(f64::from).collect();
+        let mut before: Vec<f64> = x.iter().map(|v| 0.5 * (v * 0.7).sin()).collect();
+        before[3] = -12.0;
+        let trace = Trace { channel: "voltage_v".into(), t: x.clone(), after: vec![0.0; 1000], before, ..Trace::default() };
+        let figure = against(&trace, "x", ("charge", "Ah"), &x, ["before", "after"]);
+        assert!(figure.title.ends_with("(1 off the scale)"), "{}", figure.title);
+        let Some(Layer::Dots { y, .. }) = figure.layers.iter().find(|l| matches!(l, Layer::Dots { .. })) else { panic!("dots") };
+        assert!(y.iter().all(|v| v.abs() < 1.0));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::page::Page;
 use super::sentence::size_left;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
-use crate::words::{channel, heading, upper};
+use crate::words::{channel, heading, lower, plain, upper};
 
 /// What is left.
 pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
@@ -19,21 +19,44 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
         sheet.say("Nothing: no channel is left with more than its noise.");
         return;
     }
+    // a channel that has no model has nothing left over: its whole reading is
+    let with_model = |u: &&crate::verdict::Unexplained| !v.channels.not_predicted.contains_key(&u.channel);
     let cells = |u: &crate::verdict::Unexplained| {
         let with: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
         let with = if with.is_empty() { "nothing in the log".to_owned() } else { with.join(", ") };
         vec![heading(&u.channel), format!("{:.1}", u.over_floor), size_left(v, u), u.looks_like.clone(), with]
     };
-    let rows: Vec<Vec<String>> = v.unexplained.iter().map(cells).collect();
+    let rows: Vec<Vec<String>> = v.unexplained.iter().filter(with_model).map(cells).collect();
+    if rows.is_empty() {
+        sheet.say("Nothing on a channel that has a model.");
+        return;
+    }
     sheet.data("unexplained", &["channel", "noise floors", "size", "looks like", "goes with"], &rows, None);
     sheet.figures(page.left.clone());
+}
+
+/// A text in which causes and columns are told in words.
+fn named(page: &Page<'_>, text: &str) -> String {
+    let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(from) = rest.find(word) {
+        let (before, at) = rest.split_at(from);
+        let (name, after) = at.split_at(at.find(|c| !word(c)).unwrap_or(at.len()));
+        out += before;
+        // a cause whose identifier is a plain word is said by it
+        let cause = (page.words.about)(name).filter(|_| name.contains('_'));
+        out += &cause.map_or_else(|| plain(name), |about| format!("\"{}\"", lower(about.title)));
+        rest = after;
+    }
+    out + rest
 }
 
 /// The run that would tell what is open.
 pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
     let Some(next) = &page.verdict.next_experiment else { return };
     sheet.section("What would settle it");
-    sheet.say(&format!("{}.", upper(next.why.trim_end_matches('.'))));
+    sheet.say(&format!("{}.", upper(&named(page, next.why.trim_end_matches('.')))));
     if !next.separates {
         let noun = page.words.noun;
         sheet.say(&format!("No run is proposed. A sensor that this log lacks, or the {noun} with one part exchanged, may tell."));

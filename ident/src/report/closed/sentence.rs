@@ -57,7 +57,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         told = all.iter().take(1).copied().collect();
     }
     let more = all.len() - told.len();
-    let clauses: Vec<String> = told.iter().map(|e| (words.clause)(e).with(adverb(e.probability))).collect();
+    let clauses: Vec<String> = told.iter().map(|e| words.said(e).with(adverb(e.probability))).collect();
     let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
     if own.is_empty() {
         let noun = words.noun;
@@ -79,7 +79,7 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let close = verdict.alternatives.iter().filter(|a| a.probability >= floor).take(WAYS - 1);
     // what the first alternative does without is what the question is about
     let disputed: Vec<&EffectEntry> = first.map_or(best.clone(), |a| without(&best, &a.ids));
-    let mut ways = vec![disputed.iter().map(|e| (words.clause)(e).with("")).collect::<Vec<_>>()];
+    let mut ways = vec![disputed.iter().map(|e| words.said(e).with("")).collect::<Vec<_>>()];
     // a hypothesis that differs elsewhere is another question
     let same = |ids: &[String]| without(&best, ids).iter().map(|e| &e.id).eq(disputed.iter().map(|e| &e.id));
     for other in close.filter(|a| same(&a.ids)) {
@@ -110,7 +110,7 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     // what takes most comes first, be it sure or open
     let removed = |all: &[&EffectEntry]| all.iter().map(|e| e.heldout_error_reduction).fold(0.0, f64::max);
     let sure: Vec<&EffectEntry> = sure.take(MOST).collect();
-    let said: Vec<String> = sure.iter().map(|e| (words.clause)(e).with(adverb(e.probability))).collect();
+    let said: Vec<String> = sure.iter().map(|e| words.said(e).with(adverb(e.probability))).collect();
     let out = if sure.is_empty() {
         format!("{}.", since(news, &question))
     } else if removed(&sure) > removed(&disputed) {

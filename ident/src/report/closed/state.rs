@@ -128,7 +128,8 @@ pub(super) fn factor(before: f64, after: f64) -> String {
     if before == 0.0 || !(before / after).is_finite() {
         return "-".to_owned();
     }
-    let factor = before / after;
+    // what is one to three digits is one
+    let factor = Some(before / after).filter(|f| (f - 1.0).abs() >= 5e-4).unwrap_or(1.0);
     format!("{}x", digits(factor, 0.01 * factor.abs()))
 }
 

@@ -96,7 +96,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
     };
     let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {}", e.id, list(&on), words.scope_word(e.scope)), 4));
     if e.id != "unknown" {
-        out += &format!("    {}\n", wrapped(&(words.clause)(e).sentence(), 4));
+        out += &format!("    {}\n", wrapped(&words.said(e).sentence(), 4));
     }
     for parameter in e.parameters.iter().filter(|p| p.name != "phase") {
         let [v, interval, unit] = value(parameter);
@@ -114,11 +114,11 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
 }
 
 fn left(verdict: &Verdict) -> String {
-    if verdict.unexplained.is_empty() {
+    if verdict.unexplained.iter().all(|u| verdict.channels.not_predicted.contains_key(&u.channel)) {
         return String::new();
     }
     let mut out = String::from("\nwhat is left\n");
-    for u in &verdict.unexplained {
+    for u in verdict.unexplained.iter().filter(|u| !verdict.channels.not_predicted.contains_key(&u.channel)) {
         let on: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
         let on = if on.is_empty() { String::new() } else { format!(", goes with {}", list(&on)) };
         let size = size_left(verdict, u);

@@ -7,7 +7,7 @@
 
 use crate::effects::{About, Scope, by_id};
 use crate::verdict::EffectEntry;
-use crate::words::Clause;
+use crate::words::{Clause, parameter};
 
 /// The words of a library of effects.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +20,8 @@ pub struct Vocabulary {
     pub clause: fn(&EffectEntry) -> Clause,
     /// Whether every rig has it.
     pub of_every_rig: fn(&str) -> bool,
+    /// A parameter in words, by the effect's identifier and its own name.
+    pub parameter: fn(&str, &str) -> String,
 }
 
 impl Vocabulary {
@@ -29,7 +31,23 @@ impl Vocabulary {
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
         of_every_rig: |id| by_id(id).is_some_and(crate::effects::Effect::is_of_every_rig),
+        parameter: |id, name| match (id, name) {
+            ("unknown", "from") => "variable, lowest".to_owned(),
+            ("unknown", "to") => "variable, highest".to_owned(),
+            ("unknown", _) => format!("Legendre polynomial {}", name.trim_start_matches('p')),
+            _ => parameter(name),
+        },
     };
+
+    /// What a found effect does, and of several runs on which.
+    #[must_use]
+    pub fn said(self, found: &EffectEntry) -> Clause {
+        let clause = (self.clause)(found);
+        match &found.run {
+            Some(run) => Clause::new(clause.who, format!("{} in run {run}", clause.does)),
+            None => clause,
+        }
+    }
 
     /// The short word of a scope.
     pub(crate) const fn scope_word(self, of: Scope) -> &'static str {
@@ -44,6 +62,7 @@ impl Vocabulary {
         let entry = EffectEntry {
             id: id.to_owned(),
             scope: beside.map_or(Scope::Rig, |e| e.scope),
+            run: None,
             channels: beside.map(|e| e.channels.clone()).unwrap_or_default(),
             depends_on: Vec::new(),
             equation: String::new(),
