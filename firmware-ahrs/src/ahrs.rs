@@ -14,11 +14,12 @@
 
 use crate::sampler::Readings;
 use crate::stuck::Watch;
-use crate::{ACCEL, GYRO, MAG, Mounting, TICK_HZ, adxl345, hmc5883l, itg3200};
+use crate::{ACCEL, GYRO, MAG, Mounting, TICK_HZ, chips};
 use dcm::calibration::Calibration;
 use dcm::{Dcm, Measurement, STANDARD_GRAVITY, Standard, Step, Vec3};
 use frame::message::BoardId;
 use frame::{Hello, ImuSample, Ticks};
+use imu_sensors::{adxl345, hmc5883l, itg3200};
 
 /// Configuration of the board; nothing here changes while it runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -157,7 +158,7 @@ impl Ahrs {
         if let Some(words) = accel {
             sample.accel = self.config.accel.to_body(words);
             sample.fresh |= ACCEL;
-            if adxl345::saturated(&words) {
+            if chips::ACCEL.range.saturated(&words) {
                 saturated |= ACCEL;
             } else {
                 measured.accel = Some(scaled(&sample.accel, M_S2_PER_LSB));
@@ -168,7 +169,7 @@ impl Ahrs {
             Some(words) => {
                 sample.mag = self.config.mag.to_body(words);
                 sample.fresh |= MAG;
-                measured.mag = Some(scaled(&sample.mag, UT_PER_GAUSS / hmc5883l::LSB_PER_GAUSS));
+                measured.mag = Some(scaled(&sample.mag, UT_PER_GAUSS / chips::MAG.range.lsb_per_gauss()));
             }
             None => {}
         }
@@ -220,7 +221,7 @@ fn scaled(words: &[i16; 3], scale: f32) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::itg3200::GyroReading;
+    use crate::GyroReading;
 
     const ALL: u8 = GYRO | ACCEL | MAG;
 

@@ -1,6 +1,6 @@
 //! The IMU board, portable half.
 //!
-//! What it is: drivers of the sensors over the embedded-hal I2C trait, the sampler that reads them on a fixed tick,
+//! What it is: what the sensors are set to, the sampler that reads them on a fixed tick (drivers: `imu-sensors`),
 //! [`Ahrs::tick`], which turns readings and a timestamp into an attitude and a telemetry sample, and [`Console`], which does what
 //! the user asks for. The RTIC application, the tests and the emulated board call the same functions.
 //!
@@ -14,18 +14,12 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
 
-pub mod adxl345;
 pub mod ahrs;
 pub mod calibrator;
+pub mod chips;
 pub mod console;
-pub mod error;
-#[cfg(test)]
-mod failing_bus;
-pub mod hmc5883l;
-pub mod itg3200;
 pub mod job;
 pub mod line;
-pub mod lis3dh;
 pub mod mounting;
 pub mod sampler;
 pub mod settings;
@@ -35,7 +29,7 @@ pub mod text;
 
 pub use ahrs::{Ahrs, AhrsConfig, Inputs, Outputs};
 pub use console::Console;
-pub use error::SensorError;
+pub use imu_sensors::itg3200::GyroReading;
 pub use job::{Done, Job};
 pub use line::{CommandLine, Heard};
 pub use mounting::{Axis, Mounting};

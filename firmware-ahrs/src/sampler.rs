@@ -11,8 +11,7 @@
 //!
 //! Reference: specification `ahrs.md`, "Sensors".
 
-use crate::itg3200::GyroReading;
-use crate::{ACCEL, GYRO, MAG, TEST_ACCEL, TICK_HZ, adxl345, hmc5883l, itg3200, lis3dh};
+use crate::{ACCEL, GYRO, GyroReading, MAG, TEST_ACCEL, TICK_HZ, chips};
 use embedded_hal::i2c::I2c;
 
 /// Failed reads in a row after which a sensor counts as dead: 25 ms.
@@ -20,7 +19,7 @@ pub const MISSES_ALLOWED: u8 = 5;
 /// Ticks between two attempts to bring a sensor back: 1 s.
 pub const RETRY_EVERY: u32 = TICK_HZ;
 /// The magnetometer is read on every n-th tick, so that each read finds a new sample (200/3 Hz is below its 75 Hz).
-pub const MAG_EVERY: u32 = TICK_HZ / hmc5883l::RATE_HZ + 1;
+pub const MAG_EVERY: u32 = TICK_HZ / chips::MAG.rate.hz() as u32 + 1;
 
 /// What one tick found on the bus; `None` where there is no new reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -90,10 +89,10 @@ impl<B: I2c> Sampler<B> {
         let absent = Health::Absent;
         let mut sampler = Self { bus, gyro: absent, accel: absent, mag: absent, test: absent, tick: 0 };
         let bus = &mut sampler.bus;
-        sampler.gyro.book(itg3200::configure(bus));
-        sampler.accel.book(adxl345::configure(bus));
-        sampler.mag.book(hmc5883l::configure(bus));
-        sampler.test.book(lis3dh::configure(bus));
+        sampler.gyro.book(chips::gyro(bus).configure());
+        sampler.accel.book(chips::accel(bus).configure());
+        sampler.mag.book(chips::mag(bus).configure());
+        sampler.test.book(chips::test(bus).configure());
         sampler
     }
 
@@ -110,28 +109,28 @@ impl<B: I2c> Sampler<B> {
         self.tick = tick.wrapping_add(1);
         let bus = &mut self.bus;
         match tick % RETRY_EVERY {
-            50 if !self.gyro.is_alive() => drop(self.gyro.book(itg3200::configure(bus))),
-            100 if !self.accel.is_alive() => drop(self.accel.book(adxl345::configure(bus))),
-            150 if !self.mag.is_alive() => drop(self.mag.book(hmc5883l::configure(bus))),
-            0 if tick > 0 && !self.test.is_alive() => drop(self.test.book(lis3dh::configure(bus))),
+            50 if !self.gyro.is_alive() => drop(self.gyro.book(chips::gyro(bus).configure())),
+            100 if !self.accel.is_alive() => drop(self.accel.book(chips::accel(bus).configure())),
+            150 if !self.mag.is_alive() => drop(self.mag.book(chips::mag(bus).configure())),
+            0 if tick > 0 && !self.test.is_alive() => drop(self.test.book(chips::test(bus).configure())),
             _ => {}
         }
         let mut readings = Readings::default();
         let mut lost = |bit, missing| readings.lost |= if missing { bit } else { 0 };
         if self.gyro.is_alive() {
-            readings.gyro = self.gyro.book(itg3200::read(bus));
+            readings.gyro = self.gyro.book(chips::gyro(bus).read());
             lost(GYRO, readings.gyro.is_none());
         }
         if self.accel.is_alive() {
-            readings.accel = self.accel.book(adxl345::read(bus));
+            readings.accel = self.accel.book(chips::accel(bus).read());
             lost(ACCEL, readings.accel.is_none());
         }
         if self.mag.is_alive() && tick.is_multiple_of(MAG_EVERY) {
-            readings.mag = self.mag.book(hmc5883l::read(bus));
+            readings.mag = self.mag.book(chips::mag(bus).read());
             lost(MAG, readings.mag.is_none());
         }
         if self.test.is_alive() && tick % MAG_EVERY == 1 {
-            readings.test = self.test.book(lis3dh::read(bus));
+            readings.test = self.test.book(chips::test(bus).read());
             lost(TEST_ACCEL, readings.test.is_none());
         }
         readings.alive = self.alive();

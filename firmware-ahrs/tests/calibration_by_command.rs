@@ -5,8 +5,8 @@
 use dcm::calibration::Calibration;
 use dcm::{Increment, Mat3, STANDARD_GRAVITY, Vec3, rotate};
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use firmware_ahrs::GyroReading;
 use firmware_ahrs::console::Asked;
-use firmware_ahrs::itg3200::GyroReading;
 use firmware_ahrs::{Ahrs, AhrsConfig, Console, Heard, Inputs, Readings, Settings, line};
 use frame::message::SettingsNews;
 use frame::{Event, ImuCalibrated, ImuFormat, ImuRefusal, ImuReport, ImuSensor, Message, Ticks};

@@ -2,7 +2,7 @@
 //!
 //! The whole portable half runs: counts with the chips' resolution, noise and offsets in, attitude out. Truth is the shaft.
 
-use firmware_ahrs::itg3200::GyroReading;
+use firmware_ahrs::GyroReading;
 use firmware_ahrs::{Ahrs, AhrsConfig, Inputs, Readings};
 use frame::Ticks;
 

@@ -5,7 +5,6 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_io::{Read, ReadReady, Write};
 use esc_pwm::PulseTimer;
-use firmware_ahrs::{SensorError, lis3dh};
 use firmware_rig::queue::{CAPACITY, EdgeQueue};
 use firmware_rig::{Beside, Config, Delivered, RigConsole, Start};
 use frame::calibration::Converted;
@@ -14,8 +13,9 @@ use frame::rig::{CAPTURE_CHANNELS, Fault, RigSample, RigState};
 use frame::units::{PulseWidth, Ticks};
 use frame::wire::{Decoder, Encoder, MAX_WIRE};
 use hal_sim::hal::{CaptureTimer, PulsePin, RigPins, ScanConverter, SerialEnd, SpiPort, VirtualClock, Watchdog};
-use hal_sim::imu::{ChipErrors, Lis3dh, Motion};
+use hal_sim::imu::{ChipErrors, Motion};
 use hal_sim::{Scenario, Truth};
+use imu_sensors::{Lis3dh, SensorError, lis3dh};
 
 const BAUD: u32 = 2_000_000;
 
@@ -357,20 +357,20 @@ fn the_test_accelerometer_is_read_over_spi() {
         ..Motion::LEVEL
     };
     let clock = VirtualClock::default();
-    let mut spi = SpiPort::new(clock.clone(), Some(Lis3dh::new(motion, ChipErrors::default(), 1)));
-    lis3dh::configure_spi(&mut spi).unwrap();
+    let mut spi = SpiPort::new(clock.clone(), Some(hal_sim::imu::Lis3dh::new(motion, ChipErrors::default(), 1)));
+    Lis3dh::on_spi(&mut spi, lis3dh::Config::DEFAULT).configure().unwrap();
     assert_eq!(clock.now_ns(), 3 * 2 * (20 + 800), "three transactions of two bytes");
     for k in 1..400u64 {
         clock.advance_to(k * 2_500_000);
-        let words = lis3dh::read_spi(&mut spi).unwrap();
+        let words = Lis3dh::on_spi(&mut spi, lis3dh::Config::DEFAULT).read().unwrap();
         let force = motion.force(k * 2_500_000 + 20);
         for (word, (g, sign)) in words.iter().zip(force.iter().zip([1.0, -1.0, -1.0])) {
-            let digits = sign * g * f64::from(lis3dh::LSB_PER_G);
+            let digits = sign * g * f64::from(lis3dh::Range::G16.lsb_per_g());
             assert!((f64::from(*word) - digits).abs() <= 0.51, "{word} for {digits}");
         }
     }
     assert_eq!(spi.chip().map(|c| c.served.len()), Some(399));
     let mut nothing = SpiPort::new(clock, None);
-    let refused = lis3dh::configure_spi(&mut nothing);
-    assert_eq!(refused, Err(SensorError::WrongIdentity { address: lis3dh::ADDRESS, found: 0xFF }));
+    let refused = Lis3dh::on_spi(&mut nothing, lis3dh::Config::DEFAULT).configure();
+    assert_eq!(refused, Err(SensorError::WrongIdentity { expected: 0x33, found: 0xFF }));
 }

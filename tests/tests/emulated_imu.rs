@@ -6,7 +6,7 @@
 //! Build the image first: `cargo xtask image`
 #![cfg(feature = "emulated")]
 
-use firmware_ahrs::itg3200::GyroReading;
+use firmware_ahrs::GyroReading;
 use firmware_ahrs::{Ahrs, AhrsConfig, Inputs, Readings};
 use frame::wire::Decoder;
 use frame::{ImuSample, Message};

@@ -12,13 +12,13 @@ use crate::ahrs;
 use crate::progress::Bar;
 use crate::trouble::unwritten;
 use dcm::{Mat3, STANDARD_GRAVITY};
-use firmware_ahrs::itg3200::GyroReading;
-use firmware_ahrs::{ACCEL, GYRO, MAG, adxl345, hmc5883l, itg3200};
+use firmware_ahrs::{ACCEL, GYRO, GyroReading, MAG, chips};
 use frame::ImuSample;
 use hal_sim::imu::Motion;
 use hal_sim::native::ahrs::fly;
 use hal_sim::scenario::ImuScenario;
 use ident::log::write_whole;
+use imu_sensors::{adxl345, itg3200};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -110,7 +110,7 @@ fn readings(samples: &[ImuSample]) -> String {
         let sensors = [
             (GYRO, sample.gyro, (1.0 / itg3200::LSB_PER_DEG_S).to_radians()),
             (ACCEL, sample.accel, STANDARD_GRAVITY / adxl345::LSB_PER_G),
-            (MAG, sample.mag, UT_PER_GAUSS / hmc5883l::LSB_PER_GAUSS),
+            (MAG, sample.mag, UT_PER_GAUSS / chips::MAG.range.lsb_per_gauss()),
         ];
         for (bit, words, unit) in sensors {
             for word in words {
