@@ -21,6 +21,7 @@ mod peers;
 mod place;
 mod run;
 mod setup;
+mod strangers;
 mod test;
 mod thumb;
 mod verdict;
@@ -48,7 +49,8 @@ usage: cargo xtask COMMAND
   ahrs-bench --vqf  VQF's Rust port on every variant, those included of which nothing is published (fetches it once)
   ahrs-peers       instructions, flash and RAM of other attitude filters beside ours (fetches them once)
   ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)
-  test             everything: format, lints, the book, images, tests, emulated boards, verdicts
+  strangers        packs the crates that serve other programs, builds examples/stranger on the packages and runs it
+  test             everything: format, lints, the book, images, the packed crates, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
   test --lints     format and lints, those of the code behind the emulator included (its crates take 140 s of processor time once)
   blind [ARGS]     the blind campaign (docs/blind.md), on messy rigs with --messy; ARGS go to it, --help lists them
@@ -70,6 +72,7 @@ fn main() -> ExitCode {
         ["book"] => book::book(&place),
         ["program"] => emulator::program(&place),
         ["image", "--bless"] => image::image(&place, true),
+        ["strangers"] => strangers::strangers(&place),
         ["test"] => test::everything(&place),
         ["test", "--quick"] => test::quick(&place),
         ["test", "--lints"] => test::lints(&place),

@@ -15,6 +15,7 @@ use crate::image;
 use crate::place::{BOARD, Place};
 use crate::run::{Failure, Tally, cargo, run, tests};
 use crate::setup;
+use crate::strangers;
 use crate::verdict;
 use std::time::{Duration, Instant};
 
@@ -67,6 +68,7 @@ pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
         })?;
         steps.step("the book and its links", |_| book::book(place))?;
         images(place, &mut steps)?;
+        steps.step("the crates as a stranger gets them", |_| strangers::strangers(place))?;
         host_tests(place, &mut steps)?;
         steps.step("the attitude filter on recordings", |_| ahrs_bench::bench(place, &[]))?;
         boards(place, &mut steps)?;
