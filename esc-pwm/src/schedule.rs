@@ -7,7 +7,7 @@
 //! Reference: Beharie 2013, section 3.2.6 (errata: 21 levels, 20 increments); specification `rig.md`.
 
 use crate::fault::Refusals;
-use crate::segment::FASTEST_MHZ;
+use crate::segment::FASTEST_MILLIHERTZ;
 use crate::units::PulseWidth;
 
 /// Levels of equal height and equal hold, from minimum throttle upwards.
@@ -77,9 +77,9 @@ pub struct Chirp {
     /// Its amplitude.
     pub amplitude: PulseWidth,
     /// Frequency at the beginning, millihertz.
-    pub from_mhz: u32,
+    pub from_millihertz: u32,
     /// Frequency at the end, millihertz.
-    pub to_mhz: u32,
+    pub to_millihertz: u32,
     /// Duration, milliseconds.
     pub length_ms: u32,
 }
@@ -104,10 +104,12 @@ impl Chirp {
         let t = ms.min(length);
         let square = t * t;
         let (whole, rest) = (square.checked_div(2 * length).unwrap_or(0), square.checked_rem(2 * length).unwrap_or(0));
-        let sweep = i64::from(self.to_mhz) - i64::from(self.from_mhz);
+        let sweep = i64::from(self.to_millihertz) - i64::from(self.from_millihertz);
         let part = sweep.wrapping_mul(rest as i64).checked_div(2 * length as i64).unwrap_or(0);
-        let phase =
-            i64::from(self.from_mhz).wrapping_mul(t as i64).wrapping_add(sweep.wrapping_mul(whole as i64)).wrapping_add(part);
+        let phase = i64::from(self.from_millihertz)
+            .wrapping_mul(t as i64)
+            .wrapping_add(sweep.wrapping_mul(whole as i64))
+            .wrapping_add(part);
         phase.rem_euclid(TURN) as u32
     }
 }
@@ -187,7 +189,7 @@ impl Schedule {
             Self::Step { before, after, hold_ms } => out(before) || out(after) || *hold_ms == 0,
             Self::Chirp(c) => {
                 c.length_ms == 0
-                    || c.from_mhz.max(c.to_mhz) > FASTEST_MHZ
+                    || c.from_millihertz.max(c.to_millihertz) > FASTEST_MILLIHERTZ
                     || out(&c.centre)
                     || out(&PulseWidth(c.centre.0.saturating_add(c.amplitude.0)))
                     || out(&PulseWidth(c.centre.0.saturating_sub(c.amplitude.0)))
@@ -275,11 +277,11 @@ mod tests {
     proptest! {
         /// The phase is that of exact integers of any width.
         #[test]
-        fn the_phase_is_exact(from_mhz in 0u32..=FASTEST_MHZ, to_mhz in 0u32..=FASTEST_MHZ, length_ms in 1u32.., share in 0.0f64..=1.0) {
-            let chirp = Chirp { centre: PulseWidth::MIN, amplitude: PulseWidth(0), from_mhz, to_mhz, length_ms };
+        fn the_phase_is_exact(from_millihertz in 0u32..=FASTEST_MILLIHERTZ, to_millihertz in 0u32..=FASTEST_MILLIHERTZ, length_ms in 1u32.., share in 0.0f64..=1.0) {
+            let chirp = Chirp { centre: PulseWidth::MIN, amplitude: PulseWidth(0), from_millihertz, to_millihertz, length_ms };
             let ms = (f64::from(length_ms) * share) as u64;
             let (t, l) = (i128::from(ms), i128::from(length_ms));
-            let exact = i128::from(from_mhz) * t + (i128::from(to_mhz) - i128::from(from_mhz)) * t * t / (2 * l);
+            let exact = i128::from(from_millihertz) * t + (i128::from(to_millihertz) - i128::from(from_millihertz)) * t * t / (2 * l);
             prop_assert_eq!(i128::from(chirp.phase(ms)), exact.rem_euclid(1_000_000));
         }
     }

@@ -9,7 +9,7 @@
 use crate::units::PulseWidth;
 
 /// Highest frequency of a chirp, millihertz: an ESC takes 50 pulses a second.
-pub const FASTEST_MHZ: u32 = 100_000;
+pub const FASTEST_MILLIHERTZ: u32 = 100_000;
 
 /// How the pulse moves within a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -29,9 +29,9 @@ pub enum Shape {
         /// Amplitude.
         amplitude: PulseWidth,
         /// Frequency at the beginning, millihertz.
-        from_mhz: u32,
+        from_millihertz: u32,
         /// Frequency at the end, millihertz.
-        to_mhz: u32,
+        to_millihertz: u32,
     },
     /// The host may move the pulse within these bounds, and may end the segment before its time.
     Steered {
@@ -63,11 +63,11 @@ impl Segment {
         let shape = match self.shape {
             Shape::Hold | Shape::Line { from: None } => true,
             Shape::Line { from: Some(from) } => inside(from),
-            Shape::Chirp { amplitude, from_mhz, to_mhz } => {
+            Shape::Chirp { amplitude, from_millihertz, to_millihertz } => {
                 inside(PulseWidth(self.pulse.0.saturating_add(amplitude.0)))
                     && inside(PulseWidth(self.pulse.0.saturating_sub(amplitude.0)))
-                    && from_mhz <= FASTEST_MHZ
-                    && to_mhz <= FASTEST_MHZ
+                    && from_millihertz <= FASTEST_MILLIHERTZ
+                    && to_millihertz <= FASTEST_MILLIHERTZ
             }
             Shape::Steered { low, high } => inside(low) && inside(high) && (low..=high).contains(&self.pulse),
         };

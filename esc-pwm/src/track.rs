@@ -214,8 +214,8 @@ fn pulse_of(segment: &Segment, cursor: &Cursor, age: u64) -> PulseWidth {
     match segment.shape {
         Shape::Hold => segment.pulse,
         Shape::Line { from } => between(from.unwrap_or(cursor.from), segment.pulse, age, u64::from(segment.length_ms)),
-        Shape::Chirp { amplitude, from_mhz, to_mhz } => {
-            Chirp { centre: segment.pulse, amplitude, from_mhz, to_mhz, length_ms: segment.length_ms }.value(age)
+        Shape::Chirp { amplitude, from_millihertz, to_millihertz } => {
+            Chirp { centre: segment.pulse, amplitude, from_millihertz, to_millihertz, length_ms: segment.length_ms }.value(age)
         }
         Shape::Steered { .. } => cursor.steered.unwrap_or(segment.pulse),
     }

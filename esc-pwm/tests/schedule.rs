@@ -39,7 +39,13 @@ fn impossible_schedules_are_refused() {
         stairs(us(50), 10, us(2001)),
         Schedule::Manual(us(900)),
         Schedule::Ramp { from: us(1000), to: us(1500), length_ms: 0 },
-        Schedule::Chirp(Chirp { centre: us(1900), amplitude: us(200), from_mhz: 100, to_mhz: 1000, length_ms: 1000 }),
+        Schedule::Chirp(Chirp {
+            centre: us(1900),
+            amplitude: us(200),
+            from_millihertz: 100,
+            to_millihertz: 1000,
+            length_ms: 1000,
+        }),
     ] {
         assert_eq!(bad.check(), Refusals(Refusals::OUT_OF_RANGE), "{bad:?}");
     }
@@ -47,7 +53,7 @@ fn impossible_schedules_are_refused() {
 
 #[test]
 fn a_chirp_of_constant_frequency_is_a_sine() {
-    let chirp = Chirp { centre: us(1500), amplitude: us(100), from_mhz: 2000, to_mhz: 2000, length_ms: 10_000 };
+    let chirp = Chirp { centre: us(1500), amplitude: us(100), from_millihertz: 2000, to_millihertz: 2000, length_ms: 10_000 };
     let schedule = Schedule::Chirp(chirp);
     for k in 0..20 {
         let at = |ms: u64| i64::from(schedule.pulse_at(k * 500 + ms).unwrap().0);
@@ -80,7 +86,7 @@ fn any_schedule() -> impl Strategy<Value = Schedule> {
         (pulse(), pulse(), 1u32..5000).prop_map(|(before, after, hold_ms)| Schedule::Step { before, after, hold_ms }),
         (1_400_000u32..1_600_000, 0u32..400_000, 0u32..50_000, 0u32..50_000, 1u32..100_000).prop_map(|(c, a, f, t, l)| {
             let (centre, amplitude) = (PulseWidth(c), PulseWidth(a));
-            Schedule::Chirp(Chirp { centre, amplitude, from_mhz: f, to_mhz: t, length_ms: l })
+            Schedule::Chirp(Chirp { centre, amplitude, from_millihertz: f, to_millihertz: t, length_ms: l })
         }),
     ]
 }

@@ -38,7 +38,7 @@ fn it_plays_what_was_sent() {
         hold(1200, 50),
         segment(1300, 100, line(None)),
         segment(1500, 100, line(Some(1100))),
-        segment(1500, 1000, Shape::Chirp { amplitude: us(100), from_mhz: 1000, to_mhz: 1000 }),
+        segment(1500, 1000, Shape::Chirp { amplitude: us(100), from_millihertz: 1000, to_millihertz: 1000 }),
     ]);
     assert!(track.check().is_empty());
     track.start();
@@ -64,8 +64,8 @@ fn gaps_impossible_segments_and_too_much_are_refused() {
         hold(999, 10),
         hold(1500, 0),
         segment(1500, 10, Shape::Line { from: Some(us(2001)) }),
-        segment(1900, 10, Shape::Chirp { amplitude: us(200), from_mhz: 0, to_mhz: 10 }),
-        segment(1500, 10, Shape::Chirp { amplitude: us(100), from_mhz: 0, to_mhz: u32::MAX }),
+        segment(1900, 10, Shape::Chirp { amplitude: us(200), from_millihertz: 0, to_millihertz: 10 }),
+        segment(1500, 10, Shape::Chirp { amplitude: us(100), from_millihertz: 0, to_millihertz: u32::MAX }),
         segment(1500, 10, Shape::Steered { low: us(1100), high: us(1400) }),
         segment(1500, 10, Shape::Steered { low: us(1100), high: us(2100) }),
     ] {
@@ -138,10 +138,10 @@ fn any_segment() -> impl Strategy<Value = Segment> {
     let shape = prop_oneof![
         Just(Shape::Hold),
         proptest::option::of(pulse()).prop_map(|from| Shape::Line { from }),
-        (0u32..500_000, 0u32..150_000, 0u32..150_000).prop_map(|(a, from_mhz, to_mhz)| Shape::Chirp {
+        (0u32..500_000, 0u32..150_000, 0u32..150_000).prop_map(|(a, from_millihertz, to_millihertz)| Shape::Chirp {
             amplitude: PulseWidth(a),
-            from_mhz,
-            to_mhz
+            from_millihertz,
+            to_millihertz
         }),
         (pulse(), pulse()).prop_map(|(low, high)| Shape::Steered { low, high }),
     ];

@@ -59,8 +59,8 @@ impl Rig {
             }
             Command::RunRamp { from, to, length_ms } => self.run(now, Schedule::Ramp { from, to, length_ms }),
             Command::RunStep { before, after, hold_ms } => self.run(now, Schedule::Step { before, after, hold_ms }),
-            Command::RunChirp { centre, amplitude, from_mhz, to_mhz, length_ms } => {
-                self.run(now, Schedule::Chirp(Chirp { centre, amplitude, from_mhz, to_mhz, length_ms }))
+            Command::RunChirp { centre, amplitude, from_millihertz, to_millihertz, length_ms } => {
+                self.run(now, Schedule::Chirp(Chirp { centre, amplitude, from_millihertz, to_millihertz, length_ms }))
             }
             Command::Configure(setting) => self.configure(&setting),
             Command::ConfigPart(part) => self.incoming.take(&part).map_err(|OutOfRange| Refusals(Refusals::OUT_OF_RANGE)),

@@ -82,7 +82,7 @@ fn happenings() -> Vec<Happening> {
         Command::RunVisits { step: us(200), hold_ms: 10, top: us(1200), down: false, visits: 2 },
         Command::RunRamp { from: us(1000), to: us(1500), length_ms: 30 },
         Command::RunStep { before: us(1100), after: us(1300), hold_ms: 10 },
-        Command::RunChirp { centre: us(1300), amplitude: us(100), from_mhz: 1000, to_mhz: 5000, length_ms: 40 },
+        Command::RunChirp { centre: us(1300), amplitude: us(100), from_millihertz: 1000, to_millihertz: 5000, length_ms: 40 },
         Command::SetPulse(us(1500)),
         Command::SetPulse(us(1000)),
         Command::SetPulse(us(2500)),

@@ -377,9 +377,9 @@ pub enum Command {
         /// Amplitude.
         amplitude: PulseWidth,
         /// Frequency at the beginning, millihertz.
-        from_mhz: u32,
+        from_millihertz: u32,
         /// Frequency at the end, millihertz.
-        to_mhz: u32,
+        to_millihertz: u32,
         /// Duration, milliseconds.
         length_ms: u32,
     },

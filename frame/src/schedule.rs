@@ -9,7 +9,7 @@
 
 use crate::rig::Refusals;
 use crate::units::Ticks;
-pub use esc_pwm::segment::{FASTEST_MHZ, Segment, Shape, Steer};
+pub use esc_pwm::segment::{FASTEST_MILLIHERTZ, Segment, Shape, Steer};
 use serde::{Deserialize, Serialize};
 
 /// Segments in one frame.

@@ -296,9 +296,10 @@ mod tests {
         use crate::schedule::{BATCH, Segment, SegmentBatch, Shape};
         use crate::units::PulseWidth;
         let most = PulseWidth(u32::MAX);
-        for shape in
-            [Shape::Chirp { amplitude: most, from_mhz: u32::MAX, to_mhz: u32::MAX }, Shape::Steered { low: most, high: most }]
-        {
+        for shape in [
+            Shape::Chirp { amplitude: most, from_millihertz: u32::MAX, to_millihertz: u32::MAX },
+            Shape::Steered { low: most, high: most },
+        ] {
             let segment = Segment { pulse: PulseWidth::MAX, length_ms: u32::MAX, shape };
             let batch = SegmentBatch { first: u32::MAX, count: BATCH as u8, last: true, segments: [segment; BATCH] };
             let mut out = [0; MAX_WIRE];

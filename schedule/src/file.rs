@@ -11,7 +11,7 @@ use crate::part::{self, Part};
 use crate::plan::Plan;
 use crate::replay::{Replay, replay};
 use crate::table::{Keys, Refused, number, pulse};
-use frame::schedule::FASTEST_MHZ;
+use frame::schedule::FASTEST_MILLIHERTZ;
 use frame::units::PulseWidth;
 use std::path::Path;
 use toml::Spanned;
@@ -142,7 +142,7 @@ fn chirp(keys: &mut Keys<'_>) -> Result<Part, Refused> {
     let centre = keys.pulse("centre_us")?;
     let room = (centre.as_us() - 1000.0).min(2000.0 - centre.as_us());
     let amplitude = pulse(keys.number("amplitude_us", 0.0, room)?);
-    let fastest = f64::from(FASTEST_MHZ) / 1e3;
+    let fastest = f64::from(FASTEST_MILLIHERTZ) / 1e3;
     let mhz = |hz: f64| (hz * 1e3).round() as u32;
     let (from, to) = (keys.number("from_hz", 0.0, fastest)?, keys.number("to_hz", 0.0, fastest)?);
     Ok(part::chirp(centre, amplitude, mhz(from), mhz(to), keys.time("length_s")?))

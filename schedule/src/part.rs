@@ -84,9 +84,14 @@ pub fn ramp(from: Option<PulseWidth>, to: PulseWidth, length_ms: u32) -> Part {
 
 /// A sine whose frequency moves linearly, millihertz.
 #[must_use]
-pub fn chirp(centre: PulseWidth, amplitude: PulseWidth, from_mhz: u32, to_mhz: u32, length_ms: u32) -> Part {
-    let shape = Shape::Chirp { amplitude, from_mhz, to_mhz };
-    let title = format!("chirp about {} us, {} to {} Hz", centre.as_us(), f64::from(from_mhz) / 1e3, f64::from(to_mhz) / 1e3);
+pub fn chirp(centre: PulseWidth, amplitude: PulseWidth, from_millihertz: u32, to_millihertz: u32, length_ms: u32) -> Part {
+    let shape = Shape::Chirp { amplitude, from_millihertz, to_millihertz };
+    let title = format!(
+        "chirp about {} us, {} to {} Hz",
+        centre.as_us(),
+        f64::from(from_millihertz) / 1e3,
+        f64::from(to_millihertz) / 1e3
+    );
     Part::plain(title, vec![Segment { pulse: centre, length_ms, shape }])
 }
 

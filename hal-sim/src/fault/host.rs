@@ -107,7 +107,7 @@ impl Plan {
             Course::Chirp => {
                 let centre = PulseWidth::from_us(self.pulse_us.clamp(1300, 1600));
                 let amplitude = PulseWidth(60_000);
-                vec![Command::RunChirp { centre, amplitude, from_mhz: 500, to_mhz: 4000, length_ms: 60_000 }]
+                vec![Command::RunChirp { centre, amplitude, from_millihertz: 500, to_millihertz: 4000, length_ms: 60_000 }]
             }
             Course::Segments if self.mishap == super::Mishap::StreamDry => {
                 let all = segments(self, (self.stream_ms() / 4) as u32);

@@ -233,8 +233,8 @@ fn commands(schedule: &Schedule) -> Vec<Command> {
         Schedule::Chirp(chirp) => {
             let mhz = |hz: f64| (hz * 1000.0).round() as u32;
             let (centre, amplitude) = (pulse_width(chirp.centre_us), pulse_width(chirp.amplitude_us));
-            let (from_mhz, to_mhz, length_ms) = (mhz(chirp.from_hz), mhz(chirp.to_hz), ms(chirp.length_s));
-            vec![Command::RunChirp { centre, amplitude, from_mhz, to_mhz, length_ms }]
+            let (from_millihertz, to_millihertz, length_ms) = (mhz(chirp.from_hz), mhz(chirp.to_hz), ms(chirp.length_s));
+            vec![Command::RunChirp { centre, amplitude, from_millihertz, to_millihertz, length_ms }]
         }
         Schedule::Replay(_) | Schedule::File { .. } => vec![Command::RunSchedule],
         Schedule::Steps { steps } if steps.len() > MAX_UPLOAD => vec![Command::RunSchedule],

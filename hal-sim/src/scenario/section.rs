@@ -397,7 +397,7 @@ fn pulse<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
 }
 
 fn frequency<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
-    let most = f64::from(frame::schedule::FASTEST_MHZ) / 1e3;
+    let most = f64::from(frame::schedule::FASTEST_MILLIHERTZ) / 1e3;
     checked(d, |v| (0.0..=most).contains(&v), &format!("a frequency from 0 to {most} Hz"))
 }
 
