@@ -201,18 +201,7 @@ pub(crate) const M_S2_PER_LSB: f32 = STANDARD_GRAVITY / adxl345::LSB_PER_G;
 const UT_PER_GAUSS: f32 = 100.0;
 /// Version of this package.
 const FIRMWARE: [u8; 3] =
-    [digits(env!("CARGO_PKG_VERSION_MAJOR")), digits(env!("CARGO_PKG_VERSION_MINOR")), digits(env!("CARGO_PKG_VERSION_PATCH"))];
-
-/// A decimal number of the package version, at compile time.
-const fn digits(text: &str) -> u8 {
-    let mut value = 0;
-    let mut rest = text.as_bytes();
-    while let [digit, tail @ ..] = rest {
-        value = value * 10 + (*digit - b'0');
-        rest = tail;
-    }
-    value
-}
+    frame::version::of([env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")]);
 
 fn scaled(words: &[i16; 3], scale: f32) -> Vec3 {
     Vec3::from(words.map(|w| f32::from(w) * scale))
@@ -314,8 +303,6 @@ mod tests {
 
     #[test]
     fn the_version_is_the_package_version() {
-        assert_eq!(digits("0"), 0);
-        assert_eq!(digits("117"), 117);
         assert_eq!(Ahrs::hello(168_000_000, 4, ALL).firmware, [0, 1, 0]);
     }
 

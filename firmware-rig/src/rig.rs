@@ -496,17 +496,4 @@ const START: Ticks = Ticks::from_ms(2000);
 
 /// Firmware version from the package.
 const VERSION: [u8; 3] =
-    [number(env!("CARGO_PKG_VERSION_MAJOR")), number(env!("CARGO_PKG_VERSION_MINOR")), number(env!("CARGO_PKG_VERSION_PATCH"))];
-
-/// A decimal number below 256, at compile time.
-const fn number(mut text: &str) -> u8 {
-    let mut value = 0u8;
-    while let Some((digit, rest)) = text.as_bytes().split_first() {
-        value = value * 10 + (*digit - b'0');
-        text = match core::str::from_utf8(rest) {
-            Ok(rest) => rest,
-            Err(_) => "",
-        };
-    }
-    value
-}
+    frame::version::of([env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")]);

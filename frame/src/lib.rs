@@ -24,6 +24,7 @@ pub mod message;
 pub mod rig;
 pub mod schedule;
 pub mod units;
+pub mod version;
 pub mod wire;
 
 pub use calibration::{AdcScale, Calibration, Converted};
