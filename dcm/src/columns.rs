@@ -1,6 +1,6 @@
 //! The few operations on columns of three numbers that the filter is made of: one copy of each in the image.
 //!
-//! What it is: sums, products and turns of columns, averages that follow, cutting to a limit.
+//! What it is: sums, products and turns of columns, averages that follow, clamping to a limit.
 //! What can go wrong: written out at each place, as an optimiser likes it, the same arithmetic takes three times the flash.
 //! Units: those of the input.
 //! Reference: budget of flash, `budgets/ahrs.toml`.
@@ -13,7 +13,7 @@ pub(crate) const ZERO: Column = [0.0; 3];
 
 /// a + k b.
 #[inline(never)]
-pub(crate) fn plus(a: &Column, b: &Column, k: f32) -> Column {
+pub(crate) fn add_scaled(a: &Column, b: &Column, k: f32) -> Column {
     let ([ax, ay, az], [bx, by, bz]) = (a, b);
     [ax + k * bx, ay + k * by, az + k * bz]
 }
@@ -64,13 +64,13 @@ pub(crate) fn follow(average: &mut [Column], now: &mut [Column], k: f32) {
 
 /// The smaller one; a number where one is none.
 #[inline(never)]
-pub(crate) fn least(a: f32, b: f32) -> f32 {
+pub(crate) fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Cuts every component to `most` on both sides of zero; says whether one was there or beyond.
+/// Clamps every component to `most` on both sides of zero; says whether one was there or beyond.
 #[inline(never)]
-pub(crate) fn cut(v: &mut [f32], most: f32) -> bool {
+pub(crate) fn clamp(v: &mut [f32], most: f32) -> bool {
     let mut reached = false;
     for x in v {
         if x.abs() >= most {

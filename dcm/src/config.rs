@@ -32,7 +32,7 @@ pub struct RestConfig {
 pub struct BiasConfig {
     /// Largest bias of an axis, rad/s; also the largest rate that rest may show while the bias is unknown.
     pub limit: f32,
-    /// Time of rest that weighs as much as the ignorance at start, s.
+    /// Time of rest that weighs as much as the variance at the start, s.
     pub rest_weight: f32,
     /// Share of the tilt correction that goes to the bias in motion, 1/s.
     pub tilt_gain: f32,
@@ -46,11 +46,11 @@ pub struct BiasConfig {
     /// Time constant of the averaged attitude that corrections are turned into body axes with, s; first order, cut-off
     /// 1/(2 pi tau) = 0.03 Hz.
     pub lag: f32,
-    /// Time in which motion resolves the ignorance, s.
+    /// Time in which the variance decays in motion, s.
     pub motion_tau: f32,
-    /// Growth of ignorance, 1/s.
+    /// Growth of the variance, 1/s.
     pub forgetting: f32,
-    /// Ignorance (1 at start) below which the bias is trusted.
+    /// Variance (1 at the start) below which the bias is trusted.
     pub trusted: f32,
 }
 

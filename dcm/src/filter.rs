@@ -23,7 +23,7 @@ pub use output::{Flags, Quality, STATE_WORDS};
 pub use state::StateError;
 
 use crate::angles::start_attitude;
-use crate::columns::{Column, ZERO, cut, dot, least, scaled, square, turn};
+use crate::columns::{Column, ZERO, clamp, dot, lesser, scaled, square, turn};
 use crate::config::Config;
 use crate::measurement::{Measurement, Step};
 use crate::rotation::{direction, exponential};
@@ -149,8 +149,8 @@ impl<C: Borrow<Config>> Dcm<C> {
             self.rest.restart();
         }
         self.since_gyro += dt;
-        self.since_accel = least(self.since_accel + dt, LONGEST_ACCEL);
-        self.since_mag = least(self.since_mag + dt, LONGEST_MAG);
+        self.since_accel = lesser(self.since_accel + dt, LONGEST_ACCEL);
+        self.since_mag = lesser(self.since_mag + dt, LONGEST_MAG);
         Step { bad_input: !good, ..Step::default() }
     }
 
@@ -218,7 +218,7 @@ fn taken(reading: &mut Column, shortest: f32, range: f32, step: &mut Step) -> bo
     if square < range * range {
         return true;
     }
-    let over = cut(reading, range);
+    let over = clamp(reading, range);
     step.overrange |= over;
     !over
 }

@@ -1,14 +1,14 @@
 //! Gyro bias.
 //!
-//! What it is: the bias and one number for how little is known of it. At rest the filtered rate is the bias; in motion the
+//! What it is: the bias and its variance, one number for all axes. At rest the filtered rate is the bias; in motion the
 //! turns that correct tilt and heading are what the bias has caused, seen through the averaged attitude.
 //! What can go wrong: a bias beyond the limit is cut to it; heading errors of a disturbed field reach the bias about the
 //! vertical only, and with a small gain.
-//! Units: rad/s; ignorance is 1 at the start and shrinks.
+//! Units: rad/s; the variance as a share of that at the start: 1 there, less with what is learnt.
 //! Reference: Laidig & Seel 2023, section 3.3, with scalar gains in the place of a Kalman filter.
 
 use super::state::Words;
-use crate::columns::{Column, ZERO, cut, dot, follow, least};
+use crate::columns::{Column, ZERO, clamp, dot, follow, lesser};
 use crate::config::BiasConfig;
 
 /// The state.
@@ -16,8 +16,8 @@ use crate::config::BiasConfig;
 pub(super) struct Bias {
     /// The bias, rad/s.
     pub(super) value: Column,
-    /// 1 at the start.
-    pub(super) ignorance: f32,
+    /// Its variance, as a share of that at the start.
+    pub(super) variance: f32,
     /// Averaged rotation body to earth.
     pub(super) attitude: [Column; 3],
 }
@@ -26,50 +26,50 @@ impl Bias {
     /// Nothing known.
     #[inline]
     pub(super) fn new() -> Self {
-        Self { value: ZERO, ignorance: 1.0, attitude: [[0.0; 3]; 3] }
+        Self { value: ZERO, variance: 1.0, attitude: [[0.0; 3]; 3] }
     }
 
     /// Whether rest or motion has shown it.
     pub(super) fn trusted(&self, config: &BiasConfig) -> bool {
-        self.ignorance < config.trusted
+        self.variance < config.trusted
     }
 
     /// Takes the filtered rate of a body at rest.
     #[inline]
     pub(super) fn at_rest(&mut self, config: &BiasConfig, rate: &Column, dt: f32) {
-        let weight = self.ignorance * dt;
+        let weight = self.variance * dt;
         let k = weight / (weight + config.rest_weight);
         follow(core::slice::from_mut(&mut self.value), core::slice::from_mut(&mut rate.clone()), k);
-        self.ignorance *= 1.0 - k;
-        cut(&mut self.value, config.limit);
+        self.variance *= 1.0 - k;
+        clamp(&mut self.value, config.limit);
     }
 
     /// Time passes.
     #[inline]
     pub(super) fn age(&mut self, config: &BiasConfig, dt: f32, moving: bool) {
         if moving {
-            self.ignorance *= 1.0 - dt / config.motion_tau;
+            self.variance *= 1.0 - dt / config.motion_tau;
         }
-        self.ignorance = least(self.ignorance + config.forgetting * dt, 1.0);
+        self.variance = lesser(self.variance + config.forgetting * dt, 1.0);
     }
 
     /// The averaged attitude follows.
     #[inline]
     pub(super) fn follow(&mut self, config: &BiasConfig, attitude: &[Column; 3], dt: f32) {
-        follow(&mut self.attitude, &mut attitude.clone(), least(dt / config.lag, 1.0));
+        follow(&mut self.attitude, &mut attitude.clone(), lesser(dt / config.lag, 1.0));
     }
 
     /// Takes the turn about the earth's horizontal axes that corrected the tilt over `dt`, in motion.
     #[inline]
     pub(super) fn take_tilt(&mut self, config: &BiasConfig, turn: &Column, dt: f32) {
-        let gain = config.tilt_gain * (1.0 + config.tilt_boost * self.ignorance);
+        let gain = config.tilt_gain * (1.0 + config.tilt_boost * self.variance);
         self.correct(turn, config.limit * dt, gain, config.limit);
     }
 
     /// Takes the heading error that was found over `dt`, in motion.
     #[inline]
     pub(super) fn take_heading(&mut self, config: &BiasConfig, error: f32, dt: f32) {
-        let gain = config.heading_gain * (1.0 + config.heading_boost * self.ignorance);
+        let gain = config.heading_gain * (1.0 + config.heading_boost * self.variance);
         self.correct(&[0.0, 0.0, error], 0.2, gain * dt, config.limit);
     }
 
@@ -77,18 +77,18 @@ impl Bias {
     #[inline(never)]
     fn correct(&mut self, turn: &Column, most: f32, gain: f32, limit: f32) {
         let mut turn = *turn;
-        cut(&mut turn, most);
+        clamp(&mut turn, most);
         for (value, axis) in self.value.iter_mut().zip(&self.attitude) {
             *value -= gain * dot(axis, &turn);
         }
-        cut(&mut self.value, limit);
+        clamp(&mut self.value, limit);
     }
 }
 
 impl Words for Bias {
     fn words(&mut self, visit: &mut dyn FnMut(&mut f32)) {
         self.value.words(visit);
-        visit(&mut self.ignorance);
+        visit(&mut self.variance);
         self.attitude.words(visit);
     }
 }

@@ -7,7 +7,7 @@
 //! Reference: Laidig & Seel 2023, section 3.5.
 
 use super::state::Words;
-use crate::columns::least;
+use crate::columns::lesser;
 use crate::config::FieldConfig;
 use crate::trig::{angle, root};
 
@@ -144,7 +144,7 @@ impl Field {
     #[inline]
     pub(super) fn belief(&mut self, config: &FieldConfig, dt: f32, hold: bool) -> f32 {
         if !self.disturbed(config) {
-            self.frozen = -least(config.doubt * dt - self.frozen, 0.0);
+            self.frozen = -lesser(config.doubt * dt - self.frozen, 0.0);
             return 1.0;
         }
         if !self.known() && !hold {

@@ -10,7 +10,7 @@ use super::field::Shape;
 use super::{DEAD, Dcm, taken};
 use crate::Config;
 use crate::angles::up;
-use crate::columns::{Column, ZERO, least, plus, scaled, square, turn};
+use crate::columns::{Column, ZERO, add_scaled, lesser, scaled, square, turn};
 use crate::measurement::Step;
 use crate::trig::{angle, root};
 use core::borrow::Borrow;
@@ -30,7 +30,7 @@ impl<C: Borrow<Config>> Dcm<C> {
             self.start(&up(&self.matrix.data.0), Some(field), step);
         }
         turn(&self.matrix.data.0, core::slice::from_mut(&mut seen));
-        self.field_sum = plus(&self.field_sum, &seen, 1.0);
+        self.field_sum = add_scaled(&self.field_sum, &seen, 1.0);
         self.fields += 1.0;
         first
     }
@@ -47,7 +47,7 @@ impl<C: Borrow<Config>> Dcm<C> {
         self.fields = 0.0;
         let mut free = self.iron.taken_from(&ZERO, config.iron.dead_zone, config.iron.limit);
         turn(&self.matrix.data.0, core::slice::from_mut(&mut free));
-        let seen = &plus(whole, &free, 1.0);
+        let seen = &add_scaled(whole, &free, 1.0);
         if square(seen) > config.field.strongest * config.field.strongest {
             self.magnet = true;
             self.field.doubt();
@@ -60,7 +60,7 @@ impl<C: Borrow<Config>> Dcm<C> {
         }
         let [x, y, down] = seen;
         let level = root(x * x + y * y);
-        let spin = plus(self.rest.rate.value(), &self.bias.value, -1.0);
+        let spin = add_scaled(self.rest.rate.value(), &self.bias.value, -1.0);
         let turning = square(&spin) > config.field.new_rate * config.field.new_rate;
         let other = self.field.take(&config.field, &Shape { level, down: *down }, dt, turning, self.magnet);
         if other {
@@ -73,15 +73,15 @@ impl<C: Borrow<Config>> Dcm<C> {
         let error = wrapped(config.declination, angle(*y, *x, level));
         self.heading_error = error;
         // the heading so far may be that of a magnet: the further off, the less of it is kept
-        let doubt = if other { least(error.abs() * (0.5 / config.field.dip), 1.0) } else { 0.0 };
+        let doubt = if other { lesser(error.abs() * (0.5 / config.field.dip), 1.0) } else { 0.0 };
         if !self.rest.now && learns {
             self.bias.take_heading(&config.bias, error, dt);
         }
-        self.heading_age = least(self.heading_age * (1.0 - doubt) + dt, config.heading_tau);
+        self.heading_age = lesser(self.heading_age * (1.0 - doubt) + dt, config.heading_tau);
         // an unknown bias does more harm than an unknown field, and the first seconds are the average that the heading starts from
         let hold = self.bias.trusted(&config.bias) && self.heading_age >= config.heading_tau;
         let belief = self.field.belief(&config.field, dt, hold);
-        let gain = least(dt / self.heading_age, 1.0);
+        let gain = lesser(dt / self.heading_age, 1.0);
         // a gyro at rest, whose offset is seen, holds the heading better than a field that differs from the one that is known
         if belief > 0.0 && !(self.rest.now && belief < 1.0 && self.field.known()) {
             self.turn_earth(&[0.0, 0.0, error * gain * belief]);

@@ -8,7 +8,7 @@
 //! Reference: the same idea from rates: Troni & Whitcomb, IEEE/ASME T. Mechatronics 24(4), 2019.
 
 use super::state::Words;
-use crate::columns::{Column, follow, least, plus, square, turn};
+use crate::columns::{Column, add_scaled, follow, lesser, square, turn};
 use crate::config::IronConfig;
 use crate::trig::root;
 
@@ -30,18 +30,18 @@ impl Iron {
     pub(super) fn taken_from(&self, reading: &Column, dead_zone: f32, limit: f32) -> Column {
         let long = root(square(&self.found));
         let excess = long - dead_zone;
-        let share = if excess > 0.0 { least(excess, limit) / long } else { 0.0 };
-        plus(reading, &self.found, -share)
+        let share = if excess > 0.0 { lesser(excess, limit) / long } else { 0.0 };
+        add_scaled(reading, &self.found, -share)
     }
 
     /// Takes a reading in earth axes that stands for `dt` seconds, with the attitude of its time.
     #[inline]
     pub(super) fn take(&mut self, config: &IronConfig, attitude: &[Column; 3], seen: &Column, dt: f32) {
-        let share = if self.age > 0.0 { least(dt / config.memory, 1.0) } else { 1.0 };
-        self.age = least(self.age + dt, config.lag);
+        let share = if self.age > 0.0 { lesser(dt / config.memory, 1.0) } else { 1.0 };
+        self.age = lesser(self.age + dt, config.lag);
         let [a, b, c] = *attitude;
         let mut change = [a, b, c, *seen];
-        follow(&mut self.average, &mut change, least(dt / self.age, 1.0));
+        follow(&mut self.average, &mut change, lesser(dt / self.age, 1.0));
 
         let [[ax, ay, az], [bx, by, bz], [cx, cy, cz], _] = change;
         turn(&[[ax, bx, cx], [ay, by, cy], [az, bz, cz]], &mut change);

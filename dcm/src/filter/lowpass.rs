@@ -7,7 +7,7 @@
 //! Reference: x'' tau^2 + 2 x' tau + 2 x = 2 z, cut-off sqrt(2)/(2 pi tau), damping 1/sqrt(2).
 
 use super::state::Words;
-use crate::columns::least;
+use crate::columns::lesser;
 
 /// The state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,10 +44,10 @@ impl<const N: usize> LowPass<N> {
         // running means, z - x - 2v the distance to the first; then x' tau = v, v' tau = 2 (z - x - v)
         let (lag, gain, keep, k) = if self.starting(start) {
             self.age += dt;
-            let k = least(dt / self.age, 1.0);
+            let k = lesser(dt / self.age, 1.0);
             (2.0, k, 0.5 - 0.5 * k, k)
         } else {
-            let k = least(dt / tau, 1.0);
+            let k = lesser(dt / tau, 1.0);
             (1.0, 2.0 * k, 1.0, k)
         };
         let [x, v] = &mut self.state;

@@ -8,7 +8,7 @@
 use super::state::{Words, checksum};
 use super::{Dcm, StateError};
 use crate::angles::{euler_of, quaternion_of};
-use crate::columns::{cut, least, square};
+use crate::columns::{clamp, lesser, square};
 use crate::linear::determinant;
 use crate::trig::root;
 use crate::{Config, Earth, Euler, Mat3, STANDARD_GRAVITY, Vec3};
@@ -104,9 +104,9 @@ impl<C: Borrow<Config> + Clone> Dcm<C> {
     pub fn set_bias(&mut self, bias: Vec3, sigma: f32) {
         let limit = self.config.borrow().bias.limit;
         self.bias.value = [bias.x, bias.y, bias.z].map(|b| if b.is_finite() { b } else { 0.0 });
-        cut(&mut self.bias.value, limit);
+        clamp(&mut self.bias.value, limit);
         let share = sigma / limit;
-        self.bias.ignorance = if share.is_finite() { least(share * share, 1.0) } else { 1.0 };
+        self.bias.variance = if share.is_finite() { lesser(share * share, 1.0) } else { 1.0 };
     }
 
     /// Hard iron that was found, uT, body axes: what a calibration has not taken out.
@@ -169,7 +169,7 @@ impl<C: Borrow<Config> + Clone> Dcm<C> {
         let (field_norm, field_dip) = self.field.against();
         Quality {
             heading_error: self.heading_error,
-            bias_sigma: self.config.borrow().bias.limit * root(self.bias.ignorance),
+            bias_sigma: self.config.borrow().bias.limit * root(self.bias.variance),
             field_norm,
             field_dip,
             iron: root(square(&self.iron.found)),

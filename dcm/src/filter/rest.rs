@@ -9,7 +9,7 @@
 use super::bias::Bias;
 use super::lowpass::LowPass;
 use super::state::{Words, flag};
-use crate::columns::{Column, cut, plus, square};
+use crate::columns::{Column, add_scaled, clamp, square};
 use crate::config::{Config, RestConfig};
 
 /// The state.
@@ -46,9 +46,9 @@ impl Rest {
         let away = self.rate.step(rate, dt, config.rest.filter_tau, config.rest.filter_tau);
         let mut mean = *self.rate.value();
         let fast = if bias.trusted(&config.bias) {
-            square(&plus(&mean, &bias.value, -1.0)) >= config.rest.known_rate * config.rest.known_rate
+            square(&add_scaled(&mean, &bias.value, -1.0)) >= config.rest.known_rate * config.rest.known_rate
         } else {
-            cut(&mut mean, config.bias.limit)
+            clamp(&mut mean, config.bias.limit)
         };
         if away > config.rest.rate * config.rest.rate || fast {
             self.moved();

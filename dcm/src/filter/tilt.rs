@@ -9,7 +9,7 @@
 
 use super::{DEAD, Dcm, taken};
 use crate::angles::up;
-use crate::columns::{Column, ZERO, cross, dot, least, plus, scaled, square, turn};
+use crate::columns::{Column, ZERO, add_scaled, cross, dot, lesser, scaled, square, turn};
 use crate::measurement::Step;
 use crate::rotation::{exponential, inverse_sqrt, orthonormalise};
 use crate::trig::root;
@@ -29,7 +29,7 @@ impl<C: Borrow<Config>> Dcm<C> {
     pub(super) fn gyro(&mut self, rate: &Column, step: &mut Step) {
         let config = self.config.borrow();
         let mut rate = *rate;
-        let dt = least(core::mem::take(&mut self.since_gyro), config.max_dt);
+        let dt = lesser(core::mem::take(&mut self.since_gyro), config.max_dt);
         taken(&mut rate, 0.0, config.gyro_range, step);
         if step.bad_input {
             return;
@@ -38,14 +38,14 @@ impl<C: Borrow<Config>> Dcm<C> {
         if !self.started {
             return;
         }
-        let rate = plus(&rate, &self.bias.value, -1.0);
+        let rate = add_scaled(&rate, &self.bias.value, -1.0);
         let angle = scaled(&rate, dt);
         if square(&angle) > LARGEST_TURN * LARGEST_TURN {
             step.bad_input = true;
             return;
         }
         // the axis of turning moves within the step: the second-order term of the rotation vector
-        let coned = plus(&angle, &cross(&self.last_rate, &angle), CONING * dt);
+        let coned = add_scaled(&angle, &cross(&self.last_rate, &angle), CONING * dt);
         self.last_rate = rate;
         let mut next = exponential(&coned);
         turn(&self.matrix.data.0, &mut next);
@@ -71,7 +71,7 @@ impl<C: Borrow<Config>> Dcm<C> {
         }
         step.accel_used = true;
         turn(&self.matrix.data.0, core::slice::from_mut(&mut up));
-        self.sum = plus(&self.sum, &up, dt);
+        self.sum = add_scaled(&self.sum, &up, dt);
         self.summed += dt;
         if self.summed >= self.config.borrow().tilt_window {
             self.level(force, step);
