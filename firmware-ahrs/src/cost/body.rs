@@ -1,4 +1,4 @@
-//! What the cost images run: a rolling body's readings, at the board's rates.
+//! What the cost images are: a rolling body's readings at the board's rates, and the frame around them. On the host each is an empty program.
 //!
 //! What it is: readings without any library function, so that the image without a filter holds nothing of the filter; the
 //! images differ in the filter alone, and so do their sizes and instruction counts.
@@ -8,6 +8,28 @@
 
 use core::hint::black_box;
 use dcm::{Measurement, Vec3};
+use stm32f4xx_hal as _; // its vector table
+
+/// An image that takes a step of the body by the closure, with a filter where there is one.
+macro_rules! image {
+    (let mut $filter:ident = $new:expr; $step:expr) => {
+        image! { @main { let mut $filter = $new; crate::body::run($step) } }
+    };
+    (@main { $($body:tt)* }) => {
+        #[panic_handler]
+        fn panic(_: &core::panic::PanicInfo) -> ! {
+            cortex_m::peripheral::SCB::sys_reset()
+        }
+
+        #[cortex_m_rt::entry]
+        fn main() -> ! {
+            $($body)*
+        }
+    };
+    ($step:expr) => {
+        image! { @main { crate::body::run($step) } }
+    };
+}
 
 /// Updates of a run.
 const UPDATES: u32 = 4000;
