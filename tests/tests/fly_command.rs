@@ -64,6 +64,8 @@ fn the_missions_of_the_thesis() {
     near("pitch rate, deg/s", q[soon].to_degrees(), 2.3, 0.08);
     assert!((0.02..0.2).contains(&r[soon].to_degrees()) && roll[soon].abs() < 2e-4, "{} {}", r[soon], roll[soon]);
     let landed = fly("landing");
+    let told = std::fs::read_to_string(at.join("out/landing/flight.html")).expect("the page");
+    assert!(told.contains("<p>It touched the ground after 16.7 s, at 4.7 m/s downwards. At the most it was 63.0 m high"));
     assert!(number(&landed, "/touched_m_s") > 4.0 && number(&landed, "/touched_s") < 30.0);
 
     assert_eq!(names(&at.join("out")), ["excitation", "hover", "landing", "takeoff"], "nothing else is left");
@@ -116,6 +118,8 @@ fn the_square() {
         assert_eq!(header.join(","), "t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg");
         assert!(said[0][0] < -290.0 && said[5].iter().all(|roll| roll.abs() < 15.0), "from its power-up on, 200 rows a second");
         let page = std::fs::read_to_string(at.join("out/flight.html")).expect("the page");
+        assert!(page.contains("<p>It ended so: after 10") && page.contains(" s: landed, motors off. At the most it was 2."));
+        assert!(page.contains("The board was off by up to "));
         assert!(["board-error", "board-roll", "wind"].iter().all(|id| page.contains(&format!("<figure id=\"{id}\">"))));
     }
     let text = std::fs::read_to_string(square).expect("the mission");

@@ -20,6 +20,7 @@ const CLASSES: [&str; 6] = ["a", "b", "c", "e", "f", "d"];
 pub(super) fn page(summary: &Summary, flight: &Flight) -> String {
     let rows = &flight.rows[..];
     let mut sheet = Sheet::new(&format!("Flight: {}", summary.mission));
+    sheet.say(&summary.told());
     sheet.say(&summary.lead());
     sheet.table(&["", ""], &summary.table(), |_| false);
     // the row of the touch itself is a jolt beside which nothing else would show

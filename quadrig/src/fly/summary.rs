@@ -100,7 +100,7 @@ impl Summary {
 
     /// For a reader.
     pub(super) fn text(&self) -> String {
-        let mut out = format!("{}\n", self.lead());
+        let mut out = format!("{}\n{}\n", self.lead(), self.told());
         for row in self.table() {
             out += &format!("{:<9} {}\n", row[0], row[1]);
         }
@@ -110,6 +110,32 @@ impl Summary {
     /// What was flown on what.
     pub(super) fn lead(&self) -> String {
         format!("{}: {:.2} s on {}", self.mission, self.flight_s, self.powerplant)
+    }
+
+    /// How it ended, how far it went and how well the board kept up, in plain words.
+    pub(super) fn told(&self) -> String {
+        let ended: Vec<String> = self.events.iter().map(|(t, what)| format!("after {t:.1} s: {what}")).collect();
+        let height = shown(-self.place_m[2]);
+        let end = match (ended.is_empty(), self.touched) {
+            (false, _) => format!("It ended so: {}.", ended.join("; ")),
+            (true, Some((t, speed))) => format!("It touched the ground after {t:.1} s, at {speed:.1} m/s downwards."),
+            (true, None) => {
+                let going = match shown(-self.velocity_m_s[2]) {
+                    v if v > 0.0 => format!("rises at {v:.1} m/s"),
+                    v if v < 0.0 => format!("sinks at {:.1} m/s", -v),
+                    _ => "keeps its height".to_owned(),
+                };
+                format!("After {:.1} s it is {height:.1} m up and {going}.", self.flight_s)
+            }
+        };
+        let far = format!("At the most it was {:.1} m high and leaned by {:.1} degrees.", self.highest_m, self.steepest_deg);
+        let board = self.board.as_ref().map_or_else(String::new, |off| {
+            format!(
+                " The board was off by up to {:.1} degrees in tilt and {:.1} in heading.",
+                off.tilt_deg[0], off.heading_deg[0]
+            )
+        });
+        format!("{end} {far}{board}")
     }
 
     /// What came of it: a word and what there is to say, a row each.
