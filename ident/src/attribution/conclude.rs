@@ -14,7 +14,8 @@ use super::noise::Noise;
 use super::posterior::{Posterior, Seen, share};
 use super::validate::{fairest, held_out};
 
-/// Share by which names may make a channel's error larger (specification, "Verdict").
+/// Share by which names may make a channel's error larger (specification, "Verdict"), and by which each has to make one smaller: what changes
+/// less counts as no change, one way as the other.
 const WORSE: f64 = 0.02;
 /// Error on left-out readings, in noise floors, from which on a channel is told in any case (specification, "Verdict").
 pub const LOUD: f64 = 3.0;
@@ -188,7 +189,7 @@ fn falls(problem: &Problem<'_>, fit: &Fit, before: &[f64], judged: &Judged, aske
         let shapes = &problem.library.candidates()[p.candidate].shapes;
         p.shape.iter().zip(shapes).any(|(v, s)| !s.inside(*v))
     };
-    let weak = |k: &usize| best(*k) < 0.0 || edge(*k) || spans_zero(fit, *k);
+    let weak = |k: &usize| best(*k) < WORSE || edge(*k) || spans_zero(fit, *k);
     open().filter(weak).min_by(|a, b| best(*a).total_cmp(&best(*b)))
 }
 

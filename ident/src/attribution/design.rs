@@ -58,6 +58,14 @@ pub struct Column {
     pub parts: Vec<(usize, Values)>,
 }
 
+impl Column {
+    /// Whether the amplitude is known beforehand.
+    #[must_use]
+    pub fn is_given(&self) -> bool {
+        self.prior.sd == 0.0
+    }
+}
+
 /// All columns of a hypothesis, those of the declared model first.
 #[derive(Debug, Clone, Default)]
 pub struct Design {

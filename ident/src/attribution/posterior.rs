@@ -1,13 +1,12 @@
 //! Second stage: which hypothesis, and how sure each of its names is.
 //!
 //! What it is: terms join one at a time, those with a name first; when no more do, every one is asked again, and may go or be exchanged.
-//! Then what has no name joins, and a name that it overshadows goes. All hypotheses that were looked at share the probability.
+//! Then what has no name joins, and a name goes that is not sure beside it. All hypotheses that were looked at share the probability.
 //! What can go wrong: a hypothesis that no step leads to is not looked at; probabilities are over those that were.
 //! Units: nats, probabilities 0 to 1.
 //! Reference: Madigan & Raftery 1994, JASA 89:1535 (Occam's window); Hoeting et al. 1999, Statistical Science 14:382 (inclusion).
 
 use super::candidates::{Asked, ask, prior_odds};
-use super::channel::rms;
 use super::fit::{Fit, Problem, fit};
 use super::library::{Candidate, Placed};
 
@@ -17,6 +16,8 @@ const TRIED: usize = 4;
 const FAR: f64 = 6.0;
 /// A candidate with less than this share of the first one's evidence at first sight is not fitted beside it.
 const CLOSE: f64 = 0.3;
+/// Probability from which on a name is told: that of the intervals beside it.
+const SURE: f64 = 0.95;
 /// Most terms.
 const MOST: usize = 12;
 
@@ -158,46 +159,33 @@ impl Walk<'_> {
         self.revised(best, &rivals, named)
     }
 
-    /// What has no name joins the names, as far as they hold beside it: a name goes that brought less than what has no name brings on the
-    /// channel that the name is told by. A function without a name bends to everything; what takes only a part of what that finds is
-    /// the shadow of something else.
+    /// What has no name joins the names, and a name stays that is sure beside it: a function without a name bends to everything, and what it
+    /// takes up as well as a name does is no evidence of the name.
     fn beside(&mut self, mut names: Fit, progress: &mut dyn FnMut(f64)) -> Fit {
         loop {
             let with = self.joined(&names, false, progress);
-            let shadow = (0..names.placed.len()).filter_map(|k| self.is_shadow(&names, &with, k).map(|by| (k, by)));
-            let Some((place, _)) = shadow.max_by(|a, b| a.1.total_cmp(&b.1)) else { return with };
-            let rest = without(self.problem.library.candidates(), &names.placed, place);
-            match self.look(&rest, Some(&names), 0) {
+            let Some(weak) = self.unsure(&with) else { return with };
+            let all = self.problem.library.candidates();
+            let place = names.placed.iter().position(|p| p.candidate == with.placed[weak].candidate);
+            let rest = place.map(|k| without(all, &names.placed, k));
+            match rest.and_then(|rest| self.look(&rest, Some(&names), 0)) {
                 Some(fewer) => names = fewer,
                 None => return with,
             }
         }
     }
 
-    /// By how much more what has no name brings than a name, on the channel that the name is told by; nothing where it brings less.
-    fn is_shadow(&mut self, names: &Fit, with: &Fit, place: usize) -> Option<f64> {
+    /// The name that brings least beside everything else, where it is not [`SURE`].
+    fn unsure(&mut self, with: &Fit) -> Option<usize> {
         let all = self.problem.library.candidates();
-        let less = self.look(&without(all, &names.placed, place), Some(names), 0)?;
-        let channels = self.problem.channels;
-        let told = |c: &usize| {
-            let error = |fit: &Fit| rms(&fit.residual(channels, *c));
-            channels[*c].len() as f64 * (error(&less) / error(names)).ln()
+        let named: Vec<usize> = (0..with.placed.len()).filter(|k| all[with.placed[*k].candidate].is_named()).collect();
+        let brings = |k: usize| {
+            let less = self.look(&without(all, &with.placed, k), Some(with), 0)?;
+            Some((k, score(all, with) - score(all, &less)))
         };
-        let channel = (0..channels.len()).max_by(|a, b| told(a).total_cmp(&told(b)))?;
-        let nameless = |k: &usize| !all[with.placed[*k].candidate].is_named() && touches(with, *k, channel);
-        let rest: Vec<Placed> = (0..with.placed.len()).filter(|k| !nameless(k)).map(|k| with.placed[k].clone()).collect();
-        if rest.len() == with.placed.len() {
-            return None;
-        }
-        let bare = self.look(&rest, Some(with), 0)?;
-        let brought = score(all, names) - score(all, &less);
-        Some(score(all, with) - score(all, &bare) - brought).filter(|by| *by > 0.0)
+        let weakest = named.into_iter().filter_map(brings).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        (weakest.1 < (SURE / (1.0 - SURE)).ln()).then_some(weakest.0)
     }
-}
-
-/// Whether a term has a part on a channel.
-fn touches(fit: &Fit, place: usize, channel: usize) -> bool {
-    fit.columns_of(place).any(|i| fit.design.columns[i].parts.iter().any(|p| p.0 == channel))
 }
 
 /// A hypothesis without the term at `place`, and without what cannot stand alone then.

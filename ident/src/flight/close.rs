@@ -15,7 +15,8 @@ use super::rows::{By, Rows, Told};
 use super::{FlightError, SHORTEST_S, words};
 use crate::attribution::channel::rms;
 use crate::attribution::{
-    self, Candidate, Conclusion, Library, Owner, Placed, Problem, UNKNOWN, ask, conclude, conclude_told, parameters, posterior,
+    self, Candidate, Column, Conclusion, Library, Owner, Placed, Problem, UNKNOWN, ask, conclude, conclude_told, parameters,
+    posterior,
 };
 use crate::bad::SetAside;
 use crate::effects::airframe::{Found, Told as Value};
@@ -151,6 +152,11 @@ fn validated(declared: &FlightModel, corrected: &FlightModel, log: &Log) -> Resu
     Ok(Validation { run: log.name.clone(), channels: channels.collect() })
 }
 
+/// Whether a column is one whose amplitude the declared model has to find.
+fn is_declared(column: &Column) -> bool {
+    column.owner == Owner::Declared && !column.is_given()
+}
+
 /// Everything that the account is made of.
 struct Whole<'w> {
     log: &'w Log,
@@ -184,7 +190,7 @@ impl<'w> Whole<'w> {
         let amplitude =
             |i: usize| Coefficient { name: fit.design.columns[i].name.to_owned(), value: values[shapes + i], se: se(shapes + i) };
         let declared: Vec<Coefficient> =
-            (0..fit.design.columns.len()).filter(|i| fit.design.columns[*i].owner == Owner::Declared).map(amplitude).collect();
+            (0..fit.design.columns.len()).filter(|i| is_declared(&fit.design.columns[*i])).map(amplitude).collect();
         let mut effects = Vec::new();
         let mut told = Vec::new();
         let mut first = 0;
@@ -231,7 +237,7 @@ impl<'w> Whole<'w> {
     /// The model without what was added to it now.
     fn declared_model(&self, corrected: &FlightModel) -> FlightModel {
         let fit = &self.concluded.declared;
-        let columns = fit.design.columns.iter().enumerate().filter(|(_, c)| c.owner == Owner::Declared);
+        let columns = fit.design.columns.iter().enumerate().filter(|(_, c)| is_declared(c));
         let declared = if self.library.is_against() {
             corrected.declared.clone()
         } else {

@@ -8,7 +8,7 @@
 
 use super::channels::Target;
 use super::columns::{Flight, Sink, driven};
-use super::scene::{Broken, Scene};
+use super::scene::{Broken, GYRO, Scene, delayed};
 use crate::attribution::{Column, Owner, Prior};
 
 /// Thrust coefficients lie this far from what carries the weight in the middle of the flight, as a share.
@@ -40,6 +40,7 @@ pub(super) fn declared(flight: &Flight, scene: &Scene<'_>) -> Vec<Column> {
         sink.column("voltage", Prior { mean: volts, sd: 0.2 * volts, sign: 0.0 }).constant(Target::Voltage);
     }
     field(&mut sink);
+    reading(&mut sink);
     sink.done()
 }
 
@@ -143,6 +144,23 @@ fn power(flight: &Flight, scene: &Scene<'_>, rotor: usize, power: i32) -> Vec<f6
         None => {}
     }
     out
+}
+
+/// What a late gyro reads beside the attitude: what it reads now, less what it will read once the delay is over. Its amplitude is one; where the
+/// gyro is not late it is nothing. The gyro's own readings say it, since an attitude's noise would pass for less of itself when it is shifted.
+fn reading(sink: &mut Sink<'_>) {
+    let (flight, late) = (sink.flight, sink.scene.late[GYRO]);
+    let Some(rate) = flight.record.rate.as_ref().filter(|_| flight.record.to_earth.is_some()) else { return };
+    sink.column("reading", Prior { mean: 1.0, sd: 0.0, sign: 0.0 });
+    for (axis, rate) in rate.iter().enumerate() {
+        let at = |late: f64| flight.windows.mean(&delayed(&flight.record.t, rate, late));
+        let change: Vec<f64> = if late == 0.0 {
+            vec![0.0; flight.windows.len()]
+        } else {
+            at(0.0).iter().zip(at(-late)).map(|(now, then)| now - then).collect()
+        };
+        sink.window(Target::Rate(axis), change);
+    }
 }
 
 fn field(sink: &mut Sink<'_>) {

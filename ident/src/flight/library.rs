@@ -229,6 +229,9 @@ fn known((column, value): (Column, f64)) -> Column {
 /// Columns with the coefficients of a model; the same name stands once for each rotor, in order.
 fn valued(columns: &[Column], told: &[Coefficient]) -> Vec<(Column, f64)> {
     let value = |k: usize| {
+        if columns[k].is_given() {
+            return columns[k].prior.mean;
+        }
         let name = columns[k].name;
         let nth = columns[..k].iter().filter(|c| c.name == name).count();
         told.iter().filter(|c| c.name == name).nth(nth).map_or(0.0, |c| c.value)

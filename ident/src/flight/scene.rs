@@ -22,6 +22,9 @@ pub enum Broken {
     Refused(usize, usize),
 }
 
+/// Place of the gyro among the sensors that may be late.
+pub const GYRO: usize = 1;
+
 /// The scene.
 #[derive(Debug, Clone)]
 pub struct Scene<'r> {

@@ -1,7 +1,7 @@
 //! `channel_delay`: one group of sensors is late.
 //!
 //! What it is: the accelerometer or the gyro reads what was a moment before, or the rotors' speeds do.
-//! What can go wrong: all that are late by the same stay unnoticed; a slow flight shows no delay. A reading may be a row old, and what a controller
+//! What can go wrong: all that are late by the same stay unnoticed, so a gyro with an attitude that was made from it; a slow flight shows no delay. A reading may be a row old, and what a controller
 //! holds is seen up to a row late: what is below two rows says how the log was written, and is no finding.
 //! Units: s, positive is late.
 //! Reference: specification `closing-the-loop.md`, table.
