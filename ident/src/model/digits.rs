@@ -50,7 +50,8 @@ pub(crate) fn significant(value: f64, digits: usize) -> f64 {
 /// A lowest value to four digits, no higher than it is; negative and turned a highest one, no lower.
 pub(crate) fn lowest(value: f64) -> f64 {
     let near = significant(value, 4);
-    let unit = format!("{near:.3e}").rsplit('e').next().and_then(|e| e.parse::<i32>().ok()).map_or(0.0, |e| 10f64.powi(e - 3));
+    // the last of four digits of the value itself: rounded up to a power of ten it has one place less
+    let unit = format!("{value:e}").rsplit('e').next().and_then(|e| e.parse::<i32>().ok()).map_or(0.0, |e| 10f64.powi(e - 3));
     if near > value { significant(near - unit, 4) } else { near }
 }
 
