@@ -343,7 +343,7 @@ mod tests {
     /// Each reason of the board has its advice, in its own words.
     #[test]
     fn every_reason_of_the_board_has_advice() {
-        let source = std::fs::read_to_string(Place::find().root.join("frame/src/rig.rs")).expect("the source");
+        let source = std::fs::read_to_string(Place::find().root.join("esc-pwm/src/fault.rs")).expect("the source");
         let list =
             source.split("pub const WORDS: [(u16, &'static str)").nth(1).and_then(|t| t.split("];").next()).expect("its words");
         let words: Vec<String> = literals(list).into_iter().map(|l| l.text).collect();
