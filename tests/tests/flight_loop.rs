@@ -93,27 +93,6 @@ fn what_the_library_does_not_know_is_told_without_a_name() {
     }
 }
 
-/// A gyro that is late is late beside the attitude as well as beside the rotors.
-#[test]
-fn a_late_gyro_is_named_with_its_delay() {
-    let all = (0..4000).step_by(2).filter(|s| hidden(*s) == ["channel_delay"]).map(Scenario::new);
-    // a delay below two rows says how the log was written
-    let s = all
-        .into_iter()
-        .find(|s| s.causes[0].which == 1 && s.causes[0].strength * s.instruments.hz as f64 > 2.5)
-        .expect("a late gyro");
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("run.csv"), s.log(0)).expect("a file");
-    let v = closed(folder.path(), "run.csv", &[]);
-    assert_eq!(named(&v), ["channel_delay"], "{v}");
-    let found = &v["effects"][0];
-    let channels: Vec<&str> = found["channels"].as_array().expect("channels").iter().filter_map(Value::as_str).collect();
-    assert!(channels.iter().any(|c| c.starts_with("gyro")) && channels.iter().any(|c| c.starts_with("ang_acc")), "{channels:?}");
-    let parameters = found["parameters"].as_array().expect("parameters");
-    let delay = parameters.iter().find(|p| p["name"] == "delay").and_then(|p| p["value"].as_f64()).expect("a delay");
-    assert!((delay - s.causes[0].strength).abs() < 3e-3, "{delay} of {}", s.causes[0].strength);
-}
-
 #[test]
 fn what_is_no_usable_flight_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
