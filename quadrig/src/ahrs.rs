@@ -127,7 +127,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         let lacks = has(" without gyro", |r| r.gyro.is_some())
             + &has(" without accelerometer", |r| r.accel.is_some())
             + &has(" without magnetometer (heading relative)", |r| r.mag.is_some());
-        println!("{} samples{lacks}, {}", log.rows.len(), args.output.display());
+        say!("{} samples{lacks}, {}", log.rows.len(), args.output.display());
     }
     Ok(())
 }

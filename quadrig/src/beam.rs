@@ -101,7 +101,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(folder) = &args.svg {
         figures(folder, sheet.drawn())?;
     }
-    let mut out = std::io::stdout().lock();
+    let mut out = crate::say::out();
     if args.json {
         let json = serde_json::json!({
             "beam": design,
@@ -122,7 +122,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     drop(out);
     if design.safety_reached() < design.safety {
-        eprintln!(
+        note!(
             "warning: the safety factor is {:.2}; expected at least {} (shorten to {:.0} mm or load at most {:.0} g)",
             design.safety_reached(),
             design.safety,
@@ -131,7 +131,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         );
     }
     for c in &met {
-        eprintln!("warning: {}", beam_warning(c));
+        note!("warning: {}", beam_warning(c));
     }
     Ok(())
 }

@@ -70,7 +70,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let silent = quiet || args.json;
     let say = |line: String| {
         if !silent {
-            println!("{line}");
+            say!("{line}");
         }
     };
     let (mut runs, mut rounds): (Vec<Run>, Vec<Round>) = (Vec::new(), Vec::new());
@@ -128,7 +128,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         folder.write()?;
     }
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
+        say!("{}", serde_json::to_string_pretty(&report)?);
     } else {
         closes.iter().for_each(|c| say(circle_table(c)));
         say(conclusion(&runs, &standing, &scenario));

@@ -79,7 +79,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         close(&log, model.as_ref(), &others, &mut |share| bar.set(share))?
     };
     if !quiet {
-        closed.verdict.left_out.iter().for_each(|l| eprintln!("{}: {l}", args.log().display()));
+        closed.verdict.left_out.iter().for_each(|l| note!("{}: {l}", args.log().display()));
     }
     let json = serde_json::to_string_pretty(&closed.verdict)?;
     if let Some(mut folder) = folder {
@@ -88,9 +88,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         folder.write()?;
     }
     if args.json {
-        println!("{json}");
+        say!("{json}");
     } else if !quiet {
-        print!("{}", terminal(&closed.verdict, Vocabulary::RIG, model.is_some()));
+        crate::say::text(&terminal(&closed.verdict, Vocabulary::RIG, model.is_some()));
     }
     say_unwritten(args, quiet);
     Ok(())
@@ -99,7 +99,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 /// Says that what was shown is not kept.
 pub(super) fn say_unwritten(args: &Args, quiet: bool) {
     if args.output.is_none() && !args.json && !quiet {
-        eprintln!("nothing was written; with -o FOLDER model, verdict and page are kept");
+        note!("nothing was written; with -o FOLDER model, verdict and page are kept");
     }
 }
 

@@ -54,7 +54,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut folder = Folder::new(&args.output, |name| is_result(name) || ["run.csv", "again.csv"].contains(&name))?;
     let say = |line: String| {
         if !quiet {
-            println!("{line}");
+            say!("{line}");
         }
     };
     say(format!("seed {seed}: a 570 KV motor with an 11x4.7 propeller; one effect is hidden (repeat with --seed {seed})"));

@@ -32,7 +32,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let count = add(&mut folder, "", almanac()) + add(&mut folder, "airframe/", ident::flight::almanac());
     folder.write()?;
     if !quiet {
-        println!("{count} pages in {} and {}", args.output.display(), args.output.join("airframe").display());
+        say!("{count} pages in {} and {}", args.output.display(), args.output.join("airframe").display());
     }
     Ok(())
 }

@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let history = {
         let bar = Bar::new("comparing", quiet);
         let (logs, refused) = read(&files, args, &bar);
-        refused.iter().for_each(|line| eprintln!("{line}"));
+        refused.iter().for_each(|line| note!("{line}"));
         let (mut history, order) = History::of(&logs, &|share| bar.set(READ + (COMPARED - READ) * share))?;
         let ordered: Vec<&Log> = order.iter().map(|k| &logs[*k]).collect();
         named(&mut history, &ordered, &|share| bar.set(COMPARED + (1.0 - COMPARED) * share));
@@ -87,9 +87,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         folder.write()?;
     }
     if args.json {
-        println!("{json}");
+        say!("{json}");
     } else if !quiet {
-        print!("{}", history_terminal(&history));
+        crate::say::text(&history_terminal(&history));
     }
     Ok(())
 }

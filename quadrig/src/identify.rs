@@ -14,7 +14,6 @@ use ident::fit::power::csv;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
 use ident::report::number;
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Arguments.
@@ -88,12 +87,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if quiet {
         return Ok(());
     }
-    let mut out = std::io::stdout().lock();
-    match write!(out, "{}{}", text(&found), told(&log)) {
-        // a reader that has seen enough, such as `head`, is no failure
-        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        other => Ok(other?),
-    }
+    crate::say::text(&(text(&found) + &told(&log)));
+    Ok(())
 }
 
 /// The page and the figures.

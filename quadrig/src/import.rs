@@ -107,9 +107,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         write_whole(&path, |out| out.write_all(page.as_bytes())).map_err(unwritten(&path))?;
     }
     if !quiet {
-        print!("{}", report.table());
-        joints.iter().for_each(|r| print!("{}", r.table()));
-        println!(
+        crate::say::text(&report.table());
+        joints.iter().for_each(|r| crate::say::text(&r.table()));
+        say!(
             "{} rows, {:.3} s, columns t_s {}",
             log.len(),
             log.t[log.len() - 1] - log.t[0],

@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut show = |message: &Message| {
         let sample = matches!(message, Message::Imu(_) | Message::ImuValues(_) | Message::TestAccel(_));
         if let (false, Some(line)) = (quiet || (sample && command != Command::Imu(ImuCommand::Once)), text::line(message)) {
-            print!("{line}");
+            crate::say::text(&line);
         }
         if let Message::Event(Event::Refused(_)) | Message::ImuReport(ImuReport::Refused { .. }) = message {
             refusal = text::line(message);

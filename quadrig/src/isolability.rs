@@ -54,7 +54,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         folder.write()?;
     }
     if !quiet {
-        print!("{}{}", flown(&hidden), text(&found));
+        crate::say::text(&(flown(&hidden) + &text(&found)));
     }
     Ok(())
 }

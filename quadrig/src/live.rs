@@ -54,7 +54,7 @@ fn wishes() -> Receiver<Wish> {
             match wish(&line) {
                 Some(wish) if send.send(wish).is_err() => return,
                 Some(_) => {}
-                None => eprintln!("expected p, s, q or a speed, found {line:?}"),
+                None => note!("expected p, s, q or a speed, found {line:?}"),
             }
         }
     });

@@ -5,7 +5,10 @@
 //! Units: as the files state.
 //! Reference: specification `formats.md`, "Command line".
 #![forbid(unsafe_code)]
+#![deny(clippy::print_stdout, clippy::print_stderr)] // a reader may be gone: see `say`
 
+#[macro_use]
+mod say;
 mod ahrs;
 mod apart;
 mod batch;
@@ -207,10 +210,10 @@ fn main() -> ExitCode {
     let matches = help::taught(Cli::command()).get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     match cli.command.run(cli.quiet) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => say::status(),
         Err(e) => {
             let line = e.to_string().replace('\n', " ");
-            eprintln!("quadrig: {line}");
+            note!("quadrig: {line}");
             ExitCode::from(1)
         }
     }

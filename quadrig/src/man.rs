@@ -40,7 +40,7 @@ impl Args {
 pub(crate) fn completions(args: &Completions) -> Result<(), Failure> {
     let mut text = Vec::new();
     generate(args.shell, &mut help::taught(Cli::command()), "quadrig", &mut text);
-    Ok(std::io::stdout().lock().write_all(&text)?)
+    Ok(crate::say::out().write_all(&text)?)
 }
 
 /// Writes the manual pages.
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let count = add(&mut folder, &command)?;
     folder.write()?;
     if !quiet {
-        println!("{}: {count} pages; man -l {}", args.output.display(), args.output.join("quadrig.1").display());
+        say!("{}: {count} pages; man -l {}", args.output.display(), args.output.join("quadrig.1").display());
     }
     Ok(())
 }

@@ -92,7 +92,7 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
         let mut log = Log::read(path)?;
         options.name(&mut log);
         if let Some(gaps) = Gaps::of(&log).filter(|_| !quiet) {
-            eprintln!("{}: t_s: {gaps}", path.display());
+            note!("{}: t_s: {gaps}", path.display());
         }
         return Ok(log);
     }
@@ -108,7 +108,7 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
 pub(crate) fn say(path: &Path, report: &Report) {
     for note in &report.notes {
         let count = if note.count > 1 { format!(" ({})", note.count) } else { String::new() };
-        eprintln!("{}: {}: {}{count}", path.display(), note.column, note.what);
+        note!("{}: {}: {}{count}", path.display(), note.column, note.what);
     }
 }
 
@@ -125,7 +125,7 @@ pub(crate) fn as_written(log: &Log) -> Result<Log, Failure> {
 pub(crate) fn read_model(path: &Path, quiet: bool) -> Result<Model, ModelError> {
     let model = Model::read(path)?;
     if model.goes_without() && !quiet {
-        eprintln!(
+        note!(
             "{}: {} is not there: what the model was off by on its own run is not known and may pass for something new; it predicts as ever",
             path.display(),
             beside(path).display()

@@ -115,12 +115,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         };
         let shifted = filters(values, &settings);
         if !quiet {
-            print!("{}", text(path, &log, channel, &shifted));
+            crate::say::text(&text(path, &log, channel, &shifted));
         }
         let rows = scores(path, &log, channel);
         page += &rows;
         if !quiet {
-            print!("{rows}");
+            crate::say::text(&rows);
         }
         if let Some(folder) = &mut folder {
             pictures += &draw(folder, path, &log, channel, &shifted, args.csv)?;

@@ -38,7 +38,7 @@ const LONG_S: f64 = 10.0;
 /// Says before a simulation how long it will take, where that is long: so many seconds of a run, at so many times real time.
 pub(crate) fn foretell(run_s: f64, times: f64, quiet: bool) {
     if let Some(line) = outlook(run_s, times).filter(|_| !quiet) {
-        eprintln!("{line}");
+        note!("{line}");
     }
 }
 

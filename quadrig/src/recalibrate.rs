@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     log.meta.insert("recalibrated".to_owned(), Value::String(words));
     log.write(&args.output).map_err(unwritten(&args.output))?;
     if !quiet {
-        changed.iter().for_each(|line| println!("{line}"));
+        changed.iter().for_each(|line| say!("{line}"));
     }
     Ok(())
 }

@@ -187,9 +187,9 @@ fn line_by_line(seat: &mut Seat, mut overseer: Option<Overseer>, args: &Args) ->
             match news {
                 News::Board(Message::Event(Event::Faults { faults, .. })) => {
                     let words: Vec<&str> = faults.iter().map(frame::Fault::words).collect();
-                    eprintln!("latched: {}", words.join(", "));
+                    note!("latched: {}", words.join(", "));
                 }
-                News::Recording(words) => eprintln!("{words}"),
+                News::Recording(words) => note!("{words}"),
                 _ => {}
             }
         }
@@ -199,7 +199,7 @@ fn line_by_line(seat: &mut Seat, mut overseer: Option<Overseer>, args: &Args) ->
                 seat.stop();
                 return Err(Ending::Left(words));
             }
-            eprintln!("{words}");
+            note!("{words}");
         }
         let typed_end = end.as_ref().is_some_and(|end| matches!(end.try_recv(), Err(TryRecvError::Disconnected)));
         if vigil.look(seat, args)? || typed_end {

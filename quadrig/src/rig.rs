@@ -175,7 +175,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let silent = |_: &Message| {};
     let done = |what: &str| {
         if !quiet {
-            println!("{what}");
+            say!("{what}");
         }
     };
     match &args.order {
@@ -298,10 +298,10 @@ impl Session {
 fn identify(board: &mut Board) -> Result<(), Failure> {
     let hello = board.ask(Command::Identify, |_| {}, |m| if let Message::Hello(hello) = m { Some(*hello) } else { None })?;
     let [major, minor, patch] = hello.firmware;
-    println!("{} board, firmware {major}.{minor}.{patch}, core {} MHz", hello.board.words(), hello.core_hz / 1_000_000);
-    println!("last reset: {}", reset_cause(hello.reset_cause));
+    say!("{} board, firmware {major}.{minor}.{patch}, core {} MHz", hello.board.words(), hello.core_hz / 1_000_000);
+    say!("last reset: {}", reset_cause(hello.reset_cause));
     if hello.board == BoardId::Rig {
-        println!("fitted: {}; configuration {:08x}", fitted(&hello), hello.config);
+        say!("fitted: {}; configuration {:08x}", fitted(&hello), hello.config);
     }
     Ok(())
 }

@@ -82,9 +82,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     folder.extend(flown.into_iter().map(|run| (run.file, run.text)));
     folder.write()?;
     if !quiet {
-        told.iter().for_each(|(_, why)| println!("{why}"));
+        told.iter().for_each(|(_, why)| say!("{why}"));
         let wall = begun.elapsed().as_secs_f64();
-        println!(
+        say!(
             "{}: {} runs, {simulated:.0} s in {wall:.1} s on {threads} threads, {:.0} times real time",
             args.output.display(),
             all.len() - told.len(),

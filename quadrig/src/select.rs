@@ -129,7 +129,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(folder) = &args.svg {
         figures(folder, sheet.drawn())?;
     }
-    let mut out = std::io::stdout().lock();
+    let mut out = crate::say::out();
     if args.json {
         let names: Vec<String> = chosen.iter().map(|r| format!("{} {}", r.pair.motor, r.pair.propeller)).collect();
         let json = serde_json::json!({"airframe": airframe, "need": need, "rows": rows, "chosen": names, "why": why(&rows, &chosen, &need), "left_out": left_out});
@@ -139,7 +139,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     drop(out);
     if !quiet {
-        left_out.iter().for_each(|why| eprintln!("left out: {why}"));
+        left_out.iter().for_each(|why| note!("left out: {why}"));
     }
     Ok(())
 }

@@ -109,7 +109,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     log.write(&args.output).map_err(unwritten(&args.output))?;
     if !quiet {
-        println!("{}: {} samples over {:.1} s", args.output.display(), log.len(), log.t[log.len() - 1]);
+        say!("{}: {} samples over {:.1} s", args.output.display(), log.len(), log.t[log.len() - 1]);
     }
     Ok(())
 }

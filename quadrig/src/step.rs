@@ -38,9 +38,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     };
     let table = found.ok_or_else(|| format!("{}: no channel can be fitted; expected at least two related channels", log.name))?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&table)?);
+        say!("{}", serde_json::to_string_pretty(&table)?);
     } else if !quiet {
-        print!("{}", text(&table));
+        crate::say::text(&text(&table));
     }
     Ok(())
 }

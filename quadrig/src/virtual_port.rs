@@ -87,9 +87,9 @@ mod pty {
         let mut board = switch_on(&order)?;
         let (mut cable, port) = Cable::new().map_err(|e| format!("no pseudo-terminal: {e}"))?;
         let _link = Link::new(args.link.as_deref(), &port)?;
-        println!("{port}");
+        say!("{port}");
         if !quiet {
-            println!("virtual {}; {}", board.kind().words(), help(&*board));
+            say!("virtual {}; {}", board.kind().words(), help(&*board));
         }
         std::io::stdout().flush()?;
         let typed = crate::rig::lines();
@@ -119,7 +119,7 @@ mod pty {
     }
 
     fn tell(board: &dyn VirtualBoard, what: &str) {
-        let mut out = std::io::stdout().lock();
+        let mut out = crate::say::out();
         let _ = writeln!(out, "{:>8.1} s  {what}", board.ms() as f64 * 1.0e-3).and_then(|()| out.flush()); // nobody listens: nothing is lost
     }
 

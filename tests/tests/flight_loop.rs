@@ -80,7 +80,24 @@ fn a_clean_flight_has_nothing() {
     assert_eq!((v["verdict"].as_str(), named(&v).len()), (Some("none"), 0), "{v}");
 }
 
-/// What the tool cannot use is refused with one line.
+/// A gyro that is 55 ms late: everything that the rotors do is late in it, and so is the attitude's turning. Named, with its delay, and no channel
+/// gets worse by it.
+#[test]
+fn a_late_gyro_is_named_and_makes_no_channel_worse() {
+    assert_eq!(hidden(110), ["channel_delay"]);
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("run.csv"), Scenario::new(110).log(0)).expect("a file");
+    let v = closed(folder.path(), "run.csv", &[]);
+    assert_eq!((v["verdict"].as_str(), named(&v)), (Some("attributed"), vec!["channel_delay"]), "{v}");
+    let delay = &v["effects"][0]["parameters"][0];
+    let [low, high] = [0, 1].map(|k| delay["ci95"][k].as_f64().expect("a bound"));
+    assert!(low > 0.050 && high < 0.060, "{delay}");
+    for channel in ["ang_acc_x", "ang_acc_y", "ang_acc_z", "gyro_x", "gyro_y", "gyro_z"] {
+        let [before, after] = ["before", "after"].map(|k| v["channels"][channel][k]["heldout_rms"].as_f64().expect("a number"));
+        assert!(after < 0.9 * before, "{channel}: {before} {after}");
+    }
+}
+
 /// Wash from below, whose answer by the controller passes for a late gyro; a swinging load and a tether, which pass for lift from moving.
 #[test]
 fn what_the_library_does_not_know_is_told_without_a_name() {
@@ -93,6 +110,7 @@ fn what_the_library_does_not_know_is_told_without_a_name() {
     }
 }
 
+/// What the tool cannot use is refused with one line.
 #[test]
 fn what_is_no_usable_flight_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -7,7 +7,7 @@
 
 use super::channels::{Channels, Target};
 use super::record::Record;
-use super::scene::{Scene, delayed, followed};
+use super::scene::{FORCE, GYRO, SPEED, Scene, delayed, followed};
 use super::vibration::Shaking;
 use super::windows::Windows;
 use crate::attribution::{Column, Owner, Prior, Values};
@@ -169,18 +169,30 @@ impl<'s> Sink<'s> {
         self
     }
 
-    /// What the column adds to a channel, a value a row.
+    /// What the column adds to a channel, a value a row, where the rotors' speeds say it.
     pub fn part(&mut self, target: Target, rows: &[f64]) -> &mut Self {
+        self.said_by(SPEED, target, rows)
+    }
+
+    /// What the column adds to a channel, a value a row, where the readings of the sensor at `source` say it: these are late themselves.
+    pub fn said_by(&mut self, source: usize, target: Target, rows: &[f64]) -> &mut Self {
         let Some(channel) = self.flight.channels.position(target) else { return self };
         let (windows, t) = (&self.flight.windows, &self.flight.record.t);
-        let [force, gyro, speed] = self.scene.late;
+        let behind = |sensor: usize| self.behind(sensor, source, rows);
         let seen = match target {
-            Target::Force(_) => windows.mean(&delayed(t, rows, force - speed)),
-            Target::Turning(_) => windows.slope_of_rate(&delayed(t, rows, gyro - speed)),
-            Target::Speed(_) if speed != 0.0 => windows.mean(&delayed(t, rows, speed)),
+            Target::Force(_) => windows.mean(&behind(FORCE)),
+            Target::Turning(_) => windows.slope_of_rate(&behind(GYRO)),
+            Target::Speed(_) if self.scene.late[SPEED] != 0.0 => windows.mean(&delayed(t, rows, self.scene.late[SPEED])),
             _ => windows.mean(rows),
         };
         self.seen(channel, seen)
+    }
+
+    /// What the sensor at `source` says, row by row, as late as the one at `sensor` is.
+    #[must_use]
+    pub fn behind(&self, sensor: usize, source: usize, rows: &[f64]) -> Vec<f64> {
+        let late = self.scene.late;
+        delayed(&self.flight.record.t, rows, late[sensor] - late[source])
     }
 
     /// What the column adds to a channel of which a value a window is known already.

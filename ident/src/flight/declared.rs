@@ -1,14 +1,15 @@
 //! The declared model of a flight.
 //!
-//! What it is: thrust k_T times the sum of the squared speeds along -z, reaction torque, a rigid body that turns; each rotor's speed a cubic of
-//! its pulse above the one at which the motors start and nothing below, one for all with small differences; a constant voltage; a field that is constant in earth axes. No drag, no offset.
+//! What it is: thrust k_T times the sum of the squared speeds along -z, reaction torque, a rigid body that turns. Each rotor's speed is a cubic of
+//! its pulse above the one at which the motors start and nothing below, one for all with small differences. Voltage is a constant, the field a
+//! constant in earth axes. No drag, no offset.
 //! What can go wrong: without measured speeds thrust and moments go with command and its square.
 //! Units: SI; rev/min for the speeds.
 //! Reference: specification `flight.md`, "The loop on flights"; Beharie 2013, Eq. 2.25 to 2.35 as corrected in the errata.
 
 use super::channels::Target;
 use super::columns::{Flight, Sink, driven};
-use super::scene::{Broken, GYRO, Scene, delayed};
+use super::scene::{Broken, GYRO, SPEED, Scene, delayed};
 use crate::attribution::{Column, Owner, Prior};
 
 /// Thrust coefficients lie this far from what carries the weight in the middle of the flight, as a share.
@@ -91,17 +92,18 @@ fn turning(sink: &mut Sink<'_>) {
             Some(i) => Prior { mean: (i[(axis + 1) % 3] - i[(axis + 2) % 3]) / i[axis], sd: FLATNESS.1, sign: 0.0 },
             None => Prior { mean: FLAT[axis], sd: FLATNESS.0, sign: 0.0 },
         };
-        sink.column(coupling[axis], prior).part(Target::Turning(axis), &product);
+        sink.column(coupling[axis], prior).said_by(GYRO, Target::Turning(axis), &product);
     }
     if flight.record.speed.is_empty() {
         return;
     }
     // the rotors' own angular momentum: a moment against its turning with the body, and against its change
-    let spin = scene.drives(|i| rotors[i].turns);
+    let spin = sink.behind(GYRO, SPEED, &scene.drives(|i| rotors[i].turns));
     let about = |axis: usize, sign: f64| -> Vec<f64> {
         spin.iter().enumerate().map(|(row, h)| sign * scene.rate_at(row)[axis] * h).collect()
     };
-    sink.column("spin", Prior::positive(SPIN)).part(Target::Turning(0), &about(1, -1.0)).part(Target::Turning(1), &about(0, 1.0));
+    let [roll, pitch] = [about(1, -1.0), about(0, 1.0)];
+    sink.column("spin", Prior::positive(SPIN)).said_by(GYRO, Target::Turning(0), &roll).said_by(GYRO, Target::Turning(1), &pitch);
     let change: Vec<f64> = flight.windows.slope(&spin).iter().map(|s| -s).collect();
     sink.column("spin_up", Prior::positive(SPIN)).window(Target::Turning(2), change);
 }

@@ -22,8 +22,12 @@ pub enum Broken {
     Refused(usize, usize),
 }
 
-/// Place of the gyro among the sensors that may be late.
+/// Place of the accelerometer among the sensors that may be late.
+pub const FORCE: usize = 0;
+/// Place of the gyro.
 pub const GYRO: usize = 1;
+/// Place of the rotors' speeds.
+pub const SPEED: usize = 2;
 
 /// The scene.
 #[derive(Debug, Clone)]

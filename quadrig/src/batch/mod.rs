@@ -102,20 +102,20 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     let mut told = told.into_inner().unwrap_or_default();
     told.sort();
-    told.iter().for_each(|line| eprintln!("{line}"));
+    told.iter().for_each(|line| note!("{line}"));
     let left = gather(args, &all)?;
     if !quiet {
         let known = known.into_inner();
         let wall = begun.elapsed().as_secs_f64();
-        println!(
+        say!(
             "{shard}{} of {} runs: {} closed in {wall:.1} s on {threads} threads, {known} were there already",
             own.len(),
             all.len(),
             own.len() - known
         );
         match left {
-            0 => println!("{}: {} rows", args.output.join("manifest.csv").display(), all.len()),
-            n => println!("{n} runs of other shares are not there yet; the tables come with the last share"),
+            0 => say!("{}: {} rows", args.output.join("manifest.csv").display(), all.len()),
+            n => say!("{n} runs of other shares are not there yet; the tables come with the last share"),
         }
     }
     Ok(())

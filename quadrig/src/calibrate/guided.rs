@@ -60,7 +60,7 @@ pub(super) fn run(channel: Channel, points: Option<&str>, day: u16, args: &Args,
     };
     let found = Found::of(channel, taken, Some(design), day, arm_m)?;
     if !quiet {
-        println!("{}in force so far: {now:.8} {} a count", found.table(), channel.unit());
+        say!("{}in force so far: {now:.8} {} a count", found.table(), channel.unit());
     }
     if !args.yes && !talk.agrees()? {
         return Err("nothing was stored: expected y to store; calibrate again, or with --yes".into());
@@ -71,7 +71,7 @@ pub(super) fn run(channel: Channel, points: Option<&str>, day: u16, args: &Args,
         write_whole(output, |out| out.write_all(found.toml(&board.name()).as_bytes())).map_err(unwritten(&output))?;
     }
     if !quiet {
-        println!("in force and stored; tare anew before the next run");
+        say!("in force and stored; tare anew before the next run");
     }
     Ok(())
 }
@@ -82,7 +82,7 @@ impl Talk<'_> {
         let mut taken = Vec::new();
         for point in points {
             loop {
-                println!("{}: {} on, then press enter", self.channel.column(), point.said);
+                say!("{}: {} on, then press enter", self.channel.column(), point.said);
                 self.line()?
                     .ok_or("the input ended before all points were taken; nothing was stored; expected a line for each point")?;
                 if let Some(reading) = self.settled(&point.said)? {
@@ -99,14 +99,14 @@ impl Talk<'_> {
         let mut taken = Vec::new();
         let example = ["0 g", "0 g", "0 A", "9.0 V", "20 C"][self.channel.place()];
         loop {
-            println!("{}: put a known value on and type it ({example}); an empty line ends", self.channel.column());
+            say!("{}: put a known value on and type it ({example}); an empty line ends", self.channel.column());
             let Some(line) = self.line()? else { break };
             if line.trim().is_empty() {
                 break;
             }
             match point(self.channel, &line, arm_m) {
                 Ok(point) => taken.extend(self.settled(&point.said)?.map(|reading| Taken { point, reading })),
-                Err(mistake) => eprintln!("{mistake}"),
+                Err(mistake) => note!("{mistake}"),
             }
         }
         Ok(taken)
@@ -114,7 +114,7 @@ impl Talk<'_> {
 
     /// Whether the operator wants it stored.
     fn agrees(&mut self) -> Result<bool, Failure> {
-        println!("press enter to store it on the board; type no to leave everything as it was");
+        say!("press enter to store it on the board; type no to leave everything as it was");
         Ok(self.line()?.is_some_and(|line| matches!(line.trim(), "" | "y" | "yes")))
     }
 
@@ -126,8 +126,8 @@ impl Talk<'_> {
                     Some(words) => {
                         match Hand::parse(words.trim()).map_err(Into::into).and_then(|hand| self.board.hand(&hand).map(|()| hand))
                         {
-                            Ok(hand) => println!("{}", hand.words()),
-                            Err(why) => eprintln!("{why}"),
+                            Ok(hand) => say!("{}", hand.words()),
+                            Err(why) => note!("{why}"),
                         }
                     }
                     None => return Ok(Some(line)),
@@ -165,7 +165,7 @@ impl Talk<'_> {
             match settling.look(self.board.now()) {
                 Some(Ok(reading)) => {
                     self.clear();
-                    println!("{said}: {:.3} counts, known to {:.3}", reading.counts, reading.sigma);
+                    say!("{said}: {:.3} counts, known to {:.3}", reading.counts, reading.sigma);
                     return Ok(Some(reading));
                 }
                 Some(Err(why)) => break why,
@@ -177,7 +177,7 @@ impl Talk<'_> {
             }
         };
         self.clear();
-        eprintln!("{}, {said}: {why}", self.channel.column());
+        note!("{}, {said}: {why}", self.channel.column());
         Ok(None)
     }
 
@@ -191,7 +191,7 @@ impl Talk<'_> {
 
     fn clear(&self) {
         if std::io::stderr().is_terminal() {
-            eprint!("\r{:40}\r", "");
+            let _ = write!(std::io::stderr(), "\r{:40}\r", ""); // as above: a terminal that is gone
         }
     }
 }

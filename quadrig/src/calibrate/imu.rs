@@ -63,7 +63,7 @@ pub(super) fn run(sensors: &[Sensor], input: &Path, output: &Path, quiet: bool) 
     }
     write_whole(output, |out| out.write_all(text.as_bytes())).map_err(unwritten(&output))?;
     if !quiet {
-        print!("{text}");
+        crate::say::text(&text);
     }
     Ok(())
 }

@@ -45,7 +45,7 @@ pub(super) fn run(channel: Channel, input: &Path, points: &str, day: u16, args: 
         configure::send(&mut board, &config)?;
     }
     if !quiet {
-        print!("{}", found.table());
+        crate::say::text(&found.table());
     }
     Ok(())
 }

@@ -48,9 +48,9 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         folder.write()?;
     }
     if args.json {
-        println!("{json}");
+        say!("{json}");
     } else if !quiet {
-        print!("{}", terminal(&closed.verdict, VOCABULARY, model.is_some()));
+        crate::say::text(&terminal(&closed.verdict, VOCABULARY, model.is_some()));
     }
     say_unwritten(args, quiet);
     Ok(())

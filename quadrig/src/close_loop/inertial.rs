@@ -59,9 +59,9 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         folder.write()?;
     }
     if args.json {
-        println!("{json}");
+        say!("{json}");
     } else if !quiet {
-        print!("{}", terminal(&closed.verdict, VOCABULARY, false));
+        crate::say::text(&terminal(&closed.verdict, VOCABULARY, false));
     }
     say_unwritten(args, quiet);
     Ok(())

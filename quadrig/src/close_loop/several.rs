@@ -42,9 +42,9 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         folder.write()?;
     }
     if args.json {
-        println!("{json}");
+        say!("{json}");
     } else if !quiet {
-        print!("{}", terminal(&outcome.verdict, Vocabulary::RIG, false));
+        crate::say::text(&terminal(&outcome.verdict, Vocabulary::RIG, false));
     }
     say_unwritten(args, quiet);
     Ok(())

@@ -82,10 +82,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Some(path) => {
             write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
             if !quiet {
-                println!("{}: {}", path.display(), plant.title());
+                say!("{}: {}", path.display(), plant.title());
             }
         }
-        None => print!("{text}"),
+        None => crate::say::text(&text),
     }
     Ok(())
 }

@@ -94,7 +94,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     let said = if args.json { summary.json() } else { summary.text() };
     if args.json || !quiet {
-        writeln!(std::io::stdout().lock(), "{}", said.trim_end())?;
+        writeln!(crate::say::out(), "{}", said.trim_end())?;
     }
     Ok(())
 }

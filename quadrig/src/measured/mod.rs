@@ -98,11 +98,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         write_whole(&file, |out| out.write_all(text.as_bytes())).map_err(unwritten(&file))?;
         write_figures(&folder, &figures).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
         if !quiet {
-            println!("{}: {} runs, {}", set.folder, outcome.runs.len(), file.display());
+            say!("{}: {} runs, {}", set.folder, outcome.runs.len(), file.display());
             if !outcome.transfer.is_empty() {
-                println!("{}", table::line(set.folder, &outcome.transfer));
-                println!("{}", table::line(&format!("{} together", set.folder), &outcome.together.fitted));
-                println!("{}", table::line(&format!("{} together, blind", set.folder), &outcome.together.blind));
+                say!("{}", table::line(set.folder, &outcome.transfer));
+                say!("{}", table::line(&format!("{} together", set.folder), &outcome.together.fitted));
+                say!("{}", table::line(&format!("{} together, blind", set.folder), &outcome.together.blind));
             }
         }
         outcomes.push(outcome);
@@ -111,7 +111,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     for set in flights::SETS.iter().filter(|s| args.set.is_empty() || args.set.iter().any(|n| n == s.folder)) {
         let page = flights::work(set, &rig, &folder, quiet)?;
         if !quiet {
-            println!("{}", page.section());
+            say!("{}", page.section());
         }
         flown.push(page);
     }

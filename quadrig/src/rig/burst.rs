@@ -93,7 +93,7 @@ pub(super) fn run(board: &mut Board, args: &Args, quiet: bool) -> Result<(), Fai
         write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?;
     }
     if !quiet {
-        print!("{}", shown(place, &burst, &values, &lines));
+        crate::say::text(&shown(place, &burst, &values, &lines));
     }
     Ok(())
 }

@@ -80,7 +80,7 @@ pub(crate) fn to_file(board: &mut Board, path: Option<&Path>) -> Result<(), Fail
     match path {
         Some(path) => Ok(write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?),
         None => {
-            print!("{text}");
+            crate::say::text(&text);
             Ok(())
         }
     }

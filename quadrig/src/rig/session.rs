@@ -150,7 +150,7 @@ fn line_by_line(
 ) -> Result<(), Ending> {
     let say = |line: &str| {
         if !quiet {
-            println!("{line}");
+            say!("{line}");
         }
     };
     let input = super::lines();
@@ -168,22 +168,22 @@ fn line_by_line(
                 News::Board(Message::Event(Event::State { to, .. })) => say(esc_pwm::arming::message(to)),
                 News::Board(Message::Event(Event::Faults { faults, .. })) => {
                     let words: Vec<&str> = faults.iter().map(Fault::words).collect();
-                    eprintln!("latched: {}", words.join(", "));
+                    note!("latched: {}", words.join(", "));
                 }
                 News::Board(Message::Event(Event::StopLoop { open: true, .. })) => {
-                    eprintln!("stop loop open: let the key go, check plug and wire");
+                    note!("stop loop open: let the key go, check plug and wire");
                 }
                 News::Beep(beep) => say(&format!("the ESC: {}   ({})", sound::heard(beep), sound::meaning(beep))),
                 News::Accepted(command) => going.asked |= Some(command) == errand.first,
                 News::Refused(words) if !going.asked && errand.first.is_some() => {
                     return Err(Ending::Refused(refused(&words).into()));
                 }
-                News::Refused(words) => eprintln!("the board refuses: {words}"),
+                News::Refused(words) => note!("the board refuses: {words}"),
                 News::Silent(_) if !going.asked && errand.first.is_some() => {
                     return Err(Ending::Refused(seat.board.unanswered()));
                 }
-                News::Silent(_) => eprintln!("{}", seat.board.unanswered()),
-                News::Recording(words) => eprintln!("{words}"),
+                News::Silent(_) => note!("{}", seat.board.unanswered()),
+                News::Recording(words) => note!("{words}"),
                 News::Gone(why) => {
                     let words = format!("{why}; the board stops the motor by itself within its link time-out");
                     return Err(Ending::Failed(words.into()));
@@ -209,9 +209,9 @@ fn line_by_line(
                 Ok(Typed::Command(command)) => seat.ask(command),
                 Ok(Typed::Hand(hand)) => match seat.hand(&hand) {
                     Ok(()) => say(&hand.words()),
-                    Err(why) => eprintln!("{why}"),
+                    Err(why) => note!("{why}"),
                 },
-                Err(mistake) => eprintln!("{mistake}"),
+                Err(mistake) => note!("{mistake}"),
             },
             // what was typed before the end is done first
             Err(TryRecvError::Disconnected) if !running && seat.is_idle() => return Ok(()),

@@ -53,7 +53,7 @@ pub(super) fn run(board: &mut Board) -> Result<(), Failure> {
         }
     }
     let calibration = calibration.ok_or("the board tells no calibration; expected a rig board: `quadrig rig identify`")?;
-    print!("{}", text(&Heed { hello, calibration, config, sample, health }));
+    crate::say::text(&text(&Heed { hello, calibration, config, sample, health }));
     Ok(())
 }
 

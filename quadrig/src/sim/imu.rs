@@ -57,7 +57,7 @@ pub(super) fn run(args: &Args, scenario: &ImuScenario, quiet: bool) -> Result<()
     write(&args.output, attitudes(&run.samples))?;
     if !quiet {
         let last = run.samples.last().map_or(0.0, |s| s.at.as_s());
-        println!("{}: {} samples over {last:.1} s", args.output.display(), run.samples.len());
+        say!("{}: {} samples over {last:.1} s", args.output.display(), run.samples.len());
     }
     Ok(())
 }

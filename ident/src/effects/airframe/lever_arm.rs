@@ -9,6 +9,7 @@ use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope, Sink
 use crate::attribution::Prior;
 use crate::flight::channels::Target;
 use crate::flight::columns::Flight;
+use crate::flight::scene::{FORCE, GYRO};
 use crate::verdict::Parameter;
 use nalgebra::Vector3;
 
@@ -52,7 +53,7 @@ impl AirframeEffect for LeverArm {
     fn columns(&self, _: &Form, _: &[f64], sink: &mut Sink<'_>) {
         let (flight, scene) = (sink.flight, sink.scene);
         let Some(rate) = &flight.record.rate else { return };
-        let turning = [0, 1, 2].map(|k| flight.windows.slope(&rate[k]));
+        let turning = [0, 1, 2].map(|k| flight.windows.slope(&sink.behind(FORCE, GYRO, &rate[k])));
         for (k, name) in NAMES.into_iter().enumerate() {
             let arm = Vector3::ith(k, 1.0);
             sink.column(name, Prior::about_zero(USUAL_M));
@@ -65,7 +66,7 @@ impl AirframeEffect for LeverArm {
                     .collect();
                 let turned = (0..flight.windows.len())
                     .map(|i| Vector3::new(turning[0][i], turning[1][i], turning[2][i]).cross(&arm)[axis]);
-                sink.part(Target::Force(axis), &swing).window(Target::Force(axis), turned.collect());
+                sink.said_by(GYRO, Target::Force(axis), &swing).window(Target::Force(axis), turned.collect());
             }
         }
     }
