@@ -19,6 +19,7 @@ pub mod context;
 mod correction;
 pub mod course;
 pub mod date;
+mod descend;
 pub mod design;
 pub mod diagnose;
 mod drive;

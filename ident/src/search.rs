@@ -1,11 +1,13 @@
 //! The search for shape parameters: a scan of each candidate's grid, and a joint refinement.
 //!
-//! What it is: the profile likelihood over the shapes, maximised from the best point of a grid by Nelder-Mead.
+//! What it is: the profile likelihood over the shapes, maximised from the best point of a grid: by descent ([`crate::descend`]), or by
+//! Nelder-Mead's simplex where an effect speaks of scatter and residuals say nothing.
 //! What can go wrong: a shape on its bound stays there; the diagnosis then disqualifies it.
 //! Units: log-likelihood in nats.
 //! Reference: Nelder & Mead 1965, Computer Journal 7:308.
 
 use crate::context::Context;
+use crate::descend::descend;
 use crate::effects::{Effect, Instance};
 use crate::hypothesis::{Declared, Placed, Rows};
 use crate::samples::{Base, Taught};
@@ -69,7 +71,7 @@ pub(crate) fn scan(
     best
 }
 
-/// Improves the shapes of a hypothesis together (Nelder-Mead within the plausible ranges): those of its newest effect and of
+/// Improves the shapes of a hypothesis together (within the plausible ranges): those of its newest effect and of
 /// every effect that shares a channel with it, directly or through others. The rest is independent of them.
 #[must_use]
 pub fn refine_newest(
@@ -135,28 +137,37 @@ pub(crate) fn refine_group(
     let moving = touched_by_shapes(placed, group);
     let scattering = placed.iter().any(|p| p.effect.scatters());
     let taught = Taught::new(context, declared, rows);
-    let cost = |x: &[f64]| -> f64 {
+    let at = |x: &[f64]| {
         let mut full = start.clone();
         for (i, v) in free.iter().zip(x) {
             full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
         }
-        // a soft wall keeps the simplex inside the plausible box
-        let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
-        let placed = with_shapes(placed, &full);
-        let known: f64 = placed.iter().map(Placed::prior).sum();
-        -taught.loglik(&placed, &moving, scattering) - known + 1e3 * wall
+        full
     };
+    let known = |placed: &[Placed]| placed.iter().map(Placed::prior).sum::<f64>();
     let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
     let steps: Vec<f64> = free
         .iter()
         .map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0)))
         .collect();
-    let best = nelder_mead(&cost, &x0, &steps, evaluations);
-    let mut full = start.clone();
-    for (i, v) in free.iter().zip(&best) {
-        full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
-    }
-    with_shapes(placed, &full)
+    let best = if scattering {
+        let cost = |x: &[f64]| {
+            let full = at(x);
+            // a soft wall keeps the simplex inside the plausible box
+            let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
+            let placed = with_shapes(placed, &full);
+            -taught.loglik(&placed, &moving, scattering) - known(&placed) + 1e3 * wall
+        };
+        nelder_mead(&cost, &x0, &steps, evaluations)
+    } else {
+        let left = |x: &[f64]| {
+            let placed = with_shapes(placed, &at(x));
+            taught.whitened(&placed, &moving).map(|w| (-w.loglik - known(&placed), w.left))
+        };
+        let within: Vec<(f64, f64)> = free.iter().map(|i| ranges[*i]).collect();
+        descend(&left, &x0, &steps, &within, evaluations)
+    };
+    with_shapes(placed, &at(&best))
 }
 
 fn touched_by_shapes<'p>(placed: &'p [Placed], group: &[usize]) -> Vec<&'p str> {

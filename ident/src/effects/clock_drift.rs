@@ -81,6 +81,12 @@ impl Effect for ClockDrift {
         design.map_columns(|column| late.of(column));
     }
 
+    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+        // half a row on average over the run
+        let late = |rate: f64| 0.5 * rate.abs() * context.duration();
+        fitted.iter().all(|e| e.name != "rate" || operator::is_beyond_a_row(context, late(e.value)))
+    }
+
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
         // where the load jumps within rows, lateness is known to a row only
         if operator::abrupt(context) {
