@@ -90,3 +90,37 @@ fn a_long_simulation_is_announced() {
     std::fs::write(at.join("short.toml"), scenario(5.0)).expect("a scenario");
     assert_eq!(call(at, &["sim", "short.toml", "-o", "short.csv"]).succeeded().err, "");
 }
+
+/// `quadrig ... | head`: whoever reads the result has seen enough; what was to be written is written, and nothing panics.
+#[test]
+fn a_reader_that_is_gone_loses_no_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(
+        at.join("run.toml"),
+        "rest_s = 1.0\nschedule = { kind = \"staircase\", step_us = 200, hold_s = 2, top_us = 1800 }\n",
+    )
+    .expect("a scenario");
+    call(at, &["--quiet", "sim", "run.toml", "-o", "run.csv"]).succeeded();
+    for (words, file) in [
+        (vec!["close-loop", "run.csv", "-o", "out"], "out/verdict.json"),
+        (vec!["identify", "run.csv", "-o", "m.toml"], "m.toml"),
+    ] {
+        let mut child = start(at, &words);
+        drop(child.stdout.take());
+        drop(child.stderr.take());
+        let status = child.wait().expect("it ends");
+        assert!(status.success() && at.join(file).is_file(), "{words:?}: {status}");
+    }
+}
+
+/// A full disk behind `>` is a failure.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("a full disk");
+    let command = Command::new(quadrig()).args(["effects"]).current_dir(folder.path()).stdout(full).output().expect("it runs");
+    let said = String::from_utf8_lossy(&command.stderr);
+    assert!(!command.status.success() && said.contains("standard output cannot be written"), "{said}");
+}

@@ -17,7 +17,7 @@ const SHUFFLED: f64 = 0.2;
 const DROPPED: [f64; 2] = [0.1, 0.08];
 /// Share of missing rows in holes that nobody told of, under load: a recorder that is stopped while the motor stands leaves none.
 const UNTOLD: f64 = 0.19;
-/// Holes that a logger leaves where its line fails for seconds: each is a gap that the engine takes, and only one alone can be too large.
+/// Holes that a logger leaves where its line fails for seconds, each of less than a tenth of the run: gaps, which the engine takes.
 const PAUSES: usize = 3;
 /// Rows below which no rate is judged.
 const ENOUGH: usize = 20;
@@ -127,8 +127,8 @@ fn dropped(log: &Log, hz: f64) -> Option<String> {
         .map(|(_, step)| missed(step))
         .filter(|missing| *missing >= 1.0)
         .collect();
-    let largest = under_load.iter().copied().fold(0.0, f64::max);
-    let counts = if under_load.len() <= PAUSES { largest } else { under_load.iter().sum() };
+    let gaps = under_load.len() <= PAUSES && under_load.iter().all(|missing| *missing < DROPPED[0] * promised);
+    let counts = if gaps { 0.0 } else { under_load.iter().sum() };
     let untold = counts >= UNTOLD * promised && !told;
     (scattered || untold).then(|| {
         let holes = if holes.len() == 1 { "one hole".to_owned() } else { format!("{} holes", holes.len()) };
