@@ -179,7 +179,39 @@ fn field(sink: &mut Sink<'_>) {
 
 #[cfg(test)]
 mod tests {
-    use super::FLAT;
+    use super::super::record::Record;
+    use super::super::standard::standard_flight;
+    use super::*;
+
+    /// What the rotors do, their own momentum too, is late in a late gyro; what the gyro itself says is late already; the attitude is not.
+    #[test]
+    fn a_late_gyro_is_late_in_all_that_the_rotors_do() {
+        let flight = Flight::of(Record::of(&standard_flight()).unwrap());
+        let columns = |late: f64| {
+            let mut scene = Scene::declared(&flight.record);
+            scene.late[GYRO] = late;
+            declared(&flight, &scene)
+        };
+        // two windows of 40 ms
+        let (now, late) = (columns(0.0), columns(0.08));
+        let part = |of: &[Column], name: &str, target: Target| {
+            let channel = flight.channels.position(target).unwrap();
+            let column = of.iter().find(|c| c.name == name).unwrap();
+            column.parts.iter().find(|p| p.0 == channel).map(|p| p.1.clone()).unwrap()
+        };
+        for (name, axis, windows) in
+            [("roll", 0, 2), ("pitch", 1, 2), ("yaw", 2, 2), ("spin_up", 2, 2), ("roll_coupling", 0, 0), ("yaw_coupling", 2, 0)]
+        {
+            let [now, late] = [&now, &late].map(|of| part(of, name, Target::Turning(axis)));
+            let size = now.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            assert!(size > 0.0 && (9..now.len()).all(|i| (late[i] - now[i - windows]).abs() < 1e-6 * size), "{name}");
+        }
+        let rate = &flight.record.rate.as_ref().unwrap()[0];
+        let seen = flight.windows.mean(&delayed(&flight.record.t, rate, 0.0));
+        let [now, late] = [&now, &late].map(|of| part(of, "reading", Target::Rate(0)));
+        assert!(now.iter().all(|v| *v == 0.0));
+        assert!((0..seen.len() - 9).all(|i| (late[i] - (seen[i] - seen[i + 2])).abs() < 1e-9));
+    }
 
     #[test]
     fn a_flat_body_has_the_sum_of_its_level_inertias_about_z() {
