@@ -164,8 +164,8 @@ mod tests {
         let thinned = log(RATE, 1.0, |n| n % 2 == 0).expect_err("every other row is gone");
         assert!(thinned.contains("149 of the 299 rows"), "{thinned}");
         // blocks of seconds, none of them large
-        let blocks = log(RATE, 1.0, |n| n % 50 < 40 || n > 290).expect_err("a fifth is gone in blocks");
-        assert!(blocks.contains("51 of the 300 rows are missing"), "{blocks}");
+        let blocks = log(RATE, 1.0, |n| n % 50 < 38 || n > 290).expect_err("a fifth is gone in blocks");
+        assert!(blocks.contains("63 of the 300 rows are missing"), "{blocks}");
         // a line that failed for seconds, three times
         log(RATE, 1.0, |n| n % 100 < 79 || n > 299).expect("gaps of a logger");
         // a recorder that was stopped while the motor stood
