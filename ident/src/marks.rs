@@ -134,6 +134,7 @@ fn entry(told: &Told) -> EffectEntry {
     let about = added.placed.effect.about();
     let channel = added.placed.instance.channels.first().map_or("", String::as_str);
     EffectEntry {
+        common: false,
         id: added.placed.effect.id().to_owned(),
         scope: added.placed.effect.scope(&added.placed.instance),
         run: None,

@@ -135,6 +135,9 @@ pub struct EffectEntry {
     pub id: String,
     /// What it belongs to.
     pub scope: Scope,
+    /// Whether every rig has the like: a rotor takes time, and a reading lies somewhere within its row. Told apart from what this one has.
+    #[serde(skip)]
+    pub common: bool,
     /// With several runs: the one that it is of, where it is of one alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,

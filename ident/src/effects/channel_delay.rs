@@ -75,9 +75,13 @@ impl Effect for ChannelDelay {
         through_meter(context, design, |columns| columns.iter().map(|c| late.of(c)).collect());
     }
 
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         // no meter shows a change before there is one
-        fitted.iter().all(|e| e.name != "delay" || e.value > 0.0 && operator::is_beyond_a_row(context, e.value))
+        fitted.iter().all(|e| e.name != "delay" || e.value > 0.0)
+    }
+
+    fn is_within_a_row(&self, context: &Context, fitted: &[Estimate]) -> bool {
+        fitted.iter().any(|e| e.name == "delay" && operator::is_within_a_row(context, e.value))
     }
 
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {

@@ -75,10 +75,23 @@ impl Effect for ChannelFilter {
 
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         // an average over one row of straight lines is a delay by half of it, and within two rows of a jump it cannot be told from one
+        let least = match (is_lag(instance), operator::abrupt(context)) {
+            (true, true) => 0.6,
+            (true, false) => 0.0,
+            (false, _) => 2.0,
+        };
         let width = fitted.iter().find(|e| e.name == "tau" || e.name == "window");
-        width.is_some_and(|e| {
-            if is_lag(instance) { operator::is_beyond_a_row(context, e.value) } else { e.value > 2.0 * context.step() }
-        })
+        width.is_some_and(|e| e.value > least * context.step())
+    }
+
+    fn is_within_a_row(&self, context: &Context, fitted: &[Estimate]) -> bool {
+        // an average is late by half of its window
+        let late = |e: &Estimate| match &*e.name {
+            "tau" => operator::is_within_a_row(context, e.value),
+            "window" => operator::is_within_a_row(context, 0.5 * e.value),
+            _ => false,
+        };
+        fitted.iter().any(late)
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
@@ -122,7 +135,6 @@ mod tests {
             let width = Estimate { name: name.into(), unit: "s".into(), value, se: 0.01 };
             ChannelFilter.plausible(&context, &Instance::new(&["thrust_n"], form), &[width])
         };
-        assert!(!stands(FORMS[0], "window", window) && stands(FORMS[0], "window", 0.6));
-        assert!(stands(FORMS[1], "tau", window) && !stands(FORMS[1], "tau", 0.09), "less than half a row");
+        assert!(!stands(FORMS[0], "window", window) && stands(FORMS[0], "window", 0.6) && stands(FORMS[1], "tau", window));
     }
 }

@@ -195,6 +195,10 @@ pub trait Effect: Sync {
     fn is_of_every_rig(&self) -> bool {
         false
     }
+    /// Whether it only says where in its row a reading lies: every logger has that, and no meter is late by it.
+    fn is_within_a_row(&self, _context: &Context, _fitted: &[Estimate]) -> bool {
+        false
+    }
     /// What it belongs to.
     fn scope(&self, instance: &Instance) -> Scope;
     /// Whether what an event left behind holds for later runs of the rig: a damaged blade does, a zero that slipped is set anew.

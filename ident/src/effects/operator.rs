@@ -296,9 +296,9 @@ impl Late {
     }
 }
 
-/// Whether a lateness is more than what a row leaves open: a row holds what was read at any instant of its interval, half of one from its middle.
-pub(crate) fn is_beyond_a_row(context: &Context, late_s: f64) -> bool {
-    late_s > 0.5 * context.step()
+/// Whether a lateness is no more than a row leaves open: a row holds what was read at any instant of its interval, half of one from its middle.
+pub(crate) fn is_within_a_row(context: &Context, late_s: f64) -> bool {
+    late_s <= 0.5 * context.step()
 }
 
 /// Whether the load changes within single rows: then the instant of a step is known to a row only.

@@ -358,6 +358,7 @@ impl<'w> Whole<'w> {
                 }
             };
             EffectEntry {
+                common: false,
                 id: candidate.id.to_owned(),
                 scope,
                 run: None,

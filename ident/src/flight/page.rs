@@ -18,7 +18,7 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     noun: "vehicle",
     about: airframe::about,
     clause: |found| airframe::said(found).unwrap_or_else(|| parts::bare(found)),
-    of_every_rig: |id| id == "spinup_lag",
+    of_every_rig: |found| found.id == "spinup_lag",
     parameter: |_, name| parameter(name),
 };
 

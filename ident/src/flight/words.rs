@@ -51,6 +51,7 @@ pub(super) fn no_correction(left: &[Unexplained]) -> EffectEntry {
     let mut loudest: Vec<&Unexplained> = left.iter().collect();
     loudest.sort_by(|a, b| b.over_floor.total_cmp(&a.over_floor));
     EffectEntry {
+        common: false,
         id: UNKNOWN.to_owned(),
         scope: Scope::Run,
         run: None,

@@ -204,6 +204,7 @@ fn accelerate(
     let spread = |v: f64| v / (2.0 * looks / 3.0).sqrt();
     let slow = slow_share(&t, &back);
     Some(EffectEntry {
+        common: false,
         id: "linear_acceleration".to_owned(),
         scope: Scope::Run,
         run: None,

@@ -181,6 +181,7 @@ fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectE
         let count = f.instance.terms.len();
         let (c, s) = (&outcome.after.coefficients[at..at + count], &outcome.after.sigma[at..at + count]);
         EffectEntry {
+            common: false,
             id: f.instance.id.to_owned(),
             scope: Scope::Rig,
             run: None,

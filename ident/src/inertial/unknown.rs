@@ -99,6 +99,7 @@ pub(crate) fn correct<'a>(
         .map(|(t, (c, s))| parameter(&t.name, *c, t.unit, *s))
         .collect();
     let entry = EffectEntry {
+        common: false,
         id: "unknown".to_owned(),
         scope: Scope::Run,
         run: None,
@@ -120,6 +121,7 @@ impl Correction<'_> {
     /// What is said where it would predict an axis worse: something is there, and nothing is corrected.
     pub(crate) fn refused(&self) -> EffectEntry {
         EffectEntry {
+            common: false,
             depends_on: Vec::new(),
             equation: "no correction".to_owned(),
             parameters: Vec::new(),

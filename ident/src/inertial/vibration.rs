@@ -84,6 +84,7 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
         "no line: its course cannot be predicted, only its strength".to_owned()
     };
     Some(EffectEntry {
+        common: false,
         id: "vibration".to_owned(),
         scope: Scope::Run,
         run: None,

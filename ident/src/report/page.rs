@@ -96,7 +96,7 @@ fn trace(closed: &Closed, target: &Target) -> Option<Trace> {
 /// The channel on which the names took most, over time and enlarged; without names the loudest.
 fn hero(closed: &Closed) -> Vec<Figure> {
     let v = &closed.verdict;
-    let own = |e: &&EffectEntry| e.id != "unknown" && !(Vocabulary::RIG.of_every_rig)(&e.id);
+    let own = |e: &&EffectEntry| e.id != "unknown" && !(Vocabulary::RIG.of_every_rig)(e);
     let named: Vec<&str> = v.effects.iter().filter(own).filter_map(|e| e.channels.first()).map(String::as_str).collect();
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> =

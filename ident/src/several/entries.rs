@@ -41,6 +41,8 @@ pub(super) fn entry(joint: &Joint<'_, '_>, named: &[Named], k: usize, after: &[A
     let better = |a: &&Across| without.iter().any(|w| w.run == a.run && w.channel == a.channel && w.rms > a.rms);
     let helped = after.iter().filter(|a| a.channel == first).filter(better).count();
     EffectEntry {
+        common: p.effect.is_of_every_rig()
+            || joint.members.first().is_some_and(|m| p.effect.is_within_a_row(m.context, &reported)),
         id: p.effect.id().to_owned(),
         scope: p.effect.scope(&p.instance),
         run: None,
@@ -87,6 +89,7 @@ pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -
         };
         let times = 1.0 / (1.0 - or_nothing(reduction)).max(1e-6);
         EffectEntry {
+            common: false,
             id: p.effect.id().to_owned(),
             scope,
             run: Some(context.name.clone()),
@@ -148,6 +151,7 @@ pub(super) fn unexplained(runs: &[Run], after: &[Across]) -> Vec<Unexplained> {
 /// Where something is left and nothing has a name.
 pub(super) fn unnamed(left: &Unexplained) -> EffectEntry {
     EffectEntry {
+        common: false,
         id: "unknown".to_owned(),
         scope: Scope::Run,
         run: None,

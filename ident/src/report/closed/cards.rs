@@ -29,7 +29,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     order.sort_by(|a, b| removed(b).total_cmp(&removed(a)).then(a.cmp(b)));
     let group = |e: &EffectEntry| match e.id.as_str() {
         "unknown" => 2,
-        id if (page.words.of_every_rig)(id) => 1,
+        _ if (page.words.of_every_rig)(e) => 1,
         _ => 0,
     };
     let noun = page.words.noun;

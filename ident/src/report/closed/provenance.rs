@@ -10,7 +10,7 @@ use crate::log::{Gaps, Log, digest_of};
 use crate::model::FittedTo;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
-use crate::verdict::Verdict;
+use crate::verdict::{EffectEntry, Verdict};
 use crate::words::{list, upper};
 use std::collections::BTreeMap;
 
@@ -30,18 +30,15 @@ impl Hidden {
     #[must_use]
     pub fn judged(&self, verdict: &Verdict, words: Vocabulary) -> Vec<String> {
         let sizes = if self.parameters.is_empty() { String::new() } else { format!(" ({})", self.parameters.join(", ")) };
-        let names: Vec<&str> = verdict.effects.iter().map(|e| e.id.as_str()).filter(|id| *id != "unknown").collect();
-        let found = names.contains(&self.id.as_str());
+        let named: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
+        let found = named.iter().any(|e| e.id == self.id);
         let mut out = vec![format!("hidden was {}{sizes}: {}", self.id, if found { "found" } else { "NOT FOUND" })];
         if found {
             out.push(format!("true of the names: {}", self.id));
         }
         let told = |of_every: bool| -> Vec<String> {
-            let mut ids: Vec<String> = names
-                .iter()
-                .filter(|id| **id != self.id && (words.of_every_rig)(id) == of_every)
-                .map(|id| (*id).to_owned())
-                .collect();
+            let others = named.iter().filter(|e| e.id != self.id && (words.of_every_rig)(e) == of_every);
+            let mut ids: Vec<String> = others.map(|e| e.id.clone()).collect();
             ids.dedup();
             ids
         };

@@ -44,7 +44,7 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
 fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&EffectEntry>) {
     let mut all: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
     all.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
-    all.into_iter().partition(|e| !(words.of_every_rig)(&e.id))
+    all.into_iter().partition(|e| !(words.of_every_rig)(e))
 }
 
 fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {

@@ -27,7 +27,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         out += &format!("{}\n", wrapped(&left_out.to_string(), 2));
     }
     let (named, nameless): (Vec<&EffectEntry>, Vec<&EffectEntry>) = verdict.effects.iter().partition(|e| e.id != "unknown");
-    let (own, common): (Vec<&EffectEntry>, Vec<&EffectEntry>) = named.into_iter().partition(|e| !(words.of_every_rig)(&e.id));
+    let (own, common): (Vec<&EffectEntry>, Vec<&EffectEntry>) = named.into_iter().partition(|e| !(words.of_every_rig)(e));
     let noun = words.noun;
     let [this, every] = [format!("what this {noun} has"), format!("what every {noun} has")];
     for (heading, members) in [(this.as_str(), own), (every.as_str(), common), ("without a name", nameless)] {

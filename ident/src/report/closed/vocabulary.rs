@@ -19,7 +19,7 @@ pub struct Vocabulary {
     /// What a found effect does.
     pub clause: fn(&EffectEntry) -> Clause,
     /// Whether every rig has it.
-    pub of_every_rig: fn(&str) -> bool,
+    pub of_every_rig: fn(&EffectEntry) -> bool,
     /// A parameter in words, by the effect's identifier and its own name.
     pub parameter: fn(&str, &str) -> String,
 }
@@ -30,7 +30,7 @@ impl Vocabulary {
         noun: "rig",
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
-        of_every_rig: |id| by_id(id).is_some_and(crate::effects::Effect::is_of_every_rig),
+        of_every_rig: |found| found.common,
         parameter: |id, name| match (id, name) {
             ("unknown", "from") => "variable, lowest".to_owned(),
             ("unknown", "to") => "variable, highest".to_owned(),
@@ -60,6 +60,7 @@ impl Vocabulary {
     /// What an effect that was not found would do, on the channels of one that was.
     pub(crate) fn of_another(self, id: &str, beside: Option<&EffectEntry>) -> Clause {
         let entry = EffectEntry {
+            common: false,
             id: id.to_owned(),
             scope: beside.map_or(Scope::Rig, |e| e.scope),
             run: None,
