@@ -67,7 +67,7 @@ pub(crate) fn between(context: &Context, model: &Model, other: &Model, [own, riv
             ": run on another day"
         };
         let why = format!(
-            "{both}, and no schedule tells them apart: they differ by what {names} does, which in this run followed time and not the load; repeat the run while {names} takes another course{how}"
+            "{both}, and no course of the load tells them apart: they differ by what {names} does, which in this run followed time; repeat the run while {names} takes another course{how}"
         );
         return Some(NextExperiment { why, separates: true, schedule });
     }
@@ -232,7 +232,7 @@ mod tests {
         let closed = close(&staircase(0.0), None, &[], &mut |_| {}).expect("a log");
         for declared in [Declared::default(), Declared { model: Some(&closed.declared) }] {
             let next = asked(&closed, declared);
-            assert!(next.why.contains("no schedule tells them apart"), "{}", next.why);
+            assert!(next.why.contains("no course of the load tells them apart"), "{}", next.why);
             assert!(next.why.contains("another ambient temperature"), "{}", next.why);
             assert!(!next.schedule.is_empty());
         }

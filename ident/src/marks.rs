@@ -15,7 +15,7 @@ use crate::hypothesis::{Declared, Placed};
 use crate::log::Log;
 use crate::model::{AddedEffect, Model};
 use crate::noise::median;
-use crate::verdict::{EffectEntry, Kind, Verdict};
+use crate::verdict::{EffectEntry, Kin, Kind, Verdict};
 
 /// Speed channels and the columns in which their board tells how far their two marks stand off their opposite places.
 pub(crate) const UNEVEN: [(&str, &str); 4] = [
@@ -134,7 +134,7 @@ fn entry(told: &Told) -> EffectEntry {
     let about = added.placed.effect.about();
     let channel = added.placed.instance.channels.first().map_or("", String::as_str);
     EffectEntry {
-        common: false,
+        kin: Kin::Own,
         id: added.placed.effect.id().to_owned(),
         scope: added.placed.effect.scope(&added.placed.instance),
         run: None,

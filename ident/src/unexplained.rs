@@ -92,13 +92,20 @@ fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
         return "while the load is on its way".to_owned();
     }
     let grows = grows_with_the_load(context, target, &squares);
+    let in_a_row = loudest_stretch(&squares);
     squares.sort_unstable_by(|a, b| b.total_cmp(a));
     let few = (FEW * squares.len() as f64).ceil() as usize;
     if 2.0 * squares.iter().take(few).sum::<f64>() > whole {
-        return "in single rows".to_owned();
+        return if 2.0 * in_a_row > whole { "in one stretch" } else { "in single rows" }.to_owned();
     }
     let pace = if effective_share(residual) < SLOW { "slow" } else { "from row to row" };
     if grows { format!("{pace}, grows with the load") } else { pace.to_owned() }
+}
+
+/// The most that rows one after the other hold, as many as count as few.
+fn loudest_stretch(squares: &[f64]) -> f64 {
+    let few = (FEW * squares.len() as f64).ceil() as usize;
+    squares.windows(few.max(1)).map(|w| w.iter().sum::<f64>()).fold(0.0, f64::max)
 }
 
 /// Whether the upper half of the loads holds most of a residual's squares.

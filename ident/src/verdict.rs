@@ -128,6 +128,18 @@ pub struct Parameter {
     pub ci95: [f64; 2],
 }
 
+/// Whose an effect is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Kin {
+    /// This rig's own.
+    #[default]
+    Own,
+    /// Every rig's: a rotor has inertia and takes time.
+    OfEvery,
+    /// Every logger's: where in its row a reading lies.
+    WithinRow,
+}
+
 /// One effect of the best hypothesis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectEntry {
@@ -135,9 +147,9 @@ pub struct EffectEntry {
     pub id: String,
     /// What it belongs to.
     pub scope: Scope,
-    /// Whether every rig has the like: a rotor takes time, and a reading lies somewhere within its row. Told apart from what this one has.
+    /// Whether every rig has the like: it is told apart from what this one has.
     #[serde(skip)]
-    pub common: bool,
+    pub kin: Kin,
     /// With several runs: the one that it is of, where it is of one alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run: Option<String>,

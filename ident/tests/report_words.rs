@@ -8,8 +8,8 @@
 use ident::effects::Scope;
 use ident::report::{Hidden, Vocabulary, WIDEST, sentence, terminal};
 use ident::verdict::{
-    Alternative, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, NextExperiment, Parameter, ScheduleStep, Unexplained,
-    Verdict,
+    Alternative, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, NextExperiment, Parameter, ScheduleStep,
+    Unexplained, Verdict,
 };
 
 fn parameter(name: &str, value: f64, half: f64, unit: &str) -> Parameter {
@@ -18,6 +18,7 @@ fn parameter(name: &str, value: f64, half: f64, unit: &str) -> Parameter {
 
 fn effect(id: &str, on: &str, p: f64, removes: f64, parameters: Vec<Parameter>) -> EffectEntry {
     EffectEntry {
+        kin: if ["spinup_lag", "rotor_inertia"].contains(&id) { Kin::OfEvery } else { Kin::Own },
         id: id.into(),
         scope: Scope::Rig,
         run: None,
@@ -269,16 +270,18 @@ fn every_effect_has_words() {
 fn a_demonstration_judges_its_names() {
     let hidden = |id: &str| Hidden { seed: 7, id: id.into(), parameters: vec!["resistance = 0.041 ohm".into()] };
     let lag = effect("spinup_lag", "rpm", 0.9, 0.5, vec![]);
-    let v = verdict(Kind::Attributed, vec![sag(0.9), lag, filter(0.9)]);
-    let said = hidden("supply_sag").judged(&v, Vocabulary::RIG).join("\n");
+    let row = EffectEntry { kin: Kin::WithinRow, ..effect("channel_delay", "thrust_n", 0.9, 0.2, vec![]) };
+    let v = verdict(Kind::Attributed, vec![sag(0.9), lag, filter(0.9), row]);
+    let said = hidden("supply_sag").judged(&v).join("\n");
     for word in [
         "hidden was supply_sag (resistance = 0.041 ohm): found",
         "true of every rig, the simulated one too: spinup_lag",
+        "where in its row a reading lies, no effect that anybody hides: channel_delay",
         "false of the names, nobody hid it: channel_filter",
     ] {
         assert!(said.contains(word), "{said}");
     }
-    assert!(hidden("creep").judged(&v, Vocabulary::RIG)[0].ends_with("NOT FOUND"));
+    assert!(hidden("creep").judged(&v)[0].ends_with("NOT FOUND"));
 }
 
 /// Every effect of a flight says what it does, with its size where the flight shows it.

@@ -77,7 +77,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let truth = &scenario.effects[0];
     let parameters = truth.parameters().iter().map(|(n, v, u)| format!("{n} = {} {u}", number(*v))).collect();
     let hidden = Hidden { seed, id: truth.id().to_owned(), parameters };
-    let judged = hidden.judged(&closed.verdict, Vocabulary::RIG);
+    let judged = hidden.judged(&closed.verdict);
     let origin = Origin { hidden: Some(hidden), ..Origin::of(&log) };
     folder.extend(results(&log, &closed, origin)?);
     say(terminal(&closed.verdict, Vocabulary::RIG, false));

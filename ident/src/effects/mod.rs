@@ -51,6 +51,7 @@ mod zero_drift;
 use crate::context::{Context, DIFFERENCES, Relation};
 use crate::design::TargetDesign;
 pub(crate) use crate::verdict::EffectEntry;
+use crate::verdict::Kin;
 pub(crate) use crate::words::Clause;
 pub(crate) use amplifier_saturation::Rail;
 pub(crate) use current_limit::Draw;
@@ -198,6 +199,14 @@ pub trait Effect: Sync {
     /// Whether it only says where in its row a reading lies: every logger has that, and no meter is late by it.
     fn is_within_a_row(&self, _context: &Context, _fitted: &[Estimate]) -> bool {
         false
+    }
+    /// Whose it is, as it was fitted.
+    fn kin(&self, context: &Context, fitted: &[Estimate]) -> Kin {
+        match self.is_of_every_rig() {
+            true => Kin::OfEvery,
+            false if self.is_within_a_row(context, fitted) => Kin::WithinRow,
+            false => Kin::Own,
+        }
     }
     /// What it belongs to.
     fn scope(&self, instance: &Instance) -> Scope;

@@ -23,7 +23,8 @@ use crate::effects::airframe::{Found, Told as Value};
 use crate::log::Log;
 use crate::residual::whiteness;
 use crate::verdict::{
-    Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Parameter, Unexplained, Validation, Verdict,
+    Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, Parameter, Unexplained, Validation,
+    Verdict,
 };
 use std::collections::BTreeMap;
 
@@ -358,7 +359,7 @@ impl<'w> Whole<'w> {
                 }
             };
             EffectEntry {
-                common: false,
+                kin: Kin::Own,
                 id: candidate.id.to_owned(),
                 scope,
                 run: None,

@@ -9,7 +9,7 @@ use super::columns::Usual;
 use super::library::Kind;
 use crate::attribution::{Candidate, Channel, Kept, UNKNOWN};
 use crate::effects::Scope;
-use crate::verdict::{EffectEntry, NextExperiment, ScheduleStep, Unexplained};
+use crate::verdict::{EffectEntry, Kin, NextExperiment, ScheduleStep, Unexplained};
 use crate::words::worth;
 
 /// Slower than this what is left is slow, s.
@@ -51,7 +51,7 @@ pub(super) fn no_correction(left: &[Unexplained]) -> EffectEntry {
     let mut loudest: Vec<&Unexplained> = left.iter().collect();
     loudest.sort_by(|a, b| b.over_floor.total_cmp(&a.over_floor));
     EffectEntry {
-        common: false,
+        kin: Kin::Own,
         id: UNKNOWN.to_owned(),
         scope: Scope::Run,
         run: None,

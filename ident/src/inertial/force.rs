@@ -17,7 +17,7 @@ use super::shown::Shown;
 use super::trace::{Setting, Traced, trace};
 use super::{Attitude, Recording, effects, smooth, vibration};
 use crate::effects::Scope;
-use crate::verdict::{EffectEntry, Kind};
+use crate::verdict::{EffectEntry, Kin, Kind};
 use nalgebra::{Matrix3, Vector3};
 
 /// Block, left-out stretch and cluster, s.
@@ -204,7 +204,7 @@ fn accelerate(
     let spread = |v: f64| v / (2.0 * looks / 3.0).sqrt();
     let slow = slow_share(&t, &back);
     Some(EffectEntry {
-        common: false,
+        kin: Kin::Own,
         id: "linear_acceleration".to_owned(),
         scope: Scope::Run,
         run: None,

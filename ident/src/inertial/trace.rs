@@ -13,7 +13,7 @@ use super::shown::Shown;
 use super::unknown::correct;
 use crate::effects::Scope;
 use crate::unexplained::LOUD;
-use crate::verdict::{Alternative, EffectEntry, Kind};
+use crate::verdict::{Alternative, EffectEntry, Kin, Kind};
 use crate::words::{channel, list};
 use nalgebra::Vector3;
 
@@ -181,7 +181,7 @@ fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectE
         let count = f.instance.terms.len();
         let (c, s) = (&outcome.after.coefficients[at..at + count], &outcome.after.sigma[at..at + count]);
         EffectEntry {
-            common: false,
+            kin: Kin::Own,
             id: f.instance.id.to_owned(),
             scope: Scope::Rig,
             run: None,

@@ -11,7 +11,7 @@ use super::model::Added;
 use super::search::{Scene, parameter, predict};
 use super::shown::Shown;
 use crate::effects::Scope;
-use crate::verdict::EffectEntry;
+use crate::verdict::{EffectEntry, Kin};
 use nalgebra::Vector3;
 
 /// An empirical correction.
@@ -99,7 +99,7 @@ pub(crate) fn correct<'a>(
         .map(|(t, (c, s))| parameter(&t.name, *c, t.unit, *s))
         .collect();
     let entry = EffectEntry {
-        common: false,
+        kin: Kin::Own,
         id: "unknown".to_owned(),
         scope: Scope::Run,
         run: None,
@@ -121,7 +121,7 @@ impl Correction<'_> {
     /// What is said where it would predict an axis worse: something is there, and nothing is corrected.
     pub(crate) fn refused(&self) -> EffectEntry {
         EffectEntry {
-            common: false,
+            kin: Kin::Own,
             depends_on: Vec::new(),
             equation: "no correction".to_owned(),
             parameters: Vec::new(),

@@ -15,7 +15,7 @@ use super::search::{NAMED, parameter};
 use super::shown::Shown;
 use super::trace::Setting;
 use crate::effects::Scope;
-use crate::verdict::EffectEntry;
+use crate::verdict::{EffectEntry, Kin};
 use nalgebra::{Matrix2, Vector2, Vector3};
 use std::f64::consts::TAU;
 
@@ -84,7 +84,7 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
         "no line: its course cannot be predicted, only its strength".to_owned()
     };
     Some(EffectEntry {
-        common: false,
+        kin: Kin::Own,
         id: "vibration".to_owned(),
         scope: Scope::Run,
         run: None,

@@ -18,7 +18,7 @@ use crate::hypothesis::Placed;
 use crate::model::{AddedEffect, RunLevel};
 use crate::rivals::TEMPERATURE;
 use crate::unexplained::LOUD;
-use crate::verdict::Unexplained;
+use crate::verdict::{Kin, Unexplained};
 use crate::words::channel as spoken;
 
 /// An effect of the rig.
@@ -41,8 +41,7 @@ pub(super) fn entry(joint: &Joint<'_, '_>, named: &[Named], k: usize, after: &[A
     let better = |a: &&Across| without.iter().any(|w| w.run == a.run && w.channel == a.channel && w.rms > a.rms);
     let helped = after.iter().filter(|a| a.channel == first).filter(better).count();
     EffectEntry {
-        common: p.effect.is_of_every_rig()
-            || joint.members.first().is_some_and(|m| p.effect.is_within_a_row(m.context, &reported)),
+        kin: joint.members.first().map_or(Kin::Own, |m| p.effect.kin(m.context, &reported)),
         id: p.effect.id().to_owned(),
         scope: p.effect.scope(&p.instance),
         run: None,
@@ -89,7 +88,7 @@ pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -
         };
         let times = 1.0 / (1.0 - or_nothing(reduction)).max(1e-6);
         EffectEntry {
-            common: false,
+            kin: Kin::Own,
             id: p.effect.id().to_owned(),
             scope,
             run: Some(context.name.clone()),
@@ -151,7 +150,7 @@ pub(super) fn unexplained(runs: &[Run], after: &[Across]) -> Vec<Unexplained> {
 /// Where something is left and nothing has a name.
 pub(super) fn unnamed(left: &Unexplained) -> EffectEntry {
     EffectEntry {
-        common: false,
+        kin: Kin::Own,
         id: "unknown".to_owned(),
         scope: Scope::Run,
         run: None,

@@ -66,7 +66,9 @@ impl Powerplant {
         };
         let text = |key: &str| model.meta.get(key).and_then(toml::Value::as_str).map(str::to_owned);
         let lead = model.effects.iter().find(|e| e.placed.effect.id() == "supply_sag");
-        let lead_ohm = lead.and_then(|e| e.estimates.iter().find(|e| e.name == "resistance")).map(|e| e.value);
+        let lead_ohm = lead
+            .and_then(|e| e.estimates.iter().find(|e| e.name == "resistance" || e.name.starts_with("resistance_")))
+            .map(|e| e.value);
         let found = Self {
             points: (0..POINTS).map(point).collect(),
             lag_s: rotor.lag_s(),
@@ -90,10 +92,10 @@ impl Powerplant {
         self.points.last().map_or(0.0, |p| p.thrust_n)
     }
 
-    /// Signal at which thrust begins.
+    /// Least signal at which the rotor turns: what a peer calls its idle keeps it turning.
     pub(super) fn begins(&self) -> f64 {
-        let still = self.points.partition_point(|p| p.thrust_n <= BEGUN * self.full_n());
-        self.points[still.saturating_sub(1)].signal
+        let turning = self.points.partition_point(|p| p.thrust_n <= BEGUN * self.full_n());
+        self.points[turning.min(self.points.len() - 1)].signal
     }
 
     /// Share of full thrust at a signal, between the points linearly.

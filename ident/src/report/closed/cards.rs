@@ -35,7 +35,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     let noun = page.words.noun;
     for (k, (heading, lead)) in [
         (format!("What this {noun} has"), String::new()),
-        (format!("What every {noun} has"), format!("A rotor has inertia and takes time: no {noun} is without these.")),
+        (format!("What every {noun} has"), format!("A rotor has inertia and takes time, and a reading lies somewhere within its row: no {noun} is without these.")),
         ("Without a name".to_owned(), "What no known effect explains. Where a smooth function predicts rows it has not seen, it is added to the model; it names no cause.".to_owned()),
     ]
     .into_iter()

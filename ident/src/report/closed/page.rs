@@ -88,7 +88,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         ));
         runs(&mut sheet, v, &v.validation, "other-runs");
     }
-    provenance(&mut sheet, &page.origin, v, page.words);
+    provenance(&mut sheet, &page.origin, v);
     sheet.section("More");
     sheet.fold("Every channel in numbers", |sheet| {
         sheet.say(&page.declared);

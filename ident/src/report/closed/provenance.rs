@@ -5,12 +5,11 @@
 //! Units: none.
 //! Reference: specification `report.md`.
 
-use super::vocabulary::Vocabulary;
 use crate::log::{Gaps, Log, digest_of};
 use crate::model::FittedTo;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
-use crate::verdict::{EffectEntry, Verdict};
+use crate::verdict::{EffectEntry, Kin, Verdict};
 use crate::words::{list, upper};
 use std::collections::BTreeMap;
 
@@ -28,7 +27,7 @@ pub struct Hidden {
 impl Hidden {
     /// What is true and what is false of the names, a sentence each.
     #[must_use]
-    pub fn judged(&self, verdict: &Verdict, words: Vocabulary) -> Vec<String> {
+    pub fn judged(&self, verdict: &Verdict) -> Vec<String> {
         let sizes = if self.parameters.is_empty() { String::new() } else { format!(" ({})", self.parameters.join(", ")) };
         let named: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
         let found = named.iter().any(|e| e.id == self.id);
@@ -36,18 +35,20 @@ impl Hidden {
         if found {
             out.push(format!("true of the names: {}", self.id));
         }
-        let told = |of_every: bool| -> Vec<String> {
-            let others = named.iter().filter(|e| e.id != self.id && (words.of_every_rig)(e) == of_every);
-            let mut ids: Vec<String> = others.map(|e| e.id.clone()).collect();
+        let told = |kin: Kin| -> Vec<String> {
+            let mut ids: Vec<String> = named.iter().filter(|e| e.id != self.id && e.kin == kin).map(|e| e.id.clone()).collect();
             ids.dedup();
             ids
         };
-        let (common, false_names) = (told(true), told(false));
-        if !common.is_empty() {
-            out.push(format!("true of every rig, the simulated one too: {}", list(&common)));
-        }
-        if !false_names.is_empty() {
-            out.push(format!("false of the names, nobody hid it: {}", list(&false_names)));
+        for (kin, what) in [
+            (Kin::OfEvery, "true of every rig, the simulated one too"),
+            (Kin::WithinRow, "where in its row a reading lies, no effect that anybody hides"),
+            (Kin::Own, "false of the names, nobody hid it"),
+        ] {
+            let ids = told(kin);
+            if !ids.is_empty() {
+                out.push(format!("{what}: {}", list(&ids)));
+            }
         }
         out
     }
@@ -151,11 +152,10 @@ impl Origin {
 }
 
 /// The section.
-pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict, words: Vocabulary) {
+pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict) {
     if let Some(hidden) = &origin.hidden {
         sheet.section("What was hidden");
-        let lines: Vec<String> =
-            hidden.judged(verdict, words).iter().map(|l| format!("<li>{}.</li>", escape(&upper(l)))).collect();
+        let lines: Vec<String> = hidden.judged(verdict).iter().map(|l| format!("<li>{}.</li>", escape(&upper(l)))).collect();
         sheet.html_part(&format!("<ul>{}</ul>\n", lines.concat()));
     }
     sheet.section("Where this comes from");

@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict".
 
 use super::vocabulary::Vocabulary;
-use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
+use crate::verdict::{EffectEntry, Kin, Kind, Unexplained, Verdict};
 use crate::words::{adverb, amount, channel, heading, list, upper};
 
 /// Most effects that the sentence names; the cards have all.
@@ -17,6 +17,8 @@ const SMALL: f64 = 0.02;
 const WAYS: usize = 3;
 /// Share of the first alternative's probability from which on a further one is put beside it.
 const CLOSE: f64 = 0.5;
+/// Least share of what a channel had left over that is worth a figure in the sentence.
+const TELLING: f64 = 0.1;
 /// Shares that lie within so much of each other are told as one.
 const ALIKE: f64 = 0.1;
 /// Share from which on all is explained but the noise.
@@ -49,6 +51,13 @@ fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&Effec
 
 fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let (own, common) = named(verdict, words);
+    let noun = words.noun;
+    // where in its row a reading lies is no news
+    let common: Vec<&EffectEntry> = common.into_iter().filter(|e| e.kin != Kin::WithinRow).collect();
+    if own.is_empty() && common.is_empty() {
+        let said = since(news, &format!("nothing of this {noun}'s own was named."));
+        return [said, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
+    }
     let all = if own.is_empty() { &common } else { &own };
     // what takes next to nothing stands on its card alone, unless there is nothing else
     let large = |e: &&&EffectEntry| e.heldout_error_reduction >= SMALL || all.len() == 1;
@@ -60,7 +69,6 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let clauses: Vec<String> = told.iter().map(|e| words.said(e).with(adverb(e.probability))).collect();
     let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
     if own.is_empty() {
-        let noun = words.noun;
         out += &format!(" Every {noun} has that; nothing of this {noun}'s own was named.");
     }
     let smaller = match more {
@@ -209,7 +217,8 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
     let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).map(String::as_str).collect();
     on.sort_unstable();
     on.dedup();
-    let shares: Vec<(&str, f64)> = on.into_iter().filter_map(|c| Some((c, share(verdict, c)?))).collect();
+    let told_of = |c| Some((c, share(verdict, c).filter(|s| *s >= TELLING)?));
+    let shares: Vec<(&str, f64)> = on.into_iter().filter_map(told_of).collect();
     let Some(least) = shares.iter().map(|s| s.1).min_by(f64::total_cmp) else { return String::new() };
     let most = shares.iter().map(|s| s.1).fold(least, f64::max);
     // what else was added on these channels has its part in the figure

@@ -6,7 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, lists of effects.
 
 use crate::effects::{About, Scope, by_id};
-use crate::verdict::EffectEntry;
+use crate::verdict::{EffectEntry, Kin};
 use crate::words::{Clause, parameter};
 
 /// The words of a library of effects.
@@ -30,7 +30,7 @@ impl Vocabulary {
         noun: "rig",
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
-        of_every_rig: |found| found.common,
+        of_every_rig: |found| found.kin != Kin::Own,
         parameter: |id, name| match (id, name) {
             ("unknown", "from") => "variable, lowest".to_owned(),
             ("unknown", "to") => "variable, highest".to_owned(),
@@ -60,7 +60,7 @@ impl Vocabulary {
     /// What an effect that was not found would do, on the channels of one that was.
     pub(crate) fn of_another(self, id: &str, beside: Option<&EffectEntry>) -> Clause {
         let entry = EffectEntry {
-            common: false,
+            kin: Kin::Own,
             id: id.to_owned(),
             scope: beside.map_or(Scope::Rig, |e| e.scope),
             run: None,
