@@ -25,6 +25,9 @@ pub(crate) fn base<'c>(context: &'c Context, declared: Declared<'c>, placed: &'c
 /// Samples of a channel that a scan looks at.
 const SCANNED: usize = 4000;
 
+/// Evaluations from which on a search is wide: it begins at a point of a grid, which may lie in another valley than what it looks for.
+const WIDE: usize = 100;
+
 /// Grid points from which on a scan looks at channels that have something left only.
 const LARGE_GRID: usize = 6;
 
@@ -150,21 +153,26 @@ pub(crate) fn refine_group(
         .iter()
         .map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0)))
         .collect();
+    let cost = |x: &[f64]| {
+        let full = at(x);
+        // a soft wall keeps the simplex inside the plausible box
+        let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
+        let placed = with_shapes(placed, &full);
+        -taught.loglik(&placed, &moving, scattering) - known(&placed) + 1e3 * wall
+    };
+    let left = |x: &[f64]| {
+        let placed = with_shapes(placed, &at(x));
+        taught.whitened(&placed, &moving).map(|w| (-w.loglik - known(&placed), w.left))
+    };
+    let within: Vec<(f64, f64)> = free.iter().map(|i| ranges[*i]).collect();
     let best = if scattering {
-        let cost = |x: &[f64]| {
-            let full = at(x);
-            // a soft wall keeps the simplex inside the plausible box
-            let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
-            let placed = with_shapes(placed, &full);
-            -taught.loglik(&placed, &moving, scattering) - known(&placed) + 1e3 * wall
-        };
         nelder_mead(&cost, &x0, &steps, evaluations)
+    } else if evaluations >= WIDE {
+        // from a point of a grid: the simplex finds the valley, the descent its floor
+        let wide = at(&nelder_mead(&cost, &x0, &steps, evaluations / 2));
+        let start: Vec<f64> = free.iter().map(|i| wide[*i]).collect();
+        descend(&left, &start, &steps, &within, evaluations / 2)
     } else {
-        let left = |x: &[f64]| {
-            let placed = with_shapes(placed, &at(x));
-            taught.whitened(&placed, &moving).map(|w| (-w.loglik - known(&placed), w.left))
-        };
-        let within: Vec<(f64, f64)> = free.iter().map(|i| ranges[*i]).collect();
         descend(&left, &x0, &steps, &within, evaluations)
     };
     with_shapes(placed, &at(&best))

@@ -21,6 +21,8 @@ pub const LOUD: f64 = 3.0;
 const OWN_GAIN: f64 = 0.009;
 /// Share of the rows that may be anything when sensors are held against each other.
 const FEW: f64 = 0.01;
+/// The same, of rows one after the other, as a multiple.
+const STRETCH: f64 = 4.0;
 /// Share of independent samples below which a residual is slow.
 const SLOW: f64 = 0.1;
 
@@ -102,10 +104,16 @@ fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
     if grows { format!("{pace}, grows with the load") } else { pace.to_owned() }
 }
 
-/// The most that rows one after the other hold, as many as count as few.
+/// The most that rows one after the other hold, a few times as many as count as few: spikes over a run are never so close.
 fn loudest_stretch(squares: &[f64]) -> f64 {
-    let few = (FEW * squares.len() as f64).ceil() as usize;
-    squares.windows(few.max(1)).map(|w| w.iter().sum::<f64>()).fold(0.0, f64::max)
+    let rows = ((STRETCH * FEW * squares.len() as f64).ceil() as usize).clamp(1, squares.len().max(1));
+    let mut sum: f64 = squares.iter().take(rows).sum();
+    let mut most = sum;
+    for (new, old) in squares.iter().skip(rows).zip(squares) {
+        sum += new - old;
+        most = most.max(sum);
+    }
+    most
 }
 
 /// Whether the upper half of the loads holds most of a residual's squares.

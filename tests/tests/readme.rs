@@ -170,3 +170,23 @@ fn what_contributing_names_is_there() {
         assert!(root().join(folder).is_dir(), "no folder {folder}");
     }
 }
+
+/// The excerpt of a report is what the program prints of that log today, but for lines that are left out.
+#[test]
+fn the_excerpt_is_a_report() {
+    let Some(data) = quadrig_tests::data("the run of the README's excerpt") else { return };
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let excerpt = readme.split("## What it finds on measured data").nth(1).and_then(|t| t.split("```text\n").nth(1)).unwrap();
+    let excerpt = excerpt.split("```").next().unwrap();
+    let folder = TempDir::new().unwrap();
+    let name = excerpt.lines().find_map(|l| l.strip_suffix(".csv")).expect("the log's name");
+    let source = data.join(format!("rig/spitz-esc-test/original/{name}.csv"));
+    let at = folder.path();
+    let out = format!("{name}.csv");
+    quadrig_tests::call(at, &["--quiet", "import", source.to_str().unwrap(), "-o", &out]).succeeded();
+    let said = quadrig_tests::call(at, &["close-loop", &out, "-o", "closed"]).succeeded().out;
+    let mut lines = said.lines();
+    for line in excerpt.lines().filter(|l| !l.is_empty()) {
+        assert!(lines.any(|l| l == line), "the README says {line:?}, the program does not:\n{said}");
+    }
+}
