@@ -73,12 +73,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let options = args.columns.options(&args.names);
     let log = open(args.log(), &options, quiet)?;
     let model = args.model.as_deref().map(|path| read_model(path, quiet)).transpose()?;
-    if let Some(same) = args.validate.iter().find(|p| p.canonicalize().ok() == args.log().canonicalize().ok()) {
-        return Err(format!(
-            "--validate {}: it is the log itself; expected another run of the rig, which took no part",
-            same.display()
-        )
-        .into());
+    for same in args.validate.iter().filter(|p| p.canonicalize().ok() == args.log().canonicalize().ok()) {
+        note!("--validate {}: it is the log itself, whose figures validate nothing; give another run of the rig", same.display());
     }
     let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
     let closed = {
