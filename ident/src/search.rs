@@ -25,8 +25,8 @@ pub(crate) fn base<'c>(context: &'c Context, declared: Declared<'c>, placed: &'c
 /// Samples of a channel that a scan looks at.
 const SCANNED: usize = 4000;
 
-/// Evaluations from which on a search is wide: it begins at a point of a grid, which may lie in another valley than what it looks for.
-const WIDE: usize = 100;
+/// Evaluations of the newest effect from which on its search is wide; with fewer it goes on from a wide one.
+const WIDE: usize = 60;
 
 /// Grid points from which on a scan looks at channels that have something left only.
 const LARGE_GRID: usize = 6;
@@ -85,7 +85,19 @@ pub fn refine_newest(
     evaluations: usize,
 ) -> Vec<Placed> {
     let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
-    refine_group(context, declared, placed, &connected(placed, newest), rows, evaluations)
+    refined(context, declared, placed, &connected(placed, newest), (rows, evaluations), evaluations >= WIDE)
+}
+
+/// Improves the shapes of a hypothesis' newest effect alone: the others are known, from other runs too.
+pub(crate) fn refine_alone(
+    context: &Context,
+    declared: Declared<'_>,
+    placed: &[Placed],
+    rows: Rows<'_>,
+    evaluations: usize,
+) -> Vec<Placed> {
+    let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
+    refined(context, declared, placed, &[newest], (rows, evaluations), true)
 }
 
 /// Improves all shapes of a hypothesis, each group of effects that share channels on its own.
@@ -130,6 +142,18 @@ pub(crate) fn refine_group(
     rows: Rows<'_>,
     evaluations: usize,
 ) -> Vec<Placed> {
+    refined(context, declared, placed, group, (rows, evaluations), false)
+}
+
+/// The same. `wide`: it begins at a point of a grid, which may lie in another valley than what is looked for.
+fn refined(
+    context: &Context,
+    declared: Declared<'_>,
+    placed: &[Placed],
+    group: &[usize],
+    (rows, evaluations): (Rows<'_>, usize),
+    wide: bool,
+) -> Vec<Placed> {
     let ranges: Vec<(f64, f64)> = placed.iter().flat_map(|p| p.effect.shapes(context, &p.instance)).map(|s| s.range).collect();
     let start: Vec<f64> = placed.iter().flat_map(|p| p.shape.iter().copied()).collect();
     let owner: Vec<usize> = placed.iter().enumerate().flat_map(|(k, p)| std::iter::repeat_n(k, p.shape.len())).collect();
@@ -167,8 +191,8 @@ pub(crate) fn refine_group(
     let within: Vec<(f64, f64)> = free.iter().map(|i| ranges[*i]).collect();
     let best = if scattering {
         nelder_mead(&cost, &x0, &steps, evaluations)
-    } else if evaluations >= WIDE {
-        // from a point of a grid: the simplex finds the valley, the descent its floor
+    } else if wide {
+        // the simplex finds the valley, the descent its floor
         let wide = at(&nelder_mead(&cost, &x0, &steps, evaluations / 2));
         let start: Vec<f64> = free.iter().map(|i| wide[*i]).collect();
         descend(&left, &start, &steps, &within, evaluations / 2)
