@@ -19,7 +19,6 @@ pub mod context;
 mod correction;
 pub mod course;
 pub mod date;
-mod descend;
 pub mod design;
 pub mod diagnose;
 mod drive;

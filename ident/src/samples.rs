@@ -31,8 +31,6 @@ pub(crate) struct Samples<'c> {
     levelled: Cow<'c, [f64]>,
     /// One over `levelled`.
     weights: Vec<f64>,
-    /// Their roots, made when first asked for.
-    roots: OnceCell<Vec<f64>>,
     /// Half the sum of the logarithms of `levelled`.
     half_logs: f64,
     /// Sum of the weighted squares of `y`.
@@ -100,7 +98,6 @@ impl<'c> Samples<'c> {
             squares: y.iter().zip(&weights).map(|(v, w)| w * v * v).sum(),
             y,
             weights,
-            roots: OnceCell::new(),
             half_logs: 0.5 * log_product(&levelled),
             levelled,
             late: (0..unsettled.len()).filter(|i| unsettled[*i]).collect(),
@@ -250,39 +247,6 @@ impl<'c> Samples<'c> {
     }
 }
 
-/// What a fit leaves of a target, as a descent needs it.
-pub(crate) struct Whitened {
-    pub(crate) loglik: f64,
-    /// One value a sample, so that half the sum of their squares changes as the likelihood does.
-    pub(crate) left: Vec<f64>,
-}
-
-impl Samples<'_> {
-    /// Solves a design and whitens what it leaves: by its variances, by the scales that the likelihood profiles, and by how much a sample counts.
-    fn whitened(&self, design: &TargetDesign) -> Option<Whitened> {
-        let (solution, likelihood, kept) = self.solve(design, false)?;
-        let roots = self.roots.get_or_init(|| self.weights.iter().map(|w| w.sqrt()).collect());
-        let mut left = kept.residual(&solution.coefficients);
-        left.iter_mut().zip(roots).for_each(|(r, root)| *r *= root);
-        if !self.target.trust.is_empty() {
-            left.iter_mut().for_each(|r| *r /= (1.0 + *r * *r / TAME).sqrt());
-        }
-        let all: f64 = left.iter().map(|r| r * r).sum();
-        let counts = self.target.weight * self.stride as f64;
-        let share = |sum: f64, n: usize| (counts / (sum / n.max(1) as f64).max(self.target.least_scale())).sqrt();
-        if kept.jumps.is_some() {
-            let late: f64 = self.late.iter().map(|i| left[*i] * left[*i]).sum();
-            let n = self.late.len();
-            let (calm, after) = (share(all - late, left.len() - n), share(late, n));
-            left.iter_mut().zip(&self.unsettled).for_each(|(r, late)| *r *= if *late { after } else { calm });
-        } else {
-            let share = share(all, left.len());
-            left.iter_mut().for_each(|r| *r *= share);
-        }
-        Some(Whitened { loglik: likelihood.mean, left })
-    }
-}
-
 /// Squared deviations, in variances, from which on a sample against a declared model counts by their logarithm.
 const TAME: f64 = 25.0;
 
@@ -328,21 +292,6 @@ impl<'c> Taught<'c> {
             }
         }
         sum
-    }
-
-    /// The same with what the fits leave, whitened; only where nothing speaks of scatter.
-    pub(crate) fn whitened(&self, placed: &[Placed], moving: &[&str]) -> Option<Whitened> {
-        let mut all = Whitened { loglik: 0.0, left: Vec::new() };
-        let mut designs = Designs::new(self.context, self.declared, placed);
-        let moving = (0..self.samples.len()).filter(|k| moving.contains(&self.context.targets[*k].name));
-        for k in moving {
-            let target = &self.context.targets[k];
-            let samples = self.samples[k].get_or_init(|| Samples::new(target, self.rows, self.context.len()));
-            let one = samples.whitened(designs.after(target, &mut self.steps.borrow_mut()[k]))?;
-            all.loglik += one.loglik;
-            all.left.extend(one.left);
-        }
-        Some(all)
     }
 
     fn of_target(&self, k: usize, designs: &mut Designs<'_>, scattering: bool) -> Option<f64> {

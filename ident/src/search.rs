@@ -1,13 +1,11 @@
 //! The search for shape parameters: a scan of each candidate's grid, and a joint refinement.
 //!
-//! What it is: the profile likelihood over the shapes, maximised from the best point of a grid: by descent ([`crate::descend`]), or by
-//! Nelder-Mead's simplex where an effect speaks of scatter and residuals say nothing.
+//! What it is: the profile likelihood over the shapes, maximised from the best point of a grid by Nelder-Mead.
 //! What can go wrong: a shape on its bound stays there; the diagnosis then disqualifies it.
 //! Units: log-likelihood in nats.
 //! Reference: Nelder & Mead 1965, Computer Journal 7:308.
 
 use crate::context::Context;
-use crate::descend::descend;
 use crate::effects::{Effect, Instance};
 use crate::hypothesis::{Declared, Placed, Rows};
 use crate::samples::{Base, Taught};
@@ -24,9 +22,6 @@ pub(crate) fn base<'c>(context: &'c Context, declared: Declared<'c>, placed: &'c
 
 /// Samples of a channel that a scan looks at.
 const SCANNED: usize = 4000;
-
-/// Evaluations of the newest effect from which on its search is wide; with fewer it goes on from a wide one.
-const WIDE: usize = 60;
 
 /// Grid points from which on a scan looks at channels that have something left only.
 const LARGE_GRID: usize = 6;
@@ -74,7 +69,7 @@ pub(crate) fn scan(
     best
 }
 
-/// Improves the shapes of a hypothesis together (within the plausible ranges): those of its newest effect and of
+/// Improves the shapes of a hypothesis together (Nelder-Mead within the plausible ranges): those of its newest effect and of
 /// every effect that shares a channel with it, directly or through others. The rest is independent of them.
 #[must_use]
 pub fn refine_newest(
@@ -85,19 +80,7 @@ pub fn refine_newest(
     evaluations: usize,
 ) -> Vec<Placed> {
     let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
-    refined(context, declared, placed, &connected(placed, newest), (rows, evaluations), evaluations >= WIDE)
-}
-
-/// Improves the shapes of a hypothesis' newest effect alone: the others are known, from other runs too.
-pub(crate) fn refine_alone(
-    context: &Context,
-    declared: Declared<'_>,
-    placed: &[Placed],
-    rows: Rows<'_>,
-    evaluations: usize,
-) -> Vec<Placed> {
-    let Some(newest) = placed.len().checked_sub(1) else { return Vec::new() };
-    refined(context, declared, placed, &[newest], (rows, evaluations), true)
+    refine_group(context, declared, placed, &connected(placed, newest), rows, evaluations)
 }
 
 /// Improves all shapes of a hypothesis, each group of effects that share channels on its own.
@@ -142,18 +125,6 @@ pub(crate) fn refine_group(
     rows: Rows<'_>,
     evaluations: usize,
 ) -> Vec<Placed> {
-    refined(context, declared, placed, group, (rows, evaluations), false)
-}
-
-/// The same. `wide`: it begins at a point of a grid, which may lie in another valley than what is looked for.
-fn refined(
-    context: &Context,
-    declared: Declared<'_>,
-    placed: &[Placed],
-    group: &[usize],
-    (rows, evaluations): (Rows<'_>, usize),
-    wide: bool,
-) -> Vec<Placed> {
     let ranges: Vec<(f64, f64)> = placed.iter().flat_map(|p| p.effect.shapes(context, &p.instance)).map(|s| s.range).collect();
     let start: Vec<f64> = placed.iter().flat_map(|p| p.shape.iter().copied()).collect();
     let owner: Vec<usize> = placed.iter().enumerate().flat_map(|(k, p)| std::iter::repeat_n(k, p.shape.len())).collect();
@@ -164,42 +135,28 @@ fn refined(
     let moving = touched_by_shapes(placed, group);
     let scattering = placed.iter().any(|p| p.effect.scatters());
     let taught = Taught::new(context, declared, rows);
-    let at = |x: &[f64]| {
+    let cost = |x: &[f64]| -> f64 {
         let mut full = start.clone();
         for (i, v) in free.iter().zip(x) {
             full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
         }
-        full
+        // a soft wall keeps the simplex inside the plausible box
+        let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
+        let placed = with_shapes(placed, &full);
+        let known: f64 = placed.iter().map(Placed::prior).sum();
+        -taught.loglik(&placed, &moving, scattering) - known + 1e3 * wall
     };
-    let known = |placed: &[Placed]| placed.iter().map(Placed::prior).sum::<f64>();
     let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
     let steps: Vec<f64> = free
         .iter()
         .map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0)))
         .collect();
-    let cost = |x: &[f64]| {
-        let full = at(x);
-        // a soft wall keeps the simplex inside the plausible box
-        let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
-        let placed = with_shapes(placed, &full);
-        -taught.loglik(&placed, &moving, scattering) - known(&placed) + 1e3 * wall
-    };
-    let left = |x: &[f64]| {
-        let placed = with_shapes(placed, &at(x));
-        taught.whitened(&placed, &moving).map(|w| (-w.loglik - known(&placed), w.left))
-    };
-    let within: Vec<(f64, f64)> = free.iter().map(|i| ranges[*i]).collect();
-    let best = if scattering {
-        nelder_mead(&cost, &x0, &steps, evaluations)
-    } else if wide {
-        // the simplex finds the valley, the descent its floor
-        let wide = at(&nelder_mead(&cost, &x0, &steps, evaluations / 2));
-        let start: Vec<f64> = free.iter().map(|i| wide[*i]).collect();
-        descend(&left, &start, &steps, &within, evaluations / 2)
-    } else {
-        descend(&left, &x0, &steps, &within, evaluations)
-    };
-    with_shapes(placed, &at(&best))
+    let best = nelder_mead(&cost, &x0, &steps, evaluations);
+    let mut full = start.clone();
+    for (i, v) in free.iter().zip(&best) {
+        full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
+    }
+    with_shapes(placed, &full)
 }
 
 fn touched_by_shapes<'p>(placed: &'p [Placed], group: &[usize]) -> Vec<&'p str> {

@@ -15,7 +15,7 @@ use crate::design::Label;
 use crate::effects::{NEEDED_EVIDENCE, Scope, library};
 use crate::hypothesis::{Declared, Placed, Rows, design, fit, is_plausible};
 use crate::model::{AddedEffect, RunLevel};
-use crate::search::{base, refine_alone, scan};
+use crate::search::{base, refine_newest, scan};
 use crate::solve::Normal;
 
 /// Most drifts and events of one run.
@@ -78,7 +78,7 @@ fn best(member: &Member<'_>, rig: &[Placed], shared: &[Shared]) -> Option<Placed
     });
     let (start, _) = scanned.filter(|(p, _)| !p.is_tare()).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let with: Vec<Placed> = placed.iter().chain([&start]).cloned().collect();
-    let newest = refine_alone(context, declared, &with, Rows::All, EVALUATIONS).pop()?;
+    let newest = refine_newest(context, declared, &with, Rows::All, EVALUATIONS).pop()?;
     let mut tried = member.clone();
     tried.own.push(newest.clone());
     let whole: Vec<Placed> = rig.iter().chain(&tried.own).cloned().collect();
