@@ -16,6 +16,7 @@ use crate::effects::{self, Effect, Estimate, Instance};
 use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
 use crate::moment::lasts;
+use crate::parallel::in_parallel;
 use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
@@ -398,31 +399,31 @@ pub(crate) fn round_of(
     let mut out: Vec<Candidate> = Vec::new();
     let (mut most, mut heard) = (f64::NEG_INFINITY, BTreeSet::new());
     let notable = ranked.first().map_or(0.0, |r| NOTABLE * r.0);
-    for (k, (gain, placed)) in ranked.into_iter().enumerate() {
+    ranked.retain(|r| r.0 >= -20.0);
+    let stands = |placed: &[Placed]| {
+        fit(context, declared, placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
+    };
+    let wide = |placed: &[Placed]| refine_newest(context, declared, placed, sketch, 120);
+    // those that are refined whatever comes of the others
+    let mut sure = in_parallel(ranked.len().min(refined), &|k| stands(&wide(&ranked[k].1))).into_iter();
+    for (k, (gain, placed)) in ranked.iter().enumerate() {
         progress(0.7 + 0.3 * (k as f64 / count));
-        if gain < -20.0 {
-            break;
-        }
         // what explains on its grid alone twice as much as all that came out so far is worth a refinement, whatever stands before it; so is the
         // first form of an effect that explains there a notable share of what the best does
         let first = placed.last().is_some_and(|p| heard.insert(p.effect.id()));
-        let promising = k < refined || k < 3 * refined && gain > 0.0 && (gain > 2.0 * most || first && gain > notable);
-        let placed = if promising { refine_newest(context, declared, &placed, sketch, 120) } else { placed };
-        if let Some(fitted) =
-            fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
-        {
+        let promising = k < 3 * refined && *gain > 0.0 && (*gain > 2.0 * most || first && *gain > notable);
+        let fitted = sure.next().unwrap_or_else(|| if promising { stands(&wide(placed)) } else { stands(placed) });
+        if let Some(fitted) = fitted {
             most = most.max(net_gain(context, &fitted, &best.fit, &whole));
             out.push(Candidate { fit: fitted, evidence: 0.0 });
         }
     }
     weigh(context, best, &mut out);
-    for c in out.iter_mut().take(if matches!(sketch, Rows::Every(1)) { 0 } else { POLISHED }) {
-        let placed = refine_newest(context, declared, &c.fit.placed, Rows::All, 50);
-        if let Some(fitted) =
-            fit(context, declared, &placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
-        {
-            c.fit = fitted;
-        }
+    let polished = if matches!(sketch, Rows::Every(1)) { 0 } else { out.len().min(POLISHED) };
+    let polish = |k: usize| stands(&refine_newest(context, declared, &out[k].fit.placed, Rows::All, 50));
+    let polished = in_parallel(polished, &polish);
+    for (c, fitted) in out.iter_mut().zip(polished) {
+        c.fit = fitted.unwrap_or_else(|| c.fit.clone());
     }
     weigh(context, best, &mut out);
     out

@@ -44,6 +44,7 @@ pub mod model;
 mod moment;
 pub mod noise;
 mod opponent;
+pub(crate) mod parallel;
 pub mod plateau;
 pub mod quantity;
 pub mod report;

@@ -91,7 +91,7 @@ mod pty {
         if !quiet {
             say!("virtual {}; {}", board.kind().words(), help(&*board));
         }
-        std::io::stdout().flush()?;
+        crate::say::out().flush()?;
         let typed = crate::rig::lines();
         let mut pace = Pace::new(args.speed);
         let last = args.seconds.map_or(u64::MAX, |s| (s * 1000.0) as u64);

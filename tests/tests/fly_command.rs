@@ -178,7 +178,7 @@ fn the_same_schedule_in_flight_and_on_the_rig() {
     let rest = 1.0;
     let mut compared = 0;
     for i in 0..rig_t.len() {
-        let held = (0..20).all(|k| i >= k && (rig_rpm[i] - rig_rpm[i - k]).abs() < 3.0);
+        let held = (0..25).all(|k| i >= k && (rig_rpm[i] - rig_rpm[i - k]).abs() < 3.0);
         let now = rig_t[i] - rest;
         if !held || !(0.5..20.9).contains(&now) {
             continue;

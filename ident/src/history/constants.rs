@@ -14,7 +14,7 @@ use crate::context::{Context, STANDSTILL};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::noise::median;
-use crate::several::parallel::in_parallel;
+use crate::parallel::in_parallel;
 use crate::solve::Normal;
 use crate::words;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -12,7 +12,7 @@ use crate::close::{Closed, close};
 use crate::effects::{self, Effect};
 use crate::log::Log;
 use crate::model::Model;
-use crate::several::parallel::in_parallel;
+use crate::parallel::in_parallel;
 use crate::verdict::EffectEntry;
 use crate::words::lower;
 use serde::Serialize;

@@ -6,9 +6,9 @@
 //! Reference: specification `closing-the-loop.md`.
 
 use super::Run;
-use super::parallel::in_parallel;
 use crate::close::{CloseError, close};
 use crate::log::Log;
+use crate::parallel::in_parallel;
 use std::sync::Mutex;
 
 /// Why several runs cannot be fitted together.

@@ -15,7 +15,6 @@ mod folds;
 mod joint;
 mod outcome;
 mod own;
-pub(crate) mod parallel;
 mod words;
 
 use crate::close::Closed;

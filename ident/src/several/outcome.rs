@@ -8,7 +8,6 @@
 use super::equations::left_on;
 use super::folds::{self, Tenable};
 use super::joint::{Joint, Shared};
-use super::parallel::in_parallel;
 use super::words::{self, Told};
 use super::{Member, Run, choose, own};
 use crate::bad;
@@ -19,6 +18,7 @@ use crate::hypothesis::Placed;
 use crate::log::Log;
 use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors};
 use crate::noise::median;
+use crate::parallel::in_parallel;
 use crate::sparse;
 use crate::verdict::Verdict;
 

@@ -9,12 +9,12 @@
 use super::Member;
 use super::equations::{centring, columns_of, of_run, own_columns, samples_less_fixed, shared};
 use super::joint::{Joint, Shared};
-use super::parallel::in_parallel;
 use crate::context::Target;
 use crate::design::Label;
 use crate::effects::{NEEDED_EVIDENCE, Scope, library};
 use crate::hypothesis::{Declared, Placed, Rows, design, fit, is_plausible};
 use crate::model::{AddedEffect, RunLevel};
+use crate::parallel::in_parallel;
 use crate::search::{base, refine_newest, scan};
 use crate::solve::Normal;
 

@@ -60,7 +60,10 @@ fn everything_is_there_at_80_by_24_and_at_120_by_40() {
     for (width, height) in [(80, 24), (120, 40)] {
         let lines = drawn(&running(), width, height, Glyphs::Blocks);
         let text = lines.join("\n");
-        say!("{text}");
+        #[allow(clippy::print_stdout)] // for whoever runs the test with --nocapture
+        {
+            println!("{text}");
+        }
         let wanted = [
             "/dev/ttyUSB0",
             "REC run.csv 300 rows",

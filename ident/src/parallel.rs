@@ -1,7 +1,8 @@
-//! One piece of work a run, on all cores.
+//! Pieces of work that do not wait for each other, on all cores.
 //!
-//! What it is: threads that take the next run until none is left; the results in the order of the runs.
-//! What can go wrong: a panic in one of them goes on in the caller: no run is lost silently.
+//! What it is: threads that take the next piece (a run, a fit) until none is left; the results in the order of the pieces, the same on any number
+//! of cores.
+//! What can go wrong: a panic in one of them goes on in the caller: no piece is lost silently.
 //! Units: none.
 //! Reference: `std::thread::scope`.
 
