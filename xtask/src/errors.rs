@@ -26,6 +26,7 @@ const AREAS: [(&str, &[&str]); 13] = [
             "quadrig/src/spool.rs",
             "quadrig/src/end.rs",
             "quadrig/src/open.rs",
+            "quadrig/src/say.rs",
         ],
     ),
     (
