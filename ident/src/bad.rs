@@ -10,6 +10,7 @@
 mod curve;
 mod dropout;
 mod excursion;
+mod first_turns;
 mod scale;
 mod spike;
 mod stuck;
@@ -90,8 +91,13 @@ pub fn found(log: &Log) -> Vec<SetAside> {
             continue;
         }
         // a probe that has lost its mark reads nothing, however often: no effect speaks of it
-        let lost = if SPEED.contains(&name) { dropout::found(&witnesses, name) } else { Vec::new() };
+        let mut lost = if SPEED.contains(&name) { dropout::found(&witnesses, name) } else { Vec::new() };
         witnesses.take_out(name, &lost);
+        if SPEED.contains(&name) {
+            let silent = first_turns::found(&witnesses, name);
+            witnesses.take_out(name, &silent);
+            lost.extend(silent);
+        }
         let mut events = stuck::found(&witnesses, name);
         witnesses.take_out(name, &events);
         // a probe's recovery belongs to its drop-out; elsewhere a single reading stands by itself

@@ -222,7 +222,7 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
                     format!("{} scatters {times:.1} times as much as on the day of the declared model; {evidence}", target.name);
             }
             let entry = EffectEntry {
-                kin: p.effect.kin(context, &estimates),
+                kin: p.effect.kin(context, &p.instance, &estimates),
                 id: p.effect.id().to_owned(),
                 scope: p.effect.scope(&p.instance),
                 run: None,

@@ -409,7 +409,7 @@ impl Context {
     }
 
     /// Whether a rotor whose motor is off still turns at a row.
-    fn runs_down(&self, row: usize) -> bool {
+    pub(crate) fn runs_down(&self, row: usize) -> bool {
         let off = self.pulse.as_ref().is_some_and(|p| p[row] < self.start_pulse_us);
         off && self.rpm.get(row).is_some_and(|r| *r > STANDSTILL)
     }

@@ -8,6 +8,7 @@
 
 mod clock;
 mod gaps;
+pub(crate) mod plausible;
 
 pub use gaps::Gaps;
 
@@ -191,7 +192,9 @@ impl Log {
             return Err(lines.place().refuse(None, "no data rows", "at least one line of numbers under the header"));
         }
         if format == FORMAT {
-            clock::check(&log, &Place { file, line: first_row.unwrap_or(1) })?;
+            let place = Place { file, line: first_row.unwrap_or(1) };
+            clock::check(&log, &place)?;
+            plausible::check(&log, &place)?;
         }
         log.sha256 = Some(hexadecimal(lines.digest));
         Ok(log)

@@ -65,6 +65,11 @@ impl<'l> Witnesses<'l> {
         self.clean.get(name).map(Vec::as_slice)
     }
 
+    /// The command on every row, where there is one.
+    pub(super) fn pulse(&self) -> Option<&[f64]> {
+        self.pulse.as_deref()
+    }
+
     /// Leaves these rows of a channel out.
     pub(super) fn take_out(&mut self, name: &'static str, events: &[Event]) {
         if let Some(values) = self.clean.get_mut(name) {

@@ -200,9 +200,13 @@ pub trait Effect: Sync {
     fn is_within_a_row(&self, _context: &Context, _fitted: &[Estimate]) -> bool {
         false
     }
+    /// Whether every run has it, this small: a cell that is tared anew before each run.
+    fn is_of_every_run(&self, _context: &Context, _instance: &Instance, _fitted: &[Estimate]) -> bool {
+        false
+    }
     /// Whose it is, as it was fitted.
-    fn kin(&self, context: &Context, fitted: &[Estimate]) -> Kin {
-        match self.is_of_every_rig() {
+    fn kin(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> Kin {
+        match self.is_of_every_rig() || self.is_of_every_run(context, instance, fitted) {
             true => Kin::OfEvery,
             false if self.is_within_a_row(context, fitted) => Kin::WithinRow,
             false => Kin::Own,

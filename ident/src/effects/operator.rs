@@ -304,19 +304,28 @@ pub(crate) fn is_within_a_row(context: &Context, late_s: f64) -> bool {
 /// Whether the load changes within single rows: then the instant of a step is known to a row only.
 pub(crate) fn abrupt(context: &Context) -> bool {
     *context.facts.abrupt.get_or_init(|| {
-        let signal: &[f64] = if context.rpm.is_empty() { context.pulse.as_deref().unwrap_or(&[]) } else { &context.rpm };
-        // of the squared change over three rows, the share that one row holds
-        let (mut single, mut triple) = (0.0, 0.0);
-        let large = 0.01 * signal.iter().copied().fold(0.0, f64::max);
-        for w in signal.windows(4) {
-            let (a, b, c) = (w[1] - w[0], w[2] - w[1], w[3] - w[2]);
-            if b.abs() > large && b.abs() >= a.abs() && b.abs() >= c.abs() {
-                single += b * b;
-                triple += (a + b + c).powi(2);
-            }
-        }
-        single > 0.9 * triple && single > 0.0
+        let command = context.pulse.as_deref().unwrap_or(&[]);
+        within_single_rows(if context.rpm.is_empty() { command } else { &context.rpm })
     })
+}
+
+/// Whether the command does.
+pub(crate) fn commands_abruptly(context: &Context) -> bool {
+    context.pulse.as_deref().is_some_and(within_single_rows)
+}
+
+fn within_single_rows(signal: &[f64]) -> bool {
+    // of the squared change over three rows, the share that one row holds
+    let (mut single, mut triple) = (0.0, 0.0);
+    let large = 0.01 * signal.iter().copied().fold(0.0, f64::max);
+    for w in signal.windows(4) {
+        let (a, b, c) = (w[1] - w[0], w[2] - w[1], w[3] - w[2]);
+        if b.abs() > large && b.abs() >= a.abs() && b.abs() >= c.abs() {
+            single += b * b;
+            triple += (a + b + c).powi(2);
+        }
+    }
+    single > 0.9 * triple && single > 0.0
 }
 
 /// The courses between rows that a log asks for: straight lines, and where the load jumps, jumps.

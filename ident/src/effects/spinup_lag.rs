@@ -17,7 +17,7 @@ pub(crate) struct SpinupLag;
 
 /// Form of a rotor that nothing brakes but air and friction.
 const COASTING: &str = "coasting";
-/// The same where the load jumps from row to row.
+/// The same where the command jumps from row to row.
 const COASTING_OF_STEPS: &str = "coasting_of_steps";
 /// Time constant of the quickest rotors, s.
 const QUICK: f64 = 0.04;
@@ -66,7 +66,7 @@ impl Effect for SpinupLag {
         if context.time_is_row || channels.is_empty() {
             return Vec::new();
         }
-        let coasting = if operator::abrupt(context) { COASTING_OF_STEPS } else { COASTING };
+        let coasting = if operator::commands_abruptly(context) { COASTING_OF_STEPS } else { COASTING };
         ["", coasting].iter().map(|form| Instance::new(&channels, form)).collect()
     }
 

@@ -24,18 +24,23 @@ impl Effect for TareShift {
             equation: "thrust_n (against a declared model also torque_nm) += offset for t >= t0",
             source: "Basseville & Nikiforov 1993, section 2.2",
             depends_on: &["t_s"],
-            signature: "the thrust residual has one step in time and is flat on both sides",
+            signature: "the residual is one constant, from one instant on or throughout",
             look_alikes: &["zero_drift", "gain_change"],
         }
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        {
-            let at = found.tell("t0", |t| format!(" at {t}"), "");
-            let at = if found.is_since_before() { " before the run" } else { at.as_str() };
-            let does = found.tell("offset", |v| format!("jumps by {v}{at}"), &format!("jumps{at}"));
-            Clause::new(format!("the zero of {}", found.meter()), does)
+        let zero = format!("the zero of {}", found.meter());
+        if found.is_since_before() {
+            return Clause::new(zero, found.tell("offset", |v| format!("lies {v} from where it was"), "is another one"));
         }
+        let at = found.tell("t0", |t| format!(" at {t}"), "");
+        Clause::new(zero, found.tell("offset", |v| format!("jumps by {v}{at}"), &format!("jumps{at}")))
+    }
+
+    fn is_of_every_run(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        let least = instance.channels.first().and_then(|c| context.targets.get(context.target(c)?)).map_or(0.0, |t| t.noise.rms);
+        instance.form == BEFORE && fitted.iter().any(|e| e.name == "offset" && e.value.abs() < least)
     }
 
     fn scope(&self, instance: &Instance) -> Scope {

@@ -197,7 +197,7 @@ fn is_seen_between_jumps(context: &Context, coefficient: f64) -> bool {
     let span = context.duration().max(1e-9);
     let mut normal = Normal::new(6);
     let mut rows = 0.0;
-    for (i, y) in thrust.rows.iter().zip(&thrust.y).filter(|(i, _)| settled[**i]) {
+    for (i, y) in thrust.rows.iter().zip(&thrust.y).filter(|(i, _)| settled[**i] && !context.runs_down(**i)) {
         let (n, t) = (context.rpm[*i] / 1000.0, context.t[*i] / span);
         normal.add(&[readings[*i], 1.0, n, n * n, t, t * t], *y, 1.0);
         rows += 1.0;
@@ -226,7 +226,8 @@ struct Scatter {
 fn scatter(context: &Context, thrust: &Target, torque: &Target, band: impl Fn(usize) -> usize) -> [Scatter; BANDS] {
     let mut rows = vec![[f64::NAN; 2]; context.len()];
     for (k, target) in [thrust, torque].into_iter().enumerate() {
-        target.rows.iter().zip(&target.y).for_each(|(i, y)| rows[*i][k] = *y);
+        // while a rotor runs down both go with its speed
+        target.rows.iter().zip(&target.y).filter(|(i, _)| !context.runs_down(**i)).for_each(|(i, y)| rows[*i][k] = *y);
     }
     let mut out = [Scatter::default(); BANDS];
     for stretch in &context.calm {

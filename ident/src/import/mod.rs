@@ -13,7 +13,6 @@ mod flight;
 mod header;
 mod layout;
 mod number;
-mod plausible;
 mod repair;
 mod rotor;
 mod settle;
@@ -26,6 +25,7 @@ mod unit;
 pub use flight::{flight, flight_from};
 pub use rotor::{is_recording, rotor};
 
+use crate::log::plausible::{VOUCHED, doubts};
 use crate::log::{Log, Place, ReadError};
 use std::fs::File;
 use std::io::Read;
@@ -189,10 +189,29 @@ pub fn import_from(file: &str, source: impl Read, options: &Options) -> Result<(
             "at least two of pulse, rpm, thrust, torque, current, voltage (name them with --map TARGET=SOURCE*FACTOR)",
         ));
     }
-    plausible::judge(&place, &log, &mapped, &mut report)?;
+    let vouched = judge(&place, &log, &mapped, &mut report)?;
     let row = log.time_is_row();
     log.meta.extend(layout.meta.into_iter().filter(|(key, _)| key != "time" || row));
+    if !vouched.is_empty() {
+        log.meta.insert(VOUCHED.into(), toml::Value::Array(vouched));
+    }
     log.events = layout.events;
     options.name(&mut log);
     Ok((log, report))
+}
+
+/// Refuses what no rig does, unless the user mapped the column; tells what is odd. The columns that only the mapping vouches for.
+fn judge(place: &Place<'_>, log: &Log, mapped: &[String], report: &mut Report) -> Result<Vec<toml::Value>, ReadError> {
+    let mut vouched = Vec::new();
+    for doubt in doubts(log) {
+        if doubt.never && !mapped.iter().any(|m| m == doubt.column) {
+            let expected = format!("what a rig can do; if it is right, say so with --map {}=COLUMN*FACTOR", doubt.column);
+            return Err(place.refuse(Some(doubt.column), doubt.what, expected));
+        }
+        if doubt.never {
+            vouched.push(toml::Value::String(doubt.column.to_owned()));
+        }
+        report.add(doubt.column, format!("in doubt: {}", doubt.what), 1);
+    }
+    Ok(vouched)
 }

@@ -41,7 +41,7 @@ pub(super) fn entry(joint: &Joint<'_, '_>, named: &[Named], k: usize, after: &[A
     let better = |a: &&Across| without.iter().any(|w| w.run == a.run && w.channel == a.channel && w.rms > a.rms);
     let helped = after.iter().filter(|a| a.channel == first).filter(better).count();
     EffectEntry {
-        kin: joint.members.first().map_or(Kin::Own, |m| p.effect.kin(m.context, &reported)),
+        kin: joint.members.first().map_or(Kin::Own, |m| p.effect.kin(m.context, &p.instance, &reported)),
         id: p.effect.id().to_owned(),
         scope: p.effect.scope(&p.instance),
         run: None,

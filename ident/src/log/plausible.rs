@@ -1,33 +1,49 @@
 //! What a rig can do: sample rate, thrust for its speed and its power, voltage, current.
 //!
-//! What it is: a look at an imported log for a wrong unit or swapped columns.
-//! What can go wrong: beyond what any rig does the file is refused with the likely reason; what is only unusual is a line of the report. A
-//! column that the user mapped is never refused here, and said all the same.
+//! What it is: a look at a log for a wrong unit or swapped columns.
+//! What can go wrong: beyond what any rig does the file is refused with the likely reason; what is only unusual is said. A column that the user
+//! vouches for, in the head of the log (`vouched = ["voltage_v"]`) or by mapping it, is never refused, and said all the same.
 //! Units: SI; thrust coefficient in N/(rev/min)^2.
 //! Reference: T = C_T rho n^2 D^4 with C_T 0.02 to 0.2 and D 0.02 to 2 m spans 1e-12 to 1.1e-3 N/(rev/min)^2; static thrust for electrical power:
 //! 0.01 to 0.5 N/W from a 46 mm to a 1 m propeller at load (UIUC and maker's tables); momentum theory bounds it by the disc.
 
-use super::Report;
-use crate::log::{Log, Place, ReadError, SPEED};
+use super::{Log, Place, ReadError, SPEED};
 use crate::noise::median;
 
+/// Key in a log's head: the columns whose values are right although no rig is known to do that.
+pub(crate) const VOUCHED: &str = "vouched";
+
 /// One doubt: column, what is odd with the likely reason, and whether no rig does it.
-struct Doubt {
-    column: &'static str,
-    what: String,
-    never: bool,
+pub(crate) struct Doubt {
+    pub(crate) column: &'static str,
+    pub(crate) what: String,
+    pub(crate) never: bool,
 }
 
-/// Looks at a log. `mapped` are the columns that the user vouches for.
-pub(super) fn judge(place: &Place<'_>, log: &Log, mapped: &[String], report: &mut Report) -> Result<(), ReadError> {
-    for doubt in [rate(log), speed(log), supply(log), swapped(log), thrust(log), torque(log)].into_iter().flatten() {
-        if doubt.never && !mapped.iter().any(|m| m == doubt.column) {
-            let expected = format!("what a rig can do; if it is right, say so with --map {}=COLUMN*FACTOR", doubt.column);
-            return Err(place.refuse(Some(doubt.column), doubt.what, expected));
-        }
-        report.add(doubt.column, format!("in doubt: {}", doubt.what), 1);
+/// Everything that is odd about a log.
+pub(crate) fn doubts(log: &Log) -> impl Iterator<Item = Doubt> {
+    [rate(log), speed(log), supply(log), swapped(log), thrust(log), torque(log)].into_iter().flatten()
+}
+
+impl Log {
+    /// What is unusual about it, a line for each column: perhaps a wrong unit, perhaps a rare rig.
+    #[must_use]
+    pub fn in_doubt(&self) -> Vec<String> {
+        doubts(self).map(|d| format!("{}: in doubt: {}", d.column, d.what)).collect()
     }
-    Ok(())
+}
+
+/// Refuses what no rig does.
+pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
+    let vouched = log.meta.get(VOUCHED).and_then(toml::Value::as_array);
+    let vouched = |column: &str| vouched.is_some_and(|all| all.iter().any(|v| v.as_str() == Some(column)));
+    match doubts(log).find(|d| d.never && !vouched(d.column)) {
+        None => Ok(()),
+        Some(Doubt { column, what, .. }) => {
+            let way_out = format!("if it is right, say so in the head: # {VOUCHED} = [\"{column}\"]");
+            Err(place.refuse(Some(column), what, format!("what a rig can do, in the unit of the column's name ({way_out})")))
+        }
+    }
 }
 
 fn doubt(column: &'static str, never: bool, what: String) -> Option<Doubt> {
@@ -64,7 +80,8 @@ fn loaded(log: &Log) -> (Vec<usize>, Vec<usize>) {
 
 fn rate(log: &Log) -> Option<Doubt> {
     let mut steps: Vec<f64> = log.t.windows(2).map(|w| w[1] - w[0]).collect();
-    if log.time_is_row() || steps.len() < 10 {
+    // a stated rate is the user's word for the clock
+    if log.time_is_row() || steps.len() < 10 || log.meta.contains_key("sample_hz") {
         return None;
     }
     let (step, whole) = (median(&mut steps), log.t[log.t.len() - 1] - log.t[0]);
@@ -163,5 +180,35 @@ fn torque(log: &Log) -> Option<Doubt> {
         p if p < 0.01 => doubt("torque_nm", true, said("columns swapped?")),
         p if p < 0.1 => doubt("torque_nm", false, said("torque of another unit?")),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A staircase of a small rig, with one column in another unit.
+    fn rig(head: &str, of: impl Fn(f64, f64, f64, f64) -> [f64; 4]) -> Result<Log, String> {
+        let mut text = format!("# quadrig-log 1\n{head}t_s,rpm,thrust_n,voltage_v,current_a\n");
+        for row in 0..400 {
+            let rpm = 1000.0 * f64::from(row / 80);
+            let values = of(rpm, 1.7e-7 * rpm * rpm, 12.0 - 1e-4 * rpm, 2e-10 * rpm.powi(3));
+            let values: Vec<String> = values.iter().map(|v| format!("{v:.4}")).collect();
+            text += &format!("{},{}\n", 0.1 * f64::from(row), values.join(","));
+        }
+        Log::parse("rig.csv", text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_unit_that_no_rig_reaches_is_refused_and_may_be_vouched_for() {
+        rig("", |n, t, u, i| [n, t, u, i]).expect("a rig");
+        let grams = rig("", |n, t, u, i| [n, 1000.0 * t / 9.80665, u, i]).expect_err("grams");
+        assert!(grams.contains("rig.csv:3") && grams.contains("thrust_n") && grams.contains("grams?"), "{grams}");
+        let millivolts = rig("", |n, t, u, i| [n, t, 1000.0 * u, i]).expect_err("millivolts");
+        assert!(millivolts.contains("voltage_v") && millivolts.contains("millivolts?"), "{millivolts}");
+        let swapped = rig("", |n, t, u, i| [n, t, i + 0.05, u]).expect_err("swapped");
+        assert!(swapped.contains("columns swapped?"), "{swapped}");
+        let vouched = rig("# vouched = [\"voltage_v\"]\n", |n, t, u, i| [n, t, 1000.0 * u, i]).expect("vouched for");
+        assert!(vouched.in_doubt().iter().any(|d| d.contains("voltage_v: in doubt")), "{:?}", vouched.in_doubt());
     }
 }
