@@ -26,7 +26,7 @@ pub enum Source {
     Effect = 50,
     /// Losses on the serial line.
     Line = 80,
-    /// Gusts that a flying body meets; three sub-streams, one an axis.
+    /// Gusts that a flying body meets; six sub-streams, two an axis.
     Wind = 70,
     /// Noise of the three chips of the IMU board; three sub-streams, and one for what is drawn of them.
     Imu = 90,

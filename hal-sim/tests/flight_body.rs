@@ -6,6 +6,7 @@
 
 use hal_sim::flight::attitude::{angle_between, from_euler, to_euler};
 use hal_sim::flight::vehicle::Surroundings;
+use hal_sim::flight::wind::Blowing;
 use hal_sim::flight::{Acting, Airframe, G, Matrix, Motion, RigidBody, Vector, Vehicle};
 use hal_sim::plant::air::SEA_LEVEL_DENSITY;
 use hal_sim::plant::{PlantBlock, PlantState, Powerplant, RigPlant};
@@ -69,6 +70,33 @@ fn a_fall_through_air_and_its_terminal_speed() {
         v.millisecond(&[]);
     }
     assert!((v.motion().velocity.z / terminal - 1.0).abs() < 0.01, "{} {terminal}", v.motion().velocity.z);
+}
+
+/// A vehicle that its rotors carry, let go in a steady wind: only the drag of what it is slower than the air moves it, so
+/// u = W/(1 + k W t/m) is left of the wind W after t with k = rho Cd S/2. It drifts the way that the wind blows, and as fast in the end.
+#[test]
+fn a_steady_wind_carries_a_hovering_vehicle_along() {
+    let (airframe, blows) = (Airframe::thesis(1e-4), Vector::new(3.0, -4.0, 0.0));
+    let rotor = PlantState { rpm: 4000.0, thrust_n: airframe.mass_kg * G / 4.0, ..PlantState::default() };
+    let plants = (0..4).map(|_| Box::new(Steady(rotor)) as Box<dyn Powerplant>).collect();
+    let around = Surroundings { blowing: Blowing { steady: blows.into(), ..Blowing::default() }, ..Surroundings::default() };
+    let pull = 0.5 * around.density(100.0) * airframe.drag_area_m2 / airframe.mass_kg;
+    let mut v = Vehicle::new(airframe, plants, SEA_LEVEL_DENSITY, around, high(100.0)).expect("a body");
+    v.spin_up(&[1672.0; 4], 0.002);
+    let (wind, mut t) = (blows.norm(), 0.0);
+    for until in [1.0, 20.0, 600.0] {
+        while t < until - 1e-9 {
+            v.millisecond(&[1672.0; 4]);
+            t = v.t_s();
+        }
+        let left = 1.0 + pull * wind * t;
+        let (speed, way) = (wind - wind / left, wind * t - left.ln() / pull);
+        let m = v.motion();
+        assert!((m.velocity - blows * (speed / wind)).norm() < 1e-6 * wind, "{t} s: {:?}", m.velocity);
+        let there = Vector::new(0.0, 0.0, -100.0) + blows * (way / wind);
+        assert!((m.place - there).norm() < 1e-5 * way, "{t} s: {:?} {there:?}", m.place);
+    }
+    assert!((v.motion().velocity - blows).norm() < 0.01 * wind, "the drift ends as fast as the wind");
 }
 
 /// A symmetric top without a moment: its transverse rate turns at (Iz - Ix)/Ix r, and the momentum in space stands still.

@@ -5,11 +5,13 @@
 //! Reference: specification `flight.md`, "Missions"; errata, "Climb"; `docs/mission.md`, "Against the thesis".
 
 use hal_sim::ScenarioError;
-use hal_sim::flight::Flying;
 use hal_sim::flight::attitude::to_euler;
+use hal_sim::flight::{Flying, G};
 use hal_sim::mission::{
-    AirframeFile, Catalogue, HOVER_US, HoverPoint, Mission, RotorCurves, catalogue_plants, fly, hover, modes,
+    AirframeFile, Catalogue, Flight, HOVER_US, HoverPoint, MOST_ROWS, Mission, RotorCurves, catalogue_plants, fly, fly_whole,
+    hover, modes,
 };
+use hal_sim::plant::Propeller;
 use hal_sim::plant::air::SEA_LEVEL_DENSITY;
 use std::path::{Path, PathBuf};
 
@@ -21,13 +23,19 @@ fn flown_by(mission: &Mission, airframe: &AirframeFile) -> Vec<Flying> {
     fly(mission, airframe, catalogue_plants(airframe), SEA_LEVEL_DENSITY, &mut |_| ()).expect("a vehicle")
 }
 
+fn whole(text: &str) -> Flight {
+    let (mission, airframe) = (parse(text).unwrap_or_else(|e| panic!("{e}")), AirframeFile::default());
+    let plants = catalogue_plants(&airframe);
+    fly_whole(&mission, &airframe, plants, &Catalogue(&airframe), SEA_LEVEL_DENSITY, &mut |_| ()).expect("a vehicle")
+}
+
 fn flown(name: &str) -> Vec<Flying> {
     let (mission, airframe) = Mission::load(&file(name)).unwrap_or_else(|e| panic!("{e}"));
     flown_by(&mission, &airframe)
 }
 
 fn hovers(airframe: &AirframeFile) -> HoverPoint {
-    hover(&airframe.airframe(), &Catalogue(airframe)).expect("it hovers")
+    hover(&airframe.airframe(), &Catalogue(airframe), 1.0).expect("it hovers")
 }
 
 fn upward(rows: &[Flying]) -> (f64, f64) {
@@ -95,6 +103,29 @@ fn about_the_hover() {
     close("first fall of the swing, m", fallen, 50.0 * (1.0 - (m.heave_rad_s * t).cos()), 0.05);
 }
 
+/// Over ground at 4000 m, and in warm air, the hover is that of the air there: a vehicle that flies with its pulse stays where it is.
+#[test]
+fn the_hover_is_that_of_the_air_at_the_ground() {
+    let airframe = AirframeFile::default();
+    let sea = hovers(&airframe);
+    for air in ["ground_altitude_m = 4000", "temperature_offset_k = 40", "ground_altitude_m = 2000\ntemperature_offset_k = -30"] {
+        let text = format!("duration_s = 5\n[start]\nheight_m = 5\n[air]\n{air}\n");
+        let mut mission = parse(&text).unwrap_or_else(|e| panic!("{e}"));
+        let share = mission.surroundings().density(5.0) / SEA_LEVEL_DENSITY;
+        let h = hover(&airframe.airframe(), &Catalogue(&airframe), share).expect("it hovers");
+        println!("{air}: {share:.3} of the density, {:.1} us, thrust to weight {:.2}", h.pulse_us, h.thrust_to_weight);
+        assert!(h.pulse_us > sea.pulse_us + 10.0 && h.thrust_to_weight < sea.thrust_to_weight && h.density == share);
+        let text =
+            format!("{text}[[command]]\nrotors = [1, 2, 3, 4]\nsteps = [{{ pulse_us = {:.6}, hold_s = 5 }}]\n", h.pulse_us);
+        mission = parse(&text).unwrap_or_else(|e| panic!("{e}"));
+        let (height, speed) = upward(&flown_by(&mission, &airframe));
+        assert!(height.abs() < 0.05 && speed.abs() < 0.02, "{height} {speed}");
+        // its modes are those of that air too: the lag is taken from where it hovers
+        let m = modes(&airframe.airframe(), &h, &Catalogue(&airframe), &mission.surroundings());
+        assert!(m.rotor_lag_s > 0.01 && m.rotor_lag_s < 0.1, "{m:?}");
+    }
+}
+
 /// The climb: 63 m in 20 s at 4.0 m/s follow from a lift of 4 x 1.36 N/% x 0.14 % above the weight (errata, "Climb"). With that lift
 /// the catalogue's rotors climb so. At the stated 8.5 % itself they have less, for they hover at 8.42 %.
 #[test]
@@ -151,6 +182,70 @@ fn excitation() {
     assert!(last.motion.place.z > -0.5 && last.motion.place.x < -100.0 && last.motion.place.y < -1.0, "a curved path backwards");
 }
 
+/// The excitation's yaw against the rotors' drag alone: what k_Q w^2 brings in over the pulse, and the rotors' own momentum, over the inertia.
+#[test]
+fn the_reaction_of_the_rotors_turns_the_vehicle() {
+    let (mut mission, airframe) = Mission::load(&file("excitation.toml")).unwrap_or_else(|e| panic!("{e}"));
+    (mission.log_hz, mission.duration_s, mission.imu) = (1000, 2.0, None);
+    let rows = flown_by(&mission, &airframe);
+    let (body, propeller) = (airframe.airframe(), Propeller::named(&airframe.propeller).expect("a propeller"));
+    let w = |f: &Flying, i: usize| f.rotors[i].rpm * core::f64::consts::TAU / 60.0;
+    let around = mission.surroundings();
+    let drag = |f: &Flying, i: usize| {
+        let thinner = around.density(-f.motion.place.z) / propeller.reference_density;
+        propeller.torque_coefficient * thinner * w(f, i) * w(f, i)
+    };
+    let over: Vec<&Flying> = rows.iter().filter(|f| f.t_s > 0.9995).collect();
+    let (first, last) = (over[0], over[over.len() - 1]);
+    let mut momentum = 0.0;
+    for (i, rotor) in body.rotors.iter().enumerate() {
+        let brought: f64 = over.windows(2).map(|p| 0.5 * (drag(p[0], i) + drag(p[1], i)) * (p[1].t_s - p[0].t_s)).sum();
+        momentum -= rotor.turns * (brought + body.rotor_inertia_kgm2 * (w(last, i) - w(first, i)));
+    }
+    let (want, got) = (momentum / body.inertia_kgm2[2], last.motion.rate.z - first.motion.rate.z);
+    close("yaw rate of the excitation, deg/s, against k_Q", got.to_degrees(), want.to_degrees(), 0.02);
+    assert!(want > 0.0);
+}
+
+/// A fall from 20 m with the motors off is told once, with the time and the speed of a fall with drag:
+/// v^2 = vt^2 (1 - exp(-2 g h/vt^2)), t = vt/g arcosh(exp(g h/vt^2)).
+#[test]
+fn a_touch_is_told_with_its_time_and_speed() {
+    let flight = whole(
+        "duration_s = 6\n[start]\nheight_m = 20\n[[command]]\nrotors = [1, 2, 3, 4]\nsteps = [{ pulse_us = 1000, hold_s = 6 }]\n",
+    );
+    let body = AirframeFile::default().airframe();
+    let squared = 2.0 * body.mass_kg * G / (SEA_LEVEL_DENSITY * body.drag_area_m2);
+    let fallen = G * 20.0 / squared;
+    let [touch] = flight.touches[..] else { panic!("{:?}", flight.touches) };
+    close("speed of the touch, m/s", touch.down_m_s, (squared * (1.0 - (-2.0 * fallen).exp())).sqrt(), 0.002);
+    close("time of the touch, s", touch.t_s, squared.sqrt() / G * fallen.exp().acosh(), 0.002);
+    // what takes off touches nothing; what comes down again does, once
+    let hop = |hold_s: f64| {
+        whole(&format!(
+            "duration_s = 6\n[start]\nspun_up = false\n[[command]]\nrotors = [1, 2, 3, 4]\n\
+             steps = [{{ pulse_us = 1800, hold_s = {hold_s} }}, {{ pulse_us = 1000, hold_s = 1 }}]\n"
+        ))
+    };
+    assert!(hop(6.0).touches.is_empty());
+    assert!(matches!(&hop(1.5).touches[..], [touch] if touch.t_s > 1.5 && touch.down_m_s > 1.0), "{:?}", hop(1.5).touches);
+}
+
+/// A vehicle that begins on the ground stands on it from the first row: it feels its weight, and nothing moves before its rotors lift it.
+#[test]
+fn what_begins_on_the_ground_stands() {
+    for (spun_up, pulse_us) in [(false, 1000.0), (true, 1600.0), (true, 1672.0)] {
+        let flight = whole(&format!(
+            "duration_s = 1\nlog_hz = 1000\n[start]\nspun_up = {spun_up}\n[[command]]\nrotors = [1, 2, 3, 4]\n\
+             steps = [{{ pulse_us = {pulse_us}, hold_s = 1 }}]\n"
+        ));
+        let jolt = flight.rows.iter().map(|f| (f.specific_force.z + G).abs()).fold(0.0, f64::max);
+        let moved = flight.rows.iter().map(|f| f.motion.velocity.norm()).fold(0.0, f64::max);
+        println!("{pulse_us} us: jolt {jolt:.2e} m/s^2, {moved:.2e} m/s");
+        assert!(jolt < 0.01 && moved < 1e-4 && flight.touches.is_empty(), "{pulse_us} us: {jolt} {moved}");
+    }
+}
+
 /// Straight down to the ground. A lower pulse sinks faster and for a shorter time: the printed sentence of 7.4.4 has it reversed.
 #[test]
 fn landing() {
@@ -185,7 +280,27 @@ fn parse(text: &str) -> Result<Mission, ScenarioError> {
 fn refusals_name_file_line_and_column() {
     for (text, start, word) in [
         ("seed = 1\nspeed = 3\n", "m.toml:2:1: ", "speed"),
-        ("[wind]\ngust_m_s = -1.0\n", "m.toml:2:12: ", "not below 0"),
+        ("[wind]\ngust_m_s = -1.0\n", "m.toml:2:12: ", "from 0 to 50"),
+        ("[wind]\ngust_m_s = nan\n", "m.toml:2:12: ", "gust_m_s"),
+        ("[wind]\ngust_length_m = 0\n", "m.toml:2:17: ", "from 0.1"),
+        ("[wind]\nsteady_m_s = [0, 500, 0]\n", "m.toml:2:", "from -100 to 100"),
+        ("[start]\nheight_m = -5\n", "m.toml:2:12: ", "from 0 to 5000"),
+        ("[start]\nheight_m = inf\n", "m.toml:2:12: ", "height_m"),
+        ("[start]\nvelocity_m_s = [0, 0, 1e6]\n", "m.toml:2:", "from -100 to 100"),
+        ("[start]\nattitude_deg = [0, 400, 0]\n", "m.toml:2:", "from -360 to 360"),
+        ("[start]\nheight_m = 0.1\nattitude_deg = [0, 30, 0]\n", "m.toml:2:12: ", "a height of 0.15"),
+        ("[air]\nground_altitude_m = 60000\n", "m.toml:2:21: ", "from -500 to 6000"),
+        ("[air]\ntemperature_offset_k = -300\n", "m.toml:2:24: ", "from -60 to 60"),
+        ("duration_s = 1e9\n", "m.toml:1:14: ", "at most 86400 s"),
+        ("log_hz = 1000\nduration_s = 86400\n", "m.toml:2:14: ", "at most 2000000 rows"),
+        ("[[command]]\nrotors = []\nsteps = [{ pulse_us = 1700, hold_s = 1 }]\n", "m.toml:2:10: ", "at least one rotor"),
+        ("[[command]]\nrotors = [1, 2, 1]\nsteps = [{ pulse_us = 1700, hold_s = 1 }]\n", "m.toml:2:17: ", "found 1 again"),
+        ("[[failure]]\nchip = \"gyro\"\nat_s = 1\n", "m.toml:3:8: ", "[imu] or [controller]"),
+        (
+            "[imu]\n[[failure]]\nchip = \"gyro\"\nat_s = 1\n[[failure]]\nchip = \"magnetometer\"\nat_s = 2\n",
+            "m.toml:7:8: ",
+            "one chip",
+        ),
         ("log_hz = 7\n", "m.toml:1:10: ", "divides 1000"),
         ("[[command]]\nrotors = [1, 5]\nsteps = [{ pulse_us = 1700, hold_s = 1 }]\n", "m.toml:2:14: ", "from 1 to 4"),
         ("[[command]]\nrotors = [1]\nsteps = [{ pulse_us = 2100, hold_s = 1 }]\n", "m.toml:3:", "1000 to 2000"),
@@ -194,6 +309,16 @@ fn refusals_name_file_line_and_column() {
         let message = parse(text).expect_err(text).to_string();
         assert!(message.starts_with(start) && message.contains(word) && !message.contains('\n'), "{message}");
     }
+}
+
+/// The rows of the board count as well; what is not too long is flown.
+#[test]
+fn rows_are_counted() {
+    let rows = |text: &str| parse(text).unwrap_or_else(|e| panic!("{e}")).rows();
+    assert_eq!(rows("duration_s = 100\nlog_hz = 50\n"), 5_000);
+    assert_eq!(rows("duration_s = 100\nlog_hz = 50\n[imu]\nrest_s = 10\n"), 5_000 + 200 * 110);
+    assert!(parse("duration_s = 86400\nlog_hz = 20\n").is_ok() && MOST_ROWS > 20 * 86_400);
+    assert!(parse("duration_s = 86400\nlog_hz = 20\n[imu]\n").is_err());
 }
 
 #[test]

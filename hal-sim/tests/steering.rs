@@ -134,6 +134,22 @@ fn the_square() {
     }
 }
 
+/// Over ground at 4000 m, where the air has two thirds of its density: as well held, and down at the end.
+#[test]
+fn the_square_over_high_ground() {
+    let text = std::fs::read_to_string(file("square.toml")).expect("the mission");
+    let mission = Mission::parse(&format!("{text}\n[air]\nground_altitude_m = 4000\n"), Path::new("m.toml"));
+    let flight = flown(&mission.unwrap_or_else(|e| panic!("{e}")), &AirframeFile::default());
+    let hover = flight.rows.iter().filter(|f| (8.0..68.0).contains(&f.t_s));
+    let off = hover.map(|f| (f.motion.place - Vector::new(0.0, 0.0, -2.0)).norm()).fold(0.0, f64::max);
+    println!("off by {off:.3} m; {:?} {:?}", flight.events, flight.touches);
+    assert!(off < 0.4, "{off} m");
+    assert!(matches!(&flight.events[..], [(_, how)] if how == "landed, motors off"), "{:?}", flight.events);
+    assert!(flight.touches.iter().all(|touch| touch.down_m_s < 1.0) && !flight.touches.is_empty(), "{:?}", flight.touches);
+    let last = flight.rows.last().expect("rows");
+    assert!(last.motion.place.xy().norm() < 5.0, "{:?}", last.motion.place);
+}
+
 fn square_with(failure: &str) -> Flight {
     let text = std::fs::read_to_string(file("square.toml")).expect("the mission");
     let mission = Mission::parse(&format!("{text}\n{failure}"), Path::new("m.toml")).unwrap_or_else(|e| panic!("{e}"));

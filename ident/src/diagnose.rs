@@ -23,6 +23,7 @@ use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, 
 use crate::search::{base, connected, refine, refine_newest, scan, stride};
 use crate::suspects::{nearest, stand_beside, suspects};
 use crate::together::{Ground, choose_pair};
+use crate::verdict::Kin;
 use std::collections::BTreeSet;
 
 /// Most effects on one channel.
@@ -249,15 +250,21 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         // a rival that differed by what was dropped is the winner itself
         let same = |ids: &[String]| sorted(ids.to_vec()) == sorted(best.names());
         rivals.retain(|r| !same(&r.ids) && !r.ids.is_empty());
-        let tares = best.fit.placed.iter().filter(|p| p.is_tare()).count();
-        let of_names = |names: usize| of_further_names(names.saturating_sub(tares));
+        // what every rig and every run has was not chosen among causes
+        let is_own = |p: &Placed, found: &[Estimate]| {
+            let reported = p.effect.report(context, &p.instance, found.to_vec());
+            p.effect.kin(context, &p.instance, &reported) == Kin::Own
+        };
+        let placed = || best.fit.placed.iter().zip(&estimates);
+        let choices: Vec<bool> = placed().map(|(p, found)| is_named(p) && !p.is_tare() && is_own(p, found)).collect();
+        let common = placed().zip(&choices).filter(|((p, _), choice)| is_named(p) && !**choice).count();
+        let of_names = |names: usize| of_further_names(names.saturating_sub(common));
         let names = best.names().len();
         probability *= of_names(names);
         rivals.iter_mut().for_each(|r| r.probability *= of_names(r.ids.len()));
         // what a set is less sure of than each of its names by itself, they share
-        let each = of_names(names).powf(1.0 / names.saturating_sub(tares).max(1) as f64);
-        let named = best.fit.placed.iter().zip(&mut inclusion).filter(|(p, _)| is_named(p) && !p.is_tare());
-        named.for_each(|(_, p)| *p *= each);
+        let each = of_names(names).powf(1.0 / names.saturating_sub(common).max(1) as f64);
+        choices.iter().zip(&mut inclusion).filter(|(choice, _)| **choice).for_each(|(_, p)| *p *= each);
         if let Some(suspect) = stand_beside(&best, &mut probability, &mut rivals, &suspects) {
             let shares =
                 |p: &Placed| p.instance.channels.iter().any(|c| suspect.fit.placed.iter().any(|s| s.instance.touches(c)));

@@ -386,6 +386,27 @@ pub fn digits(value: f64, half: f64) -> String {
     format!("{value:.*}", places as usize)
 }
 
+/// A value with the half width of its 95 % interval in brackets, in units of its last digit: `0.0498(5)`. `None` without either.
+#[must_use]
+pub fn bracketed(value: f64, half: f64) -> Option<String> {
+    if !value.is_finite() || half <= 0.0 || !half.is_finite() {
+        return None;
+    }
+    // one digit of the interval, two where it begins with a one
+    let size = half.log10().floor();
+    let last = if half / 10f64.powf(size) < 1.95 { size - 1.0 } else { size };
+    let power = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let (factor, exponent) =
+        if (-3.0..5.0).contains(&power) || power < last { (0.0, String::new()) } else { (power, format!("e{power}")) };
+    let (value, half, last) = (value / 10f64.powf(factor), half / 10f64.powf(factor), last - factor);
+    if last >= 0.0 {
+        let unit = 10f64.powf(last);
+        return Some(format!("{:.0}({:.0}){exponent}", (value / unit).round() * unit, (half / unit).round() * unit));
+    }
+    let places = (-last) as usize;
+    Some(format!("{value:.places$}({:.0}){exponent}", half * 10f64.powf(-last)))
+}
+
 /// Words in a row: "a", "a and b", "a, b and c".
 #[must_use]
 pub fn list(words: &[String]) -> String {

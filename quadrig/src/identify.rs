@@ -14,6 +14,7 @@ use ident::fit::power::csv;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
 use ident::report::number;
+use ident::words::bracketed;
 use std::path::PathBuf;
 
 /// Arguments.
@@ -112,20 +113,10 @@ fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
 }
 
 fn text(found: &Identified) -> String {
-    let mut out = format!("{} plateaus\n", found.plateaus.len());
-    let columns: String = found.columns.iter().map(|c| format!("{c:>22}")).collect();
-    out += &format!("{:>9} {:>9} {:>6} {:>8}  {columns}\n", "from s", "to s", "rows", "settle s");
-    for p in &found.plateaus {
-        let means: String = p
-            .means
-            .iter()
-            .map(|m| m.map_or_else(|| format!("{:>22}", "-"), |(v, se)| format!("{v:>12.4} +- {se:>6.4}")))
-            .collect();
-        out += &format!("{:>9.2} {:>9.2} {:>6} {:>8.2}  {means}\n", p.from_s, p.to_s, p.rows, p.settling_s);
-    }
+    let mut out = levels(found);
     out += "\ndeclared relations over all rows\n";
     for p in &found.model.polynomials {
-        out += &format!("{:<20} {}\n", p.channel, terms(p.coefficients.iter().copied().zip(p.errors.iter().copied())));
+        out += &format!("{:<20} {}\n", p.channel, terms(p.coefficients.iter().copied().zip(p.errors.iter().map(|se| 1.96 * se))));
     }
     for q in &found.quality {
         out += &format!(
@@ -168,6 +159,41 @@ fn text(found: &Identified) -> String {
         );
     }
     out + &asked(found)
+}
+
+/// Columns of the plateaus' table beside its own, as many as fit into 100 columns, and their width.
+const BESIDE: (usize, usize) = (5, 15);
+
+/// The plateaus, a few channels at a time; channels without a reading are left out.
+fn levels(found: &Identified) -> String {
+    let mut out = format!(
+        "{} plateaus (in brackets: half of the 95 % interval, in units of the last digit)\n{:>3}{:>9}{:>9}{:>7}{:>10}\n",
+        found.plateaus.len(),
+        "",
+        "from s",
+        "to s",
+        "rows",
+        "settle s"
+    );
+    for (n, p) in found.plateaus.iter().enumerate() {
+        out += &format!("{:>3}{:>9.2}{:>9.2}{:>7}{:>10.2}\n", n + 1, p.from_s, p.to_s, p.rows, p.settling_s);
+    }
+    let read = |k: &usize| found.plateaus.iter().any(|p| p.means[*k].is_some());
+    let columns: Vec<usize> = (0..found.columns.len()).filter(read).collect();
+    let (most, width) = BESIDE;
+    for block in columns.chunks(most) {
+        let head: String = block.iter().map(|k| format!("{:>width$}", found.columns[*k])).collect();
+        out += &format!("\n{:>3}{head}\n", "");
+        for (n, p) in found.plateaus.iter().enumerate() {
+            let cell = |k: &usize| match p.means[*k] {
+                Some((v, se)) => bracketed(v, 1.96 * se).unwrap_or_else(|| number(v)),
+                None => "-".to_owned(),
+            };
+            let cells: String = block.iter().map(|k| format!("{:>width$}", cell(k))).collect();
+            out += &format!("{:>3}{cells}\n", n + 1);
+        }
+    }
+    out
 }
 
 /// What a designer asks of each plateau, in 100 columns.
@@ -221,6 +247,11 @@ fn told(log: &Log) -> String {
     lines.iter().fold("\ntold by the board\n".to_owned(), |out, line| out + line + "\n")
 }
 
+/// Coefficients, each with half of its 95 % interval in brackets.
 fn terms(pairs: impl Iterator<Item = (f64, f64)>) -> String {
-    pairs.enumerate().map(|(k, (c, e))| format!("c{k} = {} +- {}", number(c), number(e))).collect::<Vec<_>>().join(", ")
+    pairs
+        .enumerate()
+        .map(|(k, (c, e))| format!("c{k} = {}", bracketed(c, e).unwrap_or_else(|| number(c))))
+        .collect::<Vec<_>>()
+        .join(", ")
 }

@@ -201,3 +201,22 @@ fn a_blackbox_log_holds_the_flight_that_was_written() {
     std::fs::write(at.join("old.bbl"), text).expect("a file");
     call(at, &["import", "old.bbl", "-o", "never.csv"]).refused(&["old.bbl", "Betaflight"]);
 }
+
+/// A file that is called a recording and is none is told to be damaged; nobody is sent to make a CSV of it.
+#[test]
+fn a_damaged_recording_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let noise: Vec<u8> = (0..4000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    for (ending, name) in [("ulg", "PX4 log"), ("bbl", "Betaflight Blackbox log")] {
+        for (file, bytes, word) in [("empty", &[][..], "is empty"), ("noise", &noise, "does not begin as one")] {
+            let file = format!("{file}.{ending}");
+            std::fs::write(at.join(&file), bytes).expect("a file");
+            for words in [&["import", &file, "-o", "never.csv"][..], &["close-loop", &file]] {
+                let said = call(at, words).refused(&[&file, name, word]);
+                assert!(!said.err.contains("CSV"), "{}", said.err);
+            }
+        }
+    }
+    assert!(!at.join("never.csv").exists());
+}

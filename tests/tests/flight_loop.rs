@@ -132,6 +132,34 @@ fn what_is_no_usable_flight_is_refused() {
     assert!(!at.join("out").exists());
 }
 
+/// A speed channel that reads nothing is named, with what to do; without it the pulses speak.
+#[test]
+fn a_silent_speed_channel_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let text = Scenario::new(CLEAN).log(0);
+    let header = text.lines().find(|l| l.starts_with("t_s")).expect("a header");
+    let column = header.split(',').position(|n| n == "rpm_2").expect("rpm_2");
+    let row = |line: &str| {
+        if line.starts_with('#') || line.starts_with("t_s") {
+            return line.to_owned();
+        }
+        line.split(',').enumerate().map(|(k, cell)| if k == column { "0" } else { cell }).collect::<Vec<_>>().join(",")
+    };
+    std::fs::write(at.join("dead.csv"), text.lines().map(row).collect::<Vec<_>>().join("\n") + "\n").expect("a file");
+    call(at, &["close-loop", "dead.csv", "-o", "out"]).refused(&["dead.csv: column rpm_2: reads nothing", "take the column out"]);
+    std::fs::write(at.join("run.csv"), text).expect("a file");
+    call(at, &["--quiet", "close-loop", "run.csv", "--validate", "dead.csv", "-o", "out"]).refused(&["dead.csv: column rpm_2"]);
+    // a log of another kind to validate on is told for what it is
+    std::fs::write(at.join("rig.csv"), "# quadrig-log 1\nt_s,rpm,thrust_n\n0,0,0\n1,100,1\n").expect("a file");
+    std::fs::write(at.join("unit.csv"), "t_s,gx,gy,gz,ax,ay,az\n0,0,0,0,0,0,9.8\n").expect("a file");
+    for (name, kind) in [("rig.csv", "a rig log"), ("unit.csv", "an attitude log")] {
+        call(at, &["close-loop", "run.csv", "--validate", name, "-o", "out"])
+            .refused(&[&format!("{name}:1:1: {kind}, and the run is a flight"), "another flight of the same vehicle"]);
+    }
+    assert!(!at.join("out").exists());
+}
+
 /// The recorded brushless flights: one vehicle, two flights, the same effects of about the same size.
 #[test]
 fn two_flights_of_one_vehicle_show_the_same() {

@@ -137,6 +137,64 @@ fn the_square() {
     assert!(!at.join("never").exists());
 }
 
+/// A fall from 20 m that nobody asked to end on the ground: the touch is told with the time and the speed of a fall with drag (2.30 s, 13.9 m/s),
+/// in words, as a line and in the JSON; what comes after is no flight that keeps its height.
+#[test]
+fn a_crash_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let drop =
+        "duration_s = 6\n[start]\nheight_m = 20\n[[command]]\nrotors = [1, 2, 3, 4]\nsteps = [{ pulse_us = 1000, hold_s = 6 }]\n";
+    std::fs::write(at.join("drop.toml"), drop).expect("a file");
+    let said = call(at, &["fly", "drop.toml", "-o", "out"]).succeeded().out;
+    for words in [
+        "It touched the ground after 2.3 s, at 13.9 m/s downwards. After 6.0 s it is on the ground.",
+        "ground    touched after 2.30 s at 13.9",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+    assert!(!said.contains("keeps its height"), "{said}");
+    let page = std::fs::read_to_string(at.join("out/flight.html")).expect("the page");
+    assert!(page.contains("It touched the ground after 2.3 s"));
+    let out = json(at, &["fly", "drop.toml", "--json"]);
+    assert_eq!(out["touches"].as_array().map(Vec::len), Some(1), "{out}");
+    assert_eq!((&out["touched_s"], &out["touched_m_s"]), (&out["touches"][0]["t_s"], &out["touches"][0]["down_m_s"]));
+    // a take-off touches nothing
+    std::fs::write(at.join("up.toml"), "duration_s = 2\n[start]\nspun_up = false\n[[command]]\nrotors = [1, 2, 3, 4]\nsteps = [{ pulse_us = 1750, hold_s = 2 }]\n")
+        .expect("a file");
+    let out = json(at, &["fly", "up.toml", "--json"]);
+    assert_eq!((out["touches"].as_array().map(Vec::len), out["touched_s"].is_null()), (Some(0), true), "{out}");
+}
+
+/// The hover that is told is that of the air at the ground of the mission.
+#[test]
+fn the_hover_is_told_for_the_ground_of_the_mission() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let hover = |air: &str| {
+        std::fs::write(at.join("m.toml"), format!("duration_s = 0.1\n[air]\n{air}\n")).expect("a file");
+        let out = json(at, &["fly", "m.toml", "--json"]);
+        ["pulse_us", "thrust_to_weight", "minutes"].map(|key| out["hover"][key].as_f64().expect("a number"))
+    };
+    let (sea, high, warm) = (hover(""), hover("ground_altitude_m = 4000"), hover("temperature_offset_k = 40"));
+    println!("{sea:?} {high:?} {warm:?}");
+    // two thirds of the density
+    assert!(high[0] > sea[0] + 60.0 && high[2] < sea[2], "{high:?}");
+    assert!((0.62..0.80).contains(&(high[1] / sea[1])), "{high:?}");
+    assert!(warm[0] > sea[0] + 10.0 && warm[1] < 0.95 * sea[1], "{warm:?}");
+}
+
+/// How long a flight is, is said before it begins.
+#[test]
+fn a_long_flight_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(at.join("long.toml"), "duration_s = 700\nlog_hz = 1\n").expect("a file");
+    let said = call(at, &["fly", "long.toml"]).succeeded();
+    assert!(said.err.contains("long.toml: up to 700 s of flight, 700 rows"), "{}", said.err);
+    assert_eq!(call(at, &["--quiet", "fly", "long.toml"]).succeeded().err, "");
+}
+
 /// Steps and a ramp as a scenario of the rig and as a mission have them.
 const STEPS: &str = "[{ pulse_us = 1000, hold_s = 2 }, { pulse_us = 1300, hold_s = 4 }, { pulse_us = 1700, hold_s = 4 }, \
     { pulse_us = 1900, hold_s = 4 }, { pulse_us = 1400, hold_s = 4, ramp = true }, { pulse_us = 1400, hold_s = 3 }]";
@@ -248,6 +306,19 @@ fn refusals_write_nothing() {
     call(at, &["fly", "table.toml", "-o", "out"]).refused(&["p.csv:3:3: ", "1000 to 2000"]);
     call(at, &["fly", "none.toml", "-o", "out"]).refused(&["none.toml"]);
     call(at, &["fly", "m.toml", "--model", "m.toml", "-o", "out"]).refused(&["m.toml", "format"]);
+    write("flown.toml", "format = \"quadrig-flight-model 1\"\n");
+    write("unit.toml", "format = \"quadrig-inertial 1\"\n");
+    call(at, &["fly", "m.toml", "--model", "flown.toml", "-o", "out"])
+        .refused(&["flown.toml:1:1: a model of a flight", "expected a rig's model"]);
+    call(at, &["fly", "m.toml", "--model", "unit.toml", "-o", "out"])
+        .refused(&["unit.toml:1:1: a model of an inertial unit", "expected a rig's model"]);
+    for (name, text, words) in [
+        ("deep", "[start]\nheight_m = -5\n", ["deep.toml:2:12: ", "from 0 to 5000"]),
+        ("endless", "duration_s = 1e9\n", ["endless.toml:1:14: ", "at most 86400 s"]),
+    ] {
+        write(&format!("{name}.toml"), text);
+        call(at, &["fly", &format!("{name}.toml"), "-o", "out"]).refused(&words);
+    }
     // a model of a log without a command, and one of a log without a thrust
     let rows: String = (0..12).map(|i| format!("{i},{},{}\n", 500 * i, 0.04 * f64::from(i * i))).collect();
     write("still.csv", &format!("# quadrig-log 1\nt_s,rpm,thrust_n\n{rows}"));

@@ -89,6 +89,22 @@ fn what_the_rig_has_is_shared_and_what_one_run_has_is_dated() {
     assert!(elsewhere.after < 0.05 && elsewhere.before > 3.0 * elsewhere.after, "{elsewhere:?}");
 }
 
+/// A lead that was exchanged between runs has a size of its own on each; nothing else is named in its place.
+#[test]
+fn what_differs_from_run_to_run_is_of_each_run() {
+    let folder = TempDir::new().unwrap();
+    let lead = |ohm: f64| format!("[[effect]]\nid = \"supply_sag\"\nresistance_ohm = {ohm}\n");
+    let logs = [0.08, 0.08, 0.2].iter().zip(1..).map(|(ohm, n)| flown(folder.path(), n, "", &lead(*ohm))).collect();
+    let (_, outcome) = together(logs);
+    let effects = &outcome.verdict.effects;
+    let leads: Vec<&EffectEntry> = effects.iter().filter(|e| e.id == "supply_sag").collect();
+    let ohms: Vec<(Option<&str>, f64)> =
+        leads.iter().map(|e| (e.run.as_deref(), (100.0 * e.parameters[0].value).round() / 100.0)).collect();
+    assert_eq!(ohms, [(Some("r1.csv"), 0.08), (Some("r2.csv"), 0.08), (Some("r3.csv"), 0.2)], "{effects:?}");
+    assert!(leads.iter().all(|e| e.scope == Scope::Run));
+    assert!(!effects.iter().any(|e| e.id == "battery_discharge"), "{effects:?}");
+}
+
 #[test]
 fn runs_at_other_supply_voltages_are_one_rig() {
     let folder = TempDir::new().unwrap();

@@ -133,8 +133,11 @@ fn page(root: &Path) -> Result<String, String> {
             rows.extend(refusals(&text));
         }
         let _ = write!(out, "\n## {heading}\n\n| it says | it expected, and what to try |\n| --- | --- |\n"); // a string takes everything
-        for (found, expected) in rows {
-            let _ = writeln!(out, "| {} | {} |", cell(&found), cell(&expected));
+        // what only repeats the reader's own words comes last
+        let (spoken, echoed): (Vec<_>, Vec<_>) = rows.into_iter().partition(|(found, _)| found.contains(char::is_alphabetic));
+        for (found, expected) in spoken.iter().chain(&echoed) {
+            let said = if found.contains(char::is_alphabetic) { cell(found) } else { "what it found, word for word".to_owned() };
+            let _ = writeln!(out, "| {said} | {} |", cell(expected));
         }
     }
     out += "\n## What a board refuses\n\nThe board gives every reason at once, behind `the board refuses:`.\n\n| it says | what to do |\n| --- | --- |\n";

@@ -29,6 +29,12 @@ impl Ground {
         Self { stiffness_n_m: share * frequency * frequency, damping_ns_m: 2.0 * DAMPING * share * frequency }
     }
 
+    /// How deep the points lie at rest when the ground carries this share of the weight, m.
+    #[must_use]
+    pub fn rest_m(carried: f64) -> f64 {
+        SINK_M * carried.clamp(0.0, 1.0)
+    }
+
     /// Upward push on a point at depth `z` that moves down at `w`, N.
     #[must_use]
     pub fn push_n(&self, z: f64, w: f64) -> f64 {

@@ -14,6 +14,8 @@ use crate::plant::{Air, PlantBlock, PlantLevers, PlantState, Powerplant};
 
 /// Step of the body, s.
 const STEP_S: f64 = 1.0e-3;
+/// What rounding leaves of the height of a point on the ground, m.
+const SURFACE_M: f64 = 1.0e-9;
 /// Step of the powerplants, s.
 const ROTOR_STEP_S: f64 = STEP_S / STEPS_PER_MS as f64;
 
@@ -127,6 +129,23 @@ impl Vehicle {
         let steps = (seconds / STEP_S) as u64;
         for left in (1..=steps).rev() {
             self.turn_rotors(pulses_us, -(left as f64) * STEP_S);
+        }
+    }
+
+    /// A level vehicle whose rotors lie on the surface of the ground stands there: as deep as what its rotors do not carry presses it in, so that
+    /// nothing jolts at the start. Any other stays where it is.
+    pub fn stand(&mut self) {
+        let below = |r: &super::Rotor| (self.motion.attitude * Vector::from(r.place)).z;
+        let (highest, lowest) = self
+            .airframe
+            .rotors
+            .iter()
+            .map(below)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(high, low), z| (high.min(z), low.max(z)));
+        let flat = lowest - highest < SURFACE_M;
+        if flat && (self.motion.place.z + lowest).abs() < SURFACE_M {
+            let carried = 1.0 - self.lift.thrust_n / (self.airframe.mass_kg * G);
+            self.motion.place.z = Ground::rest_m(carried) - lowest;
         }
     }
 

@@ -52,7 +52,9 @@ impl Wind {
         let stationary = [sigma, sigma * core::f64::consts::FRAC_1_SQRT_2, sigma * core::f64::consts::FRAC_1_SQRT_2];
         let mut streams = [0, 1, 2].map(|axis| Stream::new(seed, Source::Wind, axis));
         let first: [f64; 3] = core::array::from_fn(|i| stationary[i] * streams[i].normal());
-        let second = first.map(|x| 0.5 * x); // its mean given the first: they are half correlated
+        // of variance s^2 the first, the second has s^2/2 and shares s^2/2 with it: given the first, half of it and a variance of s^2/4
+        let mut own = [3, 4, 5].map(|axis| Stream::new(seed, Source::Wind, axis));
+        let second = core::array::from_fn(|i| 0.5 * (first[i] + stationary[i] * own[i].normal()));
         Self {
             steady,
             axes: axes_of(&steady),
@@ -109,6 +111,20 @@ mod tests {
         let lag = 500; // 2 m at 4 m/s
         let kept = gusts.windows(lag + 1).map(|w| w[0].y * w[lag].y).sum::<f64>() / (n * 1.5 * 1.5);
         assert!((kept - (-1.0f64).exp()).abs() < 0.06, "{kept}");
+    }
+
+    /// At the start, over many seeds: what gusts have that have always blown, and the filter's second state too (half the variance of its first).
+    #[test]
+    fn gusts_begin_as_if_they_had_always_blown() {
+        let blowing = Blowing { steady: [4.0, 0.0, 0.0], gust_m_s: 1.5, gust_length_m: 2.0 };
+        let winds: Vec<Wind> = (0..8_000).map(|seed| Wind::new(&blowing, seed)).collect();
+        let share = |of: &dyn Fn(&Wind) -> f64| winds.iter().map(|w| of(w).powi(2)).sum::<f64>() / (winds.len() as f64 * 2.25);
+        for axis in 1..3 {
+            let (first, second) = (share(&|w| w.first[axis]), share(&|w| w.second[axis]));
+            assert!((first - 0.5).abs() < 0.03 && (second - 0.25).abs() < 0.015, "{first} {second}");
+            let begins = share(&|w| (w.clone().advance() - Vector::new(4.0, 0.0, 0.0))[axis]);
+            assert!((begins - 1.0).abs() < 0.06, "{begins}");
+        }
     }
 
     #[test]

@@ -34,7 +34,22 @@ pub struct Flight {
     pub seen: Vec<(Seen, crate::flight::Rotation)>,
     /// What the controller ended or changed, and when, s.
     pub events: Vec<(f64, String)>,
+    /// Touches of the ground.
+    pub touches: Vec<Touch>,
 }
+
+/// A touch of the ground by a vehicle that was in the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// When, s.
+    pub t_s: f64,
+    /// How fast its centre of gravity came down, m/s.
+    pub down_m_s: f64,
+}
+
+/// Time in the air after which a contact is another touch, ms. The ground gives back a twentieth of the speed: the bounce of a fall at 40 m/s
+/// is over in 0.4 s.
+const TOUCH_MS: u64 = 500;
 
 /// Time for which a flight goes on after its motors were stopped, ms.
 const AFTER_MS: u64 = 3000;
@@ -90,7 +105,7 @@ fn fly_kept(
     kept: Option<Aboard>,
 ) -> Option<Flight> {
     let (body, rotors) = (airframe.airframe(), plants.len());
-    let mut steering = steering(mission, &body, curves)?;
+    let mut steering = steering(mission, &body, curves, reference_density)?;
     let section = mission.imu.or(steering.as_ref().map(|_| Default::default()));
     let mut board = section.map(|s| Board::new(&s, &body, airframe.blades(), mission.seed, bus_fault(mission, s.rest_s), kept));
     let mut vehicle = Vehicle::new(body, plants, reference_density, mission.surroundings(), mission.motion())?;
@@ -104,6 +119,7 @@ fn fly_kept(
     if mission.start.spun_up && steering.is_none() {
         vehicle.spin_up(&now, SPIN_UP_S);
     }
+    vehicle.stand();
     let mut flight = Flight::default();
     if let Some(board) = &mut board {
         let attitude = vehicle.motion().attitude;
@@ -115,6 +131,8 @@ fn fly_kept(
     let total = (mission.length_s() * 1000.0).round() as u64;
     let every = u64::from(1000 / mission.log_hz);
     let mut ends = total;
+    // what begins on the ground has touched it already
+    let mut in_air_ms = if mission.start.height_m > 0.0 { TOUCH_MS } else { 0 };
     flight.rows.push(vehicle.now());
     for ms in 0..total {
         match &mut steering {
@@ -132,12 +150,18 @@ fn fly_kept(
                 now[*rotor] = 1000.0;
             }
         }
+        let down_m_s = vehicle.motion().velocity.z;
         vehicle.millisecond(&now);
+        let on_ground = vehicle.on_ground();
+        if on_ground && in_air_ms >= TOUCH_MS {
+            flight.touches.push(Touch { t_s: vehicle.t_s(), down_m_s });
+        }
+        in_air_ms = if on_ground { 0 } else { in_air_ms + 1 };
         if let Some(seen) = board.as_mut().and_then(|b| b.millisecond(&vehicle)) {
             flight.seen.push((seen, vehicle.motion().attitude));
             steering.iter_mut().for_each(|s| s.sees(seen));
         }
-        let landed = mission.ends_on_ground && vehicle.on_ground();
+        let landed = mission.ends_on_ground && on_ground;
         if (ms + 1) % every == 0 || landed {
             flight.rows.push(vehicle.now());
         }
@@ -153,9 +177,14 @@ fn fly_kept(
 }
 
 /// The controller, where there is one; nothing where it cannot hover.
-fn steering(mission: &Mission, body: &crate::flight::Airframe, curves: &dyn RotorCurves) -> Option<Option<Steering>> {
+fn steering(
+    mission: &Mission,
+    body: &crate::flight::Airframe,
+    curves: &dyn RotorCurves,
+    reference_density: f64,
+) -> Option<Option<Steering>> {
     let Some(section) = &mission.controller else { return Some(None) };
-    let at = hover(body, curves)?;
+    let at = hover(body, curves, mission.ground_density() / reference_density)?;
     let slopes = modes(body, &at, curves, &mission.surroundings());
     let mixer = Mixer::new(body, at.pulse_us, slopes.thrust_per_us, slopes.turning_per_us[2]);
     Some(Some(Steering::new(section.clone(), mixer, body.rotors.len(), mission.seed)))

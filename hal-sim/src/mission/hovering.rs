@@ -16,8 +16,8 @@ use crate::plant::{PlantLevers, PlantState, Powerplant, RigPlant};
 pub trait RotorCurves {
     /// Where it settles at a pulse, at a share of the density for which it was set up.
     fn settled(&self, pulse_us: f64, density: f64) -> PlantState;
-    /// Its thrust, N, each millisecond after the pulse steps from one to another at which it had settled.
-    fn stepped(&self, from_us: f64, to_us: f64) -> Vec<f64>;
+    /// Its thrust, N, each millisecond after the pulse steps from one to another at which it had settled, at such a share.
+    fn stepped(&self, from_us: f64, to_us: f64, density: f64) -> Vec<f64>;
 }
 
 /// A rotor of the catalogue.
@@ -46,8 +46,8 @@ impl RotorCurves for Catalogue<'_> {
         (0..SETTLED_MS).map(|_| millisecond(&mut plant, pulse_us)).last().unwrap_or_default()
     }
 
-    fn stepped(&self, from_us: f64, to_us: f64) -> Vec<f64> {
-        let mut plant = self.plant(1.0);
+    fn stepped(&self, from_us: f64, to_us: f64, density: f64) -> Vec<f64> {
+        let mut plant = self.plant(density);
         for _ in 0..SETTLED_MS {
             millisecond(&mut plant, from_us);
         }
@@ -55,7 +55,7 @@ impl RotorCurves for Catalogue<'_> {
     }
 }
 
-/// Where thrust carries the weight at ground level.
+/// Where thrust carries the weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoverPoint {
     /// Pulse, us.
@@ -66,6 +66,8 @@ pub struct HoverPoint {
     pub full: PlantState,
     /// Thrust of all rotors at full throttle over the weight.
     pub thrust_to_weight: f64,
+    /// Density for which all this holds, as a share of that for which the rotors were set up.
+    pub density: f64,
 }
 
 impl HoverPoint {
@@ -76,10 +78,10 @@ impl HoverPoint {
     }
 }
 
-/// The hover of an airframe on such rotors; nothing where full throttle does not carry it.
-pub fn hover(airframe: &Airframe, rotor: &dyn RotorCurves) -> Option<HoverPoint> {
+/// The hover of an airframe on such rotors at a share of the density for which they were set up; nothing where full throttle does not carry it.
+pub fn hover(airframe: &Airframe, rotor: &dyn RotorCurves, density: f64) -> Option<HoverPoint> {
     let each_n = airframe.mass_kg * G / airframe.rotors.len() as f64;
-    let settled = |pulse| rotor.settled(pulse, 1.0);
+    let settled = |pulse| rotor.settled(pulse, density);
     let full = settled(2000.0);
     if !full.thrust_n.is_finite() || full.thrust_n < each_n {
         return None;
@@ -90,7 +92,7 @@ pub fn hover(airframe: &Airframe, rotor: &dyn RotorCurves) -> Option<HoverPoint>
         let middle = 0.5 * (low + high);
         if settled(middle).thrust_n < each_n { low = middle } else { high = middle }
     }
-    Some(HoverPoint { pulse_us: high, rotor: settled(high), full, thrust_to_weight: full.thrust_n / each_n })
+    Some(HoverPoint { pulse_us: high, rotor: settled(high), full, thrust_to_weight: full.thrust_n / each_n, density })
 }
 
 /// Small motions about a hover in calm air, with equal pulses. Of the twelve states those that no entry names are chains of integrators:
@@ -116,23 +118,23 @@ const NUDGE_US: f64 = 4.0;
 const THINNER: f64 = 0.01;
 const LIFTED_M: f64 = 10.0;
 
-/// The modes about a hover.
+/// The modes about a hover, at its density.
 #[must_use]
 pub fn modes(airframe: &Airframe, at: &HoverPoint, rotor: &dyn RotorCurves, around: &Surroundings) -> Modes {
-    let [less, more] = [-NUDGE_US, NUDGE_US].map(|d| rotor.settled(at.pulse_us + d, 1.0));
+    let [less, more] = [-NUDGE_US, NUDGE_US].map(|d| rotor.settled(at.pulse_us + d, at.density));
     let thrust_per_us = (more.thrust_n - less.thrust_n) / (2.0 * NUDGE_US);
     let torque_per_us = (more.torque_nm - less.torque_nm) / (2.0 * NUDGE_US);
     let farthest = |axis: usize| airframe.rotors.iter().map(|r| r.place[axis].abs()).fold(0.0, f64::max);
     let [ix, iy, iz] = airframe.inertia_kgm2;
     let spin: f64 = airframe.rotors.iter().map(|r| r.turns * airframe.rotor_inertia_kgm2 * at.rotor.rpm / RPM_PER_RAD_S).sum();
     // share by which the thrust falls with the density at a steady pulse: the rotor turns faster in thinner air
-    let thinner = rotor.settled(at.pulse_us, 1.0 - THINNER).thrust_n;
+    let thinner = rotor.settled(at.pulse_us, at.density * (1.0 - THINNER)).thrust_n;
     let share = (1.0 - thinner / at.rotor.thrust_n) / THINNER;
     let thinning_per_m = (1.0 - around.density(LIFTED_M) / around.density(0.0)) / LIFTED_M;
     Modes {
         thrust_per_us,
         turning_per_us: [farthest(1) * thrust_per_us / ix, farthest(0) * thrust_per_us / iy, torque_per_us / iz],
-        rotor_lag_s: lag(&rotor.stepped(at.pulse_us, at.pulse_us + NUDGE_US), at.rotor.thrust_n),
+        rotor_lag_s: lag(&rotor.stepped(at.pulse_us, at.pulse_us + NUDGE_US, at.density), at.rotor.thrust_n),
         heave_rad_s: (G * share * thinning_per_m).max(0.0).sqrt(),
         coning_rad_s: spin.abs() / (ix * iy).sqrt(),
     }

@@ -9,6 +9,7 @@
 
 mod aboard;
 mod airframe;
+mod bounds;
 mod fly;
 mod hovering;
 mod pulses;
@@ -17,7 +18,8 @@ mod steering;
 
 pub use aboard::{Seen, apart};
 pub use airframe::{AirframeFile, RotorSection};
-pub use fly::{Flight, catalogue_plants, fly, fly_again, fly_whole};
+pub use bounds::{LONGEST_S, MOST_ROWS};
+pub use fly::{Flight, Touch, catalogue_plants, fly, fly_again, fly_whole};
 pub use hovering::{Catalogue, HoverPoint, Modes, RotorCurves, hover, modes};
 pub use pulses::PulseTable;
 pub use sections::{Chips, ControllerSection, FailureSection, ImuSection, PositioningSection, WayPoint};
@@ -26,7 +28,7 @@ use crate::flight::attitude::from_euler;
 use crate::flight::vehicle::Surroundings;
 use crate::flight::wind::Blowing;
 use crate::flight::{Motion, Vector};
-use crate::scenario::{ScenarioError, Step, not_negative, parsed, place_of, positive, text_of};
+use crate::scenario::{ScenarioError, Step, not_negative, parsed, place_of, text_of};
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -74,11 +76,14 @@ pub struct Mission {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StartSection {
-    /// Height of the body above ground, m.
+    /// Height of the body above ground, m; at 0 it stands on it.
+    #[serde(deserialize_with = "bounds::height")]
     pub height_m: f64,
     /// Velocity over ground, earth NED, m/s.
+    #[serde(deserialize_with = "bounds::speeds")]
     pub velocity_m_s: [f64; 3],
     /// Roll, pitch, yaw, deg.
+    #[serde(deserialize_with = "bounds::angles")]
     pub attitude_deg: [f64; 3],
     /// The rotors already run at the first pulses.
     pub spun_up: bool,
@@ -89,8 +94,10 @@ pub struct StartSection {
 #[serde(default, deny_unknown_fields)]
 pub struct AirSection {
     /// Height of the ground above sea level, m.
+    #[serde(deserialize_with = "bounds::altitude")]
     pub ground_altitude_m: f64,
     /// Departure from the standard atmosphere, K.
+    #[serde(deserialize_with = "bounds::offset")]
     pub temperature_offset_k: f64,
 }
 
@@ -99,12 +106,13 @@ pub struct AirSection {
 #[serde(default, deny_unknown_fields)]
 pub struct WindSection {
     /// Mean wind, earth NED, m/s: where the air moves to.
+    #[serde(deserialize_with = "bounds::speeds")]
     pub steady_m_s: [f64; 3],
     /// Standard deviation of the gusts along each axis, m/s.
-    #[serde(deserialize_with = "not_negative")]
+    #[serde(deserialize_with = "bounds::gust")]
     pub gust_m_s: f64,
     /// Length of the turbulence, m.
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "bounds::length")]
     pub gust_length_m: f64,
 }
 
@@ -112,7 +120,8 @@ pub struct WindSection {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CommandSection {
-    /// Which rotors, from 1.
+    /// Which rotors, from 1, each once.
+    #[serde(deserialize_with = "bounds::some_rotors")]
     pub rotors: Vec<Spanned<usize>>,
     /// Their pulses one after the other; the last goes on to the end.
     #[serde(deserialize_with = "steps")]
@@ -167,11 +176,12 @@ impl Mission {
         let mut mission: Self = parsed(&text, file)?;
         let [airframe, pulses] = mission.files(file);
         let airframe = airframe.map_or_else(|| Ok(AirframeFile::default()), |path| AirframeFile::load(&path))?;
-        let rotors = airframe.rotors().len();
-        mission.check(&text, file, rotors)?;
+        let refused = |(byte, reason)| refusal(&text, file, byte, reason);
+        mission.sound(&text, &airframe).map_err(refused)?;
         if let Some(path) = pulses {
-            mission.table = PulseTable::load(&path, rotors)?;
+            mission.table = PulseTable::load(&path, airframe.rotors().len())?;
         }
+        mission.short_enough(&text).map_err(refused)?;
         Ok((mission, airframe))
     }
 
@@ -188,22 +198,9 @@ impl Mission {
     /// [`ScenarioError::Refused`] with line and column.
     pub fn parse(text: &str, file: &Path) -> Result<Self, ScenarioError> {
         let mission: Self = parsed(text, file)?;
-        mission.check(text, file, AirframeFile::default().rotors().len())?;
+        let sound = mission.sound(text, &AirframeFile::default()).and_then(|()| mission.short_enough(text));
+        sound.map_err(|(byte, reason)| refusal(text, file, byte, reason))?;
         Ok(mission)
-    }
-
-    fn check(&self, text: &str, file: &Path, rotors: usize) -> Result<(), ScenarioError> {
-        let refused = |byte: usize, reason: String| {
-            let (line, column) = place_of(text, byte);
-            Err(ScenarioError::Refused { file: file.to_owned(), line, column, reason })
-        };
-        if let Some((byte, reason)) = self.failure.iter().find_map(|f| f.sound().err()) {
-            return refused(byte, reason.to_owned());
-        }
-        let dead = self.failure.iter().filter_map(|f| f.rotor.as_ref());
-        let mut named = self.command.iter().flat_map(|c| &c.rotors).chain(dead);
-        let Some(rotor) = named.find(|r| !(1..=rotors).contains(r.get_ref())) else { return Ok(()) };
-        refused(rotor.span().start, format!("expected a rotor from 1 to {rotors}, found {}", rotor.get_ref()))
     }
 
     /// How long the flight may last, s.
@@ -243,6 +240,12 @@ impl Mission {
         }
     }
 
+    /// Density of the air on the ground, kg/m^3.
+    #[must_use]
+    pub fn ground_density(&self) -> f64 {
+        self.surroundings().density(0.0)
+    }
+
     /// The motion that it begins with.
     #[must_use]
     pub fn motion(&self) -> Motion {
@@ -253,6 +256,11 @@ impl Mission {
             ..Motion::default()
         }
     }
+}
+
+fn refusal(text: &str, file: &Path, byte: usize, reason: String) -> ScenarioError {
+    let (line, column) = place_of(text, byte);
+    ScenarioError::Refused { file: file.to_owned(), line, column, reason }
 }
 
 /// Pulse of a list at a time; a ramp begins at the pulse before it.

@@ -17,7 +17,8 @@ const IDLE_US: f64 = 1080.0;
 const OFF_US: f64 = 1000.0;
 /// Speed of a descent that nobody planned, m/s.
 const DESCENT_M_S: f64 = 0.6;
-/// How far below ground a set point must be for a landing, and how near the vehicle, m, and how slow, m/s.
+/// How far below ground a set point must be for a landing, how near to it the vehicle, m, and how slowly it may still rise or sink, m/s. It may
+/// slide: the ground has no friction.
 const LANDED_M: [f64; 3] = [0.3, 0.15, 0.3];
 /// Height of the set point from which the rotors begin to carry, m.
 const TAKES_OFF_M: f64 = 0.02;
@@ -107,7 +108,7 @@ impl Steering {
         }
         let told = Told { attitude, rate: seen.rate, place: self.place, velocity: self.velocity };
         let [below, near, slow] = LANDED_M;
-        if wanted.place.z > below && self.place.z > -near && self.velocity.norm() < slow {
+        if wanted.place.z > below && self.place.z > -near && self.velocity.z.abs() < slow {
             return self.stop(t_s, "landed, motors off");
         }
         if !self.autopilot.tick(&told, &wanted, &mut self.pulses) {
@@ -136,5 +137,40 @@ impl Steering {
         self.phase = Phase::Off;
         self.pulses.fill(OFF_US);
         self.events.push((t_s, why.to_owned()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::{Airframe, Rotation};
+    use crate::mission::WayPoint;
+
+    /// What happens to a vehicle that moves as `velocity` at `up_m` while its set point goes from 1 m above ground to 1 m below it.
+    fn ends(up_m: f64, velocity: Vector) -> Vec<(f64, String)> {
+        let place = |at_s: f64, up_m: f64| WayPoint { at_s, north_m: 0.0, east_m: 0.0, up_m, heading_deg: 0.0 };
+        let section = ControllerSection { way: vec![place(0.0, 1.0), place(1.0, -1.0)], ..ControllerSection::default() };
+        let mixer = Mixer::new(&Airframe::thesis(1e-4), 1684.0, 0.008, 0.01);
+        let mut steering = Steering::new(section, mixer, 4, 1);
+        let truth = Motion { place: Vector::new(0.0, 0.0, -up_m), velocity, ..Motion::default() };
+        steering.sees(Seen { t_s: 0.0, attitude: Some(Rotation::identity()), rate: Vector::zeros(), alive: u8::MAX });
+        for ms in 0..2_000 {
+            steering.millisecond(ms, &truth);
+        }
+        steering.events
+    }
+
+    /// The ground has no friction: a vehicle that stands on it and slides has landed.
+    #[test]
+    fn what_slides_on_the_ground_has_landed() {
+        for sideways in [0.0, 1.0, 5.0] {
+            let events = ends(-0.002, Vector::new(0.0, sideways, 0.0));
+            // the set point is 0.3 m under ground after 0.65 s
+            assert!(matches!(&events[..], [(t, how)] if how == "landed, motors off" && (0.65..0.8).contains(t)), "{events:?}");
+        }
+        for (up_m, sinks) in [(0.1, 1.0), (0.5, 0.0)] {
+            let events = ends(up_m, Vector::new(0.0, 0.0, sinks));
+            assert!(events.is_empty(), "{up_m} m, {sinks} m/s: {events:?}");
+        }
     }
 }

@@ -32,6 +32,11 @@ pub(super) fn blame<T: DeserializeOwned>(text: &str, error: &Error) -> (usize, O
     if let Some(piece) = pieces.iter().find(exact) {
         return (start, Some(piece.key.clone()));
     }
+    let unknown = error.message().strip_prefix("unknown field `").and_then(|rest| rest.split_once('`'));
+    let named: Vec<&Piece> = pieces.iter().filter(|piece| unknown.is_some_and(|(key, _)| piece.key == key)).collect();
+    if let [piece] = named[..] {
+        return (piece.whole.start, Some(piece.key.clone()));
+    }
     let is_placed = pieces.iter().any(|piece| [piece.place, piece.whole.start].contains(&start) && is_value(piece));
     if is_placed || error.message().starts_with("missing field") {
         return (start, None);
@@ -66,6 +71,14 @@ pub(super) fn blame<T: DeserializeOwned>(text: &str, error: &Error) -> (usize, O
         .or_else(|| innermost(&|_| true));
     let unknown = error.message().starts_with("unknown field");
     found.map_or((start, None), |piece| (if unknown { piece.whole.start } else { piece.place }, Some(piece.key.clone())))
+}
+
+/// The first number that is none or without end, and its key: no quantity of these files may be either.
+pub(super) fn endless(text: &str) -> Option<(usize, String)> {
+    let mut pieces = Vec::new();
+    gather(DeTable::parse(text).ok()?.get_ref(), &mut pieces);
+    let is_endless = |piece: &&Piece| text[piece.value.clone()].parse::<f64>().is_ok_and(|v| !v.is_finite());
+    pieces.iter().filter(is_endless).min_by_key(|p| p.place).map(|p| (p.place, p.key.clone()))
 }
 
 /// Whether a message holds a value as a word of its own.

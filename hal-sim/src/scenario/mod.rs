@@ -261,14 +261,26 @@ pub(crate) fn text_of(file: &Path) -> Result<String, ScenarioError> {
 
 /// What `text` describes, or where it does not.
 pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ScenarioError> {
+    let refused = |byte: usize, reason: String| {
+        let (line, column) = place_of(text, byte);
+        ScenarioError::Refused { file: file.to_owned(), line, column, reason }
+    };
+    if let Some(format) = text.lines().next().and_then(|first| first.strip_prefix("# quadrig-")) {
+        return Err(refused(
+            0,
+            format!("a file of the format quadrig-{format}; expected a description in TOML, as in docs/scenario.md"),
+        ));
+    }
+    if let Some((byte, key)) = blame::endless(text) {
+        return Err(refused(byte, format!("{key}: expected a number with an end")));
+    }
     toml::from_str(text).map_err(|error| {
         let (byte, key) = blame::blame::<T>(text, &error);
-        let (line, column) = place_of(text, byte);
         let mut reason = in_words(&error.message().replace('\n', " "));
         if let Some(key) = key.filter(|key| !reason.contains(&format!("`{key}`"))) {
             reason = format!("{key}: {reason}");
         }
-        ScenarioError::Refused { file: file.to_owned(), line, column, reason }
+        refused(byte, reason)
     })
 }
 
@@ -373,6 +385,14 @@ mod tests {
             ("[supply]\nkind = \"lipo\"\ncells = 3\ncapacity_ah = -1e1\n", "run.toml:4:15: capacity_ah: ", "found -10"),
             ("seed = 1\n[schedule]\nkind = \"staircase\"\nhold_s = 3\ntop_us = 2000\n", "run.toml:2:1: ", "step_us"),
             ("[[effect]]\nid = \"supply_sag\"\n", "run.toml:1:1: ", "resistance_ohm"),
+            (
+                "seed = 1\n\n[[effect]]\nid = \"supply_sag\"\nresistance_ohm = 0.08\nresistence = 3\n",
+                "run.toml:6:1: ",
+                "`resistence`",
+            ),
+            ("[[effect]]\nid = \"supply_sag\"\nresistance_ohm = nan\n", "run.toml:3:18: ", "resistance_ohm"),
+            ("[noise]\nthrust_n = inf\n", "run.toml:2:12: ", "a number with an end"),
+            ("# quadrig-log 1\nt_s,rpm,thrust_n\n", "run.toml:1:1: ", "quadrig-log 1"),
             ("seed = \n", "run.toml:1:", ""),
         ] {
             let message = parse(text).unwrap_err().to_string();

@@ -32,3 +32,32 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::bad::found;
+    use crate::log::Log;
+
+    /// A rotor that is started at 10 s; its tachometer is silent for `silent` rows of a tenth of a second, then reads 600 rev/min.
+    fn started(silent: usize) -> Log {
+        let mut text = String::from("# quadrig-log 1\nt_s,pulse_us,rpm,thrust_n\n");
+        for row in 0..400 {
+            let on = row >= 100;
+            let (pulse, thrust) = if on { (1100, 0.06) } else { (1000, 0.0) };
+            let rpm = if row >= 100 + silent { 600.0 + f64::from(row as u32 % 7) } else { 0.0 };
+            text +=
+                &format!("{:.1},{pulse},{rpm},{:.4}\n", 0.1 * f64::from(row as u32), thrust + 1e-4 * f64::from(row as u32 % 5));
+        }
+        Log::parse("started.csv", text.as_bytes()).expect("a log")
+    }
+
+    #[test]
+    fn the_zeros_of_two_turns_are_no_readings_and_those_of_rest_are() {
+        let rows =
+            |silent| found(&started(silent)).into_iter().filter(|a| a.channel == "rpm").map(|a| a.span()).collect::<Vec<_>>();
+        assert_eq!(rows(2), [100..102]);
+        assert!(rows(0).is_empty(), "{:?}", rows(0));
+        // of a longer silence the part that two turns at 600 rev/min explain: 0.4 s
+        assert_eq!(rows(30), [127..130]);
+    }
+}

@@ -91,10 +91,10 @@ fn run(
         None => Flight::of(Record::of(log)?),
     };
     let seconds: f64 = flight.windows.bounds.iter().map(|(a, b)| flight.record.t[b - 1] - flight.record.t[*a]).sum();
-    let short = || FlightError::Short { name: log.name.clone(), seconds };
     if seconds < SHORTEST_S || flight.channels.channels.is_empty() {
-        return Err(short());
+        return Err(FlightError::Short { name: log.name.clone(), seconds });
     }
+    let unfit = || FlightError::Unfit { name: log.name.clone(), seconds };
     let library = match model {
         Some(model) => FlightLibrary::against(&flight, model, is_own(model, &flight)),
         None => FlightLibrary::new(&flight),
@@ -102,14 +102,14 @@ fn run(
     let problem = Problem { channels: &flight.channels.channels, library: &library };
     let (found, concluded) = match names {
         None => {
-            let found = posterior(&problem, &mut |p| progress(0.8 * p)).ok_or_else(short)?;
+            let found = posterior(&problem, &mut |p| progress(0.8 * p)).ok_or_else(unfit)?;
             progress(0.8);
-            let concluded = conclude(&problem, &found).ok_or_else(short)?;
+            let concluded = conclude(&problem, &found).ok_or_else(unfit)?;
             (found, concluded)
         }
         Some(ids) => {
-            let found = attribution::told(&problem, ids).ok_or_else(short)?;
-            let concluded = conclude_told(&problem, &found).ok_or_else(short)?;
+            let found = attribution::told(&problem, ids).ok_or_else(unfit)?;
+            let concluded = conclude_told(&problem, &found).ok_or_else(unfit)?;
             (found, concluded)
         }
     };

@@ -16,6 +16,9 @@ use crate::start::start_pulse;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
+/// Ratio of speeds at which one rotor gives twice the thrust of another.
+const FAR: f64 = std::f64::consts::SQRT_2;
+
 /// A flight in its windows, with the sizes that priors are made of.
 #[derive(Debug, Clone)]
 pub struct Flight {
@@ -98,6 +101,10 @@ impl Usual {
             if values.is_empty() { absent } else { median(&mut values) }
         };
         let drive = record.drive();
+        // the sums of all rotors, as those say it whose speed can be theirs
+        let believed = believed(record, &rows);
+        let all = drive.len() as f64 / believed.len().max(1) as f64;
+        let sum = |of: &dyn Fn(f64) -> f64, i: usize| all * believed.iter().map(|d| of(d[i])).sum::<f64>();
         let rotors = drive.len().max(1) as f64;
         let commands = record.command.len().max(1) as f64;
         let command = middle(&|i| record.command.iter().map(|c| c[i]).sum::<f64>() / commands, 0.5);
@@ -105,11 +112,11 @@ impl Usual {
         let square: f64 = rows.iter().flat_map(|i| record.command.iter().map(move |c| (c[*i] - command).powi(2))).sum();
         let vehicle = &record.vehicle;
         Self {
-            sum: middle(&|i| drive.iter().map(|d| d[i]).sum(), 1.0),
-            squares: middle(&|i| drive.iter().map(|d| d[i] * d[i]).sum(), 1.0),
+            sum: middle(&|i| sum(&|d| d, i), 1.0),
+            squares: middle(&|i| sum(&|d| d * d, i), 1.0),
             turning: vehicle.usual_turning(),
             arm: vehicle.rotors.first().map_or(1.0, |r| r.x.hypot(r.y)),
-            rpm: middle(&|i| record.speed.iter().map(|w| w[i]).sum::<f64>() / rotors * super::RPM, 1.0),
+            rpm: if record.speed.is_empty() { 0.0 } else { middle(&|i| sum(&|d| d, i) / rotors * super::RPM, 1.0) },
             command: [command, (square / count).sqrt().max(1e-3)],
             start: start(record),
             supply: [
@@ -117,6 +124,27 @@ impl Usual {
                 middle(&|i| record.current.as_ref().map_or(f64::NAN, |v| v[i]), 1.0).max(1e-3),
             ],
         }
+    }
+}
+
+/// What drives the rotors, without the one whose speed cannot be its own: usually so far from the others' that it would give half or twice their
+/// thrust, on which nothing flies level. Where more than one is, nobody can say which.
+fn believed<'r>(record: &'r Record, rows: &[usize]) -> Vec<&'r Vec<f64>> {
+    let drive = record.drive();
+    let usual = |of: &Vec<f64>| {
+        let mut values: Vec<f64> = rows.iter().map(|i| of[*i]).filter(|v| v.is_finite()).collect();
+        if values.is_empty() { 0.0 } else { median(&mut values) }
+    };
+    let sizes: Vec<f64> = if record.speed.is_empty() { Vec::new() } else { drive.iter().map(usual).collect() };
+    let is_far = |rotor: &usize| {
+        let mut others: Vec<f64> = sizes.iter().enumerate().filter(|(k, _)| k != rotor).map(|(_, size)| *size).collect();
+        let (own, theirs) = (sizes[*rotor], if others.is_empty() { 0.0 } else { median(&mut others) });
+        own * FAR < theirs || own > FAR * theirs
+    };
+    let far: Vec<usize> = (0..sizes.len()).filter(is_far).collect();
+    match far[..] {
+        [out] if drive.len() > 2 => drive.iter().enumerate().filter(|(k, _)| *k != out).map(|(_, d)| d).collect(),
+        _ => drive.iter().collect(),
     }
 }
 
@@ -223,5 +251,31 @@ impl<'s> Sink<'s> {
     #[must_use]
     pub fn done(self) -> Vec<Column> {
         self.out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::standard::standard_flight;
+    use super::*;
+
+    /// A speed channel that reads half or one and a half of its rotor's speed does not move the sizes that coefficients are told in.
+    #[test]
+    fn a_broken_speed_channel_leaves_the_usual_sizes() {
+        let usual = |factor: f64| {
+            let mut log = standard_flight();
+            let of_rotor = log.columns.iter_mut().find(|c| c.name == "rpm_2").unwrap();
+            of_rotor.values.iter_mut().for_each(|v| *v *= factor);
+            Flight::of(Record::of(&log).unwrap()).usual
+        };
+        let whole = usual(1.0);
+        for factor in [0.5, 1.5, 2.0] {
+            let broken = usual(factor);
+            for (got, want) in [(broken.sum, whole.sum), (broken.squares, whole.squares), (broken.rpm, whole.rpm)] {
+                assert!((got / want - 1.0).abs() < 0.03, "{factor}: {got} {want}");
+            }
+        }
+        // what a rotor may well do is taken as it is
+        assert!((usual(1.1).sum / whole.sum - 1.025).abs() < 0.01);
     }
 }

@@ -66,6 +66,26 @@ pub enum FlightError {
         /// What is wrong.
         reason: String,
     },
+    /// A speed that reads nothing throughout.
+    #[error(
+        "{name}: column {column}: reads nothing while the others turn; expected its speed: take the column out, or mend the sensor; without it force and moments go with the pulses"
+    )]
+    Silent {
+        /// Log.
+        name: String,
+        /// Column.
+        column: String,
+    },
+    /// Readings that no model can be fitted to.
+    #[error(
+        "{name}: nothing can be fitted to {seconds:.1} s in the air; expected readings that move in every column: one that holds the same number throughout is the usual reason, take it out"
+    )]
+    Unfit {
+        /// Log.
+        name: String,
+        /// What there is in the air, s.
+        seconds: f64,
+    },
     /// Too short.
     #[error(
         "{name}: {seconds:.1} s in the air with all its readings; expected at least {SHORTEST_S} s, to leave stretches out and predict them"

@@ -83,7 +83,8 @@ impl Record {
     /// From a log.
     ///
     /// # Errors
-    /// A log that holds neither specific force nor rate, or neither speeds nor commands of its rotors; metadata that cannot be read.
+    /// A log that holds neither specific force nor rate, or neither speeds nor commands of its rotors; a speed that reads nothing while another
+    /// rotor turns; metadata that cannot be read.
     pub fn of(log: &Log) -> Result<Self, FlightError> {
         let refuse = |reason: &str| FlightError::Lacks { name: log.name.clone(), reason: reason.to_owned() };
         let vehicle = Vehicle::of(log).map_err(|reason| FlightError::Meta { name: log.name.clone(), reason })?;
@@ -102,6 +103,9 @@ impl Record {
         }
         if force.is_none() && rate.is_none() {
             return Err(refuse("neither specific force (acc_x, ...) nor rate (gyro_x, ...)"));
+        }
+        if let Some(rotor) = silent(&speed) {
+            return Err(FlightError::Silent { name: log.name.clone(), column: Target::Speed(rotor).name() });
         }
         let to_earth = attitude(log);
         let velocity = to_earth.as_ref().and_then(|to_earth| Some(in_body(to_earth, &vector(log, "vel", looked_up)?)));
@@ -178,6 +182,12 @@ impl Record {
         };
         (0..self.len()).map(|i| squares[i] > IDLE * usual && !(squares[i] < STANDS * usual && still(i))).collect()
     }
+}
+
+/// The first rotor whose speed reads nothing in any row, where another one turns.
+fn silent(speed: &[Vec<f64>]) -> Option<usize> {
+    let turns = |of: &Vec<f64>| of.iter().any(|w| w.is_finite() && *w != 0.0);
+    speed.iter().any(turns).then(|| speed.iter().position(|s| !turns(s)))?
 }
 
 /// A column with at least one reading.
@@ -260,4 +270,26 @@ fn without_spikes(log: &Log) -> (Log, Vec<Spike>) {
         own.into_iter().for_each(|i| column.values[i] = f64::NAN);
     }
     (out, spikes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::standard::standard_flight;
+    use super::*;
+
+    #[test]
+    fn a_speed_that_reads_nothing_is_named() {
+        let mut log = standard_flight();
+        let at = |log: &Log, name: &str| log.columns.iter().position(|c| c.name == name).unwrap();
+        let (dead, rows) = (at(&log, "rpm_2"), 100..200);
+        let whole = log.columns[dead].values.clone();
+        log.columns[dead].values.fill(0.0);
+        let said = Record::of(&log).unwrap_err().to_string();
+        assert!(said.contains("column rpm_2: reads nothing while the others turn; expected"), "{said}");
+        // one that is silent for a time is another matter, and so is one that is taken out: the pulses speak then
+        log.columns[dead].values[rows.clone()].copy_from_slice(&whole[rows]);
+        assert!(Record::of(&log).is_ok());
+        log.columns.remove(dead);
+        assert!(Record::of(&log).unwrap().speed.is_empty());
+    }
 }

@@ -1,7 +1,7 @@
 //! The bytes of an export as text: UTF-8, UTF-16 or Windows-1252.
 //!
 //! What it is: the first step of an import; the encoding is told by the bytes alone, and said where it is not UTF-8.
-//! What can go wrong: a spreadsheet, a packed or a binary file is refused with what to do; a line longer than [`MAX_LINE`] is refused without
+//! What can go wrong: a spreadsheet, a packed or a binary file, and a recording of a flight controller, is refused with what to do; a line longer than [`MAX_LINE`] is refused without
 //! being read to its end; UTF-8 with damaged bytes is no Windows-1252.
 //! Units: none.
 //! Reference: encoding.spec.whatwg.org (crate encoding_rs); Unicode 15, section 23.8 (byte order mark).
@@ -9,6 +9,7 @@
 use crate::log::{MAX_LINE, Place, ReadError};
 use encoding_rs::{Encoding, UTF_16BE, UTF_16LE, WINDOWS_1252};
 use std::io::Read;
+use std::path::Path;
 
 /// A file as text.
 #[derive(Debug)]
@@ -20,6 +21,29 @@ pub(super) struct Text {
     /// What is to be said of its encoding.
     pub(super) note: Option<String>,
 }
+
+/// A flight controller's own recording: how its file's name ends, how the file begins, what it is, and how it comes whole.
+struct Recording {
+    endings: &'static [&'static str],
+    magic: &'static [u8],
+    name: &'static str,
+    whole: &'static str,
+}
+
+const RECORDINGS: [Recording; 2] = [
+    Recording {
+        endings: &["ulg", "ulog"],
+        magic: &super::ulog::MAGIC,
+        name: "PX4 log (ULog)",
+        whole: "the .ulg file as the board wrote it: copy it from the card once more",
+    },
+    Recording {
+        endings: &["bbl", "bfl"],
+        magic: super::blackbox::MAGIC,
+        name: "Betaflight Blackbox log",
+        whole: "the file as the board wrote it: save it from the flash or the card once more",
+    },
+];
 
 const SPREADSHEET: &str = "a CSV file: open it in the spreadsheet program and save the sheet as 'CSV UTF-8', then import that";
 
@@ -46,6 +70,7 @@ pub(super) fn read(file: &str, mut source: impl Read) -> Result<Text, ReadError>
             break;
         }
         if from == 0 {
+            no_recording(file, &bytes)?;
             no_binary(file, &bytes)?;
         }
         for b in &bytes[from..] {
@@ -57,6 +82,9 @@ pub(super) fn read(file: &str, mut source: impl Read) -> Result<Text, ReadError>
                 return Err(Place { file, line }.refuse(None, found, "a text file with one short line a sample"));
             }
         }
+    }
+    if bytes.is_empty() {
+        no_recording(file, &bytes)?;
     }
     let (encoding, mark) = encoding(&bytes);
     if encoding == encoding_rs::UTF_8 {
@@ -80,6 +108,23 @@ fn lines(text: Text) -> Text {
         content.push('\n');
     }
     Text { content, whole, ..text }
+}
+
+/// A recording is imported as a flight before it comes here, and a file that is called one but does not begin as one is damaged.
+fn no_recording(file: &str, head: &[u8]) -> Result<(), ReadError> {
+    let place = Place { file, line: 1 };
+    let ending = Path::new(file).extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    for r in &RECORDINGS {
+        if head.starts_with(r.magic) {
+            let expected = "a flight log: make one with `quadrig import FILE -o flight.csv`, and take that";
+            return Err(place.refuse(None, format!("a {}", r.name), expected));
+        }
+        if r.endings.contains(&ending.as_str()) {
+            let what = if head.is_empty() { "is empty" } else { "does not begin as one" };
+            return Err(place.refuse(None, format!("by its name a {}, but it {what}", r.name), r.whole));
+        }
+    }
+    Ok(())
 }
 
 fn no_binary(file: &str, head: &[u8]) -> Result<(), ReadError> {
@@ -124,5 +169,31 @@ fn of_bytes(file: &str, mut bytes: Vec<u8>, mark: usize) -> Result<Text, ReadErr
             let (content, _) = WINDOWS_1252.decode_without_bom_handling(&bytes);
             Ok(Text { content: content.into_owned(), whole: true, note: Some("text in windows-1252 (not UTF-8)".to_owned()) })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A recording of a flight controller is told for what it is by its name or its first bytes; nobody is sent to a spreadsheet.
+    #[test]
+    fn recordings_are_told_for_what_they_are() {
+        for (file, bytes, words) in [
+            ("f.ulg", &b""[..], ["f.ulg:1: by its name a PX4 log (ULog), but it is empty", "copy it from the card"]),
+            (
+                "F.ULG",
+                b"\x00\x81\x02\xffno log",
+                ["F.ULG:1: by its name a PX4 log (ULog), but it does not begin as one", "copy it"],
+            ),
+            ("f.bbl", b"\x99\x01", ["f.bbl:1: by its name a Betaflight Blackbox log, but it does not begin as one", "save it"]),
+            ("f.bfl", b"", ["f.bfl:1: by its name a Betaflight Blackbox log, but it is empty", "save it"]),
+            ("f.bin", &super::super::ulog::MAGIC, ["f.bin:1: a PX4 log (ULog)", "quadrig import"]),
+            ("f.txt", super::super::blackbox::MAGIC, ["f.txt:1: a Betaflight Blackbox log", "quadrig import"]),
+        ] {
+            let said = read(file, bytes).unwrap_err().to_string();
+            assert!(words.iter().all(|w| said.contains(w)) && !said.contains("CSV"), "{said}");
+        }
+        assert!(read("f.csv", &b"t_s,rpm\n0,1\n"[..]).is_ok());
     }
 }

@@ -188,11 +188,15 @@ pub(super) fn rest(closed: &Closed, u: &Unexplained) -> Option<Figure> {
 
 /// Figures of what is left.
 fn left(closed: &Closed) -> Vec<Figure> {
-    // several speed sensors have a figure together
-    let several = SPEED.iter().filter(|c| target(closed, c).is_some()).count() > 1;
-    let own = |u: &&Unexplained| !(several && SPEED.contains(&u.channel.as_str()));
     let with_model = |u: &&Unexplained| !closed.verdict.channels.not_predicted.contains_key(&u.channel);
+    let own = |u: &&Unexplained| !is_drawn_together(closed, u);
     closed.verdict.unexplained.iter().filter(own).filter(with_model).filter_map(|u| rest(closed, u)).collect()
+}
+
+/// Whether a channel is one of several speed sensors, which have their figures together.
+pub(super) fn is_drawn_together(closed: &Closed, u: &Unexplained) -> bool {
+    let several = SPEED.iter().filter(|c| target(closed, c).is_some()).count() > 1;
+    several && SPEED.contains(&u.channel.trim_end_matches(" - others"))
 }
 
 /// Residual, and measured beside predicted, of every channel.
@@ -224,7 +228,7 @@ fn every_channel(closed: &Closed) -> Vec<Figure> {
 
 /// All speed channels in one figure, what is left of them in a second, and what each reads beyond the others beneath; none where there is
 /// one sensor.
-fn speeds(log: &Log, closed: &Closed) -> Vec<Figure> {
+pub(super) fn speeds(log: &Log, closed: &Closed) -> Vec<Figure> {
     let Some(together) = run::overlaid(log) else { return Vec::new() };
     let mut figures = vec![thinned(together)];
     for (id, title, of_contrast) in [
@@ -238,16 +242,42 @@ fn speeds(log: &Log, closed: &Closed) -> Vec<Figure> {
             Some(if of_contrast { Layer::Dots { name, class, x, y } } else { Layer::Line { name, class, x, y } })
         };
         let present = SPEED.into_iter().filter(|c| log.column(c).is_some());
+        let mut layers: Vec<Layer> = present.zip(run::CLASSES).filter_map(layer).collect();
+        let beyond = pinned(&mut layers);
+        let title = match beyond {
+            0 => title.to_owned(),
+            n => format!("{title} ({n} readings lie beyond the edges)"),
+        };
         figures.push(thinned(Figure {
             id: id.into(),
-            title: title.into(),
+            title,
             x_label: time_label(&closed.context),
             y_label: "rev/min".into(),
-            layers: present.zip(run::CLASSES).filter_map(layer).collect(),
+            layers,
             ..Figure::default()
         }));
     }
     figures
+}
+
+/// Share of the dots that decides how far the axis goes, and the room beside them.
+const MOST_DOTS: f64 = 0.98;
+const ROOM: f64 = 2.0;
+
+/// Puts the few dots that lie far out onto the edges, so that they flatten no others; how many.
+fn pinned(layers: &mut [Layer]) -> usize {
+    let of_dots = |layer: &Layer| if let Layer::Dots { y, .. } = layer { y.clone() } else { Vec::new() };
+    let mut sizes: Vec<f64> = layers.iter().flat_map(of_dots).filter(|v| v.is_finite()).map(f64::abs).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    let Some(edge) = sizes.get((MOST_DOTS * sizes.len() as f64) as usize).map(|v| ROOM * v).filter(|v| *v > 0.0) else {
+        return 0;
+    };
+    for layer in layers {
+        if let Layer::Dots { y, .. } = layer {
+            y.iter_mut().for_each(|v| *v = v.clamp(-edge, edge));
+        }
+    }
+    sizes.iter().filter(|v| **v > edge).count()
 }
 
 /// Plateaus, fits and constants, as `identify` has them.

@@ -8,7 +8,7 @@
 
 use super::closed::{self as parts, Origin, Page, Vocabulary, pair};
 use super::figure::Figure;
-use super::page::{cards, over_runs, rest};
+use super::page::{cards, is_drawn_together, over_runs, rest, speeds};
 use super::svg::escape;
 use crate::close::Closed;
 use crate::effects::Estimate;
@@ -21,6 +21,8 @@ use crate::words::digits;
 pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
     let v = &outcome.verdict;
     let alone: Vec<Closed> = (0..runs.len()).map(|run| of_run(runs, outcome, run)).collect();
+    let first = outcome.shown.as_ref().map_or(0, |shown| shown.run);
+    let own = |u: &&Unexplained| !is_drawn_together(&alone[first], u);
     let page = Page {
         verdict: v,
         words: Vocabulary::RIG,
@@ -29,9 +31,9 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as a geometric mean over the runs.".to_owned(),
         hero: outcome.shown.as_ref().map(|shown| over_runs(v, shown)).unwrap_or_default(),
         cards: cards_of(&alone, runs, outcome),
-        left: v.unexplained.iter().filter_map(|u| left_of(&alone, runs, u)).collect(),
+        left: v.unexplained.iter().filter(own).filter_map(|u| left_of(&alone, runs, u)).collect(),
         parameters: parameters(outcome),
-        speeds: Vec::new(),
+        speeds: speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| named(figure, &runs[first])).collect(),
     };
     let mut sheet = parts::begin(&page);
     for (run, of) in v.runs.iter().enumerate() {
@@ -93,7 +95,9 @@ fn parameters(outcome: &Outcome) -> Vec<Vec<String>> {
         let context = &outcome.contexts[0];
         let reported = added.placed.effect.report(context, &added.placed.instance, added.estimates.clone());
         for e in reported.iter().filter(|e| e.name != "phase") {
-            let mut row = vec![format!("{} {}", added.placed.effect.id(), e.name), e.unit.clone(), value(e)];
+            let effect = added.placed.effect;
+            let of = format!("{}: {}", effect.about().title, (Vocabulary::RIG.parameter)(effect.id(), &e.name));
+            let mut row = vec![of, e.unit.clone(), value(e)];
             for run in alone {
                 let run = added.placed.effect.report(context, &added.placed.instance, run.clone());
                 row.push(run.iter().find(|own| own.name == e.name).map_or_else(|| "-".to_owned(), value));

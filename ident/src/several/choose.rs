@@ -6,6 +6,7 @@
 //! Units: scores in nats.
 //! Reference: forward selection by cross-validation over groups, Hastie et al. 2009, section 7.10.
 
+use super::differing::is_same;
 use super::joint::{Across, Compared, Joint, Shared, compared};
 use super::words::typical;
 use super::{FEWEST, Member};
@@ -44,6 +45,10 @@ fn pool(joint: &Joint<'_, '_>, runs: &[&Closed]) -> Vec<Vec<Placed>> {
         if p.effect.id() == "unknown" || p.effect.scope(&p.instance) != Scope::Rig || joint.tellers(p) < FEWEST {
             return;
         }
+        // and what has a size of its own on each run with those
+        if joint.members.iter().any(|m| m.own.iter().any(|own| is_same(own, p))) {
+            return;
+        }
         match out.iter_mut().find(|o| is_same(&o[0], p)) {
             Some(known) => known.push(p.clone()),
             None => out.push(vec![p.clone()]),
@@ -64,10 +69,6 @@ fn pool(joint: &Joint<'_, '_>, runs: &[&Closed]) -> Vec<Vec<Placed>> {
             .for_each(&mut add);
     }
     out
-}
-
-fn is_same(a: &Placed, b: &Placed) -> bool {
-    a.effect.id() == b.effect.id() && a.instance == b.instance
 }
 
 /// The effects that the runs share.

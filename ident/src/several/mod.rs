@@ -9,6 +9,7 @@
 
 mod alone;
 mod choose;
+mod differing;
 mod entries;
 mod equations;
 mod folds;

@@ -9,7 +9,7 @@ use super::equations::left_on;
 use super::folds::{self, Tenable};
 use super::joint::{Joint, Shared};
 use super::words::{self, Told};
-use super::{Member, Run, choose, own};
+use super::{Member, Run, choose, differing, own};
 use crate::bad;
 use crate::close::Closed;
 use crate::context::{Context, is_contrast};
@@ -87,8 +87,10 @@ fn shown(tenable: &Tenable<'_>) -> Option<Shown> {
 pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> Outcome {
     let start = start_pulse(runs);
     let contexts: Vec<Context> = runs.iter().map(|run| prepared(&run.log, start)).collect();
-    let members: Vec<Member<'_>> = runs.iter().zip(&contexts).map(|(run, c)| Member::of(&run.closed, c, &contexts)).collect();
+    let mut members: Vec<Member<'_>> = runs.iter().zip(&contexts).map(|(run, c)| Member::of(&run.closed, c, &contexts)).collect();
     let closed: Vec<&Closed> = runs.iter().map(|r| &r.closed).collect();
+    let differing = differing::found(&closed, &members);
+    members.iter_mut().zip(differing).for_each(|(m, differing)| m.own.extend(differing));
     let named = choose::choose(&closed, &members, &mut |share| progress(0.6 * share));
     let tenable = folds::tenable(&members, named);
     progress(0.9);

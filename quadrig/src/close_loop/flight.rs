@@ -5,6 +5,7 @@
 //! Units: as the channels state.
 //! Reference: specification `flight.md`, "The loop on flights".
 
+use super::inertial::is_attitude_log;
 use super::{Args, is_result, say_unwritten};
 use crate::Failure;
 use crate::folder::Folder;
@@ -15,7 +16,7 @@ use ident::flight::library::FlightLibrary;
 use ident::flight::predict::{columns, is_by_row, is_own, over_windows, seen_by};
 use ident::flight::{FlightModel, MODEL_FORMAT, VOCABULARY, close, page};
 use ident::flight_log;
-use ident::log::write_whole;
+use ident::log::{Log, write_whole};
 use ident::report::{Origin, terminal};
 use std::fmt::Write;
 use std::io::{BufRead, BufReader};
@@ -23,9 +24,14 @@ use std::path::Path;
 
 /// Whether a file begins as a flight log does.
 pub(crate) fn is_flight_log(path: &Path) -> bool {
+    begins_as(path, flight_log::FORMAT)
+}
+
+/// Whether a file begins as a log of a format does.
+fn begins_as(path: &Path, format: &str) -> bool {
     let Ok(file) = std::fs::File::open(path) else { return false };
     let first = BufReader::new(file).lines().map_while(Result::ok).find(|l| !l.trim().is_empty());
-    first.is_some_and(|l| l.trim_start_matches('#').trim() == flight_log::FORMAT)
+    first.is_some_and(|l| l.trim_start_matches('#').trim() == format)
 }
 
 /// Runs the command.
@@ -33,7 +39,7 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
     let log = flight_log::read(args.log())?;
     let model = args.model.as_deref().map(read_model).transpose()?;
-    let others = args.validate.iter().map(|p| flight_log::read(p)).collect::<Result<Vec<_>, _>>()?;
+    let others = args.validate.iter().map(|p| other_flight(p)).collect::<Result<Vec<_>, _>>()?;
     let closed = {
         let bar = Bar::new("searching", quiet);
         close(&log, model.as_ref(), &others, &mut |share| bar.set(share))?
@@ -54,6 +60,25 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     say_unwritten(args, quiet);
     Ok(())
+}
+
+/// A flight to validate on; a log of another kind is refused as what it is.
+fn other_flight(path: &Path) -> Result<Log, Failure> {
+    let kind = if is_attitude_log(path) {
+        Some("an attitude log")
+    } else if begins_as(path, ident::log::FORMAT) {
+        Some("a rig log")
+    } else {
+        None
+    };
+    match kind {
+        Some(kind) => Err(format!(
+            "{}:1:1: {kind}, and the run is a flight; expected another flight of the same vehicle for --validate",
+            path.display()
+        )
+        .into()),
+        None => Ok(flight_log::read(path)?),
+    }
 }
 
 fn read_model(path: &Path) -> Result<FlightModel, Failure> {

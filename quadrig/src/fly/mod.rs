@@ -13,6 +13,7 @@ mod summary;
 
 use crate::Failure;
 use crate::apart::Paths;
+use crate::close_loop::{flight, inertial};
 use crate::folder::Folder;
 use crate::open::read_model;
 use crate::progress::Bar;
@@ -58,6 +59,19 @@ enum Rotors {
     Model(Box<ModelRotor>),
 }
 
+impl Rotors {
+    /// Density for which they are set up, kg/m^3.
+    fn density(&self) -> f64 {
+        match self {
+            Self::Catalogue => SEA_LEVEL_DENSITY,
+            Self::Model(rotor) => rotor.density().0,
+        }
+    }
+}
+
+/// Flight from which on it is said how long it is before it begins, s.
+const LONG_S: f64 = 600.0;
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let (mission, file) = Mission::load(&args.mission)?;
@@ -71,14 +85,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         )
         .into());
     }
-    let model = args.model.as_deref().map(|path| read_model(path, quiet)).transpose()?;
+    let model = args.model.as_deref().map(|path| model_of_a_rig(path, quiet)).transpose()?;
     let rotors = rotors_of(model.as_ref(), args.model.as_deref(), &airframe)?;
     let curves: &dyn RotorCurves = match &rotors {
         Rotors::Catalogue => &Catalogue(&file),
         Rotors::Model(rotor) => rotor.as_ref(),
     };
+    if mission.length_s() >= LONG_S && !quiet {
+        note!("{}: up to {:.0} s of flight, {} rows", args.mission.display(), mission.length_s(), mission.rows());
+    }
     let flight = flown(&mission, &file, &rotors, curves, quiet || args.json)?;
-    let summary = Summary::of(&mission, &file, &airframe, curves, powerplant(&file, &rotors, model.as_ref()), &flight);
+    let of = (curves, rotors.density());
+    let summary = Summary::of(&mission, &file, &airframe, of, powerplant(&file, &rotors, model.as_ref()), &flight);
     if let Some(mut folder) = folder {
         let told =
             [("mission", mission.name.clone()), ("airframe", file.name.clone()), ("powerplant", summary.powerplant.clone())];
@@ -97,6 +115,19 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         writeln!(crate::say::out(), "{}", said.trim_end())?;
     }
     Ok(())
+}
+
+/// A rig's model. A flight's or an inertial unit's is refused as what it is.
+fn model_of_a_rig(path: &Path, quiet: bool) -> Result<Model, Failure> {
+    let other = [("a flight", flight::model_text(path)), ("an inertial unit", inertial::model_text(path))];
+    if let Some((of, _)) = other.iter().find(|(_, text)| text.is_some()) {
+        return Err(format!(
+            "{}:1:1: a model of {of}, which holds no rotor alone; expected a rig's model, of `quadrig identify` or `close-loop` on a rig log",
+            path.display()
+        )
+        .into());
+    }
+    Ok(read_model(path, quiet)?)
 }
 
 fn rotors_of(model: Option<&Model>, path: Option<&Path>, airframe: &Airframe) -> Result<Rotors, Failure> {
@@ -126,13 +157,13 @@ fn flown(
     curves: &dyn RotorCurves,
     quiet: bool,
 ) -> Result<Flight, Failure> {
-    let (plants, density) = match rotors {
-        Rotors::Catalogue => (catalogue_plants(file), SEA_LEVEL_DENSITY),
-        Rotors::Model(rotor) if mission.controller.is_some() => (following(file, rotor), rotor.density().0),
-        Rotors::Model(rotor) => (planned(mission, file, rotor)?, rotor.density().0),
+    let plants = match rotors {
+        Rotors::Catalogue => catalogue_plants(file),
+        Rotors::Model(rotor) if mission.controller.is_some() => following(file, rotor),
+        Rotors::Model(rotor) => planned(mission, file, rotor)?,
     };
     let bar = Bar::new("flying", quiet || mission.length_s() < 60.0);
-    let flight = fly_whole(mission, file, plants, curves, density, &mut |share| bar.set(share));
+    let flight = fly_whole(mission, file, plants, curves, rotors.density(), &mut |share| bar.set(share));
     flight.ok_or_else(|| "a controller is to steer what cannot hover; expected more thrust, or less weight".into())
 }
 

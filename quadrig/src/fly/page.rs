@@ -24,7 +24,7 @@ pub(super) fn page(summary: &Summary, flight: &Flight) -> String {
     sheet.say(&summary.lead());
     sheet.table(&["", ""], &summary.table(), |_| false);
     // the row of the touch itself is a jolt beside which nothing else would show
-    let rows = if summary.touched.is_some() { &rows[..rows.len() - 1] } else { rows };
+    let rows = if summary.ends_in_touch { &rows[..rows.len() - 1] } else { rows };
     sheet.section("Pulses and margins");
     sheet.figures(vec![pulses(rows), thrusts(summary, rows), speeds(rows), currents(rows)]);
     sheet.section("Path");

@@ -153,7 +153,7 @@ impl ModelRotor {
     /// of the range, from rest. What a run has done to the model's rotor by then (charge drawn, heat) is not in it.
     pub(crate) fn following(&self) -> Following {
         let (from, to) = (MIDDLE_US, MIDDLE_US + 20.0);
-        let thrust = self.stepped(from, to);
+        let thrust = self.stepped(from, to, 1.0);
         let ends = thrust.last().copied().unwrap_or(0.0);
         let starts = self.settled(from, 1.0).thrust_n;
         let there = starts + (1.0 - 1.0 / core::f64::consts::E) * (ends - starts);
@@ -205,10 +205,10 @@ impl RotorCurves for ModelRotor {
         between(&self.settled[i], &self.settled[i + 1], place - i as f64).in_air(density)
     }
 
-    fn stepped(&self, from_us: f64, to_us: f64) -> Vec<f64> {
+    fn stepped(&self, from_us: f64, to_us: f64, density: f64) -> Vec<f64> {
         let dt_s = 1.0e-3;
         let pulses = (0..4000).map(|i| if i < 3000 { from_us } else { to_us }).collect();
-        self.rows(dt_s, pulses).map_or_else(Vec::new, |rows| rows[3000..].iter().map(|r| r.thrust_n).collect())
+        self.rows(dt_s, pulses).map_or_else(Vec::new, |rows| rows[3000..].iter().map(|r| density * r.thrust_n).collect())
     }
 }
 

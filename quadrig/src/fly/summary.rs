@@ -6,9 +6,12 @@
 //! Reference: specification `flight.md`, "The body"; docs/mission.md, "The summary".
 
 use hal_sim::flight::attitude::to_euler;
-use hal_sim::flight::{Airframe, Flying, G};
-use hal_sim::mission::{AirframeFile, Flight, HoverPoint, Mission, Modes, RotorCurves, apart, hover, modes};
+use hal_sim::flight::{Airframe, Flying, G, Vector};
+use hal_sim::mission::{AirframeFile, Flight, HoverPoint, Mission, Modes, RotorCurves, Touch, apart, hover, modes};
 use serde_json::{Value, json};
+
+/// Most touches that have a line each.
+const TOLD: usize = 5;
 
 /// The summary of a flight.
 pub(super) struct Summary {
@@ -25,8 +28,12 @@ pub(super) struct Summary {
     highest_m: f64,
     fastest_m_s: f64,
     steepest_deg: f64,
-    /// When the flight ended on the ground, and how fast it came down.
-    pub(super) touched: Option<(f64, f64)>,
+    /// Touches of the ground.
+    touches: Vec<Touch>,
+    /// Whether the flight ended with a touch.
+    pub(super) ends_in_touch: bool,
+    /// Whether it stands on the ground in the end.
+    on_ground: bool,
     board: Option<Off>,
     /// What the controller ended or changed, and when, s.
     pub(super) events: Vec<(f64, String)>,
@@ -56,23 +63,23 @@ impl Off {
 }
 
 impl Summary {
-    /// Of a flight that was flown.
+    /// Of a flight that was flown; `curves` hold at `reference_density`, kg/m^3.
     pub(super) fn of(
         mission: &Mission,
         file: &AirframeFile,
         airframe: &Airframe,
-        curves: &dyn RotorCurves,
+        (curves, reference_density): (&dyn RotorCurves, f64),
         powerplant: String,
         flight: &Flight,
     ) -> Self {
         let rows = &flight.rows;
         let around = mission.surroundings();
-        let hover = hover(airframe, curves).map(|at| (at, modes(airframe, &at, curves, &around)));
+        let share = mission.ground_density() / reference_density;
+        let hover = hover(airframe, curves, share).map(|at| (at, modes(airframe, &at, curves, &around)));
         let most = |of: &dyn Fn(&Flying) -> f64| rows.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
         let last = &rows[rows.len() - 1];
         let m = &last.motion;
-        // the row before the touch still has the speed of the fall
-        let touched = mission.ends_on_ground.then(|| (last.t_s, rows[rows.len().max(2) - 2].motion.velocity.z));
+        let lowest = airframe.rotors.iter().map(|r| (m.attitude * Vector::from(r.place)).z).fold(f64::NEG_INFINITY, f64::max);
         Self {
             mission: mission.name.clone(),
             powerplant,
@@ -84,7 +91,9 @@ impl Summary {
             highest_m: most(&|f| -f.motion.place.z),
             fastest_m_s: most(&|f| f.motion.velocity.norm()),
             steepest_deg: most(&|f| tilt(f).to_degrees()),
-            touched: touched.filter(|_| last.t_s + 1e-6 < mission.length_s()),
+            touches: flight.touches.clone(),
+            ends_in_touch: mission.ends_on_ground && flight.touches.iter().any(|touch| touch.t_s >= last.t_s),
+            on_ground: m.place.z + lowest > 0.0,
             board: Off::of(flight),
             events: flight.events.clone(),
             place_m: m.place.into(),
@@ -116,18 +125,21 @@ impl Summary {
     pub(super) fn told(&self) -> String {
         let ended: Vec<String> = self.events.iter().map(|(t, what)| format!("after {t:.1} s: {what}")).collect();
         let height = shown(-self.place_m[2]);
-        let end = match (ended.is_empty(), self.touched) {
+        let touched = self.touched();
+        let end = match (ended.is_empty(), self.ends_in_touch) {
             (false, _) => format!("It ended so: {}.", ended.join("; ")),
-            (true, Some((t, speed))) => format!("It touched the ground after {t:.1} s, at {speed:.1} m/s downwards."),
-            (true, None) => {
+            (true, true) => touched.clone(),
+            (true, false) if self.on_ground => format!("{touched} After {:.1} s it is on the ground.", self.flight_s),
+            (true, false) => {
                 let going = match shown(-self.velocity_m_s[2]) {
                     v if v > 0.0 => format!("rises at {v:.1} m/s"),
                     v if v < 0.0 => format!("sinks at {:.1} m/s", -v),
                     _ => "keeps its height".to_owned(),
                 };
-                format!("After {:.1} s it is {height:.1} m up and {going}.", self.flight_s)
+                format!("{touched} After {:.1} s it is {height:.1} m up and {going}.", self.flight_s)
             }
         };
+        let end = end.trim_start();
         let far = format!("At the most it was {:.1} m high and leaned by {:.1} degrees.", self.highest_m, self.steepest_deg);
         let board = self.board.as_ref().map_or_else(String::new, |off| {
             format!(
@@ -135,7 +147,19 @@ impl Summary {
                 off.tilt_deg[0], off.heading_deg[0]
             )
         });
-        format!("{end} {far}{board}")
+        let touched = if ended.is_empty() || touched.is_empty() { String::new() } else { format!(" {touched}") };
+        format!("{end} {far}{touched}{board}")
+    }
+
+    /// The touches of the ground, in plain words; nothing without one.
+    fn touched(&self) -> String {
+        let hardest = self.touches.iter().max_by(|a, b| a.down_m_s.total_cmp(&b.down_m_s));
+        let (Some(first), Some(hardest)) = (self.touches.first(), hardest) else { return String::new() };
+        let at = |touch: &Touch| format!("after {:.1} s, at {:.1} m/s downwards", touch.t_s, shown(touch.down_m_s));
+        match self.touches.len() {
+            1 => format!("It touched the ground {}.", at(first)),
+            n => format!("It touched the ground {n} times: first {}; hardest {}.", at(first), at(hardest)),
+        }
     }
 
     /// What came of it: a word and what there is to say, a row each.
@@ -153,8 +177,12 @@ impl Summary {
         for (t, what) in &self.events {
             rows.push(("control", format!("{t:.2} s: {what}")));
         }
-        if let Some((t, speed)) = self.touched {
+        for touch in self.touches.iter().take(TOLD) {
+            let (t, speed) = (touch.t_s, shown(touch.down_m_s));
             rows.push(("ground", format!("touched after {t:.2} s at {speed:.2} m/s downwards")));
+        }
+        if let Some(more) = self.touches.len().checked_sub(TOLD).filter(|more| *more > 0) {
+            rows.push(("ground", format!("touched {more} times more")));
         }
         let ([n, e, d], [vn, ve, vd]) = (self.place_m.map(shown), self.velocity_m_s.map(shown));
         let [roll, pitch, yaw] = self.attitude_deg.map(shown);
@@ -245,8 +273,9 @@ impl Summary {
             "steepest_deg": self.steepest_deg,
             "ahrs": self.board.as_ref().map(|off| json!({ "tilt_deg": off.tilt_deg, "heading_deg": off.heading_deg })),
             "events": self.events.iter().map(|(t, what)| json!({ "t_s": t, "what": what })).collect::<Vec<_>>(),
-            "touched_s": self.touched.map(|t| t.0),
-            "touched_m_s": self.touched.map(|t| t.1),
+            "touched_s": self.touches.first().map(|touch| touch.t_s),
+            "touched_m_s": self.touches.first().map(|touch| touch.down_m_s),
+            "touches": self.touches.iter().map(|touch| json!({ "t_s": touch.t_s, "down_m_s": touch.down_m_s })).collect::<Vec<_>>(),
             "end": { "place_m": self.place_m, "velocity_m_s": self.velocity_m_s, "attitude_deg": self.attitude_deg },
         });
         format!("{summary:#}")

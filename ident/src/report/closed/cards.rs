@@ -126,6 +126,10 @@ fn title(page: &Page<'_>, id: &str) -> String {
 pub(super) fn removes(v: &Verdict, e: &EffectEntry) -> String {
     let (first, reduction) = (e.channels.first().map_or("", String::as_str), e.heldout_error_reduction);
     let Some(c) = v.channels.get(first) else { return String::new() };
+    // what several runs are off by says nothing of one of them; the evidence does
+    if e.run.is_some() {
+        return String::new();
+    }
     if e.id == "unknown" && e.depends_on.is_empty() {
         return "No correction was fitted.".to_owned();
     }
@@ -154,8 +158,13 @@ pub(super) fn value(p: &Parameter) -> [String; 3] {
     [fine(p.value), format!("{} to {}", fine(p.ci95[0]), fine(p.ci95[1])), unit_of(unit)]
 }
 
+/// Whether a reader asks for a parameter: not where in its row a step lies, nor since when what was there before the run.
+pub(super) fn is_shown(e: &EffectEntry, p: &Parameter) -> bool {
+    p.name != "phase" && !(p.name == "t0" && e.is_since_before())
+}
+
 fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
-    let shown = |p: &&Parameter| p.name != "phase";
+    let shown = |p: &&Parameter| is_shown(e, p);
     let rows: Vec<Vec<String>> = e
         .parameters
         .iter()

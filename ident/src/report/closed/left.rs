@@ -7,6 +7,7 @@
 
 use super::page::Page;
 use super::sentence::size_left;
+use super::vocabulary::Vocabulary;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
 use crate::words::{channel, heading, lower, plain, upper};
@@ -36,7 +37,7 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
 }
 
 /// A text in which causes and columns are told in words.
-fn named(page: &Page<'_>, text: &str) -> String {
+pub(super) fn in_words(words: Vocabulary, text: &str) -> String {
     let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let mut out = String::new();
     let mut rest = text;
@@ -45,7 +46,7 @@ fn named(page: &Page<'_>, text: &str) -> String {
         let (name, after) = at.split_at(at.find(|c| !word(c)).unwrap_or(at.len()));
         out += before;
         // a cause whose identifier is a plain word is said by it
-        let cause = (page.words.about)(name).filter(|_| name.contains('_'));
+        let cause = (words.about)(name).filter(|_| name.contains('_'));
         out += &cause.map_or_else(|| plain(name), |about| format!("\"{}\"", lower(about.title)));
         rest = after;
     }
@@ -56,7 +57,7 @@ fn named(page: &Page<'_>, text: &str) -> String {
 pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
     let Some(next) = &page.verdict.next_experiment else { return };
     sheet.section("What would settle it");
-    sheet.say(&format!("{}.", upper(&named(page, next.why.trim_end_matches('.')))));
+    sheet.say(&format!("{}.", upper(&in_words(page.words, next.why.trim_end_matches('.')))));
     if !next.separates {
         let noun = page.words.noun;
         sheet.say(&format!("No run is proposed. A sensor that this log lacks, or the {noun} with one part exchanged, may tell."));

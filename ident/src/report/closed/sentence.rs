@@ -6,8 +6,10 @@
 //! Reference: specification `formats.md`, "Verdict".
 
 use super::vocabulary::Vocabulary;
+use crate::unexplained::LOUD;
 use crate::verdict::{EffectEntry, Kin, Kind, Unexplained, Verdict};
-use crate::words::{adverb, amount, channel, heading, list, upper};
+use crate::words::{Clause, adverb, amount, channel, heading, list, upper};
+use std::collections::BTreeSet;
 
 /// Most effects that the sentence names; the cards have all.
 const MOST: usize = 3;
@@ -66,7 +68,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         told = all.iter().take(1).copied().collect();
     }
     let more = all.len() - told.len();
-    let clauses: Vec<String> = told.iter().map(|e| words.said(e).with(adverb(e.probability))).collect();
+    let clauses = by_subject(&told, words);
     let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
     if own.is_empty() {
         out += &format!(" Every {noun} has that; nothing of this {noun}'s own was named.");
@@ -77,6 +79,18 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         n => format!("{n} smaller causes are told below."),
     };
     [out, explained(verdict, &told), smaller, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+/// A clause for each effect; what differs from run to run is one clause with a part for each.
+fn by_subject(told: &[&EffectEntry], words: Vocabulary) -> Vec<String> {
+    let mut out: Vec<(&EffectEntry, Vec<String>)> = Vec::new();
+    for e in told {
+        match out.iter_mut().find(|(first, _)| first.run.is_some() && e.run.is_some() && first.id == e.id) {
+            Some((_, parts)) => parts.push(words.said(e).does),
+            None => out.push((e, vec![words.said(e).does])),
+        }
+    }
+    out.iter().map(|(e, parts)| Clause::new(words.said(e).who, list(parts)).with(adverb(e.probability))).collect()
 }
 
 fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
@@ -152,14 +166,13 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
 }
 
 fn none(verdict: &Verdict, news: bool) -> String {
-    let said = match (news, loudest(verdict)) {
-        (true, None) => "Nothing is new since the declared model: no channel is left with more than its noise.",
-        (false, None) => "Nothing is left to explain: no channel is left with more than its noise.",
-        (true, Some(_)) => "Nothing that could be named is new since the declared model.",
-        (false, Some(_)) => "Nothing that could be named is left over.",
-    };
-    let left = if loudest(verdict).is_some() { left(verdict) } else { String::new() };
-    if left.is_empty() { said.to_owned() } else { format!("{said} {left}") }
+    let quiet = loudest(verdict).is_none() && !goes_beyond_noise(verdict);
+    match (news, quiet) {
+        (true, true) => "Nothing is new since the declared model: no channel is left with more than its noise.".to_owned(),
+        (false, true) => "Nothing is left to explain: no channel is left with more than its noise.".to_owned(),
+        (true, false) => format!("Nothing that could be named is new since the declared model. {}", left(verdict)),
+        (false, false) => format!("Nothing that could be named is left over. {}", left(verdict)),
+    }
 }
 
 /// What was found; against a declared model it is new since then.
@@ -254,7 +267,17 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
 /// What is worth a word among what is left; a channel without a model is told by itself.
 fn loud(verdict: &Verdict) -> impl Iterator<Item = &Unexplained> {
     let modelled = |u: &&Unexplained| !verdict.channels.not_predicted.contains_key(&u.channel);
-    verdict.unexplained.iter().filter(|u| u.over_floor > QUIET).filter(modelled)
+    verdict.unexplained.iter().filter(|u| u.over_floor > LOUD).filter(modelled)
+}
+
+/// Whether anything is left that is more than noise, loud or not.
+fn goes_beyond_noise(verdict: &Verdict) -> bool {
+    !verdict.unexplained.is_empty() || verdict.channels.values().any(|c| c.after.heldout_rms > QUIET * c.noise_floor_rms)
+}
+
+/// The quantity that a channel measures: several sensors of one speed are one.
+fn quantity(name: &str) -> &str {
+    if name.starts_with("rpm") && !name.starts_with("rpm_esc") { "rpm" } else { name }
 }
 
 /// What is loudest among what is left.
@@ -275,20 +298,19 @@ pub(super) fn size_left(verdict: &Verdict, u: &Unexplained) -> String {
 
 fn left(verdict: &Verdict) -> String {
     let Some(loudest) = loudest(verdict) else {
-        let over = verdict.channels.values().any(|c| c.after.heldout_rms > QUIET * c.noise_floor_rms);
-        let noise = verdict.unexplained.is_empty() && !over;
-        return if noise { "What is left is noise." } else { "Little is left beyond the noise." }.to_owned();
+        let said = if goes_beyond_noise(verdict) { "Little is left beyond the noise." } else { "What is left is noise." };
+        return said.to_owned();
     };
-    let others = loud(verdict).count() - 1;
-    let (size, on) = (size_left(verdict, loudest), channel(&loudest.channel));
-    let what = if others > 0 {
-        format!("Most is left on {on}: {size} ({})", loudest.looks_like)
-    } else {
-        format!("On {on} {size} is left ({})", loudest.looks_like)
-    };
-    match others {
-        0 => format!("{what}."),
-        1 => format!("{what}; something is left on one more channel."),
-        n => format!("{what}; something is left on {n} more channels."),
+    let what = quantity(&loudest.channel);
+    let others: BTreeSet<&str> = loud(verdict).map(|u| quantity(&u.channel)).filter(|q| *q != what).collect();
+    let sensors = loud(verdict).filter(|u| quantity(&u.channel) == what && verdict.channels.contains_key(&u.channel)).count();
+    let on = if sensors > 1 { "the speeds".to_owned() } else { channel(&loudest.channel) };
+    let size = size_left(verdict, loudest);
+    let looks = &loudest.looks_like;
+    let named: Vec<String> = others.iter().map(|q| channel(q)).collect();
+    match named.len() {
+        0 => format!("On {on} {size} is left ({looks})."),
+        1..=3 => format!("Most is left on {on}: {size} ({looks}); something is left on {}.", list(&named)),
+        n => format!("Most is left on {on}: {size} ({looks}); something is left on {n} more quantities."),
     }
 }

@@ -5,7 +5,8 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{removes, value};
+use super::cards::{is_shown, removes, value};
+use super::left::in_words;
 use super::sentence::{sentence, size_left};
 use super::state::{factor, figures, word};
 use super::vocabulary::Vocabulary;
@@ -45,7 +46,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     if let Some(next) = &verdict.next_experiment {
         let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us {} s", s.pulse_us, s.hold_s)).collect();
-        out += &format!("\n{}\n", wrapped(&format!("what would settle it: {}", next.why), 2));
+        out += &format!("\n{}\n", wrapped(&format!("what would settle it: {}", in_words(words, &next.why)), 2));
         if !steps.is_empty() && next.separates {
             out += &format!("  {}\n", wrapped(&steps.join(", "), 2));
         }
@@ -98,7 +99,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
     if e.id != "unknown" {
         out += &format!("    {}\n", wrapped(&words.said(e).sentence(), 4));
     }
-    for parameter in e.parameters.iter().filter(|p| p.name != "phase") {
+    for parameter in e.parameters.iter().filter(|p| is_shown(e, p)) {
         let [v, interval, unit] = value(parameter);
         let name = &parameter.name;
         out += &match upper_bound(parameter) {

@@ -13,6 +13,7 @@ pub use page::page;
 pub use terminal::terminal;
 
 use crate::history::{History, Value};
+use crate::words;
 
 /// Measures that stand first: at most so many of what moved, the surest first, then the constants of the thesis.
 fn foremost(history: &History, most: usize) -> Vec<usize> {
@@ -31,25 +32,9 @@ fn foremost(history: &History, most: usize) -> Vec<usize> {
 /// Most measures that moved at the head of a table.
 const MOVED: usize = 2;
 
-/// A value with the half width of its 95 % interval in brackets, in units of its last digit: `0.0498(5)`.
+/// A value with the half width of its 95 % interval in brackets.
 fn bracketed(v: Value) -> String {
-    let half = v.half();
-    if !v.value.is_finite() || half <= 0.0 || !half.is_finite() {
-        return "-".to_owned();
-    }
-    // one digit of the interval, two where it begins with a one
-    let size = half.log10().floor();
-    let last = if half / 10f64.powf(size) < 1.95 { size - 1.0 } else { size };
-    let power = if v.value == 0.0 { 0.0 } else { v.value.abs().log10().floor() };
-    let (factor, exponent) =
-        if (-3.0..5.0).contains(&power) || power < last { (0.0, String::new()) } else { (power, format!("e{power}")) };
-    let (value, half, last) = (v.value / 10f64.powf(factor), half / 10f64.powf(factor), last - factor);
-    if last >= 0.0 {
-        let unit = 10f64.powf(last);
-        return format!("{:.0}({:.0}){exponent}", (value / unit).round() * unit, (half / unit).round() * unit);
-    }
-    let places = (-last) as usize;
-    format!("{value:.places$}({:.0}){exponent}", half * 10f64.powf(-last))
+    words::bracketed(v.value, v.half()).unwrap_or_else(|| "-".to_owned())
 }
 
 #[cfg(test)]
