@@ -79,7 +79,7 @@ fn alternative(ids: &[&str], probability: f64) -> Alternative {
 /// Verdict, whether a model was declared, words at the head, words that must not stand there.
 fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static str])> {
     let both = || vec![filter(0.99), sag(0.99)];
-    let with_left = |v: Verdict| Verdict { unexplained: vec![left("thrust_n", 3.0)], ..v };
+    let with_left = |v: Verdict| Verdict { unexplained: vec![left("thrust_n", 3.1)], ..v };
     let open = |p: f64| Verdict {
         alternatives: vec![
             alternative(&["channel_delay", "supply_sag"], p),
@@ -165,7 +165,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         ),
         (
             Verdict {
-                unexplained: vec![left("thrust_n", 3.0)],
+                unexplained: vec![left("thrust_n", 3.1)],
                 ..verdict(Kind::Unattributed, vec![effect("unknown", "thrust_n", 0.9, 0.4, vec![])])
             },
             false,

@@ -94,6 +94,7 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
         if let Some(gaps) = Gaps::of(&log).filter(|_| !quiet) {
             note!("{}: t_s: {gaps}", path.display());
         }
+        log.refuse_absurd(path)?;
         log.in_doubt().iter().filter(|_| !quiet).for_each(|doubt| note!("{}: {doubt}", path.display()));
         return Ok(log);
     }

@@ -270,3 +270,23 @@ fn every_peer_has_its_links() {
     call(&bench(), &["export", "run.csv", "--to", "px4"]).refused(&["run.csv:", "expected"]);
     call(&bench(), &["export", "model.toml", "--to", "px4", "-o", "model.toml"]).refused(&["model.toml: is an input"]);
 }
+
+/// Each row is what the rotor settles at: torque and current of a rotor that has inertia climb with the pulse, without a spike where it starts.
+#[test]
+fn a_rotor_with_inertia_is_told_as_it_settles() {
+    let folder = bench();
+    call(&folder, &["--quiet", "close-loop", "run.csv", "-o", "closed"]).succeeded();
+    let model = std::fs::read_to_string(folder.join("closed/model.toml")).expect("a model");
+    assert!(model.contains("rotor_inertia"), "the run names the rotor's inertia");
+    let table = call(&folder, &["export", "closed/model.toml", "--to", "csv"]).succeeded().out;
+    let rows: Vec<Vec<f64>> = table
+        .lines()
+        .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()))
+        .map(|l| l.split(',').filter_map(|v| v.parse().ok()).collect())
+        .collect();
+    assert_eq!(rows.len(), 101, "{table}");
+    for (column, name) in [(4, "torque"), (5, "current")] {
+        let falls = rows.windows(2).find(|w| w[1][column] < w[0][column] - 1e-3 * rows[100][column]);
+        assert!(falls.is_none(), "{name} falls: {falls:?}");
+    }
+}

@@ -6,9 +6,9 @@
 //! Units: kg.m2, A.s2/rad.
 //! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt).
 
-use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
 use crate::attribution::noise::usual_step;
-use crate::context::{Context, Relation};
+use crate::context::{Context, GAP, Relation};
 use crate::design::TargetDesign;
 
 /// See the module.
@@ -56,8 +56,10 @@ impl Effect for RotorInertia {
         let (torque, current) = (present(context, &["torque_nm"]), present(context, &["current_a"]));
         let both = present(context, &["torque_nm", "current_a"]);
         let mut out = Vec::new();
-        for set in [both, torque, current] {
-            let instance = Instance::new(&set, "");
+        // where the speed steps between rows, meters that average over a row see the step in the row in which it ends
+        let forms: &[&str] = if operator::commands_abruptly(context) { &["", OVER_THE_ROW] } else { &[""] };
+        for (set, form) in [both, torque, current].iter().flat_map(|set| forms.iter().map(move |form| (set, *form))) {
+            let instance = Instance::new(set, form);
             if !set.is_empty() && !out.contains(&instance) {
                 out.push(instance);
             }
@@ -73,15 +75,31 @@ impl Effect for RotorInertia {
         vec![Amplitude { name: "inertia", unit: "kg.m2" }, Amplitude { name: "current_gain", unit: "A.s2/rad" }]
     }
 
-    fn apply(&self, context: &Context, _: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
         let amplitude = usize::from(design.relation == Relation::Current);
-        design.add(position, amplitude, acceleration(context));
+        let of_row = if instance.form == OVER_THE_ROW { over_the_row(context) } else { acceleration(context) };
+        design.add(position, amplitude, of_row);
     }
 
     /// Speeding up takes, it does not give. Against a model it is a difference of two inertias.
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         context.against_model || fitted.iter().all(|e| e.value > -2.0 * e.se) && fitted.iter().any(|e| e.value > 0.0)
     }
+}
+
+/// Form of meters that average over each row.
+const OVER_THE_ROW: &str = "over_the_row";
+
+/// Mean angular acceleration since the row before, rad/s^2; none after a gap in time.
+fn over_the_row(context: &Context) -> Vec<f64> {
+    let (t, rpm) = (&context.t, &context.rpm);
+    let usual = usual_step(t);
+    let since = |i: usize| {
+        let dt = t[i] - t[i - 1];
+        let known = (0.5 * usual..GAP * usual).contains(&dt);
+        if known { (rpm[i] - rpm[i - 1]) / dt * std::f64::consts::TAU / 60.0 } else { 0.0 }
+    };
+    (0..t.len()).map(|i| if i == 0 { 0.0 } else { since(i) }).collect()
 }
 
 /// Angular acceleration by central differences of the consensus speed, rad/s^2.

@@ -41,6 +41,8 @@ pub struct Closed {
     pub flight: Flight,
     /// For each channel of the flight what the declared and the corrected model predict of its windows.
     pub predicted: Vec<[Vec<f64>; 2]>,
+    /// For each effect of the verdict, and each channel, what it adds to the prediction; nothing where it only shapes what others add.
+    pub adds: Vec<Vec<Vec<f64>>>,
     /// What the flight can show: candidates as the first stage asked for them.
     pub asked: Vec<Shown>,
 }
@@ -123,6 +125,10 @@ fn run(
     }
     progress(1.0);
     let predicted = (0..flight.channels.channels.len()).map(|c| whole.both(c)).collect();
+    let of_effect = |k: &crate::attribution::Kept| {
+        (0..flight.channels.channels.len()).map(|c| concluded.fit.adds(k.place, problem.channels, c)).collect()
+    };
+    let adds = concluded.kept.iter().map(of_effect).collect();
     let shown = found.asked.iter().filter(|a| a.joins.len() == 1).map(|a| Shown {
         name: words::name(&library.candidates()[a.joins[0].candidate]),
         angle: a.gain.angle,
@@ -130,7 +136,7 @@ fn run(
         enough: a.can_be_shown(),
     });
     let asked = shown.collect();
-    Ok(Closed { verdict, model: corrected, parameters, predicted, asked, flight: flight.clone() })
+    Ok(Closed { verdict, model: corrected, parameters, predicted, adds, asked, flight: flight.clone() })
 }
 
 /// Error of the declared and of the corrected model on another flight, one constant a channel apart.

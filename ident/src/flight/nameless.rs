@@ -70,6 +70,23 @@ impl Variable {
         }
     }
 
+    /// Its unit.
+    pub(super) fn unit(self) -> &'static str {
+        self.said(false).1
+    }
+
+    /// The one that an effect's variable means for a channel: of a vector the part along the channel's own axis.
+    pub(super) fn meant(name: &str, channel: &str) -> Option<Self> {
+        let axis = ["_x", "_y", "_z"].iter().position(|end| channel.ends_with(end));
+        match (name, axis) {
+            ("vel", Some(2) | None) => Some(Self::Across),
+            ("vel", Some(k)) => Some(Self::Air(k)),
+            ("gyro", Some(k)) => Some(Self::Rate(k)),
+            ("pos_z", _) => Some(Self::Height),
+            (name, _) => VARIABLES.into_iter().find(|v| v.name() == name && *v != Self::Time),
+        }
+    }
+
     /// What a value of it is, as people say it, and its unit; `by_command` where no speed of a rotor is known.
     fn said(self, by_command: bool) -> (&'static str, &'static str) {
         match self {
@@ -88,7 +105,7 @@ impl Variable {
     }
 
     /// Its values in each window; `None` where the flight lacks it.
-    fn values(self, flight: &Flight, scene: &Scene<'_>) -> Option<Vec<f64>> {
+    pub(super) fn values(self, flight: &Flight, scene: &Scene<'_>) -> Option<Vec<f64>> {
         let windows = &flight.windows;
         match self {
             Self::Air(k) => scene.air.as_ref().map(|v| windows.mean(&v[k])),

@@ -7,6 +7,8 @@
 //! Reference: specification `closing-the-loop.md`, step 8.
 
 use super::close::Closed;
+use super::nameless::Variable;
+use super::scene::Scene;
 use super::windows::LENGTH_S;
 use crate::effects::airframe;
 use crate::report::closed::{self as parts, Page, Trace};
@@ -41,7 +43,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
             "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged."
         ),
         hero: parts::most(v, &traces),
-        cards: parts::each(v, &traces),
+        cards: cards(closed, &traces),
         left: parts::rest(v, &traces),
         parameters: Vec::new(),
         speeds: Vec::new(),
@@ -62,6 +64,32 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
     });
     parts::aside(&mut sheet, v);
     sheet.html()
+}
+
+/// Of each effect what its first channel leaves over without it and with it, against the variable that it depends on; over time where that is no
+/// column of windows, before and after all effects where it only shapes what others add.
+fn cards(closed: &Closed, traces: &[Trace]) -> Vec<Vec<Figure>> {
+    let v = &closed.verdict;
+    let scene = Scene::declared(&closed.flight.record);
+    let mut out = parts::each(v, traces);
+    for (k, (card, (e, adds))) in out.iter_mut().zip(v.effects.iter().zip(&closed.adds)).enumerate() {
+        let at = traces.iter().position(|t| e.channels.first() == Some(&t.channel));
+        let Some((trace, added)) = at.and_then(|at| Some((&traces[at], adds.get(at)?))) else { continue };
+        if added.iter().all(|a| *a == 0.0) {
+            continue;
+        }
+        let without = trace.with_before(trace.after.iter().zip(added).map(|(r, a)| r + a).collect());
+        let variable = e.depends_on.iter().find_map(|name| {
+            let variable = Variable::meant(name, &trace.channel)?;
+            Some((variable, variable.values(&closed.flight, &scene)?))
+        });
+        let id = format!("effect-{}", k + 1);
+        *card = vec![match variable {
+            Some((variable, x)) => parts::against(&without, &id, (variable.name(), variable.unit()), &x, parts::ALONE),
+            None => parts::over_time(&without, &id, parts::ALONE),
+        }];
+    }
+    out
 }
 
 fn trace(closed: &Closed, k: usize) -> Trace {

@@ -9,6 +9,9 @@
 
 use super::{Log, Place, ReadError, SPEED};
 use crate::noise::median;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
 
 /// Key in a log's head: the columns whose values are right although no rig is known to do that.
 pub(crate) const VOUCHED: &str = "vouched";
@@ -31,19 +34,32 @@ impl Log {
     pub fn in_doubt(&self) -> Vec<String> {
         doubts(self).map(|d| format!("{}: in doubt: {}", d.column, d.what)).collect()
     }
-}
 
-/// Refuses what no rig does.
-pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
-    let vouched = log.meta.get(VOUCHED).and_then(toml::Value::as_array);
-    let vouched = |column: &str| vouched.is_some_and(|all| all.iter().any(|v| v.as_str() == Some(column)));
-    match doubts(log).find(|d| d.never && !vouched(d.column)) {
-        None => Ok(()),
-        Some(Doubt { column, what, .. }) => {
-            let way_out = format!("if it is right, say so in the head: # {VOUCHED} = [\"{column}\"]");
-            Err(place.refuse(Some(column), what, format!("what a rig can do, in the unit of the column's name ({way_out})")))
+    /// Refuses what no rig does, unless the head vouches for it. A reader of raw codes does not ask: what it reads may be the wrong scale
+    /// that it is there to mend.
+    ///
+    /// # Errors
+    /// [`ReadError::Content`] with file and column, at the line of the header.
+    pub fn refuse_absurd(&self, path: &Path) -> Result<(), ReadError> {
+        let vouched = self.meta.get(VOUCHED).and_then(toml::Value::as_array);
+        let vouched = |column: &str| vouched.is_some_and(|all| all.iter().any(|v| v.as_str() == Some(column)));
+        match doubts(self).find(|d| d.never && !vouched(d.column)) {
+            None => Ok(()),
+            Some(Doubt { column, what, .. }) => {
+                let way_out = format!("if it is right, say so in the head: # {VOUCHED} = [\"{column}\"]");
+                let expected = format!("what a rig can do, in the unit of the column's name ({way_out})");
+                let file = path.display().to_string();
+                Err(Place { file: &file, line: header_line(path) }.refuse(Some(column), what, expected))
+            }
         }
     }
+}
+
+/// Line of a log's header, from 1.
+fn header_line(path: &Path) -> usize {
+    let Ok(file) = File::open(path) else { return 1 };
+    let comments = BufReader::new(file).lines().map_while(Result::ok).take_while(|line| line.starts_with(['#', '\u{feff}']));
+    comments.count() + 1
 }
 
 fn doubt(column: &'static str, never: bool, what: String) -> Option<Doubt> {
@@ -196,19 +212,25 @@ mod tests {
             let values: Vec<String> = values.iter().map(|v| format!("{v:.4}")).collect();
             text += &format!("{},{}\n", 0.1 * f64::from(row), values.join(","));
         }
-        Log::parse("rig.csv", text.as_bytes()).map_err(|e| e.to_string())
+        let folder = tempfile::TempDir::new().expect("a folder");
+        let path = folder.path().join("rig.csv");
+        std::fs::write(&path, text).expect("written");
+        let log = Log::read(&path).map_err(|e| e.to_string())?;
+        log.refuse_absurd(&path).map_err(|e| e.to_string())?;
+        Ok(log)
     }
 
     #[test]
     fn a_unit_that_no_rig_reaches_is_refused_and_may_be_vouched_for() {
         rig("", |n, t, u, i| [n, t, u, i]).expect("a rig");
         let grams = rig("", |n, t, u, i| [n, 1000.0 * t / 9.80665, u, i]).expect_err("grams");
-        assert!(grams.contains("rig.csv:3") && grams.contains("thrust_n") && grams.contains("grams?"), "{grams}");
+        assert!(grams.contains("rig.csv:2") && grams.contains("thrust_n") && grams.contains("grams?"), "{grams}");
         let millivolts = rig("", |n, t, u, i| [n, t, 1000.0 * u, i]).expect_err("millivolts");
         assert!(millivolts.contains("voltage_v") && millivolts.contains("millivolts?"), "{millivolts}");
         let swapped = rig("", |n, t, u, i| [n, t, i + 0.05, u]).expect_err("swapped");
         assert!(swapped.contains("columns swapped?"), "{swapped}");
-        let vouched = rig("# vouched = [\"voltage_v\"]\n", |n, t, u, i| [n, t, 1000.0 * u, i]).expect("vouched for");
+        let vouched =
+            rig("# vouched = [\"voltage_v\", \"thrust_n\"]\n", |n, t, u, i| [n, t, 1000.0 * u, i]).expect("vouched for");
         assert!(vouched.in_doubt().iter().any(|d| d.contains("voltage_v: in doubt")), "{:?}", vouched.in_doubt());
     }
 }

@@ -1,7 +1,7 @@
 //! What the rig has on its runs, but of another size on each: a lead that was exchanged.
 //!
-//! What it is: an effect of the rig that stands on two runs and more is tried with one size for all and with a size of its own on each. Where the
-//! one leaves a run loud that its own leaves quiet, the size belongs to the run.
+//! What it is: an effect of the rig that stands on two runs and more is tried with one size for all and with a size of its own on each. Where that of
+//! the others leaves a run off by more than half, and its own leaves it quiet, the size belongs to the run.
 //! What can go wrong: a run that is loud for other reasons tells nothing; the effect stays the rig's.
 //! Units: noise floors.
 //! Reference: random effects against fixed ones, Laird & Ware 1982, Biometrics 38:963; specification `formats.md`, "Scope".
@@ -44,7 +44,10 @@ fn is_of_rig(p: &Placed) -> bool {
     is_named(p) && !p.effect.is_of_every_rig() && p.effect.scope(&p.instance) == Scope::Rig
 }
 
-/// Whether one size for all leaves a channel of a run loud that the run alone, with a size of its own, left quiet.
+/// Share of what a run is off by without the effect that the others' size leaves, from which on theirs is nearer to none than to its own.
+const HALF: f64 = 0.5;
+
+/// Whether a run alone, with a size of its own, left a channel quiet that the size of the other runs leaves loud, and off by more than half.
 fn differs(runs: &[&Closed], members: &[Member<'_>], p: &Placed, each: &[Option<Placed>]) -> bool {
     let joint = Joint::of(members);
     let channels: Vec<&'static str> = joint.channels().into_iter().filter(|c| p.instance.touches(c) && !is_contrast(c)).collect();
@@ -52,6 +55,11 @@ fn differs(runs: &[&Closed], members: &[Member<'_>], p: &Placed, each: &[Option<
         let alone = runs[a.run].verdict.channels.get(a.channel);
         alone.is_some_and(|c| c.after.heldout_rms <= LOUD * c.noise_floor_rms)
     };
-    let shared = joint.across(std::slice::from_ref(p), Some(&channels));
-    shared.iter().any(|a| each[a.run].is_some() && a.rms > LOUD * a.floor && was_quiet(a))
+    let none = joint.across(&[], Some(&channels));
+    let is_far = |a: &Across| {
+        let without = none.iter().find(|n| n.run == a.run && n.channel == a.channel);
+        a.rms > LOUD * a.floor && without.is_none_or(|n| a.rms > HALF * n.rms)
+    };
+    let theirs = joint.across(std::slice::from_ref(p), Some(&channels));
+    theirs.iter().any(|a| each[a.run].is_some() && is_far(a) && was_quiet(a))
 }

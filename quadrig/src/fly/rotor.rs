@@ -60,6 +60,8 @@ const FIRST_S: f64 = 1.5e-3;
 const MIDDLE_US: f64 = 1500.0;
 /// Rows and time that each level is held.
 const LEVEL_ROWS: usize = 20;
+/// Rows at the end of a level that the next one reaches into: a change of speed is told by the rows on both sides.
+const BESIDE: usize = 3;
 const LEVEL_ROW_S: f64 = 0.1;
 
 /// Whether what an effect says holds for the rotor in flight: an empirical correction does where it is no drift of one run.
@@ -96,7 +98,8 @@ impl ModelRotor {
         let turns = |rows: &Vec<PlantState>| rows.first().zip(rows.last()).is_some_and(|(a, b)| b.rpm > a.rpm);
         let rows = rotor.rows(LEVEL_ROW_S, pulses).filter(turns);
         let rows = rows.ok_or("no speed from a command; expected one identified from a log with pulse_us")?;
-        rotor.settled = rows.chunks(LEVEL_ROWS).filter_map(|level| level.last().copied()).collect();
+        // the rows beside the next level see its speed come
+        rotor.settled = rows.chunks(LEVEL_ROWS).filter_map(|level| level.iter().rev().nth(BESIDE).copied()).collect();
         Ok(rotor)
     }
 

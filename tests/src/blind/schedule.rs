@@ -114,6 +114,17 @@ impl Schedule {
         self.points.iter_mut().for_each(|p| p.0 = (p.0 / step).round() * step);
     }
 
+    /// Moves every jump to the middle of the interval of rows, `hz` a second, in which it lies: where a reader of the log has to put it.
+    pub fn as_logged(&mut self, hz: f64) {
+        for k in 1..self.points.len() {
+            let [a, b] = [self.points[k - 1], self.points[k]];
+            if (a.0, a.1 == b.1) == (b.0, false) {
+                let middle = ((a.0 * hz).floor() + 0.5) / hz;
+                (self.points[k - 1].0, self.points[k].0) = (middle, middle);
+            }
+        }
+    }
+
     fn hold(&mut self, level: f64, until: f64) {
         let from = self.points.last().map_or(0.0, |p| p.0);
         self.points.push((from, level));

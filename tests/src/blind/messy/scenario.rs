@@ -145,11 +145,14 @@ impl Messy {
         self.dirt.onto(run, &mut Chance::new(self.seed, 700 + which as u64))
     }
 
-    /// Speed of each row at a command without any wander, by channel, thinned like the run.
+    /// Speed of each row at a command without any wander, by channel, thinned like the run. A jump of the command lies in the middle of its row's
+    /// interval: when within it the log does not say.
     #[must_use]
     pub fn still(&self, which: usize) -> Run {
         let stream = 100 + 10 * which as u64;
-        let run = run::run(&self.rig, &self.acting(which), &self.schedules[which], self.seed, stream, false);
+        let mut schedule = self.schedules[which].clone();
+        schedule.as_logged(self.rig.hz);
+        let run = run::run(&self.rig, &self.acting(which), &schedule, self.seed, stream, false);
         self.dirt.onto(run, &mut Chance::new(self.seed, 700 + which as u64)).0
     }
 }
