@@ -147,17 +147,17 @@ fn a_crash_is_told() {
         "duration_s = 6\n[start]\nheight_m = 20\n[[command]]\nrotors = [1, 2, 3, 4]\nsteps = [{ pulse_us = 1000, hold_s = 6 }]\n";
     std::fs::write(at.join("drop.toml"), drop).expect("a file");
     let said = call(at, &["fly", "drop.toml", "-o", "out"]).succeeded().out;
-    for words in [
-        "It touched the ground after 2.3 s, at 13.9 m/s downwards. After 6.0 s it is on the ground.",
-        "ground    touched after 2.30 s at 13.9",
-    ] {
+    for words in
+        ["first after 2.3 s, at 13.9 m/s downwards", "After 6.0 s it is on the ground.", "ground    touched after 2.30 s at 13.9"]
+    {
         assert!(said.contains(words), "{said}");
     }
     assert!(!said.contains("keeps its height"), "{said}");
     let page = std::fs::read_to_string(at.join("out/flight.html")).expect("the page");
-    assert!(page.contains("It touched the ground after 2.3 s"));
+    assert!(page.contains("first after 2.3 s"));
     let out = json(at, &["fly", "drop.toml", "--json"]);
-    assert_eq!(out["touches"].as_array().map(Vec::len), Some(1), "{out}");
+    // it bounces, and the bounces are told too
+    assert!(out["touches"].as_array().is_some_and(|touches| !touches.is_empty()), "{out}");
     assert_eq!((&out["touched_s"], &out["touched_m_s"]), (&out["touches"][0]["t_s"], &out["touches"][0]["down_m_s"]));
     // a take-off touches nothing
     std::fs::write(at.join("up.toml"), "duration_s = 2\n[start]\nspun_up = false\n[[command]]\nrotors = [1, 2, 3, 4]\nsteps = [{ pulse_us = 1750, hold_s = 2 }]\n")
@@ -236,7 +236,9 @@ fn the_same_schedule_in_flight_and_on_the_rig() {
     let rest = 1.0;
     let mut compared = 0;
     for i in 0..rig_t.len() {
-        let held = (0..25).all(|k| i >= k && (rig_rpm[i] - rig_rpm[i - k]).abs() < 3.0);
+        // a step shows in the thrust before the encoder has seen it
+        let held = (0..25).all(|k| i >= k && (rig_rpm[i] - rig_rpm[i - k]).abs() < 3.0)
+            && rig_rpm.get(i + 2).is_none_or(|next| (next - rig_rpm[i]).abs() < 3.0);
         let now = rig_t[i] - rest;
         if !held || !(0.5..20.9).contains(&now) {
             continue;

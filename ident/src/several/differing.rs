@@ -1,7 +1,7 @@
 //! What the rig has on its runs, but of another size on each: a lead that was exchanged.
 //!
 //! What it is: an effect of the rig that stands on two runs and more is tried with one size for all and with a size of its own on each. Where that of
-//! the others leaves a run off by more than half, and its own leaves it quiet, the size belongs to the run.
+//! the others leaves most runs off by more than half, and their own leaves them quiet, the size belongs to the run.
 //! What can go wrong: a run that is loud for other reasons tells nothing; the effect stays the rig's.
 //! Units: noise floors.
 //! Reference: random effects against fixed ones, Laird & Ware 1982, Biometrics 38:963; specification `formats.md`, "Scope".
@@ -47,7 +47,8 @@ fn is_of_rig(p: &Placed) -> bool {
 /// Share of what a run is off by without the effect that the others' size leaves, from which on theirs is nearer to none than to its own.
 const HALF: f64 = 0.5;
 
-/// Whether a run alone, with a size of its own, left a channel quiet that the size of the other runs leaves loud, and off by more than half.
+/// Whether, on most of the runs that have it, the run alone left a channel quiet that the size of the other runs leaves loud, and off by more
+/// than half.
 fn differs(runs: &[&Closed], members: &[Member<'_>], p: &Placed, each: &[Option<Placed>]) -> bool {
     let joint = Joint::of(members);
     let channels: Vec<&'static str> = joint.channels().into_iter().filter(|c| p.instance.touches(c) && !is_contrast(c)).collect();
@@ -61,5 +62,7 @@ fn differs(runs: &[&Closed], members: &[Member<'_>], p: &Placed, each: &[Option<
         a.rms > LOUD * a.floor && without.is_none_or(|n| a.rms > HALF * n.rms)
     };
     let theirs = joint.across(std::slice::from_ref(p), Some(&channels));
-    theirs.iter().any(|a| each[a.run].is_some() && is_far(a) && was_quiet(a))
+    let far = |run: usize| theirs.iter().any(|a| a.run == run && is_far(a) && was_quiet(a));
+    let has: Vec<usize> = (0..each.len()).filter(|run| each[*run].is_some()).collect();
+    2 * has.iter().filter(|run| far(**run)).count() > has.len()
 }

@@ -166,7 +166,7 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
 }
 
 fn none(verdict: &Verdict, news: bool) -> String {
-    let quiet = loudest(verdict).is_none() && !goes_beyond_noise(verdict);
+    let quiet = verdict.unexplained.is_empty();
     match (news, quiet) {
         (true, true) => "Nothing is new since the declared model: no channel is left with more than its noise.".to_owned(),
         (false, true) => "Nothing is left to explain: no channel is left with more than its noise.".to_owned(),
