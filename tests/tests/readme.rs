@@ -97,7 +97,14 @@ fn names_what_it_hides_and_nothing_else(folder: &Path, markdown: &str) {
     let ids = |list: Vec<&str>| -> std::collections::BTreeSet<String> { list.into_iter().map(str::to_owned).collect() };
     let hidden = ids(scenario["effect"].as_array().expect("effects").iter().filter_map(|e| e["id"].as_str()).collect());
     let named = ids(verdict["effects"].as_array().expect("effects").iter().filter_map(|e| e["id"].as_str()).collect());
-    let own: std::collections::BTreeSet<String> = named.into_iter().filter(|id| !EVERY_RIG.contains(&id.as_str())).collect();
+    // a meter that averages over a row of a tenth of a second is every logger's
+    let within_a_row = |id: &str| {
+        let found = verdict["effects"].as_array().expect("effects").iter().find(|e| e["id"] == id);
+        let window = found.and_then(|e| e["parameters"].as_array()?.iter().find(|p| p["name"] == "window")?["value"].as_f64());
+        window.is_some_and(|s| s <= 0.1)
+    };
+    let own: std::collections::BTreeSet<String> =
+        named.into_iter().filter(|id| !EVERY_RIG.contains(&id.as_str()) && !within_a_row(id)).collect();
     assert_eq!(own, hidden, "{verdict:#}");
     assert_eq!(verdict["verdict"], "attributed");
 }

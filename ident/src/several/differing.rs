@@ -1,35 +1,44 @@
 //! What the rig has on its runs, but of another size on each: a lead that was exchanged.
 //!
-//! What it is: an effect of the rig that stands on two runs and more is tried with one size for all and with a size of its own on each. Where that of
-//! the others leaves most runs off by more than half, and their own leaves them quiet, the size belongs to the run.
+//! What it is: an effect of the rig that stands on two runs and more is the rig's where its sizes agree. Where on most of these runs its own size
+//! is off from the mean of the others' by more than half of itself, and the run alone left the channel quiet, the size belongs to the run.
 //! What can go wrong: a run that is loud for other reasons tells nothing; the effect stays the rig's.
-//! Units: noise floors.
+//! Units: those of the effect's parameters.
 //! Reference: random effects against fixed ones, Laird & Ware 1982, Biometrics 38:963; specification `formats.md`, "Scope".
 
-use super::joint::{Across, Joint};
-use super::{FEWEST, Member};
+use super::FEWEST;
 use crate::beside::is_named;
 use crate::close::Closed;
-use crate::context::is_contrast;
-use crate::effects::Scope;
+use crate::effects::{Estimate, Scope};
 use crate::hypothesis::Placed;
 use crate::unexplained::LOUD;
 
+/// Share of its own size by which a run's may be off from the others' before theirs is nearer to none than to its own.
+const HALF: f64 = 0.5;
+
+/// An effect of the rig as one run has it.
+struct Own {
+    placed: Placed,
+    /// Its parameters.
+    sizes: Vec<Estimate>,
+    /// Whether the run alone left its first channel quiet.
+    quiet: bool,
+}
+
 /// The effects whose size differs from run to run, as each run has them.
-pub(super) fn found(runs: &[&Closed], members: &[Member<'_>]) -> Vec<Vec<Placed>> {
+pub(super) fn found(runs: &[&Closed]) -> Vec<Vec<Placed>> {
     let mut out: Vec<Vec<Placed>> = vec![Vec::new(); runs.len()];
-    let of_run =
-        |run: &&Closed| -> Vec<Placed> { run.diagnosis.best.fit.placed.iter().filter(|p| is_of_rig(p)).cloned().collect() };
-    let all: Vec<Vec<Placed>> = runs.iter().map(of_run).collect();
-    let mut asked: Vec<Placed> = Vec::new();
-    for p in all.iter().flatten() {
+    let all: Vec<Vec<Own>> = runs.iter().map(|run| of_run(run)).collect();
+    let mut asked: Vec<&Placed> = Vec::new();
+    for p in all.iter().flatten().map(|own| &own.placed) {
         if asked.iter().any(|a| is_same(a, p)) {
             continue;
         }
-        asked.push(p.clone());
-        let each: Vec<Option<Placed>> = all.iter().map(|run| run.iter().find(|q| is_same(q, p)).cloned()).collect();
-        if each.iter().flatten().count() >= FEWEST && differs(runs, members, p, &each) {
-            out.iter_mut().zip(each).for_each(|(own, p)| own.extend(p));
+        asked.push(p);
+        let each: Vec<Option<&Own>> = all.iter().map(|run| run.iter().find(|own| is_same(&own.placed, p))).collect();
+        let has: Vec<&Own> = each.iter().flatten().copied().collect();
+        if has.len() >= FEWEST && differs(&has) {
+            out.iter_mut().zip(each).for_each(|(list, own)| list.extend(own.map(|own| own.placed.clone())));
         }
     }
     out
@@ -40,29 +49,32 @@ pub(super) fn is_same(a: &Placed, b: &Placed) -> bool {
     a.effect.id() == b.effect.id() && a.instance == b.instance
 }
 
-fn is_of_rig(p: &Placed) -> bool {
-    is_named(p) && !p.effect.is_of_every_rig() && p.effect.scope(&p.instance) == Scope::Rig
+fn of_run(run: &Closed) -> Vec<Own> {
+    let of_rig = |p: &Placed| is_named(p) && !p.effect.is_of_every_rig() && p.effect.scope(&p.instance) == Scope::Rig;
+    let quiet = |p: &Placed| {
+        let first = p.instance.channels.first().and_then(|c| run.verdict.channels.get(c));
+        first.is_some_and(|c| c.after.heldout_rms <= LOUD * c.noise_floor_rms)
+    };
+    let placed = run.diagnosis.best.fit.placed.iter().zip(&run.diagnosis.estimates).filter(|(p, _)| of_rig(p));
+    placed
+        .map(|(p, found)| Own {
+            sizes: p.effect.report(&run.context, &p.instance, found.clone()),
+            quiet: quiet(p),
+            placed: p.clone(),
+        })
+        .collect()
 }
 
-/// Share of what a run is off by without the effect that the others' size leaves, from which on theirs is nearer to none than to its own.
-const HALF: f64 = 0.5;
-
-/// Whether, on most of the runs that have it, the run alone left a channel quiet that the size of the other runs leaves loud, and off by more
-/// than half.
-fn differs(runs: &[&Closed], members: &[Member<'_>], p: &Placed, each: &[Option<Placed>]) -> bool {
-    let joint = Joint::of(members);
-    let channels: Vec<&'static str> = joint.channels().into_iter().filter(|c| p.instance.touches(c) && !is_contrast(c)).collect();
-    let was_quiet = |a: &Across| {
-        let alone = runs[a.run].verdict.channels.get(a.channel);
-        alone.is_some_and(|c| c.after.heldout_rms <= LOUD * c.noise_floor_rms)
+/// Whether on most runs the size that is known best differs from the others' by more than half of itself.
+fn differs(has: &[&Own]) -> bool {
+    let known = |e: &Estimate| if e.se > 0.0 { e.value.abs() / e.se } else { 0.0 };
+    let best = has[0].sizes.iter().max_by(|a, b| known(a).total_cmp(&known(b)));
+    let Some(name) = best.map(|e| e.name.as_str()) else { return false };
+    let sizes: Vec<Option<f64>> = has.iter().map(|own| own.sizes.iter().find(|e| e.name == name).map(|e| e.value)).collect();
+    let far = |k: usize| {
+        let others: Vec<f64> = (0..sizes.len()).filter(|i| *i != k).filter_map(|i| sizes[i]).collect();
+        let mean = others.iter().sum::<f64>() / others.len().max(1) as f64;
+        has[k].quiet && sizes[k].is_some_and(|own| !others.is_empty() && (own - mean).abs() > HALF * own.abs())
     };
-    let none = joint.across(&[], Some(&channels));
-    let is_far = |a: &Across| {
-        let without = none.iter().find(|n| n.run == a.run && n.channel == a.channel);
-        a.rms > LOUD * a.floor && without.is_none_or(|n| a.rms > HALF * n.rms)
-    };
-    let theirs = joint.across(std::slice::from_ref(p), Some(&channels));
-    let far = |run: usize| theirs.iter().any(|a| a.run == run && is_far(a) && was_quiet(a));
-    let has: Vec<usize> = (0..each.len()).filter(|run| each[*run].is_some()).collect();
-    2 * has.iter().filter(|run| far(**run)).count() > has.len()
+    2 * (0..has.len()).filter(|k| far(*k)).count() > has.len()
 }

@@ -89,7 +89,7 @@ pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> O
     let contexts: Vec<Context> = runs.iter().map(|run| prepared(&run.log, start)).collect();
     let mut members: Vec<Member<'_>> = runs.iter().zip(&contexts).map(|(run, c)| Member::of(&run.closed, c, &contexts)).collect();
     let closed: Vec<&Closed> = runs.iter().map(|r| &r.closed).collect();
-    let differing = differing::found(&closed, &members);
+    let differing = differing::found(&closed);
     members.iter_mut().zip(differing).for_each(|(m, differing)| m.own.extend(differing));
     let named = choose::choose(&closed, &members, &mut |share| progress(0.6 * share));
     let tenable = folds::tenable(&members, named);
