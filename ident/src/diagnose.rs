@@ -258,6 +258,14 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let placed = || best.fit.placed.iter().zip(&estimates);
         let choices: Vec<bool> = placed().map(|(p, found)| is_named(p) && !p.is_tare() && is_own(p, found)).collect();
         let common = placed().zip(&choices).filter(|((p, _), choice)| is_named(p) && !**choice).count();
+        // what stands in the place of something that every logger has is no question
+        let is_open: Vec<bool> = placed().zip(&choices).filter(|((p, _), _)| is_named(p)).map(|(_, choice)| *choice).collect();
+        let standing = best.names();
+        let asks = |r: &Rival| {
+            let differs = |k: &usize| r.ids[*k] != standing[*k];
+            r.ids.len() != standing.len() || (0..standing.len()).filter(differs).any(|k| is_open[k])
+        };
+        rivals.retain(asks);
         let of_names = |names: usize| of_further_names(names.saturating_sub(common));
         let names = best.names().len();
         probability *= of_names(names);

@@ -74,15 +74,16 @@ impl Effect for ChannelFilter {
     }
 
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
-        // an average over one row of straight lines is a delay by half of it, and within two rows of a jump it cannot be told from one; the
-        // average over a row is what any logger may take
+        // an average over one row of straight lines is a delay by half of it, and within two rows of a jump it cannot be told from one; where
+        // the command jumps between rows, the average over a row is what any logger may take
         let least = match (is_lag(instance), operator::abrupt(context)) {
             (true, true) => 0.6,
             (true, false) => 0.0,
             (false, _) => 2.0,
         };
         let width = fitted.iter().find(|e| e.name == "tau" || e.name == "window");
-        width.is_some_and(|e| e.value > least * context.step()) || self.is_within_a_row(context, fitted)
+        width.is_some_and(|e| e.value > least * context.step())
+            || operator::commands_abruptly(context) && self.is_within_a_row(context, fitted)
     }
 
     fn is_within_a_row(&self, context: &Context, fitted: &[Estimate]) -> bool {
