@@ -11,7 +11,7 @@ use super::figure::Figure;
 use super::page::{cards, is_drawn_together, over_runs, rest, speeds};
 use super::svg::escape;
 use crate::close::Closed;
-use crate::effects::Estimate;
+use crate::effects::{EffectEntry, Estimate};
 use crate::several::{Outcome, Run};
 use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Unexplained, Validation};
 use crate::words::digits;
@@ -71,9 +71,14 @@ fn cards_of(alone: &[Closed], runs: &[Run], outcome: &Outcome) -> Vec<Vec<Figure
     let order = std::iter::once(first).chain((0..runs.len()).filter(|run| *run != first));
     let mut out = vec![Vec::new(); outcome.verdict.effects.len()];
     for run in order.filter(|_| !runs.is_empty()) {
-        for (card, figures) in out.iter_mut().zip(cards(&alone[run])) {
-            if card.is_empty() {
-                *card = figures.into_iter().map(|figure| named(figure, &runs[run])).collect();
+        // what is of one run alone is shown on that one
+        let mut one = alone[run].clone();
+        let shown = |e: &EffectEntry| e.run.as_ref().is_none_or(|of| *of == runs[run].log.name);
+        let places: Vec<usize> = (0..out.len()).filter(|k| shown(&one.verdict.effects[*k])).collect();
+        one.verdict.effects.retain(shown);
+        for (k, figures) in places.into_iter().zip(cards(&one)) {
+            if out[k].is_empty() {
+                out[k] = figures.into_iter().map(|figure| named(figure, &runs[run])).collect();
             }
         }
     }
