@@ -237,9 +237,9 @@ fn the_same_schedule_in_flight_and_on_the_rig() {
     let mut compared = 0;
     for i in 0..rig_t.len() {
         // a step shows in the thrust before the encoder has seen it
-        let held = (0..25).all(|k| i >= k && (rig_rpm[i] - rig_rpm[i - k]).abs() < 3.0)
-            && rig_rpm.get(i + 2).is_none_or(|next| (next - rig_rpm[i]).abs() < 3.0);
         let now = rig_t[i] - rest;
+        let starts = (2.0..2.3).contains(&now);
+        let held = !starts && (0..25).all(|k| i >= k && (rig_rpm[i] - rig_rpm[i - k]).abs() < 3.0);
         if !held || !(0.5..20.9).contains(&now) {
             continue;
         }
