@@ -167,7 +167,7 @@ fn start(record: &Record) -> f64 {
 pub fn driven(flight: &Flight, scene: &Scene<'_>, rotor: usize) -> Vec<(f64, bool)> {
     let record = scene.record;
     let command = &record.command[rotor];
-    let behind = scene.lag.map(|lag| followed(&record.t, command, lag));
+    let behind = scene.lag.map(|lag| followed(&record.t, command, &lag));
     let start = flight.usual.start;
     behind.as_ref().unwrap_or(command).iter().map(|u| (*u, *u > start)).collect()
 }

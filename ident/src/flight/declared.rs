@@ -8,8 +8,8 @@
 //! Reference: specification `flight.md`, "The loop on flights"; Beharie 2013, Eq. 2.25 to 2.35 as corrected in the errata.
 
 use super::channels::Target;
-use super::columns::{Flight, Sink, driven};
-use super::scene::{Broken, GYRO, SPEED, Scene, delayed};
+use super::columns::{Flight, Sink};
+use super::scene::{Broken, Follows, GYRO, SPEED, Scene, delayed};
 use crate::attribution::{Column, Owner, Prior};
 
 /// Thrust coefficients lie this far from what carries the weight in the middle of the flight, as a share.
@@ -108,8 +108,8 @@ fn turning(sink: &mut Sink<'_>) {
     sink.column("spin_up", Prior::positive(SPIN)).window(Target::Turning(2), change);
 }
 
-/// Each rotor's speed, rev/min, from its pulse: powers of the command about its middle, through the rotor's lag if it has one; nothing where the
-/// motor stands still.
+/// Each rotor's speed, rev/min, from its pulse: powers of the command about its middle, none where it turns no motor. The rotor follows what they
+/// add up to with its lag, if it has one.
 fn speeds(sink: &mut Sink<'_>) {
     let (flight, scene) = (sink.flight, sink.scene);
     if flight.record.speed.is_empty() || flight.record.command.is_empty() {
@@ -136,8 +136,13 @@ fn speeds(sink: &mut Sink<'_>) {
 /// What a rotor's speed channel reads for a power of its command about the middle of all commands.
 fn power(flight: &Flight, scene: &Scene<'_>, rotor: usize, power: i32) -> Vec<f64> {
     let [middle, spread] = flight.usual.command;
-    let value = |(u, turns): (f64, bool)| if turns { ((u - middle) / spread).powi(power) } else { 0.0 };
-    let mut out: Vec<f64> = driven(flight, scene, rotor).into_iter().map(value).collect();
+    let command = &scene.record.command[rotor];
+    let value = |u: &f64| if *u > flight.usual.start { ((u - middle) / spread).powi(power) } else { 0.0 };
+    let settles: Vec<f64> = command.iter().map(value).collect();
+    let mut out = match scene.lag {
+        Some(lag) => Follows::of(&scene.record.t, command, &lag).of_rows(&settles),
+        None => settles,
+    };
     match scene.broken[rotor] {
         Some(Broken::Factor(factor, from)) => {
             out.iter_mut().zip(&scene.record.t).filter(|(_, t)| **t >= from).for_each(|(v, _)| *v *= factor);

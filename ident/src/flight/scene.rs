@@ -45,7 +45,7 @@ pub struct Scene<'r> {
     /// By how much specific force, gyro and the rotors' speeds are late, s.
     pub late: [f64; 3],
     /// Time constants of the rotors on the way up and down, s.
-    pub lag: Option<[f64; 2]>,
+    pub lag: Option<Lag>,
     /// What is wrong with a rotor's speed channel.
     pub broken: Vec<Option<Broken>>,
 }
@@ -78,21 +78,26 @@ impl<'r> Scene<'r> {
 
     fn replace(&mut self, refused: usize, from: usize, to: usize) {
         let record = self.record;
-        let behind = |c: &Vec<f64>| self.lag.map_or_else(|| c.clone(), |lag| followed(&record.t, c, lag));
-        let commands: Vec<Vec<f64>> = record.command.iter().map(behind).collect();
+        // what each power of the command adds to a speed, through the lag
+        let powers = |command: &Vec<f64>| -> Vec<Vec<f64>> {
+            let follows = self.lag.map(|lag| Follows::of(&record.t, command, &lag));
+            let power = |k: i32| -> Vec<f64> { command.iter().map(|u| u.powi(k)).collect() };
+            (0..=DEGREE).map(|k| follows.as_ref().map_or_else(|| power(k), |f| f.of_rows(&power(k)))).collect()
+        };
+        let commands: Vec<Vec<Vec<f64>>> = record.command.iter().map(powers).collect();
+        let at = |rotor: usize, row: usize| -> Vec<f64> { commands[rotor].iter().map(|power| power[row]).collect() };
         let mut normal = Normal::new(DEGREE as usize + 1);
-        let powers = |u: f64| -> Vec<f64> { (0..=DEGREE).map(|k| u.powi(k)).collect() };
-        for (rotor, command) in commands.iter().enumerate() {
+        for rotor in 0..commands.len() {
             for row in (0..record.len()).filter(|r| record.flying[*r] && (rotor != refused || !(from..to).contains(r))) {
-                let (u, w) = (command[row], record.speed[rotor][row]);
-                if u.is_finite() && w.is_finite() {
-                    normal.add(&powers(u), w, 1.0);
+                let (u, w) = (at(rotor, row), record.speed[rotor][row]);
+                if u.iter().all(|u| u.is_finite()) && w.is_finite() {
+                    normal.add(&u, w, 1.0);
                 }
             }
         }
         let Some(curve) = normal.solve() else { return };
-        for (drive, command) in self.drive[refused][from..to].iter_mut().zip(&commands[refused][from..to]) {
-            *drive = powers(*command).iter().zip(&curve.coefficients).map(|(p, c)| p * c).sum();
+        for row in from..to {
+            self.drive[refused][row] = at(refused, row).iter().zip(&curve.coefficients).map(|(p, c)| p * c).sum();
         }
     }
 
@@ -192,20 +197,65 @@ pub fn delayed(t: &[f64], values: &[f64], by: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A rotor that follows `target` with one time constant on the way up and another down; between two rows its target is their mean.
-#[must_use]
-pub fn followed(t: &[f64], target: &[f64], [up, down]: [f64; 2]) -> Vec<f64> {
-    let mut state = target.first().copied().unwrap_or(0.0);
-    let mut out = Vec::with_capacity(t.len());
-    for i in 0..target.len() {
-        if i > 0 {
-            let aim = 0.5 * (target[i - 1] + target[i]);
-            let tau = if aim > state { up } else { down };
-            state = if aim.is_finite() { aim + (state - aim) * (-(t[i] - t[i - 1]) / tau.max(1e-6)).exp() } else { state };
-        }
-        out.push(state);
+/// How late the rotors follow their commands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lag {
+    /// Time constant on the way up, s.
+    pub up: f64,
+    /// Time constant on the way down, s.
+    pub down: f64,
+    /// Share of the time between two rows for which the command of the later one holds already: a controller's pulse jumps somewhere between them.
+    pub phase: f64,
+}
+
+/// How a rotor follows its command, row by row. Whether it is on its way up or down is the command's to say, so that what a rotor settles at, or
+/// any part of that, follows by the same rows.
+#[derive(Debug, Clone)]
+pub struct Follows {
+    /// Shares of the distance to the target that are left after the two parts of the time to the next row; one where nothing is known of the
+    /// command.
+    left: Vec<[f64; 2]>,
+}
+
+impl Follows {
+    /// For a command.
+    #[must_use]
+    pub fn of(t: &[f64], command: &[f64], lag: &Lag) -> Self {
+        let mut state = command.first().copied().unwrap_or(0.0);
+        let mut part = |goal: f64, dt: f64| {
+            let tau = if goal > state { lag.up } else { lag.down };
+            let left = (-dt / tau.max(1e-6)).exp();
+            state = goal + (state - goal) * left;
+            left
+        };
+        let row = |i: usize| match [command[i], command[i + 1], t[i + 1] - t[i]] {
+            [now, next, dt] if now.is_finite() && next.is_finite() => [part(now, dt * (1.0 - lag.phase)), part(next, dt * lag.phase)],
+            _ => [1.0; 2],
+        };
+        Self { left: (0..command.len().saturating_sub(1)).map(row).collect() }
     }
-    out
+
+    /// What follows `target`.
+    #[must_use]
+    pub fn of_rows(&self, target: &[f64]) -> Vec<f64> {
+        let mut state = target.first().copied().unwrap_or(0.0);
+        let follow = |(left, ends): (&[f64; 2], &[f64])| {
+            if ends.iter().all(|e| e.is_finite()) {
+                for (left, goal) in left.iter().zip(ends) {
+                    state = goal + (state - goal) * left;
+                }
+            }
+            state
+        };
+        let first = target.first().copied();
+        first.into_iter().chain(self.left.iter().zip(target.windows(2)).map(follow)).collect()
+    }
+}
+
+/// A command as a rotor follows it.
+#[must_use]
+pub fn followed(t: &[f64], command: &[f64], lag: &Lag) -> Vec<f64> {
+    Follows::of(t, command, lag).of_rows(command)
 }
 
 #[cfg(test)]
@@ -236,8 +286,21 @@ mod tests {
     fn a_rotor_follows() {
         let t: Vec<f64> = (0..1000).map(|i| 0.001 * f64::from(i)).collect();
         let aim: Vec<f64> = t.iter().map(|t| if *t < 0.0005 || *t >= 0.5 { 0.0 } else { 1.0 }).collect();
-        let seen = followed(&t, &aim, [0.05, 0.1]);
+        let lag = Lag { up: 0.05, down: 0.1, phase: 0.5 };
+        let seen = followed(&t, &aim, &lag);
         assert!((seen[50] - (1.0 - (-1.0f64).exp())).abs() < 0.01, "{}", seen[50]);
         assert!((seen[599] / seen[499] - (-1.0f64).exp()).abs() < 0.01, "{}", seen[599]);
+        // what it settles at, a curve of the command, is reached in the same time: the lag is the rotor's, not the command's
+        let settles: Vec<f64> = aim.iter().map(|a| 10.0 * a * a).collect();
+        let turns = Follows::of(&t, &aim, &lag).of_rows(&settles);
+        assert!(turns.iter().zip(&seen).all(|(w, u)| (w - 10.0 * u).abs() < 1e-9));
+    }
+
+    /// A command that came right after the row before has driven for the whole row, one that came right before its own row not at all.
+    #[test]
+    fn a_command_jumps_within_its_row() {
+        let first = |phase: f64| followed(&[0.0, 0.02], &[0.0, 1.0], &Lag { up: 0.1, down: 0.1, phase })[1];
+        assert!((first(1.0) - (1.0 - (-0.2f64).exp())).abs() < 1e-12 && first(0.0) == 0.0);
+        assert!((first(0.25) - (1.0 - (-0.05f64).exp())).abs() < 1e-12);
     }
 }

@@ -1,6 +1,7 @@
 //! `spinup_lag`: the rotors follow their pulses with a lag.
 //!
-//! What it is: first order, with one time constant on the way up and another down. Where no speed was measured, thrust and moments lag.
+//! What it is: first order, with one time constant on the way up and another down. The pulse jumps somewhere between two rows: where, is a
+//! parameter. Where no speed was measured, thrust and moments lag.
 //! What can go wrong: pulses that hardly move show no lag.
 //! Units: s.
 //! Reference: Beharie 2013, section 5.3; Eschmann, Albani & Loianno, 2024 (motor delays of the Crazyflie).
@@ -8,7 +9,7 @@
 use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope};
 use crate::attribution::Shape;
 use crate::flight::columns::Flight;
-use crate::flight::scene::{Scene, followed};
+use crate::flight::scene::{Lag, Scene, followed};
 use crate::verdict::Parameter;
 
 pub(super) struct SpinupLag;
@@ -49,8 +50,9 @@ impl AirframeEffect for SpinupLag {
             return Vec::new();
         }
         let along = |name| Shape { name, unit: "s", range: RANGE };
-        let starts = STARTS.map(|s| vec![s, s]).to_vec();
-        vec![Form { shapes: vec![along("tau_up"), along("tau_down")], starts, ..Form::default() }]
+        let phase = Shape { name: "phase", unit: "1", range: (0.0, 1.0) };
+        let starts = STARTS.map(|s| vec![s, s, 0.5]).to_vec();
+        vec![Form { shapes: vec![along("tau_up"), along("tau_down"), phase], starts, ..Form::default() }]
     }
 
     fn alters(&self) -> bool {
@@ -58,10 +60,11 @@ impl AirframeEffect for SpinupLag {
     }
 
     fn alter(&self, flight: &Flight, _: &Form, shape: &[f64], scene: &mut Scene<'_>) {
-        let lag = [shape[0], shape[1]];
+        let [up, down, phase] = *shape else { return };
+        let lag = Lag { up, down, phase };
         scene.lag = Some(lag);
         if flight.record.speed.is_empty() {
-            scene.drive = flight.record.command.iter().map(|c| followed(&flight.record.t, c, lag)).collect();
+            scene.drive = flight.record.command.iter().map(|c| followed(&flight.record.t, c, &lag)).collect();
         }
     }
 
