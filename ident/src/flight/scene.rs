@@ -229,7 +229,9 @@ impl Follows {
             left
         };
         let row = |i: usize| match [command[i], command[i + 1], t[i + 1] - t[i]] {
-            [now, next, dt] if now.is_finite() && next.is_finite() => [part(now, dt * (1.0 - lag.phase)), part(next, dt * lag.phase)],
+            [now, next, dt] if now.is_finite() && next.is_finite() => {
+                [part(now, dt * (1.0 - lag.phase)), part(next, dt * lag.phase)]
+            }
             _ => [1.0; 2],
         };
         Self { left: (0..command.len().saturating_sub(1)).map(row).collect() }

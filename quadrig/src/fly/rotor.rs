@@ -58,6 +58,8 @@ const LEVEL_US: f64 = 5.0;
 const FIRST_S: f64 = 1.5e-3;
 /// Where the lag of a rotor that follows is taken, us.
 const MIDDLE_US: f64 = 1500.0;
+/// Place of the latency among the shapes of a rotor that coasts.
+const LATENCY: usize = 3;
 /// Rows and time that each level is held.
 const LEVEL_ROWS: usize = 20;
 /// Rows at the end of a level that the next one reaches into: a change of speed is told by the rows on both sides.
@@ -80,6 +82,10 @@ impl ModelRotor {
         for added in flying.effects.iter_mut().filter(|e| e.placed.effect.scope(&e.placed.instance) == Scope::Event) {
             // its only shape is the instant
             added.placed.shape.iter_mut().for_each(|t0| *t0 = f64::MIN);
+        }
+        // a command that jumps between two rows of a log seems as late as its instant is unknown; a flight knows when its commands come
+        for lag in flying.effects.iter_mut().filter(|e| e.placed.instance.form == "coasting_of_steps") {
+            lag.placed.shape[LATENCY] = 0.0;
         }
         // where the run saw the rotor stand still, what its force and torque read then is the zero of the day
         for p in &mut flying.polynomials {
