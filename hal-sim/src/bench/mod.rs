@@ -22,23 +22,23 @@
 //! # let _ = (wake, strain_v, beep);
 //! ```
 
+mod gives;
 mod imbalance;
-mod parts;
 mod steps;
 
-pub use parts::{BenchParts, CONVERSION_HZ, Listens, Millisecond, Truth};
+pub use gives::{CONVERSION_HZ, Listens, Millisecond, Truth};
 
-use crate::effect::{Levers, Scheduled};
+use crate::effect::{Levers, Scheduled, fitted, open};
 use crate::noise::{Source, Stream};
+use crate::parts::BenchParts;
 use crate::plant::beam::BeamMode;
 use crate::plant::bridge::BridgeState;
 use crate::plant::mount::MountState;
 use crate::plant::powerplant::STEPS_PER_MS;
-use crate::plant::{Beam, EscDialogue, EscState, Mount, PlantBlock, Powerplant, RigPlant};
-use crate::scenario::Scenario;
+use crate::plant::{BackEmf, Beam, EscDialogue, EscState, Mount, PlantBlock, Powerplant, RigPlant};
 use crate::sensor::back_emf::BackEmfState;
 use crate::sensor::{
-    AnalogFront, BackEmf, BackEmfMeter, Comparator, Converter, Edge, EdgeDetail, EscTelemetry, EscWire, Geometry, Logger,
+    AnalogFront, BackEmfMeter, Comparator, Converter, Edge, EdgeDetail, EscTelemetry, EscWire, Geometry, Logger,
     Tachometers,
 };
 use esc_pwm::dshot::Frame;
@@ -47,7 +47,6 @@ use frame::message::Beep;
 use frame::rig::ADC_CHANNELS;
 use frame::units::Ticks;
 use imbalance::Whirl;
-use parts::{fitted, open};
 use std::collections::VecDeque;
 
 /// Integration step, ns.
@@ -56,6 +55,17 @@ pub const STEP_NS: u64 = 100_000;
 pub const STEP_S: f64 = 1.0e-4;
 /// Standard gravity, m/s^2.
 const G: f64 = 9.806_65;
+
+/// A rig before a run.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// What it is built of.
+    pub parts: BenchParts,
+    /// What it does beside; 128 at the most.
+    pub effects: Vec<Scheduled>,
+    /// Of everything that is drawn.
+    pub seed: u64,
+}
 
 /// The rig.
 pub struct Bench {
@@ -108,15 +118,13 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// A bench at rest without ESC power. `plant` takes the place of the scenario's own powerplant; effects on the
+    /// A bench at rest without ESC power. `plant` takes the place of the rig's own powerplant; effects on the
     /// powerplant then have nothing to act on, those on the load cell and the sensors still do.
     #[must_use]
-    pub fn new(scenario: &Scenario, plant: Option<Box<dyn Powerplant>>, detail: EdgeDetail) -> Self {
-        let base = scenario.parts();
-        let effects = scenario.effects.clone();
+    pub fn new(setup: impl Into<Setup>, plant: Option<Box<dyn Powerplant>>, detail: EdgeDetail) -> Self {
+        let Setup { parts: base, effects, seed } = setup.into();
         let open = open(&effects, -1.0);
         let parts = fitted(&base, &effects, open);
-        let seed = scenario.seed;
         let mut phase = Stream::new(seed, Source::Phase, 0);
         let angle_rev = phase.uniform();
         let cells = parts.plant.supply.cells();
@@ -340,61 +348,6 @@ impl Bench {
             marks: self.geometry.marks(),
             adc: self.front.scales(),
             pole_pairs: [self.base.plant.motor.pole_pairs as u16; 2],
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use frame::rig::CAPTURE_CHANNELS;
-
-    /// The native run's millisecond at once gives what the emulated board's steps give.
-    #[test]
-    fn a_millisecond_at_once_is_its_ten_steps() {
-        for effect in
-            [None, Some("beam_resonance"), Some("spinup_lag"), Some("clock_drift"), Some("loosening_mount"), Some("encoder_drag")]
-        {
-            let scenario = Scenario::demo(3, effect).unwrap_or_else(|e| panic!("{e}"));
-            let bench = || {
-                let mut bench = Bench::new(&scenario, None, EdgeDetail::Captured);
-                bench.set_power(true);
-                bench
-            };
-            let (mut fast, mut slow) = (bench(), bench());
-            let mut out = Millisecond::default();
-            let mut turned = 0;
-            for ms in 0..12_000u64 {
-                let width = if ms < 5_000 { 1_000_000 } else { 1_700_000 };
-                for bench in [&mut fast, &mut slow] {
-                    bench.listen(Listens { esc: true, back_emf: true });
-                    if ms == 5_500 {
-                        bench.start_run();
-                    }
-                    if ms % 20 == 2 {
-                        bench.pulse(ms * 1_000_000, width);
-                    }
-                }
-                fast.millisecond(&mut out);
-                slow.advance_to((ms + 1) * 1_000_000);
-                let mut edges: [Vec<u32>; CAPTURE_CHANNELS] = Default::default();
-                while let Some(edge) = slow.edge_until(u64::MAX) {
-                    edges[usize::from(edge.channel)].push(edge.at_ticks as u32);
-                }
-                assert_eq!(out.edges, edges, "{effect:?} {ms} ms");
-                let turns = std::iter::from_fn(|| slow.turn_until(u64::MAX));
-                turned += out.back_emf.len();
-                assert!(
-                    turns.filter(|e| e.rising).map(|e| e.at_ticks as u32).eq(out.back_emf.iter().copied()),
-                    "{effect:?} {ms} ms"
-                );
-                let words: Vec<u16> = std::iter::from_fn(|| slow.esc_word((ms + 1) * 1_000_000)).collect();
-                assert_eq!(out.esc, words, "{effect:?} {ms} ms");
-                assert_eq!(fast.truth(), slow.truth(), "{effect:?} {ms} ms");
-                assert_eq!(fast.voltages(), slow.voltages(), "{effect:?} {ms} ms");
-            }
-            assert!(fast.truth().plant.rpm > 1000.0);
-            assert!(turned > 1000, "{turned} electrical turns");
         }
     }
 }

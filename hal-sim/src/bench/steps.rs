@@ -6,9 +6,8 @@
 //! Reference: house rule 7; `docs/speed.md`, for what is computed part by part.
 
 use super::imbalance::{SPEEDS, turn_cosine};
-use super::parts::open;
 use super::{Bench, Millisecond, STEP_NS, STEP_S, Truth};
-use crate::effect::Levers;
+use crate::effect::{Levers, open};
 use crate::plant::bridge::Load;
 use crate::plant::powerplant::STEPS_PER_MS;
 use crate::plant::{Beam, EscState};

@@ -5,8 +5,8 @@
 //! Units: K/s.
 //! Reference: ideal gas law; ISO 2533.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

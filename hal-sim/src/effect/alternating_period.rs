@@ -6,8 +6,8 @@
 //! Units: deg, deviation from 180.
 //! Reference: Beharie 2013 section 5.7.1 and Fig. 5.27.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

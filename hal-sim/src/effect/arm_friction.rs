@@ -6,8 +6,8 @@
 //! Units: N.m.
 //! Reference: Jenkins element; the thrust beam's own is `hysteresis`. Not in the library of `ident`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

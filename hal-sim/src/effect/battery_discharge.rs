@@ -5,8 +5,8 @@
 //! Units: A.h, ohm, 0..1 of charge.
 //! Reference: Beharie 2013 Table 8 (three-cell packs) and errata 5.59; cell curve in `plant/supply.rs`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use crate::plant::supply::{Source, Supply};
 use serde::{Deserialize, Serialize};

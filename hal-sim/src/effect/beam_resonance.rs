@@ -6,8 +6,8 @@
 //! Units: Hz, 1, g.mm, s.
 //! Reference: Beharie 2013 section 5.7.1; errata "beam (Table 7)": 41.9 Hz with 244 g at the tip, damping ratio 0.01-0.03.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use crate::plant::Beam;
 use serde::{Deserialize, Serialize};

@@ -5,8 +5,8 @@
 //! Units: rev/min, 1.
 //! Reference: Beharie 2013 section 2.4 (aero-elastic blades).
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -7,8 +7,8 @@
 //! Reference: Beharie 2013 section 5.7.1, Fig. 5.54-5.55. Whole revolutions of the same mark cancel any constant twist, so
 //! extra edges are the only way to over-read.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

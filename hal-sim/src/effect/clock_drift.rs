@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct ClockDrift {
     /// Seconds late a second, not negative.
-    #[serde(deserialize_with = "crate::scenario::not_negative")]
+    #[serde(deserialize_with = "crate::number::not_negative")]
     pub rate: f64,
 }
 

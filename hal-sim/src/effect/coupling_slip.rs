@@ -7,8 +7,8 @@
 //! Reference: torque balance of a shaft with viscous drag c behind a friction coupling with viscous part d: slope c/(c + d)
 //! of the excess is lost.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@
 //! Units: share of the load, s.
 //! Reference: Kelvin-Voigt element; specification `closing-the-loop.md`, `creep`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@
 //! Units: A.
 //! Reference: specification `closing-the-loop.md`, `current_limit`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

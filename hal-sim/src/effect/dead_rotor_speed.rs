@@ -6,8 +6,8 @@
 //! Units: 1, channel number.
 //! Reference: Beharie 2013 section 5.7.1 (red blade); specification `rig.md`, faults.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

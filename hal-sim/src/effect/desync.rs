@@ -6,8 +6,8 @@
 //! Units: A, s.
 //! Reference: sensorless commutation, Hendershot & Miller 2010, 9.5. Not in the library of `ident`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

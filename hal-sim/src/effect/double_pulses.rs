@@ -5,8 +5,8 @@
 //! Units: 1, channel number, deg.
 //! Reference: Beharie 2013 section 5.7.1 and Fig. 5.14 (edges that ring).
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -6,8 +6,8 @@
 //! Units: rev/min, electrical deg.
 //! Reference: phase advance, Hendershot & Miller 2010, chapter 8. Not in the library of `ident`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@
 //! Units: N.
 //! Reference: Jenkins element (spring and slider); specification `closing-the-loop.md`, `hysteresis`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -6,8 +6,8 @@
 //! Units: deg, revolutions.
 //! Reference: Junker 1969, self-loosening of bolted joints. Not in the library of `ident`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

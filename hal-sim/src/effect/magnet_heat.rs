@@ -7,8 +7,8 @@
 //! Reference: NdFeB loses 0.11 %/K reversibly; demagnetisation beyond the knee, Hendershot & Miller 2010, chapter 3. Not in
 //! the library of `ident`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

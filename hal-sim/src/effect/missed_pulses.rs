@@ -5,8 +5,8 @@
 //! Units: 1, channel number.
 //! Reference: specification `closing-the-loop.md`, `missed_pulses`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -9,14 +9,15 @@
 //!
 //! A new effect is one file and one line in the list below.
 
-use crate::bench::BenchParts;
 use crate::noise::{Source, Stream};
+use crate::parts::BenchParts;
 use crate::plant::PlantLevers;
 use frame::rig::ADC_CHANNELS;
 use serde::{Deserialize, Serialize};
 
 mod scheduled;
 pub use scheduled::Scheduled;
+pub(crate) use scheduled::{fitted, open};
 
 /// Parameters that effects move during a run. The default is a healthy rig.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,8 +5,8 @@
 //! Units: deg, channel number.
 //! Reference: specification `rig.md`, "The simulator" (noisy sensors). Not in the library of `ident`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

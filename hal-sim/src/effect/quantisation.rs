@@ -5,8 +5,8 @@
 //! Units: N.
 //! Reference: specification `closing-the-loop.md`, `quantisation`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

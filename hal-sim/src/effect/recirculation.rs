@@ -6,8 +6,8 @@
 //! Units: 1, s.
 //! Reference: momentum theory with inflow, Leishman 2006, 2.3 and 3.3. Not in the library of `ident`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

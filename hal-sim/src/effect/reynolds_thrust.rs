@@ -5,8 +5,8 @@
 //! Units: 1.
 //! Reference: Deters, Ananda & Selig 2014, small propellers.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

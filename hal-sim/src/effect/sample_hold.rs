@@ -5,8 +5,8 @@
 //! Units: s.
 //! Reference: specification `closing-the-loop.md`, `sample_hold`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -7,6 +7,7 @@
 //! Reference: specification `rig.md`, "Faults can be injected at any time".
 
 use super::EffectKind;
+use crate::parts::BenchParts;
 use serde::{Deserialize, Serialize};
 
 /// An effect and its window. Without a window it acts throughout, parts that it changes from power-on.
@@ -42,4 +43,18 @@ impl core::ops::Deref for Scheduled {
     fn deref(&self) -> &EffectKind {
         &self.effect
     }
+}
+
+/// Bits of the effects whose windows are open `run_s` into the run. A run holds at most 128 effects.
+pub(crate) fn open(effects: &[Scheduled], run_s: f64) -> u128 {
+    effects.iter().enumerate().filter(|(_, e)| e.is_open(run_s)).fold(0, |bits, (i, _)| bits | 1 << i)
+}
+
+/// The parts with the effects of `open` fitted.
+pub(crate) fn fitted(base: &BenchParts, effects: &[Scheduled], open: u128) -> BenchParts {
+    let mut parts = base.clone();
+    for (_, effect) in effects.iter().enumerate().filter(|(i, _)| open & (1 << i) != 0) {
+        effect.fit(&mut parts);
+    }
+    parts
 }

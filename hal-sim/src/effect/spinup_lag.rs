@@ -5,8 +5,8 @@
 //! Units: s.
 //! Reference: first-order spin-up model, Pounds et al. 2010; the ESC's "acceleration" setting, Beharie 2013 Appendix C.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

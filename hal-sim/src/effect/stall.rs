@@ -7,8 +7,8 @@
 //! Reference: Leishman 2006, *Principles of Helicopter Aerodynamics*, 7.1; lift grows with r^2, torque with r^3 along the
 //! blade.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

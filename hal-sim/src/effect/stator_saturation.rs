@@ -6,8 +6,8 @@
 //! Units: A, s.
 //! Reference: saturation of the teeth, Hendershot & Miller 2010, chapter 3. Not in the library of `ident`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

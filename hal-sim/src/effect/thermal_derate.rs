@@ -5,8 +5,8 @@
 //! Units: s, share of the output at 7 A.
 //! Reference: Beharie 2013 Appendix C, protection C; lumped-capacitance heating.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

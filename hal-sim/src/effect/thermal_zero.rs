@@ -5,8 +5,8 @@
 //! Units: N/K, K/W, K/s, s.
 //! Reference: Beharie 2013 section 5.3 and Table 6 (gauge temperature coefficient 10.8 or 11.7 ppm/K, errata "App. B").
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

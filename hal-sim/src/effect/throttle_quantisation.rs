@@ -5,8 +5,8 @@
 //! Units: us.
 //! Reference: specification `closing-the-loop.md`, `throttle_quantisation`.
 
+use crate::parts::BenchParts;
 use super::Effect;
-use crate::bench::BenchParts;
 use crate::noise::Stream;
 use serde::{Deserialize, Serialize};
 

@@ -12,7 +12,6 @@ use super::chip::{ChipKind, SensorChip, Served};
 use super::errors::Errors;
 use super::hidden::Hidden;
 use crate::clock::VirtualClock;
-use crate::scenario::{FaultKind, Scenario, ScheduledFault};
 use embedded_hal::i2c::{Error, ErrorKind, ErrorType, I2c, NoAcknowledgeSource, Operation};
 
 /// One bit at 400 kHz, ns.
@@ -50,24 +49,10 @@ pub enum BusFault {
 }
 
 impl BusFault {
-    /// The fault that a scenario schedules, its times counted from power-up of the board; the first one, for the board takes one a run.
+    /// A data line that is held from an instant on, ns, until the bus is freed as it should be.
     #[must_use]
-    pub fn of(scenario: &Scenario) -> Self {
-        Self::first(&scenario.faults)
-    }
-
-    /// The first fault of the bus among `faults`.
-    #[must_use]
-    pub fn first(faults: &[ScheduledFault]) -> Self {
-        let ns = |s: f64| (s * 1.0e9) as u64;
-        let fault = faults.iter().find_map(|fault| match fault.kind {
-            FaultKind::I2cNack { chip } => {
-                Some(Self::LoosePlug { nth: usize::from(chip), off_ns: ns(fault.from_s), back_ns: ns(fault.until_s) })
-            }
-            FaultKind::I2cStuck => Some(Self::HeldData { from_ns: ns(fault.from_s), clocks: FREEING_CLOCKS }),
-            _ => None,
-        });
-        fault.unwrap_or_default()
+    pub fn held(from_ns: u64) -> Self {
+        Self::HeldData { from_ns, clocks: FREEING_CLOCKS }
     }
 }
 

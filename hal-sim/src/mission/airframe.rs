@@ -7,9 +7,10 @@
 
 use crate::flight::airframe::{ARM_M, Build, DRAG_AREA_M2};
 use crate::flight::{Airframe, Rotor};
+use crate::number::{not_negative, positive};
 use crate::plant::{Parts, supply::Source};
 use crate::scenario::{NoiseSection, Scenario, ScenarioError, SupplySection};
-use crate::scenario::{motor_name, not_negative, parsed, positive, propeller_name, text_of};
+use crate::scenario::{motor_name, parsed, propeller_name, text_of};
 use serde::{Deserialize, Deserializer, de::Error};
 use std::path::Path;
 

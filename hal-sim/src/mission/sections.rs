@@ -9,7 +9,7 @@ use crate::flight::Gains;
 use crate::flight::Vector;
 use crate::flight::autopilot::SetPoint;
 use crate::imu::Motion;
-use crate::scenario::not_negative;
+use crate::number::not_negative;
 use serde::{Deserialize, Deserializer, de::Error};
 use toml::Spanned;
 

@@ -41,7 +41,7 @@ pub use meter::Meter;
 pub use motor::Motor;
 pub use mount::Mount;
 pub use parts::Parts;
-pub use powerplant::{PlantBlock, PlantLevers, PlantState, Powerplant};
+pub use powerplant::{BackEmf, PlantBlock, PlantLevers, PlantState, Powerplant};
 pub use propeller::Propeller;
 pub use rig_plant::RigPlant;
 pub use room_air::RoomAir;

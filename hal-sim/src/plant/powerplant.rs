@@ -7,7 +7,6 @@
 //! Reference: specification `closing-the-loop.md`, step 9.
 
 use super::parts::Parts;
-use crate::sensor::BackEmf;
 
 /// What the powerplant does at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -24,6 +23,15 @@ pub struct PlantState {
     pub voltage_v: f64,
     /// Temperature of the rig, degC.
     pub temp_c: f64,
+}
+
+/// What the windings give at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BackEmf {
+    /// Amplitude of the voltage between two windings, V: the back-EMF constant 60/(2 pi KV) times the speed in rad/s.
+    pub amplitude_v: f64,
+    /// Electrical turns in a turn of the rotor.
+    pub pole_pairs: u32,
 }
 
 /// Steps of the bench in a millisecond.

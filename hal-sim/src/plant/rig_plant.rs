@@ -11,12 +11,11 @@ use super::fixed::Fixed;
 use super::flux::FluxState;
 use super::limiter::LimiterState;
 use super::parts::Parts;
-use super::powerplant::{PlantBlock, PlantLevers, PlantState, Powerplant, STEPS_PER_MS};
+use super::powerplant::{BackEmf, PlantBlock, PlantLevers, PlantState, Powerplant, STEPS_PER_MS};
 use super::room_air::Draught;
 use super::shaft::{Acting, Shaft, Turns, show};
 use super::thermal::ThermalState;
 use crate::noise::{Coloured, Source, Stream};
-use crate::sensor::BackEmf;
 use core::f64::consts::TAU;
 
 /// rev/min in one rad/s.

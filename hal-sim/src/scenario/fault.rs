@@ -5,6 +5,8 @@
 //! Units: s of the run's own time; probability.
 //! Reference: specification `rig.md`, "The simulator" (faults at any time).
 
+use super::Scenario;
+use crate::imu::BusFault;
 use serde::{Deserialize, Serialize};
 
 /// A fault and its window.
@@ -72,5 +74,27 @@ impl ScheduledFault {
     #[must_use]
     pub fn is_on(&self, run_s: f64) -> bool {
         (self.from_s..self.until_s).contains(&run_s)
+    }
+}
+
+impl BusFault {
+    /// The fault that a scenario schedules, its times counted from power-up of the board; the first one, for the board takes one a run.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        Self::first(&scenario.faults)
+    }
+
+    /// The first fault of the bus among `faults`.
+    #[must_use]
+    pub fn first(faults: &[ScheduledFault]) -> Self {
+        let ns = |s: f64| (s * 1.0e9) as u64;
+        let fault = faults.iter().find_map(|fault| match fault.kind {
+            FaultKind::I2cNack { chip } => {
+                Some(Self::LoosePlug { nth: usize::from(chip), off_ns: ns(fault.from_s), back_ns: ns(fault.until_s) })
+            }
+            FaultKind::I2cStuck => Some(Self::held(ns(fault.from_s))),
+            _ => None,
+        });
+        fault.unwrap_or_default()
     }
 }

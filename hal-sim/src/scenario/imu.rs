@@ -7,10 +7,10 @@
 //! Units: each key carries its own; body axes FRD, earth NED.
 //! Reference: `docs/scenario.md`, "The IMU board"; specification `ahrs.md`, "Sensors".
 
-use super::section::{not_negative, positive};
 use super::{FaultKind, ScheduledFault};
 use crate::imu::{BusFault, ChipErrors, ChipKind, Errors, Hidden, ImuScheduled, Motion};
 use crate::native::ahrs::ImuRig;
+use crate::number::{not_negative, positive};
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 /// Gauss in a microtesla.

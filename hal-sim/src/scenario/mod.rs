@@ -18,8 +18,10 @@ pub use section::{
     SupplySection,
 };
 
-use crate::bench::BenchParts;
+use crate::bench::Setup;
 use crate::effect::{self, Scheduled};
+use crate::number::positive;
+use crate::parts::BenchParts;
 use crate::plant::{
     Air, Beam, Blade, Bridge, Commutation, Esc, Flux, Guard, Limiter, Motor, Mount, Parts, Propeller, RoomAir, Supply, Thermal,
     supply,
@@ -27,7 +29,6 @@ use crate::plant::{
 use crate::sensor::{EscErrors, Geometry};
 use frame::rig::CAPTURE_CHANNELS;
 use frame::units::PulseWidth;
-pub(crate) use section::{not_negative, positive};
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned, de::Error};
 use std::path::{Path, PathBuf};
 
@@ -228,6 +229,12 @@ impl Scenario {
             bridge: Bridge { zero_temperature_c: self.air.temperature_c, ..Bridge::default() },
             noise: [n.thrust_n, n.torque_nm, n.current_a, n.voltage_v, n.temp_k],
         }
+    }
+}
+
+impl From<&Scenario> for Setup {
+    fn from(scenario: &Scenario) -> Self {
+        Self { parts: scenario.parts(), effects: scenario.effects.clone(), seed: scenario.seed }
     }
 }
 

@@ -5,6 +5,7 @@
 //! Units: each key carries its own.
 //! Reference: `docs/scenario.md`.
 
+use crate::number::{checked, not_negative, positive};
 use crate::plant::{CutOff, Guard};
 use frame::message::MAX_UPLOAD;
 use schedule::{Plan, Replay, ScheduleError, part};
@@ -361,19 +362,6 @@ impl Schedule {
             _ => None,
         }
     }
-}
-
-fn checked<'de, D: Deserializer<'de>>(d: D, ok: impl Fn(f64) -> bool, expected: &str) -> Result<f64, D::Error> {
-    let value = f64::deserialize(d)?;
-    if ok(value) { Ok(value) } else { Err(D::Error::custom(format!("expected {expected}, found {value}"))) }
-}
-
-pub(crate) fn positive<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
-    checked(d, |v| v > 0.0 && v.is_finite(), "a number above 0")
-}
-
-pub(crate) fn not_negative<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
-    checked(d, |v| v >= 0.0 && v.is_finite(), "a number not below 0")
 }
 
 /// Longest time that a schedule may name, s; that of schedule files.

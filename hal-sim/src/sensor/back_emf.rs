@@ -9,15 +9,7 @@
 //! the K1 are not stated: 0.15 V and 0.5 s are assumed.
 
 use crate::noise::{Source, Stream};
-
-/// What the windings give at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BackEmf {
-    /// Amplitude of the voltage between two windings, V: the back-EMF constant 60/(2 pi KV) times the speed in rad/s.
-    pub amplitude_v: f64,
-    /// Electrical turns in a turn of the rotor.
-    pub pole_pairs: u32,
-}
+use crate::plant::BackEmf;
 
 /// The meter's properties.
 #[derive(Debug, Clone, Copy, PartialEq)]

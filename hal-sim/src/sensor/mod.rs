@@ -15,7 +15,7 @@ pub mod logger;
 pub mod tachometers;
 
 pub use adc::{AnalogFront, Converter};
-pub use back_emf::{BackEmf, BackEmfMeter, Comparator};
+pub use back_emf::{BackEmfMeter, Comparator};
 pub use edge::{Edge, EdgeDetail, Geometry};
 pub use esc_telemetry::{EscErrors, EscTelemetry, EscWire};
 pub use logger::Logger;

@@ -17,17 +17,19 @@ pub struct Shape {
     pub unit: &'static str,
     /// Plausible range, over which it is expected evenly.
     pub range: (f64, f64),
+    /// Whether nothing lies beyond the range, so that its ends are values like any other (a share).
+    pub closed: bool,
 }
 
 /// Share of a range within which a value lies on its edge.
 const EDGE: f64 = 2e-3;
 
 impl Shape {
-    /// Whether a value lies inside the range and not on its edge.
+    /// Whether a value lies inside the range, and not on an edge that stands for what lies beyond.
     #[must_use]
     pub fn inside(&self, value: f64) -> bool {
         let (lo, hi) = self.range;
-        ((value - lo) / (hi - lo) - 0.5).abs() < 0.5 - EDGE
+        self.closed || ((value - lo) / (hi - lo) - 0.5).abs() < 0.5 - EDGE
     }
 }
 

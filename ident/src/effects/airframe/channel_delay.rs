@@ -57,7 +57,7 @@ impl AirframeEffect for ChannelDelay {
         let there =
             [record.force.is_some(), record.rate.is_some() && !record.vehicle.rotors.is_empty(), !record.speed.is_empty()];
         let rows = 2.0 * usual_step(&record.t);
-        let shape = || Shape { name: "delay", unit: "s", range: (rows, LONGEST_S.max(2.0 * rows)) };
+        let shape = || Shape { name: "delay", unit: "s", range: (rows, LONGEST_S.max(2.0 * rows)), closed: false };
         let form = |index: usize| Form {
             name: GROUPS[index].to_owned(),
             index,

@@ -60,10 +60,10 @@ impl AirframeEffect for DeadRotorSpeed {
         if record.speed.is_empty() || record.command.is_empty() || record.rotors() < 2 {
             return Vec::new();
         }
-        let factor = || Shape { name: "factor", unit: "1", range: RANGE };
+        let factor = || Shape { name: "factor", unit: "1", range: RANGE, closed: false };
         let (first, last) = (record.t.first().copied().unwrap_or(0.0), record.t.last().copied().unwrap_or(1.0));
         let at = |share: f64| first + share * (last - first);
-        let onset = || Shape { name: "t0", unit: "s", range: (at(0.02), at(0.98)) };
+        let onset = || Shape { name: "t0", unit: "s", range: (at(0.02), at(0.98)), closed: false };
         let mut out = Vec::new();
         for index in 0..record.rotors() {
             let named = |what: &str| format!("rotor {}{what}", index + 1);

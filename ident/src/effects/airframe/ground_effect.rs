@@ -57,7 +57,7 @@ impl AirframeEffect for GroundEffect {
         if !(lowest > 0.0 && lowest < RADII.1 * arm * 2.0) || record.force.is_none() {
             return Vec::new();
         }
-        let shape = Shape { name: "radius", unit: "m", range: (RADII.0 * arm, RADII.1 * arm) };
+        let shape = Shape { name: "radius", unit: "m", range: (RADII.0 * arm, RADII.1 * arm), closed: false };
         vec![Form { shapes: vec![shape], starts: STARTS.map(|s| vec![s * arm]).to_vec(), ..Form::default() }]
     }
 

@@ -57,10 +57,10 @@ impl AirframeEffect for RotorGain {
         if record.vehicle.rotors.is_empty() || record.rate.is_none() {
             return Vec::new();
         }
-        let change = || Shape { name: "thrust_change", unit: "1", range: RANGE };
+        let change = || Shape { name: "thrust_change", unit: "1", range: RANGE, closed: false };
         let (first, last) = (record.t.first().copied().unwrap_or(0.0), record.t.last().copied().unwrap_or(1.0));
         let at = |share: f64| first + share * (last - first);
-        let onset = || Shape { name: "t0", unit: "s", range: (at(0.05), at(0.95)) };
+        let onset = || Shape { name: "t0", unit: "s", range: (at(0.05), at(0.95)), closed: false };
         let rotors = 0..record.vehicle.rotors.len();
         let whole = rotors.clone().map(|index| Form {
             name: format!("rotor {}", index + 1),

@@ -49,8 +49,8 @@ impl AirframeEffect for SpinupLag {
         if flight.record.command.is_empty() {
             return Vec::new();
         }
-        let along = |name| Shape { name, unit: "s", range: RANGE };
-        let phase = Shape { name: "phase", unit: "1", range: (0.0, 1.0) };
+        let along = |name| Shape { name, unit: "s", range: RANGE, closed: false };
+        let phase = Shape { name: "phase", unit: "1", range: (0.0, 1.0), closed: true };
         let starts = STARTS.map(|s| vec![s, s, 0.5]).to_vec();
         vec![Form { shapes: vec![along("tau_up"), along("tau_down"), phase], starts, ..Form::default() }]
     }

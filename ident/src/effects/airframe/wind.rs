@@ -48,7 +48,7 @@ impl AirframeEffect for Wind {
         if flight.record.velocity.is_none() {
             return Vec::new();
         }
-        let along = |name| Shape { name, unit: "m/s", range: (-STRONGEST, STRONGEST) };
+        let along = |name| Shape { name, unit: "m/s", range: (-STRONGEST, STRONGEST), closed: false };
         let starts = STARTS.map(|s| s.to_vec()).to_vec();
         vec![Form { shapes: vec![along("north"), along("east")], starts, ..Form::default() }]
     }
