@@ -17,6 +17,8 @@ pub(super) struct SpinupLag;
 /// Time constants, s: range and starts.
 const RANGE: (f64, f64) = (1e-3, 0.5);
 const STARTS: [f64; 3] = [0.02, 0.05, 0.12];
+/// Share of the time between two rows at which a pulse is first taken to jump.
+const MIDDLE: f64 = 0.5;
 
 impl AirframeEffect for SpinupLag {
     fn id(&self) -> &'static str {
@@ -51,7 +53,7 @@ impl AirframeEffect for SpinupLag {
         }
         let along = |name| Shape { name, unit: "s", range: RANGE, closed: false };
         let phase = Shape { name: "phase", unit: "1", range: (0.0, 1.0), closed: true };
-        let starts = STARTS.map(|s| vec![s, s, 0.5]).to_vec();
+        let starts = STARTS.map(|s| vec![s, s, MIDDLE]).to_vec();
         vec![Form { shapes: vec![along("tau_up"), along("tau_down"), phase], starts, ..Form::default() }]
     }
 
@@ -60,8 +62,9 @@ impl AirframeEffect for SpinupLag {
     }
 
     fn alter(&self, flight: &Flight, _: &Form, shape: &[f64], scene: &mut Scene<'_>) {
-        let [up, down, phase] = *shape else { return };
-        let lag = Lag { up, down, phase };
+        let [up, down, ref phase @ ..] = *shape else { return };
+        // a model file without a phase was fitted with the middle
+        let lag = Lag { up, down, phase: phase.first().copied().unwrap_or(MIDDLE) };
         scene.lag = Some(lag);
         if flight.record.speed.is_empty() {
             scene.drive = flight.record.command.iter().map(|c| followed(&flight.record.t, c, &lag)).collect();
