@@ -83,6 +83,22 @@ mod tests {
         }
     }
 
+    /// From every place of the ring and about the turn of its counters, filled to every level: what was put in comes out in order, the one
+    /// too many is refused and harms nothing, and then the queue is empty.
+    #[test]
+    fn every_fill_from_every_place() {
+        let capacity = CAPACITY as u32;
+        for begin in (0..capacity).chain(u32::MAX - capacity..=u32::MAX) {
+            let queue = EdgeQueue { put: AtomicU32::new(begin), taken: AtomicU32::new(begin), ..EdgeQueue::new() };
+            for fill in 0..=capacity {
+                assert!((0..fill).all(|i| queue.put(!i)), "{fill} from {begin}");
+                assert!(fill < capacity || !queue.put(7), "{fill} from {begin}");
+                assert!((0..fill).all(|i| queue.take() == Some(!i)), "{fill} from {begin}");
+                assert_eq!(queue.take(), None, "{fill} from {begin}");
+            }
+        }
+    }
+
     #[test]
     fn order_survives_two_threads() {
         let queue = EdgeQueue::new();

@@ -37,6 +37,13 @@ impl Ticks {
         self.0 as f64 / f64::from(Self::HZ)
     }
 
+    /// The next instant at which the low 32 bits of the time are `counter`: what the capture timer reads at most one of its turns (51.1 s at
+    /// [`Self::HZ`]) after this instant.
+    #[must_use]
+    pub const fn counted(self, counter: u32) -> Self {
+        Self(self.0.wrapping_add(counter.wrapping_sub(self.0 as u32) as u64))
+    }
+
     /// Time elapsed since `earlier`; zero when `earlier` is later.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Self {

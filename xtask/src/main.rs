@@ -49,6 +49,7 @@ usage: cargo xtask COMMAND
   ahrs-bench --vqf  VQF's Rust port on every variant, those included of which nothing is published (fetches it once)
   ahrs-peers       instructions, flash and RAM of other attitude filters beside ours (fetches them once)
   ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)
+  prove            what holds of pulses, clock, queue, stuffing and checksum for every value, not for drawn ones
   strangers        packs the crates that serve other programs, builds examples/stranger on the packages and runs it
   test             everything: format, lints, the book, images, the packed crates, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
@@ -72,6 +73,7 @@ fn main() -> ExitCode {
         ["book"] => book::book(&place),
         ["program"] => emulator::program(&place),
         ["image", "--bless"] => image::image(&place, true),
+        ["prove"] => test::proofs(&place),
         ["strangers"] => strangers::strangers(&place),
         ["test"] => test::everything(&place),
         ["test", "--quick"] => test::quick(&place),

@@ -71,17 +71,20 @@ pub(crate) fn output(command: &mut Command) -> Result<String, Failure> {
 }
 
 /// How many checks passed and failed.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Default, Clone, PartialEq)]
 pub(crate) struct Tally {
     /// Checks that held.
     pub(crate) passed: usize,
     /// Checks that did not.
     pub(crate) failed: usize,
+    /// Test programs, with what each took, s.
+    pub(crate) took: Vec<(String, f64)>,
 }
 
 impl Tally {
-    fn read(&mut self, line: &str) {
-        let Some(rest) = line.trim().strip_prefix("test result: ") else { return };
+    /// Takes up what a line says of a test program that has ended: how long it took, s, where it says so.
+    fn read(&mut self, line: &str) -> Option<f64> {
+        let rest = line.trim().strip_prefix("test result: ")?;
         for part in rest.split(['.', ';']) {
             match part.trim().split_once(' ') {
                 Some((n, "passed")) => self.passed += n.parse().unwrap_or(0),
@@ -89,7 +92,27 @@ impl Tally {
                 _ => {}
             }
         }
+        rest.rsplit_once("finished in ")?.1.strip_suffix('s')?.parse().ok()
     }
+
+    /// The test programs that took longest, the slowest first.
+    pub(crate) fn slowest(&self, most: usize) -> Vec<&(String, f64)> {
+        let mut all: Vec<&(String, f64)> = self.took.iter().collect();
+        all.sort_by(|a, b| b.1.total_cmp(&a.1));
+        all.truncate(most);
+        all
+    }
+}
+
+/// The test program that a line of cargo's announces: a source file, or the package of a doc test.
+fn announced(line: &str) -> Option<String> {
+    let line = line.trim();
+    if let Some(package) = line.strip_prefix("Doc-tests ") {
+        return Some(format!("examples in the documentation of {package}"));
+    }
+    let (source, program) = line.strip_prefix("Running ")?.trim_start_matches("unittests ").rsplit_once(" (")?;
+    let name = program.rsplit('/').next()?.rsplit_once('-')?.0;
+    Some(format!("{source} of {name}"))
 }
 
 /// Runs a test command; its output passes through while its summary lines are counted.
@@ -99,17 +122,28 @@ pub(crate) fn tests(command: &mut Command, tally: &mut Tally) -> Result<(), Fail
     let mut child = command
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
         .spawn()
         .map_err(|error| Failure(format!("`{words}` cannot be started: {error}")))?;
+    let stderr = child.stderr.take();
+    let names = std::thread::spawn(move || {
+        let lines = stderr.into_iter().flat_map(|stderr| BufReader::new(stderr).lines().map_while(Result::ok));
+        lines.inspect(|line| eprintln!("{line}")).filter_map(|line| announced(&line)).collect::<Vec<String>>()
+    });
+    let mut took = Vec::new();
     if let Some(stdout) = child.stdout.take() {
         let mut out = std::io::stdout().lock();
         for line in BufReader::new(stdout).lines() {
             let line = line?;
-            tally.read(&line);
+            took.extend(tally.read(&line));
             writeln!(out, "{line}")?;
         }
     }
     let status = child.wait()?;
+    // a program that died left no summary: nobody knows then whose the others are
+    if let Some(names) = names.join().ok().filter(|names| names.len() == took.len()) {
+        tally.took.extend(names.into_iter().zip(took));
+    }
     if status.success() { Ok(()) } else { Err(Failure(format!("`{words}` failed ({status})"))) }
 }
 
@@ -128,7 +162,24 @@ mod tests {
         ] {
             tally.read(line);
         }
-        assert_eq!(tally, Tally { passed: 14, failed: 1 });
+        assert_eq!((tally.passed, tally.failed), (14, 1));
+    }
+
+    #[test]
+    fn each_test_program_has_its_name_and_its_time() {
+        let mut tally = Tally::default();
+        let summary = "test result: ok. 2 passed; 0 failed; 1 ignored; 0 measured; 3 filtered out; finished in 12.50s";
+        assert_eq!(tally.read(summary), Some(12.5));
+        for (line, name) in [
+            ("     Running unittests src/lib.rs (target/release/deps/ident-6d32b2bd1c1e3d4a)", Some("src/lib.rs of ident")),
+            ("     Running tests/batch.rs (target/release/deps/batch-f2a8a332c64dce3e)", Some("tests/batch.rs of batch")),
+            ("   Doc-tests hal_sim", Some("examples in the documentation of hal_sim")),
+            ("   Compiling ident v0.1.0 (/somewhere/ident)", None),
+        ] {
+            assert_eq!(announced(line).as_deref(), name);
+        }
+        tally.took = [("a", 1.0), ("b", 3.0), ("c", 2.0)].map(|(name, s)| (name.to_owned(), s)).to_vec();
+        assert_eq!(tally.slowest(2).iter().map(|t| t.1).collect::<Vec<_>>(), [3.0, 2.0]);
     }
 
     #[test]

@@ -19,6 +19,9 @@ use crate::strangers;
 use crate::verdict;
 use std::time::{Duration, Instant};
 
+/// Test programs that are named at the end, the slowest first.
+const SLOWEST: usize = 10;
+
 /// The steps that were taken, with their times.
 #[derive(Debug, Default)]
 struct Steps {
@@ -43,6 +46,14 @@ impl Steps {
         }
         let all: Duration = self.taken.iter().map(|(_, t)| *t).sum();
         println!("{:>7.1} s  in all", all.as_secs_f64());
+        let slowest = self.tally.slowest(SLOWEST);
+        if !slowest.is_empty() {
+            println!("\nthe slowest test programs");
+        }
+        for (name, seconds) in slowest {
+            println!("{seconds:>7.1} s  {name}");
+        }
+        println!();
         let failed = self.tally.failed + usize::from(done.is_err() && self.tally.failed == 0);
         println!("{} passed, {failed} failed", self.tally.passed);
         done
@@ -96,6 +107,20 @@ pub(crate) fn lints(place: &Place) -> Result<(), Failure> {
     steps.finish(done)
 }
 
+/// What is looked at for every value there is. The tests of the host hold all of it, too.
+pub(crate) fn proofs(place: &Place) -> Result<(), Failure> {
+    let mut steps = Steps::default();
+    let done = (|| {
+        steps.step("pulses, clock, stuffing and checksum", |tally| {
+            tests(&mut cargo(place, &["test", "--release", "--workspace", "--test", "exhaustive"]), tally)
+        })?;
+        steps.step("queue", |tally| {
+            tests(&mut cargo(place, &["test", "--release", "-p", "firmware-rig", "--lib", "queue::"]), tally)
+        })
+    })();
+    steps.finish(done)
+}
+
 /// The flash images in the emulator.
 pub(crate) fn on_boards(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
@@ -130,7 +155,9 @@ fn host_lints(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
     steps.step("format", |_| run(&mut cargo(place, &["fmt", "--all", "--check"])))?;
     // the profile of the tests, so that build scripts and procedural macros compile once
     steps.step("lints of the host", |_| {
-        run(&mut cargo(place, &["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"]))
+        run(&mut cargo(place, &["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+        let alone = ["clippy", "--release", "-p", "hal-sim", "--no-default-features", "--lib", "--", "-D", "warnings"];
+        run(&mut cargo(place, &alone))
     })
 }
 

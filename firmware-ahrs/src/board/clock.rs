@@ -12,8 +12,7 @@ use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 /// The running clock.
 pub(crate) struct Clock {
     timer: TIM2,
-    high: u64,
-    low: u32,
+    last: Ticks,
 }
 
 impl Clock {
@@ -25,16 +24,12 @@ impl Clock {
         timer.arr().write(|w| w.arr().set(u32::MAX));
         timer.egr().write(|w| w.ug().set_bit());
         timer.cr1().write(|w| w.cen().set_bit());
-        Self { timer, high: 0, low: 0 }
+        Self { timer, last: Ticks(0) }
     }
 
     /// The present instant.
     pub(crate) fn now(&mut self) -> Ticks {
-        let low = self.timer.cnt().read().cnt().bits();
-        if low < self.low {
-            self.high += 1 << 32;
-        }
-        self.low = low;
-        Ticks(self.high | u64::from(low))
+        self.last = self.last.counted(self.timer.cnt().read().cnt().bits());
+        self.last
     }
 }

@@ -133,8 +133,7 @@ pub(crate) struct Clock {
 impl Clock {
     /// The time, from a counter that was read just now.
     pub(crate) fn now(&mut self, counter: u32) -> Ticks {
-        let passed = counter.wrapping_sub(self.last.0 as u32);
-        self.last = Ticks(self.last.0 + u64::from(passed));
+        self.last = self.last.counted(counter);
         self.last
     }
 }

@@ -38,8 +38,7 @@ use crate::plant::powerplant::STEPS_PER_MS;
 use crate::plant::{BackEmf, Beam, EscDialogue, EscState, Mount, PlantBlock, Powerplant, RigPlant};
 use crate::sensor::back_emf::BackEmfState;
 use crate::sensor::{
-    AnalogFront, BackEmfMeter, Comparator, Converter, Edge, EdgeDetail, EscTelemetry, EscWire, Geometry, Logger,
-    Tachometers,
+    AnalogFront, BackEmfMeter, Comparator, Converter, Edge, EdgeDetail, EscTelemetry, EscWire, Geometry, Logger, Tachometers,
 };
 use esc_pwm::dshot::Frame;
 use frame::calibration::Calibration;
