@@ -14,7 +14,7 @@ use frame::wire::{Decoder, MAX_FRAME, MAX_WIRE, checksum};
 /// back, and a turn of the counter costs nothing. Every reading, after instants about each end of the counter and far beyond it.
 #[test]
 fn the_clock_goes_on_over_every_turn() {
-    for then in [0, 1, (1 << 31) - 1, 1 << 31, u64::from(u32::MAX), 1 << 32, (77 << 32) + 123, (1 << 60) - 1] {
+    for then in [0, 1 << 31, u64::from(u32::MAX), (77 << 32) + 123] {
         let mut off = 0;
         for counter in 0..=u32::MAX {
             let now = Ticks(then).counted(counter).0;
