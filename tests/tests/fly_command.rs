@@ -248,7 +248,7 @@ fn the_same_schedule_in_flight_and_on_the_rig() {
         assert!((rpm[row] - rig_rpm[i]).abs() < 5.0 + 0.002 * rig_rpm[i], "{now} s: {} {}", rpm[row], rig_rpm[i]);
         compared += 1;
     }
-    assert!(compared > 50, "{compared} rows held");
+    assert!(compared > 40, "{compared} rows held");
     // and on the way: 63 % of the step to 1300 us and to 1700 us comes at the same time within a row of the rig
     for step_s in [2.0, 6.0] {
         let crossing = |t: &[f64], rpm: &[f64], from: f64| {

@@ -13,6 +13,7 @@
 mod ahrs_bench;
 mod book;
 mod callgraph;
+mod changed;
 mod emulator;
 mod errors;
 mod hazards;
@@ -56,6 +57,7 @@ usage: cargo xtask COMMAND
   test --lints     format and lints, those of the code behind the emulator included (its crates take 140 s of processor time once)
   blind [ARGS]     the blind campaign (docs/blind.md), on messy rigs with --messy; ARGS go to it, --help lists them
   faults [--runs N] [--page FILE]  the fault campaign on the native board (docs/faults.md)
+  test --changed [COMMIT]  tests of what differs from a commit (main) and of all that is built on it, nothing else
   test --emulated  the images on emulated boards, nothing else
   test --verdicts  the verdict contract on recorded and simulated logs, nothing else
 ";
@@ -77,6 +79,8 @@ fn main() -> ExitCode {
         ["strangers"] => strangers::strangers(&place),
         ["test"] => test::everything(&place),
         ["test", "--quick"] => test::quick(&place),
+        ["test", "--changed"] => test::changed(&place, "main"),
+        ["test", "--changed", base] => test::changed(&place, base),
         ["test", "--lints"] => test::lints(&place),
         ["blind", rest @ ..] => {
             let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "blind", "--"];

@@ -10,6 +10,7 @@
 
 use crate::ahrs_bench;
 use crate::book;
+use crate::changed;
 use crate::emulator;
 use crate::image;
 use crate::place::{BOARD, Place};
@@ -92,6 +93,19 @@ pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
 pub(crate) fn quick(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
     let done = host_lints(place, &mut steps).and_then(|()| host_tests(place, &mut steps));
+    steps.finish(done)
+}
+
+/// Tests of what differs from a commit, and of all that is built on it.
+pub(crate) fn changed(place: &Place, base: &str) -> Result<(), Failure> {
+    let words = changed::words(place, base)?;
+    if words.is_empty() {
+        println!("nothing differs from {base}");
+        return Ok(());
+    }
+    let mut steps = Steps::default();
+    let done = steps
+        .step("tests of what changed", |tally| tests(cargo(place, &["test", "--release", "--no-fail-fast"]).args(&words), tally));
     steps.finish(done)
 }
 
