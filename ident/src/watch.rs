@@ -61,11 +61,14 @@ pub fn expected(model: &Model, log: &Log) -> Vec<Expected> {
 }
 
 /// For each row by how much the command has moved in the time that a load takes to settle, in jumps of the model's own run: a model is off
-/// after a jump in proportion to it. Not a number where the model does not tell its jumps.
+/// after a jump in proportion to it. Not a number where the model does not tell its jumps, and after a fall of the command deeper than any of
+/// its own run: a rotor that nothing drives coasts, and in what time the model has not seen.
 fn jumps(model: &Model, context: &Context) -> Vec<f64> {
     let own: Vec<f64> = model.course.iter().flat_map(|c| c.commands.windows(2).map(|w| (w[1].1 - w[0].1).powi(2))).collect();
     let usual = (own.iter().sum::<f64>() / own.len() as f64).sqrt();
     let Some(pulse) = context.pulse.as_ref().filter(|_| usual > 0.0) else { return vec![f64::NAN; context.len()] };
+    let commands = model.course.iter().flat_map(|c| c.commands.windows(2));
+    let deepest = commands.map(|w| w[0].1 - w[1].1).fold(0.0, f64::max);
     let settles = leftover::AGES[leftover::AGES.len() - 1];
     let mut from = 0;
     let of_row = |row: usize| {
@@ -73,7 +76,7 @@ fn jumps(model: &Model, context: &Context) -> Vec<f64> {
             from += 1;
         }
         let (low, high) = pulse[from..=row].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
-        (high - low) / usual
+        if high - pulse[row] > 1.01 * deepest { f64::NAN } else { (high - low) / usual }
     };
     (0..context.len()).map(of_row).collect()
 }

@@ -14,10 +14,10 @@ use crate::sim::{fly, fly_model};
 use clap::builder::PossibleValuesParser;
 use hal_sim::{Scenario, effect};
 use ident::close::close;
-use ident::context::Context;
+use ident::context::{Context, unit_of};
 use ident::log::Log;
 use ident::plateau::plateaus;
-use ident::report::{Hidden, Origin, Vocabulary, number, terminal};
+use ident::report::{Hidden, Origin, Vocabulary, number, terminal, wrapped};
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -57,7 +57,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             say!("{line}");
         }
     };
-    say(format!("seed {seed}: a 570 KV motor with an 11x4.7 propeller; one effect is hidden (repeat with --seed {seed})"));
+    let hides = format!("seed {seed}: a 570 KV motor with an 11x4.7 propeller; one effect is hidden (repeat with --seed {seed})");
+    say(wrapped(&hides, 0));
     let log = fly(&scenario, None, "run.csv", "flying", quiet)?;
     let mut text = Vec::new();
     log.write_to(&mut text)?;
@@ -75,7 +76,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         close(&log, None, &[], &mut |share| bar.set(share))?
     };
     let truth = &scenario.effects[0];
-    let parameters = truth.parameters().iter().map(|(n, v, u)| format!("{n} = {} {u}", number(*v))).collect();
+    let parameters = truth
+        .parameters()
+        .iter()
+        .map(|(n, v, u)| format!("{n} = {}{}", number(*v), if *u == "1" { String::new() } else { format!(" {u}") }))
+        .collect();
     let hidden = Hidden { seed, id: truth.id().to_owned(), parameters };
     let judged = hidden.judged(&closed.verdict);
     let origin = Origin { hidden: Some(hidden), ..Origin::of(&log) };
@@ -93,7 +98,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
 
     folder.write()?;
-    judged.into_iter().for_each(&say);
+    judged.into_iter().map(|line| wrapped(&line, 2)).for_each(&say);
     say(format!("the page to look at: {}", args.output.join("report.html").display()));
     Ok(())
 }
@@ -106,7 +111,8 @@ fn resimulated(model: &ident::model::Model, again: &Log) -> String {
         let Some(prediction) = model.predict(&context, target.name) else { continue };
         let residual: Vec<f64> = target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).collect();
         let rms = (residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64).sqrt();
-        out += &format!("  {:<12} rms {:>10.5}, noise floor {:>10.5}\n", target.name, rms, target.noise.rms);
+        let unit = unit_of(target.name);
+        out += &format!("  {:<12} rms {:>10.5} {unit}, noise floor {:>10.5} {unit}\n", target.name, rms, target.noise.rms);
     }
     out
 }

@@ -13,7 +13,7 @@ use crate::trouble::unwritten;
 use ident::fit::power::csv;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
-use ident::report::number;
+use ident::report::{WIDEST, number, wrapped};
 use ident::words::bracketed;
 use std::path::PathBuf;
 
@@ -116,7 +116,8 @@ fn text(found: &Identified) -> String {
     let mut out = levels(found);
     out += "\ndeclared relations over all rows\n";
     for p in &found.model.polynomials {
-        out += &format!("{:<20} {}\n", p.channel, terms(p.coefficients.iter().copied().zip(p.errors.iter().map(|se| 1.96 * se))));
+        let all = terms(p.coefficients.iter().copied().zip(p.errors.iter().map(|se| 1.96 * se)));
+        out += &format!("{:<20} {}\n", p.channel, wrapped(&all, 21));
     }
     for q in &found.quality {
         out += &format!(
@@ -137,10 +138,12 @@ fn text(found: &Identified) -> String {
             if f.curve.outliers.is_empty() { String::new() } else { format!(", left out: points {}", listed(&f.curve.outliers)) };
         let coefficients = (0..=f.degree).map(|k| f.curve.coefficient(k));
         out += &format!(
-            "{:<14} {}; chi2 {:.2}{chosen}{left_out}\n",
+            "{:<14} {}\n",
             f.name,
-            terms(coefficients.map(|c| (c.value, c.half))),
-            f.curve.chi2
+            wrapped(
+                &format!("{}; chi2 {:.2}{chosen}{left_out}", terms(coefficients.map(|c| (c.value, c.half))), f.curve.chi2),
+                15
+            )
         );
     }
     if !found.constants.is_empty() {
@@ -148,21 +151,23 @@ fn text(found: &Identified) -> String {
     }
     for c in &found.constants {
         out += &format!(
-            "{:<9} {} +- {} {} (95 %: {} to {}){}\n",
+            "{:<9} {} +- {} {} (95 %: {} to {})\n",
             c.name,
             number(c.value),
             number(c.se),
             c.unit,
             number(c.value - c.half),
-            number(c.value + c.half),
-            c.law.map_or_else(String::new, |law| format!("; {}", law.words()))
+            number(c.value + c.half)
         );
+        if let Some(law) = c.law {
+            out += &format!("{:<9} {}\n", "", wrapped(&law.words(), 10));
+        }
     }
     out + &asked(found)
 }
 
-/// Columns of the plateaus' table beside its own, as many as fit into 100 columns, and their width.
-const BESIDE: (usize, usize) = (5, 15);
+/// Least width of a column of the plateaus' table beside its own.
+const LEAST: usize = 14;
 
 /// The plateaus, a few channels at a time; channels without a reading are left out.
 fn levels(found: &Identified) -> String {
@@ -180,7 +185,9 @@ fn levels(found: &Identified) -> String {
     }
     let read = |k: &usize| found.plateaus.iter().any(|p| p.means[*k].is_some());
     let columns: Vec<usize> = (0..found.columns.len()).filter(read).collect();
-    let (most, width) = BESIDE;
+    // as wide as the longest name asks for, as many as fit
+    let width = columns.iter().map(|k| found.columns[*k].chars().count() + 1).fold(LEAST, usize::max);
+    let most = ((WIDEST - 3) / width).max(1);
     for block in columns.chunks(most) {
         let head: String = block.iter().map(|k| format!("{:>width$}", found.columns[*k])).collect();
         out += &format!("\n{:>3}{head}\n", "");
@@ -221,7 +228,7 @@ fn asked(found: &Identified) -> String {
         out += &format!("\n{}", SHOWN.map(cell).concat());
     }
     out.push('\n');
-    found.disc.lacks().iter().for_each(|lack| out += &format!("{lack}\n"));
+    found.disc.lacks().iter().for_each(|lack| out += &format!("{}\n", wrapped(lack, 2)));
     match &found.surface {
         Ok(s) => {
             out + &format!(
@@ -229,7 +236,7 @@ fn asked(found: &Identified) -> String {
                 s.measured.0, s.measured.1
             )
         }
-        Err(why) => out + &format!("thrust over throttle and voltage: {why}\n"),
+        Err(why) => out + &format!("{}\n", wrapped(&format!("thrust over throttle and voltage: {why}"), 2)),
     }
 }
 

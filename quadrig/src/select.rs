@@ -20,8 +20,8 @@ use ident::context::Context;
 use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
-use ident::report::selection;
-use ident::select::{Airframe, Need, Pair, Row, choose, from_log, misses, read_table, row, thesis, why};
+use ident::report::{selection, wrapped};
+use ident::select::{Airframe, Need, Pair, Row, choose, from_log, is_repeated, misses, read_table, row, thesis, why};
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -233,6 +233,9 @@ fn fly(motor: &str, propeller: &str) -> Pair {
     }
 }
 
+/// Columns of the widest line.
+const COLUMNS: usize = 100;
+
 fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
     let width = |of: fn(&Pair) -> &str, least: usize| pairs.iter().map(|p| of(p).chars().count()).fold(least, usize::max);
     let (m, p) = (width(|p| &p.motor, 8), width(|p| &p.propeller, 9));
@@ -263,13 +266,17 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         for w in &r.with_batteries {
             out += &format!(" {:>7.1}", w.full_throttle_min.0);
         }
-        out += &mark;
-        out += clipped;
-        out.push('\n');
+        // what does not fit beside the figures stands beneath them
+        let words = format!("{mark}{clipped}");
+        let beside = out.lines().last().map_or(0, |l| l.chars().count()) + words.chars().count() <= COLUMNS;
+        out += &if beside { format!("{words}\n") } else { format!("\n    {}\n", wrapped(words.trim(), 4)) };
+        if is_repeated(rows, r) {
+            out += &format!("    of {}\n", r.pair.source);
+        }
     }
     for pair in pairs.iter().filter(|p| p.maximum.is_none()) {
         out += &format!("{:<m$} {:<p$} no result\n", pair.motor, pair.propeller);
     }
-    out += &format!("{}\n", why(rows, chosen, need));
+    out += &format!("{}\n", wrapped(&why(rows, chosen, need), 0));
     out
 }

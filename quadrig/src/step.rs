@@ -10,6 +10,7 @@ use crate::open::{Columns, Names, open};
 use crate::progress::Bar;
 use clap::builder::PossibleValuesParser;
 use ident::inspect::{STEPS, Table, step};
+use ident::report::{WIDEST, wrapped};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -58,11 +59,32 @@ fn text(table: &Table) -> String {
                 .unwrap_or(0)
         })
         .collect();
+    let total = widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1);
+    if total > WIDEST {
+        return records(table);
+    }
     let line = |cells: &[String]| -> String {
         let padded: Vec<String> = cells.iter().zip(&widths).map(|(c, w)| format!("{c:<w$}")).collect();
         format!("{}\n", padded.join("  ").trim_end())
     };
     let head: Vec<String> = table.columns.iter().map(|c| (*c).to_owned()).collect();
     let body: String = table.rows.iter().map(|r| line(r)).collect();
-    format!("{}: {}\n\n{}{body}\n{}\n", table.step, table.question, line(&head), table.note)
+    format!("{}{}{body}\n{}\n", heading(table), line(&head), wrapped(&table.note, 0))
+}
+
+fn heading(table: &Table) -> String {
+    format!("{}\n\n", wrapped(&format!("{}: {}", table.step, table.question), 0))
+}
+
+/// A table too wide for a terminal: a paragraph for each row, its first cell as the heading.
+fn records(table: &Table) -> String {
+    let widest = table.columns.iter().skip(1).map(|c| c.chars().count()).max().unwrap_or(0);
+    let paragraph = |row: &Vec<String>| -> String {
+        let (first, rest) = row.split_first().map_or(("", &[][..]), |(first, rest)| (first.as_str(), rest));
+        let cells = table.columns.iter().skip(1).zip(rest).filter(|(_, cell)| !cell.trim().is_empty());
+        let lines = cells.map(|(name, cell)| format!("  {name:<widest$}  {}\n", wrapped(cell, widest + 4)));
+        format!("{} {}\n{}", table.columns.first().copied().unwrap_or_default(), wrapped(first, 2), lines.collect::<String>())
+    };
+    let body: String = table.rows.iter().map(paragraph).collect();
+    format!("{}{body}\n{}\n", heading(table), wrapped(&table.note, 0))
 }

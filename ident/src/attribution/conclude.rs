@@ -246,9 +246,18 @@ fn own_terms(fit: &Fit) -> Vec<usize> {
     out
 }
 
+/// The hypotheses without the terms of the best one that fell afterwards: what made those fall does not hang on the hypothesis.
+fn standing(seen: &[Seen], best: &[usize]) -> Vec<Seen> {
+    let top = seen.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+    let fell = |t: &usize| top.is_some_and(|s| s.terms.contains(t)) && !best.contains(t);
+    let without = |s: &Seen| Seen { terms: s.terms.iter().copied().filter(|t| !fell(t)).collect(), score: s.score };
+    seen.iter().map(without).collect()
+}
+
 /// What could stand in the place of a candidate: the hypotheses that hold something else instead.
 fn rivals(seen: &[Seen], fit: &Fit, own: usize) -> Vec<(Vec<usize>, f64)> {
     let best = own_terms(fit);
+    let seen = &standing(seen, &best)[..];
     let instead = |s: &Seen| -> Vec<usize> { s.terms.iter().copied().filter(|t| !best.contains(t)).collect() };
     let mut out: Vec<(Vec<usize>, f64)> = Vec::new();
     for s in seen.iter().filter(|s| !s.terms.contains(&own)) {
@@ -266,8 +275,15 @@ fn rivals(seen: &[Seen], fit: &Fit, own: usize) -> Vec<(Vec<usize>, f64)> {
 
 fn alternatives(seen: &[Seen], fit: &Fit) -> Vec<(Vec<usize>, f64)> {
     let best = own_terms(fit);
-    let others = seen.iter().filter(|s| s.terms != best);
-    let mut out: Vec<(Vec<usize>, f64)> = others.map(|s| (s.terms.clone(), share(seen, |h| std::ptr::eq(h, s)))).collect();
+    let seen = &standing(seen, &best)[..];
+    let mut out: Vec<(Vec<usize>, f64)> = Vec::new();
+    for s in seen.iter().filter(|s| s.terms != best) {
+        let probability = share(seen, |h| std::ptr::eq(h, s));
+        match out.iter_mut().find(|o| o.0 == s.terms) {
+            Some(o) => o.1 += probability,
+            None => out.push((s.terms.clone(), probability)),
+        }
+    }
     out.retain(|o| o.1 > LISTED);
     out.sort_by(|a, b| b.1.total_cmp(&a.1));
     out

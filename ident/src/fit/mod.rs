@@ -126,12 +126,16 @@ pub struct Law {
     pub chi2: f64,
     /// Levels less coefficients.
     pub freedom: usize,
-    /// Whether chance alone could make them scatter so (p of 0.01 and more).
+    /// Whether chance alone could make them scatter so (p of 0.01 and more), and no more than a fifth of them was left out.
     pub holds: bool,
+    /// Levels that were left out: far off in the light of the others.
+    pub left_out: usize,
 }
 
 /// Probability below which a law is said not to hold.
 const HOLDS: f64 = 0.01;
+/// One in this many levels may be a stray one.
+const STRAY: usize = 5;
 
 impl Law {
     /// Of a reduced chi-squared.
@@ -139,7 +143,12 @@ impl Law {
     pub fn of(chi2: f64, freedom: usize) -> Self {
         let freely = freedom.max(1) as f64;
         let holds = ChiSquared::new(freely).is_ok_and(|law| law.sf(chi2 * freely) >= HOLDS);
-        Self { chi2, freedom, holds }
+        Self { chi2, freedom, holds, left_out: 0 }
+    }
+
+    /// The same where some levels were left out. More than a fifth of all are no stray ones: something else acts on them.
+    fn without(self, left_out: usize, all: usize) -> Self {
+        Self { holds: self.holds && STRAY * left_out <= all, left_out, ..self }
     }
 
     /// In words.
@@ -147,7 +156,12 @@ impl Law {
     pub fn words(&self) -> String {
         let law =
             if self.holds { "the law holds" } else { "the law does not hold, the interval is widened to what the levels show" };
-        format!("chi2 {:.2} of {}, {law}", self.chi2, self.freedom)
+        let left_out = match self.left_out {
+            0 => String::new(),
+            1 => ", 1 level left out".to_owned(),
+            n => format!(", {n} levels left out"),
+        };
+        format!("chi2 {:.2} of {}{left_out}, {law}", self.chi2, self.freedom)
     }
 }
 
@@ -172,10 +186,11 @@ pub fn square_law(
         })
         .collect();
     let curve = Curve::fit(&points, 1)?;
-    let law = Law::of(curve.chi2, curve.freedom);
+    let left_out = curve.outliers.len();
+    let law = Law::of(curve.chi2, curve.freedom).without(left_out, curve.points.len());
     let mut k = curve.coefficient(1);
     if !law.holds {
-        let wide = farthest(&curve).max(k.half);
+        let wide = farthest(&curve, STRAY * left_out > curve.points.len()).max(k.half);
         k.se *= wide / k.half;
         k.half = wide;
     }
@@ -185,10 +200,10 @@ pub fn square_law(
     Some((k, curve, law))
 }
 
-/// How far the farthest level's own quotient stands from the slope, its 95 % error aside; the levels that were left out say nothing.
-fn farthest(curve: &Curve) -> f64 {
+/// How far the farthest level's own quotient stands from the slope, its 95 % error aside; a level that was left out counts where `all` do.
+fn farthest(curve: &Curve, all: bool) -> f64 {
     let (zero, slope) = (curve.coefficient(0), curve.coefficients[1]);
-    let turning = curve.points.iter().enumerate().filter(|(i, p)| p.x > 0.0 && !curve.outliers.contains(i));
+    let turning = curve.points.iter().enumerate().filter(|(i, p)| p.x > 0.0 && (all || !curve.outliers.contains(i)));
     turning
         .map(|(_, p)| {
             let error = p.y_error.hypot(slope * p.x_error).hypot(zero.se) / p.x;

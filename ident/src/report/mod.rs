@@ -21,7 +21,7 @@ mod style;
 mod svg;
 
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
-pub use closed::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal};
+pub use closed::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal, wrapped};
 pub use figure::{Figure, Layer, Mark};
 pub use history::{page as history_page, terminal as history_terminal};
 pub use isolability::{isolability, isolability_csv, isolability_svg};

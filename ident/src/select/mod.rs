@@ -11,7 +11,7 @@ mod pairs;
 mod why;
 
 pub use pairs::{from_log, read_table, thesis};
-pub use why::{misses, why};
+pub use why::{is_repeated, misses, why};
 
 use crate::quantity::{Ampere, AmpereHour, GRAVITY, Kilogram, Minute, Newton};
 use serde::Serialize;

@@ -28,8 +28,17 @@ pub fn misses(row: &Row, need: &Need) -> Vec<String> {
     out
 }
 
-fn named(row: &Row) -> String {
-    format!("{} with {}", row.pair.motor, row.pair.propeller)
+/// A pair's name, and where its figures come from where another row has the same name.
+fn named(rows: &[Row], row: &Row) -> String {
+    let from = if is_repeated(rows, row) { format!(" ({})", row.pair.source) } else { String::new() };
+    format!("{} with {}{from}", row.pair.motor, row.pair.propeller)
+}
+
+/// Whether another row is of a pair of the same name.
+#[must_use]
+pub fn is_repeated(rows: &[Row], row: &Row) -> bool {
+    let same = |r: &&Row| r.pair.motor == row.pair.motor && r.pair.propeller == row.pair.propeller;
+    rows.iter().filter(same).count() > 1
 }
 
 /// The choice and its reason.
@@ -37,8 +46,8 @@ fn named(row: &Row) -> String {
 pub fn why(rows: &[Row], chosen: &[&Row], need: &Need) -> String {
     let Some(best) = chosen.first() else {
         let nearest = rows.iter().max_by(|a, b| a.total_thrust_n.0.total_cmp(&b.total_thrust_n.0));
-        let nearest =
-            nearest.map_or_else(String::new, |row| format!("; nearest comes {}: {}", named(row), misses(row, need).join(", ")));
+        let nearest = nearest
+            .map_or_else(String::new, |row| format!("; nearest comes {}: {}", named(rows, row), misses(row, need).join(", ")));
         return format!("choice: none of {} meets every need{nearest}", rows.len());
     };
     let of = if chosen.len() == 1 {
@@ -46,16 +55,17 @@ pub fn why(rows: &[Row], chosen: &[&Row], need: &Need) -> String {
     } else {
         format!("most thrust for each ampere of the {} that meet every need", chosen.len())
     };
-    let runner_up = chosen.get(1).map_or_else(String::new, |r| format!("; next {}, {:.2} N/A", named(r), r.efficiency_n_per_a));
+    let runner_up =
+        chosen.get(1).map_or_else(String::new, |r| format!("; next {}, {:.2} N/A", named(rows, r), r.efficiency_n_per_a));
     let thrifty = rows
         .iter()
         .filter(|r| r.efficiency_n_per_a > best.efficiency_n_per_a)
         .max_by(|a, b| a.efficiency_n_per_a.total_cmp(&b.efficiency_n_per_a));
     let thrifty = thrifty.map_or_else(String::new, |r| {
-        format!("; {} gives {:.2} N/A but {}", named(r), r.efficiency_n_per_a, misses(r, need).join(", "))
+        format!("; {} gives {:.2} N/A but {}", named(rows, r), r.efficiency_n_per_a, misses(r, need).join(", "))
     });
     let bound = if best.pair.clipped { "; its thrust reading is clipped, a lower bound" } else { "" };
-    format!("choice: {}: {:.2} N/A, {of}{bound}{runner_up}{thrifty}", named(best), best.efficiency_n_per_a)
+    format!("choice: {}: {:.2} N/A, {of}{bound}{runner_up}{thrifty}", named(rows, best), best.efficiency_n_per_a)
 }
 
 #[cfg(test)]

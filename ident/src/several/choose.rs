@@ -201,13 +201,15 @@ fn gain_of(joint: &Joint<'_, '_>, rig: &[Placed], now: &[Across], k: usize) -> (
     (-gain, then)
 }
 
-/// Effects that the later ones have made needless go.
+/// Effects that the later ones have made needless go: what they had to bring to join, each still has to bring beside the others.
 fn drop_useless(joint: &Joint<'_, '_>, rig: &mut Vec<Placed>, now: &mut Vec<Across>) {
     loop {
         let worth = |k: usize| (k, gain_of(joint, rig, now, k));
-        let least = (0..rig.len()).map(worth).min_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let needless =
+            |(_, (gain, then)): &(usize, (f64, Vec<Across>))| *gain < NEEDED_EVIDENCE || !is_worth(&compared(then, now));
+        let least = (0..rig.len()).map(worth).filter(needless).min_by(|a, b| a.1.0.total_cmp(&b.1.0));
         match least {
-            Some((k, (gain, then))) if gain < NEEDED_EVIDENCE && rig.len() > 1 => {
+            Some((k, (_, then))) if rig.len() > 1 => {
                 rig.remove(k);
                 *now = then;
             }

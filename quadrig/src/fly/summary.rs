@@ -8,6 +8,7 @@
 use hal_sim::flight::attitude::to_euler;
 use hal_sim::flight::{Airframe, Flying, G, Vector};
 use hal_sim::mission::{AirframeFile, Flight, HoverPoint, Mission, Modes, RotorCurves, Touch, apart, hover, modes};
+use ident::report::{WIDEST, wrapped};
 use serde_json::{Value, json};
 
 /// Most touches that have a line each.
@@ -109,9 +110,14 @@ impl Summary {
 
     /// For a reader.
     pub(super) fn text(&self) -> String {
-        let mut out = format!("{}\n{}\n", self.lead(), self.told());
+        // a list that does not fit stands on a line of its own
+        let mut lead = self.lead();
+        if lead.chars().count() > WIDEST {
+            lead = lead.replace("; of the rig", ";\nof the rig");
+        }
+        let mut out = format!("{lead}\n{}\n", wrapped(&self.told(), 0));
         for row in self.table() {
-            out += &format!("{:<9} {}\n", row[0], row[1]);
+            out += &format!("{:<9} {}\n", row[0], wrapped(&row[1], 10));
         }
         out
     }

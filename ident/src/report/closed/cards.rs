@@ -12,6 +12,7 @@ use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
+use crate::rivals::UNEXPLAINED;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
 use crate::words::{
     channel, counted, digits, list, lower, plain, probability, scaled, scope, signs, sized, sureness, upper, upper_bound,
@@ -62,7 +63,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     let nameless = e.id == "unknown";
     let sure = if nameless { "unsure" } else { sureness(e.probability) };
     let p = format!("p {}", equals(&probability(e.probability)));
-    let chip = if nameless { format!("no name; that something is there: {p}") } else { format!("{sure}: {p}") };
+    let chip = if nameless { format!("no name; {}", that_it_is_there(e.probability)) } else { format!("{sure}: {p}") };
     let title = if nameless {
         let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
         let with: Vec<String> = e.depends_on.iter().map(|c| channel(c)).collect();
@@ -97,13 +98,23 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     let mut html = format!(
         "<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n",
         escape(&e.equation),
-        escape(&upper(&plain(signs(&e.evidence))))
+        escape(&said_first(&plain(signs(&e.evidence))))
     );
     let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
     if let Some(how) = settle(page, e) {
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
     }
     sheet.html_part(&format!("{html}</div></div></article>\n"));
+}
+
+/// How sure it is that something without a name is there: what the verdicts so far say where nothing in the library was tried against it,
+/// else its probability.
+pub(super) fn that_it_is_there(p: f64) -> String {
+    if p == UNEXPLAINED {
+        "nine in ten such verdicts are right".to_owned()
+    } else {
+        format!("that something is there: p {}", equals(&probability(p)))
+    }
 }
 
 fn equals(text: &str) -> String {
@@ -120,6 +131,12 @@ fn anchor(v: &Verdict, k: usize) -> String {
 /// An effect's title as a part of a sentence.
 fn title(page: &Page<'_>, id: &str) -> String {
     (page.words.about)(id).map_or_else(|| id.replace('_', " "), |about| lower(about.title))
+}
+
+/// A sentence's beginning in capitals, but not that of a relation such as rpm(pulse).
+fn said_first(text: &str) -> String {
+    let first = text.split_whitespace().next().unwrap_or_default();
+    if first.contains('(') { text.to_owned() } else { upper(text) }
 }
 
 /// What would be left on its first channel without it.
@@ -212,8 +229,11 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
     let told = |title: &String| found.iter().any(|f| f.starts_with(&format!("{title} (")));
     let alike: Vec<String> = known.iter().map(|id| title(page, id)).filter(|title| !told(title)).collect();
     let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
-    let found =
-        if found.is_empty() { "nothing else that was tried came close.".to_owned() } else { format!("{}.", found.join("; ")) };
+    let found = match found.is_empty() {
+        true if e.probability < SETTLED && e.id != "unknown" => "another form of it, or what it is easily taken for.".to_owned(),
+        true => "nothing else that was tried came close.".to_owned(),
+        false => format!("{}.", found.join("; ")),
+    };
     format!("{found}{alike}")
 }
 

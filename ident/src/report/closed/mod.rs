@@ -25,7 +25,6 @@ pub(crate) use page::{Page, begin};
 pub use provenance::{Hidden, Origin};
 pub use sentence::sentence;
 pub(crate) use state::bars;
-pub(crate) use terminal::wrapped;
-pub use terminal::{WIDEST, terminal};
+pub use terminal::{WIDEST, terminal, wrapped};
 pub use vocabulary::Vocabulary;
 pub(crate) use vocabulary::bare;

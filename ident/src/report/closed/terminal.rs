@@ -5,7 +5,7 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{is_shown, removes, value};
+use super::cards::{is_shown, removes, that_it_is_there, value};
 use super::left::in_words;
 use super::sentence::{sentence, size_left};
 use super::state::{factor, figures, word};
@@ -41,7 +41,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     out += &set_aside(verdict);
     if !verdict.alternatives.is_empty() {
         let all: Vec<String> =
-            verdict.alternatives.iter().map(|a| format!("{} ({})", a.ids.join(" + "), probability(a.probability))).collect();
+            verdict.alternatives.iter().map(|a| format!("{} ({})", together(&a.ids), probability(a.probability))).collect();
         out += &format!("\n{}\n", wrapped(&format!("alternatives: {}", all.join(", ")), 2));
     }
     if let Some(next) = &verdict.next_experiment {
@@ -62,6 +62,13 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         }
     }
     out
+}
+
+/// Names side by side; what has none is said once.
+fn together(ids: &[String]) -> String {
+    let (nameless, mut named): (Vec<&str>, Vec<&str>) = ids.iter().map(String::as_str).partition(|id| *id == "unknown");
+    named.extend(nameless.first());
+    named.join(" + ")
 }
 
 /// The run, or the runs.
@@ -92,7 +99,7 @@ fn channels(verdict: &Verdict) -> String {
 fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
     let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
     let p = match e.id.as_str() {
-        "unknown" => format!("that something is there: p {}", probability(e.probability)),
+        "unknown" => that_it_is_there(e.probability),
         _ => format!("p {}", probability(e.probability)),
     };
     let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {}", e.id, list(&on), words.scope_word(e.scope)), 4));
@@ -146,7 +153,8 @@ fn set_aside(verdict: &Verdict) -> String {
 }
 
 /// Text in lines of at most [`WIDEST`] columns; further lines are set in by `indent`.
-pub(crate) fn wrapped(text: &str, indent: usize) -> String {
+#[must_use]
+pub fn wrapped(text: &str, indent: usize) -> String {
     let lead = text.len() - text.trim_start().len();
     let mut out = " ".repeat(lead);
     // the caller may have set in the first line by as much
