@@ -50,6 +50,7 @@ const AREAS: [(&str, &[&str]); 13] = [
         "Scenarios, missions, simulation",
         &[
             "hal-sim/src/scenario",
+            "hal-sim/src/number.rs",
             "hal-sim/src/mission",
             "hal-sim/src/native",
             "quadrig/src/sim.rs",
@@ -181,12 +182,18 @@ fn refusals(source: &str) -> Vec<(String, String)> {
             let of_expect = before.ends_with(".expect(") || before.ends_with("expect_err(");
             let is_whole = found.is_empty() || found.ends_with([' ', ':', ';', '(']);
             if !of_expect && is_whole && !expected.is_empty() {
-                out.push((found.trim_end_matches([' ', ';', ':']).to_owned(), expected.to_owned()));
+                let found = found.trim_end_matches([' ', ';', ':']);
+                let found =
+                    if found.is_empty() { used_in(code, &literals, literal).unwrap_or_default() } else { found.to_owned() };
+                out.push((found, expected.to_owned()));
             }
         }
     }
-    // place.refuse(column, found, expected): the word itself stands in the type's own text
-    for (at, call) in code.match_indices(".refuse(") {
+    // refuse(.., found, expected), of a place or by a closure of this name: the word itself stands in the type's own text
+    for (at, call) in code.match_indices("refuse(") {
+        if code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
+            continue;
+        }
         let end = closing(code, at + call.len());
         // the column's name is no part of what is said
         let is_column = |l: &Literal| code[..l.start].ends_with("Some(");
@@ -197,9 +204,23 @@ fn refusals(source: &str) -> Vec<(String, String)> {
             .map(|l| l.text.as_str())
             .filter(|t| t.len() > 2)
             .collect();
+        let arguments = &code[at + call.len()..end];
+        let bound = |name: &str| {
+            let is_there = arguments.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name);
+            if is_there { bound_to(code, &literals, at, name) } else { Vec::new() }
+        };
+        let founds = bound("found");
+        let found = founds.first().cloned().unwrap_or_default();
+        let told: Vec<String> = ["reason", "expected"].iter().flat_map(|name| bound(name)).collect();
         match inside[..] {
-            [] => {}
-            [expected] if !expected.contains("expected ") => out.push((String::new(), expected.to_owned())),
+            [] => out.extend(told.into_iter().filter(|t| !t.contains("expected ")).map(|t| (found.clone(), t))),
+            [expected] if !expected.contains("expected ") && !told.is_empty() && founds.is_empty() => {
+                out.extend(told.into_iter().map(|t| (expected.to_owned(), t)));
+            }
+            [expected] if !expected.contains("expected ") => {
+                let begins = told.first().filter(|_| expected.starts_with("...")).map_or_else(String::new, String::clone);
+                out.push((found, format!("{begins}{}", if begins.is_empty() { expected } else { &expected[3..] })));
+            }
             [found, ref expected @ ..] if !found.contains("expected ") && !expected.is_empty() => {
                 out.push((found.to_owned(), expected.join(" ")));
             }
@@ -207,6 +228,44 @@ fn refusals(source: &str) -> Vec<(String, String)> {
         }
     }
     out
+}
+
+/// What is said before a text that has a name of its own: the text that this name is put into.
+fn used_in(code: &str, literals: &[Literal], named: &Literal) -> Option<String> {
+    let before = code[..named.start].trim_end().trim_end_matches("format!(").trim_end().strip_suffix('=')?.trim_end();
+    let statement =
+        before.rsplit(['{', '}', ';']).next()?.trim().trim_start_matches("pub(super) ").trim_start_matches("pub(crate) ");
+    let name = statement.strip_prefix("let ").or_else(|| statement.strip_prefix("const "))?.split(':').next()?.trim();
+    let mark = format!("{{{name}}}");
+    let user = literals
+        .iter()
+        .find(|l| l.start > named.start && code[l.start + 1..ending(code.as_bytes(), l.start + 1)].contains(&mark))?;
+    let raw = &code[user.start + 1..ending(code.as_bytes(), user.start + 1)];
+    let said = plain(raw.split(&mark).next()?);
+    let said = said.trim_end_matches([' ', ';', ':']).to_owned();
+    said.chars().any(char::is_alphabetic).then_some(said)
+}
+
+/// The texts of the last `let NAME = ...;` before a place.
+fn bound_to(code: &str, literals: &[Literal], at: usize, name: &str) -> Vec<String> {
+    let Some(from) = code[..at].rfind(&format!("let {name} =")) else { return Vec::new() };
+    let mut depth = 0;
+    let length = code[from..].find(|c| {
+        match c {
+            '{' | '(' => depth += 1,
+            '}' | ')' => depth -= 1,
+            _ => {}
+        }
+        c == ';' && depth == 0
+    });
+    let end = from + length.unwrap_or(0);
+    // what is bound within belongs to another name
+    let is_own = |l: &&Literal| {
+        let before = &code[from + 4..l.start];
+        before.rfind("let ").is_none_or(|k| before[k..].contains(';'))
+    };
+    let inside = literals.iter().filter(|l| l.start > from && l.start < end && l.text.len() > 12);
+    inside.filter(is_own).map(|l| l.text.clone()).collect()
 }
 
 /// A text of the source.
@@ -302,6 +361,10 @@ mod tests {
             let a = format!("{}: {column} is \"late\"; expected seconds: sort {them}", 1);
             let b = x.expect("expected as a habit");
             return Err(place.refuse(Some(name), format!("{n} fields"), "6 as in the header"));
+            let expected = "expected a new folder";
+            return Err(format!("{path}: holds {name}, mixed up with these; {expected}"));
+            let found = format!("{n} of {rows} rows would be dropped: {likely}");
+            return refuse(found, "a clock that moves on");
             let c = ['"', '\'', 'x'];
             #[error("no effect {0:?}; expected one of {list}")]
             #[cfg(test)]
@@ -309,8 +372,10 @@ mod tests {
         "#;
         let wanted = [
             ("...: ... is \"late\"", "seconds: sort ..."),
+            ("...: holds ..., mixed up with these", "a new folder"),
             ("no effect ...", "one of ..."),
             ("... fields", "6 as in the header"),
+            ("... of ... rows would be dropped: ...", "a clock that moves on"),
         ];
         let wanted: Vec<(String, String)> = wanted.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect();
         assert_eq!(refusals(source), wanted);
