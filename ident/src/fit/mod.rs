@@ -20,6 +20,7 @@ pub use motor::{Motor, motor};
 pub use spin::{Spin, spin};
 
 use crate::log::{Log, SPEED};
+use crate::noise::median;
 use crate::plateau::Plateau;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -200,10 +201,13 @@ pub fn square_law(
     Some((k, curve, law))
 }
 
-/// How far the farthest level's own quotient stands from the slope, its 95 % error aside; a level that was left out counts where `all` do.
+/// How far the farthest level's own quotient stands from the slope, its 95 % error aside. Where `all` count, those that were left out do in the
+/// upper half of the levels: at low speeds a zero that is a little off decides the quotient.
 fn farthest(curve: &Curve, all: bool) -> f64 {
     let (zero, slope) = (curve.coefficient(0), curve.coefficients[1]);
-    let turning = curve.points.iter().enumerate().filter(|(i, p)| p.x > 0.0 && (all || !curve.outliers.contains(i)));
+    let middle = median(&mut curve.points.iter().map(|p| p.x).collect::<Vec<_>>());
+    let turning =
+        curve.points.iter().enumerate().filter(|(i, p)| p.x > 0.0 && (all && p.x > middle || !curve.outliers.contains(i)));
     turning
         .map(|(_, p)| {
             let error = p.y_error.hypot(slope * p.x_error).hypot(zero.se) / p.x;

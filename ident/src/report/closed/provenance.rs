@@ -31,7 +31,7 @@ impl Hidden {
         let sizes = if self.parameters.is_empty() { String::new() } else { format!(" ({})", self.parameters.join(", ")) };
         let named: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
         let found = named.iter().any(|e| e.id == self.id);
-        let mut out = vec![format!("hidden was {}{sizes}: {}", self.id, if found { "found" } else { "NOT FOUND" })];
+        let mut out = vec![format!("hidden was {}: {}{sizes}", self.id, if found { "found" } else { "NOT FOUND" })];
         if found {
             out.push(format!("true of the names: {}", self.id));
         }
