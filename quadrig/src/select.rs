@@ -235,10 +235,18 @@ fn fly(motor: &str, propeller: &str) -> Pair {
 
 /// Columns of the widest line.
 const COLUMNS: usize = 100;
+/// Least columns of the names, and the most that both together leave room beside.
+const MOTOR: usize = 8;
+const PROPELLER: usize = 9;
+const NAMES: usize = 32;
 
 fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
     let width = |of: fn(&Pair) -> &str, least: usize| pairs.iter().map(|p| of(p).chars().count()).fold(least, usize::max);
-    let (m, p) = (width(|p| &p.motor, 8), width(|p| &p.propeller, 9));
+    // names that leave no room for the figures stand above them
+    let (m, p) = match (width(|p| &p.motor, MOTOR), width(|p| &p.propeller, PROPELLER)) {
+        (m, p) if m + p <= NAMES => (m, p),
+        _ => (MOTOR, PROPELLER),
+    };
     let mut out = format!(
         "{:<m$} {:<p$} {:>8} {:>8} {:>5} {:>7} {:>9}",
         "motor", "propeller", "thrust N", "A", "N/A", "hovers", "resultant"
@@ -253,10 +261,14 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         let mark = if misses.is_empty() { "  meets the need".to_owned() } else { format!("  {}", misses.join(", ")) };
         let clipped = if r.pair.clipped { "  thrust reading clipped: a lower bound" } else { "" };
         let with = r.with_batteries.iter().find(|w| w.batteries == need.batteries);
+        let (motor, propeller) = (r.pair.motor.as_str(), r.pair.propeller.as_str());
+        let fits = motor.chars().count() <= m && propeller.chars().count() <= p;
+        if !fits {
+            out += &format!("{motor} {propeller}\n");
+        }
+        let [motor, propeller] = if fits { [motor, propeller] } else { [""; 2] };
         out += &format!(
-            "{:<m$} {:<p$} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
-            r.pair.motor,
-            r.pair.propeller,
+            "{motor:<m$} {propeller:<p$} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
             r.total_thrust_n.0 / 4.0,
             r.pair.maximum.map_or(f64::NAN, |m| m.current_a.0),
             r.efficiency_n_per_a,
