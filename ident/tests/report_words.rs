@@ -281,7 +281,7 @@ fn a_demonstration_judges_its_names() {
     ] {
         assert!(said.contains(word), "{said}");
     }
-    assert!(hidden("creep").judged(&v)[0].ends_with("NOT FOUND"));
+    assert!(hidden("creep").judged(&v)[0].starts_with("hidden was creep: NOT FOUND"));
 }
 
 /// Every effect of a flight says what it does, with its size where the flight shows it.

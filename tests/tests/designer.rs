@@ -140,9 +140,9 @@ fn a_constant_whose_law_does_not_hold_is_widened() {
     let plain = identified(at, "plain", &scenario(11.5, ""), &[]);
     let plain = constant(&plain, "k_T ");
     assert!(plain.contains("the law holds"), "{plain}");
-    // a part of a blade breaks off before the last six of 21 levels: those on one side of it are no stray ones
-    let breaks = "[[effect]]\nid = \"blade_damage\"\nthrust_change = -0.16\ntorque_change = 0.08\nt0_s = 92.0\n";
-    let broken = constant(&identified(at, "broken", &scenario(11.5, breaks), &[]), "k_T ");
+    // a part of a blade breaks off on the way up: a third of the levels is on the other side of it, and those are no stray ones
+    let breaks = std::fs::read_to_string(root().join("examples/broken-blade.toml")).expect("an example");
+    let broken = constant(&identified(at, "broken", &breaks, &[]), "k_T ");
     assert!(broken.contains("levels left out, the law does not hold"), "{broken}");
     let (low, high) = interval(&broken);
     let fast = rows(at, "broken-table.csv").into_iter().filter(|r| r["rpm"] > 3500.0).collect::<Vec<_>>();
