@@ -17,7 +17,7 @@ fn no_width_leaves_the_range() {
     let wrong = |ns: u32| {
         let pulse = PulseWidth(ns).clamped().0;
         let inside = |ns: u32| (1_000_000..=2_000_000).contains(&ns);
-        u32::from(!inside(pulse)) | u32::from(inside(ns)) * (pulse ^ ns)
+        u32::from(!inside(pulse)) | (u32::from(inside(ns)) * (pulse ^ ns))
     };
     // blocks, which the compiler takes several at a time
     for block in 0..1u32 << 16 {
