@@ -144,3 +144,24 @@ fn numbers_that_no_prediction_reads_are_refused_where_they_stand() {
     edited("a key of an effect", "shape = [0.4]", "shapes = 1\nshape = [0.4]", &["effect[1].shapes", "shape"]);
     edited("a key of the file", "start_pulse_us = ", "start_us = 1\nstart_pulse_us = ", &["key start_us", "start_pulse_us"]);
 }
+
+/// Until a tachometer has seen its second mark it reads nothing. Those zeros are no readings to judge by, and a prediction says them all the same.
+#[test]
+fn before_its_second_mark_a_tachometer_is_predicted_to_read_nothing() {
+    let bench = Bench::new();
+    let start = "schedule = { kind = \"up_down\", step_us = 100, hold_s = 4, top_us = 1800 }\n[sensors]\nfitted = [\"beam\"]\n";
+    fs::write(bench.path("rig.toml"), format!("seed = 4\n{start}")).unwrap();
+    bench.call(&["--quiet", "sim", "rig.toml", "-o", "run.csv"]).succeeded();
+    bench.call(&["--quiet", "close-loop", "run.csv", "-o", "closed"]).succeeded();
+    bench.call(&["--quiet", "predict", "closed/model.toml", "run.csv", "-o", "pred.csv"]).succeeded();
+    let verdict: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(bench.path("closed/verdict.json")).unwrap()).unwrap();
+    let aside = verdict["set_aside"].as_array().unwrap();
+    let silent = aside.iter().find(|a| a["channel"] == "rpm_beam" && a["value"] == 0.0).expect("zeros of the start");
+    let table = fs::read_to_string(bench.path("pred.csv")).unwrap();
+    let mut lines = table.lines().filter(|l| !l.starts_with('#'));
+    let column = lines.next().unwrap().split(',').position(|c| c == "rpm_beam").unwrap();
+    let row = silent["row"].as_u64().unwrap() as usize;
+    let said = lines.nth(row).unwrap().split(',').nth(column).unwrap();
+    assert_eq!(said.parse::<f64>().ok(), Some(0.0), "row {row}: {said:?}");
+}
