@@ -46,6 +46,9 @@ pub struct SetAside {
     /// One of several single readings of its channel: it stays in the log for the effect that speaks of them.
     #[serde(skip)]
     pub recurs: bool,
+    /// The zeros of a tachometer before its second mark: no reading to judge by, but what it reads then is known.
+    #[serde(skip)]
+    pub silent: bool,
 }
 
 impl fmt::Display for SetAside {
@@ -196,5 +199,6 @@ fn told(log: &Log, name: &str, column: &[f64], event: &Event) -> Option<SetAside
         value: column[event.worst],
         expected: event.expected,
         recurs: false,
+        silent: event.silent,
     })
 }

@@ -10,7 +10,7 @@
 //! Reference: Page 1954, Biometrika 41:100; Moustakides 1986, Annals of Statistics 14:1379 (optimal for a known shift); Siegmund 1985,
 //! "Sequential Analysis", section II.6 (run length).
 
-use crate::context::{Context, Target};
+use crate::context::{CALM_US, Context, Target};
 use crate::hypothesis::Declared;
 use crate::leftover::{self, Leftover};
 use crate::log::{Column, Log};
@@ -76,7 +76,7 @@ fn jumps(model: &Model, context: &Context) -> Vec<f64> {
             from += 1;
         }
         let (low, high) = pulse[from..=row].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
-        if high - pulse[row] > 1.01 * deepest { f64::NAN } else { (high - low) / usual }
+        if high - pulse[row] > deepest + CALM_US { f64::NAN } else { (high - low) / usual }
     };
     (0..context.len()).map(of_row).collect()
 }

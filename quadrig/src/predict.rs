@@ -11,7 +11,6 @@ use crate::close_loop::{flight, inertial};
 use crate::open::{Columns, Names, open};
 use crate::trouble::unwritten;
 use clap::ValueEnum;
-use ident::bad::SetAside;
 use ident::context::Context;
 use ident::log::{Column, Log, write_whole};
 use ident::model::Model;
@@ -118,11 +117,9 @@ fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
         for row in target.unclaimed.iter().chain(&target.aside) {
             values[*row] = f64::NAN; // an empty field
         }
-        // until a tachometer has seen its second mark it reads nothing, as before, and that is what is expected of it
-        let read = log.column(name).unwrap_or_default();
-        let from_rest = |a: &&SetAside| a.channel == name && a.value == 0.0 && a.row > 0 && read[a.row - 1] == 0.0;
-        for start in context.set_aside.iter().filter(from_rest) {
-            values[start.row..start.row + start.rows].fill(0.0);
+        // a tachometer that has not seen its second mark reads nothing, whatever the rotor does
+        for silent in context.set_aside.iter().filter(|a| a.silent && a.channel == name) {
+            values[silent.span()].fill(0.0);
         }
         Some(Column { name: name.to_owned(), values })
     };

@@ -20,7 +20,7 @@ use ident::context::Context;
 use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
-use ident::report::{selection, wrapped};
+use ident::report::{WIDEST, selection, wrapped};
 use ident::select::{Airframe, Need, Pair, Row, choose, from_log, is_repeated, misses, read_table, row, thesis, why};
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -233,8 +233,6 @@ fn fly(motor: &str, propeller: &str) -> Pair {
     }
 }
 
-/// Columns of the widest line.
-const COLUMNS: usize = 100;
 /// Least columns of the names, and the most that both together leave room beside.
 const MOTOR: usize = 8;
 const PROPELLER: usize = 9;
@@ -280,7 +278,7 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         }
         // what does not fit beside the figures stands beneath them
         let words = format!("{mark}{clipped}");
-        let beside = out.lines().last().map_or(0, |l| l.chars().count()) + words.chars().count() <= COLUMNS;
+        let beside = out.lines().last().map_or(0, |l| l.chars().count()) + words.chars().count() <= WIDEST;
         out += &if beside { format!("{words}\n") } else { format!("\n    {}\n", wrapped(words.trim(), 4)) };
         if is_repeated(rows, r) {
             out += &format!("    of {}\n", r.pair.source);

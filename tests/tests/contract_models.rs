@@ -149,8 +149,8 @@ fn numbers_that_no_prediction_reads_are_refused_where_they_stand() {
 #[test]
 fn before_its_second_mark_a_tachometer_is_predicted_to_read_nothing() {
     let bench = Bench::new();
-    let start = "schedule = { kind = \"up_down\", step_us = 100, hold_s = 4, top_us = 1800 }\n[sensors]\nfitted = [\"beam\"]\n";
-    fs::write(bench.path("rig.toml"), format!("seed = 4\n{start}")).unwrap();
+    let rig = "seed = 4\nschedule = { kind = \"up_down\", step_us = 100, hold_s = 4, top_us = 1800 }\n";
+    fs::write(bench.path("rig.toml"), rig).unwrap();
     bench.call(&["--quiet", "sim", "rig.toml", "-o", "run.csv"]).succeeded();
     bench.call(&["--quiet", "close-loop", "run.csv", "-o", "closed"]).succeeded();
     bench.call(&["--quiet", "predict", "closed/model.toml", "run.csv", "-o", "pred.csv"]).succeeded();
@@ -161,7 +161,8 @@ fn before_its_second_mark_a_tachometer_is_predicted_to_read_nothing() {
     let table = fs::read_to_string(bench.path("pred.csv")).unwrap();
     let mut lines = table.lines().filter(|l| !l.starts_with('#'));
     let column = lines.next().unwrap().split(',').position(|c| c == "rpm_beam").unwrap();
-    let row = silent["row"].as_u64().unwrap() as usize;
-    let said = lines.nth(row).unwrap().split(',').nth(column).unwrap();
-    assert_eq!(said.parse::<f64>().ok(), Some(0.0), "row {row}: {said:?}");
+    let [row, rows] = ["row", "rows"].map(|key| silent[key].as_u64().unwrap() as usize);
+    let said: Vec<Option<f64>> = lines.skip(row).map(|l| l.split(',').nth(column)?.parse().ok()).take(rows + 1).collect();
+    // and from the first reading on it is the rotor's speed that is predicted
+    assert!(said[..rows].iter().all(|v| *v == Some(0.0)) && said[rows].is_some_and(|v| v > 500.0), "row {row}: {said:?}");
 }

@@ -257,31 +257,25 @@ fn standing(seen: &[Seen], best: &[usize]) -> Vec<Seen> {
 /// What could stand in the place of a candidate: the hypotheses that hold something else instead.
 fn rivals(seen: &[Seen], fit: &Fit, own: usize) -> Vec<(Vec<usize>, f64)> {
     let best = own_terms(fit);
-    let seen = &standing(seen, &best)[..];
-    let instead = |s: &Seen| -> Vec<usize> { s.terms.iter().copied().filter(|t| !best.contains(t)).collect() };
-    let mut out: Vec<(Vec<usize>, f64)> = Vec::new();
-    for s in seen.iter().filter(|s| !s.terms.contains(&own)) {
-        let other = instead(s);
-        let probability = share(seen, |h| std::ptr::eq(h, s));
-        match out.iter_mut().find(|o| o.0 == other) {
-            Some(o) => o.1 += probability,
-            None => out.push((other, probability)),
-        }
-    }
-    out.retain(|o| o.1 > LISTED && !o.0.is_empty());
-    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let instead = |s: &Seen| s.terms.iter().copied().filter(|t| !best.contains(t)).collect::<Vec<_>>();
+    let mut out = together(&standing(seen, &best), |s| !s.terms.contains(&own), instead);
+    out.retain(|o| !o.0.is_empty());
     out
 }
 
 fn alternatives(seen: &[Seen], fit: &Fit) -> Vec<(Vec<usize>, f64)> {
     let best = own_terms(fit);
-    let seen = &standing(seen, &best)[..];
+    together(&standing(seen, &best), |s| s.terms != best, |s| s.terms.clone())
+}
+
+/// Some of the hypotheses under what each is told as, those alike together, the most probable first.
+fn together(seen: &[Seen], some: impl Fn(&Seen) -> bool, told: impl Fn(&Seen) -> Vec<usize>) -> Vec<(Vec<usize>, f64)> {
     let mut out: Vec<(Vec<usize>, f64)> = Vec::new();
-    for s in seen.iter().filter(|s| s.terms != best) {
-        let probability = share(seen, |h| std::ptr::eq(h, s));
-        match out.iter_mut().find(|o| o.0 == s.terms) {
+    for s in seen.iter().filter(|s| some(s)) {
+        let (terms, probability) = (told(s), share(seen, |h| std::ptr::eq(h, s)));
+        match out.iter_mut().find(|o| o.0 == terms) {
             Some(o) => o.1 += probability,
-            None => out.push((s.terms.clone(), probability)),
+            None => out.push((terms, probability)),
         }
     }
     out.retain(|o| o.1 > LISTED);

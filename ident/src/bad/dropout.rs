@@ -205,7 +205,7 @@ impl Judge<'_> {
         }
         // a single reading is for those who look at single readings
         let rows = row..end;
-        let event = Event { expected: witness.said[worst], rows, worst, at_step: false };
+        let event = Event { expected: witness.said[worst], rows, worst, at_step: false, silent: false };
         let loses = depth > DEPTH * event.expected;
         let stands = loses
             && event.rows.len() > super::SINGLE

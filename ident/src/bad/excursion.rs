@@ -24,6 +24,8 @@ pub(super) struct Event {
     pub(super) expected: f64,
     /// Whether the load has just stepped.
     pub(super) at_step: bool,
+    /// Whether they are the zeros of a tachometer before its second mark.
+    pub(super) silent: bool,
 }
 
 /// Most samples of an excursion, its recovery included: 40 samples and five time constants of as many.
@@ -288,7 +290,7 @@ impl<'c> Search<'c> {
     fn event(&self, e: &Excursion) -> Event {
         let rows = self.case.rows[e.from]..self.case.rows[e.to - 1] + 1;
         let expected = self.case.expected(e.worst, e.usual);
-        Event { rows, worst: self.case.rows[e.worst], expected, at_step: self.since[e.from].class < ON_ITS_WAY }
+        Event { rows, worst: self.case.rows[e.worst], expected, at_step: self.since[e.from].class < ON_ITS_WAY, silent: false }
     }
 }
 

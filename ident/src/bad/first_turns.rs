@@ -28,7 +28,7 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
             let rows = rest.iter().take_while(silent).count();
             // a stretch without a row of rest is a drop-out, and no start
             let start = (rows > 0 && rows < rest.len()).then(|| rest[rows - 1])?;
-            Some(Event { rows: start..first, worst: start, expected: read[first], at_step: true })
+            Some(Event { rows: start..first, worst: start, expected: read[first], at_step: true, silent: true })
         })
         .collect()
 }

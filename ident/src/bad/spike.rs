@@ -43,7 +43,7 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
     };
     let event = |k: usize| {
         let row = case.rows[k];
-        Event { rows: row..row + 1, worst: row, expected: case.y[k] - off[k], at_step: since[k].class <= PEAKS }
+        Event { rows: row..row + 1, worst: row, expected: case.y[k] - off[k], at_step: since[k].class <= PEAKS, silent: false }
     };
     let mut out: Vec<Event> = Vec::new();
     for k in without_recurring((0..n).filter(|k| far(*k)).collect(), &since, |k| *k) {

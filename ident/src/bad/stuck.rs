@@ -43,5 +43,5 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
     let off = |k: &usize| (case.r[*k] - usual).abs();
     let Some(worst) = samples.clone().max_by(|a, b| off(a).total_cmp(&off(b))) else { return Vec::new() };
     let rows = case.rows[samples.start]..case.rows[samples.end - 1] + 1;
-    vec![Event { rows, worst: case.rows[worst], expected: y[worst] - case.r[worst] + usual, at_step: false }]
+    vec![Event { rows, worst: case.rows[worst], expected: y[worst] - case.r[worst] + usual, at_step: false, silent: false }]
 }

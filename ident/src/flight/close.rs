@@ -308,6 +308,7 @@ impl<'w> Whole<'w> {
             value: s.value,
             expected: s.expected,
             recurs: false,
+            silent: false,
         });
         Verdict {
             format: FORMAT,

@@ -85,7 +85,7 @@ impl ModelRotor {
         }
         // a command that jumps between two rows of a log seems as late as its instant is unknown; a flight knows when its commands come
         for lag in flying.effects.iter_mut().filter(|e| e.placed.instance.form == "coasting_of_steps") {
-            lag.placed.shape[LATENCY] = 0.0;
+            lag.placed.shape.iter_mut().skip(LATENCY).for_each(|latency| *latency = 0.0);
         }
         // where the run saw the rotor stand still, what its force and torque read then is the zero of the day
         for p in &mut flying.polynomials {
