@@ -93,14 +93,7 @@ pub fn found(log: &Log) -> Vec<SetAside> {
         if samples < FEWEST {
             continue;
         }
-        // a probe that has lost its mark reads nothing, however often: no effect speaks of it
-        let mut lost = if SPEED.contains(&name) { dropout::found(&witnesses, name) } else { Vec::new() };
-        witnesses.take_out(name, &lost);
-        if SPEED.contains(&name) {
-            let silent = first_turns::found(&witnesses, name);
-            witnesses.take_out(name, &silent);
-            lost.extend(silent);
-        }
+        let lost = if SPEED.contains(&name) { of_probe(&mut witnesses, name) } else { Vec::new() };
         let mut events = stuck::found(&witnesses, name);
         witnesses.take_out(name, &events);
         // a probe's recovery belongs to its drop-out; elsewhere a single reading stands by itself
@@ -128,6 +121,23 @@ pub fn found(log: &Log) -> Vec<SetAside> {
         .filter_map(|(name, column, e)| told(log, name, column, e))
         .chain(kept)
         .collect()
+}
+
+/// What a probe has not seen: a start's zeros, which would be taken for a mark that was lost, and the marks that it has lost. It reads nothing
+/// then, however often: no effect speaks of it.
+fn of_probe(witnesses: &mut Witnesses<'_>, name: &'static str) -> Vec<Event> {
+    let silent = first_turns::found(witnesses, name);
+    witnesses.take_out(name, &silent);
+    let mut lost = dropout::found(witnesses, name);
+    witnesses.take_out(name, &lost);
+    // zeros that follow a loss are the end of it: the rotor had begun to turn before
+    for start in silent {
+        match lost.iter_mut().find(|e| e.rows.end == start.rows.start) {
+            Some(loss) => loss.rows.end = start.rows.end,
+            None => lost.push(start),
+        }
+    }
+    lost
 }
 
 /// The log without the samples that were set aside: they are missing ones.

@@ -148,21 +148,31 @@ fn numbers_that_no_prediction_reads_are_refused_where_they_stand() {
 /// Until a tachometer has seen its second mark it reads nothing. Those zeros are no readings to judge by, and a prediction says them all the same.
 #[test]
 fn before_its_second_mark_a_tachometer_is_predicted_to_read_nothing() {
-    let bench = Bench::new();
-    let rig = "seed = 4\nschedule = { kind = \"up_down\", step_us = 100, hold_s = 4, top_us = 1800 }\n";
-    fs::write(bench.path("rig.toml"), rig).unwrap();
-    bench.call(&["--quiet", "sim", "rig.toml", "-o", "run.csv"]).succeeded();
-    bench.call(&["--quiet", "close-loop", "run.csv", "-o", "closed"]).succeeded();
-    bench.call(&["--quiet", "predict", "closed/model.toml", "run.csv", "-o", "pred.csv"]).succeeded();
-    let verdict: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(bench.path("closed/verdict.json")).unwrap()).unwrap();
-    let aside = verdict["set_aside"].as_array().unwrap();
-    let silent = aside.iter().find(|a| a["channel"] == "rpm_beam" && a["value"] == 0.0).expect("zeros of the start");
-    let table = fs::read_to_string(bench.path("pred.csv")).unwrap();
+    for sensors in ["", "sensors = { fitted = [\"beam\"] }\n"] {
+        let bench = Bench::new();
+        let rig = format!("seed = 4\n{sensors}schedule = {{ kind = \"up_down\", step_us = 100, hold_s = 4, top_us = 1800 }}\n");
+        fs::write(bench.path("rig.toml"), rig).unwrap();
+        bench.call(&["--quiet", "sim", "rig.toml", "-o", "run.csv"]).succeeded();
+        bench.call(&["--quiet", "close-loop", "run.csv", "-o", "closed"]).succeeded();
+        bench.call(&["--quiet", "predict", "closed/model.toml", "run.csv", "-o", "pred.csv"]).succeeded();
+        let verdict: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(bench.path("closed/verdict.json")).unwrap()).unwrap();
+        let aside = verdict["set_aside"].as_array().unwrap();
+        let silent = aside.iter().find(|a| a["channel"] == "rpm_beam" && a["value"] == 0.0).expect("zeros of the start");
+        let [row, rows] = ["row", "rows"].map(|key| silent[key].as_u64().unwrap() as usize);
+        // the zeros and no reading after them, on a rig whose only witness is the load as well
+        let read = beam(&bench, "run.csv", row, rows + 1);
+        assert!(read[..rows].iter().all(|v| *v == Some(0.0)) && read[rows].is_some_and(|v| v > 0.0), "row {row}: {read:?}");
+        // and from the first reading on it is the rotor's speed that is predicted
+        let said = beam(&bench, "pred.csv", row, rows + 1);
+        assert!(said[..rows].iter().all(|v| *v == Some(0.0)) && said[rows].is_some_and(|v| v > 500.0), "row {row}: {said:?}");
+    }
+}
+
+/// What a table says of the beam's speed, so many rows from one on.
+fn beam(bench: &Bench, file: &str, row: usize, rows: usize) -> Vec<Option<f64>> {
+    let table = fs::read_to_string(bench.path(file)).unwrap();
     let mut lines = table.lines().filter(|l| !l.starts_with('#'));
     let column = lines.next().unwrap().split(',').position(|c| c == "rpm_beam").unwrap();
-    let [row, rows] = ["row", "rows"].map(|key| silent[key].as_u64().unwrap() as usize);
-    let said: Vec<Option<f64>> = lines.skip(row).map(|l| l.split(',').nth(column)?.parse().ok()).take(rows + 1).collect();
-    // and from the first reading on it is the rotor's speed that is predicted
-    assert!(said[..rows].iter().all(|v| *v == Some(0.0)) && said[rows].is_some_and(|v| v > 500.0), "row {row}: {said:?}");
+    lines.skip(row).map(|l| l.split(',').nth(column)?.parse().ok()).take(rows).collect()
 }

@@ -84,4 +84,23 @@ mod tests {
         assert_eq!(stands_out(&[1.0, 1.0, 1.0, 9.0, 5.0, 5.0, 5.0], 3), 4.0);
         assert_eq!(stands_out(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0], 6), -5.0);
     }
+
+    /// A rotor of some inertia that is sped up twice and slowed down in smaller steps: the torque peaks after the two by more than the other
+    /// steps show.
+    #[test]
+    fn the_torque_of_speeding_up_is_no_spike() {
+        let mut text = String::from("# quadrig-log 1\nt_s,pulse_us,rpm,torque_nm\n");
+        let (mut rpm, mut pulse) = (0.0, 1000.0);
+        for row in 0..600_u32 {
+            if row % 60 == 30 {
+                pulse += if row % 300 == 30 { 90.0 } else { -20.0 };
+            }
+            let before: f64 = rpm;
+            rpm += 0.7 * (5.0 * (pulse - 1000.0) - before);
+            let torque = 1e-8 * rpm * rpm + 1e-4 * (rpm - before) + 2e-5 * f64::from(row * 7 % 5);
+            text += &format!("{:.1},{pulse},{:.1},{torque:.6}\n", 0.1 * f64::from(row), rpm + f64::from(row * 3 % 5) * 0.2);
+        }
+        let aside = crate::bad::found(&crate::log::Log::parse("run.csv", text.as_bytes()).expect("a log"));
+        assert!(aside.iter().all(|a| a.channel != "torque_nm"), "{aside:?}");
+    }
 }

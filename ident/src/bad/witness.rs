@@ -1,7 +1,7 @@
 //! Who bears witness for a channel, and what is expected of it.
 //!
 //! What it is: the other speed channels for a speed, the speed for thrust, torque and current, the command where neither is there; each
-//! through a curve of its own. What was found bad of one channel is bridged before the next one is judged by it.
+//! through a curve of its own, torque and current with what speeding the rotor up takes. What was found bad of one channel is bridged before the next one is judged by it.
 //! What can go wrong: a log of one channel has no witness but its own time.
 //! Units: rows, s, the channel's own.
 //! Reference: specification `closing-the-loop.md`, step 2 (relations between channels).
@@ -15,6 +15,9 @@ use std::collections::BTreeMap;
 
 /// Change of a regressor within two rows, as a share of its span, that is a step where no command was logged.
 const STEP: f64 = 0.02;
+
+/// Channels that rise while the rotor speeds up, beyond their curves: its inertia takes torque, and torque takes current.
+const ACCELERATES: [&str; 2] = ["torque_nm", "current_a"];
 
 /// The log as far as it has been judged.
 pub(super) struct Witnesses<'l> {
@@ -98,7 +101,14 @@ impl<'l> Witnesses<'l> {
         let commanded = later.and_then(|p| self.through(&rows, &y, p)).unwrap_or_default();
         let mut signals = signals.into_iter();
         let first = signals.find_map(|signal| Some((self.through(&rows, &y, &signal)?, signal)));
-        let (said, signal) = first.unwrap_or_default();
+        let (mut said, signal) = first.unwrap_or_default();
+        if ACCELERATES.contains(&name)
+            && let Some(speed) = self.speed(name)
+        {
+            let takes = acceleration(&self.log.t, &speed, self.step);
+            let left: Vec<f64> = rows.iter().zip(&y).map(|(i, y)| y - said.get(*i).copied().unwrap_or(0.0)).collect();
+            add_share(&mut said, &rows, &left, &takes);
+        }
         let r = if said.is_empty() { y.clone() } else { rows.iter().zip(&y).map(|(i, y)| y - said[*i]).collect() };
         let others = if with_others { signals.filter_map(|s| self.through(&rows, &y, &s)).collect() } else { Vec::new() };
         let prompt = self.pulse.is_some() || SPEED.contains(&name) && self.speed(name).is_some();
@@ -170,6 +180,44 @@ impl<'l> Witnesses<'l> {
         let gap = |i: usize| t[i] - t[i - 1] > GAP * self.step;
         (1..t.len()).filter(|i| gap(*i) || jumps(*i)).map(|i| (i, gap(i))).collect()
     }
+}
+
+/// Change of the speed since the row before over the time between them; none after a gap.
+fn acceleration(t: &[f64], speed: &[f64], step: f64) -> Vec<f64> {
+    let since = |i: usize| {
+        let dt = t[i] - t[i - 1];
+        if dt > 0.0 && dt < GAP * step { (speed[i] - speed[i - 1]) / dt } else { 0.0 }
+    };
+    (0..speed.len()).map(|i| if i == 0 { 0.0 } else { since(i) }).collect()
+}
+
+/// Adds the share of an acceleration that a channel shows: of speeding up, and of slowing down, where a controller may let the rotor coast.
+/// Least absolute departures through the origin (the weighted median of the ratios), so that no bad sample decides it.
+fn add_share(said: &mut [f64], rows: &[usize], left: &[f64], takes: &[f64]) {
+    for sign in [1.0, -1.0] {
+        let mut ratios: Vec<(f64, f64)> = rows
+            .iter()
+            .zip(left)
+            .filter(|(i, _)| sign * takes[**i] > 0.0)
+            .map(|(i, l)| (l / takes[*i], takes[*i].abs()))
+            .collect();
+        let share = weighted_median(&mut ratios);
+        said.iter_mut().zip(takes).filter(|(_, a)| sign * **a > 0.0).for_each(|(s, a)| *s += share * a);
+    }
+}
+
+/// The value up to which half of the weight lies; 0 of nothing.
+fn weighted_median(of: &mut [(f64, f64)]) -> f64 {
+    of.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * of.iter().map(|v| v.1).sum::<f64>();
+    let mut below = 0.0;
+    for (value, weight) in of.iter() {
+        below += weight;
+        if below >= half {
+            return *value;
+        }
+    }
+    0.0
 }
 
 fn span(values: &[f64]) -> f64 {
