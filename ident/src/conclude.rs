@@ -92,20 +92,22 @@ fn spoils(context: &Context, fit: &Fit, errors: &Errors<'_>) -> Option<usize> {
         .next()
 }
 
-/// Of two effects that cancel on a channel the one that helps less.
+/// Of two effects that cancel on a channel the one that helps less; the one without a name beside one with a name, whose size would not be its
+/// own.
 fn cancelled(context: &Context, declared: Declared<'_>, fit: &Fit, errors: &Errors<'_>) -> Option<usize> {
     let help = |k: usize| quoted(context, &fit.placed[k], errors.after, &errors.without[k]).of_news;
     for (i, target) in context.targets.iter().enumerate().filter(|(_, t)| !t.relation.is_evidence()) {
-        let there: Vec<usize> =
-            (0..fit.placed.len()).filter(|k| is_named(&fit.placed[*k]) && fit.placed[*k].instance.touches(target.name)).collect();
-        if there.len() < 2 {
+        let there: Vec<usize> = (0..fit.placed.len()).filter(|k| fit.placed[*k].instance.touches(target.name)).collect();
+        if there.len() < 2 || !there.iter().any(|k| is_named(&fit.placed[*k])) {
             continue;
         }
         let parts: Vec<Vec<f64>> = there.iter().map(|k| contribution(context, declared, fit, *k, i)).collect();
         for a in 0..there.len() {
             for b in 0..a {
+                let pair = [there[a], there[b]];
                 if cancel(&parts[a], &parts[b], target.noise.rms) {
-                    return Some(if help(there[a]) < help(there[b]) { there[a] } else { there[b] });
+                    let without_name = pair.into_iter().find(|k| !is_named(&fit.placed[*k]));
+                    return without_name.or_else(|| pair.into_iter().min_by(|x, y| help(*x).total_cmp(&help(*y))));
                 }
             }
         }

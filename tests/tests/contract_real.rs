@@ -43,6 +43,20 @@ fn stated(run: &Path) -> f64 {
     row.split('|').nth(4).and_then(|cell| cell.trim().parse().ok()).expect("a factor in the fourth column")
 }
 
+/// A Crazyflie's battery and wires drop some two tenths of a volt per ampere; a term without a name in the power of the same deck would trade
+/// places with it.
+#[test]
+fn a_supply_lead_keeps_its_size_beside_what_has_no_name() {
+    let Some(data) = data("the lead of a Crazyflie") else { return };
+    let run = data.join("rig/crazyflie-stand/tidy/cf21-stock2.csv");
+    let folder = TempDir::new().unwrap();
+    let said = call(folder.path(), &["close-loop", text(&run), "-o", "out", "--json"]).succeeded();
+    let verdict: Value = serde_json::from_str(&said.out).expect("the verdict is JSON");
+    let sag = verdict["effects"].as_array().unwrap().iter().find(|e| e["id"] == "supply_sag").expect("the sag is named");
+    let ohms = sag["parameters"][0]["value"].as_f64().unwrap();
+    assert!((0.1..0.4).contains(&ohms), "{ohms} ohm");
+}
+
 #[test]
 fn the_loop_closes_on_three_recorded_runs() {
     let Some(data) = data("the loop on recorded runs") else { return };
