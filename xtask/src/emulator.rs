@@ -9,6 +9,7 @@
 //!
 //! Reference: rigless 0.4, `soc/stm32f427/memory_map.rs`; The Cargo Book, "Path overrides".
 
+use crate::folder;
 use crate::place::Place;
 use crate::run::{Failure, cargo, output, run};
 use std::fs;
@@ -28,7 +29,7 @@ pub(crate) fn with_flash(place: &Place) -> Result<String, Failure> {
         if part.exists() {
             fs::remove_dir_all(&part)?;
         }
-        copy_folder(&source, &part)?;
+        folder::copy(&source, &part)?;
         let map = part.join("src/soc/stm32f427/memory_map.rs");
         let text = fs::read_to_string(&map)?;
         if text.matches(READ_ONLY).count() != 1 {
@@ -67,20 +68,6 @@ fn published(place: &Place) -> Result<PathBuf, Failure> {
         .find(|path| path.contains("/rigless-0.4"))
         .ok_or_else(|| Failure("cargo metadata names no rigless 0.4".to_owned()))?;
     Path::new(manifest).parent().map(Path::to_path_buf).ok_or_else(|| Failure(format!("{manifest}: no folder")))
-}
-
-fn copy_folder(from: &Path, to: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(to)?;
-    for entry in fs::read_dir(from)? {
-        let entry = entry?;
-        let target = to.join(entry.file_name());
-        if entry.file_type()?.is_dir() {
-            copy_folder(&entry.path(), &target)?;
-        } else {
-            fs::copy(entry.path(), target)?;
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

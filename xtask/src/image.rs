@@ -111,8 +111,13 @@ pub(crate) fn build(place: &Place) -> Result<(), Failure> {
 
 /// The build command of both images: never in pieces, which come out larger than what is flashed.
 pub(crate) fn images(place: &Place) -> Command {
+    images_in(place, Path::new("target/fw"))
+}
+
+/// The same in another target folder.
+pub(crate) fn images_in(place: &Place, target: &Path) -> Command {
     let mut command = cargo(place, &["build", "--config", ".cargo/image.toml", "--release", "--target", BOARD]);
-    command.args(PACKAGES.iter().flat_map(|p| ["-p", p])).args(["--target-dir", "target/fw"]).env("CARGO_INCREMENTAL", "0");
+    command.args(PACKAGES.iter().flat_map(|p| ["-p", p])).arg("--target-dir").arg(target).env("CARGO_INCREMENTAL", "0");
     command
 }
 

@@ -16,10 +16,12 @@ mod callgraph;
 mod changed;
 mod emulator;
 mod errors;
+mod folder;
 mod hazards;
 mod image;
 mod peers;
 mod place;
+mod release;
 mod run;
 mod setup;
 mod strangers;
@@ -51,6 +53,8 @@ usage: cargo xtask COMMAND
   ahrs-peers       instructions, flash and RAM of other attitude filters beside ours (fetches them once)
   ahrs-causes [N]  what the inertial tracer names on recorded and on N simulated logs a case (docs/ahrs-causes.md)
   prove            what holds of pulses, clock, queue, stuffing and checksum for every value, not for drawn ones
+  release          flash images (ELF and HEX), the command line, the book, notes and digests in target/quadrig-VERSION
+  release --twice  the same, built again elsewhere to see that it comes out the same
   strangers        packs the crates that serve other programs, builds examples/stranger on the packages and runs it
   test             everything: format, lints, the book, images, the packed crates, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
@@ -76,6 +80,8 @@ fn main() -> ExitCode {
         ["program"] => emulator::program(&place),
         ["image", "--bless"] => image::image(&place, true),
         ["prove"] => test::proofs(&place),
+        ["release"] => release::release(&place, false),
+        ["release", "--twice"] => release::release(&place, true),
         ["strangers"] => strangers::strangers(&place),
         ["test"] => test::everything(&place),
         ["test", "--quick"] => test::quick(&place),
