@@ -297,7 +297,7 @@ fn decimals(name: &str) -> usize {
     }
 }
 
-fn trimmed(value: f64, digits: usize) -> String {
+pub(crate) fn trimmed(value: f64, digits: usize) -> String {
     let mut s = format!("{value:.digits$}");
     if s.contains('.') {
         let keep = s.trim_end_matches('0').trim_end_matches('.').len();
@@ -409,7 +409,7 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
                     return Err(place.refuse(
                         None,
                         format!("'{line}'"),
-                        format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
+                        format!("'# {format}' on the first line ({})", taken(comment)),
                     ));
                 }
                 format_seen = true;
@@ -431,6 +431,15 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
             ));
         }
         return check_header(&line, &place);
+    }
+}
+
+/// What takes a file of another format.
+fn taken(format: &str) -> &'static str {
+    match format {
+        crate::flight_log::FORMAT => "a flight: `quadrig close-loop` takes it",
+        FORMAT => "a rig's log: without --model of a flight `quadrig close-loop` and `predict` take it",
+        _ => "use `quadrig import` for other formats",
     }
 }
 
