@@ -406,11 +406,19 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
             let comment = comment.trim();
             if !format_seen {
                 if comment != format {
-                    return Err(place.refuse(
-                        None,
-                        format!("'{line}'"),
-                        format!("'# {format}' on the first line ({})", taken(comment)),
-                    ));
+                    let found = format!("'{line}'");
+                    return Err(match comment {
+                        crate::flight_log::FORMAT => place.refuse(
+                            None,
+                            found,
+                            format!("'# {format}' on the first line (a flight: `quadrig close-loop` takes it)"),
+                        ),
+                        _ => place.refuse(
+                            None,
+                            found,
+                            format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
+                        ),
+                    });
                 }
                 format_seen = true;
             } else if let Some(event) = event(comment) {
@@ -431,15 +439,6 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
             ));
         }
         return check_header(&line, &place);
-    }
-}
-
-/// What takes a file of another format.
-fn taken(format: &str) -> &'static str {
-    match format {
-        crate::flight_log::FORMAT => "a flight: `quadrig close-loop` takes it",
-        FORMAT => "a rig's log: without --model of a flight `quadrig close-loop` and `predict` take it",
-        _ => "use `quadrig import` for other formats",
     }
 }
 

@@ -116,11 +116,11 @@ fn stamps(place: &Place<'_>, field: &mut Field, report: &mut Report) -> Result<(
         s if s >= 1.0 => &["*0.001"],
         _ => &[""],
     };
-    let maps: Vec<String> = factors.iter().map(|factor| format!("--map 't_s={}{factor}'", field.cell)).collect();
+    let maps: Vec<String> = factors.iter().map(|factor| format!("'t_s={}{factor}'", field.cell)).collect();
     Err(place.refuse(
         Some(&field.cell),
         format!("a time without a unit, rows {} apart: {}", trimmed(step, 4), units_of(step)),
-        format!("the unit in the header, such as 'Time (s)', or {}", maps.join(" or ")),
+        format!("the unit in the header, such as 'Time (s)', or --map {}", maps.join(" or ")),
     ))
 }
 
