@@ -297,7 +297,7 @@ fn decimals(name: &str) -> usize {
     }
 }
 
-fn trimmed(value: f64, digits: usize) -> String {
+pub(crate) fn trimmed(value: f64, digits: usize) -> String {
     let mut s = format!("{value:.digits$}");
     if s.contains('.') {
         let keep = s.trim_end_matches('0').trim_end_matches('.').len();
@@ -406,11 +406,19 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
             let comment = comment.trim();
             if !format_seen {
                 if comment != format {
-                    return Err(place.refuse(
-                        None,
-                        format!("'{line}'"),
-                        format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
-                    ));
+                    let found = format!("'{line}'");
+                    return Err(match comment {
+                        crate::flight_log::FORMAT => place.refuse(
+                            None,
+                            found,
+                            format!("'# {format}' on the first line (a flight: `quadrig close-loop` takes it)"),
+                        ),
+                        _ => place.refuse(
+                            None,
+                            found,
+                            format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
+                        ),
+                    });
                 }
                 format_seen = true;
             } else if let Some(event) = event(comment) {

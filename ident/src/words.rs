@@ -5,8 +5,11 @@
 //! Units: scaled to a size that one reads at a glance (0.041 ohm is 41 mohm).
 //! Reference: GUM, clause 7.2.6 (digits of a result).
 
+mod plain;
+
 use crate::effects::Scope;
 use crate::verdict::{EffectEntry, Parameter};
+pub use plain::{formula, plain};
 
 /// What a cause does, in two parts: an adverb fits between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -237,23 +240,6 @@ pub fn channel(name: &str) -> String {
         other => other,
     };
     said.to_owned()
-}
-
-/// A text whose columns are told as people say them.
-#[must_use]
-pub fn plain(text: &str) -> String {
-    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let mut out = String::new();
-    let mut rest = text;
-    while let Some(from) = rest.find(is_name) {
-        let name = &rest[from..];
-        let name = &name[..name.find(|c| !is_name(c)).unwrap_or(name.len())];
-        out += &rest[..from];
-        // a word without an underscore is a word
-        out += &if name.contains('_') { channel(name) } else { name.to_owned() };
-        rest = &rest[from + name.len()..];
-    }
-    out + rest
 }
 
 /// A channel of a flight or attitude log as people say it: a quantity and its axis, or the speed of a rotor.

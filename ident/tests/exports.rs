@@ -216,7 +216,7 @@ fn what_is_in_doubt_is_refused_with_the_likely_reason() {
     for (text, wanted) in [
         (
             "Time,RPM,Thrust (N)\n0,1,1\n20,2,2\n40,3,3\n".to_owned(),
-            "column Time: a time without a unit, rows 20.0000 apart: milliseconds?",
+            "column Time: a time without a unit, rows 20 apart: milliseconds (a row each 0.02 s)?",
         ),
         ("Time (s),RPM,Thrust\n0,1000,100\n1,2000,400\n".to_owned(), "column Thrust: no unit, values up to 400: grams?"),
         ("Time (s),ESC signal,RPM\n0,0,0\n1,1500,9000\n2,200,1000\n".to_owned(), "DShot 0 to 2047?"),
@@ -243,7 +243,7 @@ fn what_is_in_doubt_is_refused_with_the_likely_reason() {
         (staircase(all, &|i, u| format!("{},{},{},0,{},12\n", 20.0 * i, 5000.0 * u, 2.0 * u, 5.0 * u)), ""),
         (
             staircase(all, &|i, u| format!("{},{},{},0,{},12\n", 100.0 * i, 5000.0 * u, 2.0 * u, 5.0 * u)),
-            "column t_s: rows 100 s apart, 5900 s in all: milliseconds?",
+            "column t_s: rows 100 s apart, 5900 s in all: milliseconds (a row each 0.1 s)?",
         ),
         (
             staircase(all, &|i, u| format!("{},{},{},0,{},12\n", 1e-6 * i, 5000.0 * u, 2.0 * u, 5.0 * u)),

@@ -183,14 +183,16 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         (
             verdict(Kind::None, vec![]),
             false,
-            &["Nothing is left to explain: no channel is left with more than its noise."],
+            &["The declared model explains the run: no channel is left with more than its noise."],
             &["The load cell", "lacks"],
         ),
-        (verdict(Kind::None, vec![]), true, &["Nothing is new since the declared model"], &[]),
+        (verdict(Kind::None, vec![]), true, &["The declared model still explains the run"], &[]),
         (
             with_left(verdict(Kind::None, vec![])),
             false,
-            &["Nothing that could be named is left over. On thrust 0.028 N is left (slow)."],
+            &[
+                "The declared model explains the run, but for a rest that no name was found for. On thrust 0.028 N is left (slow).",
+            ],
             &["more than its noise"],
         ),
     ]
@@ -340,7 +342,10 @@ fn what_is_not_predicted_is_not_left() {
 #[test]
 fn a_text_is_told_without_names_of_columns() {
     let said = ident::words::plain("the thrust_n residual follows temp_c, as thrust(rpm) holds; time_since_step");
-    assert_eq!(said, "the thrust residual follows temperature, as thrust(rpm) holds; time since the last step");
+    assert_eq!(
+        said,
+        "the thrust residual follows temperature, as the curve of thrust over speed holds; time since the last step"
+    );
     assert_eq!(ident::words::channel("mz"), "field (z)");
     let late = effect("channel_delay", "mx", 0.9, 0.5, vec![parameter("delay", 0.011, 0.001, "s")]);
     assert_eq!((ident::flight::VOCABULARY.clause)(&late).sentence(), "The magnetometer answers 11 ms late.");

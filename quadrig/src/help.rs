@@ -6,6 +6,7 @@
 //! Reference: clap, `Command::after_help`.
 
 use clap::Command;
+use ident::report::WIDEST;
 
 /// What is taught of one command.
 struct Entry {
@@ -126,6 +127,7 @@ impl Entry {
 
 /// The command line with what it teaches.
 pub(crate) fn taught(command: Command) -> Command {
+    let command = command.max_term_width(WIDEST);
     let wanted = ENTRIES.iter().filter(|e| e.path.split(' ').next_back() != Some("help"));
     wanted.fold(command, |command, entry| {
         let path: Vec<&str> = entry.path.split(' ').filter(|word| !word.is_empty()).collect();
@@ -210,6 +212,18 @@ mod tests {
             for file in words.iter().filter(|w| w.starts_with("examples/")) {
                 assert!(root().join(file).is_file(), "{}: {file} is not there", entry.example);
             }
+        }
+    }
+
+    /// Help fits into the columns that every other output fits into.
+    #[test]
+    fn help_fits_a_terminal() {
+        for (path, command) in walked(&taught(Cli::command()), "") {
+            let mut command = command.max_term_width(WIDEST).term_width(WIDEST);
+            let text = command.render_long_help().to_string();
+            let wide: Vec<&str> = text.lines().filter(|l| l.chars().count() > WIDEST).collect();
+            // a word that is longer than a line stands as it is
+            assert!(wide.iter().all(|l| l.split_whitespace().count() == 1), "quadrig {path}: {wide:?}");
         }
     }
 

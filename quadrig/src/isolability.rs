@@ -18,6 +18,7 @@ use ident::import::Options;
 use ident::isolability::{Apart, Cause, Isolability, Standing, isolability, short};
 use ident::log::Log;
 use ident::report;
+use ident::report::wrapped;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -82,9 +83,9 @@ fn flown(hidden: &[String]) -> String {
 
 /// The matrix as a person reads it.
 fn text(found: &Isolability) -> String {
-    let mut out = format!("{}: {} rows, {:.0} s\n{}", found.run, found.rows, found.duration_s, wrapped(&found.summary(), ""));
+    let mut out = format!("{}: {} rows, {:.0} s\n{}", found.run, found.rows, found.duration_s, line(&found.summary(), 0));
     if !found.found.is_empty() {
-        out += &wrapped(&format!("The log as it is holds {}; they stay in it.", found.found.join(", ")), "");
+        out += &line(&format!("The log as it is holds {}; they stay in it.", found.found.join(", ")), 0);
     }
     out += &table(found);
     out += &matrix(found);
@@ -92,26 +93,36 @@ fn text(found: &Isolability) -> String {
     for (standing, words) in [(Standing::Unshown, "named at no size"), (Standing::Unjudged, "not judged, no fit makes sense")] {
         let names = found.names(standing);
         if !names.is_empty() {
-            out += &wrapped(&format!("{words}: {}", names.join(", ")), "  ");
+            out += &line(&format!("{words}: {}", names.join(", ")), 2);
         }
     }
-    out += &wrapped(&format!("not offered by these channels: {}", found.not_offered.join(", ")), "  ");
+    out += &line(&format!("not offered by these channels: {}", found.not_offered.join(", ")), 2);
     out
 }
 
+/// A text in lines, further ones set in.
+fn line(text: &str, indent: usize) -> String {
+    wrapped(text, indent) + "\n"
+}
+
 fn table(found: &Isolability) -> String {
-    let mut out =
-        format!("\n{:<26} {:<12} {:>6} {:>7}  {}\n", "named from this size on", "channel", "floors", "beside", "in its own unit");
+    let of_channels = found.causes.iter().filter(|c| c.seen.is_some()).map(|c| c.main.chars().count());
+    let wide = of_channels.chain(["channel".len()]).max().unwrap_or_default();
+    let mut out = format!(
+        "\n{:<26} {:<wide$} {:>6} {:>7}  {}\n",
+        "named from this size on", "channel", "floors", "beside", "in its own unit"
+    );
     for (k, cause) in found.causes.iter().enumerate() {
         let Some(seen) = &cause.seen else { continue };
-        let own = clipped(&cause.in_words(), 43);
         let beside = format!("{:.1} %", 100.0 * cause.free);
         let name = format!("{:>2} {}", k + 1, cause.name);
-        out += &format!("{name:<26} {:<12} {:>6} {beside:>7}  {own}\n", clipped(&cause.main, 12), short(seen.floors));
+        let before = format!("{name:<26} {:<wide$} {:>6} {beside:>7}  ", cause.main, short(seen.floors));
+        // what is long goes on under itself
+        out += &format!("{before}{}", line(&cause.in_words(), before.chars().count()));
     }
-    out += &wrapped(
+    out += &line(
         "floors: root mean square of what the declared model cannot take up. beside: share of its squares that is. Under 1 % a cause is named only if it is exactly as the library has it.",
-        "",
+        0,
     );
     out
 }
@@ -144,7 +155,7 @@ fn matrix(found: &Isolability) -> String {
         let later: Vec<String> =
             found.later(cause).iter().filter_map(|(name, at)| Some(format!("{name} from {} floors", short((*at)?)))).collect();
         if !later.is_empty() {
-            out += &wrapped(&format!("{} is told from {}", cause.name, later.join(", ")), "  ");
+            out += &line(&format!("{} is told from {}", cause.name, later.join(", ")), 2);
         }
     }
     out
@@ -153,42 +164,17 @@ fn matrix(found: &Isolability) -> String {
 fn groups(found: &Isolability) -> String {
     let mut out = String::new();
     for group in &found.groups {
-        out += &wrapped(&format!("\ncannot be told apart: {}", found.members(group)), "  ");
+        out += "\n";
+        out += &line(&format!("cannot be told apart: {}", found.members(group)), 2);
         if let Some(next) = &group.next {
             if !next.separates {
-                out += &wrapped(&format!("  no run would: {}", next.why), "  ");
+                out += &line(&format!("  no run would: {}", next.why), 2);
                 continue;
             }
-            out += &wrapped(&format!("  a run that would: {}", next.why), "  ");
+            out += &line(&format!("  a run that would: {}", next.why), 2);
             let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us x {} s", s.pulse_us, s.hold_s)).collect();
-            out += &wrapped(&format!("  {}", steps.join(", ")), "  ");
+            out += &line(&format!("  {}", steps.join(", ")), 2);
         }
     }
     if found.groups.is_empty() { out } else { out + "\n" }
-}
-
-/// Columns of a terminal.
-const COLUMNS: usize = 100;
-
-/// Lines of at most [`COLUMNS`], further ones indented.
-fn wrapped(text: &str, indent: &str) -> String {
-    let start = text.len() - text.trim_start_matches([' ', '\n']).len();
-    let mut lines = vec![text[..start].to_owned()];
-    for word in text.split_whitespace() {
-        let line = lines.last().map_or(0, |l| l.trim_start_matches('\n').chars().count());
-        if line + 1 + word.chars().count() > COLUMNS {
-            lines.push(indent.to_owned());
-        }
-        if let Some(line) = lines.last_mut() {
-            if !line.is_empty() && !line.ends_with([' ', '\n']) {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    lines.join("\n") + "\n"
-}
-
-fn clipped(text: &str, most: usize) -> String {
-    if text.chars().count() <= most { text.to_owned() } else { text.chars().take(most - 2).chain("..".chars()).collect() }
 }

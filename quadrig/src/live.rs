@@ -61,8 +61,8 @@ fn wishes() -> Receiver<Wish> {
     receive
 }
 
-/// Shows the run in the terminal view to its end or until the viewer has had enough. What was flown until then is kept.
-pub(crate) fn view(session: &mut Session, scenario: &Scenario, speed: f64) -> Result<(), Failure> {
+/// Shows the run in the terminal view to its end or until the viewer has had enough, which it tells. What was flown until then is kept.
+pub(crate) fn view(session: &mut Session, scenario: &Scenario, speed: f64) -> Result<bool, Failure> {
     let ended = Ended::watch()?;
     let mut terminal = Terminal::take()?;
     let mut screen = Screen::new(format!("simulated rig  {}", scenario.name));
@@ -76,7 +76,7 @@ pub(crate) fn view(session: &mut Session, scenario: &Scenario, speed: f64) -> Re
         let mut steps = if live.paused { 0 } else { LOOK_MS };
         for key in terminal.keys()? {
             match screen.key(key) {
-                Some(Key::Quit | Key::Stop) => return Ok(()),
+                Some(Key::Quit | Key::Stop) => return Ok(true),
                 Some(Key::Pause) => live.paused = !live.paused,
                 Some(Key::Step) => (live.paused, steps) = (true, REFRESH_MS),
                 Some(Key::Speed(factor)) => (live.speed, live.paused) = (factor, false),
@@ -104,7 +104,7 @@ pub(crate) fn view(session: &mut Session, scenario: &Scenario, speed: f64) -> Re
             until_due((session.now_s() - from_s) / live.speed, begun, &ended);
         }
     }
-    Ok(())
+    Ok(running)
 }
 
 /// Waits until so many seconds have gone by since `begun`, or an end has come.
@@ -115,8 +115,8 @@ fn until_due(seconds: f64, begun: Instant, ended: &Ended) {
     }
 }
 
-/// Shows the run to its end or until the viewer has had enough.
-pub(crate) fn watch(session: &mut Session, mut speed: f64) -> Result<(), Failure> {
+/// Shows the run to its end or until the viewer has had enough, which it tells.
+pub(crate) fn watch(session: &mut Session, mut speed: f64) -> Result<bool, Failure> {
     let (wishes, ended) = (wishes(), Ended::watch()?);
     let mut paused = false;
     let mut open = true;
@@ -155,7 +155,7 @@ pub(crate) fn watch(session: &mut Session, mut speed: f64) -> Result<(), Failure
             if !session.step()? {
                 show(session, speed, false);
                 let _ = writeln!(std::io::stdout()); // a closed view ends nothing
-                return Ok(());
+                return Ok(false);
             }
         }
         show(session, speed, paused);
@@ -164,7 +164,7 @@ pub(crate) fn watch(session: &mut Session, mut speed: f64) -> Result<(), Failure
         }
     }
     let _ = writeln!(std::io::stdout()); // likewise
-    Ok(())
+    Ok(true)
 }
 
 fn show(session: &Session, speed: f64, paused: bool) {

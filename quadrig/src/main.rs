@@ -34,6 +34,7 @@ mod import;
 mod imu;
 mod isolability;
 mod join;
+mod kind;
 mod live;
 mod man;
 mod measured;

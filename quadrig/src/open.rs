@@ -98,7 +98,8 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
         log.in_doubt().iter().filter(|_| !quiet).for_each(|doubt| note!("{}: {doubt}", path.display()));
         return Ok(log);
     }
-    let (log, report) = import_as(path, options)?;
+    let (log, report) =
+        import_as(path, options).map_err(|why| crate::kind::of_the_imu(path).map_or(why.into(), Failure::from))?;
     let log = as_written(&log)?;
     if !quiet {
         say(path, &report);
@@ -106,11 +107,14 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
     Ok(log)
 }
 
-/// Says what was found, one line each.
+/// Says what was found: the file once, then one line each.
 pub(crate) fn say(path: &Path, report: &Report) {
+    if !report.notes.is_empty() {
+        note!("{}: read as an export; found on the way:", path.display());
+    }
     for note in &report.notes {
         let count = if note.count > 1 { format!(" ({})", note.count) } else { String::new() };
-        note!("{}: {}: {}{count}", path.display(), note.column, note.what);
+        note!("  {}: {}{count}", note.column, note.what);
     }
 }
 

@@ -75,6 +75,9 @@ best on the run, which only who knows the levels can choose. The mended one find
 *Right*: found with a mean within three standard errors (of the mean and of the level's value together), speed / thrust. *Error*: root mean square over the
 found levels, in per cent of the highest level.
 
+";
+
+const TABLE: &str = "\
 | run | levels | detector | found | right | wrong | error, % |
 | --- | --- | --- | --- | --- | --- | --- |
 ";
@@ -102,7 +105,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             Folder::new(path, known).map(|_| Folder::of_added(path)) // what cannot be of a run like this is refused before it begins
         })
         .transpose()?;
-    let (mut page, mut pictures) = (String::from(HEAD), String::new());
+    let (mut page, mut pictures) = (format!("{HEAD}{TABLE}"), String::new());
+    let mut headed = false;
     for path in &args.logs {
         let log = read(path)?;
         let channel = match &args.channel {
@@ -119,8 +123,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         }
         let rows = scores(path, &log, channel);
         page += &rows;
-        if !quiet {
+        if !quiet && !rows.is_empty() {
+            crate::say::text(if headed { "" } else { TABLE });
             crate::say::text(&rows);
+            headed = true;
         }
         if let Some(folder) = &mut folder {
             pictures += &draw(folder, path, &log, channel, &shifted, args.csv)?;

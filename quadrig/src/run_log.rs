@@ -11,6 +11,7 @@ use frame::message::Event;
 use frame::rig::{FaultSet, RigSample, RigState};
 use hal_sim::native::firmware_config;
 use hal_sim::plant::PlantLevers;
+use hal_sim::plant::air::Air;
 use hal_sim::{PlantState, Powerplant, RunRecord, Scenario};
 use ident::log::{Column, Log};
 use ident::model::Model;
@@ -23,6 +24,9 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: b
     let text = |s: &str| toml::Value::String(s.to_owned());
     log.meta.insert("motor".into(), text(&scenario.motor));
     log.meta.insert("propeller".into(), text(&scenario.propeller));
+    // what a laboratory reads off its barometer before the run
+    let air = Air { temperature_c: scenario.air.temperature_c, pressure_pa: scenario.air.pressure_pa };
+    log.meta.insert("air_density_kg_m3".into(), toml::Value::Float((1e4 * air.density()).round() / 1e4));
     let config = RigConfig::of(&firmware_config(scenario));
     let config = (config.digest() == record.hello.config).then_some(&config);
     log.meta.extend(evidence::head(Some(&record.hello), &record.calibration, config));

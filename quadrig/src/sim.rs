@@ -19,7 +19,7 @@ use crate::trouble::unwritten;
 use crate::view;
 use hal_sim::native::{PinRecord, Session};
 use hal_sim::scenario::AnyScenario;
-use hal_sim::{Powerplant, RunRecord, Scenario, Truth};
+use hal_sim::{Powerplant, RunRecord, Scenario, ScenarioError, SimError, Truth};
 use ident::log::{Log, write_whole};
 use ident::model::Model;
 use std::io::Write;
@@ -77,7 +77,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let scenario = match AnyScenario::load(&args.scenario)? {
+    let scenario = match AnyScenario::load(&args.scenario).map_err(|why| no_scenario(&args.scenario, why))? {
         AnyScenario::Rig(scenario) => *scenario,
         AnyScenario::Imu(scenario) => return imu::run(args, &scenario, quiet),
     };
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     let mut log = to_log(&scenario, &record, &name, args.raw);
     if log.is_empty() {
-        return Err("the run ended before its first sample; no log was written; expected to run on until the rig is armed".into());
+        return Err("ended before the first sample: no log was written; expected to go on until the rig is armed".into());
     }
     if let Some(path) = &args.model {
         log = fly_model(&scenario, &read_model(path, quiet)?, &log, &name, quiet)?;
@@ -114,6 +114,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Why a file is no scenario: a board's configuration is TOML too.
+fn no_scenario(path: &Path, why: ScenarioError) -> Failure {
+    match crate::rig::file::read(path) {
+        Ok(_) => format!(
+            "{}:1:1: the configuration of a board (`quadrig rig configure` takes it); expected a scenario, such as examples/thin-lead.toml: docs/scenario.md lists its keys",
+            path.display()
+        )
+        .into(),
+        Err(_) => why.into(),
+    }
+}
+
 /// The run that the arguments ask for, with the record of its pins where one is wanted.
 fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Failure> {
     let mut session = Session::new(scenario, None);
@@ -121,10 +133,11 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
         session.record_pins(scenario);
     }
     foretell(scenario.run_s(), if args.live && args.speed > 0.0 { args.speed } else { pace(scenario, 1.0) }, quiet);
+    let mut cut_short = false;
     if args.live && !quiet && view::is_there() {
-        live::view(&mut session, scenario, args.speed)?;
+        cut_short = live::view(&mut session, scenario, args.speed)?;
     } else if args.live {
-        live::watch(&mut session, args.speed)?;
+        cut_short = live::watch(&mut session, args.speed)?;
     } else {
         let bar = Bar::new("flying", quiet);
         while session.step()? {
@@ -134,7 +147,14 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
     if let (Some(path), Some(pins)) = (&args.pins, session.pins()) {
         write_whole(path, |mut out| pins.write(&mut out)).map_err(unwritten(&path))?;
     }
-    Ok(session.finish()?)
+    let now_s = session.now_s();
+    match session.finish() {
+        Err(SimError::Stuck { .. }) if cut_short => Err(format!(
+            "ended after {now_s:.1} s of the run, before the rig was armed: nothing was recorded, no log was written; expected to go on until it is armed"
+        )
+        .into()),
+        finished => Ok(finished?),
+    }
 }
 
 /// Length of a run from which on its pace is tried before it starts, s.

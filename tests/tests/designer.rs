@@ -86,6 +86,17 @@ fn every_plateau_has_its_power_and_what_is_not_known_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let said = identified(at, "run", &scenario(11.5, ""), &[]);
+    assert!(!said.contains(": not known"), "the simulated air is in the head: {said}");
+    let told = rows(at, "run-table.csv");
+    let full = told.iter().max_by(|a, b| a["pulse_us"].total_cmp(&b["pulse_us"])).expect("levels");
+    let per_second = full["rpm"] / 60.0;
+    let by_hand = full["thrust_n"] / (1.225 * per_second * per_second * (11.0 * 0.0254_f64).powi(4));
+    assert!((full["c_t"] / by_hand - 1.0).abs() < 1e-3, "{} {by_hand}", full["c_t"]);
+    // of a log that does not tell it
+    let log = std::fs::read_to_string(at.join("run.csv")).expect("a log");
+    let untold: String = log.lines().filter(|l| !l.contains("air_density_kg_m3")).map(|l| format!("{l}\n")).collect();
+    std::fs::write(at.join("run.csv"), untold).expect("a log");
+    let said = call(at, &["identify", "run.csv", "-o", "bare.toml", "--table", "run-table.csv"]).succeeded().out;
     assert!(said.contains("density of the air: not known") && !said.contains("diameter of the propeller"), "{said}");
     let table = rows(at, "run-table.csv");
     let top = table.iter().max_by(|a, b| a["pulse_us"].total_cmp(&b["pulse_us"])).expect("levels");

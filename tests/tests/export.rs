@@ -252,6 +252,58 @@ fn a_lag_is_told_where_there_is_one() {
     }
 }
 
+/// Battery and delays as each peer has them; the cells are silently ignored by none.
+#[test]
+fn battery_and_delays_are_told() {
+    let more = "\n[[effect]]\nid = \"supply_sag\"\nchannels = [\"voltage_v\"]\nscope = \"rig\"\nshape = []\n[effect.amplitude.voltage_v]\nresistance_ohm = 0.048\n[effect.parameter]\nresistance_ohm = 0.048\n\n[[effect]]\nid = \"channel_delay\"\nchannels = [\"thrust_n\"]\nscope = \"rig\"\nshape = [0.43]\n[effect.amplitude]\n";
+    let model = std::fs::read_to_string(bench().join("model.toml")).expect("a model") + more;
+    std::fs::write(bench().join("battery.toml"), model).expect("a model");
+    let of =
+        |peer: &str, more: &[&str]| call(&bench(), &[&["export", "battery.toml", "--to", peer], more].concat()).succeeded().out;
+    for peer in PEERS {
+        assert_ne!(of(peer, &["--cells", "4"]), of(peer, &[]), "{peer} tells the cells");
+        assert!(of(peer, &[]).contains("(--cells)"), "{peer} says what it lacks");
+    }
+    let keys = px4(&of("px4", &["--cells", "4"]));
+    assert_eq!((keys["BAT1_N_CELLS"], keys["BAT1_R_INTERNAL"]), (4.0, 0.012));
+    assert!(!px4(&of("px4", &[])).keys().any(|key| key.starts_with("BAT1")));
+    let text = of("betaflight", &["--cells", "4"]);
+    let set = |key: &str| after(&text, &format!("set {key} ="));
+    assert_eq!(
+        ["force_battery_cell_count", "vbat_max_cell_voltage", "vbat_min_cell_voltage"].map(set),
+        [4.0, 430.0, 330.0],
+        "{text}"
+    );
+    let text = of("crazyflie", &["--cells", "2"]);
+    let define = |name: &str| after(&text, &format!("#define {name} "));
+    assert_eq!(["DEFAULT_BAT_LOW_VOLTAGE", "DEFAULT_BAT_CRITICAL_LOW_VOLTAGE"].map(define), [6.4, 6.0], "{text}");
+    let text = of("simulink", &["--cells", "3"]);
+    let field = |name: &str| after(&text, &format!("powerplant.{name} ="));
+    let supply = Model::read(&bench().join("model.toml")).polynomial("voltage_v")[0];
+    assert_eq!(["cells", "lead_ohm", "latency_s", "meter_delay_s.thrust_n"].map(field), [3.0, 0.048, 0.0, 0.43], "{text}");
+    assert!((field("supply_v") / supply - 1.0).abs() < 0.01, "{} V, the model's {supply}", field("supply_v"));
+    let text = of("csv", &["--cells", "3"]);
+    assert_eq!(after(&text, "battery that will fly:"), 3.0);
+    assert_eq!(after(&text, "delay of the rig's meter of thrust_n"), 0.43);
+    assert_eq!(after(&text, "resistance of the supply's lead"), 0.048);
+}
+
+/// A latency of a rotor that coasts stands beside its lag.
+#[test]
+fn a_latency_is_told_where_there_is_one() {
+    let coasting = "\n[[effect]]\nid = \"spinup_lag\"\nform = \"coasting\"\nchannels = [\"rpm_beam\", \"rpm_opto\", \"rpm_hall\", \"rpm_encoder\"]\nscope = \"rig\"\nshape = [0.04, 0.4, 0.1, 0.015]\n[effect.amplitude]\n";
+    let model = std::fs::read_to_string(bench().join("model.toml")).expect("a model") + coasting;
+    std::fs::write(bench().join("late.toml"), model).expect("a model");
+    for (peer, mark) in [
+        ("simulink", "powerplant.latency_s ="),
+        ("csv", "latency of the rotor's answer"),
+        ("px4", "latency of the rotor's answer"),
+    ] {
+        let text = call(&bench(), &["export", "late.toml", "--to", peer]).succeeded().out;
+        assert_eq!(after(&text, mark), 0.015, "{peer}");
+    }
+}
+
 /// Every file links to its peer's definition, twice gives the same bytes, and a file is written whole.
 #[test]
 fn every_peer_has_its_links() {

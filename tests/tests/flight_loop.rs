@@ -39,6 +39,21 @@ fn left(at: &Path, predicted: &str, seen: &str, column: &str) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
+/// The figure of each card is of the channel of which its text tells the error; the rotors' speeds are in one figure; titles are words.
+fn shows_what_its_text_tells(page: &str, v: &Value) {
+    for (k, e) in v["effects"].as_array().expect("effects").iter().enumerate() {
+        let of = e["channels"][0].as_str().expect("a channel").replace('_', "-");
+        let figure = format!("<figure id=\"effect-{}-", k + 1);
+        let drawn = page.split(&figure).nth(1).unwrap_or_else(|| panic!("effect {} has a figure", k + 1));
+        assert!(drawn.split('"').next().is_some_and(|id| id.contains(&of)), "{of}: {}", &drawn[..40]);
+        assert!(e["id"] == "unknown" || drawn.contains(">without it</text>"), "{of}");
+    }
+    assert!(page.contains("<figure id=\"rotors-measured\">") && page.contains("Speed left over, every rotor"));
+    let titles = page.split("<figcaption>").skip(1).filter_map(|t| t.split("</figcaption>").next());
+    let raw: Vec<&str> = titles.filter(|t| t.contains('_') || t.starts_with("Speed of rotor")).collect();
+    assert!(raw.is_empty(), "{raw:?}");
+}
+
 #[test]
 fn a_hidden_drag_is_named_and_its_model_predicts_another_flight() {
     let s = hides("rotor_drag");
@@ -66,6 +81,7 @@ fn a_hidden_drag_is_named_and_its_model_predicts_another_flight() {
     }
     let page = std::fs::read_to_string(at.join("out/report.html")).expect("a page");
     assert!(page.contains("rotor_drag") && page.contains("What this flight can show"));
+    shows_what_its_text_tells(&page, &v);
     // against its own model nothing is new; an input does not lie where the results go
     std::fs::rename(at.join("out/model.toml"), at.join("model.toml")).expect("moved");
     let again = closed(at, "run.csv", &["--model", "model.toml"]);

@@ -27,6 +27,21 @@ fn hidden_causes_are_named_and_clean_logs_are_not_accused() {
     }
 }
 
+/// The figure of each card is of the axis of which its text tells the error, and titles are words.
+fn shows_what_its_text_tells(page: &str, answer: &Answer) {
+    for (k, e) in answer.json["effects"].as_array().unwrap().iter().enumerate() {
+        let (id, of) = (e["id"].as_str().unwrap(), e["channels"][0].as_str().unwrap());
+        let mark = format!("<figure id=\"effect-{}-", k + 1);
+        let figures = page.split(&mark).skip(1).filter_map(|f| f.split('"').next());
+        for figure in figures {
+            assert!(figure.split('-').any(|part| part == of), "{id}: text of {of}, figure {figure}");
+        }
+    }
+    let titles = page.split("<figcaption>").skip(1).filter_map(|t| t.split("</figcaption>").next());
+    let raw: Vec<&str> = titles.filter(|t| t.contains("gx") || t.contains("mx") || t.contains("measured - predicted")).collect();
+    assert!(raw.is_empty(), "{raw:?}");
+}
+
 /// What the simulator hides is named from the text of its readings, and its size comes back.
 #[test]
 fn what_the_simulator_hides_is_named() {
@@ -41,6 +56,7 @@ fn what_the_simulator_hides_is_named() {
         let ids: Vec<&str> = answer.ids.iter().map(String::as_str).collect();
         let judged_as = if id == "transmitter" { "unknown" } else { id };
         assert!(right(judged_as, &answer.verdict, &ids), "{id}: {} {ids:?}", answer.verdict);
+        shows_what_its_text_tells(&std::fs::read_to_string(bench.path().join("out/report.html")).unwrap(), &answer);
         for (name, value) in log.truth {
             let (found, [low, high]) = answer.parameter(id, &name).unwrap_or_else(|| panic!("{id}: no {name}"));
             let wide = 3.0 * (high - low); // six times the half width: five standard errors and more
@@ -88,7 +104,10 @@ fn figures_can_be_recomputed_from_the_model() {
         .sqrt();
     assert!((5.0..7.0).contains(&size), "{size}");
     let page = std::fs::read_to_string(bench.path().join("out/report.html")).unwrap();
-    assert!(page.contains("hard_iron") && page.contains("residual-mx") && !page.contains("NaN"), "a page with its figures");
+    assert!(
+        page.contains("hard_iron") && page.contains("<figure id=\"every-mx\">") && !page.contains("NaN"),
+        "a page with its figures"
+    );
     assert_eq!(answer.json["format"], "quadrig-verdict 2");
     // its card has a figure of its own (it set in at an instant: over time), and its parameters in words with units
     for words in ["<figure id=\"effect-1-m", "without it", "added to the field (x)", ">uT<"] {

@@ -34,6 +34,69 @@ fn alone(name: &'static str, words: &'static str, said: &'static [&'static str])
     Case { name, file: None, words, said }
 }
 
+/// Files of another kind than the command takes: each refusal names what takes or makes them.
+fn kinds() -> Vec<Case> {
+    const ATTITUDE: &str = "t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg\n0.005,1,0,0,0,0,0,0\n0.010,1,0,0,0,0,0,0\n";
+    const READINGS: &str = "t_s,gx,gy,gz,ax,ay,az\n0.005,0,0,0,0,0,-9.8\n0.010,0,0,0,0,0,-9.8\n";
+    const FLIGHT: &str = "# quadrig-flight 1\nt_s,pulse_us_1,rpm_1\n0.0,1500,4000\n0.1,1500,4000\n";
+    const INERTIAL: &str = "format = \"quadrig-inertial 1\"\nsource = \"run.csv\"\nspan_s = [0.0, 1.0]\nsensor = []\n";
+    const OF_A_FLIGHT: &str = "format = \"quadrig-flight-model 1\"\n";
+    let seconds: String = (0..400).map(|n| format!("{},{},{}\n", 1000 * n, 1000 + n, 10 * n)).collect();
+    let bare = format!("Time,ESC signal (us),Motor Optical Speed (RPM)\n{seconds}");
+    let named = format!("Time (s),ESC signal (us),Motor Optical Speed (RPM)\n{seconds}");
+    vec![
+        with(
+            "an attitude to close the loop on",
+            "bad.csv",
+            ATTITUDE,
+            "close-loop bad.csv -o out",
+            &["bad.csv:1:1", "--readings READINGS"],
+        ),
+        with("an attitude to identify", "bad.csv", ATTITUDE, IDENTIFY, &["bad.csv:1:1", "--readings READINGS"]),
+        with("an attitude to filter", "bad.csv", ATTITUDE, "ahrs bad.csv out.csv", &["bad.csv:1:", "--readings READINGS"]),
+        with("readings to identify", "bad.csv", READINGS, IDENTIFY, &["bad.csv:1:1: readings of an IMU", "`quadrig close-loop`"]),
+        with("a flight to identify", "bad.csv", FLIGHT, IDENTIFY, &["bad.csv:1", "a flight: `quadrig close-loop` takes it"]),
+        with(
+            "a flight to step through",
+            "bad.csv",
+            FLIGHT,
+            "step residual bad.csv",
+            &["a flight: `quadrig close-loop` takes it"],
+        ),
+        with(
+            "a flight's model to export",
+            "bad.toml",
+            OF_A_FLIGHT,
+            "export bad.toml --to px4 -o out",
+            &["bad.toml:1", "`quadrig predict`", "for another flight"],
+        ),
+        with(
+            "an attitude's model to export",
+            "bad.toml",
+            INERTIAL,
+            "export bad.toml --to px4 -o out",
+            &["bad.toml:1", "for its own recording"],
+        ),
+        with(
+            "a time of a thousand",
+            "bad.csv",
+            bare,
+            "import bad.csv -o out.csv",
+            &[
+                "rows 1000 apart: microseconds (a row each 0.001 s) or milliseconds (a row each 1 s)?",
+                "--map 't_s=Time*0.000001'",
+            ],
+        ),
+        with(
+            "seconds of a thousand",
+            "bad.csv",
+            named,
+            "import bad.csv -o out.csv",
+            &["rows 1000 s apart", "*0.000001 microseconds"],
+        ),
+    ]
+}
+
 /// The good log, its rows changed.
 fn rows(change: impl Fn(Vec<String>) -> Vec<String>) -> String {
     let text = good_log();
@@ -328,6 +391,13 @@ fn scenarios() -> Vec<Case> {
             &["bad.toml: describes the IMU board"],
         ),
         alone("a scenario that is not there", "loop nowhere.toml", &["nowhere.toml: cannot be read"]),
+        with(
+            "a board's configuration",
+            "bad.toml",
+            std::fs::read(quadrig_tests::root().join("examples/rig/thesis.toml")).expect("a preset"),
+            SIM,
+            &["bad.toml:1:1: the configuration of a board", "examples/thin-lead.toml"],
+        ),
         alone("a log in the place of pins", "sim empty.toml --replay good.csv -o out.csv", &["good.csv", "quadrig pins"]),
     ]
 }
@@ -535,7 +605,7 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
         _ => format!("{line}\n"),
     };
     write("no-command.csv", good_log().lines().map(without_command).collect::<String>().as_bytes());
-    let lists = [logs(), models(), scenarios(), missions(), schedules(), boards(), arguments(), outputs()];
+    let lists = [logs(), kinds(), models(), scenarios(), missions(), schedules(), boards(), arguments(), outputs()];
     let cases: Vec<Case> = lists.into_iter().flatten().collect();
     assert!(cases.len() >= 70, "{} cases", cases.len());
     let mut wrong = Vec::new();

@@ -44,6 +44,7 @@ const AREAS: [(&str, &[&str]); 13] = [
             "quadrig/src/ahrs.rs",
             "quadrig/src/ahrs",
             "quadrig/src/close_loop",
+            "quadrig/src/kind.rs",
         ],
     ),
     (

@@ -61,6 +61,17 @@ pub struct Left {
     pub memory_s: f64,
 }
 
+/// What is left of every reading when its block of time took no part in the fit, by channel.
+#[derive(Debug, Clone, Default)]
+pub struct HeldOut {
+    /// Of the declared model.
+    pub before: Vec<Vec<f64>>,
+    /// Of the final hypothesis.
+    pub after: Vec<Vec<f64>>,
+    /// Of the final hypothesis without one of its terms, the rest fitted again; by place.
+    pub without: Vec<Vec<Vec<f64>>>,
+}
+
 /// The conclusion.
 #[derive(Debug, Clone)]
 pub struct Conclusion {
@@ -74,6 +85,8 @@ pub struct Conclusion {
     pub before: Vec<Errors>,
     /// Errors of the final hypothesis, by channel.
     pub after: Vec<Errors>,
+    /// What those held-out errors are the means of.
+    pub held_out: HeldOut,
     /// What is left.
     pub left: Vec<Left>,
     /// Whole hypotheses beside the final one, with their probability.
@@ -92,10 +105,11 @@ pub fn conclude(problem: &Problem<'_>, posterior: &Posterior) -> Option<Conclusi
     // names are judged without what has no name beside them: it would hold part of what they explain
     let (names, nameless): (Vec<Placed>, Vec<Placed>) = posterior.best.placed.iter().cloned().partition(is_named);
     let mut chosen = if nameless.is_empty() { posterior.best.clone() } else { fit(problem, &names, Some(&posterior.best), 0)? };
-    let mut judged = sifted(problem, &before, &mut chosen, &is_named)?;
+    let declared_errors = errors(&before);
+    let mut judged = sifted(problem, &declared_errors, &mut chosen, &is_named)?;
     if !nameless.is_empty() {
         chosen = fit(problem, &[chosen.placed.as_slice(), &nameless].concat(), Some(&chosen), 0)?;
-        judged = sifted(problem, &before, &mut chosen, &|p| !is_named(p))?;
+        judged = sifted(problem, &declared_errors, &mut chosen, &|p| !is_named(p))?;
     }
     let last = fit_as(problem, &chosen, &judged.noise)?;
     Some(account(problem, posterior, (declared, before), (last, judged)))
@@ -107,7 +121,7 @@ pub fn conclude_told(problem: &Problem<'_>, posterior: &Posterior) -> Option<Con
     let (declared_noise, before) = fairest(problem, &posterior.declared)?;
     let declared = fit_as(problem, &posterior.declared, &declared_noise)?;
     let mut chosen = posterior.best.clone();
-    let judged = sifted(problem, &before, &mut chosen, &|_| false)?;
+    let judged = sifted(problem, &errors(&before), &mut chosen, &|_| false)?;
     let last = fit_as(problem, &chosen, &judged.noise)?;
     Some(account(problem, posterior, (declared, before), (last, judged)))
 }
@@ -116,22 +130,37 @@ pub fn conclude_told(problem: &Problem<'_>, posterior: &Posterior) -> Option<Con
 struct Judged {
     /// Weighting that predicts them best.
     noise: Vec<Noise>,
-    /// Error by channel.
-    errors: Vec<f64>,
+    /// What is left by channel.
+    left: Vec<Vec<f64>>,
     /// The same without each term.
-    without: Vec<Vec<f64>>,
+    left_without: Vec<Vec<Vec<f64>>>,
     /// Channels that each term changes.
     touched: Vec<Vec<usize>>,
+}
+
+/// Error of each channel.
+fn errors(left: &[Vec<f64>]) -> Vec<f64> {
+    left.iter().map(|r| rms(r)).collect()
+}
+
+impl Judged {
+    fn errors(&self) -> Vec<f64> {
+        errors(&self.left)
+    }
+
+    fn errors_without(&self) -> Vec<Vec<f64>> {
+        self.left_without.iter().map(|left| errors(left)).collect()
+    }
 }
 
 /// Takes those of the terms that are asked about out of a hypothesis that have to go, one after the other.
 fn sifted(problem: &Problem<'_>, before: &[f64], chosen: &mut Fit, asked: &dyn Fn(&Placed) -> bool) -> Option<Judged> {
     loop {
-        let (noise, errors) = fairest(problem, chosen)?;
+        let (noise, left) = fairest(problem, chosen)?;
         let terms = 0..chosen.placed.len();
-        let without = terms.clone().map(|k| errors_without(problem, chosen, &noise, k)).collect::<Option<_>>()?;
+        let left_without = terms.clone().map(|k| left_without(problem, chosen, &noise, k)).collect::<Option<_>>()?;
         let touched = terms.map(|k| channels_of(problem, chosen, k)).collect();
-        let judged = Judged { noise, errors, without, touched };
+        let judged = Judged { noise, left, left_without, touched };
         let Some(falls) = falls(problem, chosen, before, &judged, asked) else { return Some(judged) };
         let rest: Vec<Placed> = chosen.placed.iter().enumerate().filter(|(k, _)| *k != falls).map(|(_, p)| p.clone()).collect();
         *chosen = fit(problem, &rest, Some(chosen), 0)?;
@@ -145,10 +174,10 @@ fn fit_as(problem: &Problem<'_>, of: &Fit, noise: &[Noise]) -> Option<Fit> {
     Some(Fit { amplitudes, covariance, solved, noise: noise.to_vec(), ..of.clone() })
 }
 
-/// Held-out errors without the term at `place`, the rest fitted again.
-fn errors_without(problem: &Problem<'_>, fit: &Fit, noise: &[Noise], place: usize) -> Option<Vec<f64>> {
+/// What is left of held-out readings without the term at `place`, the rest fitted again.
+fn left_without(problem: &Problem<'_>, fit: &Fit, noise: &[Noise], place: usize) -> Option<Vec<Vec<f64>>> {
     let rest: Vec<Placed> = fit.placed.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, p)| p.clone()).collect();
-    Some(held_out(problem, &rest, noise, false)?.iter().map(|r| rms(r)).collect())
+    held_out(problem, &rest, noise, false)
 }
 
 /// Channels whose prediction changes when the term at `place` goes and everything else stays.
@@ -173,7 +202,7 @@ fn channels_of(problem: &Problem<'_>, fit: &Fit, place: usize) -> Vec<usize> {
 
 /// The term that has to go, if one of those that are asked about has.
 fn falls(problem: &Problem<'_>, fit: &Fit, before: &[f64], judged: &Judged, asked: &dyn Fn(&Placed) -> bool) -> Option<usize> {
-    let Judged { errors: after, without, touched, .. } = judged;
+    let (after, without, touched) = (judged.errors(), judged.errors_without(), &judged.touched);
     let gain = |k: usize, c: usize| 1.0 - after[c] / without[k][c];
     let best = |k: usize| touched[k].iter().map(|c| gain(k, *c)).fold(f64::NEG_INFINITY, f64::max);
     let open = || (0..touched.len()).filter(|k| asked(&fit.placed[*k]));
@@ -204,10 +233,11 @@ fn spans_zero(fit: &Fit, place: usize) -> bool {
 fn account(
     problem: &Problem<'_>,
     posterior: &Posterior,
-    (declared, before_held): (Fit, Vec<f64>),
+    (declared, before): (Fit, Vec<Vec<f64>>),
     (fit, judged): (Fit, Judged),
 ) -> Conclusion {
-    let Judged { errors: after_held, without, touched, .. } = judged;
+    let (before_held, after_held, without) = (errors(&before), judged.errors(), judged.errors_without());
+    let Judged { touched, left: after, left_without, .. } = judged;
     let all = problem.library.candidates();
     let mut kept: Vec<Kept> = (0..fit.placed.len())
         .map(|place| {
@@ -221,7 +251,7 @@ fn account(
         .collect();
     let named = |k: &Kept| all[fit.placed[k.place].candidate].is_named();
     kept.sort_by(|a, b| named(b).cmp(&named(a)).then(b.lead.total_cmp(&a.lead)));
-    let errors = |of: &Fit, held: Vec<f64>| -> Vec<Errors> {
+    let figures = |of: &Fit, held: Vec<f64>| -> Vec<Errors> {
         held.into_iter()
             .enumerate()
             .map(|(c, held_out)| Errors { rms: rms(&of.residual(problem.channels, c)), held_out })
@@ -230,9 +260,10 @@ fn account(
     let ambiguous = kept.first().is_some_and(|k| named(k) && k.rivals.first().is_some_and(|r| r.1 > BESIDE * k.probability));
     Conclusion {
         left: left(problem, &fit, &after_held),
-        before: errors(&declared, before_held),
+        before: figures(&declared, before_held),
         declared,
-        after: errors(&fit, after_held),
+        after: figures(&fit, after_held),
+        held_out: HeldOut { before, after, without: left_without },
         alternatives: alternatives(&posterior.seen, &fit),
         ambiguous,
         kept,

@@ -66,14 +66,6 @@ impl Fit {
         self.design.predict(&self.amplitudes, channel, channels[channel].len())
     }
 
-    /// What the term at `place` adds to the prediction of a channel; nothing where it only shapes what others add.
-    #[must_use]
-    pub fn adds(&self, place: usize, channels: &[Channel], channel: usize) -> Vec<f64> {
-        let mut only = vec![0.0; self.amplitudes.len()];
-        self.columns_of(place).for_each(|i| only[i] = self.amplitudes[i]);
-        self.design.predict(&only, channel, channels[channel].len())
-    }
-
     /// What is left of a channel.
     #[must_use]
     pub fn residual(&self, channels: &[Channel], channel: usize) -> Vec<f64> {

@@ -30,7 +30,7 @@ pub mod validate;
 
 pub use candidates::{Asked, ask};
 pub use channel::Channel;
-pub use conclude::{Conclusion, Kept, Left, conclude, conclude_told};
+pub use conclude::{Conclusion, HeldOut, Kept, Left, conclude, conclude_told};
 pub use design::{Column, Design, Owner, Prior, Values};
 pub use fit::{Fit, Problem, fit, parameters};
 pub use library::{Candidate, Library, Placed, Shape, UNKNOWN};

@@ -82,16 +82,15 @@ fn even(noise: &Noise) -> Noise {
     Noise { white: noise.total(), wander: 0.0, ..*noise }
 }
 
-/// For each channel the weighting, by the noise as it was found or even, that predicts left-out readings better, and the errors with it. A
-/// wander that the model cannot follow leaves weight to fast changes alone, which a wrong model fits at the price of all that is slow.
+/// For each channel the weighting, by the noise as it was found or even, that predicts left-out readings better, and what is left of those with
+/// it. A wander that the model cannot follow leaves weight to fast changes alone, which a wrong model fits at the price of all that is slow.
 #[must_use]
-pub fn fairest(problem: &Problem<'_>, fit: &Fit) -> Option<(Vec<Noise>, Vec<f64>)> {
-    let errors =
-        |noise: &[Noise]| Some(held_out(problem, &fit.placed, noise, true)?.iter().map(|r| rms(r)).collect::<Vec<f64>>());
+pub fn fairest(problem: &Problem<'_>, fit: &Fit) -> Option<(Vec<Noise>, Vec<Vec<f64>>)> {
+    let left = |noise: &[Noise]| held_out(problem, &fit.placed, noise, true);
     let evens: Vec<Noise> = fit.noise.iter().map(even).collect();
-    let (a, b) = (errors(&fit.noise)?, errors(&evens)?);
-    let noise: Vec<Noise> = (0..a.len()).map(|c| if a[c] <= b[c] { fit.noise[c] } else { evens[c] }).collect();
-    let mixed = errors(&noise)?;
-    let total = |e: &[f64]| e.iter().map(|v| v.max(f64::MIN_POSITIVE).ln()).sum::<f64>();
+    let (a, b) = (left(&fit.noise)?, left(&evens)?);
+    let noise: Vec<Noise> = (0..a.len()).map(|c| if rms(&a[c]) <= rms(&b[c]) { fit.noise[c] } else { evens[c] }).collect();
+    let mixed = left(&noise)?;
+    let total = |left: &[Vec<f64>]| left.iter().map(|r| rms(r).max(f64::MIN_POSITIVE).ln()).sum::<f64>();
     [(noise, mixed), (fit.noise.clone(), a), (evens, b)].into_iter().min_by(|x, y| total(&x.1).total_cmp(&total(&y.1)))
 }

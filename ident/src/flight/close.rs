@@ -15,8 +15,8 @@ use super::rows::{By, Rows, Told};
 use super::{FlightError, SHORTEST_S, words};
 use crate::attribution::channel::rms;
 use crate::attribution::{
-    self, Candidate, Column, Conclusion, Library, Owner, Placed, Problem, UNKNOWN, ask, conclude, conclude_told, parameters,
-    posterior,
+    self, Candidate, Column, Conclusion, HeldOut, Library, Owner, Placed, Problem, UNKNOWN, ask, conclude, conclude_told,
+    parameters, posterior,
 };
 use crate::bad::SetAside;
 use crate::effects::airframe::{Found, Told as Value};
@@ -41,8 +41,8 @@ pub struct Closed {
     pub flight: Flight,
     /// For each channel of the flight what the declared and the corrected model predict of its windows.
     pub predicted: Vec<[Vec<f64>; 2]>,
-    /// For each effect of the verdict, and each channel, what it adds to the prediction; nothing where it only shapes what others add.
-    pub adds: Vec<Vec<Vec<f64>>>,
+    /// For each channel what is left of windows that no fit saw: before, after, and without each effect of the verdict.
+    pub held_out: HeldOut,
     /// What the flight can show: candidates as the first stage asked for them.
     pub asked: Vec<Shown>,
 }
@@ -50,7 +50,7 @@ pub struct Closed {
 /// Whether a flight can show a cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shown {
-    /// Its name, with its form.
+    /// Its title, with its form.
     pub name: String,
     /// Share of its columns that nothing in the declared model spans.
     pub angle: f64,
@@ -125,18 +125,16 @@ fn run(
     }
     progress(1.0);
     let predicted = (0..flight.channels.channels.len()).map(|c| whole.both(c)).collect();
-    let of_effect = |k: &crate::attribution::Kept| {
-        (0..flight.channels.channels.len()).map(|c| concluded.fit.adds(k.place, problem.channels, c)).collect()
-    };
-    let adds = concluded.kept.iter().map(of_effect).collect();
+    let without = concluded.kept.iter().map(|k| concluded.held_out.without[k.place].clone()).collect();
+    let held_out = HeldOut { without, ..concluded.held_out.clone() };
     let shown = found.asked.iter().filter(|a| a.joins.len() == 1).map(|a| Shown {
-        name: words::name(&library.candidates()[a.joins[0].candidate]),
+        name: words::title(&library.candidates()[a.joins[0].candidate]),
         angle: a.gain.angle,
         signal: a.gain.reach.sqrt(),
         enough: a.can_be_shown(),
     });
     let asked = shown.collect();
-    Ok(Closed { verdict, model: corrected, parameters, predicted, adds, asked, flight: flight.clone() })
+    Ok(Closed { verdict, model: corrected, parameters, predicted, held_out, asked, flight: flight.clone() })
 }
 
 /// Error of the declared and of the corrected model on another flight, one constant a channel apart.

@@ -14,7 +14,7 @@ use crate::attribution::{Candidate, Prior, UNKNOWN};
 use crate::effects::Scope;
 use crate::effects::airframe::Told;
 use crate::verdict::Parameter;
-use crate::words::digits;
+use crate::words::{channel, digits};
 
 /// A variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +67,14 @@ impl Variable {
             Self::Rate(_) => "gyro_z",
             Self::Drive => "rpm",
             Self::Time => "t_s",
+        }
+    }
+
+    /// What it is called at an axis.
+    pub(super) fn label(self) -> String {
+        match self {
+            Self::Drive => "speed of all rotors together".to_owned(),
+            other => channel(other.name()),
         }
     }
 

@@ -1,11 +1,12 @@
 //! The page of a flight's closed loop.
 //!
-//! What it is: the traces of the flight's channels handed to the page that every closed loop has, what this flight can show, and the residual of
-//! every channel before and after.
+//! What it is: what windows that no fit saw leave over of each channel, handed to the page that every closed loop has; the rotors' speeds
+//! together; and what this flight can show.
 //! What can go wrong: nothing; channels that the flight lacks have no figure.
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
+use super::channels::Target;
 use super::close::Closed;
 use super::nameless::Variable;
 use super::scene::Scene;
@@ -13,7 +14,8 @@ use super::windows::LENGTH_S;
 use crate::effects::airframe;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
-use crate::words::parameter;
+use crate::verdict::EffectEntry;
+use crate::words::{channel, parameter};
 
 /// The words of the flight's library.
 pub const VOCABULARY: Vocabulary = Vocabulary {
@@ -23,6 +25,9 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     of_every_rig: |found| found.id == "spinup_lag",
     parameter: |_, name| parameter(name),
 };
+
+/// Rotors of one figure: as many lines as the eye tells apart.
+const TOGETHER: usize = 4;
 
 /// The report as one self-contained page.
 #[must_use]
@@ -34,22 +39,24 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
             closed.flight.windows.bounds.first().map_or(0.0, |(a, b)| closed.flight.record.t[b - 1] - closed.flight.record.t[*a]),
         );
     let traces: Vec<Trace> = (0..closed.predicted.len()).map(|k| trace(closed, k)).collect();
+    let (of_rotors, alone): (Vec<Trace>, Vec<Trace>) = traces.iter().cloned().partition(|t| is_rotor(closed, &t.channel));
     let page = Page {
         verdict: v,
         words: VOCABULARY,
         news: origin.model.is_some(),
         origin,
         declared: format!(
-            "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged."
+            "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged. Figures show what is left of windows that no fit saw."
         ),
         hero: parts::most(v, &traces),
         cards: cards(closed, &traces),
-        left: parts::rest(v, &traces),
+        left: parts::rest(v, &alone),
         parameters: Vec::new(),
-        speeds: Vec::new(),
+        speeds: ("The rotors' speeds", speeds(closed, &of_rotors)),
     };
     let mut sheet = parts::begin(&page);
-    sheet.fold("Every channel in figures", |sheet| sheet.figures(figures(closed).into_iter().map(parts::thinned).collect()));
+    let every = alone.iter().map(|t| parts::over_time(t, "every", parts::pair(v))).collect();
+    sheet.fold("Every channel in figures", |sheet| sheet.figures(every));
     sheet.fold("What this flight can show", |sheet| {
         sheet.say("For each cause: the share of its signal that nothing in the declared model can stand for, and the signal over noise that it would have at its usual size. Where these are not enough it is not named, whatever the residual.");
         let shown: Vec<Vec<String>> = closed
@@ -66,44 +73,88 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
     sheet.html()
 }
 
-/// Of each effect what its first channel leaves over without it and with it, against the variable that it depends on; over time where that is no
-/// column of windows, before and after all effects where it only shapes what others add.
-fn cards(closed: &Closed, traces: &[Trace]) -> Vec<Vec<Figure>> {
-    let v = &closed.verdict;
-    let scene = Scene::declared(&closed.flight.record);
-    let mut out = parts::each(v, traces);
-    for (k, (card, (e, adds))) in out.iter_mut().zip(v.effects.iter().zip(&closed.adds)).enumerate() {
-        let at = traces.iter().position(|t| e.channels.first() == Some(&t.channel));
-        let Some((trace, added)) = at.and_then(|at| Some((&traces[at], adds.get(at)?))) else { continue };
-        if added.iter().all(|a| *a == 0.0) {
-            continue;
+/// Whether a channel is the speed of one of several rotors.
+fn is_rotor(closed: &Closed, name: &str) -> bool {
+    let speeds = closed.flight.channels.targets.iter().filter(|t| matches!(t, Target::Speed(_)));
+    speeds.clone().count() > 1 && speeds.map(|t| t.name()).any(|rotor| rotor == name)
+}
+
+/// The rotors' speeds together: as measured, and what is left of them before and after.
+fn speeds(closed: &Closed, of_rotors: &[Trace]) -> Vec<Figure> {
+    let channels = &closed.flight.channels.channels;
+    let measured = |t: &Trace| channels.iter().find(|c| c.name == t.channel).map(|c| c.y.clone()).unwrap_or_default();
+    let [before, after] = parts::pair(&closed.verdict);
+    let mut out = Vec::new();
+    for (k, some) in of_rotors.chunks(TOGETHER).enumerate() {
+        let figure = |id: &str, title: String, y: &dyn Fn(&Trace) -> Vec<f64>| {
+            let line = |(t, class): (&Trace, &'static str)| {
+                let (x, y) = parts::lifted(&t.t, &y(t));
+                Layer::Line { name: channel(&t.channel), class, x, y }
+            };
+            parts::thinned(Figure {
+                id: if k == 0 { format!("rotors-{id}") } else { format!("rotors-{id}-{}", k + 1) },
+                title,
+                x_label: "time, s".to_owned(),
+                y_label: "rev/min".to_owned(),
+                layers: some.iter().zip(["a", "b", "c", "e"]).map(line).collect(),
+                ..Figure::default()
+            })
+        };
+        out.push(figure("measured", "Speed of every rotor".to_owned(), &measured));
+        out.push(figure("before", format!("Speed left over, every rotor ({before})"), &|t| t.before.clone()));
+        if !after.is_empty() {
+            out.push(figure("after", format!("Speed left over, every rotor ({after})"), &|t| t.after.clone()));
         }
-        let without = trace.with_before(trace.after.iter().zip(added).map(|(r, a)| r + a).collect());
-        let variable = e.depends_on.iter().find_map(|name| {
-            let variable = Variable::meant(name, &trace.channel)?;
-            Some((variable, variable.values(&closed.flight, &scene)?))
-        });
-        let id = format!("effect-{}", k + 1);
-        *card = vec![match variable {
-            Some((variable, x)) => parts::against(&without, &id, (variable.name(), variable.unit()), &x, parts::ALONE),
-            None => parts::over_time(&without, &id, parts::ALONE),
-        }];
     }
     out
 }
 
+/// Of each effect what its first channel leaves over without it and with it, the channel of which its text tells the error: against the variable
+/// that it depends on; over time where the log lacks that.
+fn cards(closed: &Closed, traces: &[Trace]) -> Vec<Vec<Figure>> {
+    let scene = Scene::declared(&closed.flight.record);
+    let card = |(k, e): (usize, &EffectEntry)| {
+        let at = traces.iter().position(|t| e.channels.first() == Some(&t.channel))?;
+        let id = format!("effect-{}", k + 1);
+        // what nothing predicts was not added
+        let Some(without) = closed.held_out.without.get(k).and_then(|of| of.get(at)) else {
+            return Some(parts::over_time(&traces[at], &id, parts::pair(&closed.verdict)));
+        };
+        let trace = traces[at].with_before(without.clone());
+        let over = e.depends_on.iter().find_map(|name| against(closed, &scene, name, &trace.channel));
+        Some(match over {
+            Some((label, unit, x)) => parts::against(&trace, &id, (&label, unit), &x, parts::ALONE),
+            None => parts::over_time(&trace, &id, parts::ALONE),
+        })
+    };
+    closed.verdict.effects.iter().enumerate().map(|e| card(e).into_iter().collect()).collect()
+}
+
+/// What an effect of a channel goes with, its unit, and its mean in each window; `None` where the flight lacks it.
+fn against(closed: &Closed, scene: &Scene<'_>, name: &str, of: &str) -> Option<(String, &'static str, Vec<f64>)> {
+    let record = &closed.flight.record;
+    let mean = |values: &Option<Vec<f64>>| values.as_ref().map(|v| closed.flight.windows.mean(v));
+    match name {
+        "current_a" => Some((channel(name), "A", mean(&record.current)?)),
+        "temp_c" => Some((channel(name), "degC", mean(&record.temperature)?)),
+        _ => {
+            let variable = Variable::meant(name, of)?;
+            Some((variable.label(), variable.unit(), variable.values(&closed.flight, scene)?))
+        }
+    }
+}
+
+/// What is left of windows that no fit saw.
 fn trace(closed: &Closed, k: usize) -> Trace {
     let c = &closed.flight.channels.channels[k];
-    let [before, after] = &closed.predicted[k];
-    let left = |p: &[f64]| -> Vec<f64> { c.y.iter().zip(p).map(|(y, p)| y - p).collect() };
     Trace {
         channel: c.name.clone(),
         unit: c.unit.to_string(),
         floor: closed.verdict.channels.get(&c.name).map_or(0.0, |c| c.noise_floor_rms),
         time_label: "time, s".to_owned(),
         t: closed.flight.windows.t.clone(),
-        before: left(before),
-        after: left(after),
+        before: closed.held_out.before[k].clone(),
+        after: closed.held_out.after[k].clone(),
     }
 }
 

@@ -8,9 +8,9 @@
 use super::columns::Usual;
 use super::library::Kind;
 use crate::attribution::{Candidate, Channel, Kept, UNKNOWN};
-use crate::effects::Scope;
+use crate::effects::{Scope, airframe};
 use crate::verdict::{EffectEntry, Kin, NextExperiment, ScheduleStep, Unexplained};
-use crate::words::worth;
+use crate::words::{plain, worth};
 
 /// Slower than this what is left is slow, s.
 const SLOW_S: f64 = 0.3;
@@ -20,6 +20,16 @@ const STRETCH_S: f64 = 10.0;
 /// A candidate with its form.
 pub(super) fn name(candidate: &Candidate) -> String {
     if candidate.form.is_empty() { candidate.id.to_owned() } else { format!("{} ({})", candidate.id, candidate.form) }
+}
+
+/// The same in words; what has no name is told by its form.
+pub(super) fn title(candidate: &Candidate) -> String {
+    let form = plain(&candidate.form);
+    match (airframe::about(candidate.id), form.is_empty()) {
+        (Some(about), true) => about.title.to_owned(),
+        (Some(about), false) => format!("{} ({form})", about.title),
+        (None, _) => format!("no name: {form}"),
+    }
 }
 
 /// Why a term stands.

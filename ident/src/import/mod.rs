@@ -205,7 +205,11 @@ fn judge(place: &Place<'_>, log: &Log, mapped: &[String], report: &mut Report) -
     let mut vouched = Vec::new();
     for doubt in doubts(log) {
         if doubt.never && !mapped.iter().any(|m| m == doubt.column) {
-            let expected = format!("what a rig can do; if it is right, say so with --map {}=COLUMN*FACTOR", doubt.column);
+            let expected = match doubt.column {
+                "t_s" => "seconds: --map 't_s=COLUMN*0.001' reads milliseconds, *0.000001 microseconds, and *1 keeps it as it is"
+                    .to_owned(),
+                column => format!("what a rig can do; --map {column}=COLUMN*FACTOR converts it, and *1 keeps it as it is"),
+            };
             return Err(place.refuse(Some(doubt.column), doubt.what, expected));
         }
         if doubt.never {

@@ -8,7 +8,8 @@
 use super::Report;
 use super::clock::{over_midnight, since_1970};
 use super::table::{Field, Reading};
-use crate::log::{Place, ReadError};
+use crate::log::plausible::units_of;
+use crate::log::{Place, ReadError, trimmed};
 use crate::noise::median;
 
 /// Settles every column.
@@ -108,15 +109,18 @@ fn stamps(place: &Place<'_>, field: &mut Field, report: &mut Report) -> Result<(
     }
     let mut steps: Vec<f64> = field.values.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 0.0).collect();
     let step = if steps.is_empty() { 0.0 } else { median(&mut steps) };
-    let (likely, factor) = match step {
-        s if s >= 2000.0 => ("microseconds?", "*0.000001"),
-        s if s >= 1.0 => ("milliseconds?", "*0.001"),
-        _ => ("seconds?", ""),
+    let factors: &[&str] = match step {
+        s if s >= 2000.0 => &["*0.000001"],
+        // a row each second in milliseconds, or a thousand rows a second in microseconds
+        s if s >= 500.0 => &["*0.000001", "*0.001"],
+        s if s >= 1.0 => &["*0.001"],
+        _ => &[""],
     };
+    let maps: Vec<String> = factors.iter().map(|factor| format!("'t_s={}{factor}'", field.cell)).collect();
     Err(place.refuse(
         Some(&field.cell),
-        format!("a time without a unit, rows {step:.4} apart: {likely}"),
-        format!("the unit in the header, such as 'Time (s)', or --map 't_s={}{factor}'", field.cell),
+        format!("a time without a unit, rows {} apart: {}", trimmed(step, 4), units_of(step)),
+        format!("the unit in the header, such as 'Time (s)', or --map {}", maps.join(" or ")),
     ))
 }
 

@@ -109,7 +109,7 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
     };
     effects.extend(nameless);
     let unexplained = unexplained(&channels, &effects);
-    let mut alternatives: Vec<Alternative> = sensors.iter().flat_map(|s| s.alternatives.clone()).collect();
+    let mut alternatives = alternatives(&sensors);
     alternatives.retain(|a| a.probability >= 1e-3);
     alternatives.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let next_experiment = (verdict == Kind::Ambiguous).then(next);
@@ -134,6 +134,17 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         sensor: sensors.iter().map(|s| s.part.clone()).collect(),
     };
     Closed { verdict, model, sensors }
+}
+
+/// Whole accounts beside the one that is told: another one of one sensor, and of the others what was found.
+fn alternatives(sensors: &[Sensor]) -> Vec<Alternative> {
+    let found = |s: &Sensor| s.effects.iter().filter(|e| e.id != "unknown").map(|e| e.id.clone()).collect::<Vec<_>>();
+    let beside = |one: usize, a: &Alternative| {
+        let of = |(k, s): (usize, &Sensor)| if k == one { a.ids.clone() } else { found(s) };
+        Alternative { ids: sensors.iter().enumerate().flat_map(of).collect(), probability: a.probability }
+    };
+    let all = sensors.iter().enumerate();
+    all.flat_map(|(k, s)| s.alternatives.iter().map(move |a| beside(k, a)).collect::<Vec<_>>()).collect()
 }
 
 /// The channels on which more than three noise floors are left.
@@ -204,5 +215,52 @@ impl Sensor {
     #[must_use]
     pub fn summary(&self) -> (Kind, [f64; 2], Vec<&str>) {
         (self.kind, self.excess, self.effects.iter().map(|e| e.id.as_str()).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Scope;
+    use crate::verdict::Kin;
+
+    fn sensor(channels: [&'static str; 3], id: &str, instead: &str) -> Sensor {
+        let effect = EffectEntry {
+            kin: Kin::Own,
+            id: id.to_owned(),
+            scope: Scope::Rig,
+            run: None,
+            channels: vec![channels[0].to_owned()],
+            depends_on: Vec::new(),
+            equation: String::new(),
+            probability: 0.9,
+            parameters: Vec::new(),
+            heldout_error_reduction: 0.5,
+            evidence: String::new(),
+        };
+        Sensor {
+            channels,
+            unit: "1",
+            declared: Vec::new(),
+            corrected: Vec::new(),
+            floor: [1.0; 3],
+            heldout_before: [1.0; 3],
+            heldout_after: [1.0; 3],
+            effects: vec![effect],
+            shown: Vec::new(),
+            alternatives: vec![Alternative { ids: vec![instead.to_owned()], probability: 0.1 }],
+            kind: Kind::Attributed,
+            excess: [2.0, 1.0],
+            part: Part::default(),
+        }
+    }
+
+    /// What stands in the place of one sensor's cause leaves the causes of the others where they are.
+    #[test]
+    fn an_alternative_is_a_whole_account() {
+        let sensors =
+            [sensor(["gx", "gy", "gz"], "gyro_bias", "gyro_temperature"), sensor(["mx", "my", "mz"], "hard_iron", "soft_iron")];
+        let ids: Vec<String> = alternatives(&sensors).into_iter().map(|a| a.ids.join("+")).collect();
+        assert_eq!(ids, ["gyro_temperature+hard_iron", "gyro_bias+soft_iron"]);
     }
 }

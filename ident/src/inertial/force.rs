@@ -12,7 +12,7 @@ use super::account::{Sensor, by_axis, judge};
 use super::least::{Readings, Term};
 use super::model::{Part, linear};
 use super::noise::{axis_level, floor, levels};
-use super::search::{Scene, evidence, parameter};
+use super::search::{Scene, descending, evidence, parameter, reductions};
 use super::shown::Shown;
 use super::trace::{Setting, Traced, trace};
 use super::{Attitude, Recording, effects, smooth, vibration};
@@ -81,6 +81,7 @@ pub(crate) fn trace_force(recording: &Recording, attitude: &Attitude) -> Option<
         _ => Kind::Attributed,
     };
     sensor.excess[1] = excess;
+    at_its_axis(recording, sensor, &mut named);
     sensor.effects = named;
     // every prediction of a row comes from its neighbours or from a few constants: what is left at the rows is held out
     sensor.heldout_before = by_axis(&flat(recording, &sensor.declared));
@@ -144,6 +145,20 @@ fn carried(
     (0..recording.t.len()).map(|i| from[i] + to_earth[i].tr_mul(&smooth::between(t, back, recording.t[i]))).collect()
 }
 
+/// What each name is worth at the rows of its axis, where the errors are told too.
+fn at_its_axis(recording: &Recording, sensor: &Sensor, named: &mut [EffectEntry]) {
+    for e in named {
+        let Some(shown) = sensor.shown.iter().find(|s| s.id == e.id) else { continue };
+        let rows = recording.accel.iter().zip(&sensor.corrected).zip(&shown.added);
+        let (with, without): (Vec<f64>, Vec<f64>) = rows
+            .map(|((m, p), added)| (m[shown.axis] - p[shown.axis], m[shown.axis] - p[shown.axis] + added))
+            .filter(|r| r.0.is_finite() && r.1.is_finite())
+            .unzip();
+        let share = Readings::square(&with) / Readings::square(&without).max(1e-300);
+        e.heldout_error_reduction = (1.0 - share.sqrt()).max(0.0);
+    }
+}
+
 /// Residual at the claimed rows, x, y, z, x, y, z, ...
 fn flat(recording: &Recording, predicted: &[Vector3<f64>]) -> Vec<f64> {
     let left = recording.accel.iter().zip(predicted).map(|(m, p)| m - p).filter(|r| r.iter().all(|c| c.is_finite()));
@@ -197,7 +212,8 @@ fn accelerate(
     }
     let with = carried(recording, to_earth, &traced.sensor.corrected, &t, &back);
     let added: Vec<Vector3<f64>> = with.iter().zip(&traced.sensor.corrected).map(|(w, c)| w - c).collect();
-    traced.sensor.shown.push(Shown::over_time("linear_acceleration", &added));
+    let axes = descending(reductions(&flat(recording, &traced.sensor.corrected), &flat(recording, &with)));
+    traced.sensor.shown.push(Shown::over_time("linear_acceleration", axes[0], &added));
     traced.sensor.corrected = with;
     traced.sensor.part.carried_width_s = Some(width);
     let axis = |k: usize| (back.iter().map(|v| v[k] * v[k]).sum::<f64>() / back.len() as f64).sqrt();
@@ -208,7 +224,7 @@ fn accelerate(
         id: "linear_acceleration".to_owned(),
         scope: Scope::Run,
         run: None,
-        channels: setting.channels.map(str::to_owned).to_vec(),
+        channels: axes.map(|k| setting.channels[k].to_owned()).to_vec(),
         depends_on: vec!["t_s".to_owned()],
         equation: "f += R^T a(t), a smooth in earth axes with bounded speed".to_owned(),
         probability: 1.0 / (1.0 + (-nats).exp()),

@@ -11,7 +11,7 @@ use crate::effects::airframe;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;
-use crate::words::{Clause, channel, list, parameter};
+use crate::words::{Clause, channel, heading, list, lower, parameter};
 use nalgebra::Vector3;
 
 /// The words of an inertial unit's causes.
@@ -74,14 +74,11 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         cards: cards(recording, closed),
         left: parts::rest(v, &traces),
         parameters: Vec::new(),
-        speeds: Vec::new(),
+        speeds: ("", Vec::new()),
     };
     let mut sheet = parts::begin(&page);
-    sheet.fold("Every channel in figures", |sheet| {
-        for s in &closed.sensors {
-            sheet.figures((0..3).map(|k| parts::thinned(figure(recording, s, k))).collect());
-        }
-    });
+    let every = traces.iter().map(|t| parts::over_time(t, "every", parts::pair(v))).collect();
+    sheet.fold("Every channel in figures", |sheet| sheet.figures(every));
     sheet.fold("The run", |sheet| sheet.figures(closed.sensors.iter().map(|s| parts::thinned(overview(recording, s))).collect()));
     parts::aside(&mut sheet, v);
     sheet.html()
@@ -102,7 +99,7 @@ fn trace(recording: &Recording, sensor: &Sensor, axis: usize) -> Trace {
     }
 }
 
-/// Figures of each effect: what the axis on which it adds most leaves over without it and with it, over the variable that it goes with.
+/// Figures of each effect: what the axis of which its text tells the error leaves over without it and with it, over the variable that it goes with.
 fn cards(recording: &Recording, closed: &Closed) -> Vec<Vec<Figure>> {
     closed.verdict.effects.iter().enumerate().map(|(k, e)| card(recording, closed, k, e).into_iter().collect()).collect()
 }
@@ -112,11 +109,7 @@ fn card(recording: &Recording, closed: &Closed, k: usize, e: &EffectEntry) -> Op
     let sensor = closed.sensors.iter().find(|s| s.channels.contains(&first.as_str()))?;
     let shown = sensor.shown.iter().find(|s| s.id == e.id)?;
     let whole = trace(recording, sensor, shown.axis);
-    // alone on its sensor: the declared model is what stands without it
-    let before = match sensor.effects.len() {
-        1 => whole.before.clone(),
-        _ => whole.after.iter().zip(&shown.added).map(|(after, added)| after + added).collect(),
-    };
+    let before = whole.after.iter().zip(&shown.added).map(|(after, added)| after + added).collect();
     let trace = whole.with_before(before);
     let id = format!("effect-{}", k + 1);
     Some(match &shown.over {
@@ -128,39 +121,23 @@ fn card(recording: &Recording, closed: &Closed, k: usize, e: &EffectEntry) -> Op
     })
 }
 
-fn figure(recording: &Recording, sensor: &Sensor, axis: usize) -> Figure {
-    let measured = sensor.measured(recording);
-    let left =
-        |predicted: &[Vector3<f64>]| -> Vec<f64> { measured.iter().zip(predicted).map(|(m, p)| m[axis] - p[axis]).collect() };
-    let line = |name: &str, class, y| Layer::Line { name: name.to_owned(), class, x: recording.t.clone(), y };
-    Figure {
-        id: format!("residual-{}", sensor.channels[axis]),
-        title: format!("{}: measured - predicted", sensor.channels[axis]),
-        x_label: "time, s".to_owned(),
-        y_label: format!("residual, {}", sensor.unit),
-        layers: vec![line("before", "b", left(&sensor.declared)), line("after", "a", left(&sensor.corrected))],
-        height: 260.0,
-        categories: Vec::new(),
-        captioned: false,
-    }
-}
-
 fn overview(recording: &Recording, sensor: &Sensor) -> Figure {
     let measured = sensor.measured(recording);
     let line = |k: usize| Layer::Line {
-        name: sensor.channels[k].to_owned(),
+        name: channel(sensor.channels[k]),
         class: ["a", "b", "c"][k],
         x: recording.t.clone(),
         y: measured.iter().map(|m| m[k]).collect(),
     };
+    let quantity = heading(sensor.channels[0]);
+    let quantity = quantity.trim_end_matches(" (x)");
     Figure {
         id: format!("run-{}", sensor.channels[0]),
-        title: format!("{} as measured", sensor.channels.join(", ")),
+        title: format!("{quantity} as measured"),
         x_label: "time, s".to_owned(),
-        y_label: sensor.unit.to_owned(),
+        y_label: format!("{}, {}", lower(quantity), sensor.unit),
         layers: (0..3).map(line).collect(),
         height: 260.0,
-        categories: Vec::new(),
-        captioned: false,
+        ..Figure::default()
     }
 }

@@ -66,6 +66,10 @@ pub(crate) struct Found<'a> {
     pub(crate) shape_ci: [f64; 2],
     /// 1 - (held-out error with all)/(without this one).
     pub(crate) reduction: f64,
+    /// The same of each axis.
+    pub(crate) by_axis: [f64; 3],
+    /// Coefficients of the declared model and of the other causes when it is left out, in their order.
+    pub(crate) without: Vec<f64>,
     /// Evidence for it beside the others.
     pub(crate) evidence: f64,
 }
@@ -114,6 +118,19 @@ const WORSE: f64 = 0.02;
 pub(crate) fn spoils(before: &[f64], after: &[f64]) -> [bool; 3] {
     let (before, after) = (by_axis(before), by_axis(after));
     std::array::from_fn(|k| after[k] > (1.0 + WORSE) * before[k])
+}
+
+/// 1 - (error with)/(without) of each axis.
+pub(crate) fn reductions(without: &[f64], with: &[f64]) -> [f64; 3] {
+    let (without, with) = (by_axis(without), by_axis(with));
+    std::array::from_fn(|k| 1.0 - with[k] / without[k].max(1e-300))
+}
+
+/// The axes, the one that gains most first.
+pub(crate) fn descending(by_axis: [f64; 3]) -> [usize; 3] {
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|a, b| by_axis[*b].total_cmp(&by_axis[*a]));
+    axes
 }
 
 /// Searches; `noise` is a block's own standard deviation, `doubt` what the attitude's error makes of it.
@@ -266,14 +283,15 @@ fn conclude<'a>(
     let alternatives = rivals.into_iter().map(|(ids, e)| (ids, e.min(0.0).exp() / (1.0 + weights))).collect();
     let count = chosen.len();
     let mut found = Vec::with_capacity(count);
-    let lost: Vec<f64> = (0..count)
+    let lost: Vec<Option<Solved>> = (0..count)
         .map(|k| {
             let others = chosen.iter().enumerate().filter(|(i, _)| *i != k).flat_map(|(_, c)| &c.columns);
-            let without = readings.solve(&base.iter().chain(others).collect::<Vec<_>>(), noise);
-            without.map_or(full, |s| Readings::square(&s.heldout))
+            readings.solve(&base.iter().chain(others).collect::<Vec<_>>(), noise)
         })
         .collect();
-    for (t, left) in chosen.into_iter().zip(lost) {
+    for (t, lost) in chosen.into_iter().zip(lost) {
+        let (lost, without) = lost.map_or_else(|| (after.heldout.clone(), Vec::new()), |s| (s.heldout, s.coefficients));
+        let left = Readings::square(&lost);
         let least = t.scanned.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
         let near = |s: &(f64, f64)| 0.5 * looks * (s.1 / least.max(1e-300)).ln() < 1.92;
         let shape_ci = bracket(&t.scanned, near);
@@ -281,6 +299,8 @@ fn conclude<'a>(
             instance: t.instance,
             shape_ci,
             reduction: 1.0 - (full / left.max(1e-300)).sqrt(),
+            by_axis: reductions(&lost, &after.heldout),
+            without,
             evidence: evidence(looks, left, full, slack),
         });
     }

@@ -1,6 +1,6 @@
 //! What convinces of a cause: what it adds to a channel, and the variable that it goes with.
 //!
-//! What it is: for each cause that was found the axis on which it adds most, what it adds there row by row, and the variable of its figure.
+//! What it is: for each cause that was found the axis whose error it takes away most, what it adds there row by row, and the variable of its figure.
 //! What can go wrong: a cause that goes with time alone has no variable; its figure is over time.
 //! Units: those of the channel; of the variable as it states.
 //! Reference: component-plus-residual plots: Larsen & McCleary 1972, Technometrics 14:781.
@@ -24,7 +24,7 @@ pub(crate) struct Over {
 #[derive(Debug, Clone)]
 pub(crate) struct Shown {
     pub(crate) id: String,
-    /// Axis on which it adds most.
+    /// Axis of which its text tells the error.
     pub(crate) axis: usize,
     /// What it adds there, row by row; not a number where the sensor is not predicted.
     pub(crate) added: Vec<f64>,
@@ -35,29 +35,34 @@ pub(crate) struct Shown {
 }
 
 impl Shown {
-    /// Of what a cause adds at each row.
-    pub(crate) fn over_time(id: &str, added: &[Vector3<f64>]) -> Self {
-        let axis = largest((0..3).map(|k| square(added.iter().map(|v| v[k]))));
+    /// Of what a cause adds at each row to an axis.
+    pub(crate) fn over_time(id: &str, axis: usize, added: &[Vector3<f64>]) -> Self {
         let added = added.iter().map(|v| v[axis]).collect();
         Self { id: id.to_owned(), axis, added, over: None, seconds: None }
     }
 
     /// The same of a cause that is linear in its terms; `claimed` are the rows that are predicted.
-    pub(crate) fn of(id: &str, terms: &[Term<'_>], coefficients: &[f64], scene: &Scene<'_>, claimed: &[bool]) -> Self {
-        let (shown, strongest) = Self::linear(id, terms, coefficients, scene, claimed);
+    pub(crate) fn of(
+        (id, axis): (&str, usize),
+        terms: &[Term<'_>],
+        coefficients: &[f64],
+        scene: &Scene<'_>,
+        claimed: &[bool],
+    ) -> Self {
+        let (shown, strongest) = Self::linear((id, axis), terms, coefficients, scene, claimed);
         let over = terms.get(strongest).and_then(|term| over(id, term, shown.axis, scene, claimed));
         Self { over, ..shown }
     }
 
     /// The same of a correction without a name, which is linear in an axis of rate or specific force, or in time.
     pub(crate) fn of_correction(
-        variable: &str,
+        (variable, axis): (&str, usize),
         terms: &[Term<'_>],
         coefficients: &[f64],
         scene: &Scene<'_>,
         claimed: &[bool],
     ) -> Self {
-        let (shown, strongest) = Self::linear("unknown", terms, coefficients, scene, claimed);
+        let (shown, strongest) = Self::linear(("unknown", axis), terms, coefficients, scene, claimed);
         let (name, unit) = if variable == "g" { ("turn rate", "rad/s") } else { ("specific force", "m/s^2") };
         let over = terms.get(strongest).filter(|_| variable != "t").map(|term| Over {
             name: format!("{name} ({})", AXES[goes_with(term).unwrap_or(shown.axis)]),
@@ -68,14 +73,20 @@ impl Shown {
     }
 
     /// What the terms add, and which of them adds most.
-    fn linear(id: &str, terms: &[Term<'_>], coefficients: &[f64], scene: &Scene<'_>, claimed: &[bool]) -> (Self, usize) {
+    fn linear(
+        (id, axis): (&str, usize),
+        terms: &[Term<'_>],
+        coefficients: &[f64],
+        scene: &Scene<'_>,
+        claimed: &[bool],
+    ) -> (Self, usize) {
         let t = &scene.recording.t;
         let rows: Vec<usize> = (0..t.len()).filter(|i| claimed[*i]).collect();
         let mut added = vec![Vector3::repeat(f64::NAN); t.len()];
         for i in &rows {
             added[*i] = super::search::predict(terms, coefficients, t[*i], *i);
         }
-        let shown = Self::over_time(id, &added);
+        let shown = Self::over_time(id, axis, &added);
         let part = |(term, c): (&Term<'_>, &f64)| square(rows.iter().map(|i| c * (term.value)(*i)[shown.axis]));
         let strongest = largest(terms.iter().zip(coefficients).map(part));
         (shown, strongest)
@@ -127,7 +138,7 @@ fn square(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Position of the largest.
-fn largest(values: impl Iterator<Item = f64>) -> usize {
+pub(crate) fn largest(values: impl Iterator<Item = f64>) -> usize {
     values.enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0))).map_or(0, |best| best.0)
 }
 
@@ -148,33 +159,34 @@ mod tests {
         }
     }
 
-    /// The axis on which a cause adds most, and of that axis the variable of the term that does.
+    /// What a cause adds to an axis, and of that axis the variable of the term that adds most.
     #[test]
-    fn a_cause_is_shown_where_it_adds_most() {
+    fn a_cause_is_shown_on_its_axis() {
         let recording = recording();
         let to_earth = vec![Matrix3::identity(); 200];
         let predicted: Vec<Vector3<f64>> = recording.t.iter().map(|t| Vector3::new(20.0, *t, 40.0)).collect();
         let scene = Scene { recording: &recording, to_earth: &to_earth, predicted: &predicted, turning: &[], heard: (0.0, 2.0) };
         let mut claimed = vec![true; 200];
         claimed[0] = false;
-        let of = |id: &str, terms: Vec<Term<'_>>, coefficients: &[f64]| Shown::of(id, &terms, coefficients, &scene, &claimed);
+        let of =
+            |id: (&str, usize), terms: Vec<Term<'_>>, coefficients: &[f64]| Shown::of(id, &terms, coefficients, &scene, &claimed);
         let warm =
             |k: usize| Term::new(["per_kelvin_x", "per_kelvin_y"][k], "rad/s/K", move |i| Vector3::ith(k, 0.01 * i as f64));
-        let shown = of("gyro_temperature", vec![warm(0), warm(1)], &[0.1, -0.3]);
+        let shown = of(("gyro_temperature", 1), vec![warm(0), warm(1)], &[0.1, -0.3]);
         let over = shown.over.expect("the temperature");
         assert_eq!((shown.axis, over.name.as_str(), over.unit), (1, "temperature", "degC"));
         assert!((shown.added[100] + 0.3).abs() < 1e-12 && (over.values[100] - 21.0).abs() < 1e-12);
         assert!(shown.added[0].is_nan() && over.values[0].is_nan(), "a row that is not predicted");
         let iron = |k: usize| Term::new(["s_xy", "s_zz"][k], "1", |i: usize| Vector3::new(predicted[i].y, 0.0, 0.0));
-        let over = of("soft_iron", vec![iron(0)], &[0.02]).over.expect("the field");
+        let over = of(("soft_iron", 0), vec![iron(0)], &[0.02]).over.expect("the field");
         assert_eq!((over.name.as_str(), over.unit, over.values[150]), ("predicted field (y)", "uT", predicted[150].y));
         // what set in at an instant, and what is a curve over time, are shown over time
         let late = Term { support: (1.0, f64::INFINITY), ..Term::new("offset_x", "uT", |_| Vector3::x()) };
-        assert!(of("hard_iron", vec![late], &[6.0]).over.is_none());
+        assert!(of(("hard_iron", 0), vec![late], &[6.0]).over.is_none());
         let always = Term::new("offset_x", "uT", |_| Vector3::x());
-        assert_eq!(of("hard_iron", vec![always], &[6.0]).over.expect("the heading").name, "heading");
+        assert_eq!(of(("hard_iron", 0), vec![always], &[6.0]).over.expect("the heading").name, "heading");
         let by_force = Term::new("mx_ax", "uT/(m/s^2)", |i: usize| Vector3::new(recording.accel[i].x, 0.0, 0.0));
-        let over = Shown::of_correction("a", &[by_force], &[0.5], &scene, &claimed).over.expect("the force");
+        let over = Shown::of_correction(("a", 0), &[by_force], &[0.5], &scene, &claimed).over.expect("the force");
         assert_eq!((over.name.as_str(), over.unit), ("specific force (x)", "m/s^2"));
     }
 }

@@ -8,7 +8,7 @@
 use super::account::{Sensor, by_axis, judge};
 use super::least::{Readings, Term};
 use super::model::{Added, Part};
-use super::search::{Cause, Found, Outcome, Scene, parameters, predict, search, spoils};
+use super::search::{Cause, Found, Outcome, Scene, descending, parameters, predict, search, spoils};
 use super::shown::Shown;
 use super::unknown::correct;
 use crate::effects::Scope;
@@ -68,7 +68,7 @@ pub(crate) fn trace<'a>(
         heldout_before: by_axis(&outcome.before.heldout),
         heldout_after: by_axis(&outcome.before.heldout),
         effects: Vec::new(),
-        shown: shown(&outcome, base.len(), scene, claimed),
+        shown: shown(&outcome, base, scene, claimed),
         alternatives: Vec::new(),
         kind,
         excess: [over(before), over(before)],
@@ -94,7 +94,10 @@ pub(crate) fn trace<'a>(
                 sensor.heldout_after = by_axis(&c.solved.heldout);
                 sensor.excess[1] = over(mean(&c.solved.heldout));
                 sensor.part = part(setting, &c.solved.coefficients[..base.len()], vec![c.added(base.len())]);
-                sensor.shown.push(c.shown(base.len(), scene, claimed));
+                let mut shown = c.shown(base.len(), scene, claimed);
+                let rows = sensor.corrected.iter().zip(&sensor.declared);
+                shown.added = rows.map(|(with, without)| with[shown.axis] - without[shown.axis]).collect();
+                sensor.shown.push(shown);
                 sensor.effects = vec![c.entry];
             }
         }
@@ -121,15 +124,44 @@ pub(crate) fn trace<'a>(
     Some(Traced { sensor, effect, named })
 }
 
-/// What convinces of each cause that was found.
-fn shown(outcome: &Outcome<'_>, base: usize, scene: &Scene<'_>, claimed: &[bool]) -> Vec<Shown> {
-    let mut at = base;
-    let one = |f: &Found<'_>| {
+/// The axes of which a cause speaks, the one that it helps most first: none that is predicted worse with all that was found.
+fn helped(outcome: &Outcome<'_>, found: &Found<'_>) -> Vec<usize> {
+    let worse = spoils(&outcome.before.heldout, &outcome.after.heldout);
+    descending(found.by_axis).into_iter().filter(|k| !worse[*k]).collect()
+}
+
+/// What convinces of each cause that was found: what it changes beside the others, which stand in for it where they can.
+fn shown(outcome: &Outcome<'_>, base: &[Term<'_>], scene: &Scene<'_>, claimed: &[bool]) -> Vec<Shown> {
+    let t = &scene.recording.t;
+    let mut at = base.len();
+    let one = |(k, f): (usize, &Found<'_>)| {
         let from = at;
         at += f.instance.terms.len();
-        Shown::of(f.instance.id, &f.instance.terms, &outcome.after.coefficients[from..at], scene, claimed)
+        let axis = helped(outcome, f).first().copied().unwrap_or(0);
+        let own = &outcome.after.coefficients[from..at];
+        let mut shown = Shown::of((f.instance.id, axis), &f.instance.terms, own, scene, claimed);
+        if !f.without.is_empty() {
+            let others = |i: usize| without(outcome, base, k, t[i], i)[axis];
+            let with = |i: usize| {
+                (predict(base, &outcome.after.coefficients, t[i], i) + contribution(outcome, base.len(), t[i], i))[axis]
+            };
+            shown.added = (0..t.len()).map(|i| if claimed[i] { with(i) - others(i) } else { f64::NAN }).collect();
+        }
+        shown
     };
-    outcome.found.iter().map(one).collect()
+    outcome.found.iter().enumerate().map(one).collect()
+}
+
+/// What is predicted of a row without one of the causes.
+fn without(outcome: &Outcome<'_>, base: &[Term<'_>], left_out: usize, t: f64, row: usize) -> Vector3<f64> {
+    let coefficients = &outcome.found[left_out].without;
+    let mut sum = predict(base, coefficients, t, row);
+    let mut at = base.len();
+    for (_, f) in outcome.found.iter().enumerate().filter(|(k, _)| *k != left_out) {
+        sum += predict(&f.instance.terms, &coefficients[at..], t, row);
+        at += f.instance.terms.len();
+    }
+    sum
 }
 
 fn part(setting: &Setting, declared: &[f64], effect: Vec<Added>) -> Part {
@@ -166,31 +198,24 @@ fn contribution(outcome: &Outcome<'_>, base: usize, t: f64, row: usize) -> Vecto
 
 fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectEntry> {
     let mut at = base;
-    // an axis that is predicted worse with all that was found is none that they speak of
     let worse = spoils(&outcome.before.heldout, &outcome.after.heldout);
-    let of = |bad: bool| -> Vec<String> {
-        setting.channels.iter().zip(worse).filter(|(_, w)| *w == bad).map(|(c, _)| (*c).to_owned()).collect()
-    };
-    let (channels, spoilt) = (of(false), of(true));
-    let but = if spoilt.is_empty() {
-        String::new()
-    } else {
-        format!("; {} is predicted worse with them", list(&spoilt.iter().map(|c| channel(c)).collect::<Vec<_>>()))
-    };
+    let spoilt: Vec<String> = (0..3).filter(|k| worse[*k]).map(|k| channel(setting.channels[k])).collect();
+    let but = if spoilt.is_empty() { String::new() } else { format!("; {} is predicted worse with them", list(&spoilt)) };
     let entry = |f: &Found<'_>, at: usize| {
         let count = f.instance.terms.len();
         let (c, s) = (&outcome.after.coefficients[at..at + count], &outcome.after.sigma[at..at + count]);
+        let axes = helped(outcome, f);
         EffectEntry {
             kin: Kin::Own,
             id: f.instance.id.to_owned(),
             scope: Scope::Rig,
             run: None,
-            channels: channels.clone(),
+            channels: axes.iter().map(|k| setting.channels[*k].to_owned()).collect(),
             depends_on: f.instance.depends_on.iter().map(|d| (*d).to_owned()).collect(),
             equation: f.instance.equation.to_owned(),
             probability: outcome.probability,
             parameters: parameters(f, c, s),
-            heldout_error_reduction: f.reduction,
+            heldout_error_reduction: axes.first().map_or(0.0, |k| f.by_axis[*k].max(0.0)),
             evidence: format!(
                 "without it left-out stretches are predicted {:.1} % worse ({:.0} nats){but}",
                 100.0 * (1.0 / (1.0 - f.reduction).max(1e-9) - 1.0),

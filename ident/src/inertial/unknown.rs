@@ -8,7 +8,7 @@
 
 use super::least::{Column, Readings, Solved, Term};
 use super::model::Added;
-use super::search::{Scene, parameter, predict};
+use super::search::{Scene, descending, parameter, predict, reductions};
 use super::shown::Shown;
 use crate::effects::Scope;
 use crate::verdict::{EffectEntry, Kin};
@@ -21,6 +21,8 @@ pub(crate) struct Correction<'a> {
     pub(crate) terms: Vec<Term<'a>>,
     pub(crate) entry: EffectEntry,
     variable: &'static str,
+    /// The axis that it helps most.
+    axis: usize,
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -71,7 +73,7 @@ pub(crate) fn correct<'a>(
     noise: f64,
 ) -> Option<Correction<'a>> {
     let fixed: Vec<Column> = base.iter().map(|t| readings.column(t)).collect();
-    let before = Readings::square(&readings.solve(&fixed.iter().collect::<Vec<_>>(), noise)?.heldout);
+    let before = readings.solve(&fixed.iter().collect::<Vec<_>>(), noise)?.heldout;
     // a channel does not explain itself
     let variables = VARIABLES.into_iter().filter(|name| !channels[0].starts_with(name));
     let mut best: Option<(f64, &'static str, Vec<Term<'a>>, Solved)> = None;
@@ -84,7 +86,9 @@ pub(crate) fn correct<'a>(
             best = Some((left, name, terms, solved));
         }
     }
-    let (left, name, terms, solved) = best?;
+    let (_, name, terms, solved) = best?;
+    let by_axis = reductions(&before, &solved.heldout);
+    let axes = descending(by_axis);
     let depends_on: Vec<String> = match name {
         "g" => vec!["gx", "gy", "gz"],
         "a" => vec!["ax", "ay", "az"],
@@ -103,7 +107,7 @@ pub(crate) fn correct<'a>(
         id: "unknown".to_owned(),
         scope: Scope::Run,
         run: None,
-        channels: channels.map(str::to_owned).to_vec(),
+        channels: axes.map(|k| channels[k].to_owned()).to_vec(),
         evidence: format!(
             "no known cause takes away half of what is over; linear in {} predicts left-out stretches best",
             depends_on.join(", ")
@@ -112,9 +116,9 @@ pub(crate) fn correct<'a>(
         equation: format!("{} += A {name}", &channels[0][..1]),
         probability: 1.0,
         parameters,
-        heldout_error_reduction: 1.0 - (left / before.max(1e-300)).sqrt(),
+        heldout_error_reduction: by_axis[axes[0]].max(0.0),
     };
-    Some(Correction { solved, terms, entry, variable: name })
+    Some(Correction { solved, terms, entry, variable: name, axis: axes[0] })
 }
 
 impl Correction<'_> {
@@ -134,7 +138,7 @@ impl Correction<'_> {
 
     /// What convinces of it, behind so many coefficients of the declared model.
     pub(crate) fn shown(&self, base: usize, scene: &Scene<'_>, claimed: &[bool]) -> Shown {
-        Shown::of_correction(self.variable, &self.terms, &self.solved.coefficients[base..], scene, claimed)
+        Shown::of_correction((self.variable, self.axis), &self.terms, &self.solved.coefficients[base..], scene, claimed)
     }
 
     /// Its share of the model, behind so many coefficients of the declared one.

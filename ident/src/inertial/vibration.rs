@@ -9,9 +9,9 @@
 //! Reference: Welch, IEEE Transactions on Audio and Electroacoustics 15(2), 1967.
 
 use super::Recording;
-use super::account::Sensor;
+use super::account::{Sensor, by_axis};
 use super::noise::{levels, quantile};
-use super::search::{NAMED, parameter};
+use super::search::{NAMED, descending, parameter, reductions};
 use super::shown::Shown;
 use super::trace::Setting;
 use crate::effects::Scope;
@@ -64,7 +64,10 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
         sensor.part.line_hz = Some(frequency);
     }
     let seconds = predicted.then(|| PERIODS / frequency);
-    sensor.shown.push(Shown { seconds, ..Shown::over_time("vibration", &added) });
+    // what cannot be predicted is told of the axis that it shakes most
+    let flat = |v: &[Vector3<f64>]| -> Vec<f64> { v.iter().flat_map(|v| [v.x, v.y, v.z]).collect() };
+    let axes = descending(if predicted { reductions(&flat(&left), &flat(&after)) } else { by_axis(&flat(&left)) });
+    sensor.shown.push(Shown { seconds, ..Shown::over_time("vibration", axes[0], &added) });
     let looks = level.len() as f64;
     // a line's own strength: its prediction does not know the noise of the rows that it predicts; second differences would weigh it
     // by its frequency
@@ -88,7 +91,7 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
         id: "vibration".to_owned(),
         scope: Scope::Run,
         run: None,
-        channels: setting.channels.map(str::to_owned).to_vec(),
+        channels: axes.map(|k| setting.channels[k].to_owned()).to_vec(),
         depends_on: vec!["t_s".to_owned()],
         equation: if has_line {
             "f += c cos(2 pi frequency t) + s sin(2 pi frequency t)"

@@ -37,6 +37,8 @@ pub struct Gaps {
     pub standing: Option<usize>,
     /// Whether they are single rows of an even clock.
     pub single: bool,
+    /// Tick of that clock, s, where the rows follow each other as evenly as it can tell: its times may be coarse, and no row missing.
+    pub coarse: Option<f64>,
 }
 
 impl Gaps {
@@ -57,7 +59,8 @@ impl Gaps {
         let tick = sorted[sorted.len() / 4];
         let off = |step: f64| (step / tick - (step / tick).round()).abs();
         let even = steps.iter().filter(|s| off(**s) <= EVEN[1]).count() as f64 >= EVEN[0] * steps.len() as f64;
-        let single = Self { single: true, ..Self::among(log, &steps, tick, 1.5) };
+        let coarse = is_even(&log.t, tick).then_some(tick);
+        let single = Self { single: true, coarse, ..Self::among(log, &steps, tick, 1.5) };
         (even && single.missing_s >= TOLD * single.whole_s).then_some(single)
     }
 
@@ -71,6 +74,7 @@ impl Gaps {
             longest: [0.0; 2],
             standing: stands.as_ref().map(|_| 0),
             single: false,
+            coarse: None,
         };
         for (i, hole) in steps.iter().enumerate().filter(|(_, s)| **s > longer * step) {
             out.missing_s += hole - step;
@@ -86,6 +90,17 @@ impl Gaps {
     }
 }
 
+/// Whether times lie within a tick of a straight line over the number of the row: rows that come evenly, each told by the tick before it. Of rows
+/// that are dropped here and there the line leaves more and more.
+fn is_even(t: &[f64], tick: f64) -> bool {
+    let (Some(first), Some(last)) = (t.first(), t.last()) else { return false };
+    let step = (last - first) / (t.len() - 1).max(1) as f64;
+    let off = t.iter().enumerate().map(|(i, t)| t - first - step * i as f64);
+    let (low, high) = off.fold((0.0_f64, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+    // the line through both ends may itself be off by a tick
+    high - low <= 2.0 * tick
+}
+
 /// Rows on which the motor stands, by the first load that the log has.
 pub(super) fn standing(log: &Log) -> Option<Vec<bool>> {
     let of = |name: &str| log.column(name);
@@ -96,7 +111,7 @@ pub(super) fn standing(log: &Log) -> Option<Vec<bool>> {
 
 impl fmt::Display for Gaps {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { missing_s, whole_s, holes, longest: [at, longest], standing, single } = self;
+        let Self { missing_s, whole_s, holes, longest: [at, longest], standing, single, coarse } = self;
         let share = 100.0 * missing_s / whole_s;
         let [missing, whole, longest, at] = [missing_s, whole_s, longest, at].map(|v| trimmed(*v, 2));
         let plural = if *holes == 1 { "one hole".to_owned() } else { format!("{holes} holes") };
@@ -104,17 +119,24 @@ impl fmt::Display for Gaps {
             f,
             "{share:.0} % of the time has no row ({missing} of {whole} s, in {plural}, the longest {longest} s from {at} s on): "
         )?;
-        match standing {
-            _ if *single => {
+        match (coarse, standing) {
+            (Some(tick), _) => {
                 write!(
                     f,
-                    "single rows of an even clock are missing: dropped by a filter, a bad line or a thinned export, or the clock is coarser than the rows"
+                    "at even places, as a clock makes them whose ticks of {} s are coarser than its rows; or every so many rows one was dropped",
+                    trimmed(*tick, 6)
                 )
             }
-            Some(n) if n == holes => {
+            (None, _) if *single => {
+                write!(
+                    f,
+                    "single rows of an even clock are missing at uneven places: dropped by a filter, a bad line or a thinned export"
+                )
+            }
+            (None, Some(n)) if n == holes => {
                 write!(f, "the motor stood still on both sides, as where a recorder is stopped between blocks")
             }
-            Some(n) => {
+            (None, Some(n)) => {
                 let of =
                     if *n == 0 { "the motor turned".to_owned() } else { format!("in {} of them the motor turned", holes - n) };
                 write!(
@@ -122,7 +144,7 @@ impl fmt::Display for Gaps {
                     "{of}, so that rows were lost, dropped by a filter, or the recorder was stopped under load; what happened meanwhile is not known"
                 )
             }
-            None => write!(f, "the recorder was stopped, or rows were dropped"),
+            (None, None) => write!(f, "the recorder was stopped, or rows were dropped"),
         }
     }
 }
@@ -158,6 +180,11 @@ mod tests {
     fn single_rows_that_are_missing_are_told() {
         let single = Gaps::of(&log(|n| n % 5 != 3)).expect("every fifth is gone");
         assert!(single.single && single.to_string().starts_with("20 % of the time has no row"), "{single}");
+        assert!(single.to_string().contains("ticks of 0.1 s are coarser than its rows; or every so many rows"), "{single}");
+        // here and there
+        let scattered = Gaps::of(&log(|n| (n * n + n / 7) % 5 != 3)).expect("rows are gone");
+        assert!(scattered.single && scattered.coarse.is_none(), "{scattered}");
+        assert!(scattered.to_string().contains("at uneven places: dropped by a filter"), "{scattered}");
         // steps of any length are uneven sampling, not holes
         let mut uneven = log(|_| true);
         uneven.t.iter_mut().enumerate().for_each(|(i, t)| *t += 0.04 * (i as f64 * 2.4).sin());

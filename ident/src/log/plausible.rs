@@ -7,7 +7,7 @@
 //! Reference: T = C_T rho n^2 D^4 with C_T 0.02 to 0.2 and D 0.02 to 2 m spans 1e-12 to 1.1e-3 N/(rev/min)^2; static thrust for electrical power:
 //! 0.01 to 0.5 N/W from a 46 mm to a 1 m propeller at load (UIUC and maker's tables); momentum theory bounds it by the disc.
 
-use super::{Log, Place, ReadError, SPEED};
+use super::{Log, Place, ReadError, SPEED, trimmed};
 use crate::noise::median;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -103,11 +103,22 @@ fn rate(log: &Log) -> Option<Doubt> {
     let (step, whole) = (median(&mut steps), log.t[log.t.len() - 1] - log.t[0]);
     let said = |likely: &str| format!("rows {step} s apart, {whole:.0} s in all: {likely}");
     match step {
-        s if s > 60.0 || (s >= 2.0 && whole > 6.0 * 3600.0) => doubt("t_s", true, said("milliseconds?")),
-        s if s > 10.0 => doubt("t_s", false, said("milliseconds?")),
+        s if s > 60.0 || (s >= 2.0 && whole > 6.0 * 3600.0) => doubt("t_s", true, said(&units_of(s))),
+        s if s > 10.0 => doubt("t_s", false, said(&units_of(s))),
         s if s < 1e-5 => doubt("t_s", true, said("seconds, read as milliseconds or microseconds?")),
         s if s < 1e-4 => doubt("t_s", false, said("a unit too small?")),
         _ => None,
+    }
+}
+
+/// The units in which rows so far apart are a usual clock, with the seconds that they mean.
+pub(crate) fn units_of(step: f64) -> String {
+    let said = |unit: &str, factor: f64| format!("{unit} (a row each {} s)", trimmed(step * factor, 6));
+    match step {
+        s if s >= 2000.0 => said("microseconds", 1e-6) + "?",
+        s if s >= 500.0 => format!("{} or {}?", said("microseconds", 1e-6), said("milliseconds", 1e-3)),
+        s if s >= 1.0 => said("milliseconds", 1e-3) + "?",
+        _ => "seconds?".to_owned(),
     }
 }
 

@@ -71,7 +71,26 @@ impl Model {
     }
 
     fn from_table(root: &Table) -> Result<Self, Refusal> {
-        if root.get("format").and_then(Value::as_str) != Some(FORMAT) {
+        let format = root.get("format").and_then(Value::as_str);
+        if format == Some(crate::flight::MODEL_FORMAT) {
+            return Err(refusal(
+                "format",
+                root.get("format"),
+                &format!(
+                    "'{FORMAT}', the model of a rig: `quadrig predict` and `close-loop --model` take that of a flight, for another flight"
+                ),
+            ));
+        }
+        if format == Some(crate::inertial::MODEL_FORMAT) {
+            return Err(refusal(
+                "format",
+                root.get("format"),
+                &format!(
+                    "'{FORMAT}', the model of a rig: `quadrig predict` takes that of an attitude log, for its own recording"
+                ),
+            ));
+        }
+        if format != Some(FORMAT) {
             return Err(refusal("format", root.get("format"), &format!("'{FORMAT}'")));
         }
         only(root, &ROOT)?;

@@ -340,8 +340,7 @@ impl Figure {
     /// The legend's entries, laid out in as many rows as they need.
     fn entries(&self) -> Vec<Entry<'_>> {
         let mut out: Vec<Entry<'_>> = Vec::new();
-        // wide enough for the larger letters of a phone
-        let (first, letter) = if self.captioned { (10.0, 10.6) } else { (LEFT, 8.8) };
+        let first = if self.captioned { 10.0 } else { LEFT };
         let (mut at, mut row) = (first, 0);
         for layer in &self.layers {
             let (name, class, key) = match layer {
@@ -355,7 +354,7 @@ impl Figure {
             if name.is_empty() {
                 continue;
             }
-            let wide = 21.0 + letter * name.chars().count() as f64;
+            let wide = 21.0 + if self.captioned { on_a_phone(name) } else { 8.8 * name.chars().count() as f64 };
             if at > first && at + wide > WIDTH {
                 (at, row) = (first, row + 1);
             }
@@ -386,6 +385,16 @@ impl Figure {
             let _ = write!(out, "<text class=\"tick\" x=\"{:.1}\" y=\"{}\">{}</text>", at + 21.0, y + 4.0, escape(name));
         }
     }
+}
+
+/// Width of a word in the larger letters of a phone, by what letters are narrow and wide.
+fn on_a_phone(word: &str) -> f64 {
+    let em = |c: char| match c {
+        'f' | 'i' | 'j' | 'l' | 'r' | 't' | ' ' | ',' | '.' | '(' | ')' => 0.38,
+        'm' | 'w' | 'M' | 'W' => 0.97,
+        _ => 0.63,
+    };
+    20.0 * word.chars().map(em).sum::<f64>()
 }
 
 /// One entry of the legend.

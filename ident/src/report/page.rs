@@ -35,7 +35,7 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         cards: cards(closed),
         left: left(closed),
         parameters: Vec::new(),
-        speeds: speeds(log, closed),
+        speeds: (SPEEDS, speeds(log, closed)),
     };
     let mut sheet = parts::begin(&page);
     sheet.fold("Every channel in figures", |sheet| sheet.figures(every_channel(closed)));
@@ -226,6 +226,9 @@ fn every_channel(closed: &Closed) -> Vec<Figure> {
     out
 }
 
+/// Heading of the speed sensors' figures.
+pub(super) const SPEEDS: &str = "Speed sensors";
+
 /// All speed channels in one figure, what is left of them in a second, and what each reads beyond the others beneath; none where there is
 /// one sensor.
 pub(super) fn speeds(log: &Log, closed: &Closed) -> Vec<Figure> {
@@ -296,7 +299,8 @@ fn time_label(context: &Context) -> String {
     if context.time_is_row { "row".to_owned() } else { "time, s".to_owned() }
 }
 
+/// Label of an axis under a title that names the channel: its unit.
 fn axis(name: &str) -> String {
     let unit = unit_of(name);
-    if unit.is_empty() { channel(name) } else { format!("{}, {unit}", channel(name)) }
+    if unit.is_empty() { channel(name) } else { unit.to_owned() }
 }

@@ -19,7 +19,7 @@ use crate::log::{Gaps, Log, SPEED};
 use crate::noise::median;
 use crate::plateau::Plateau;
 use crate::shift::{Settings, filters};
-use crate::words::channel;
+use crate::words::{channel, upper};
 
 /// Colours of the speed channels.
 pub(super) const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];
@@ -258,6 +258,11 @@ fn unscaled(x: &str, value: f64) -> f64 {
     if x == "pulse_us" { 1000.0 + 1000.0 * value } else { 1000.0 * value }
 }
 
+/// A relation in words: "thrust over speed".
+fn over(f: &Fitted) -> String {
+    format!("{} over {}", channel(&f.y), channel(f.x))
+}
+
 pub(super) fn relation(f: &Fitted) -> Figure {
     let (low, high) = f.curve.range();
     let grid: Vec<f64> = (0..=120).map(|k| low + (high - low) * f64::from(k) / 120.0).collect();
@@ -297,9 +302,9 @@ pub(super) fn relation(f: &Fitted) -> Figure {
     }
     Figure {
         id: f.name.replace(['(', ')'], "-").trim_end_matches('-').to_owned(),
-        title: format!("{}, order {} (R2 {:.5})", f.name, f.degree, f.curve.r2),
-        x_label: label(f.x),
-        y_label: label(&f.y),
+        title: format!("{}, order {} (R2 {:.5})", upper(&over(f)), f.degree, f.curve.r2),
+        x_label: format!("{}, {}", channel(f.x), unit_of(f.x)),
+        y_label: format!("{}, {unit}", channel(&f.y)),
         layers,
         ..Figure::default()
     }
@@ -415,7 +420,7 @@ pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
             (0..=f.degree).map(move |k| {
                 let c = f.curve.coefficient(k);
                 let (chi2, chosen) = if k == 0 { (said(f), chosen.clone()) } else { Default::default() };
-                vec![f.name.to_owned(), format!("c{k}"), number(c.value), number(c.half), chi2, chosen]
+                vec![over(f), format!("c{k}"), number(c.value), number(c.half), chi2, chosen]
             })
         })
         .collect();

@@ -8,7 +8,7 @@
 
 use super::closed::{self as parts, Origin, Page, Vocabulary, pair};
 use super::figure::Figure;
-use super::page::{cards, is_drawn_together, over_runs, rest, speeds};
+use super::page::{SPEEDS, cards, is_drawn_together, over_runs, rest, speeds};
 use super::svg::escape;
 use crate::close::Closed;
 use crate::effects::{EffectEntry, Estimate};
@@ -33,7 +33,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         cards: cards_of(&alone, runs, outcome),
         left: v.unexplained.iter().filter(own).filter_map(|u| left_of(&alone, runs, u)).collect(),
         parameters: parameters(outcome),
-        speeds: speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| named(figure, &runs[first])).collect(),
+        speeds: (SPEEDS, speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| named(figure, &runs[first])).collect()),
     };
     let mut sheet = parts::begin(&page);
     for (run, of) in v.runs.iter().enumerate() {

@@ -36,7 +36,7 @@ pub(crate) const PAGE: &str = "
 *{box-sizing:border-box}body{font:16px/1.5 system-ui,-apple-system,'Segoe UI',sans-serif;color:var(--fg);background:var(--bg);max-width:76rem;margin:0 auto;padding:1rem}
 h1{font-size:1.6rem;line-height:1.25;overflow-wrap:anywhere}h2{font-size:1.2rem;margin:2.2rem 0 .6rem}.lead{font-size:1.1rem}p{max-width:48rem}.soft{color:var(--soft)}
 .figs{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,29rem),1fr));gap:1.2rem}figure{margin:0;min-width:0}
-.wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}th,td{padding:.25rem .7rem;text-align:right;border-bottom:1px solid var(--grid);white-space:nowrap}th:first-child,td:first-child{text-align:left}td.text,th.text{text-align:left;white-space:normal;min-width:14rem}
+.wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}th,td{padding:.25rem .7rem;text-align:right;border-bottom:1px solid var(--grid);white-space:nowrap}th:first-child,td:first-child{text-align:left}thead th{white-space:normal;max-width:9rem;vertical-align:bottom}td.text,th.text{text-align:left;white-space:normal;min-width:14rem}
 tr.chosen{background:var(--span);font-weight:600}.warn{border-left:4px solid var(--b);padding:.4rem .8rem;background:var(--card)}
 code{font-size:.92em}
 @media screen and (max-width:600px){body{font-size:15px;padding:.7rem}h1{font-size:1.3rem}.fig text{font-size:16px}.fig .title{font-size:18px}.fig .tick{font-size:15px}.fig .tip text{font-size:13px}th,td{padding:.25rem .45rem}}

@@ -55,6 +55,9 @@ impl Columns {
                 Ok(first)
             }
         };
+        if crate::kind::is_attitude_alone(&names) {
+            return Err(crate::kind::ATTITUDE_ALONE.to_owned());
+        }
         let time = find("t_s")?.ok_or("no column t_s; expected t_s,gx,gy,gz,ax,ay,az[,mx,my,mz]")?;
         let mut sensors = [None; 3];
         for (slot, axes) in sensors.iter_mut().zip(SENSORS) {

@@ -10,6 +10,7 @@ use super::{Args, is_result, say_unwritten};
 use crate::Failure;
 use crate::ahrs::imu_log::{ImuLog, Row};
 use crate::folder::Folder;
+use crate::kind::{columns, has_readings};
 use crate::progress::Bar;
 use crate::trouble::unwritten;
 use dcm::{Config, Dcm, Measurement, Vec3};
@@ -18,16 +19,11 @@ use ident::log::write_whole;
 use ident::report::{Origin, terminal};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// Whether the first line that is no comment names a gyro's three axes.
 pub(crate) fn is_attitude_log(path: &Path) -> bool {
-    let Ok(file) = std::fs::File::open(path) else { return false };
-    let header = BufReader::new(file).lines().map_while(Result::ok).find(|l| !l.starts_with('#') && !l.trim().is_empty());
-    let header = header.unwrap_or_default();
-    let names: Vec<&str> = header.split(',').map(str::trim).collect();
-    ["gx", "gy", "gz"].iter().all(|n| names.contains(n))
+    has_readings(&columns(path))
 }
 
 /// Runs the command.

@@ -7,10 +7,13 @@
 
 use super::{Powerplant, comments, full, off, untold};
 
-const DEFINED: [&str; 2] = [
+const DEFINED: [&str; 3] = [
     "keys: https://betaflight.com/docs/development/Cli",
     "curve: https://github.com/betaflight/betaflight/blob/4.5-maintenance/src/main/flight/pid.c",
+    "battery: https://github.com/betaflight/betaflight/blob/4.5-maintenance/src/main/cli/settings.c",
 ];
+/// Hundredths of a volt of a cell, highest and lowest (Betaflight's own defaults, for lithium polymer).
+const CELL_CV: [u32; 2] = [430, 330];
 /// Largest value of the key.
 const MOST: u32 = 150;
 
@@ -38,7 +41,7 @@ fn stated_kv(name: &str) -> Option<u32> {
 }
 
 /// The lines.
-pub(super) fn text(plant: &Powerplant) -> String {
+pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
     let square_error = |per_cent: u32| -> f64 {
         let linear = f64::from(per_cent) / 100.0;
         plant.points.iter().map(|p| (plant.share(signal(p.signal, linear)) - p.signal).powi(2)).sum()
@@ -56,18 +59,29 @@ pub(super) fn text(plant: &Powerplant) -> String {
     let lacks = [
         kv.is_none().then(|| "motor_kv: the log's head names no KV".to_owned()),
         plant.pole_pairs.is_none().then(|| "motor_poles: the log's head tells no pole_pairs".to_owned()),
-        Some("vbat_sag_compensation: the battery that will fly is not known".to_owned()),
+        cells
+            .is_none()
+            .then(|| "force_battery_cell_count, vbat_max_cell_voltage, vbat_min_cell_voltage: the battery that will fly is not known (--cells)".to_owned()),
+        Some("vbat_sag_compensation: how much of the sag is made up for is the pilot's choice".to_owned()),
     ];
     head.extend(untold(lacks.into_iter().flatten().chain(plant.beside())));
     let mut out = comments("#", &head);
     out += &format!("set dshot_idle_value = {:.0}\n", 1e4 * plant.begins());
+    if let Some(cells) = cells {
+        out += &format!("set force_battery_cell_count = {cells}\n");
+    }
     if let Some(kv) = kv {
         out += &format!("set motor_kv = {kv}\n");
     }
     if let Some(pairs) = plant.pole_pairs {
         out += &format!("set motor_poles = {}\n", 2 * pairs);
     }
-    out + &format!("set thrust_linear = {best}\nsave\n")
+    out += &format!("set thrust_linear = {best}\n");
+    if cells.is_some() {
+        let [most, least] = CELL_CV;
+        out += &format!("set vbat_max_cell_voltage = {most}\nset vbat_min_cell_voltage = {least}\n");
+    }
+    out + "save\n"
 }
 
 #[cfg(test)]

@@ -13,8 +13,11 @@ const DEFINED: [&str; 2] = [
     "curve: https://www.bitcraze.io/documentation/repository/crazyflie-firmware/master/functional-areas/pwm-to-thrust/",
 ];
 
+/// Volts of a cell, low and critical (the firmware's own, for its one cell).
+const CELL_V: [f64; 2] = [3.2, 3.0];
+
 /// The header.
-pub(super) fn text(plant: &Powerplant) -> Result<String, &'static str> {
+pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> Result<String, &'static str> {
     let lacks = "the model predicts no voltage; expected one identified from a log with voltage_v";
     let turning: Vec<(f64, f64)> = plant
         .points
@@ -39,7 +42,10 @@ pub(super) fn text(plant: &Powerplant) -> Result<String, &'static str> {
     head.extend(DEFINED.map(str::to_owned));
     head.push(format!("thrust = sum of VMOTOR2THRUSTn v^n, v = signal times supply; {}", off(plant.off_percent(curve))));
     let no_torque = arm.is_none().then(|| "THRUST2TORQUE: the model predicts no torque".to_owned());
-    head.extend(untold(no_torque.into_iter().chain(plant.beside())));
+    let no_battery = cells.is_none().then(|| {
+        "DEFAULT_BAT_LOW_VOLTAGE, DEFAULT_BAT_CRITICAL_LOW_VOLTAGE: the battery that will fly is not known (--cells)".to_owned()
+    });
+    head.extend(untold(no_torque.into_iter().chain(no_battery).chain(plant.beside())));
     let mut out = comments("//", &head) + "#pragma once\n";
     for (k, c) in solved.iter().enumerate() {
         out += &format!("#define VMOTOR2THRUST{k} {c:.9e}f\n");
@@ -47,6 +53,11 @@ pub(super) fn text(plant: &Powerplant) -> Result<String, &'static str> {
     out += &format!("#define THRUST_MIN {least:.6}f\n#define THRUST_MAX {:.6}f\n", plant.full_n());
     if let Some(arm) = arm {
         out += &format!("#define THRUST2TORQUE {arm:.6}f\n");
+    }
+    if let Some(cells) = cells.map(f64::from) {
+        for (name, volts) in ["DEFAULT_BAT_LOW_VOLTAGE", "DEFAULT_BAT_CRITICAL_LOW_VOLTAGE"].iter().zip(CELL_V) {
+            out += &format!("#define {name} {:.1}f\n", cells * volts);
+        }
     }
     Ok(out)
 }

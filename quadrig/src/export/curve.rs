@@ -8,10 +8,12 @@
 use crate::Failure;
 use crate::fly::rotor::ModelRotor;
 use hal_sim::mission::RotorCurves;
-use ident::model::Model;
+use ident::model::{AddedEffect, Model};
 use std::f64::consts::TAU;
 use std::path::Path;
 
+/// How the line about the supply's lead begins.
+pub(super) const LEAD: &str = "resistance of the supply's lead";
 /// Points of the curve.
 const POINTS: usize = 101;
 /// Share of full thrust at which thrust has begun.
@@ -42,8 +44,14 @@ pub(super) struct Powerplant {
     pub(super) named: [Option<String>; 2],
     /// Pairs of poles, where the head told them.
     pub(super) pole_pairs: Option<i64>,
+    /// Time by which the rotor answers late beside its lag, s, where the model holds one.
+    pub(super) latency_s: Option<f64>,
     /// Resistance of the supply's lead, ohm, where the model holds one.
     pub(super) lead_ohm: Option<f64>,
+    /// Fall of the supply for the charge drawn, V/Ah, where the model holds one.
+    pub(super) fall_v_per_ah: Option<f64>,
+    /// Channels whose meter on the rig is late, and by how much, s.
+    pub(super) late: Vec<(String, f64)>,
 }
 
 impl Powerplant {
@@ -65,17 +73,24 @@ impl Powerplant {
             }
         };
         let text = |key: &str| model.meta.get(key).and_then(toml::Value::as_str).map(str::to_owned);
-        let lead = model.effects.iter().find(|e| e.placed.effect.id() == "supply_sag");
-        let lead_ohm = lead
-            .and_then(|e| e.estimates.iter().find(|e| e.name == "resistance" || e.name.starts_with("resistance_")))
-            .map(|e| e.value);
+        let estimate = |id: &str, name: &str| {
+            let effect = model.effects.iter().find(|e| e.placed.effect.id() == id)?;
+            effect.estimates.iter().find(|e| e.name == name || e.name.starts_with(&format!("{name}_"))).map(|e| e.value)
+        };
+        let late = |e: &AddedEffect| {
+            let delay = e.placed.shape.first().copied().unwrap_or(0.0);
+            e.placed.instance.channels.iter().map(move |channel| (channel.clone(), delay)).collect::<Vec<_>>()
+        };
         let found = Self {
             points: (0..POINTS).map(point).collect(),
             lag_s: rotor.lag_s(),
+            latency_s: rotor.latency_s(),
             source: model.source.clone(),
             named: ["motor", "propeller"].map(text),
             pole_pairs: model.meta.get("pole_pairs").and_then(toml::Value::as_integer),
-            lead_ohm,
+            lead_ohm: estimate("supply_sag", "resistance"),
+            fall_v_per_ah: estimate("battery_discharge", "slope"),
+            late: model.effects.iter().filter(|e| e.placed.effect.id() == "channel_delay").flat_map(late).collect(),
         };
         if found.full_n() <= 0.0 {
             return Err(format!(
@@ -153,7 +168,14 @@ impl Powerplant {
             Some(lag_s) => format!("time constant of the rotor {lag_s:.4} s"),
             None => self.no_lag(),
         };
-        let lead = self.lead_ohm.map(|r| format!("resistance of the supply's lead {r:.4} ohm"));
-        std::iter::once(lag).chain(lead).collect()
+        let latency = self.latency_s.map(|s| format!("latency of the rotor's answer {s:.4} s, beside its time constant"));
+        let lead = self.lead_ohm.map(|r| format!("{LEAD} {r:.4} ohm"));
+        let fall = self.fall_v_per_ah.map(|v| format!("fall of the supply {v:.4} V for each ampere hour drawn"));
+        std::iter::once(lag).chain(latency).chain(lead).chain(fall).chain(self.meters()).collect()
+    }
+
+    /// Meters of the rig that are late: not the powerplant's, but a simulation of the rig has them.
+    pub(super) fn meters(&self) -> impl Iterator<Item = String> + '_ {
+        self.late.iter().map(|(channel, s)| format!("delay of the rig's meter of {channel} {s:.4} s"))
     }
 }

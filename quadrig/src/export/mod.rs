@@ -26,17 +26,17 @@ use std::path::PathBuf;
 /// Whose file.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Peer {
-    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM.
+    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM, with --cells BAT1_N_CELLS and BAT1_R_INTERNAL.
     Px4,
     /// Parameter file: MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX, with --cells MOT_BAT_VOLT_MAX and _MIN.
     Ardupilot,
-    /// Lines for the command line: thrust_linear, motor_kv, motor_poles, dshot_idle_value.
+    /// Lines for the command line: thrust_linear, motor_kv, motor_poles, dshot_idle_value, with --cells those of the battery.
     Betaflight,
-    /// C header: thrust over motor voltage, thrust_min and _max, torque over thrust.
+    /// C header: thrust over motor voltage, thrust_min and _max, torque over thrust, with --cells the battery's limits.
     Crazyflie,
-    /// MATLAB script with a structure of tables for lookup blocks.
+    /// MATLAB script with a structure of tables for lookup blocks, supply, lag, latency and delays.
     Simulink,
-    /// Table of settled states over the pulse.
+    /// Table of settled states over the pulse, with supply, lag, latency and delays in its head.
     Csv,
 }
 
@@ -51,7 +51,7 @@ pub(crate) struct Args {
     /// Where it goes; standard output without it.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Cells in series of the battery that will fly, for the peers that ask; the model knows its own supply alone.
+    /// Cells in series of the battery that will fly; every file says them, or what hangs on them. The model knows its own supply alone.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=14))]
     cells: Option<u32>,
     /// Rotors of the vehicle, for the peers that name each.
@@ -71,12 +71,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let model = Model::read(&args.model)?;
     let plant = Powerplant::of(&args.model, &model)?;
     let text = match args.to {
-        Peer::Px4 => px4::text(&plant, args.rotors),
+        Peer::Px4 => px4::text(&plant, args.rotors, args.cells),
         Peer::Ardupilot => ardupilot::text(&plant, args.cells),
-        Peer::Betaflight => betaflight::text(&plant),
-        Peer::Crazyflie => crazyflie::text(&plant).map_err(|why| format!("{}: {why}", args.model.display()))?,
-        Peer::Simulink => simulink::text(&plant),
-        Peer::Csv => table::text(&plant),
+        Peer::Betaflight => betaflight::text(&plant, args.cells),
+        Peer::Crazyflie => crazyflie::text(&plant, args.cells).map_err(|why| format!("{}: {why}", args.model.display()))?,
+        Peer::Simulink => simulink::text(&plant, args.cells),
+        Peer::Csv => table::text(&plant, args.cells),
     };
     match &args.output {
         Some(path) => {

@@ -1,6 +1,7 @@
 //! Simulink: a MATLAB script that makes a structure of tables.
 //!
-//! What it is: settled states over the signal for one-dimensional lookup tables, the rotor's time constant for a first-order lag, quotients.
+//! What it is: settled states over the signal for one-dimensional lookup tables, the rotor's time constant for a first-order lag, latency, the
+//! supply, meters that are late, quotients.
 //! What can go wrong: a channel that the model lacks is an empty matrix, and a comment says so.
 //! Units: in the names of the fields.
 //! Reference: MathWorks, block "1-D Lookup Table"; "Transfer Fcn".
@@ -8,13 +9,14 @@
 use super::curve::Point;
 use super::{Powerplant, comments, full, off, untold};
 
-const DEFINED: [&str; 2] = [
+const DEFINED: [&str; 3] = [
     "table: https://www.mathworks.com/help/simulink/slref/1dlookuptable.html",
     "lag: https://www.mathworks.com/help/simulink/slref/transferfcn.html, 1/(tau_s s + 1)",
+    "latency and delays: https://www.mathworks.com/help/simulink/slref/transportdelay.html",
 ];
 
 /// The script.
-pub(super) fn text(plant: &Powerplant) -> String {
+pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
     let mut head = vec![plant.title(), full(plant)];
     head.extend(DEFINED.map(str::to_owned));
     head.push(format!("linear between the points; {}", off(plant.off_percent(|u| plant.share(u)))));
@@ -42,6 +44,12 @@ pub(super) fn text(plant: &Powerplant) -> String {
     if plant.lag_s.is_none() {
         head.push(plant.no_lag() + ": tau_s = 0, a first-order lag that passes its input");
     }
+    if plant.latency_s.is_none() {
+        head.push("latency_s = 0: the model holds none; the answer begins with the command".to_owned());
+    }
+    if cells.is_none() {
+        head.push("cells: the battery that will fly is not known (--cells)".to_owned());
+    }
     let mut out = comments("%", &head) + "powerplant = struct();\n";
     for (name, of, digits) in fields {
         out += &format!("powerplant.{name} = {};\n", column(of, digits));
@@ -49,5 +57,13 @@ pub(super) fn text(plant: &Powerplant) -> String {
     let tau = plant.lag_s.map_or_else(|| "0".to_owned(), |lag_s| format!("{lag_s:.5}"));
     out += &format!("powerplant.tau_s = {tau};\npowerplant.k_thrust_ns2 = {k_thrust:.6e};\n");
     out += &format!("powerplant.torque_per_thrust_m = {};\n", arm.map_or_else(|| "[]".to_owned(), |arm| format!("{arm:.6}")));
-    out + &format!("powerplant.lead_ohm = {};\n", plant.lead_ohm.map_or_else(|| "[]".to_owned(), |r| format!("{r:.5}")))
+    let known = |v: Option<f64>| v.map_or_else(|| "[]".to_owned(), |v| format!("{v:.5}"));
+    out += &format!("powerplant.latency_s = {:.5};\n", plant.latency_s.unwrap_or(0.0));
+    out += &format!("powerplant.supply_v = {};\n", known(plant.points.first().and_then(|p| p.voltage_v)));
+    out += &format!("powerplant.lead_ohm = {};\n", known(plant.lead_ohm));
+    out += &format!("powerplant.fall_v_per_ah = {};\n", known(plant.fall_v_per_ah));
+    out += &format!("powerplant.cells = {};\n", cells.map_or_else(|| "[]".to_owned(), |cells| cells.to_string()));
+    out += "powerplant.meter_delay_s = struct();\n";
+    plant.late.iter().for_each(|(channel, s)| out += &format!("powerplant.meter_delay_s.{channel} = {s:.5};\n"));
+    out
 }

@@ -8,10 +8,17 @@
 use super::{Powerplant, comments, full, off};
 
 /// The table.
-pub(super) fn text(plant: &Powerplant) -> String {
+pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
     let mut head = vec![plant.title(), full(plant), "file: https://www.rfc-editor.org/rfc/rfc4180".to_owned()];
     head.push(format!("linear between the rows; {}", off(plant.off_percent(|u| plant.share(u)))));
     head.extend(plant.beside());
+    if plant.latency_s.is_none() {
+        head.push("latency of the rotor's answer: the model holds none".to_owned());
+    }
+    head.push(match cells {
+        Some(cells) => format!("battery that will fly: {cells} cells"),
+        None => "battery that will fly: not known (--cells)".to_owned(),
+    });
     let mut out = comments("#", &head) + "pulse_us,signal,rpm,thrust_n,torque_nm,current_a,voltage_v\n";
     for p in &plant.points {
         let cell = |v: Option<f64>, digits: usize| v.map_or_else(String::new, |v| format!("{v:.digits$}"));

@@ -176,6 +176,13 @@ impl ModelRotor {
         Some(self.following().lag_s).filter(|lag_s| *lag_s > FIRST_S)
     }
 
+    /// Time by which the rotor answers a command late beside its lag, s; nothing where the model holds none.
+    pub(crate) fn latency_s(&self) -> Option<f64> {
+        let coasts = |e: &&AddedEffect| e.placed.instance.form.starts_with("coasting");
+        let latency = self.model.effects.iter().find(coasts)?.placed.shape.get(LATENCY)?;
+        Some(*latency).filter(|s| *s > 0.0)
+    }
+
     /// The settled state of a speed.
     fn turning(&self, rpm: f64) -> PlantState {
         let after = self.settled.partition_point(|s| s.rpm < rpm).clamp(1, self.settled.len() - 1);

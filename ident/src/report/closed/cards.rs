@@ -15,7 +15,7 @@ use crate::report::svg::escape;
 use crate::rivals::UNEXPLAINED;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
 use crate::words::{
-    channel, counted, digits, list, lower, plain, probability, scaled, scope, signs, sized, sureness, upper, upper_bound,
+    channel, counted, digits, formula, list, lower, plain, probability, scaled, scope, signs, sized, sureness, upper, upper_bound,
 };
 use std::fmt::Write;
 
@@ -95,10 +95,12 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     sheet.figures(figures);
     sheet.html_part("<div>\n");
     parameters(sheet, page.words, e);
+    let (equation, form) = formula(&e.equation);
+    let form = form.map(|form| format!(" ({})", escape(&form))).unwrap_or_default();
     let mut html = format!(
-        "<p class=\"soft\"><code>{}</code></p>\n<p>{}.</p>\n",
-        escape(&e.equation),
-        escape(&said_first(&plain(signs(&e.evidence))))
+        "<p class=\"soft\"><code>{}</code>{form}</p>\n<p>{}.</p>\n",
+        escape(equation),
+        escape(&upper(&plain(signs(&e.evidence))))
     );
     let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
     if let Some(how) = settle(page, e) {
@@ -131,12 +133,6 @@ fn anchor(v: &Verdict, k: usize) -> String {
 /// An effect's title as a part of a sentence.
 fn title(page: &Page<'_>, id: &str) -> String {
     (page.words.about)(id).map_or_else(|| id.replace('_', " "), |about| lower(about.title))
-}
-
-/// A sentence's beginning in capitals, but not that of a relation such as rpm(pulse).
-fn said_first(text: &str) -> String {
-    let first = text.split_whitespace().next().unwrap_or_default();
-    if first.contains('(') { text.to_owned() } else { upper(text) }
 }
 
 /// What would be left on its first channel without it.

@@ -181,18 +181,6 @@ fn shown(names: [&'static str; 2]) -> impl Iterator<Item = (&'static str, &'stat
     names.into_iter().zip(["b", "a"]).filter(|(name, _)| !name.is_empty())
 }
 
-/// For each effect of a verdict its first channel where most was taken away; where that cannot be told, whole.
-pub(crate) fn each(verdict: &Verdict, traces: &[Trace]) -> Vec<Vec<Figure>> {
-    let figure = |(k, e): (usize, &EffectEntry)| {
-        let trace = traces.iter().find(|t| e.channels.first() == Some(&t.channel))?;
-        Some(
-            enlarged(trace, &format!("effect-{}", k + 1), pair(verdict))
-                .unwrap_or_else(|| over_time(trace, "effect", pair(verdict))),
-        )
-    };
-    verdict.effects.iter().enumerate().map(|e| figure(e).into_iter().collect()).collect()
-}
-
 /// The channels of which something is left, over the whole run.
 pub(crate) fn rest(verdict: &Verdict, traces: &[Trace]) -> Vec<Figure> {
     let trace = |u: &Unexplained| traces.iter().find(|t| t.channel == u.channel);
@@ -228,7 +216,7 @@ fn usual(values: &[f64]) -> f64 {
 }
 
 /// Values over time, with a hole where samples are missing for long.
-fn lifted(t: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn lifted(t: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let usual = if steps.is_empty() { 0.0 } else { median(&mut steps) };
     let (mut x, mut out) = (Vec::with_capacity(t.len()), Vec::with_capacity(t.len()));
@@ -243,17 +231,85 @@ fn lifted(t: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (x, out)
 }
 
-/// A figure whose lines and clouds hold no more points than its pixels show.
+/// A figure whose lines and clouds hold no more points than its pixels show. A line that would fill its own noise as a block is told by the mean
+/// of each column of pixels, before a band from the lowest to the highest.
 pub(crate) fn thinned(mut figure: Figure) -> Figure {
+    let mut bands = Vec::new();
     for layer in &mut figure.layers {
         match layer {
-            Layer::Line { x, y, .. } => (*x, *y) = line(x, y),
+            Layer::Line { x, y, class, .. } => match columns(x, y).filter(|all| is_block(all)) {
+                Some(all) => {
+                    bands.extend(bands_of(&all, class));
+                    (*x, *y) = all.iter().map(|c| (c.x, c.mean)).unzip();
+                }
+                None => (*x, *y) = line(x, y),
+            },
             Layer::Dots { x, y, .. } => (*x, *y) = cloud(x, y),
             Layer::Marks { marks, .. } => *marks = apart(marks),
             _ => {}
         }
     }
+    if !bands.is_empty() {
+        figure.title += "; line: mean, band: lowest to highest";
+        // behind every line, so that none is covered
+        let first = figure.layers.iter().position(|l| matches!(l, Layer::Line { .. })).unwrap_or(0);
+        figure.layers.splice(first..first, bands);
+    }
     figure
+}
+
+/// What a line shows in one column of pixels; nothing finite where it has a hole.
+#[derive(Debug, Clone, Copy)]
+struct Column {
+    x: f64,
+    mean: f64,
+    low: f64,
+    high: f64,
+}
+
+/// The columns of a line that has several samples in each.
+fn columns(x: &[f64], y: &[f64]) -> Option<Vec<Column>> {
+    if x.len() <= 3 * COLUMNS {
+        return None;
+    }
+    let (first, last) = (x[0], x[x.len() - 1]);
+    let at = |v: f64| ((v - first) / (last - first) * COLUMNS as f64) as i64;
+    let mut out = Vec::with_capacity(COLUMNS + 1);
+    let mut i = 0;
+    while i < x.len() {
+        // a hole is a column of its own
+        let hole = !y[i].is_finite();
+        let ends = |k: &usize| at(x[*k]) != at(x[i]) || y[*k].is_finite() == hole;
+        let end = (i + 1..x.len()).find(ends).unwrap_or(x.len());
+        let values = &y[i..end];
+        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        out.push(Column { x: 0.5 * (x[i] + x[end - 1]), mean, low, high });
+        i = end;
+    }
+    Some(out)
+}
+
+/// Whether columns mostly lie over their neighbours, so that a line through their extremes is a block.
+fn is_block(all: &[Column]) -> bool {
+    let (mut over, mut wide) = (0.0, 0.0);
+    for pair in all.windows(2).filter(|p| p.iter().all(|c| c.mean.is_finite())) {
+        over += (pair[0].high.min(pair[1].high) - pair[0].low.max(pair[1].low)).max(0.0);
+        wide += 0.5 * (pair[0].high - pair[0].low + pair[1].high - pair[1].low);
+    }
+    over > 0.5 * wide
+}
+
+/// Bands over the columns, one for each stretch without a hole.
+fn bands_of(all: &[Column], class: &'static str) -> Vec<Layer> {
+    let band = |part: &[Column]| Layer::Band {
+        name: String::new(),
+        class,
+        x: part.iter().map(|c| c.x).collect(),
+        lower: part.iter().map(|c| c.low).collect(),
+        upper: part.iter().map(|c| c.high).collect(),
+    };
+    all.split(|c| !c.mean.is_finite()).filter(|part| !part.is_empty()).map(band).collect()
 }
 
 /// A line with the two extremes of every column of pixels.
@@ -341,6 +397,26 @@ mod tests {
         let (cx, cy) = cloud(&x, &y);
         assert!(cx.len() <= DOTS && cy.contains(&50.0));
         assert_eq!(cloud(&x, &y), (cx, cy), "the same every time");
+    }
+
+    /// Noise of many rows is a band with its mean; what moves is a line; a hole parts the band.
+    #[test]
+    fn noise_is_no_block() {
+        let x: Vec<f64> = (0..60_000).map(f64::from).collect();
+        let noise: Vec<f64> = x.iter().map(|v| if (20e3..30e3).contains(v) { f64::NAN } else { (v * 0.7).sin() }).collect();
+        let ramp: Vec<f64> = x.iter().map(|v| v * v).collect();
+        let of = |y: &[f64]| {
+            let layer = Layer::Line { name: "x".into(), class: "a", x: x.clone(), y: y.to_vec() };
+            thinned(Figure { layers: vec![layer], ..Figure::default() })
+        };
+        let [Layer::Band { lower, upper, .. }, Layer::Band { .. }, Layer::Line { y, .. }] = &of(&noise).layers[..] else {
+            panic!("two bands and a line")
+        };
+        // a column beside the hole may hold few samples
+        let most = |out: usize| out <= 2;
+        assert!(most(lower.iter().zip(upper).filter(|(l, u)| **l > -0.99 || **u < 0.99).count()));
+        assert!(y.len() < 2 * COLUMNS && most(y.iter().filter(|v| v.is_finite() && v.abs() > 0.1).count()), "the mean");
+        assert!(matches!(&of(&ramp).layers[..], [Layer::Line { .. }]));
     }
 
     #[test]

@@ -34,8 +34,8 @@ pub(crate) struct Page<'p> {
     pub(crate) left: Vec<Figure>,
     /// Of several runs: each parameter run by run, the head first.
     pub(crate) parameters: Vec<Vec<String>>,
-    /// Figures of several speed sensors together, and their contrasts.
-    pub(crate) speeds: Vec<Figure>,
+    /// Figures of several speeds together, under a heading of their own.
+    pub(crate) speeds: (&'static str, Vec<Figure>),
 }
 
 /// The page up to where the folds begin.
@@ -62,9 +62,10 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     cards::cards(&mut sheet, page);
     left::left(&mut sheet, page);
     left::settle(&mut sheet, page);
-    if !page.speeds.is_empty() {
-        sheet.section("Speed sensors");
-        sheet.figures(page.speeds.clone());
+    let (heading, speeds) = &page.speeds;
+    if !speeds.is_empty() {
+        sheet.section(heading);
+        sheet.figures(speeds.clone());
     }
     if !v.runs.is_empty() {
         sheet.section("Each run, predicted by the others");

@@ -168,10 +168,14 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
 fn none(verdict: &Verdict, news: bool) -> String {
     let quiet = verdict.unexplained.is_empty();
     match (news, quiet) {
-        (true, true) => "Nothing is new since the declared model: no channel is left with more than its noise.".to_owned(),
-        (false, true) => "Nothing is left to explain: no channel is left with more than its noise.".to_owned(),
-        (true, false) => format!("Nothing that could be named is new since the declared model. {}", left(verdict)),
-        (false, false) => format!("Nothing that could be named is left over. {}", left(verdict)),
+        (true, true) => "The declared model still explains the run: no channel is left with more than its noise.".to_owned(),
+        (false, true) => "The declared model explains the run: no channel is left with more than its noise.".to_owned(),
+        (true, false) => {
+            format!("The declared model still explains the run, but for a rest that no name was found for. {}", left(verdict))
+        }
+        (false, false) => {
+            format!("The declared model explains the run, but for a rest that no name was found for. {}", left(verdict))
+        }
     }
 }
 

@@ -117,7 +117,7 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained], [_, after]:
     };
     let _ = writeln!(
         out,
-        "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: {}. Logarithmic, in noise floors of each channel. Error on rows that no fit saw.</p>",
+        "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: {}. Logarithmic, in noise floors of each channel. Error on rows that no fit saw. A share in per cent is one of its square above the noise floor: 75 % less is half the error.</p>",
         escape(&after)
     );
     out

@@ -1,0 +1,70 @@
+//! Texts in which columns, relations and forms are told as people say them.
+//!
+//! What it is: what the search writes down for programs (`thrust(rpm)`, `rpm_hall`, `[over_the_row]`) in words for a page.
+//! What can go wrong: a name that has no other word stays as it is.
+//! Units: none.
+//! Reference: `words::channel`.
+
+use super::channel;
+
+/// A text whose columns, and relations such as thrust(rpm), are told as people say them.
+#[must_use]
+pub fn plain(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(from) = rest.find(is_of_a_name) {
+        out += &rest[..from];
+        let name = first_name(&rest[from..]);
+        let after = &rest[from + name.len()..];
+        (out, rest) = match relation(name, after) {
+            Some((said, after)) => (out + &said, after),
+            // a word without an underscore is a word
+            None if name.contains('_') => (out + &channel(name), after),
+            None => (out + name, after),
+        };
+    }
+    out + rest
+}
+
+fn is_of_a_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_'
+}
+
+fn first_name(text: &str) -> &str {
+    &text[..text.find(|c| !is_of_a_name(c)).unwrap_or(text.len())]
+}
+
+/// "the curve of thrust over speed" for `thrust` with "(rpm)" behind it, and what comes after.
+fn relation<'t>(of: &str, behind: &'t str) -> Option<(String, &'t str)> {
+    let inside = behind.strip_prefix('(')?;
+    let over = first_name(inside);
+    let after = inside[over.len()..].strip_prefix(')')?;
+    let known = |name: &str| ["rpm", "pulse", "thrust", "torque", "current", "voltage"].contains(&name);
+    (known(of) && known(over)).then(|| (format!("the curve of {} over {}", channel(of), channel(over)), after))
+}
+
+/// An equation without the mark of its form, and that form in words.
+#[must_use]
+pub fn formula(equation: &str) -> (&str, Option<String>) {
+    let marked = equation.strip_suffix(']').and_then(|e| e.rsplit_once(" ["));
+    match marked {
+        Some((equation, form)) => (equation, Some(plain(form).replace('_', " "))),
+        None => (equation, None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn relations_and_forms_are_words() {
+        assert_eq!(
+            plain("rpm(pulse) is off; thrust(rpm) holds, so does k(x) and rpm_hall"),
+            "the curve of speed over pulse is off; the curve of thrust over speed holds, so does k(x) and speed (Hall)"
+        );
+        let (equation, form) = formula("torque_nm += inertia d(omega)/dt [over_the_row]");
+        assert_eq!((equation, form.as_deref()), ("torque_nm += inertia d(omega)/dt", Some("over the row")));
+        assert_eq!(formula("a[k] = 1"), ("a[k] = 1", None));
+    }
+}
