@@ -131,7 +131,7 @@ fn dropped(log: &Log, hz: f64) -> Option<String> {
         .collect();
     let gaps = under_load.len() <= PAUSES && under_load.iter().all(|missing| *missing < DROPPED[0] * promised);
     let counts = if gaps { 0.0 } else { under_load.iter().sum() };
-    let untold = counts >= UNTOLD * promised && !told;
+    let untold = absent.min(counts) >= UNTOLD * promised && !told;
     (scattered || untold).then(|| {
         let holes = if holes.len() == 1 { "one hole".to_owned() } else { format!("{} holes", holes.len()) };
         format!("{missing} of the {promised} rows are missing that sample_hz = {} promises, in {holes}", number(hz))
