@@ -19,6 +19,7 @@ use object::LittleEndian;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader, ProgramHeader};
 use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -156,12 +157,10 @@ fn digests(folder: &Path) -> Result<Vec<(String, String)>, Failure> {
 
 /// Names of the files that are not in both, or not the same in both.
 fn differing(one: &[(String, String)], other: &[(String, String)]) -> Vec<String> {
-    let alone =
-        |a: &[(String, String)], b: &[(String, String)]| a.iter().filter(|file| !b.contains(file)).map(|f| f.0.clone()).collect();
-    let mut out: Vec<String> = [alone(one, other), alone(other, one)].concat();
-    out.sort();
-    out.dedup();
-    out
+    let only = one.iter().filter(|file| !other.contains(file));
+    let only_other = other.iter().filter(|file| !one.contains(file));
+    let names: BTreeSet<String> = only.chain(only_other).map(|(name, _)| name.clone()).collect();
+    names.into_iter().collect()
 }
 
 /// A row for each file but the book's: bytes and digest, and for an image what it takes of the chip.
