@@ -9,7 +9,7 @@ mod plain;
 
 use crate::effects::Scope;
 use crate::verdict::{EffectEntry, Parameter};
-pub use plain::{formula, plain};
+pub use plain::{channels, formula, plain};
 
 /// What a cause does, in two parts: an adverb fits between them.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -190,6 +190,16 @@ fn refusals(source: &str) -> Vec<(String, String)> {
             }
         }
     }
+    // refusal(key, what it holds, expected), of a key of a model file
+    for (at, call) in code.match_indices("refusal(").filter(|(at, _)| !code[..*at].ends_with("fn ")) {
+        let from = at + call.len();
+        let arguments = arguments(code, from, closing(code, from));
+        let text_in = |n: usize| literals.iter().find(|l| arguments.get(n).is_some_and(|range| range.contains(&l.start)));
+        if let Some(expected) = text_in(2).filter(|_| arguments.len() >= 3) {
+            let key = text_in(0).map_or("...", |l| l.text.as_str());
+            out.push((format!("key {key}: ..."), expected.text.clone()));
+        }
+    }
     // refuse(.., found, expected), of a place or by a closure of this name: the word itself stands in the type's own text
     for (at, call) in code.match_indices("refuse(") {
         if code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
@@ -228,6 +238,26 @@ fn refusals(source: &str) -> Vec<(String, String)> {
             _ => {}
         }
     }
+    out
+}
+
+/// Where the arguments of a call stand, of which the first begins at `from` and the last ends at `end`.
+fn arguments(code: &str, from: usize, end: usize) -> Vec<std::ops::Range<usize>> {
+    let (mut depth, mut begin, mut out) = (0, from, Vec::new());
+    let literals = literals(&code[from..end]);
+    let is_text = |at: usize| literals.iter().any(|l| at >= l.start && at <= ending(&code.as_bytes()[from..end], l.start + 1));
+    for (at, c) in code[from..end].char_indices().filter(|(at, _)| !is_text(*at)) {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' => depth -= 1,
+            ',' if depth == 0 => {
+                out.push(begin..from + at);
+                begin = from + at + 1;
+            }
+            _ => {}
+        }
+    }
+    out.push(begin..end);
     out
 }
 
@@ -367,6 +397,9 @@ mod tests {
             let found = format!("{n} of {rows} rows would be dropped: {likely}");
             return refuse(found, "a clock that moves on");
             let c = ['"', '\'', 'x'];
+            return Err(refusal("start_pulse_us", start, "a finite number, in us"));
+            return Err(refusal(&place(key), root.get("format"), &format!("one of {}", known.join(", "))));
+            return Err(refusal("shape", at("shape"), &wanted()));
             #[error("no effect {0:?}; expected one of {list}")]
             #[cfg(test)]
             let d = "in a test; expected nothing";
@@ -375,6 +408,8 @@ mod tests {
             ("...: ... is \"late\"", "seconds: sort ..."),
             ("...: holds ..., mixed up with these", "a new folder"),
             ("no effect ...", "one of ..."),
+            ("key start_pulse_us: ...", "a finite number, in us"),
+            ("key ...: ...", "one of ..."),
             ("... fields", "6 as in the header"),
             ("... of ... rows would be dropped: ...", "a clock that moves on"),
         ];

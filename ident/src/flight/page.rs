@@ -20,6 +20,7 @@ use crate::words::{channel, parameter};
 /// The words of the flight's library.
 pub const VOCABULARY: Vocabulary = Vocabulary {
     noun: "vehicle",
+    held_out: "five time blocks",
     about: airframe::about,
     clause: |found| airframe::said(found).unwrap_or_else(|| parts::bare(found)),
     of_every_rig: |found| found.id == "spinup_lag",

@@ -11,12 +11,18 @@ use crate::effects::airframe;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;
-use crate::words::{Clause, channel, heading, list, lower, parameter};
+use crate::words::{Clause, channel, channels, heading, lower, parameter};
 use nalgebra::Vector3;
 
 /// The words of an inertial unit's causes.
-pub const VOCABULARY: Vocabulary =
-    Vocabulary { noun: "board", about: airframe::about, clause, of_every_rig: |_| false, parameter: named };
+pub const VOCABULARY: Vocabulary = Vocabulary {
+    noun: "board",
+    held_out: "every fifth stretch of time, in five turns",
+    about: airframe::about,
+    clause,
+    of_every_rig: |_| false,
+    parameter: named,
+};
 
 /// A parameter in words: what it is, and of which axis.
 fn named(id: &str, name: &str) -> String {
@@ -50,7 +56,7 @@ fn named(id: &str, name: &str) -> String {
 
 /// Causes that have no page in the flight's library.
 fn clause(found: &EffectEntry) -> Clause {
-    let on = list(&found.channels.iter().map(|c| channel(c)).collect::<Vec<_>>());
+    let on = channels(&found.channels);
     match found.id.as_str() {
         "stationary_magnet" => Clause::new("a magnet beside the board", "disturbs the field"),
         "vibration" => Clause::new("vibration", format!("is in {on}")),

@@ -5,7 +5,7 @@
 //! Units: none.
 //! Reference: `words::channel`.
 
-use super::channel;
+use super::{channel, list};
 
 /// A text whose columns, and relations such as thrust(rpm), are told as people say them.
 #[must_use]
@@ -24,6 +24,34 @@ pub fn plain(text: &str) -> String {
         };
     }
     out + rest
+}
+
+/// Channels in a row; those of one quantity share its name: "voltage and speed (beam and Hall)", "speed of rotors 1 and 2".
+#[must_use]
+pub fn channels(names: &[String]) -> String {
+    const ROTOR: &str = "speed of rotor";
+    let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+    for name in names {
+        let said = channel(name);
+        let (of, one) = match said.strip_suffix(')').and_then(|s| s.split_once(" (")) {
+            Some((of, one)) => (of, Some(one)),
+            None => said.strip_prefix(ROTOR).map_or((said.as_str(), None), |one| (ROTOR, Some(one.trim_start()))),
+        };
+        match groups.iter_mut().find(|(quantity, _)| quantity == of) {
+            Some((_, members)) => members.extend(one.map(str::to_owned)),
+            None => groups.push((of.to_owned(), one.map(str::to_owned).into_iter().collect())),
+        }
+    }
+    let told = |(of, mut members): (String, Vec<String>)| {
+        members.sort_unstable_by_key(|member| member.to_lowercase());
+        match members.len() {
+            0 => of,
+            1 if of == ROTOR => format!("{of} {}", list(&members)),
+            _ if of == ROTOR => format!("{of}s {}", list(&members)),
+            _ => format!("{of} ({})", list(&members)),
+        }
+    };
+    list(&groups.into_iter().map(told).collect::<Vec<_>>())
 }
 
 fn is_of_a_name(c: char) -> bool {
@@ -66,5 +94,15 @@ mod tests {
         let (equation, form) = formula("torque_nm += inertia d(omega)/dt [over_the_row]");
         assert_eq!((equation, form.as_deref()), ("torque_nm += inertia d(omega)/dt", Some("over the row")));
         assert_eq!(formula("a[k] = 1"), ("a[k] = 1", None));
+    }
+
+    #[test]
+    fn channels_of_one_quantity_share_its_name() {
+        let said = |names: &[&str]| channels(&names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
+        assert_eq!(said(&["rpm_hall"]), "speed (Hall)");
+        assert_eq!(said(&["voltage_v", "rpm_opto", "rpm_beam"]), "voltage and speed (beam and optical)");
+        assert_eq!(said(&["rpm_3", "rpm_1", "rpm_4", "voltage_v"]), "speed of rotors 1, 3 and 4 and voltage");
+        assert_eq!(said(&["acc_y", "acc_x", "rpm_2"]), "specific force (x and y) and speed of rotor 2");
+        assert_eq!(said(&["t_s"]), "time");
     }
 }

@@ -15,7 +15,8 @@ use crate::report::svg::escape;
 use crate::rivals::UNEXPLAINED;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
 use crate::words::{
-    channel, counted, digits, formula, list, lower, plain, probability, scaled, scope, signs, sized, sureness, upper, upper_bound,
+    channel, channels, counted, digits, formula, lower, plain, probability, scaled, scope, signs, sized, sureness, upper,
+    upper_bound,
 };
 use std::fmt::Write;
 
@@ -65,12 +66,11 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     let p = format!("p {}", equals(&probability(e.probability)));
     let chip = if nameless { format!("no name; {}", that_it_is_there(e.probability)) } else { format!("{sure}: {p}") };
     let title = if nameless {
-        let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
-        let with: Vec<String> = e.depends_on.iter().map(|c| channel(c)).collect();
-        if with.is_empty() {
-            format!("Something on {} that nothing tried here predicts.", list(&on))
+        let on = channels(&e.channels);
+        if e.depends_on.is_empty() {
+            format!("Something on {on} that nothing tried here predicts.")
         } else {
-            format!("Something on {} that goes with {}.", list(&on), list(&with))
+            format!("Something on {on} that goes with {}.", channels(&e.depends_on))
         }
     } else {
         page.words.said(e).sentence()
@@ -82,7 +82,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
         escape(&title),
         escape(&chip),
         escape(&e.id),
-        escape(&list(&e.channels.iter().map(|c| channel(c)).collect::<Vec<_>>())),
+        escape(&channels(&e.channels)),
         escape(&removes(v, e)),
     );
     // what has no name belongs to nothing that is known

@@ -16,7 +16,7 @@ use crate::words::channel;
 const MOST: usize = 100;
 
 /// The errors of every channel in numbers.
-pub(crate) fn channels(sheet: &mut Sheet, verdict: &Verdict) {
+pub(crate) fn channels(sheet: &mut Sheet, verdict: &Verdict, held_out: &str) {
     let rows: Vec<Vec<String>> = verdict
         .channels
         .iter()
@@ -47,7 +47,7 @@ pub(crate) fn channels(sheet: &mut Sheet, verdict: &Verdict) {
         "after_rms",
         "after_whiteness_p",
     ];
-    sheet.say("Held-out: five time blocks and every second interior level, each predicted by a fit that did not see it. The share that the sentence states is that of the squared held-out error above the noise floor.");
+    sheet.say(&format!("Held-out: {held_out}, each predicted by a fit that did not see it. The share that the sentence states is that of the squared held-out error above the noise floor."));
     sheet.data("channels", &head, &rows, Some((&raw_head, &raw)));
 }
 

@@ -93,7 +93,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     sheet.section("More");
     sheet.fold("Every channel in numbers", |sheet| {
         sheet.say(&page.declared);
-        fold::channels(sheet, v);
+        fold::channels(sheet, v, page.words.held_out);
     });
     sheet
 }

@@ -12,7 +12,7 @@ use super::state::{factor, figures, word};
 use super::vocabulary::Vocabulary;
 use crate::context::unit_of;
 use crate::verdict::{EffectEntry, Verdict};
-use crate::words::{channel, list, probability, signs, upper, upper_bound};
+use crate::words::{self, channel, list, probability, signs, upper, upper_bound};
 
 /// Columns of the widest line.
 pub const WIDEST: usize = 100;
@@ -97,12 +97,14 @@ fn channels(verdict: &Verdict) -> String {
 }
 
 fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
-    let on: Vec<String> = e.channels.iter().map(|c| channel(c)).collect();
     let p = match e.id.as_str() {
         "unknown" => that_it_is_there(e.probability),
         _ => format!("p {}", probability(e.probability)),
     };
-    let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {}", e.id, list(&on), words.scope_word(e.scope)), 4));
+    let mut out = format!(
+        "{}\n",
+        wrapped(&format!("  {} ({p}) on {}, {}", e.id, words::channels(&e.channels), words.scope_word(e.scope)), 4)
+    );
     if e.id != "unknown" {
         out += &format!("    {}\n", wrapped(&words.said(e).sentence(), 4));
     }

@@ -14,6 +14,8 @@ use crate::words::{Clause, parameter};
 pub struct Vocabulary {
     /// What the log is of, such as a rig.
     pub noun: &'static str,
+    /// Which rows a fit did not see when it predicted them.
+    pub held_out: &'static str,
     /// What an effect is.
     pub about: fn(&str) -> Option<About>,
     /// What a found effect does.
@@ -28,6 +30,7 @@ impl Vocabulary {
     /// Of a rig's log.
     pub const RIG: Self = Self {
         noun: "rig",
+        held_out: "five time blocks and every second interior level",
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
         of_every_rig: |found| found.kin != Kin::Own,
