@@ -128,16 +128,9 @@ pub fn found(log: &Log) -> Vec<SetAside> {
 fn of_probe(witnesses: &mut Witnesses<'_>, name: &'static str) -> Vec<Event> {
     let silent = first_turns::found(witnesses, name);
     witnesses.take_out(name, &silent);
-    let mut lost = dropout::found(witnesses, name);
+    let lost = dropout::found(witnesses, name);
     witnesses.take_out(name, &lost);
-    // zeros that follow a loss are the end of it: the rotor had begun to turn before
-    for start in silent {
-        match lost.iter_mut().find(|e| e.rows.end == start.rows.start) {
-            Some(loss) => loss.rows.end = start.rows.end,
-            None => lost.push(start),
-        }
-    }
-    lost
+    [silent, lost].concat()
 }
 
 /// The log without the samples that were set aside: they are missing ones.

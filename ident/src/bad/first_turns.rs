@@ -9,6 +9,7 @@
 use super::excursion::Event;
 use super::witness::Witnesses;
 use crate::context::CALM_US;
+use std::collections::BTreeMap;
 
 /// Turns, times two for a speed that grows evenly from nothing, in s rev/min.
 const SILENT: f64 = 2.0 * 2.0 * 60.0;
@@ -18,6 +19,16 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
     let Some(read) = witnesses.clean(name) else { return Vec::new() };
     let measured: Vec<usize> = (0..read.len()).filter(|i| read[*i].is_finite()).collect();
     let rests = |i: &usize| read[*i] <= 0.0;
+    // readings at each command, and those that say nothing: at one at which the rotor stands most of them do
+    let mut at_command: BTreeMap<i64, [usize; 2]> = BTreeMap::new();
+    let level = |row: usize| witnesses.pulse().map_or(0, |p| (p[row] / CALM_US).round() as i64);
+    for row in &measured {
+        let [all, none] = at_command.entry(level(*row)).or_default();
+        *all += 1;
+        *none += usize::from(rests(row));
+    }
+    let stands =
+        |row: usize| witnesses.pulse().is_none() || at_command.get(&level(row)).is_some_and(|[all, none]| 2 * none > *all);
     let first_readings = measured.windows(2).enumerate().filter(|(_, w)| rests(&w[0]) && !rests(&w[1]));
     first_readings
         .filter_map(|(k, w)| {
@@ -26,8 +37,8 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
             let commanded = |i: usize| witnesses.pulse().is_none_or(|p| (p[i] - p[first]).abs() <= CALM_US);
             let silent = |i: &&usize| witnesses.t[first] - witnesses.t[**i] < SILENT / read[first] && commanded(**i);
             let rows = rest.iter().take_while(silent).count();
-            // a stretch without a row of rest is a drop-out, and no start
-            let start = (rows > 0 && rows < rest.len()).then(|| rest[rows - 1])?;
+            // a stretch without a row of rest before it is a drop-out, and no start
+            let start = (rows > 0 && rest.get(rows).is_some_and(|before| stands(*before))).then(|| rest[rows - 1])?;
             Some(Event { rows: start..first, worst: start, expected: read[first], at_step: true, silent: true })
         })
         .collect()
@@ -59,5 +70,18 @@ mod tests {
         assert!(rows(0).is_empty(), "{:?}", rows(0));
         // of a longer silence the load says that the rotor turned: a mark was lost
         assert_eq!(rows(30), vec![100..130; 1]);
+    }
+
+    /// A mark that is lost across a step of the command, on a rotor that turns before and after.
+    #[test]
+    fn zeros_of_a_rotor_that_was_told_to_turn_are_no_start() {
+        let mut text = String::from("# quadrig-log 1\nt_s,pulse_us,rpm\n");
+        for row in 0..400_u32 {
+            let pulse = if row < 200 { 1500 } else { 1520 };
+            let rpm = if (150..204).contains(&row) { 0 } else { 600 + row % 7 };
+            text += &format!("{:.2},{pulse},{rpm}\n", 0.02 * f64::from(row));
+        }
+        let log = Log::parse("lost.csv", text.as_bytes()).expect("a log");
+        assert!(super::found(&crate::bad::witness::Witnesses::of(&log), "rpm").is_empty());
     }
 }
