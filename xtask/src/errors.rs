@@ -196,7 +196,8 @@ fn refusals(source: &str) -> Vec<(String, String)> {
         let arguments = arguments(code, from, closing(code, from));
         let text_in = |n: usize| literals.iter().find(|l| arguments.get(n).is_some_and(|range| range.contains(&l.start)));
         if let Some(expected) = text_in(2).filter(|_| arguments.len() >= 3) {
-            let key = text_in(0).map_or("...", |l| l.text.as_str());
+            let is_word = |l: &&Literal| l.text.contains(char::is_alphabetic);
+            let key = text_in(0).filter(is_word).map_or("...", |l| l.text.as_str());
             out.push((format!("key {key}: ..."), expected.text.clone()));
         }
     }
@@ -398,7 +399,7 @@ mod tests {
             return refuse(found, "a clock that moves on");
             let c = ['"', '\'', 'x'];
             return Err(refusal("start_pulse_us", start, "a finite number, in us"));
-            return Err(refusal(&place(key), root.get("format"), &format!("one of {}", known.join(", "))));
+            return Err(refusal(&format!("{place}.{key}"), root.get("format"), &format!("one of {}", known.join(", "))));
             return Err(refusal("shape", at("shape"), &wanted()));
             #[error("no effect {0:?}; expected one of {list}")]
             #[cfg(test)]
