@@ -132,7 +132,7 @@ fn hex(elf: &[u8]) -> Result<String, Failure> {
         }
     }
     records.push(Record::EndOfFile);
-    Ok(ihex::create_object_file_representation(&records)? + "\n")
+    Ok(ihex::create_object_file_representation(&records)?)
 }
 
 /// The SHA-256 of every file of a folder, by name.
@@ -213,6 +213,7 @@ mod tests {
     fn a_hex_file_says_what_lies_where_in_the_flash() {
         let bytes: Vec<u8> = (0..40).collect();
         let text = hex(&elf(0x0800_fff8, &bytes)).expect("an image");
+        assert!(text.ends_with(":00000001FF\n") && !text.contains("\n\n"), "{text}");
         let mut upper = 0;
         let mut read = std::collections::BTreeMap::new();
         for record in ihex::Reader::new(&text) {
