@@ -7,7 +7,7 @@
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3; least absolute deviations, Huber & Ronchetti 2009, chapter 7.
 
 use crate::bad::Curve;
-use crate::context::{STILL_US, bridge, starts};
+use crate::context::{GAP, STILL_US, bridge, starts};
 use crate::log::Log;
 use crate::noise::{median, quantum};
 use crate::start::start_pulse;
@@ -20,6 +20,17 @@ const CONSTANTS: (f64, f64, usize) = (0.02, 3.0, 24);
 const FINE: usize = 9;
 /// Share of the way still to go that is uncertain while a rotor is on it: one time constant stands for a rotor that has several.
 const ON_ITS_WAY: f64 = 0.15;
+
+/// Mean angular acceleration since the row before, rad/s^2, of a speed in rev/min; none after a gap in time, nor where two rows follow each
+/// other at once and their own errors would make any acceleration. `usual`: the usual time between rows, s.
+pub(crate) fn acceleration_of_rows(t: &[f64], speed: &[f64], usual: f64) -> Vec<f64> {
+    let since = |i: usize| {
+        let dt = t[i] - t[i - 1];
+        let known = (0.5 * usual..GAP * usual).contains(&dt);
+        if known { (speed[i] - speed[i - 1]) / dt * std::f64::consts::TAU / 60.0 } else { 0.0 }
+    };
+    (0..t.len()).map(|i| if i == 0 { 0.0 } else { since(i) }).collect()
+}
 
 /// A drive.
 pub(crate) struct Drive {

@@ -1,7 +1,8 @@
 //! What a lab takes away: flash images, the command line, the book, and what they are.
 //!
-//! What it is: builds everything anew in a folder of its own, with no path of this machine in it, and puts it into one folder: both images
-//! as ELF and as Intel HEX, the program of this host, the book, the notes of this version, and the SHA-256 of every file.
+//! What it is: builds everything anew in a folder of its own and puts it into one folder: both images as ELF and as Intel HEX, the program of
+//! this host, the book, the notes of this version, and the SHA-256 of every file. The images hold no path of this machine; the program holds
+//! one, that of its source tree, for `quadrig flash`.
 //!
 //! What can go wrong: changes that are not committed (the notes then say so); a build that is not the same twice: `--twice` builds again
 //! elsewhere and names the file that differs.

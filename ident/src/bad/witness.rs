@@ -9,6 +9,7 @@
 use super::curve::Curve;
 use super::excursion::Event;
 use crate::context::{CALM_US, GAP, bridge};
+use crate::drive::acceleration_of_rows;
 use crate::log::{Log, SPEED};
 use crate::noise::median;
 use std::collections::BTreeMap;
@@ -105,7 +106,7 @@ impl<'l> Witnesses<'l> {
         if ACCELERATES.contains(&name)
             && let Some(speed) = self.speed(name)
         {
-            let takes = acceleration(&self.log.t, &speed, self.step);
+            let takes = acceleration_of_rows(&self.log.t, &speed, self.step);
             let left: Vec<f64> = rows.iter().zip(&y).map(|(i, y)| y - said.get(*i).copied().unwrap_or(0.0)).collect();
             add_share(&mut said, &rows, &left, &takes);
         }
@@ -180,15 +181,6 @@ impl<'l> Witnesses<'l> {
         let gap = |i: usize| t[i] - t[i - 1] > GAP * self.step;
         (1..t.len()).filter(|i| gap(*i) || jumps(*i)).map(|i| (i, gap(i))).collect()
     }
-}
-
-/// Change of the speed since the row before over the time between them; none after a gap.
-fn acceleration(t: &[f64], speed: &[f64], step: f64) -> Vec<f64> {
-    let since = |i: usize| {
-        let dt = t[i] - t[i - 1];
-        if dt > 0.0 && dt < GAP * step { (speed[i] - speed[i - 1]) / dt } else { 0.0 }
-    };
-    (0..speed.len()).map(|i| if i == 0 { 0.0 } else { since(i) }).collect()
 }
 
 /// Adds the share of an acceleration that a channel shows: of speeding up, and of slowing down, where a controller may let the rotor coast.

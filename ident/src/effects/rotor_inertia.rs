@@ -8,8 +8,9 @@
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
 use crate::attribution::noise::usual_step;
-use crate::context::{Context, GAP, Relation};
+use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
+use crate::drive::acceleration_of_rows;
 
 /// See the module.
 pub(crate) struct RotorInertia;
@@ -77,7 +78,11 @@ impl Effect for RotorInertia {
 
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
         let amplitude = usize::from(design.relation == Relation::Current);
-        let of_row = if instance.form == OVER_THE_ROW { over_the_row(context) } else { acceleration(context) };
+        let of_row = if instance.form == OVER_THE_ROW {
+            acceleration_of_rows(&context.t, &context.rpm, usual_step(&context.t))
+        } else {
+            acceleration(context)
+        };
         design.add(position, amplitude, of_row);
     }
 
@@ -89,18 +94,6 @@ impl Effect for RotorInertia {
 
 /// Form of meters that average over each row.
 const OVER_THE_ROW: &str = "over_the_row";
-
-/// Mean angular acceleration since the row before, rad/s^2; none after a gap in time.
-fn over_the_row(context: &Context) -> Vec<f64> {
-    let (t, rpm) = (&context.t, &context.rpm);
-    let usual = usual_step(t);
-    let since = |i: usize| {
-        let dt = t[i] - t[i - 1];
-        let known = (0.5 * usual..GAP * usual).contains(&dt);
-        if known { (rpm[i] - rpm[i - 1]) / dt * std::f64::consts::TAU / 60.0 } else { 0.0 }
-    };
-    (0..t.len()).map(|i| if i == 0 { 0.0 } else { since(i) }).collect()
-}
 
 /// Angular acceleration by central differences of the consensus speed, rad/s^2.
 ///
