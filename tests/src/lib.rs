@@ -39,6 +39,7 @@ pub fn quadrig() -> &'static Path {
     BUILT.get_or_init(|| {
         let built = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
             .args(["build", "--quiet", "--release", "--bin", "quadrig", "--message-format", "json-render-diagnostics"])
+            .args(cargo_words())
             .current_dir(root())
             .stdin(Stdio::null())
             .stderr(Stdio::inherit())
@@ -53,6 +54,19 @@ pub fn quadrig() -> &'static Path {
             .and_then(|message| message["executable"].as_str().map(PathBuf::from))
             .expect("cargo names the program that it built")
     })
+}
+
+/// Further words for cargo with which the running tests were built, so that no library is built a second time for the program that they
+/// call: a word a line in `QUADRIG_CARGO_WORDS`, which `cargo xtask test` sets.
+#[must_use]
+pub fn cargo_words() -> Vec<String> {
+    std::env::var("QUADRIG_CARGO_WORDS").map_or_else(|_| Vec::new(), |words| words.lines().map(str::to_owned).collect())
+}
+
+/// How many cases of a long campaign are tried: `few` in the suite, `all` by `cargo xtask campaign`, which sets `QUADRIG_CAMPAIGN`.
+#[must_use]
+pub fn cases<N>(few: N, all: N) -> N {
+    if std::env::var_os("QUADRIG_CAMPAIGN").is_some() { all } else { few }
 }
 
 /// What one call of the command line left.

@@ -6,7 +6,7 @@
 //! Units: as printed.
 //! Reference: specification `formats.md`, `quadrig demo`.
 
-use quadrig_tests::{call, quadrig};
+use quadrig_tests::{call, cases, quadrig};
 use serde_json::Value;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
@@ -53,7 +53,7 @@ fn verdict(folder: &Path) -> Value {
 fn every_hidden_effect_is_named_and_its_error_falls() {
     let mut missed = Vec::new();
     for id in HIDDEN {
-        for seed in SEEDS {
+        for seed in &SEEDS[..cases(1, SEEDS.len())] {
             let folder = TempDir::new().unwrap();
             let out = demo(folder.path(), &["--seed", seed, "--effect", id]);
             let verdict = verdict(folder.path());

@@ -7,7 +7,7 @@
 //! Units: none.
 //! Reference: `README.md`; CommonMark, fenced code blocks.
 
-use quadrig_tests::{quadrig, root};
+use quadrig_tests::{cargo_words, quadrig, root};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
@@ -131,7 +131,9 @@ fn every_command_stands_in_the_readme() {
 #[test]
 fn cargo_run_is_the_command_line() {
     let done = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["run", "--quiet", "--release", "--", "--version"])
+        .args(["run", "--quiet", "--release"])
+        .args(cargo_words())
+        .args(["--", "--version"])
         .current_dir(root())
         .stdin(Stdio::null())
         .output()

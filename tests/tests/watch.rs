@@ -1,15 +1,17 @@
-//! A run held against its model while it goes on: 100 healthy runs, and blades that break in mid-run.
+//! A run held against its model while it goes on: healthy runs, and blades that break in mid-run; a hundred and twenty by `cargo xtask campaign`.
 
 use ident::log::Log;
 use ident::model::Model;
 use ident::watch::{Departure, Watch};
-use quadrig_tests::call;
+use quadrig_tests::{call, cases};
 use std::path::Path;
 
 /// What `--stop-at` is given.
 const STOP_AT: f64 = 8.0;
-/// Healthy runs.
-const HEALTHY: u64 = 100;
+/// Healthy runs, in the suite and in the campaign: as many of each schedule.
+const HEALTHY: [u64; 2] = [24, 100];
+/// Runs with blades that break.
+const BROKEN: [u64; 2] = [8, 20];
 
 /// Flies a scenario and reads its log.
 fn flown(folder: &Path, text: &str) -> Log {
@@ -62,24 +64,25 @@ fn schedule(seed: u64) -> String {
 }
 
 #[test]
-fn a_hundred_healthy_runs_are_stopped_by_nothing() {
+fn healthy_runs_are_stopped_by_nothing() {
+    let healthy = cases(HEALTHY[0], HEALTHY[1]);
     let folder = tempfile::tempdir().expect("a folder");
     let model = model(folder.path());
     let mut worst = 0.0_f64;
-    for seed in 1..=HEALTHY {
+    for seed in 1..=healthy {
         let log = flown(folder.path(), &format!("seed = {seed}\n{}\n", schedule(seed)));
         let (found, most) = watched(&model, &log);
         worst = worst.max(most);
         assert_eq!(found, None, "seed {seed}, {}", schedule(seed));
     }
-    println!("the largest single residual of {HEALTHY} runs: {worst:.1} noise floors");
+    println!("the largest single residual of {healthy} runs: {worst:.1} noise floors");
 }
 
 #[test]
 fn blades_that_break_in_mid_run_are_found_within_two_seconds() {
     let folder = tempfile::tempdir().expect("a folder");
     let model = model(folder.path());
-    for seed in 1..=20u64 {
+    for seed in 1..=cases(BROKEN[0], BROKEN[1]) {
         // under load: a tenth of hardly any thrust is below every noise floor
         let t0 = [44.0, 26.0, 13.0, 20.0][(seed % 4) as usize] + 0.37 * seed as f64;
         let change = -0.12 - 0.04 * (seed % 5) as f64;

@@ -19,6 +19,12 @@ use std::path::{Path, PathBuf};
 const READ_ONLY: &str = "        .erased_in(&SECTORS)\n        .erased_to(0xFF),";
 const PROGRAMMED: &str = "        .erased_in(&SECTORS)\n        .erased_to(0xFF)\n        .programmed_by(\"FLASH\"),";
 
+/// The words with which cargo builds the workspace with this emulator in it. It declares a newer Rust than the pinned one and compiles on it.
+pub(crate) fn words(place: &Place) -> Result<Vec<String>, Failure> {
+    let feature = ["--features", "quadrig-tests/emulated", "--ignore-rust-version", "--config"].map(str::to_owned);
+    Ok(feature.into_iter().chain([with_flash(place)?]).collect())
+}
+
 /// The argument that lets cargo build with the copy, which is made if it is not there.
 pub(crate) fn with_flash(place: &Place) -> Result<String, Failure> {
     let source = published(place)?;

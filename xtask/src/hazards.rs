@@ -72,8 +72,8 @@ impl Check {
             None => "",
         };
         let mut command = if self.flies() {
-            let mut command = cargo(copy, &["test", "--config", &emulator::with_flash(copy)?]);
-            command.args(["--release", "--workspace", "--features", "quadrig-tests/emulated", "--ignore-rust-version"]);
+            let mut command = cargo(copy, &["test", "--release", "--workspace"]);
+            command.args(emulator::words(copy)?);
             command.env("QUADRIG_EMULATOR_KEEPS_FLASH", "1").env("QUADRIG_FW_DIR", copy.images());
             command
         } else {

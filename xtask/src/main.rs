@@ -10,7 +10,6 @@
 //! Reference: `budgets/`, `.cargo/image.toml`, `.ci/run`.
 #![forbid(unsafe_code)]
 
-mod ahrs_bench;
 mod book;
 mod callgraph;
 mod changed;
@@ -21,6 +20,7 @@ mod hazards;
 mod image;
 mod peers;
 mod place;
+mod programs;
 mod release;
 mod run;
 mod setup;
@@ -58,6 +58,8 @@ usage: cargo xtask COMMAND
   strangers        packs the crates that serve other programs, builds examples/stranger on the packages and runs it
   test             everything: format, lints, the book, images, the packed crates, tests, emulated boards, verdicts
   test --quick     format, lints and tests of the host, nothing else
+  test --programs  every test program, those of the emulated boards included; no lints, no packing, no verdicts
+  campaign         the long forms of what the tests try a part of: healthy and broken runs watched, sizes of causes, demonstrations
   test --lints     format and lints, those of the code behind the emulator included (its crates take 140 s of processor time once)
   blind [ARGS]     the blind campaign (docs/blind.md), on messy rigs with --messy; ARGS go to it, --help lists them
   faults [--runs N] [--page FILE]  the fault campaign on the native board (docs/faults.md)
@@ -87,6 +89,8 @@ fn main() -> ExitCode {
         ["test", "--quick"] => test::quick(&place),
         ["test", "--changed"] => test::changed(&place, "main"),
         ["test", "--changed", base] => test::changed(&place, base),
+        ["campaign"] => test::campaign(&place),
+        ["test", "--programs"] => test::on_host_and_boards(&place),
         ["test", "--lints"] => test::lints(&place),
         ["blind", rest @ ..] => {
             let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "blind", "--"];
@@ -98,7 +102,7 @@ fn main() -> ExitCode {
         }
         ["ahrs-bench", "--vqf"] => peers::vqf(&place),
         ["ahrs-peers"] => peers::peers(&place),
-        ["ahrs-bench", rest @ ..] => ahrs_bench::bench(&place, rest),
+        ["ahrs-bench", rest @ ..] => test::ahrs_bench(&place, &[], rest),
         ["ahrs-causes", rest @ ..] => {
             let head = ["run", "--release", "--package", "quadrig-tests", "--bin", "causes", "--"];
             run::run(&mut run::cargo(&place, &[&head, rest].concat()))

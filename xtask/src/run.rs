@@ -83,7 +83,7 @@ pub(crate) struct Tally {
 
 impl Tally {
     /// Takes up what a line says of a test program that has ended: how long it took, s, where it says so.
-    fn read(&mut self, line: &str) -> Option<f64> {
+    pub(crate) fn read(&mut self, line: &str) -> Option<f64> {
         let rest = line.trim().strip_prefix("test result: ")?;
         for part in rest.split(['.', ';']) {
             match part.trim().split_once(' ') {

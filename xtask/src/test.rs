@@ -8,12 +8,12 @@
 //!
 //! Reference: `.ci/run` calls exactly this.
 
-use crate::ahrs_bench;
 use crate::book;
 use crate::changed;
 use crate::emulator;
 use crate::image;
 use crate::place::{BOARD, Place};
+use crate::programs;
 use crate::run::{Failure, Tally, cargo, run, tests};
 use crate::setup;
 use crate::strangers;
@@ -61,7 +61,7 @@ impl Steps {
     }
 }
 
-/// Everything that CI runs.
+/// Everything that CI runs. The host's programs are built once, with the emulator in them.
 pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
     let done = (|| {
@@ -81,18 +81,24 @@ pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
         steps.step("the book and its links", |_| book::book(place))?;
         images(place, &mut steps)?;
         steps.step("the crates as a stranger gets them", |_| strangers::strangers(place))?;
-        host_tests(place, &mut steps)?;
-        steps.step("the attitude filter on recordings", |_| ahrs_bench::bench(place, &[]))?;
-        boards(place, &mut steps)?;
-        logs(place, &mut steps)
+        let words = emulator::words(place)?;
+        host_tests(place, &words, &mut steps)?;
+        steps.step("the attitude filter on recordings", |_| ahrs_bench(place, &words, &[]))?;
+        logs(place, &words, &mut steps)
     })();
     steps.finish(done)
+}
+
+/// The attitude filter on recordings; `words` as in [`programs::build`].
+pub(crate) fn ahrs_bench(place: &Place, words: &[String], rest: &[&str]) -> Result<(), Failure> {
+    let head = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "ahrs-bench"];
+    run(cargo(place, &head).args(words).arg("--").args(rest))
 }
 
 /// Format, lints and tests of the host.
 pub(crate) fn quick(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
-    let done = host_lints(place, &mut steps).and_then(|()| host_tests(place, &mut steps));
+    let done = host_lints(place, &mut steps).and_then(|()| host_tests(place, &[], &mut steps));
     steps.finish(done)
 }
 
@@ -115,7 +121,12 @@ pub(crate) fn lints(place: &Place) -> Result<(), Failure> {
     let done = host_lints(place, &mut steps).and_then(|()| {
         steps.step("lints of the emulated boards", |_| {
             let mut clippy = cargo(place, &["clippy"]);
-            run(clippy.args(FEATURE).args(["--all-targets", "--", "-D", "warnings"]))
+            run(clippy.args(["--release", "--workspace"]).args(emulator::words(place)?).args([
+                "--all-targets",
+                "--",
+                "-D",
+                "warnings",
+            ]))
         })
     });
     steps.finish(done)
@@ -135,6 +146,30 @@ pub(crate) fn proofs(place: &Place) -> Result<(), Failure> {
     steps.finish(done)
 }
 
+/// Tests of which the suite tries some cases, with all of them.
+const LONG: [&str; 3] = ["watch", "isolability", "demo"];
+
+/// The long forms of tests.
+pub(crate) fn campaign(place: &Place) -> Result<(), Failure> {
+    let mut steps = Steps::default();
+    let done = steps.step("campaigns", |tally| {
+        let words = ["test", "--release", "--workspace", "--no-fail-fast"];
+        let mut command = cargo(place, &words);
+        tests(command.args(LONG.iter().flat_map(|name| ["--test", name])).env("QUADRIG_CAMPAIGN", "1"), tally)
+    });
+    steps.finish(done)
+}
+
+/// Every test program, with the emulator in it.
+pub(crate) fn on_host_and_boards(place: &Place) -> Result<(), Failure> {
+    let mut steps = Steps::default();
+    let done = (|| {
+        images(place, &mut steps)?;
+        host_tests(place, &emulator::words(place)?, &mut steps)
+    })();
+    steps.finish(done)
+}
+
 /// The flash images in the emulator.
 pub(crate) fn on_boards(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
@@ -145,7 +180,7 @@ pub(crate) fn on_boards(place: &Place) -> Result<(), Failure> {
 /// The verdict contract.
 pub(crate) fn on_logs(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
-    let done = logs(place, &mut steps);
+    let done = logs(place, &[], &mut steps);
     steps.finish(done)
 }
 
@@ -161,8 +196,8 @@ fn boards(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
     steps.step("the images on emulated boards", |tally| emulated(place, tally))
 }
 
-fn logs(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
-    steps.step("verdict contract", |tally| verdict::verdicts(place, tally))
+fn logs(place: &Place, words: &[String], steps: &mut Steps) -> Result<(), Failure> {
+    steps.step("verdict contract", |tally| verdict::verdicts(place, words, tally))
 }
 
 fn host_lints(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
@@ -175,9 +210,17 @@ fn host_lints(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
     })
 }
 
-fn host_tests(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
-    steps.step("tests of the host", |tally| {
-        tests(&mut cargo(place, &["test", "--release", "--workspace", "--no-fail-fast"]), tally)
+/// Every test program there is with these features, and the examples in the documentation.
+fn host_tests(place: &Place, words: &[String], steps: &mut Steps) -> Result<(), Failure> {
+    let mut all = Vec::new();
+    steps.step("the test programs are built", |_| {
+        all = programs::build(place, words, &[])?;
+        Ok(())
+    })?;
+    steps.step("tests", |tally| {
+        let of_programs = programs::run(place, &all, words, tally);
+        let mut examples = cargo(place, &["test", "--release", "--workspace", "--doc"]);
+        tests(examples.args(words), tally).and(of_programs)
     })?;
     // the digests that the release build has just met; without debug information it compiles in half the time
     steps.step("same bytes in a debug build", |tally| {
@@ -185,24 +228,19 @@ fn host_tests(place: &Place, steps: &mut Steps) -> Result<(), Failure> {
     })
 }
 
-/// Everything with the emulator; see [`emulated`].
-const FEATURE: [&str; 5] = ["--release", "--workspace", "--features", "quadrig-tests/emulated", "--ignore-rust-version"];
-
-/// The tests that load the flash images into the emulator. It declares a newer Rust than the pinned one and compiles on it.
+/// The tests that load the flash images into the emulator.
 fn emulated(place: &Place, tally: &mut Tally) -> Result<(), Failure> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(place.root.join("tests/tests"))? {
         let path = entry?.path();
         if let Some(name) = path.file_stem().and_then(|n| n.to_str()).filter(|n| n.starts_with("emulated_")) {
-            files.push(name.to_owned());
+            files.extend(["--test".to_owned(), name.to_owned()]);
         }
     }
-    files.sort();
     if files.is_empty() {
         return Err(Failure("tests/tests holds no emulated_*.rs".to_owned()));
     }
-    let mut command = cargo(place, &["test", "--config", &emulator::with_flash(place)?]);
-    command.args(FEATURE).args(files.iter().flat_map(|f| ["--test", f])).env("QUADRIG_FW_DIR", place.images());
-    command.env("QUADRIG_EMULATOR_KEEPS_FLASH", "1");
-    tests(&mut command, tally)
+    let words = emulator::words(place)?;
+    let all = programs::build(place, &words, &files)?;
+    programs::run(place, &all, &words, tally)
 }

@@ -18,8 +18,8 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-/// Checks every log at hand.
-pub(crate) fn verdicts(place: &Place, tally: &mut Tally) -> Result<(), Failure> {
+/// Checks every log at hand; `words` choose the features of the programs that are built.
+pub(crate) fn verdicts(place: &Place, words: &[String], tally: &mut Tally) -> Result<(), Failure> {
     let (data, checker) = (place.data(), place.checker());
     for needed in [&data, &checker] {
         if !needed.exists() {
@@ -35,10 +35,10 @@ pub(crate) fn verdicts(place: &Place, tally: &mut Tally) -> Result<(), Failure> 
         }
     }
     let python = setup::python(place)?;
-    run(&mut cargo(place, &["build", "--quiet", "--release", "--bin", "quadrig"]))?;
+    run(cargo(place, &["build", "--quiet", "--release", "--bin", "quadrig"]).args(words))?;
     let mut logs = imports(place, &data)?;
-    logs.push(glitches(place)?);
-    logs.extend(attitudes(place)?);
+    logs.push(glitches(place, words)?);
+    logs.extend(attitudes(place, words)?);
     logs.extend(listed(&data.join("blind-sample"), |name| name.ends_with(".csv") && !name.contains(".validate."))?);
     let kept = check_all(&logs, |log| check(&python, &checker, &place.quadrig(), log))?;
     tally.passed += kept;
@@ -63,19 +63,19 @@ fn imports(place: &Place, data: &Path) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// A run of the independent generator that hides glitch rows, about which nothing may be claimed.
-fn glitches(place: &Place) -> Result<PathBuf, Failure> {
+fn glitches(place: &Place, features: &[String]) -> Result<PathBuf, Failure> {
     const SEED: &str = "102";
     let folder = place.root.join("target/verdict");
-    let words = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "blind", "--", "--dump", SEED];
-    run(cargo(place, &words).arg(&folder))?;
+    let words = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "blind"];
+    run(cargo(place, &words).args(features).args(["--", "--dump", SEED]).arg(&folder))?;
     Ok(folder.join(format!("{SEED}.csv")))
 }
 
 /// Attitude logs: simulated ones of both generators and the disturbed BROAD trials.
-fn attitudes(place: &Place) -> Result<Vec<PathBuf>, Failure> {
+fn attitudes(place: &Place, features: &[String]) -> Result<Vec<PathBuf>, Failure> {
     let folder = place.root.join("target/verdict/attitude");
-    let words = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "causes", "--", "--dump"];
-    run(cargo(place, &words).arg(&folder))?;
+    let words = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "causes"];
+    run(cargo(place, &words).args(features).args(["--", "--dump"]).arg(&folder))?;
     listed(&folder, |name| name.ends_with(".csv"))
 }
 

@@ -4,10 +4,10 @@
 //! `cargo xtask ahrs-bench`; where VQF's own figures are published, the port's stand for the variants' definitions.
 //! What can go wrong: missing or damaged data: one line says which.
 //! Units: degrees.
-//! Reference: Laidig & Seel, VQF, Information Fusion 91 (2023); `xtask/src/ahrs_bench/`.
+//! Reference: Laidig & Seel, VQF, Information Fusion 91 (2023); `tests/src/bin/ahrs_bench/`.
 #![allow(dead_code)] // the shared modules hold more than is used here
 
-#[path = "../../src/ahrs_bench"]
+#[path = "../../../tests/src/bin/ahrs_bench"]
 mod ahrs_bench {
     pub(crate) mod score;
     pub(crate) mod trial;

@@ -5,6 +5,7 @@
 //! What can go wrong: a target that is missed is a failure; so is missing data.
 //! Units: degrees.
 //! Reference: specification `ahrs.md`; README of the data; `docs/ahrs.md`.
+#![forbid(unsafe_code)]
 
 mod ablation;
 mod broad;
@@ -12,29 +13,42 @@ mod calm;
 mod constants;
 mod groups;
 mod margin;
-pub(crate) mod phones;
+mod phones;
 mod plots;
 mod published;
+mod run;
 mod scan;
-pub(crate) mod score;
+mod score;
 mod sets;
-pub(crate) mod trial;
-pub(crate) mod variant;
+mod trial;
+mod variant;
 mod worst;
 
-use crate::place::Place;
-use crate::run::Failure;
 use published::Published;
-use score::{Score, run};
+use quadrig_tests::data;
+use run::Failure;
+use score::Score;
 use sets::Sets;
 use trial::Trial;
 use variant::Variant;
 
+fn main() -> std::process::ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    match bench(&words.iter().map(String::as_str).collect::<Vec<_>>()) {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("ahrs-bench: {failure}");
+            std::process::ExitCode::FAILURE
+        }
+    }
+}
+
 /// Runs it all.
-pub(crate) fn bench(place: &Place, words: &[&str]) -> Result<(), Failure> {
-    let folder = place.data().join("ahrs");
+fn bench(words: &[&str]) -> Result<(), Failure> {
+    let data = data("the attitude filter on recordings").ok_or_else(|| Failure("no recorded data (QUADRIG_DATA)".to_owned()))?;
+    let folder = data.join("ahrs");
     let trials = trial::trials(&folder.join("broad"))?;
-    let second = place.data().join("ahrs-phones");
+    let second = data.join("ahrs-phones");
     if let ["--scan"] = words {
         return scan::scan(&Sets::read(&trials, &second)?);
     }
@@ -75,7 +89,7 @@ fn joined<T>(handle: std::thread::ScopedJoinHandle<'_, T>) -> T {
 
 fn scores(trials: &[Trial], variant: Variant, new: impl Fn() -> Box<dyn score::Filter> + Sync) -> Vec<Score> {
     std::thread::scope(|scope| {
-        let handles: Vec<_> = trials.iter().map(|t| scope.spawn(|| run(new().as_mut(), &variant.of(t), |_| {}))).collect();
+        let handles: Vec<_> = trials.iter().map(|t| scope.spawn(|| score::run(new().as_mut(), &variant.of(t), |_| {}))).collect();
         handles.into_iter().map(joined).collect()
     })
 }
