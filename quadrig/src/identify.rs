@@ -115,7 +115,7 @@ fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
 
 fn text(found: &Identified) -> String {
     let mut out = format!("{}\n\n", wrapped(&headline(found), 0)) + &levels(found);
-    out += "\ndeclared relations over all rows (polynomials of the speed in 1000 rev/min, those over the pulse of what it is above\n1000 us in 1000 us)\n";
+    out += "\ndeclared relations over all rows (of the speed in 1000 rev/min; of the pulse above 1000 us in ms)\n";
     for p in &found.model.polynomials {
         let all = terms(p.coefficients.iter().copied().zip(p.errors.iter().map(|se| 1.96 * se)));
         out += &format!("{:<20} {}\n", channel(&p.channel), wrapped(&all, 21));
