@@ -82,7 +82,7 @@ fn whose(verdict: &Verdict) -> String {
 
 fn channels(verdict: &Verdict) -> String {
     let error = if verdict.runs.is_empty() { "held-out error" } else { "across runs" };
-    let names = verdict.channels.iter().map(|(name, _)| name).chain(verdict.channels.not_predicted.keys());
+    let names = verdict.channels.keys().chain(verdict.channels.not_predicted.keys());
     // as wide as the longest name asks for, the figures closer together beside one
     let first = names.map(|name| channel(name).chars().count() + 1).fold(16, usize::max);
     let wide = ((WIDEST - 28 - first) / 3).min(16);
