@@ -444,7 +444,7 @@ mod tests {
     #[test]
     fn a_slower_channel_is_a_line() {
         let t: Vec<f64> = (0..1200).map(|i| 0.005 * f64::from(i)).collect();
-        let slow = |i: &u32| i % 3 == 0 && !(600..800).contains(i);
+        let slow = |i: &u32| i.is_multiple_of(3) && !(600..800).contains(i);
         let before: Vec<f64> = (0..1200).map(|i| if slow(&i) { 5.0 } else { f64::NAN }).collect();
         let trace = Trace { channel: "mag_x".into(), t, after: before.clone(), before, ..Trace::default() };
         let figure = over_time(&trace, "x", ["before", "after"]);
