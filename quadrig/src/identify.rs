@@ -123,7 +123,7 @@ fn text(found: &Identified) -> String {
     for q in &found.quality {
         out += &format!(
             "{:<20} rms {} {}, noise floor {}, R2 {:.6}\n",
-            channel(&q.channel),
+            channel(q.channel),
             number(q.rms),
             q.unit,
             number(q.noise_floor),
