@@ -14,6 +14,7 @@ use crate::hypothesis::{Declared, Placed, design};
 use crate::log::{Column, Log};
 use crate::report::{Figure, Layer, number};
 use crate::solve::Normal;
+use crate::words::plain;
 use std::fmt::Write;
 
 /// Root mean square, in noise floors, to which a linear amplitude is scaled on its most affected channel.
@@ -171,7 +172,7 @@ fn page(
         about.title,
         about.equation,
         about.source,
-        about.signature,
+        plain(about.signature),
         about.depends_on.join(", ")
     );
     text.push_str("\n## Parameters\n\nBounds are those of the standard run; times scale with the run's length.\n\n| parameter | unit | from | to |\n| --- | --- | --- | --- |\n");

@@ -50,6 +50,21 @@ impl Constant {
     fn new(name: &'static str, e: Estimate, unit: &'static str, law: Option<Law>) -> Self {
         Self { name, value: e.value, se: e.se, half: e.half, unit, law }
     }
+
+    /// What it is.
+    #[must_use]
+    pub fn words(&self) -> &'static str {
+        match self.name {
+            "k_T" => "thrust for the square of the speed",
+            "k_Q" => "torque for the square of the speed",
+            "KV" => "speed for each volt",
+            "R" => "resistance",
+            "I0" => "current without load",
+            "tau_up" => "time constant on the way up",
+            "tau_down" => "time constant on the way down",
+            _ => "",
+        }
+    }
 }
 
 /// What identification gives.

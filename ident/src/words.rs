@@ -265,6 +265,13 @@ pub fn heading(name: &str) -> String {
     if said == name { said } else { upper(&said) }
 }
 
+/// A channel with its unit: "speed (Hall), rev/min".
+#[must_use]
+pub fn axis(name: &str) -> String {
+    let unit = crate::context::unit_of(name);
+    if unit.is_empty() { channel(name) } else { format!("{}, {unit}", channel(name)) }
+}
+
 /// The meter behind a channel.
 #[must_use]
 pub fn meter(name: &str) -> String {
@@ -390,7 +397,10 @@ pub fn bracketed(value: f64, half: f64) -> Option<String> {
         return Some(format!("{:.0}({:.0}){exponent}", (value / unit).round() * unit, (half / unit).round() * unit));
     }
     let places = (-last) as usize;
-    Some(format!("{value:.places$}({:.0}){exponent}", half * 10f64.powf(-last)))
+    let digits = format!("{value:.places$}");
+    // a zero has no sign
+    let digits = digits.strip_prefix('-').filter(|d| d.chars().all(|c| c == '0' || c == '.')).unwrap_or(&digits);
+    Some(format!("{digits}({:.0}){exponent}", half * 10f64.powf(-last)))
 }
 
 /// Words in a row: "a", "a and b", "a, b and c".

@@ -342,10 +342,7 @@ fn what_is_not_predicted_is_not_left() {
 #[test]
 fn a_text_is_told_without_names_of_columns() {
     let said = ident::words::plain("the thrust_n residual follows temp_c, as thrust(rpm) holds; time_since_step");
-    assert_eq!(
-        said,
-        "the thrust residual follows temperature, as the curve of thrust over speed holds; time since the last step"
-    );
+    assert_eq!(said, "the thrust residual follows temperature, as thrust against the speed holds; time since the last step");
     assert_eq!(ident::words::channel("mz"), "field (z)");
     let late = effect("channel_delay", "mx", 0.9, 0.5, vec![parameter("delay", 0.011, 0.001, "s")]);
     assert_eq!((ident::flight::VOCABULARY.clause)(&late).sentence(), "The magnetometer answers 11 ms late.");

@@ -26,14 +26,14 @@ const US_S: &str = "pulses in us (1000 to 2000; duty in per cent is us / 200), t
 const LOG: &str = "those of the log's column names: s, us, rev/min, N, N.m, A, V, degC";
 
 const ENTRIES: [Entry; 45] = [
-    entry("demo", LOG, "demo --seed 7 --effect supply_sag -o out/demo", "README.md"),
+    entry("demo", LOG, "demo --seed 7 --effect supply_sag -o out/demo", "docs/book/tutorials/without-hardware.md"),
     entry("sim", LOG, "sim examples/thin-lead.toml -o out/run.csv", "docs/scenario.md"),
     entry("runs", "hold in s", "runs -o out/runs --hold 30", "docs/scenario.md"),
     entry(
         "import",
         "those of the export's own heads, converted to the log's",
         "import export.csv -o out/run.csv --map thrust_n=Load*0.00980665",
-        "README.md",
+        "docs/book/how-to/import.md",
     ),
     entry(
         "identify",

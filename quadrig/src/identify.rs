@@ -10,11 +10,12 @@ use crate::apart::Paths;
 use crate::folder::figures;
 use crate::open::{Columns, Names, open};
 use crate::trouble::unwritten;
+use ident::context::unit_of;
 use ident::fit::power::csv;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
-use ident::report::{WIDEST, number, wrapped};
-use ident::words::bracketed;
+use ident::report::{WIDEST, headline, number, wrapped};
+use ident::words::{bracketed, channel};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -113,16 +114,16 @@ fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
 }
 
 fn text(found: &Identified) -> String {
-    let mut out = levels(found);
-    out += "\ndeclared relations over all rows\n";
+    let mut out = format!("{}\n\n", wrapped(&headline(found), 0)) + &levels(found);
+    out += "\ndeclared relations over all rows (of the speed in 1000 rev/min; of the pulse above 1000 us in ms)\n";
     for p in &found.model.polynomials {
         let all = terms(p.coefficients.iter().copied().zip(p.errors.iter().map(|se| 1.96 * se)));
-        out += &format!("{:<20} {}\n", p.channel, wrapped(&all, 21));
+        out += &format!("{:<20} {}\n", channel(&p.channel), wrapped(&all, 21));
     }
     for q in &found.quality {
         out += &format!(
             "{:<20} rms {} {}, noise floor {}, R2 {:.6}\n",
-            q.channel,
+            channel(q.channel),
             number(q.rms),
             q.unit,
             number(q.noise_floor),
@@ -138,11 +139,11 @@ fn text(found: &Identified) -> String {
             if f.curve.outliers.is_empty() { String::new() } else { format!(", left out: points {}", listed(&f.curve.outliers)) };
         let coefficients = (0..=f.degree).map(|k| f.curve.coefficient(k));
         out += &format!(
-            "{:<14} {}\n",
-            f.name,
+            "{:<26} {}\n",
+            format!("{} over {}", channel(&f.y), channel(f.x)),
             wrapped(
                 &format!("{}; chi2 {:.2}{chosen}{left_out}", terms(coefficients.map(|c| (c.value, c.half))), f.curve.chi2),
-                15
+                27
             )
         );
     }
@@ -186,13 +187,17 @@ fn levels(found: &Identified) -> String {
     let read = |k: &usize| found.plateaus.iter().any(|p| p.means[*k].is_some());
     let columns: Vec<usize> = (0..found.columns.len()).filter(read).collect();
     // as wide as the longest name asks for, as many as fit
-    let width = columns.iter().map(|k| found.columns[*k].chars().count() + 1).fold(LEAST, usize::max);
+    let width = columns.iter().map(|k| channel(&found.columns[*k]).chars().count() + 1).fold(LEAST, usize::max);
     let most = ((WIDEST - 3) / width).max(1);
     for block in columns.chunks(most) {
-        let head: String = block.iter().map(|k| format!("{:>width$}", found.columns[*k])).collect();
-        out += &format!("\n{:>3}{head}\n", "");
+        let head = |word: &dyn Fn(&str) -> String| {
+            block.iter().map(|k| format!("{:>width$}", word(&found.columns[*k]))).collect::<String>()
+        };
+        let (names, units) = (head(&channel), head(&|name| unit_of(name).to_owned()));
+        out += &format!("\n{:>3}{names}\n{:>3}{units}\n", "", "");
         for (n, p) in found.plateaus.iter().enumerate() {
             let cell = |k: &usize| match p.means[*k] {
+                Some((v, 0.0)) => format!("{v}"), // a command has no error
                 Some((v, se)) => bracketed(v, 1.96 * se).unwrap_or_else(|| number(v)),
                 None => "-".to_owned(),
             };

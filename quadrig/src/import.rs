@@ -78,7 +78,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         (Some(found), _) => found,
         (None, Some(n)) => ident::import::rotor(&args.file, n as usize)?
             .ok_or_else(|| format!("--rotor {n}: {} is no PX4 ULog and no Betaflight Blackbox log", args.file.display()))?,
-        (None, None) => ident::import::import_as(&args.file, &options)?,
+        (None, None) => ident::import::import_as(&args.file, &options)
+            .map_err(|why| crate::kind::another(&args.file).map_or(why.into(), Failure::from))?,
     };
     options.name(&mut log);
     let (mut shown, mut joints) = (None, Vec::new());

@@ -1,11 +1,12 @@
 //! What a file is that a command does not take.
 //!
-//! What it is: the two files of the IMU board, known by the names of their columns, and what takes or makes them instead.
+//! What it is: the two files of the IMU board, known by the names of their columns, and what is no table at all: a model, another TOML file, a
+//! verdict, a page. Each with what takes or makes it instead.
 //! What can go wrong: nothing; any other file is left to its reader's own words.
 //! Units: none.
 //! Reference: specification `formats.md`, "Attitude log"; docs/scenario.md.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 /// What is said of the board's own log, which holds the attitude and no readings.
@@ -30,8 +31,36 @@ pub(crate) fn is_attitude_alone<S: AsRef<str>>(columns: &[S]) -> bool {
     ["qw", "qx", "qy", "qz"].into_iter().all(has) && !has("gx") && !has("gyro_x")
 }
 
+/// What a file is that is no run, where it is one that this program knows.
+pub(crate) fn another(path: &Path) -> Option<String> {
+    of_the_imu(path).or_else(|| no_table(path))
+}
+
+/// Bytes of the longest file that is looked at as a whole.
+const LOOKED_AT: u64 = 1 << 20;
+
+/// What a file is that holds no table.
+fn no_table(path: &Path) -> Option<String> {
+    let mut text = String::new();
+    std::fs::File::open(path).ok()?.take(LOOKED_AT).read_to_string(&mut text).ok()?;
+    let what = match text.trim_start().chars().next()? {
+        '<' => "a page; expected the log that it tells of, which its part \"Where this comes from\" names",
+        '{' if text.contains("\"quadrig-verdict") => "a verdict; expected the log that it is of: `run` in it names that",
+        _ => {
+            let table = toml::from_str::<toml::Table>(&text).ok().filter(|t| !t.is_empty())?;
+            let format = table.get("format").and_then(toml::Value::as_str).unwrap_or_default();
+            if format.starts_with("quadrig-model") {
+                "a model; expected a log or an export: `--model` of close-loop, sim and fly takes a model, and so do predict and export"
+            } else {
+                "a TOML file; expected a log or an export: `quadrig sim SCENARIO.toml -o LOG` makes a log of a scenario"
+            }
+        }
+    };
+    Some(format!("{}:1:1: {what}", path.display()))
+}
+
 /// What a file is that is no rig's log, where it is one of the IMU board's.
-pub(crate) fn of_the_imu(path: &Path) -> Option<String> {
+fn of_the_imu(path: &Path) -> Option<String> {
     let columns = columns(path);
     let file = path.display();
     if is_attitude_alone(&columns) {

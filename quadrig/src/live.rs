@@ -1,8 +1,8 @@
 //! The live view of a simulated run.
 //!
 //! What it is: the terminal view of a rig, fed with what the simulated board sends, in step with the clock times a factor; keys pause it, take single
-//! steps, change the speed or end it. Without a terminal one line ten times a simulated second, and lines on the standard input. Ctrl-C ends it as
-//! `q` does: what was flown until then is kept.
+//! steps, change the speed or end it. Without a terminal one line ten times a simulated second, and lines on the standard input. Ctrl-C and a
+//! terminal that goes away end it as `q` does: what was flown until then is kept.
 //! What can go wrong: a machine that cannot keep up shows a lower factor than asked; nothing else changes, the bytes are the same.
 //! Units: s, rev/min, N, A.
 //! Reference: specification `rig.md`, "The simulator".
@@ -74,7 +74,8 @@ pub(crate) fn view(session: &mut Session, scenario: &Scenario, speed: f64) -> Re
     while running && !ended.now() {
         screen.live = Some(live);
         let mut steps = if live.paused { 0 } else { LOOK_MS };
-        for key in terminal.keys()? {
+        let Ok(keys) = terminal.keys() else { return Ok(true) }; // the terminal went away: an end like any other
+        for key in keys {
             match screen.key(key) {
                 Some(Key::Quit | Key::Stop) => return Ok(true),
                 Some(Key::Pause) => live.paused = !live.paused,
@@ -97,7 +98,9 @@ pub(crate) fn view(session: &mut Session, scenario: &Scenario, speed: f64) -> Re
         screen.link = decoder.stats();
         live.share = session.share();
         screen.live = Some(live);
-        terminal.show(&screen, steps == REFRESH_MS)?;
+        if terminal.show(&screen, steps == REFRESH_MS).is_err() {
+            return Ok(running);
+        }
         if live.paused {
             std::thread::sleep(Duration::from_millis(20));
         } else if live.speed > 0.0 {

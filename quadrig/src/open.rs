@@ -98,8 +98,7 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
         log.in_doubt().iter().filter(|_| !quiet).for_each(|doubt| note!("{}: {doubt}", path.display()));
         return Ok(log);
     }
-    let (log, report) =
-        import_as(path, options).map_err(|why| crate::kind::of_the_imu(path).map_or(why.into(), Failure::from))?;
+    let (log, report) = import_as(path, options).map_err(|why| crate::kind::another(path).map_or(why.into(), Failure::from))?;
     let log = as_written(&log)?;
     if !quiet {
         say(path, &report);

@@ -288,6 +288,34 @@ fn battery_and_delays_are_told() {
     assert_eq!(after(&text, "resistance of the supply's lead"), 0.048);
 }
 
+/// A capacity is told by the caller alone, goes under the key of its peer, and a file without one says that it is not known.
+#[test]
+fn a_capacity_is_told_in_the_peers_own_key() {
+    let told = |peer: &str| exported(peer, &["--capacity", "5200"]);
+    for peer in PEERS {
+        assert!(exported(peer, &[]).contains("not known (--capacity)"), "{peer} says what it lacks");
+        assert!(!told(peer).contains("(--capacity)"), "{peer}");
+    }
+    assert_eq!(px4(&told("px4"))["BAT1_CAPACITY"], 5200.0);
+    for (peer, key) in [
+        ("ardupilot", "BATT_CAPACITY,"),
+        ("betaflight", "set bat_capacity ="),
+        ("crazyflie", "capacity of the battery that will fly"),
+        ("simulink", "powerplant.capacity_mah ="),
+        ("csv", "capacity of the battery that will fly:"),
+    ] {
+        assert_eq!(after(&told(peer), key), 5200.0, "{peer}");
+    }
+    assert!(exported("simulink", &[]).contains("powerplant.capacity_mah = [];"));
+    // more than the key of Betaflight takes is not cut short in silence
+    let large = exported("betaflight", &["--capacity", "25000"]);
+    assert!(!large.contains("set bat_capacity") && large.contains("25000 mAh are more than the 20000"), "{large}");
+    for wrong in ["0", "5.2", "lots"] {
+        let said = call(&bench(), &["export", "model.toml", "--to", "px4", "--capacity", wrong]);
+        assert!(said.status != Some(0) && said.err.contains("--capacity"), "{wrong}: {}", said.err);
+    }
+}
+
 /// A latency of a rotor that coasts stands beside its lag.
 #[test]
 fn a_latency_is_told_where_there_is_one() {

@@ -188,3 +188,36 @@ fn a_simulated_run_is_watched_paused_and_stepped() {
     assert!(status.success() && rest.contains("samples over"), "{rest}");
     assert!(folder.path().join("run.csv").is_file());
 }
+
+/// Whatever ends a simulated run that is watched keeps what was flown until then.
+#[test]
+fn an_end_of_a_watched_run_keeps_its_log() {
+    let scenario = "rest_s = 1.0\nschedule = { kind = \"staircase\", step_us = 500, hold_s = 300, top_us = 2000 }\n";
+    for end in ["control-c", "INT", "TERM", "HUP", "hang-up"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("run.toml"), scenario).expect("a scenario");
+        let words = ["sim", "run.toml", "-o", "run.csv", "--live", "--speed", "20"];
+        let mut screen = Screen::start(folder.path(), &words, SMALL);
+        screen.until(" RUNNING ");
+        std::thread::sleep(Duration::from_millis(500));
+        let rest = match end {
+            "hang-up" => {
+                screen.hang_up();
+                String::new()
+            }
+            "control-c" => {
+                screen.press("\x03");
+                screen.end().1
+            }
+            signal => {
+                screen.signal(signal);
+                let (status, rest) = screen.end();
+                assert!(status.success() && rest.contains("samples over"), "{end}: {rest}");
+                rest
+            }
+        };
+        assert!(folder.path().join("run.csv").is_file(), "{end}: {rest}");
+        let rows = rows(&folder.path().join("run.csv"));
+        assert!((50..5000).contains(&rows.len()), "{end}: {} rows of 902 s; {rest}", rows.len());
+    }
+}

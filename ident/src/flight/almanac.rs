@@ -16,6 +16,7 @@ use crate::attribution::fit::difference;
 use crate::attribution::{Column, Fit, Library, Noise, Owner, Placed, Prior, Problem, fit};
 use crate::effects::airframe::{AirframeEffect, library};
 use crate::report::{Figure, Layer, number};
+use crate::words::plain;
 use std::fmt::Write;
 
 /// Channels that a figure holds at most.
@@ -79,7 +80,10 @@ fn page(effect: &'static dyn AirframeEffect, flight: &Flight, all: &[Signature],
     let depends = if about.depends_on.is_empty() { "nothing".to_owned() } else { about.depends_on.join(", ") };
     let mut text = format!(
         "# {id}\n\n{}.\n\n```text\n{}\n```\n\nSource: {}\n\nIn the residual: {}.\n\nDepends on: {depends}.\n",
-        about.title, about.equation, about.source, about.signature
+        about.title,
+        about.equation,
+        about.source,
+        plain(about.signature)
     );
     text.push_str("\n## Parameters\n\nBounds are those of the standard flight.\n\n| parameter | unit | from | to |\n| --- | --- | --- | --- |\n");
     let own: Vec<&Signature> = all.iter().filter(|s| s.effect.id() == id).collect();

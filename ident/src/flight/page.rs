@@ -122,7 +122,10 @@ fn cards(closed: &Closed, traces: &[Trace]) -> Vec<Vec<Figure>> {
             return Some(parts::over_time(&traces[at], &id, parts::pair(&closed.verdict)));
         };
         let trace = traces[at].with_before(without.clone());
-        let over = e.depends_on.iter().find_map(|name| against(closed, &scene, name, &trace.channel));
+        let over = e
+            .depends_on
+            .iter()
+            .find_map(|name| against(closed, &scene, name, &trace.channel).filter(|(_, _, x)| parts::moves(x)));
         Some(match over {
             Some((label, unit, x)) => parts::against(&trace, &id, (&label, unit), &x, parts::ALONE),
             None => parts::over_time(&trace, &id, parts::ALONE),

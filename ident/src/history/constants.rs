@@ -69,20 +69,10 @@ fn of_run(log: &Log, context: &Context, curves: &[Curve]) -> Vec<Told> {
 /// What identification gives: shown, and made up of what is asked by itself.
 fn constants(log: &Log) -> Vec<Told> {
     let found = identify(log).map(|found| found.constants).unwrap_or_default();
-    let words = |name: &str| match name {
-        "k_T" => "thrust for the square of the speed",
-        "k_Q" => "torque for the square of the speed",
-        "KV" => "speed for each volt",
-        "R" => "resistance",
-        "I0" => "current without load",
-        "tau_up" => "time constant on the way up",
-        "tau_down" => "time constant on the way down",
-        _ => "",
-    };
     let of = |c: &crate::identify::Constant| {
         let m = Measure {
             name: c.name.to_owned(),
-            words: words(c.name).to_owned(),
+            words: c.words().to_owned(),
             unit: c.unit.to_owned(),
             scale: Scale::Linear,
             channel: String::new(),

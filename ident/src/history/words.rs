@@ -74,7 +74,11 @@ pub fn summary(history: &History) -> String {
     let n = history.runs.len();
     let last = history.label(n - 1);
     match history.changes.len() {
-        0 => format!("Nothing changed over {n} runs beyond what days differ by, from {} to {last}.", history.label(0)),
+        0 => {
+            let first = history.label(0);
+            let span = if history.dated { format!(", from {first} to {last}") } else { String::new() };
+            format!("Nothing changed over {n} runs beyond what days differ by{span}.")
+        }
         1 => format!("{n} runs, one change. {}", sentence(history, &history.changes[0])),
         k => {
             let all: Vec<String> = history.changes.iter().map(|c| sentence(history, c)).collect();

@@ -41,7 +41,7 @@ pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figu
 const ELSEWHERE: [&str; 4] = ["rpm", "torque_nm", "current_a", "voltage_v"];
 
 /// A value to the digits that its error supports.
-fn paired(value: f64, error: f64) -> String {
+pub(super) fn paired(value: f64, error: f64) -> String {
     if !(error.is_finite() && error > 0.0) {
         return format!("{value}");
     }

@@ -26,7 +26,7 @@ pub use figure::{Figure, Layer, Mark};
 pub use history::{page as history_page, terminal as history_terminal};
 pub use isolability::{isolability, isolability_csv, isolability_svg};
 pub use page::closed_loop;
-pub use run::run;
+pub use run::{headline, run};
 pub use selection::selection;
 pub use several::several;
 pub use sheet::{Sheet, write_figures};
@@ -35,7 +35,10 @@ pub use shift::{filter_figures, study_figures};
 /// A number with five significant digits, as tables print it.
 #[must_use]
 pub fn number(v: f64) -> String {
-    if v != 0.0 && (v.abs() < 1e-3 || v.abs() >= 1e5) { format!("{v:.4e}") } else { format!("{v:.5}") }
+    if v == 0.0 {
+        return "0".to_owned();
+    }
+    if v.abs() < 1e-3 || v.abs() >= 1e5 { format!("{v:.4e}") } else { format!("{v:.5}") }
 }
 
 #[cfg(test)]
@@ -45,7 +48,7 @@ mod tests {
     #[test]
     fn small_numbers_keep_their_digits() {
         assert_eq!(number(6.3e-5), "6.3000e-5");
-        assert_eq!(number(0.0), "0.00000");
+        assert_eq!(number(0.0), "0");
         assert_eq!(number(1.5), "1.50000");
     }
 }

@@ -6,7 +6,7 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
-use super::closed::{self as parts, ALONE, Origin, Page, Trace, Vocabulary, against, enlarged, over_time, pair, thinned};
+use super::closed::{self as parts, ALONE, Origin, Page, Trace, Vocabulary, against, enlarged, moves, over_time, pair, thinned};
 use super::designer::designer;
 use super::figure::{Figure, Layer};
 use super::run;
@@ -149,7 +149,11 @@ fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<V
         return None;
     }
     let of_steps = e.depends_on.iter().any(|v| ["time_since_step", "rpm_rate"].contains(&v.as_str()));
-    let over = if of_steps { None } else { e.depends_on.iter().find_map(|name| Some((name, values(context, target, name)?))) };
+    let over = if of_steps {
+        None
+    } else {
+        e.depends_on.iter().find_map(|name| Some((name, values(context, target, name).filter(|x| moves(x))?)))
+    };
     let figure = match over {
         Some((name, x)) => against(&trace, id, (name, unit_of_variable(name)), &x, ALONE),
         None => match enlarged(&trace, id, ALONE).filter(|_| of_steps) {
@@ -179,7 +183,7 @@ fn values(context: &Context, target: &Target, name: &str) -> Option<Vec<f64>> {
 pub(super) fn rest(closed: &Closed, u: &Unexplained) -> Option<Figure> {
     let target = target(closed, &u.channel)?;
     let trace = trace(closed, target)?;
-    let over = u.depends_on.iter().find_map(|name| Some((name, values(&closed.context, target, name)?)));
+    let over = u.depends_on.iter().find_map(|name| Some((name, values(&closed.context, target, name).filter(|x| moves(x))?)));
     Some(match over {
         Some((name, x)) => against(&trace, "left", (name, unit_of_variable(name)), &x, pair(&closed.verdict)),
         None => over_time(&trace, "left", pair(&closed.verdict)),

@@ -6,20 +6,21 @@
 //! Units: on the axes.
 //! Reference: Beharie 2013, Figures 5.22 to 5.25, 5.56 to 5.79.
 
-use super::designer::designer;
+use super::designer::{designer, paired};
 use super::figure::{Figure, Layer, Mark};
 use super::number;
 use super::sheet::Sheet;
 use super::shift::filter_figures;
 use crate::board;
 use crate::context::unit_of;
+use crate::fit::power::Level;
 use crate::fit::{Fitted, Law};
 use crate::identify::Identified;
 use crate::log::{Gaps, Log, SPEED};
 use crate::noise::median;
 use crate::plateau::Plateau;
 use crate::shift::{Settings, filters};
-use crate::words::{channel, upper};
+use crate::words::{self, axis, channel, heading, upper};
 
 /// Colours of the speed channels.
 pub(super) const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];
@@ -27,8 +28,8 @@ pub(super) const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];
 /// The page of a run; `other` is a second run to be laid beside it (with and without the encoder, Figures 5.22 to 5.25).
 #[must_use]
 pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) -> Sheet {
-    let mut sheet = Sheet::new(&format!("Identification of {}", log.name));
-    sheet.say(&lead(log, found));
+    let mut sheet = Sheet::told(&format!("Identification of {}", log.name), &headline(found));
+    sheet.soft(&lead(log, found));
     if let Some(gaps) = Gaps::of(log) {
         sheet.warn(&format!("{gaps}."));
     }
@@ -71,12 +72,47 @@ fn lead(log: &Log, found: &Identified) -> String {
     let rig: Vec<String> = ["motor", "propeller", "supply"].iter().filter_map(|k| text(k).map(str::to_owned)).collect();
     let rig = if rig.is_empty() { String::new() } else { format!("{}. ", rig.join(", ")) };
     format!(
-        "{rig}{} rows over {:.1} {}, reduced to {} plateaus.",
+        "{}: {rig}{} rows over {:.1} {}, reduced to {} plateaus.",
+        log.name,
         log.len(),
         log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0),
         if log.time_is_row() { "rows" } else { "s" },
         found.plateaus.len()
     )
+}
+
+/// What the powerplant does at its highest level, and which law does not hold, in plain words.
+#[must_use]
+pub fn headline(found: &Identified) -> String {
+    let mut out = highest(&found.levels)
+        .unwrap_or_else(|| format!("{} plateaus were found, none of them with a thrust.", found.plateaus.len()));
+    let broken: Vec<String> = found
+        .constants
+        .iter()
+        .filter(|c| c.law.is_some_and(|l| !l.holds))
+        .map(|c| format!("{} ({})", c.words(), c.name))
+        .collect();
+    if let [first, rest @ ..] = broken.as_slice() {
+        let are = if rest.is_empty() { "is no constant" } else { "are no constants" };
+        let which = if rest.is_empty() { first.clone() } else { words::list(&broken) };
+        out += &format!(" {} {are} over these levels: intervals are widened to what the levels show.", upper(&which));
+    }
+    out
+}
+
+/// "At 2000 us the rotor lifts 6.1 N at 7410 rev/min, for 84 W: 7.4 g/W."
+fn highest(levels: &[Level]) -> Option<String> {
+    let thrust = |l: &&Level| l.of("thrust_n").map_or(f64::NEG_INFINITY, |v| v.0);
+    let level = levels.iter().max_by(|a, b| thrust(a).total_cmp(&thrust(b)))?;
+    let said = |name: &str, unit: &str| level.of(name).map(|(v, se)| format!("{} {unit}", words::digits(v, 1.96 * se)));
+    let mut out = match level.of("pulse_us") {
+        Some((pulse, _)) => format!("At {pulse:.0} us the rotor lifts {}", said("thrust_n", "N")?),
+        None => format!("On its highest level the rotor lifts {}", said("thrust_n", "N")?),
+    };
+    out += &said("rpm", "rev/min").map(|v| format!(" at {v}")).unwrap_or_default();
+    out += &said("electrical_w", "W").map(|v| format!(", for {v}")).unwrap_or_default();
+    out += &said("g_per_w", "g/W").map(|v| format!(": {v}")).unwrap_or_default();
+    Some(out + ".")
 }
 
 pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
@@ -87,17 +123,24 @@ pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
         .constants
         .iter()
         .map(|c| {
-            let interval = format!("{} to {}", number(c.value - c.half), number(c.value + c.half));
+            let fine = |v: f64| words::digits(v, 0.1 * c.half);
+            let interval = format!("{} to {}", fine(c.value - c.half), fine(c.value + c.half));
             let law = c.law.map_or_else(|| "-".to_owned(), |law| law.words());
-            vec![c.name.to_owned(), number(c.value), number(c.se), interval, c.unit.to_owned(), law]
+            vec![format!("{}, {}", c.words(), c.name), fine(c.value), interval, c.unit.to_owned(), law]
         })
         .collect();
-    sheet.listed("constants", &["constant", "value", "standard error", "95 % interval", "unit", "its law"], &rows);
-}
-
-fn label(channel: &str) -> String {
-    let unit = unit_of(channel);
-    if unit.is_empty() { channel.to_owned() } else { format!("{channel}, {unit}") }
+    let all = |v: f64| format!("{v}");
+    let raw: Vec<Vec<String>> = found
+        .constants
+        .iter()
+        .map(|c| {
+            let name = [c.name, c.words()].map(str::to_owned);
+            let figures = [c.value, c.se, c.value - c.half, c.value + c.half].map(all);
+            name.into_iter().chain(figures).chain([c.unit.to_owned()]).collect()
+        })
+        .collect();
+    let raw_head = ["constant", "what", "value", "standard_error", "low_95", "high_95", "unit"];
+    sheet.data("constants", &["constant", "value", "95 % interval", "unit", "its law"], &rows, Some((&raw_head, &raw)));
 }
 
 fn time_label(log: &Log) -> String {
@@ -141,18 +184,18 @@ fn over_time(log: &Log, found: &Identified, channel: &str) -> Option<Figure> {
         .enumerate()
         .filter_map(|(k, p)| {
             let (mean, se) = p.of(log, channel)?;
-            let text = format!("{}: {mean:.4} +- {:.4} {unit}, {} rows", k + 1, 1.96 * se, p.rows);
+            let text = format!("{}: {mean:.4} \u{b1} {:.4} {unit}, {} rows", k + 1, 1.96 * se, p.rows);
             Some(Mark { x: 0.5 * (p.from_s + p.to_s), y: mean, error: 0.0, text })
         })
         .collect();
     Some(Figure {
         id: format!("time-{}", channel.replace('_', "-")),
-        title: format!("{channel} over time"),
+        title: format!("{} over time", heading(channel)),
         x_label: time_label(log),
-        y_label: label(channel),
+        y_label: axis(channel),
         layers: vec![
             spans(&found.plateaus),
-            Layer::Line { name: channel.to_owned(), class: "a", x, y },
+            Layer::Line { name: words::channel(channel), class: "a", x, y },
             Layer::Marks { name: "means".into(), class: "b", marks },
         ],
         ..Figure::default()
@@ -170,7 +213,7 @@ pub(super) fn overlaid(log: &Log) -> Option<Figure> {
         id: "time-speeds".into(),
         title: "Speed channels over time".into(),
         x_label: time_label(log),
-        y_label: "rev/min".into(),
+        y_label: "speed, rev/min".into(),
         layers: layers.collect(),
         ..Figure::default()
     })
@@ -186,17 +229,17 @@ fn over_current(log: &Log, found: &Identified) -> Option<Figure> {
         .map(|(channel, class)| {
             let mark = |p: &Plateau| {
                 let ((current, _), (rpm, se)) = (p.of(log, "current_a")?, p.of(log, channel)?);
-                let text = format!("{channel}: {rpm:.1} +- {:.1} rev/min at {current:.3} A", 1.96 * se);
+                let text = format!("{}: {rpm:.1} \u{b1} {:.1} rev/min at {current:.3} A", words::channel(channel), 1.96 * se);
                 Some(Mark { x: current, y: rpm, error: 1.96 * se, text })
             };
-            Layer::Marks { name: channel.to_owned(), class, marks: found.plateaus.iter().filter_map(mark).collect() }
+            Layer::Marks { name: words::channel(channel), class, marks: found.plateaus.iter().filter_map(mark).collect() }
         })
         .collect();
     (!layers.is_empty()).then(|| Figure {
         id: "speed-current".into(),
         title: "Speed over current, plateau means".into(),
-        x_label: "current_a, A".into(),
-        y_label: "rev/min".into(),
+        x_label: "current, A".into(),
+        y_label: "speed, rev/min".into(),
         layers,
         ..Figure::default()
     })
@@ -224,12 +267,12 @@ fn differences(log: &Log, plateaus: &[Plateau]) -> Option<Figure> {
                 .map(|((v, r), on)| if *on && *r > 0.05 * top { 100.0 * (v - r) / r } else { f64::NAN })
                 .collect();
             let (x, y) = present(&log.t, &difference);
-            Some(Layer::Dots { name: (*channel).to_owned(), class, x, y })
+            Some(Layer::Dots { name: words::channel(channel), class, x, y })
         })
         .collect();
     Some(Figure {
         id: "channel-differences".into(),
-        title: format!("Speed channels less {base}"),
+        title: format!("Speed channels less {}", words::channel(base)),
         x_label: time_label(log),
         y_label: "difference, %".into(),
         layers,
@@ -286,7 +329,7 @@ pub(super) fn relation(f: &Fitted) -> Figure {
                     x: at,
                     y: p.y,
                     error: 1.96 * p.y_error,
-                    text: format!("{at:.1} {}: {:.4} +- {:.4} {unit}", unit_of(f.x), p.y, 1.96 * p.y_error),
+                    text: format!("{at:.1} {}: {:.4} \u{b1} {:.4} {unit}", unit_of(f.x), p.y, 1.96 * p.y_error),
                 }
             })
             .collect()
@@ -303,8 +346,8 @@ pub(super) fn relation(f: &Fitted) -> Figure {
     Figure {
         id: f.name.replace(['(', ')'], "-").trim_end_matches('-').to_owned(),
         title: format!("{}, order {} (R2 {:.5})", upper(&over(f)), f.degree, f.curve.r2),
-        x_label: format!("{}, {}", channel(f.x), unit_of(f.x)),
-        y_label: format!("{}, {unit}", channel(&f.y)),
+        x_label: axis(f.x),
+        y_label: axis(&f.y),
         layers,
         ..Figure::default()
     }
@@ -324,7 +367,7 @@ fn side_by_side(a: (&Log, &Identified), b: (&Log, &Identified)) -> Vec<Figure> {
             id: id.into(),
             title: title.into(),
             x_label: time_label(a.0),
-            y_label: channels[0].map(label).unwrap_or_default(),
+            y_label: channels[0].map(axis).unwrap_or_default(),
             layers: vec![
                 Layer::Line { name: a.0.name.clone(), class: "a", x: xa, y: ya },
                 Layer::Line { name: b.0.name.clone(), class: "b", x: xb, y: yb },
@@ -365,14 +408,14 @@ fn side_by_side(a: (&Log, &Identified), b: (&Log, &Identified)) -> Vec<Figure> {
                 x: unscaled(fa.x, middle),
                 y: fb.curve.at(middle),
                 error: 0.0,
-                text: format!("second less first: {difference:.4} +- {half:.4} {}", unit_of(&fa.y)),
+                text: format!("second less first: {difference:.4} \u{b1} {half:.4} {}", unit_of(&fa.y)),
             }],
         });
         out.push(Figure {
             id: format!("beside-{}", fa.name.replace(['(', ')'], "-").trim_end_matches('-')),
-            title: format!("{} of both runs", fa.name),
-            x_label: label(fa.x),
-            y_label: label(&fa.y),
+            title: format!("{} of both runs", upper(&over(fa))),
+            x_label: axis(fa.x),
+            y_label: axis(&fa.y),
             layers,
             ..Figure::default()
         });
@@ -383,7 +426,7 @@ fn side_by_side(a: (&Log, &Identified), b: (&Log, &Identified)) -> Vec<Figure> {
 pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
     let mut header =
         vec!["plateau".to_owned(), "from, s".to_owned(), "to, s".to_owned(), "settling, s".to_owned(), "rows".to_owned()];
-    header.extend(log.columns.iter().map(|c| label(&c.name)));
+    header.extend(log.columns.iter().map(|c| axis(&c.name)));
     let rows: Vec<Vec<String>> = found
         .plateaus
         .iter()
@@ -396,7 +439,7 @@ pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
                 format!("{:.2}", p.settling_s),
                 p.rows.to_string(),
             ];
-            row.extend(p.means.iter().map(|m| m.map_or_else(|| "-".to_owned(), |(v, se)| format!("{v:.4} +- {se:.4}"))));
+            row.extend(p.means.iter().map(|m| m.map_or_else(|| "-".to_owned(), |(v, se)| paired(v, se))));
             row
         })
         .collect();
@@ -424,5 +467,5 @@ pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
             })
         })
         .collect();
-    sheet.listed("coefficients", &["relation", "coefficient", "value", "+-", "chi2", "order by AICc"], &rows);
+    sheet.listed("coefficients", &["relation", "coefficient", "value", "\u{b1}", "chi2", "order by AICc"], &rows);
 }

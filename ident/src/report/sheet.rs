@@ -91,9 +91,9 @@ impl Sheet {
             return;
         }
         let shown = &rows[..rows.len().min(LONGEST)];
-        self.data(name, header, shown, None);
+        self.data(name, header, shown, Some((header, rows)));
         if rows.len() > shown.len() {
-            self.say(&format!("The first {LONGEST} of {}.", rows.len()));
+            self.say(&format!("The first {LONGEST} of {}; the CSV has all.", rows.len()));
         }
     }
 

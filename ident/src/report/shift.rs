@@ -9,6 +9,7 @@ use super::figure::{Figure, Layer};
 use crate::context::unit_of;
 use crate::plateau::study::{OFFSETS, Tried};
 use crate::shift::Filters;
+use crate::words;
 
 /// Filters 2 to 6 one above the other over time, and Filter 1 with its threshold.
 #[must_use]
@@ -16,7 +17,7 @@ pub fn filter_figures(t: &[f64], f: &Filters, channel: &str) -> Vec<Figure> {
     let per = format!("{} per sample", unit_of(channel));
     let one = Figure {
         id: "filter-1".into(),
-        title: format!("Filter 1 of {channel}"),
+        title: format!("Filter 1 of {}", words::channel(channel)),
         x_label: "time, s".into(),
         y_label: per,
         layers: vec![
@@ -41,7 +42,7 @@ pub fn filter_figures(t: &[f64], f: &Filters, channel: &str) -> Vec<Figure> {
         .collect();
     let logic = Figure {
         id: "filters-2-to-6".into(),
-        title: format!("Filters 2 to 6 of {channel}, offset {} samples", f.offset),
+        title: format!("Filters 2 to 6 of {}, offset {} samples", words::channel(channel), f.offset),
         x_label: "time, s".into(),
         y_label: "off - on, stacked".into(),
         layers,

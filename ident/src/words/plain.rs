@@ -62,13 +62,13 @@ fn first_name(text: &str) -> &str {
     &text[..text.find(|c| !is_of_a_name(c)).unwrap_or(text.len())]
 }
 
-/// "the curve of thrust over speed" for `thrust` with "(rpm)" behind it, and what comes after.
+/// "thrust against the speed" for `thrust` with "(rpm)" behind it, and what comes after.
 fn relation<'t>(of: &str, behind: &'t str) -> Option<(String, &'t str)> {
     let inside = behind.strip_prefix('(')?;
     let over = first_name(inside);
     let after = inside[over.len()..].strip_prefix(')')?;
     let known = |name: &str| ["rpm", "pulse", "thrust", "torque", "current", "voltage"].contains(&name);
-    (known(of) && known(over)).then(|| (format!("the curve of {} over {}", channel(of), channel(over)), after))
+    (known(of) && known(over)).then(|| (format!("{} against the {}", channel(of), channel(over)), after))
 }
 
 /// An equation without the mark of its form, and that form in words.
@@ -89,7 +89,7 @@ mod tests {
     fn relations_and_forms_are_words() {
         assert_eq!(
             plain("rpm(pulse) is off; thrust(rpm) holds, so does k(x) and rpm_hall"),
-            "the curve of speed over pulse is off; the curve of thrust over speed holds, so does k(x) and speed (Hall)"
+            "speed against the pulse is off; thrust against the speed holds, so does k(x) and speed (Hall)"
         );
         let (equation, form) = formula("torque_nm += inertia d(omega)/dt [over_the_row]");
         assert_eq!((equation, form.as_deref()), ("torque_nm += inertia d(omega)/dt", Some("over the row")));

@@ -6,17 +6,18 @@
 //! Units: ArduPilot's.
 //! Reference: ArduCopter parameters (MOT_*); "Motor thrust scaling".
 
-use super::{Powerplant, comments, full, off, untold};
+use super::{Battery, Powerplant, comments, full, off, untold};
 
-const DEFINED: [&str; 2] = [
+const DEFINED: [&str; 3] = [
     "keys: https://ardupilot.org/copter/docs/parameters.html#mot-parameters",
+    "battery: https://ardupilot.org/copter/docs/parameters.html#batt-parameters",
     "curve: https://ardupilot.org/copter/docs/motor-thrust-scaling.html",
 ];
 /// Volts of a cell, full and empty (ArduPilot's own advice for lithium polymer).
 const CELL_V: [f64; 2] = [4.2, 3.3];
 
 /// The file.
-pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
+pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
     let from = plant.begins();
     // as the file rounds them
     let [from, expo] = [from, plant.square_share(from)].map(|v| (1e4 * v).round() / 1e4);
@@ -30,13 +31,17 @@ pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
         "thrust = (1 - MOT_THST_EXPO) x + MOT_THST_EXPO x^2, x from MOT_SPIN_MIN to MOT_SPIN_MAX of the signal; {}",
         off(plant.off_percent(curve))
     ));
-    let no_battery = cells
+    let no_battery = battery
+        .cells
         .is_none()
         .then(|| "MOT_BAT_VOLT_MAX, MOT_BAT_VOLT_MIN: the battery that will fly is not known (--cells)".to_owned());
     let rotor_lag = plant.beside();
-    head.extend(untold(no_battery.into_iter().chain(rotor_lag)));
+    head.extend(untold(no_battery.into_iter().chain(battery.no_capacity("BATT_CAPACITY")).chain(rotor_lag)));
     let mut out = comments("#", &head);
-    if let Some(cells) = cells {
+    if let Some(capacity) = battery.capacity_mah {
+        out += &format!("BATT_CAPACITY,{capacity}\n");
+    }
+    if let Some(cells) = battery.cells {
         for (name, volts) in ["MOT_BAT_VOLT_MAX", "MOT_BAT_VOLT_MIN"].iter().zip(CELL_V) {
             out += &format!("{name},{:.2}\n", f64::from(cells) * volts);
         }

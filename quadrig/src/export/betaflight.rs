@@ -5,7 +5,7 @@
 //! Units: Betaflight's: per cent, hundredths of a per cent.
 //! Reference: betaflight/src/main/flight/pid.c, `pidApplyThrustLinearization`: signal = x (1 + L (1 - x)^2), x the demand, L = thrust_linear/100.
 
-use super::{Powerplant, comments, full, off, untold};
+use super::{Battery, Powerplant, comments, full, off, untold};
 
 const DEFINED: [&str; 3] = [
     "keys: https://betaflight.com/docs/development/Cli",
@@ -16,6 +16,9 @@ const DEFINED: [&str; 3] = [
 const CELL_CV: [u32; 2] = [430, 330];
 /// Largest value of the key.
 const MOST: u32 = 150;
+
+/// Largest capacity that its key takes, mAh.
+const MOST_MAH: u32 = 20_000;
 
 /// Signal that a demand is given.
 fn signal(demand: f64, linear: f64) -> f64 {
@@ -41,7 +44,7 @@ fn stated_kv(name: &str) -> Option<u32> {
 }
 
 /// The lines.
-pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
+pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
     let square_error = |per_cent: u32| -> f64 {
         let linear = f64::from(per_cent) / 100.0;
         plant.points.iter().map(|p| (plant.share(signal(p.signal, linear)) - p.signal).powi(2)).sum()
@@ -59,15 +62,24 @@ pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
     let lacks = [
         kv.is_none().then(|| "motor_kv: the log's head names no KV".to_owned()),
         plant.pole_pairs.is_none().then(|| "motor_poles: the log's head tells no pole_pairs".to_owned()),
-        cells
+        battery
+            .cells
             .is_none()
             .then(|| "force_battery_cell_count, vbat_max_cell_voltage, vbat_min_cell_voltage: the battery that will fly is not known (--cells)".to_owned()),
+        battery.no_capacity("bat_capacity"),
+        battery
+            .capacity_mah
+            .filter(|c| *c > MOST_MAH)
+            .map(|c| format!("bat_capacity: {c} mAh are more than the {MOST_MAH} that the key takes")),
         Some("vbat_sag_compensation: how much of the sag is made up for is the pilot's choice".to_owned()),
     ];
     head.extend(untold(lacks.into_iter().flatten().chain(plant.beside())));
     let mut out = comments("#", &head);
+    if let Some(capacity) = battery.capacity_mah.filter(|c| *c <= MOST_MAH) {
+        out += &format!("set bat_capacity = {capacity}\n");
+    }
     out += &format!("set dshot_idle_value = {:.0}\n", 1e4 * plant.begins());
-    if let Some(cells) = cells {
+    if let Some(cells) = battery.cells {
         out += &format!("set force_battery_cell_count = {cells}\n");
     }
     if let Some(kv) = kv {
@@ -77,7 +89,7 @@ pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
         out += &format!("set motor_poles = {}\n", 2 * pairs);
     }
     out += &format!("set thrust_linear = {best}\n");
-    if cells.is_some() {
+    if battery.cells.is_some() {
         let [most, least] = CELL_CV;
         out += &format!("set vbat_max_cell_voltage = {most}\nset vbat_min_cell_voltage = {least}\n");
     }

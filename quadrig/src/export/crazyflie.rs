@@ -5,7 +5,7 @@
 //! Units: N, V, m.
 //! Reference: crazyflie-firmware, `platform_defaults_*.h` and "PWM to thrust".
 
-use super::{Powerplant, comments, full, off, untold};
+use super::{Battery, Powerplant, comments, full, off, untold};
 use nalgebra::{DMatrix, DVector};
 
 const DEFINED: [&str; 2] = [
@@ -17,7 +17,7 @@ const DEFINED: [&str; 2] = [
 const CELL_V: [f64; 2] = [3.2, 3.0];
 
 /// The header.
-pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> Result<String, &'static str> {
+pub(super) fn text(plant: &Powerplant, battery: Battery) -> Result<String, &'static str> {
     let lacks = "the model predicts no voltage; expected one identified from a log with voltage_v";
     let turning: Vec<(f64, f64)> = plant
         .points
@@ -42,10 +42,13 @@ pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> Result<String, &'s
     head.extend(DEFINED.map(str::to_owned));
     head.push(format!("thrust = sum of VMOTOR2THRUSTn v^n, v = signal times supply; {}", off(plant.off_percent(curve))));
     let no_torque = arm.is_none().then(|| "THRUST2TORQUE: the model predicts no torque".to_owned());
-    let no_battery = cells.is_none().then(|| {
+    let no_battery = battery.cells.is_none().then(|| {
         "DEFAULT_BAT_LOW_VOLTAGE, DEFAULT_BAT_CRITICAL_LOW_VOLTAGE: the battery that will fly is not known (--cells)".to_owned()
     });
-    head.extend(untold(no_torque.into_iter().chain(no_battery).chain(plant.beside())));
+    let capacity = battery.no_capacity("capacity").or(battery
+        .capacity_mah
+        .map(|c| format!("capacity of the battery that will fly {c} mAh: the firmware has no key for it")));
+    head.extend(untold(no_torque.into_iter().chain(no_battery).chain(capacity).chain(plant.beside())));
     let mut out = comments("//", &head) + "#pragma once\n";
     for (k, c) in solved.iter().enumerate() {
         out += &format!("#define VMOTOR2THRUST{k} {c:.9e}f\n");
@@ -54,7 +57,7 @@ pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> Result<String, &'s
     if let Some(arm) = arm {
         out += &format!("#define THRUST2TORQUE {arm:.6}f\n");
     }
-    if let Some(cells) = cells.map(f64::from) {
+    if let Some(cells) = battery.cells.map(f64::from) {
         for (name, volts) in ["DEFAULT_BAT_LOW_VOLTAGE", "DEFAULT_BAT_CRITICAL_LOW_VOLTAGE"].iter().zip(CELL_V) {
             out += &format!("#define {name} {:.1}f\n", cells * volts);
         }

@@ -26,11 +26,12 @@ use std::path::PathBuf;
 /// Whose file.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Peer {
-    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM, with --cells BAT1_N_CELLS and BAT1_R_INTERNAL.
+    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM, with --cells BAT1_N_CELLS and BAT1_R_INTERNAL, with --capacity
+    /// BAT1_CAPACITY.
     Px4,
-    /// Parameter file: MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX, with --cells MOT_BAT_VOLT_MAX and _MIN.
+    /// Parameter file: MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX, with --cells MOT_BAT_VOLT_MAX and _MIN, with --capacity BATT_CAPACITY.
     Ardupilot,
-    /// Lines for the command line: thrust_linear, motor_kv, motor_poles, dshot_idle_value, with --cells those of the battery.
+    /// Lines for the command line: thrust_linear, motor_kv, motor_poles, dshot_idle_value, with --cells those of the battery, with --capacity bat_capacity.
     Betaflight,
     /// C header: thrust over motor voltage, thrust_min and _max, torque over thrust, with --cells the battery's limits.
     Crazyflie,
@@ -54,6 +55,9 @@ pub(crate) struct Args {
     /// Cells in series of the battery that will fly; every file says them, or what hangs on them. The model knows its own supply alone.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=14))]
     cells: Option<u32>,
+    /// Capacity of that battery, mAh, as printed on it: no model knows it.
+    #[arg(long, value_name = "MAH", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    capacity: Option<u32>,
     /// Rotors of the vehicle, for the peers that name each.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
     rotors: u32,
@@ -70,13 +74,14 @@ impl Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let model = Model::read(&args.model)?;
     let plant = Powerplant::of(&args.model, &model)?;
+    let battery = Battery { cells: args.cells, capacity_mah: args.capacity };
     let text = match args.to {
-        Peer::Px4 => px4::text(&plant, args.rotors, args.cells),
-        Peer::Ardupilot => ardupilot::text(&plant, args.cells),
-        Peer::Betaflight => betaflight::text(&plant, args.cells),
-        Peer::Crazyflie => crazyflie::text(&plant, args.cells).map_err(|why| format!("{}: {why}", args.model.display()))?,
-        Peer::Simulink => simulink::text(&plant, args.cells),
-        Peer::Csv => table::text(&plant, args.cells),
+        Peer::Px4 => px4::text(&plant, args.rotors, battery),
+        Peer::Ardupilot => ardupilot::text(&plant, battery),
+        Peer::Betaflight => betaflight::text(&plant, battery),
+        Peer::Crazyflie => crazyflie::text(&plant, battery).map_err(|why| format!("{}: {why}", args.model.display()))?,
+        Peer::Simulink => simulink::text(&plant, battery),
+        Peer::Csv => table::text(&plant, battery),
     };
     match &args.output {
         Some(path) => {
@@ -88,6 +93,21 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         None => crate::say::text(&text),
     }
     Ok(())
+}
+
+/// The battery that will fly, as far as the caller tells it.
+#[derive(Clone, Copy)]
+struct Battery {
+    /// In series.
+    cells: Option<u32>,
+    capacity_mah: Option<u32>,
+}
+
+impl Battery {
+    /// What stands in the place of a capacity that nobody told.
+    fn no_capacity(self, key: &str) -> Option<String> {
+        self.capacity_mah.is_none().then(|| format!("{key}: the capacity of the battery that will fly is not known (--capacity)"))
+    }
 }
 
 /// Lines of a head behind a comment sign.

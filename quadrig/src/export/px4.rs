@@ -7,7 +7,7 @@
 //! Reference: PX4 parameter reference; QGroundControl, file format of parameters.
 
 use super::curve::LEAD;
-use super::{Powerplant, comments, full, off, untold};
+use super::{Battery, Powerplant, comments, full, off, untold};
 
 const DEFINED: [&str; 3] = [
     "keys: https://docs.px4.io/main/en/advanced_config/parameter_reference.html",
@@ -19,7 +19,7 @@ const INT32: u32 = 6;
 const REAL32: u32 = 9;
 
 /// The file.
-pub(super) fn text(plant: &Powerplant, rotors: u32, cells: Option<u32>) -> String {
+pub(super) fn text(plant: &Powerplant, rotors: u32, battery: Battery) -> String {
     let factor = plant.square_share(0.0);
     let curve = |u: f64| (1.0 - factor) * u + factor * u * u;
     let (k_thrust, arm) = plant.quotients();
@@ -38,22 +38,27 @@ pub(super) fn text(plant: &Powerplant, rotors: u32, cells: Option<u32>) -> Strin
     let no_moment = arm.is_none().then(|| "CA_ROTORn_KM: the model predicts no torque".to_owned());
     let sign = "CA_ROTORn_KM is positive for rotors that turn counter-clockwise; turn the sign for the others".to_owned();
     head.extend(arm.map(|_| sign));
-    let per_cell = cells.zip(plant.lead_ohm).map(|(cells, lead_ohm)| lead_ohm / f64::from(cells));
+    let per_cell = battery.cells.zip(plant.lead_ohm).map(|(cells, lead_ohm)| lead_ohm / f64::from(cells));
     head.extend(
         per_cell.map(|_| "BAT1_R_INTERNAL: the resistance of the rig's supply and its lead, shared among the cells".to_owned()),
     );
-    let no_battery = match (cells, plant.lead_ohm) {
+    let no_battery = match (battery.cells, plant.lead_ohm) {
         (None, _) => Some("BAT1_N_CELLS, BAT1_R_INTERNAL: the battery that will fly is not known (--cells)"),
         (_, None) => Some("BAT1_R_INTERNAL: the model holds no resistance of the supply"),
         _ => None,
     };
     // what has a key is told by it
     let beside = plant.beside().into_iter().filter(|line| per_cell.is_none() || !line.starts_with(LEAD));
-    head.extend(untold(no_moment.into_iter().chain(no_battery.map(str::to_owned)).chain(beside)));
+    head.extend(untold(
+        no_moment.into_iter().chain(no_battery.map(str::to_owned)).chain(battery.no_capacity("BAT1_CAPACITY")).chain(beside),
+    ));
     head.extend([String::new(), "Vehicle-Id Component-Id Name Value Type".to_owned()]);
     let line = |name: &str, value: &str, kind: u32| format!("1\t1\t{name}\t{value}\t{kind}\n");
     let mut out = comments("#", &head);
-    if let Some(cells) = cells {
+    if let Some(capacity) = battery.capacity_mah {
+        out += &line("BAT1_CAPACITY", &format!("{capacity}.0"), REAL32);
+    }
+    if let Some(cells) = battery.cells {
         out += &line("BAT1_N_CELLS", &cells.to_string(), INT32);
     }
     if let Some(per_cell) = per_cell {

@@ -7,7 +7,7 @@
 //! Reference: MathWorks, block "1-D Lookup Table"; "Transfer Fcn".
 
 use super::curve::Point;
-use super::{Powerplant, comments, full, off, untold};
+use super::{Battery, Powerplant, comments, full, off, untold};
 
 const DEFINED: [&str; 3] = [
     "table: https://www.mathworks.com/help/simulink/slref/1dlookuptable.html",
@@ -16,7 +16,7 @@ const DEFINED: [&str; 3] = [
 ];
 
 /// The script.
-pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
+pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
     let mut head = vec![plant.title(), full(plant)];
     head.extend(DEFINED.map(str::to_owned));
     head.push(format!("linear between the points; {}", off(plant.off_percent(|u| plant.share(u)))));
@@ -47,7 +47,8 @@ pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
     if plant.latency_s.is_none() {
         head.push("latency_s = 0: the model holds none; the answer begins with the command".to_owned());
     }
-    if cells.is_none() {
+    head.extend(battery.no_capacity("capacity_mah"));
+    if battery.cells.is_none() {
         head.push("cells: the battery that will fly is not known (--cells)".to_owned());
     }
     let mut out = comments("%", &head) + "powerplant = struct();\n";
@@ -62,7 +63,8 @@ pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
     out += &format!("powerplant.supply_v = {};\n", known(plant.points.first().and_then(|p| p.voltage_v)));
     out += &format!("powerplant.lead_ohm = {};\n", known(plant.lead_ohm));
     out += &format!("powerplant.fall_v_per_ah = {};\n", known(plant.fall_v_per_ah));
-    out += &format!("powerplant.cells = {};\n", cells.map_or_else(|| "[]".to_owned(), |cells| cells.to_string()));
+    let told = |v: Option<u32>| v.map_or_else(|| "[]".to_owned(), |v| v.to_string());
+    out += &format!("powerplant.cells = {};\npowerplant.capacity_mah = {};\n", told(battery.cells), told(battery.capacity_mah));
     out += "powerplant.meter_delay_s = struct();\n";
     plant.late.iter().for_each(|(channel, s)| out += &format!("powerplant.meter_delay_s.{channel} = {s:.5};\n"));
     out

@@ -5,19 +5,23 @@
 //! Units: in the names of the columns.
 //! Reference: RFC 4180.
 
-use super::{Powerplant, comments, full, off};
+use super::{Battery, Powerplant, comments, full, off};
 
 /// The table.
-pub(super) fn text(plant: &Powerplant, cells: Option<u32>) -> String {
+pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
     let mut head = vec![plant.title(), full(plant), "file: https://www.rfc-editor.org/rfc/rfc4180".to_owned()];
     head.push(format!("linear between the rows; {}", off(plant.off_percent(|u| plant.share(u)))));
     head.extend(plant.beside());
     if plant.latency_s.is_none() {
         head.push("latency of the rotor's answer: the model holds none".to_owned());
     }
-    head.push(match cells {
+    head.push(match battery.cells {
         Some(cells) => format!("battery that will fly: {cells} cells"),
         None => "battery that will fly: not known (--cells)".to_owned(),
+    });
+    head.push(match battery.capacity_mah {
+        Some(capacity) => format!("capacity of the battery that will fly: {capacity} mAh"),
+        None => "capacity of the battery that will fly: not known (--capacity)".to_owned(),
     });
     let mut out = comments("#", &head) + "pulse_us,signal,rpm,thrust_n,torque_nm,current_a,voltage_v\n";
     for p in &plant.points {

@@ -11,7 +11,8 @@ use super::{Outcome, Recorded, Tried};
 use ident::close::Closed;
 use ident::context::unit_of;
 use ident::report::{Figure, Layer};
-use ident::verdict::{EffectEntry, Kind};
+use ident::verdict::{EffectEntry, Kind, Parameter};
+use ident::words::{channel, list, plain, upper};
 use std::fmt::Write;
 
 /// Runs above which a set is summed up instead of shown run by run.
@@ -85,12 +86,32 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
                 run.name,
                 figure_name(run, entry),
                 run.name,
-                entry.evidence
+                sentences(&entry.evidence)
             );
             let _ = closed;
         }
     }
     out
+}
+
+/// Parameters with their intervals. A term without a name is said in words; the verdict has its coefficients.
+fn parameters(e: &EffectEntry) -> String {
+    if e.id == "unknown" {
+        let of: Vec<String> = e.depends_on.iter().map(|d| channel(d)).collect();
+        return if of.is_empty() {
+            "no correction".to_owned()
+        } else {
+            format!("a smooth function of {}, whose coefficients the verdict has", list(&of))
+        };
+    }
+    let told =
+        |p: &Parameter| format!("{} = {} {} ({} to {})", p.name, three(p.value), p.unit, three(p.ci95[0]), three(p.ci95[1]));
+    e.parameters.iter().map(told).collect::<Vec<_>>().join(", ")
+}
+
+/// Clauses as sentences of their own.
+fn sentences(evidence: &str) -> String {
+    plain(evidence).split("; ").map(upper).collect::<Vec<_>>().join(". ")
 }
 
 /// The row of a set in the summary.
@@ -231,19 +252,14 @@ fn run(out: &mut String, figures: &mut Vec<Figure>, run: &Recorded, closed: &Clo
         );
     }
     for e in &v.effects {
-        let parameters: Vec<String> = e
-            .parameters
-            .iter()
-            .map(|p| format!("{} = {} {} ({} to {})", p.name, three(p.value), p.unit, three(p.ci95[0]), three(p.ci95[1])))
-            .collect();
         let _ = writeln!(
             out,
             "\n**{}** (p = {:.2}) on {}: {}. {}.",
             e.id,
             e.probability,
             e.channels.join(", "),
-            parameters.join(", "),
-            e.evidence
+            parameters(e),
+            sentences(&e.evidence)
         );
     }
     if !v.alternatives.is_empty() {

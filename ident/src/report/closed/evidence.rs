@@ -215,20 +215,29 @@ fn usual(values: &[f64]) -> f64 {
     sizes.get((sizes.len() * 199 / 200).min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
-/// Values over time, with a hole where samples are missing for long.
+/// Values over time, with a hole where samples are missing for long. A channel that is slower than the log has no sample on most rows: its samples
+/// are joined.
 pub(crate) fn lifted(t: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    let there: Vec<(f64, f64)> = t.iter().copied().zip(y.iter().copied()).filter(|p| p.1.is_finite()).collect();
+    let mut steps: Vec<f64> = there.windows(2).map(|w| w[1].0 - w[0].0).collect();
     let usual = if steps.is_empty() { 0.0 } else { median(&mut steps) };
-    let (mut x, mut out) = (Vec::with_capacity(t.len()), Vec::with_capacity(t.len()));
-    for i in 0..t.len() {
-        if i > 0 && t[i] - t[i - 1] > GAP * usual {
-            x.push(t[i - 1]);
+    let (mut x, mut out) = (Vec::with_capacity(there.len()), Vec::with_capacity(there.len()));
+    for (i, (t, y)) in there.iter().enumerate() {
+        if i > 0 && t - there[i - 1].0 > GAP * usual {
+            x.push(there[i - 1].0);
             out.push(f64::NAN);
         }
-        x.push(t[i]);
-        out.push(y[i]);
+        x.push(*t);
+        out.push(*y);
     }
     (x, out)
+}
+
+/// Whether a variable moved, so that something can be drawn against it.
+pub(crate) fn moves(x: &[f64]) -> bool {
+    let finite = || x.iter().copied().filter(|v| v.is_finite());
+    let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    high - low > 1e-9 * high.abs().max(low.abs())
 }
 
 /// A figure whose lines and clouds hold no more points than its pixels show. A line that would fill its own noise as a block is told by the mean
@@ -429,6 +438,23 @@ mod tests {
         assert!(figure.title.ends_with("(1 off the scale)"), "{}", figure.title);
         let Some(Layer::Dots { y, .. }) = figure.layers.iter().find(|l| matches!(l, Layer::Dots { .. })) else { panic!("dots") };
         assert!(y.iter().all(|v| v.abs() < 1.0));
+    }
+
+    /// A magnetometer that is read on every third row: its samples are a line, and a long hole parts it.
+    #[test]
+    fn a_slower_channel_is_a_line() {
+        let t: Vec<f64> = (0..1200).map(|i| 0.005 * f64::from(i)).collect();
+        let slow = |i: &u32| i.is_multiple_of(3) && !(600..800).contains(i);
+        let before: Vec<f64> = (0..1200).map(|i| if slow(&i) { 5.0 } else { f64::NAN }).collect();
+        let trace = Trace { channel: "mag_x".into(), t, after: before.clone(), before, ..Trace::default() };
+        let figure = over_time(&trace, "x", ["before", "after"]);
+        let Some(Layer::Line { y, .. }) = figure.layers.first() else { panic!("a line") };
+        assert_eq!((y.iter().filter(|v| v.is_finite()).count(), y.iter().filter(|v| !v.is_finite()).count()), (333, 1));
+    }
+
+    #[test]
+    fn nothing_is_drawn_against_what_stands_still() {
+        assert!(!moves(&[]) && !moves(&[0.0, 0.0, f64::NAN]) && !moves(&[4.2; 5]) && moves(&[0.0, 0.1]));
     }
 
     #[test]

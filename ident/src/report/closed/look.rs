@@ -12,7 +12,7 @@ pub(crate) const LOOK: &str = "
 .told h2 a,.told h3 a{color:inherit;text-decoration:none}.told h2 a:hover::after{content:' #';color:var(--soft)}
 .told a{color:var(--a)}
 .state{margin:1.2rem 0 .4rem;border-top:1px solid var(--grid)}
-.state .row,.state .head{display:grid;grid-template-columns:12.5rem minmax(7rem,1fr) 9rem 9rem 4rem 8.4rem;gap:.7rem;align-items:center;border-bottom:1px solid var(--grid);padding:.3rem 0}
+.state .row,.state .head{display:grid;grid-template-columns:16rem minmax(7rem,1fr) 9rem 9rem 4rem 8.4rem;gap:.7rem;align-items:center;border-bottom:1px solid var(--grid);padding:.3rem 0}
 .state .head{color:var(--soft);font-size:.85rem}.state .head span:nth-child(n+3):nth-child(-n+5),.state .num{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .state .axis{position:relative;height:1.2rem}.state .axis i{position:absolute;font-style:normal;transform:translateX(-50%);white-space:nowrap}
 .state .axis i.end{transform:translateX(-100%)}.state .track{position:relative;height:1.7rem;display:block}.state .track i{position:absolute;top:-.3rem;bottom:-.3rem;border-left:1px solid var(--grid)}.state .track i.floor{border-left:2px solid var(--fg)}

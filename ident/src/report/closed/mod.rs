@@ -18,7 +18,7 @@ mod state;
 mod terminal;
 mod vocabulary;
 
-pub(crate) use evidence::{ALONE, Trace, against, enlarged, lifted, most, over_time, pair, part, rest, slug, thinned};
+pub(crate) use evidence::{ALONE, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, slug, thinned};
 pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};
 pub(crate) use page::{Page, begin};

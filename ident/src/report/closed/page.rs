@@ -45,8 +45,14 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     let mut sheet = Sheet::told(&format!("{of_what}: what the model lacks"), &sentence(v, page.words, page.news));
     sheet.soft(&page.origin.line());
     sheet.html_part(&state::bars(&v.channels, &v.unexplained, pair(v)));
-    for lack in &page.origin.lacks {
-        sheet.warn(&format!("{lack}."));
+    match page.origin.lacks.as_slice() {
+        [lack] => sheet.warn(&format!("{lack}.")),
+        [lack, others @ ..] => {
+            let runs =
+                if others.len() == 1 { "One more run lacks".to_owned() } else { format!("{} more runs lack", others.len()) };
+            sheet.warn(&format!("{lack}. {runs} rows, told under \"Rows that are missing\"."));
+        }
+        [] => {}
     }
     for l in &v.left_out {
         sheet.warn(&format!("Left out: {l}."));
@@ -91,6 +97,9 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     }
     provenance(&mut sheet, &page.origin, v);
     sheet.section("More");
+    if page.origin.lacks.len() > 1 {
+        sheet.fold("Rows that are missing", |sheet| page.origin.lacks.iter().for_each(|lack| sheet.say(&format!("{lack}."))));
+    }
     sheet.fold("Every channel in numbers", |sheet| {
         sheet.say(&page.declared);
         fold::channels(sheet, v, page.words.held_out);

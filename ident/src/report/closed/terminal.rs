@@ -12,7 +12,7 @@ use super::state::{factor, figures, word};
 use super::vocabulary::Vocabulary;
 use crate::context::unit_of;
 use crate::verdict::{EffectEntry, Verdict};
-use crate::words::{self, channel, list, probability, signs, upper, upper_bound};
+use crate::words::{self, channel, list, plain, probability, signs, upper, upper_bound};
 
 /// Columns of the widest line.
 pub const WIDEST: usize = 100;
@@ -58,7 +58,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         for (name, b) in &v.channels {
             let unit = verdict.channels.get(name).map_or(unit_of(name), |c| c.unit.as_str());
             let [_, before, after] = figures(unit, b.before, b.before, b.after);
-            out += &format!("  {name:<14}{before:>18}{after:>18}{:>10}\n", factor(b.before, b.after));
+            out += &format!("  {:<16}{before:>18}{after:>18}{:>10}\n", channel(name), factor(b.before, b.after));
         }
     }
     out
@@ -82,16 +82,22 @@ fn whose(verdict: &Verdict) -> String {
 
 fn channels(verdict: &Verdict) -> String {
     let error = if verdict.runs.is_empty() { "held-out error" } else { "across runs" };
-    let mut out = format!("\n{:<16}{:>16}{:>16}{:>16}{:>9}  {}\n", error, "noise floor", "before", "after", "factor", "state");
+    let names = verdict.channels.keys().chain(verdict.channels.not_predicted.keys());
+    // as wide as the longest name asks for, the figures closer together beside one
+    let first = names.map(|name| channel(name).chars().count() + 1).fold(16, usize::max);
+    let wide = ((WIDEST - 28 - first) / 3).min(16);
+    let mut out =
+        format!("\n{error:<first$}{:>wide$}{:>wide$}{:>wide$}{:>9}  {}\n", "noise floor", "before", "after", "factor", "state");
     for (name, c) in &verdict.channels {
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
         let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
         let left = verdict.unexplained.iter().any(|u| u.channel == *name);
         let times = factor(c.before.heldout_rms, c.after.heldout_rms);
-        out += &format!("{name:<16}{floor:>16}{before:>16}{after:>16}{times:>9}  {}\n", word(floors, left));
+        let said = channel(name);
+        out += &format!("{said:<first$}{floor:>wide$}{before:>wide$}{after:>wide$}{times:>9}  {}\n", word(floors, left));
     }
     for (name, reason) in &verdict.channels.not_predicted {
-        out += &format!("{name:<16}not predicted: {reason}\n");
+        out += &format!("{:<first$}not predicted: {reason}\n", channel(name));
     }
     out
 }
@@ -120,7 +126,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
     if !removes.is_empty() {
         out += &format!("    {}\n", wrapped(&removes, 4));
     }
-    out + &format!("    {}\n", wrapped(&format!("evidence: {}", signs(&e.evidence)), 4))
+    out + &format!("    {}\n", wrapped(&format!("evidence: {}", plain(signs(&e.evidence))), 4))
 }
 
 fn left(verdict: &Verdict) -> String {
@@ -134,7 +140,7 @@ fn left(verdict: &Verdict) -> String {
         let size = size_left(verdict, u);
         out += &format!(
             "  {}\n",
-            wrapped(&format!("{}: {size}, {:.1} noise floors, {}{on}", u.channel, u.over_floor, u.looks_like), 4)
+            wrapped(&format!("{}: {size}, {:.1} noise floors, {}{on}", channel(&u.channel), u.over_floor, u.looks_like), 4)
         );
     }
     out
