@@ -38,8 +38,24 @@ fn families(top: f64) -> Vec<(&'static str, Vec<ScheduleStep>)> {
 #[must_use]
 pub fn next(context: &Context, declared: Declared<'_>, model: &Model, diagnosis: &Diagnosis) -> Option<NextExperiment> {
     let rival = diagnosis.rivals.first()?;
-    let names = [diagnosis.best.ids().join(" + "), rival.ids.join(" + ")];
-    between(context, model, &model_of(context, declared, &rival.fit), &names)
+    between(context, model, &model_of(context, declared, &rival.fit), &apart(diagnosis.best.ids(), rival.ids.clone()))
+}
+
+/// What each of two hypotheses has and the other lacks; what both have is no question.
+fn apart(own: Vec<String>, rival: Vec<String>) -> [String; 2] {
+    let less = |of: &[String], other: &[String]| {
+        let mut other = other.to_vec();
+        let mut left = of.to_vec();
+        left.retain(|id| match other.iter().position(|o| o == id) {
+            Some(at) => {
+                other.swap_remove(at);
+                false
+            }
+            None => id != "unknown",
+        });
+        if left.is_empty() { "nothing more".to_owned() } else { left.join(" + ") }
+    };
+    [less(&own, &rival), less(&rival, &own)]
 }
 
 /// The model that a fit of a log makes.
@@ -236,6 +252,14 @@ mod tests {
             assert!(next.why.contains("another ambient temperature"), "{}", next.why);
             assert!(!next.schedule.is_empty());
         }
+    }
+
+    #[test]
+    fn only_what_differs_is_a_question() {
+        let ids = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<Vec<String>>();
+        let both = apart(ids(&["spinup_lag", "reynolds_thrust", "unknown"]), ids(&["spinup_lag", "torque_crosstalk"]));
+        assert_eq!(both, ["reynolds_thrust", "torque_crosstalk"]);
+        assert_eq!(apart(ids(&["glitch_rows", "glitch_rows"]), ids(&["glitch_rows"])), ["glitch_rows", "nothing more"]);
     }
 
     #[test]

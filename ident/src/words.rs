@@ -50,6 +50,12 @@ impl Clause {
 }
 
 impl EffectEntry {
+    /// Whether it tells of a few readings alone: of no cause that a rig has, and not worth a headline beside one.
+    #[must_use]
+    pub fn is_of_single_readings(&self) -> bool {
+        self.id == "glitch_rows"
+    }
+
     /// A parameter.
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
@@ -120,7 +126,7 @@ impl EffectEntry {
 #[must_use]
 pub fn scope(scope: Scope, noun: &str) -> String {
     match scope {
-        Scope::Rig => format!("of the {noun}: it is there on every run"),
+        Scope::Rig => format!("of the {noun}: expected on every run"),
         Scope::Run => "of this run: another run has a value of its own".to_owned(),
         Scope::Event => "of one instant: it does not recur by itself".to_owned(),
     }
@@ -377,6 +383,23 @@ pub fn digits(value: f64, half: f64) -> String {
         return format!("{:.0}", (value / unit).round() * unit);
     }
     format!("{value:.*}", places as usize)
+}
+
+/// A value and the ends of its interval, with so many digits that the three differ.
+#[must_use]
+pub fn with_interval(value: f64, [low, high]: [f64; 2]) -> [String; 3] {
+    let half = 0.5 * (high - low).abs();
+    let said = [value, low, high].map(|v| digits(v, if half > 0.0 { 0.1 * half } else { 0.0 }));
+    if said[1] != said[2] || half <= 0.0 || !half.is_finite() {
+        return said;
+    }
+    // to the second digit of the half width
+    let last = half.log10().floor() - 1.0;
+    let power = [value, low, high].iter().map(|v| v.abs()).fold(0.0, f64::max).log10().floor();
+    if (-3.0..5.0).contains(&power) {
+        return [value, low, high].map(|v| format!("{v:.*}", (-last).max(0.0) as usize));
+    }
+    [value, low, high].map(|v| format!("{:.*}e{power}", (power - last).max(0.0) as usize, v / 10f64.powf(power)))
 }
 
 /// A value with the half width of its 95 % interval in brackets, in units of its last digit: `0.0498(5)`. `None` without either.

@@ -18,6 +18,7 @@ use ident::context::{Context, unit_of};
 use ident::log::Log;
 use ident::plateau::plateaus;
 use ident::report::{Hidden, Origin, Vocabulary, number, terminal, wrapped};
+use ident::words::{amount, channel};
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -111,8 +112,8 @@ fn resimulated(model: &ident::model::Model, again: &Log) -> String {
         let Some(prediction) = model.predict(&context, target.name) else { continue };
         let residual: Vec<f64> = target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).collect();
         let rms = (residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64).sqrt();
-        let unit = unit_of(target.name);
-        out += &format!("  {:<12} rms {:>10.5} {unit}, noise floor {:>10.5} {unit}\n", target.name, rms, target.noise.rms);
+        let [left, floor] = [rms, target.noise.rms].map(|v| amount(v, unit_of(target.name)));
+        out += &format!("  {:<16}{left:>14} left, noise floor {floor}\n", channel(target.name));
     }
     out
 }

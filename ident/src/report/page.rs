@@ -14,6 +14,8 @@ use super::sheet::Sheet;
 use crate::close::Closed;
 use crate::context::{Context, DIFFERENCES, Target, unit_of};
 use crate::effects::unknown::variable;
+use crate::experiment::model_of;
+use crate::hypothesis::{Declared, Rows, fit};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
@@ -97,10 +99,12 @@ fn trace(closed: &Closed, target: &Target) -> Option<Trace> {
 fn hero(closed: &Closed) -> Vec<Figure> {
     let v = &closed.verdict;
     let own = |e: &&EffectEntry| e.id != "unknown" && !(Vocabulary::RIG.of_every_rig)(e);
-    let named: Vec<&str> = v.effects.iter().filter(own).filter_map(|e| e.channels.first()).map(String::as_str).collect();
+    // what the sentence begins with
+    let first = v.effects.iter().filter(own).filter(|e| !e.is_of_single_readings());
+    let first =
+        first.max_by(|a, b| a.heldout_error_reduction.total_cmp(&b.heldout_error_reduction)).and_then(|e| e.channels.first());
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
-    let traces: Vec<Trace> =
-        targets.filter(|t| named.is_empty() || named.contains(&t.name)).filter_map(|t| trace(closed, t)).collect();
+    let traces: Vec<Trace> = targets.filter(|t| first.is_none_or(|c| *c == t.name)).filter_map(|t| trace(closed, t)).collect();
     parts::most(&closed.verdict, &traces)
 }
 
@@ -141,10 +145,8 @@ pub(super) fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
 
 fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<Vec<Figure>> {
     let (context, target) = (&closed.context, target(closed, e.channels.first()?)?);
-    let mut without = closed.model.clone();
-    without.effects.remove(position);
     let whole = trace(closed, target)?;
-    let trace = whole.with_before(residual(context, target, &without)?);
+    let trace = whole.with_before(residual(context, target, &without(closed, position)?)?);
     if trace.before == trace.after {
         return None;
     }
@@ -162,6 +164,19 @@ fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<V
         },
     };
     Some(vec![figure])
+}
+
+/// The model without one of its effects. Where nothing was declared all others are fitted again, as they would be by who does not know of it.
+fn without(closed: &Closed, position: usize) -> Option<Model> {
+    let mut others = closed.diagnosis.best.fit.placed.clone();
+    if closed.context.against_model || position >= others.len() {
+        let mut model = closed.model.clone();
+        model.effects.remove(position);
+        return Some(model);
+    }
+    others.remove(position);
+    let fit = fit(&closed.context, Declared::default(), &others, None, Rows::All)?;
+    Some(model_of(&closed.context, Declared::default(), &fit))
 }
 
 /// Unit of a variable: of a column its own, of what adds up over a run that of the sum.

@@ -123,10 +123,10 @@ pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
         .constants
         .iter()
         .map(|c| {
-            let fine = |v: f64| words::digits(v, 0.1 * c.half);
-            let interval = format!("{} to {}", fine(c.value - c.half), fine(c.value + c.half));
+            let [value, low, high] = words::with_interval(c.value, [c.value - c.half, c.value + c.half]);
+            let interval = format!("{low} to {high}");
             let law = c.law.map_or_else(|| "-".to_owned(), |law| law.words());
-            vec![format!("{}, {}", c.words(), c.name), fine(c.value), interval, c.unit.to_owned(), law]
+            vec![format!("{}, {}", c.words(), c.name), value, interval, c.unit.to_owned(), law]
         })
         .collect();
     let all = |v: f64| format!("{v}");

@@ -16,19 +16,29 @@ use crate::rivals::UNEXPLAINED;
 use crate::verdict::{EffectEntry, Parameter, Verdict};
 use crate::words::{
     channel, channels, counted, digits, formula, lower, plain, probability, scaled, scope, signs, sized, sureness, upper,
-    upper_bound,
+    upper_bound, with_interval,
 };
 use std::fmt::Write;
 
 /// Probability below which the card says how to settle it.
 const SETTLED: f64 = 0.85;
 
+/// Probability from which on what no hypothesis has is told.
+const OPEN: f64 = 0.05;
+
+/// Effects in the order in which they are told: what removes most first, what a few readings hold last.
+pub(super) fn order(v: &Verdict) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..v.effects.len()).collect();
+    let removed = |k: &usize| v.effects[*k].heldout_error_reduction;
+    let of_readings = |k: &usize| v.effects[*k].is_of_single_readings();
+    order.sort_by(|a, b| of_readings(a).cmp(&of_readings(b)).then(removed(b).total_cmp(&removed(a))).then(a.cmp(b)));
+    order
+}
+
 /// The cards: those of this rig, those of every rig, and corrections without a name.
 pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     let v = page.verdict;
-    let mut order: Vec<usize> = (0..v.effects.len()).collect();
-    let removed = |k: &usize| v.effects[*k].heldout_error_reduction;
-    order.sort_by(|a, b| removed(b).total_cmp(&removed(a)).then(a.cmp(b)));
+    let order = order(v);
     let group = |e: &EffectEntry| match e.id.as_str() {
         "unknown" => 2,
         _ if (page.words.of_every_rig)(e) => 1,
@@ -102,7 +112,9 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
         escape(equation),
         escape(&upper(&plain(signs(&e.evidence))))
     );
-    let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
+    if !nameless {
+        let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
+    }
     if let Some(how) = settle(page, e) {
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
     }
@@ -166,9 +178,8 @@ pub(super) fn value(p: &Parameter) -> [String; 3] {
         return [count.clone(), format!("{count} to {count}"), unit_of(&p.unit)];
     }
     let (factor, unit) = scaled(p.value, &p.unit);
-    let half = factor * 0.5 * (p.ci95[1] - p.ci95[0]).abs();
-    let fine = |v: f64| digits(factor * v, if half > 0.0 { 0.1 * half } else { 0.0 });
-    [fine(p.value), format!("{} to {}", fine(p.ci95[0]), fine(p.ci95[1])), unit_of(unit)]
+    let [v, low, high] = with_interval(factor * p.value, p.ci95.map(|v| factor * v));
+    [v, format!("{low} to {high}"), unit_of(unit)]
 }
 
 /// Whether a reader asks for a parameter: not where in its row a step lies, nor since when what was there before the run.
@@ -207,7 +218,7 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
     let v = page.verdict;
     let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
     let here = v.effects.iter().filter(|b| b.id == e.id).count();
-    let mut found: Vec<String> = Vec::new();
+    let (mut found, mut given): (Vec<String>, f64) = (Vec::new(), 0.0);
     for a in &v.alternatives {
         let lacks = a.ids.iter().filter(|id| **id == e.id).count() < here;
         let instead = instead(&best, &a.ids);
@@ -218,6 +229,7 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
                 instead.iter().map(|id| title(page, id)).collect::<Vec<_>>().join(", and ")
             };
             found.push(format!("{what} ({})", probability(a.probability)));
+            given += a.probability;
         }
     }
     let known = (page.words.about)(&e.id).map(|a| a.look_alikes).unwrap_or_default();
@@ -225,11 +237,15 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
     let told = |title: &String| found.iter().any(|f| f.starts_with(&format!("{title} (")));
     let alike: Vec<String> = known.iter().map(|id| title(page, id)).filter(|title| !told(title)).collect();
     let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
-    let found = match found.is_empty() {
-        true if e.probability < SETTLED && e.id != "unknown" => "another form of it, or what it is easily taken for.".to_owned(),
-        true => "nothing else that was tried came close.".to_owned(),
-        false => format!("{}.", found.join("; ")),
-    };
+    // what neither the effect nor a hypothesis without it has
+    let open = 1.0 - e.probability - given;
+    if open >= OPEN {
+        let what =
+            if found.is_empty() { "no other name came close; that it is no cause of its own" } else { "no cause of its own" };
+        found.push(format!("{what} ({})", probability(open)));
+    }
+    let found =
+        if found.is_empty() { "nothing else that was tried came close.".to_owned() } else { format!("{}.", found.join("; ")) };
     format!("{found}{alike}")
 }
 

@@ -10,7 +10,8 @@ use super::sentence::size_left;
 use super::vocabulary::Vocabulary;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
-use crate::words::{channel, heading, lower, plain, upper};
+use crate::verdict::Verdict;
+use crate::words::{amount, channel, heading, lower, plain, upper};
 
 /// What is left.
 pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
@@ -33,7 +34,22 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
         return;
     }
     sheet.data("unexplained", &["channel", "noise floors", "size", "looks like", "goes with"], &rows, None);
+    // a figure of rows that the fit saw says nothing of those that it did not see
+    let seen: Vec<String> = v.unexplained.iter().filter(with_model).filter_map(|u| beyond_what_was_seen(v, &u.channel)).collect();
+    seen.iter().for_each(|said| sheet.say(said));
     sheet.figures(page.left.clone());
+}
+
+/// Times the error on rows that the fit saw from which on that on rows it did not see is told apart.
+const BEYOND: f64 = 2.0;
+
+/// What is said of a channel whose left-out rows are missed by much more than those that the fit saw.
+fn beyond_what_was_seen(v: &Verdict, name: &str) -> Option<String> {
+    let c = v.channels.get(name)?;
+    let [out, seen] = [c.after.heldout_rms, c.after.rms].map(|rms| amount(rms, &c.unit));
+    (c.after.heldout_rms > BEYOND * c.after.rms).then(|| {
+        format!("The figures show all rows, which the fit saw: on {} it is off by {seen}. Rows that are left out are missed by {out}: the others do not tell what lies between or beyond them.", channel(name))
+    })
 }
 
 /// A text in which causes and columns are told in words.

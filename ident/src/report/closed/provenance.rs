@@ -5,11 +5,12 @@
 //! Units: none.
 //! Reference: specification `report.md`.
 
+use super::cards::{is_shown, value};
 use crate::log::{Gaps, Log, digest_of};
 use crate::model::FittedTo;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
-use crate::verdict::{EffectEntry, Kin, Verdict};
+use crate::verdict::{EffectEntry, Kin, Parameter, Verdict};
 use crate::words::{list, upper};
 use std::collections::BTreeMap;
 
@@ -31,7 +32,8 @@ impl Hidden {
         let sizes = if self.parameters.is_empty() { String::new() } else { format!(" ({})", self.parameters.join(", ")) };
         let named: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
         let found = named.iter().any(|e| e.id == self.id);
-        let mut out = vec![format!("hidden was {}: {}{sizes}", self.id, if found { "found" } else { "NOT FOUND" })];
+        let mut out = vec![format!("hidden was {}{sizes}: {}", self.id, if found { "found" } else { "NOT FOUND" })];
+        out.extend(named.iter().find(|e| e.id == self.id).and_then(|e| as_found(e)));
         if found {
             out.push(format!("true of the names: {}", self.id));
         }
@@ -52,6 +54,16 @@ impl Hidden {
         }
         out
     }
+}
+
+/// The sizes with which an effect was found.
+fn as_found(e: &EffectEntry) -> Option<String> {
+    let size = |p: &Parameter| {
+        let [v, interval, unit] = value(p);
+        format!("{} = {} (95 %: {interval})", p.name, format!("{v} {unit}").trim_end())
+    };
+    let sizes: Vec<String> = e.parameters.iter().filter(|p| is_shown(e, p)).map(size).collect();
+    (!sizes.is_empty()).then(|| format!("found with {}", sizes.join(", ")))
 }
 
 /// Where a run comes from.

@@ -47,7 +47,8 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
 /// The effects with a name, what removes most first: those of this rig, and those of every rig.
 fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&EffectEntry>) {
     let mut all: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
-    all.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
+    let last = EffectEntry::is_of_single_readings;
+    all.sort_by(|a, b| last(a).cmp(&last(b)).then(b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction)));
     all.into_iter().partition(|e| !(words.of_every_rig)(e))
 }
 
@@ -62,7 +63,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     let all = if own.is_empty() { &common } else { &own };
     // what takes next to nothing stands on its card alone, unless there is nothing else
-    let large = |e: &&&EffectEntry| e.heldout_error_reduction >= SMALL || all.len() == 1;
+    let large = |e: &&&EffectEntry| (e.heldout_error_reduction >= SMALL && !e.is_of_single_readings()) || all.len() == 1;
     let mut told: Vec<&EffectEntry> = all.iter().filter(large).take(MOST).copied().collect();
     if told.is_empty() {
         told = all.iter().take(1).copied().collect();
@@ -194,7 +195,7 @@ fn joined_lower(clauses: &[String]) -> String {
 }
 
 /// Effects of the best hypothesis that another one lacks.
-fn without<'e>(best: &[&'e EffectEntry], ids: &[String]) -> Vec<&'e EffectEntry> {
+pub(super) fn without<'e>(best: &[&'e EffectEntry], ids: &[String]) -> Vec<&'e EffectEntry> {
     let mut ids: Vec<&String> = ids.iter().collect();
     let mut out = Vec::new();
     for e in best {

@@ -5,13 +5,13 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{is_shown, removes, that_it_is_there, value};
+use super::cards::{is_shown, order, removes, that_it_is_there, value};
 use super::left::in_words;
-use super::sentence::{sentence, size_left};
+use super::sentence::{instead, sentence, size_left, without};
 use super::state::{factor, figures, word};
 use super::vocabulary::Vocabulary;
 use crate::context::unit_of;
-use crate::verdict::{EffectEntry, Verdict};
+use crate::verdict::{Alternative, Channel, EffectEntry, Verdict};
 use crate::words::{self, channel, list, plain, probability, signs, upper, upper_bound};
 
 /// Columns of the widest line.
@@ -22,12 +22,17 @@ const ASIDE: usize = 5;
 /// The text.
 #[must_use]
 pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
-    let mut out = format!("{}\n{}\n", wrapped(&sentence(verdict, words, news), 0), wrapped(&whose(verdict), 0));
+    let said = sentence(verdict, words, news);
+    let mut out = format!("{}\n{}\n", wrapped(&said, 0), wrapped(&whose(verdict), 0));
     out += &channels(verdict);
+    if said.contains(" % of what ") {
+        out += "(per cent of the squared error above the noise floor: 75 % less is half the error)\n";
+    }
     for left_out in &verdict.left_out {
         out += &format!("{}\n", wrapped(&left_out.to_string(), 2));
     }
-    let (named, nameless): (Vec<&EffectEntry>, Vec<&EffectEntry>) = verdict.effects.iter().partition(|e| e.id != "unknown");
+    let all = order(verdict).into_iter().map(|k| &verdict.effects[k]);
+    let (named, nameless): (Vec<&EffectEntry>, Vec<&EffectEntry>) = all.partition(|e| e.id != "unknown");
     let (own, common): (Vec<&EffectEntry>, Vec<&EffectEntry>) = named.into_iter().partition(|e| !(words.of_every_rig)(e));
     let noun = words.noun;
     let [this, every] = [format!("what this {noun} has"), format!("what every {noun} has")];
@@ -40,9 +45,8 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     out += &left(verdict);
     out += &set_aside(verdict);
     if !verdict.alternatives.is_empty() {
-        let all: Vec<String> =
-            verdict.alternatives.iter().map(|a| format!("{} ({})", together(&a.ids), probability(a.probability))).collect();
-        out += &format!("\n{}\n", wrapped(&format!("alternatives: {}", all.join(", ")), 2));
+        let all: Vec<String> = verdict.alternatives.iter().map(|a| alternative(verdict, a)).collect();
+        out += &format!("\n{}\n", wrapped(&format!("alternatives: {}", all.join("; ")), 2));
     }
     if let Some(next) = &verdict.next_experiment {
         let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us {} s", s.pulse_us, s.hold_s)).collect();
@@ -64,11 +68,18 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     out
 }
 
-/// Names side by side; what has none is said once.
-fn together(ids: &[String]) -> String {
-    let (nameless, mut named): (Vec<&str>, Vec<&str>) = ids.iter().map(String::as_str).partition(|id| *id == "unknown");
-    named.extend(nameless.first());
-    named.join(" + ")
+/// By what another hypothesis differs: what it has, and what it does without.
+fn alternative(verdict: &Verdict, other: &Alternative) -> String {
+    let best: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
+    let more = instead(&best, &other.ids).join(" + ");
+    let less = without(&best, &other.ids).iter().map(|e| e.id.as_str()).collect::<Vec<_>>().join(" + ");
+    let said = match (more.is_empty(), less.is_empty()) {
+        (false, false) => format!("{more} in the place of {less}"),
+        (false, true) => format!("{more} as well"),
+        (true, false) => format!("without {less}"),
+        (true, true) => other.ids.join(" + "),
+    };
+    format!("{said} ({})", probability(other.probability))
 }
 
 /// The run, or the runs.
@@ -82,19 +93,26 @@ fn whose(verdict: &Verdict) -> String {
 
 fn channels(verdict: &Verdict) -> String {
     let error = if verdict.runs.is_empty() { "held-out error" } else { "across runs" };
-    let names = verdict.channels.keys().chain(verdict.channels.not_predicted.keys());
-    // as wide as the longest name asks for, the figures closer together beside one
-    let first = names.map(|name| channel(name).chars().count() + 1).fold(16, usize::max);
-    let wide = ((WIDEST - 28 - first) / 3).min(16);
-    let mut out =
-        format!("\n{error:<first$}{:>wide$}{:>wide$}{:>wide$}{:>9}  {}\n", "noise floor", "before", "after", "factor", "state");
-    for (name, c) in &verdict.channels {
+    let row = |(name, c): (&String, &Channel)| {
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
         let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
         let left = verdict.unexplained.iter().any(|u| u.channel == *name);
         let times = factor(c.before.heldout_rms, c.after.heldout_rms);
-        let said = channel(name);
-        out += &format!("{said:<first$}{floor:>wide$}{before:>wide$}{after:>wide$}{times:>9}  {}\n", word(floors, left));
+        [channel(name), floor, before, after, times, word(floors, left).to_owned()]
+    };
+    let head = [error, "noise floor", "before", "after", "factor", "state"].map(str::to_owned);
+    let rows: Vec<[String; 6]> = std::iter::once(head).chain(verdict.channels.iter().map(row)).collect();
+    let letters = |text: &str| text.chars().count();
+    let longest = |k: usize| rows.iter().map(|r| letters(&r[k])).max().unwrap_or_default();
+    let names = verdict.channels.not_predicted.keys();
+    let first = names.map(|name| letters(&channel(name))).chain([longest(0), 15]).max().unwrap_or_default() + 1;
+    // figures stand well apart where there is room, and never touch
+    let room = WIDEST.saturating_sub(first + longest(5) + 2) / 4;
+    let wide = |k: usize| (longest(k) + 1).max(room.min(if k == 4 { 9 } else { 16 }));
+    let mut out = String::from("\n");
+    for [name, floor, before, after, times, state] in &rows {
+        let [a, b, c, d] = [1, 2, 3, 4].map(wide);
+        out += &format!("{name:<first$}{floor:>a$}{before:>b$}{after:>c$}{times:>d$}  {state}\n");
     }
     for (name, reason) in &verdict.channels.not_predicted {
         out += &format!("{:<first$}not predicted: {reason}\n", channel(name));
