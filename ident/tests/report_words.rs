@@ -276,7 +276,8 @@ fn a_demonstration_judges_its_names() {
     let v = verdict(Kind::Attributed, vec![sag(0.9), lag, filter(0.9), row]);
     let said = hidden("supply_sag").judged(&v).join("\n");
     for word in [
-        "hidden was supply_sag (resistance = 0.041 ohm): found",
+        "hidden was supply_sag: found",
+        "hidden with resistance = 0.041 ohm",
         "found with resistance = ",
         "true of every rig, the simulated one too: spinup_lag",
         "where in its row a reading lies, no effect that anybody hides: channel_delay",
@@ -284,7 +285,7 @@ fn a_demonstration_judges_its_names() {
     ] {
         assert!(said.contains(word), "{said}");
     }
-    assert!(hidden("creep").judged(&v)[0].starts_with("hidden was creep (resistance = 0.041 ohm): NOT FOUND"));
+    assert!(hidden("creep").judged(&v)[0].starts_with("hidden was creep: NOT FOUND"));
 }
 
 /// Every effect of a flight says what it does, with its size where the flight shows it.

@@ -18,7 +18,7 @@ use ident::context::{Context, unit_of};
 use ident::log::Log;
 use ident::plateau::plateaus;
 use ident::report::{Hidden, Origin, Vocabulary, number, terminal, wrapped};
-use ident::words::{amount, channel};
+use ident::words::{channel, digits, scaled};
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -112,7 +112,8 @@ fn resimulated(model: &ident::model::Model, again: &Log) -> String {
         let Some(prediction) = model.predict(&context, target.name) else { continue };
         let residual: Vec<f64> = target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).collect();
         let rms = (residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64).sqrt();
-        let [left, floor] = [rms, target.noise.rms].map(|v| amount(v, unit_of(target.name)));
+        let (factor, unit) = scaled(rms.max(target.noise.rms), unit_of(target.name));
+        let [left, floor] = [rms, target.noise.rms].map(|v| format!("{} {unit}", digits(factor * v, 0.005 * factor * v)));
         out += &format!("  {:<16}{left:>14} left, noise floor {floor}\n", channel(target.name));
     }
     out

@@ -110,7 +110,8 @@ fn a_seed_is_a_run() {
 fn the_corrected_model_leaves_noise() {
     let folder = TempDir::new().unwrap();
     let out = demo(folder.path(), &["--seed", "1006", "--effect", "thermal_zero"]);
-    let row = out.lines().skip_while(|l| !l.contains("as the plant")).find(|l| l.contains("thrust_n")).expect("a row for thrust");
+    let row =
+        out.lines().skip_while(|l| !l.contains("as the plant")).find(|l| l.starts_with("  thrust ")).expect("a row for thrust");
     let numbers: Vec<f64> = row.split([' ', ',']).filter_map(|w| w.parse().ok()).collect();
     let [rms, floor] = numbers[..] else { panic!("{row}") };
     assert!(rms < 2.0 * floor, "{row}");

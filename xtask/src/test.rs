@@ -91,7 +91,7 @@ pub(crate) fn everything(place: &Place) -> Result<(), Failure> {
 
 /// The attitude filter on recordings; `words` as in [`programs::build`].
 pub(crate) fn ahrs_bench(place: &Place, words: &[String], rest: &[&str]) -> Result<(), Failure> {
-    let head = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "ahrs-bench"];
+    let head = ["run", "--quiet", "--release", "--bin", "ahrs-bench"];
     run(cargo(place, &head).args(words).arg("--").args(rest))
 }
 

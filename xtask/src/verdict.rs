@@ -66,7 +66,7 @@ fn imports(place: &Place, data: &Path) -> Result<Vec<PathBuf>, Failure> {
 fn glitches(place: &Place, features: &[String]) -> Result<PathBuf, Failure> {
     const SEED: &str = "102";
     let folder = place.root.join("target/verdict");
-    let words = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "blind"];
+    let words = ["run", "--quiet", "--release", "--bin", "blind"];
     run(cargo(place, &words).args(features).args(["--", "--dump", SEED]).arg(&folder))?;
     Ok(folder.join(format!("{SEED}.csv")))
 }
@@ -74,7 +74,7 @@ fn glitches(place: &Place, features: &[String]) -> Result<PathBuf, Failure> {
 /// Attitude logs: simulated ones of both generators and the disturbed BROAD trials.
 fn attitudes(place: &Place, features: &[String]) -> Result<Vec<PathBuf>, Failure> {
     let folder = place.root.join("target/verdict/attitude");
-    let words = ["run", "--quiet", "--release", "--package", "quadrig-tests", "--bin", "causes"];
+    let words = ["run", "--quiet", "--release", "--bin", "causes"];
     run(cargo(place, &words).args(features).args(["--", "--dump"]).arg(&folder))?;
     listed(&folder, |name| name.ends_with(".csv"))
 }

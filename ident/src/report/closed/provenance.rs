@@ -29,10 +29,12 @@ impl Hidden {
     /// What is true and what is false of the names, a sentence each.
     #[must_use]
     pub fn judged(&self, verdict: &Verdict) -> Vec<String> {
-        let sizes = if self.parameters.is_empty() { String::new() } else { format!(" ({})", self.parameters.join(", ")) };
         let named: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
         let found = named.iter().any(|e| e.id == self.id);
-        let mut out = vec![format!("hidden was {}{sizes}: {}", self.id, if found { "found" } else { "NOT FOUND" })];
+        let mut out = vec![format!("hidden was {}: {}", self.id, if found { "found" } else { "NOT FOUND" })];
+        if !self.parameters.is_empty() {
+            out.push(format!("hidden with {}", self.parameters.join(", ")));
+        }
         out.extend(named.iter().find(|e| e.id == self.id).and_then(|e| as_found(e)));
         if found {
             out.push(format!("true of the names: {}", self.id));
