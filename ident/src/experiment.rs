@@ -12,6 +12,7 @@ use crate::diagnose::Diagnosis;
 use crate::hypothesis::{Declared, Fit};
 use crate::log::{Column, Log, SPEED};
 use crate::model::Model;
+use crate::rivals::beyond;
 use crate::simulate::from_command;
 use crate::verdict::{NextExperiment, ScheduleStep};
 use crate::weather::continued;
@@ -38,24 +39,15 @@ fn families(top: f64) -> Vec<(&'static str, Vec<ScheduleStep>)> {
 #[must_use]
 pub fn next(context: &Context, declared: Declared<'_>, model: &Model, diagnosis: &Diagnosis) -> Option<NextExperiment> {
     let rival = diagnosis.rivals.first()?;
-    between(context, model, &model_of(context, declared, &rival.fit), &apart(diagnosis.best.ids(), rival.ids.clone()))
+    between(context, model, &model_of(context, declared, &rival.fit), &apart(&diagnosis.best.ids(), &rival.ids))
 }
 
 /// What each of two hypotheses has and the other lacks; what both have is no question.
-fn apart(own: Vec<String>, rival: Vec<String>) -> [String; 2] {
-    let less = |of: &[String], other: &[String]| {
-        let mut other = other.to_vec();
-        let mut left = of.to_vec();
-        left.retain(|id| match other.iter().position(|o| o == id) {
-            Some(at) => {
-                other.swap_remove(at);
-                false
-            }
-            None => id != "unknown",
-        });
-        if left.is_empty() { "nothing more".to_owned() } else { left.join(" + ") }
-    };
-    [less(&own, &rival), less(&rival, &own)]
+fn apart(own: &[String], rival: &[String]) -> [String; 2] {
+    [(own, rival), (rival, own)].map(|(of, other)| match beyond(of, other) {
+        left if left.is_empty() => "nothing more".to_owned(),
+        left => left.join(" + "),
+    })
 }
 
 /// The model that a fit of a log makes.
@@ -257,9 +249,9 @@ mod tests {
     #[test]
     fn only_what_differs_is_a_question() {
         let ids = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<Vec<String>>();
-        let both = apart(ids(&["spinup_lag", "reynolds_thrust", "unknown"]), ids(&["spinup_lag", "torque_crosstalk"]));
+        let both = apart(&ids(&["spinup_lag", "reynolds_thrust", "unknown"]), &ids(&["spinup_lag", "torque_crosstalk"]));
         assert_eq!(both, ["reynolds_thrust", "torque_crosstalk"]);
-        assert_eq!(apart(ids(&["glitch_rows", "glitch_rows"]), ids(&["glitch_rows"])), ["glitch_rows", "nothing more"]);
+        assert_eq!(apart(&ids(&["glitch_rows", "glitch_rows"]), &ids(&["glitch_rows"])), ["glitch_rows", "nothing more"]);
     }
 
     #[test]

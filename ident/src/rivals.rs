@@ -96,6 +96,20 @@ pub(crate) fn sorted(mut ids: Vec<String>) -> Vec<String> {
     ids
 }
 
+/// Names of a hypothesis that another one lacks, each as often as it is lacking; what has no name is none.
+pub(crate) fn beyond(ids: &[String], other: &[String]) -> Vec<String> {
+    let mut other: Vec<&String> = other.iter().collect();
+    let mut left = ids.to_vec();
+    left.retain(|id| match other.iter().position(|o| *o == id) {
+        Some(at) => {
+            other.swap_remove(at);
+            false
+        }
+        None => id != "unknown",
+    });
+    left
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -126,7 +126,7 @@ impl EffectEntry {
 #[must_use]
 pub fn scope(scope: Scope, noun: &str) -> String {
     match scope {
-        Scope::Rig => format!("of the {noun}: expected on every run"),
+        Scope::Rig => format!("of the {noun}: every run should show it"),
         Scope::Run => "of this run: another run has a value of its own".to_owned(),
         Scope::Event => "of one instant: it does not recur by itself".to_owned(),
     }

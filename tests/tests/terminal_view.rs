@@ -5,7 +5,7 @@ use quadrig_tests::desk::{Desk, Line};
 use quadrig_tests::screen::Screen;
 use quadrig_tests::{quadrig, root};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitStatus};
 use std::time::Duration;
 
 const SMALL: (u16, u16) = (80, 24);
@@ -87,6 +87,20 @@ fn a_schedule_waits_for_its_key_shows_what_is_left_and_ends_by_itself() {
     assert!(rows.iter().filter(|r| r[1] == 1400.0).count() >= 18, "the top level was held");
 }
 
+/// Ends a session by a key, a signal, or a terminal that goes away; its status and its last words where somebody can still hear them.
+fn ended(mut screen: Screen, end: &str) -> (Option<ExitStatus>, String) {
+    match end {
+        "hang-up" => {
+            screen.hang_up();
+            return (None, String::new());
+        }
+        "control-c" => screen.press("\x03"),
+        signal => screen.signal(signal),
+    }
+    let (status, rest) = screen.end();
+    (Some(status), rest)
+}
+
 /// Whatever ends a session stops the motor and closes the recording.
 #[test]
 fn an_end_by_signal_or_control_c_loses_nothing() {
@@ -103,20 +117,7 @@ fn an_end_by_signal_or_control_c_loses_nothing() {
         screen.until(" ARMED ");
         screen.press("=1200\r");
         screen.until("pulse  1200.0 us");
-        let rest = match end {
-            "hang-up" => {
-                screen.hang_up();
-                String::new()
-            }
-            "control-c" => {
-                screen.press("\x03");
-                screen.end().1
-            }
-            signal => {
-                screen.signal(signal);
-                screen.end().1
-            }
-        };
+        let (_, rest) = ended(screen, end);
         std::thread::sleep(Duration::from_millis(100));
         assert!(desk.pulses().last().is_some_and(|p| !p.is_live()), "{end}: the motor was stopped at once");
         let rows = rows(&folder.path().join("seen.csv"));
@@ -201,22 +202,9 @@ fn an_end_of_a_watched_run_keeps_its_log() {
         let mut screen = Screen::start(folder.path(), &words, SMALL);
         screen.until(" RUNNING ");
         std::thread::sleep(Duration::from_millis(500));
-        let rest = match end {
-            "hang-up" => {
-                screen.hang_up();
-                String::new()
-            }
-            "control-c" => {
-                screen.press("\x03");
-                screen.end().1
-            }
-            signal => {
-                screen.signal(signal);
-                let (status, rest) = screen.end();
-                assert!(status.success() && rest.contains("samples over"), "{end}: {rest}");
-                rest
-            }
-        };
+        let (status, rest) = ended(screen, end);
+        // who is gone is told nothing
+        assert!(status.is_none_or(|s| s.success() && rest.contains("samples over")), "{end}: {rest}");
         assert!(folder.path().join("run.csv").is_file(), "{end}: {rest}");
         let rows = rows(&folder.path().join("run.csv"));
         assert!((50..5000).contains(&rows.len()), "{end}: {} rows of 902 s; {rest}", rows.len());

@@ -10,11 +10,9 @@
 //! Reference: The Cargo Book, "External tools" (JSON messages) and "Environment variables".
 
 use crate::place::Place;
-use crate::run::{Failure, Tally, cargo, output};
-use std::path::{Path, PathBuf};
+use crate::run::{Failure, Tally, cargo, cores, output, side_by_side};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
 use std::time::Instant;
 
 /// Variable that tells the tests how the program that they call is built, a word a line: with the libraries that they are built with.
@@ -46,7 +44,7 @@ pub(crate) fn build(place: &Place, words: &[String], more: &[String]) -> Result<
         return Err(Failure("cargo built no test program".to_owned()));
     }
     // those that call the command line take longest: short ones fill the end
-    programs.sort_by_key(|p| !p.folder.ends_with("tests"));
+    programs.sort_by_key(|p| (!p.folder.ends_with("tests"), p.folder.clone(), p.name.clone()));
     Ok(programs)
 }
 
@@ -64,50 +62,28 @@ fn program(message: &serde_json::Value) -> Option<Program> {
 
 /// Runs them; what each says comes in one piece.
 pub(crate) fn run(place: &Place, programs: &[Program], words: &[String], tally: &mut Tally) -> Result<(), Failure> {
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
     let is_alone = |p: &&Program| ALONE.iter().any(|name| p.name.ends_with(&format!(" of {name}")));
     let (alone, others): (Vec<&Program>, Vec<&Program>) = programs.iter().partition(is_alone);
     let mut failed = Vec::new();
-    beside(place, (&others, workers), words, (tally, &mut failed))?;
-    beside(place, (&alone, 1), words, (tally, &mut failed))?;
-    if failed.is_empty() { Ok(()) } else { Err(Failure(format!("failed: {}", failed.join(", ")))) }
-}
-
-/// Runs so many of them at a time, and notes those that fail.
-fn beside(
-    place: &Place,
-    (programs, workers): (&[&Program], usize),
-    words: &[String],
-    (tally, failed): (&mut Tally, &mut Vec<String>),
-) -> Result<(), Failure> {
-    let (next, (ended, arrived)) = (AtomicUsize::new(0), mpsc::channel());
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            let (ended, next) = (ended.clone(), &next);
-            scope.spawn(move || {
-                while let Some(program) = programs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let began = Instant::now();
-                    let done = run_one(place, program, words, workers > 1);
-                    if ended.send((*program, done, began.elapsed().as_secs_f64())).is_err() {
-                        return;
-                    }
-                }
-            });
-        }
-        drop(ended);
-        for (program, done, seconds) in arrived {
+    for (programs, workers) in [(others, cores()), (alone, 1)] {
+        let timed = |program: &&Program| {
+            let began = Instant::now();
+            (run_one(place, program, words, workers > 1), began.elapsed().as_secs_f64())
+        };
+        side_by_side(&programs, workers, timed, |program, (done, seconds)| {
             let (held, text) = done?;
             println!("     Running {}\n{text}", program.name);
-            text.lines().for_each(|line| {
+            for line in text.lines() {
                 tally.read(line);
-            });
+            }
             tally.took.push((program.name.clone(), seconds));
             if !held {
                 failed.push(program.name.clone());
             }
-        }
-        Ok(())
-    })
+            Ok(())
+        })?;
+    }
+    if failed.is_empty() { Ok(()) } else { Err(Failure(format!("failed: {}", failed.join(", ")))) }
 }
 
 fn run_one(place: &Place, program: &Program, words: &[String], in_company: bool) -> Result<(bool, String), Failure> {
@@ -124,18 +100,15 @@ fn run_one(place: &Place, program: &Program, words: &[String], in_company: bool)
         .env(WORDS, words.join("\n"))
         .stdin(Stdio::null())
         .output()
-        .map_err(|error| Failure(format!("{}: cannot be started: {error}", shown(&program.executable))))?;
+        .map_err(|error| Failure(format!("{}: cannot be started: {error}", program.executable.display())))?;
     let text = [done.stdout, done.stderr].concat();
     Ok((done.status.success(), String::from_utf8_lossy(&text).into_owned()))
-}
-
-fn shown(path: &Path) -> String {
-    path.display().to_string()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     #[test]
     fn a_test_program_is_found_among_cargo_s_messages() {

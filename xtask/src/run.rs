@@ -13,6 +13,8 @@ use std::ffi::OsStr;
 use std::fmt;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
 
 /// Why a task ended: one line.
 #[derive(Debug)]
@@ -113,6 +115,35 @@ fn announced(line: &str) -> Option<String> {
     let (source, program) = line.strip_prefix("Running ")?.trim_start_matches("unittests ").rsplit_once(" (")?;
     let name = program.rsplit('/').next()?.rsplit_once('-')?.0;
     Some(format!("{source} of {name}"))
+}
+
+/// Does a piece of work for each item, so many at a time, and hears of each as it ends.
+pub(crate) fn side_by_side<'i, T: Sync, R: Send>(
+    items: &'i [T],
+    workers: usize,
+    work: impl Fn(&'i T) -> R + Sync,
+    mut heard: impl FnMut(&'i T, R) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let (next, (ended, arrived)) = (AtomicUsize::new(0), mpsc::channel());
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            let (ended, next, work) = (ended.clone(), &next, &work);
+            scope.spawn(move || {
+                while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    if ended.send((item, work(item))).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(ended);
+        arrived.into_iter().try_for_each(|(item, done)| heard(item, done))
+    })
+}
+
+/// As many workers as there are cores.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// Runs a test command; its output passes through while its summary lines are counted.

@@ -11,12 +11,10 @@
 //! Reference: `check_verdict.py`, the contract of `quadrig-verdict 2` in executable form.
 
 use crate::place::{Place, on_ci};
-use crate::run::{Failure, Tally, cargo, run};
+use crate::run::{Failure, Tally, cargo, cores, run, side_by_side};
 use crate::setup;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
 
 /// Checks every log at hand; `words` choose the features of the programs that are built.
 pub(crate) fn verdicts(place: &Place, words: &[String], tally: &mut Tally) -> Result<(), Failure> {
@@ -93,28 +91,19 @@ fn listed(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<PathBuf>, 
 
 /// Tries all logs, as many at a time as there are cores, and prints each answer in one piece; returns how many held.
 fn check_all(logs: &[PathBuf], check: impl Fn(&Path) -> Result<(bool, String), Failure> + Sync) -> Result<usize, Failure> {
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    let (next, (answers, arrived)) = (AtomicUsize::new(0), mpsc::channel());
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            let (answers, next, check) = (answers.clone(), &next, &check);
-            scope.spawn(move || {
-                while let Some(log) = logs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    if answers.send((log, check(log))).is_err() {
-                        return;
-                    }
-                }
-            });
-        }
-        drop(answers);
-        let mut kept = 0;
-        for (log, answer) in arrived {
+    let mut kept = 0;
+    side_by_side(
+        logs,
+        cores(),
+        |log| check(log),
+        |log, answer| {
             let (held, text) = answer?;
             println!("{}: {}\n{text}", log.display(), if held { "kept" } else { "NOT KEPT" });
             kept += usize::from(held);
-        }
-        Ok(kept)
-    })
+            Ok(())
+        },
+    )?;
+    Ok(kept)
 }
 
 fn check(python: &Path, checker: &Path, quadrig: &Path, log: &Path) -> Result<(bool, String), Failure> {

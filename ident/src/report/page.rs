@@ -14,7 +14,7 @@ use super::sheet::Sheet;
 use crate::close::Closed;
 use crate::context::{Context, DIFFERENCES, Target, unit_of};
 use crate::effects::unknown::variable;
-use crate::experiment::model_of;
+use crate::heldout::residuals;
 use crate::hypothesis::{Declared, Rows, fit};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
@@ -100,9 +100,8 @@ fn hero(closed: &Closed) -> Vec<Figure> {
     let v = &closed.verdict;
     let own = |e: &&EffectEntry| e.id != "unknown" && !(Vocabulary::RIG.of_every_rig)(e);
     // what the sentence begins with
-    let first = v.effects.iter().filter(own).filter(|e| !e.is_of_single_readings());
-    let first =
-        first.max_by(|a, b| a.heldout_error_reduction.total_cmp(&b.heldout_error_reduction)).and_then(|e| e.channels.first());
+    let told = parts::order(v).into_iter().map(|k| &v.effects[k]);
+    let first = told.filter(own).find(|e| !e.is_of_single_readings()).and_then(|e| e.channels.first());
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> = targets.filter(|t| first.is_none_or(|c| *c == t.name)).filter_map(|t| trace(closed, t)).collect();
     parts::most(&closed.verdict, &traces)
@@ -146,7 +145,7 @@ pub(super) fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
 fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<Vec<Figure>> {
     let (context, target) = (&closed.context, target(closed, e.channels.first()?)?);
     let whole = trace(closed, target)?;
-    let trace = whole.with_before(residual(context, target, &without(closed, position)?)?);
+    let trace = whole.with_before(without(closed, target, position)?);
     if trace.before == trace.after {
         return None;
     }
@@ -166,17 +165,24 @@ fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<V
     Some(vec![figure])
 }
 
-/// The model without one of its effects. Where nothing was declared all others are fitted again, as they would be by who does not know of it.
-fn without(closed: &Closed, position: usize) -> Option<Model> {
+/// What is left of a target without one of the effects. Where nothing was declared all others are fitted again, as they would be by who does not
+/// know of it.
+fn without(closed: &Closed, target: &Target, position: usize) -> Option<Vec<f64>> {
+    let context = &closed.context;
     let mut others = closed.diagnosis.best.fit.placed.clone();
-    if closed.context.against_model || position >= others.len() {
+    if context.against_model || position >= others.len() {
         let mut model = closed.model.clone();
         model.effects.remove(position);
-        return Some(model);
+        return residual(context, target, &model);
     }
     others.remove(position);
-    let fit = fit(&closed.context, Declared::default(), &others, None, Rows::All)?;
-    Some(model_of(&closed.context, Declared::default(), &fit))
+    let fit = fit(context, Declared::default(), &others, None, Rows::All)?;
+    Some(of_samples(target, &residuals(context, Declared::default(), &fit)[context.target(target.name)?]))
+}
+
+/// Of one value a sample those of the rows that count.
+fn of_samples(target: &Target, values: &[f64]) -> Vec<f64> {
+    claimed(target).map(|k| values[k]).collect()
 }
 
 /// Unit of a variable: of a column its own, of what adds up over a run that of the sum.

@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict" (`effects`, `alternatives`).
 
 use super::page::Page;
-use super::sentence::instead;
+use super::sentence::{instead, order};
 use super::state::figures;
 use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
@@ -25,15 +25,6 @@ const SETTLED: f64 = 0.85;
 
 /// Probability from which on what no hypothesis has is told.
 const OPEN: f64 = 0.05;
-
-/// Effects in the order in which they are told: what removes most first, what a few readings hold last.
-pub(super) fn order(v: &Verdict) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..v.effects.len()).collect();
-    let removed = |k: &usize| v.effects[*k].heldout_error_reduction;
-    let of_readings = |k: &usize| v.effects[*k].is_of_single_readings();
-    order.sort_by(|a, b| of_readings(a).cmp(&of_readings(b)).then(removed(b).total_cmp(&removed(a))).then(a.cmp(b)));
-    order
-}
 
 /// The cards: those of this rig, those of every rig, and corrections without a name.
 pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {

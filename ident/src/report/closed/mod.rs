@@ -23,6 +23,7 @@ pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};
 pub(crate) use page::{Page, begin};
 pub use provenance::{Hidden, Origin};
+pub(crate) use sentence::order;
 pub use sentence::sentence;
 pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal, wrapped};

@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict".
 
 use super::vocabulary::Vocabulary;
+use crate::rivals::beyond;
 use crate::unexplained::LOUD;
 use crate::verdict::{EffectEntry, Kin, Kind, Unexplained, Verdict};
 use crate::words::{Clause, adverb, amount, channel, heading, list, upper};
@@ -44,12 +45,19 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     std::iter::once(said).chain(without).collect::<Vec<_>>().join(" ")
 }
 
-/// The effects with a name, what removes most first: those of this rig, and those of every rig.
+/// Effects in the order in which they are told: what removes most first, what a few readings hold last.
+pub(crate) fn order(v: &Verdict) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..v.effects.len()).collect();
+    let removed = |k: &usize| v.effects[*k].heldout_error_reduction;
+    let of_readings = |k: &usize| v.effects[*k].is_of_single_readings();
+    order.sort_by(|a, b| of_readings(a).cmp(&of_readings(b)).then(removed(b).total_cmp(&removed(a))).then(a.cmp(b)));
+    order
+}
+
+/// The effects with a name: those of this rig, and those of every rig.
 fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&EffectEntry>) {
-    let mut all: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
-    let last = EffectEntry::is_of_single_readings;
-    all.sort_by(|a, b| last(a).cmp(&last(b)).then(b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction)));
-    all.into_iter().partition(|e| !(words.of_every_rig)(e))
+    let all = order(verdict).into_iter().map(|k| &verdict.effects[k]).filter(|e| e.id != "unknown");
+    all.partition(|e| !(words.of_every_rig)(e))
 }
 
 fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
@@ -209,17 +217,7 @@ pub(super) fn without<'e>(best: &[&'e EffectEntry], ids: &[String]) -> Vec<&'e E
 
 /// Identifiers of a hypothesis that the best one lacks.
 pub(super) fn instead(best: &[&EffectEntry], ids: &[String]) -> Vec<String> {
-    let mut own: Vec<&str> = best.iter().map(|e| e.id.as_str()).collect();
-    ids.iter()
-        .filter(|id| match own.iter().position(|o| o == id) {
-            Some(at) => {
-                own.remove(at);
-                false
-            }
-            None => id.as_str() != "unknown",
-        })
-        .cloned()
-        .collect()
+    beyond(ids, &best.iter().map(|e| e.id.clone()).collect::<Vec<_>>())
 }
 
 /// Share of what a channel had left over its noise that is gone, as squares.

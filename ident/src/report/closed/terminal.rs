@@ -5,9 +5,9 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{is_shown, order, removes, that_it_is_there, value};
+use super::cards::{is_shown, removes, that_it_is_there, value};
 use super::left::in_words;
-use super::sentence::{instead, sentence, size_left, without};
+use super::sentence::{instead, order, sentence, size_left, without};
 use super::state::{factor, figures, word};
 use super::vocabulary::Vocabulary;
 use crate::context::unit_of;
