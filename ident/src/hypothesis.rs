@@ -8,7 +8,7 @@
 
 use crate::context::{Context, Relation, Target};
 use crate::design::{Label, TargetDesign};
-use crate::effects::{BEFORE, Effect, Estimate, Instance, Stage};
+use crate::effects::{BEFORE, Effect, EffectEntry, Estimate, Instance, Stage};
 use crate::model::Model;
 use crate::samples::{Samples, Taught};
 use crate::solve::Solution;
@@ -27,6 +27,11 @@ pub struct Placed {
 }
 
 impl Placed {
+    /// Whether an entry of a verdict tells of it.
+    pub(crate) fn is_told_by(&self, e: &EffectEntry) -> bool {
+        self.effect.id() == e.id && e.channels.iter().all(|c| self.instance.touches(c))
+    }
+
     /// What is known of its shapes before any run, nats.
     pub(crate) fn prior(&self) -> f64 {
         self.effect.prior(&self.instance, &self.shape)

@@ -199,6 +199,14 @@ pub struct NextExperiment {
     pub schedule: Vec<ScheduleStep>,
 }
 
+impl EffectEntry {
+    /// Whether it says only that something is there: nothing that was tried predicts it, so that nothing was added.
+    #[must_use]
+    pub fn is_without_correction(&self) -> bool {
+        self.id == "unknown" && self.depends_on.is_empty() && self.parameters.is_empty()
+    }
+}
+
 impl Verdict {
     /// The run that is proposed: a next experiment that would settle something.
     #[must_use]

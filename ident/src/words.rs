@@ -74,6 +74,21 @@ impl EffectEntry {
         self.tell_times(name, if unit == "%" { 100.0 } else { 1.0 }, unit, with, without)
     }
 
+    /// The size of a parameter without its sign in words of its own, in a unit that means as much; `word` is the one for up or the one for down.
+    #[must_use]
+    pub fn tell_signed(
+        &self,
+        name: &str,
+        (factor, unit): (f64, &str),
+        [up, down]: [&str; 2],
+        with: impl Fn(&str, &str) -> String,
+        without: &str,
+    ) -> String {
+        let rises = self.parameter(name).is_none_or(|p| p.value >= 0.0);
+        let (sign, word) = if rises { (factor, up) } else { (-factor, down) };
+        self.tell_times(name, sign, unit, |size| with(word, size), without)
+    }
+
     /// The same times a factor.
     #[must_use]
     pub fn tell_times(&self, name: &str, factor: f64, unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
@@ -262,6 +277,14 @@ fn of_flight(name: &str) -> Option<String> {
         _ => return None,
     };
     ["x", "y", "z"].contains(&of).then(|| format!("{said} ({of})"))
+}
+
+/// The quantity of which a channel is an axis, or the channel itself: "specific force" of "specific force (x)".
+#[must_use]
+pub fn vector(name: &str) -> String {
+    let said = channel(name);
+    let axis = [" (x)", " (y)", " (z)"].iter().find_map(|axis| said.strip_suffix(axis));
+    axis.map_or_else(|| said.clone(), str::to_owned)
 }
 
 /// A channel at the head of something: with a large letter, or as its column where it has no other word.

@@ -326,7 +326,7 @@ fn an_event_of_one_run_names_its_run() {
     };
     let v = verdict(Kind::Attributed, vec![slip]);
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.contains("jumps by 0.150 N at 47.2 s in run day2.csv"), "{said}");
+    assert!(said.contains("jumps up by 0.150 N at 47.2 s in run day2.csv"), "{said}");
     assert!(terminal(&v, Vocabulary::RIG, false).contains("in run day2.csv"), "{said}");
 }
 

@@ -29,16 +29,10 @@ impl Effect for BladeDamage {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        {
-            let at = found.tell("t0", |t| format!(" at {t}"), "");
-            let does = found.tell_in(
-                "thrust_change",
-                "%",
-                |v| format!("changes the thrust by {v}{at}"),
-                &format!("changes the thrust{at}"),
-            );
-            Clause::new("damage to a blade", does)
-        }
+        let since = found.tell("t0", |t| format!(" from {t} on"), "");
+        let with = |word: &str, v: &str| format!("{word} {v} of the thrust{since}");
+        let without = format!("changes the thrust{since}");
+        Clause::new("a damaged blade", found.tell_signed("thrust_change", (100.0, "%"), ["adds", "takes"], with, &without))
     }
 
     fn scope(&self, _: &Instance) -> Scope {

@@ -30,13 +30,11 @@ impl Effect for GainChange {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        {
-            let at = found.tell("t0", |t| format!(" at {t}"), "");
-            let at = if found.is_since_before() { " before the run" } else { at.as_str() };
-            let step = found.tell_in("gain_change", "%", |v| format!("changes by {v}{at}"), &format!("changes{at}"));
-            let drift = found.tell("rate", |_| "drifts with time".to_owned(), &step);
-            Clause::new("the load cell's gain", drift)
-        }
+        let at = found.tell("t0", |t| format!(" at {t}"), "");
+        let at = if found.is_since_before() { " before the run" } else { at.as_str() };
+        let with = |word: &str, v: &str| format!("{word} by {v}{at}");
+        let step = found.tell_signed("gain_change", (100.0, "%"), ["rises", "falls"], with, &format!("changes{at}"));
+        Clause::new("the load cell's gain", found.tell("rate", |_| "drifts with time".to_owned(), &step))
     }
 
     fn scope(&self, instance: &Instance) -> Scope {

@@ -8,6 +8,8 @@
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::context::Context;
 use crate::design::{Label, TargetDesign};
+use crate::verdict::Parameter;
+use crate::words::sized;
 use std::sync::Arc;
 
 /// See the module.
@@ -30,14 +32,13 @@ impl Effect for ReynoldsThrust {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        Clause::new(
-            "the thrust",
-            found.tell(
-                "exponent",
-                |v| format!("grows faster than the speed squared, by an exponent of {v}"),
-                "follows another power of the speed, as small propellers do",
-            ),
-        )
+        let power =
+            found.parameter("exponent").map(|p| Parameter { value: 2.0 + p.value, ci95: p.ci95.map(|v| 2.0 + v), ..p.clone() });
+        let does = power.as_ref().and_then(sized).map_or_else(
+            || "follows another power of the speed, as small propellers do".to_owned(),
+            |v| format!("grows with the speed to the power of {v}, not of two"),
+        );
+        Clause::new("the thrust", does)
     }
 
     fn scope(&self, _: &Instance) -> Scope {

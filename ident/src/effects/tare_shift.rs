@@ -31,11 +31,14 @@ impl Effect for TareShift {
 
     fn said(&self, found: &EffectEntry) -> Clause {
         let zero = format!("the zero of {}", found.meter());
+        let own = (1.0, found.unit());
         if found.is_since_before() {
-            return Clause::new(zero, found.tell("offset", |v| format!("lies {v} from where it was"), "is another one"));
+            let with = |word: &str, v: &str| format!("lies {v} {word} where it was");
+            return Clause::new(zero, found.tell_signed("offset", own, ["above", "below"], with, "is another one"));
         }
         let at = found.tell("t0", |t| format!(" at {t}"), "");
-        Clause::new(zero, found.tell("offset", |v| format!("jumps by {v}{at}"), &format!("jumps{at}")))
+        let with = |word: &str, v: &str| format!("jumps {word} by {v}{at}");
+        Clause::new(zero, found.tell_signed("offset", own, ["up", "down"], with, &format!("jumps{at}")))
     }
 
     fn is_of_every_run(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {

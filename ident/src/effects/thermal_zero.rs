@@ -34,9 +34,11 @@ impl Effect for ThermalZero {
     fn said(&self, found: &EffectEntry) -> Clause {
         Clause::new(
             "the load cell's zero",
-            found.tell(
+            found.tell_signed(
                 "coefficient",
-                |v| format!("moves by {v} with the temperature").replace("N/K", "N per kelvin"),
+                (1.0, "N"),
+                ["rises", "falls"],
+                |word, v| format!("{word} by {v} per kelvin"),
                 "moves with the temperature",
             ),
         )

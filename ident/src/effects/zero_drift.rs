@@ -31,7 +31,13 @@ impl Effect for ZeroDrift {
     fn said(&self, found: &EffectEntry) -> Clause {
         Clause::new(
             "the load cell's zero",
-            found.tell_times("rate", 60.0, "N", |v| format!("drifts by {v} a minute"), "drifts with time"),
+            found.tell_signed(
+                "rate",
+                (60.0, "N"),
+                ["up", "down"],
+                |word, v| format!("drifts {word} by {v} a minute"),
+                "drifts with time",
+            ),
         )
     }
 

@@ -42,7 +42,7 @@ pub(super) fn evidence(kept: &Kept, kind: &Kind, channels: &[Channel]) -> String
         Kind::Nameless(_) => "no known effect; straight lines between knots".to_owned(),
     };
     let worth = kept.channels.first().map_or(String::new(), |(c, reduction)| worth(&channels[*c].name, *reduction));
-    format!("{signature}; {:.0} nats ahead of everything without it{worth}", kept.lead.clamp(0.0, 1e6))
+    format!("{signature}{worth}")
 }
 
 /// The shape of what is left, from the memory of its wander.
@@ -50,9 +50,9 @@ pub(super) fn looks_like(memory_s: f64) -> String {
     if memory_s == 0.0 {
         "from window to window".to_owned()
     } else if memory_s > SLOW_S {
-        format!("slow, keeps for {memory_s:.1} s")
+        format!("slow, within {memory_s:.1} s")
     } else {
-        format!("keeps for {memory_s:.2} s")
+        format!("within {memory_s:.2} s")
     }
 }
 

@@ -236,7 +236,7 @@ fn accelerate(
             .collect(),
         heldout_error_reduction: 1.0 - (left / now.max(1e-300)).sqrt(),
         evidence: format!(
-            "neighbours predict {:.0} % of the variance of left-out stretches ({nats:.0} nats); means over five seconds are {:.0} % of it: the speed stays bounded",
+            "neighbours predict {:.0} % of the variance of left-out stretches; means over five seconds are {:.0} % of it: the speed stays bounded",
             100.0 * (1.0 - left / now),
             100.0 * slow
         ),

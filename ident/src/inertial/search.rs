@@ -70,8 +70,6 @@ pub(crate) struct Found<'a> {
     pub(crate) by_axis: [f64; 3],
     /// Coefficients of the declared model and of the other causes when it is left out, in their order.
     pub(crate) without: Vec<f64>,
-    /// Evidence for it beside the others.
-    pub(crate) evidence: f64,
 }
 
 /// What came of a search.
@@ -189,7 +187,7 @@ pub(crate) fn search<'a>(
         chosen.push(won);
     }
     prune(readings, &base, &mut chosen, noise, slack);
-    Some(conclude(readings, &base, chosen, before, rivals, noise, slack))
+    Some(conclude(readings, &base, chosen, before, rivals, noise))
 }
 
 fn named(t: &Try<'_>) -> bool {
@@ -273,7 +271,6 @@ fn conclude<'a>(
     before: Solved,
     rivals: Vec<(Vec<&'static str>, f64)>,
     noise: f64,
-    slack: f64,
 ) -> Outcome<'a> {
     let after = chosen.last().map_or_else(|| before.clone(), |c| c.solved.clone());
     let full = Readings::square(&after.heldout);
@@ -301,7 +298,6 @@ fn conclude<'a>(
             reduction: 1.0 - (full / left.max(1e-300)).sqrt(),
             by_axis: reductions(&lost, &after.heldout),
             without,
-            evidence: evidence(looks, left, full, slack),
         });
     }
     Outcome { found, before, after, probability, alternatives }

@@ -124,6 +124,11 @@ pub(crate) fn trace<'a>(
     Some(Traced { sensor, effect, named })
 }
 
+/// What a cause belongs to: what stands in the room is not the board's.
+fn scope(id: &str) -> Scope {
+    if id == "stationary_magnet" { Scope::Run } else { Scope::Rig }
+}
+
 /// The axes of which a cause speaks, the one that it helps most first: none that is predicted worse with all that was found.
 fn helped(outcome: &Outcome<'_>, found: &Found<'_>) -> Vec<usize> {
     let worse = spoils(&outcome.before.heldout, &outcome.after.heldout);
@@ -208,7 +213,7 @@ fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectE
         EffectEntry {
             kin: Kin::Own,
             id: f.instance.id.to_owned(),
-            scope: Scope::Rig,
+            scope: scope(f.instance.id),
             run: None,
             channels: axes.iter().map(|k| setting.channels[*k].to_owned()).collect(),
             depends_on: f.instance.depends_on.iter().map(|d| (*d).to_owned()).collect(),
@@ -217,9 +222,8 @@ fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectE
             parameters: parameters(f, c, s),
             heldout_error_reduction: axes.first().map_or(0.0, |k| f.by_axis[*k].max(0.0)),
             evidence: format!(
-                "without it left-out stretches are predicted {:.1} % worse ({:.0} nats){but}",
-                100.0 * (1.0 / (1.0 - f.reduction).max(1e-9) - 1.0),
-                f.evidence
+                "without it left-out stretches are predicted {:.1} % worse{but}",
+                100.0 * (1.0 / (1.0 - f.reduction).max(1e-9) - 1.0)
             ),
         }
     };

@@ -6,7 +6,9 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
-use super::closed::{self as parts, ALONE, Origin, Page, Trace, Vocabulary, against, enlarged, moves, over_time, pair, thinned};
+use super::closed::{
+    self as parts, ALONE, Origin, Page, Trace, Vocabulary, against, enlarged, lifted, moves, over_time, pair, thinned,
+};
 use super::designer::designer;
 use super::figure::{Figure, Layer};
 use super::run;
@@ -95,35 +97,51 @@ fn trace(closed: &Closed, target: &Target) -> Option<Trace> {
     })
 }
 
-/// The channel on which the names took most, over time and enlarged; without names the loudest.
+/// The figure that convinces most.
 fn hero(closed: &Closed) -> Vec<Figure> {
-    let v = &closed.verdict;
-    let own = |e: &&EffectEntry| e.id != "unknown" && !(Vocabulary::RIG.of_every_rig)(e);
-    // what the sentence begins with
-    let told = parts::order(v).into_iter().map(|k| &v.effects[k]);
-    let first = told.filter(own).find(|e| !e.is_of_single_readings()).and_then(|e| e.channels.first());
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
-    let traces: Vec<Trace> = targets.filter(|t| first.is_none_or(|c| *c == t.name)).filter_map(|t| trace(closed, t)).collect();
-    parts::most(&closed.verdict, &traces)
+    let traces: Vec<Trace> = targets.filter_map(|t| trace(closed, t)).collect();
+    parts::most(&closed.verdict, Vocabulary::RIG, &traces)
 }
 
 /// What is left of one of several runs, predicted by a fit to the others.
-pub(super) fn over_runs(verdict: &Verdict, shown: &Shown) -> Vec<Figure> {
-    let trace = Trace {
+fn across(shown: &Shown) -> Trace {
+    Trace {
         channel: shown.channel.to_owned(),
         unit: unit_of(shown.channel).to_owned(),
         floor: shown.floor,
-        time_label: format!("time on {}, s", shown.name),
+        time_label: "time, s".to_owned(),
         t: shown.t.clone(),
         before: shown.before.clone(),
         after: shown.after.clone(),
-    };
-    let names = pair(verdict);
+    }
+}
+
+/// The figure that convinces most of several runs.
+pub(super) fn over_runs(verdict: &Verdict, shown: &Shown) -> Vec<Figure> {
+    let (trace, names) = (across(shown), pair(verdict));
     std::iter::once(over_time(&trace, "most", names)).chain(enlarged(&trace, "most", names)).collect()
 }
 
+/// The figure of an effect that several runs share, on one of them.
+pub(super) fn card_across(closed: &Closed, e: &EffectEntry, shown: &Shown, id: &str) -> Option<Figure> {
+    Some(drawn(&closed.context, e, target(closed, shown.channel)?, &across(shown), id))
+}
+
+/// The figure of what one of several runs has alone: what is left when it is taken out of the model, one constant apart.
+pub(super) fn card_alone(closed: &Closed, e: &EffectEntry, id: &str) -> Option<Figure> {
+    let position = closed.model.effects.iter().rposition(|added| added.placed.is_told_by(e))?;
+    let target = target(closed, e.channels.first()?)?;
+    let whole = trace(closed, target)?;
+    let mut without = taken_out(closed, target, position)?;
+    let more: Vec<f64> = without.iter().zip(&whole.after).map(|(w, a)| w - a).filter(|d| d.is_finite()).collect();
+    let mean = more.iter().sum::<f64>() / more.len().max(1) as f64;
+    without.iter_mut().for_each(|w| *w -= mean);
+    Some(drawn(&closed.context, e, target, &whole.with_before(without), id))
+}
+
 /// Figures of each effect: what its first channel leaves over without it and with it.
-pub(super) fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
+fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
     let mut used = vec![false; closed.model.effects.len()];
     closed
         .verdict
@@ -131,10 +149,7 @@ pub(super) fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
         .iter()
         .enumerate()
         .map(|(k, e)| {
-            let same = |i: &usize| {
-                let p = &closed.model.effects[*i].placed;
-                !used[*i] && p.effect.id() == e.id && e.channels.iter().all(|c| p.instance.touches(c))
-            };
+            let same = |i: &usize| !used[*i] && closed.model.effects[*i].placed.is_told_by(e);
             let Some(i) = (0..used.len()).find(same) else { return Vec::new() };
             used[i] = true;
             card(closed, e, i, &format!("effect-{}", k + 1)).unwrap_or_default()
@@ -143,26 +158,27 @@ pub(super) fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
 }
 
 fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<Vec<Figure>> {
-    let (context, target) = (&closed.context, target(closed, e.channels.first()?)?);
+    let target = target(closed, e.channels.first()?)?;
     let whole = trace(closed, target)?;
     let trace = whole.with_before(without(closed, target, position)?);
-    if trace.before == trace.after {
-        return None;
-    }
+    (trace.before != trace.after).then(|| vec![drawn(&closed.context, e, target, &trace, id)])
+}
+
+/// What is left of a channel without an effect and with it, over what the effect goes with.
+fn drawn(context: &Context, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Figure {
     let of_steps = e.depends_on.iter().any(|v| ["time_since_step", "rpm_rate"].contains(&v.as_str()));
     let over = if of_steps {
         None
     } else {
         e.depends_on.iter().find_map(|name| Some((name, values(context, target, name).filter(|x| moves(x))?)))
     };
-    let figure = match over {
-        Some((name, x)) => against(&trace, id, (name, unit_of_variable(name)), &x, ALONE),
-        None => match enlarged(&trace, id, ALONE).filter(|_| of_steps) {
+    match over {
+        Some((name, x)) => against(trace, id, (name, unit_of_variable(name)), &x, ALONE),
+        None => match enlarged(trace, id, ALONE).filter(|_| of_steps) {
             Some(figure) => figure,
-            None => over_time(&trace, id, ALONE),
+            None => over_time(trace, id, ALONE),
         },
-    };
-    Some(vec![figure])
+    }
 }
 
 /// What is left of a target without one of the effects. Where nothing was declared all others are fitted again, as they would be by who does not
@@ -171,13 +187,18 @@ fn without(closed: &Closed, target: &Target, position: usize) -> Option<Vec<f64>
     let context = &closed.context;
     let mut others = closed.diagnosis.best.fit.placed.clone();
     if context.against_model || position >= others.len() {
-        let mut model = closed.model.clone();
-        model.effects.remove(position);
-        return residual(context, target, &model);
+        return taken_out(closed, target, position);
     }
     others.remove(position);
     let fit = fit(context, Declared::default(), &others, None, Rows::All)?;
     Some(of_samples(target, &residuals(context, Declared::default(), &fit)[context.target(target.name)?]))
+}
+
+/// The same with everything else as the model has it.
+fn taken_out(closed: &Closed, target: &Target, position: usize) -> Option<Vec<f64>> {
+    let mut model = closed.model.clone();
+    model.effects.remove(position);
+    residual(&closed.context, target, &model)
 }
 
 /// Of one value a sample those of the rows that count.
@@ -233,7 +254,10 @@ fn every_channel(closed: &Closed) -> Vec<Figure> {
         out.push(over_time(&trace, "every", pair(&closed.verdict)));
         let measured: Vec<f64> = claimed(target).map(|k| target.y[k]).collect();
         let predicted = |left: &[f64]| -> Vec<f64> { measured.iter().zip(left).map(|(m, r)| m - r).collect() };
-        let line = |name: &str, class, y| Layer::Line { name: name.to_owned(), class, x: trace.t.clone(), y };
+        let line = |name: &str, class, y: Vec<f64>| {
+            let (x, y) = lifted(&trace.t, &y);
+            Layer::Line { name: name.to_owned(), class, x, y }
+        };
         let after = pair(&closed.verdict)[1].trim_end_matches(", after");
         out.push(thinned(Figure {
             id: format!("measured-{}", parts::slug(target.name)),

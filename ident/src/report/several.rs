@@ -7,33 +7,37 @@
 //! Reference: specification `formats.md`, `across_runs_rms`.
 
 use super::closed::{self as parts, Origin, Page, Vocabulary, pair};
-use super::figure::Figure;
-use super::page::{SPEEDS, cards, is_drawn_together, over_runs, rest, speeds};
+use super::figure::{Figure, Layer, Mark};
+use super::page::{SPEEDS, card_across, card_alone, is_drawn_together, over_runs, rest, speeds};
 use super::svg::escape;
 use crate::close::Closed;
 use crate::effects::{EffectEntry, Estimate};
 use crate::several::{Outcome, Run};
-use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Unexplained, Validation};
-use crate::words::digits;
+use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Unexplained, Validation, Verdict};
+use crate::words::{digits, scaled, upper};
+
+/// Most runs that have their numbers beneath a figure; of more every fifth has.
+const MOST_NAMES: usize = 12;
 
 /// The report of several runs as one self-contained page; `links` are the pages of the runs, in their order.
 #[must_use]
 pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
-    let v = &outcome.verdict;
+    let v = &*outcome.verdict.briefly();
     let alone: Vec<Closed> = (0..runs.len()).map(|run| of_run(runs, outcome, run)).collect();
     let first = outcome.shown.as_ref().map_or(0, |shown| shown.run);
     let own = |u: &&Unexplained| !is_drawn_together(&alone[first], u);
+    let on = |run: usize, figure: Figure| named(figure, &v.runs[run].run);
     let page = Page {
         verdict: v,
         words: Vocabulary::RIG,
         news: false,
         origin: Origin::of_several(&runs.iter().map(|r| &r.log).collect::<Vec<_>>()),
         declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as a geometric mean over the runs.".to_owned(),
-        hero: outcome.shown.as_ref().map(|shown| over_runs(v, shown)).unwrap_or_default(),
-        cards: cards_of(&alone, runs, outcome),
-        left: v.unexplained.iter().filter(own).filter_map(|u| left_of(&alone, runs, u)).collect(),
-        parameters: parameters(outcome),
-        speeds: (SPEEDS, speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| named(figure, &runs[first])).collect()),
+        hero: outcome.shown.iter().flat_map(|shown| over_runs(v, shown)).map(|figure| on(first, figure)).collect(),
+        cards: v.effects.iter().enumerate().map(|(k, e)| card(&alone, outcome, v, k, e)).collect(),
+        left: outcome.verdict.unexplained.iter().filter(own).filter_map(|u| left_of(&alone, runs, u)).map(|(run, figure)| on(run, figure)).collect(),
+        parameters: parameters(outcome, v),
+        speeds: (SPEEDS, speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| on(first, figure)).collect()),
     };
     let mut sheet = parts::begin(&page);
     for (run, of) in v.runs.iter().enumerate() {
@@ -41,7 +45,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
             if let Some(link) = links.get(run) {
                 sheet.html_part(&format!("<p><a href=\"{}\">The run alone</a>, with its own verdict.</p>\n", escape(link)));
             }
-            sheet.html_part(&parts::bars(&channels(v, outcome, run, of), &[], pair(v)));
+            sheet.html_part(&parts::bars(&channels(v, outcome, run, of), &[], &[], pair(v)));
         });
     }
     sheet.html()
@@ -60,41 +64,72 @@ fn of_run(runs: &[Run], outcome: &Outcome, run: usize) -> Closed {
 }
 
 /// The figure, with the run that it is of.
-fn named(mut figure: Figure, run: &Run) -> Figure {
-    figure.title = format!("{}, {}", figure.title, run.log.name);
+fn named(mut figure: Figure, run: &str) -> Figure {
+    figure.title = format!("{}, {run}", figure.title);
     figure
 }
 
-/// Figures of each effect, of the run that the figure that convinces most is of; what happened on another run alone is shown on that one.
-fn cards_of(alone: &[Closed], runs: &[Run], outcome: &Outcome) -> Vec<Vec<Figure>> {
-    let first = outcome.shown.as_ref().map_or(0, |shown| shown.run);
-    let order = std::iter::once(first).chain((0..runs.len()).filter(|run| *run != first));
-    let mut out = vec![Vec::new(); outcome.verdict.effects.len()];
-    for run in order.filter(|_| !runs.is_empty()) {
-        // what is of one run alone is shown on that one
-        let mut one = alone[run].clone();
-        let shown = |e: &EffectEntry| e.run.as_ref().is_none_or(|of| *of == runs[run].log.name);
-        let places: Vec<usize> = (0..out.len()).filter(|k| shown(&one.verdict.effects[*k])).collect();
-        one.verdict.effects.retain(shown);
-        for (k, figures) in places.into_iter().zip(cards(&one)) {
-            if out[k].is_empty() {
-                out[k] = figures.into_iter().map(|figure| named(figure, &runs[run])).collect();
-            }
-        }
+/// Figures of an effect: of what the rig has the run on which it took most, predicted by the others, and its size run by run; of what one run has
+/// that run.
+fn card(alone: &[Closed], outcome: &Outcome, v: &Verdict, k: usize, e: &EffectEntry) -> Vec<Figure> {
+    let id = format!("effect-{}", k + 1);
+    if let Some(run) = e.run.as_ref().and_then(|of| v.runs.iter().position(|r| r.run == *of)) {
+        return card_alone(&alone[run], e, &id).map(|figure| named(figure, &v.runs[run].run)).into_iter().collect();
     }
-    out
+    let Some(at) = outcome.model.effects.iter().position(|added| added.placed.is_told_by(e)) else { return Vec::new() };
+    let shown = outcome.each.get(at).and_then(Option::as_ref);
+    let most = shown.and_then(|s| Some(named(card_across(&alone[s.run], e, s, &id)?, &v.runs[s.run].run)));
+    most.into_iter().chain(sizes(outcome, v, at, &id)).collect()
 }
 
-/// The figure of what is left on a channel, of the run on which it is loudest.
-fn left_of(alone: &[Closed], runs: &[Run], u: &Unexplained) -> Option<Figure> {
+/// The parameter that is known best, as each run alone has it, beside what all share.
+fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str) -> Option<Figure> {
+    let added = outcome.model.effects.get(at)?;
+    let (effect, instance, context) = (added.placed.effect, &added.placed.instance, outcome.contexts.first()?);
+    let told = |e: &[Estimate]| effect.report(context, instance, e.to_vec());
+    let known = |e: &&Estimate| e.se > 0.0 && e.se.is_finite() && e.name != "phase";
+    let sure = |e: &Estimate| e.value.abs() / e.se;
+    let half = |e: &Estimate| if e.se.is_finite() { 1.96 * e.se } else { 0.0 };
+    let all = told(&added.estimates);
+    let best = all.iter().filter(known).max_by(|a, b| sure(a).total_cmp(&sure(b)))?;
+    let (factor, unit) = scaled(best.value, &best.unit);
+    let mark = |(run, alone): (usize, &Vec<Estimate>)| {
+        let own = told(alone).into_iter().find(|e| e.name == best.name)?;
+        let (y, error) = (factor * own.value, factor * half(&own));
+        let interval = if error > 0.0 { format!(" \u{b1} {}", digits(error, 0.1 * error)) } else { String::new() };
+        let text = format!("{}: {}{interval} {unit}", v.runs.get(run)?.run, digits(y, 0.1 * error));
+        Some(Mark { x: run as f64, y, error, text })
+    };
+    let marks: Vec<Mark> = outcome.alone.get(at)?.iter().enumerate().filter_map(mark).collect();
+    let name = (Vocabulary::RIG.parameter)(effect.id(), &best.name);
+    let unit = if unit == "1" { String::new() } else { format!(", {unit}") };
+    (marks.len() > 1).then(|| Figure {
+        id: format!("{id}-runs"),
+        title: format!("{} run by run, each run alone", upper(&name)),
+        x_label: "run, in the order of the list above".to_owned(),
+        y_label: format!("{name}{unit}"),
+        layers: vec![
+            Layer::Level { y: factor * best.value, text: "all runs".to_owned() },
+            Layer::Marks { name: String::new(), class: "a", marks },
+        ],
+        height: 220.0,
+        categories: (1..=v.runs.len())
+            .map(|k| if v.runs.len() > MOST_NAMES && k % 5 != 0 { String::new() } else { k.to_string() })
+            .collect(),
+        ..Figure::default()
+    })
+}
+
+/// The figure of what is left on a channel, of the run on which it is loudest, and which that is.
+fn left_of(alone: &[Closed], runs: &[Run], u: &Unexplained) -> Option<(usize, Figure)> {
     let loudest = runs.iter().position(|run| u.looks_like.contains(&run.log.name));
-    loudest.into_iter().chain(0..runs.len()).find_map(|run| Some(named(rest(&alone[run], u)?, &runs[run])))
+    loudest.into_iter().chain(0..runs.len()).find_map(|run| Some((run, rest(&alone[run], u)?)))
 }
 
 /// Each parameter of the rig's effects as all runs share it, and as each run alone has it.
-fn parameters(outcome: &Outcome) -> Vec<Vec<String>> {
+fn parameters(outcome: &Outcome, v: &Verdict) -> Vec<Vec<String>> {
     let value = |e: &Estimate| digits(e.value, if e.se.is_finite() && e.se > 0.0 { e.se } else { 0.005 * e.value.abs() });
-    let head = ["parameter", "unit", "all runs"].into_iter().chain(outcome.verdict.runs.iter().map(|r| r.run.as_str()));
+    let head = ["parameter", "unit", "all runs"].into_iter().chain(v.runs.iter().map(|r| r.run.as_str()));
     let mut rows = vec![head.map(str::to_owned).collect()];
     for (added, alone) in outcome.model.effects.iter().zip(&outcome.alone) {
         let context = &outcome.contexts[0];
@@ -114,7 +149,7 @@ fn parameters(outcome: &Outcome) -> Vec<Vec<String>> {
 }
 
 /// The channels of one run, as the bars have them.
-fn channels(v: &crate::verdict::Verdict, outcome: &Outcome, run: usize, of: &Validation) -> Channels {
+fn channels(v: &Verdict, outcome: &Outcome, run: usize, of: &Validation) -> Channels {
     let mut out = Channels::default();
     let context = &outcome.contexts[run];
     for (name, BeforeAfter { before, after }) in &of.channels {

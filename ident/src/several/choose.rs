@@ -37,6 +37,11 @@ pub(super) struct Named {
     pub(super) score: f64,
 }
 
+/// The effects of the rig but one.
+pub(super) fn without(named: &[Named], k: usize) -> Vec<Placed> {
+    named.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, n)| n.placed.clone()).collect()
+}
+
 /// Candidates: every effect of the rig that stood on a run or came close, with the shapes that it had there.
 fn pool(joint: &Joint<'_, '_>, runs: &[&Closed]) -> Vec<Vec<Placed>> {
     let mut out: Vec<Vec<Placed>> = Vec::new();

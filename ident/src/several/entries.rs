@@ -21,14 +21,17 @@ use crate::unexplained::LOUD;
 use crate::verdict::{Kin, Unexplained};
 use crate::words::channel as spoken;
 
-/// An effect of the rig.
-pub(super) fn entry(joint: &Joint<'_, '_>, named: &[Named], k: usize, after: &[Across], estimates: &[Estimate]) -> EffectEntry {
-    let (p, score) = (&named[k].placed, named[k].score);
-    let others: Vec<Placed> = named.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, n)| n.placed.clone()).collect();
-    let without = joint.across(&others, None);
+/// An effect of the rig, with the errors of the runs without it and with all.
+pub(super) fn entry(
+    joint: &Joint<'_, '_>,
+    named: &Named,
+    [without, after]: [&[Across]; 2],
+    estimates: &[Estimate],
+) -> EffectEntry {
+    let (p, score) = (&named.placed, named.score);
     let taken = |channel: &str| {
         let pooled = |list: &[Across]| typical(list.iter().filter(|a| a.channel == channel).map(|a| a.rms));
-        1.0 - pooled(after) / pooled(&without)
+        1.0 - pooled(after) / pooled(without)
     };
     let mut channels: Vec<String> = p.instance.channels.iter().filter(|c| !is_contrast(c)).cloned().collect();
     channels.sort_by(|a, b| or_nothing(taken(b)).total_cmp(&or_nothing(taken(a))));

@@ -7,7 +7,7 @@
 
 use super::equations::left_on;
 use super::folds::{self, Tenable};
-use super::joint::{Joint, Shared};
+use super::joint::{Across, Joint, Shared, compared};
 use super::words::{self, Told};
 use super::{Member, Run, choose, differing, own};
 use crate::bad;
@@ -37,6 +37,8 @@ pub struct Outcome {
     pub alone: Vec<Vec<Vec<Estimate>>>,
     /// Where the names took most.
     pub shown: Option<Shown>,
+    /// For each effect of the rig where it took most: before without it, after with it.
+    pub each: Vec<Option<Shown>>,
 }
 
 /// What is left of a channel of one run, predicted by a fit to the others.
@@ -60,9 +62,14 @@ pub struct Shown {
 
 /// The channel and run on which the names took most, with what is left of it.
 fn shown(tenable: &Tenable<'_>) -> Option<Shown> {
-    let Tenable { members, folds, compared, .. } = tenable;
-    let most = compared.iter().filter(|c| !is_contrast(c.before.channel)).max_by(|a, b| a.times().total_cmp(&b.times()))?;
-    let (run, channel) = (most.before.run, most.before.channel);
+    let most =
+        tenable.compared.iter().filter(|c| !is_contrast(c.before.channel)).max_by(|a, b| a.times().total_cmp(&b.times()))?;
+    shown_on(tenable, (most.before.run, most.before.channel), &[])
+}
+
+/// What is left of a channel of a run, predicted by a fit to the others: before with fewer effects, after with all.
+fn shown_on(tenable: &Tenable<'_>, (run, channel): (usize, &'static str), fewer: &[Placed]) -> Option<Shown> {
+    let Tenable { members, folds, .. } = tenable;
     let member = &members[run];
     let k = member.context.target(channel)?;
     let left = |rig: &[Placed], shared: &[Shared]| {
@@ -77,9 +84,17 @@ fn shown(tenable: &Tenable<'_>) -> Option<Shown> {
         channel,
         floor: target.noise.rms,
         t: target.rows.iter().filter(|row| target.claims(**row)).map(|row| member.context.t[*row]).collect(),
-        before: left(&[], &Joint::of(members).without(run).shared(&[]))?,
+        before: left(fewer, &Joint::of(members).without(run).shared(fewer))?,
         after: left(&fold.rig, &fold.shared)?,
     })
+}
+
+/// The run on which an effect of the rig took most of the channel that it is quoted for.
+fn shown_without(tenable: &Tenable<'_>, k: usize, without: &[Across], quoted: &str) -> Option<Shown> {
+    let after: Vec<Across> = tenable.compared.iter().map(|c| c.after).filter(|a| a.channel == quoted).collect();
+    let most = compared(without, &after).into_iter().max_by(|a, b| a.times().total_cmp(&b.times()))?;
+    let fewer: Vec<Placed> = choose::without(&tenable.named, k);
+    shown_on(tenable, (most.before.run, most.before.channel), &fewer)
 }
 
 /// Closes the loop on several runs of one rig.
@@ -101,11 +116,22 @@ pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> O
     let own = joint.members.iter().map(|m| own::of(m, &rig, &shared)).collect();
     let model = model(runs, &contexts, &shared, &rig, &estimates, own);
     let declared = declared(runs, &contexts, &members);
-    let told = Told { runs, contexts: &contexts, tenable: &tenable, models: [&declared, &model], estimates: &estimates };
+    let without: Vec<Vec<Across>> = (0..rig.len()).map(|k| joint.across(&choose::without(&tenable.named, k), None)).collect();
+    let told = Told {
+        runs,
+        contexts: &contexts,
+        tenable: &tenable,
+        models: [&declared, &model],
+        estimates: &estimates,
+        without: &without,
+    };
     let verdict = words::verdict(&told);
     let (alone, shown) = (alone(&joint, &rig), shown(&tenable));
+    let quoted =
+        |k: usize| verdict.effects.iter().find(|e| e.run.is_none() && rig[k].is_told_by(e)).and_then(|e| e.channels.first());
+    let each = (0..rig.len()).map(|k| shown_without(&tenable, k, &without[k], quoted(k)?)).collect();
     progress(1.0);
-    Outcome { contexts, declared, model, verdict, alone, shown }
+    Outcome { contexts, declared, model, verdict, alone, shown, each }
 }
 
 /// The declared model, fitted to all runs: no effect, of the rig or of a run.

@@ -29,16 +29,18 @@ pub(super) struct Told<'f, 'a> {
     pub(super) models: [&'f Model; 2],
     /// For each name its parameters.
     pub(super) estimates: &'f [Vec<Estimate>],
+    /// For each name the errors of the runs without it.
+    pub(super) without: &'f [Vec<Across>],
 }
 
 /// The contract's words.
 pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
-    let Told { runs, contexts, tenable, models, estimates } = *told;
+    let Told { runs, contexts, tenable, models, estimates, without } = *told;
     let Tenable { named, members, worths, compared, .. } = tenable;
     let joint = Joint::of(members);
     let after: Vec<Across> = compared.iter().map(|c| c.after).collect();
     let channels = channels(told);
-    let mut effects: Vec<_> = (0..named.len()).map(|k| entry(&joint, named, k, &after, &estimates[k])).collect();
+    let mut effects: Vec<_> = (0..named.len()).map(|k| entry(&joint, &named[k], [&without[k], &after], &estimates[k])).collect();
     effects.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
     let own = models[1].own.iter().zip(worths).enumerate();
     effects.extend(own.flat_map(|(run, (own, worths))| own_entries(&contexts[run], own, worths)));

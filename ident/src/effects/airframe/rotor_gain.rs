@@ -37,15 +37,13 @@ impl AirframeEffect for RotorGain {
 
     fn said(&self, found: &EffectEntry) -> Clause {
         let rotor = found.parameter("rotor").map_or_else(|| "one rotor".to_owned(), |p| format!("rotor {:.0}", p.value));
-        let gains = found.parameter("thrust_change").is_some_and(|p| p.value > 0.0);
-        let (sign, word) = if gains { (100.0, "more") } else { (-100.0, "less") };
-        let with = |v: &str| format!("gives {v} {word} thrust than its speed says");
-        let without = format!("gives {word} thrust than its speed says");
+        let with = |word: &str, v: &str| format!("gives {v} {word} thrust than its speed says");
         let since = match found.scope {
             Scope::Event => found.tell("t0", |v| format!(" from {v} on"), ""),
             _ => String::new(),
         };
-        Clause::new(rotor, found.tell_times("thrust_change", sign, "%", with, &without) + &since)
+        let other = "gives another thrust than its speed says";
+        Clause::new(rotor, found.tell_signed("thrust_change", (100.0, "%"), ["more", "less"], with, other) + &since)
     }
 
     fn scope(&self, form: &Form) -> Scope {

@@ -38,13 +38,15 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     let noun = page.words.noun;
     for (k, (heading, lead)) in [
         (format!("What this {noun} has"), String::new()),
-        (format!("What every {noun} has"), format!("A rotor has inertia and takes time, and a reading lies somewhere within its row: no {noun} is without these.")),
+        (format!("What every {noun} has"), format!("A rotor has inertia and takes time, a reading lies somewhere within its row, and no two clocks run alike: no {noun} is without these.")),
         ("Without a name".to_owned(), "What no known effect explains. Where a smooth function predicts rows it has not seen, it is added to the model; it names no cause.".to_owned()),
     ]
     .into_iter()
     .enumerate()
     {
-        let members: Vec<usize> = order.iter().copied().filter(|i| group(&v.effects[*i]) == k).collect();
+        // of what nothing was added for, the section on what is left tells
+        let told = |i: &usize| !v.effects[*i].is_without_correction();
+        let members: Vec<usize> = order.iter().copied().filter(|i| group(&v.effects[*i]) == k).filter(told).collect();
         if members.is_empty() {
             continue;
         }
@@ -67,12 +69,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     let p = format!("p {}", equals(&probability(e.probability)));
     let chip = if nameless { format!("no name; {}", that_it_is_there(e.probability)) } else { format!("{sure}: {p}") };
     let title = if nameless {
-        let on = channels(&e.channels);
-        if e.depends_on.is_empty() {
-            format!("Something on {on} that nothing tried here predicts.")
-        } else {
-            format!("Something on {on} that goes with {}.", channels(&e.depends_on))
-        }
+        format!("Something on {} that goes with {}.", channels(&e.channels), channels(&e.depends_on))
     } else {
         page.words.said(e).sentence()
     };
@@ -117,6 +114,8 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
 pub(super) fn that_it_is_there(p: f64) -> String {
     if p == UNEXPLAINED {
         "nine in ten such verdicts are right".to_owned()
+    } else if p < 0.5 {
+        "other forms would do as well".to_owned()
     } else {
         format!("that something is there: p {}", equals(&probability(p)))
     }
@@ -146,7 +145,7 @@ pub(super) fn removes(v: &Verdict, e: &EffectEntry) -> String {
     if e.run.is_some() {
         return String::new();
     }
-    if e.id == "unknown" && e.depends_on.is_empty() {
+    if e.is_without_correction() {
         return "No correction was fitted.".to_owned();
     }
     if reduction <= 0.0 || !c.after.heldout_rms.is_finite() {

@@ -5,6 +5,8 @@
 //! Units: the channel's.
 //! Reference: component-plus-residual plots: Larsen & McCleary 1972, Technometrics 14:781.
 
+use super::sentence::order;
+use super::vocabulary::Vocabulary;
 use crate::noise::median;
 use crate::report::figure::{Figure, Layer, Mark};
 use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
@@ -152,15 +154,21 @@ pub(crate) fn part(trace: &Trace, id: &str, names: [&'static str; 2], wide: f64)
     })
 }
 
-/// The channel on which most was taken away, over time and enlarged; where nothing was, the loudest.
-pub(crate) fn most(verdict: &Verdict, traces: &[Trace]) -> Vec<Figure> {
+/// The channel that the sentence begins with, over time and enlarged; without names the loudest.
+pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Vec<Figure> {
+    let own = |e: &&EffectEntry| e.id != "unknown" && !(words.of_every_rig)(e) && !e.is_of_single_readings();
+    let told = order(verdict).into_iter().map(|k| &verdict.effects[k]).find(own).and_then(|e| e.channels.first());
     let weight = |t: &&Trace| {
         verdict.channels.get(&t.channel).map_or(0.0, |c| match verdict.verdict {
             Kind::Attributed | Kind::Ambiguous => c.before.heldout_rms / c.after.heldout_rms.max(1e-300),
             Kind::Unattributed | Kind::None => c.after.heldout_rms / c.noise_floor_rms,
         })
     };
-    let Some(trace) = traces.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))) else { return Vec::new() };
+    let Some(trace) =
+        traces.iter().filter(|t| told.is_none_or(|c| *c == t.channel)).max_by(|a, b| weight(a).total_cmp(&weight(b)))
+    else {
+        return Vec::new();
+    };
     let names = pair(verdict);
     std::iter::once(over_time(trace, "most", names)).chain(enlarged(trace, "most", names)).collect()
 }

@@ -8,6 +8,7 @@
 use super::page::Page;
 use super::sentence::size_left;
 use super::vocabulary::Vocabulary;
+use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
 use crate::verdict::Verdict;
@@ -25,7 +26,12 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     let with_model = |u: &&crate::verdict::Unexplained| !v.channels.not_predicted.contains_key(&u.channel);
     let cells = |u: &crate::verdict::Unexplained| {
         let with: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
-        let with = if with.is_empty() { "nothing in the log".to_owned() } else { with.join(", ") };
+        let with = match with.as_slice() {
+            // what it looks like says so
+            [] if u.looks_like.contains("grows with the load") => "the load".to_owned(),
+            [] => "nothing in the log".to_owned(),
+            with => with.join(", "),
+        };
         vec![heading(&u.channel), format!("{:.1}", u.over_floor), size_left(v, u), u.looks_like.clone(), with]
     };
     let rows: Vec<Vec<String>> = v.unexplained.iter().filter(with_model).map(cells).collect();
@@ -34,10 +40,14 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
         return;
     }
     sheet.data("unexplained", &["channel", "noise floors", "size", "looks like", "goes with"], &rows, None);
+    let untold = v.effects.iter().filter(|e| e.is_without_correction());
+    untold.for_each(|e| sheet.say(&format!("{}.", upper(&plain(&e.evidence)))));
     // a figure of rows that the fit saw says nothing of those that it did not see
     let seen: Vec<String> = v.unexplained.iter().filter(with_model).filter_map(|u| beyond_what_was_seen(v, &u.channel)).collect();
     seen.iter().for_each(|said| sheet.say(said));
-    sheet.figures(page.left.clone());
+    // what the convincing figure shows is not drawn again
+    let shown = |f: &Figure| page.hero.iter().any(|h| h.title == f.title);
+    sheet.figures(page.left.iter().filter(|f| !shown(f)).cloned().collect());
 }
 
 /// Times the error on rows that the fit saw from which on that on rows it did not see is told apart.

@@ -6,6 +6,7 @@
 //! Units: told to the digits that the intervals support.
 //! Reference: specification `formats.md`, "Verdict".
 
+mod brief;
 mod cards;
 mod evidence;
 mod fold;
@@ -23,7 +24,6 @@ pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};
 pub(crate) use page::{Page, begin};
 pub use provenance::{Hidden, Origin};
-pub(crate) use sentence::order;
 pub use sentence::sentence;
 pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal, wrapped};

@@ -7,12 +7,15 @@
 
 use super::provenance::{Origin, provenance};
 use super::vocabulary::Vocabulary;
-use super::{cards, fold, left, pair, sentence, state};
+use super::{cards, fold, left, sentence, state};
 use crate::context::unit_of;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::verdict::{Kind, Validation, Verdict};
-use crate::words::heading;
+use crate::words::{digits, heading, scaled};
+
+/// Rows below which a log is a table of levels, and the page says what that means.
+const FEW_ROWS: usize = 30;
 
 /// What a page is made of.
 pub(crate) struct Page<'p> {
@@ -44,7 +47,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     let of_what = if v.runs.is_empty() { v.run.clone() } else { format!("{} runs of one rig", v.runs.len()) };
     let mut sheet = Sheet::told(&format!("{of_what}: what the model lacks"), &sentence(v, page.words, page.news));
     sheet.soft(&page.origin.line());
-    sheet.html_part(&state::bars(&v.channels, &v.unexplained, pair(v)));
+    sheet.html_part(&state::state(v));
     match page.origin.lacks.as_slice() {
         [lack] => sheet.warn(&format!("{lack}.")),
         [lack, others @ ..] => {
@@ -53,6 +56,9 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
             sheet.warn(&format!("{lack}. {runs} rows, told under \"Rows that are missing\"."));
         }
         [] => {}
+    }
+    if v.runs.is_empty() && page.origin.log.rows < FEW_ROWS {
+        sheet.warn(&format!("Only {} rows: nothing between two levels is seen, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.", page.origin.log.rows));
     }
     for l in &v.left_out {
         sheet.warn(&format!("Left out: {l}."));
@@ -117,13 +123,16 @@ fn runs(sheet: &mut Sheet, v: &Verdict, list: &[Validation], name: &str) {
         .into_iter()
         .map(|channel| {
             let unit = v.channels.get(channel).map_or(unit_of(channel), |c| c.unit.as_str());
+            let most = list.iter().filter_map(|r| r.channels.get(channel)).map(|b| b.before.max(b.after)).fold(0.0, f64::max);
+            let (factor, unit) = scaled(most, unit);
+            let unit = if unit == "rpm" { "rev/min" } else { unit };
             let cell = |r: &Validation| {
                 r.channels.get(channel).map_or_else(String::new, |b| {
-                    let [_, before, after] = state::figures(unit, b.before, b.before, b.after);
+                    let [before, after] = [b.before, b.after].map(|v| digits(factor * v, 0.005 * (factor * v).abs()));
                     format!("{before} to {after}, {}", state::factor(b.before, b.after))
                 })
             };
-            std::iter::once(heading(channel)).chain(list.iter().map(cell)).collect()
+            std::iter::once(format!("{}, {unit}", heading(channel))).chain(list.iter().map(cell)).collect()
         })
         .collect();
     let head: Vec<&str> = head.iter().map(String::as_str).collect();

@@ -8,8 +8,8 @@
 use super::vocabulary::Vocabulary;
 use crate::rivals::beyond;
 use crate::unexplained::LOUD;
-use crate::verdict::{EffectEntry, Kin, Kind, Unexplained, Verdict};
-use crate::words::{Clause, adverb, amount, channel, heading, list, upper};
+use crate::verdict::{Channel, EffectEntry, Kin, Kind, Unexplained, Verdict};
+use crate::words::{Clause, adverb, amount, channel, heading, list, upper, vector};
 use std::collections::BTreeSet;
 
 /// Most effects that the sentence names; the cards have all.
@@ -220,11 +220,11 @@ pub(super) fn instead(best: &[&EffectEntry], ids: &[String]) -> Vec<String> {
     beyond(ids, &best.iter().map(|e| e.id.clone()).collect::<Vec<_>>())
 }
 
-/// Share of what a channel had left over its noise that is gone, as squares.
-pub(super) fn share(verdict: &Verdict, name: &str) -> Option<f64> {
-    let c = verdict.channels.get(name)?;
-    let over = |rms: f64| (rms * rms - c.noise_floor_rms * c.noise_floor_rms).max(0.0);
-    let (before, after) = (over(c.before.heldout_rms), over(c.after.heldout_rms));
+/// Share of what a quantity had left over its noise that is gone, as squares: of a vector over all its axes.
+fn share(verdict: &Verdict, name: &str) -> Option<f64> {
+    let of = |c: &Channel, rms: f64| (rms * rms - c.noise_floor_rms * c.noise_floor_rms).max(0.0);
+    let axes = verdict.channels.iter().filter(|(other, _)| vector(other) == vector(name)).map(|(_, c)| c);
+    let (before, after) = axes.fold((0.0, 0.0), |(b, a), c| (b + of(c, c.before.heldout_rms), a + of(c, c.after.heldout_rms)));
     (before > 0.0 && after.is_finite()).then(|| (1.0 - after / before).max(0.0))
 }
 
@@ -232,17 +232,16 @@ pub(super) fn share(verdict: &Verdict, name: &str) -> Option<f64> {
 fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
     let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).map(String::as_str).collect();
     on.sort_unstable();
-    on.dedup();
+    on.dedup_by_key(|c| vector(c));
     let told_of = |c| Some((c, share(verdict, c).filter(|s| *s >= TELLING)?));
     let shares: Vec<(&str, f64)> = on.into_iter().filter_map(told_of).collect();
+    let is_told = |c: &String| shares.iter().any(|s| vector(s.0) == vector(c));
     let Some(least) = shares.iter().map(|s| s.1).min_by(f64::total_cmp) else { return String::new() };
     let most = shares.iter().map(|s| s.1).fold(least, f64::max);
     // what else was added on these channels has its part in the figure
-    let others = verdict.effects.iter().any(|e| {
-        !told.iter().any(|t| std::ptr::eq(*t, e)) && e.channels.iter().any(|c| shares.iter().any(|s| s.0 == c.as_str()))
-    });
-    let nameless =
-        verdict.effects.iter().any(|e| e.id == "unknown" && e.channels.iter().any(|c| shares.iter().any(|s| s.0 == c.as_str())));
+    let beside = |e: &&EffectEntry| !told.iter().any(|t| std::ptr::eq(*t, *e)) && e.channels.iter().any(is_told);
+    let others = verdict.effects.iter().any(|e| beside(&e));
+    let nameless = verdict.effects.iter().filter(beside).any(|e| e.id == "unknown");
     let subject = match (others, told.len()) {
         (true, _) if nameless => "With all that is told below, what has no name included, the model explains",
         (true, _) => "With all that is named below the model explains",
@@ -250,19 +249,19 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
         (false, _) => "Together they explain",
     };
     // nothing is all as long as something is told of what is left
-    let rest = verdict.unexplained.iter().any(|u| shares.iter().any(|s| s.0 == u.channel));
+    let rest = verdict.unexplained.iter().any(|u| is_told(&u.channel));
     let per_cent = |share: f64| match share {
         s if s >= ALL && !rest => "all".to_owned(),
         s => format!("{:.0} %", (100.0 * s).min(99.0)),
     };
-    let names: Vec<String> = shares.iter().map(|s| channel(s.0)).collect();
+    let names: Vec<String> = shares.iter().map(|s| vector(s.0)).collect();
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
         return format!("{subject} {} of what {} had left over.", per_cent(mean), list(&names));
     }
-    let parts: Vec<String> = shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), channel(s.0))).collect();
+    let parts: Vec<String> = shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), vector(s.0))).collect();
     let short: Vec<String> = std::iter::once(parts[0].clone())
-        .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), channel(s.0))))
+        .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), vector(s.0))))
         .collect();
     format!("{subject} {}.", list(&short))
 }
@@ -309,7 +308,8 @@ fn left(verdict: &Verdict) -> String {
     let sensors = loud(verdict).filter(|u| quantity(&u.channel) == what && verdict.channels.contains_key(&u.channel)).count();
     let on = if sensors > 1 { "the speeds".to_owned() } else { channel(&loudest.channel) };
     let size = size_left(verdict, loudest);
-    let looks = &loudest.looks_like;
+    // the first words; the section on what is left has all
+    let looks = loudest.looks_like.split(';').next().unwrap_or_default();
     let named: Vec<String> = others.iter().map(|q| channel(q)).collect();
     match named.len() {
         0 => format!("On {on} {size} is left ({looks})."),

@@ -5,8 +5,10 @@
 //! Units: noise floors; the figures beside the bars carry the channel's own.
 //! Reference: none.
 
+use super::evidence::pair;
 use crate::report::svg::escape;
-use crate::verdict::{Channels, Unexplained};
+use crate::unexplained::LOUD;
+use crate::verdict::{Channels, Verdict};
 use crate::words::{channel, digits, scaled, upper};
 use std::fmt::Write;
 
@@ -42,15 +44,22 @@ pub(super) fn figures(unit: &str, floor: f64, before: f64, after: f64) -> [Strin
     [floor, before, after].map(|v| format!("{} {unit}", digits(factor * v, 0.005 * (factor * v).abs())))
 }
 
-/// What is said of a channel in a word.
-pub(super) fn word([before, after]: [f64; 2], left: bool) -> &'static str {
+/// What is said of a channel in a word. `left`: what remains is no noise; `named`: a name improves it.
+pub(super) fn word([before, after]: [f64; 2], left: bool, named: bool) -> &'static str {
     match after {
         f if !f.is_finite() => "not known",
-        f if f <= EXPLAINED && before <= EXPLAINED && !left => "only noise",
-        f if f <= EXPLAINED && !left => "explained",
-        f if f <= 3.0 => "little left",
-        _ => "unexplained rest",
+        f if f > LOUD => "unexplained rest",
+        f if f > EXPLAINED => "little left",
+        _ if left => "a trace left",
+        _ if before <= EXPLAINED && !named => "only noise",
+        _ => "explained",
     }
+}
+
+/// The channels that a name improves most.
+pub(super) fn named(verdict: &Verdict) -> Vec<&str> {
+    let named = verdict.effects.iter().filter(|e| e.id != "unknown" && e.heldout_error_reduction > 0.0);
+    named.filter_map(|e| e.channels.first()).map(String::as_str).collect()
 }
 
 /// A channel as people say it, with its column's name where that is another word.
@@ -59,8 +68,14 @@ fn spoken(name: &str) -> String {
     if said == name { escape(name) } else { format!("{} <code>{}</code>", escape(&upper(&said)), escape(name)) }
 }
 
-/// The bars.
-pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained], [_, after]: [&str; 2]) -> String {
+/// The bars of a verdict's channels.
+pub(super) fn state(v: &Verdict) -> String {
+    let left: Vec<&str> = v.unexplained.iter().map(|u| u.channel.as_str()).collect();
+    bars(&v.channels, &left, &named(v), pair(v))
+}
+
+/// The bars; `left` are the channels on which more than noise is left, `named` those that a name improves.
+pub(crate) fn bars(channels: &Channels, left: &[&str], named: &[&str], [_, after]: [&str; 2]) -> String {
     let scale = Scale::of(channels);
     let mut out = String::from("<div class=\"state\" role=\"table\" aria-label=\"error of each channel before and after\">\n");
     out +=
@@ -73,7 +88,7 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained], [_, after]:
     out += "</span><span role=\"columnheader\">before</span><span role=\"columnheader\">after</span><span role=\"columnheader\">factor</span><span role=\"columnheader\">state</span></div>\n";
     for (name, c) in channels {
         let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
-        let left = unexplained.iter().any(|u| u.channel == *name);
+        let [left, named] = [left, named].map(|list| list.contains(&name.as_str()));
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
         let label = format!("{}: before {:.1}, after {:.1} noise floors", channel(name), floors[0], floors[1]);
         let _ = write!(
@@ -99,7 +114,7 @@ pub(crate) fn bars(channels: &Channels, unexplained: &[Unexplained], [_, after]:
             out,
             "</span><span class=\"num\" role=\"cell\" data-of=\"before\">{before}</span><span class=\"num\" role=\"cell\" data-of=\"after\">{after}</span><span class=\"num\" role=\"cell\" data-of=\"factor\">{}</span><span class=\"word\" role=\"cell\">{}</span></div>",
             factor(c.before.heldout_rms, c.after.heldout_rms),
-            word(floors, left),
+            word(floors, left, named),
         );
     }
     for (name, reason) in &channels.not_predicted {
@@ -147,7 +162,7 @@ mod tests {
             channels.predicted.insert(name.into(), c);
         }
         channels.not_predicted.insert("rpm".into(), "no command was logged".into());
-        let html = bars(&channels, &[], ["declared, nothing added", ""]);
+        let html = bars(&channels, &[], &[], ["declared, nothing added", ""]);
         assert!(!html.contains("corrected"), "{html}");
         let scale = Scale::of(&channels);
         assert!(scale.at(1.0) > 0.0 && scale.at(100.0) < 100.0 && scale.at(0.1) == 0.0);

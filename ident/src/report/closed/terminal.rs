@@ -8,7 +8,7 @@
 use super::cards::{is_shown, removes, that_it_is_there, value};
 use super::left::in_words;
 use super::sentence::{instead, order, sentence, size_left, without};
-use super::state::{factor, figures, word};
+use super::state::{factor, figures, named, word};
 use super::vocabulary::Vocabulary;
 use crate::context::unit_of;
 use crate::verdict::{Alternative, Channel, EffectEntry, Verdict};
@@ -21,9 +21,10 @@ const ASIDE: usize = 5;
 
 /// The text.
 #[must_use]
-pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
+pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
+    let verdict = &*whole.briefly();
     let said = sentence(verdict, words, news);
-    let mut out = format!("{}\n{}\n", wrapped(&said, 0), wrapped(&whose(verdict), 0));
+    let mut out = format!("{}\n{}\n", wrapped(&said, 0), wrapped(&whose(whole), 0));
     out += &channels(verdict);
     if said.contains(" % of what ") {
         out += "(per cent of the squared error above the noise floor: 75 % less is half the error)\n";
@@ -59,6 +60,7 @@ pub fn terminal(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let of_several = verdict.runs.iter().map(|v| (v, format!("{}, predicted by a fit to the others:", v.run)));
     for (v, heading) in of_several.chain(took_no_part) {
         out += &format!("\n{}\n", wrapped(&heading, 2));
+        out += &format!("  {:<16}{:>18}{:>18}{:>10}\n", "rms error", "before", "after", "factor");
         for (name, b) in &v.channels {
             let unit = verdict.channels.get(name).map_or(unit_of(name), |c| c.unit.as_str());
             let [_, before, after] = figures(unit, b.before, b.before, b.after);
@@ -93,12 +95,14 @@ fn whose(verdict: &Verdict) -> String {
 
 fn channels(verdict: &Verdict) -> String {
     let error = if verdict.runs.is_empty() { "held-out error" } else { "across runs" };
+    let named = named(verdict);
     let row = |(name, c): (&String, &Channel)| {
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
         let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
         let left = verdict.unexplained.iter().any(|u| u.channel == *name);
+        let named = named.contains(&name.as_str());
         let times = factor(c.before.heldout_rms, c.after.heldout_rms);
-        [channel(name), floor, before, after, times, word(floors, left).to_owned()]
+        [channel(name), floor, before, after, times, word(floors, left, named).to_owned()]
     };
     let head = [error, "noise floor", "before", "after", "factor", "state"].map(str::to_owned);
     let rows: Vec<[String; 6]> = std::iter::once(head).chain(verdict.channels.iter().map(row)).collect();

@@ -91,7 +91,7 @@ fn of_change(sheet: &mut Sheet, history: &History, change: &Change) {
     if !change.names.is_empty() {
         let row = |n: &crate::history::Name| vec![upper(&n.title), n.id.clone(), format!("{:.1}", n.score)];
         let rows: Vec<Vec<String>> = change.names.iter().map(row).collect();
-        sheet.data("names", &["name", "effect", "score, nats"], &rows, None);
+        sheet.data("names", &["name", "effect", "evidence, nats"], &rows, None);
     }
 }
 
