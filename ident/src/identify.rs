@@ -165,6 +165,13 @@ const TABLE: usize = 64;
 /// Error that a row of a table is given, as a share of its column's largest value; the scatter about a curve corrects it.
 const TABLE_ERROR: f64 = 0.01;
 
+/// The levels of a log: its plateaus, or every row of a table that has one row for each level.
+#[must_use]
+pub fn levels(context: &Context, log: &Log) -> Vec<Plateau> {
+    let plateaus = detect(log, &context.rpm);
+    if plateaus.is_empty() { table_rows(log, context).0 } else { plateaus }
+}
+
 /// A static table has one row for each level: every row is a point.
 fn table_rows(log: &Log, context: &Context) -> (Vec<Plateau>, Vec<Option<(f64, f64)>>) {
     if log.len() > TABLE {

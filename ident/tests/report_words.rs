@@ -310,6 +310,41 @@ fn every_effect_of_a_flight_has_words() {
     assert_eq!(said("mass_offset", unknown_size), "The centre of gravity lies off the middle.");
 }
 
+/// A size is told without its sign: a word tells the direction.
+#[test]
+fn sizes_have_no_sign() {
+    let said = |id: &str, name: &str, value: f64, unit: &str| {
+        let found = effect(id, "thrust_n", 0.95, 0.5, vec![parameter(name, value, 0.01 * value.abs(), unit)]);
+        (Vocabulary::RIG.clause)(&found).sentence()
+    };
+    for (id, name, unit, up, down) in [
+        ("zero_drift", "rate", "N/s", "drifts up by 1.20 N a minute", "drifts down by 1.20 N a minute"),
+        ("tare_shift", "offset", "N", "jumps up by 20.0 mN", "jumps down by 20.0 mN"),
+        ("gain_change", "gain_change", "1", "rises by 2.00 %", "falls by 2.00 %"),
+        ("blade_damage", "thrust_change", "1", "adds 2.00 % of the thrust", "takes 2.00 % of the thrust"),
+        ("thermal_zero", "coefficient", "N/K", "rises by 20.0 mN per kelvin", "falls by 20.0 mN per kelvin"),
+        ("reynolds_thrust", "exponent", "1", "to the power of 2.02, not of two", "to the power of 1.98, not of two"),
+    ] {
+        let size = if id == "tare_shift" || id == "thermal_zero" { 0.0200 } else { 0.02 };
+        let [above, below] = [size, -size].map(|v| said(id, name, v, unit));
+        assert!(above.contains(up) && below.contains(down), "{above} / {below}");
+    }
+}
+
+/// What is told of several sensors of one speed, or of the axes of a vector, is told of the whole.
+#[test]
+fn a_share_is_that_of_the_whole_quantity() {
+    let mut v = verdict(Kind::Attributed, vec![effect("spinup_lag", "rpm_hall", 0.99, 0.9, vec![])]);
+    let of = |rms: f64| Figures { rms, heldout_rms: rms, across_runs_rms: None, whiteness_p: 0.2 };
+    for (name, after) in [("rpm_hall", 1.0), ("rpm_beam", 10.0)] {
+        let channel = Channel { unit: "rev/min".into(), noise_floor_rms: 1.0, before: of(20.0), after: of(after) };
+        v.channels.predicted.insert(name.into(), channel);
+    }
+    let said = sentence(&v, Vocabulary::RIG, false);
+    // 1 - (0 + 99)/(399 + 399)
+    assert!(said.contains("88 % of what the speeds had left over"), "{said}");
+}
+
 /// Of several runs what happened on one alone names it, on the terminal and at the head.
 #[test]
 fn an_event_of_one_run_names_its_run() {

@@ -50,6 +50,22 @@ fn a_measured_run_is_a_pair_and_knows_its_hover() {
     assert!(said.err.contains("resonance at 2511 rev/min (unbalance") && said.err.contains("1255 rev/min (blade pass)"));
 }
 
+/// A table that a stand writes has one row for each level.
+#[test]
+fn a_table_of_levels_is_a_pair() {
+    let folder = TempDir::new().unwrap();
+    let rows = (0..9).map(|k| {
+        let (rpm, t) = (1500.0 + 600.0 * f64::from(k), 2.0 * f64::from(k));
+        format!("{t:.1},{},{rpm:.0},{:.3},{:.3}\n", 1100 + 100 * k, 1.5e-7 * rpm * rpm, 1.2e-7 * rpm * rpm)
+    });
+    let table: String = std::iter::once("t_s,pulse_us,rpm,thrust_n,current_a\n".to_owned()).chain(rows).collect();
+    std::fs::write(folder.path().join("table.csv"), table).unwrap();
+    let said = call(folder.path(), &["select", "table.csv", "--json"]).succeeded();
+    let json: Value = serde_json::from_str(&said.out).unwrap();
+    let most = json["rows"][0]["pair"]["maximum"]["thrust_n"].as_f64().expect("the row with most thrust");
+    assert!((most - 1.5e-7 * 6300.0_f64.powi(2)).abs() < 0.001, "{most}: {}", said.out);
+}
+
 #[test]
 fn the_beam_of_table_7_and_a_wrong_one() {
     let folder = TempDir::new().unwrap();

@@ -121,9 +121,7 @@ fn over(id: &str, term: &Term<'_>, axis: usize, scene: &Scene<'_>, claimed: &[bo
             make("temperature".to_owned(), "degC", &|i| recording.temperature.get(i).copied().unwrap_or(f64::NAN))
         }
         "g_sensitivity" => make(format!("specific force ({letter})"), "m/s^2", &|i| recording.accel[i][of]),
-        "lever_arm" => make(format!("force ({own}) that the turning makes on an arm of 1 m along {letter}"), "m/s^2", &|i| {
-            (term.value)(i)[axis]
-        }),
+        "lever_arm" => make(format!("turning force ({own}) of a 1 m arm along {letter}"), "m/s^2", &|i| (term.value)(i)[axis]),
         _ => None,
     }
 }

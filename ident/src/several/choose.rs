@@ -127,7 +127,7 @@ fn may_stand_beside(rig: &[Placed], newcomer: &Placed) -> bool {
 }
 
 /// Whether it takes enough off the error of one of its channels, on average over the runs, to be worth a name.
-fn is_worth(compared: &[Compared]) -> bool {
+pub(super) fn is_worth(compared: &[Compared]) -> bool {
     let gone = |channel: &str| 1.0 - 1.0 / typical(compared.iter().filter(|c| c.before.channel == channel).map(Compared::times));
     compared.iter().any(|c| gone(c.before.channel) > NEEDED_REDUCTION)
 }

@@ -45,7 +45,8 @@ pub(super) struct Tenable<'a> {
     pub(super) compared: Vec<Compared>,
 }
 
-/// Each run predicted by a fit to the others, shapes too. Names that make a run's channel worse go, the weakest first.
+/// Each run predicted by a fit to the others, shapes too. Names that make a run's channel worse go, and those that help none, the
+/// weakest first.
 pub(super) fn tenable<'a>(members: &[Member<'a>], mut named: Vec<Named>) -> Tenable<'a> {
     loop {
         let rig: Vec<Placed> = named.iter().map(|n| n.placed.clone()).collect();
@@ -58,11 +59,20 @@ pub(super) fn tenable<'a>(members: &[Member<'a>], mut named: Vec<Named>) -> Tena
             let touching = (0..named.len()).filter(|k| named[*k].placed.instance.touches(worse));
             touching.min_by(|a, b| named[*a].score.total_cmp(&named[*b].score))
         });
-        match weakest {
+        match weakest.or_else(|| needless(&joint, &named, &after)) {
             Some(k) => drop(named.remove(k)),
             None => return Tenable { named, members, worths, folds, compared },
         }
     }
+}
+
+/// The weakest of the names that take no more off the error of any channel than what has no name.
+fn needless(joint: &Joint<'_, '_>, named: &[Named], after: &[Across]) -> Option<usize> {
+    let is_needless = |k: &usize| {
+        let without = joint.across(&choose::without(named, *k), None);
+        !choose::is_worth(&compared(&without, after))
+    };
+    (0..named.len()).filter(is_needless).min_by(|a, b| named[*a].score.total_cmp(&named[*b].score))
 }
 
 /// The fits without one run each, on all cores, and what they predict of it.

@@ -220,10 +220,17 @@ pub(super) fn instead(best: &[&EffectEntry], ids: &[String]) -> Vec<String> {
     beyond(ids, &best.iter().map(|e| e.id.clone()).collect::<Vec<_>>())
 }
 
-/// Share of what a quantity had left over its noise that is gone, as squares: of a vector over all its axes.
+/// What a channel is a part of: a vector of which it is an axis, the speed that several sensors read.
+fn whole(verdict: &Verdict, name: &str) -> String {
+    let sensors = verdict.channels.keys().filter(|c| quantity(c) == "rpm").count();
+    if quantity(name) == "rpm" && sensors > 1 { "the speeds".to_owned() } else { vector(name) }
+}
+
+/// Share of what such a whole had left over its noise that is gone, as squares over all its channels.
 fn share(verdict: &Verdict, name: &str) -> Option<f64> {
     let of = |c: &Channel, rms: f64| (rms * rms - c.noise_floor_rms * c.noise_floor_rms).max(0.0);
-    let axes = verdict.channels.iter().filter(|(other, _)| vector(other) == vector(name)).map(|(_, c)| c);
+    let named = whole(verdict, name);
+    let axes = verdict.channels.iter().filter(|(other, _)| whole(verdict, other) == named).map(|(_, c)| c);
     let (before, after) = axes.fold((0.0, 0.0), |(b, a), c| (b + of(c, c.before.heldout_rms), a + of(c, c.after.heldout_rms)));
     (before > 0.0 && after.is_finite()).then(|| (1.0 - after / before).max(0.0))
 }
@@ -232,10 +239,10 @@ fn share(verdict: &Verdict, name: &str) -> Option<f64> {
 fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
     let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).map(String::as_str).collect();
     on.sort_unstable();
-    on.dedup_by_key(|c| vector(c));
+    on.dedup_by_key(|c| whole(verdict, c));
     let told_of = |c| Some((c, share(verdict, c).filter(|s| *s >= TELLING)?));
     let shares: Vec<(&str, f64)> = on.into_iter().filter_map(told_of).collect();
-    let is_told = |c: &String| shares.iter().any(|s| vector(s.0) == vector(c));
+    let is_told = |c: &String| shares.iter().any(|s| whole(verdict, s.0) == whole(verdict, c));
     let Some(least) = shares.iter().map(|s| s.1).min_by(f64::total_cmp) else { return String::new() };
     let most = shares.iter().map(|s| s.1).fold(least, f64::max);
     // what else was added on these channels has its part in the figure
@@ -254,14 +261,15 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
         s if s >= ALL && !rest => "all".to_owned(),
         s => format!("{:.0} %", (100.0 * s).min(99.0)),
     };
-    let names: Vec<String> = shares.iter().map(|s| vector(s.0)).collect();
+    let names: Vec<String> = shares.iter().map(|s| whole(verdict, s.0)).collect();
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
         return format!("{subject} {} of what {} had left over.", per_cent(mean), list(&names));
     }
-    let parts: Vec<String> = shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), vector(s.0))).collect();
+    let parts: Vec<String> =
+        shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), whole(verdict, s.0))).collect();
     let short: Vec<String> = std::iter::once(parts[0].clone())
-        .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), vector(s.0))))
+        .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))))
         .collect();
     format!("{subject} {}.", list(&short))
 }

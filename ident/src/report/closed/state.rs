@@ -154,6 +154,21 @@ mod tests {
     use crate::verdict::{Channel, Figures};
 
     #[test]
+    fn no_state_contradicts_what_stands_beside_it() {
+        for (floors, left, named, said) in [
+            ([1.2, 0.9], false, false, "only noise"),
+            ([1.2, 0.9], false, true, "explained"),
+            ([40.0, 1.2], false, false, "explained"),
+            ([1.2, 0.8], true, false, "a trace left"),
+            ([40.0, 2.0], false, true, "little left"),
+            ([40.0, 3.5], false, true, "unexplained rest"),
+            ([40.0, f64::NAN], false, true, "not known"),
+        ] {
+            assert_eq!(word(floors, left, named), said, "{floors:?} {left} {named}");
+        }
+    }
+
+    #[test]
     fn bars_share_a_scale_and_end_at_the_floor() {
         let of = |rms: f64| Figures { rms, heldout_rms: rms, across_runs_rms: None, whiteness_p: 0.5 };
         let mut channels = Channels::default();
