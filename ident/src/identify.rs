@@ -167,7 +167,7 @@ const TABLE_ERROR: f64 = 0.01;
 
 /// The levels of a log: its plateaus, or every row of a table that has one row for each level.
 #[must_use]
-pub fn levels(context: &Context, log: &Log) -> Vec<Plateau> {
+pub fn settled(context: &Context, log: &Log) -> Vec<Plateau> {
     let plateaus = detect(log, &context.rpm);
     if plateaus.is_empty() { table_rows(log, context).0 } else { plateaus }
 }

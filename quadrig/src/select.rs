@@ -17,7 +17,7 @@ use hal_sim::Scenario;
 use hal_sim::plant::{Propeller, motor};
 use hal_sim::scenario::Schedule;
 use ident::context::Context;
-use ident::identify::levels;
+use ident::identify::settled;
 use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
@@ -173,7 +173,7 @@ fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure>
     for (key, value) in given.into_iter().filter_map(|(k, v)| Some((k, v.as_ref()?))) {
         log.meta.entry(key.to_owned()).or_insert_with(|| toml::Value::String(value.clone()));
     }
-    let pair = from_log(&log, &levels(&Context::new(&log, None), &log));
+    let pair = from_log(&log, &settled(&Context::new(&log, None), &log));
     if pair.maximum.is_none() {
         let expected =
             "expected a run with thrust_n and current_a on levels of at least 5 rows, or a table with a row for each level";
