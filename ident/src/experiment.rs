@@ -59,7 +59,7 @@ pub(crate) fn model_of(context: &Context, declared: Declared<'_>, fit: &Fit) -> 
 /// The best of the families for two models of one log, each with the names that it holds.
 pub(crate) fn between(context: &Context, model: &Model, other: &Model, [own, rival]: &[String; 2]) -> Option<NextExperiment> {
     let top = context.pulse.as_ref().map_or(2000.0, |p| p.iter().copied().fold(1000.0, f64::max));
-    let both = format!("{own} and {rival} explain this run about equally well");
+    let both = format!("this run cannot settle between {own} and {rival}");
     let mut families = families(top);
     let weather = uncontrolled(context, model, other);
     let moved = |schedule: &[ScheduleStep]| {

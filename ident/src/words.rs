@@ -139,8 +139,12 @@ impl EffectEntry {
 
 /// What a scope of something that is called so means to the reader.
 #[must_use]
-pub fn scope(scope: Scope, noun: &str) -> String {
-    match scope {
+pub fn scope(e: &EffectEntry, noun: &str) -> String {
+    match e.scope {
+        // it began and did not end
+        Scope::Event if e.parameter("t0").is_some() && e.parameter("t1").is_none() => {
+            format!("since one instant: it stays with the {noun} until something is changed")
+        }
         Scope::Rig => format!("of the {noun}: every run should show it"),
         Scope::Run => "of this run: another run has a value of its own".to_owned(),
         Scope::Event => "of one instant: it does not recur by itself".to_owned(),

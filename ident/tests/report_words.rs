@@ -106,7 +106,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             with_left(verdict(Kind::Attributed, vec![filter(0.7)])),
             true,
             &[
-                "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.028 N is left (slow).",
+                "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.030 N is left (slow).",
             ],
             &["noise."],
         ),
@@ -143,6 +143,15 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             &["explain", "battery", "proposed"],
         ),
         (
+            // words and figures agree
+            open(0.11),
+            false,
+            &[
+                "Perhaps the load cell reads the mean of its last 0.50 s, or, less likely, the load cell answers late: this run cannot tell.",
+            ],
+            &["Either"],
+        ),
+        (
             // what takes most is told first, although it is no question
             Verdict { alternatives: open(0.45).alternatives, ..verdict(Kind::Ambiguous, vec![small_filter, sag(0.99)]) },
             false,
@@ -170,7 +179,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             },
             false,
             &[
-                "Something is left on thrust that no known effect explains. It goes with time; a smooth term without a name was fitted. On thrust 0.028 N is left (slow).",
+                "Something is left on thrust that no known effect explains. It goes with time; a smooth term without a name was fitted. On thrust 0.030 N is left (slow).",
             ],
             &["explains thrust", "%"],
         ),
@@ -191,7 +200,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             with_left(verdict(Kind::None, vec![])),
             false,
             &[
-                "The declared model explains the run, but for a rest that no name was found for. On thrust 0.028 N is left (slow).",
+                "The declared model explains the run, but for a rest that no name was found for. On thrust 0.030 N is left (slow).",
             ],
             &["more than its noise"],
         ),
@@ -281,10 +290,14 @@ fn a_demonstration_judges_its_names() {
         "found with resistance = ",
         "true of every rig, the simulated one too: spinup_lag",
         "where in its row a reading lies, no effect that anybody hides: channel_delay",
-        "false of the names, nobody hid it: channel_filter",
+        "named, and false (nobody hid it): channel_filter",
     ] {
         assert!(said.contains(word), "{said}");
     }
+    assert!(!said.contains("outside the interval"), "{said}");
+    let other = Hidden { parameters: vec!["resistance = 0.05 ohm".into()], ..hidden("supply_sag") };
+    let said = other.judged(&v).join("\n");
+    assert!(said.contains("what was hidden lies outside the interval of resistance"), "{said}");
     assert!(hidden("creep").judged(&v)[0].starts_with("hidden was creep: NOT FOUND"));
 }
 

@@ -11,6 +11,7 @@ use crate::trouble::unread;
 use ident::import::{Mapping, Options, Report, import_as};
 use ident::log::{Gaps, Log};
 use ident::model::{Model, ModelError, beside};
+use ident::report::wrapped;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -113,7 +114,7 @@ pub(crate) fn say(path: &Path, report: &Report) {
     }
     for note in &report.notes {
         let count = if note.count > 1 { format!(" ({})", note.count) } else { String::new() };
-        note!("  {}: {}{count}", note.column, note.what);
+        note!("{}", wrapped(&format!("  {}: {}{count}", note.column, note.what), 4));
     }
 }
 

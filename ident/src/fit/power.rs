@@ -145,7 +145,14 @@ fn product(constant: f64, factors: &[(Option<Valued>, f64)]) -> Option<Valued> {
     Some((value, value * relative.sqrt()))
 }
 
-/// The figures of every plateau; `zeros` are what thrust and torque read at rest.
+/// Whether a log has a level at rest, so that the zero of a channel is known and not guessed from faster ones.
+#[must_use]
+pub fn rests(speed: &[Option<Valued>]) -> bool {
+    let top = speed.iter().flatten().map(|v| v.0).fold(0.0, f64::max);
+    speed.iter().flatten().any(|v| v.0 <= TOO_SMALL * top)
+}
+
+/// The figures of every plateau; `zeros` are what thrust and torque read at rest, which are taken off where the log has a level at rest.
 #[must_use]
 pub fn levels(
     log: &Log,
@@ -154,6 +161,7 @@ pub fn levels(
     zeros: [Option<Estimate>; 2],
     disc: &Disc,
 ) -> Vec<Level> {
+    let zeros = if rests(speed) { zeros } else { [None; 2] };
     let less =
         |v: Option<Valued>, zero: Option<Estimate>| v.map(|(v, se)| zero.map_or((v, se), |z| (v - z.value, se.hypot(z.se))));
     let raw: Vec<[Option<Valued>; 6]> = plateaus

@@ -20,6 +20,7 @@ use crate::words::{channel, parameter};
 /// The words of the flight's library.
 pub const VOCABULARY: Vocabulary = Vocabulary {
     noun: "vehicle",
+    declared: "a rigid body, thrust with the square of each rotor's speed, no drag",
     held_out: "five time blocks",
     about: airframe::about,
     clause: |found| airframe::said(found).unwrap_or_else(|| parts::bare(found)),

@@ -17,6 +17,7 @@ use nalgebra::Vector3;
 /// The words of an inertial unit's causes.
 pub const VOCABULARY: Vocabulary = Vocabulary {
     noun: "board",
+    declared: "a constant field, gravity alone, constant offsets",
     held_out: "every fifth stretch of time, in five turns",
     about: airframe::about,
     clause,

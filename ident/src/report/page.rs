@@ -43,7 +43,7 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
     };
     let mut sheet = parts::begin(&page);
     sheet.fold("Every channel in figures", |sheet| sheet.figures(every_channel(closed)));
-    identified(&mut sheet, log);
+    identified(&mut sheet, log, v);
     parts::candidates(&mut sheet, &closed.diagnosis);
     parts::aside(&mut sheet, v);
     sheet.html()
@@ -333,8 +333,12 @@ fn pinned(layers: &mut [Layer]) -> usize {
 }
 
 /// Plateaus, fits and constants, as `identify` has them.
-fn identified(sheet: &mut Sheet, log: &Log) {
-    let Ok(found) = identify(log) else { return };
+fn identified(sheet: &mut Sheet, log: &Log, v: &Verdict) {
+    let Ok(mut found) = identify(log) else { return };
+    // the card of the rotor's lag has its time constants, beside everything else that was found
+    if v.effects.iter().any(|e| e.id == "spinup_lag") {
+        found.constants.retain(|c| !c.name.starts_with("tau_"));
+    }
     sheet.fold("Plateaus, fits and constants", |sheet| {
         run::constants(sheet, &found);
         sheet.figures(found.curves.iter().map(run::relation).map(thinned).collect());

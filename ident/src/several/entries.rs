@@ -135,7 +135,7 @@ pub(super) fn unexplained(runs: &[Run], after: &[Across]) -> Vec<Unexplained> {
         let told = run.unexplained.iter().find(|u| u.channel == a.channel);
         let looks_like = match told {
             Some(told) => format!("loudest on {}: {}", run.run, told.looks_like),
-            None => format!("loudest on {}, which alone is explained: it differs from run to run", run.run),
+            None => format!("loudest on {}; a fit to that run alone removes it, the runs differ", run.run),
         };
         let depends_on = told.map(|t| t.depends_on.clone()).unwrap_or_default();
         out.push(Unexplained { channel: a.channel.to_owned(), over_floor: a.rms / a.floor, depends_on, looks_like });

@@ -44,7 +44,9 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
     effects.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
     let own = models[1].own.iter().zip(worths).enumerate();
     effects.extend(own.flat_map(|(run, (own, worths))| own_entries(&contexts[run], own, worths)));
-    let unexplained = unexplained(runs, &after);
+    let mut unexplained = unexplained(runs, &after);
+    // what nothing predicts has nothing left over
+    unexplained.retain(|u| !channels.not_predicted.contains_key(&u.channel));
     let kind = match (effects.is_empty(), unexplained.is_empty()) {
         (false, _) => Kind::Attributed,
         (true, false) => Kind::Unattributed,
@@ -53,6 +55,7 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
     if kind == Kind::Unattributed {
         effects.extend(unexplained.first().map(unnamed));
     }
+    let silent: Vec<String> = channels.not_predicted.keys().cloned().collect();
     Verdict {
         format: FORMAT,
         run: runs[0].log.name.clone(),
@@ -65,12 +68,13 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
         left_out: Vec::new(),
         set_aside: Vec::new(),
         validation: Vec::new(),
-        runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared)).collect(),
+        runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared, &silent)).collect(),
     }
 }
 
-fn of_run(run: &Run, k: usize, compared: &[Compared]) -> Validation {
-    let own = compared.iter().filter(|c| c.before.run == k && !is_contrast(c.before.channel));
+fn of_run(run: &Run, k: usize, compared: &[Compared], silent: &[String]) -> Validation {
+    let told = |c: &&Compared| !is_contrast(c.before.channel) && !silent.iter().any(|s| s == c.before.channel);
+    let own = compared.iter().filter(|c| c.before.run == k).filter(told);
     let channels: BTreeMap<String, BeforeAfter> =
         own.map(|c| (c.before.channel.to_owned(), BeforeAfter { before: c.before.rms, after: c.after.rms })).collect();
     Validation { run: run.log.name.clone(), channels }
@@ -88,7 +92,13 @@ fn channels(told: &Told<'_, '_>) -> Channels {
             continue;
         }
         if target.relation == Relation::SpeedAlone {
-            out.not_predicted.insert(name.to_owned(), NO_COMMAND.to_owned());
+            let without = contexts.iter().filter(|c| c.pulse.is_none()).count();
+            let reason = if without == contexts.len() {
+                NO_COMMAND.to_owned()
+            } else {
+                format!("{NO_COMMAND} on {without} of {} runs", contexts.len())
+            };
+            out.not_predicted.insert(name.to_owned(), reason);
             continue;
         }
         let compared: Vec<&Compared> = tenable.compared.iter().filter(|c| c.before.channel == name).collect();

@@ -35,8 +35,14 @@ impl AirframeEffect for TranslationalLift {
         }
     }
 
-    fn said(&self, _: &EffectEntry) -> Clause {
-        Clause::new("thrust", "grows across the air and falls in a climb")
+    fn said(&self, found: &EffectEntry) -> Clause {
+        let word = |name: &str, [up, down]: [&'static str; 2]| match found.parameter(name) {
+            Some(p) if p.value < 0.0 => down,
+            _ => up,
+        };
+        let across = word("across", ["grows", "falls"]);
+        let climb = word("climb", ["falls", "grows"]);
+        Clause::new("thrust", format!("{across} across the air and {climb} in a climb"))
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -6,14 +6,14 @@
 //! Reference: specification `formats.md`, "Verdict" (`effects`, `alternatives`).
 
 use super::page::Page;
-use super::sentence::{instead, order};
+use super::sentence::{instead, order, without};
 use super::state::figures;
 use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::rivals::UNEXPLAINED;
-use crate::verdict::{EffectEntry, Parameter, Verdict};
+use crate::verdict::{Alternative, EffectEntry, Parameter, Verdict};
 use crate::words::{
     channel, channels, counted, digits, formula, lower, plain, probability, scaled, scope, signs, sized, sureness, upper,
     upper_bound, with_interval,
@@ -85,7 +85,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     );
     // what has no name belongs to nothing that is known
     if e.id != "unknown" {
-        let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(&scope(e.scope, page.words.noun))));
+        let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(&scope(e, page.words.noun))));
     }
     sheet.html_part(&html);
     let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
@@ -172,9 +172,10 @@ pub(super) fn value(p: &Parameter) -> [String; 3] {
     [v, format!("{low} to {high}"), unit_of(unit)]
 }
 
-/// Whether a reader asks for a parameter: not where in its row a step lies, nor since when what was there before the run.
+/// Whether a reader asks for a parameter: not for the terms of a curve, nor where in its row a step lies, nor since when what was there before
+/// the run.
 pub(super) fn is_shown(e: &EffectEntry, p: &Parameter) -> bool {
-    p.name != "phase" && !(p.name == "t0" && e.is_since_before())
+    e.id != "unknown" && p.name != "phase" && !(p.name == "t0" && e.is_since_before())
 }
 
 fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
@@ -230,8 +231,7 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
     // what neither the effect nor a hypothesis without it has
     let open = 1.0 - e.probability - given;
     if open >= OPEN {
-        let what =
-            if found.is_empty() { "no other name came close; that it is no cause of its own" } else { "no cause of its own" };
+        let what = if found.is_empty() { "no other name came close; perhaps no cause of its own" } else { "no cause of its own" };
         found.push(format!("{what} ({})", probability(open)));
     }
     let found =
@@ -244,7 +244,10 @@ fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
     if e.probability >= SETTLED {
         return None;
     }
-    if page.verdict.proposed().is_some() {
+    let v = page.verdict;
+    let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
+    let asked = |a: &Alternative| without(&best, &a.ids).iter().any(|d| std::ptr::eq(*d, e));
+    if v.proposed().is_some() && v.alternatives.first().is_some_and(asked) {
         return Some("<a href=\"#what-would-settle-it\">the run that is proposed below</a>.".to_owned());
     }
     let noun = page.words.noun;

@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict" (`unexplained`, `next_experiment`).
 
 use super::page::Page;
-use super::sentence::size_left;
+use super::sentence::{floors_left, size_left};
 use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
@@ -32,7 +32,7 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
             [] => "nothing in the log".to_owned(),
             with => with.join(", "),
         };
-        vec![heading(&u.channel), format!("{:.1}", u.over_floor), size_left(v, u), u.looks_like.clone(), with]
+        vec![heading(&u.channel), format!("{:.1}", floors_left(v, u)), size_left(v, u), u.looks_like.clone(), with]
     };
     let rows: Vec<Vec<String>> = v.unexplained.iter().filter(with_model).map(cells).collect();
     if rows.is_empty() {
@@ -44,7 +44,9 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     untold.for_each(|e| sheet.say(&format!("{}.", upper(&plain(&e.evidence)))));
     // a figure of rows that the fit saw says nothing of those that it did not see
     let seen: Vec<String> = v.unexplained.iter().filter(with_model).filter_map(|u| beyond_what_was_seen(v, &u.channel)).collect();
-    seen.iter().for_each(|said| sheet.say(said));
+    if !seen.is_empty() {
+        sheet.say(&format!("The figures show all rows, which the fit saw. Rows that are left out are missed by far more ({}): the others do not tell what lies between or beyond them.", seen.join("; ")));
+    }
     // what the convincing figure shows is not drawn again
     let shown = |f: &Figure| page.hero.iter().any(|h| h.title == f.title);
     sheet.figures(page.left.iter().filter(|f| !shown(f)).cloned().collect());
@@ -53,13 +55,11 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
 /// Times the error on rows that the fit saw from which on that on rows it did not see is told apart.
 const BEYOND: f64 = 2.0;
 
-/// What is said of a channel whose left-out rows are missed by much more than those that the fit saw.
+/// The errors of a channel whose left-out rows are missed by much more than those that the fit saw.
 fn beyond_what_was_seen(v: &Verdict, name: &str) -> Option<String> {
     let c = v.channels.get(name)?;
     let [out, seen] = [c.after.heldout_rms, c.after.rms].map(|rms| amount(rms, &c.unit));
-    (c.after.heldout_rms > BEYOND * c.after.rms).then(|| {
-        format!("The figures show all rows, which the fit saw: on {} it is off by {seen}. Rows that are left out are missed by {out}: the others do not tell what lies between or beyond them.", channel(name))
-    })
+    (c.after.heldout_rms > BEYOND * c.after.rms).then(|| format!("{}: {out} for {seen}", channel(name)))
 }
 
 /// A text in which causes and columns are told in words.

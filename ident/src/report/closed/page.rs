@@ -6,6 +6,7 @@
 //! Reference: specification `report.md`.
 
 use super::provenance::{Origin, provenance};
+use super::sentence::PER_CENT;
 use super::vocabulary::Vocabulary;
 use super::{cards, fold, left, sentence, state};
 use crate::context::unit_of;
@@ -45,9 +46,11 @@ pub(crate) struct Page<'p> {
 pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     let v = page.verdict;
     let of_what = if v.runs.is_empty() { v.run.clone() } else { format!("{} runs of one rig", v.runs.len()) };
-    let mut sheet = Sheet::told(&format!("{of_what}: what the model lacks"), &sentence(v, page.words, page.news));
+    let said = sentence(v, page.words, page.news);
+    let declared = if page.news { "the one that was given" } else { page.words.declared };
+    let mut sheet = Sheet::told(&format!("{of_what}: what the model lacks"), &said);
     sheet.soft(&page.origin.line());
-    sheet.html_part(&state::state(v));
+    sheet.html_part(&state::state(v, declared, said.contains(PER_CENT)));
     match page.origin.lacks.as_slice() {
         [lack] => sheet.warn(&format!("{lack}.")),
         [lack, others @ ..] => {
@@ -58,7 +61,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         [] => {}
     }
     if v.runs.is_empty() && page.origin.log.rows < FEW_ROWS {
-        sheet.warn(&format!("Only {} rows: nothing between two levels is seen, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.", page.origin.log.rows));
+        sheet.warn(&format!("Only {} rows: no level has two to compare, so that the noise floors are guesses, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.", page.origin.log.rows));
     }
     for l in &v.left_out {
         sheet.warn(&format!("Left out: {l}."));

@@ -35,9 +35,16 @@ impl Hidden {
         if !self.parameters.is_empty() {
             out.push(format!("hidden with {}", self.parameters.join(", ")));
         }
-        out.extend(named.iter().find(|e| e.id == self.id).and_then(|e| as_found(e)));
+        let of_it = named.iter().find(|e| e.id == self.id);
+        out.extend(of_it.and_then(|e| as_found(e)));
+        let missed: Vec<&str> =
+            of_it.iter().flat_map(|e| &e.parameters).filter(|p| self.misses(p)).map(|p| p.name.as_str()).collect();
+        if !missed.is_empty() {
+            let whose = missed.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+            out.push(format!("what was hidden lies outside the interval of {}; one in twenty does", list(&whose)));
+        }
         if found {
-            out.push(format!("true of the names: {}", self.id));
+            out.push(format!("named, and true: {}", self.id));
         }
         let told = |kin: Kin| -> Vec<String> {
             let mut ids: Vec<String> = named.iter().filter(|e| e.id != self.id && e.kin == kin).map(|e| e.id.clone()).collect();
@@ -47,7 +54,7 @@ impl Hidden {
         for (kin, what) in [
             (Kin::OfEvery, "true of every rig, the simulated one too"),
             (Kin::WithinRow, "where in its row a reading lies, no effect that anybody hides"),
-            (Kin::Own, "false of the names, nobody hid it"),
+            (Kin::Own, "named, and false (nobody hid it)"),
         ] {
             let ids = told(kin);
             if !ids.is_empty() {
@@ -55,6 +62,14 @@ impl Hidden {
             }
         }
         out
+    }
+
+    /// Whether the interval of a parameter lies beside what was hidden, where that is known in the same unit.
+    fn misses(&self, p: &Parameter) -> bool {
+        let hidden = self.parameters.iter().find_map(|text| text.split_once(" = ").filter(|(name, _)| *name == p.name));
+        let Some((value, unit)) = hidden.map(|(_, said)| said.split_once(' ').unwrap_or((said, ""))) else { return false };
+        let same = unit == p.unit || (unit.is_empty() && p.unit == "1");
+        value.parse::<f64>().is_ok_and(|v| same && !(p.ci95[0]..=p.ci95[1]).contains(&v))
     }
 }
 

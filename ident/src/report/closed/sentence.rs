@@ -29,6 +29,9 @@ const ALL: f64 = 0.995;
 /// Noise floors up to which what is left is not worth a word.
 const QUIET: f64 = 1.5;
 
+/// What stands in a sentence that tells a share.
+pub(super) const PER_CENT: &str = " % of what ";
+
 /// The sentence. `news`: the loop was closed against a declared model, so that what was found is new since then.
 #[must_use]
 pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
@@ -82,12 +85,11 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     if own.is_empty() {
         out += &format!(" Every {noun} has that; nothing of this {noun}'s own was named.");
     }
-    let smaller = match more {
-        0 => String::new(),
-        1 => "A smaller cause is told below.".to_owned(),
-        n => format!("{n} smaller causes are told below."),
-    };
-    [out, explained(verdict, &told), smaller, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+    [out, explained(verdict, &told), smaller(more), left(verdict)]
+        .into_iter()
+        .filter(|s| !s.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// A clause for each effect; what differs from run to run is one clause with a part for each.
@@ -132,8 +134,12 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         [] => "the causes named below are not sure on this run".to_owned(),
         [one] => format!("perhaps {}: {doubt}", list(one)),
         [first, rest @ ..] => {
-            let rest: Vec<String> = rest.iter().map(|w| format!("or {}", list(w))).collect();
-            format!("either {}, {}: {doubt}", list(first), rest.join(", "))
+            // words and figures must agree
+            let best = disputed.iter().map(|e| e.probability).fold(0.0, f64::max);
+            let behind = verdict.alternatives.first().is_some_and(|a| a.probability < CLOSE * best);
+            let (either, or) = if behind { ("perhaps", "or, less likely,") } else { ("either", "or") };
+            let rest: Vec<String> = rest.iter().map(|w| format!("{or} {}", list(w))).collect();
+            format!("{either} {}, {}: {doubt}", list(first), rest.join(", "))
         }
     };
     let all = if own.is_empty() { &common } else { &own };
@@ -141,6 +147,7 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     // what takes most comes first, be it sure or open
     let removed = |all: &[&EffectEntry]| all.iter().map(|e| e.heldout_error_reduction).fold(0.0, f64::max);
     let sure: Vec<&EffectEntry> = sure.take(MOST).collect();
+    let told = sure.len() + all.iter().filter(|e| disputed.iter().any(|d| std::ptr::eq(*d, **e))).count();
     let said: Vec<String> = sure.iter().map(|e| words.said(e).with(adverb(e.probability))).collect();
     let out = if sure.is_empty() {
         format!("{}.", since(news, &question))
@@ -149,8 +156,18 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     } else {
         format!("{}. Beside that, {}.", since(news, &question), joined_lower(&said))
     };
+    let out = [out, smaller(all.len().saturating_sub(told))];
     let left = left(verdict);
-    if left.is_empty() { out } else { format!("{out} {left}") }
+    out.into_iter().chain([left]).filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+/// How many causes the cards have beside those of the sentence.
+fn smaller(more: usize) -> String {
+    match more {
+        0 => String::new(),
+        1 => "A smaller cause is told below.".to_owned(),
+        n => format!("{n} smaller causes are told below."),
+    }
 }
 
 fn unattributed(verdict: &Verdict, news: bool) -> String {
@@ -295,15 +312,15 @@ fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
     loud(verdict).max_by(|a, b| a.over_floor.total_cmp(&b.over_floor))
 }
 
-/// The error that is left on a channel beyond its noise, with unit.
+/// The error that is left on a channel, with unit: the one that the state of the channels tells.
 pub(super) fn size_left(verdict: &Verdict, u: &Unexplained) -> String {
-    match verdict.channels.get(&u.channel) {
-        Some(c) => {
-            let over = (c.after.heldout_rms.powi(2) - c.noise_floor_rms.powi(2)).max(0.0).sqrt();
-            amount(if over > 0.0 { over } else { c.after.heldout_rms }, &c.unit)
-        }
-        None => format!("{:.1} times the noise", u.over_floor),
-    }
+    let of = verdict.channels.get(&u.channel);
+    of.map_or_else(|| format!("{:.1} times the noise", u.over_floor), |c| amount(c.after.heldout_rms, &c.unit))
+}
+
+/// The same in noise floors: of several runs that of all of them, as the state of the channels tells it.
+pub(super) fn floors_left(verdict: &Verdict, u: &Unexplained) -> f64 {
+    verdict.channels.get(&u.channel).map_or(u.over_floor, |c| c.after.heldout_rms / c.noise_floor_rms)
 }
 
 fn left(verdict: &Verdict) -> String {
@@ -315,7 +332,12 @@ fn left(verdict: &Verdict) -> String {
     let others: BTreeSet<&str> = loud(verdict).map(|u| quantity(&u.channel)).filter(|q| *q != what).collect();
     let sensors = loud(verdict).filter(|u| quantity(&u.channel) == what && verdict.channels.contains_key(&u.channel)).count();
     let on = if sensors > 1 { "the speeds".to_owned() } else { channel(&loudest.channel) };
-    let size = size_left(verdict, loudest);
+    let of = |c: &&str| verdict.channels.get(*c).map_or(0.0, |c| c.after.heldout_rms);
+    let largest = loud(verdict).map(|u| u.channel.as_str()).filter(|c| sensors > 1 && quantity(c) == what);
+    let size = match largest.max_by(|a, b| of(a).total_cmp(&of(b))) {
+        Some(c) => format!("up to {}", amount(of(&c), &verdict.channels[c].unit)),
+        None => size_left(verdict, loudest),
+    };
     // the first words; the section on what is left has all
     let looks = loudest.looks_like.split(';').next().unwrap_or_default();
     let named: Vec<String> = others.iter().map(|q| channel(q)).collect();

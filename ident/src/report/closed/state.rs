@@ -69,9 +69,15 @@ fn spoken(name: &str) -> String {
 }
 
 /// The bars of a verdict's channels.
-pub(super) fn state(v: &Verdict) -> String {
+pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool) -> String {
     let left: Vec<&str> = v.unexplained.iter().map(|u| u.channel.as_str()).collect();
-    bars(&v.channels, &left, &named(v), pair(v))
+    let share = if per_cent {
+        " A share in per cent is of the squared error above the noise floor: 75 % less is half the error."
+    } else {
+        ""
+    };
+    let key = format!("<p class=\"soft\">The declared model: {declared}.{share}</p>\n");
+    bars(&v.channels, &left, &named(v), pair(v)) + &key
 }
 
 /// The bars; `left` are the channels on which more than noise is left, `named` those that a name improves.
@@ -82,7 +88,11 @@ pub(crate) fn bars(channels: &Channels, left: &[&str], named: &[&str], [_, after
         "<div class=\"head\" role=\"row\"><span role=\"columnheader\">channel</span><span class=\"axis\" role=\"columnheader\">";
     for tick in scale.ticks() {
         let name = if tick == 1.0 { "noise floor".to_owned() } else { format!("{tick:.0}") };
-        let (at, end) = (scale.at(tick), if scale.at(tick) > 94.0 { " class=\"end\"" } else { "" });
+        let (at, end) = match scale.at(tick) {
+            at if at > 94.0 => (at, " class=\"end\""),
+            at if at < 6.0 => (at, " class=\"begin\""),
+            at => (at, ""),
+        };
         let _ = write!(out, "<i{end} style=\"left:{at:.1}%\">{name}</i>");
     }
     out += "</span><span role=\"columnheader\">before</span><span role=\"columnheader\">after</span><span role=\"columnheader\">factor</span><span role=\"columnheader\">state</span></div>\n";
@@ -132,7 +142,7 @@ pub(crate) fn bars(channels: &Channels, left: &[&str], named: &[&str], [_, after
     };
     let _ = writeln!(
         out,
-        "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: {}. Logarithmic, in noise floors of each channel. Error on rows that no fit saw. A share in per cent is one of its square above the noise floor: 75 % less is half the error.</p>",
+        "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: {}. Logarithmic, in noise floors of each channel. Error on rows that no fit saw.</p>",
         escape(&after)
     );
     out

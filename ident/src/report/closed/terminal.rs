@@ -7,7 +7,7 @@
 
 use super::cards::{is_shown, removes, that_it_is_there, value};
 use super::left::in_words;
-use super::sentence::{instead, order, sentence, size_left, without};
+use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
 use super::state::{factor, figures, named, word};
 use super::vocabulary::Vocabulary;
 use crate::context::unit_of;
@@ -26,7 +26,7 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
     let said = sentence(verdict, words, news);
     let mut out = format!("{}\n{}\n", wrapped(&said, 0), wrapped(&whose(whole), 0));
     out += &channels(verdict);
-    if said.contains(" % of what ") {
+    if said.contains(PER_CENT) {
         out += "(per cent of the squared error above the noise floor: 75 % less is half the error)\n";
     }
     for left_out in &verdict.left_out {
@@ -45,8 +45,8 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     out += &left(verdict);
     out += &set_aside(verdict);
-    if !verdict.alternatives.is_empty() {
-        let all: Vec<String> = verdict.alternatives.iter().map(|a| alternative(verdict, a)).collect();
+    let all: Vec<String> = verdict.alternatives.iter().filter_map(|a| alternative(verdict, a)).collect();
+    if !all.is_empty() {
         out += &format!("\n{}\n", wrapped(&format!("alternatives: {}", all.join("; ")), 2));
     }
     if let Some(next) = &verdict.next_experiment {
@@ -70,8 +70,8 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
     out
 }
 
-/// By what another hypothesis differs: what it has, and what it does without.
-fn alternative(verdict: &Verdict, other: &Alternative) -> String {
+/// By what another hypothesis differs: what it has, and what it does without; nothing where its names are the same.
+fn alternative(verdict: &Verdict, other: &Alternative) -> Option<String> {
     let best: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
     let more = instead(&best, &other.ids).join(" + ");
     let less = without(&best, &other.ids).iter().map(|e| e.id.as_str()).collect::<Vec<_>>().join(" + ");
@@ -79,9 +79,10 @@ fn alternative(verdict: &Verdict, other: &Alternative) -> String {
         (false, false) => format!("{more} in the place of {less}"),
         (false, true) => format!("{more} as well"),
         (true, false) => format!("without {less}"),
-        (true, true) => other.ids.join(" + "),
+        // the same names over again
+        (true, true) => return None,
     };
-    format!("{said} ({})", probability(other.probability))
+    Some(format!("{said} ({})", probability(other.probability)))
 }
 
 /// The run, or the runs.
@@ -162,7 +163,10 @@ fn left(verdict: &Verdict) -> String {
         let size = size_left(verdict, u);
         out += &format!(
             "  {}\n",
-            wrapped(&format!("{}: {size}, {:.1} noise floors, {}{on}", channel(&u.channel), u.over_floor, u.looks_like), 4)
+            wrapped(
+                &format!("{}: {size}, {:.1} noise floors, {}{on}", channel(&u.channel), floors_left(verdict, u), u.looks_like),
+                4
+            )
         );
     }
     out

@@ -14,6 +14,8 @@ use crate::words::{Clause, parameter};
 pub struct Vocabulary {
     /// What the log is of, such as a rig.
     pub noun: &'static str,
+    /// What a declared model is where none was given.
+    pub declared: &'static str,
     /// Which rows a fit did not see when it predicted them.
     pub held_out: &'static str,
     /// What an effect is.
@@ -30,6 +32,7 @@ impl Vocabulary {
     /// Of a rig's log.
     pub const RIG: Self = Self {
         noun: "rig",
+        declared: "static curves, fitted to what was measured",
         held_out: "five time blocks and every second interior level",
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
