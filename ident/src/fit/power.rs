@@ -282,7 +282,9 @@ mod tests {
         };
         let disc = Disc { diameter_m: Some(0.2794), density_kg_m3: Some(1.2) };
         let zero = Estimate { value: 0.1, se: 0.0, half: 0.0 };
-        let found = levels(&log, std::slice::from_ref(&plateau), &[Some((8000.0, 0.0))], [Some(zero), None], &disc);
+        let rest = Plateau { means: [1000.0, 0.1, 0.0, 0.0, 11.0].map(|v| Some((v, 0.0))).to_vec(), ..plateau.clone() };
+        let speeds = [Some((8000.0, 0.0)), Some((0.0, 0.0))];
+        let found = levels(&log, &[plateau.clone(), rest], &speeds, [Some(zero), None], &disc);
         let near = |name: &str, wanted: f64| {
             let (v, _) = found[0].of(name).unwrap_or_else(|| panic!("{name}"));
             assert!((v / wanted - 1.0).abs() < 1e-3, "{name}: {v}, by hand {wanted}");
@@ -297,6 +299,9 @@ mod tests {
         near("figure_of_merit", 5.0_f64.powf(1.5) / ((2.0 * 1.2 * PI * 0.1397 * 0.1397_f64).sqrt() * 67.02));
         let (g_per_w, se) = found[0].of("g_per_w").expect("known");
         assert!((se / g_per_w - 0.01).abs() < 1e-6, "one per cent of thrust is one per cent of it");
+        // a zero that no level at rest shows is guessed, and not taken off
+        let turning = levels(&log, std::slice::from_ref(&plateau), &speeds[..1], [Some(zero), None], &disc);
+        assert!(turning[0].of("g_per_w").is_some_and(|(v, _)| (v / 5.253 - 1.0).abs() < 1e-3), "{:?}", turning[0]);
         let unknown = levels(&log, std::slice::from_ref(&plateau), &[Some((8000.0, 0.0))], [None; 2], &Disc::default());
         assert_eq!(["c_t", "c_p", "figure_of_merit"].map(|n| unknown[0].of(n)), [None; 3]);
         let text = csv(&[plateau], &unknown);
