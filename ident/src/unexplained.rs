@@ -14,6 +14,7 @@ use crate::inspect::goes_with;
 use crate::opponent::left_over;
 use crate::solve::Normal;
 use crate::verdict::{Channels, Unexplained};
+use std::ops::Range;
 
 /// Error on left-out rows, in noise floors, from which on a channel must be told.
 pub const LOUD: f64 = 3.0;
@@ -23,6 +24,8 @@ const OWN_GAIN: f64 = 0.009;
 const FEW: f64 = 0.01;
 /// The same, of rows one after the other, as a multiple.
 const STRETCH: f64 = 4.0;
+/// Share of a stretch that the rows which it is told by hold.
+const NINE_TENTHS: f64 = 0.9;
 /// Share of independent samples below which a residual is slow.
 const SLOW: f64 = 0.1;
 
@@ -94,26 +97,49 @@ fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
         return "while the load is on its way".to_owned();
     }
     let grows = grows_with_the_load(context, target, &squares);
-    let in_a_row = loudest_stretch(&squares);
+    let (in_a_row, stretch) = loudest_stretch(&squares);
     squares.sort_unstable_by(|a, b| b.total_cmp(a));
     let few = (FEW * squares.len() as f64).ceil() as usize;
     if 2.0 * squares.iter().take(few).sum::<f64>() > whole {
-        return if 2.0 * in_a_row > whole { "in one stretch" } else { "in single rows" }.to_owned();
+        return if 2.0 * in_a_row > whole { in_one(context, target, &stretch) } else { "in single rows".to_owned() };
     }
     let pace = if effective_share(residual) < SLOW { "slow" } else { "from row to row" };
     if grows { format!("{pace}, grows with the load") } else { pace.to_owned() }
 }
 
-/// The most that rows one after the other hold, a few times as many as count as few: spikes over a run are never so close.
-fn loudest_stretch(squares: &[f64]) -> f64 {
+/// Where a stretch of a target's samples lies in the log.
+fn in_one(context: &Context, target: &Target, stretch: &Range<usize>) -> String {
+    let at = |k: usize| target.rows.get(k).and_then(|row| context.t.get(*row)).copied().unwrap_or(f64::NAN);
+    let (from, to) = (at(stretch.start), at(stretch.end.saturating_sub(1)));
+    if context.time_is_row {
+        format!("in one stretch, rows {from:.0} to {to:.0}")
+    } else {
+        format!("in one stretch, {from:.1} to {to:.1} s")
+    }
+}
+
+/// The most that rows one after the other hold, a few times as many as count as few, and those of them that hold nine tenths of it: spikes over a
+/// run are never so close.
+fn loudest_stretch(squares: &[f64]) -> (f64, Range<usize>) {
     let rows = ((STRETCH * FEW * squares.len() as f64).ceil() as usize).clamp(1, squares.len().max(1));
     let mut sum: f64 = squares.iter().take(rows).sum();
-    let mut most = sum;
-    for (new, old) in squares.iter().skip(rows).zip(squares) {
+    let (mut most, mut from) = (sum, 0);
+    for (k, (new, old)) in squares.iter().skip(rows).zip(squares).enumerate() {
         sum += new - old;
-        most = most.max(sum);
+        if sum > most {
+            (most, from) = (sum, k + 1);
+        }
     }
-    most
+    let (mut range, mut held) = (from..(from + rows).min(squares.len()), most);
+    while range.len() > 1 {
+        let (first, last) = (squares[range.start], squares[range.end - 1]);
+        held -= first.min(last);
+        if held < NINE_TENTHS * most {
+            break;
+        }
+        if first < last { range.start += 1 } else { range.end -= 1 }
+    }
+    (most, range)
 }
 
 /// Whether the upper half of the loads holds most of a residual's squares.

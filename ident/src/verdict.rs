@@ -207,6 +207,19 @@ impl EffectEntry {
     }
 }
 
+impl NextExperiment {
+    /// The steps that the schedule repeats, and how often.
+    #[must_use]
+    pub fn cycle(&self) -> (&[ScheduleStep], usize) {
+        let all = &self.schedule;
+        let repeats = |n: &usize| all.len() % n == 0 && all.iter().enumerate().all(|(k, step)| *step == all[k % n]);
+        match (1..=all.len()).find(repeats) {
+            Some(n) => (&all[..n], all.len() / n),
+            None => (all, 1),
+        }
+    }
+}
+
 impl Verdict {
     /// The run that is proposed: a next experiment that would settle something.
     #[must_use]

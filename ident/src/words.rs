@@ -343,7 +343,7 @@ pub fn scaled(value: f64, unit: &str) -> (f64, &str) {
     }
 }
 
-/// A parameter with unit, to the digits that its interval supports; `None` where the interval is wider than half of the value.
+/// A parameter with unit, to the digits that its interval supports, two at the least; `None` where the interval is wider than half of the value.
 #[must_use]
 pub fn sized(p: &Parameter) -> Option<String> {
     if let Some(count) = counted(p) {
@@ -354,7 +354,9 @@ pub fn sized(p: &Parameter) -> Option<String> {
         return None;
     }
     let (factor, unit) = scaled(p.value, &p.unit);
-    Some(with_unit(&digits(factor * p.value, factor * half), unit))
+    // two digits at the least, so that no rounding moves it by more than a twentieth
+    let second = 10f64.powf((factor * p.value).abs().log10().floor() - 1.0);
+    Some(with_unit(&digits(factor * p.value, (factor * half).min(second)), unit))
 }
 
 /// A whole number that was counted, not measured: its interval has no width.
@@ -494,6 +496,7 @@ mod tests {
             (0.04113, 0.00122, "ohm", "41 mohm"),
             (0.43048, 0.038, "s", "0.43 s"),
             (8437.0, 30.0, "rpm", "8440 rev/min"),
+            (0.0943, 0.0105, "ohm", "94 mohm"),
             (6.83e-5, 2e-6, "kg.m2", "6.8e-5 kg.m2"),
             (-0.25, 0.004, "N", "-0.250 N"),
             (12.0, 0.0, "rows", "12 rows"),

@@ -11,7 +11,7 @@ use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
-use crate::verdict::Verdict;
+use crate::verdict::{ScheduleStep, Verdict};
 use crate::words::{amount, channel, heading, lower, plain, upper};
 
 /// What is left.
@@ -91,8 +91,13 @@ pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
     if next.schedule.is_empty() || !next.separates {
         return;
     }
-    let rows: Vec<Vec<String>> = next.schedule.iter().map(|s| vec![s.pulse_us.to_string(), s.hold_s.to_string()]).collect();
-    sheet.data("next-experiment", &["pulse, us", "hold, s"], &rows, None);
+    let row = |s: &ScheduleStep| vec![s.pulse_us.to_string(), s.hold_s.to_string()];
+    let (cycle, times) = next.cycle();
+    if times > 1 {
+        sheet.say(&format!("{times} times:"));
+    }
+    let [rows, raw]: [Vec<Vec<String>>; 2] = [cycle, &next.schedule].map(|steps| steps.iter().map(row).collect());
+    sheet.data("next-experiment", &["pulse, us", "hold, s"], &rows, Some((&["pulse_us", "hold_s"], &raw)));
     let steps: Vec<String> =
         next.schedule.iter().map(|s| format!("  {{ pulse_us = {}, hold_s = {} }},\n", s.pulse_us, s.hold_s)).collect();
     let file = format!("name = \"what would settle it\"\n\n[[part]]\nkind = \"steps\"\nsteps = [\n{}]\n", steps.concat());

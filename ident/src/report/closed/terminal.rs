@@ -50,10 +50,12 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
         out += &format!("\n{}\n", wrapped(&format!("alternatives: {}", all.join("; ")), 2));
     }
     if let Some(next) = &verdict.next_experiment {
-        let steps: Vec<String> = next.schedule.iter().map(|s| format!("{} us {} s", s.pulse_us, s.hold_s)).collect();
+        let (cycle, times) = next.cycle();
+        let steps: Vec<String> = cycle.iter().map(|s| format!("{} us {} s", s.pulse_us, s.hold_s)).collect();
+        let often = if times > 1 { format!("{times} times ") } else { String::new() };
         out += &format!("\n{}\n", wrapped(&format!("what would settle it: {}", in_words(words, &next.why)), 2));
         if !steps.is_empty() && next.separates {
-            out += &format!("  {}\n", wrapped(&steps.join(", "), 2));
+            out += &format!("  {}\n", wrapped(&format!("{often}{}", steps.join(", ")), 2));
         }
     }
     let took_no_part = verdict.validation.iter().map(|v| (v, format!("on {}, which took no part:", v.run)));
