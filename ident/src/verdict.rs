@@ -212,7 +212,7 @@ impl NextExperiment {
     #[must_use]
     pub fn cycle(&self) -> (&[ScheduleStep], usize) {
         let all = &self.schedule;
-        let repeats = |n: &usize| all.len() % n == 0 && all.iter().enumerate().all(|(k, step)| *step == all[k % n]);
+        let repeats = |n: &usize| all.len().is_multiple_of(*n) && all.iter().enumerate().all(|(k, step)| *step == all[k % n]);
         match (1..=all.len()).find(repeats) {
             Some(n) => (&all[..n], all.len() / n),
             None => (all, 1),
