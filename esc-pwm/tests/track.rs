@@ -2,7 +2,7 @@
 
 use esc_pwm::PulseWidth;
 use esc_pwm::Refusals;
-use esc_pwm::segment::{Segment, Shape, Steer};
+use esc_pwm::segment::{FASTEST_MILLIHERTZ, Segment, Shape, Steer};
 use esc_pwm::track::{AHEAD_MS, Played, TRACK, Track};
 use proptest::prelude::*;
 
@@ -76,6 +76,55 @@ fn gaps_impossible_segments_and_too_much_are_refused() {
     assert_eq!(full.take(TRACK as u32, &[hold(1100, 10)], true), refused, "full");
     full.take(0, &[hold(1300, 1)], true).unwrap();
     assert_eq!(full.next(), 1, "number 0 begins anew");
+}
+
+/// Every pulse that a segment gives may lie at an end of the range, none beyond; its frequency at the fastest.
+#[test]
+fn a_segment_may_reach_its_bounds() {
+    let chirp =
+        |amplitude, from_millihertz, to_millihertz| Shape::Chirp { amplitude: us(amplitude), from_millihertz, to_millihertz };
+    let line = |from| Shape::Line { from: Some(us(from)) };
+    let steered = |low, high| Shape::Steered { low: us(low), high: us(high) };
+    let fastest = FASTEST_MILLIHERTZ;
+    for (possible, pulse, shape) in [
+        (true, 1000, Shape::Hold),
+        (true, 2000, Shape::Hold),
+        (false, 2001, Shape::Hold),
+        (false, 999, Shape::Line { from: None }),
+        (true, 1500, line(1000)),
+        (false, 1500, line(999)),
+        (false, 2001, line(1500)),
+        (true, 1500, chirp(500, fastest, fastest)),
+        (false, 1600, chirp(401, 0, 0)),
+        (false, 1400, chirp(401, 0, 0)),
+        (false, 1500, chirp(10, fastest + 1, 0)),
+        (false, 1500, chirp(10, 0, fastest + 1)),
+        (true, 1000, steered(1000, 2000)),
+        (true, 2000, steered(1000, 2000)),
+        (false, 1500, steered(999, 2000)),
+        (false, 1500, steered(1000, 2001)),
+        (false, 1199, steered(1200, 1400)),
+        (false, 1401, steered(1200, 1400)),
+    ] {
+        assert_eq!(segment(pulse, 1, shape).is_possible(), possible, "{pulse} us, {shape:?}");
+        assert!(!segment(pulse, 0, shape).is_possible(), "it takes no time");
+    }
+}
+
+/// Whoever plans a run sees its highest pulse before anything turns.
+#[test]
+fn a_segment_tells_its_highest_pulse() {
+    let chirp = Shape::Chirp { amplitude: us(100), from_millihertz: 10, to_millihertz: 20 };
+    for (shape, highest) in [
+        (Shape::Hold, 1400),
+        (Shape::Line { from: None }, 1400),
+        (Shape::Line { from: Some(us(1200)) }, 1400),
+        (Shape::Line { from: Some(us(1600)) }, 1600),
+        (chirp, 1500),
+        (Shape::Steered { low: us(1200), high: us(1700) }, 1700),
+    ] {
+        assert_eq!(segment(1400, 10, shape).highest(), us(highest), "{shape:?}");
+    }
 }
 
 #[test]
