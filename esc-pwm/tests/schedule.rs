@@ -100,6 +100,8 @@ fn a_staircase_counts_its_levels() {
     assert_eq!(stairs(0, 2000, false).increments(), 0);
     let walked = |stairs: Staircase| (0..).map_while(|i| Schedule::Staircase(stairs).pulse_at(i * 10)).count();
     assert_eq!((walked(stairs(300, 2000, false)), walked(stairs(300, 2000, true))), (4, 7), "no visit is one");
+    let levels = [0, 10, 20, 30, 40, 50, 60].map(|ms| Schedule::Staircase(stairs(300, 2000, true)).pulse_at(ms));
+    assert_eq!(levels, [1000, 1300, 1600, 1900, 1600, 1300, 1000].map(|level| Some(us(level))));
 }
 
 #[test]
@@ -111,6 +113,18 @@ fn a_ramp_and_a_step_are_what_they_say() {
     let step = Schedule::Step { before: us(1200), after: us(1600), hold_ms: 50 };
     assert_eq!(at(step, [0, 49, 50, 100]), [Some(1200), Some(1200), Some(1600), None]);
     assert_eq!(step.pulse_at(99), Some(us(1600)));
+}
+
+/// The pulse is the nearest nanosecond of the sine, on both sides of its middle.
+#[test]
+fn a_chirp_is_rounded_to_the_nearest() {
+    let amplitude = PulseWidth(1000);
+    let chirp = Chirp { centre: us(1500), amplitude, from_millihertz: 1000, to_millihertz: 1000, length_ms: 1000 };
+    for ms in 0..1000 {
+        let exact = 1000.0 * (std::f64::consts::TAU * ms as f64 / 1000.0).sin();
+        let given = f64::from(Schedule::Chirp(chirp).pulse_at(ms).unwrap().0) - 1_500_000.0;
+        assert!((given - exact).abs() < 0.51, "{ms} ms: {given} for {exact}");
+    }
 }
 
 /// Half a turn apart the pulse is as far above the middle as below it, to the nanosecond.
