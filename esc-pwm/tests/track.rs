@@ -127,6 +127,55 @@ fn a_segment_tells_its_highest_pulse() {
     }
 }
 
+/// Step by step: each step is the last until the next one comes, in order and once; number 0 begins anew.
+#[test]
+fn a_schedule_grows_step_by_step() {
+    let refused = Err(Refusals(Refusals::OUT_OF_RANGE));
+    let mut track = Track::new();
+    assert_eq!(track.append_last(1, hold(1200, 10)), refused, "a gap");
+    assert_eq!(track.append_last(0, hold(2100, 10)), refused, "impossible");
+    track.append_last(0, hold(1100, 10)).unwrap();
+    track.append_last(1, hold(1200, 10)).unwrap();
+    assert_eq!(track.append_last(1, hold(1300, 10)), refused, "it is there");
+    assert_eq!(track.append_last(3, hold(1300, 10)), refused, "a gap");
+    track.append_last(2, hold(1300, 10)).unwrap();
+    assert!(track.check().is_empty());
+    track.start();
+    assert_eq!(
+        [5, 15, 25, 30].map(|ms| track.at(ms)),
+        [Played::Pulse(us(1100)), Played::Pulse(us(1200)), Played::Pulse(us(1300)), Played::Over]
+    );
+    assert_eq!(track.append_last(3, hold(1400, 10)), refused, "it is being played, and was whole");
+    track.stop();
+    track.append_last(0, hold(1500, 10)).unwrap();
+    assert_eq!(track.next(), 1, "a new one");
+}
+
+/// A track that was stopped gives no pulse, and can be begun again or replaced.
+#[test]
+fn a_stopped_track_gives_nothing() {
+    let mut track = loaded(&[hold(1100, 600)]);
+    track.start();
+    assert_eq!(track.at(10), Played::Pulse(us(1100)));
+    track.stop();
+    assert_eq!((track.playing(), track.at(20)), (None, Played::Over));
+    track.start();
+    assert_eq!((track.playing(), track.at(20)), (Some((0, 0)), Played::Pulse(us(1100))));
+}
+
+/// What is agreed to be there ahead is enough; a millisecond less is not, unless it is all.
+#[test]
+fn a_stream_may_begin_with_what_was_agreed() {
+    let begun = |length_ms, last| {
+        let mut track = Track::new();
+        track.take(0, &[hold(1200, length_ms)], last).unwrap();
+        track.check()
+    };
+    assert_eq!(begun(AHEAD_MS as u32, false), Refusals::default());
+    assert_eq!(begun(AHEAD_MS as u32 - 1, false), Refusals(Refusals::SHORT_STREAM));
+    assert_eq!(begun(1, true), Refusals::default());
+}
+
 #[test]
 fn what_is_there_already_is_not_taken_twice() {
     let mut track = loaded(&[hold(1100, 600), hold(1200, 10)]);
