@@ -39,11 +39,13 @@ struct Memory {
     left: usize,
     /// A cell that is programmed wrongly.
     worn: bool,
+    /// Protected against writing, and silent about it.
+    protected: bool,
 }
 
 impl Memory {
     fn new() -> Self {
-        Self { cells: vec![0xff; 2 * PAGE], left: usize::MAX, worn: false }
+        Self { cells: vec![0xff; 2 * PAGE], left: usize::MAX, worn: false, protected: false }
     }
 
     fn may(&mut self) -> Result<(), Gone> {
@@ -84,12 +86,18 @@ impl NorFlash for Memory {
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), Gone> {
         self.may()?;
+        if self.protected {
+            return Ok(());
+        }
         self.cells[from as usize..to as usize].fill(0xff);
         Ok(())
     }
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Gone> {
         self.may()?;
+        if self.protected {
+            return Ok(());
+        }
         self.cells[offset as usize..].iter_mut().zip(bytes).for_each(|(cell, byte)| *cell &= byte);
         if self.worn && bytes.len() > 8 {
             self.cells[offset as usize + 8] &= 0x7f;
@@ -150,6 +158,16 @@ fn damage_is_told_and_mended_by_the_next_save() {
 fn a_worn_cell_is_no_success() {
     let mut flash = Memory { worn: true, ..Memory::new() };
     assert_eq!(save(&mut flash, RANGE, &filled(0xff)), SettingsNews::Failed);
+}
+
+/// A flash that takes everything and writes nothing still holds the old settings: those are not the ones that were to be stored.
+#[test]
+fn old_settings_that_read_back_are_no_success() {
+    let mut flash = Memory::new();
+    save(&mut flash, RANGE, &filled(1));
+    flash.protected = true;
+    assert_eq!(save(&mut flash, RANGE, &filled(2)), SettingsNews::Failed);
+    assert_eq!(load(&mut flash, RANGE), (Some(filled(1)), SettingsNews::Loaded));
 }
 
 /// Settings of another version are there, and are not these.
