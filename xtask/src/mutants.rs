@@ -133,6 +133,10 @@ pub(crate) fn mutants(place: &Place, words: &[&str]) -> Result<(), Failure> {
         }
     }
     let tool = tool(place)?;
+    let lock = place.root.join("target/mutation/lock");
+    fs::create_dir_all(lock.with_file_name(""))?;
+    let lock = fs::File::create(lock)?;
+    lock.try_lock().map_err(|error| Failure(format!("mutants: another run breaks the copy in target/mutation ({error})")))?;
     let copy = folder::sources(place, "target/mutation/tree")?;
     let bench = Bench { place, tool, copy, results: place.root.join("target/mutation/results") };
     let chosen = packages.iter().filter(|package| asked.places.is_empty() || asked.places.iter().any(|place| package.has(place)));
