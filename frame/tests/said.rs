@@ -3,9 +3,10 @@
 use esc_pwm::ArmingEvent;
 use frame::esc::EscVerdict;
 use frame::imu_command::ImuCommand;
-use frame::message::{Beep, BoardId, Command, CrashCause, SettingsNews, Trial};
+use frame::message::{BURST_PART, Beep, BoardId, BurstPart, Command, CrashCause, Message, SettingsNews, Trial};
 use frame::schedule::{BATCH, Segment, SegmentBatch, Shape, Steer};
 use frame::units::{PulseWidth, Ticks};
+use frame::wire::{Decoder, Encoder, MAX_WIRE};
 use std::collections::BTreeSet;
 
 fn different(words: &[&str]) -> bool {
@@ -70,6 +71,22 @@ fn a_batch_holds_the_first_eight_and_ends_the_schedule_only_with_all() {
     assert_eq!(SegmentBatch { count: 9, ..SegmentBatch::of(0, &list) }.segments(), None, "it cannot hold nine");
     let question = SegmentBatch::question(17);
     assert_eq!((question.first, question.last, question.segments()), (17, false, Some(&[][..])));
+}
+
+/// A part of a burst carries as many conversions as it is said to, and is the longest message that a board sends.
+#[test]
+fn a_part_of_a_burst_comes_back_whole() {
+    let mut codes = [[0; 32]; BURST_PART / 32];
+    codes.as_flattened_mut().iter_mut().zip(4000..).for_each(|(code, n)| *code = n);
+    assert_eq!(codes.as_flattened().len(), BURST_PART);
+    let part = BurstPart { channel: 3, from: Ticks(7), rate_hz: 61_800.0, length: 9600, at: 96, codes };
+    let mut out = [0; MAX_WIRE];
+    let n = Encoder::default().encode(Ticks(9), &Message::BurstPart(part), &mut out).unwrap();
+    let mut decoder = Decoder::default();
+    let got = out[..n].iter().find_map(|byte| decoder.push::<Message>(*byte)).unwrap();
+    assert_eq!(got.message, Message::BurstPart(part));
+    let Message::BurstPart(back) = got.message else { panic!("{got:?}") };
+    assert_eq!(back.codes.as_flattened().iter().copied().collect::<Vec<_>>(), (4000..4096).collect::<Vec<u16>>());
 }
 
 #[test]
