@@ -86,7 +86,7 @@ fn a_part_of_a_burst_comes_back_whole() {
     let got = out[..n].iter().find_map(|byte| decoder.push::<Message>(*byte)).unwrap();
     assert_eq!(got.message, Message::BurstPart(part));
     let Message::BurstPart(back) = got.message else { panic!("{got:?}") };
-    assert_eq!(back.codes.as_flattened().iter().copied().collect::<Vec<_>>(), (4000..4096).collect::<Vec<u16>>());
+    assert_eq!(back.codes.as_flattened().to_vec(), (4000..4096).collect::<Vec<u16>>());
 }
 
 #[test]
