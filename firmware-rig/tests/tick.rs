@@ -1,7 +1,8 @@
 //! The rig through its one door, `Rig::tick`, at 1 kHz with a host that answers.
 
 use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Outputs, Rig};
-use frame::message::{Beep, Command, Event, Trial};
+use frame::imu_command::ImuCommand;
+use frame::message::{Beep, Command, Event, Setting, Trial};
 use frame::rig::{AdcVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::schedule::{ScheduleNews, Segment, SegmentBatch, Shape, Steer};
 use frame::units::{PulseWidth, Ticks};
@@ -568,6 +569,79 @@ fn tare_takes_the_last_means_as_zero() {
     assert_eq!(bench.rig.calibration().convert(&last).adc[0], Some(0.0));
     let mut bench = Bench::running(1500);
     assert_eq!(bench.say(Command::Tare), refused(Refusals::WRONG_STATE));
+}
+
+/// A bench whose rotor turns although the rig is disarmed: by hand, by wind, or it coasts.
+fn turning() -> Bench {
+    let mut bench = Bench::new();
+    let marks = bench.rig.config().marks;
+    let mut rotor = Rotor { marks, fast: &[], turned: [0.0; 4], rpm: 3000.0 };
+    for _ in 0..500 {
+        rotor.tick(&mut bench);
+    }
+    bench
+}
+
+/// What changes the board itself is done while it is disarmed and nothing turns, and then once.
+#[test]
+fn settings_are_changed_and_stored_at_rest_only() {
+    let change = Command::Configure(Setting::LogPeriodMs(50));
+    for command in [Command::SaveSettings, change] {
+        assert_eq!(Bench::armed().say(command), refused(Refusals::WRONG_STATE), "{command:?}");
+        assert_eq!(Bench::running(1500).say(command), refused(Refusals::WRONG_STATE), "{command:?}");
+        let mut bench = turning();
+        assert_eq!(bench.say(command), refused(Refusals::ROTOR_TURNING), "{command:?}");
+        assert_eq!(bench.rig.settings().log_period_ms, Bench::new().rig.settings().log_period_ms);
+    }
+    let mut bench = Bench::new();
+    assert_eq!(bench.say(change), Some(Event::Accepted));
+    assert_eq!(bench.rig.settings().log_period_ms, 50);
+    assert_eq!(bench.say(Command::Configure(Setting::LogPeriodMs(0))), refused(Refusals::OUT_OF_RANGE));
+    assert!(!bench.tick_with(None, &[]).store);
+    assert!(bench.tick_with(Some(Command::SaveSettings), &[]).store);
+    assert!(!bench.tick_with(None, &[]).store, "once");
+    assert!(!Bench::armed().tick_with(Some(Command::SaveSettings), &[]).store);
+}
+
+/// A zero is taken of a load that stands still and that the channel sees.
+#[test]
+fn a_tare_needs_a_still_rotor_and_two_good_channels() {
+    assert_eq!(turning().say(Command::Tare), refused(Refusals::ROTOR_TURNING));
+    assert_eq!(Bench::holding_max().say(Command::Tare), refused(Refusals::WRONG_STATE));
+    for channel in [0, 1] {
+        let mut bench = Bench::new();
+        bench.counts[channel] = 4095;
+        bench.run(250);
+        assert_eq!(bench.say(Command::Tare), refused(Refusals::OUT_OF_RANGE), "channel {channel} is at its end");
+    }
+    let mut bench = Bench::new();
+    bench.counts = [1500, 2100, 300, 0, 950];
+    bench.run(250);
+    let before = bench.rig.calibration();
+    assert_eq!(bench.say(Command::Tare), Some(Event::Accepted));
+    let after = bench.rig.calibration();
+    assert_eq!((after.adc[0].zero, after.adc[1].zero), (1500.0, 2100.0));
+    assert_eq!((after.adc[0].gain, after.adc[1].gain), (before.adc[0].gain, before.adc[1].gain));
+    assert_eq!(after.adc[2..], before.adc[2..], "no other channel is loaded by the motor's weight");
+}
+
+#[test]
+fn a_burst_is_of_a_channel_that_is_fitted() {
+    let fitted = [true, true, true, false, true];
+    let mut bench = Bench::with(Config { fitted, ..Config::thesis_570kv() });
+    for channel in 0..7u8 {
+        let there = fitted.get(usize::from(channel)) == Some(&true);
+        let outputs = bench.tick_with(Some(Command::Burst { channel }), &[]);
+        assert_eq!(outputs.burst, there.then_some(channel));
+        assert_eq!(bench.tick_with(None, &[]).burst, None, "once");
+        let answer = if there { Some(Event::Accepted) } else { refused(Refusals::OUT_OF_RANGE) };
+        assert_eq!(bench.say(Command::Burst { channel }), answer, "channel {channel}");
+    }
+}
+
+#[test]
+fn a_command_of_the_other_board_is_refused() {
+    assert_eq!(Bench::new().say(Command::Imu(ImuCommand::Once)), refused(Refusals::WRONG_STATE));
 }
 
 #[test]
