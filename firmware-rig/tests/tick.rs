@@ -623,6 +623,23 @@ fn a_tare_needs_a_still_rotor_and_two_good_channels() {
     assert_eq!((after.adc[0].zero, after.adc[1].zero), (1500.0, 2100.0));
     assert_eq!((after.adc[0].gain, after.adc[1].gain), (before.adc[0].gain, before.adc[1].gain));
     assert_eq!(after.adc[2..], before.adc[2..], "no other channel is loaded by the motor's weight");
+    let fitted = [true, false, true, true, true];
+    let mut bench = Bench::with(Config { fitted, ..Config::thesis_570kv() });
+    bench.run(250);
+    let before = bench.rig.calibration();
+    assert_eq!(bench.say(Command::Tare), Some(Event::Accepted));
+    assert_eq!(bench.rig.calibration().adc[1], before.adc[1], "what is not fitted keeps its scale");
+}
+
+/// The board asks whether a pulse above minimum is given before it changes the form of its pulses.
+#[test]
+fn it_knows_whether_the_throttle_is_open() {
+    assert!(!Bench::new().rig.is_live() && !Bench::armed().rig.is_live());
+    assert!(Bench::holding_max().rig.is_live());
+    let mut bench = Bench::running(1300);
+    assert!(bench.rig.is_live());
+    bench.tick_with(Some(Command::Stop), &[]);
+    assert!(!bench.rig.is_live());
 }
 
 #[test]
