@@ -17,6 +17,10 @@ struct Bench {
     counts: [u16; 5],
     stop_line: bool,
     linked: bool,
+    /// Ticks by which the control tick comes after its millisecond.
+    late: u64,
+    line: LineNews,
+    paused: bool,
     pulse: PulseWidth,
     events: Vec<Event>,
     samples: Vec<RigSample>,
@@ -34,6 +38,9 @@ impl Bench {
             counts: [1427, 2048, 248, 0, 900], // nothing powered, 22.5 degC
             stop_line: false,
             linked: true,
+            late: 0,
+            line: LineNews::default(),
+            paused: false,
             pulse: PulseWidth(0),
             events: Vec::new(),
             samples: Vec::new(),
@@ -59,16 +66,16 @@ impl Bench {
             block
         });
         let inputs = Inputs {
-            now: Ticks(self.ms * MS),
+            now: Ticks(self.ms * MS + self.late),
             edges,
             over_capture: [false; 4],
             adc: &adc,
             beside: Beside::UNWIRED,
             command: command.or(keep_alive),
-            line: LineNews::default(),
+            line: core::mem::take(&mut self.line),
             stop_input: self.stop_line,
             brown_out: false,
-            paused: false,
+            paused: self.paused,
         };
         let outputs = self.rig.tick(&inputs);
         self.pulse = outputs.pulse;
@@ -275,6 +282,55 @@ fn a_late_tick_stops_the_motor() {
     bench.ms += 6;
     assert_eq!(bench.tick_with(None, &[]).pulse, PulseWidth::MIN);
     assert!(bench.rig.faults().contains(Fault::ControlStalled));
+}
+
+/// Ticks come some cycles early or late; what counts is the nearest millisecond.
+#[test]
+fn the_time_between_two_ticks_is_rounded() {
+    for (late, stalled) in [(MS * 4 / 10, false), (MS * 6 / 10, true)] {
+        let mut bench = Bench::running(1500);
+        bench.ms += 4;
+        bench.late = late;
+        bench.run(1);
+        assert_eq!(bench.rig.faults().contains(Fault::ControlStalled), stalled, "5 ms and {late} ticks");
+    }
+    let mut bench = Bench::new();
+    bench.late = 100; // the first tick is late, all that follow seem early
+    bench.run(1);
+    bench.late = 0;
+    bench.run(1000);
+    let times: Vec<u64> = bench.samples.iter().map(|sample| sample.at.as_ms()).collect();
+    let period = bench.rig.config().log_period().as_ms();
+    assert_eq!(times, (1..).map(|n| 1 + n * period).take_while(|ms| *ms <= 1001).collect::<Vec<_>>());
+}
+
+/// Erasing flash holds the board up, which is no stall while it is disarmed. Nothing may hold up a rig that is armed.
+#[test]
+fn a_pause_is_forgiven_while_disarmed_and_never_else() {
+    for (paused, mut bench, forgiven) in [
+        (true, Bench::new(), true),
+        (false, Bench::new(), false),
+        (true, Bench::armed(), false),
+        (true, Bench::running(1500), false),
+    ] {
+        bench.run(10);
+        bench.ms += 1500;
+        bench.paused = paused;
+        bench.tick_with(Some(Command::Ping), &[]);
+        assert_eq!(bench.rig.faults().is_empty(), forgiven, "{:?}", bench.rig.faults());
+    }
+}
+
+/// A host is told that a frame of its was not obeyed because it came again.
+#[test]
+fn a_replayed_frame_is_told() {
+    let mut bench = Bench::new();
+    bench.run(50);
+    let replayed = Event::Refused(Refusals(Refusals::REPLAYED));
+    assert!(!bench.events.contains(&replayed));
+    bench.line.replayed = 1;
+    bench.run(5);
+    assert_eq!(bench.events.iter().filter(|event| **event == replayed).count(), 1);
 }
 
 #[test]
@@ -680,6 +736,24 @@ fn hello_tells_what_is_fitted() {
     let rig = Rig::new(Config { marks: [2, 0, 2, 25], ..Config::thesis_570kv() });
     let hello = rig.hello(0x14);
     assert_eq!((hello.present, hello.reset_cause, hello.core_hz), (0b1101, 0x14, 168_000_000));
+    let fitted = [true, false, true, true, false];
+    assert_eq!(Rig::new(Config { fitted, ..Config::thesis_570kv() }).hello(0).analogue, 0b01101);
+}
+
+/// A tare outlives every change that leaves the load cell's scale alone, and none that does not.
+#[test]
+fn a_tare_belongs_to_its_scale() {
+    let mut bench = Bench::new();
+    bench.counts[0] = 1500;
+    bench.run(250);
+    assert_eq!(bench.say(Command::Tare), Some(Event::Accepted));
+    let tared = bench.rig.calibration();
+    assert_eq!(bench.say(Command::Configure(Setting::SlewNsPerMs(500))), Some(Event::Accepted));
+    assert_eq!(bench.rig.calibration(), tared);
+    assert_eq!(bench.say(Command::Configure(Setting::Marks([1, 0, 0, 0]))), Some(Event::Accepted));
+    let other = bench.rig.calibration();
+    assert_eq!((other.marks, bench.rig.hello(0).present), ([1, 0, 0, 0], 1), "another calibration is in force");
+    assert_eq!(other, Rig::with_settings(Config::thesis_570kv(), bench.rig.settings()).calibration(), "untared");
 }
 
 fn any_command() -> impl Strategy<Value = Command> {
