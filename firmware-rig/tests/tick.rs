@@ -15,6 +15,8 @@ struct Bench {
     rig: Rig,
     ms: u64,
     counts: [u16; 5],
+    /// Conversions of each channel in a tick.
+    conversions: usize,
     stop_line: bool,
     linked: bool,
     /// Ticks by which the control tick comes after its millisecond.
@@ -36,6 +38,7 @@ impl Bench {
             rig: Rig::new(config),
             ms: 0,
             counts: [1427, 2048, 248, 0, 900], // nothing powered, 22.5 degC
+            conversions: 8,
             stop_line: false,
             linked: true,
             late: 0,
@@ -62,7 +65,7 @@ impl Bench {
         let keep_alive = (self.linked && self.ms.is_multiple_of(100)).then_some(Command::Ping);
         let adc = self.counts.map(|code| {
             let mut block = AdcBlock::default();
-            (0..8).for_each(|_| block.push(code));
+            (0..self.conversions).for_each(|_| block.push(code));
             block
         });
         let inputs = Inputs {
@@ -351,6 +354,23 @@ fn analogue_limits_trip_in_time() {
     }
 }
 
+/// A wire that breaks reads an end of its range for good; a converter that stands gives nothing. Either ends the run.
+#[test]
+fn a_lost_channel_stops_the_motor() {
+    let after = |change: fn(&mut Bench)| {
+        let mut bench = Bench::running(1500);
+        let (begun, limit) = (bench.ms, u64::from(bench.rig.config().limits.analogue_ms));
+        change(&mut bench);
+        while bench.pulse.is_live() && bench.ms < begun + 1000 {
+            bench.run(1);
+        }
+        (bench.ms - begun <= limit, bench.rig.faults().contains(Fault::AdcLost))
+    };
+    assert_eq!(after(|bench| bench.counts[2] = 0), (true, true), "the current's wire is open");
+    assert_eq!(after(|bench| bench.counts[1] = 4095), (true, true), "the torque's lies on the supply");
+    assert_eq!(after(|bench| bench.conversions = 0), (true, true), "no conversion comes");
+}
+
 #[test]
 fn range_calibration() {
     let confirmed = Command::CalibrateRange { confirm: Command::CALIBRATE_CONFIRM };
@@ -410,6 +430,8 @@ fn a_rotor_that_turns_ends_maximum_pulses() {
 #[test]
 fn maximum_is_held_for_a_bounded_time_from_the_power_edge() {
     let mut bench = Bench::holding_max();
+    bench.run(5_000); // towards an ESC without power it may wait
+    assert_eq!(bench.pulse, PulseWidth::MAX);
     bench.power();
     bench.run(6_490);
     assert_eq!(bench.pulse, PulseWidth::MAX);

@@ -229,6 +229,12 @@ struct Bench<'p> {
 }
 
 impl Package {
+    /// The words after `cargo test` for all tests but those that take too long.
+    fn all_tests(&self) -> Vec<&str> {
+        let skip = self.skip.iter().flat_map(|test| ["--skip", test.as_str()]);
+        ["--lib", "--tests", "--"].into_iter().chain(skip).collect()
+    }
+
     /// Whether `place` is this package, or a file of it.
     fn has(&self, place: &str) -> bool {
         let below = place.strip_prefix(self.name.as_str());
@@ -295,7 +301,7 @@ impl Bench<'_> {
         if all == 0 {
             return Ok(fates);
         }
-        run(&mut self.tests(&package.name, &[])).map_err(|error| Failure(format!("{error} before anything was broken")))?;
+        run(&mut self.tests(package)).map_err(|error| Failure(format!("{error} before anything was broken")))?;
         for (file, names) in files {
             if difference.is_some_and(|(_, until)| Instant::now() > until) {
                 return Err(Failure(format!(
@@ -310,9 +316,7 @@ impl Bench<'_> {
             for (tests, seconds) in stages {
                 let alive: BTreeSet<String> = missed(&came).map(str::to_owned).collect();
                 if !alive.is_empty() {
-                    let skip = package.skip.iter().flat_map(|test| ["--skip", test.as_str()]);
-                    let words: Vec<&str> = ["--lib", "--tests", "--"].into_iter().chain(skip).collect();
-                    came.extend(self.turn(package, &file, &alive, &["--test-package", tests], &words, seconds)?);
+                    came.extend(self.turn(package, &file, &alive, &["--test-package", tests], &package.all_tests(), seconds)?);
                 }
             }
             println!("  {file}: {}, {:.0} s", words(&came), start.elapsed().as_secs_f64());
@@ -328,9 +332,9 @@ impl Bench<'_> {
     }
 
     /// `cargo test` of a package as the mutants will meet it.
-    fn tests(&self, package: &str, words: &[&str]) -> Command {
-        let mut command = cargo(&self.copy, &["test", "--quiet", "--profile", PROFILE, "-p", package]);
-        command.args(words).env("CARGO_TARGET_DIR", &self.copy.target).stdout(Stdio::null());
+    fn tests(&self, package: &Package) -> Command {
+        let mut command = cargo(&self.copy, &["test", "--quiet", "--profile", PROFILE, "-p", &package.name]);
+        command.args(package.all_tests()).env("CARGO_TARGET_DIR", &self.copy.target).stdout(Stdio::null());
         command
     }
 
