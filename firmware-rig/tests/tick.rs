@@ -226,6 +226,19 @@ fn a_stop_gives_minimum_on_its_own_tick_and_latches() {
     assert_eq!(bench.say(Command::Arm), Some(Event::Accepted));
 }
 
+/// After a run the ESC hears minimum for as long as it was agreed before the next arming, to the tick.
+#[test]
+fn the_low_interval_is_kept_in_full() {
+    let mut bench = Bench::running(1500);
+    let live = bench.ms;
+    bench.tick_with(Some(Command::Stop), &[]);
+    bench.tick_with(Some(Command::ClearFaults), &[]);
+    while bench.rig.state() == RigState::Disarmed && bench.ms < live + 5000 {
+        bench.tick_with(Some(Command::Arm), &[]);
+    }
+    assert_eq!(bench.ms - live, u64::from(bench.rig.config().times.low_interval_ms));
+}
+
 #[test]
 fn the_stop_line_works_without_a_host() {
     let mut bench = Bench::running(1300);

@@ -41,6 +41,7 @@ usage: cargo xtask COMMAND
   hazards --page   writes docs/hazards.md
   mutants [PACKAGE|FILE]...  breaks the code in every small way and sees the tests notice; writes docs/mutants.md (budgets/mutants.toml)
   mutants --again [PACKAGE|FILE]...  only what no test noticed the last time, what was not tried, and what changed since
+  mutants --page   writes docs/mutants.md anew from the list and from what came of the last runs
   mutants --changed [COMMIT]  only lines that differ from a commit (main); no page
   book             builds docs/ with mdBook into target/book and checks every link of what comes out
   errors           writes docs/errors.md: every refusal of the command line, from the source

@@ -99,6 +99,8 @@ struct Asked<'w> {
     changed: Option<&'w str>,
     /// Only what no test noticed the last time, and what was not tried.
     again: bool,
+    /// Only the page, of what came of it the last time.
+    page: bool,
     /// These packages, or files of theirs; none: all.
     places: Vec<&'w str>,
 }
@@ -110,8 +112,11 @@ fn asked<'w>(words: &[&'w str]) -> Result<Asked<'w>, Failure> {
         match word {
             "--changed" => asked.changed = Some(words.next_if(|word| !word.starts_with('-')).unwrap_or("main")),
             "--again" => asked.again = true,
+            "--page" => asked.page = true,
             _ if word.starts_with('-') => {
-                return Err(Failure(format!("mutants: expected --changed [COMMIT], --again, a package or a file, got {word}")));
+                return Err(Failure(format!(
+                    "mutants: expected --changed [COMMIT], --again, --page, a package or a file, got {word}"
+                )));
             }
             place => asked.places.push(place),
         }
@@ -123,6 +128,10 @@ fn asked<'w>(words: &[&'w str]) -> Result<Asked<'w>, Failure> {
 pub(crate) fn mutants(place: &Place, words: &[&str]) -> Result<(), Failure> {
     let asked = asked(words)?;
     let (packages, accepted) = read(place)?;
+    let results = Results { place, folder: place.root.join("target/mutation/results") };
+    if asked.page {
+        return results.write_page(&packages, &accepted);
+    }
     for asked in &asked.places {
         if !packages.iter().any(|package| package.has(asked)) {
             let known: Vec<&str> = packages.iter().map(|package| package.name.as_str()).collect();
@@ -138,7 +147,7 @@ pub(crate) fn mutants(place: &Place, words: &[&str]) -> Result<(), Failure> {
     let lock = fs::File::create(lock)?;
     lock.try_lock().map_err(|error| Failure(format!("mutants: another run breaks the copy in target/mutation ({error})")))?;
     let copy = folder::sources(place, "target/mutation/tree")?;
-    let bench = Bench { place, tool, copy, results: place.root.join("target/mutation/results") };
+    let bench = Bench { place, tool, copy, results };
     let chosen = packages.iter().filter(|package| asked.places.is_empty() || asked.places.iter().any(|place| package.has(place)));
     let mut open = Vec::new();
     match asked.changed {
@@ -158,7 +167,7 @@ pub(crate) fn mutants(place: &Place, words: &[&str]) -> Result<(), Failure> {
                 open.extend(stale(place, package, &fates, &accepted));
                 tell(&package.name, &count(place, &fates, &accepted));
             }
-            bench.write_page(&packages, &accepted)?;
+            bench.results.write_page(&packages, &accepted)?;
         }
     }
     for line in &open {
@@ -224,8 +233,13 @@ struct Bench<'p> {
     place: &'p Place,
     tool: PathBuf,
     copy: Place,
-    /// What became of each mutant, a file a package.
-    results: PathBuf,
+    results: Results<'p>,
+}
+
+/// What became of each mutant, a file a package.
+struct Results<'p> {
+    place: &'p Place,
+    folder: PathBuf,
 }
 
 impl Package {
@@ -272,7 +286,7 @@ impl Bench<'_> {
     /// Breaks a package, or what of it is asked for; of a difference its lines only, and nothing is begun after the instant.
     fn run(&self, package: &Package, asked: &Asked<'_>, difference: Option<(&Path, Instant)>) -> Result<Fates, Failure> {
         let start = Instant::now();
-        let known = if difference.is_none() { self.known(package)? } else { Fates::new() };
+        let known = if difference.is_none() { self.results.known(package)? } else { Fates::new() };
         let whole = asked.places.is_empty() || asked.places.contains(&package.name.as_str());
         let mut list = self.tool(&["--list", "-p", &package.name]);
         if let Some((diff, _)) = difference {
@@ -325,7 +339,7 @@ impl Bench<'_> {
             }
             fates.extend(came);
             if difference.is_none() {
-                self.keep(package, &fates)?; // whoever ends this goes on with --again
+                self.results.keep(package, &fates)?; // whoever ends this goes on with --again
             }
         }
         Ok(fates)
@@ -381,9 +395,11 @@ impl Bench<'_> {
             None => Ok(came),
         }
     }
+}
 
+impl Results<'_> {
     fn file(&self, package: &str) -> PathBuf {
-        self.results.join(format!("{package}.txt"))
+        self.folder.join(format!("{package}.txt"))
     }
 
     /// What is known of a package, as far as its files are those that were broken then.
@@ -430,7 +446,7 @@ impl Bench<'_> {
             }
             let _ = writeln!(text, "{}\t{name}", fate.word());
         }
-        fs::create_dir_all(&self.results)?;
+        fs::create_dir_all(&self.folder)?;
         Ok(fs::write(self.file(&package.name), text)?)
     }
 
@@ -630,7 +646,7 @@ mod tests {
         let there = fs::read_to_string(place.root.join(PAGE)).unwrap_or_default();
         let rows = |package: &Package| there.lines().find(|line| line.starts_with(&head(&package.name))).map(str::to_owned);
         let rows: Vec<String> = packages.iter().filter_map(rows).collect();
-        assert!(there == page(&rows, &accepted), "{PAGE}: run `cargo xtask mutants --again`");
+        assert!(there == page(&rows, &accepted), "{PAGE}: run `cargo xtask mutants --page`");
     }
 
     #[test]
@@ -658,7 +674,7 @@ mod tests {
     fn words_are_understood_or_refused() {
         assert_eq!(asked(&["--changed", "v1", "frame"]).unwrap().places, ["frame"]);
         assert_eq!(asked(&["--changed"]).unwrap().changed, Some("main"));
-        assert_eq!(asked(&["--again", "frame"]).unwrap(), Asked { again: true, places: vec!["frame"], changed: None });
+        assert_eq!(asked(&["--again", "frame"]).unwrap(), Asked { again: true, places: vec!["frame"], ..Asked::default() });
         assert!(asked(&["--agian"]).is_err());
         let (_, packages, _) = whole();
         let found = |place: &str| packages.iter().find(|package| package.has(place)).map(|package| package.name.as_str());
