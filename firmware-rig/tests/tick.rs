@@ -3,7 +3,7 @@
 use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Outputs, Rig};
 use frame::imu_command::ImuCommand;
 use frame::message::{Beep, Command, Event, Setting, Trial};
-use frame::rig::{AdcVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
+use frame::rig::{AdcVerdict, CaptureVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::schedule::{ScheduleNews, Segment, SegmentBatch, Shape, Steer};
 use frame::units::{PulseWidth, Ticks};
 use proptest::prelude::*;
@@ -763,6 +763,47 @@ fn samples_come_at_the_log_rate_without_drift() {
         let counted: u64 = bench.samples.iter().map(|s| u64::from(s.adc[0].count)).sum();
         assert_eq!(counted, (5000 / ms * ms + 1) * 8, "no conversion is lost or counted twice");
         assert!(bench.samples.iter().all(|s| s.adc[3].verdict == AdcVerdict::Nominal), "an unpowered supply reads zero");
+    }
+}
+
+/// After a pause of many periods the next sample is the next one of its row: none is made up, none comes early.
+#[test]
+fn samples_keep_their_row_over_a_pause() {
+    let mut bench = Bench::new();
+    bench.run(250);
+    bench.ms += 1520;
+    bench.paused = true;
+    bench.run(1);
+    bench.paused = false;
+    bench.run(500);
+    let times: Vec<u64> = bench.samples.iter().map(|sample| sample.at.as_ms()).collect();
+    assert_eq!(times, [101, 201, 1771, 1801, 1901, 2001, 2101, 2201]);
+}
+
+/// Other marks are other channels: what is fitted from now on is heard, and what is not any more is absent.
+#[test]
+fn changed_marks_are_listened_to() {
+    let mut bench = Bench::with(Config { marks: [0, 0, 2, 0], ..Config::thesis_570kv() });
+    assert_eq!(bench.say(Command::Configure(Setting::Marks([2, 0, 0, 0]))), Some(Event::Accepted));
+    let mut rotor = Rotor { marks: [2, 0, 0, 0], fast: &[], turned: [0.0; 4], rpm: 3000.0 };
+    for _ in 0..500 {
+        rotor.tick(&mut bench);
+    }
+    let last = *bench.samples.last().unwrap();
+    assert_eq!([0, 2].map(|channel: usize| last.rpm[channel].verdict), [CaptureVerdict::Nominal, CaptureVerdict::Absent]);
+    let speed = bench.rig.calibration().speed(0, &last.rpm[0]).unwrap();
+    assert!((speed - 3000.0).abs() < 1.0, "{speed} rev/min");
+}
+
+/// Either a speed sensor or the current sees a rotor that turns while maximum is held; one of the two is enough.
+#[test]
+fn one_witness_is_enough_for_the_range_calibration() {
+    let fitted = |current| [true, true, current, true, true];
+    for (marks, current, refused) in [([2, 1, 2, 25], false, false), ([0; 4], true, false), ([0; 4], false, true)] {
+        let mut bench = Bench::with(Config { marks, fitted: fitted(current), ..Config::thesis_570kv() });
+        let answer = bench.say(Command::CalibrateRange { confirm: 0 });
+        let Some(Event::Refused(reasons)) = answer else { panic!("{answer:?}") };
+        assert_eq!(reasons.0 & Refusals::NO_WITNESS != 0, refused, "{marks:?}, current {current}: {reasons}");
     }
 }
 
