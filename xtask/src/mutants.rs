@@ -286,7 +286,7 @@ impl Bench<'_> {
     /// Breaks a package, or what of it is asked for; of a difference its lines only, and nothing is begun after the instant.
     fn run(&self, package: &Package, asked: &Asked<'_>, difference: Option<(&Path, Instant)>) -> Result<Fates, Failure> {
         let start = Instant::now();
-        let known = if difference.is_none() { self.results.known(package)? } else { Fates::new() };
+        let known = if difference.is_none() { self.results.known(&self.copy.root, package)? } else { Fates::new() };
         let whole = asked.places.is_empty() || asked.places.contains(&package.name.as_str());
         let mut list = self.tool(&["--list", "-p", &package.name]);
         if let Some((diff, _)) = difference {
@@ -339,7 +339,7 @@ impl Bench<'_> {
             }
             fates.extend(came);
             if difference.is_none() {
-                self.results.keep(package, &fates)?; // whoever ends this goes on with --again
+                self.results.keep(&self.copy.root, package, &fates)?; // whoever ends this goes on with --again
             }
         }
         Ok(fates)
@@ -402,8 +402,8 @@ impl Results<'_> {
         self.folder.join(format!("{package}.txt"))
     }
 
-    /// What is known of a package, as far as its files are those that were broken then.
-    fn known(&self, package: &Package) -> Result<Fates, Failure> {
+    /// What is known of a package, as far as its files in `root` are those that were broken then.
+    fn known(&self, root: &Path, package: &Package) -> Result<Fates, Failure> {
         let Ok(text) = fs::read_to_string(self.file(&package.name)) else { return Ok(Fates::new()) };
         let mut fates = Fates::new();
         let mut same = false;
@@ -411,7 +411,7 @@ impl Results<'_> {
             match line.split_once('\t') {
                 Some(("file", rest)) => {
                     let Some((digest, file)) = rest.split_once('\t') else { continue };
-                    same = self.digest(file).is_ok_and(|now| now == digest);
+                    same = Self::digest(root, file).is_ok_and(|now| now == digest);
                 }
                 Some((word, name)) if same => {
                     fates.extend(Fate::ALL.iter().find(|(_, w)| *w == word).map(|(fate, _)| (name.to_owned(), *fate)));
@@ -423,9 +423,9 @@ impl Results<'_> {
     }
 
     /// Of what a file holds beside its unit tests.
-    fn digest(&self, file: &str) -> Result<String, Failure> {
+    fn digest(root: &Path, file: &str) -> Result<String, Failure> {
         use sha2::Digest as _;
-        let text = fs::read_to_string(self.place.root.join(file))?;
+        let text = fs::read_to_string(root.join(file))?;
         // unit tests stand at the end of a file, and are never broken
         let code = text.split("\n#[cfg(test)]\nmod ").next().unwrap_or_default();
         Ok(sha2::Sha256::digest(code).iter().fold(String::new(), |mut hex, byte| {
@@ -434,14 +434,14 @@ impl Results<'_> {
         }))
     }
 
-    /// Writes what became of a package's mutants, for `--again` and the page.
-    fn keep(&self, package: &Package, fates: &Fates) -> Result<(), Failure> {
+    /// Writes what became of the mutants of a package whose sources are in `root`, for `--again` and the page.
+    fn keep(&self, root: &Path, package: &Package, fates: &Fates) -> Result<(), Failure> {
         let mut text = String::new();
         let mut last = "";
         for (name, fate) in fates {
             let file = name.split(':').next().unwrap_or_default();
             if file != last {
-                let _ = writeln!(text, "file\t{}\t{file}", self.digest(file)?);
+                let _ = writeln!(text, "file\t{}\t{file}", Self::digest(root, file)?);
                 last = file;
             }
             let _ = writeln!(text, "{}\t{name}", fate.word());
@@ -456,7 +456,7 @@ impl Results<'_> {
         let mut rows = Vec::new();
         for package in packages {
             let head = head(&package.name);
-            let fates = self.known(package)?;
+            let fates = self.known(&self.place.root, package)?;
             if fates.is_empty() {
                 rows.extend(before.lines().find(|line| line.starts_with(&head)).map(str::to_owned));
             } else {
