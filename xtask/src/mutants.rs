@@ -388,7 +388,8 @@ impl Bench<'_> {
         let mut came = Fates::new();
         for (fate, word) in Fate::ALL.into_iter().filter(|(fate, _)| *fate != Fate::Untried) {
             let text = fs::read_to_string(out.join(format!("mutants.out/{word}.txt"))).unwrap_or_default();
-            came.extend(text.lines().filter(|line| !line.is_empty()).map(|line| (line.to_owned(), fate)));
+            // the tool lets deleted fields of a struct pass its own filter
+            came.extend(text.lines().filter(|line| names.contains(*line)).map(|line| (line.to_owned(), fate)));
         }
         match names.iter().find(|name| !came.contains_key(*name)) {
             Some(name) => Err(Failure(format!("{name}: cargo-mutants says nothing of it: {}", text.trim()))),
