@@ -287,6 +287,103 @@ mod tests {
         assert_eq!(trips_after(Disarmed, Readings { tick_ms: 6, ..good() }, Fault::ControlStalled), Some(1));
     }
 
+    /// A limit may be reached; only what lies beyond it trips, in whatever direction it is.
+    #[test]
+    fn a_reading_at_its_limit_is_within_it() {
+        use State::{Armed, CalibrateHoldMax, Running};
+        let of = |change: fn(&mut Readings, f32), value: f32| {
+            let mut readings = good();
+            change(&mut readings, value);
+            readings
+        };
+        type Row = (State, Fault, fn(&mut Readings, f32), f32, f32);
+        let rows: [Row; 13] = [
+            (Running, Fault::Overspeed, |r, v| r.speed = Some(RevPerMin(v)), 10_000.0, 10_001.0),
+            (Running, Fault::BelowLimit, |r, v| r.speed = Some(RevPerMin(v)), 500.0, 499.0),
+            (Running, Fault::OverCurrent, |r, v| r.current = Some(Ampere(v)), 30.0, 30.1),
+            (Running, Fault::BelowLimit, |r, v| r.current = Some(Ampere(v)), 0.1, 0.09),
+            (CalibrateHoldMax, Fault::OverCurrent, |r, v| r.current = Some(Ampere(v)), 1.0, 1.1),
+            (Armed, Fault::UnderVoltage, |r, v| r.voltage = Some(Volt(v)), 9.0, 8.9),
+            (Armed, Fault::OverVoltage, |r, v| r.voltage = Some(Volt(v)), 17.0, 17.1),
+            (Running, Fault::LoadCellOverload, |r, v| r.load = Some(Newton(v)), 30.0, 30.1),
+            (Running, Fault::LoadCellOverload, |r, v| r.load = Some(Newton(v)), -30.0, -30.1),
+            (Running, Fault::TorqueLimit, |r, v| r.torque = Some(NewtonMetre(v)), 0.5, 0.51),
+            (Running, Fault::TemperatureLimit, |r, v| r.temperature = Some(Celsius(v)), 80.0, 80.1),
+            (Armed, Fault::LinkLost, |r, v| r.silence_ms = v as u32, 1000.0, 1001.0),
+            (Running, Fault::ControlStalled, |r, v| r.tick_ms = v as u32, 5.0, 6.0),
+        ];
+        for (state, fault, change, at, beyond) in rows {
+            assert_eq!(trips_after(state, of(change, at), fault), None, "{fault:?} at {at}");
+            assert!(trips_after(state, of(change, beyond), fault).is_some(), "{fault:?} at {beyond}");
+        }
+    }
+
+    /// What the rig does in a state decides which limits are looked at: loads where pulses above minimum are given, the supply where the ESC
+    /// is meant to have one, the host wherever the machine may go on by itself.
+    #[test]
+    fn each_limit_is_looked_at_in_its_states_and_in_no_others() {
+        use State::{Armed, CalibrateHoldMax, CalibrateHoldMin, Running};
+        let live: &[State] = &[Running, CalibrateHoldMax];
+        let powered: &[State] = &[Running, Armed];
+        let linked: &[State] = &[Running, CalibrateHoldMax, Armed, CalibrateHoldMin];
+        let always: &[State] = &crate::arming::STATES;
+        let at_rest = || Readings { current: Some(Ampere(0.5)), ..good() };
+        for (fault, readings, states) in [
+            (Fault::Overspeed, Readings { speed: Some(RevPerMin(11_000.0)), ..at_rest() }, always),
+            (Fault::OverCurrent, Readings { current: Some(Ampere(31.0)), ..at_rest() }, always),
+            (Fault::OverCurrent, Readings { current: Some(Ampere(1.5)), ..at_rest() }, &[CalibrateHoldMax]),
+            (Fault::BelowLimit, Readings { speed: Some(RevPerMin(100.0)), ..at_rest() }, &[Running]),
+            (Fault::BelowLimit, Readings { current: Some(Ampere(0.05)), ..at_rest() }, &[Running]),
+            (Fault::UnderVoltage, Readings { voltage: Some(Volt(8.0)), ..at_rest() }, powered),
+            (Fault::OverVoltage, Readings { voltage: Some(Volt(18.0)), ..at_rest() }, powered),
+            (Fault::TemperatureLimit, Readings { temperature: Some(Celsius(90.0)), ..at_rest() }, powered),
+            (Fault::LoadCellOverload, Readings { load: Some(Newton(31.0)), ..at_rest() }, live),
+            (Fault::LoadCellOverload, Readings { load_saturated: true, ..at_rest() }, live),
+            (Fault::TorqueLimit, Readings { torque: Some(NewtonMetre(0.6)), ..at_rest() }, live),
+            (Fault::SensorDisagreement, Readings { disagreeing: 2, ..at_rest() }, live),
+            (Fault::AdcLost, Readings { adc_missing: true, ..at_rest() }, live),
+            (Fault::SensorLost, Readings { lost: 1, ..at_rest() }, live),
+            (Fault::LinkLost, Readings { silence_ms: 1001, ..at_rest() }, linked),
+            (Fault::LinkCorrupt, Readings { damaged: 1, ..at_rest() }, linked),
+            (Fault::CommandReplayed, Readings { replayed: 1, ..at_rest() }, linked),
+            (Fault::RotorTurned, Readings { stirs: true, ..at_rest() }, &[CalibrateHoldMax]),
+            (Fault::BrownOut, Readings { brown_out: true, ..at_rest() }, always),
+            (Fault::ControlStalled, Readings { tick_ms: 6, ..at_rest() }, always),
+        ] {
+            for state in crate::arming::STATES {
+                assert_eq!(trips_after(state, readings, fault).is_some(), states.contains(&state), "{fault:?} in {state:?}");
+            }
+        }
+    }
+
+    /// A late tick counts for as long as it took, one within the same millisecond for one.
+    #[test]
+    fn times_are_those_of_the_clock_and_not_of_the_ticks() {
+        let over = |tick_ms| Readings { current: Some(Ampere(31.0)), tick_ms, ..good() };
+        assert_eq!(trips_after(State::Running, over(5), Fault::OverCurrent), Some(10));
+        assert_eq!(trips_after(State::Running, over(0), Fault::OverCurrent), Some(50));
+    }
+
+    /// A channel that is not fitted has no reading, and one without bounds no limit.
+    #[test]
+    fn what_is_missing_trips_nothing() {
+        let (mut blind, mut free) = (Protection::default(), Protection::default());
+        let nothing = Readings { driven: true, tick_ms: 1, ..Readings::default() };
+        let no_limits = Limits {
+            speed: Bounds::NONE,
+            thrust: Bounds::NONE,
+            torque: Bounds::NONE,
+            current: Bounds::NONE,
+            voltage: Bounds::NONE,
+            temperature: Bounds::NONE,
+            ..LIMITS
+        };
+        for _ in 0..2000 {
+            assert!(blind.check(State::Running, &nothing, &LIMITS).is_empty());
+            assert!(free.check(State::Running, &good(), &no_limits).is_empty());
+        }
+    }
+
     #[test]
     fn the_third_damaged_frame_in_half_a_second_trips_and_rare_ones_do_not() {
         let trips = |apart: u32| {

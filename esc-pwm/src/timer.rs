@@ -128,6 +128,23 @@ mod tests {
         assert_eq!(timer.ticks(PulseWidth(u32::MAX)), 6000);
     }
 
+    /// A tick of the board's timer is a third of a microsecond; what no 32 bits of nanoseconds hold is told as the most that they do.
+    #[test]
+    fn ticks_become_the_nearest_nanosecond() {
+        let timer = PulseTimer::new(84_000_000, 16).unwrap();
+        assert_eq!([3000, 3001, 3002].map(|ticks| timer.pulse(ticks).0), [1_000_000, 1_000_333, 1_000_667]);
+        assert_eq!(timer.pulse(u32::MAX), PulseWidth(u32::MAX));
+    }
+
+    #[test]
+    fn a_refusal_says_which_clock_and_what_to_do() {
+        extern crate std;
+        use std::string::ToString;
+        let said = |clock_hz| PulseTimer::new(clock_hz, 16).unwrap_err().to_string();
+        assert_eq!(said(84_000_001), "no divider of 84000001 Hz gives the period exactly: choose another clock");
+        assert_eq!(said(800_000), "the counter advances at 800000 Hz: too coarse, choose a faster clock");
+    }
+
     /// Beharie 2013, section 3.2.3: a 2.5 ns tick gives 600 000 ticks for 1.5 ms.
     #[test]
     fn the_thesis_tick() {

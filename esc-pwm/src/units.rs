@@ -103,3 +103,31 @@ impl Default for PulseWidth {
         Self::MIN
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn a_quantity_says_its_unit() {
+        assert_eq!(Newton(3.5).to_string(), "3.5 N");
+        assert_eq!(std::format!("{:.1}", RevPerMin(4000.04)), "4000.0 rev/min");
+        assert_eq!(Celsius::UNIT, "degC");
+    }
+
+    /// 1000 and 2000 us are pulses; minimum alone does not turn the rotor, and is what there is without a word.
+    #[test]
+    fn a_pulse_is_1000_to_2000_us() {
+        assert_eq!((PulseWidth::from_us(1500).0, PulseWidth(1_500_250).as_us()), (1_500_000, 1500.25));
+        for (ns, clamped) in
+            [(0, 1_000_000), (999_999, 1_000_000), (1_000_001, 1_000_001), (2_000_000, 2_000_000), (2_000_001, 2_000_000)]
+        {
+            assert_eq!(PulseWidth(ns).clamped().0, clamped);
+        }
+        assert_eq!(PulseWidth::default(), PulseWidth::MIN);
+        assert!(!PulseWidth::MIN.is_live() && !PulseWidth(0).is_live() && PulseWidth(1_000_001).is_live());
+        assert_eq!(PulseWidth::from_us(u32::MAX).clamped(), PulseWidth::MAX, "no width of 32 bits wraps to a shorter one");
+    }
+}

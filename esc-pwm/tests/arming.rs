@@ -4,10 +4,15 @@ use esc_pwm::PulseWidth;
 use esc_pwm::arming::{STATES, TABLE, message};
 use esc_pwm::dshot::{Frame, Throttle};
 use esc_pwm::{ArmingEvent, ArmingTimes, Objections, Outcome, pulse_for, step, time_out};
-use esc_pwm::{Refusals, State};
+use esc_pwm::{Fault, Refusals, State};
 use std::collections::BTreeSet;
 
-const RUN_UNLESS: u16 = Refusals::FAULT_LATCHED | Refusals::OUT_OF_RANGE | Refusals::EMPTY_SCHEDULE;
+const RUN_UNLESS: u16 = Refusals::FAULT_LATCHED | Refusals::OUT_OF_RANGE | Refusals::EMPTY_SCHEDULE | Refusals::SHORT_STREAM;
+const ARM_UNLESS: u16 = Refusals::FAULT_LATCHED
+    | Refusals::THROTTLE_NOT_LOW
+    | Refusals::NO_LOW_INTERVAL
+    | Refusals::ROTOR_TURNING
+    | Refusals::STOP_OPEN;
 const CALIBRATE_UNLESS: u16 = Refusals::FAULT_LATCHED
     | Refusals::THROTTLE_NOT_LOW
     | Refusals::NO_LOW_INTERVAL
@@ -158,6 +163,61 @@ fn a_refusal_lists_every_reason() {
         step(State::Running, ArmingEvent::Arm, Refusals(Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW)),
         Outcome::Refused(Refusals(Refusals::WRONG_STATE | Refusals::ROTOR_TURNING | Refusals::THROTTLE_NOT_LOW))
     );
+}
+
+/// Each reason alone is enough, every other one is none; elsewhere the same reasons are told beside the wrong state.
+#[test]
+fn each_command_has_its_own_reasons() {
+    use ArmingEvent::{Arm, Calibrate, Run};
+    let all = Refusals(u16::MAX);
+    for (state, command, reasons, to, elsewhere) in [
+        (State::Disarmed, Arm, ARM_UNLESS, State::ArmHoldMin, State::Running),
+        (State::Disarmed, Calibrate, CALIBRATE_UNLESS, State::CalibrateHoldMax, State::Armed),
+        (State::Armed, Run, RUN_UNLESS, State::Running, State::Disarmed),
+        (State::Running, Run, RUN_UNLESS, State::Running, State::Faulted),
+    ] {
+        for bit in (0..16).map(|n| 1 << n) {
+            let expected = if reasons & bit == 0 { Outcome::To(to) } else { Outcome::Refused(Refusals(bit)) };
+            assert_eq!(step(state, command, Refusals(bit)), expected, "{command:?}: {}", Refusals(bit));
+        }
+        assert_eq!(step(elsewhere, command, all), Outcome::Refused(Refusals(reasons | Refusals::WRONG_STATE)), "{command:?}");
+    }
+}
+
+/// What is heard of the ESC and of the clock is no command: where it does not belong nobody is told of a refusal.
+#[test]
+fn what_nobody_commands_is_ignored_where_it_does_not_belong() {
+    use ArmingEvent::{Cells, Double, Finished, Long, NoSignal, Programming, Ready, SelfTestFailed, TimeOut};
+    for event in [Long, Cells, Ready, Double, Programming, NoSignal, SelfTestFailed, TimeOut, Finished] {
+        assert_eq!(step(State::Disarmed, event, Refusals::default()), Outcome::Ignored, "{event:?}");
+        assert!(!event.is_command());
+    }
+}
+
+/// Every way to `Faulted` that the machine finds itself names a fault; a tripped limit brings its own.
+#[test]
+fn what_stops_the_rig_names_its_fault() {
+    use ArmingEvent::{NoSignal, SelfTestFailed, Stop, TimeOut, Trip};
+    for row in TABLE.iter().filter(|row| row.to == State::Faulted) {
+        assert!(row.on == Trip || row.on.fault().is_some(), "{row:?}");
+    }
+    let named = |fault: Fault| ArmingEvent::ALL.into_iter().filter(move |event| event.fault() == Some(fault));
+    assert!(named(Fault::OperatorStop).eq([Stop]));
+    assert!(named(Fault::EscSelfTest).eq([SelfTestFailed]));
+    assert!(named(Fault::ArmingTimeout).eq([NoSignal, TimeOut]));
+    assert_eq!(ArmingEvent::ALL.into_iter().filter_map(ArmingEvent::fault).count(), 4);
+}
+
+/// The operator knows from the words where the machine stands, and when maximum pulses are given.
+#[test]
+fn every_state_tells_the_operator_something_of_its_own() {
+    let told: BTreeSet<&str> = STATES.into_iter().map(message).collect();
+    assert_eq!(told.len(), STATES.len());
+    for state in STATES {
+        assert_eq!(message(state).contains("MAXIMUM"), state == State::CalibrateHoldMax, "{state:?}");
+    }
+    let named: BTreeSet<&str> = STATES.into_iter().map(State::words).collect();
+    assert_eq!(named.len(), STATES.len());
 }
 
 #[test]

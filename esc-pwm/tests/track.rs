@@ -2,7 +2,7 @@
 
 use esc_pwm::PulseWidth;
 use esc_pwm::Refusals;
-use esc_pwm::segment::{Segment, Shape, Steer};
+use esc_pwm::segment::{FASTEST_MILLIHERTZ, Segment, Shape, Steer};
 use esc_pwm::track::{AHEAD_MS, Played, TRACK, Track};
 use proptest::prelude::*;
 
@@ -76,6 +76,104 @@ fn gaps_impossible_segments_and_too_much_are_refused() {
     assert_eq!(full.take(TRACK as u32, &[hold(1100, 10)], true), refused, "full");
     full.take(0, &[hold(1300, 1)], true).unwrap();
     assert_eq!(full.next(), 1, "number 0 begins anew");
+}
+
+/// Every pulse that a segment gives may lie at an end of the range, none beyond; its frequency at the fastest.
+#[test]
+fn a_segment_may_reach_its_bounds() {
+    let chirp =
+        |amplitude, from_millihertz, to_millihertz| Shape::Chirp { amplitude: us(amplitude), from_millihertz, to_millihertz };
+    let line = |from| Shape::Line { from: Some(us(from)) };
+    let steered = |low, high| Shape::Steered { low: us(low), high: us(high) };
+    let fastest = FASTEST_MILLIHERTZ;
+    for (possible, pulse, shape) in [
+        (true, 1000, Shape::Hold),
+        (true, 2000, Shape::Hold),
+        (false, 2001, Shape::Hold),
+        (false, 999, Shape::Line { from: None }),
+        (true, 1500, line(1000)),
+        (false, 1500, line(999)),
+        (false, 2001, line(1500)),
+        (true, 1500, chirp(500, fastest, fastest)),
+        (false, 1600, chirp(401, 0, 0)),
+        (false, 1400, chirp(401, 0, 0)),
+        (false, 1500, chirp(10, fastest + 1, 0)),
+        (false, 1500, chirp(10, 0, fastest + 1)),
+        (true, 1000, steered(1000, 2000)),
+        (true, 2000, steered(1000, 2000)),
+        (false, 1500, steered(999, 2000)),
+        (false, 1500, steered(1000, 2001)),
+        (false, 1199, steered(1200, 1400)),
+        (false, 1401, steered(1200, 1400)),
+    ] {
+        assert_eq!(segment(pulse, 1, shape).is_possible(), possible, "{pulse} us, {shape:?}");
+        assert!(!segment(pulse, 0, shape).is_possible(), "it takes no time");
+    }
+}
+
+/// Whoever plans a run sees its highest pulse before anything turns.
+#[test]
+fn a_segment_tells_its_highest_pulse() {
+    let chirp = Shape::Chirp { amplitude: us(100), from_millihertz: 10, to_millihertz: 20 };
+    for (shape, highest) in [
+        (Shape::Hold, 1400),
+        (Shape::Line { from: None }, 1400),
+        (Shape::Line { from: Some(us(1200)) }, 1400),
+        (Shape::Line { from: Some(us(1600)) }, 1600),
+        (chirp, 1500),
+        (Shape::Steered { low: us(1200), high: us(1700) }, 1700),
+    ] {
+        assert_eq!(segment(1400, 10, shape).highest(), us(highest), "{shape:?}");
+    }
+}
+
+/// Step by step: each step is the last until the next one comes, in order and once; number 0 begins anew.
+#[test]
+fn a_schedule_grows_step_by_step() {
+    let refused = Err(Refusals(Refusals::OUT_OF_RANGE));
+    let mut track = Track::new();
+    assert_eq!(track.append_last(1, hold(1200, 10)), refused, "a gap");
+    assert_eq!(track.append_last(0, hold(2100, 10)), refused, "impossible");
+    track.append_last(0, hold(1100, 10)).unwrap();
+    track.append_last(1, hold(1200, 10)).unwrap();
+    assert_eq!(track.append_last(1, hold(1300, 10)), refused, "it is there");
+    assert_eq!(track.append_last(3, hold(1300, 10)), refused, "a gap");
+    track.append_last(2, hold(1300, 10)).unwrap();
+    assert!(track.check().is_empty());
+    track.start();
+    assert_eq!(
+        [5, 15, 25, 30].map(|ms| track.at(ms)),
+        [Played::Pulse(us(1100)), Played::Pulse(us(1200)), Played::Pulse(us(1300)), Played::Over]
+    );
+    assert_eq!(track.append_last(3, hold(1400, 10)), refused, "it is being played, and was whole");
+    track.stop();
+    track.append_last(0, hold(1500, 10)).unwrap();
+    assert_eq!(track.next(), 1, "a new one");
+}
+
+/// A track that was stopped gives no pulse, and can be begun again or replaced.
+#[test]
+fn a_stopped_track_gives_nothing() {
+    let mut track = loaded(&[hold(1100, 600)]);
+    track.start();
+    assert_eq!(track.at(10), Played::Pulse(us(1100)));
+    track.stop();
+    assert_eq!((track.playing(), track.at(20)), (None, Played::Over));
+    track.start();
+    assert_eq!((track.playing(), track.at(20)), (Some((0, 0)), Played::Pulse(us(1100))));
+}
+
+/// What is agreed to be there ahead is enough; a millisecond less is not, unless it is all.
+#[test]
+fn a_stream_may_begin_with_what_was_agreed() {
+    let begun = |length_ms, last| {
+        let mut track = Track::new();
+        track.take(0, &[hold(1200, length_ms)], last).unwrap();
+        track.check()
+    };
+    assert_eq!(begun(AHEAD_MS as u32, false), Refusals::default());
+    assert_eq!(begun(AHEAD_MS as u32 - 1, false), Refusals(Refusals::SHORT_STREAM));
+    assert_eq!(begun(1, true), Refusals::default());
 }
 
 #[test]

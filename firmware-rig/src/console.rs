@@ -363,4 +363,147 @@ mod tests {
         assert!(console.queued().len() <= QUEUED);
         assert_eq!(console.queued().last(), Some(&0), "it ends with a frame's end");
     }
+
+    /// Says `command` and ticks on; what is told meanwhile.
+    fn answered(console: &mut RigConsole, ms: &mut u64, command: &Command) -> std::vec::Vec<Message> {
+        let mut wire = [0; MAX_WIRE];
+        let mut host = Encoder::default();
+        let used = host.encode(Ticks::from_ms(*ms + 1), command, &mut wire).unwrap();
+        wire[..used].iter().for_each(|b| console.hear(*b));
+        let mut told = std::vec::Vec::new();
+        for _ in 0..5 {
+            *ms += 1;
+            console.tick(&delivered(*ms, &adc()), |_, _| ());
+            told.extend(messages(console));
+        }
+        told
+    }
+
+    fn count(told: &[Message], is: fn(&Message) -> bool) -> usize {
+        told.iter().filter(|message| is(message)).count()
+    }
+
+    /// A crystal that is not known keeps the rig at minimum until a reset finds a good one; a known one raises nothing.
+    #[test]
+    fn a_board_without_a_crystal_stands_still() {
+        let console = |crystal_hz| {
+            let clock = ClockNews { crystal_hz, measured_hz: 0 };
+            let ended = Some(Event::Panicked { line: 7, file: [0; 24] });
+            let start = Start { reset_cause: 0x0E, clock, stored: None, news: SettingsNews::Absent, ended };
+            RigConsole::start(Ticks(0), Config::thesis_570kv(), &start)
+        };
+        assert!(console(8_000_000).rig().faults().is_empty());
+        let (mut failed, mut ms) = (console(0), 0);
+        assert!(
+            messages(&mut failed).contains(&Message::Event(Event::Panicked { line: 7, file: [0; 24] })),
+            "what ended it is told"
+        );
+        for command in [Command::ClearFaults, Command::Arm] {
+            answered(&mut failed, &mut ms, &command);
+            assert!(failed.rig().faults().contains(Fault::ClockFailed));
+            assert_eq!(failed.rig().state(), RigState::Disarmed, "{command:?}");
+        }
+    }
+
+    /// The scales come with whoever introduces itself, after a tare and after a change, and not with every tick.
+    #[test]
+    fn it_introduces_itself_when_asked_and_when_it_is_another() {
+        let (mut console, mut ms) = (started(), 0);
+        let hellos: fn(&Message) -> bool = |m| matches!(m, Message::Hello(_));
+        let scales: fn(&Message) -> bool = |m| matches!(m, Message::Calibration(_));
+        messages(&mut console);
+        answered(&mut console, &mut ms, &Command::Ping);
+        for _ in 0..50 {
+            answered(&mut console, &mut ms, &Command::Ping);
+        }
+        for (command, introduced, scaled) in [
+            (Command::Ping, 0, 0),
+            (Command::Identify, 1, 1),
+            (Command::Tare, 0, 1),
+            (Command::Tare, 0, 1),
+            (Command::Configure(frame::message::Setting::LogPeriodMs(50)), 1, 1),
+            (Command::Ping, 0, 0),
+        ] {
+            let told = answered(&mut console, &mut ms, &command);
+            assert_eq!((count(&told, hellos), count(&told, scales)), (introduced, scaled), "{command:?}");
+        }
+    }
+
+    /// Part by part a host reads the configuration in force; behind its end there is none.
+    #[test]
+    fn the_configuration_can_be_read() {
+        let (mut console, mut ms) = (started(), 0);
+        messages(&mut console);
+        let mut form = std::vec::Vec::new();
+        loop {
+            let told = answered(&mut console, &mut ms, &Command::ConfigRead { at: form.len() as u16 });
+            let Some(part) = told.iter().find_map(|m| if let Message::ConfigPart(part) = m { Some(*part) } else { None }) else {
+                let refused = Message::Event(Event::Refused(Refusals(Refusals::OUT_OF_RANGE)));
+                assert!(told.contains(&refused), "{told:?}");
+                break;
+            };
+            assert_eq!(usize::from(part.at), form.len());
+            let rest = usize::from(part.length) - form.len();
+            form.extend(part.bytes.iter().take(rest));
+        }
+        assert_eq!(RigConfig::from_form(&form), Some(console.rig().settings()));
+    }
+
+    /// What the host sent in vain stands in the report of every second.
+    #[test]
+    fn frames_are_counted_good_damaged_and_replayed() {
+        let (mut console, mut host) = (started(), Encoder::default());
+        let framed = |host: &mut Encoder| {
+            let mut wire = [0; MAX_WIRE];
+            let used = host.encode(Ticks(1), &Command::Ping, &mut wire).unwrap();
+            wire[..used].to_vec()
+        };
+        let last = (0..3).map(|_| framed(&mut host)).inspect(|frame| frame.iter().for_each(|b| console.hear(*b))).last().unwrap();
+        [&last, &last].into_iter().flatten().for_each(|b| console.hear(*b));
+        for _ in 0..2 {
+            let mut hurt = framed(&mut host);
+            hurt[3] ^= 0x55;
+            hurt.iter().for_each(|b| console.hear(*b));
+        }
+        console.tick(&delivered(1, &adc()), |_, _| ());
+        let told = messages(&mut console);
+        let health = told.iter().find_map(|m| if let Message::Health(health) = m { Some(*health) } else { None }).unwrap();
+        assert_eq!(health.frames, [5, 2, 2], "a frame that comes again is whole");
+    }
+
+    /// What was handed to the line is not handed to it again.
+    #[test]
+    fn what_was_sent_is_gone() {
+        let mut console = started();
+        assert!(!console.queued().is_empty());
+        console.sent();
+        assert!(console.queued().is_empty());
+    }
+
+    /// The conversions of the channel that was asked for leave in parts, and only where samples and answers have room beside them.
+    #[test]
+    fn a_burst_leaves_beside_the_samples() {
+        let (mut console, mut ms, mut memory) = (started(), 0, [0; 96]);
+        messages(&mut console);
+        assert_eq!(console.wanted(), None);
+        answered(&mut console, &mut ms, &Command::Burst { channel: 3 });
+        assert_eq!(console.wanted(), Some(3));
+        let codes = core::array::from_fn::<u16, 96, _>(|n| n as u16);
+        let room = QUEUED - 3 * MAX_WIRE;
+        console.queue.resize(room + 1, 1).unwrap();
+        let record = |console: &mut RigConsole, memory: &mut [u16]| {
+            let before = console.queued().len();
+            console.record(Ticks(9), &Conversions { codes: Some(&codes), rate_hz: 61_765.0 }, memory);
+            console.queued().len() - before
+        };
+        assert_eq!(record(&mut console, &mut memory), 0, "no room");
+        assert_eq!((console.wanted(), memory), (None, codes), "it is recorded");
+        console.queue.truncate(room);
+        console.queue.pop();
+        console.queue.push(0).unwrap();
+        assert!(record(&mut console, &mut memory) > 96, "its part");
+        let told = messages(&mut console);
+        assert!(matches!(told[..], [Message::BurstPart(part)] if part.codes.as_flattened() == codes && part.channel == 3));
+        assert_eq!(record(&mut console, &mut memory), 0, "once");
+    }
 }

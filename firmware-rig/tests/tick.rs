@@ -1,8 +1,9 @@
 //! The rig through its one door, `Rig::tick`, at 1 kHz with a host that answers.
 
 use firmware_rig::{AdcBlock, Beside, Config, Inputs, LineNews, Outputs, Rig};
-use frame::message::{Beep, Command, Event, Trial};
-use frame::rig::{AdcVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
+use frame::imu_command::ImuCommand;
+use frame::message::{Beep, Command, Event, Setting, Trial};
+use frame::rig::{AdcVerdict, CaptureVerdict, Fault, FaultSet, Refusals, RigSample, RigState};
 use frame::schedule::{ScheduleNews, Segment, SegmentBatch, Shape, Steer};
 use frame::units::{PulseWidth, Ticks};
 use proptest::prelude::*;
@@ -14,8 +15,14 @@ struct Bench {
     rig: Rig,
     ms: u64,
     counts: [u16; 5],
+    /// Conversions of each channel in a tick.
+    conversions: usize,
     stop_line: bool,
     linked: bool,
+    /// Ticks by which the control tick comes after its millisecond.
+    late: u64,
+    line: LineNews,
+    paused: bool,
     pulse: PulseWidth,
     events: Vec<Event>,
     samples: Vec<RigSample>,
@@ -31,8 +38,12 @@ impl Bench {
             rig: Rig::new(config),
             ms: 0,
             counts: [1427, 2048, 248, 0, 900], // nothing powered, 22.5 degC
+            conversions: 8,
             stop_line: false,
             linked: true,
+            late: 0,
+            line: LineNews::default(),
+            paused: false,
             pulse: PulseWidth(0),
             events: Vec::new(),
             samples: Vec::new(),
@@ -54,20 +65,20 @@ impl Bench {
         let keep_alive = (self.linked && self.ms.is_multiple_of(100)).then_some(Command::Ping);
         let adc = self.counts.map(|code| {
             let mut block = AdcBlock::default();
-            (0..8).for_each(|_| block.push(code));
+            (0..self.conversions).for_each(|_| block.push(code));
             block
         });
         let inputs = Inputs {
-            now: Ticks(self.ms * MS),
+            now: Ticks(self.ms * MS + self.late),
             edges,
             over_capture: [false; 4],
             adc: &adc,
             beside: Beside::UNWIRED,
             command: command.or(keep_alive),
-            line: LineNews::default(),
+            line: core::mem::take(&mut self.line),
             stop_input: self.stop_line,
             brown_out: false,
-            paused: false,
+            paused: self.paused,
         };
         let outputs = self.rig.tick(&inputs);
         self.pulse = outputs.pulse;
@@ -215,6 +226,19 @@ fn a_stop_gives_minimum_on_its_own_tick_and_latches() {
     assert_eq!(bench.say(Command::Arm), Some(Event::Accepted));
 }
 
+/// After a run the ESC hears minimum for as long as it was agreed before the next arming, to the tick.
+#[test]
+fn the_low_interval_is_kept_in_full() {
+    let mut bench = Bench::running(1500);
+    let live = bench.ms;
+    bench.tick_with(Some(Command::Stop), &[]);
+    bench.tick_with(Some(Command::ClearFaults), &[]);
+    while bench.rig.state() == RigState::Disarmed && bench.ms < live + 5000 {
+        bench.tick_with(Some(Command::Arm), &[]);
+    }
+    assert_eq!(bench.ms - live, u64::from(bench.rig.config().times.low_interval_ms));
+}
+
 #[test]
 fn the_stop_line_works_without_a_host() {
     let mut bench = Bench::running(1300);
@@ -276,6 +300,55 @@ fn a_late_tick_stops_the_motor() {
     assert!(bench.rig.faults().contains(Fault::ControlStalled));
 }
 
+/// Ticks come some cycles early or late; what counts is the nearest millisecond.
+#[test]
+fn the_time_between_two_ticks_is_rounded() {
+    for (late, stalled) in [(MS * 4 / 10, false), (MS * 6 / 10, true)] {
+        let mut bench = Bench::running(1500);
+        bench.ms += 4;
+        bench.late = late;
+        bench.run(1);
+        assert_eq!(bench.rig.faults().contains(Fault::ControlStalled), stalled, "5 ms and {late} ticks");
+    }
+    let mut bench = Bench::new();
+    bench.late = 100; // the first tick is late, all that follow seem early
+    bench.run(1);
+    bench.late = 0;
+    bench.run(1000);
+    let times: Vec<u64> = bench.samples.iter().map(|sample| sample.at.as_ms()).collect();
+    let period = bench.rig.config().log_period().as_ms();
+    assert_eq!(times, (1..).map(|n| 1 + n * period).take_while(|ms| *ms <= 1001).collect::<Vec<_>>());
+}
+
+/// Erasing flash holds the board up, which is no stall while it is disarmed. Nothing may hold up a rig that is armed.
+#[test]
+fn a_pause_is_forgiven_while_disarmed_and_never_else() {
+    for (paused, mut bench, forgiven) in [
+        (true, Bench::new(), true),
+        (false, Bench::new(), false),
+        (true, Bench::armed(), false),
+        (true, Bench::running(1500), false),
+    ] {
+        bench.run(10);
+        bench.ms += 1500;
+        bench.paused = paused;
+        bench.tick_with(Some(Command::Ping), &[]);
+        assert_eq!(bench.rig.faults().is_empty(), forgiven, "{:?}", bench.rig.faults());
+    }
+}
+
+/// A host is told that a frame of its was not obeyed because it came again.
+#[test]
+fn a_replayed_frame_is_told() {
+    let mut bench = Bench::new();
+    bench.run(50);
+    let replayed = Event::Refused(Refusals(Refusals::REPLAYED));
+    assert!(!bench.events.contains(&replayed));
+    bench.line.replayed = 1;
+    bench.run(5);
+    assert_eq!(bench.events.iter().filter(|event| **event == replayed).count(), 1);
+}
+
 #[test]
 fn analogue_limits_trip_in_time() {
     for (channel, counts, fault) in [
@@ -292,6 +365,23 @@ fn analogue_limits_trip_in_time() {
         assert_eq!(bench.pulse, PulseWidth::MIN, "{fault:?} does not trip");
         assert!(bench.rig.faults().contains(fault), "{fault:?}");
     }
+}
+
+/// A wire that breaks reads an end of its range for good; a converter that stands gives nothing. Either ends the run.
+#[test]
+fn a_lost_channel_stops_the_motor() {
+    let after = |change: fn(&mut Bench)| {
+        let mut bench = Bench::running(1500);
+        let (begun, limit) = (bench.ms, u64::from(bench.rig.config().limits.analogue_ms));
+        change(&mut bench);
+        while bench.pulse.is_live() && bench.ms < begun + 1000 {
+            bench.run(1);
+        }
+        (bench.ms - begun <= limit, bench.rig.faults().contains(Fault::AdcLost))
+    };
+    assert_eq!(after(|bench| bench.counts[2] = 0), (true, true), "the current's wire is open");
+    assert_eq!(after(|bench| bench.counts[1] = 4095), (true, true), "the torque's lies on the supply");
+    assert_eq!(after(|bench| bench.conversions = 0), (true, true), "no conversion comes");
 }
 
 #[test]
@@ -353,6 +443,8 @@ fn a_rotor_that_turns_ends_maximum_pulses() {
 #[test]
 fn maximum_is_held_for_a_bounded_time_from_the_power_edge() {
     let mut bench = Bench::holding_max();
+    bench.run(5_000); // towards an ESC without power it may wait
+    assert_eq!(bench.pulse, PulseWidth::MAX);
     bench.power();
     bench.run(6_490);
     assert_eq!(bench.pulse, PulseWidth::MAX);
@@ -570,6 +662,96 @@ fn tare_takes_the_last_means_as_zero() {
     assert_eq!(bench.say(Command::Tare), refused(Refusals::WRONG_STATE));
 }
 
+/// A bench whose rotor turns although the rig is disarmed: by hand, by wind, or it coasts.
+fn turning() -> Bench {
+    let mut bench = Bench::new();
+    let marks = bench.rig.config().marks;
+    let mut rotor = Rotor { marks, fast: &[], turned: [0.0; 4], rpm: 3000.0 };
+    for _ in 0..500 {
+        rotor.tick(&mut bench);
+    }
+    bench
+}
+
+/// What changes the board itself is done while it is disarmed and nothing turns, and then once.
+#[test]
+fn settings_are_changed_and_stored_at_rest_only() {
+    let change = Command::Configure(Setting::LogPeriodMs(50));
+    for command in [Command::SaveSettings, change] {
+        assert_eq!(Bench::armed().say(command), refused(Refusals::WRONG_STATE), "{command:?}");
+        assert_eq!(Bench::running(1500).say(command), refused(Refusals::WRONG_STATE), "{command:?}");
+        let mut bench = turning();
+        assert_eq!(bench.say(command), refused(Refusals::ROTOR_TURNING), "{command:?}");
+        assert_eq!(bench.rig.settings().log_period_ms, Bench::new().rig.settings().log_period_ms);
+    }
+    let mut bench = Bench::new();
+    assert_eq!(bench.say(change), Some(Event::Accepted));
+    assert_eq!(bench.rig.settings().log_period_ms, 50);
+    assert_eq!(bench.say(Command::Configure(Setting::LogPeriodMs(0))), refused(Refusals::OUT_OF_RANGE));
+    assert!(!bench.tick_with(None, &[]).store);
+    assert!(bench.tick_with(Some(Command::SaveSettings), &[]).store);
+    assert!(!bench.tick_with(None, &[]).store, "once");
+    assert!(!Bench::armed().tick_with(Some(Command::SaveSettings), &[]).store);
+}
+
+/// A zero is taken of a load that stands still and that the channel sees.
+#[test]
+fn a_tare_needs_a_still_rotor_and_two_good_channels() {
+    assert_eq!(turning().say(Command::Tare), refused(Refusals::ROTOR_TURNING));
+    assert_eq!(Bench::holding_max().say(Command::Tare), refused(Refusals::WRONG_STATE));
+    for channel in [0, 1] {
+        let mut bench = Bench::new();
+        bench.counts[channel] = 4095;
+        bench.run(250);
+        assert_eq!(bench.say(Command::Tare), refused(Refusals::OUT_OF_RANGE), "channel {channel} is at its end");
+    }
+    let mut bench = Bench::new();
+    bench.counts = [1500, 2100, 300, 0, 950];
+    bench.run(250);
+    let before = bench.rig.calibration();
+    assert_eq!(bench.say(Command::Tare), Some(Event::Accepted));
+    let after = bench.rig.calibration();
+    assert_eq!((after.adc[0].zero, after.adc[1].zero), (1500.0, 2100.0));
+    assert_eq!((after.adc[0].gain, after.adc[1].gain), (before.adc[0].gain, before.adc[1].gain));
+    assert_eq!(after.adc[2..], before.adc[2..], "no other channel is loaded by the motor's weight");
+    let fitted = [true, false, true, true, true];
+    let mut bench = Bench::with(Config { fitted, ..Config::thesis_570kv() });
+    bench.run(250);
+    let before = bench.rig.calibration();
+    assert_eq!(bench.say(Command::Tare), Some(Event::Accepted));
+    assert_eq!(bench.rig.calibration().adc[1], before.adc[1], "what is not fitted keeps its scale");
+}
+
+/// The board asks whether a pulse above minimum is given before it changes the form of its pulses.
+#[test]
+fn it_knows_whether_the_throttle_is_open() {
+    assert!(!Bench::new().rig.is_live() && !Bench::armed().rig.is_live());
+    assert!(Bench::holding_max().rig.is_live());
+    let mut bench = Bench::running(1300);
+    assert!(bench.rig.is_live());
+    bench.tick_with(Some(Command::Stop), &[]);
+    assert!(!bench.rig.is_live());
+}
+
+#[test]
+fn a_burst_is_of_a_channel_that_is_fitted() {
+    let fitted = [true, true, true, false, true];
+    let mut bench = Bench::with(Config { fitted, ..Config::thesis_570kv() });
+    for channel in 0..7u8 {
+        let there = fitted.get(usize::from(channel)) == Some(&true);
+        let outputs = bench.tick_with(Some(Command::Burst { channel }), &[]);
+        assert_eq!(outputs.burst, there.then_some(channel));
+        assert_eq!(bench.tick_with(None, &[]).burst, None, "once");
+        let answer = if there { Some(Event::Accepted) } else { refused(Refusals::OUT_OF_RANGE) };
+        assert_eq!(bench.say(Command::Burst { channel }), answer, "channel {channel}");
+    }
+}
+
+#[test]
+fn a_command_of_the_other_board_is_refused() {
+    assert_eq!(Bench::new().say(Command::Imu(ImuCommand::Once)), refused(Refusals::WRONG_STATE));
+}
+
 #[test]
 fn samples_come_at_the_log_rate_without_drift() {
     for ms in [10, 100, 1000] {
@@ -584,11 +766,70 @@ fn samples_come_at_the_log_rate_without_drift() {
     }
 }
 
+/// After a pause of many periods the next sample is the next one of its row: none is made up, none comes early.
+#[test]
+fn samples_keep_their_row_over_a_pause() {
+    let mut bench = Bench::new();
+    bench.run(250);
+    bench.ms += 1520;
+    bench.paused = true;
+    bench.run(1);
+    bench.paused = false;
+    bench.run(500);
+    let times: Vec<u64> = bench.samples.iter().map(|sample| sample.at.as_ms()).collect();
+    assert_eq!(times, [101, 201, 1771, 1801, 1901, 2001, 2101, 2201]);
+}
+
+/// Other marks are other channels: what is fitted from now on is heard, and what is not any more is absent.
+#[test]
+fn changed_marks_are_listened_to() {
+    let mut bench = Bench::with(Config { marks: [0, 0, 2, 0], ..Config::thesis_570kv() });
+    assert_eq!(bench.say(Command::Configure(Setting::Marks([2, 0, 0, 0]))), Some(Event::Accepted));
+    let mut rotor = Rotor { marks: [2, 0, 0, 0], fast: &[], turned: [0.0; 4], rpm: 3000.0 };
+    for _ in 0..500 {
+        rotor.tick(&mut bench);
+    }
+    let last = *bench.samples.last().unwrap();
+    assert_eq!([0, 2].map(|channel: usize| last.rpm[channel].verdict), [CaptureVerdict::Nominal, CaptureVerdict::Absent]);
+    let speed = bench.rig.calibration().speed(0, &last.rpm[0]).unwrap();
+    assert!((speed - 3000.0).abs() < 1.0, "{speed} rev/min");
+}
+
+/// Either a speed sensor or the current sees a rotor that turns while maximum is held; one of the two is enough.
+#[test]
+fn one_witness_is_enough_for_the_range_calibration() {
+    let fitted = |current| [true, true, current, true, true];
+    for (marks, current, refused) in [([2, 1, 2, 25], false, false), ([0; 4], true, false), ([0; 4], false, true)] {
+        let mut bench = Bench::with(Config { marks, fitted: fitted(current), ..Config::thesis_570kv() });
+        let answer = bench.say(Command::CalibrateRange { confirm: 0 });
+        let Some(Event::Refused(reasons)) = answer else { panic!("{answer:?}") };
+        assert_eq!(reasons.0 & Refusals::NO_WITNESS != 0, refused, "{marks:?}, current {current}: {reasons}");
+    }
+}
+
 #[test]
 fn hello_tells_what_is_fitted() {
     let rig = Rig::new(Config { marks: [2, 0, 2, 25], ..Config::thesis_570kv() });
     let hello = rig.hello(0x14);
     assert_eq!((hello.present, hello.reset_cause, hello.core_hz), (0b1101, 0x14, 168_000_000));
+    let fitted = [true, false, true, true, false];
+    assert_eq!(Rig::new(Config { fitted, ..Config::thesis_570kv() }).hello(0).analogue, 0b01101);
+}
+
+/// A tare outlives every change that leaves the load cell's scale alone, and none that does not.
+#[test]
+fn a_tare_belongs_to_its_scale() {
+    let mut bench = Bench::new();
+    bench.counts[0] = 1500;
+    bench.run(250);
+    assert_eq!(bench.say(Command::Tare), Some(Event::Accepted));
+    let tared = bench.rig.calibration();
+    assert_eq!(bench.say(Command::Configure(Setting::SlewNsPerMs(500))), Some(Event::Accepted));
+    assert_eq!(bench.rig.calibration(), tared);
+    assert_eq!(bench.say(Command::Configure(Setting::Marks([1, 0, 0, 0]))), Some(Event::Accepted));
+    let other = bench.rig.calibration();
+    assert_eq!((other.marks, bench.rig.hello(0).present), ([1, 0, 0, 0], 1), "another calibration is in force");
+    assert_eq!(other, Rig::with_settings(Config::thesis_570kv(), bench.rig.settings()).calibration(), "untared");
 }
 
 fn any_command() -> impl Strategy<Value = Command> {

@@ -90,11 +90,10 @@ impl Calibration {
         let scale = self.adc.get(channel)?;
         match code.verdict {
             AdcVerdict::Missing | AdcVerdict::Open | AdcVerdict::Short | AdcVerdict::Absent => None,
-            AdcVerdict::Nominal | AdcVerdict::Saturated if code.count > 0 => {
+            AdcVerdict::Nominal | AdcVerdict::Saturated => (code.count > 0).then(|| {
                 let mean = f64::from(code.sum) / f64::from(code.count);
-                Some((mean - f64::from(scale.zero)) * f64::from(scale.gain))
-            }
-            _ => None,
+                (mean - f64::from(scale.zero)) * f64::from(scale.gain)
+            }),
         }
     }
 

@@ -58,4 +58,17 @@ mod tests {
         let rest = Consensus::of(&[Some(0.0); 4], &[Stopped; 4]).unwrap();
         assert_eq!((rest.rpm, rest.deviation), (0.0, [None; 4]));
     }
+
+    /// The middle one of three, the mean of the two in the middle of four: a channel that is far off moves neither.
+    #[test]
+    fn it_is_the_median() {
+        let of = |rpm: [f64; 4], verdicts| Consensus::of(&rpm.map(Some), &verdicts).unwrap();
+        let three = of([9000.0, 4000.0, 4100.0, 0.0], [Nominal, Nominal, Nominal, Lost]);
+        assert_eq!((three.rpm, three.trusted), (4100.0, 3));
+        let four = of([9000.0, 4000.0, 4100.0, 4200.0], [Nominal; 4]);
+        assert_eq!((four.rpm, four.trusted), (4150.0, 4));
+        assert!((four.deviation[1].unwrap() - (4000.0 / 4150.0 - 1.0)).abs() < 1e-12);
+        let two = of([0.0, 4000.0, 4100.0, 0.0], [Stopped, Nominal, Missed, Lost]);
+        assert_eq!((two.rpm, two.trusted), (2000.0, 2), "a channel that stands is trusted");
+    }
 }

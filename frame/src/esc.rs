@@ -109,6 +109,8 @@ mod tests {
         assert!(nominal(100, 2).esc_is_new(None));
         assert!(!nominal(101, 3).esc_is_new(Some(&nominal(100, 2))));
         assert!(!nominal(130, 31).esc_is_new(Some(&nominal(100, 2))), "the same, known to a millisecond");
+        assert!(!nominal(130, 30).esc_is_new(Some(&nominal(100, 2))), "two frames are further apart than that");
+        assert!(nominal(130, 29).esc_is_new(Some(&nominal(100, 2))));
         assert!(nominal(133, 4).esc_is_new(Some(&nominal(100, 2))));
         assert!(nominal(10, 4).esc_is_new(Some(&nominal(5_000, 2))), "after a reset");
         assert!(nominal(700, 2).esc_is_new(Some(&sample(600, 400, EscVerdict::Silent))));

@@ -136,6 +136,16 @@ mod tests {
         assert_eq!(&file, b"at/does/not/fit/src/main.rs".last_chunk::<24>().unwrap());
     }
 
+    /// Another version of the firmware may have kept something that this one does not know.
+    #[test]
+    fn a_whole_record_of_an_unknown_kind_is_not_told() {
+        for kind in [0, 5, 0xff, 0x200, 0x1_0100] {
+            let record = Record::new();
+            record.write(kind, [1, 2, 3], "");
+            assert_eq!(record.take(), None, "{kind:#x}");
+        }
+    }
+
     #[test]
     fn a_damaged_record_is_not_told() {
         for word in 0..WORDS {

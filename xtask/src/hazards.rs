@@ -11,14 +11,15 @@
 //! Reference: specification `rig.md`, "On a real bench".
 
 use crate::emulator;
+use crate::folder;
 use crate::image::images;
 use crate::place::Place;
-use crate::run::{Failure, cargo};
+use crate::run::{Failure, cargo, said};
 use crate::setup;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Instant;
 
 /// The hazards, their mends and tests.
@@ -162,7 +163,7 @@ pub(crate) fn write_page(place: &Place) -> Result<(), Failure> {
 /// Breaks the mends, those of `only` these lines where any are named, and sees their tests fail.
 pub(crate) fn break_each(place: &Place, only: &[&str]) -> Result<(), Failure> {
     setup::target(place)?;
-    let copy = copy(place)?;
+    let copy = folder::sources(place, "target/hazards")?;
     let (mut noticed, mut missed) = (0, Vec::new());
     for Hazard { line, mends, .. } in &read(place)? {
         if !only.is_empty() && !only.contains(&line.to_string().as_str()) {
@@ -210,35 +211,6 @@ fn broken(copy: &Place, mend: &Mend) -> Result<Result<(), String>, Failure> {
     let noticed = !passed && output.contains(&mend.test.says());
     let end: Vec<&str> = output.lines().rev().take(30).collect();
     Ok(if noticed { Ok(()) } else { Err(end.into_iter().rev().collect::<Vec<_>>().join("\n")) })
-}
-
-/// Whether a command succeeds, and all that it says.
-fn said(command: &mut Command) -> Result<(bool, String), Failure> {
-    command.env_remove("DEFMT_LOG"); // cargo gave it to us: the copy's own configuration counts
-    let done = command.stdin(Stdio::null()).output().map_err(|error| Failure(format!("cargo cannot be started: {error}")))?;
-    let both = [done.stdout, done.stderr].concat();
-    Ok((done.status.success(), String::from_utf8_lossy(&both).into_owned()))
-}
-
-/// The sources under `target/hazards`; a file that is the same is left alone, so that little is built anew.
-fn copy(place: &Place) -> Result<Place, Failure> {
-    let root = place.root.join("target/hazards");
-    let mut list = Command::new("git");
-    list.args(["ls-files", "--cached", "--others", "--exclude-standard", "-z"]).current_dir(&place.root);
-    let (true, list) = said(&mut list)? else { return Err(Failure("git ls-files failed: a checkout is needed".to_owned())) };
-    for name in list.split('\0').filter(|name| !name.is_empty()) {
-        let (from, to) = (place.root.join(name), root.join(name));
-        let Ok(bytes) = fs::read(&from) else { continue }; // taken away and not yet committed
-        if fs::read(&to).is_ok_and(|there| there == bytes) {
-            continue;
-        }
-        if let Some(folder) = to.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        fs::write(&to, bytes)?;
-    }
-    let target = root.join("target");
-    Ok(Place { root, target })
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ mod errors;
 mod folder;
 mod hazards;
 mod image;
+mod mutants;
 mod peers;
 mod place;
 mod programs;
@@ -38,6 +39,10 @@ usage: cargo xtask COMMAND
   setup            Rust target of the boards, Python environment of the verdict checker, mdBook
   hazards [LINE]...  breaks each mend of tests/hazards.toml in a copy and sees its test fail
   hazards --page   writes docs/hazards.md
+  mutants [PACKAGE|FILE]...  breaks the code in every small way and sees the tests notice; writes docs/mutants.md (budgets/mutants.toml)
+  mutants --again [PACKAGE|FILE]...  only what no test noticed the last time, what was not tried, and what changed since
+  mutants --page   writes docs/mutants.md anew from the list and from what came of the last runs
+  mutants --changed [COMMIT]  only lines that differ from a commit (main); no page
   book             builds docs/ with mdBook into target/book and checks every link of what comes out
   errors           writes docs/errors.md: every refusal of the command line, from the source
   image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
@@ -77,6 +82,7 @@ fn main() -> ExitCode {
         ["image"] => image::image(&place, false),
         ["hazards", "--page"] => hazards::write_page(&place),
         ["hazards", lines @ ..] => hazards::break_each(&place, lines),
+        ["mutants", rest @ ..] => mutants::mutants(&place, rest),
         ["errors"] => errors::write(&place),
         ["book"] => book::book(&place),
         ["program"] => emulator::program(&place),

@@ -72,6 +72,15 @@ pub(crate) fn output(command: &mut Command) -> Result<String, Failure> {
     Ok(String::from_utf8_lossy(&done.stdout).trim().to_owned())
 }
 
+/// Whether a command succeeds, and all that it says.
+pub(crate) fn said(command: &mut Command) -> Result<(bool, String), Failure> {
+    let words = typed(command);
+    command.env_remove("DEFMT_LOG"); // cargo gave it to us: the configuration of where the command runs counts
+    let done = command.stdin(Stdio::null()).output().map_err(|error| Failure(format!("`{words}` cannot be started: {error}")))?;
+    let both = [done.stdout, done.stderr].concat();
+    Ok((done.status.success(), String::from_utf8_lossy(&both).into_owned()))
+}
+
 /// How many checks passed and failed.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub(crate) struct Tally {
