@@ -101,7 +101,11 @@ fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
     squares.sort_unstable_by(|a, b| b.total_cmp(a));
     let few = (FEW * squares.len() as f64).ceil() as usize;
     if 2.0 * squares.iter().take(few).sum::<f64>() > whole {
-        return if 2.0 * in_a_row > whole { in_one(context, target, &stretch) } else { "in single rows".to_owned() };
+        return if 2.0 * in_a_row > whole && stretch.len() > 1 {
+            in_one(context, target, &stretch)
+        } else {
+            "in single rows".to_owned()
+        };
     }
     let pace = if effective_share(residual) < SLOW { "slow" } else { "from row to row" };
     if grows { format!("{pace}, grows with the load") } else { pace.to_owned() }
@@ -152,4 +156,20 @@ fn grows_with_the_load(context: &Context, target: &Target, squares: &[f64]) -> b
         target.rows.iter().zip(squares).filter(|(row, _)| (load[**row] > middle) == above).map(|(_, s)| s).sum()
     };
     part(true) > 3.0 * part(false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::loudest_stretch;
+
+    #[test]
+    fn a_stretch_is_told_by_the_rows_that_hold_it() {
+        let mut squares = vec![0.01; 1000];
+        squares[400..420].fill(1.0);
+        let (most, range) = loudest_stretch(&squares);
+        assert!(most > 20.0 && range.start >= 400 && range.end <= 420 && range.len() >= 18, "{most} {range:?}");
+        squares[700] = 1e4;
+        assert_eq!(loudest_stretch(&squares).1, 700..701, "a single row is no stretch");
+        assert_eq!(loudest_stretch(&[]).1, 0..0);
+    }
 }

@@ -279,3 +279,22 @@ pub struct Verdict {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub runs: Vec<Validation>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{NextExperiment, ScheduleStep};
+
+    #[test]
+    fn a_schedule_that_repeats_itself_is_one_cycle() {
+        let of = |pulses: &[f64]| NextExperiment {
+            why: String::new(),
+            separates: true,
+            schedule: pulses.iter().map(|p| ScheduleStep { pulse_us: *p, hold_s: 4.0 }).collect(),
+        };
+        let told = |pulses: &[f64]| of(pulses).cycle().1;
+        assert_eq!(told(&[1200.0, 1900.0, 1200.0, 1900.0]), 2);
+        assert_eq!(told(&[1200.0, 1900.0, 1200.0]), 1);
+        assert_eq!(told(&[1500.0; 3]), 3);
+        assert_eq!(of(&[]).cycle(), (&[] as &[ScheduleStep], 1));
+    }
+}

@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 
 /// Most columns of a table that a phone shows as one.
 const NARROW: usize = 4;
+/// Letters of a word from which on four columns are too many for a phone.
+const LONG: usize = 8;
 /// Most cells of a wider table whose rows a phone shows one under the other; a longer one keeps its first column in view and scrolls.
 const STACKED: usize = 600;
 /// Most rows of a table on a closed loop's page.
@@ -148,7 +150,9 @@ impl Sheet {
         let texts: Vec<bool> =
             (0..header.len()).map(|k| k > 0 && rows.iter().any(|r| r.get(k).is_some_and(|c| c.chars().count() > 34))).collect();
         let class = |k: usize| if texts.get(k) == Some(&true) { " class=\"text\"" } else { "" };
-        let stacked = self.told && header.len() > NARROW && rows.len() * header.len() <= STACKED;
+        let wide = |cell: &String| cell.split(' ').any(|word| word.chars().count() > LONG);
+        let narrow = header.len() < NARROW || (header.len() == NARROW && !rows.iter().flatten().any(wide));
+        let stacked = self.told && !narrow && rows.len() * header.len() <= STACKED;
         self.body += &format!("<div class=\"wide\"><table{}><thead><tr>", if stacked { " class=\"stack\"" } else { "" });
         for (k, cell) in header.iter().enumerate() {
             self.body += &format!("<th{}>{}</th>", class(k), escape(cell));

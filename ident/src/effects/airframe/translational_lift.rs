@@ -30,7 +30,7 @@ impl AirframeEffect for TranslationalLift {
             equation: "T = k_T sum w^2 + across * v_xy^2 - climb * (sum w / usual sum w) * v_up, v through the air, up along the rotors",
             source: "Leishman 2006, section 3.3; Svacha, Mohta & Kumar, ICUAS 2017.",
             depends_on: &["vel", "rpm"],
-            signature: "specific force along the rotors grows with the square of the speed across, and falls with the climb",
+            signature: "specific force along the rotors goes with the square of the speed across, and with the climb",
             look_alikes: &["body_drag", "ground_effect"],
         }
     }

@@ -14,6 +14,8 @@ use std::fmt::Write;
 
 /// Left end of the scale, noise floors.
 const FROM: f64 = 0.5;
+/// Per cent of the scale that the words at the floor need for themselves.
+const CLEAR: f64 = 14.0;
 /// Noise floors up to which a channel counts as explained.
 const EXPLAINED: f64 = 1.5;
 
@@ -34,7 +36,8 @@ impl Scale {
     }
 
     fn ticks(&self) -> impl Iterator<Item = f64> + '_ {
-        (0..7).map(|k| 10f64.powi(k)).take_while(|v| *v <= self.to)
+        let clear = |v: &f64| *v == 1.0 || self.at(*v) - self.at(1.0) >= CLEAR;
+        (0..7).map(|k| 10f64.powi(k)).take_while(|v| *v <= self.to).filter(clear)
     }
 }
 
