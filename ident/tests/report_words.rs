@@ -229,7 +229,7 @@ fn a_channel_without_a_model_is_told() {
     // what no model predicts is not told as what a model leaves
     v.unexplained = vec![left("rpm", 380.0), left("voltage_v", 8.0)];
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.ends_with("On voltage 79 mV is left (slow). Speed has no model: no command was logged."), "{said}");
+    assert!(said.ends_with("On voltage 80 mV is left (slow). Speed has no model: no command was logged."), "{said}");
     v.unexplained.truncate(1);
     let said = sentence(&v, Vocabulary::RIG, false);
     assert!(said.ends_with("Little is left beyond the noise. Speed has no model: no command was logged."), "{said}");
@@ -332,10 +332,10 @@ fn sizes_have_no_sign() {
     };
     for (id, name, unit, up, down) in [
         ("zero_drift", "rate", "N/s", "drifts up by 1.20 N a minute", "drifts down by 1.20 N a minute"),
-        ("tare_shift", "offset", "N", "jumps up by 20.0 mN", "jumps down by 20.0 mN"),
+        ("tare_shift", "offset", "N", "jumps up by 0.0200 N", "jumps down by 0.0200 N"),
         ("gain_change", "gain_change", "1", "rises by 2.00 %", "falls by 2.00 %"),
         ("blade_damage", "thrust_change", "1", "adds 2.00 % of the thrust", "takes 2.00 % of the thrust"),
-        ("thermal_zero", "coefficient", "N/K", "rises by 20.0 mN per kelvin", "falls by 20.0 mN per kelvin"),
+        ("thermal_zero", "coefficient", "N/K", "rises by 0.0200 N per kelvin", "falls by 0.0200 N per kelvin"),
         ("reynolds_thrust", "exponent", "1", "to the power of 2.02, not of two", "to the power of 1.98, not of two"),
     ] {
         let [above, below] = [0.02, -0.02].map(|v| said(id, name, v, unit));

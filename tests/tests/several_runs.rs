@@ -165,7 +165,7 @@ fn the_command_writes_the_rig_and_each_run_and_refuses_what_is_no_set_of_runs() 
         assert!(card.contains("<svg"), "a card without its figure: {card}");
     }
     let left = page.split("id=\"what-is-left\"").nth(1).and_then(|p| p.split("<h2").next()).unwrap();
-    assert!(left.contains("<svg") && left.contains("r1.csv"), "what is left has its figure: {left}");
+    assert!(left.contains("<svg") && left.contains("whole run, r1"), "what is left has its figure: {left}");
     for said in ["The supply lead drops", "Each run, predicted by the others", "runs/r1/report.html", "runs/r2/report.html"] {
         assert!(page.contains(said), "the page does not say {said}");
     }
