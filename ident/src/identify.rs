@@ -165,6 +165,12 @@ const TABLE: usize = 64;
 /// Error that a row of a table is given, as a share of its column's largest value; the scatter about a curve corrects it.
 const TABLE_ERROR: f64 = 0.01;
 
+/// Whether a log is a table with one row for each level.
+#[must_use]
+pub fn is_table(context: &Context, log: &Log) -> bool {
+    log.len() <= TABLE && detect(log, &context.rpm).is_empty()
+}
+
 /// The levels of a log: its plateaus, or every row of a table that has one row for each level.
 #[must_use]
 pub fn settled(context: &Context, log: &Log) -> Vec<Plateau> {

@@ -343,6 +343,19 @@ fn sizes_have_no_sign() {
     }
 }
 
+/// The terms of a rig's or a flight's curve are seen in its figure; those of an attitude log's correction have words.
+#[test]
+fn terms_of_a_curve_are_not_told() {
+    let curve = effect("unknown", "thrust_n", 0.9, 0.4, vec![parameter("p1", 0.5, 0.01, "N")]);
+    let v = verdict(Kind::Unattributed, vec![curve]);
+    for words in [Vocabulary::RIG, ident::flight::VOCABULARY] {
+        assert!(!terminal(&v, words, false).contains("p1 ="));
+    }
+    let linear = effect("unknown", "gx", 0.9, 0.4, vec![parameter("gx_ax", 0.5, 0.01, "1")]);
+    let v = verdict(Kind::Unattributed, vec![linear]);
+    assert!(terminal(&v, ident::inertial::VOCABULARY, false).contains("gx_ax = 0.50"));
+}
+
 /// What is told of several sensors of one speed, or of the axes of a vector, is told of the whole.
 #[test]
 fn a_share_is_that_of_the_whole_quantity() {

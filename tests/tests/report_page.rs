@@ -86,6 +86,23 @@ fn a_page_begins_with_the_sentence_that_heads_the_terminal() {
     assert!(again == said && same == page, "the same log gave another page");
 }
 
+/// On a table with one row for each level the floors are guesses, and the page says so; a run of many rows is no table.
+#[test]
+fn a_table_of_levels_is_told_as_one() {
+    let folder = TempDir::new().unwrap();
+    let rows = (0..9).map(|k| {
+        let (rpm, t) = (1500.0 + 600.0 * f64::from(k), 2.0 * f64::from(k));
+        format!("{t:.1},{},{rpm:.0},{:.3},{:.3}\n", 1100 + 100 * k, 1.5e-7 * rpm * rpm, 1.2e-7 * rpm * rpm)
+    });
+    let table: String = std::iter::once("t_s,pulse_us,rpm,thrust_n,current_a\n".to_owned()).chain(rows).collect();
+    std::fs::write(folder.path().join("table.csv"), table).expect("a table");
+    let (_, page, _) = closed(folder.path(), "table.csv", "table");
+    assert!(text(&page).contains("Only 9 rows, one for each level"), "{}", text(&page));
+    let log = sagging(folder.path());
+    let (_, page, _) = closed(folder.path(), &log, "run");
+    assert!(!text(&page).contains("one for each level"));
+}
+
 /// A load cell that reads the speed squared, on stairs, at 200 Hz for 50 minutes.
 #[test]
 fn six_hundred_thousand_rows_are_a_page() {

@@ -25,7 +25,8 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     about: airframe::about,
     clause: |found| airframe::said(found).unwrap_or_else(|| parts::bare(found)),
     of_every_rig: |found| found.id == "spinup_lag",
-    parameter: |_, name| parameter(name),
+    // a curve is seen in its figure
+    parameter: |id, name| if id == "unknown" { String::new() } else { parameter(name) },
 };
 
 /// Rotors of one figure: as many lines as the eye tells apart.
@@ -47,6 +48,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         words: VOCABULARY,
         news: origin.model.is_some(),
         origin,
+        cautions: Vec::new(),
         declared: format!(
             "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged. Figures show what is left of windows that no fit saw."
         ),

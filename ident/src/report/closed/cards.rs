@@ -172,14 +172,13 @@ pub(super) fn value(p: &Parameter) -> [String; 3] {
     [v, format!("{low} to {high}"), unit_of(unit)]
 }
 
-/// Whether a reader asks for a parameter: not for the terms of a curve, nor where in its row a step lies, nor since when what was there before
-/// the run.
-pub(super) fn is_shown(e: &EffectEntry, p: &Parameter) -> bool {
-    e.id != "unknown" && p.name != "phase" && !(p.name == "t0" && e.is_since_before())
+/// Whether a reader asks for a parameter: not for what has no word, nor where in its row a step lies, nor since when what was there before the run.
+pub(super) fn is_shown(words: Vocabulary, e: &EffectEntry, p: &Parameter) -> bool {
+    !(words.parameter)(&e.id, &p.name).is_empty() && p.name != "phase" && !(p.name == "t0" && e.is_since_before())
 }
 
 fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
-    let shown = |p: &&Parameter| is_shown(e, p);
+    let shown = |p: &&Parameter| is_shown(words, e, p);
     let rows: Vec<Vec<String>> = e
         .parameters
         .iter()

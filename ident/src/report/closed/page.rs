@@ -15,9 +15,6 @@ use crate::report::sheet::Sheet;
 use crate::verdict::{Kind, Validation, Verdict};
 use crate::words::{digits, heading, scaled};
 
-/// Rows below which a log is a table of levels, and the page says what that means.
-const FEW_ROWS: usize = 30;
-
 /// What a page is made of.
 pub(crate) struct Page<'p> {
     /// The verdict.
@@ -28,6 +25,8 @@ pub(crate) struct Page<'p> {
     pub(crate) news: bool,
     /// Where it comes from.
     pub(crate) origin: Origin,
+    /// What a reader must know before the figures, a paragraph each.
+    pub(crate) cautions: Vec<String>,
     /// What the declared model is, in a paragraph.
     pub(crate) declared: String,
     /// The figures that convince most.
@@ -60,9 +59,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         }
         [] => {}
     }
-    if v.runs.is_empty() && page.origin.log.rows < FEW_ROWS {
-        sheet.warn(&format!("Only {} rows: no level has two to compare, so that the noise floors are guesses, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.", page.origin.log.rows));
-    }
+    page.cautions.iter().for_each(|caution| sheet.warn(caution));
     for l in &v.left_out {
         sheet.warn(&format!("Left out: {l}."));
     }

@@ -6,6 +6,7 @@
 //! Reference: specification `report.md`.
 
 use super::cards::{is_shown, value};
+use super::vocabulary::Vocabulary;
 use crate::log::{Gaps, Log, digest_of};
 use crate::model::FittedTo;
 use crate::report::sheet::Sheet;
@@ -37,11 +38,10 @@ impl Hidden {
         }
         let of_it = named.iter().find(|e| e.id == self.id);
         out.extend(of_it.and_then(|e| as_found(e)));
-        let missed: Vec<&str> =
-            of_it.iter().flat_map(|e| &e.parameters).filter(|p| self.misses(p)).map(|p| p.name.as_str()).collect();
+        let missed = of_it.iter().flat_map(|e| &e.parameters).filter(|p| self.misses(p));
+        let missed: Vec<String> = missed.map(|p| p.name.clone()).collect();
         if !missed.is_empty() {
-            let whose = missed.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-            out.push(format!("what was hidden lies outside the interval of {}; one in twenty does", list(&whose)));
+            out.push(format!("what was hidden lies outside the interval of {}; one in twenty does", list(&missed)));
         }
         if found {
             out.push(format!("named, and true: {}", self.id));
@@ -79,7 +79,7 @@ fn as_found(e: &EffectEntry) -> Option<String> {
         let [v, interval, unit] = value(p);
         format!("{} = {} (95 %: {interval})", p.name, format!("{v} {unit}").trim_end())
     };
-    let sizes: Vec<String> = e.parameters.iter().filter(|p| is_shown(e, p)).map(size).collect();
+    let sizes: Vec<String> = e.parameters.iter().filter(|p| is_shown(Vocabulary::RIG, e, p)).map(size).collect();
     (!sizes.is_empty()).then(|| format!("found with {}", sizes.join(", ")))
 }
 

@@ -139,7 +139,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
     if e.id != "unknown" {
         out += &format!("    {}\n", wrapped(&words.said(e).sentence(), 4));
     }
-    for parameter in e.parameters.iter().filter(|p| is_shown(e, p)) {
+    for parameter in e.parameters.iter().filter(|p| is_shown(words, e, p)) {
         let [v, interval, unit] = value(parameter);
         let name = &parameter.name;
         out += &match upper_bound(parameter) {

@@ -24,7 +24,7 @@ pub struct Vocabulary {
     pub clause: fn(&EffectEntry) -> Clause,
     /// Whether every rig has it.
     pub of_every_rig: fn(&EffectEntry) -> bool,
-    /// A parameter in words, by the effect's identifier and its own name.
+    /// A parameter in words, by the effect's identifier and its own name; empty where no reader asks for it.
     pub parameter: fn(&str, &str) -> String,
 }
 
@@ -38,9 +38,8 @@ impl Vocabulary {
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
         of_every_rig: |found| found.kin != Kin::Own,
         parameter: |id, name| match (id, name) {
-            ("unknown", "from") => "variable, lowest".to_owned(),
-            ("unknown", "to") => "variable, highest".to_owned(),
-            ("unknown", _) => format!("Legendre polynomial {}", name.trim_start_matches('p')),
+            // a curve is seen in its figure
+            ("unknown", _) => String::new(),
             _ => parameter(name),
         },
     };
