@@ -98,7 +98,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         )
     };
     let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
-    let mut after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit);
+    let mut after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit).supplied_by(&context);
     let mut verdict = Verdict {
         format: FORMAT,
         run: log.name.clone(),
@@ -163,7 +163,8 @@ fn channels(context: &Context, declared: Declared<'_>, d: &Diagnosis) -> Channel
                 let r: Vec<f64> = (0..r.len()).filter(judged).map(|k| target.as_it_stands(target.rows[k], r[k])).collect();
                 let t: Vec<f64> = target.rows.iter().filter(|i| target.claims(**i)).map(|i| context.t[*i]).collect();
                 let rms = (r.iter().map(|v| v * v).sum::<f64>() / r.len().max(1) as f64).sqrt();
-                let heldout_rms = if held.claimed.is_finite() { held.claimed } else { of_its_own(context, declared, fit, i) };
+                let is_known = held.claimed.is_finite() || target.relation.is_evidence();
+                let heldout_rms = if is_known { held.claimed } else { of_its_own(context, declared, fit, i) };
                 Figures { rms, heldout_rms, across_runs_rms: None, whiteness_p: whiteness(&t, &r) }
             })
             .collect()

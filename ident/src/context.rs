@@ -16,6 +16,7 @@ use crate::leftover::{self, Leftover};
 use crate::log::{Log, MODELLED, SPEED};
 use crate::marks;
 use crate::noise::{self, Noise};
+use crate::remembered::Remembered;
 use crate::solve::Normal;
 use crate::start::start_pulse;
 use std::borrow::Cow;
@@ -359,6 +360,8 @@ pub(crate) struct Facts {
     pub(crate) rail: OnceLock<Option<crate::effects::Rail>>,
     /// See [`Context::step`].
     pub(crate) step: OnceLock<f64>,
+    /// Shapes that a search has found.
+    pub(crate) refined: Remembered,
 }
 
 impl Context {
@@ -499,7 +502,7 @@ impl Context {
         self.against_model = true;
         let known = model.course.as_ref().map(|course| (course, course.counterparts(self)));
         let step = self.step();
-        let predictions: Vec<Option<Vec<f64>>> = self.targets.iter().map(|t| model.predict(self, t.name)).collect();
+        let predictions: Vec<Option<Vec<f64>>> = self.targets.iter().map(|t| model.predict_at_its_own_supply(self, t.name)).collect();
         for ((target, load), prediction) in self.targets.iter_mut().zip(loads).zip(&predictions) {
             if let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) {
                 let course = known.as_ref().zip(prediction.as_ref()).and_then(|((course, rows), prediction)| {

@@ -151,7 +151,10 @@ impl<'a> Designs<'a> {
                 && last.0 == touching
         };
         let kept = self.last.take().filter(alike).map(|(_, design)| TargetDesign { name: target.name, ..design });
-        let made = kept.unwrap_or_else(|| steps.apply(self.context, self.placed, plain(self.context, self.declared, target)));
+        let made = kept.unwrap_or_else(|| {
+            let design = steps.plain(|| plain(self.context, self.declared, target));
+            steps.apply(self.context, self.placed, design)
+        });
         &self.last.insert((touching, made)).1
     }
 }

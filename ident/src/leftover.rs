@@ -52,12 +52,7 @@ impl Leftover {
     /// The known error at a load: straight lines between the points, the outer ones beyond.
     #[must_use]
     pub fn known(&self, load: f64) -> f64 {
-        let after = self.curve.partition_point(|(at, _)| *at < load);
-        match (after.checked_sub(1).and_then(|k| self.curve.get(k)), self.curve.get(after)) {
-            (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (load - a.0) / (b.0 - a.0),
-            (Some(only), None) | (None, Some(only)) => only.1,
-            (None, None) => 0.0,
-        }
+        along(&self.curve, load)
     }
 
     /// The largest scatter where the load is held.
@@ -89,6 +84,16 @@ impl Leftover {
     /// the same way: many jumps are no more witnesses than one.
     pub(crate) fn variance(&self, load: f64, class: usize, alike: &Alike, noise: f64) -> f64 {
         (self.scatter[self.part(load)][class].powi(2) - noise * noise).max(0.0) * alike.0[class]
+    }
+}
+
+/// The value of a curve at a load: straight lines between the points, the outer ones beyond; nothing on a curve without a point.
+pub(crate) fn along(curve: &[(f64, f64)], load: f64) -> f64 {
+    let after = curve.partition_point(|(at, _)| *at < load);
+    match (after.checked_sub(1).and_then(|k| curve.get(k)), curve.get(after)) {
+        (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (load - a.0) / (b.0 - a.0),
+        (Some(only), None) | (None, Some(only)) => only.1,
+        (None, None) => 0.0,
     }
 }
 
@@ -201,16 +206,21 @@ impl Sum {
 fn curve(rows: &[(usize, f64, f64)]) -> Vec<(f64, f64)> {
     let holds = 4 * rows.iter().filter(|(class, ..)| HELD.contains(class)).count() > rows.len();
     let counts = |class: &usize| HELD.contains(class) || !holds && *class == MOVING;
-    let mut held: Vec<(f64, f64)> = rows.iter().filter(|(class, ..)| counts(class)).map(|(_, load, r)| (*load, *r)).collect();
-    held.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (Some(first), Some(last)) = (held.first(), held.last()) else { return Vec::new() };
-    let (low, width) = (first.0, ((last.0 - first.0) / BINS).max(1e-9));
-    let bin = |load: f64| ((load - low) / width) as usize;
-    let mean = |part: &[(f64, f64)]| {
+    let held: Vec<(f64, f64)> = rows.iter().filter(|(class, ..)| counts(class)).map(|(_, load, r)| (*load, *r)).collect();
+    let mean = |part: &Vec<(f64, f64)>| {
         let n = part.len() as f64;
         (part.iter().map(|p| p.0).sum::<f64>() / n, part.iter().map(|p| p.1).sum::<f64>() / n)
     };
-    held.chunk_by(|a, b| bin(a.0) == bin(b.0)).filter(|part| part.len() >= FEWEST).map(mean).collect()
+    binned(held).iter().filter(|part| part.len() >= FEWEST).map(mean).collect()
+}
+
+/// Points by load, from low to high, those together that one point of a curve stands for.
+pub(crate) fn binned(mut points: Vec<(f64, f64)>) -> Vec<Vec<(f64, f64)>> {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
+    let (low, width) = (first.0, ((last.0 - first.0) / BINS).max(1e-9));
+    let bin = |load: f64| ((load - low) / width) as usize;
+    points.chunk_by(|a, b| bin(a.0) == bin(b.0)).map(<[_]>::to_vec).collect()
 }
 
 #[cfg(test)]

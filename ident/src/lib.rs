@@ -47,6 +47,7 @@ mod opponent;
 pub(crate) mod parallel;
 pub mod plateau;
 pub mod quantity;
+mod remembered;
 pub mod report;
 pub mod residual;
 mod revise;

@@ -24,6 +24,7 @@ mod reach;
 mod read;
 mod run;
 mod scope;
+mod supply;
 
 pub use discrepancy::beside;
 pub use reach::Reach;
@@ -82,6 +83,8 @@ pub struct Model {
     pub effects: Vec<AddedEffect>,
     /// Density of the air over that of ISO 2533 air at 20 degC, the mean of the run that the model was identified from, where its log tells.
     pub air: Option<f64>,
+    /// For each channel that follows the supply the voltage of the model's own run by load ([`supply`]).
+    pub supply: Vec<(String, Vec<(f64, f64)>)>,
     /// For each channel what the model leaves over of the run that it was identified from, where that is known.
     pub leftovers: Vec<(String, Leftover)>,
     /// What it is off by on that run while the load is on its way, row for row.
@@ -268,9 +271,17 @@ impl Model {
         self.effects.iter().map(|e| e.placed.clone()).collect()
     }
 
-    /// Prediction of one channel by its primary relation, on every row; `None` where the model does not know the channel.
+    /// Prediction of one channel by its primary relation, on every row; `None` where the model does not know the channel. Speed and current
+    /// follow the voltage that was measured, where the model knows that of its own run.
     #[must_use]
     pub fn predict(&self, context: &Context, channel: &'static str) -> Option<Vec<f64>> {
+        let target = context.targets.iter().find(|t| t.name == channel)?;
+        self.predict_at_the_supply_of(context, target).or_else(|| self.predict_at_its_own_supply(context, channel))
+    }
+
+    /// The same at the voltage of the model's own run.
+    #[must_use]
+    pub fn predict_at_its_own_supply(&self, context: &Context, channel: &'static str) -> Option<Vec<f64>> {
         let target = context.targets.iter().find(|t| t.name == channel)?;
         let (design, coefficients) = self.design(context, target, &self.placed())?;
         let mut out = design.predict(&coefficients, context.len());
@@ -368,6 +379,7 @@ impl Model {
             if let Some((_, left)) = self.leftovers.iter().find(|(channel, _)| whole && *channel == p.channel) {
                 t.extend(discrepancy::channel_keys(&p.channel, left));
             }
+            supply::insert(&mut t, &p.channel, &self.supply);
             channels.insert(p.channel.clone(), t.into());
         }
         root.insert("channel".into(), channels.into());

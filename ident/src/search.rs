@@ -8,6 +8,7 @@
 use crate::context::Context;
 use crate::effects::{Effect, Instance};
 use crate::hypothesis::{Declared, Placed, Rows};
+use crate::remembered::Question;
 use crate::samples::{Base, Taught};
 
 /// The stride over rows that keeps the longest target near `most` samples.
@@ -133,30 +134,34 @@ pub(crate) fn refine_group(
         return placed.to_vec();
     }
     let moving = touched_by_shapes(placed, group);
-    let scattering = placed.iter().any(|p| p.effect.scatters());
-    let taught = Taught::new(context, declared, rows);
-    let cost = |x: &[f64]| -> f64 {
-        let mut full = start.clone();
-        for (i, v) in free.iter().zip(x) {
-            full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
-        }
-        // a soft wall keeps the simplex inside the plausible box
-        let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
-        let placed = with_shapes(placed, &full);
-        let known: f64 = placed.iter().map(Placed::prior).sum();
-        -taught.loglik(&placed, &moving, scattering) - known + 1e3 * wall
-    };
-    let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
-    let steps: Vec<f64> = free
-        .iter()
-        .map(|i| (0.15 * start[*i].abs()).max(0.01 * (ranges[*i].1 - ranges[*i].0)).min(0.2 * (ranges[*i].1 - ranges[*i].0)))
-        .collect();
-    let best = nelder_mead(&cost, &x0, &steps, evaluations);
-    let mut full = start.clone();
-    for (i, v) in free.iter().zip(&best) {
-        full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
-    }
-    with_shapes(placed, &full)
+    let question = Question::new((context, declared), placed, group, &moving, rows, evaluations);
+    let shapes = context.facts.refined.or_found(question, || {
+        let taught = Taught::new(context, declared, rows);
+        let scattering = placed.iter().any(|p| p.effect.scatters());
+        let inside = |x: &[f64]| -> Vec<f64> {
+            let mut full = start.clone();
+            for (i, v) in free.iter().zip(x) {
+                full[*i] = v.clamp(ranges[*i].0, ranges[*i].1);
+            }
+            full
+        };
+        let cost = |x: &[f64]| -> f64 {
+            let full = inside(x);
+            // a soft wall keeps the simplex inside the plausible box
+            let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
+            let placed = with_shapes(placed, &full);
+            let known: f64 = group.iter().map(|k| placed[*k].prior()).sum();
+            -taught.loglik(&placed, &moving, scattering) - known + 1e3 * wall
+        };
+        let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
+        let widths = free.iter().map(|i| (start[*i].abs(), ranges[*i].1 - ranges[*i].0));
+        let steps: Vec<f64> = widths.map(|(at, width)| (0.15 * at).max(0.01 * width).min(0.2 * width)).collect();
+        let best = with_shapes(placed, &inside(&nelder_mead(&cost, &x0, &steps, evaluations)));
+        group.iter().map(|k| best[*k].shape.clone()).collect()
+    });
+    let mut out = placed.to_vec();
+    group.iter().zip(shapes).for_each(|(k, shape)| out[*k].shape = shape);
+    out
 }
 
 fn touched_by_shapes<'p>(placed: &'p [Placed], group: &[usize]) -> Vec<&'p str> {

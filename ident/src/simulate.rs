@@ -38,7 +38,7 @@ pub fn from_command(model: &Model, name: &str, t: &[f64], pulse_us: &[f64], cova
             let names: Vec<&'static str> =
                 context.targets.iter().map(|t| t.name).filter(|n| SPEED.contains(n) == speed_pass).collect();
             for name in names {
-                if let Some(values) = model.predict(&context, name)
+                if let Some(values) = model.predict_at_its_own_supply(&context, name)
                     && let Some(column) = log.columns.iter_mut().find(|c| c.name == name)
                 {
                     let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs())).max(f64::MIN_POSITIVE);

@@ -15,6 +15,8 @@ use std::sync::Arc;
 /// How one target's design came about.
 #[derive(Default)]
 pub(crate) struct Steps {
+    /// The design without effects, which no hypothesis changes.
+    plain: Option<TargetDesign>,
     steps: Vec<Step>,
     /// What a declared model's rotor has made of which column.
     turned: Vec<(Values, Values)>,
@@ -39,6 +41,11 @@ impl Step {
 }
 
 impl Steps {
+    /// The design without effects as it was `made` when it was first asked for.
+    pub(crate) fn plain(&mut self, made: impl FnOnce() -> TargetDesign) -> TargetDesign {
+        self.plain.get_or_insert_with(made).clone()
+    }
+
     /// The effects of a hypothesis that touch the design's target, applied in causal order.
     pub(crate) fn apply(&mut self, context: &Context, placed: &[Placed], mut design: TargetDesign) -> TargetDesign {
         let in_a_row = |p: &Placed| p.stage() == Stage::Output && context.is_table();

@@ -82,7 +82,7 @@ fn jumps(model: &Model, context: &Context) -> Vec<f64> {
 }
 
 fn of_target(model: &Model, context: &Context, target: &Target, classes: &[usize], jumps: &[f64]) -> Option<Expected> {
-    let prediction = model.predict(context, target.name)?;
+    let prediction = model.predict_at_its_own_supply(context, target.name)?;
     let left = model.leftovers.iter().find(|(channel, _)| channel == target.name).map(|(_, left)| left);
     let load = context.regressor(target.relation)?;
     let none = Leftover::default();

@@ -119,7 +119,7 @@ pub struct About {
 }
 
 /// One way in which an effect may be present in this log: which channels it touches, in which form.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Instance {
     /// Channels, the first of which is the one that figures are quoted for.
     pub channels: Vec<String>,

@@ -153,7 +153,7 @@ impl Model {
     }
 
     /// What the effect at a position adds to a prediction of all.
-    fn part(&self, context: &Context, target: &Target, all: &[f64], k: usize) -> Option<Vec<f64>> {
+    pub(super) fn part(&self, context: &Context, target: &Target, all: &[f64], k: usize) -> Option<Vec<f64>> {
         let rest = self.varied(context, target, |placed| placed[k].instance.channels.clear())?;
         Some(all.iter().zip(&rest).map(|(a, r)| a - r).collect())
     }

@@ -8,6 +8,7 @@
 
 use super::{
     AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, discrepancy, keyed, leftover_keys, place, reach, run,
+    supply,
 };
 use crate::context::{Context, Relation};
 use crate::course::{COURSE_KEYS, Course};
@@ -124,6 +125,8 @@ impl Model {
             model.polynomials.push(polynomial);
             let left = leftover(name, value).map_err(|refusal| within(&format!("channel.{name}"), refusal))?;
             model.leftovers.extend(left.map(|left| (name.clone(), left)));
+            let by_load = supply::read(name, value).map_err(|refusal| within(&format!("channel.{name}"), refusal))?;
+            model.supply.extend(by_load.map(|by_load| (name.clone(), by_load)));
         }
         let list = match root.get("effect") {
             None => [].as_slice(),
@@ -197,7 +200,7 @@ fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {
     let terms = |has_pulse| Relation::of(channel, has_pulse).map(|r| r.degree() + 1);
     let (Some(full), Some(alone)) = (terms(true), terms(false)) else { return Err(no_channel("", channel)) };
     let keys: Vec<String> = (0..full).map(|k| coefficient_key(channel, k)).collect();
-    let left = leftover_keys(channel);
+    let left: Vec<String> = leftover_keys(channel).into_iter().chain(supply::keys(channel)).collect();
     let known = |key: &str| {
         key == "relation" || left.iter().any(|k| key == k) || keys.iter().any(|k| key == k || key.strip_suffix("_se") == Some(k))
     };

@@ -105,7 +105,7 @@ fn without(closed: &Closed, log: &Log, k: usize) -> Option<Model> {
     let (context, declared) = (&closed.context, Declared::default());
     let placed = refine(context, declared, &placed, Rows::All, EVALUATIONS);
     let fitted = fit(context, declared, &placed, None, Rows::All)?;
-    Some(Model::from_fit(context, log, declared, &fitted).elsewhere())
+    Some(Model::from_fit(context, log, declared, &fitted).supplied_by(context).elsewhere())
 }
 
 /// Error of a channel on the rows of which something is claimed; of an effect that is single readings, on those readings too.

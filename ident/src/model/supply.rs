@@ -1,0 +1,213 @@
+//! What speed and current do at another supply voltage.
+//!
+//! What it is: a speed controller gives the motor a share of its supply. One run says how speed and current go with the load at the voltage that
+//! its supply gave; at another voltage the speed is higher and the current at a speed lower, by powers that are known of brushless motors. The
+//! model keeps the voltage of its own run by load, and compares that of another run with it.
+//! What can go wrong: a controller that holds the speed by itself does not follow its supply. A run without a voltage is taken to have the
+//! model's own. Where an effect of the model speaks of the voltage and of the channel, its part is not counted twice.
+//! Units: V; loads in kus or krpm as the channel's polynomial.
+//! Reference: V = k omega + R I at a fixed duty: d ln(omega) / d ln(V) = 1 / (1 + R I / V), one without load and 0.8 where a fifth of the voltage
+//! is lost in the winding. The same power from a higher voltage is less current, and what switching loses grows with the voltage. On 56 pairs of
+//! runs at 7 and 11 V the powers are 0.97 to 0.81 from low to high speed, and -0.69 (fivein-static-tables, MIT 2018, Cao and Strawson).
+
+use super::read::{Refusal, finite, refusal};
+use super::{AddedEffect, Model, digits, load_unit};
+use crate::context::{Context, Relation, Target};
+use crate::leftover::{along, binned};
+use crate::noise::median;
+use std::borrow::Cow;
+use toml::{Table, Value};
+
+/// Power of the voltage that the speed at a pulse goes with.
+const OF_SPEED: f64 = 0.8;
+/// The same of the current at a speed: minus one if the power were the same, less what switching loses more of.
+const OF_CURRENT: f64 = -0.7;
+/// The channel of the supply's voltage.
+const VOLTAGE: &str = "voltage_v";
+/// Least ratio of two voltages.
+const LEAST: f64 = 0.1;
+/// Significant digits of a voltage.
+const DIGITS: usize = 6;
+
+/// Voltage of a run by the load of a channel, from low to high.
+pub(crate) type ByLoad = Vec<(f64, f64)>;
+
+/// Voltage at a load and its standard error.
+struct Level {
+    load: f64,
+    volts: f64,
+    se: f64,
+}
+
+/// Power of the voltage that a relation goes with; `None` of one that does not follow the supply.
+fn power(relation: Relation) -> Option<f64> {
+    match relation {
+        Relation::SpeedFromPulse => Some(OF_SPEED),
+        Relation::Current => Some(OF_CURRENT),
+        _ => None,
+    }
+}
+
+/// Keys of a channel's table: loads, and the voltage there.
+pub(super) fn keys(channel: &str) -> [String; 2] {
+    [format!("supply_at_{}", load_unit(channel)), "supply_v".to_owned()]
+}
+
+/// What a channel's table holds of it.
+pub(super) fn to_keys(channel: &str, by_load: &ByLoad) -> [(String, Value); 2] {
+    let [at, volts] = keys(channel);
+    let list = |of: fn(&(f64, f64)) -> f64| -> Value {
+        by_load.iter().map(|p| Value::from(digits::significant(of(p), DIGITS))).collect::<Vec<_>>().into()
+    };
+    [(at, list(|p| p.0)), (volts, list(|p| p.1))]
+}
+
+/// Both lists of a channel's table, or neither.
+pub(super) fn read(channel: &str, value: &Value) -> Result<Option<ByLoad>, Refusal> {
+    let [at, volts] = keys(channel);
+    if value.get(&at).is_none() && value.get(&volts).is_none() {
+        return Ok(None);
+    }
+    let list = |key: &str| -> Option<Vec<f64>> { value.get(key)?.as_array()?.iter().map(finite).collect() };
+    let loads = list(&at).filter(|l| l.is_sorted_by(|a, b| a < b));
+    let loads =
+        loads.ok_or_else(|| refusal(&at, value.get(&at), "a list of finite numbers, each larger than the one before"))?;
+    let fits = |v: &Vec<f64>| v.len() == loads.len() && v.iter().all(|v| *v > 0.0);
+    let expected = || format!("a list of {} numbers above zero, as {at} has", loads.len());
+    let levels = list(&volts).filter(fits).ok_or_else(|| refusal(&volts, value.get(&volts), &expected()))?;
+    Ok(Some(loads.into_iter().zip(levels).collect()))
+}
+
+impl Model {
+    /// The model with the voltage that its own run's supply gave.
+    #[must_use]
+    pub fn supplied_by(mut self, context: &Context) -> Self {
+        let of_target = |target: &Target| {
+            power(target.relation)?;
+            let mut volts = self.follows_by_itself(target).then(|| readings(context))??;
+            self.less_what_it_says(context, target, &mut volts)?;
+            let levels = levels(&volts, &context.regressor(target.relation)?);
+            let mut by_load: ByLoad = levels.iter().map(|l| (l.load, l.volts)).collect();
+            if target.relation == Relation::Current {
+                falling(&mut by_load);
+            }
+            (!by_load.is_empty()).then(|| (target.name.to_owned(), by_load))
+        };
+        self.supply = context.targets.iter().filter_map(of_target).collect();
+        self
+    }
+
+    /// Prediction of a channel at the voltage that was measured; `None` where the model or the run does not know the one that its own supply
+    /// gave, or the channel does not follow it. What effects of the model make of the voltage is measured here, and left out.
+    pub(super) fn predict_at_the_supply_of(&self, context: &Context, target: &Target) -> Option<Vec<f64>> {
+        let (_, own) = self.supply.iter().find(|(channel, _)| channel == target.name)?;
+        let (power, loads) = (power(target.relation)?, context.regressor(target.relation)?);
+        // what a supply gives hangs on the command, also where it cannot give what the motor asks for
+        let commands = context.regressor(Relation::SpeedFromPulse).unwrap_or_else(|| loads.clone());
+        let measured = readings(context)?;
+        let levels = levels(&measured, &commands);
+        let (volts, errors): (ByLoad, ByLoad) = levels.iter().map(|l| ((l.load, l.volts), (l.load, l.se))).unzip();
+        let trend = trend(context, &measured, |row| along(&volts, commands[row]));
+        let mut out = self.without_what_it_says(context, target).predict_at_its_own_supply(context, target.name)?;
+        for (row, p) in out.iter_mut().enumerate() {
+            let (volts, se) = (along(&volts, commands[row]) + trend[row], along(&errors, commands[row]));
+            let (apart, open) = ((volts / along(own, loads[row])).max(LEAST).ln(), 2.0 * (se / volts).powi(2));
+            // two supplies that only the noise of their meters tells apart are one
+            *p *= (power * apart.powi(3) / (apart * apart + open).max(f64::MIN_POSITIVE)).exp();
+        }
+        Some(out)
+    }
+
+    /// Whether no effect of the model says already how a channel follows the voltage.
+    fn follows_by_itself(&self, target: &Target) -> bool {
+        !self.effects.iter().any(|e| e.placed.effect.id() == "supply_voltage" && e.placed.instance.touches(target.name))
+    }
+
+    /// Positions of the effects that speak of the voltage and of this channel.
+    fn of_both(&self, context: &Context, target: &Target) -> Vec<usize> {
+        let both = |e: &AddedEffect| e.placed.instance.touches(target.name) && e.placed.instance.touches(VOLTAGE);
+        let known = context.target(VOLTAGE).is_some();
+        (0..self.effects.len()).filter(|k| known && both(&self.effects[*k])).collect()
+    }
+
+    /// Takes what they say of the voltage off its readings.
+    fn less_what_it_says(&self, context: &Context, target: &Target, volts: &mut [(usize, f64)]) -> Option<()> {
+        let meter = &context.targets[context.target(VOLTAGE)?];
+        let Some((design, coefficients)) = self.design(context, meter, &self.placed()) else { return Some(()) };
+        let all = design.predict(&coefficients, context.len());
+        for k in self.of_both(context, target) {
+            let part = self.part(context, meter, &all, k)?;
+            volts.iter_mut().for_each(|(row, v)| *v -= part[*row]);
+        }
+        Some(())
+    }
+
+    /// The model in which they do not speak of this channel.
+    fn without_what_it_says(&self, context: &Context, target: &Target) -> Cow<'_, Self> {
+        let both = self.of_both(context, target);
+        if both.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let mut out = self.clone();
+        for k in both {
+            out.effects[k].placed.instance.channels.retain(|c| c != target.name);
+            out.effects[k].reach.retain(|r| r.channel != target.name);
+        }
+        Cow::Owned(out)
+    }
+}
+
+/// The readings of the supply's voltage by row, where the motor is driven and has settled.
+fn readings(context: &Context) -> Option<Vec<(usize, f64)>> {
+    let meter = &context.targets[context.target(VOLTAGE)?];
+    let drives = |row: usize| context.pulse.as_ref().is_none_or(|p| p[row] >= context.start_pulse_us);
+    let held = |k: usize| meter.unsettled.get(k).is_none_or(|u| !u);
+    let rows = meter.rows.iter().copied().zip(meter.y.iter().copied()).enumerate();
+    let counts = |(k, (row, v)): &(usize, (usize, f64))| held(*k) && meter.claims(*row) && drives(*row) && *v > 0.0;
+    let out: Vec<(usize, f64)> = rows.filter(counts).map(|(_, reading)| reading).collect();
+    (!out.is_empty()).then_some(out)
+}
+
+/// The voltage by a load.
+fn levels(volts: &[(usize, f64)], loads: &[f64]) -> Vec<Level> {
+    binned(volts.iter().map(|(row, v)| (loads[*row], *v)).collect()).iter().map(|part| level(part)).collect()
+}
+
+/// What the voltage does on each row beside its levels: a straight line in time, as a battery that empties.
+fn trend(context: &Context, volts: &[(usize, f64)], level: impl Fn(usize) -> f64) -> Vec<f64> {
+    let n = volts.len() as f64;
+    let middle = volts.iter().map(|(row, _)| context.t[*row]).sum::<f64>() / n;
+    let (mut with, mut square) = (0.0, 0.0);
+    for (row, v) in volts {
+        let t = context.t[*row] - middle;
+        with += t * (v - level(*row));
+        square += t * t;
+    }
+    let slope = if square > 0.0 { with / square } else { 0.0 };
+    context.t.iter().map(|t| slope * (t - middle)).collect()
+}
+
+/// A supply's voltage falls with the load: where it is lower at a load than at a higher one, the supply had come to its limit, and the motor
+/// ran slower than it was driven to.
+fn falling(by_load: &mut ByLoad) {
+    let mut most = 0.0_f64;
+    for (_, volts) in by_load.iter_mut().rev() {
+        most = most.max(*volts);
+        *volts = most;
+    }
+}
+
+/// Median voltage of rows of about one load.
+fn level(rows: &[(f64, f64)]) -> Level {
+    let n = rows.len() as f64;
+    let volts = median(&mut rows.iter().map(|r| r.1).collect::<Vec<f64>>());
+    let spread = rows.iter().map(|r| (r.1 - volts).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    Level { load: rows.iter().map(|r| r.0).sum::<f64>() / n, volts, se: (spread / n).sqrt() }
+}
+
+/// For the table of a channel whose readings follow the supply.
+pub(super) fn insert(table: &mut Table, channel: &str, supply: &[(String, ByLoad)]) {
+    if let Some((_, by_load)) = supply.iter().find(|(name, _)| name == channel) {
+        table.extend(to_keys(channel, by_load));
+    }
+}
