@@ -111,14 +111,23 @@ pub(crate) fn correction(context: &Context, declared: Declared<'_>, base: &Fit, 
     Some(Fit { placed, targets })
 }
 
-/// Whether a variable stands for the channel itself or for the load, which its relation holds already. (The departure of
-/// thrust from its polynomial in the speed is still a question; current and voltage follow the load with their own lags.)
+/// Whether a variable stands for the channel itself or for the load, which its relation holds already: by the same meter or by a second one. (The
+/// departure of thrust from its polynomial in the speed is still a question; current and voltage follow the load with their own lags.)
 pub(crate) fn is_load(context: &Context, target: &Target, name: &str) -> bool {
-    let held = match target.relation {
-        Relation::Torque | Relation::Thrust | Relation::Current => ["pulse_us", "current_a", "voltage_v"].contains(&name),
-        _ => ["pulse_us", "current_a", "voltage_v", "rpm"].contains(&name),
+    let held: &[&str] = match target.relation {
+        Relation::Torque | Relation::Thrust | Relation::Current => &["pulse_us", "current_a", "voltage_v"],
+        _ => &["pulse_us", "current_a", "voltage_v", "rpm"],
     };
-    held || twin(context, target, name)
+    let second = || held.iter().chain([&target.name]).any(|of| is_second_meter(context, of, name));
+    held.contains(&name) || second() || twin(context, target, name)
+}
+
+/// Whether a column is a second meter of what a channel measures, such as `esc_voltage_v` beside `voltage_v`. Where both read the same the
+/// quantity itself moves: one meter is no cause of the other's reading.
+pub(crate) fn is_second_meter(context: &Context, channel: &str, column: &str) -> bool {
+    let quantity = channel.split('_').next().unwrap_or(channel);
+    let same = column.split('_').any(|word| word == quantity);
+    same && column != channel && context.covariates.iter().any(|c| c.0 == column)
 }
 
 /// Whether a column repeats the target in other units: squared correlation above 0.98 on its rows.

@@ -7,9 +7,10 @@
 
 mod plain;
 
-use crate::effects::Scope;
+use crate::effects::alternating_period::TOLD_BY_THE_BOARD;
+use crate::effects::{OF_THE_SUPPLY, Scope};
 use crate::verdict::{EffectEntry, Parameter};
-pub use plain::{channels, formula, plain};
+pub use plain::{channels, curve, formula, plain};
 
 /// What a cause does, in two parts: an adverb fits between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -130,6 +131,28 @@ impl EffectEntry {
         self.channels.first().map_or("", |c| crate::context::unit_of(c))
     }
 
+    /// Whether the readings themselves show it, so that no prediction changes.
+    #[must_use]
+    pub fn is_read_off(&self) -> bool {
+        [TOLD_BY_THE_BOARD, OF_THE_SUPPLY].iter().any(|form| self.equation.ends_with(&format!("[{form}]")))
+    }
+
+    /// Whether it began within the run, and did not end.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        self.parameter("t0").is_some() && self.parameter("t1").is_none() && !self.is_since_before()
+    }
+
+    /// Of an effect of several sizes none of which is well known how many may each be zero, where most of them may, and how many it has. Instants
+    /// and times are no sizes.
+    #[must_use]
+    pub fn open_sizes(&self) -> Option<(usize, usize)> {
+        let sizes: Vec<&Parameter> = self.parameters.iter().filter(|p| !POSITIVE.contains(&p.unit.as_str())).collect();
+        let open = sizes.iter().filter(|p| p.ci95[0] <= 0.0 && p.ci95[1] >= 0.0).count();
+        let known = sizes.iter().any(|p| sized(p).is_some());
+        (self.id != "unknown" && !known && open > 1 && 2 * open > sizes.len()).then_some((open, sizes.len()))
+    }
+
     /// Whether it was there before the run began.
     #[must_use]
     pub fn is_since_before(&self) -> bool {
@@ -142,13 +165,16 @@ impl EffectEntry {
 pub fn scope(e: &EffectEntry, noun: &str) -> String {
     match e.scope {
         // it began and did not end
-        Scope::Event if e.parameter("t0").is_some() && e.parameter("t1").is_none() => {
-            format!("since one instant: it stays with the {noun} until something is changed")
-        }
+        Scope::Event if e.parameter("t0").is_some() && e.parameter("t1").is_none() => since_one_instant(noun),
+        Scope::Rig if e.has_begun() => since_one_instant(noun),
         Scope::Rig => format!("of the {noun}: every run should show it"),
         Scope::Run => "of this run: another run has a value of its own".to_owned(),
         Scope::Event => "of one instant: it does not recur by itself".to_owned(),
     }
+}
+
+fn since_one_instant(noun: &str) -> String {
+    format!("since one instant: it stays with the {noun} until something is changed")
 }
 
 /// A parameter's name in words.
@@ -187,7 +213,7 @@ pub(crate) fn signs(evidence: &str) -> &str {
 
 /// Probability from which on a cause is told without an adverb. Where nothing else explains a channel the search still keeps a tenth for causes
 /// that the library lacks, so that hardly a name stands above 0.9.
-const SURE: f64 = 0.85;
+pub(crate) const SURE: f64 = 0.85;
 
 /// How sure a probability is, as an adverb; empty where nothing needs to be said.
 #[must_use]

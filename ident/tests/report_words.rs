@@ -63,6 +63,7 @@ fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
         next_experiment: None,
         left_out: vec![],
         set_aside: vec![],
+        guessed_floors: None,
         validation: vec![],
         runs: vec![],
     }

@@ -19,6 +19,9 @@ use spin_up::SPIN_UP;
 /// See the module.
 pub(crate) struct CurrentLimit;
 
+/// Form of a limit that the meters of voltage and current show ([`crate::supply_limit`]): it changes no prediction.
+pub(crate) const OF_THE_SUPPLY: &str = "of the supply, read off its meters";
+
 impl Effect for CurrentLimit {
     fn id(&self) -> &'static str {
         "current_limit"
@@ -36,6 +39,10 @@ impl Effect for CurrentLimit {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
+        if found.equation.ends_with(&format!("[{OF_THE_SUPPLY}]")) {
+            let does = |held: &str| format!("{held}, and its voltage gives way");
+            return Clause::new("the supply", does(&found.tell("limit", |v| format!("holds the current to {v}"), "holds the current")));
+        }
         Clause::new("the current", found.tell("limit", |v| format!("is held to {v}"), "is limited"))
     }
 

@@ -18,7 +18,7 @@ use crate::context::{Context, DIFFERENCES, Target, unit_of};
 use crate::effects::unknown::variable;
 use crate::heldout::residuals;
 use crate::hypothesis::{Declared, Rows, fit};
-use crate::identify::{identify, is_table};
+use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
 use crate::several::Shown;
@@ -34,7 +34,6 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         words: Vocabulary::RIG,
         news: closed.context.against_model,
         origin,
-        cautions: cautions(log, closed),
         declared: declared(closed),
         hero: hero(closed),
         cards: cards(closed),
@@ -48,15 +47,6 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
     parts::candidates(&mut sheet, &closed.diagnosis);
     parts::aside(&mut sheet, v);
     sheet.html()
-}
-
-fn cautions(log: &Log, closed: &Closed) -> Vec<String> {
-    let table = is_table(&closed.context, log);
-    let said = format!(
-        "Only {} rows, one for each level: none has two to compare, so that the noise floors are guesses, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.",
-        log.len()
-    );
-    if table { vec![said] } else { Vec::new() }
 }
 
 fn declared(closed: &Closed) -> String {

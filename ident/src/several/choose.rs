@@ -35,6 +35,8 @@ pub(super) struct Named {
     pub(super) placed: Placed,
     /// By how much worse the runs predict each other without it, nats.
     pub(super) score: f64,
+    /// The same of what could stand in its place, were it not there.
+    pub(super) rivals: Vec<f64>,
 }
 
 /// The effects of the rig but one.
@@ -90,8 +92,28 @@ pub(super) fn choose(runs: &[&Closed], members: &[Member<'_>], progress: &mut dy
         now = then;
         drop_useless(&joint, &mut rig, &mut now);
     }
-    let scores: Vec<f64> = (0..rig.len()).map(|k| gain_of(&joint, &rig, &now, k).0).collect();
-    rig.into_iter().zip(scores).map(|(placed, score)| Named { placed, score }).collect()
+    let named = |k: usize| {
+        let (score, without) = gain_of(&joint, &rig, &now, k);
+        Named { placed: rig[k].clone(), score, rivals: rivals(&joint, &rig, k, &without, &pool) }
+    };
+    (0..rig.len()).map(named).collect()
+}
+
+/// By how much better the runs predict each other with each candidate in the place of one of the rig's effects on its channels.
+fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], pool: &[Vec<Placed>]) -> Vec<f64> {
+    let mut others = rig.to_vec();
+    let left = others.remove(k);
+    let close = |starts: &&Vec<Placed>| {
+        let first = &starts[0];
+        first.effect.id() != left.effect.id()
+            && first.instance.channels.iter().any(|c| left.instance.touches(c))
+            && may_stand_beside(&others, first)
+    };
+    let gain = |starts: &Vec<Placed>| {
+        let gains = starts.iter().map(|p| tried(joint, &others, without, p).0);
+        gains.fold(f64::NEG_INFINITY, f64::max)
+    };
+    pool.iter().filter(close).map(gain).collect()
 }
 
 type Joined = (usize, Placed, Vec<Across>);

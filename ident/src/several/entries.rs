@@ -28,7 +28,7 @@ pub(super) fn entry(
     [without, after]: [&[Across]; 2],
     estimates: &[Estimate],
 ) -> EffectEntry {
-    let (p, score) = (&named.placed, named.score);
+    let p = &named.placed;
     let taken = |channel: &str| {
         let pooled = |list: &[Across]| typical(list.iter().filter(|a| a.channel == channel).map(|a| a.rms));
         1.0 - pooled(after) / pooled(without)
@@ -50,7 +50,7 @@ pub(super) fn entry(
         run: None,
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: equation(p),
-        probability: probability(score),
+        probability: probability(named.score, &named.rivals),
         parameters: reported.iter().map(|e| parameter(e, &shapes, &first)).collect(),
         heldout_error_reduction: reduction,
         evidence: format!(
@@ -97,7 +97,7 @@ pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -
             run: Some(context.name.clone()),
             depends_on: p.effect.about().depends_on.iter().map(|v| (*v).to_owned()).collect(),
             equation: equation(p),
-            probability: probability(worth.gain),
+            probability: probability(worth.gain, &worth.rivals),
             parameters: reported.iter().map(|e| parameter(e, &shapes, first)).collect(),
             heldout_error_reduction: or_nothing(reduction),
             evidence: format!(
@@ -117,8 +117,10 @@ fn equation(p: &Placed) -> String {
     if p.instance.form.is_empty() { about.equation.to_owned() } else { format!("{} [{}]", about.equation, p.instance.form) }
 }
 
-fn probability(score: f64) -> f64 {
-    1.0 / (1.0 + (-score / TEMPERATURE).exp())
+/// Probability of a name by its evidence, against that of what could stand in its place and against nothing.
+fn probability(score: f64, rivals: &[f64]) -> f64 {
+    let against = |evidence: f64| ((evidence - score) / TEMPERATURE).exp();
+    1.0 / (1.0 + against(0.0) + rivals.iter().map(|r| against(*r)).sum::<f64>())
 }
 
 /// Every channel that is loud on a run after all, once, with the run on which it is loudest; and every contrast of a speed sensor that a run
@@ -164,5 +166,18 @@ pub(super) fn unnamed(left: &Unexplained) -> EffectEntry {
         parameters: Vec::new(),
         heldout_error_reduction: 0.0,
         evidence: left.looks_like.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::probability;
+
+    #[test]
+    fn what_could_stand_in_its_place_takes_from_a_name() {
+        assert!(probability(30.0, &[]) > 0.99);
+        assert!((probability(30.0, &[30.0]) - 0.5).abs() < 1e-3, "one that explains as much is as probable");
+        assert!(probability(30.0, &[-100.0, 2.0]) > 0.99, "others are far behind");
+        assert!((probability(0.0, &[]) - 0.5).abs() < 1e-12);
     }
 }

@@ -67,6 +67,7 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
         next_experiment: None,
         left_out: Vec::new(),
         set_aside: Vec::new(),
+        guessed_floors: runs.iter().filter_map(|r| r.closed.verdict.guessed_floors).max(),
         validation: Vec::new(),
         runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared, &silent)).collect(),
     }
