@@ -147,7 +147,10 @@ mod tests {
     fn leads_batteries_and_throttles_at_their_end_are_not() {
         for (what, of) in [
             ("a lead of 80 mohm", vec![[1700.0, 8.0, 10.4], [1800.0, 11.0, 10.1], [1900.0, 15.0, 9.8]]),
-            ("a weak battery: more current for less voltage", vec![[1700.0, 8.0, 11.4], [1800.0, 11.0, 10.8], [1900.0, 15.0, 10.0]]),
+            (
+                "a weak battery: more current for less voltage",
+                vec![[1700.0, 8.0, 11.4], [1800.0, 11.0, 10.8], [1900.0, 15.0, 10.0]],
+            ),
             ("a battery that empties at full throttle", vec![[1800.0, 15.0, 11.0], [1900.0, 13.4, 10.4], [2000.0, 11.6, 9.7]]),
             ("a throttle end point on a stiff supply", vec![[1800.0, 14.0, 12.0], [1900.0, 15.0, 11.9], [2000.0, 15.0, 11.9]]),
             ("the voltage of another battery", vec![[1800.0, 15.0, 12.0], [1200.0, 2.0, 12.0], [1300.0, 2.0, 10.0]]),

@@ -39,9 +39,9 @@ impl Effect for CurrentLimit {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        if found.equation.ends_with(&format!("[{OF_THE_SUPPLY}]")) {
-            let does = |held: &str| format!("{held}, and its voltage gives way");
-            return Clause::new("the supply", does(&found.tell("limit", |v| format!("holds the current to {v}"), "holds the current")));
+        if found.equation.contains(OF_THE_SUPPLY) {
+            let holds = found.tell("limit", |v| format!("holds the current to {v}"), "holds the current");
+            return Clause::new("the supply", format!("{holds}, and its voltage gives way"));
         }
         Clause::new("the current", found.tell("limit", |v| format!("is held to {v}"), "is limited"))
     }

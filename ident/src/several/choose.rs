@@ -109,11 +109,17 @@ fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], p
             && first.instance.channels.iter().any(|c| left.instance.touches(c))
             && may_stand_beside(&others, first)
     };
-    let gain = |starts: &Vec<Placed>| {
-        let gains = starts.iter().map(|p| tried(joint, &others, without, p).0);
-        gains.fold(f64::NEG_INFINITY, f64::max)
+    // what could not join could not stand there either
+    let stands = |p: &Placed, then: &[Across]| {
+        let compared = compared(without, then);
+        let with: Vec<Placed> = others.iter().chain([p]).cloned().collect();
+        is_worth(&compared) && harms(&compared).is_none() && is_plausible(joint, &with)
     };
-    pool.iter().filter(close).map(gain).collect()
+    let gain = |starts: &Vec<Placed>| {
+        let tried = starts.iter().map(|p| (p, tried(joint, &others, without, p)));
+        tried.filter(|(p, (_, then))| stands(p, then)).map(|(_, (gain, _))| gain).max_by(f64::total_cmp)
+    };
+    pool.iter().filter(close).filter_map(gain).collect()
 }
 
 type Joined = (usize, Placed, Vec<Across>);

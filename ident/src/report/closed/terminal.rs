@@ -11,6 +11,7 @@ use super::left::in_words;
 use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
 use super::state::{factor, figures, named, word};
 use super::vocabulary::Vocabulary;
+use crate::bad::SetAside;
 use crate::context::unit_of;
 use crate::effects::Scope;
 use crate::verdict::{Alternative, Channel, EffectEntry, Verdict};
@@ -180,7 +181,9 @@ fn left(verdict: &Verdict) -> String {
 
 /// The samples that took no part.
 fn set_aside(verdict: &Verdict) -> String {
-    let all = &verdict.set_aside;
+    // the longest first: they say most of the log
+    let mut all: Vec<&SetAside> = verdict.set_aside.iter().collect();
+    all.sort_by_key(|aside| std::cmp::Reverse(aside.rows));
     if all.is_empty() {
         return String::new();
     }
