@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn readings_without_a_supply_are_set_aside() {
-        let off = log(|i| i < 53 || i >= 580);
+        let off = log(|i| !(53..580).contains(&i));
         assert_eq!(rows(&off), vec![0..53, 580..600]);
         let first = found(&off).remove(0);
         assert!(first.value.abs() < 0.01 && (first.expected - 12.0).abs() < 0.1, "{first}");

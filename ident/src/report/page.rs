@@ -97,11 +97,40 @@ fn trace(closed: &Closed, target: &Target) -> Option<Trace> {
     })
 }
 
-/// The figure that convinces most.
+/// The figure that convinces most; of names that the readings themselves show those readings.
 fn hero(closed: &Closed) -> Vec<Figure> {
+    let mut named = closed.verdict.effects.iter().filter(|e| e.id != "unknown").peekable();
+    if let Some(first) = named.peek().copied()
+        && named.all(EffectEntry::is_read_off)
+    {
+        return readings(closed, first);
+    }
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> = targets.filter_map(|t| trace(closed, t)).collect();
     parts::most(&closed.verdict, Vocabulary::RIG, &traces)
+}
+
+/// What an effect's channels read at each command.
+fn readings(closed: &Closed, e: &EffectEntry) -> Vec<Figure> {
+    let Some(pulse) = &closed.context.pulse else { return Vec::new() };
+    let figure = |name: &String| {
+        let target = target(closed, name)?;
+        Some(thinned(Figure {
+            id: format!("read-{}", parts::slug(name)),
+            title: format!("{} as measured, against the command", heading(name)),
+            x_label: axis("pulse_us"),
+            y_label: axis(name),
+            layers: vec![Layer::Dots {
+                name: "measured".to_owned(),
+                class: "a",
+                x: of_rows(target, pulse),
+                y: claimed(target).map(|k| target.y[k]).collect(),
+            }],
+            height: 280.0,
+            ..Figure::default()
+        }))
+    };
+    e.channels.iter().filter_map(figure).collect()
 }
 
 /// What is left of one of several runs, predicted by a fit to the others.

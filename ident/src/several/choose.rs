@@ -36,7 +36,7 @@ pub(super) struct Named {
     /// By how much worse the runs predict each other without it, nats.
     pub(super) score: f64,
     /// The same of what could stand in its place, were it not there.
-    pub(super) rivals: Vec<f64>,
+    pub(super) rivals: Vec<(&'static str, f64)>,
 }
 
 /// The effects of the rig but one.
@@ -100,7 +100,7 @@ pub(super) fn choose(runs: &[&Closed], members: &[Member<'_>], progress: &mut dy
 }
 
 /// By how much better the runs predict each other with each candidate in the place of one of the rig's effects on its channels.
-fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], pool: &[Vec<Placed>]) -> Vec<f64> {
+fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], pool: &[Vec<Placed>]) -> Vec<(&'static str, f64)> {
     let mut others = rig.to_vec();
     let left = others.remove(k);
     let close = |starts: &&Vec<Placed>| {
@@ -117,7 +117,8 @@ fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], p
     };
     let gain = |starts: &Vec<Placed>| {
         let tried = starts.iter().map(|p| (p, tried(joint, &others, without, p)));
-        tried.filter(|(p, (_, then))| stands(p, then)).map(|(_, (gain, _))| gain).max_by(f64::total_cmp)
+        let gain = tried.filter(|(p, (_, then))| stands(p, then)).map(|(_, (gain, _))| gain).max_by(f64::total_cmp)?;
+        Some((starts[0].effect.id(), gain))
     };
     pool.iter().filter(close).filter_map(gain).collect()
 }

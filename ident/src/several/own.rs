@@ -32,8 +32,8 @@ pub(super) struct Worth {
     pub(super) gain: f64,
     /// Share of the error that it takes, by channel.
     pub(super) reduction: Vec<(&'static str, f64)>,
-    /// Evidence of what could stand in its place, nats.
-    pub(super) rivals: Vec<f64>,
+    /// What could stand in its place, with its evidence, nats.
+    pub(super) rivals: Vec<(&'static str, f64)>,
 }
 
 /// The drifts and events of each run beside the rig's effects: those that it had alone and still needs, and those that show now.
@@ -106,13 +106,13 @@ fn refined(member: &Member<'_>, rig: &[Placed], shared: &[Shared], start: &Place
     is_plausible(context, declared, &stands, whole.len() - 1).then_some((newest, gain))
 }
 
-/// Evidence of the drifts and events that could stand in the place of one of a run's own: those on its channels that come closest.
-fn rivals(member: &Member<'_>, rig: &[Placed], shared: &[Shared], k: usize) -> Vec<f64> {
+/// The drifts and events that could stand in the place of one of a run's own, with their evidence: those on its channels that come closest.
+fn rivals(member: &Member<'_>, rig: &[Placed], shared: &[Shared], k: usize) -> Vec<(&'static str, f64)> {
     let mut without = member.clone();
     let taken = without.own.remove(k);
     let other = |p: &Placed| p.effect.id() != taken.effect.id() && p.instance.channels.iter().any(|c| taken.instance.touches(c));
     let close = scanned(&without, rig).into_iter().filter(other).take(RIVALS);
-    close.filter_map(|start| Some(refined(&without, rig, shared, &start)?.1)).collect()
+    close.filter_map(|start| Some((start.effect.id(), refined(&without, rig, shared, &start)?.1))).collect()
 }
 
 /// What one of a run's own effects is worth: how much worse its samples are fitted without it, less the penalty for its parameters.
