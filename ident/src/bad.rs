@@ -14,6 +14,7 @@ mod first_turns;
 mod scale;
 mod spike;
 mod stuck;
+mod unpowered;
 mod witness;
 
 pub(crate) use curve::Curve;
@@ -72,6 +73,9 @@ const MOST: f64 = 0.05;
 /// Rows up to which a departure is a single reading: the running median of five that `glitch_rows` looks through copes with two.
 const SINGLE: usize = 2;
 
+/// The channel that reads the supply.
+const CHANNEL_OF_SUPPLY: &str = "voltage_v";
+
 /// The channels that are judged, those first that others are judged by.
 fn judged() -> impl Iterator<Item = &'static str> {
     MODELLED.into_iter().chain(["thrust_rms_n", "temp_c"])
@@ -94,6 +98,8 @@ pub fn found(log: &Log) -> Vec<SetAside> {
             continue;
         }
         let lost = if SPEED.contains(&name) { of_probe(&mut witnesses, name) } else { Vec::new() };
+        let off = if name == CHANNEL_OF_SUPPLY { unpowered::found(log) } else { Vec::new() };
+        witnesses.take_out(name, &off);
         let mut events = stuck::found(&witnesses, name);
         witnesses.take_out(name, &events);
         // a probe's recovery belongs to its drop-out; elsewhere a single reading stands by itself
@@ -105,7 +111,7 @@ pub fn found(log: &Log) -> Vec<SetAside> {
             events.extend(more);
         }
         let (mut events, recurring) = of_no_effect(name, column, events, samples, speeds);
-        events.extend(lost);
+        events.extend(lost.into_iter().chain(off));
         events.sort_by_key(|e| e.rows.start);
         witnesses.settle(name, &events);
         kept.extend(recurring.iter().filter_map(|e| Some(SetAside { recurs: true, ..told(log, name, column, e)? })));

@@ -15,6 +15,7 @@ use crate::effects::unknown::Words;
 use crate::effects::{Estimate, Shape};
 use crate::heldout;
 use crate::hypothesis::{Declared, Fit, Placed, Rows};
+use crate::identify::is_table;
 use crate::leftover;
 use crate::log::Log;
 use crate::long::diagnose_any;
@@ -24,6 +25,7 @@ use crate::residual::whiteness;
 use crate::rivals::UNEXPLAINED;
 use crate::search::refine;
 use crate::sparse;
+use crate::supply_limit;
 use crate::unexplained::{LOUD, Left, unexplained};
 use crate::verdict::{
     Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict,
@@ -110,10 +112,12 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         next_experiment: None,
         left_out,
         set_aside: context.set_aside.clone(),
+        guessed_floors: is_table(&context, log).then(|| log.len()),
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
         runs: Vec::new(),
     };
     marks::tell(&mut verdict, &mut after_model, &marks);
+    supply_limit::tell(&mut verdict, supply_limit::told(log, &context));
     if verdict.verdict == Kind::Ambiguous {
         verdict.next_experiment =
             crate::experiment::next(found.searched.as_ref().unwrap_or(&context), declared, &after_model, &diagnosis);

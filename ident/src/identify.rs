@@ -163,7 +163,7 @@ pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, Clos
 /// Longest log whose rows may each be a level of their own.
 const TABLE: usize = 64;
 /// Error that a row of a table is given, as a share of its column's largest value; the scatter about a curve corrects it.
-const TABLE_ERROR: f64 = 0.01;
+pub(crate) const TABLE_ERROR: f64 = 0.01;
 
 /// Whether a log is a table with one row for each level.
 #[must_use]

@@ -63,6 +63,7 @@ pub mod solve;
 pub mod sparse;
 mod start;
 mod steps;
+mod supply_limit;
 mod suspects;
 mod together;
 pub mod told;

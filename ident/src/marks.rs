@@ -35,8 +35,8 @@ const APART: f64 = 1.3;
 /// Largest difference between low and high speed, as a share of the angle: half of what such a twist shows; and what edges' own noise may make of
 /// marks that stand as they should, deg.
 const STEADY: (f64, f64) = (0.2, 1.0);
-/// Probability of what a board tells at all speeds: no campaign has counted how often that is wrong.
-const CERTAIN: f64 = 0.95;
+/// Probability of what the readings themselves show: no campaign has counted how often that is wrong.
+pub(crate) const CERTAIN: f64 = 0.95;
 /// Standard deviation, in digits, of what is rounded to whole ones: 1/sqrt(12).
 const ROUNDED: f64 = 0.288_675;
 /// Digit in which boards tell the angle, deg: 90 deg by a ten-thousandth of a period.
@@ -115,18 +115,23 @@ pub(crate) fn tell(verdict: &mut Verdict, model: &mut Model, told: &[Told]) {
     if told.is_empty() {
         return;
     }
+    model.effects.extend(told.iter().map(|one| one.added.clone()));
+    stand(verdict, told.iter().map(entry).collect());
+}
+
+/// Puts names that the readings themselves show into a verdict.
+pub(crate) fn stand(verdict: &mut Verdict, entries: Vec<EffectEntry>) {
     if matches!(verdict.verdict, Kind::None | Kind::Unattributed) {
         verdict.verdict = Kind::Attributed;
     }
-    model.effects.extend(told.iter().map(|one| one.added.clone()));
-    // what has no name stays last
-    let names = verdict.effects.iter().take_while(|e| e.id != "unknown").count();
-    verdict.effects.splice(names..names, told.iter().map(entry));
     // the other hypotheses hold what is told as well
     for other in &mut verdict.alternatives {
         other.probability *= CERTAIN;
-        other.ids.extend(told.iter().map(|one| one.added.placed.effect.id().to_owned()));
+        other.ids.extend(entries.iter().map(|e| e.id.clone()));
     }
+    // what has no name stays last
+    let names = verdict.effects.iter().take_while(|e| e.id != "unknown").count();
+    verdict.effects.splice(names..names, entries);
 }
 
 fn entry(told: &Told) -> EffectEntry {

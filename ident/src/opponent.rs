@@ -12,6 +12,7 @@ use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{Effect, Instance, quantisation};
 use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Designs, Fit, Placed, Rows, fit_target};
+use crate::log::MODELLED;
 use crate::moment::best_moment;
 use crate::residual::whiteness;
 
@@ -111,14 +112,24 @@ pub(crate) fn correction(context: &Context, declared: Declared<'_>, base: &Fit, 
     Some(Fit { placed, targets })
 }
 
-/// Whether a variable stands for the channel itself or for the load, which its relation holds already. (The departure of
-/// thrust from its polynomial in the speed is still a question; current and voltage follow the load with their own lags.)
+/// Whether a variable stands for the channel itself or for the load, which its relation holds already. (The departure of thrust from its polynomial
+/// in the speed is still a question; current and voltage follow the load with their own lags.) A second meter of a channel stands for what the
+/// first one does: no channel is asked over another one.
 pub(crate) fn is_load(context: &Context, target: &Target, name: &str) -> bool {
-    let held = match target.relation {
-        Relation::Torque | Relation::Thrust | Relation::Current => ["pulse_us", "current_a", "voltage_v"].contains(&name),
-        _ => ["pulse_us", "current_a", "voltage_v", "rpm"].contains(&name),
+    let held: &[&str] = match target.relation {
+        Relation::Torque | Relation::Thrust | Relation::Current => &["pulse_us", "current_a", "voltage_v"],
+        _ => &["pulse_us", "current_a", "voltage_v", "rpm"],
     };
-    held || twin(context, target, name)
+    let second = || MODELLED.iter().any(|of| is_second_meter(context, of, name));
+    held.contains(&name) || second() || twin(context, target, name)
+}
+
+/// Whether a column is a second meter of what a channel measures, such as `esc_voltage_v` beside `voltage_v`. Where both read the same the
+/// quantity itself moves: one meter is no cause of the other's reading.
+pub(crate) fn is_second_meter(context: &Context, channel: &str, column: &str) -> bool {
+    let quantity = channel.split('_').next().unwrap_or(channel);
+    let same = column.split('_').any(|word| word == quantity);
+    same && column != channel && context.covariates.iter().any(|c| c.0 == column)
 }
 
 /// Whether a column repeats the target in other units: squared correlation above 0.98 on its rows.
@@ -230,4 +241,29 @@ fn takes_most(context: &Context, target: &Target, (before, after): (&[f64], &[f6
     let needed = if context.against_model { NEEDED_AGAINST_MODEL } else { NEEDED_SHARE };
     // between jumps only what stood out there can have been explained there
     !calm_only && (b < 1.5 * floor || a < 2.25 * floor) || b > 1.5 * floor && (b - a) > needed * (b - floor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Column, Log};
+
+    #[test]
+    fn a_second_meter_stands_for_the_first() {
+        let wave = |k: f64| (0..200).map(|i| 10.0 + (k * f64::from(i)).sin()).collect::<Vec<f64>>();
+        let columns =
+            ["rpm", "torque_nm", "current_a", "voltage_v", "esc_voltage_v", "esc_current_a", "board_temp_c", "torque_raw"];
+        let column = |(k, name): (usize, &&str)| Column { name: (*name).to_owned(), values: wave(0.1 + 0.037 * k as f64) };
+        let columns = columns.iter().enumerate().map(column).collect();
+        let t = (0..200).map(|i| 0.1 * f64::from(i)).collect();
+        let context = Context::new(&Log { name: "two.csv".into(), t, columns, ..Log::default() }, None);
+        let held = |channel: &str, name: &str| {
+            let target = &context.targets[context.target(channel).unwrap_or_else(|| panic!("{channel}"))];
+            is_load(&context, target, name)
+        };
+        assert!(held("voltage_v", "esc_voltage_v") && held("torque_nm", "torque_raw"), "of the channel itself");
+        assert!(held("torque_nm", "esc_current_a") && held("voltage_v", "torque_raw"), "of the load");
+        assert!(!held("voltage_v", "board_temp_c") && !held("current_a", "board_temp_c"));
+        assert!(!is_second_meter(&context, "rpm_hall", "rpm"), "the consensus is no column of its own");
+    }
 }

@@ -11,7 +11,7 @@ use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::heldout;
 use crate::hypothesis::{Declared, Fit, effective_share};
 use crate::inspect::goes_with;
-use crate::opponent::left_over;
+use crate::opponent::{is_second_meter, left_over};
 use crate::solve::Normal;
 use crate::verdict::{Channels, Unexplained};
 use std::ops::Range;
@@ -49,16 +49,22 @@ pub(crate) fn unexplained(context: &Context, declared: Declared<'_>, fit: &Fit, 
                 .filter(|over| *over > LOUD || left_over(context, target, &residuals[i])),
         };
         if let Some(over_floor) = over_floor.filter(|over| over.is_finite()) {
-            let told = Unexplained {
-                channel: spoken(target.name),
-                over_floor,
-                depends_on: goes_with(context, i, &residuals[i]),
-                looks_like: looks_like(context, target, &residuals[i]),
-            };
+            let (meters, depends_on): (Vec<String>, Vec<String>) =
+                goes_with(context, i, &residuals[i]).into_iter().partition(|name| is_second_meter(context, target.name, name));
+            let looks_like = looks_like(context, target, &residuals[i]) + &borne_out(&meters);
+            let told = Unexplained { channel: spoken(target.name), over_floor, depends_on, looks_like };
             out.push(Left { target: i, told });
         }
     }
     out
+}
+
+/// That further meters of the same quantity read what is left as well; the raw codes of the one meter bear out nothing.
+fn borne_out(meters: &[String]) -> String {
+    match meters.iter().find(|name| !name.ends_with("_raw")) {
+        Some(second) => format!("; {second} reads it as well, so that it is no error of one meter"),
+        None => String::new(),
+    }
 }
 
 /// The name of a channel as people say it.

@@ -272,6 +272,9 @@ pub struct Verdict {
     /// Samples that nothing else in the log bears out, in stretches: they took no part.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub set_aside: Vec<SetAside>,
+    /// Rows of a table with one row for each level: none has two to compare, so that the noise floors are guesses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub guessed_floors: Option<usize>,
     /// Other runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub validation: Vec<Validation>,

@@ -5,11 +5,12 @@
 //! Units: scaled to a size that one reads at a glance (0.041 ohm is 41 mohm).
 //! Reference: GUM, clause 7.2.6 (digits of a result).
 
+mod entry;
 mod plain;
 
 use crate::effects::Scope;
 use crate::verdict::{EffectEntry, Parameter};
-pub use plain::{channels, formula, plain};
+pub use plain::{channels, curve, formula, plain};
 
 /// What a cause does, in two parts: an adverb fits between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,106 +50,21 @@ impl Clause {
     }
 }
 
-impl EffectEntry {
-    /// Whether it tells of a few readings alone: of no cause that a rig has, and not worth a headline beside one.
-    #[must_use]
-    pub fn is_of_single_readings(&self) -> bool {
-        self.id == "glitch_rows"
-    }
-
-    /// A parameter.
-    #[must_use]
-    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
-        self.parameters.iter().find(|p| p.name == name)
-    }
-
-    /// `with` the size of a parameter, or `without` where the run does not show it.
-    #[must_use]
-    pub fn tell(&self, name: &str, with: impl Fn(&str) -> String, without: &str) -> String {
-        self.parameter(name).and_then(sized).map_or_else(|| without.to_owned(), |v| with(&v))
-    }
-
-    /// The same in another unit that means as much: `V` (each ampere) for `ohm`; `%` for a share.
-    #[must_use]
-    pub fn tell_in(&self, name: &str, unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
-        self.tell_times(name, if unit == "%" { 100.0 } else { 1.0 }, unit, with, without)
-    }
-
-    /// The size of a parameter without its sign in words of its own, in a unit that means as much; `word` is the one for up or the one for down.
-    #[must_use]
-    pub fn tell_signed(
-        &self,
-        name: &str,
-        (factor, unit): (f64, &str),
-        [up, down]: [&str; 2],
-        with: impl Fn(&str, &str) -> String,
-        without: &str,
-    ) -> String {
-        let rises = self.parameter(name).is_none_or(|p| p.value >= 0.0);
-        let (sign, word) = if rises { (factor, up) } else { (-factor, down) };
-        self.tell_times(name, sign, unit, |size| with(word, size), without)
-    }
-
-    /// The same times a factor.
-    #[must_use]
-    pub fn tell_times(&self, name: &str, factor: f64, unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
-        let scaled = self.parameter(name).map(|p| Parameter {
-            name: p.name.clone(),
-            value: factor * p.value,
-            unit: unit.to_owned(),
-            ci95: p.ci95.map(|v| factor * v),
-        });
-        scaled.as_ref().and_then(sized).map_or_else(|| without.to_owned(), |v| with(&v))
-    }
-
-    /// The length of a vector, `NAME_x` to `NAME_z`, with its interval carried along.
-    #[must_use]
-    pub fn tell_length(&self, name: &str, unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
-        let axes = ["x", "y", "z"].map(|axis| format!("{name}_{axis}"));
-        self.tell_length_of(&axes.each_ref().map(String::as_str), unit, with, without)
-    }
-
-    /// The length of a vector from the parameters that are its axes.
-    #[must_use]
-    pub fn tell_length_of(&self, axes: &[&str], unit: &str, with: impl Fn(&str) -> String, without: &str) -> String {
-        let axes: Vec<&Parameter> = axes.iter().filter_map(|axis| self.parameter(axis)).collect();
-        let length = axes.iter().map(|p| p.value * p.value).sum::<f64>().sqrt();
-        let half = axes.iter().map(|p| (p.value / length * 0.5 * (p.ci95[1] - p.ci95[0])).powi(2)).sum::<f64>().sqrt();
-        let whole = Parameter { name: String::new(), value: length, unit: unit.to_owned(), ci95: [length - half, length + half] };
-        sized(&whole).map_or_else(|| without.to_owned(), |v| with(&v))
-    }
-
-    /// The meter of its first channel: "the load cell".
-    #[must_use]
-    pub fn meter(&self) -> String {
-        self.channels.first().map_or_else(|| "a meter".to_owned(), |c| meter(c))
-    }
-
-    /// Unit of its first channel.
-    #[must_use]
-    pub fn unit(&self) -> &'static str {
-        self.channels.first().map_or("", |c| crate::context::unit_of(c))
-    }
-
-    /// Whether it was there before the run began.
-    #[must_use]
-    pub fn is_since_before(&self) -> bool {
-        self.equation.contains("since before the run")
-    }
-}
-
 /// What a scope of something that is called so means to the reader.
 #[must_use]
 pub fn scope(e: &EffectEntry, noun: &str) -> String {
     match e.scope {
         // it began and did not end
-        Scope::Event if e.parameter("t0").is_some() && e.parameter("t1").is_none() => {
-            format!("since one instant: it stays with the {noun} until something is changed")
-        }
+        Scope::Event if e.parameter("t0").is_some() && e.parameter("t1").is_none() => since_one_instant(noun),
+        Scope::Rig if e.has_begun() => since_one_instant(noun),
         Scope::Rig => format!("of the {noun}: every run should show it"),
         Scope::Run => "of this run: another run has a value of its own".to_owned(),
         Scope::Event => "of one instant: it does not recur by itself".to_owned(),
     }
+}
+
+fn since_one_instant(noun: &str) -> String {
+    format!("since one instant: it stays with the {noun} until something is changed")
 }
 
 /// A parameter's name in words.
@@ -187,7 +103,7 @@ pub(crate) fn signs(evidence: &str) -> &str {
 
 /// Probability from which on a cause is told without an adverb. Where nothing else explains a channel the search still keeps a tenth for causes
 /// that the library lacks, so that hardly a name stands above 0.9.
-const SURE: f64 = 0.85;
+pub(crate) const SURE: f64 = 0.85;
 
 /// How sure a probability is, as an adverb; empty where nothing needs to be said.
 #[must_use]

@@ -50,7 +50,7 @@ fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
         after: of(after),
     };
     let mut channels = Channels::default();
-    channels.predicted.insert("thrust_n".into(), channel("N", 0.01, 0.3, 0.03));
+    channels.predicted.insert("thrust_n".into(), channel("N", 0.01, 0.3, 0.0304));
     channels.predicted.insert("voltage_v".into(), channel("V", 0.01, 0.5, 0.08));
     Verdict {
         format: FORMAT,
@@ -63,6 +63,7 @@ fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
         next_experiment: None,
         left_out: vec![],
         set_aside: vec![],
+        guessed_floors: None,
         validation: vec![],
         runs: vec![],
     }
@@ -199,10 +200,32 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         (
             with_left(verdict(Kind::None, vec![])),
             false,
+            &["No name was found for what the declared model leaves over. On thrust 0.030 N is left (slow)."],
+            &["more than its noise", "explains"],
+        ),
+        (
+            with_left(verdict(Kind::None, vec![])),
+            true,
             &[
-                "The declared model explains the run, but for a rest that no name was found for. On thrust 0.030 N is left (slow).",
+                "Nothing is new since the declared model: what is left it left over on its own day, too. On thrust 0.030 N is left",
             ],
-            &["more than its noise"],
+            &["explains"],
+        ),
+        (
+            Verdict { guessed_floors: Some(16), ..verdict(Kind::None, vec![]) },
+            false,
+            &["As far as guessed noise floors tell, the declared model explains the run"],
+            &["The declared model explains"],
+        ),
+        (
+            // a question does not hide what has no name
+            Verdict {
+                alternatives: open(0.45).alternatives,
+                ..verdict(Kind::Ambiguous, vec![filter(0.5), sag(0.99), effect("unknown", "thrust_n", 0.9, 0.4, vec![])])
+            },
+            false,
+            &["What has no name is told below, too."],
+            &[],
         ),
     ]
 }
@@ -368,6 +391,107 @@ fn a_share_is_that_of_the_whole_quantity() {
     let said = sentence(&v, Vocabulary::RIG, false);
     // 1 - (0 + 99)/(399 + 399)
     assert!(said.contains("88 % of what the speeds had left over"), "{said}");
+}
+
+/// A channel of which the state says that little is left, over all runs, is not told as loud for the one run on which it is.
+#[test]
+fn the_sentence_counts_what_the_state_calls_unexplained() {
+    let mut v = verdict(Kind::Attributed, vec![sag(0.9)]);
+    v.unexplained = vec![left("thrust_n", 9.0), left("voltage_v", 8.0)];
+    if let Some(thrust) = v.channels.predicted.get_mut("thrust_n") {
+        thrust.after.heldout_rms = 0.02;
+    }
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.contains("On voltage 80 mV is left (slow).") && !said.contains("thrust"), "{said}");
+}
+
+/// A share of a whole vector does not hide that one of its axes is worse for it.
+#[test]
+fn an_axis_that_is_worse_is_told() {
+    let mut v = verdict(Kind::Attributed, vec![effect("hard_iron", "mz", 0.99, 0.7, vec![])]);
+    let of = |rms: f64| Figures { rms, heldout_rms: rms, across_runs_rms: None, whiteness_p: 0.2 };
+    let axis =
+        |before: f64, after: f64| Channel { unit: "uT".into(), noise_floor_rms: 0.2, before: of(before), after: of(after) };
+    v.channels.predicted =
+        [("mx", axis(3.56, 2.27)), ("my", axis(3.40, 3.47)), ("mz", axis(14.1, 3.70))].map(|(n, c)| (n.to_owned(), c)).into();
+    let said = sentence(&v, ident::inertial::VOCABULARY, false);
+    assert!(said.contains("of what field had left over. Field (y) is predicted 2 % worse."), "{said}");
+}
+
+/// What is left looks like what it does on the sensor whose size is told.
+#[test]
+fn a_size_and_its_look_are_of_one_sensor() {
+    let mut v = verdict(Kind::Attributed, vec![sag(0.9)]);
+    let of = |rms: f64| Figures { rms, heldout_rms: rms, across_runs_rms: None, whiteness_p: 0.2 };
+    for (name, floor, after) in [("rpm_hall", 1.0, 8.0), ("rpm_beam", 1.5, 9.0)] {
+        let channel = Channel { unit: "rpm".into(), noise_floor_rms: floor, before: of(20.0), after: of(after) };
+        v.channels.predicted.insert(name.into(), channel);
+    }
+    let on_its_way = Unexplained { looks_like: "while the load is on its way".into(), ..left("rpm_beam", 6.0) };
+    v.unexplained = vec![Unexplained { looks_like: "in single rows".into(), ..left("rpm_hall", 8.0) }, on_its_way];
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.contains("up to 9.0 rev/min is left (while the load is on its way)"), "{said}");
+}
+
+/// Rotors of which the same is told have one entry.
+#[test]
+fn what_is_alike_but_for_its_channel_is_told_once() {
+    let rotor = |k: usize| effect("unknown", &format!("rpm_{k}"), 0.999, 0.4, vec![]);
+    let mut v = verdict(Kind::Unattributed, vec![rotor(1), rotor(2), rotor(3), rotor(4)]);
+    let one = v.channels.predicted["thrust_n"].clone();
+    for k in 1..=4 {
+        let after = if k == 4 { Figures { heldout_rms: 0.2, ..one.after } } else { one.after };
+        v.channels.predicted.insert(format!("rpm_{k}"), Channel { after, ..one.clone() });
+    }
+    let text = terminal(&v, ident::flight::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains("on speed of rotors 1, 2 and 3, vehicle Without it the error of speed of rotor 1 is"), "{text}");
+    assert!(text.contains("The others are alike.") && text.contains("on speed of rotor 4, vehicle"), "{text}");
+    assert_eq!(text.matches("unknown (").count(), 2, "{text}");
+}
+
+/// What began within a run is not told as of every run, and of sizes of which none is known the effect alone is sure.
+#[test]
+fn an_effect_of_a_board_claims_no_more_than_its_intervals() {
+    let z = parameter("offset_z", 17.9, 6.0, "uT");
+    let magnet = effect("hard_iron", "mz", 0.999, 0.2, vec![z, parameter("t0", 40.8, 1.8, "s")]);
+    assert!(ident::words::scope(&magnet, "board").starts_with("since one instant"));
+    let said = (ident::inertial::VOCABULARY.clause)(&magnet).sentence();
+    assert!(said.ends_with("to the field from 41 s on."), "{said}");
+    let sizes = |clear: f64| [clear, 0.011, 0.024, 0.021].map(|v| parameter("s_xy", v, 0.035, "1")).to_vec();
+    let iron = |clear: f64| {
+        let v = verdict(Kind::Attributed, vec![effect("soft_iron", "thrust_n", 0.999, 0.05, sizes(clear))]);
+        terminal(&v, ident::inertial::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    assert!(iron(0.05).contains("of its 4 sizes 3 may each be zero"), "{}", iron(0.05));
+    assert!(!iron(0.2).contains("may each be zero"), "one is well known: {}", iron(0.2));
+}
+
+/// Floors that are guesses, and floors that no sensor has, are told before the figures.
+#[test]
+fn floors_that_are_no_measure_are_told() {
+    let plain = verdict(Kind::Attributed, vec![sag(0.9)]);
+    let said = |v: &Verdict| terminal(v, Vocabulary::RIG, false).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(!said(&plain).contains("guesses") && !said(&plain).contains("16-bit"));
+    assert!(said(&Verdict { guessed_floors: Some(11), ..plain.clone() }).contains("Only 11 rows, one for each level"));
+    let mut silent = plain;
+    if let Some(c) = silent.channels.predicted.get_mut("voltage_v") {
+        c.noise_floor_rms = 1e-6;
+    }
+    assert!(
+        said(&silent).contains("Voltage: the noise floor lies beneath the rounding of any 16-bit sensor"),
+        "{}",
+        said(&silent)
+    );
+}
+
+/// A correction without a name is told as a curve, not by its polynomials.
+#[test]
+fn a_curve_has_words() {
+    let mut curve = effect("unknown", "rpm", 0.9, 0.4, vec![]);
+    curve.equation = "reading += sum of p_k P_k(v) [pulse_us, terms 3]".into();
+    assert_eq!(ident::words::curve(&curve).as_deref(), Some("a smooth curve of pulse, 3 terms"));
+    curve.equation = "no correction".into();
+    assert_eq!((ident::words::curve(&curve), ident::words::curve(&sag(0.9))), (None, None));
 }
 
 /// Of several runs what happened on one alone names it, on the terminal and at the head.

@@ -19,6 +19,9 @@ use spin_up::SPIN_UP;
 /// See the module.
 pub(crate) struct CurrentLimit;
 
+/// Form of a limit that the meters of voltage and current show ([`crate::supply_limit`]): it changes no prediction.
+pub(crate) const OF_THE_SUPPLY: &str = "of the supply, read off its meters";
+
 impl Effect for CurrentLimit {
     fn id(&self) -> &'static str {
         "current_limit"
@@ -36,6 +39,10 @@ impl Effect for CurrentLimit {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
+        if found.equation.contains(OF_THE_SUPPLY) {
+            let holds = found.tell("limit", |v| format!("holds the current to {v}"), "holds the current");
+            return Clause::new("the supply", format!("{holds}, and its voltage gives way"));
+        }
         Clause::new("the current", found.tell("limit", |v| format!("is held to {v}"), "is limited"))
     }
 

@@ -54,7 +54,7 @@ pub(crate) use crate::verdict::EffectEntry;
 use crate::verdict::Kin;
 pub(crate) use crate::words::Clause;
 pub(crate) use amplifier_saturation::Rail;
-pub(crate) use current_limit::Draw;
+pub(crate) use current_limit::{CurrentLimit, Draw, OF_THE_SUPPLY};
 pub(crate) use tare_shift::BEFORE;
 pub(crate) use throttle_quantisation::Best as SawTooth;
 

@@ -314,6 +314,7 @@ impl<'w> Whole<'w> {
             verdict: kind,
             alternatives: alternatives.collect(),
             set_aside: aside.collect(),
+            guessed_floors: None,
             left_out: Vec::new(),
             validation: Vec::new(),
             runs: Vec::new(),
@@ -380,7 +381,7 @@ impl<'w> Whole<'w> {
         c.kept.iter().map(entry).collect()
     }
 
-    /// What is left: loud, or not white.
+    /// What is left: loud, or above the floor and not white.
     fn unexplained(&self, channels: &Channels) -> Vec<Unexplained> {
         let c = self.concluded;
         let nameless = ask(&self.problem, &c.fit, &|_, candidate| !candidate.is_named());
@@ -399,7 +400,9 @@ impl<'w> Whole<'w> {
             let figures = channels.get(&channel.name)?;
             let over_floor = figures.after.heldout_rms / figures.noise_floor_rms.max(f64::MIN_POSITIVE);
             let left = c.left.iter().find(|l| l.channel == k);
-            (left.is_some() || over_floor > crate::attribution::conclude::LOUD).then(|| Unexplained {
+            // a pattern beneath the floor is none that a reader must see
+            let patterned = left.is_some() && over_floor > 1.0;
+            (patterned || over_floor > crate::attribution::conclude::LOUD).then(|| Unexplained {
                 channel: channel.name.clone(),
                 over_floor,
                 depends_on: goes_with(k),

@@ -124,6 +124,7 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         next_experiment,
         left_out: Vec::new(),
         set_aside: Vec::new(),
+        guessed_floors: None,
         validation: Vec::new(),
         runs: Vec::new(),
     };

@@ -76,7 +76,6 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         words: VOCABULARY,
         news: false,
         origin,
-        cautions: Vec::new(),
         declared: "Declared: a field that is constant in earth axes, gravity and a constant offset, a constant offset of the gyro at rest. The attitude comes from gyro and accelerometer alone.".to_owned(),
         hero: parts::most(v, VOCABULARY, &traces),
         cards: cards(recording, closed),

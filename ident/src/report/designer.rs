@@ -19,7 +19,7 @@ pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figu
         return;
     }
     let zero = if rests(&found.speeds) {
-        "Thrust and torque less what they read at rest"
+        "Thrust and torque less the zero of their square laws: where the line through all levels meets rest"
     } else {
         "Thrust and torque as read: no level is at rest"
     };

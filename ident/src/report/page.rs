@@ -18,7 +18,7 @@ use crate::context::{Context, DIFFERENCES, Target, unit_of};
 use crate::effects::unknown::variable;
 use crate::heldout::residuals;
 use crate::hypothesis::{Declared, Rows, fit};
-use crate::identify::{identify, is_table};
+use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
 use crate::several::Shown;
@@ -34,7 +34,6 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         words: Vocabulary::RIG,
         news: closed.context.against_model,
         origin,
-        cautions: cautions(log, closed),
         declared: declared(closed),
         hero: hero(closed),
         cards: cards(closed),
@@ -48,15 +47,6 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
     parts::candidates(&mut sheet, &closed.diagnosis);
     parts::aside(&mut sheet, v);
     sheet.html()
-}
-
-fn cautions(log: &Log, closed: &Closed) -> Vec<String> {
-    let table = is_table(&closed.context, log);
-    let said = format!(
-        "Only {} rows, one for each level: none has two to compare, so that the noise floors are guesses, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.",
-        log.len()
-    );
-    if table { vec![said] } else { Vec::new() }
 }
 
 fn declared(closed: &Closed) -> String {
@@ -107,11 +97,40 @@ fn trace(closed: &Closed, target: &Target) -> Option<Trace> {
     })
 }
 
-/// The figure that convinces most.
+/// The figure that convinces most; of names that the readings themselves show those readings.
 fn hero(closed: &Closed) -> Vec<Figure> {
+    let mut named = closed.verdict.effects.iter().filter(|e| e.id != "unknown").peekable();
+    if let Some(first) = named.peek().copied()
+        && named.all(EffectEntry::is_read_off)
+    {
+        return readings(closed, first);
+    }
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> = targets.filter_map(|t| trace(closed, t)).collect();
     parts::most(&closed.verdict, Vocabulary::RIG, &traces)
+}
+
+/// What an effect's channels read at each command.
+fn readings(closed: &Closed, e: &EffectEntry) -> Vec<Figure> {
+    let Some(pulse) = &closed.context.pulse else { return Vec::new() };
+    let figure = |name: &String| {
+        let target = target(closed, name)?;
+        Some(thinned(Figure {
+            id: format!("read-{}", parts::slug(name)),
+            title: format!("{} as measured, against the command", heading(name)),
+            x_label: axis("pulse_us"),
+            y_label: axis(name),
+            layers: vec![Layer::Dots {
+                name: "measured".to_owned(),
+                class: "a",
+                x: of_rows(target, pulse),
+                y: claimed(target).map(|k| target.y[k]).collect(),
+            }],
+            height: 280.0,
+            ..Figure::default()
+        }))
+    };
+    e.channels.iter().filter_map(figure).collect()
 }
 
 /// What is left of one of several runs, predicted by a fit to the others.

@@ -32,7 +32,6 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         words: Vocabulary::RIG,
         news: false,
         origin: Origin::of_several(&runs.iter().map(|r| &r.log).collect::<Vec<_>>()),
-        cautions: Vec::new(),
         declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as a geometric mean over the runs.".to_owned(),
         hero: outcome.shown.iter().flat_map(|shown| over_runs(v, shown)).map(|figure| on(first, figure)).collect(),
         cards: v.effects.iter().enumerate().map(|(k, e)| card(&alone, outcome, v, k, e)).collect(),
@@ -46,6 +45,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
             if let Some(link) = links.get(run) {
                 sheet.html_part(&format!("<p><a href=\"{}\">The run alone</a>, with its own verdict.</p>\n", escape(link)));
             }
+            sheet.say("What follows is not of the run alone. It is this run as a fit to the other runs predicts it:");
             sheet.html_part(&parts::bars(&channels(v, outcome, run, of), &[], &[], pair(v)));
         });
     }

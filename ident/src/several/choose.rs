@@ -35,6 +35,8 @@ pub(super) struct Named {
     pub(super) placed: Placed,
     /// By how much worse the runs predict each other without it, nats.
     pub(super) score: f64,
+    /// The same of what could stand in its place, were it not there.
+    pub(super) rivals: Vec<(&'static str, f64)>,
 }
 
 /// The effects of the rig but one.
@@ -90,8 +92,35 @@ pub(super) fn choose(runs: &[&Closed], members: &[Member<'_>], progress: &mut dy
         now = then;
         drop_useless(&joint, &mut rig, &mut now);
     }
-    let scores: Vec<f64> = (0..rig.len()).map(|k| gain_of(&joint, &rig, &now, k).0).collect();
-    rig.into_iter().zip(scores).map(|(placed, score)| Named { placed, score }).collect()
+    let named = |k: usize| {
+        let (score, without) = gain_of(&joint, &rig, &now, k);
+        Named { placed: rig[k].clone(), score, rivals: rivals(&joint, &rig, k, &without, &pool) }
+    };
+    (0..rig.len()).map(named).collect()
+}
+
+/// By how much better the runs predict each other with each candidate in the place of one of the rig's effects on its channels.
+fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], pool: &[Vec<Placed>]) -> Vec<(&'static str, f64)> {
+    let mut others = rig.to_vec();
+    let left = others.remove(k);
+    let close = |starts: &&Vec<Placed>| {
+        let first = &starts[0];
+        first.effect.id() != left.effect.id()
+            && first.instance.channels.iter().any(|c| left.instance.touches(c))
+            && may_stand_beside(&others, first)
+    };
+    // what could not join could not stand there either
+    let stands = |p: &Placed, then: &[Across]| {
+        let compared = compared(without, then);
+        let with: Vec<Placed> = others.iter().chain([p]).cloned().collect();
+        is_worth(&compared) && harms(&compared).is_none() && is_plausible(joint, &with)
+    };
+    let gain = |starts: &Vec<Placed>| {
+        let tried = starts.iter().map(|p| (p, tried(joint, &others, without, p)));
+        let gain = tried.filter(|(p, (_, then))| stands(p, then)).map(|(_, (gain, _))| gain).max_by(f64::total_cmp)?;
+        Some((starts[0].effect.id(), gain))
+    };
+    pool.iter().filter(close).filter_map(gain).collect()
 }
 
 type Joined = (usize, Placed, Vec<Across>);

@@ -18,8 +18,11 @@ use crate::hypothesis::Placed;
 use crate::model::{AddedEffect, RunLevel};
 use crate::rivals::TEMPERATURE;
 use crate::unexplained::LOUD;
-use crate::verdict::{Kin, Unexplained};
+use crate::verdict::{Alternative, Kin, Unexplained};
 use crate::words::channel as spoken;
+
+/// What could stand in the place of a name, with its probability.
+pub(super) type Others = Vec<(&'static str, f64)>;
 
 /// An effect of the rig, with the errors of the runs without it and with all.
 pub(super) fn entry(
@@ -27,8 +30,9 @@ pub(super) fn entry(
     named: &Named,
     [without, after]: [&[Across]; 2],
     estimates: &[Estimate],
-) -> EffectEntry {
-    let (p, score) = (&named.placed, named.score);
+) -> (EffectEntry, Others) {
+    let p = &named.placed;
+    let (probability, others) = probabilities(named.score, &named.rivals);
     let taken = |channel: &str| {
         let pooled = |list: &[Across]| typical(list.iter().filter(|a| a.channel == channel).map(|a| a.rms));
         1.0 - pooled(after) / pooled(without)
@@ -43,14 +47,14 @@ pub(super) fn entry(
     let about = p.effect.about();
     let better = |a: &&Across| without.iter().any(|w| w.run == a.run && w.channel == a.channel && w.rms > a.rms);
     let helped = after.iter().filter(|a| a.channel == first).filter(better).count();
-    EffectEntry {
+    let entry = EffectEntry {
         kin: joint.members.first().map_or(Kin::Own, |m| p.effect.kin(m.context, &p.instance, &reported)),
         id: p.effect.id().to_owned(),
         scope: p.effect.scope(&p.instance),
         run: None,
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: equation(p),
-        probability: probability(score),
+        probability,
         parameters: reported.iter().map(|e| parameter(e, &shapes, &first)).collect(),
         heldout_error_reduction: reduction,
         evidence: format!(
@@ -61,7 +65,8 @@ pub(super) fn entry(
             1.0 / (1.0 - reduction).max(1e-6)
         ),
         channels,
-    }
+    };
+    (entry, others)
 }
 
 fn or_nothing(reduction: f64) -> f64 {
@@ -69,9 +74,10 @@ fn or_nothing(reduction: f64) -> f64 {
 }
 
 /// The drifts and events of one run.
-pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -> Vec<EffectEntry> {
+pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -> Vec<(EffectEntry, Others)> {
     let told = |(added, worth): (&AddedEffect, &Worth)| {
         let p = &added.placed;
+        let (probability, others) = probabilities(worth.gain, &worth.rivals);
         let (first, reduction) = worth
             .reduction
             .iter()
@@ -90,14 +96,14 @@ pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -
             own => own,
         };
         let times = 1.0 / (1.0 - or_nothing(reduction)).max(1e-6);
-        EffectEntry {
+        let entry = EffectEntry {
             kin: Kin::Own,
             id: p.effect.id().to_owned(),
             scope,
             run: Some(context.name.clone()),
             depends_on: p.effect.about().depends_on.iter().map(|v| (*v).to_owned()).collect(),
             equation: equation(p),
-            probability: probability(worth.gain),
+            probability,
             parameters: reported.iter().map(|e| parameter(e, &shapes, first)).collect(),
             heldout_error_reduction: or_nothing(reduction),
             evidence: format!(
@@ -107,7 +113,8 @@ pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -
                 spoken(first)
             ),
             channels,
-        }
+        };
+        (entry, others)
     };
     own.effects.iter().zip(worths).map(told).collect()
 }
@@ -117,8 +124,28 @@ fn equation(p: &Placed) -> String {
     if p.instance.form.is_empty() { about.equation.to_owned() } else { format!("{} [{}]", about.equation, p.instance.form) }
 }
 
-fn probability(score: f64) -> f64 {
-    1.0 / (1.0 + (-score / TEMPERATURE).exp())
+/// Probability of a name by its evidence, against that of what could stand in its place and against nothing; that of each of the others.
+fn probabilities(score: f64, rivals: &[(&'static str, f64)]) -> (f64, Vec<(&'static str, f64)>) {
+    let against = |evidence: f64| ((evidence - score) / TEMPERATURE).exp();
+    let total = 1.0 + against(0.0) + rivals.iter().map(|r| against(r.1)).sum::<f64>();
+    (1.0 / total, rivals.iter().map(|(id, evidence)| (*id, against(*evidence) / total)).collect())
+}
+
+/// Probability from which on another hypothesis is listed.
+const LISTED: f64 = 0.005;
+
+/// The verdict's names with one of them replaced by what could stand in its place, most probable first. `told` are the names, each with its
+/// others.
+pub(super) fn alternatives(told: &[(EffectEntry, Others)]) -> Vec<Alternative> {
+    let swapped = |k: usize, id: &str| {
+        let name = |(j, (e, _)): (usize, &(EffectEntry, Others))| if j == k { id.to_owned() } else { e.id.clone() };
+        told.iter().enumerate().map(name).collect()
+    };
+    let all = told.iter().enumerate().flat_map(|(k, (_, others))| others.iter().map(move |(id, p)| (k, *id, *p)));
+    let listed = all.filter(|(.., p)| *p >= LISTED);
+    let mut out: Vec<Alternative> = listed.map(|(k, id, probability)| Alternative { ids: swapped(k, id), probability }).collect();
+    out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    out
 }
 
 /// Every channel that is loud on a run after all, once, with the run on which it is loudest; and every contrast of a speed sensor that a run
@@ -164,5 +191,19 @@ pub(super) fn unnamed(left: &Unexplained) -> EffectEntry {
         parameters: Vec::new(),
         heldout_error_reduction: 0.0,
         evidence: left.looks_like.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::probabilities;
+
+    #[test]
+    fn what_could_stand_in_its_place_takes_from_a_name() {
+        assert!(probabilities(30.0, &[]).0 > 0.99);
+        let (own, others) = probabilities(30.0, &[("creep", 30.0)]);
+        assert!((own - 0.5).abs() < 1e-3 && (others[0].1 - own).abs() < 1e-12, "one that explains as much is as probable");
+        assert!(probabilities(30.0, &[("creep", -100.0), ("stall", 2.0)]).0 > 0.99, "others are far behind");
+        assert!((probabilities(0.0, &[]).0 - 0.5).abs() < 1e-12);
     }
 }

@@ -20,6 +20,8 @@ use crate::solve::Normal;
 
 /// Most drifts and events of one run.
 const MOST: usize = 3;
+/// Others that are weighed against one: the next ones explain less on their grids.
+const RIVALS: usize = 4;
 /// Evaluations for the shapes of one.
 const EVALUATIONS: usize = 60;
 
@@ -30,6 +32,8 @@ pub(super) struct Worth {
     pub(super) gain: f64,
     /// Share of the error that it takes, by channel.
     pub(super) reduction: Vec<(&'static str, f64)>,
+    /// What could stand in its place, with its evidence, nats.
+    pub(super) rivals: Vec<(&'static str, f64)>,
 }
 
 /// The drifts and events of each run beside the rig's effects: those that it had alone and still needs, and those that show now.
@@ -42,7 +46,8 @@ pub(super) fn settle(members: &mut [Member<'_>], rig: &[Placed]) -> Vec<Vec<Wort
             let Some(newest) = best(&member, rig, &shared) else { break };
             member.own.push(newest);
         }
-        let all = (0..member.own.len()).map(|k| worth(&member, rig, &shared, k)).collect();
+        let told = |k: usize| Worth { rivals: rivals(&member, rig, &shared, k), ..worth(&member, rig, &shared, k) };
+        let all = (0..member.own.len()).map(told).collect();
         (member.own, all)
     };
     let settled: Vec<(Vec<Placed>, Vec<Worth>)> = in_parallel(members.len(), &of_run);
@@ -65,6 +70,13 @@ fn prune(member: &mut Member<'_>, rig: &[Placed], shared: &[Shared]) {
 
 /// The drift or event that explains most of what is left of a run, if one explains enough.
 fn best(member: &Member<'_>, rig: &[Placed], shared: &[Shared]) -> Option<Placed> {
+    let start = scanned(member, rig).into_iter().next()?;
+    let (newest, gain) = refined(member, rig, shared, &start)?;
+    (gain > NEEDED_EVIDENCE).then_some(newest)
+}
+
+/// The drifts and events that a run may have beside what it has, by what their grids explain: the best first.
+fn scanned(member: &Member<'_>, rig: &[Placed]) -> Vec<Placed> {
     let (context, declared) = (member.context, Declared::default());
     let placed: Vec<Placed> = rig.iter().chain(&member.own).cloned().collect();
     let base = base(context, declared, &placed);
@@ -76,16 +88,31 @@ fn best(member: &Member<'_>, rig: &[Placed], shared: &[Shared]) -> Option<Placed
         let (shape, gain) = scan(context, &base, effect, &instance, &loud)?;
         Some((Placed { effect, instance, shape }, gain))
     });
-    let (start, _) = scanned.filter(|(p, _)| !p.is_tare()).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let with: Vec<Placed> = placed.iter().chain([&start]).cloned().collect();
+    let mut all: Vec<(Placed, f64)> = scanned.filter(|(p, _)| !p.is_tare()).collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all.into_iter().map(|(placed, _)| placed).collect()
+}
+
+/// A newcomer with its shapes refined, and its evidence; `None` where it makes no sense.
+fn refined(member: &Member<'_>, rig: &[Placed], shared: &[Shared], start: &Placed) -> Option<(Placed, f64)> {
+    let (context, declared) = (member.context, Declared::default());
+    let with: Vec<Placed> = rig.iter().chain(&member.own).chain([start]).cloned().collect();
     let newest = refine_newest(context, declared, &with, Rows::All, EVALUATIONS).pop()?;
     let mut tried = member.clone();
     tried.own.push(newest.clone());
     let whole: Vec<Placed> = rig.iter().chain(&tried.own).cloned().collect();
-    let plausible =
-        fit(context, declared, &whole, None, Rows::All).is_some_and(|f| is_plausible(context, declared, &f, whole.len() - 1));
-    let enough = worth(&tried, rig, shared, tried.own.len() - 1).gain > NEEDED_EVIDENCE;
-    (plausible && enough).then_some(newest)
+    let stands = fit(context, declared, &whole, None, Rows::All)?;
+    let gain = worth(&tried, rig, shared, tried.own.len() - 1).gain;
+    is_plausible(context, declared, &stands, whole.len() - 1).then_some((newest, gain))
+}
+
+/// The drifts and events that could stand in the place of one of a run's own, with their evidence: those on its channels that come closest.
+fn rivals(member: &Member<'_>, rig: &[Placed], shared: &[Shared], k: usize) -> Vec<(&'static str, f64)> {
+    let mut without = member.clone();
+    let taken = without.own.remove(k);
+    let other = |p: &Placed| p.effect.id() != taken.effect.id() && p.instance.channels.iter().any(|c| taken.instance.touches(c));
+    let close = scanned(&without, rig).into_iter().filter(other).take(RIVALS);
+    close.filter_map(|start| Some((start.effect.id(), refined(&without, rig, shared, &start)?.1))).collect()
 }
 
 /// What one of a run's own effects is worth: how much worse its samples are fitted without it, less the penalty for its parameters.
@@ -104,7 +131,7 @@ fn worth(member: &Member<'_>, rig: &[Placed], shared: &[Shared], k: usize) -> Wo
         most = most.max(samples);
     }
     let parameters = taken.shape.len() + taken.effect.amplitudes(&taken.instance).len();
-    Worth { gain: gain - 0.5 * parameters as f64 * most.ln(), reduction }
+    Worth { gain: gain - 0.5 * parameters as f64 * most.ln(), reduction, rivals: Vec::new() }
 }
 
 /// The run's own values, with the shared ones known.

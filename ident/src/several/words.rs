@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict", `across_runs_rms`.
 
 use super::Run;
-use super::entries::{entry, own_entries, unexplained, unnamed};
+use super::entries::{alternatives, entry, own_entries, unexplained, unnamed};
 use super::folds::Tenable;
 use super::joint::{Across, Compared, Joint};
 use crate::close::{NO_COMMAND, validation};
@@ -40,10 +40,12 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
     let joint = Joint::of(members);
     let after: Vec<Across> = compared.iter().map(|c| c.after).collect();
     let channels = channels(told);
-    let mut effects: Vec<_> = (0..named.len()).map(|k| entry(&joint, &named[k], [&without[k], &after], &estimates[k])).collect();
-    effects.sort_by(|a, b| b.heldout_error_reduction.total_cmp(&a.heldout_error_reduction));
+    let mut names: Vec<_> = (0..named.len()).map(|k| entry(&joint, &named[k], [&without[k], &after], &estimates[k])).collect();
+    names.sort_by(|a, b| b.0.heldout_error_reduction.total_cmp(&a.0.heldout_error_reduction));
     let own = models[1].own.iter().zip(worths).enumerate();
-    effects.extend(own.flat_map(|(run, (own, worths))| own_entries(&contexts[run], own, worths)));
+    names.extend(own.flat_map(|(run, (own, worths))| own_entries(&contexts[run], own, worths)));
+    let alternatives = alternatives(&names);
+    let mut effects: Vec<_> = names.into_iter().map(|(entry, _)| entry).collect();
     let mut unexplained = unexplained(runs, &after);
     // what nothing predicts has nothing left over
     unexplained.retain(|u| !channels.not_predicted.contains_key(&u.channel));
@@ -63,10 +65,11 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
         channels,
         effects,
         unexplained,
-        alternatives: Vec::new(),
+        alternatives,
         next_experiment: None,
         left_out: Vec::new(),
         set_aside: Vec::new(),
+        guessed_floors: runs.iter().filter_map(|r| r.closed.verdict.guessed_floors).max(),
         validation: Vec::new(),
         runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared, &silent)).collect(),
     }

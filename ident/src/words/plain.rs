@@ -6,6 +6,8 @@
 //! Reference: `words::channel`.
 
 use super::{channel, list};
+use crate::effects::unknown::parts;
+use crate::verdict::EffectEntry;
 
 /// A text whose columns, and relations such as thrust(rpm), are told as people say them.
 #[must_use]
@@ -79,6 +81,15 @@ pub fn formula(equation: &str) -> (&str, Option<String>) {
         Some((equation, form)) => (equation, Some(plain(form).replace('_', " "))),
         None => (equation, None),
     }
+}
+
+/// A correction without a name in words: "a smooth curve of pulse, 3 terms"; nothing of any other effect.
+#[must_use]
+pub fn curve(e: &EffectEntry) -> Option<String> {
+    let form = e.equation.strip_suffix(']').filter(|_| e.id == "unknown").and_then(|of| of.rsplit_once(" ["))?.1;
+    let (variable, terms) = parts(form);
+    let plural = if terms == 1 { "" } else { "s" };
+    (terms > 0).then(|| format!("a smooth curve of {}, {terms} term{plural}", channel(variable)))
 }
 
 #[cfg(test)]

@@ -34,10 +34,9 @@ impl AirframeEffect for HardIron {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        Clause::new(
-            "a magnet on board",
-            found.tell_length("offset", "uT", |v| format!("adds {v} to the field"), "shifts the field"),
-        )
+        let since = found.tell("t0", |v| format!(" from {v} on"), "");
+        let does = found.tell_length("offset", "uT", |v| format!("adds {v} to the field"), "shifts the field");
+        Clause::new("a magnet on board", format!("{does}{since}"))
     }
 
     fn scope(&self, _: &Form) -> Scope {

@@ -15,13 +15,10 @@ use crate::report::svg::escape;
 use crate::rivals::UNEXPLAINED;
 use crate::verdict::{Alternative, EffectEntry, Parameter, Verdict};
 use crate::words::{
-    channel, channels, counted, digits, formula, lower, plain, probability, scaled, scope, signs, sized, sureness, upper,
-    upper_bound, with_interval,
+    SURE, channel, channels, counted, curve, digits, formula, lower, plain, probability, scaled, scope, signs, sized, sureness,
+    upper, upper_bound, with_interval,
 };
 use std::fmt::Write;
-
-/// Probability below which the card says how to settle it.
-const SETTLED: f64 = 0.85;
 
 /// Probability from which on what no hypothesis has is told.
 const OPEN: f64 = 0.05;
@@ -54,22 +51,59 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
         if !lead.is_empty() {
             sheet.say(&lead);
         }
-        for (place, i) in members.into_iter().enumerate() {
+        for (place, group) in alike(v, &members).iter().enumerate() {
             let number = (k == 0).then_some(place + 1);
-            card(sheet, page, i, number);
+            card(sheet, page, group, number);
         }
     }
 }
 
-fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
+/// Effects by their position, those without a name that are alike but for their channel together: the rotors of a vehicle, for instance.
+pub(super) fn alike(v: &Verdict, members: &[usize]) -> Vec<Vec<usize>> {
+    let mut out: Vec<Vec<usize>> = Vec::new();
+    for k in members {
+        let same = |group: &&mut Vec<usize>| group.first().is_some_and(|first| is_alike(v, &v.effects[*first], &v.effects[*k]));
+        match out.iter_mut().find(same) {
+            Some(group) => group.push(*k),
+            None => out.push(vec![*k]),
+        }
+    }
+    out
+}
+
+/// Whether all that is told of two effects without a name is the same, but for their channel.
+fn is_alike(v: &Verdict, a: &EffectEntry, b: &EffectEntry) -> bool {
+    let told = |e: &EffectEntry| {
+        let of = e.channels.first().map(|c| channel(c)).unwrap_or_default();
+        (removes(v, e).replace(&of, ""), that_it_is_there(e.probability))
+    };
+    let nameless = [a, b].iter().all(|e| e.id == "unknown");
+    nameless && a.depends_on == b.depends_on && a.scope == b.scope && told(a) == told(b)
+}
+
+/// The channels of a group of effects.
+pub(super) fn channels_of(v: &Verdict, group: &[usize]) -> String {
+    channels(&group.iter().flat_map(|k| v.effects[*k].channels.clone()).collect::<Vec<_>>())
+}
+
+/// What the first of a group removes, and that the others do the same.
+pub(super) fn removed(v: &Verdict, group: &[usize]) -> String {
+    let first = group.first().map(|k| removes(v, &v.effects[*k])).unwrap_or_default();
+    if group.len() > 1 { format!("{first} The others are alike.") } else { first }
+}
+
+fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usize>) {
+    let Some(k) = group.first().copied() else { return };
     let (v, e) = (page.verdict, &page.verdict.effects[k]);
+    let on = channels_of(v, group);
+    let there = if open_sizes(e).is_some() { " that it is there" } else { "" };
     // what has no name is sure of nothing but that something is there
     let nameless = e.id == "unknown";
     let sure = if nameless { "unsure" } else { sureness(e.probability) };
     let p = format!("p {}", equals(&probability(e.probability)));
-    let chip = if nameless { format!("no name; {}", that_it_is_there(e.probability)) } else { format!("{sure}: {p}") };
+    let chip = if nameless { format!("no name; {}", that_it_is_there(e.probability)) } else { format!("{sure}{there}: {p}") };
     let title = if nameless {
-        format!("Something on {} that goes with {}.", channels(&e.channels), channels(&e.depends_on))
+        format!("Something on {on} that goes with {}.", channels(&e.depends_on))
     } else {
         page.words.said(e).sentence()
     };
@@ -80,12 +114,15 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
         escape(&title),
         escape(&chip),
         escape(&e.id),
-        escape(&channels(&e.channels)),
-        escape(&removes(v, e)),
+        escape(&on),
+        escape(&removed(v, group)),
     );
     // what has no name belongs to nothing that is known
     if e.id != "unknown" {
         let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(&scope(e, page.words.noun))));
+    }
+    if let Some(open) = open_sizes(e) {
+        let _ = writeln!(html, "<p class=\"soft\">{}</p>", escape(&open));
     }
     sheet.html_part(&html);
     let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
@@ -93,13 +130,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
     sheet.figures(figures);
     sheet.html_part("<div>\n");
     parameters(sheet, page.words, e);
-    let (equation, form) = formula(&e.equation);
-    let form = form.map(|form| format!(" ({})", escape(&form))).unwrap_or_default();
-    let mut html = format!(
-        "<p class=\"soft\"><code>{}</code>{form}</p>\n<p>{}.</p>\n",
-        escape(equation),
-        escape(&upper(&plain(signs(&e.evidence))))
-    );
+    let mut html = format!("<p class=\"soft\">{}</p>\n<p>{}.</p>\n", written(e), escape(&upper(&plain(signs(&e.evidence)))));
     if !nameless {
         let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
     }
@@ -107,6 +138,16 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, k: usize, number: Option<usize>) {
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
     }
     sheet.html_part(&format!("{html}</div></div></article>\n"));
+}
+
+/// What the model holds of an effect: its formula, or of a curve without a name what it is.
+fn written(e: &EffectEntry) -> String {
+    if let Some(said) = curve(e) {
+        return format!("Added: {}.", escape(&said));
+    }
+    let (equation, form) = formula(&e.equation);
+    let form = form.map(|form| format!(" ({})", escape(&form))).unwrap_or_default();
+    format!("<code>{}</code>{form}", escape(equation))
 }
 
 /// How sure it is that something without a name is there: what the verdicts so far say where nothing in the library was tried against it,
@@ -119,6 +160,12 @@ pub(super) fn that_it_is_there(p: f64) -> String {
     } else {
         format!("that something is there: p {}", equals(&probability(p)))
     }
+}
+
+/// Of an effect of several sizes most of which may be zero: that it is there is known, and they are not.
+pub(super) fn open_sizes(e: &EffectEntry) -> Option<String> {
+    let (open, all) = e.open_sizes()?;
+    Some(format!("Left-out rows say that it is there. How large it is they do not: of its {all} sizes {open} may each be zero."))
 }
 
 fn equals(text: &str) -> String {
@@ -147,6 +194,9 @@ pub(super) fn removes(v: &Verdict, e: &EffectEntry) -> String {
     }
     if e.is_without_correction() {
         return "No correction was fitted.".to_owned();
+    }
+    if e.is_read_off() {
+        return "The readings themselves show it: no prediction changes.".to_owned();
     }
     if reduction <= 0.0 || !c.after.heldout_rms.is_finite() {
         return format!("It removes nothing of the error of {}.", channel(first));
@@ -229,18 +279,25 @@ pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
     let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
     // what neither the effect nor a hypothesis without it has
     let open = 1.0 - e.probability - given;
-    if open >= OPEN {
-        let what = if found.is_empty() { "no other name came close; perhaps no cause of its own" } else { "no cause of its own" };
-        found.push(format!("{what} ({})", probability(open)));
+    let kept = if open >= OPEN { kept_open(e, &probability(open)) } else { String::new() };
+    if found.is_empty() {
+        return format!("no other name that was tried came close.{kept}{alike}");
     }
-    let found =
-        if found.is_empty() { "nothing else that was tried came close.".to_owned() } else { format!("{}.", found.join("; ")) };
-    format!("{found}{alike}")
+    format!("{}.{kept}{alike}", found.join("; "))
+}
+
+/// What no hypothesis has: of a sure effect the part that the search keeps for causes that it does not know, of another one that it may be none.
+fn kept_open(e: &EffectEntry, open: &str) -> String {
+    if e.probability >= SURE {
+        format!(" {open} is kept for a cause that the library lacks.")
+    } else {
+        format!(" Perhaps it has no cause of its own ({open}).")
+    }
 }
 
 /// What would settle an effect that is not sure.
 fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
-    if e.probability >= SETTLED {
+    if e.probability >= SURE {
         return None;
     }
     let v = page.verdict;

@@ -177,7 +177,7 @@ pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Ve
 pub(crate) fn pair(verdict: &Verdict) -> [&'static str; 2] {
     let fitted = |e: &EffectEntry| e.heldout_error_reduction > 0.0;
     let nameless = verdict.effects.iter().any(|e| e.id == "unknown" && fitted(e));
-    match verdict.effects.iter().any(|e| e.id != "unknown") {
+    match verdict.effects.iter().any(|e| e.id != "unknown" && !e.is_read_off()) {
         true => ["declared, before", "corrected, after"],
         false if nameless => ["declared, before", "with a term without a name, after"],
         false => ["declared, nothing added", ""],

@@ -8,6 +8,7 @@
 
 mod brief;
 mod cards;
+mod cautions;
 mod evidence;
 mod fold;
 mod left;

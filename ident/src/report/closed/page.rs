@@ -8,7 +8,7 @@
 use super::provenance::{Origin, provenance};
 use super::sentence::PER_CENT;
 use super::vocabulary::Vocabulary;
-use super::{cards, fold, left, sentence, state};
+use super::{cards, cautions, fold, left, sentence, state};
 use crate::context::unit_of;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
@@ -25,8 +25,6 @@ pub(crate) struct Page<'p> {
     pub(crate) news: bool,
     /// Where it comes from.
     pub(crate) origin: Origin,
-    /// What a reader must know before the figures, a paragraph each.
-    pub(crate) cautions: Vec<String>,
     /// What the declared model is, in a paragraph.
     pub(crate) declared: String,
     /// The figures that convince most.
@@ -59,7 +57,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         }
         [] => {}
     }
-    page.cautions.iter().for_each(|caution| sheet.warn(caution));
+    cautions::cautions(v).iter().for_each(|caution| sheet.warn(caution));
     for l in &v.left_out {
         sheet.warn(&format!("Left out: {l}."));
     }
@@ -82,6 +80,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     if !v.runs.is_empty() {
         sheet.section("Each run, predicted by the others");
         sheet.say("Predicted whole by a fit to the other runs, one constant a channel apart. Before and after, rms.");
+        sheet.say("The probabilities above are those of all runs together. Each run is a witness of its own, and what they say adds up: a name that no run alone is sure of may be sure here.");
         runs(&mut sheet, v, &v.runs, "each-run");
     }
     if let [head, rows @ ..] = page.parameters.as_slice()

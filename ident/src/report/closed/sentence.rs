@@ -156,7 +156,9 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     } else {
         format!("{}. Beside that, {}.", since(news, &question), joined_lower(&said))
     };
-    let out = [out, smaller(all.len().saturating_sub(told))];
+    let nameless = verdict.effects.iter().any(|e| e.id == "unknown" && !e.is_without_correction());
+    let nameless = if nameless { "What has no name is told below, too." } else { "" };
+    let out = [out, smaller(all.len().saturating_sub(told)), nameless.to_owned()];
     let left = left(verdict);
     out.into_iter().chain([left]).filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
 }
@@ -195,13 +197,14 @@ fn none(verdict: &Verdict, news: bool) -> String {
     let quiet = verdict.unexplained.is_empty();
     match (news, quiet) {
         (true, true) => "The declared model still explains the run: no channel is left with more than its noise.".to_owned(),
+        (false, true) if verdict.guessed_floors.is_some() => {
+            "As far as guessed noise floors tell, the declared model explains the run: no channel is left with more.".to_owned()
+        }
         (false, true) => "The declared model explains the run: no channel is left with more than its noise.".to_owned(),
         (true, false) => {
-            format!("The declared model still explains the run, but for a rest that no name was found for. {}", left(verdict))
+            format!("Nothing is new since the declared model: what is left it left over on its own day, too. {}", left(verdict))
         }
-        (false, false) => {
-            format!("The declared model explains the run, but for a rest that no name was found for. {}", left(verdict))
-        }
+        (false, false) => format!("No name was found for what the declared model leaves over. {}", left(verdict)),
     }
 }
 
@@ -279,22 +282,30 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
         s => format!("{:.0} %", (100.0 * s).min(99.0)),
     };
     let names: Vec<String> = shares.iter().map(|s| whole(verdict, s.0)).collect();
+    let but: String = worse(verdict, &is_told).collect();
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
-        return format!("{subject} {} of what {} had left over.", per_cent(mean), list(&names));
+        return format!("{subject} {} of what {} had left over.{but}", per_cent(mean), list(&names));
     }
     let parts: Vec<String> =
         shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), whole(verdict, s.0))).collect();
     let short: Vec<String> = std::iter::once(parts[0].clone())
         .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))))
         .collect();
-    format!("{subject} {}.", list(&short))
+    format!("{subject} {}.{but}", list(&short))
+}
+
+/// The channels of what a share is told of that are predicted worse for all that: the share of the whole does not show it.
+fn worse<'v>(verdict: &'v Verdict, is_told: &'v dyn Fn(&String) -> bool) -> impl Iterator<Item = String> + 'v {
+    let grows = |c: &Channel| 100.0 * (c.after.heldout_rms / c.before.heldout_rms - 1.0);
+    let worse = verdict.channels.iter().filter(|(name, _)| is_told(name)).map(move |(name, c)| (name, grows(c)));
+    worse.filter(|(_, more)| *more >= 0.5).map(|(name, more)| format!(" {} is predicted {more:.0} % worse.", heading(name)))
 }
 
 /// What is worth a word among what is left; a channel without a model is told by itself.
 fn loud(verdict: &Verdict) -> impl Iterator<Item = &Unexplained> {
     let modelled = |u: &&Unexplained| !verdict.channels.not_predicted.contains_key(&u.channel);
-    verdict.unexplained.iter().filter(|u| u.over_floor > LOUD).filter(modelled)
+    verdict.unexplained.iter().filter(|u| floors_left(verdict, u) > LOUD).filter(modelled)
 }
 
 /// Whether anything is left that is more than noise, loud or not.
@@ -309,7 +320,7 @@ fn quantity(name: &str) -> &str {
 
 /// What is loudest among what is left.
 fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
-    loud(verdict).max_by(|a, b| a.over_floor.total_cmp(&b.over_floor))
+    loud(verdict).max_by(|a, b| floors_left(verdict, a).total_cmp(&floors_left(verdict, b)))
 }
 
 /// The error that is left on a channel, with unit: the one that the state of the channels tells.
@@ -332,14 +343,14 @@ fn left(verdict: &Verdict) -> String {
     let others: BTreeSet<&str> = loud(verdict).map(|u| quantity(&u.channel)).filter(|q| *q != what).collect();
     let sensors = loud(verdict).filter(|u| quantity(&u.channel) == what && verdict.channels.contains_key(&u.channel)).count();
     let on = if sensors > 1 { "the speeds".to_owned() } else { channel(&loudest.channel) };
-    let of = |c: &&str| verdict.channels.get(*c).map_or(0.0, |c| c.after.heldout_rms);
-    let largest = loud(verdict).map(|u| u.channel.as_str()).filter(|c| sensors > 1 && quantity(c) == what);
-    let size = match largest.max_by(|a, b| of(a).total_cmp(&of(b))) {
-        Some(c) => format!("up to {}", amount(of(&c), &verdict.channels[c].unit)),
-        None => size_left(verdict, loudest),
-    };
+    let of = |u: &&Unexplained| verdict.channels.get(&u.channel).map_or(0.0, |c| c.after.heldout_rms);
+    let largest = loud(verdict).filter(|u| sensors > 1 && quantity(&u.channel) == what).max_by(|a, b| of(a).total_cmp(&of(b)));
+    // what it looks like is told of the sensor whose size is told
+    let told = largest.unwrap_or(loudest);
+    let up_to = if largest.is_some() { "up to " } else { "" };
+    let size = format!("{up_to}{}", size_left(verdict, told));
     // the first words; the section on what is left has all
-    let looks = loudest.looks_like.split(';').next().unwrap_or_default();
+    let looks = told.looks_like.split(';').next().unwrap_or_default();
     let named: Vec<String> = others.iter().map(|q| channel(q)).collect();
     match named.len() {
         0 => format!("On {on} {size} is left ({looks})."),

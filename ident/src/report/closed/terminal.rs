@@ -5,14 +5,17 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{is_shown, removes, that_it_is_there, value};
+use super::cards::{alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value};
+use super::cautions::cautions;
 use super::left::in_words;
 use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
 use super::state::{factor, figures, named, word};
 use super::vocabulary::Vocabulary;
+use crate::bad::SetAside;
 use crate::context::unit_of;
+use crate::effects::Scope;
 use crate::verdict::{Alternative, Channel, EffectEntry, Verdict};
-use crate::words::{self, channel, list, plain, probability, signs, upper, upper_bound};
+use crate::words::{channel, list, plain, probability, signs, upper, upper_bound};
 
 /// Columns of the widest line.
 pub const WIDEST: usize = 100;
@@ -29,18 +32,21 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
     if said.contains(PER_CENT) {
         out += "(per cent of the squared error above the noise floor: 75 % less is half the error)\n";
     }
+    for caution in cautions(verdict) {
+        out += &format!("{}\n", wrapped(&caution, 0));
+    }
     for left_out in &verdict.left_out {
         out += &format!("{}\n", wrapped(&left_out.to_string(), 2));
     }
-    let all = order(verdict).into_iter().map(|k| &verdict.effects[k]);
-    let (named, nameless): (Vec<&EffectEntry>, Vec<&EffectEntry>) = all.partition(|e| e.id != "unknown");
-    let (own, common): (Vec<&EffectEntry>, Vec<&EffectEntry>) = named.into_iter().partition(|e| !(words.of_every_rig)(e));
+    let of = |k: &usize| &verdict.effects[*k];
+    let (named, nameless): (Vec<usize>, Vec<usize>) = order(verdict).into_iter().partition(|k| of(k).id != "unknown");
+    let (own, common): (Vec<usize>, Vec<usize>) = named.into_iter().partition(|k| !(words.of_every_rig)(of(k)));
     let noun = words.noun;
     let [this, every] = [format!("what this {noun} has"), format!("what every {noun} has")];
     for (heading, members) in [(this.as_str(), own), (every.as_str(), common), ("without a name", nameless)] {
         if !members.is_empty() {
             out += &format!("\n{heading}\n");
-            members.iter().for_each(|e| out += &effect(verdict, words, e));
+            alike(verdict, &members).iter().for_each(|group| out += &effect(verdict, words, group));
         }
     }
     out += &left(verdict);
@@ -127,15 +133,15 @@ fn channels(verdict: &Verdict) -> String {
     out
 }
 
-fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
+fn effect(verdict: &Verdict, words: Vocabulary, group: &[usize]) -> String {
+    let Some(e) = group.first().map(|k| &verdict.effects[*k]) else { return String::new() };
     let p = match e.id.as_str() {
         "unknown" => that_it_is_there(e.probability),
         _ => format!("p {}", probability(e.probability)),
     };
-    let mut out = format!(
-        "{}\n",
-        wrapped(&format!("  {} ({p}) on {}, {}", e.id, words::channels(&e.channels), words.scope_word(e.scope)), 4)
-    );
+    let since = if e.has_begun() && e.scope == Scope::Rig { " since one instant" } else { "" };
+    let scope = words.scope_word(e.scope);
+    let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {scope}{since}", e.id, channels_of(verdict, group)), 4));
     if e.id != "unknown" {
         out += &format!("    {}\n", wrapped(&words.said(e).sentence(), 4));
     }
@@ -147,9 +153,8 @@ fn effect(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> String {
             None => format!("    {name} = {}  (95 %: {interval})\n", format!("{v} {unit}").trim_end()),
         };
     }
-    let removes = removes(verdict, e);
-    if !removes.is_empty() {
-        out += &format!("    {}\n", wrapped(&removes, 4));
+    for said in open_sizes(e).into_iter().chain(Some(removed(verdict, group))).filter(|said| !said.is_empty()) {
+        out += &format!("    {}\n", wrapped(&said, 4));
     }
     out + &format!("    {}\n", wrapped(&format!("evidence: {}", plain(signs(&e.evidence))), 4))
 }
@@ -176,7 +181,9 @@ fn left(verdict: &Verdict) -> String {
 
 /// The samples that took no part.
 fn set_aside(verdict: &Verdict) -> String {
-    let all = &verdict.set_aside;
+    // the longest first: they say most of the log
+    let mut all: Vec<&SetAside> = verdict.set_aside.iter().collect();
+    all.sort_by_key(|aside| std::cmp::Reverse(aside.rows));
     if all.is_empty() {
         return String::new();
     }

@@ -1,0 +1,162 @@
+//! A supply at its current limit, read off its own meters.
+//!
+//! What it is: below its limit a supply holds its voltage; from there on it holds the current, and the voltage gives way. Where the command rises from
+//! one level to the next while the current stands still and the voltage falls, both meters show it: no lead does that, and no throttle that
+//! rises no further. Two levels suffice, so that a table of eleven rows tells it. It is named from there; no prediction changes.
+//! What can go wrong: a limit that only the highest level reaches leaves no level at which the current stands still, and is not told.
+//! Units: A, V, us.
+//! Reference: constant-current mode of laboratory supplies.
+
+use crate::close::parameter;
+use crate::context::{CALM_US, Context};
+use crate::effects::{CurrentLimit, Effect, Estimate, Instance, OF_THE_SUPPLY};
+use crate::identify::{TABLE_ERROR, settled};
+use crate::log::Log;
+use crate::marks::{self, CERTAIN};
+use crate::plateau::Plateau;
+use crate::verdict::{EffectEntry, Kin, Unexplained, Verdict};
+use crate::words::amount;
+
+/// Standard errors by which a voltage must have fallen to be said to fall.
+const CLEARLY: f64 = 3.0;
+/// Relative change of the current over that of the voltage below which it is the current that is held. A motor whose duty no longer rises draws
+/// less as its voltage falls, by as large a share at the least; a lead costs voltage for more current only, and a share of it that is smaller
+/// still. Both are beyond one; half of it parts them from a supply that holds its current.
+const HELD: f64 = 0.5;
+
+/// What both meters show at one level, and its command.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    pulse: f64,
+    current: (f64, f64),
+    voltage: (f64, f64),
+}
+
+/// A stretch of levels at the limit.
+#[derive(Debug, Clone, PartialEq)]
+struct Limit {
+    /// A, with its standard error.
+    current: (f64, f64),
+    /// Command at the first and at the last level, us.
+    pulses: [f64; 2],
+    /// The same of the voltage, V.
+    volts: [f64; 2],
+}
+
+/// What a verdict says of the limit that a log shows; nothing where none shows, and where a declared model stands for what every day has.
+pub(crate) fn told(log: &Log, context: &Context) -> Option<EffectEntry> {
+    let measured = ["pulse_us", "current_a", "voltage_v"].iter().all(|name| log.column(name).is_some());
+    let limit = if measured && !context.against_model { limit(&levels(log, &settled(context, log))) } else { None }?;
+    let instance = Instance::new(&["current_a", "voltage_v"], OF_THE_SUPPLY);
+    let about = CurrentLimit.about();
+    let (value, se) = limit.current;
+    let held = Estimate { name: "limit".to_owned(), unit: "A".to_owned(), value, se };
+    let ([from, to], [before, after]) = (limit.pulses, limit.volts);
+    Some(EffectEntry {
+        kin: Kin::Own,
+        id: CurrentLimit.id().to_owned(),
+        scope: CurrentLimit.scope(&instance),
+        run: None,
+        depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
+        equation: format!("current_a <= limit, voltage_v gives way [{OF_THE_SUPPLY}]"),
+        probability: CERTAIN,
+        parameters: vec![parameter(&held, &[], "current_a")],
+        heldout_error_reduction: 0.0,
+        evidence: format!(
+            "the command rises from {from:.0} to {to:.0} us, the current stands still, and the voltage falls from {} to {}; \
+             both meters show it, and the model does not hold it",
+            amount(before, "V"),
+            amount(after, "V")
+        ),
+        channels: instance.channels,
+    })
+}
+
+/// Adds it to a verdict. What is left without a correction on what the limit moves has a name then.
+pub(crate) fn tell(verdict: &mut Verdict, told: Option<EffectEntry>) {
+    let known = verdict.effects.iter().any(|e| e.id == CurrentLimit.id());
+    let Some(entry) = told.filter(|_| !known) else { return };
+    let moved = |channel: &str| entry.channels.iter().any(|c| c == channel) || channel.starts_with("rpm");
+    verdict.effects.retain(|e| !(e.is_without_correction() && e.channels.iter().all(|c| moved(c))));
+    let part = |u: &mut Unexplained| u.looks_like += "; the levels at the supply's limit are part of it";
+    verdict.unexplained.iter_mut().filter(|u| moved(&u.channel)).for_each(part);
+    marks::stand(verdict, vec![entry]);
+}
+
+fn levels(log: &Log, plateaus: &[Plateau]) -> Vec<Level> {
+    let level = |p: &Plateau| {
+        let of = |name| p.of(log, name);
+        // no meter is better than what a row of a table is given
+        let read = |name| of(name).map(|(v, se): (f64, f64)| (v, se.max(TABLE_ERROR * v.abs())));
+        Some(Level { pulse: of("pulse_us")?.0, current: read("current_a")?, voltage: read("voltage_v")? })
+    };
+    plateaus.iter().filter_map(level).collect()
+}
+
+/// The first stretch of levels one after the other over which the current is held, and no level draws more.
+fn limit(levels: &[Level]) -> Option<Limit> {
+    let most = levels.iter().map(|l| l.current.0).fold(0.0, f64::max);
+    let first = levels.windows(2).position(|w| is_held(w, most))?;
+    let steps = levels[first..].windows(2).take_while(|w| is_held(w, most)).count();
+    let held = &levels[first + 1..=first + steps];
+    let n = held.len() as f64;
+    let mean = held.iter().map(|l| l.current.0).sum::<f64>() / n;
+    // one meter: what it is off by is the same on every level
+    let se = held.iter().map(|l| l.current.1).sum::<f64>() / n;
+    let last = held.last()?;
+    Some(Limit {
+        current: (mean, se),
+        pulses: [levels[first].pulse, last.pulse],
+        volts: [levels[first].voltage.0, last.voltage.0],
+    })
+}
+
+/// Whether the current was held from one level to the next.
+fn is_held(step: &[Level], most: f64) -> bool {
+    let [a, b] = step else { return false };
+    let falls = 1.0 - b.voltage.0 / a.voltage.0;
+    let error = (a.voltage.1 / a.voltage.0).hypot(b.voltage.1 / a.voltage.0);
+    let moves = (b.current.0 / a.current.0 - 1.0).abs();
+    let highest = most - b.current.0 < CLEARLY * b.current.1;
+    b.pulse > a.pulse + CALM_US && highest && falls > CLEARLY * error && moves < HELD * falls
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Level, limit};
+
+    fn levels(of: &[[f64; 3]]) -> Vec<Level> {
+        of.iter().map(|[pulse, a, v]| Level { pulse: *pulse, current: (*a, 0.01 * a), voltage: (*v, 0.01 * v) }).collect()
+    }
+
+    #[test]
+    fn a_supply_that_holds_its_current_is_told() {
+        let found = limit(&levels(&[
+            [1620.0, 6.34, 10.93],
+            [1715.0, 8.40, 10.86],
+            [1810.0, 10.91, 10.59],
+            [1905.0, 10.93, 8.81],
+            [2000.0, 10.94, 7.79],
+        ]))
+        .expect("a limit");
+        assert_eq!((found.pulses, found.volts), ([1810.0, 2000.0], [10.59, 7.79]));
+        assert!((found.current.0 - 10.935).abs() < 1e-9);
+    }
+
+    #[test]
+    fn leads_batteries_and_throttles_at_their_end_are_not() {
+        for (what, of) in [
+            ("a lead of 80 mohm", vec![[1700.0, 8.0, 10.4], [1800.0, 11.0, 10.1], [1900.0, 15.0, 9.8]]),
+            (
+                "a weak battery: more current for less voltage",
+                vec![[1700.0, 8.0, 11.4], [1800.0, 11.0, 10.8], [1900.0, 15.0, 10.0]],
+            ),
+            ("a battery that empties at full throttle", vec![[1800.0, 15.0, 11.0], [1900.0, 13.4, 10.4], [2000.0, 11.6, 9.7]]),
+            ("a throttle end point on a stiff supply", vec![[1800.0, 14.0, 12.0], [1900.0, 15.0, 11.9], [2000.0, 15.0, 11.9]]),
+            ("the voltage of another battery", vec![[1800.0, 15.0, 12.0], [1200.0, 2.0, 12.0], [1300.0, 2.0, 10.0]]),
+            ("a step down", vec![[2000.0, 10.9, 10.5], [1900.0, 10.9, 8.8]]),
+        ] {
+            assert_eq!(limit(&levels(&of)), None, "{what}");
+        }
+    }
+}
