@@ -502,7 +502,8 @@ impl Context {
         self.against_model = true;
         let known = model.course.as_ref().map(|course| (course, course.counterparts(self)));
         let step = self.step();
-        let predictions: Vec<Option<Vec<f64>>> = self.targets.iter().map(|t| model.predict_at_its_own_supply(self, t.name)).collect();
+        let predictions: Vec<Option<Vec<f64>>> =
+            self.targets.iter().map(|t| model.predict_at_its_own_supply(self, t.name)).collect();
         for ((target, load), prediction) in self.targets.iter_mut().zip(loads).zip(&predictions) {
             if let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) {
                 let course = known.as_ref().zip(prediction.as_ref()).and_then(|((course, rows), prediction)| {

@@ -39,7 +39,7 @@ mod speed_channel;
 mod spinup_lag;
 mod stall;
 mod supply_sag;
-mod supply_voltage;
+pub(crate) mod supply_voltage;
 mod tare_shift;
 mod thermal_derate;
 mod thermal_zero;

@@ -6,22 +6,18 @@
 //! What can go wrong: a controller that holds the speed by itself does not follow its supply. A run without a voltage is taken to have the
 //! model's own. Where an effect of the model speaks of the voltage and of the channel, its part is not counted twice.
 //! Units: V; loads in kus or krpm as the channel's polynomial.
-//! Reference: V = k omega + R I at a fixed duty: d ln(omega) / d ln(V) = 1 / (1 + R I / V), one without load and 0.8 where a fifth of the voltage
-//! is lost in the winding. The same power from a higher voltage is less current, and what switching loses grows with the voltage. On 56 pairs of
-//! runs at 7 and 11 V the powers are 0.97 to 0.81 from low to high speed, and -0.69 (fivein-static-tables, MIT 2018, Cao and Strawson).
+//! Reference: V = k omega + R I at a fixed duty, d ln(omega) / d ln(V) = 1 / (1 + R I / V); the powers and where they come from:
+//! [`crate::effects`], `supply_voltage`.
 
 use super::read::{Refusal, finite, refusal};
 use super::{AddedEffect, Model, digits, load_unit};
 use crate::context::{Context, Relation, Target};
+use crate::effects::supply_voltage::{OF_CURRENT, OF_SPEED};
 use crate::leftover::{along, binned};
 use crate::noise::median;
 use std::borrow::Cow;
 use toml::{Table, Value};
 
-/// Power of the voltage that the speed at a pulse goes with.
-const OF_SPEED: f64 = 0.8;
-/// The same of the current at a speed: minus one if the power were the same, less what switching loses more of.
-const OF_CURRENT: f64 = -0.7;
 /// The channel of the supply's voltage.
 const VOLTAGE: &str = "voltage_v";
 /// Least ratio of two voltages.
@@ -42,8 +38,8 @@ struct Level {
 /// Power of the voltage that a relation goes with; `None` of one that does not follow the supply.
 fn power(relation: Relation) -> Option<f64> {
     match relation {
-        Relation::SpeedFromPulse => Some(OF_SPEED),
-        Relation::Current => Some(OF_CURRENT),
+        Relation::SpeedFromPulse => Some(OF_SPEED.0),
+        Relation::Current => Some(-OF_CURRENT.0),
         _ => None,
     }
 }
@@ -70,8 +66,7 @@ pub(super) fn read(channel: &str, value: &Value) -> Result<Option<ByLoad>, Refus
     }
     let list = |key: &str| -> Option<Vec<f64>> { value.get(key)?.as_array()?.iter().map(finite).collect() };
     let loads = list(&at).filter(|l| l.is_sorted_by(|a, b| a < b));
-    let loads =
-        loads.ok_or_else(|| refusal(&at, value.get(&at), "a list of finite numbers, each larger than the one before"))?;
+    let loads = loads.ok_or_else(|| refusal(&at, value.get(&at), "a list of finite numbers, each larger than the one before"))?;
     let fits = |v: &Vec<f64>| v.len() == loads.len() && v.iter().all(|v| *v > 0.0);
     let expected = || format!("a list of {} numbers above zero, as {at} has", loads.len());
     let levels = list(&volts).filter(fits).ok_or_else(|| refusal(&volts, value.get(&volts), &expected()))?;
@@ -209,5 +204,135 @@ fn level(rows: &[(f64, f64)]) -> Level {
 pub(super) fn insert(table: &mut Table, channel: &str, supply: &[(String, ByLoad)]) {
     if let Some((_, by_load)) = supply.iter().find(|(name, _)| name == channel) {
         table.extend(to_keys(channel, by_load));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::close::{close, validation};
+    use crate::log::{Column, Log};
+
+    /// A motor behind a lead of 20 mohm: V duty = k omega + b omega^2, current from the power, 21 levels of 40 rows.
+    fn run(volts: f64) -> Log {
+        let noise = |i: usize, k: f64| (k * (i * i) as f64).sin();
+        let pulse: Vec<f64> = (0..840).map(|i| 1100.0 + 45.0 * (i / 40 * 8 % 21) as f64).collect();
+        let steady = |p: f64| {
+            let (k, b, mut v) = (0.45, 0.006, volts);
+            let mut amperes = 0.0;
+            let mut krpm = 0.0;
+            for _ in 0..50 {
+                v = volts - 0.02 * amperes;
+                let drive = v * (p - 1000.0) / 1000.0;
+                krpm = (-k + f64::sqrt(k * k + 4.0 * b * drive)) / (2.0 * b);
+                amperes = 0.012 * f64::powi(krpm, 3) / v;
+            }
+            [1000.0 * krpm, amperes, v]
+        };
+        let of = |at: usize, size: f64, k: f64| -> Vec<f64> {
+            pulse.iter().enumerate().map(|(i, p)| steady(*p)[at] + size * noise(i, k)).collect()
+        };
+        let columns = [
+            ("rpm", of(0, 5.0, 0.7)),
+            ("current_a", of(1, 0.02, 1.3)),
+            ("voltage_v", of(2, 0.01, 2.9)),
+            ("pulse_us", pulse.clone()),
+        ];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        Log { name: format!("{volts}.csv"), t: (0..840).map(|i| 0.1 * f64::from(i)).collect(), columns, ..Log::default() }
+    }
+
+    #[test]
+    fn a_run_at_another_voltage_is_predicted() {
+        for (own, other) in [(7.4, 11.1), (11.1, 7.4), (16.0, 15.0)] {
+            let closed = close(&run(own), None, &[run(other)], &mut |_| {}).expect("a run");
+            let channels = &closed.verdict.validation[0].channels;
+            for name in ["rpm", "current_a"] {
+                let error = channels[name];
+                assert!(error.after < 0.4 * error.before, "{own} V on {other} V, {name}: {error:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_supply_changes_nothing() {
+        let closed = close(&run(11.1), None, &[], &mut |_| {}).expect("a run");
+        // the same voltage, its noise another
+        let mut again = run(11.1);
+        let volts = again.columns.iter_mut().find(|c| c.name == "voltage_v").expect("a meter");
+        volts.values.iter_mut().enumerate().for_each(|(i, v)| *v += 0.01 * (5.1 * (i * i) as f64).sin());
+        let context = Context::new(&again, Some(closed.model.start_pulse_us));
+        for name in ["rpm", "current_a"] {
+            let moved = closed.model.predict(&context, name).expect("a prediction");
+            let stays = closed.model.predict_at_its_own_supply(&context, name).expect("a prediction");
+            let most = moved.iter().zip(&stays).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
+            assert!(most < 2e-4, "{name} moved by {most}");
+        }
+        let mut blind = run(9.0);
+        blind.columns.retain(|c| c.name != "voltage_v");
+        let context = Context::new(&blind, Some(closed.model.start_pulse_us));
+        assert_eq!(closed.model.predict(&context, "rpm"), closed.model.predict_at_its_own_supply(&context, "rpm"));
+    }
+
+    #[test]
+    fn what_is_measured_of_the_voltage_is_not_guessed_from_the_charge() {
+        let text = r#"
+            format = "quadrig-model 1"
+            source = "day.csv"
+            start_pulse_us = 1000.0
+            [consensus]
+            channels = ["rpm"]
+            [channel.voltage_v]
+            c0_v = 12.0
+            [channel.rpm]
+            c0_rev_per_min = 0.0
+            c1_rev_per_min_per_kus = 10000.0
+            c2_rev_per_min_per_kus2 = 0.0
+            c3_rev_per_min_per_kus3 = 0.0
+            supply_at_kus = [0.1, 1.0]
+            supply_v = [12.0, 12.0]
+            [[effect]]
+            id = "battery_discharge"
+            channels = ["voltage_v", "rpm"]
+            scope = "rig"
+            shape = [5.0]
+            [effect.amplitude.voltage_v]
+            slope_v_per_ah = 60.0
+        "#;
+        let model = Model::parse("m.toml", text).expect("a model");
+        // ten minutes at 6 A, the voltage as fresh as ever
+        let of = |value: f64| vec![value; 600];
+        let columns = [("pulse_us", of(1500.0)), ("rpm", of(5000.0)), ("current_a", of(6.0)), ("voltage_v", of(12.0))];
+        let log = Log {
+            t: (0..600).map(f64::from).collect(),
+            columns: columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect(),
+            ..Log::default()
+        };
+        let context = Context::new(&log, Some(1000.0));
+        let last = |all: Option<Vec<f64>>| all.and_then(|v| v.last().copied()).expect("a prediction");
+        assert!(last(model.predict_at_its_own_supply(&context, "rpm")) < 2000.0, "1 Ah at 5 per Ah");
+        assert!((last(model.predict(&context, "rpm")) - 5000.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn a_limit_is_no_fall_with_the_load() {
+        let mut by_load = vec![(1.0, 11.0), (2.0, 7.5), (2.1, 10.8), (3.0, 10.0)];
+        falling(&mut by_load);
+        assert_eq!(by_load, [(1.0, 11.0), (2.0, 10.8), (2.1, 10.8), (3.0, 10.0)]);
+    }
+
+    #[test]
+    fn it_stands_in_the_model_s_file() {
+        let model = close(&run(11.1), None, &[], &mut |_| {}).expect("a run").model;
+        let text = model.to_toml();
+        let again = Model::parse("m.toml", &text).expect("what was written");
+        assert_eq!(again.supply.len(), 2);
+        for ((channel, a), (other, b)) in model.supply.iter().zip(&again.supply) {
+            assert!(channel == other && a.len() == b.len());
+            assert!(a.iter().zip(b).all(|(a, b)| (a.0 - b.0).abs() < 1e-4 && (a.1 - b.1).abs() < 1e-4));
+        }
+        let refused = |from: &str, to: &str| Model::parse("m.toml", &text.replacen(from, to, 1)).expect_err(to).to_string();
+        assert!(refused("supply_v = [", "supply_v = [-1.0, ").contains("channel.current_a.supply_v"));
+        assert!(refused("supply_at_kus = [", "supply_at_kus = [9.0, ").contains("channel.rpm.supply_at_kus"));
     }
 }
