@@ -43,7 +43,7 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
     };
     let mut sheet = parts::begin(&page);
     sheet.fold("Every channel in figures", |sheet| sheet.figures(every_channel(closed)));
-    identified(&mut sheet, log, v);
+    identified(&mut sheet, log, closed);
     parts::candidates(&mut sheet, &closed.diagnosis);
     parts::aside(&mut sheet, v);
     sheet.html()
@@ -362,7 +362,8 @@ fn pinned(layers: &mut [Layer]) -> usize {
 }
 
 /// Plateaus, fits and constants, as `identify` has them.
-fn identified(sheet: &mut Sheet, log: &Log, v: &Verdict) {
+fn identified(sheet: &mut Sheet, log: &Log, closed: &Closed) {
+    let v = &closed.verdict;
     let Ok(mut found) = identify(log) else { return };
     // the card of the rotor's lag has its time constants, beside everything else that was found
     if v.effects.iter().any(|e| e.id == "spinup_lag") {
@@ -373,6 +374,9 @@ fn identified(sheet: &mut Sheet, log: &Log, v: &Verdict) {
         sheet.figures(found.curves.iter().map(run::relation).map(thinned).collect());
         run::coefficients(sheet, &found);
         run::plateaus(sheet, log, &found);
+        if let Some(said) = closed.model.said_of_the_supply() {
+            sheet.say(&said);
+        }
     });
     sheet.fold("Power, efficiency, coefficients", |sheet| designer(sheet, &found, thinned));
 }

@@ -61,7 +61,8 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     let _ = writeln!(out, "{}", line("**all**", &all));
     out.push_str(
         "\nNames: each name of a run, sought in the verdict of each other run of its rig. A correction without a name is none. \
-         A rig at two supply voltages turns at another speed for the same pulse: no constant takes that off, and both models have it. \
+         A rig at two supply voltages turns at another speed for the same pulse: no constant takes that off. The corrected model follows the voltage \
+         that was measured, the declared one does not. \
          A prediction that runs away stays in the mean, and there it outweighs all others: the list of the worst shows it.\n",
     );
     let mut worst: Vec<(&str, &Prediction)> =
