@@ -75,7 +75,7 @@ pub fn circle(again: &Log, model: &Model) -> Circle {
         .iter()
         .filter(|t| !t.relation.is_evidence())
         .filter_map(|target| {
-            let prediction = model.predict(&context, target.name)?;
+            let prediction = model.predict_at_its_own_supply(&context, target.name)?;
             let residual: Vec<f64> = target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).collect();
             let t: Vec<f64> = target.rows.iter().map(|i| context.t[*i]).collect();
             let rms = (residual.iter().map(|r| r * r).sum::<f64>() / residual.len().max(1) as f64).sqrt();
@@ -108,7 +108,7 @@ fn settle(context: &mut Context, model: &Model) {
 /// Takes the second run's own tare out of the load-cell channels.
 fn tare(context: &mut Context, model: &Model) {
     for name in ["thrust_n", "torque_nm"] {
-        let Some(prediction) = model.predict(context, name) else { continue };
+        let Some(prediction) = model.predict_at_its_own_supply(context, name) else { continue };
         let Some(target) = context.targets.iter_mut().find(|t| t.name == name) else { continue };
         let sum: f64 = target.rows.iter().zip(&target.y).map(|(i, y)| y - prediction[*i]).sum();
         let offset = sum / target.rows.len().max(1) as f64;
@@ -120,7 +120,9 @@ fn tare(context: &mut Context, model: &Model) {
 /// fast enough to be measured.
 fn settled(context: &Context, model: &Model) -> Option<Vec<bool>> {
     let pulse = context.pulse.as_ref()?;
-    let speed = context.with_relation(Relation::SpeedFromPulse).find_map(|i| model.predict(context, context.targets[i].name))?;
+    let speed = context
+        .with_relation(Relation::SpeedFromPulse)
+        .find_map(|i| model.predict_at_its_own_supply(context, context.targets[i].name))?;
     let lags = model.effects.iter().map(|e| &e.placed).any(|p| {
         p.effect.about().depends_on.contains(&"time_since_step")
             && p.instance.channels.iter().any(|c| SPEED.contains(&c.as_str()))
