@@ -11,11 +11,18 @@
 //!
 //! Reference: <https://mutants.rs>; `budgets/mutants.toml`.
 
+mod bench;
+mod page;
+mod results;
+
+use bench::Bench;
+use page::{count, left, stale, tell};
+use results::Results;
+
 use crate::folder;
 use crate::place::Place;
-use crate::run::{Failure, cargo, output, run, said};
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
+use crate::run::{Failure, cargo, run};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -228,20 +235,6 @@ fn read(place: &Place) -> Result<(Vec<Package>, Vec<Accepted>), Failure> {
     Ok((packages, accepted))
 }
 
-/// Where the work is done.
-struct Bench<'p> {
-    place: &'p Place,
-    tool: PathBuf,
-    copy: Place,
-    results: Results<'p>,
-}
-
-/// What became of each mutant, a file a package.
-struct Results<'p> {
-    place: &'p Place,
-    folder: PathBuf,
-}
-
 impl Package {
     /// The words after `cargo test` for all tests but those that take too long.
     fn all_tests(&self) -> Vec<&str> {
@@ -256,226 +249,6 @@ impl Package {
     }
 }
 
-impl Bench<'_> {
-    /// The tool's `words` in the copy, builds of the copy's own.
-    fn tool(&self, words: &[&str]) -> Command {
-        let mut command = Command::new(&self.tool);
-        command.arg("mutants").args(words).current_dir(&self.copy.root).env("CARGO_TARGET_DIR", &self.copy.target);
-        command
-    }
-
-    /// What differs from `base`, as a file: new files that git does not know yet included.
-    fn difference(&self, base: &str) -> Result<PathBuf, Failure> {
-        let git = |words: &[&str]| {
-            let mut command = Command::new("git");
-            command.args(words).current_dir(&self.place.root);
-            command
-        };
-        let mut whole = output(&mut git(&["diff", base, "--", "*.rs"]))? + "\n";
-        let new = output(&mut git(&["ls-files", "--others", "--exclude-standard", "--", "*.rs"]))?;
-        for file in new.lines() {
-            // a difference is no success of `git diff --no-index`
-            let (_, text) = said(&mut git(&["diff", "--no-index", "--", "/dev/null", file]))?;
-            whole += &text;
-        }
-        let file = self.place.root.join("target/mutation/changed.diff");
-        fs::write(&file, whole)?;
-        Ok(file)
-    }
-
-    /// Breaks a package, or what of it is asked for; of a difference its lines only, and nothing is begun after the instant.
-    fn run(&self, package: &Package, asked: &Asked<'_>, difference: Option<(&Path, Instant)>) -> Result<Fates, Failure> {
-        let start = Instant::now();
-        let known = if difference.is_none() { self.results.known(&self.copy.root, package)? } else { Fates::new() };
-        let whole = asked.places.is_empty() || asked.places.contains(&package.name.as_str());
-        let mut list = self.tool(&["--list", "-p", &package.name]);
-        if let Some((diff, _)) = difference {
-            list.arg("--in-diff").arg(diff);
-        }
-        let prefix = format!("{}/", package.name);
-        let mut files: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-        let mut fates = Fates::new();
-        for name in output(&mut list)?.lines() {
-            let file = name.split(':').next().unwrap_or_default();
-            let Some(below) = file.strip_prefix(&prefix) else { continue };
-            if package.without.iter().any(|start| below.starts_with(start.as_str())) {
-                continue;
-            }
-            let fate = known.get(name).copied().unwrap_or(Fate::Untried);
-            let wanted = whole || asked.places.contains(&file);
-            if wanted && (!asked.again || matches!(fate, Fate::Missed | Fate::Untried)) {
-                files.entry(below.to_owned()).or_default().insert(name.to_owned());
-                fates.insert(name.to_owned(), Fate::Untried);
-            } else {
-                fates.insert(name.to_owned(), fate);
-            }
-        }
-        let all: usize = files.values().map(BTreeSet::len).sum();
-        println!("{}: {all} mutants in {} files", package.name, files.len());
-        if all == 0 {
-            return Ok(fates);
-        }
-        run(&mut self.tests(package)).map_err(|error| Failure(format!("{error} before anything was broken")))?;
-        for (file, names) in files {
-            if difference.is_some_and(|(_, until)| Instant::now() > until) {
-                return Err(Failure(format!(
-                    "{prefix}{file}: its mutants, and what comes after, have no time left: name packages"
-                )));
-            }
-            let quick: Vec<String> = self.quick(package, &file);
-            let quick: Vec<&str> = quick.iter().map(String::as_str).collect();
-            let mut came = self.turn(package, &file, &names, &[], &quick, QUICK_S)?;
-            let mut stages = vec![(package.name.as_str(), WHOLE_S)];
-            stages.extend(package.beside.iter().map(|beside| (beside.as_str(), WHOLE_S)));
-            for (tests, seconds) in stages {
-                let alive: BTreeSet<String> = missed(&came).map(str::to_owned).collect();
-                if !alive.is_empty() {
-                    came.extend(self.turn(package, &file, &alive, &["--test-package", tests], &package.all_tests(), seconds)?);
-                }
-            }
-            println!("  {file}: {}, {:.0} s", words(&came), start.elapsed().as_secs_f64());
-            for name in missed(&came) {
-                println!("    missed {name}");
-            }
-            fates.extend(came);
-            if difference.is_none() {
-                self.results.keep(&self.copy.root, package, &fates)?; // whoever ends this goes on with --again
-            }
-        }
-        Ok(fates)
-    }
-
-    /// `cargo test` of a package as the mutants will meet it.
-    fn tests(&self, package: &Package) -> Command {
-        let mut command = cargo(&self.copy, &["test", "--quiet", "--profile", PROFILE, "-p", &package.name]);
-        command.args(package.all_tests()).env("CARGO_TARGET_DIR", &self.copy.target).stdout(Stdio::null());
-        command
-    }
-
-    /// Unit tests, and the integration test that bears the name of the file (of the module that it is a part of).
-    fn quick(&self, package: &Package, file: &str) -> Vec<String> {
-        let stem = file.split('/').nth(1).unwrap_or_default().trim_end_matches(".rs").to_owned();
-        let tests = package.first.get(file).cloned().unwrap_or_else(|| vec![stem]);
-        let there = |test: &String| self.copy.root.join(format!("{}/tests/{test}.rs", package.name)).exists();
-        let each = tests.into_iter().filter(there).flat_map(|test| ["--test".to_owned(), test]);
-        std::iter::once("--lib".to_owned()).chain(each).collect()
-    }
-
-    /// What becomes of the mutants `names` of one file under some tests.
-    fn turn(
-        &self,
-        package: &Package,
-        file: &str,
-        names: &BTreeSet<String>,
-        words: &[&str],
-        tests: &[&str],
-        seconds: u64,
-    ) -> Result<Fates, Failure> {
-        let out = self.place.root.join("target/mutation/turn");
-        let _ = fs::remove_dir_all(&out);
-        fs::create_dir_all(&out)?;
-        let path = format!("{}/{file}", package.name);
-        let only: Vec<String> = names.iter().map(|name| format!("^{}$", escaped(name))).collect();
-        let list = self.place.root.join("target/mutation/turn.toml");
-        let mut table = toml::Table::new();
-        table.insert("examine_re".to_owned(), only.into());
-        fs::write(&list, table.to_string())?;
-        let seconds = seconds.to_string();
-        let mut command = self.tool(&["--in-place", "--baseline", "skip", "--profile", PROFILE, "--colors", "never"]);
-        command.args(["--build-timeout", "300", "--timeout", &seconds, "-p", &package.name, "-f", &path]).args(words);
-        command.arg("--config").arg(&list).arg("-o").arg(&out).arg("--").args(tests);
-        let (_, text) = said(&mut command)?;
-        let mut came = Fates::new();
-        for (fate, word) in Fate::ALL.into_iter().filter(|(fate, _)| *fate != Fate::Untried) {
-            let text = fs::read_to_string(out.join(format!("mutants.out/{word}.txt"))).unwrap_or_default();
-            // the tool lets deleted fields of a struct pass its own filter
-            came.extend(text.lines().filter(|line| names.contains(*line)).map(|line| (line.to_owned(), fate)));
-        }
-        match names.iter().find(|name| !came.contains_key(*name)) {
-            Some(name) => Err(Failure(format!("{name}: cargo-mutants says nothing of it: {}", text.trim()))),
-            None => Ok(came),
-        }
-    }
-}
-
-impl Results<'_> {
-    fn file(&self, package: &str) -> PathBuf {
-        self.folder.join(format!("{package}.txt"))
-    }
-
-    /// What is known of a package, as far as its files in `root` are those that were broken then.
-    fn known(&self, root: &Path, package: &Package) -> Result<Fates, Failure> {
-        let Ok(text) = fs::read_to_string(self.file(&package.name)) else { return Ok(Fates::new()) };
-        let mut fates = Fates::new();
-        let mut same = false;
-        for line in text.lines() {
-            match line.split_once('\t') {
-                Some(("file", rest)) => {
-                    let Some((digest, file)) = rest.split_once('\t') else { continue };
-                    same = Self::digest(root, file).is_ok_and(|now| now == digest);
-                }
-                Some((word, name)) if same => {
-                    fates.extend(Fate::ALL.iter().find(|(_, w)| *w == word).map(|(fate, _)| (name.to_owned(), *fate)));
-                }
-                _ => {}
-            }
-        }
-        Ok(fates)
-    }
-
-    /// Of what a file holds beside its unit tests.
-    fn digest(root: &Path, file: &str) -> Result<String, Failure> {
-        use sha2::Digest as _;
-        let text = fs::read_to_string(root.join(file))?;
-        // unit tests stand at the end of a file, and are never broken
-        let code = text.split("\n#[cfg(test)]\nmod ").next().unwrap_or_default();
-        Ok(sha2::Sha256::digest(code).iter().fold(String::new(), |mut hex, byte| {
-            let _ = write!(hex, "{byte:02x}");
-            hex
-        }))
-    }
-
-    /// Writes what became of the mutants of a package whose sources are in `root`, for `--again` and the page.
-    fn keep(&self, root: &Path, package: &Package, fates: &Fates) -> Result<(), Failure> {
-        let mut text = String::new();
-        let mut last = "";
-        for (name, fate) in fates {
-            let file = name.split(':').next().unwrap_or_default();
-            if file != last {
-                let _ = writeln!(text, "file\t{}\t{file}", Self::digest(root, file)?);
-                last = file;
-            }
-            let _ = writeln!(text, "{}\t{name}", fate.word());
-        }
-        fs::create_dir_all(&self.folder)?;
-        Ok(fs::write(self.file(&package.name), text)?)
-    }
-
-    /// Writes the page; a package that was not broken here keeps its row.
-    fn write_page(&self, packages: &[Package], accepted: &[Accepted]) -> Result<(), Failure> {
-        let before = fs::read_to_string(self.place.root.join(PAGE)).unwrap_or_default();
-        let mut rows = Vec::new();
-        for package in packages {
-            let head = head(&package.name);
-            let fates = self.known(&self.place.root, package)?;
-            if fates.is_empty() {
-                rows.extend(before.lines().find(|line| line.starts_with(&head)).map(str::to_owned));
-            } else {
-                rows.push(row(&package.name, &count(self.place, &fates, accepted)));
-            }
-        }
-        fs::write(self.place.root.join(PAGE), page(&rows, accepted))?;
-        println!("{PAGE}");
-        Ok(())
-    }
-}
-
-/// A name with what regular expressions know made plain.
-fn escaped(name: &str) -> String {
-    let special = |c: char| "\\.+*?()|[]{}^$#&-~".contains(c);
-    name.chars().flat_map(|c| special(c).then_some('\\').into_iter().chain([c])).collect()
-}
-
 fn missed(fates: &Fates) -> impl Iterator<Item = &str> {
     fates.iter().filter(|(_, fate)| **fate == Fate::Missed).map(|(name, _)| name.as_str())
 }
@@ -484,126 +257,6 @@ fn words(fates: &Fates) -> String {
     let of = |asked: Fate| fates.values().filter(|fate| **fate == asked).count();
     let each = Fate::ALL.into_iter().map(|(fate, word)| (of(fate), word)).filter(|(n, _)| *n > 0);
     each.map(|(n, word)| format!("{n} {word}")).collect::<Vec<_>>().join(", ")
-}
-
-/// A mutant's file, line and column from 1, and its name without the two.
-fn parts(name: &str) -> Option<(&str, usize, usize, String)> {
-    let (file, rest) = name.split_once(':')?;
-    let (line, rest) = rest.split_once(':')?;
-    let (column, change) = rest.split_once(": ")?;
-    Some((file, line.parse().ok()?, column.parse().ok()?, format!("{file}: {change}")))
-}
-
-/// How the source goes on where a mutant begins.
-fn source(place: &Place, name: &str) -> Option<String> {
-    let (file, line, column, _) = parts(name)?;
-    let text = fs::read_to_string(place.root.join(file)).ok()?;
-    Some(text.lines().nth(line.checked_sub(1)?)?.chars().skip(column.checked_sub(1)?).collect())
-}
-
-impl Accepted {
-    fn is(&self, place: &Place, name: &str) -> bool {
-        let same = parts(name).is_some_and(|(_, _, _, plain)| plain == self.mutant);
-        same && (self.at.is_empty() || source(place, name).is_some_and(|source| source.starts_with(&self.at)))
-    }
-}
-
-/// The missed mutants that the list does not accept, a line each.
-fn left(place: &Place, fates: &Fates, accepted: &[Accepted]) -> Vec<String> {
-    let open = missed(fates).filter(|name| !accepted.iter().any(|accepted| accepted.is(place, name)));
-    open.map(|name| format!("missed: {name}   [{}]", source(place, name).unwrap_or_default())).collect()
-}
-
-/// The accepted mutants of a package that live no more, a line each.
-fn stale(place: &Place, package: &Package, fates: &Fates, accepted: &[Accepted]) -> Vec<String> {
-    if fates.values().any(|fate| *fate == Fate::Untried) {
-        return Vec::new();
-    }
-    let prefix = format!("{}/", package.name);
-    let own = accepted.iter().filter(|accepted| accepted.mutant.starts_with(&prefix));
-    let gone = own.filter(|accepted| !missed(fates).any(|name| accepted.is(place, name)));
-    gone.map(|accepted| format!("accepted, but caught or gone: {} [{}]", accepted.mutant, accepted.at)).collect()
-}
-
-/// A row of the table.
-#[derive(Debug, PartialEq)]
-struct Count {
-    viable: usize,
-    caught: usize,
-    time_outs: usize,
-    missed: usize,
-    equivalent: usize,
-    untried: usize,
-}
-
-fn count(place: &Place, fates: &Fates, accepted: &[Accepted]) -> Count {
-    let of = |asked: Fate| fates.values().filter(|fate| **fate == asked).count();
-    let same = |name: &&str| accepted.iter().any(|accepted| accepted.equivalent && accepted.is(place, name));
-    let equivalent = missed(fates).filter(same).count();
-    let missed = of(Fate::Missed) - equivalent;
-    let (caught, time_outs) = (of(Fate::Caught), of(Fate::TimeOut));
-    Count { viable: caught + time_outs + missed, caught, time_outs, missed, equivalent, untried: of(Fate::Untried) }
-}
-
-impl Count {
-    /// Share of what was noticed, per cent.
-    fn share(&self) -> f64 {
-        100.0 * (self.caught + self.time_outs) as f64 / self.viable.max(1) as f64
-    }
-}
-
-fn tell(package: &str, count: &Count) {
-    let Count { viable, caught, time_outs, missed, equivalent, untried } = count;
-    println!(
-        "{package}: {viable} viable, {caught} caught, {time_outs} never ended, {missed} missed, {equivalent} equivalent, \
-         {untried} untried: {:.1} %",
-        count.share()
-    );
-}
-
-fn head(package: &str) -> String {
-    format!("| `{package}` |")
-}
-
-fn row(package: &str, count: &Count) -> String {
-    let Count { viable, caught, time_outs, missed, equivalent, untried } = count;
-    format!(
-        "{} {viable} | {caught} | {time_outs} | {missed} | {:.1} % | {equivalent} | {untried} |",
-        head(package),
-        count.share()
-    )
-}
-
-fn page(rows: &[String], accepted: &[Accepted]) -> String {
-    let mut page = String::from(
-        "# Broken on purpose: do the tests notice?\n\n\
-         `cargo xtask mutants` breaks the code in every small way that cargo-mutants knows: a sign, a comparison, a function's result.\n\
-         Each broken program is a mutant. It is caught when a test fails, and missed when all pass.\n\
-         Its own quick tests come first, then all tests of its package. This page is written by that command from `budgets/mutants.toml`.\n\n\
-         - *Viable*: mutants that compile and do something else than the code.\n\
-         - *Never ended*: the tests hang; that is noticed, too, and counts as caught.\n\
-         - *Equivalent*: the mutant does what the code does. No test can tell, so it is left out of the share.\n\
-         - *Untried*: its file was not broken yet.\n\n\
-         Code that touches registers is left out: the emulated boards hold it.\n\n\
-         | package | viable | caught | never ended | missed | share | equivalent | untried |\n\
-         | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
-    );
-    for row in rows {
-        let _ = writeln!(page, "{row}");
-    }
-    let typed = |text: &str| format!("`{}`", text.replace('|', "\\|"));
-    for (title, equivalent) in [("Missed, and why they may", false), ("Equivalent, and why", true)] {
-        let mut list = accepted.iter().filter(|accepted| accepted.equivalent == equivalent).peekable();
-        if list.peek().is_none() {
-            continue;
-        }
-        let _ = write!(page, "\n## {title}\n\n| mutant | where | why |\n| --- | --- | --- |\n");
-        for Accepted { mutant, at, why, .. } in list {
-            let at = if at.is_empty() { String::new() } else { typed(at) };
-            let _ = writeln!(page, "| {} | {at} | {why} |", typed(mutant));
-        }
-    }
-    page
 }
 
 #[cfg(test)]
@@ -642,36 +295,6 @@ mod tests {
     }
 
     #[test]
-    fn the_page_is_current() {
-        let (place, packages, accepted) = whole();
-        let there = fs::read_to_string(place.root.join(PAGE)).unwrap_or_default();
-        let rows = |package: &Package| there.lines().find(|line| line.starts_with(&head(&package.name))).map(str::to_owned);
-        let rows: Vec<String> = packages.iter().filter_map(rows).collect();
-        assert!(there == page(&rows, &accepted), "{PAGE}: run `cargo xtask mutants --page`");
-    }
-
-    #[test]
-    fn a_mutant_is_known_by_its_file_its_change_and_its_place() {
-        let place = Place::find();
-        let name = "xtask/src/mutants.rs:1:5: replace x with y";
-        assert_eq!(parts(name), Some(("xtask/src/mutants.rs", 1, 5, "xtask/src/mutants.rs: replace x with y".to_owned())));
-        let accepted = |at: &str| Accepted {
-            mutant: "xtask/src/mutants.rs: replace x with y".to_owned(),
-            at: at.to_owned(),
-            equivalent: true,
-            why: String::new(),
-        };
-        assert!(accepted("`cargo xtask").is(&place, name) && accepted("").is(&place, name));
-        assert!(!accepted("cargo xtask").is(&place, name));
-        let fates = |fate| Fates::from([(name.to_owned(), fate)]);
-        assert_eq!(left(&place, &fates(Fate::Missed), &[]).len(), 1);
-        assert!(left(&place, &fates(Fate::Missed), &[accepted("")]).is_empty());
-        assert!(left(&place, &fates(Fate::TimeOut), &[]).is_empty());
-        assert_eq!(count(&place, &fates(Fate::Missed), &[accepted("")]).viable, 0, "no test can tell it");
-        assert_eq!(count(&place, &fates(Fate::Missed), &[]).share(), 0.0);
-    }
-
-    #[test]
     fn words_are_understood_or_refused() {
         assert_eq!(asked(&["--changed", "v1", "frame"]).unwrap().places, ["frame"]);
         assert_eq!(asked(&["--changed"]).unwrap().changed, Some("main"));
@@ -681,10 +304,5 @@ mod tests {
         let found = |place: &str| packages.iter().find(|package| package.has(place)).map(|package| package.name.as_str());
         assert_eq!(found("firmware-rig/src/rig.rs"), Some("firmware-rig"));
         assert_eq!((found("frame"), found("frames"), found("frame/tests")), (Some("frame"), None, None));
-    }
-
-    #[test]
-    fn names_are_plain_to_a_regular_expression() {
-        assert_eq!(escaped("a.rs:1:2: replace | with (b)"), "a\\.rs:1:2: replace \\| with \\(b\\)");
     }
 }
