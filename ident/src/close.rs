@@ -75,6 +75,10 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     context.leave_aside(aside);
     let model = model.map(|m| m.on(whole));
     let declared = Declared { model: model.as_deref() };
+    let limit = if model.is_none() { supply_limit::found(log, &context) } else { None };
+    if let Some(limit) = &limit {
+        context.leave_out_from(log, limit.from_us());
+    }
     context.against(declared);
     let refused = || CloseError::NoRelation { run: log.name.clone() };
     if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > sparse::TOO_FEW) {
@@ -117,7 +121,9 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         runs: Vec::new(),
     };
     marks::tell(&mut verdict, &mut after_model, &marks);
-    supply_limit::tell(&mut verdict, supply_limit::told(log, &context));
+    if let Some(limit) = &limit {
+        supply_limit::tell(&mut verdict, limit);
+    }
     if verdict.verdict == Kind::Ambiguous {
         verdict.next_experiment =
             crate::experiment::next(found.searched.as_ref().unwrap_or(&context), declared, &after_model, &diagnosis);

@@ -13,7 +13,7 @@ use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
 use crate::hypothesis::Declared;
 use crate::leftover::{self, Leftover};
-use crate::log::{Log, MODELLED, SPEED};
+use crate::log::{Column, Log, MODELLED, SPEED};
 use crate::marks;
 use crate::noise::{self, Noise};
 use crate::remembered::Remembered;
@@ -162,6 +162,8 @@ const FLOORED: f64 = 0.05;
 /// are taken for noise on one day and for the rotor's way on another.
 const NOISIER: f64 = 4.0;
 
+/// Samples beyond the degree of a polynomial that a fit needs: one for the constant, three to tell its noise.
+const FEWEST_BEYOND: usize = 4;
 /// Below this speed, rev/min, a rotor counts as standing: slower than any brushless motor runs without position sensors.
 pub(crate) const STANDSTILL: f64 = 100.0;
 /// Fewest samples after jumps, and between them, that show how well either is predicted.
@@ -320,6 +322,8 @@ pub struct Context {
     pub calm: Vec<(usize, usize)>,
     /// Rows at the head of the steady stretches in which the rotor still approaches its new speed; empty without a command or a speed.
     pub(crate) settling: Vec<bool>,
+    /// Command from which on the supply was at its current limit, us: rows of it are left out ([`Self::leave_out_from`]).
+    pub(crate) limited_from: Option<f64>,
     /// What is sought may have set in before the run: a declared model stands as it is, and a constant departure from it is news.
     pub(crate) against_model: bool,
     /// Logarithm of the density of a declared model's air over that of ISO 2533 air at 20 degC; 0 where none is declared, and where an effect
@@ -372,6 +376,28 @@ impl Context {
         let mut context = Self::of_clean(&bad::without(log, &aside), start_pulse_us);
         context.leave_aside(aside);
         context
+    }
+
+    /// Leaves the rows of a log from a command on out of what hangs on a supply that holds its voltage: speed, current and the voltage itself. A channel
+    /// on which too little would be left keeps them.
+    pub(crate) fn leave_out_from(&mut self, log: &Log, command_us: f64) {
+        let Some(pulse) = self.pulse.clone() else { return };
+        let follows = |t: &Target| matches!(t.relation, Relation::SpeedFromPulse | Relation::Current | Relation::Voltage);
+        let held = |name: &str| {
+            let mut values = log.column(name)?.to_vec();
+            values.iter_mut().zip(&pulse).filter(|(_, p)| **p > command_us - CALM_US).for_each(|(v, _)| *v = f64::NAN);
+            Some(Log { columns: vec![Column { name: name.to_owned(), values }], ..Log::default() })
+        };
+        for k in (0..self.targets.len()).filter(|k| follows(&self.targets[*k])).collect::<Vec<_>>() {
+            let old = &self.targets[k];
+            let Some(mut new) = held(old.name).and_then(|log| target(&log, self, old.name)) else { continue };
+            if new.rows.len() >= old.relation.degree() + FEWEST_BEYOND {
+                new.weight = old.weight;
+                new.unclaimed = glitch_rows::unclaimed(self, &new);
+                self.targets[k] = new;
+            }
+        }
+        self.limited_from = Some(command_us);
     }
 
     /// Remembers which samples are missing because they were bad ones.
@@ -447,6 +473,7 @@ impl Context {
             calm,
             against_model: false,
             air: 0.0,
+            limited_from: None,
             settling,
             expected_torque: Vec::new(),
             expected_speed: Vec::new(),

@@ -346,7 +346,7 @@ impl Scanned {
 }
 
 /// Fewest samples of a channel on which an effect with shape parameters is tried; a bare amplitude needs fewer.
-pub(crate) const FEWEST_SAMPLES: (usize, usize) = (30, 10);
+pub(crate) const FEWEST_SAMPLES: (usize, usize) = (30, 7);
 
 /// Every instance of every effect that the log could hold.
 pub(crate) fn offers(context: &Context) -> Vec<Scanned> {

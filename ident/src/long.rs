@@ -105,6 +105,9 @@ pub(crate) fn diagnose_any(log: &Log, context: &Context, declared: Declared<'_>,
         return Some(Found { diagnosis: diagnose(context, declared, progress)?, searched: None, estimates: None });
     };
     let mut few = Context::of_clean(&thinned(log, &rows), Some(context.start_pulse_us));
+    if let Some(us) = context.limited_from {
+        few.leave_out_from(&thinned(log, &rows), us);
+    }
     few.against(declared);
     let means = means(log, context, declared, &rows);
     // targets of all contexts stand in the same order; where thinning lost a channel, nothing is saved
@@ -129,8 +132,12 @@ pub(crate) fn diagnose_any(log: &Log, context: &Context, declared: Declared<'_>,
 
 /// The context of the means, each weighted by what the noise of all rows makes of its number of rows.
 fn means(log: &Log, context: &Context, declared: Declared<'_>, rows: &[usize]) -> Context {
-    let mut means = Context::of_clean(&averaged(log, rows), Some(context.start_pulse_us));
-    let sizes: Vec<f64> = rows.iter().zip(rows[1..].iter().copied().chain([log.len()])).map(|(a, b)| (b - a) as f64).collect();
+    let (all, log) = (log.len(), &averaged(log, rows));
+    let mut means = Context::of_clean(log, Some(context.start_pulse_us));
+    if let Some(us) = context.limited_from {
+        means.leave_out_from(log, us);
+    }
+    let sizes: Vec<f64> = rows.iter().zip(rows[1..].iter().copied().chain([all])).map(|(a, b)| (b - a) as f64).collect();
     let speeds = means.rpm.clone();
     for target in &mut means.targets {
         if let Some(whole) = context.targets.iter().find(|t| t.name == target.name) {

@@ -2,7 +2,8 @@
 //!
 //! What it is: below its limit a supply holds its voltage; from there on it holds the current, and the voltage gives way. Where the command rises from
 //! one level to the next while the current stands still and the voltage falls, both meters show it: no lead does that, and no throttle that
-//! rises no further. Two levels suffice, so that a table of eleven rows tells it. It is named from there; no prediction changes.
+//! rises no further. Two levels suffice, so that a table of eleven rows tells it. It is named from there, and these levels are left
+//! out of what hangs on a supply that holds its voltage.
 //! What can go wrong: a limit that only the highest level reaches leaves no level at which the current stands still, and is not told.
 //! Units: A, V, us.
 //! Reference: constant-current mode of laboratory supplies.
@@ -14,7 +15,7 @@ use crate::identify::{TABLE_ERROR, settled};
 use crate::log::Log;
 use crate::marks::{self, CERTAIN};
 use crate::plateau::Plateau;
-use crate::verdict::{EffectEntry, Kin, Unexplained, Verdict};
+use crate::verdict::{EffectEntry, Kin, Verdict};
 use crate::words::amount;
 
 /// Standard errors by which a voltage must have fallen to be said to fall.
@@ -34,7 +35,7 @@ struct Level {
 
 /// A stretch of levels at the limit.
 #[derive(Debug, Clone, PartialEq)]
-struct Limit {
+pub(crate) struct Limit {
     /// A, with its standard error.
     current: (f64, f64),
     /// Command at the first and at the last level, us.
@@ -43,16 +44,20 @@ struct Limit {
     volts: [f64; 2],
 }
 
-/// What a verdict says of the limit that a log shows; nothing where none shows, and where a declared model stands for what every day has.
-pub(crate) fn told(log: &Log, context: &Context) -> Option<EffectEntry> {
+/// The limit that a log shows, if it shows one.
+pub(crate) fn found(log: &Log, context: &Context) -> Option<Limit> {
     let measured = ["pulse_us", "current_a", "voltage_v"].iter().all(|name| log.column(name).is_some());
-    let limit = if measured && !context.against_model { limit(&levels(log, &settled(context, log))) } else { None }?;
+    measured.then(|| limit(&levels(log, &settled(context, log))))?
+}
+
+/// What a verdict says of it.
+fn told(limit: &Limit) -> EffectEntry {
     let instance = Instance::new(&["current_a", "voltage_v"], OF_THE_SUPPLY);
     let about = CurrentLimit.about();
     let (value, se) = limit.current;
     let held = Estimate { name: "limit".to_owned(), unit: "A".to_owned(), value, se };
     let ([from, to], [before, after]) = (limit.pulses, limit.volts);
-    Some(EffectEntry {
+    EffectEntry {
         kin: Kin::Own,
         id: CurrentLimit.id().to_owned(),
         scope: CurrentLimit.scope(&instance),
@@ -64,23 +69,20 @@ pub(crate) fn told(log: &Log, context: &Context) -> Option<EffectEntry> {
         heldout_error_reduction: 0.0,
         evidence: format!(
             "the command rises from {from:.0} to {to:.0} us, the current stands still, and the voltage falls from {} to {}; \
-             both meters show it, and the model does not hold it",
+             both meters show it. What the supply cannot give is no matter of the rig: these levels are left out of what the model says of speed, \
+             current and voltage",
             amount(before, "V"),
             amount(after, "V")
         ),
         channels: instance.channels,
-    })
+    }
 }
 
-/// Adds it to a verdict. What is left without a correction on what the limit moves has a name then.
-pub(crate) fn tell(verdict: &mut Verdict, told: Option<EffectEntry>) {
-    let known = verdict.effects.iter().any(|e| e.id == CurrentLimit.id());
-    let Some(entry) = told.filter(|_| !known) else { return };
-    let moved = |channel: &str| entry.channels.iter().any(|c| c == channel) || channel.starts_with("rpm");
-    verdict.effects.retain(|e| !(e.is_without_correction() && e.channels.iter().all(|c| moved(c))));
-    let part = |u: &mut Unexplained| u.looks_like += "; the levels at the supply's limit are part of it";
-    verdict.unexplained.iter_mut().filter(|u| moved(&u.channel)).for_each(part);
-    marks::stand(verdict, vec![entry]);
+/// Adds it to a verdict.
+pub(crate) fn tell(verdict: &mut Verdict, limit: &Limit) {
+    if !verdict.effects.iter().any(|e| e.id == CurrentLimit.id()) {
+        marks::stand(verdict, vec![told(limit)]);
+    }
 }
 
 fn levels(log: &Log, plateaus: &[Plateau]) -> Vec<Level> {
@@ -91,6 +93,13 @@ fn levels(log: &Log, plateaus: &[Plateau]) -> Vec<Level> {
         Some(Level { pulse: of("pulse_us")?.0, current: read("current_a")?, voltage: read("voltage_v")? })
     };
     plateaus.iter().filter_map(level).collect()
+}
+
+impl Limit {
+    /// Command of the first level at the limit, us.
+    pub(crate) fn from_us(&self) -> f64 {
+        self.pulses[0]
+    }
 }
 
 /// The first stretch of levels one after the other over which the current is held, and no level draws more.

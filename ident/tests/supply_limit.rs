@@ -41,6 +41,17 @@ fn a_limit_that_both_meters_show_is_named_on_eleven_rows() {
     assert!(closed.model.effects.iter().all(|e| e.placed.effect.id() != "current_limit"));
     assert!(closed.verdict.effects.iter().all(|e| !e.is_without_correction()), "{:?}", closed.verdict.effects);
     assert_eq!(closed.verdict.guessed_floors, Some(11));
+    // the levels at the limit say nothing of the lead, nor of the speed that the motor is driven to; thrust at a speed is what it is
+    let rows = |name: &str| closed.context.targets[closed.context.target(name).expect(name)].rows.len();
+    assert!(
+        rows("rpm") < 10 && rows("rpm") == rows("voltage_v") && rows("thrust_n") == 11,
+        "{} {}",
+        rows("rpm"),
+        rows("thrust_n")
+    );
+    let lead = closed.verdict.effects.iter().find(|e| e.id == "supply_sag").expect("30 mohm");
+    assert!((lead.parameters[0].value - 0.03).abs() < 0.001, "{:?}", lead.parameters);
+    assert!(closed.verdict.channels["rpm"].after.heldout_rms < 100.0, "{:?}", closed.verdict.channels["rpm"]);
 }
 
 #[test]

@@ -20,6 +20,7 @@ use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, sh
 use crate::noise::median;
 use crate::parallel::in_parallel;
 use crate::sparse;
+use crate::supply_limit;
 use crate::verdict::Verdict;
 
 /// What several runs amount to.
@@ -148,8 +149,12 @@ fn start_pulse(runs: &[Run]) -> f64 {
 fn prepared(log: &Log, start: f64) -> Context {
     let log = &*sparse::without(log, &sparse::left_out(log));
     let aside = bad::found(log);
-    let mut context = Context::of_clean(&bad::without(log, &aside), Some(start));
+    let log = &*bad::without(log, &aside);
+    let mut context = Context::of_clean(log, Some(start));
     context.leave_aside(aside);
+    if let Some(limit) = supply_limit::found(log, &context) {
+        context.leave_out_from(log, limit.from_us());
+    }
     context
 }
 
