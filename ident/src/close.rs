@@ -77,7 +77,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let declared = Declared { model: model.as_deref() };
     let limit = if model.is_none() { supply_limit::found(log, &context) } else { None };
     if let Some(limit) = &limit {
-        context.leave_out_from(log, limit.from_us());
+        context.leave_out_from(log, limit.begins_us());
     }
     context.against(declared);
     let refused = || CloseError::NoRelation { run: log.name.clone() };

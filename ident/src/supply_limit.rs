@@ -97,7 +97,7 @@ fn levels(log: &Log, plateaus: &[Plateau]) -> Vec<Level> {
 
 impl Limit {
     /// Command of the first level at the limit, us.
-    pub(crate) fn from_us(&self) -> f64 {
+    pub(crate) fn begins_us(&self) -> f64 {
         self.pulses[0]
     }
 }

@@ -153,7 +153,7 @@ fn prepared(log: &Log, start: f64) -> Context {
     let mut context = Context::of_clean(log, Some(start));
     context.leave_aside(aside);
     if let Some(limit) = supply_limit::found(log, &context) {
-        context.leave_out_from(log, limit.from_us());
+        context.leave_out_from(log, limit.begins_us());
     }
     context
 }
