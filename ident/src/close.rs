@@ -76,9 +76,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let model = model.map(|m| m.on(whole));
     let declared = Declared { model: model.as_deref() };
     let limit = if model.is_none() { supply_limit::found(log, &context) } else { None };
-    if let Some(limit) = &limit {
-        context.leave_out_from(log, limit.begins_us());
-    }
+    let at_limit = limit.as_ref().map(|limit| context.leave_out_from(log, limit.begins_us())).unwrap_or_default();
     context.against(declared);
     let refused = || CloseError::NoRelation { run: log.name.clone() };
     if !context.targets.iter().any(|t| t.relation.degree() > 0 && t.rows.len() > sparse::TOO_FEW) {
@@ -122,7 +120,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     };
     marks::tell(&mut verdict, &mut after_model, &marks);
     if let Some(limit) = &limit {
-        supply_limit::tell(&mut verdict, limit);
+        supply_limit::tell(&mut verdict, limit, &supply_limit::missed(log, &context, &before_model, &at_limit));
     }
     if verdict.verdict == Kind::Ambiguous {
         verdict.next_experiment =

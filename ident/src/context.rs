@@ -13,7 +13,7 @@ use crate::design::{Values, powers_of};
 use crate::effects::glitch_rows;
 use crate::hypothesis::Declared;
 use crate::leftover::{self, Leftover};
-use crate::log::{Column, Log, MODELLED, SPEED};
+use crate::log::{Log, MODELLED, SPEED};
 use crate::marks;
 use crate::noise::{self, Noise};
 use crate::remembered::Remembered;
@@ -378,26 +378,21 @@ impl Context {
         context
     }
 
-    /// Leaves the rows of a log from a command on out of what hangs on a supply that holds its voltage: speed, current and the voltage itself. A channel
-    /// on which too little would be left keeps them.
-    pub(crate) fn leave_out_from(&mut self, log: &Log, command_us: f64) {
-        let Some(pulse) = self.pulse.clone() else { return };
+    /// Leaves the rows of a log from a command on out of what hangs on a supply that holds its voltage: speed, current and the voltage itself; names
+    /// these channels. A channel on which too little would be left keeps them.
+    pub(crate) fn leave_out_from(&mut self, log: &Log, command_us: f64) -> Vec<&'static str> {
+        let Some(pulse) = &self.pulse else { return Vec::new() };
+        let counts = |row: usize| pulse[row] <= command_us - CALM_US;
         let follows = |t: &Target| matches!(t.relation, Relation::SpeedFromPulse | Relation::Current | Relation::Voltage);
-        let held = |name: &str| {
-            let mut values = log.column(name)?.to_vec();
-            values.iter_mut().zip(&pulse).filter(|(_, p)| **p > command_us - CALM_US).for_each(|(v, _)| *v = f64::NAN);
-            Some(Log { columns: vec![Column { name: name.to_owned(), values }], ..Log::default() })
+        let fewer = |t: &Target| {
+            let new = target(log, self, t.name, &counts).filter(|new| new.rows.len() >= t.relation.degree() + FEWEST_BEYOND)?;
+            Some(Target { unclaimed: glitch_rows::unclaimed(self, &new), ..new })
         };
-        for k in (0..self.targets.len()).filter(|k| follows(&self.targets[*k])).collect::<Vec<_>>() {
-            let old = &self.targets[k];
-            let Some(mut new) = held(old.name).and_then(|log| target(&log, self, old.name)) else { continue };
-            if new.rows.len() >= old.relation.degree() + FEWEST_BEYOND {
-                new.weight = old.weight;
-                new.unclaimed = glitch_rows::unclaimed(self, &new);
-                self.targets[k] = new;
-            }
-        }
+        let new: Vec<Option<Target>> = self.targets.iter().map(|t| follows(t).then(|| fewer(t)).flatten()).collect();
+        let left_out = new.iter().flatten().map(|t| t.name).collect();
+        self.targets.iter_mut().zip(new).for_each(|(target, new)| *target = new.unwrap_or_else(|| target.clone()));
         self.limited_from = Some(command_us);
+        left_out
     }
 
     /// Remembers which samples are missing because they were bad ones.
@@ -494,7 +489,7 @@ impl Context {
     pub fn declared(&self, log: &Log, name: &'static str) -> Option<Target> {
         match DIFFERENCES.iter().find(|d| d.1 == name) {
             Some((channel, name)) => difference(self, name, log.column(channel)?),
-            None => target(log, self, name),
+            None => target(log, self, name, &|_| true),
         }
     }
 
@@ -658,14 +653,15 @@ fn targets(log: &Log, context: &Context) -> Vec<Target> {
     Context::declared_names(log).into_iter().filter_map(|name| context.declared(log, name)).collect()
 }
 
-fn target(log: &Log, context: &Context, name: &'static str) -> Option<Target> {
+/// A channel as a target, of the rows that count.
+fn target(log: &Log, context: &Context, name: &'static str, counts: &dyn Fn(usize) -> bool) -> Option<Target> {
     let column = log.column(name)?;
     let relation = Relation::of(name, context.pulse.is_some())?;
     let needs_rpm = matches!(relation, Relation::Thrust | Relation::Torque | Relation::Current | Relation::ThrustRms);
     if needs_rpm && context.rpm.is_empty() {
         return None;
     }
-    let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite()).collect();
+    let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite() && counts(*i)).collect();
     if rows.is_empty() {
         return None;
     }

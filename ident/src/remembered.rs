@@ -43,8 +43,7 @@ impl Question {
             Rows::Where(mask) => mask.hash(&mut digest),
         }
         for target in context.targets.iter().filter(|t| moving.contains(&t.name)) {
-            let numbers = [&target.y, &target.levelled].into_iter().flatten();
-            digest.write_u64(numbers.fold(0, |sum, v| (sum ^ v.to_bits()).rotate_left(5).wrapping_mul(0x517c_c1b7_2722_0a95)));
+            [&target.y, &target.levelled].into_iter().flatten().for_each(|v| v.to_bits().hash(&mut digest));
         }
         if let Some(model) = declared.model {
             format!("{:?} {:?}", model.polynomials, model.effects).hash(&mut digest);

@@ -9,14 +9,15 @@
 //! Reference: constant-current mode of laboratory supplies.
 
 use crate::close::parameter;
-use crate::context::{CALM_US, Context};
+use crate::context::{CALM_US, Context, unit_of};
 use crate::effects::{CurrentLimit, Effect, Estimate, Instance, OF_THE_SUPPLY};
 use crate::identify::{TABLE_ERROR, settled};
 use crate::log::Log;
 use crate::marks::{self, CERTAIN};
+use crate::model::Model;
 use crate::plateau::Plateau;
 use crate::verdict::{EffectEntry, Kin, Verdict};
-use crate::words::amount;
+use crate::words::{amount, channel};
 
 /// Standard errors by which a voltage must have fallen to be said to fall.
 const CLEARLY: f64 = 3.0;
@@ -50,8 +51,20 @@ pub(crate) fn found(log: &Log, context: &Context) -> Option<Limit> {
     measured.then(|| limit(&levels(log, &settled(context, log))))?
 }
 
-/// What a verdict says of it.
-fn told(limit: &Limit) -> EffectEntry {
+/// How far off the levels at the limit are from what a model says of the channels that they were left out of, at the most.
+pub(crate) fn missed(log: &Log, context: &Context, model: &Model, left_out: &[&'static str]) -> Vec<String> {
+    let (Some(pulse), Some(from)) = (&context.pulse, context.limited_from) else { return Vec::new() };
+    let of_channel = |name: &&'static str| {
+        let (readings, prediction) = (log.column(name)?, model.predict_at_its_own_supply(context, name)?);
+        let off = (0..pulse.len()).filter(|row| pulse[*row] > from - CALM_US).map(|row| (readings[row] - prediction[row]).abs());
+        let most = off.filter(|v| v.is_finite()).fold(0.0, f64::max);
+        Some(format!("{} by up to {}", channel(name), amount(most, unit_of(name))))
+    };
+    left_out.iter().filter_map(of_channel).collect()
+}
+
+/// What a verdict says of it, and of what was left out for it.
+fn told(limit: &Limit, missed: &[String]) -> EffectEntry {
     let instance = Instance::new(&["current_a", "voltage_v"], OF_THE_SUPPLY);
     let about = CurrentLimit.about();
     let (value, se) = limit.current;
@@ -69,19 +82,31 @@ fn told(limit: &Limit) -> EffectEntry {
         heldout_error_reduction: 0.0,
         evidence: format!(
             "the command rises from {from:.0} to {to:.0} us, the current stands still, and the voltage falls from {} to {}; \
-             both meters show it. What the supply cannot give is no matter of the rig: these levels are left out of what the model says of speed, \
-             current and voltage",
+             both meters show it{}",
             amount(before, "V"),
-            amount(after, "V")
+            amount(after, "V"),
+            without(missed)
         ),
         channels: instance.channels,
     }
 }
 
-/// Adds it to a verdict.
-pub(crate) fn tell(verdict: &mut Verdict, limit: &Limit) {
-    if !verdict.effects.iter().any(|e| e.id == CurrentLimit.id()) {
-        marks::stand(verdict, vec![told(limit)]);
+/// That the levels took no part, and how far off they would be.
+fn without(missed: &[String]) -> String {
+    if missed.is_empty() {
+        return String::new();
+    }
+    format!(
+        ". What the supply cannot give is no matter of the rig: these levels are left out, and are off what the others say of {}",
+        missed.join(", ")
+    )
+}
+
+/// Adds it to a verdict. One that names a current limit already says beside it what was left out.
+pub(crate) fn tell(verdict: &mut Verdict, limit: &Limit, missed: &[String]) {
+    match verdict.effects.iter_mut().find(|e| e.id == CurrentLimit.id()) {
+        Some(known) => known.evidence += &without(missed),
+        None => marks::stand(verdict, vec![told(limit, missed)]),
     }
 }
 

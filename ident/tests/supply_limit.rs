@@ -49,6 +49,8 @@ fn a_limit_that_both_meters_show_is_named_on_eleven_rows() {
         rows("rpm"),
         rows("thrust_n")
     );
+    let said = &closed.verdict.effects.iter().find(|e| e.id == "current_limit").expect("a limit").evidence;
+    assert!(said.contains("left out") && said.contains("speed by up to") && said.contains("voltage by up to"), "{said}");
     let lead = closed.verdict.effects.iter().find(|e| e.id == "supply_sag").expect("30 mohm");
     assert!((lead.parameters[0].value - 0.03).abs() < 0.001, "{:?}", lead.parameters);
     assert!(closed.verdict.channels["rpm"].after.heldout_rms < 100.0, "{:?}", closed.verdict.channels["rpm"]);

@@ -196,7 +196,7 @@ pub(super) fn removes(v: &Verdict, e: &EffectEntry) -> String {
         return "No correction was fitted.".to_owned();
     }
     if e.is_read_off() {
-        return "The readings themselves show it: no prediction changes.".to_owned();
+        return "The readings themselves show it: the model has no term for it.".to_owned();
     }
     if reduction <= 0.0 || !c.after.heldout_rms.is_finite() {
         return format!("It removes nothing of the error of {}.", channel(first));
