@@ -143,3 +143,51 @@ fn thrust_coefficients_agree_with_the_uiuc_table_within_what_is_uncertain() {
     let (k, _) = constant(&found, "k_T").expect("k_T of the table");
     assert!((thrust_coefficient(k, 0.2286, 1.225) / uiuc - 1.0).abs() < 0.06);
 }
+
+/// Rows of a table as pulse, speed, current and voltage, the rotor turning.
+fn levels(path: &Path) -> Vec<[f64; 4]> {
+    let (log, _) = import(path, &[]).unwrap_or_else(|e| panic!("{e}"));
+    let column = |name: &str| log.column(name).unwrap_or_else(|| panic!("{}: no {name}", path.display())).to_vec();
+    let all = ["pulse_us", "rpm", "current_a", "voltage_v"].map(column);
+    (0..log.len()).map(|i| [0, 1, 2, 3].map(|k| all[k][i])).filter(|row| row[1] > 100.0).collect()
+}
+
+/// A column along another, by straight lines; nothing outside.
+fn along(rows: &[[f64; 4]], x: usize, y: usize, at: f64) -> Option<f64> {
+    let between = rows.windows(2).find(|w| w[0][x] <= at && at <= w[1][x] && w[0][x] < w[1][x])?;
+    Some(between[0][y] + (at - between[0][x]) / (between[1][x] - between[0][x]) * (between[1][y] - between[0][y]))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// The powers of the voltage that a model carries over to another supply: ratios of speed at a pulse and of current at a speed over those of the
+/// voltage, on every pair of runs at 7 and 11 V. The set that they were read off.
+#[test]
+fn the_powers_of_the_supply_s_voltage_are_those_of_the_pairs() {
+    let Some(data) = data("the five-inch tables") else { return };
+    let (mut slow, mut fast, mut current) = (Vec::new(), Vec::new(), Vec::new());
+    for path in files(&data.join("rig/fivein-static-tables/tidy"), |n| n.ends_with("_7.csv")) {
+        let low = levels(&path);
+        let high = levels(Path::new(&path.display().to_string().replace("_7.csv", "_11.csv")));
+        for [pulse, rpm, ampere, volts] in &high {
+            let power = |x: usize, y: usize, at: f64, value: f64| {
+                Some((value / along(&low, x, y, at)?).ln() / (volts / along(&low, x, 3, at)?).ln())
+            };
+            match power(0, 1, *pulse, *rpm) {
+                Some(e) if *pulse < 1200.0 => slow.push(e),
+                Some(e) if *pulse > 1600.0 => fast.push(e),
+                _ => {}
+            }
+            current.extend(power(1, 2, *rpm, *ampere));
+        }
+    }
+    let pairs = [&slow, &fast, &current].map(Vec::len);
+    let found = [slow, fast, current].map(median);
+    println!("speed at low and at high pulses, current at a speed: {found:.2?}, of {pairs:?} levels");
+    let near = |value: f64, known: f64| (value - known).abs() < 0.05;
+    assert!(pairs.iter().all(|n| *n > 40), "{pairs:?}");
+    assert!(near(found[0], 0.97) && near(found[1], 0.82) && near(found[2], -0.70), "{found:?}");
+}

@@ -5,7 +5,8 @@
 //! What can go wrong: on one run a voltage falls with the load, and nobody can tell it from what the load does: asked of several runs only.
 //! Units: exponent 1; reference V.
 //! Reference: brushless motor at a fixed duty, V = k omega + R I, I as the square of the speed: the exponent of the speed is one over one and the share
-//! of R I in V. On 56 pairs of runs at 7 and 11 V it falls from 0.97 to 0.81 with the load (fivein-static-tables, MIT 2018, Cao and Strawson).
+//! of R I in V. On 56 pairs of runs at 7 and 11 V it falls from 0.97 to 0.82 with the load (fivein-static-tables, MIT 2018, Cao and Strawson;
+//! the test `the_powers_of_the_supply_s_voltage_are_those_of_the_pairs` computes it).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
 use crate::context::Context;
@@ -23,7 +24,7 @@ const EXPONENTS: (f64, f64) = (0.05, 2.0);
 /// at full speed and next to none of it at the lowest. Mean and standard deviation.
 pub(crate) const OF_SPEED: (f64, f64) = (0.8, 0.1);
 /// The same of the current at a speed: one for the same power, less where switching loses more at a higher voltage. On 56 pairs of runs at 7 and
-/// 11 V (fivein-static-tables, MIT 2018, Cao and Strawson) it is 0.69, and from motor to motor 0.1 about that.
+/// 11 V (fivein-static-tables, MIT 2018, Cao and Strawson) it is 0.70, and from motor to motor 0.1 about that.
 pub(crate) const OF_CURRENT: (f64, f64) = (0.7, 0.1);
 
 /// What is known of an exponent.
