@@ -13,6 +13,7 @@ pub mod book;
 pub mod budget;
 pub mod desk;
 pub mod flights;
+pub mod fuzzed;
 pub mod inertial;
 pub mod probe;
 pub mod recorders;

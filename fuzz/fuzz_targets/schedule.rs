@@ -1,0 +1,2 @@
+#![no_main]
+quadrig_fuzz::fuzzed!(schedule);
