@@ -11,7 +11,7 @@ use crate::context::Context;
 use crate::diagnose::Diagnosis;
 use crate::hypothesis::{Declared, Fit};
 use crate::log::{Column, Log, SPEED};
-use crate::model::Model;
+use crate::model::{AddedEffect, Model};
 use crate::rivals::beyond;
 use crate::simulate::from_command;
 use crate::verdict::{NextExperiment, ScheduleStep};
@@ -149,14 +149,28 @@ fn difference(context: &Context, a: &Model, b: &Model, schedule: &[ScheduleStep]
         models = models.map(|m| Cow::Owned(without_speed(&m)));
     }
     let [la, lb] = models.map(|m| from_command(&m, "predicted", &t, &pulse, &weather));
+    let asked = apart_on(a, b);
     context
         .targets
         .iter()
+        .filter(|target| asked.is_empty() || asked.iter().any(|name| name == target.name))
         .filter_map(|target| {
             let (x, y) = (la.column(target.name)?, lb.column(target.name)?);
             Some(x.iter().zip(y).map(|(x, y)| (x - y) / target.noise.rms).collect())
         })
         .collect()
+}
+
+/// The channels of what one of two models has and the other lacks: elsewhere their fits differ by chance, and by more where they are continued.
+fn apart_on(a: &Model, b: &Model) -> Vec<String> {
+    let lacks = |e: &AddedEffect, other: &Model| {
+        !other
+            .effects
+            .iter()
+            .any(|o| o.placed.effect.id() == e.placed.effect.id() && o.placed.instance.channels == e.placed.instance.channels)
+    };
+    let own = a.effects.iter().filter(|e| lacks(e, b)).chain(b.effects.iter().filter(|e| lacks(e, a)));
+    own.flat_map(|e| e.placed.instance.channels.iter().cloned()).collect()
 }
 
 fn less(mut a: Vec<Vec<f64>>, b: Vec<Vec<f64>>) -> Vec<Vec<f64>> {

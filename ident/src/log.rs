@@ -7,9 +7,11 @@
 //! Reference: specification `formats.md`, "Rig log".
 
 mod clock;
+mod disc;
 mod gaps;
 pub(crate) mod plausible;
 
+pub use disc::Disc;
 pub use gaps::Gaps;
 
 use sha2::{Digest, Sha256};
@@ -424,6 +426,13 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
             } else if let Some(event) = event(comment) {
                 log.events.push(event);
             } else if let Ok(table) = comment.parse::<toml::Table>() {
+                if let Some(key) = table.keys().find(|key| log.meta.contains_key(*key)) {
+                    return Err(place.refuse(
+                        Some(key),
+                        "it stands twice in the head",
+                        "each key once: which of the two is right?",
+                    ));
+                }
                 log.meta.extend(table);
             }
             continue;

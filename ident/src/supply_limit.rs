@@ -2,9 +2,10 @@
 //!
 //! What it is: below its limit a supply holds its voltage; from there on it holds the current, and the voltage gives way. Where the command rises from
 //! one level to the next while the current stands still and the voltage falls, both meters show it: no lead does that, and no throttle that
-//! rises no further. Two levels suffice, so that a table of eleven rows tells it. It is named from there, and these levels are left
-//! out of what hangs on a supply that holds its voltage.
-//! What can go wrong: a limit that only the highest level reaches leaves no level at which the current stands still, and is not told.
+//! rises no further. Two levels suffice, so that a table of eleven rows tells it. Where only the highest level reaches the limit, the current
+//! rises by clearly less than from the level before, and the voltage falls by clearly more than the levels before cost for it. It is named from
+//! there, and these levels are left out of what hangs on a supply that holds its voltage.
+//! What can go wrong: a lead that comes loose on the highest level looks the same; the level is then left out as well.
 //! Units: A, V, us.
 //! Reference: constant-current mode of laboratory supplies.
 
@@ -16,6 +17,7 @@ use crate::log::Log;
 use crate::marks::{self, CERTAIN};
 use crate::model::Model;
 use crate::plateau::Plateau;
+use crate::solve::Normal;
 use crate::verdict::{EffectEntry, Kin, Verdict};
 use crate::words::{amount, channel};
 
@@ -43,6 +45,8 @@ pub(crate) struct Limit {
     pulses: [f64; 2],
     /// The same of the voltage, V.
     volts: [f64; 2],
+    /// Command of the first level at the limit, us.
+    begins: f64,
 }
 
 /// The limit that a log shows, if it shows one.
@@ -70,6 +74,7 @@ fn told(limit: &Limit, missed: &[String]) -> EffectEntry {
     let (value, se) = limit.current;
     let held = Estimate { name: "limit".to_owned(), unit: "A".to_owned(), value, se };
     let ([from, to], [before, after]) = (limit.pulses, limit.volts);
+    let current = if limit.begins == from { "stands still" } else { "rises by less than before" };
     EffectEntry {
         kin: Kin::Own,
         id: CurrentLimit.id().to_owned(),
@@ -81,7 +86,7 @@ fn told(limit: &Limit, missed: &[String]) -> EffectEntry {
         parameters: vec![parameter(&held, &[], "current_a")],
         heldout_error_reduction: 0.0,
         evidence: format!(
-            "the command rises from {from:.0} to {to:.0} us, the current stands still, and the voltage falls from {} to {}; \
+            "the command rises from {from:.0} to {to:.0} us, the current {current}, and the voltage falls from {} to {}; \
              both meters show it{}",
             amount(before, "V"),
             amount(after, "V"),
@@ -123,12 +128,45 @@ fn levels(log: &Log, plateaus: &[Plateau]) -> Vec<Level> {
 impl Limit {
     /// Command of the first level at the limit, us.
     pub(crate) fn begins_us(&self) -> f64 {
-        self.pulses[0]
+        self.begins
     }
 }
 
-/// The first stretch of levels one after the other over which the current is held, and no level draws more.
 fn limit(levels: &[Level]) -> Option<Limit> {
+    stretch(levels).or_else(|| levels.windows(3).find_map(|w| highest(w, levels)))
+}
+
+/// The highest level, where it alone is at the limit. A motor's current grows ever faster with the command: it is no less than what the rise before
+/// continues to. A lead costs as much for each ampere as it did before.
+fn highest(step: &[Level], levels: &[Level]) -> Option<Limit> {
+    let [a, b, c] = step else { return None };
+    let rises = a.pulse + CALM_US < b.pulse && b.pulse + CALM_US < c.pulse && a.current.0 < b.current.0;
+    let is_most = levels.iter().all(|l| l.pulse <= c.pulse && l.current.0 <= c.current.0);
+    let further = (c.pulse - b.pulse) / (b.pulse - a.pulse);
+    let short = b.current.0 + further * (b.current.0 - a.current.0) - c.current.0;
+    let error = ((1.0 + further) * b.current.1).hypot(further * a.current.1).hypot(c.current.1);
+    let (expected, error_v) = by_the_lead(levels, c)?;
+    let fell = expected - c.voltage.0;
+    let is_limit = rises && is_most && short > CLEARLY * error && fell > CLEARLY * error_v.hypot(c.voltage.1);
+    is_limit.then(|| Limit { current: c.current, pulses: [b.pulse, c.pulse], volts: [b.voltage.0, c.voltage.0], begins: c.pulse })
+}
+
+/// The voltage that a lead leaves at a level by all the others, with its standard error: a straight line over the current.
+fn by_the_lead(levels: &[Level], at: &Level) -> Option<(f64, f64)> {
+    let others: Vec<&Level> = levels.iter().filter(|l| l.pulse < at.pulse).collect();
+    let columns = [vec![1.0; others.len()], others.iter().map(|l| l.current.0).collect()];
+    let volts: Vec<f64> = others.iter().map(|l| l.voltage.0).collect();
+    let weights: Vec<f64> = others.iter().map(|l| l.voltage.1.powi(-2)).collect();
+    let line = Normal::of_columns(&columns, &volts, &weights).solve()?;
+    let place = [1.0, at.current.0];
+    let expected = line.coefficients.iter().zip(place).map(|(c, x)| c * x).sum();
+    let terms = (0..2).flat_map(|i| (0..2).map(move |j| (i, j)));
+    let variance: f64 = terms.map(|(i, j)| place[i] * line.inverse[(i, j)] * place[j]).sum();
+    Some((expected, variance.max(0.0).sqrt()))
+}
+
+/// The first stretch of levels one after the other over which the current is held, and no level draws more.
+fn stretch(levels: &[Level]) -> Option<Limit> {
     let most = levels.iter().map(|l| l.current.0).fold(0.0, f64::max);
     let first = levels.windows(2).position(|w| is_held(w, most))?;
     let steps = levels[first..].windows(2).take_while(|w| is_held(w, most)).count();
@@ -142,6 +180,7 @@ fn limit(levels: &[Level]) -> Option<Limit> {
         current: (mean, se),
         pulses: [levels[first].pulse, last.pulse],
         volts: [levels[first].voltage.0, last.voltage.0],
+        begins: levels[first].pulse,
     })
 }
 
@@ -175,6 +214,20 @@ mod tests {
         .expect("a limit");
         assert_eq!((found.pulses, found.volts), ([1810.0, 2000.0], [10.59, 7.79]));
         assert!((found.current.0 - 10.935).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_limit_that_only_the_highest_level_reaches_is_told() {
+        let of = |amps: f64, volts: f64| {
+            let below = [[1430.0, 2.41, 11.03], [1525.0, 3.27, 11.006], [1620.0, 4.35, 10.973], [1715.0, 5.83, 10.931]];
+            levels(&[&below[..], &[[1810.0, 7.74, 10.875], [1905.0, 9.92, 10.808], [2000.0, amps, volts]]].concat())
+        };
+        let found = limit(&of(10.94, 10.196)).expect("a limit");
+        assert_eq!((found.begins, found.volts, found.current.0), (2000.0, [10.808, 10.196], 10.94));
+        // a throttle that ends before 2000 us costs no voltage, and a battery that gives way at full load does not hold the current
+        for other in [of(10.94, 10.78), of(12.2, 10.2)] {
+            assert_eq!(limit(&other), None);
+        }
     }
 
     #[test]

@@ -73,6 +73,15 @@ pub fn parameter(name: &str) -> String {
     match name {
         "t0" => "from".to_owned(),
         "t1" => "until".to_owned(),
+        "onset" => "begins at".to_owned(),
+        "tau" => "time constant".to_owned(),
+        "tau_up" => "time constant on the way up".to_owned(),
+        "tau_down" => "time constant on the way down".to_owned(),
+        "slack" => "play before it turns".to_owned(),
+        "derate" => "loss of speed with heat".to_owned(),
+        "speed_loss" => "loss of speed".to_owned(),
+        "current_rise" => "rise of the current".to_owned(),
+        "current_loss" => "loss of current".to_owned(),
         _ => match name.rsplit_once('_') {
             Some((of, axis @ ("x" | "y" | "z"))) => format!("{} ({axis})", of.replace('_', " ")),
             _ => name.replace('_', " "),

@@ -359,7 +359,13 @@ fn sizes_have_no_sign() {
         ("gain_change", "gain_change", "1", "rises by 2.00 %", "falls by 2.00 %"),
         ("blade_damage", "thrust_change", "1", "adds 2.00 % of the thrust", "takes 2.00 % of the thrust"),
         ("thermal_zero", "coefficient", "N/K", "rises by 0.0200 N per kelvin", "falls by 0.0200 N per kelvin"),
-        ("reynolds_thrust", "exponent", "1", "to the power of 2.02, not of two", "to the power of 1.98, not of two"),
+        (
+            "reynolds_thrust",
+            "exponent",
+            "1",
+            "grows faster with the speed than declared, by the speed to the power of 0.0200",
+            "grows slower",
+        ),
     ] {
         let [above, below] = [0.02, -0.02].map(|v| said(id, name, v, unit));
         assert!(above.contains(up) && below.contains(down), "{above} / {below}");

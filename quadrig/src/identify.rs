@@ -12,6 +12,7 @@ use crate::open::{Columns, Names, open};
 use crate::trouble::unwritten;
 use ident::context::unit_of;
 use ident::fit::power::csv;
+use ident::fit::ratio;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
 use ident::report::{WIDEST, headline, number, wrapped};
@@ -142,7 +143,11 @@ fn text(found: &Identified) -> String {
             "{:<26} {}\n",
             format!("{} over {}", channel(&f.y), channel(f.x)),
             wrapped(
-                &format!("{}; chi2 {:.2}{chosen}{left_out}", terms(coefficients.map(|c| (c.value, c.half))), f.curve.chi2),
+                &format!(
+                    "{}; chi2/dof {}{chosen}{left_out}",
+                    terms(coefficients.map(|c| (c.value, c.half))),
+                    ratio(f.curve.chi2)
+                ),
                 27
             )
         );

@@ -74,7 +74,7 @@ fn thrust_at_another_voltage_is_what_the_surface_says() {
         "download=\"plateau-figures.csv\"",
         "download=\"thrust-surface.csv\"",
         "figure of merit",
-        "chi2 ",
+        "chi2/dof ",
     ] {
         assert!(page.contains(text), "the page lacks {text}");
     }

@@ -32,12 +32,15 @@ impl Effect for ReynoldsThrust {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        let power =
-            found.parameter("exponent").map(|p| Parameter { value: 2.0 + p.value, ci95: p.ci95.map(|v| 2.0 + v), ..p.clone() });
-        let does = power.as_ref().and_then(sized).map_or_else(
-            || "follows another power of the speed, as small propellers do".to_owned(),
-            |v| format!("grows with the speed to the power of {v}, not of two"),
-        );
+        let exponent = found.parameter("exponent");
+        let size = exponent.map(|p| Parameter { value: p.value.abs(), ci95: p.ci95.map(f64::abs), ..p.clone() });
+        let does = match (exponent, size.as_ref().and_then(sized)) {
+            (Some(p), Some(v)) => {
+                let how = if p.value > 0.0 { "faster" } else { "slower" };
+                format!("grows {how} with the speed than declared, by the speed to the power of {v}")
+            }
+            _ => "follows another power of the speed, as small propellers do".to_owned(),
+        };
         Clause::new("the thrust", does)
     }
 

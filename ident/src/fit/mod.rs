@@ -123,7 +123,7 @@ pub fn relations(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) 
 /// How well a law describes its levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Law {
-    /// Scatter of the levels about it over what their errors promise, squared; 1 where both agree.
+    /// Scatter of the levels about it over what their errors promise, squared, for each degree of freedom; 1 where both agree.
     pub chi2: f64,
     /// Levels less coefficients.
     pub freedom: usize,
@@ -131,6 +131,8 @@ pub struct Law {
     pub holds: bool,
     /// Levels that were left out: far off in the light of the others.
     pub left_out: usize,
+    /// What the channel reads at rest by this law, and its unit, where the law has a zero of its own.
+    pub zero: Option<(f64, &'static str)>,
 }
 
 /// Probability below which a law is said not to hold.
@@ -144,7 +146,7 @@ impl Law {
     pub fn of(chi2: f64, freedom: usize) -> Self {
         let freely = freedom.max(1) as f64;
         let holds = ChiSquared::new(freely).is_ok_and(|law| law.sf(chi2 * freely) >= HOLDS);
-        Self { chi2, freedom, holds, left_out: 0 }
+        Self { chi2, freedom, holds, left_out: 0, zero: None }
     }
 
     /// The same where some levels were left out. More than a fifth of all are no stray ones: something else acts on them.
@@ -162,8 +164,15 @@ impl Law {
             1 => ", 1 level left out".to_owned(),
             n => format!(", {n} levels left out"),
         };
-        format!("chi2 {:.2} of {}{left_out}, {law}", self.chi2, self.freedom)
+        let zero = self.zero.map_or_else(String::new, |(v, unit)| format!("; at rest {v:.4} {unit}"));
+        format!("chi2/dof {}, dof {}{left_out}, {law}{zero}", ratio(self.chi2), self.freedom)
     }
+}
+
+/// A chi-squared for each degree of freedom, to the digits that say something.
+#[must_use]
+pub fn ratio(chi2: f64) -> String {
+    if chi2 < 100.0 { format!("{chi2:.2}") } else { format!("{chi2:.0}") }
 }
 
 /// Coefficient of omega^2 with a free zero: k_T for thrust, k_Q for torque. Where the square is not the law, its interval is as wide as the
@@ -188,7 +197,9 @@ pub fn square_law(
         .collect();
     let curve = Curve::fit(&points, 1)?;
     let left_out = curve.outliers.len();
-    let law = Law::of(curve.chi2, curve.freedom).without(left_out, curve.points.len());
+    let unit = if channel == "thrust_n" { "N" } else { "N.m" };
+    let zero = Some((curve.coefficient(0).value, unit));
+    let law = Law { zero, ..Law::of(curve.chi2, curve.freedom).without(left_out, curve.points.len()) };
     let mut k = curve.coefficient(1);
     if !law.holds {
         let wide = farthest(&curve, STRAY * left_out > curve.points.len()).max(k.half);
@@ -206,8 +217,9 @@ pub fn square_law(
 fn farthest(curve: &Curve, all: bool) -> f64 {
     let (zero, slope) = (curve.coefficient(0), curve.coefficients[1]);
     let middle = median(&mut curve.points.iter().map(|p| p.x).collect::<Vec<_>>());
-    let turning =
-        curve.points.iter().enumerate().filter(|(i, p)| p.x > 0.0 && (all && p.x > middle || !curve.outliers.contains(i)));
+    let least = power::TOO_SMALL * curve.points.iter().map(|p| p.x).fold(0.0, f64::max);
+    let counts = |i: &usize, p: &Point| p.x > least && (all && p.x > middle || !curve.outliers.contains(i));
+    let turning = curve.points.iter().enumerate().filter(|(i, p)| counts(i, p));
     turning
         .map(|(_, p)| {
             let error = p.y_error.hypot(slope * p.x_error).hypot(zero.se) / p.x;

@@ -21,6 +21,10 @@ const UNTOLD: f64 = 0.19;
 const PAUSES: usize = 3;
 /// Rows below which no rate is judged.
 const ENOUGH: usize = 20;
+/// Share of the step that the stated rate promises below which it is no step of that rate: a log that is recorded faster says so.
+const TOO_CLOSE: f64 = 0.2;
+/// Step between whole numbers from which on they are no milliseconds: a row each two seconds.
+const MICROSECONDS: f64 = 2000.0;
 /// Step between whole numbers, s, and length of a run with such steps, s, above which they are no seconds.
 const NO_SECONDS: [f64; 2] = [5.0, 10_800.0];
 
@@ -84,6 +88,10 @@ pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
                     return refuse(found, format!("seconds; these look like {unit}: divide t_s by {times}"));
                 }
             }
+            if middle * hz < TOO_CLOSE {
+                let found = format!("rows {} s apart, where sample_hz says {} s", number(middle), number(1.0 / hz));
+                return refuse(found, format!("seconds; {}: multiply t_s, or mend sample_hz", coarser(middle * hz)));
+            }
             if let Some(found) = dropped(log, hz) {
                 let expected =
                     format!("a row each {} s; rows were dropped (a bad line, a filter, a thinned export)", number(1.0 / hz));
@@ -93,11 +101,21 @@ pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
         None if no_seconds(log, middle) => {
             let found = format!("whole numbers, {} apart, up to {}", number(middle), number(log.t[log.len() - 1]));
             let way_out = format!("if they are seconds, say so in the head: # sample_hz = {}", number(1.0 / middle));
-            return refuse(found, format!("seconds; these look like milliseconds: divide t_s by 1000 ({way_out})"));
+            let (unit, times) = if middle >= MICROSECONDS { ("microseconds", 1_000_000) } else { ("milliseconds", 1000) };
+            return refuse(found, format!("seconds; these look like {unit}: divide t_s by {times} ({way_out})"));
         }
         None => {}
     }
     Ok(())
+}
+
+/// The unit in which rows would be as far apart as they should.
+fn coarser(share: f64) -> String {
+    let near = |times: f64| (0.8..1.25).contains(&(share * times));
+    match [("minutes", 60.0), ("hours", 3600.0)].into_iter().find(|(_, times)| near(*times)) {
+        Some((unit, times)) => format!("these look like {unit} ({times:.0} s each)"),
+        None => "these look like another unit, or like another rate".to_owned(),
+    }
 }
 
 /// Whole numbers so far apart, or so long, that no run was recorded like that.
@@ -134,7 +152,12 @@ fn dropped(log: &Log, hz: f64) -> Option<String> {
     let untold = absent.min(counts) >= UNTOLD * promised && !told;
     (scattered || untold).then(|| {
         let holes = if holes.len() == 1 { "one hole".to_owned() } else { format!("{} holes", holes.len()) };
-        format!("{missing} of the {promised} rows are missing that sample_hz = {} promises, in {holes}", number(hz))
+        let first = steps.iter().position(|step| missed(step) >= 1.0).map_or(0.0, |i| log.t[i]);
+        let after = number(first);
+        format!(
+            "{missing} of the {promised} rows are missing that sample_hz = {} promises, in {holes}, from {after} s on",
+            number(hz)
+        )
     })
 }
 
@@ -160,7 +183,7 @@ mod tests {
     fn dropped_rows_are_refused_where_a_rate_is_stated() {
         let fifth = log(RATE, 1.0, |n| n % 5 != 3).expect_err("every fifth row is gone");
         assert!(fifth.contains("column t_s: 60 of the 300 rows are missing"), "{fifth}");
-        assert!(fifth.contains("in 60 holes; expected a row each 0.1 s; rows were dropped"), "{fifth}");
+        assert!(fifth.contains("in 60 holes, from 0.2 s on; expected a row each 0.1 s; rows were dropped"), "{fifth}");
         let block = log(RATE, 1.0, |n| !(100..160).contains(&n)).expect_err("a fifth is gone");
         assert!(block.contains("60 of the 300 rows are missing") && block.contains("one hole"), "{block}");
         let thinned = log(RATE, 1.0, |n| n % 2 == 0).expect_err("every other row is gone");
@@ -203,6 +226,12 @@ mod tests {
         assert!(
             log(RATE, 1e6, |_| true).expect_err("microseconds").contains("these look like microseconds: divide t_s by 1000000")
         );
+        let minutes = log(RATE, 1.0 / 60.0, |_| true).expect_err("minutes");
+        assert!(minutes.contains("these look like minutes (60 s each)"), "{minutes}");
+        let micro = log("", 1e6, |_| true).expect_err("microseconds");
+        assert!(micro.contains("these look like microseconds: divide t_s by 1000000"), "{micro}");
+        let twice = log("# sample_hz = 10.0\n# sample_hz = 20.0\n", 1.0, |_| true).expect_err("a key twice");
+        assert!(twice.contains("run.csv:3: column sample_hz: it stands twice in the head"), "{twice}");
         let whole = log("", 1000.0, |_| true).expect_err("milliseconds");
         assert!(whole.contains("whole numbers, 100 apart, up to 29900") && whole.contains("# sample_hz = 0.01"), "{whole}");
         log("# sample_hz = 0.01\n", 1000.0, |_| true).expect("it says that rows are 100 s apart");

@@ -123,7 +123,7 @@ impl fmt::Display for Gaps {
             (Some(tick), _) => {
                 write!(
                     f,
-                    "at even places, as a clock makes them whose ticks of {} s are coarser than its rows; or every so many rows one was dropped",
+                    "at even places: every so many rows one was dropped (a filter, a thinned export), or the clock's ticks of {} s are coarser than its rows",
                     trimmed(*tick, 6)
                 )
             }
@@ -180,7 +180,12 @@ mod tests {
     fn single_rows_that_are_missing_are_told() {
         let single = Gaps::of(&log(|n| n % 5 != 3)).expect("every fifth is gone");
         assert!(single.single && single.to_string().starts_with("20 % of the time has no row"), "{single}");
-        assert!(single.to_string().contains("ticks of 0.1 s are coarser than its rows; or every so many rows"), "{single}");
+        assert!(
+            single
+                .to_string()
+                .contains("every so many rows one was dropped (a filter, a thinned export), or the clock's ticks of 0.1 s"),
+            "{single}"
+        );
         // here and there
         let scattered = Gaps::of(&log(|n| (n * n + n / 7) % 5 != 3)).expect("rows are gone");
         assert!(scattered.single && scattered.coarse.is_none(), "{scattered}");

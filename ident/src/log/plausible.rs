@@ -1,13 +1,14 @@
 //! What a rig can do: sample rate, thrust for its speed and its power, voltage, current.
 //!
-//! What it is: a look at a log for a wrong unit or swapped columns.
+//! What it is: a look at a log for a wrong unit or swapped columns, and at what its head says of propeller and air.
 //! What can go wrong: beyond what any rig does the file is refused with the likely reason; what is only unusual is said. A column that the user
 //! vouches for, in the head of the log (`vouched = ["voltage_v"]`) or by mapping it, is never refused, and said all the same.
 //! Units: SI; thrust coefficient in N/(rev/min)^2.
 //! Reference: T = C_T rho n^2 D^4 with C_T 0.02 to 0.2 and D 0.02 to 2 m spans 1e-12 to 1.1e-3 N/(rev/min)^2; static thrust for electrical power:
-//! 0.01 to 0.5 N/W from a 46 mm to a 1 m propeller at load (UIUC and maker's tables); momentum theory bounds it by the disc.
+//! 0.01 to 0.5 N/W from a 46 mm to a 1 m propeller at load (UIUC and maker's tables). A disc needs T^1.5/sqrt(2 rho A) of power at the least
+//! (momentum theory; a duct up to 0.7 of it); propellers need 1.3 to 4 times as much, and their C_T is 0.02 to 0.2.
 
-use super::{Log, Place, ReadError, SPEED, trimmed};
+use super::{Disc, Log, Place, ReadError, SPEED, trimmed};
 use crate::noise::median;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -15,6 +16,13 @@ use std::path::Path;
 
 /// Key in a log's head: the columns whose values are right although no rig is known to do that.
 pub(crate) const VOUCHED: &str = "vouched";
+
+/// Key of the head that holds the density of the air.
+const AIR: &str = "air_density_kg_m3";
+/// N, W, A, V, rev/min below which a meter's own error may be all there is.
+const FAINT: f64 = 0.5;
+/// Diameter of the largest propeller on a test stand, m.
+const LARGEST_M: f64 = 3.5;
 
 /// One doubt: column, what is odd with the likely reason, and whether no rig does it.
 pub(crate) struct Doubt {
@@ -25,7 +33,9 @@ pub(crate) struct Doubt {
 
 /// Everything that is odd about a log.
 pub(crate) fn doubts(log: &Log) -> impl Iterator<Item = Doubt> {
-    [rate(log), speed(log), supply(log), swapped(log), thrust(log), torque(log)].into_iter().flatten()
+    [head(log), rate(log), speed(log), supply(log), reversed(log), swapped(log), thrust(log), disc(log), torque(log)]
+        .into_iter()
+        .flatten()
 }
 
 impl Log {
@@ -177,16 +187,78 @@ fn thrust(log: &Log) -> Option<Doubt> {
         }
     }
     let power = typical(log, "voltage_v", &rows)? * typical(log, "current_a", &rows)?;
-    if power < 0.5 {
+    // next to nothing of both is a meter's own error
+    if power <= 0.0 || (power < FAINT && thrust < FAINT) {
         return None;
     }
     let per_watt = thrust / power;
     let said = |likely: &str| format!("{thrust:.3} N for {power:.1} W: {likely}");
     match per_watt {
-        p if p > 1.5 => doubt("thrust_n", true, said("grams? milliamperes?")),
+        p if p > 1.5 => doubt("thrust_n", true, said("grams? kiloamperes or kilovolts?")),
         p if p > 0.6 => doubt("thrust_n", false, said("grams? a current of another unit?")),
         p if p < 0.001 => doubt("thrust_n", true, said("kilograms? columns swapped?")),
         p if p < 0.008 => doubt("thrust_n", false, said("kilograms?")),
+        _ => None,
+    }
+}
+
+/// What the head says of propeller and air.
+fn head(log: &Log) -> Option<Doubt> {
+    let known = Disc::of(log);
+    if let Some(said) = log.meta.get(AIR).filter(|v| v.as_float().is_none() && v.as_integer().is_none()) {
+        return doubt(AIR, true, format!("{said} is no number; expected kg/m^3, such as 1.2"));
+    }
+    if let Some(air) = known.density_kg_m3.filter(|air| !(0.1..=10.0).contains(air)) {
+        return doubt(AIR, true, format!("air of {} kg/m^3: g/l, or a pressure of another unit?", trimmed(air, 6)));
+    }
+    let size = known.diameter_m.filter(|d| *d > LARGEST_M)?;
+    doubt(
+        "propeller",
+        true,
+        format!("a propeller of {size:.2} m: a name in millimetres? it is read in inches (diameter_m says it in metres)"),
+    )
+}
+
+/// Channels that no rig reverses: a rotor turns one way, and a supply gives.
+fn reversed(log: &Log) -> Option<Doubt> {
+    let (rows, _) = loaded(log);
+    let negative = |name: &'static str| typical(log, name, &rows).filter(|v| *v < -FAINT).map(|v| (name, v));
+    let (name, value) = SPEED.into_iter().chain(["voltage_v", "current_a"]).find_map(negative)?;
+    doubt(name, true, format!("{} under load: the sign, or wires that are swapped?", trimmed(value, 3)))
+}
+
+/// What an actuator disc can do, and a propeller does.
+fn disc(log: &Log) -> Option<Doubt> {
+    let (rows, _) = loaded(log);
+    let known = Disc::of(log);
+    let (diameter, area, air) = (known.diameter_m?, known.area_m2()?, known.density_kg_m3?);
+    let name = SPEED.into_iter().find(|s| log.column(s).is_some())?;
+    let (thrust, n) = (typical(log, "thrust_n", &rows)?, typical(log, name, &rows)? / 60.0);
+    if thrust <= 0.0 || n <= 0.0 {
+        return None;
+    }
+    let c_t = thrust / (air * n * n * diameter.powi(4));
+    let said = |likely: &str| format!("a thrust coefficient of {} at {:.2} m: {likely}", trimmed(c_t, 4), diameter);
+    match c_t {
+        c if c > 1.0 => return doubt(name, true, said("speed in rad/s or rev/s? thrust in grams?")),
+        c if c > 0.4 => return doubt(name, false, said("speed or thrust of another unit? another propeller?")),
+        c if c < 0.001 => return doubt(name, true, said("electrical turns? thrust in kilograms?")),
+        c if c < 0.01 => return doubt(name, false, said("electrical turns? thrust in kilograms? another propeller?")),
+        _ => {}
+    }
+    let shaft = typical(log, "torque_nm", &rows)? * n * std::f64::consts::TAU;
+    if shaft <= 0.0 || (shaft < FAINT && thrust < FAINT) {
+        return None;
+    }
+    let merit = thrust.powf(1.5) / ((2.0 * air * area).sqrt() * shaft);
+    let said = |likely: &str| {
+        format!("a figure of merit of {} at {:.2} m, and an ideal disc has 1: {likely}", trimmed(merit, 3), diameter)
+    };
+    match merit {
+        m if m > 2.0 => doubt("thrust_n", true, said("thrust or torque of another unit?")),
+        m if m > 1.0 => doubt("thrust_n", false, said("thrust or torque of another unit? another propeller?")),
+        m if m < 0.03 => doubt("thrust_n", true, said("thrust in kilograms? torque of another unit?")),
+        m if m < 0.1 => doubt("thrust_n", false, said("thrust in kilograms or pounds? torque of another unit?")),
         _ => None,
     }
 }
@@ -197,7 +269,7 @@ fn torque(log: &Log) -> Option<Doubt> {
     let (torque, n) = (typical(log, "torque_nm", &rows)?, typical(log, name, &rows)?);
     let power = typical(log, "voltage_v", &rows)? * typical(log, "current_a", &rows)?;
     let shaft = torque * n * std::f64::consts::TAU / 60.0;
-    if power < 0.5 || torque <= 0.0 {
+    if power <= 0.0 || torque <= 0.0 || (power < FAINT && shaft < FAINT) {
         return None;
     }
     let said = |likely: &str| format!("{shaft:.1} W at the shaft of {power:.1} W from the supply: {likely}");
@@ -229,6 +301,35 @@ mod tests {
         let log = Log::read(&path).map_err(|e| e.to_string())?;
         log.refuse_absurd(&path).map_err(|e| e.to_string())?;
         Ok(log)
+    }
+
+    #[test]
+    fn a_current_a_thousand_times_too_small_is_refused() {
+        for (column, of) in [("current", [1.0, 1e-3]), ("voltage", [1e-3, 1.0])] {
+            let found = rig("", |n, t, u, i| [n, t, of[0] * u, of[1] * i]).expect_err(column);
+            assert!(found.contains("thrust_n") && found.contains("kilo"), "{column}: {found}");
+        }
+    }
+
+    /// 2 N at 4000 rev/min of an 11 inch propeller: C_T is 0.06.
+    #[test]
+    fn what_no_disc_does_is_told() {
+        const HEAD: &str = "# propeller = \"11x4.7\"\n# air_density_kg_m3 = 1.2\n";
+        rig(HEAD, |n, t, u, i| [n, t, u, i]).expect("a propeller");
+        let rad_s = rig(HEAD, |n, t, u, i| [n / 9.5493, t, u, i]).expect_err("rad/s");
+        assert!(rad_s.contains("rad/s"), "{rad_s}");
+        let electrical = rig(HEAD, |n, t, u, i| [7.0 * n, t, u, i]).expect("odd");
+        assert!(electrical.in_doubt().iter().any(|d| d.contains("electrical turns?")), "{:?}", electrical.in_doubt());
+        for (head, said) in [
+            ("# air_density_kg_m3 = 0.001225\n", "0.001225 kg/m^3"),
+            ("# air_density_kg_m3 = \"banana\"\n", "is no number"),
+            ("# propeller = \"279x119\"\n", "millimetres?"),
+        ] {
+            let found = rig(head, |n, t, u, i| [n, t, u, i]).expect_err(head);
+            assert!(found.contains(said), "{found}");
+        }
+        let reversed = rig("", |n, t, u, i| [n, t, -u, i]).expect_err("a sign");
+        assert!(reversed.contains("voltage_v") && reversed.contains("sign"), "{reversed}");
     }
 
     #[test]

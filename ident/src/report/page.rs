@@ -61,9 +61,10 @@ fn declared(closed: &Closed) -> String {
     }
 }
 
-/// The residual of a target under a model, on the rows of which it claims something.
+/// The residual of a target under a model as the verdict judges it, on the rows of which it claims something: a declared model that knows its
+/// own supply does not follow a voltage that this run's effects explain.
 fn residual(context: &Context, target: &Target, model: &Model) -> Option<Vec<f64>> {
-    let p = model.predict(context, target.name)?;
+    let p = model.predict_at_its_own_supply(context, target.name)?;
     Some(claimed(target).map(|k| target.y[k] - p[target.rows[k]]).collect())
 }
 
@@ -253,12 +254,20 @@ fn values(context: &Context, target: &Target, name: &str) -> Option<Vec<f64>> {
 /// Of a channel on which something is left: over the variable that it goes with, else over time.
 pub(super) fn rest(closed: &Closed, u: &Unexplained) -> Option<Figure> {
     let target = target(closed, &u.channel)?;
-    let trace = trace(closed, target)?;
+    Some(over_what(closed, u, target, &trace(closed, target)?))
+}
+
+/// The same of one of several runs, predicted by a fit to the others.
+pub(super) fn left_across(closed: &Closed, u: &Unexplained, shown: &Shown) -> Option<Figure> {
+    Some(over_what(closed, u, target(closed, shown.channel)?, &across(shown)))
+}
+
+fn over_what(closed: &Closed, u: &Unexplained, target: &Target, trace: &Trace) -> Figure {
     let over = u.depends_on.iter().find_map(|name| Some((name, values(&closed.context, target, name).filter(|x| moves(x))?)));
-    Some(match over {
-        Some((name, x)) => against(&trace, "left", (name, unit_of_variable(name)), &x, pair(&closed.verdict)),
-        None => over_time(&trace, "left", pair(&closed.verdict)),
-    })
+    match over {
+        Some((name, x)) => against(trace, "left", (name, unit_of_variable(name)), &x, pair(&closed.verdict)),
+        None => over_time(trace, "left", pair(&closed.verdict)),
+    }
 }
 
 /// Figures of what is left.
@@ -389,4 +398,51 @@ fn time_label(context: &Context) -> String {
 fn axis(name: &str) -> String {
     let unit = unit_of(name);
     if unit.is_empty() { channel(name) } else { unit.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::close::close;
+    use crate::log::Column;
+
+    /// A staircase on a supply behind a lead of so many ohms: the speed follows the voltage.
+    fn run(lead: f64) -> Log {
+        let t: Vec<f64> = (0..1000).map(|i| 0.1 * f64::from(i)).collect();
+        let pulse: Vec<f64> = (0..1000).map(|i| 1100.0 + 80.0 * f64::from(i / 100)).collect();
+        let wave = |i: usize, k: f64| (k * (i * i) as f64).sin();
+        let free: Vec<f64> = pulse.iter().map(|p| 7.0 * (p - 1000.0)).collect();
+        let current: Vec<f64> = free.iter().map(|r| 3e-11 * r.powi(3)).collect();
+        let voltage: Vec<f64> = current.iter().map(|a| 12.0 - lead * a).collect();
+        let rpm: Vec<f64> = free.iter().zip(&voltage).map(|(r, v)| r * (v / 12.0).powf(0.8)).collect();
+        let thrust = rpm.iter().map(|r| 1e-7 * r * r).collect();
+        let columns = [
+            ("pulse_us", pulse, 0.0),
+            ("rpm", rpm, 4.0),
+            ("thrust_n", thrust, 0.01),
+            ("current_a", current, 0.02),
+            ("voltage_v", voltage, 0.005),
+        ];
+        let noisy = |(k, (name, values, size)): (usize, (&str, Vec<f64>, f64))| Column {
+            name: name.to_owned(),
+            values: values.into_iter().enumerate().map(|(i, v)| v + size * wave(i, 0.7 + k as f64)).collect(),
+        };
+        Log { name: "run.csv".into(), t, columns: columns.into_iter().enumerate().map(noisy).collect(), ..Log::default() }
+    }
+
+    /// A declared model that knows its own supply must not be drawn as if it knew the lead that is new.
+    #[test]
+    fn what_is_drawn_is_what_the_verdict_judges() {
+        let healthy = close(&run(0.0), None, &[], &mut |_| {}).expect("a log").model;
+        let thin = close(&run(0.08), Some(&healthy), &[], &mut |_| {}).expect("a log");
+        let rms = |r: &[f64]| (r.iter().map(|v| v * v).sum::<f64>() / r.len() as f64).sqrt();
+        for name in ["rpm", "voltage_v"] {
+            let told = &thin.verdict.channels[name];
+            let drawn = trace(&thin, target(&thin, name).expect(name)).expect(name);
+            for (what, drawn, told) in [("before", &drawn.before, told.before.rms), ("after", &drawn.after, told.after.rms)] {
+                assert!((rms(drawn) / told - 1.0).abs() < 0.1, "{name} {what}: {} drawn, {told} told", rms(drawn));
+            }
+            assert!(told.before.rms > 3.0 * told.after.rms, "{name}: {told:?}");
+        }
+    }
 }

@@ -8,13 +8,12 @@
 
 use super::designer::{designer, paired};
 use super::figure::{Figure, Layer, Mark};
-use super::number;
 use super::sheet::Sheet;
 use super::shift::filter_figures;
 use crate::board;
 use crate::context::unit_of;
 use crate::fit::power::Level;
-use crate::fit::{Fitted, Law};
+use crate::fit::{Fitted, Law, ratio};
 use crate::identify::Identified;
 use crate::log::{Gaps, Log, SPEED};
 use crate::noise::median;
@@ -444,17 +443,38 @@ pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
         })
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    sheet.listed("plateaus", &header, &rows);
+    let (raw_head, raw) = raw_plateaus(log, found);
+    let raw_head: Vec<&str> = raw_head.iter().map(String::as_str).collect();
+    sheet.listed("plateaus", &header, &rows, Some((&raw_head, &raw)));
 }
 
-/// Chi-squared of a curve, and whether it holds.
+/// The plateaus with all digits: of each column its mean and the standard error.
+fn raw_plateaus(log: &Log, found: &Identified) -> (Vec<String>, Vec<Vec<String>>) {
+    let mut head = ["plateau", "from_s", "to_s", "settling_s", "rows"].map(str::to_owned).to_vec();
+    head.extend(log.columns.iter().flat_map(|c| [c.name.clone(), format!("{}_se", c.name)]));
+    let row = |(k, p): (usize, &Plateau)| {
+        let mut row = vec![(k + 1).to_string()];
+        row.extend([p.from_s, p.to_s, p.settling_s].map(|v| v.to_string()));
+        row.push(p.rows.to_string());
+        row.extend(p.means.iter().flat_map(|m| m.map_or_else(Default::default, |(v, se)| [v.to_string(), se.to_string()])));
+        row
+    };
+    (head, found.plateaus.iter().enumerate().map(row).collect())
+}
+
+/// Chi-squared of a curve for each degree of freedom, and whether it holds.
 fn said(f: &Fitted) -> String {
     let law = Law::of(f.curve.chi2, f.curve.freedom);
-    format!("{:.2} of {}{}", law.chi2, law.freedom, if law.holds { "" } else { ", does not hold" })
+    format!("{}, dof {}{}", ratio(law.chi2), law.freedom, if law.holds { "" } else { ", does not hold" })
+}
+
+/// A value and half of its interval, to two digits of the latter.
+fn as_known(value: f64, half: f64) -> [String; 2] {
+    [value, half].map(|v| words::digits(v, half))
 }
 
 pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
-    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. Half widths of 95 % intervals. Chi2 is the scatter of the plateaus about the curve over what their own errors promise, of so many degrees of freedom; where chance does not explain it (p below 0.01) the curve does not hold, and the interval is as much wider.");
+    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. Half widths of 95 % intervals. Chi2/dof is the scatter of the plateaus about the curve over what their own errors promise, squared, for each degree of freedom: 1 where both agree; where chance does not explain it (p below 0.01) the curve does not hold, and the interval is as much wider.");
     let rows: Vec<Vec<String>> = found
         .curves
         .iter()
@@ -463,9 +483,10 @@ pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
             (0..=f.degree).map(move |k| {
                 let c = f.curve.coefficient(k);
                 let (chi2, chosen) = if k == 0 { (said(f), chosen.clone()) } else { Default::default() };
-                vec![over(f), format!("c{k}"), number(c.value), number(c.half), chi2, chosen]
+                let [value, half] = as_known(c.value, c.half);
+                vec![over(f), format!("c{k}"), value, half, chi2, chosen]
             })
         })
         .collect();
-    sheet.listed("coefficients", &["relation", "coefficient", "value", "\u{b1}", "chi2", "order by AICc"], &rows);
+    sheet.listed("coefficients", &["relation", "coefficient", "value", "\u{b1}", "chi2/dof", "order by AICc"], &rows, None);
 }

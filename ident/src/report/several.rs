@@ -8,11 +8,11 @@
 
 use super::closed::{self as parts, Origin, Page, Vocabulary, pair};
 use super::figure::{Figure, Layer, Mark};
-use super::page::{SPEEDS, card_across, card_alone, is_drawn_together, over_runs, rest, speeds};
+use super::page::{SPEEDS, card_across, card_alone, is_drawn_together, left_across, over_runs, rest, speeds};
 use super::svg::escape;
 use crate::close::Closed;
 use crate::effects::{EffectEntry, Estimate};
-use crate::several::{Outcome, Run};
+use crate::several::{Outcome, Run, Shown};
 use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Unexplained, Validation, Verdict};
 use crate::words::{digits, scaled, upper};
 
@@ -32,10 +32,10 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         words: Vocabulary::RIG,
         news: false,
         origin: Origin::of_several(&runs.iter().map(|r| &r.log).collect::<Vec<_>>()),
-        declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as a geometric mean over the runs.".to_owned(),
+        declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as the root of the mean square over the runs.".to_owned(),
         hero: outcome.shown.iter().flat_map(|shown| over_runs(v, shown)).map(|figure| on(first, figure)).collect(),
         cards: v.effects.iter().enumerate().map(|(k, e)| card(&alone, outcome, v, k, e)).collect(),
-        left: outcome.verdict.unexplained.iter().filter(own).filter_map(|u| left_of(&alone, runs, u)).map(|(run, figure)| on(run, figure)).collect(),
+        left: v.unexplained.iter().zip(&outcome.left).filter(|(u, _)| own(u)).filter_map(|(u, shown)| left_of(&alone, u, shown.as_ref())).map(|(run, figure)| on(run, figure)).collect(),
         parameters: parameters(outcome, v),
         speeds: (SPEEDS, speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| on(first, figure)).collect()),
     };
@@ -121,10 +121,13 @@ fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str) -> Option<Figure> 
     })
 }
 
-/// The figure of what is left on a channel, of the run on which it is loudest, and which that is.
-fn left_of(alone: &[Closed], runs: &[Run], u: &Unexplained) -> Option<(usize, Figure)> {
-    let loudest = runs.iter().position(|run| u.looks_like.contains(&run.log.name));
-    loudest.into_iter().chain(0..runs.len()).find_map(|run| Some((run, rest(&alone[run], u)?)))
+/// The figure of what is left on a channel of the run on which it is loudest, as the others predict it, and which run that is; of what a speed
+/// sensor reads beyond the others that of a run alone.
+fn left_of(alone: &[Closed], u: &Unexplained, shown: Option<&Shown>) -> Option<(usize, Figure)> {
+    match shown {
+        Some(shown) => Some((shown.run, left_across(&alone[shown.run], u, shown)?)),
+        None => alone.iter().enumerate().find_map(|(run, of)| Some((run, rest(of, u)?))),
+    }
 }
 
 /// Each parameter of the rig's effects as all runs share it, and as each run alone has it.

@@ -22,6 +22,8 @@ const LONG: usize = 8;
 const STACKED: usize = 600;
 /// Most rows of a table on a closed loop's page.
 const LONGEST: usize = 300;
+/// Longest CSV that a page holds whole, bytes: a page has some six tables that grow with the run, and keeps to 3 MB.
+const MOST_CSV: usize = 200_000;
 
 /// A page under construction.
 #[derive(Debug, Clone, Default)]
@@ -72,30 +74,33 @@ impl Sheet {
         self.body += "</details>\n";
     }
 
-    /// A table that can be copied, and downloaded as CSV: `raw` with all digits where it is given, else what is seen.
+    /// A table that can be copied, and downloaded as CSV: `raw` with all digits where it is given, else what is seen. A very long one is cut, and
+    /// so is its CSV where that is long.
     pub(crate) fn data(&mut self, name: &str, header: &[&str], rows: &[Vec<String>], raw: Option<(&[&str], &[Vec<String>])>) {
         let (head, lines) = raw.unwrap_or((header, rows));
         let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
-        let csv: String = std::iter::once(&head).chain(lines).map(|row| csv_line(row)).collect();
+        let text = |lines: &[Vec<String>]| -> String { std::iter::once(&head).chain(lines).map(|row| csv_line(row)).collect() };
+        let (all, most) = (text(lines), LONGEST.min(lines.len()));
+        let (csv, has) =
+            if all.len() > MOST_CSV { (text(&lines[..most]), "the CSV has no more") } else { (all, "the CSV has all") };
         self.body += "<div class=\"tab\">";
-        self.table(header, rows, |_| false);
+        self.table(header, &rows[..rows.len().min(LONGEST)], |_| false);
         self.body += &format!(
             "<p class=\"tools\"><a download=\"{}.csv\" href=\"{}\">CSV</a><button class=\"copy\" hidden>copy</button></p></div>\n",
             escape(name),
             data_uri("text/csv", &csv)
         );
+        if rows.len() > LONGEST {
+            self.say(&format!("The first {LONGEST} of {} rows; {has}.", rows.len()));
+        }
     }
 
-    /// A long table: on a closed loop's page it can be copied, and is cut where it is very long.
-    pub(crate) fn listed(&mut self, name: &str, header: &[&str], rows: &[Vec<String>]) {
-        if !self.told {
+    /// A table that can be copied on a closed loop's page.
+    pub(crate) fn listed(&mut self, name: &str, header: &[&str], rows: &[Vec<String>], raw: Option<(&[&str], &[Vec<String>])>) {
+        if self.told {
+            self.data(name, header, rows, raw);
+        } else {
             self.table(header, rows, |_| false);
-            return;
-        }
-        let shown = &rows[..rows.len().min(LONGEST)];
-        self.data(name, header, shown, Some((header, rows)));
-        if rows.len() > shown.len() {
-            self.say(&format!("The first {LONGEST} of {}; the CSV has all.", rows.len()));
         }
     }
 

@@ -8,7 +8,6 @@
 
 use super::differing::is_same;
 use super::joint::{Across, Compared, Joint, Shared, compared};
-use super::words::typical;
 use super::{FEWEST, Member};
 use crate::close::Closed;
 use crate::context::Context;
@@ -153,6 +152,12 @@ fn may_stand_beside(rig: &[Placed], newcomer: &Placed) -> bool {
     let same =
         |p: &&Placed| p.effect.id() == newcomer.effect.id() && p.instance.channels.iter().any(|c| newcomer.instance.touches(c));
     !rig.iter().any(|p| same(&p))
+}
+
+/// Geometric mean.
+fn typical(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v.max(f64::MIN_POSITIVE).ln(), n + 1.0));
+    f64::exp(sum / n)
 }
 
 /// Whether it takes enough off the error of one of its channels, on average over the runs, to be worth a name.

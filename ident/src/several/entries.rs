@@ -10,7 +10,7 @@ use super::Run;
 use super::choose::Named;
 use super::joint::{Across, Joint};
 use super::own::Worth;
-use super::words::typical;
+use super::words::root_mean;
 use crate::close::parameter;
 use crate::context::{Context, is_contrast};
 use crate::effects::{EffectEntry, Estimate, Scope};
@@ -18,7 +18,7 @@ use crate::hypothesis::Placed;
 use crate::model::{AddedEffect, RunLevel};
 use crate::rivals::TEMPERATURE;
 use crate::unexplained::LOUD;
-use crate::verdict::{Alternative, Kin, Unexplained};
+use crate::verdict::{Alternative, Channels, Kin, Unexplained};
 use crate::words::channel as spoken;
 
 /// What could stand in the place of a name, with its probability.
@@ -34,7 +34,7 @@ pub(super) fn entry(
     let p = &named.placed;
     let (probability, others) = probabilities(named.score, &named.rivals);
     let taken = |channel: &str| {
-        let pooled = |list: &[Across]| typical(list.iter().filter(|a| a.channel == channel).map(|a| a.rms));
+        let pooled = |list: &[Across]| root_mean(list.iter().filter(|a| a.channel == channel).map(|a| a.rms));
         1.0 - pooled(after) / pooled(without)
     };
     let mut channels: Vec<String> = p.instance.channels.iter().filter(|c| !is_contrast(c)).cloned().collect();
@@ -148,25 +148,31 @@ pub(super) fn alternatives(told: &[(EffectEntry, Others)]) -> Vec<Alternative> {
     out
 }
 
-/// Every channel that is loud on a run after all, once, with the run on which it is loudest; and every contrast of a speed sensor that a run
-/// alone left unexplained.
-pub(super) fn unexplained(runs: &[Run], after: &[Across]) -> Vec<Unexplained> {
-    let mut loud: Vec<&Across> = after.iter().filter(|a| a.rms > LOUD * a.floor && !is_contrast(a.channel)).collect();
-    loud.sort_by(|a, b| (b.rms / b.floor).total_cmp(&(a.rms / a.floor)));
+/// The run that is left with the largest error on a channel, predicted by the others.
+pub(super) fn loudest<'a>(after: &'a [Across], channel: &str) -> Option<&'a Across> {
+    after.iter().filter(|a| a.channel == channel).max_by(|a, b| a.rms.total_cmp(&b.rms))
+}
+
+/// Every channel that is loud on a run after all, once, as large as over all runs, with the run on which it is loudest; and every contrast of a
+/// speed sensor that a run alone left unexplained.
+pub(super) fn unexplained(runs: &[Run], after: &[Across], channels: &Channels) -> Vec<Unexplained> {
     let mut out: Vec<Unexplained> = Vec::new();
-    for a in loud {
+    for a in after.iter().filter(|a| a.rms > LOUD * a.floor && !is_contrast(a.channel)) {
+        let (Some(loudest), Some(whole)) = (loudest(after, a.channel), channels.get(a.channel)) else { continue };
         if out.iter().any(|u| u.channel == a.channel) {
             continue;
         }
-        let run = &runs[a.run].closed.verdict;
+        let run = &runs[loudest.run].closed.verdict;
         let told = run.unexplained.iter().find(|u| u.channel == a.channel);
         let looks_like = match told {
             Some(told) => format!("loudest on {}: {}", run.run, told.looks_like),
             None => format!("loudest on {}; a fit to that run alone removes it, the runs differ", run.run),
         };
         let depends_on = told.map(|t| t.depends_on.clone()).unwrap_or_default();
-        out.push(Unexplained { channel: a.channel.to_owned(), over_floor: a.rms / a.floor, depends_on, looks_like });
+        let over_floor = whole.after.heldout_rms / whole.noise_floor_rms;
+        out.push(Unexplained { channel: a.channel.to_owned(), over_floor, depends_on, looks_like });
     }
+    out.sort_by(|a, b| b.over_floor.total_cmp(&a.over_floor));
     for run in runs.iter().map(|r| &r.closed.verdict) {
         for told in run.unexplained.iter().filter(|u| u.channel.ends_with(" - others")) {
             if !out.iter().any(|u| u.channel == told.channel) {

@@ -5,6 +5,7 @@
 //! Units: as the channels.
 //! Reference: specification `formats.md`, "Model file", `[run]`.
 
+use super::entries::loudest;
 use super::equations::left_on;
 use super::folds::{self, Tenable};
 use super::joint::{Across, Joint, Shared, compared};
@@ -40,6 +41,8 @@ pub struct Outcome {
     pub shown: Option<Shown>,
     /// For each effect of the rig where it took most: before without it, after with it.
     pub each: Vec<Option<Shown>>,
+    /// For each channel that the verdict leaves unexplained the run on which it is loudest.
+    pub left: Vec<Option<Shown>>,
 }
 
 /// What is left of a channel of one run, predicted by a fit to the others.
@@ -131,8 +134,11 @@ pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> O
     let quoted =
         |k: usize| verdict.effects.iter().find(|e| e.run.is_none() && rig[k].is_told_by(e)).and_then(|e| e.channels.first());
     let each = (0..rig.len()).map(|k| shown_without(&tenable, k, &without[k], quoted(k)?)).collect();
+    let after: Vec<Across> = tenable.compared.iter().map(|c| c.after).collect();
+    let loudest = |channel: &str| loudest(&after, channel).and_then(|a| shown_on(&tenable, (a.run, a.channel), &[]));
+    let left = verdict.unexplained.iter().map(|u| loudest(&u.channel)).collect();
     progress(1.0);
-    Outcome { contexts, declared, model, verdict, alone, shown, each }
+    Outcome { contexts, declared, model, verdict, alone, shown, each, left }
 }
 
 /// The declared model, fitted to all runs: no effect, of the rig or of a run.

@@ -46,7 +46,7 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
     names.extend(own.flat_map(|(run, (own, worths))| own_entries(&contexts[run], own, worths)));
     let alternatives = alternatives(&names);
     let mut effects: Vec<_> = names.into_iter().map(|(entry, _)| entry).collect();
-    let mut unexplained = unexplained(runs, &after);
+    let mut unexplained = unexplained(runs, &after, &channels);
     // what nothing predicts has nothing left over
     unexplained.retain(|u| !channels.not_predicted.contains_key(&u.channel));
     let kind = match (effects.is_empty(), unexplained.is_empty()) {
@@ -83,8 +83,8 @@ fn of_run(run: &Run, k: usize, compared: &[Compared], silent: &[String]) -> Vali
     Validation { run: run.log.name.clone(), channels }
 }
 
-/// Each channel over all runs: what is left across runs and the noise floor as geometric means over the runs, so that a run of wild steps does
-/// not stand for all; what the written model leaves as the root of the mean square. A channel that no second run has is not predicted.
+/// Each channel over all runs, as the root of the mean square over the runs: what is left across runs, the noise floor, what the written model
+/// leaves. A channel that no second run has is not predicted.
 fn channels(told: &Told<'_, '_>) -> Channels {
     let Told { runs, contexts, tenable, models, .. } = *told;
     let mut out = Channels::default();
@@ -109,7 +109,7 @@ fn channels(told: &Told<'_, '_>) -> Channels {
             out.not_predicted.insert(name.to_owned(), "no second run measured it".to_owned());
             continue;
         }
-        let pooled = |of: &dyn Fn(&Compared) -> f64| typical(compared.iter().map(|c| of(c)));
+        let pooled = |of: &dyn Fn(&Compared) -> f64| root_mean(compared.iter().map(|c| of(c)));
         let figures = |side: usize, across: f64, of: &dyn Fn(&BeforeAfter) -> f64| Figures {
             rms: root_mean(own.iter().filter_map(|v| v.channels.get(name)).map(of)),
             heldout_rms: across,
@@ -132,13 +132,8 @@ fn channels(told: &Told<'_, '_>) -> Channels {
     out
 }
 
-/// Geometric mean.
-pub(super) fn typical(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v.max(f64::MIN_POSITIVE).ln(), n + 1.0));
-    f64::exp(sum / n)
-}
-
-fn root_mean(values: impl Iterator<Item = f64>) -> f64 {
+/// Root of the mean square.
+pub(super) fn root_mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
     f64::sqrt(sum / n)
 }

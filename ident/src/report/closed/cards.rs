@@ -242,6 +242,7 @@ fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
     let raw: Vec<Vec<String>> = e
         .parameters
         .iter()
+        .filter(shown)
         .map(|p| vec![p.name.clone(), p.value.to_string(), p.ci95[0].to_string(), p.ci95[1].to_string(), p.unit.clone()])
         .collect();
     if !rows.is_empty() {

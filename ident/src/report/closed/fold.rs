@@ -6,6 +6,7 @@
 //! Reference: specification `report.md`.
 
 use super::state::figures;
+use crate::bad::SetAside;
 use crate::diagnose::Diagnosis;
 use crate::report::number;
 use crate::report::sheet::Sheet;
@@ -58,12 +59,21 @@ pub(crate) fn aside(sheet: &mut Sheet, verdict: &Verdict) {
     if lines.is_empty() {
         return;
     }
+    let raw = |a: &SetAside| {
+        let counts = [a.row, a.rows].map(|n| n.to_string());
+        let figures = [a.t_s, a.until_s, a.value, a.expected].map(|v| v.to_string());
+        std::iter::once(a.channel.clone()).chain(counts).chain(figures).collect()
+    };
+    let raw: Vec<Vec<String>> = verdict.set_aside.iter().map(raw).collect();
     let all = lines.len();
     lines.truncate(MOST);
     if all > MOST {
         lines.push(vec![format!("and {} more, listed in verdict.json", all - MOST)]);
     }
-    sheet.fold("What took no part", |sheet| sheet.data("set-aside", &["what, and why"], &lines, None));
+    sheet.fold("What took no part", |sheet| {
+        let raw_head = ["channel", "row", "rows", "t_s", "until_s", "value", "expected"];
+        sheet.data("set-aside", &["what, and why"], &lines, Some((&raw_head, &raw)));
+    });
 }
 
 /// The candidates of each round, with their evidence.

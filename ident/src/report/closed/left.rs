@@ -34,12 +34,21 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
         };
         vec![heading(&u.channel), format!("{:.1}", floors_left(v, u)), size_left(v, u), u.looks_like.clone(), with]
     };
-    let rows: Vec<Vec<String>> = v.unexplained.iter().filter(with_model).map(cells).collect();
+    let mut told: Vec<&crate::verdict::Unexplained> = v.unexplained.iter().filter(with_model).collect();
+    told.sort_by(|a, b| floors_left(v, b).total_cmp(&floors_left(v, a)));
+    let rows: Vec<Vec<String>> = told.iter().copied().map(cells).collect();
     if rows.is_empty() {
         sheet.say("Nothing on a channel that has a model.");
         return;
     }
-    sheet.data("unexplained", &["channel", "noise floors", "size", "looks like", "goes with"], &rows, None);
+    let raw = |u: &crate::verdict::Unexplained| {
+        let figures = v.channels.get(&u.channel).map(|c| (c.after.heldout_rms.to_string(), c.unit.clone())).unwrap_or_default();
+        let floors = floors_left(v, u).to_string();
+        vec![u.channel.clone(), floors, figures.0, figures.1, u.looks_like.clone(), u.depends_on.join(" ")]
+    };
+    let raw: Vec<Vec<String>> = told.iter().copied().map(raw).collect();
+    let raw_head = ["channel", "over_floor", "size", "unit", "looks_like", "depends_on"];
+    sheet.data("unexplained", &["channel", "noise floors", "size", "looks like", "goes with"], &rows, Some((&raw_head, &raw)));
     let untold = v.effects.iter().filter(|e| e.is_without_correction());
     untold.for_each(|e| sheet.say(&format!("{}.", upper(&plain(&e.evidence)))));
     // a figure of rows that the fit saw says nothing of those that it did not see

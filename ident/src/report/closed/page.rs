@@ -128,12 +128,19 @@ fn runs(sheet: &mut Sheet, v: &Verdict, list: &[Validation], name: &str) {
             let cell = |r: &Validation| {
                 r.channels.get(channel).map_or_else(String::new, |b| {
                     let [before, after] = [b.before, b.after].map(|v| digits(factor * v, 0.005 * (factor * v).abs()));
-                    format!("{before} to {after}, {}", state::factor(b.before, b.after))
+                    format!("{before} \u{2192} {after} ({})", state::factor(b.before, b.after))
                 })
             };
             std::iter::once(format!("{}, {unit}", heading(channel))).chain(list.iter().map(cell)).collect()
         })
         .collect();
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    sheet.data(name, &head, &rows, None);
+    let raw_head = ["channel", "unit", "run", "before", "after"];
+    let raw = list.iter().flat_map(|r| r.channels.iter().map(move |(name, b)| (r, name, b)));
+    let raw: Vec<Vec<String>> = raw
+        .map(|(r, name, b)| {
+            vec![name.clone(), unit_of(name).to_owned(), r.run.clone(), b.before.to_string(), b.after.to_string()]
+        })
+        .collect();
+    sheet.data(name, &head, &rows, Some((&raw_head, &raw)));
 }

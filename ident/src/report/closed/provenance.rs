@@ -41,7 +41,7 @@ impl Hidden {
         let missed = of_it.iter().flat_map(|e| &e.parameters).filter(|p| self.misses(p));
         let missed: Vec<String> = missed.map(|p| p.name.clone()).collect();
         if !missed.is_empty() {
-            out.push(format!("what was hidden lies outside the interval of {}; one in twenty does", list(&missed)));
+            out.push(format!("what was hidden lies outside the interval of {}", list(&missed)));
         }
         if found {
             out.push(format!("named, and true: {}", self.id));

@@ -348,9 +348,9 @@ fn left(verdict: &Verdict) -> String {
     // what it looks like is told of the sensor whose size is told
     let told = largest.unwrap_or(loudest);
     let up_to = if largest.is_some() { "up to " } else { "" };
-    let size = format!("{up_to}{}", size_left(verdict, told));
+    let size = format!("{up_to}{} rms", size_left(verdict, told));
     // the first words; the section on what is left has all
-    let looks = told.looks_like.split(';').next().unwrap_or_default();
+    let looks = told.looks_like.split(';').next().unwrap_or_default().replace("in one stretch", "mostly in one stretch");
     let named: Vec<String> = others.iter().map(|q| channel(q)).collect();
     match named.len() {
         0 => format!("On {on} {size} is left ({looks})."),
