@@ -7,7 +7,7 @@
 
 use crate::bad;
 use crate::conclude::{Quoted, quoted};
-use crate::context::{Context, DIFFERENCES, Relation, Target, is_contrast, unit_of};
+use crate::context::{Context, DIFFERENCES, Relation, STANDSTILL, Target, is_contrast, unit_of};
 use crate::correction::without_correction;
 use crate::course;
 use crate::diagnose::Diagnosis;
@@ -114,6 +114,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         next_experiment: None,
         left_out,
         set_aside: context.set_aside.clone(),
+        at_rest: never_turned(&context),
         guessed_floors: is_table(&context, log).then(|| log.len()),
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
         runs: Vec::new(),
@@ -127,6 +128,13 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
             crate::experiment::next(found.searched.as_ref().unwrap_or(&context), declared, &after_model, &diagnosis);
     }
     Ok(Closed { context, diagnosis, declared: before_model, model: after_model, verdict })
+}
+
+/// Whether the motor stood throughout, by its speed, or by its command where no speed was measured.
+fn never_turned(context: &Context) -> bool {
+    let turns = context.rpm.iter().any(|rpm| *rpm > STANDSTILL);
+    let driven = context.pulse.as_ref().is_some_and(|p| p.iter().any(|p| *p >= context.start_pulse_us));
+    if context.rpm.is_empty() { context.pulse.is_some() && !driven } else { !turns }
 }
 
 /// Where nothing stands and something loud is left all the same, on a channel or on what one speed sensor reads beyond the others, it is told.

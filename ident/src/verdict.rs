@@ -275,6 +275,9 @@ pub struct Verdict {
     /// Rows of a table with one row for each level: none has two to compare, so that the noise floors are guesses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guessed_floors: Option<usize>,
+    /// The motor never turned: nothing is seen of what a load brings about.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub at_rest: bool,
     /// Other runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub validation: Vec<Validation>,

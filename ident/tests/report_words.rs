@@ -64,6 +64,7 @@ fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
         left_out: vec![],
         set_aside: vec![],
         guessed_floors: None,
+        at_rest: false,
         validation: vec![],
         runs: vec![],
     }
@@ -347,6 +348,13 @@ fn every_effect_of_a_flight_has_words() {
 }
 
 /// A size is told without its sign: a word tells the direction.
+#[test]
+fn a_run_at_rest_explains_nothing() {
+    let said = |kind: Kind| sentence(&Verdict { at_rest: true, ..verdict(kind, vec![]) }, Vocabulary::RIG, false);
+    assert_eq!(said(Kind::None), "The motor never turned: this run says nothing of a load.");
+    assert!(said(Kind::Unattributed).starts_with("The motor never turned: this run says nothing of a load. Something"));
+}
+
 #[test]
 fn sizes_have_no_sign() {
     let said = |id: &str, name: &str, value: f64, unit: &str| {

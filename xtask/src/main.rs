@@ -16,6 +16,7 @@ mod changed;
 mod emulator;
 mod errors;
 mod folder;
+mod fuzz;
 mod hazards;
 mod image;
 mod mutants;
@@ -43,6 +44,7 @@ usage: cargo xtask COMMAND
   mutants --again [PACKAGE|FILE]...  only what no test noticed the last time, what was not tried, and what changed since
   mutants --page   writes docs/mutants.md anew from the list and from what came of the last runs
   mutants --changed [COMMIT]  only lines that differ from a commit (main); no page
+  fuzz [--minutes N] [TARGET]...  each way in from any bytes, with cargo-fuzz on a nightly compiler (fuzz/README.md)
   book             builds docs/ with mdBook into target/book and checks every link of what comes out
   errors           writes docs/errors.md: every refusal of the command line, from the source
   image            build both flash images, print their sizes, compare with budgets/size.toml; the rig's control loop and
@@ -84,6 +86,7 @@ fn main() -> ExitCode {
         ["hazards", lines @ ..] => hazards::break_each(&place, lines),
         ["mutants", rest @ ..] => mutants::mutants(&place, rest),
         ["errors"] => errors::write(&place),
+        ["fuzz", rest @ ..] => fuzz::fuzz(&place, rest),
         ["book"] => book::book(&place),
         ["program"] => emulator::program(&place),
         ["image", "--bless"] => image::image(&place, true),

@@ -136,13 +136,13 @@ fn scatter(curve: &Curve, target: &Target, places: &[usize], x: &[f64], residual
     out
 }
 
-/// Shares of bad and of repeated samples, and the last digit.
+/// Shares of bad and of repeated samples and of those at the highest reading, and the last digit.
 pub(super) fn samples(context: &Context, target: &Target) -> Vec<Told> {
     let name = words::channel(target.name);
     let n = target.rows.len() as f64;
     let bad = (target.unclaimed.len() + target.aside.len()) as f64 + 0.5;
     let mut out = vec![(
-        measure(target.name, "bad samples", format!("bad samples of {name}"), "%", Scale::Log),
+        measure(target.name, "bad samples", format!("bad samples of {name}"), "%", Scale::Count),
         Value { value: 100.0 * bad / n, se: 100.0 * bad.sqrt() / n },
     )];
     let moved = |k: &usize| {
@@ -154,10 +154,16 @@ pub(super) fn samples(context: &Context, target: &Target) -> Vec<Told> {
         let held = moving.iter().filter(|k| target.y[**k] == target.y[**k - 1]).count() as f64 + 0.5;
         let n = moving.len() as f64;
         out.push((
-            measure(target.name, "repeats", format!("repeated samples of {name}"), "%", Scale::Log),
+            measure(target.name, "repeats", format!("repeated samples of {name}"), "%", Scale::Count),
             Value { value: 100.0 * held / n, se: 100.0 * held.sqrt() / n },
         ));
     }
+    let highest = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let at_the_top = target.y.iter().filter(|y| **y == highest).count() as f64 + 0.5;
+    out.push((
+        measure(target.name, "at the top", format!("samples of {name} at its highest reading"), "%", Scale::Count),
+        Value { value: 100.0 * at_the_top / n, se: 100.0 * at_the_top.sqrt() / n },
+    ));
     let step = quantum(&target.y);
     if step > 0.0 {
         let step_of = measure(target.name, "step", format!("last digit of {name}"), unit_of(target.name), Scale::Log);

@@ -13,11 +13,14 @@ use super::measure::{Measure, Scale, Value};
 use crate::context::{Context, STANDSTILL};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
-use crate::noise::median;
+use crate::noise::{median, quantum};
 use crate::parallel::in_parallel;
 use crate::solve::Normal;
 use crate::words;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Rows by which a lag is told.
+const MOVING: usize = 24;
 
 /// For each run one value a measure.
 type Table = Vec<Vec<Option<Value>>>;
@@ -59,6 +62,8 @@ pub(super) fn of(logs: &[&Log], progress: &(dyn Fn(f64) + Sync)) -> Option<(Vec<
 fn of_run(log: &Log, context: &Context, curves: &[Curve]) -> Vec<Told> {
     let mut out = constants(log);
     out.extend(curves.iter().filter_map(|c| told(context, c)).flatten());
+    let beside = contrasts(&out);
+    out.extend(beside);
     out.extend(supply(context));
     out.extend(differences(log, context));
     out.extend(day(log));
@@ -163,15 +168,59 @@ fn differences(log: &Log, context: &Context) -> Vec<Told> {
             measure(name, "beyond with speed", format!("{words} beyond the others, over the speed"), "%", Scale::Linear),
             value(1),
         ));
-        let rms = variance.sqrt();
+        // sensors that read the same to the last digit scatter by that digit
+        let rms = variance.sqrt().max(100.0 * quantum(own) / (12.0_f64.sqrt() * top));
         let scatter = measure(name, "scatter beside", format!("scatter of {words} about the others"), "%", Scale::Log);
         out.push((scatter, Value { value: rms, se: rms / (2.0 * n).sqrt() }));
+        out.extend(lag(context, own, &others_of(&channels, name, log.len()), words.as_str(), name));
         let far = y.len() as f64 - n + 0.5;
-        let odd = measure(name, "odd rows", format!("rows in which {words} stands alone"), "%", Scale::Log);
+        let odd = measure(name, "odd rows", format!("rows in which {words} stands alone"), "%", Scale::Count);
         let share = 100.0 / y.len() as f64;
         out.push((odd, Value { value: share * far, se: share * far.sqrt() }));
     }
     out
+}
+
+/// The median of the other speed sensors on each row.
+fn others_of(channels: &[(&'static str, &[f64])], name: &str, rows: usize) -> Vec<f64> {
+    let of = |row: usize| {
+        let mut all: Vec<f64> = channels.iter().filter(|c| c.0 != name).map(|c| c.1[row]).filter(|v| v.is_finite()).collect();
+        if all.is_empty() { f64::NAN } else { median(&mut all) }
+    };
+    (0..rows).map(of).collect()
+}
+
+/// By how much a speed sensor is behind the others: what it reads less than they do, over what they rise by in a second, where they move most.
+fn lag(context: &Context, own: &[f64], others: &[f64], words: &str, name: &'static str) -> Option<Told> {
+    let t = &context.t;
+    let moves: Vec<(f64, f64)> = (1..others.len().saturating_sub(1))
+        .map(|i| ((others[i + 1] - others[i - 1]) / (t[i + 1] - t[i - 1]), others[i] - own[i]))
+        .filter(|(rate, behind)| rate.is_finite() && behind.is_finite())
+        .collect();
+    let mut rates: Vec<f64> = moves.iter().map(|m| m.0.abs()).collect();
+    rates.sort_by(f64::total_cmp);
+    let fast = rates.get(rates.len().checked_sub(MOVING)?).copied().filter(|rate| *rate > 0.0)?;
+    let mut behind: Vec<f64> = moves.iter().filter(|m| m.0.abs() >= fast).map(|m| 1000.0 * m.1 / m.0).collect();
+    let n = behind.len() as f64;
+    let middle = median(&mut behind);
+    let spread = 1.4826 * median(&mut behind.iter().map(|v| (v - middle).abs()).collect::<Vec<f64>>());
+    // the standard error of a median; no clock is better than a hundredth of a row
+    let se = (1.2533 * spread / n.sqrt()).max(10.0 * context.step());
+    let of = measure(name, "late beside", format!("{words} behind the others"), "ms", Scale::Linear);
+    Some((of, Value { value: middle, se }))
+}
+
+/// How the gains of two channels over the speed differ: the day's air, which moves all of them alike, falls out.
+fn contrasts(told: &[Told]) -> Vec<Told> {
+    const PAIRS: [[&str; 2]; 3] = [["thrust_n", "torque_nm"], ["thrust_n", "current_a"], ["torque_nm", "current_a"]];
+    let gain = |channel: &str| told.iter().find(|(m, _)| m.channel == channel && m.name.ends_with(" gain")).map(|(_, v)| *v);
+    let of = |[a, b]: [&str; 2]| {
+        let (one, other) = (gain(a)?, gain(b)?);
+        let (of_a, of_b) = (words::channel(a), words::channel(b));
+        let m = measure(a, &format!("gain beside {b}"), format!("gain of {of_a} beside that of {of_b}"), "%", Scale::Linear);
+        Some((m, Value { value: one.value - other.value, se: one.se.hypot(other.se) }))
+    };
+    PAIRS.into_iter().filter_map(of).collect()
 }
 
 /// Mean temperature and pressure.

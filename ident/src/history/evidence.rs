@@ -25,6 +25,8 @@ pub(super) struct Series {
     y: Vec<f64>,
     /// Their variances.
     variance: Vec<f64>,
+    /// Their mean, on that scale.
+    pub(super) level: f64,
     /// Runs that have them.
     pub(super) at: Vec<usize>,
     /// What the day explains, in standard deviations, one column each.
@@ -74,7 +76,7 @@ impl Series {
         let variance: Vec<f64> = own.iter().map(|v| v.se * v.se + least * least).collect();
         let picked = |c: &Vec<f64>| standard(&at.iter().map(|k| c[*k]).collect::<Vec<f64>>());
         let beside = beside.iter().filter_map(picked).collect();
-        (spread > 0.0).then_some(Self { y, variance, at, beside, spread })
+        (spread > 0.0).then_some(Self { y, variance, level: mean, at, beside, spread })
     }
 
     fn scattered(&self, tau: f64) -> Option<Scattered<'_>> {

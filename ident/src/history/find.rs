@@ -109,9 +109,7 @@ struct Asked {
 fn days(history: &History, [from, to]: [usize; 2]) -> Vec<Vec<f64>> {
     let of = |m: usize| history.runs[from..to].iter().map(|r| r.values[m].map(|v| v.value)).collect::<Option<Vec<f64>>>();
     let all: Vec<Vec<f64>> = (0..history.measures.len()).filter(|m| history.measures[*m].of_day).filter_map(of).collect();
-    // each takes a run's worth of knowledge: few runs do not pay for them
-    let most = (to - from).saturating_sub(FEWEST + 2) / 2;
-    all.into_iter().take(most).collect()
+    all
 }
 
 fn asked(history: &History, [from, to]: [usize; 2]) -> Vec<Asked> {
@@ -120,8 +118,11 @@ fn asked(history: &History, [from, to]: [usize; 2]) -> Vec<Asked> {
         let measure = &history.measures[m];
         let compared = |v: &Option<Value>| v.map(|v| v.compared(measure.scale));
         let values: Vec<Option<Value>> = history.runs[from..to].iter().map(|r| compared(&r.values[m])).collect();
+        // each takes a run's worth of knowledge: few runs do not pay for them
+        let most = values.iter().flatten().count().saturating_sub(FEWEST + 2) / 2;
+        let beside = &beside[..most.min(beside.len())];
         let least = if measure.scale == Scale::Log { LEAST_LOG } else { 0.0 };
-        Some(Asked { measure: m, series: Series::of(&values, &beside, least)? })
+        Some(Asked { measure: m, series: Series::of(&values, beside, least)? })
     };
     (0..history.measures.len()).filter(|m| history.measures[*m].asked).filter_map(of).collect()
 }
@@ -140,7 +141,9 @@ fn sought(history: &History, [from, to]: [usize; 2]) -> Option<Change> {
     let forms: Vec<Vec<f64>> = steps.into_iter().chain([times(history, [from, to])]).collect();
     let all: Vec<Vec<Departure>> = asked.iter().map(|a| a.series.departures(&forms)).collect();
     let gaps = n - 1;
-    let mean = |form: usize| log_mean(all.iter().map(|d| d[form].evidence));
+    // a change moves a share of the measures, and no less than one: any one of them is as likely as that to be among them
+    let moved_share = (MOVED * asked.len() as f64).max(1.0).ln();
+    let mean = |form: usize| log_mean(all.iter().map(|d| d[form].evidence)) + moved_share;
     let step = log_mean((0..gaps).map(mean));
     let drift = if n > FEWEST { mean(gaps) } else { f64::NEG_INFINITY };
     // either is as likely before
@@ -219,7 +222,12 @@ fn moved(history: &History, asked: &[Asked], all: &[Vec<Departure>], form: usize
         .map(|(a, d)| {
             let (m, d) = (&history.measures[a.measure], d[form]);
             let ends = [d.size, d.size - 1.96 * d.se, d.size + 1.96 * d.se];
-            let [by, low, high] = if m.scale == Scale::Log { ends.map(f64::exp) } else { ends };
+            let [by, low, high] = match m.scale {
+                Scale::Linear => ends,
+                Scale::Log => ends.map(f64::exp),
+                // of squares the difference is the sum of the roots times that of the roots
+                Scale::Count => ends.map(|v| 2.0 * a.series.level * v),
+            };
             let per = match (drifts, history.dated) {
                 (false, _) => "",
                 (true, true) => " a week",

@@ -5,7 +5,7 @@
 //! Units: the measure's.
 //! Reference: Shewhart 1931, "Economic Control of Quality of Manufactured Product"; Montgomery, individuals chart.
 
-use super::measure::{Scale, Value};
+use super::measure::Value;
 use super::{FEWEST, History};
 use serde::Serialize;
 
@@ -41,7 +41,7 @@ impl Chart {
         let days = (own.iter().map(|v| (v.value - centre).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
         let sd = if own.len() < FEWEST { errors } else { days.max(errors) };
         let ends = [centre, centre - WIDE * sd, centre + WIDE * sd];
-        let [centre, low, high] = if scale == Scale::Log { ends.map(f64::exp) } else { ends };
+        let [centre, low, high] = ends.map(|v| scale.back(v));
         Some(Self { centre, low, high, runs: own.len() })
     }
 

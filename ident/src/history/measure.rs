@@ -13,8 +13,23 @@ use serde::Serialize;
 pub enum Scale {
     /// By their difference.
     Linear,
-    /// By their quotient: noise floors, shares.
+    /// By their quotient: noise floors, steps of the last digit.
     Log,
+    /// Shares of rows that were counted, by their square roots: those scatter alike whatever the share (Bartlett 1936, J. R. Stat. Soc. Suppl.
+    /// 3:68), and a share of nothing is known as well as any other.
+    Count,
+}
+
+impl Scale {
+    /// A value from the scale on which it is compared back to the measure's own unit.
+    #[must_use]
+    pub fn back(self, compared: f64) -> f64 {
+        match self {
+            Self::Linear => compared,
+            Self::Log => compared.exp(),
+            Self::Count => compared.max(0.0).powi(2),
+        }
+    }
 }
 
 /// Something that each run tells of its rig.
@@ -54,6 +69,10 @@ impl Value {
             Scale::Log => {
                 let v = self.value.max(f64::MIN_POSITIVE);
                 Self { value: v.ln(), se: self.se / v }
+            }
+            Scale::Count => {
+                let root = self.value.max(f64::MIN_POSITIVE).sqrt();
+                Self { value: root, se: self.se / (2.0 * root) }
             }
         }
     }

@@ -1,7 +1,8 @@
 //! What a change is called.
 //!
 //! What it is: the loop closed on runs after the gap against a model of the last run before it, by the same library that names causes in one
-//! run. What the loop names on other runs before the gap as well is how days differ, and is taken off.
+//! run. What the loop names on other runs before the gap as well, and as large, is how days differ, and is taken off. What came to stay has the
+//! same size on all runs after the gap: another one is of its own day.
 //! What can go wrong: an effect that the run before the gap hides is not seen after it; a drift is told by its measure, not by the library.
 //! Units: scores are logarithms of odds, nats.
 //! Reference: specification `closing-the-loop.md`; difference in differences.
@@ -12,6 +13,7 @@ use crate::close::{Closed, close};
 use crate::effects::{self, Effect};
 use crate::log::Log;
 use crate::model::Model;
+use crate::noise::median;
 use crate::parallel::in_parallel;
 use crate::verdict::EffectEntry;
 use crate::words::lower;
@@ -92,11 +94,15 @@ fn against(log: &Log, model: &Model) -> Option<Closed> {
 /// An effect as a name, where runs after the gap speak for it more than those before.
 fn told(effect: &'static dyn Effect, usual: &[Option<Closed>], news: &[Option<Closed>], moved: &[&str]) -> Option<Name> {
     let id = effect.id();
-    let mean = |runs: &[Option<Closed>]| {
-        let all: Vec<f64> = runs.iter().flatten().map(|c| odds(c, id)).collect();
-        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
-    };
-    let score = mean(news)? - mean(usual).unwrap_or(-MOST);
+    let mean = |all: Vec<f64>| (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64);
+    let mut sizes: Vec<f64> = news.iter().flatten().filter_map(|c| size(entry(c, id)?)).collect();
+    let as_large = if sizes.is_empty() { None } else { Some(median(&mut sizes)) };
+    // a run on which it has no size tells by its odds alone
+    let like = |c: &Closed| times(entry(c, id), as_large);
+    let same = |c: &Closed| if like(c).is_some_and(|times| !(0.5..2.0).contains(&times)) { -MOST } else { odds(c, id) };
+    let as_before = |c: &Closed| if like(c).is_some_and(|times| times < 0.5) { -MOST } else { odds(c, id) };
+    let after = mean(news.iter().flatten().map(same).collect())?;
+    let score = after - mean(usual.iter().flatten().map(as_before).collect()).unwrap_or(-MOST);
     let entry = news.iter().flatten().filter_map(|c| entry(c, id)).find(|e| {
         moved.is_empty()
             || e.channels
@@ -105,6 +111,18 @@ fn told(effect: &'static dyn Effect, usual: &[Option<Closed>], news: &[Option<Cl
     })?;
     let words = lower(&effect.said(entry).sentence());
     (score > 0.0).then(|| Name { id: id.to_owned(), title: lower(effect.about().title), words, score })
+}
+
+/// How large an effect is, with its sign: the first of its parameters that is no instant and no shape.
+fn size(entry: &EffectEntry) -> Option<f64> {
+    const SHAPES: [&str; 8] = ["t0", "t1", "phase", "tau", "tau_up", "tau_down", "onset", "slack"];
+    entry.parameters.iter().find(|p| !SHAPES.contains(&p.name.as_str())).map(|p| p.value)
+}
+
+/// How large an effect is on a run, over what it is after the gap: below a half it is nearer to nothing.
+fn times(on_run: Option<&EffectEntry>, after: Option<f64>) -> Option<f64> {
+    let times = on_run.and_then(size)? / after?;
+    times.is_finite().then_some(times)
 }
 
 fn entry<'c>(closed: &'c Closed, id: &str) -> Option<&'c EffectEntry> {

@@ -69,6 +69,7 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
         next_experiment: None,
         left_out: Vec::new(),
         set_aside: Vec::new(),
+        at_rest: runs.iter().all(|r| r.closed.verdict.at_rest),
         guessed_floors: runs.iter().filter_map(|r| r.closed.verdict.guessed_floors).max(),
         validation: Vec::new(),
         runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared, &silent)).collect(),

@@ -41,6 +41,12 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         Kind::Unattributed => unattributed(verdict, news),
         Kind::None => none(verdict, news),
     };
+    let said = if verdict.at_rest {
+        let rest = if verdict.verdict == Kind::None { String::new() } else { format!(" {said}") };
+        format!("The motor never turned: this run says nothing of a load.{rest}")
+    } else {
+        said
+    };
     let without = verdict.channels.not_predicted.iter().map(|(name, reason)| match reason.contains(':') {
         true => format!("{} has no model ({reason}).", heading(name)),
         false => format!("{} has no model: {reason}.", heading(name)),

@@ -97,6 +97,11 @@ impl Life {
         let mut k = Chance::new(seed, 900 + attempt);
         let mut rig = Rig::draw(&mut k);
         rig.hz = rig.hz.min(20.0);
+        // the head says the rate that is written
+        rig.meta
+            .iter_mut()
+            .filter(|line| line.starts_with("sample_hz"))
+            .for_each(|line| *line = format!("sample_hz = {:.1}", rig.hz));
         let id = if seed >= CLEAN || (seed / 2) % DRIFTS == DRIFTS - 1 { None } else { Some(Self::id(seed)) };
         if let Some(id) = id {
             Effect::equip(id, &mut rig, &mut k);
