@@ -1,7 +1,7 @@
 //! What a change is called.
 //!
-//! What it is: the loop closed on runs after the gap against a model of the last run before it, by the same library that names causes in one
-//! run. What the loop names on other runs before the gap as well, and as large, is how days differ, and is taken off. What came to stay has the
+//! What it is: the loop closed on runs after the gap against a model of the most usual run before it, by the same library that names causes in one
+//! run. A model of a day of its own would find that day in all others. What the loop names on other runs before the gap as well, and as large, is how days differ, and is taken off. What came to stay has the
 //! same size on all runs after the gap: another one is of its own day.
 //! What can go wrong: an effect that the run before the gap hides is not seen after it; a drift is told by its measure, not by the library.
 //! Units: scores are logarithms of odds, nats.
@@ -18,6 +18,7 @@ use crate::parallel::in_parallel;
 use crate::verdict::EffectEntry;
 use crate::words::lower;
 use serde::Serialize;
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Runs after a gap that are asked, and runs before it that show how days differ.
@@ -52,13 +53,33 @@ pub fn named(history: &mut History, logs: &[&Log], progress: &(dyn Fn(f64) + Syn
 }
 
 /// Runs that are asked about a change: the one that the model is of, others before it, some after it.
-fn chosen(change: &Change) -> (usize, Vec<usize>, Vec<usize>) {
+fn chosen(history: &History, change: &Change) -> (usize, Vec<usize>, Vec<usize>) {
     let [from, to] = change.among;
     let gap = if change.kind == Kind::Drift { from + 1 } else { change.first };
-    let last = gap - 1;
-    let before: Vec<usize> = (from..last).rev().take(BEFORE).collect();
+    let own = most_usual(history, from..gap);
+    let before: Vec<usize> = (from..gap).rev().filter(|k| *k != own).take(BEFORE).collect();
     let after: Vec<usize> = if change.kind == Kind::Drift { (gap..to).rev().take(AFTER).collect() } else { spread(gap, to) };
-    (last, before, after)
+    (own, before, after)
+}
+
+/// The run among some whose measures are nearest to their medians, each in the spread of those runs; the latest of those that are as near.
+fn most_usual(history: &History, runs: Range<usize>) -> usize {
+    let mut off = vec![0.0; runs.len()];
+    for (m, measure) in history.measures.iter().enumerate().filter(|(_, measure)| measure.asked) {
+        let of = |k: usize| history.runs[k].values[m].map(|v| v.compared(measure.scale).value);
+        let mut all: Vec<f64> = runs.clone().filter_map(of).collect();
+        if all.len() < 3 {
+            continue;
+        }
+        let middle = median(&mut all);
+        let spread = median(&mut all.iter().map(|v| (v - middle).abs()).collect::<Vec<f64>>()).max(f64::MIN_POSITIVE);
+        for (off, value) in off.iter_mut().zip(runs.clone().map(of)) {
+            // one measure far off is as odd as it gets
+            *off += value.map_or(3.0, |v| ((v - middle).abs() / spread).min(3.0));
+        }
+    }
+    let least = off.iter().copied().fold(f64::INFINITY, f64::min);
+    off.iter().rposition(|o| *o <= least).map_or(runs.start, |k| runs.start + k)
 }
 
 /// First, middle and last of some runs.
@@ -69,8 +90,8 @@ fn spread(from: usize, to: usize) -> Vec<usize> {
 }
 
 fn names(history: &History, change: &Change, logs: &[&Log], progress: &(dyn Fn(f64) + Sync)) -> Vec<Name> {
-    let (last, before, after) = chosen(change);
-    let Ok(own) = close(logs[last], None, &[], &mut |_| {}) else { return Vec::new() };
+    let (usual, before, after) = chosen(history, change);
+    let Ok(own) = close(logs[usual], None, &[], &mut |_| {}) else { return Vec::new() };
     let runs: Vec<usize> = before.iter().chain(&after).copied().collect();
     let done = AtomicUsize::new(1);
     let of = |k: usize| {
@@ -103,14 +124,17 @@ fn told(effect: &'static dyn Effect, usual: &[Option<Closed>], news: &[Option<Cl
     let as_before = |c: &Closed| if like(c).is_some_and(|times| times < 0.5) { -MOST } else { odds(c, id) };
     let after = mean(news.iter().flatten().map(same).collect())?;
     let score = after - mean(usual.iter().flatten().map(as_before).collect()).unwrap_or(-MOST);
-    let entry = news.iter().flatten().filter_map(|c| entry(c, id)).find(|e| {
-        moved.is_empty()
-            || e.channels
-                .iter()
-                .any(|c| moved.contains(&c.as_str()) || c.starts_with("rpm") && moved.iter().any(|m| m.starts_with("rpm")))
-    })?;
+    let entry = news.iter().flatten().filter_map(|c| entry(c, id)).find(|e| moved.is_empty() || touches(e, moved))?;
+    // what does not touch what moved most leaves that without a cause
+    let score = if moved.first().is_some_and(|most| !touches(entry, &[*most])) { score - MOST } else { score };
     let words = lower(&effect.said(entry).sentence());
     (score > 0.0).then(|| Name { id: id.to_owned(), title: lower(effect.about().title), words, score })
+}
+
+/// Whether an effect is on one of these channels; the sensors of one speed are one.
+fn touches(e: &EffectEntry, channels: &[&str]) -> bool {
+    let speed = |c: &str| c.starts_with("rpm");
+    e.channels.iter().any(|c| channels.iter().any(|m| c == m || speed(c) && speed(m)))
 }
 
 /// How large an effect is, with its sign: the first of its parameters that is no instant and no shape.

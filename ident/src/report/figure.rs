@@ -10,6 +10,9 @@ use super::style::COLOURS;
 use super::svg::{escape, label, line_path, short_label, span, ticks};
 use std::fmt::Write;
 
+/// Dots up to which each is drawn large: a table of levels is no cloud.
+const FEW_DOTS: usize = 80;
+
 /// Width of the drawing in its own units: two figures side by side on a desk, one on a phone.
 const WIDTH: f64 = 560.0;
 const LEFT: f64 = 80.0;
@@ -414,7 +417,9 @@ fn draw_layer(out: &mut String, layer: &Layer, f: &Frame) {
         }
         Layer::Dots { class, x, y, .. } => {
             let stride = x.len().div_ceil(2500).max(1);
-            let _ = write!(out, "<path class=\"{class} dots\" d=\"");
+            let there = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite()).count();
+            let few = if there <= FEW_DOTS { " few" } else { "" };
+            let _ = write!(out, "<path class=\"{class} dots{few}\" d=\"");
             for (x, y) in x.iter().zip(y).step_by(stride).filter(|(x, y)| x.is_finite() && y.is_finite()) {
                 let _ = write!(out, "M{:.1} {:.1}h.01", px(*x), py(*y));
             }

@@ -20,7 +20,7 @@ svg.fig{display:block;width:100%;height:auto;background:var(--bg);break-inside:a
 .fig text{fill:var(--fg);font:13px system-ui,-apple-system,'Segoe UI',sans-serif}.fig .title{font-size:15px;font-weight:600}.fig .tick{font-size:12px}.fig .axis{fill:var(--soft)}
 .fig .grid{stroke:var(--grid);stroke-width:1}.fig .rule{stroke:var(--soft);stroke-width:1.2;stroke-dasharray:5 4}
 .fig path{fill:none;stroke-width:1.6;stroke-linejoin:round}.fig .key{stroke-width:3}
-.fig .dots{stroke-width:2.4;stroke-linecap:round;opacity:.55}
+.fig .dots{stroke-width:2.4;stroke-linecap:round;opacity:.55}.fig .dots.few{stroke-width:6;opacity:.9}
 .fig .a{stroke:var(--a)}.fig .b{stroke:var(--b)}.fig .c{stroke:var(--c)}.fig .d{stroke:var(--d)}.fig .e{stroke:var(--e)}.fig .f{stroke:var(--f)}
 .fig path.band,.fig .patch{stroke:none;opacity:.25}.fig .a.band,.fig .a.patch{fill:var(--a)}.fig .b.band,.fig .b.patch{fill:var(--b)}.fig .c.band,.fig .c.patch{fill:var(--c)}.fig .d.band,.fig .d.patch{fill:var(--d)}.fig .e.band,.fig .e.patch{fill:var(--e)}
 .fig rect.span{fill:var(--span)}.fig rect.span.patch{fill:var(--a);opacity:.25}
