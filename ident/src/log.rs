@@ -9,8 +9,10 @@
 mod clock;
 mod gaps;
 pub(crate) mod plausible;
+mod whole;
 
 pub use gaps::Gaps;
+pub use whole::{folder_of, no_regular_file, place_of, what_lies_at, write_whole};
 
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -263,26 +265,6 @@ pub fn event_line(text: &str) -> String {
 pub(crate) fn event(comment: &str) -> Option<String> {
     let table = comment.strip_prefix("event").and_then(|_| comment.parse::<toml::Table>().ok())?;
     table.get("event")?.as_str().map(str::to_owned)
-}
-
-/// Writes a file whole or not at all: temporary file in the same folder, sync, rename.
-///
-/// # Errors
-/// What the system says.
-pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // as any other file: the umask decides
-    let mut file = builder.tempfile_in(folder)?;
-    {
-        let mut buffered = std::io::BufWriter::new(file.as_file_mut());
-        fill(&mut buffered)?;
-        buffered.flush()?;
-    }
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|e| e.error)?;
-    Ok(())
 }
 
 fn decimals(name: &str) -> usize {

@@ -606,7 +606,35 @@ fn outputs() -> Vec<Case> {
         alone("pages of effects among notes", "effects -o full", &["full: holds notes.txt"]),
         alone("figures among notes", "select --svg full", &["full: holds notes.txt"]),
         alone("a folder that is a file", "close-loop good.csv -o model.toml", &["model.toml: ", "a folder"]),
-        alone("a folder that is not there", "identify good.csv -o absent/out.toml", &["absent/out.toml: cannot be written"]),
+        alone(
+            "two folders that are not there",
+            "identify good.csv -o absent/deep/out.toml",
+            &["absent/deep/out.toml: cannot be written (absent is not there)"],
+        ),
+        alone("the same of a folder", "close-loop good.csv -o absent/deep/out", &["(absent is not there)"]),
+        alone("a folder in a file", "identify good.csv -o model.toml/out.toml", &["model.toml is no folder"]),
+        alone(
+            "a folder in the place of a file",
+            "identify good.csv -o full",
+            &["full: is a folder, which stays as it is", "for -o"],
+        ),
+        alone("a device for a model", "identify good.csv -o /dev/full", &["/dev/full: is a device, which stays as it is"]),
+        alone(
+            "a device for a page",
+            "identify good.csv -o out.toml --report /dev/null",
+            &["/dev/null: is a device", "for --report"],
+        ),
+        alone("a device for an export", "export model.toml --to px4 -o /dev/null", &["/dev/null: is a device"]),
+        alone("a device for a recording", "log --port sim --speed 0 --seconds 1 -o /dev/null", &["/dev/null: is a device"]),
+        alone("a device for figures", "select --svg /dev/null", &["/dev/null: is no folder; expected a folder for --svg"]),
+        alone("a file for a batch", "batch . -o good.csv", &["good.csv: is no folder; expected a folder for -o"]),
+        alone("a device for a run", "sim short.toml -o /dev/null", &["/dev/null: is a device"]),
+        alone(
+            "a device without an end",
+            "identify /dev/zero -o out.toml",
+            &["/dev/zero: is a device, which can be read only once"],
+        ),
+        alone("a device in the place of a log", "step residual /dev/zero", &["/dev/zero: is a device"]),
     ]
 }
 
@@ -667,3 +695,50 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
     }
     assert!(wrong.is_empty(), "{} of {} cases:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
 }
+/// A pipe gives its bytes once, and an input is looked at before it is read; a link to a device stays one.
+#[cfg(unix)]
+#[test]
+fn pipes_and_links_to_devices_are_left_alone() {
+    let bench = Bench::new();
+    let made = std::process::Command::new("mkfifo").arg(bench.path("pipe.csv")).status().expect("mkfifo");
+    assert!(made.success());
+    for words in [vec!["identify", "pipe.csv", "-o", "out.toml"], vec!["import", "pipe.csv", "-o", "out.csv"]] {
+        bench
+            .call(&words)
+            .refused(&["pipe.csv: is a pipe, which can be read only once", "expected a file: save it to one first"]);
+    }
+    bench.call(&["identify", "good.csv", "-o", "pipe.csv"]).refused(&["pipe.csv: is a pipe, which stays as it is"]);
+    std::os::unix::fs::symlink("/dev/null", bench.path("link.toml")).expect("a link");
+    bench.call(&["identify", "good.csv", "-o", "link.toml"]).refused(&["link.toml: is a device"]);
+    assert!(bench.path("link.toml").is_symlink());
+    assert_eq!(bench.names(), ["good.csv", "link.toml", "model.toml", "pipe.csv"]);
+}
+
+/// One missing folder is made, whatever the command and its option; a link to a file leads on to it.
+#[test]
+fn a_missing_folder_of_an_output_is_made() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("run.toml"), "schedule = { kind = \"steps\", steps = [{ pulse_us = 1300, hold_s = 2 }] }\n")
+        .expect("a scenario");
+    for (words, files) in [
+        ("sim run.toml -o a/run.csv --truth b/truth.csv", vec!["a/run.csv", "b/truth.csv"]),
+        (
+            "identify good.csv -o c/model.toml --report d/page.html --svg e/figures",
+            vec!["c/model.toml", "d/page.html", "e/figures"],
+        ),
+        ("predict model.toml good.csv -o f/pred.csv", vec!["f/pred.csv"]),
+        ("export model.toml --to csv -o g/table.csv", vec!["g/table.csv"]),
+        ("log --port sim --speed 0 --seconds 1 -o h/log.csv", vec!["h/log.csv"]),
+    ] {
+        bench.call(&words.split(' ').collect::<Vec<_>>()).succeeded();
+        assert!(files.iter().all(|file| bench.path(file).exists()), "{words}");
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("a/run.csv", bench.path("link.csv")).expect("a link");
+        bench.call(&["export", "model.toml", "--to", "csv", "-o", "link.csv"]).succeeded();
+        let read = |name: &str| std::fs::read(bench.path(name)).expect("a file");
+        assert!(bench.path("link.csv").is_symlink() && read("a/run.csv") == read("g/table.csv"));
+    }
+}
+

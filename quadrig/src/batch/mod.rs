@@ -53,7 +53,7 @@ pub(crate) struct Args {
 impl Args {
     /// What it reads and writes.
     pub(crate) fn paths(&self) -> Paths<'_> {
-        Paths::default().reads([&self.folder]).writes("-o", [&self.output])
+        Paths::default().reads([&self.folder]).adds_to("-o", [&self.output])
     }
 }
 
