@@ -70,7 +70,7 @@ impl Place<'_> {
         ReadError::Content {
             file: self.file.to_owned(),
             line: self.line,
-            place: column.map(|c| format!("column {c}: ")).unwrap_or_default(),
+            place: column.map(|c| format!("column {}: ", short(c))).unwrap_or_default(),
             found: found.into(),
             expected: expected.into(),
         }
@@ -354,6 +354,10 @@ impl<'a, R: BufRead> Lines<'a, R> {
         }
         self.digest.update(&bytes);
         self.number += 1;
+        if self.number == 1 && bytes.trim_ascii_end().contains(&b'\r') {
+            let found = "lines that end with a carriage return alone";
+            return Err(self.place().refuse(None, found, "lines that end with a line feed: save the file so in an editor"));
+        }
         if n > MAX_LINE {
             return Err(self.place().refuse(
                 None,
@@ -388,7 +392,7 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
             let comment = comment.trim();
             if !format_seen {
                 if comment != format {
-                    let found = format!("'{line}'");
+                    let found = format!("'{}'", short(&line));
                     return Err(match comment {
                         crate::flight_log::FORMAT => place.refuse(
                             None,
@@ -548,6 +552,15 @@ mod tests {
 
     fn parse(text: &str) -> Result<Log, String> {
         Log::parse("run.csv", text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_a_message_quotes_is_short() {
+        let said = parse("# quadrig-log 1\rt_s,rpm,thrust_n\r0,1,2\r").unwrap_err();
+        assert!(said.starts_with("run.csv:1: lines that end with a carriage return alone; expected"), "{said}");
+        let said = parse(&format!("# {}\nt_s,rpm,thrust_n\n0,1,2\n", "x".repeat(5000))).unwrap_err();
+        assert!(said.len() < 200 && said.contains("xxx...'"), "{said}");
+        assert_eq!(parse("# quadrig-log 1\r\nt_s,rpm,thrust_n\r\n0,1,2\r\n").unwrap().len(), 1);
     }
 
     #[test]

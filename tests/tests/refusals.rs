@@ -87,6 +87,45 @@ fn kinds() -> Vec<Case> {
             "identify bad.html -o out.toml",
             &["bad.html:1:1: a page"],
         ),
+        alone(
+            "a log to configure a board",
+            "rig --port sim --speed 0 configure good.csv",
+            &["good.csv:1:1: a log; expected a board's configuration"],
+        ),
+        with(
+            "an export to configure a board",
+            "bad",
+            "Time (s),Thrust (N),Speed\n0,1,2\n",
+            "rig --port sim --speed 0 configure bad",
+            &["bad:1:1: a table of values"],
+        ),
+        alone(
+            "a log in the place of a schedule",
+            "rig --port sim --speed 0 run good.csv -o out.csv",
+            &["good.csv:1:1: a log; expected a schedule", "--next takes a verdict"],
+        ),
+        alone(
+            "a model in the place of a schedule",
+            "rig --port sim --speed 0 run model.toml -o out.csv",
+            &["model.toml:1:1: a model; expected a schedule"],
+        ),
+        with(
+            "a verdict in the place of a calibration",
+            "bad.json",
+            "{\n  \"format\": \"quadrig-verdict 2\"\n}\n",
+            "recalibrate good.csv --with bad.json -o out.csv",
+            &["bad.json:1:1: a verdict; expected a file of `quadrig calibrate`"],
+        ),
+        alone(
+            "a folder of runs that is not there",
+            "batch nowhere -o out",
+            &["nowhere: no folder of this name is there; expected a folder"],
+        ),
+        alone(
+            "a run in the place of a folder",
+            "batch good.csv -o out",
+            &["good.csv: no folder of this name is there", "`quadrig close-loop`"],
+        ),
         with("an attitude to identify", "bad.csv", ATTITUDE, IDENTIFY, &["bad.csv:1:1", "--readings READINGS"]),
         with("an attitude to filter", "bad.csv", ATTITUDE, "ahrs bad.csv out.csv", &["bad.csv:1:", "--readings READINGS"]),
         with("readings to identify", "bad.csv", READINGS, IDENTIFY, &["bad.csv:1:1: readings of an IMU", "`quadrig close-loop`"]),
@@ -162,6 +201,13 @@ fn logs() -> Vec<Case> {
     let shuffled = rows(|rows| (0..rows.len()).map(|n| rows[n * 131 % rows.len()].clone()).collect());
     let twice = rows(|rows| [rows.clone(), rows].concat());
     vec![
+        with(
+            "line ends of carriage returns",
+            "bad.csv",
+            good_log().replace('\n', "\r"),
+            IDENTIFY,
+            &["bad.csv:1: lines that end with a carriage return alone"],
+        ),
         with("shuffled rows", "bad.csv", shuffled, IDENTIFY, &["bad.csv:8: column t_s", "rows look shuffled, sort them by t_s"]),
         with("two runs in one", "bad.csv", twice, IDENTIFY, &["bad.csv:424: column t_s: 0 steps back from 41.9", "a second run"]),
         with(
@@ -467,6 +513,11 @@ fn schedules() -> Vec<Case> {
         ),
         case("a part of no kind", "[[part]]\nkind = \"hld\"\n", &["bad.toml:2:8: ", "\"hld\"", "hold, staircase"]),
         case(
+        case(
+            "an airframe in the place of its file",
+            "duration_s = 2\n\n[airframe]\narm_m = 0.3\n",
+            &["bad.toml:3:1: airframe: a table", "the name of a file, in quotes"],
+        ),
             "a part with a key that is none",
             "[[part]]\nkind = \"hold\"\npulse_us = 1500\nhold_s = 1\nhld = 2\n",
             &["bad.toml:5:1: ", "\"hld\"", "hold_s"],

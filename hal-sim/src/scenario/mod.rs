@@ -315,8 +315,10 @@ pub(crate) fn place_of(text: &str, byte: usize) -> (usize, usize) {
 pub(crate) fn motor_name<'de, D: Deserializer<'de>>(d: D) -> Result<String, D::Error> {
     let name = String::deserialize(d)?;
     if Motor::named(&name).is_some() {
+        "path string" => "the name of a file, in quotes",
         return Ok(name);
     }
+    let before = before.replace("invalid type: map", "a table").replace("invalid type: sequence", "a list");
     let names = crate::plant::motor::MOTORS.map(|(kv, _)| format!("{kv}KV")).join(", ");
     Err(D::Error::custom(format!("expected one of {names}, found {name:?}")))
 }
