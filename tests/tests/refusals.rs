@@ -458,6 +458,21 @@ fn scenarios() -> Vec<Case> {
             "[supply]\nkind = \"lipo\"\ncells = 0\ncapacity_ah = 4\nresistance_ohm = 0.01\n",
             &["bad.toml:3:9: cells: ", "1 to 14"],
         ),
+        case(
+            "a lead of less than nothing",
+            "[[effect]]\nid = \"supply_sag\"\nresistance_ohm = -0.08\n",
+            &["bad.toml:3:18: resistance_ohm: ", "from 0 to 100 ohm, found -0.08"],
+        ),
+        case(
+            "a blade that lost more than all",
+            "[[effect]]\nid = \"blade_damage\"\nthrust_change = -1.5\ntorque_change = 0.1\nt0_s = 3\n",
+            &["bad.toml:3:17: thrust_change: ", "above -1 (all of it) to 10, found -1.5"],
+        ),
+        case(
+            "a blade that breaks after the run",
+            "[[effect]]\nid = \"blade_damage\"\nthrust_change = -0.1\ntorque_change = 0.1\nt0_s = 4000\n",
+            &["bad.toml:5:8: t0_s: ", "within the run, before 332 s, found 4000"],
+        ),
         case("a rest that is no number", "rest_s = nan\n", &["bad.toml:1:10: rest_s: "]),
         case(
             "a run that the firmware stops",
@@ -498,6 +513,11 @@ fn missions() -> Vec<Case> {
             "duration_s = 2\n[[command]]\nrotors = [1]\nsteps = [\n  { pulse_us = 1700, hold_s = 1 },\n  { pulse_us = 170, hold_s = 1 },\n]\n",
             &["bad.toml:6:16: pulse_us: ", "found 170"],
         ),
+        case(
+            "an airframe in the place of its file",
+            "duration_s = 2\n\n[airframe]\narm_m = 0.3\n",
+            &["bad.toml:3:1: airframe: a table", "the name of a file, in quotes"],
+        ),
         case("an airframe that is not there", "airframe = \"nowhere.toml\"\n", &["nowhere.toml: cannot be read"]),
         case("pulses that are not there", "pulses = \"nowhere.csv\"\n", &["nowhere.csv: cannot be read"]),
     ]
@@ -513,11 +533,6 @@ fn schedules() -> Vec<Case> {
         ),
         case("a part of no kind", "[[part]]\nkind = \"hld\"\n", &["bad.toml:2:8: ", "\"hld\"", "hold, staircase"]),
         case(
-        case(
-            "an airframe in the place of its file",
-            "duration_s = 2\n\n[airframe]\narm_m = 0.3\n",
-            &["bad.toml:3:1: airframe: a table", "the name of a file, in quotes"],
-        ),
             "a part with a key that is none",
             "[[part]]\nkind = \"hold\"\npulse_us = 1500\nhold_s = 1\nhld = 2\n",
             &["bad.toml:5:1: ", "\"hld\"", "hold_s"],
@@ -601,6 +616,8 @@ fn arguments() -> Vec<Case> {
         alone("a beam of no number", "beam --modulus nan", &["--modulus NaN"]),
         alone("a motor that nobody measured", "select --motor 1KV", &["--motor 1KV", "570KV"]),
         alone("a battery without charge", "select --capacity 0", &["--capacity 0", "a positive number"]),
+        alone("a battery in mAh", "select --capacity 4400", &["--capacity 4400: expected A.h", "4400 mAh are 4.4 A.h"]),
+        alone("a frame in grams", "select --bare 774", &["--bare 774: expected kg", "774 g are 0.774 kg"]),
         alone("a declination beyond the pole", "ahrs good.csv out.csv --declination 700", &["--declination 700", "-180 to 180"]),
         alone("a channel that is none", "plateaus good.csv --channel thrust", &["no column thrust", "thrust_n"]),
         alone("data that are not there", "measured nowhere -o out", &["nowhere", "no such folder"]),
@@ -704,48 +721,6 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
-#[test]
-fn malformed_input_is_refused_in_one_line_that_teaches() {
-    let bench = Bench::new();
-    let write = |name: &str, bytes: &[u8]| std::fs::write(bench.path(name), bytes).expect("a file");
-    std::fs::create_dir(bench.path("full")).expect("a folder");
-    write("full/notes.txt", b"mine");
-    write("empty.toml", b"");
-    write("short.toml", b"duration_s = 1\n");
-    write("plan.toml", b"[[part]]\nkind = \"hold\"\npulse_us = 1200\nhold_s = 1\n");
-    write("on-file.toml", b"schedule = { kind = \"file\", file = \"plan.toml\" }\n");
-    let without_command = |line: &str| match line.split(',').collect::<Vec<_>>()[..] {
-        [t, _, ref rest @ ..] if !line.starts_with('#') => format!("{t},{}\n", rest.join(",")),
-        _ => format!("{line}\n"),
-    };
-    write("no-command.csv", good_log().lines().map(without_command).collect::<String>().as_bytes());
-    let lists = [logs(), kinds(), models(), scenarios(), missions(), schedules(), boards(), arguments(), outputs()];
-    let cases: Vec<Case> = lists.into_iter().flatten().collect();
-    assert!(cases.len() >= 70, "{} cases", cases.len());
-    let mut wrong = Vec::new();
-    for case in &cases {
-        if let Some((file, bytes)) = &case.file {
-            write(file, bytes);
-        }
-        let before = contents(bench.folder());
-        let words: Vec<&str> = case.words.split(' ').collect();
-        let said = bench.call(&words);
-        let lacks: Vec<&str> = case.said.iter().chain(&["expected"]).copied().filter(|text| !said.err.contains(text)).collect();
-        if said.status != Some(1) || said.err.lines().count() != 1 || !said.out.is_empty() || !lacks.is_empty() {
-            wrong.push(format!(
-                "{}: `quadrig {}`: status {:?}, lacks {lacks:?}\n  {}{}",
-                case.name, case.words, said.status, said.err, said.out
-            ));
-        }
-        if contents(bench.folder()) != before {
-            wrong.push(format!("{}: `quadrig {}` changed the folder", case.name, case.words));
-        }
-        if let Some((file, _)) = &case.file {
-            std::fs::remove_file(bench.path(file)).expect("it is there");
-        }
-    }
-    assert!(wrong.is_empty(), "{} of {} cases:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
-}
 /// A pipe gives its bytes once, and an input is looked at before it is read; a link to a device stays one.
 #[cfg(unix)]
 #[test]
@@ -793,3 +768,45 @@ fn a_missing_folder_of_an_output_is_made() {
     }
 }
 
+#[test]
+fn malformed_input_is_refused_in_one_line_that_teaches() {
+    let bench = Bench::new();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(bench.path(name), bytes).expect("a file");
+    std::fs::create_dir(bench.path("full")).expect("a folder");
+    write("full/notes.txt", b"mine");
+    write("empty.toml", b"");
+    write("short.toml", b"duration_s = 1\n");
+    write("plan.toml", b"[[part]]\nkind = \"hold\"\npulse_us = 1200\nhold_s = 1\n");
+    write("on-file.toml", b"schedule = { kind = \"file\", file = \"plan.toml\" }\n");
+    let without_command = |line: &str| match line.split(',').collect::<Vec<_>>()[..] {
+        [t, _, ref rest @ ..] if !line.starts_with('#') => format!("{t},{}\n", rest.join(",")),
+        _ => format!("{line}\n"),
+    };
+    write("no-command.csv", good_log().lines().map(without_command).collect::<String>().as_bytes());
+    let lists = [logs(), kinds(), models(), scenarios(), missions(), schedules(), boards(), arguments(), outputs()];
+    let cases: Vec<Case> = lists.into_iter().flatten().collect();
+    assert!(cases.len() >= 70, "{} cases", cases.len());
+    let mut wrong = Vec::new();
+    for case in &cases {
+        if let Some((file, bytes)) = &case.file {
+            write(file, bytes);
+        }
+        let before = contents(bench.folder());
+        let words: Vec<&str> = case.words.split(' ').collect();
+        let said = bench.call(&words);
+        let lacks: Vec<&str> = case.said.iter().chain(&["expected"]).copied().filter(|text| !said.err.contains(text)).collect();
+        if said.status != Some(1) || said.err.lines().count() != 1 || !said.out.is_empty() || !lacks.is_empty() {
+            wrong.push(format!(
+                "{}: `quadrig {}`: status {:?}, lacks {lacks:?}\n  {}{}",
+                case.name, case.words, said.status, said.err, said.out
+            ));
+        }
+        if contents(bench.folder()) != before {
+            wrong.push(format!("{}: `quadrig {}` changed the folder", case.name, case.words));
+        }
+        if let Some((file, _)) = &case.file {
+            std::fs::remove_file(bench.path(file)).expect("it is there");
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {} cases:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}
