@@ -351,8 +351,9 @@ fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
     if key == "factory" {
         return Ok(Setting::Factory);
     }
-    let value = value.ok_or_else(|| format!("{key}: expected a value after it"))?;
+    let told = || value.ok_or_else(|| format!("{key}: no value; expected one after it, such as `configure log-ms 100`"));
     let whole = |most: f64| {
+        let value = told()?;
         if value.fract() == 0.0 && (0.0..=most).contains(&value) {
             Ok(value)
         } else {
@@ -363,12 +364,12 @@ fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
         "log-ms" => Setting::LogPeriodMs(whole(65_535.0)? as u16),
         "link-ms" => Setting::LinkMs(whole(65_535.0)? as u16),
         "slew" => Setting::SlewNsPerMs(whole(f64::from(u32::MAX))? as u32),
-        "speed-limit" => Setting::SpeedLimit(value as f32),
-        "current-limit" => Setting::CurrentLimit(value as f32),
-        "voltage-limit" => Setting::VoltageLimit(value as f32),
+        "speed-limit" => Setting::SpeedLimit(told()? as f32),
+        "current-limit" => Setting::CurrentLimit(told()? as f32),
+        "voltage-limit" => Setting::VoltageLimit(told()? as f32),
         _ => {
             return Err(format!(
-                "{key}: no such setting; expected one of log-ms, link-ms, slew, speed-limit, current-limit, voltage-limit, factory"
+                "{key}: no such setting, nor a file; expected one of log-ms, link-ms, slew, speed-limit, current-limit, voltage-limit, factory"
             )
             .into());
         }

@@ -568,6 +568,12 @@ fn boards() -> Vec<Case> {
             "rig --port sim --speed 0 set 1500",
             &["the board refuses: not in this state", "`quadrig rig status`"],
         ),
+        alone(
+            "a configuration that is not there",
+            "rig --port sim --speed 0 configure nowhere.csv",
+            &["nowhere.csv: no such setting, nor a file", "log-ms"],
+        ),
+        alone("a setting without its value", "rig --port sim --speed 0 configure slew", &["slew: no value", "log-ms 100"]),
         alone("a setting that is none", "rig --port sim --speed 0 configure colour 5", &["colour: no such setting", "log-ms"]),
         with(
             "a configuration with a key that is none",
