@@ -48,12 +48,6 @@ fn head(path: &Path) -> Option<String> {
 /// What a text is that is no file of settings.
 fn kind_of(text: &str) -> Option<&'static str> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
-    if text.starts_with("# quadrig-flight") {
-        return Some("a flight's log");
-    }
-    if text.starts_with("# quadrig-") {
-        return Some("a log");
-    }
     if text.starts_with('<') {
         return Some("a page");
     }
@@ -63,6 +57,12 @@ fn kind_of(text: &str) -> Option<&'static str> {
     if let Ok(table) = toml::from_str::<toml::Table>(text) {
         let format = table.get("format").and_then(toml::Value::as_str).unwrap_or_default();
         return format.starts_with("quadrig-").then_some("a model");
+    }
+    if text.starts_with("# quadrig-flight") {
+        return Some("a flight's log");
+    }
+    if text.starts_with("# quadrig-") {
+        return Some("a log");
     }
     let first = text.lines().find(|line| !line.starts_with('#') && !line.trim().is_empty())?;
     (first.matches([',', ';', '\t']).count() >= 2 && !first.contains('=')).then_some("a table of values, such as a log")
@@ -122,6 +122,7 @@ mod tests {
             ("{\n \"format\": \"quadrig-verdict 2\"\n}", Some("a verdict")),
             ("format = \"quadrig-model 1\"\n", Some("a model")),
             ("Time (s),Thrust (N),Speed\n0,1,2\n", Some("a table of values, such as a log")),
+            ("# quadrig-calibration 1\n[calibrated.current]\nper_count = 0.016\n", None),
             ("rate_hz = 10\n[esc]\n", None),
             ("rate_hz = [1, 2, 3\n", None),
         ] {
