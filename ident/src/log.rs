@@ -10,9 +10,11 @@ mod clock;
 mod disc;
 mod gaps;
 pub(crate) mod plausible;
+mod whole;
 
 pub use disc::Disc;
 pub use gaps::Gaps;
+pub use whole::{folder_of, no_regular_file, place_of, what_lies_at, write_whole};
 
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -70,7 +72,7 @@ impl Place<'_> {
         ReadError::Content {
             file: self.file.to_owned(),
             line: self.line,
-            place: column.map(|c| format!("column {c}: ")).unwrap_or_default(),
+            place: column.map(|c| format!("column {}: ", short(c))).unwrap_or_default(),
             found: found.into(),
             expected: expected.into(),
         }
@@ -267,26 +269,6 @@ pub(crate) fn event(comment: &str) -> Option<String> {
     table.get("event")?.as_str().map(str::to_owned)
 }
 
-/// Writes a file whole or not at all: temporary file in the same folder, sync, rename.
-///
-/// # Errors
-/// What the system says.
-pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // as any other file: the umask decides
-    let mut file = builder.tempfile_in(folder)?;
-    {
-        let mut buffered = std::io::BufWriter::new(file.as_file_mut());
-        fill(&mut buffered)?;
-        buffered.flush()?;
-    }
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|e| e.error)?;
-    Ok(())
-}
-
 fn decimals(name: &str) -> usize {
     match name {
         "torque_nm" => 6,
@@ -374,6 +356,10 @@ impl<'a, R: BufRead> Lines<'a, R> {
         }
         self.digest.update(&bytes);
         self.number += 1;
+        if self.number == 1 && bytes.trim_ascii_end().contains(&b'\r') {
+            let found = "lines that end with a carriage return alone";
+            return Err(self.place().refuse(None, found, "lines that end with a line feed: save the file so in an editor"));
+        }
         if n > MAX_LINE {
             return Err(self.place().refuse(
                 None,
@@ -408,7 +394,7 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
             let comment = comment.trim();
             if !format_seen {
                 if comment != format {
-                    let found = format!("'{line}'");
+                    let found = format!("'{}'", short(&line));
                     return Err(match comment {
                         crate::flight_log::FORMAT => place.refuse(
                             None,
@@ -575,6 +561,15 @@ mod tests {
 
     fn parse(text: &str) -> Result<Log, String> {
         Log::parse("run.csv", text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_a_message_quotes_is_short() {
+        let said = parse("# quadrig-log 1\rt_s,rpm,thrust_n\r0,1,2\r").unwrap_err();
+        assert!(said.starts_with("run.csv:1: lines that end with a carriage return alone; expected"), "{said}");
+        let said = parse(&format!("# {}\nt_s,rpm,thrust_n\n0,1,2\n", "x".repeat(5000))).unwrap_err();
+        assert!(said.len() < 200 && said.contains("xxx...'"), "{said}");
+        assert_eq!(parse("# quadrig-log 1\r\nt_s,rpm,thrust_n\r\n0,1,2\r\n").unwrap().len(), 1);
     }
 
     #[test]

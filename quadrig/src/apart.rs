@@ -1,12 +1,13 @@
 //! What a command reads and what it writes, kept apart.
 //!
 //! What it is: every command names its files before it begins ([`Paths`]); an output in the place of an input, or of another output, is
-//! refused, and nothing has been read or written yet.
+//! refused, and nothing has been read or written yet. So is an input that can be read only once, and an output that is no regular file.
 //! What can go wrong: files that lie in the same place under two names (a link, `./`) are the same file.
 //! Units: none.
 //! Reference: specification `formats.md`: no command writes over one of its own inputs.
 
 use crate::Failure;
+use ident::log::{folder_of, no_regular_file, what_lies_at};
 use ident::model::beside;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +17,7 @@ pub(crate) struct Paths<'a> {
     inputs: Vec<&'a Path>,
     files: Vec<(&'static str, &'a Path)>,
     folders: Vec<(&'static str, &'a Path)>,
+    kept: Vec<(&'static str, &'a Path)>,
 }
 
 impl<'a> Paths<'a> {
@@ -37,8 +39,28 @@ impl<'a> Paths<'a> {
         self
     }
 
-    /// Refuses an output in the place of an input or of another output.
+    /// A folder to whose files others are added.
+    pub(crate) fn adds_to(mut self, option: &'static str, folder: impl IntoIterator<Item = &'a PathBuf>) -> Self {
+        self.kept.extend(folder.into_iter().map(|f| (option, f.as_path())));
+        self
+    }
+
+    /// Refuses what cannot be read twice, what cannot be written, and an output in the place of an input or of another output.
     pub(crate) fn check(&self) -> Result<(), Failure> {
+        self.inputs.iter().try_for_each(|input| is_readable_again(input))?;
+        self.are_apart()?;
+        self.files.iter().try_for_each(|(option, file)| is_regular(option, file))?;
+        self.folders.iter().chain(&self.kept).try_for_each(|(option, folder)| is_folder(option, folder))?;
+        self.files.iter().chain(&self.folders).chain(&self.kept).try_for_each(|(_, output)| has_folder(output))
+    }
+
+    fn are_apart(&self) -> Result<(), Failure> {
+        for (option, folder) in &self.kept {
+            if self.inputs.iter().any(|input| is_same(input, folder)) {
+                let expected = format!("expected another folder for {option}");
+                return Err(format!("{}: is an input of this command; {expected}", folder.display()).into());
+            }
+        }
         for (n, (option, file)) in self.files.iter().enumerate() {
             // a model is read with the file beside it
             if self.inputs.iter().any(|input| is_same(input, file) || is_same(&beside(input), file)) {
@@ -68,6 +90,43 @@ impl<'a> Paths<'a> {
     }
 }
 
+/// A pipe or a device gives its bytes once, and an input is looked at before it is read.
+fn is_readable_again(input: &Path) -> Result<(), Failure> {
+    let kind = std::fs::metadata(input).ok().filter(|found| !found.is_dir()).as_ref().and_then(no_regular_file);
+    kind.map_or(Ok(()), |kind| {
+        Err(format!("{}: is {kind}, which can be read only once; expected a file: save it to one first", input.display()).into())
+    })
+}
+
+fn is_regular(option: &str, file: &Path) -> Result<(), Failure> {
+    what_lies_at(file).as_ref().and_then(no_regular_file).map_or(Ok(()), |kind| {
+        Err(format!("{}: is {kind}, which stays as it is; expected the name of a regular file for {option}", file.display())
+            .into())
+    })
+}
+
+fn is_folder(option: &str, folder: &Path) -> Result<(), Failure> {
+    if what_lies_at(folder).is_some_and(|found| !found.is_dir()) {
+        return Err(format!("{}: is no folder; expected a folder for {option}", folder.display()).into());
+    }
+    Ok(())
+}
+
+/// One missing folder of an output is made, and no more: a longer path that is not there is a typing error.
+fn has_folder(output: &Path) -> Result<(), Failure> {
+    let folder = folder_of(output);
+    let lacks = |folder: &Path, why: &str| -> Result<(), Failure> {
+        let expected = "expected a folder that is there (one that is missing before the name is made)";
+        Err(format!("{}: cannot be written ({} {why}); {expected}", output.display(), folder.display()).into())
+    };
+    match (folder.is_dir(), folder.exists()) {
+        (true, _) => Ok(()),
+        (_, true) => lacks(folder, "is no folder"),
+        _ if folder_of(folder).is_dir() => Ok(()),
+        _ => lacks(folder_of(folder), "is not there"),
+    }
+}
+
 fn is_same(a: &Path, b: &Path) -> bool {
     place(a).zip(place(b)).is_some_and(|(a, b)| a == b)
 }
@@ -89,6 +148,22 @@ fn place_of_folder(folder: &Path) -> Option<PathBuf> {
 mod tests {
     use super::*;
     use std::fs;
+
+    #[test]
+    fn one_folder_may_be_missing() {
+        let at = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| at.path().join(name);
+        fs::write(path("file"), "").expect("a file");
+        let checked =
+            |path: PathBuf| [Paths::default().writes("-o", [&path]).check(), Paths::default().fills("-o", [&path]).check()];
+        checked(path("out/run.csv")).into_iter().for_each(|c| c.expect("one is made"));
+        for (name, why) in [("no/such/run.csv", "no is not there"), ("file/run.csv", "file is no folder")] {
+            for checked in checked(path(name)) {
+                let said = checked.expect_err("to be refused").to_string();
+                assert!(said.contains(why) && said.contains("expected a folder"), "{said}");
+            }
+        }
+    }
 
     #[test]
     fn one_place_has_many_names() {

@@ -48,8 +48,8 @@ const ENTRIES: [Entry; 45] = [
         "docs/identification.md",
     ),
     entry("close-loop", LOG, "close-loop out/run.csv -o out/closed", "docs/loop.md"),
-    entry("batch", LOG, "batch runs -o out/batch", "docs/book/how-to/batch.md"),
-    entry("history", LOG, "history runs -o out/history", "docs/book/how-to/history.md"),
+    entry("batch", LOG, "batch out/runs -o out/batch", "docs/book/how-to/batch.md"),
+    entry("history", LOG, "history day1.csv day2.csv day3.csv -o out/history", "docs/book/how-to/history.md"),
     entry("select", "N, A, kg, A.h, min", "select --motor 570KV --thrust 19.62 -o out/select.html", "docs/identification.md"),
     entry(
         "beam",

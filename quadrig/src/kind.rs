@@ -6,6 +6,7 @@
 //! Units: none.
 //! Reference: specification `formats.md`, "Attitude log"; docs/scenario.md.
 
+use crate::Failure;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -29,6 +30,42 @@ pub(crate) fn has_readings(columns: &[String]) -> bool {
 pub(crate) fn is_attitude_alone<S: AsRef<str>>(columns: &[S]) -> bool {
     let has = |name: &str| columns.iter().any(|c| c.as_ref() == name);
     ["qw", "qx", "qy", "qz"].into_iter().all(has) && !has("gx") && !has("gyro_x")
+}
+
+/// Refuses a file that is of another kind than a file of settings in TOML, in the words of its kind; what is TOML is left to its reader.
+pub(crate) fn refuse_other(path: &Path, expected: &str) -> Result<(), Failure> {
+    let what = head(path).as_deref().and_then(kind_of);
+    what.map_or(Ok(()), |what| Err(format!("{}:1:1: {what}; expected {expected}", path.display()).into()))
+}
+
+/// The beginning of a file.
+fn head(path: &Path) -> Option<String> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path).ok()?.take(LOOKED_AT).read_to_end(&mut bytes).ok()?;
+    Some(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// What a text is that is no file of settings.
+fn kind_of(text: &str) -> Option<&'static str> {
+    let text = text.trim_start_matches('\u{feff}').trim_start();
+    if text.starts_with('<') {
+        return Some("a page");
+    }
+    if text.starts_with('{') && text.contains("\"quadrig-verdict") {
+        return Some("a verdict");
+    }
+    if let Ok(table) = toml::from_str::<toml::Table>(text) {
+        let format = table.get("format").and_then(toml::Value::as_str).unwrap_or_default();
+        return format.starts_with("quadrig-").then_some("a model");
+    }
+    if text.starts_with("# quadrig-flight") {
+        return Some("a flight's log");
+    }
+    if text.starts_with("# quadrig-") {
+        return Some("a log");
+    }
+    let first = text.lines().find(|line| !line.starts_with('#') && !line.trim().is_empty())?;
+    (first.matches([',', ';', '\t']).count() >= 2 && !first.contains('=')).then_some("a table of values, such as a log")
 }
 
 /// What a file is that is no run, where it is one that this program knows.
@@ -69,5 +106,27 @@ fn of_the_imu(path: &Path) -> Option<String> {
         Some(format!("{file}:1:1: readings of an IMU; expected a rig's log: `quadrig close-loop` and `quadrig ahrs` take these"))
     } else {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_known_by_its_beginning() {
+        for (text, kind) in [
+            ("# quadrig-log 1\nt_s,rpm\n", Some("a log")),
+            ("# quadrig-flight 1\nt_s,rpm_1\n", Some("a flight's log")),
+            ("\u{feff}<!doctype html>", Some("a page")),
+            ("{\n \"format\": \"quadrig-verdict 2\"\n}", Some("a verdict")),
+            ("format = \"quadrig-model 1\"\n", Some("a model")),
+            ("Time (s),Thrust (N),Speed\n0,1,2\n", Some("a table of values, such as a log")),
+            ("# quadrig-calibration 1\n[calibrated.current]\nper_count = 0.016\n", None),
+            ("rate_hz = 10\n[esc]\n", None),
+            ("rate_hz = [1, 2, 3\n", None),
+        ] {
+            assert_eq!(kind_of(text), kind, "{text}");
+        }
     }
 }

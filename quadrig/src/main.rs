@@ -167,7 +167,8 @@ impl Command {
             Self::Predict(args) => args.paths(),
             Self::Export(args) => args.paths(),
             Self::Man(args) => args.paths(),
-            Self::Step(_) | Self::Completions(_) | Self::Flash(_) | Self::Imu(_) | Self::Virtual(_) => Paths::default(),
+            Self::Step(args) => args.paths(),
+            Self::Completions(_) | Self::Flash(_) | Self::Imu(_) | Self::Virtual(_) => Paths::default(),
         }
     }
 

@@ -8,6 +8,7 @@
 
 use crate::Failure;
 use crate::apart::Paths;
+use crate::kind::refuse_other;
 use crate::rig::{date, file};
 use crate::trouble::unwritten;
 use firmware_rig::Config;
@@ -79,6 +80,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 
 /// A calibration's scales; of a whole configuration everything.
 fn read(path: &Path) -> Result<News, Failure> {
+    refuse_other(path, "a file of `quadrig calibrate`, or a rig's configuration: docs/configuration.md lists the keys")?;
     if file::is_scales_alone(path) {
         let better = |found: Calibrated| Better { scale: found.scale, found: Some(found) };
         return Ok(News { scales: file::scales(path)?.map(|found| found.map(better)), marks: [0; CAPTURE_CHANNELS] });

@@ -21,6 +21,7 @@ mod typed;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::board::Board;
+use crate::kind::refuse_other;
 use crate::port::PortArgs;
 use crate::record;
 use crate::view;
@@ -244,10 +245,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             session.hold(board, args, Errand { first: Some(Command::Arm), run: Some(run), course, ..Errand::default() }, quiet)
         }
         Order::Run { schedule, next, session, .. } => {
-            let plan = match (schedule, next) {
-                (_, Some(verdict)) => Plan::next_experiment(verdict)?,
-                (file, None) => Plan::read(file.as_deref().unwrap_or(Path::new("")))?,
-            };
+            let plan = planned(schedule.as_deref(), next.as_deref())?;
             done(&plan.summary());
             let course = Some((plan.name.clone(), plan.longest_s()));
             let (first, run) = (Some(Command::Arm), Some(Command::RunSchedule));
@@ -329,17 +327,33 @@ pub(super) fn reset_cause(flags: u8) -> &'static str {
     NAMES.iter().find(|(bit, _)| flags & bit != 0).map_or("unknown", |(_, name)| name)
 }
 
+/// What is to be run: a schedule, or the next experiment of a verdict.
+fn planned(schedule: Option<&Path>, next: Option<&Path>) -> Result<Plan, Failure> {
+    let Some(verdict) = next else {
+        let file = schedule.unwrap_or(Path::new(""));
+        let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        if !is_json {
+            let expected =
+                "a schedule, such as examples/schedule/constant.toml: docs/schedule.md lists the keys; --next takes a verdict";
+            refuse_other(file, expected)?;
+        }
+        return Ok(Plan::read(file)?);
+    };
+    Ok(Plan::next_experiment(verdict)?)
+}
+
 /// Whether the word names a file rather than a setting.
 fn is_file(word: &str) -> bool {
-    word.ends_with(".toml") || word.contains(std::path::MAIN_SEPARATOR)
+    word.ends_with(".toml") || word.contains(std::path::MAIN_SEPARATOR) || Path::new(word).is_file()
 }
 
 fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
     if key == "factory" {
         return Ok(Setting::Factory);
     }
-    let value = value.ok_or_else(|| format!("{key}: expected a value after it"))?;
+    let told = || value.ok_or_else(|| format!("{key}: no value; expected one after it, such as `configure log-ms 100`"));
     let whole = |most: f64| {
+        let value = told()?;
         if value.fract() == 0.0 && (0.0..=most).contains(&value) {
             Ok(value)
         } else {
@@ -350,12 +364,12 @@ fn setting(key: &str, value: Option<f64>) -> Result<Setting, Failure> {
         "log-ms" => Setting::LogPeriodMs(whole(65_535.0)? as u16),
         "link-ms" => Setting::LinkMs(whole(65_535.0)? as u16),
         "slew" => Setting::SlewNsPerMs(whole(f64::from(u32::MAX))? as u32),
-        "speed-limit" => Setting::SpeedLimit(value as f32),
-        "current-limit" => Setting::CurrentLimit(value as f32),
-        "voltage-limit" => Setting::VoltageLimit(value as f32),
+        "speed-limit" => Setting::SpeedLimit(told()? as f32),
+        "current-limit" => Setting::CurrentLimit(told()? as f32),
+        "voltage-limit" => Setting::VoltageLimit(told()? as f32),
         _ => {
             return Err(format!(
-                "{key}: no such setting; expected one of log-ms, link-ms, slew, speed-limit, current-limit, voltage-limit, factory"
+                "{key}: no such setting, nor a file; expected one of log-ms, link-ms, slew, speed-limit, current-limit, voltage-limit, factory"
             )
             .into());
         }

@@ -26,6 +26,32 @@ use ident::select::{Airframe, Need, Pair, Row, choose, from_log, is_repeated, mi
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
+/// Most that a value of a multirotor can be, and the smaller unit that one above it is likely to be in: a thousandth.
+struct Limit {
+    most: f64,
+    unit: &'static str,
+    thousandth: &'static str,
+}
+
+/// The heaviest multirotors weigh some 100 kg, and carry some 100 A.h.
+const MASS: Limit = Limit { most: 200.0, unit: "kg", thousandth: "g" };
+/// See [`MASS`].
+const CHARGE: Limit = Limit { most: 200.0, unit: "A.h", thousandth: "mAh" };
+
+impl Limit {
+    fn check(&self, name: &str, value: f64) -> Result<(), Failure> {
+        let Self { most, unit, thousandth } = self;
+        if !(value.is_finite() && value > 0.0) {
+            return Err(format!("{name} {value}: expected a positive number").into());
+        }
+        if value > *most {
+            let likely = format!("is it in {thousandth}? {value} {thousandth} are {} {unit}", value / 1000.0);
+            return Err(format!("{name} {value}: expected {unit}, {most} at most: {likely}").into());
+        }
+        Ok(())
+    }
+}
+
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -83,11 +109,8 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    for (name, value) in [("--bare", args.bare), ("--battery", args.battery), ("--capacity", args.capacity)] {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(format!("{name} {value}: expected a positive number").into());
-        }
-    }
+    let given = [("--bare", args.bare, &MASS), ("--battery", args.battery, &MASS), ("--capacity", args.capacity, &CHARGE)];
+    given.into_iter().try_for_each(|(name, value, limit)| limit.check(name, value))?;
     let airframe =
         Airframe { bare_kg: Kilogram(args.bare), battery_kg: Kilogram(args.battery), capacity_ah: AmpereHour(args.capacity) };
     let need = Need {

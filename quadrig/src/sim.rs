@@ -20,7 +20,7 @@ use crate::view;
 use hal_sim::native::{PinRecord, Session};
 use hal_sim::scenario::AnyScenario;
 use hal_sim::{Powerplant, RunRecord, Scenario, ScenarioError, SimError, Truth};
-use ident::log::{Log, write_whole};
+use ident::log::{Log, SPEED, write_whole};
 use ident::model::Model;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -82,6 +82,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         AnyScenario::Imu(scenario) => return imu::run(args, &scenario, quiet),
     };
     args.paths().reads(&scenario.schedule.file(&args.scenario)).check()?;
+    scenario.begins_in_time(&args.scenario)?;
     if args.readings.is_some() {
         return Err(format!(
             "{}: describes the rig; expected a scenario of the IMU board with --readings",
@@ -219,6 +220,15 @@ pub(crate) fn fly(
 
 /// The same schedule with an identified model as the plant; `like` is the run whose command it follows.
 pub(crate) fn fly_model(scenario: &Scenario, model: &Model, like: &Log, name: &str, quiet: bool) -> Result<Log, Failure> {
+    let predicts = |channels: &[&str]| model.polynomials.iter().any(|p| channels.contains(&p.channel.as_str()));
+    let lacks = [("speed", predicts(&SPEED)), ("thrust", predicts(&["thrust_n"]))];
+    if let Some((what, _)) = lacks.iter().find(|(_, predicted)| !predicted) {
+        let expected = "expected one identified from a log with pulse_us, a speed and thrust_n";
+        return Err(format!("the model predicts no {what}, and nothing else takes its place; {expected}").into());
+    }
+    for channel in ["torque_nm", "current_a", "voltage_v"].iter().filter(|c| !quiet && !predicts(&[c])) {
+        note!("{channel}: the model does not predict it; the log holds what the channel reads of 0");
+    }
     let plant = IdentifiedPlant::new(model, like)
         .ok_or("the model predicts no speed from a command; expected one identified from a log with pulse_us")?;
     let healthy = Scenario { effects: Vec::new(), ..scenario.clone() };

@@ -1,7 +1,7 @@
 //! A log file that grows while it is recorded.
 //!
 //! What it is: whole lines go to `NAME.part` beside the target; at the end it is synced and renamed, so that the target is whole or
-//! not there.
+//! not there. An earlier file of the target's name is kept under another one.
 //! What can go wrong: a full disk. What was written stays, cut at a line's end; what comes after is kept in memory and tried again
 //! every second; what finds no room to the end goes to the folder for temporary files, and the message says where.
 //! Units: bytes.
@@ -9,7 +9,7 @@
 
 use crate::Failure;
 use crate::trouble::unwritten;
-use ident::log::write_whole;
+use ident::log::{place_of, write_whole};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -32,15 +32,13 @@ pub(crate) struct Spool {
 impl Spool {
     /// Creates the part beside `target`, and the folder where it is not there yet.
     pub(crate) fn create(target: &Path) -> Result<Self, Failure> {
+        let target = &place_of(target).map_err(unwritten(target))?;
         let mut name = target.file_name().ok_or("-o: expected the name of a file")?.to_owned();
         name.push(".part");
         let part = target.with_file_name(name);
         if std::fs::metadata(&part).is_ok_and(|found| found.len() > 0) {
             let expected = "it is a log: expected another name for it, or for the new one, before anything more is recorded here";
             return Err(format!("{}: left by a recording that was cut off; {expected}", part.display()).into());
-        }
-        if let Some(folder) = target.parent() {
-            std::fs::create_dir_all(folder).map_err(unwritten(folder))?;
         }
         let file = OpenOptions::new().write(true).create(true).truncate(true).open(&part);
         let file = file.map_err(|e| {
@@ -101,9 +99,10 @@ impl Spool {
     }
 
     /// Syncs and renames; what happened in mid-run goes into the head. What found no room goes to the temporary folder.
-    pub(crate) fn finish(mut self) -> Result<(), Failure> {
+    pub(crate) fn finish(mut self, quiet: bool) -> Result<(), Failure> {
         self.flush();
         let synced = self.file.sync_all();
+        keep_earlier(&self.target, quiet).map_err(|why| format!("{why}; what was recorded is in {}", self.part.display()))?;
         // where there is no room for a second copy the events stay among the rows, where readers find them as well
         if synced.is_ok() && self.waiting.is_empty() && lifted(&self.part, &self.target).unwrap_or(false) {
             let _ = std::fs::remove_file(&self.part);
@@ -133,6 +132,41 @@ impl Spool {
             .into()),
         }
     }
+}
+
+/// Gives an earlier recording at `target` a second name, the first that is free of `NAME-1`, `NAME-2` and so on, and says so: the new one may
+/// take its place.
+pub(crate) fn keep_earlier(target: &Path, quiet: bool) -> Result<(), Failure> {
+    if !std::fs::metadata(target).is_ok_and(|found| found.is_file() && found.len() > 0) {
+        return Ok(());
+    }
+    let kept = second_name(target).map_err(|e| {
+        let expected = "expected a folder in which it can be renamed, or another name for the new recording";
+        format!("{}: the earlier recording cannot be kept under another name ({e}); {expected}", target.display())
+    })?;
+    if !quiet {
+        note!("{}: there was an earlier recording of this name; it is now {}", target.display(), kept.display());
+    }
+    Ok(())
+}
+
+/// Where the file is found from now on. A link leaves no instant without either name; where the disk knows none the file is renamed.
+fn second_name(target: &Path) -> std::io::Result<PathBuf> {
+    let words = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
+    let (stem, ending) = (words(target.file_stem()), words(target.extension()));
+    for n in 1_u64.. {
+        let name = if ending.is_empty() { format!("{stem}-{n}") } else { format!("{stem}-{n}.{ending}") };
+        let second = target.with_file_name(name);
+        if second.symlink_metadata().is_ok() {
+            continue;
+        }
+        match std::fs::hard_link(target, &second) {
+            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(_) => return std::fs::rename(target, &second).map(|()| second),
+            Ok(()) => return Ok(second),
+        }
+    }
+    Err(std::io::ErrorKind::AlreadyExists.into())
 }
 
 /// Writes what is in `part` to `target` with the events from among its rows in the head; `false` when there are none.
@@ -184,6 +218,24 @@ mod tests {
     }
 
     #[test]
+    fn an_earlier_recording_keeps_its_rows() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        let text = |name: &str| std::fs::read_to_string(at(name)).expect("a file");
+        for n in ["1", "2", "3"] {
+            let mut spool = Spool::create(&at("run.csv")).expect("a part");
+            assert_eq!(spool.add(&format!("# quadrig-log 1\nt_s\n{n}\n# event = \"1 s: x\"\n")), None);
+            spool.finish(true).expect("it ends");
+        }
+        for (name, n) in [("run-1.csv", "1"), ("run-2.csv", "2"), ("run.csv", "3")] {
+            assert!(text(name).ends_with(&format!("t_s\n{n}\n")), "{name}: {}", text(name));
+        }
+        std::fs::write(at("bare"), "old").expect("a file");
+        keep_earlier(&at("bare"), true).expect("it is kept");
+        assert_eq!(text("bare-1"), "old");
+    }
+
+    #[test]
     fn what_happened_in_mid_run_stands_in_the_head() {
         let folder = tempfile::tempdir().expect("a folder");
         let target = folder.path().join("run.csv");
@@ -193,7 +245,7 @@ mod tests {
         {
             assert_eq!(spool.add(lines), None);
         }
-        spool.finish().expect("it ends");
+        spool.finish(true).expect("it ends");
         let text = std::fs::read_to_string(&target).expect("a log");
         assert_eq!(text, "# quadrig-log 1\n# a = 1\n# event = \"0.050 s: x\"\n# event = \"1.500 s: y\"\nt_s,b,c\n0,1,2\n1,1,2\n");
         assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 1, "and the part is gone");

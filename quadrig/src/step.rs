@@ -6,6 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, "The steps".
 
 use crate::Failure;
+use crate::apart::Paths;
 use crate::open::{Columns, Names, open};
 use crate::progress::Bar;
 use clap::builder::PossibleValuesParser;
@@ -28,6 +29,13 @@ pub(crate) struct Args {
     columns: Columns,
     #[command(flatten)]
     names: Names,
+}
+
+impl Args {
+    /// What it reads.
+    pub(crate) fn paths(&self) -> Paths<'_> {
+        Paths::default().reads([&self.log])
+    }
 }
 
 /// Runs the command.

@@ -282,11 +282,11 @@ fn unwritable_outputs_are_refused_by_name() {
     let before = bench.names();
     for words in [
         ["--quiet", "identify", "good.csv", "-o", "taken/model.toml"].as_slice(),
-        &["--quiet", "identify", "good.csv", "-o", "absent/model.toml"],
+        &["--quiet", "identify", "good.csv", "-o", "absent/deep/model.toml"],
         &["--quiet", "identify", "good.csv", "-o", "folder"],
-        &["--quiet", "import", "good.csv", "-o", "absent/log.csv"],
+        &["--quiet", "import", "good.csv", "-o", "absent/deep/log.csv"],
         &["--quiet", "import", "good.csv", "-o", "folder"],
-        &["predict", "model.toml", "good.csv", "-o", "absent/pred.csv"],
+        &["predict", "model.toml", "good.csv", "-o", "absent/deep/pred.csv"],
         &["--quiet", "close-loop", "good.csv", "-o", "taken"],
         &["--quiet", "close-loop", "good.csv", "-o", "taken/out"],
     ] {

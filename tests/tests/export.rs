@@ -114,7 +114,14 @@ fn px4_reads_it_back() {
     let keys = px4(&text);
     let factor = keys["THR_MDL_FAC"];
     let full = keys["CA_ROTOR0_CT"];
-    compare(&text, 5.0, |u| full * (factor * u * u + (1.0 - factor) * u));
+    let [from, to] = ["PWM_MAIN_MIN1", "PWM_MAIN_MAX1"].map(|key| keys[key] / 1000.0 - 1.0);
+    compare(&text, 5.0, |u| {
+        let x = ((u - from) / (to - from)).clamp(0.0, 1.0);
+        full * (factor * x * x + (1.0 - factor) * x)
+    });
+    // without thrust it turns, disarmed it stands
+    let of = |u: f64| Model::read(&bench().join("model.toml")).rpm(u);
+    assert!(of(from) > 0.0 && of(keys["PWM_MAIN_DIS4"] / 1000.0 - 1.0) == 0.0 && keys["PWM_MAIN_MIN4"] == keys["PWM_MAIN_MIN1"]);
     assert_eq!(
         (keys["CA_ROTOR_COUNT"], keys.contains_key("CA_ROTOR3_KM"), keys.contains_key("CA_ROTOR4_CT")),
         (4.0, true, false)
@@ -142,6 +149,9 @@ fn ardupilot_reads_it_back() {
         let x = ((u - from) / (to - from)).clamp(0.0, 1.0);
         after(&text, "full thrust") * ((1.0 - expo) * x + expo * x * x)
     });
+    // armed it turns, and below what flies: arming is refused where it is not
+    let armed = keys["MOT_SPIN_ARM"];
+    assert!(armed < from && Model::read(&bench().join("model.toml")).rpm(armed) > 0.0, "{armed}, {from}");
     assert!(!keys.contains_key("MOT_BAT_VOLT_MAX") && text.contains("not in this file: MOT_BAT_VOLT_MAX"), "{text}");
     let keys = read(&exported("ardupilot", &["--cells", "4"]));
     assert_eq!((keys["MOT_BAT_VOLT_MAX"], keys["MOT_BAT_VOLT_MIN"]), (16.8, 13.2));
@@ -156,10 +166,10 @@ fn betaflight_reads_it_back() {
         .map(|(key, v)| (key, v.parse().expect("a number")))
         .collect();
     let linear = set["thrust_linear"] / 100.0;
+    let idle = set["dshot_idle_value"] / 10_000.0;
     // the demand whose signal this is, by a fine search of its own
-    let demand = |u: f64| {
-        (0..=20_000).map(|k| f64::from(k) / 20_000.0).find(|x| x * (1.0 + linear * (1.0 - x) * (1.0 - x)) >= u).unwrap_or(1.0)
-    };
+    let signal = |x: f64| idle + (1.0 - idle) * x * (1.0 + linear * (1.0 - x) * (1.0 - x));
+    let demand = |u: f64| (0..=20_000).map(|k| f64::from(k) / 20_000.0).find(|x| signal(*x) >= u).unwrap_or(1.0);
     compare(&text, 10.0, |u| after(&text, "full thrust") * demand(u));
     assert_eq!((set["motor_kv"], set["motor_poles"]), (570.0, 14.0));
     assert!(text.ends_with("save\n") && (300.0..2000.0).contains(&set["dshot_idle_value"]), "{text}");
@@ -329,6 +339,26 @@ fn a_latency_is_told_where_there_is_one() {
     ] {
         let text = call(&bench(), &["export", "late.toml", "--to", peer]).succeeded().out;
         assert_eq!(after(&text, mark), 0.015, "{peer}");
+    }
+}
+
+/// A model of rows between which the command jumps holds the latency of those rows: every file tells it as theirs, and none as the rotor's.
+#[test]
+fn a_latency_of_rows_is_not_the_rotors() {
+    let folder = bench();
+    call(&folder, &["--quiet", "close-loop", "run.csv", "-o", "stepped"]).succeeded();
+    let model = std::fs::read_to_string(folder.join("stepped/model.toml")).expect("a model");
+    assert!(model.contains("form = \"coasting_of_steps\""), "{model}");
+    let of_rows = after(&model, "latency_s =");
+    for peer in PEERS {
+        let text = call(&folder, &["export", "stepped/model.toml", "--to", peer]).succeeded().out;
+        let told = after(&text, "latency of the log's rows");
+        assert!((told - of_rows).abs() < 1e-4, "{peer}: {told} s, the model's {of_rows}");
+        assert!(!text.contains("the model holds none") && !text.contains("latency of the rotor's answer"), "{peer}: {text}");
+        if peer == "simulink" {
+            let fields = ["latency_s", "log_latency_s"].map(|name| after(&text, &format!("powerplant.{name} =")));
+            assert!(fields[0] == 0.0 && (fields[1] - of_rows).abs() < 1e-4, "{fields:?}");
+        }
     }
 }
 

@@ -330,6 +330,37 @@ fn refusals_write_nothing() {
         call(at, &["--quiet", "identify", &format!("{name}.csv"), "-o", &format!("{name}.toml")]).succeeded();
         call(at, &["fly", "m.toml", "--model", &format!("{name}.toml"), "-o", "out"]).refused(&[name, word]);
     }
+    // a model whose thrust has no end, changed by hand
+    write("run.toml", "schedule = { kind = \"staircase\", step_us = 250, hold_s = 2, top_us = 2000 }\n");
+    call(at, &["--quiet", "sim", "run.toml", "-o", "run.csv"]).succeeded();
+    call(at, &["--quiet", "identify", "run.csv", "-o", "sound.toml"]).succeeded();
+    let sound = std::fs::read_to_string(at.join("sound.toml")).expect("a model");
+    let changed = |change: &dyn Fn(&str, &str) -> Option<String>| -> String {
+        let mut table = String::new();
+        let lines = sound.lines().filter(|l| !l.starts_with("discrepancy_sha256")).filter_map(|line| {
+            if line.starts_with('[') {
+                line.clone_into(&mut table);
+            }
+            change(&table, line)
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    let without = |is_gone: &dyn Fn(&str) -> bool| changed(&|table, line| (!is_gone(table)).then(|| line.to_owned()));
+    let of_thrust = |table: &str| table == "[channel.thrust_n]";
+    let huge = |table: &str, line: &str| {
+        let is_square = of_thrust(table) && line.starts_with("c2_n_per_krpm2 =");
+        Some(if is_square { "c2_n_per_krpm2 = 1e200" } else { line }.to_owned())
+    };
+    write("huge.toml", &changed(&huge));
+    call(at, &["fly", "m.toml", "--model", "huge.toml", "-o", "out"])
+        .refused(&["huge.toml: the flight on it has no finite numbers from 0", "changed by hand?"]);
+    // nothing of the catalogue stands in for what a model does not predict
+    write("no-thrust.toml", &without(&of_thrust));
+    write("no-speed.toml", &without(&|table| table.starts_with("[channel.rpm_") && !table.ends_with("_difference]")));
+    for (name, word) in [("no-thrust", "predicts no thrust"), ("no-speed", "predicts no speed")] {
+        let said = call(at, &["--quiet", "sim", "run.toml", "--model", &format!("{name}.toml"), "-o", "again.csv"]);
+        assert!(said.status == Some(1) && said.err.contains(word) && !at.join("again.csv").exists(), "{name}: {}", said.err);
+    }
     assert!(!at.join("out").exists());
     // a folder of somebody's files, and one that an input lies in
     call(at, &["fly", "m.toml", "-o", "."]).refused(&["m.toml", "is an input"]);

@@ -73,6 +73,33 @@ fn an_interrupted_session_keeps_its_log() {
     assert!(rows(at, "listened.csv") > 10);
 }
 
+/// A recording of a board never takes the place of an earlier one: that is found under the next free name, and one line says so.
+#[test]
+fn an_earlier_recording_is_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let read = |name: &str| std::fs::read(at.join(name)).expect(name);
+    let log = ["log", "--port", "sim", "--speed", "0", "--seconds", "1", "-o", "real.csv"];
+    let run = ["rig", "--port", "sim", "--speed", "0", "--assist", "run", "--hold", "1", "--top", "1050", "-o", "real.csv"];
+    let burst = ["rig", "--port", "sim", "--speed", "0", "burst", "thrust", "-o", "real.csv"];
+    std::fs::write(at.join("real.csv"), "mine\n").expect("a file");
+    let mut before = read("real.csv");
+    for (n, words) in [&log[..], &run, &burst].into_iter().enumerate() {
+        let said = call(at, words).succeeded();
+        let kept = format!("real-{}.csv", n + 1);
+        let told = format!("real.csv: there was an earlier recording of this name; it is now {kept}");
+        assert!(said.err.lines().any(|line| line.ends_with(&told)), "{words:?}: {}", said.err);
+        assert!(read(&kept) == before && read("real.csv") != before, "{words:?}");
+        before = read("real.csv");
+    }
+    assert_eq!(std::fs::read_dir(at).expect("the folder").count(), 4);
+    // what is computed is computed again
+    std::fs::write(at.join("run.toml"), "schedule = { kind = \"steps\", steps = [{ pulse_us = 1300, hold_s = 2 }] }\n")
+        .expect("a scenario");
+    call(at, &["sim", "run.toml", "-o", "real.csv"]).succeeded();
+    assert!(!at.join("real-4.csv").exists());
+}
+
 /// A run of a day says how long it will take before it starts; a short one says nothing.
 #[test]
 fn a_long_simulation_is_announced() {

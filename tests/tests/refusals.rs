@@ -87,6 +87,45 @@ fn kinds() -> Vec<Case> {
             "identify bad.html -o out.toml",
             &["bad.html:1:1: a page"],
         ),
+        alone(
+            "a log to configure a board",
+            "rig --port sim --speed 0 configure good.csv",
+            &["good.csv:1:1: a log; expected a board's configuration"],
+        ),
+        with(
+            "an export to configure a board",
+            "bad",
+            "Time (s),Thrust (N),Speed\n0,1,2\n",
+            "rig --port sim --speed 0 configure bad",
+            &["bad:1:1: a table of values"],
+        ),
+        alone(
+            "a log in the place of a schedule",
+            "rig --port sim --speed 0 run good.csv -o out.csv",
+            &["good.csv:1:1: a log; expected a schedule", "--next takes a verdict"],
+        ),
+        alone(
+            "a model in the place of a schedule",
+            "rig --port sim --speed 0 run model.toml -o out.csv",
+            &["model.toml:1:1: a model; expected a schedule"],
+        ),
+        with(
+            "a verdict in the place of a calibration",
+            "bad.json",
+            "{\n  \"format\": \"quadrig-verdict 2\"\n}\n",
+            "recalibrate good.csv --with bad.json -o out.csv",
+            &["bad.json:1:1: a verdict; expected a file of `quadrig calibrate`"],
+        ),
+        alone(
+            "a folder of runs that is not there",
+            "batch nowhere -o out",
+            &["nowhere: no folder of this name is there; expected a folder"],
+        ),
+        alone(
+            "a run in the place of a folder",
+            "batch good.csv -o out",
+            &["good.csv: no folder of this name is there", "`quadrig close-loop`"],
+        ),
         with("an attitude to identify", "bad.csv", ATTITUDE, IDENTIFY, &["bad.csv:1:1", "--readings READINGS"]),
         with("an attitude to filter", "bad.csv", ATTITUDE, "ahrs bad.csv out.csv", &["bad.csv:1:", "--readings READINGS"]),
         with("readings to identify", "bad.csv", READINGS, IDENTIFY, &["bad.csv:1:1: readings of an IMU", "`quadrig close-loop`"]),
@@ -162,6 +201,13 @@ fn logs() -> Vec<Case> {
     let shuffled = rows(|rows| (0..rows.len()).map(|n| rows[n * 131 % rows.len()].clone()).collect());
     let twice = rows(|rows| [rows.clone(), rows].concat());
     vec![
+        with(
+            "line ends of carriage returns",
+            "bad.csv",
+            good_log().replace('\n', "\r"),
+            IDENTIFY,
+            &["bad.csv:1: lines that end with a carriage return alone"],
+        ),
         with("shuffled rows", "bad.csv", shuffled, IDENTIFY, &["bad.csv:8: column t_s", "rows look shuffled, sort them by t_s"]),
         with("two runs in one", "bad.csv", twice, IDENTIFY, &["bad.csv:424: column t_s: 0 steps back from 41.9", "a second run"]),
         with(
@@ -412,6 +458,21 @@ fn scenarios() -> Vec<Case> {
             "[supply]\nkind = \"lipo\"\ncells = 0\ncapacity_ah = 4\nresistance_ohm = 0.01\n",
             &["bad.toml:3:9: cells: ", "1 to 14"],
         ),
+        case(
+            "a lead of less than nothing",
+            "[[effect]]\nid = \"supply_sag\"\nresistance_ohm = -0.08\n",
+            &["bad.toml:3:18: resistance_ohm: ", "from 0 to 100 ohm, found -0.08"],
+        ),
+        case(
+            "a blade that lost more than all",
+            "[[effect]]\nid = \"blade_damage\"\nthrust_change = -1.5\ntorque_change = 0.1\nt0_s = 3\n",
+            &["bad.toml:3:17: thrust_change: ", "above -1 (all of it) to 10, found -1.5"],
+        ),
+        case(
+            "a blade that breaks after the run",
+            "[[effect]]\nid = \"blade_damage\"\nthrust_change = -0.1\ntorque_change = 0.1\nt0_s = 4000\n",
+            &["bad.toml:5:8: t0_s: ", "within the run, before 332 s, found 4000"],
+        ),
         case("a rest that is no number", "rest_s = nan\n", &["bad.toml:1:10: rest_s: "]),
         case(
             "a run that the firmware stops",
@@ -451,6 +512,11 @@ fn missions() -> Vec<Case> {
             "a pulse out of range",
             "duration_s = 2\n[[command]]\nrotors = [1]\nsteps = [\n  { pulse_us = 1700, hold_s = 1 },\n  { pulse_us = 170, hold_s = 1 },\n]\n",
             &["bad.toml:6:16: pulse_us: ", "found 170"],
+        ),
+        case(
+            "an airframe in the place of its file",
+            "duration_s = 2\n\n[airframe]\narm_m = 0.3\n",
+            &["bad.toml:3:1: airframe: a table", "the name of a file, in quotes"],
         ),
         case("an airframe that is not there", "airframe = \"nowhere.toml\"\n", &["nowhere.toml: cannot be read"]),
         case("pulses that are not there", "pulses = \"nowhere.csv\"\n", &["nowhere.csv: cannot be read"]),
@@ -502,6 +568,12 @@ fn boards() -> Vec<Case> {
             "rig --port sim --speed 0 set 1500",
             &["the board refuses: not in this state", "`quadrig rig status`"],
         ),
+        alone(
+            "a configuration that is not there",
+            "rig --port sim --speed 0 configure nowhere.csv",
+            &["nowhere.csv: no such setting, nor a file", "log-ms"],
+        ),
+        alone("a setting without its value", "rig --port sim --speed 0 configure slew", &["slew: no value", "log-ms 100"]),
         alone("a setting that is none", "rig --port sim --speed 0 configure colour 5", &["colour: no such setting", "log-ms"]),
         with(
             "a configuration with a key that is none",
@@ -550,6 +622,8 @@ fn arguments() -> Vec<Case> {
         alone("a beam of no number", "beam --modulus nan", &["--modulus NaN"]),
         alone("a motor that nobody measured", "select --motor 1KV", &["--motor 1KV", "570KV"]),
         alone("a battery without charge", "select --capacity 0", &["--capacity 0", "a positive number"]),
+        alone("a battery in mAh", "select --capacity 4400", &["--capacity 4400: expected A.h", "4400 mAh are 4.4 A.h"]),
+        alone("a frame in grams", "select --bare 774", &["--bare 774: expected kg", "774 g are 0.774 kg"]),
         alone("a declination beyond the pole", "ahrs good.csv out.csv --declination 700", &["--declination 700", "-180 to 180"]),
         alone("a channel that is none", "plateaus good.csv --channel thrust", &["no column thrust", "thrust_n"]),
         alone("data that are not there", "measured nowhere -o out", &["nowhere", "no such folder"]),
@@ -606,7 +680,35 @@ fn outputs() -> Vec<Case> {
         alone("pages of effects among notes", "effects -o full", &["full: holds notes.txt"]),
         alone("figures among notes", "select --svg full", &["full: holds notes.txt"]),
         alone("a folder that is a file", "close-loop good.csv -o model.toml", &["model.toml: ", "a folder"]),
-        alone("a folder that is not there", "identify good.csv -o absent/out.toml", &["absent/out.toml: cannot be written"]),
+        alone(
+            "two folders that are not there",
+            "identify good.csv -o absent/deep/out.toml",
+            &["absent/deep/out.toml: cannot be written (absent is not there)"],
+        ),
+        alone("the same of a folder", "close-loop good.csv -o absent/deep/out", &["(absent is not there)"]),
+        alone("a folder in a file", "identify good.csv -o model.toml/out.toml", &["model.toml is no folder"]),
+        alone(
+            "a folder in the place of a file",
+            "identify good.csv -o full",
+            &["full: is a folder, which stays as it is", "for -o"],
+        ),
+        alone("a device for a model", "identify good.csv -o /dev/full", &["/dev/full: is a device, which stays as it is"]),
+        alone(
+            "a device for a page",
+            "identify good.csv -o out.toml --report /dev/null",
+            &["/dev/null: is a device", "for --report"],
+        ),
+        alone("a device for an export", "export model.toml --to px4 -o /dev/null", &["/dev/null: is a device"]),
+        alone("a device for a recording", "log --port sim --speed 0 --seconds 1 -o /dev/null", &["/dev/null: is a device"]),
+        alone("a device for figures", "select --svg /dev/null", &["/dev/null: is no folder; expected a folder for --svg"]),
+        alone("a file for a batch", "batch . -o good.csv", &["good.csv: is no folder; expected a folder for -o"]),
+        alone("a device for a run", "sim short.toml -o /dev/null", &["/dev/null: is a device"]),
+        alone(
+            "a device without an end",
+            "identify /dev/zero -o out.toml",
+            &["/dev/zero: is a device, which can be read only once"],
+        ),
+        alone("a device in the place of a log", "step residual /dev/zero", &["/dev/zero: is a device"]),
     ]
 }
 
@@ -623,6 +725,53 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         }
     }
     found
+}
+
+/// A pipe gives its bytes once, and an input is looked at before it is read; a link to a device stays one.
+#[cfg(unix)]
+#[test]
+fn pipes_and_links_to_devices_are_left_alone() {
+    let bench = Bench::new();
+    let made = std::process::Command::new("mkfifo").arg(bench.path("pipe.csv")).status().expect("mkfifo");
+    assert!(made.success());
+    for words in [vec!["identify", "pipe.csv", "-o", "out.toml"], vec!["import", "pipe.csv", "-o", "out.csv"]] {
+        bench
+            .call(&words)
+            .refused(&["pipe.csv: is a pipe, which can be read only once", "expected a file: save it to one first"]);
+    }
+    bench.call(&["identify", "good.csv", "-o", "pipe.csv"]).refused(&["pipe.csv: is a pipe, which stays as it is"]);
+    std::os::unix::fs::symlink("/dev/null", bench.path("link.toml")).expect("a link");
+    bench.call(&["identify", "good.csv", "-o", "link.toml"]).refused(&["link.toml: is a device"]);
+    assert!(bench.path("link.toml").is_symlink());
+    assert_eq!(bench.names(), ["good.csv", "link.toml", "model.toml", "pipe.csv"]);
+}
+
+/// One missing folder is made, whatever the command and its option; a link to a file leads on to it.
+#[test]
+fn a_missing_folder_of_an_output_is_made() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("run.toml"), "schedule = { kind = \"steps\", steps = [{ pulse_us = 1300, hold_s = 2 }] }\n")
+        .expect("a scenario");
+    for (words, files) in [
+        ("sim run.toml -o a/run.csv --truth b/truth.csv", vec!["a/run.csv", "b/truth.csv"]),
+        (
+            "identify good.csv -o c/model.toml --report d/page.html --svg e/figures",
+            vec!["c/model.toml", "d/page.html", "e/figures"],
+        ),
+        ("predict model.toml good.csv -o f/pred.csv", vec!["f/pred.csv"]),
+        ("export model.toml --to csv -o g/table.csv", vec!["g/table.csv"]),
+        ("log --port sim --speed 0 --seconds 1 -o h/log.csv", vec!["h/log.csv"]),
+    ] {
+        bench.call(&words.split(' ').collect::<Vec<_>>()).succeeded();
+        assert!(files.iter().all(|file| bench.path(file).exists()), "{words}");
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("a/run.csv", bench.path("link.csv")).expect("a link");
+        bench.call(&["export", "model.toml", "--to", "csv", "-o", "link.csv"]).succeeded();
+        let read = |name: &str| std::fs::read(bench.path(name)).expect("a file");
+        assert!(bench.path("link.csv").is_symlink() && read("a/run.csv") == read("g/table.csv"));
+    }
 }
 
 #[test]

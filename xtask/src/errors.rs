@@ -138,8 +138,7 @@ fn page(root: &Path) -> Result<String, String> {
         // what only repeats the reader's own words comes last
         let (spoken, echoed): (Vec<_>, Vec<_>) = rows.into_iter().partition(|(found, _)| found.contains(char::is_alphabetic));
         for (found, expected) in spoken.iter().chain(&echoed) {
-            let said = if found.contains(char::is_alphabetic) { cell(found) } else { "what it found, word for word".to_owned() };
-            let _ = writeln!(out, "| {said} | {} |", cell(expected));
+            let _ = writeln!(out, "| {} | {} |", said(found, expected), cell(expected));
         }
     }
     out += "\n## What a board refuses\n\nThe board gives every reason at once, behind `the board refuses:`.\n\n| it says | what to do |\n| --- | --- |\n";
@@ -147,6 +146,18 @@ fn page(root: &Path) -> Result<String, String> {
         let _ = writeln!(out, "| {says} | {todo} |");
     }
     Ok(out)
+}
+
+/// What the page says of what is found: its words; where the source holds none, what stands in their place.
+fn said(found: &str, expected: &str) -> String {
+    match found {
+        found if found.contains(char::is_alphabetic) => cell(found),
+        // it is told at the end, behind the name of its key, option or field
+        "" | "..." if expected.contains("found ") => "the name of what holds the value".to_owned(),
+        "... ..." => "the option and its value".to_owned(),
+        found if found.contains('\'') => format!("the value: {}", cell(found)),
+        _ => "what it found, word for word".to_owned(),
+    }
 }
 
 /// The source files of a place, in order; tests in files of their own are none.
@@ -216,6 +227,12 @@ fn refusals(source: &str) -> Vec<(String, String)> {
             .map(|l| l.text.as_str())
             .filter(|t| t.len() > 2)
             .collect();
+        let ranges = arguments(code, at + call.len(), end);
+        let is_found = |text: &str| {
+            let holds = |l: &&Literal| l.text == text && ranges.get(1).is_some_and(|range| range.contains(&l.start));
+            // a reason alone is all that is found
+            ranges.len() == 1 || (ranges.len() == 3 && literals.iter().any(|l| holds(&l)))
+        };
         let arguments = &code[at + call.len()..end];
         let bound = |name: &str| {
             let is_there = arguments.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name);
@@ -229,6 +246,10 @@ fn refusals(source: &str) -> Vec<(String, String)> {
             [expected] if !expected.contains("expected ") && !told.is_empty() && founds.is_empty() => {
                 out.extend(told.into_iter().map(|t| (expected.to_owned(), t)));
             }
+            // the text stands where what is found does, and what was expected has none
+            [found] if is_found(found) && !found.contains("expected ") => {
+                out.push((found.to_owned(), String::new()));
+            }
             [expected] if !expected.contains("expected ") => {
                 let begins = told.first().filter(|_| expected.starts_with("...")).map_or_else(String::new, String::clone);
                 out.push((found, format!("{begins}{}", if begins.is_empty() { expected } else { &expected[3..] })));
@@ -239,7 +260,31 @@ fn refusals(source: &str) -> Vec<(String, String)> {
             _ => {}
         }
     }
+    // what one of several looks at a log found: a refusal that only hands it on says it for each
+    let found = doubts(code, &literals);
+    let is_handed_on = |(found, expected): &(String, String)| found.is_empty() && expected.starts_with("what a rig can do");
+    if let (false, Some(at)) = (found.is_empty(), out.iter().position(is_handed_on)) {
+        let (_, expected) = out.remove(at);
+        out.extend(found.into_iter().map(|found| (found, expected.clone())));
+    }
     out
+}
+
+/// What no rig does: `doubt(column, never, what)`, where `what` is a text, or a reason that a closure `said` puts behind its own.
+fn doubts(code: &str, literals: &[Literal]) -> Vec<String> {
+    let is_call = |at: usize| !code[..at].ends_with("fn ") && !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+    let calls = code.match_indices("doubt(").filter(|(at, _)| is_call(*at));
+    let found = calls.filter_map(|(at, call)| {
+        let from = at + call.len();
+        let what = arguments(code, from, closing(code, from)).into_iter().nth(2)?;
+        let text = literals.iter().find(|l| what.contains(&l.start)).map(|l| l.text.clone());
+        if !code[what].trim_start().starts_with("said(") {
+            return text;
+        }
+        let begins = bound_to(code, literals, at, "said").first()?.trim_end_matches("...").to_owned();
+        Some(begins + &text.unwrap_or_else(|| "...".to_owned()))
+    });
+    found.collect()
 }
 
 /// Where the arguments of a call stand, of which the first begins at `from` and the last ends at `end`.
@@ -296,7 +341,8 @@ fn bound_to(code: &str, literals: &[Literal], at: usize, name: &str) -> Vec<Stri
         let before = &code[from + 4..l.start];
         before.rfind("let ").is_none_or(|k| before[k..].contains(';'))
     };
-    let inside = literals.iter().filter(|l| l.start > from && l.start < end && l.text.len() > 12);
+    let least = if name == "found" { 0 } else { 12 };
+    let inside = literals.iter().filter(|l| l.start > from && l.start < end && l.text.len() > least);
     inside.filter(is_own).map(|l| l.text.clone()).collect()
 }
 
@@ -398,9 +444,16 @@ mod tests {
             let found = format!("{n} of {rows} rows would be dropped: {likely}");
             return refuse(found, "a clock that moves on");
             let c = ['"', '\'', 'x'];
+            return Err(place.refuse(None, format!("by its name a {}", r.name), r.whole));
             return Err(refusal("start_pulse_us", start, "a finite number, in us"));
             return Err(refusal(&format!("{place}.{key}"), root.get("format"), &format!("one of {}", known.join(", "))));
             return Err(refusal("shape", at("shape"), &wanted()));
+            fn doubt(column: &str, never: bool, what: String) {}
+            let said = |likely: &str| format!("{thrust} N at {n} rev/min: {likely}");
+            doubt("thrust_n", true, said("grams?"));
+            doubt("voltage_v", top > 500.0, format!("{top:.0} V: hundredths of a volt?"));
+            let expected = format!("what a rig can do, in the unit of {column}");
+            Err(place.refuse(Some(column), what, expected))
             #[error("no effect {0:?}; expected one of {list}")]
             #[cfg(test)]
             let d = "in a test; expected nothing";
@@ -413,6 +466,9 @@ mod tests {
             ("key ...: ...", "one of ..."),
             ("... fields", "6 as in the header"),
             ("... of ... rows would be dropped: ...", "a clock that moves on"),
+            ("by its name a ...", ""),
+            ("... N at ... rev/min: grams?", "what a rig can do, in the unit of ..."),
+            ("... V: hundredths of a volt?", "what a rig can do, in the unit of ..."),
         ];
         let wanted: Vec<(String, String)> = wanted.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect();
         assert_eq!(refusals(source), wanted);

@@ -29,7 +29,7 @@ use crate::flight::vehicle::Surroundings;
 use crate::flight::wind::Blowing;
 use crate::flight::{Motion, Vector};
 use crate::number::not_negative;
-use crate::scenario::{ScenarioError, Step, parsed, place_of, text_of};
+use crate::scenario::{ScenarioError, Step, parsed, refused, text_of};
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -177,12 +177,12 @@ impl Mission {
         let mut mission: Self = parsed(&text, file)?;
         let [airframe, pulses] = mission.files(file);
         let airframe = airframe.map_or_else(|| Ok(AirframeFile::default()), |path| AirframeFile::load(&path))?;
-        let refused = |(byte, reason)| refusal(&text, file, byte, reason);
-        mission.sound(&text, &airframe).map_err(refused)?;
+        let here = |(byte, reason)| refused(&text, file, byte, reason);
+        mission.sound(&text, &airframe).map_err(here)?;
         if let Some(path) = pulses {
             mission.table = PulseTable::load(&path, airframe.rotors().len())?;
         }
-        mission.short_enough(&text).map_err(refused)?;
+        mission.short_enough(&text).map_err(here)?;
         Ok((mission, airframe))
     }
 
@@ -200,7 +200,7 @@ impl Mission {
     pub fn parse(text: &str, file: &Path) -> Result<Self, ScenarioError> {
         let mission: Self = parsed(text, file)?;
         let sound = mission.sound(text, &AirframeFile::default()).and_then(|()| mission.short_enough(text));
-        sound.map_err(|(byte, reason)| refusal(text, file, byte, reason))?;
+        sound.map_err(|(byte, reason)| refused(text, file, byte, reason))?;
         Ok(mission)
     }
 
@@ -257,11 +257,6 @@ impl Mission {
             ..Motion::default()
         }
     }
-}
-
-fn refusal(text: &str, file: &Path, byte: usize, reason: String) -> ScenarioError {
-    let (line, column) = place_of(text, byte);
-    ScenarioError::Refused { file: file.to_owned(), line, column, reason }
 }
 
 /// Pulse of a list at a time; a ramp begins at the pulse before it.

@@ -28,7 +28,9 @@ pub(super) fn blame<T: DeserializeOwned>(text: &str, error: &Error) -> (usize, O
     let mut pieces = Vec::new();
     gather(table.get_ref(), &mut pieces);
     let is_value = |piece: &Piece| !text[piece.value.clone()].starts_with(['{', '[']);
-    let exact = |piece: &&Piece| error.span().is_some_and(|span| span == piece.value) && is_value(piece);
+    // a table or a list where a value is due: nothing within it is to blame
+    let is_another_kind = error.message().starts_with("invalid type: map") || error.message().starts_with("invalid type: seq");
+    let exact = |piece: &&Piece| error.span().is_some_and(|span| span == piece.value) && (is_value(piece) || is_another_kind);
     if let Some(piece) = pieces.iter().find(exact) {
         return (start, Some(piece.key.clone()));
     }

@@ -9,6 +9,7 @@
 mod blame;
 mod fault;
 mod imu;
+mod possible;
 mod section;
 
 pub use fault::{FaultKind, ScheduledFault};
@@ -158,8 +159,18 @@ impl Scenario {
     /// [`ScenarioError::Refused`] with line and column.
     pub fn parse(text: &str, file: &Path) -> Result<Self, ScenarioError> {
         let mut scenario: Self = parsed(text, file)?;
+        possible::sizes(text).map_err(|(byte, reason)| refused(text, file, byte, reason))?;
         scenario.schedule.load(file.parent().unwrap_or(Path::new("")))?;
         Ok(scenario)
+    }
+
+    /// Refuses an effect or a fault of its file that begins when the run is over: nothing of it would be seen.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Refused`] with line and column.
+    pub fn begins_in_time(&self, file: &Path) -> Result<(), ScenarioError> {
+        let text = text_of(file)?;
+        possible::onsets(&text, self.run_s()).map_err(|(byte, reason)| refused(&text, file, byte, reason))
     }
 
     /// Length of the logged run, s.
@@ -266,12 +277,15 @@ pub(crate) fn text_of(file: &Path) -> Result<String, ScenarioError> {
     std::fs::read_to_string(file).map_err(|source| ScenarioError::Unreadable { file: file.to_owned(), source })
 }
 
+/// A refusal of what stands at a byte of `text`.
+pub(crate) fn refused(text: &str, file: &Path, byte: usize, reason: String) -> ScenarioError {
+    let (line, column) = place_of(text, byte);
+    ScenarioError::Refused { file: file.to_owned(), line, column, reason }
+}
+
 /// What `text` describes, or where it does not.
 pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ScenarioError> {
-    let refused = |byte: usize, reason: String| {
-        let (line, column) = place_of(text, byte);
-        ScenarioError::Refused { file: file.to_owned(), line, column, reason }
-    };
+    let refused = |byte: usize, reason: String| refused(text, file, byte, reason);
     if let Some(format) = text.lines().next().and_then(|first| first.strip_prefix("# quadrig-")) {
         return Err(refused(
             0,
@@ -301,8 +315,10 @@ fn in_words(message: &str) -> String {
         "u64" | "u32" | "u16" | "usize" => "a whole number from 0",
         "i64" | "i32" => "a whole number",
         "a boolean" | "bool" => "true or false",
+        "path string" => "the name of a file, in quotes",
         other => other,
     };
+    let before = before.replace("invalid type: map", "a table").replace("invalid type: sequence", "a list");
     format!("{before}expected {kind}")
 }
 
@@ -396,6 +412,11 @@ mod tests {
                 "seed = 1\n\n[[effect]]\nid = \"supply_sag\"\nresistance_ohm = 0.08\nresistence = 3\n",
                 "run.toml:6:1: ",
                 "`resistence`",
+            ),
+            (
+                "[[effect]]\nid = \"supply_sag\"\nresistance_ohm = -0.08\n",
+                "run.toml:3:18: resistance_ohm: ",
+                "a resistance from 0 to 100 ohm, found -0.08",
             ),
             ("[[effect]]\nid = \"supply_sag\"\nresistance_ohm = nan\n", "run.toml:3:18: ", "resistance_ohm"),
             ("[noise]\nthrust_n = inf\n", "run.toml:2:12: ", "a number with an end"),

@@ -53,7 +53,7 @@ pub(crate) struct Args {
 impl Args {
     /// What it reads and writes.
     pub(crate) fn paths(&self) -> Paths<'_> {
-        Paths::default().reads([&self.folder]).writes("-o", [&self.output])
+        Paths::default().reads([&self.folder]).adds_to("-o", [&self.output])
     }
 }
 
@@ -127,6 +127,10 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 
 /// Files that may be runs, by their path from the folder, in order. What lies in the output folder is none.
 fn files(folder: &Path, output: &Path) -> Result<Vec<String>, Failure> {
+    if !folder.is_dir() {
+        let expected = "expected a folder of rig logs and exports (`quadrig close-loop` takes a single one)";
+        return Err(format!("{}: no folder of this name is there; {expected}", folder.display()).into());
+    }
     let output = std::fs::canonicalize(output).ok();
     let (mut found, mut open) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(at) = open.pop() {

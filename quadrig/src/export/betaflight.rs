@@ -3,34 +3,38 @@
 //! What it is: thrust_linear, so that thrust follows the demand as a straight line as well as that one number can make it; poles, KV, idle.
 //! What can go wrong: KV and poles stand in no model but in the head of its log, where that told them.
 //! Units: Betaflight's: per cent, hundredths of a per cent.
-//! Reference: betaflight/src/main/flight/pid.c, `pidApplyThrustLinearization`: signal = x (1 + L (1 - x)^2), x the demand, L = thrust_linear/100.
+//! Reference: betaflight/src/main/flight/pid.c, `pidApplyThrustLinearization`: x (1 + L (1 - x)^2), x the demand, L = thrust_linear/100;
+//! betaflight/src/main/flight/mixer.c: that share of the range above the idle is the signal.
 
 use super::{Battery, Powerplant, comments, full, off, untold};
 
-const DEFINED: [&str; 3] = [
+const DEFINED: [&str; 4] = [
     "keys: https://betaflight.com/docs/development/Cli",
     "curve: https://github.com/betaflight/betaflight/blob/4.5-maintenance/src/main/flight/pid.c",
+    "idle: https://github.com/betaflight/betaflight/blob/4.5-maintenance/src/main/flight/mixer.c",
     "battery: https://github.com/betaflight/betaflight/blob/4.5-maintenance/src/main/cli/settings.c",
 ];
 /// Hundredths of a volt of a cell, highest and lowest (Betaflight's own defaults, for lithium polymer).
 const CELL_CV: [u32; 2] = [430, 330];
 /// Largest value of the key.
 const MOST: u32 = 150;
+/// Largest idle that its key takes, hundredths of a per cent.
+const MOST_IDLE: f64 = 2000.0;
 
 /// Largest capacity that its key takes, mAh.
 const MOST_MAH: u32 = 20_000;
 
-/// Signal that a demand is given.
-fn signal(demand: f64, linear: f64) -> f64 {
+/// Share of the range above the idle that a demand is given.
+fn given(demand: f64, linear: f64) -> f64 {
     demand * (1.0 + linear * (1.0 - demand).powi(2))
 }
 
-/// Demand whose signal this is: what Betaflight takes for the share of thrust.
+/// Demand that is given this share: what Betaflight takes for the share of thrust.
 fn demand(wanted: f64, linear: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
-        if signal(middle, linear) < wanted { low = middle } else { high = middle }
+        if given(middle, linear) < wanted { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }
@@ -45,18 +49,21 @@ fn stated_kv(name: &str) -> Option<u32> {
 
 /// The lines.
 pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
+    let idle_value = (1e4 * plant.begins()).round().min(MOST_IDLE);
+    let idle = 1e-4 * idle_value;
     let square_error = |per_cent: u32| -> f64 {
         let linear = f64::from(per_cent) / 100.0;
-        plant.points.iter().map(|p| (plant.share(signal(p.signal, linear)) - p.signal).powi(2)).sum()
+        let signal = |demand: f64| idle + (1.0 - idle) * given(demand, linear);
+        plant.points.iter().map(|p| (plant.share(signal(p.signal)) - p.signal).powi(2)).sum()
     };
-    // signal(x) rises all the way up to L of 3, and the key ends long before
+    // given(x) rises all the way up to L of 3, and the key ends long before
     let best = (0..=MOST).min_by(|a, b| square_error(*a).total_cmp(&square_error(*b))).unwrap_or(0);
     let linear = f64::from(best) / 100.0;
     let mut head = vec![plant.title(), full(plant)];
     head.extend(DEFINED.map(str::to_owned));
     head.push(format!(
-        "signal = x (1 + L (1 - x)^2), x the share of full thrust, L = thrust_linear/100; {}",
-        off(plant.off_percent(|u| demand(u, linear)))
+        "signal = idle + (1 - idle) x (1 + L (1 - x)^2), x the share of full thrust, L = thrust_linear/100, idle = dshot_idle_value/10000; {}",
+        off(plant.off_percent(|u| demand(((u - idle) / (1.0 - idle)).max(0.0), linear)))
     ));
     let kv = plant.named[0].as_deref().and_then(stated_kv);
     let lacks = [
@@ -78,7 +85,7 @@ pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
     if let Some(capacity) = battery.capacity_mah.filter(|c| *c <= MOST_MAH) {
         out += &format!("set bat_capacity = {capacity}\n");
     }
-    out += &format!("set dshot_idle_value = {:.0}\n", 1e4 * plant.begins());
+    out += &format!("set dshot_idle_value = {idle_value:.0}\n");
     if let Some(cells) = battery.cells {
         out += &format!("set force_battery_cell_count = {cells}\n");
     }
@@ -101,10 +108,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_demand_is_the_inverse_of_its_signal() {
+    fn a_demand_is_the_inverse_of_what_it_is_given() {
         for k in 0..=20 {
             let x = f64::from(k) / 20.0;
-            assert!((demand(signal(x, 0.7), 0.7) - x).abs() < 1e-9, "{x}");
+            assert!((demand(given(x, 0.7), 0.7) - x).abs() < 1e-9, "{x}");
         }
     }
 

@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, "Powerplant model".
 
 use crate::Failure;
-use crate::fly::rotor::ModelRotor;
+use crate::fly::rotor::{ModelRotor, latency_of_rows_s};
 use hal_sim::mission::RotorCurves;
 use ident::model::{AddedEffect, Model};
 use std::f64::consts::TAU;
@@ -44,8 +44,12 @@ pub(super) struct Powerplant {
     pub(super) named: [Option<String>; 2],
     /// Pairs of poles, where the head told them.
     pub(super) pole_pairs: Option<i64>,
+    /// Signal at which the rotor starts, in steps of 5 us.
+    pub(super) turns: f64,
     /// Time by which the rotor answers late beside its lag, s, where the model holds one.
     pub(super) latency_s: Option<f64>,
+    /// Time by which the rows of the model's log follow a command that jumps between two of them, s; how much of it is the rotor's no row tells.
+    pub(super) row_latency_s: Option<f64>,
     /// Resistance of the supply's lead, ohm, where the model holds one.
     pub(super) lead_ohm: Option<f64>,
     /// Fall of the supply for the charge drawn, V/Ah, where the model holds one.
@@ -84,7 +88,12 @@ impl Powerplant {
         let found = Self {
             points: (0..POINTS).map(point).collect(),
             lag_s: rotor.lag_s(),
+            turns: (0..200)
+                .map(|k| f64::from(k) / 200.0)
+                .find(|u| rotor.settled(1000.0 + 1000.0 * u, 1.0).rpm > 0.0)
+                .unwrap_or(1.0),
             latency_s: rotor.latency_s(),
+            row_latency_s: latency_of_rows_s(model),
             source: model.source.clone(),
             named: ["motor", "propeller"].map(text),
             pole_pairs: model.meta.get("pole_pairs").and_then(toml::Value::as_integer),
@@ -169,9 +178,19 @@ impl Powerplant {
             None => self.no_lag(),
         };
         let latency = self.latency_s.map(|s| format!("latency of the rotor's answer {s:.4} s, beside its time constant"));
+        let latency = latency.or_else(|| self.of_the_rows());
         let lead = self.lead_ohm.map(|r| format!("{LEAD} {r:.4} ohm"));
         let fall = self.fall_v_per_ah.map(|v| format!("fall of the supply {v:.4} V for each ampere hour drawn"));
         std::iter::once(lag).chain(latency).chain(lead).chain(fall).chain(self.meters()).collect()
+    }
+
+    /// A latency that is the rows' and not known to be the rotor's.
+    pub(super) fn of_the_rows(&self) -> Option<String> {
+        self.row_latency_s.map(|s| {
+            format!(
+                "latency of the log's rows {s:.4} s: when between two rows a command came, and the mean over a row, are in it; how much is the rotor's is not known"
+            )
+        })
     }
 
     /// Meters of the rig that are late: not the powerplant's, but a simulation of the rig has them.

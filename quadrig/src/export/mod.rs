@@ -26,10 +26,10 @@ use std::path::PathBuf;
 /// Whose file.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Peer {
-    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM, with --cells BAT1_N_CELLS and BAT1_R_INTERNAL, with --capacity
+    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM, PWM_MAIN_MINn, with --cells BAT1_N_CELLS and BAT1_R_INTERNAL, with --capacity
     /// BAT1_CAPACITY.
     Px4,
-    /// Parameter file: MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX, with --cells MOT_BAT_VOLT_MAX and _MIN, with --capacity BATT_CAPACITY.
+    /// Parameter file: MOT_THST_EXPO, MOT_SPIN_ARM, _MIN and _MAX, with --cells MOT_BAT_VOLT_MAX and _MIN, with --capacity BATT_CAPACITY.
     Ardupilot,
     /// Lines for the command line: thrust_linear, motor_kv, motor_poles, dshot_idle_value, with --cells those of the battery, with --capacity bat_capacity.
     Betaflight,

@@ -20,14 +20,20 @@ const REAL32: u32 = 9;
 
 /// The file.
 pub(super) fn text(plant: &Powerplant, rotors: u32, battery: Battery) -> String {
-    let factor = plant.square_share(0.0);
-    let curve = |u: f64| (1.0 - factor) * u + factor * u * u;
+    // a whole pulse, at which the rotor turns: what the autopilot gives without thrust keeps it turning
+    let least_us = (1000.0 + 1000.0 * plant.begins()).round();
+    let from = least_us / 1000.0 - 1.0;
+    let factor = plant.square_share(from);
+    let curve = |u: f64| {
+        let x = ((u - from) / (1.0 - from)).max(0.0);
+        (1.0 - factor) * x + factor * x * x
+    };
     let (k_thrust, arm) = plant.quotients();
     let top_rad_s = plant.points.last().map_or(0.0, |p| p.rpm * std::f64::consts::TAU / 60.0);
     let mut head = vec!["Onboard parameters".to_owned(), String::new(), plant.title(), full(plant)];
     head.extend(DEFINED.map(str::to_owned));
     head.push(format!(
-        "thrust = THR_MDL_FAC u^2 + (1 - THR_MDL_FAC) u, u the signal from 1000 to 2000 us; {}",
+        "thrust = THR_MDL_FAC x^2 + (1 - THR_MDL_FAC) x, x the signal from PWM_MAIN_MINn to PWM_MAIN_MAXn; {}",
         off(plant.off_percent(curve))
     ));
     let moment = arm.map_or_else(|| "not known".to_owned(), |arm| format!("{arm:.6}"));
@@ -72,8 +78,9 @@ pub(super) fn text(plant: &Powerplant, rotors: u32, battery: Battery) -> String 
         }
     }
     for k in 1..=rotors {
+        out += &line(&format!("PWM_MAIN_DIS{k}"), "1000", INT32);
         out += &line(&format!("PWM_MAIN_MAX{k}"), "2000", INT32);
-        out += &line(&format!("PWM_MAIN_MIN{k}"), "1000", INT32);
+        out += &line(&format!("PWM_MAIN_MIN{k}"), &format!("{least_us:.0}"), INT32);
     }
     out + &line("THR_MDL_FAC", &format!("{factor:.6}"), REAL32)
 }

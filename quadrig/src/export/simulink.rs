@@ -45,7 +45,11 @@ pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
         head.push(plant.no_lag() + ": tau_s = 0, a first-order lag that passes its input");
     }
     if plant.latency_s.is_none() {
-        head.push("latency_s = 0: the model holds none; the answer begins with the command".to_owned());
+        let why = plant.of_the_rows().map_or_else(
+            || "the model holds none; the answer begins with the command".to_owned(),
+            |rows| format!("log_latency_s is the {rows}"),
+        );
+        head.push(format!("latency_s = 0: {why}"));
     }
     head.extend(battery.no_capacity("capacity_mah"));
     if battery.cells.is_none() {
@@ -60,6 +64,7 @@ pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
     out += &format!("powerplant.torque_per_thrust_m = {};\n", arm.map_or_else(|| "[]".to_owned(), |arm| format!("{arm:.6}")));
     let known = |v: Option<f64>| v.map_or_else(|| "[]".to_owned(), |v| format!("{v:.5}"));
     out += &format!("powerplant.latency_s = {:.5};\n", plant.latency_s.unwrap_or(0.0));
+    out += &format!("powerplant.log_latency_s = {};\n", known(plant.row_latency_s));
     out += &format!("powerplant.supply_v = {};\n", known(plant.points.first().and_then(|p| p.voltage_v)));
     out += &format!("powerplant.lead_ohm = {};\n", known(plant.lead_ohm));
     out += &format!("powerplant.fall_v_per_ah = {};\n", known(plant.fall_v_per_ah));

@@ -12,7 +12,7 @@ pub(super) fn text(plant: &Powerplant, battery: Battery) -> String {
     let mut head = vec![plant.title(), full(plant), "file: https://www.rfc-editor.org/rfc/rfc4180".to_owned()];
     head.push(format!("linear between the rows; {}", off(plant.off_percent(|u| plant.share(u)))));
     head.extend(plant.beside());
-    if plant.latency_s.is_none() {
+    if plant.latency_s.is_none() && plant.row_latency_s.is_none() {
         head.push("latency of the rotor's answer: the model holds none".to_owned());
     }
     head.push(match battery.cells {

@@ -95,6 +95,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         note!("{}: up to {:.0} s of flight, {} rows", args.mission.display(), mission.length_s(), mission.rows());
     }
     let flight = flown(&mission, &file, &rotors, curves, quiet || args.json)?;
+    has_numbers(&flight, args.model.as_deref().unwrap_or(&args.mission))?;
     let of = (curves, rotors.density());
     let summary = Summary::of(&mission, &file, &airframe, of, powerplant(&file, &rotors, model.as_ref()), &flight);
     if let Some(mut folder) = folder {
@@ -117,6 +118,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Refuses a flight that left the numbers: nothing that is said of it would be true.
+fn has_numbers(flight: &Flight, from: &Path) -> Result<(), Failure> {
+    let states = |f: &hal_sim::flight::Flying| {
+        let motion = f.motion.place.iter().chain(f.motion.velocity.iter()).chain(f.specific_force.iter());
+        motion.copied().chain(f.rotors.iter().flat_map(|r| [r.rpm, r.thrust_n, r.torque_nm])).all(f64::is_finite)
+    };
+    flight.rows.iter().find(|row| !states(row)).map_or(Ok(()), |row| {
+        let expected = "expected speeds and thrusts that a rotor can have: was the model changed by hand?";
+        Err(format!("{}: the flight on it has no finite numbers from {:.2} s on; {expected}", from.display(), row.t_s).into())
+    })
+}
+
 /// A rig's model. A flight's or an inertial unit's is refused as what it is.
 fn model_of_a_rig(path: &Path, quiet: bool) -> Result<Model, Failure> {
     let other = [("a flight", flight::model_text(path)), ("an inertial unit", inertial::model_text(path))];
@@ -132,9 +145,8 @@ fn model_of_a_rig(path: &Path, quiet: bool) -> Result<Model, Failure> {
 
 fn rotors_of(model: Option<&Model>, path: Option<&Path>, airframe: &Airframe) -> Result<Rotors, Failure> {
     let (Some(model), Some(path)) = (model, path) else { return Ok(Rotors::Catalogue) };
-    let rotor = ModelRotor::new(model, airframe.rotor_inertia_kgm2).map_err(|why| {
-        format!("{}: the model predicts {why}; expected one identified from a log with pulse_us and thrust_n", path.display())
-    })?;
+    let rotor = ModelRotor::new(model, airframe.rotor_inertia_kgm2)
+        .map_err(|why| format!("{}: the model predicts {why}", path.display()))?;
     Ok(Rotors::Model(Box::new(rotor)))
 }
 

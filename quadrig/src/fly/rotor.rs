@@ -58,6 +58,8 @@ const LEVEL_US: f64 = 5.0;
 const FIRST_S: f64 = 1.5e-3;
 /// Where the lag of a rotor that follows is taken, us.
 const MIDDLE_US: f64 = 1500.0;
+/// Form of a lag that was seen through rows between which the command jumps.
+const OF_STEPS: &str = "coasting_of_steps";
 /// Place of the latency among the shapes of a rotor that coasts.
 const LATENCY: usize = 3;
 /// Rows and time that each level is held.
@@ -72,6 +74,13 @@ fn flies(added: &AddedEffect) -> bool {
     FLIES.contains(&effect.id()) || effect.id() == "unknown" && effect.scope(&added.placed.instance) == Scope::Rig
 }
 
+/// Time by which the rows of a model's log follow a command that jumps between two of them, s. When it came there, and the mean over a row,
+/// are in it: a rotor that is told its commands does not have it.
+pub(crate) fn latency_of_rows_s(model: &Model) -> Option<f64> {
+    let lag = model.effects.iter().find(|e| e.placed.instance.form == OF_STEPS)?;
+    lag.placed.shape.get(LATENCY).copied().filter(|s| *s > 0.0)
+}
+
 impl ModelRotor {
     /// The rotors of `model`; `inertia_kgm2` is that of one about its shaft.
     ///
@@ -84,7 +93,7 @@ impl ModelRotor {
             added.placed.shape.iter_mut().for_each(|t0| *t0 = f64::MIN);
         }
         // a command that jumps between two rows of a log seems as late as its instant is unknown; a flight knows when its commands come
-        for lag in flying.effects.iter_mut().filter(|e| e.placed.instance.form == "coasting_of_steps") {
+        for lag in flying.effects.iter_mut().filter(|e| e.placed.instance.form == OF_STEPS) {
             lag.placed.shape.iter_mut().skip(LATENCY).for_each(|latency| *latency = 0.0);
         }
         // where the run saw the rotor stand still, what its force and torque read then is the zero of the day

@@ -43,7 +43,7 @@ pub(crate) struct Args {
 impl Args {
     /// What it reads and writes.
     pub(crate) fn paths(&self) -> Paths<'_> {
-        Paths::default().reads([&self.data]).writes("-o", [&self.output])
+        Paths::default().reads([&self.data]).adds_to("-o", [&self.output])
     }
 }
 

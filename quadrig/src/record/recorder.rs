@@ -286,6 +286,6 @@ impl Recorder {
             self.spool.discard();
             return Err("no sample arrived; nothing was recorded; expected samples: is the board powered?".into());
         }
-        self.spool.finish()
+        self.spool.finish(quiet)
     }
 }

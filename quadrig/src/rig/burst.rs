@@ -10,6 +10,7 @@ use super::configure;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::board::{Board, Heard, refused};
+use crate::spool::keep_earlier;
 use crate::trouble::unwritten;
 use firmware_rig::burst::LENGTH;
 use frame::Consensus;
@@ -83,6 +84,7 @@ pub(super) fn run(board: &mut Board, args: &Args, quiet: bool) -> Result<(), Fai
     let lines = spectrum(&values, burst.rate_hz, args.to);
     if let Some(path) = &args.output {
         let text = conversions(place, &burst, &values);
+        keep_earlier(path, quiet)?;
         write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?;
     }
     if let Some(path) = &args.spectrum {

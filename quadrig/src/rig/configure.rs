@@ -9,6 +9,7 @@
 use super::file;
 use crate::Failure;
 use crate::board::Board;
+use crate::kind::refuse_other;
 use crate::trouble::unwritten;
 use firmware_rig::RigConfig;
 use frame::message::{Command, Event, Message, SettingsNews};
@@ -57,8 +58,12 @@ pub(crate) fn save(board: &mut Board) -> Result<(), Failure> {
     }
 }
 
+/// What is expected of a file.
+const CONFIGURATION: &str = "a board's configuration, such as examples/rig/thesis.toml, or a file of `quadrig calibrate`: docs/configuration.md lists the keys";
+
 /// Configures the board from a file. A file without `[calibrated]` leaves the board's own scales; one with nothing else changes these alone.
 pub(crate) fn from_file(board: &mut Board, path: &Path) -> Result<u32, Failure> {
+    refuse_other(path, CONFIGURATION)?;
     if file::is_scales_alone(path) {
         let found = file::scales(path)?;
         let mut config = in_force(board)?;
