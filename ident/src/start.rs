@@ -14,8 +14,12 @@ const IDLE_US: f64 = 1000.0;
 /// Time after a jump of the command, s, and rows, for which the rotor may still stand or coast.
 const COASTS: (f64, usize) = (1.0, 5);
 
+/// Share of the log's highest speed above which a rotor turns.
+pub(crate) const TURNS: f64 = 0.01;
+
 /// Pulse that parts standing from turning with the fewest exceptions, us: midway between the pulses on its two sides. Rows right
-/// after a jump of the command do not count, where enough others do: the rotor comes later than the command.
+/// after a jump of the command do not count, where enough others do: the rotor comes later than the command. A rotor that stands at the end of
+/// rows of one pulse only coasted in those before.
 pub(crate) fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
     let Some(pulse) = pulse.filter(|_| !rpm.is_empty()) else { return 1000.0 };
     let top = rpm.iter().copied().fold(0.0, f64::max);
@@ -28,9 +32,10 @@ pub(crate) fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 
             t[i] - since.0 > COASTS.0 && i >= since.1 + COASTS.1
         })
         .collect();
+    let turns = kept_turning(pulse, rpm, TURNS * top);
     let rows = |only_settled: bool| -> Vec<(f64, bool)> {
         let chosen = (0..pulse.len()).filter(|i| !only_settled || settled[*i]);
-        chosen.map(|i| (pulse[i], rpm[i] > 0.01 * top)).collect()
+        chosen.map(|i| (pulse[i], turns[i])).collect()
     };
     let mut sorted = rows(true);
     let turn = sorted.iter().filter(|r| r.1).count();
@@ -57,6 +62,15 @@ pub(crate) fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 
     }
 }
 
+/// Whether the pulse of each row keeps the rotor turning: it does not where the rotor stands at the end of the rows of that very pulse.
+fn kept_turning(pulse: &[f64], rpm: &[f64], least: f64) -> Vec<bool> {
+    let mut out: Vec<bool> = rpm.iter().map(|v| *v > least).collect();
+    for i in (1..out.len()).rev() {
+        out[i - 1] &= pulse[i - 1] != pulse[i] || out[i];
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,6 +95,16 @@ mod tests {
     fn a_rotor_that_coasts_does_not_move_the_start() {
         let (t, pulse, rpm) = late(&[(1000.0, 6.0), (1100.0, 6.0), (1400.0, 6.0), (1000.0, 6.0)]);
         assert!(rpm[190] > 0.01 * 3200.0 && pulse[190] == 1000.0, "the rotor coasts at the lowest pulse");
+        assert_eq!(start_pulse(&t, Some(&pulse), &rpm), 1050.0);
+    }
+
+    /// A flight ends with the motors cut: more rows coast than stand, and yet no motor turns at that pulse.
+    #[test]
+    fn a_rotor_that_coasts_for_longer_than_it_stands_does_not_move_the_start() {
+        let (t, pulse, mut rpm) = late(&[(1000.0, 0.1), (1100.0, 6.0), (1700.0, 20.0), (1000.0, 6.0)]);
+        let cut = pulse.iter().rposition(|p| *p > 1000.0).unwrap() + 1;
+        rpm[cut..].iter_mut().enumerate().for_each(|(k, v)| *v = (5600.0 - 130.0 * k as f64).max(0.0));
+        assert!(rpm[cut..].iter().filter(|v| **v > 0.01 * 5600.0).count() > 40);
         assert_eq!(start_pulse(&t, Some(&pulse), &rpm), 1050.0);
     }
 

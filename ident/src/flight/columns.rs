@@ -12,7 +12,6 @@ use super::vibration::Shaking;
 use super::windows::Windows;
 use crate::attribution::{Column, Owner, Prior, Values};
 use crate::noise::median;
-use crate::start::start_pulse;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -70,14 +69,16 @@ impl Flight {
     }
 
     /// The same flight row by row, for what is told as it was logged: each row whose inputs are known is a window of its own, on the ground too.
+    /// Rows in which a rotor coasts make no claim.
     #[must_use]
     pub fn by_row(&self) -> Self {
         let record = self.record.clone();
+        let coasts = record.coasts();
         let known = |i: usize| {
             let series = record.speed.iter().chain(&record.command).chain(&record.current);
             series.into_iter().all(|c| c[i].is_finite()) && record.voltage.as_ref().is_none_or(|v| v[i].is_finite())
         };
-        let rows: Vec<usize> = (0..record.len()).filter(|i| known(*i)).collect();
+        let rows: Vec<usize> = (0..record.len()).filter(|i| known(*i) && !coasts[*i]).collect();
         let windows = Windows::each(&record.t, &rows);
         let channels = Channels::of(&record, &windows);
         Self { windows, channels, usual: self.usual, shaking: None, record }
@@ -118,7 +119,7 @@ impl Usual {
             arm: vehicle.rotors.first().map_or(1.0, |r| r.x.hypot(r.y)),
             rpm: if record.speed.is_empty() { 0.0 } else { middle(&|i| sum(&|d| d, i) / rotors * super::RPM, 1.0) },
             command: [command, (square / count).sqrt().max(1e-3)],
-            start: start(record),
+            start: record.start,
             supply: [
                 middle(&|i| record.voltage.as_ref().map_or(f64::NAN, |v| v[i]), 1.0),
                 middle(&|i| record.current.as_ref().map_or(f64::NAN, |v| v[i]), 1.0).max(1e-3),
@@ -146,20 +147,6 @@ fn believed<'r>(record: &'r Record, rows: &[usize]) -> Vec<&'r Vec<f64>> {
         [out] if drive.len() > 2 => drive.iter().enumerate().filter(|(k, _)| *k != out).map(|(_, d)| d).collect(),
         _ => drive.iter().collect(),
     }
-}
-
-/// Command at which the motors start, read off the mean of all rotors: the rows on the ground are what shows it. Where no motor stands still it is
-/// that of every speed controller.
-fn start(record: &Record) -> f64 {
-    if record.speed.is_empty() || record.command.is_empty() {
-        return 0.0;
-    }
-    let mean = |of: &[Vec<f64>], row: usize| of.iter().map(|c| c[row]).sum::<f64>() / of.len() as f64;
-    let known = |row: &usize| mean(&record.command, *row).is_finite() && mean(&record.speed, *row).is_finite();
-    let rows: Vec<usize> = (0..record.len()).filter(known).collect();
-    let of = |value: &dyn Fn(usize) -> f64| rows.iter().map(|row| value(*row)).collect::<Vec<f64>>();
-    let pulse = of(&|row| 1000.0 + 1000.0 * mean(&record.command, row));
-    (start_pulse(&of(&|row| record.t[row]), Some(&pulse), &of(&|row| mean(&record.speed, row))) - 1000.0) / 1000.0
 }
 
 /// What drives a rotor by its command, through the rotor's lag if it has one, row by row; and whether it turns at that.

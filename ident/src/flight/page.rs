@@ -49,7 +49,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         news: origin.model.is_some(),
         origin,
         declared: format!(
-            "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged. Figures show what is left of windows that no fit saw."
+            "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged, but for rows in which a rotor coasts with its motor cut. Figures show what is left of windows that no fit saw."
         ),
         hero: parts::most(v, VOCABULARY, &traces),
         cards: cards(closed, &traces),

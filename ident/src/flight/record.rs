@@ -12,6 +12,7 @@ use super::vehicle::Vehicle;
 use crate::flight_log::rotors;
 use crate::log::Log;
 use crate::noise::median;
+use crate::start::{TURNS, start_pulse};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
@@ -75,6 +76,8 @@ pub struct Record {
     pub temperature: Option<Vec<f64>>,
     /// Rows in the air.
     pub flying: Vec<bool>,
+    /// Command at which the motors start, as a share of full: up to it none is driven.
+    pub start: f64,
     /// Single readings that were set aside.
     pub spikes: Vec<Spike>,
 }
@@ -125,8 +128,10 @@ impl Record {
             current: looked_up(log, "current_a"),
             temperature: looked_up(log, "temp_c"),
             flying: Vec::new(),
+            start: 0.0,
             spikes,
         };
+        record.start = record.starts_at();
         record.flying = record.in_the_air();
         Ok(record)
     }
@@ -170,7 +175,37 @@ impl Record {
         (0..self.len()).map(|i| self.drive().iter().map(|d| d[i] * d[i]).sum()).collect()
     }
 
-    /// A vehicle whose rotors idle, or that does not move while they carry less than usual, is not in the air.
+    /// Command at which the motors start, read off the mean of all rotors: the rows on the ground are what shows it. Where no motor stands still it is
+    /// that of every speed controller.
+    fn starts_at(&self) -> f64 {
+        if self.speed.is_empty() || self.command.is_empty() {
+            return 0.0;
+        }
+        let mean = |of: &[Vec<f64>], row: usize| of.iter().map(|c| c[row]).sum::<f64>() / of.len() as f64;
+        let known = |row: &usize| mean(&self.command, *row).is_finite() && mean(&self.speed, *row).is_finite();
+        let rows: Vec<usize> = (0..self.len()).filter(known).collect();
+        let of = |value: &dyn Fn(usize) -> f64| rows.iter().map(|row| value(*row)).collect::<Vec<f64>>();
+        let pulse = of(&|row| 1000.0 + 1000.0 * mean(&self.command, row));
+        (start_pulse(&of(&|row| self.t[row]), Some(&pulse), &of(&|row| mean(&self.speed, row))) - 1000.0) / 1000.0
+    }
+
+    /// For each row whether a rotor coasts: nothing drives it, and it still turns. How it slows down then is the air's to say, not the pulse's.
+    #[must_use]
+    pub fn coasts(&self) -> Vec<bool> {
+        let mut out = vec![false; self.len()];
+        for (speed, command) in self.speed.iter().zip(&self.command) {
+            let least = TURNS * speed.iter().copied().fold(0.0, f64::max);
+            out.iter_mut().enumerate().for_each(|(i, coasts)| *coasts |= command[i] <= self.start && speed[i] > least);
+        }
+        out
+    }
+
+    /// Whether no motor is driven at a row.
+    fn is_cut(&self, row: usize) -> bool {
+        !self.speed.is_empty() && !self.command.is_empty() && self.command.iter().all(|c| c[row] <= self.start)
+    }
+
+    /// A vehicle whose rotors idle or are cut, or that does not move while they carry less than usual, is not in the air.
     fn in_the_air(&self) -> Vec<bool> {
         let squares = self.squares();
         let mut known: Vec<f64> = squares.iter().copied().filter(|s| s.is_finite()).collect();
@@ -180,7 +215,9 @@ impl Record {
             let slow = size(&self.velocity, i).is_some_and(|v| v < STILL.0);
             slow && size(&self.rate, i).is_none_or(|w| w < STILL.1)
         };
-        (0..self.len()).map(|i| squares[i] > IDLE * usual && !(squares[i] < STANDS * usual && still(i))).collect()
+        (0..self.len())
+            .map(|i| squares[i] > IDLE * usual && !self.is_cut(i) && !(squares[i] < STANDS * usual && still(i)))
+            .collect()
     }
 }
 
@@ -276,6 +313,25 @@ fn without_spikes(log: &Log) -> (Log, Vec<Spike>) {
 mod tests {
     use super::super::standard::standard_flight;
     use super::*;
+
+    /// After the motors are cut the rotors coast: by no pulse, and not in the air, however fast they still turn.
+    #[test]
+    fn a_rotor_without_drive_coasts() {
+        let mut log = standard_flight();
+        let (rows, cut) = (log.t.len(), log.t.len() - 300);
+        for column in &mut log.columns {
+            if column.name.starts_with("rpm_") {
+                let from = column.values[cut];
+                (cut..rows).for_each(|i| column.values[i] = (from * (1.0 - (i - cut) as f64 / 200.0)).max(0.0));
+            } else if column.name.starts_with("pulse_us_") {
+                column.values[cut..].fill(1000.0);
+            }
+        }
+        let record = Record::of(&log).unwrap();
+        let coasts = record.coasts();
+        assert!(record.start > 0.0 && !coasts[cut - 1] && (cut..cut + 190).all(|i| coasts[i]) && !coasts[rows - 1]);
+        assert!(record.flying[cut - 1] && !record.flying[cut] && record.speed[0][cut] > 0.99 * record.speed[0][cut - 1]);
+    }
 
     #[test]
     fn a_speed_that_reads_nothing_is_named() {
