@@ -11,6 +11,7 @@ use super::windows::Windows;
 use crate::attribution::Channel;
 use crate::attribution::channel::FEWEST;
 use crate::noise::quantum;
+use crate::words::digits;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// What a channel shows.
@@ -31,6 +32,10 @@ pub enum Target {
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
+/// Share of a reading to which one that never changes is told: three digits.
+const FIGURES: f64 = 5e-3;
+/// Share of a reading beneath which a change of it is the arithmetic's: a mean of a million doubles is off by less.
+const ROUNDING: f64 = 1e-9;
 
 impl Target {
     /// Name of the channel, that of the log's column where there is one.
@@ -137,8 +142,13 @@ impl Channels {
         let size = y.iter().filter(|v| v.is_finite()).map(|v| v.abs()).fold(0.0, f64::max);
         if y.len() < FEWEST || y.iter().any(|v| !v.is_finite()) {
             self.refuse(&target.name(), "too few readings in the air");
+        } else if y.iter().all(|v| (v - y[0]).abs() <= ROUNDING * size) {
+            self.refuse(
+                &target.name(),
+                &format!("reads {} {} throughout: nothing to explain", digits(y[0], FIGURES * y[0].abs()), target.unit()),
+            );
         } else {
-            let floor = floor.max(1e-9 * size).max(f64::MIN_POSITIVE);
+            let floor = floor.max(ROUNDING * size).max(f64::MIN_POSITIVE);
             self.targets.push(target);
             self.channels.push(Channel { name: target.name(), unit: target.unit(), t: windows.t.clone(), y, floor });
         }
@@ -173,4 +183,23 @@ fn turned(to_earth: &[Matrix3<f64>], windows: &Windows, record: &Record) -> Axes
         (0..3).for_each(|k| out[k].push(rate[k]));
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::columns::Flight;
+    use super::super::standard::standard_flight;
+    use super::*;
+
+    /// A supply that never moves has no noise to hold an error against, and nothing to explain.
+    #[test]
+    fn a_reading_that_never_changes_is_not_predicted() {
+        let mut log = standard_flight();
+        let voltage = log.columns.iter_mut().find(|c| c.name == "voltage_v").unwrap();
+        voltage.values.fill(11.5);
+        let channels = Flight::of(Record::of(&log).unwrap()).channels;
+        assert!(channels.position(Target::Voltage).is_none() && channels.position(Target::Speed(0)).is_some());
+        let told = ("voltage_v".to_owned(), "reads 11.5 V throughout: nothing to explain".to_owned());
+        assert!(channels.not_predicted.contains(&told), "{:?}", channels.not_predicted);
+    }
 }

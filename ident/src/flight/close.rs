@@ -93,10 +93,13 @@ fn run(
         None => Flight::of(Record::of(log)?),
     };
     let seconds: f64 = flight.windows.bounds.iter().map(|(a, b)| flight.record.t[b - 1] - flight.record.t[*a]).sum();
-    if seconds < SHORTEST_S || flight.channels.channels.is_empty() {
+    if seconds < SHORTEST_S {
         return Err(FlightError::Short { name: log.name.clone(), seconds });
     }
     let unfit = || FlightError::Unfit { name: log.name.clone(), seconds };
+    if flight.channels.channels.is_empty() {
+        return Err(unfit());
+    }
     let library = match model {
         Some(model) => FlightLibrary::against(&flight, model, is_own(model, &flight)),
         None => FlightLibrary::new(&flight),
