@@ -7,7 +7,7 @@
 //! Reference: specification `flight.md`, "The loop on flights".
 
 use quadrig_tests::flights::scenario::{CLEAN, Scenario, hidden};
-use quadrig_tests::{call, data};
+use quadrig_tests::{call, data, root};
 use serde_json::Value;
 use std::path::Path;
 
@@ -86,6 +86,44 @@ fn a_hidden_drag_is_named_and_its_model_predicts_another_flight() {
     std::fs::rename(at.join("out/model.toml"), at.join("model.toml")).expect("moved");
     let again = closed(at, "run.csv", &["--model", "model.toml"]);
     assert!(named(&again).is_empty(), "{again}");
+}
+
+/// A flight of the simulator, with its ground run and its coasting down: the rotors' one lag comes out, no channel gets worse, nothing is added
+/// beneath a noise floor, what is said to be left without a term is what a fit without it leaves, and a constant supply is no channel.
+#[test]
+fn a_simulated_flight_is_made_worse_nowhere() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let mission = root().join("examples/flight/square.toml");
+    call(at, &["--quiet", "fly", mission.to_str().expect("a plain name"), "-o", "fly"]).succeeded();
+    let v = closed(at, "fly/flight.csv", &[]);
+    let number = |v: &Value| v.as_f64().expect("a number");
+    for (name, c) in v["channels"].as_object().expect("channels").iter().filter(|(_, c)| c["not_predicted"].is_null()) {
+        let [before, after] = ["before", "after"].map(|k| number(&c[k]["heldout_rms"]));
+        assert!(after <= 1.02 * before, "{name}: {before} {after}");
+        if name.starts_with("rpm_") {
+            assert!(before < 100.0 && after < 10.0, "{name}: {before} {after}");
+        }
+    }
+    assert!(
+        v["channels"]["voltage_v"]["not_predicted"].as_str().is_some_and(|why| why.contains("throughout")),
+        "{}",
+        v["channels"]
+    );
+    let effects = v["effects"].as_array().expect("effects");
+    for e in effects.iter().filter(|e| e["id"] == "unknown") {
+        let c = &v["channels"][e["channels"][0].as_str().expect("a channel")];
+        assert!(number(&c["before"]["heldout_rms"]) > number(&c["noise_floor_rms"]), "{e}");
+    }
+    let lag = effects.iter().find(|e| e["id"] == "spinup_lag").expect("the lag");
+    for name in ["tau_up", "tau_down"] {
+        let p = lag["parameters"].as_array().expect("parameters").iter().find(|p| p["name"] == name).expect("a time");
+        assert!((0.03..0.05).contains(&number(&p["value"])), "{p}");
+    }
+    let of = &v["channels"][lag["channels"][0].as_str().expect("a channel")];
+    let without = number(&of["after"]["heldout_rms"]) / (1.0 - number(&lag["heldout_error_reduction"]));
+    let before = number(&of["before"]["heldout_rms"]);
+    assert!((without / before - 1.0).abs() < 0.1, "without the lag alone the declared model is left: {without} {before}");
 }
 
 #[test]

@@ -12,11 +12,11 @@ use super::fit::{Fit, Problem, fit};
 use super::library::Placed;
 use super::noise::Noise;
 use super::posterior::{Posterior, Seen, share};
-use super::validate::{fairest, held_out};
+use super::validate::{fairest, fairest_of};
 
 /// Share by which names may make a channel's error larger (specification, "Verdict"), and by which each has to make one smaller: what changes
 /// less counts as no change, one way as the other.
-const WORSE: f64 = 0.02;
+pub(crate) const WORSE: f64 = 0.02;
 /// Error on left-out readings, in noise floors, from which on a channel is told in any case (specification, "Verdict").
 pub const LOUD: f64 = 3.0;
 /// Evidence of a wander from which on it is told, nats: on a dozen channels of white noise one in a hundred logs reaches it.
@@ -87,6 +87,8 @@ pub struct Conclusion {
     pub after: Vec<Errors>,
     /// What those held-out errors are the means of.
     pub held_out: HeldOut,
+    /// For each place the weighting with which the hypothesis without that term predicts best.
+    pub weighting_without: Vec<Vec<Noise>>,
     /// What is left.
     pub left: Vec<Left>,
     /// Whole hypotheses beside the final one, with their probability.
@@ -95,16 +97,18 @@ pub struct Conclusion {
     pub ambiguous: bool,
 }
 
-/// Concludes.
+/// Concludes; candidates that are `barred` are no part of it.
 #[must_use]
-pub fn conclude(problem: &Problem<'_>, posterior: &Posterior) -> Option<Conclusion> {
+pub fn conclude(problem: &Problem<'_>, posterior: &Posterior, barred: &[usize]) -> Option<Conclusion> {
     let (declared_noise, before) = fairest(problem, &posterior.declared)?;
     let declared = fit_as(problem, &posterior.declared, &declared_noise)?;
     let all = problem.library.candidates();
     let is_named = |p: &Placed| all[p.candidate].is_named();
     // names are judged without what has no name beside them: it would hold part of what they explain
-    let (names, nameless): (Vec<Placed>, Vec<Placed>) = posterior.best.placed.iter().cloned().partition(is_named);
-    let mut chosen = if nameless.is_empty() { posterior.best.clone() } else { fit(problem, &names, Some(&posterior.best), 0)? };
+    let open = posterior.best.placed.iter().filter(|p| !barred.contains(&p.candidate)).cloned();
+    let (names, nameless): (Vec<Placed>, Vec<Placed>) = open.partition(is_named);
+    let whole = names.len() == posterior.best.placed.len();
+    let mut chosen = if whole { posterior.best.clone() } else { fit(problem, &names, Some(&posterior.best), 0)? };
     let declared_errors = errors(&before);
     let mut judged = sifted(problem, &declared_errors, &mut chosen, &is_named)?;
     if !nameless.is_empty() {
@@ -134,6 +138,8 @@ struct Judged {
     left: Vec<Vec<f64>>,
     /// The same without each term.
     left_without: Vec<Vec<Vec<f64>>>,
+    /// Weighting that predicts best without each term.
+    weighting_without: Vec<Vec<Noise>>,
     /// Channels that each term changes.
     touched: Vec<Vec<usize>>,
 }
@@ -158,9 +164,10 @@ fn sifted(problem: &Problem<'_>, before: &[f64], chosen: &mut Fit, asked: &dyn F
     loop {
         let (noise, left) = fairest(problem, chosen)?;
         let terms = 0..chosen.placed.len();
-        let left_without = terms.clone().map(|k| left_without(problem, chosen, &noise, k)).collect::<Option<_>>()?;
+        let without = terms.clone().map(|k| without(problem, chosen, k)).collect::<Option<Vec<_>>>()?;
+        let (weighting_without, left_without) = without.into_iter().unzip();
         let touched = terms.map(|k| channels_of(problem, chosen, k)).collect();
-        let judged = Judged { noise, left, left_without, touched };
+        let judged = Judged { noise, left, left_without, weighting_without, touched };
         let Some(falls) = falls(problem, chosen, before, &judged, asked) else { return Some(judged) };
         let rest: Vec<Placed> = chosen.placed.iter().enumerate().filter(|(k, _)| *k != falls).map(|(_, p)| p.clone()).collect();
         *chosen = fit(problem, &rest, Some(chosen), 0)?;
@@ -174,10 +181,11 @@ fn fit_as(problem: &Problem<'_>, of: &Fit, noise: &[Noise]) -> Option<Fit> {
     Some(Fit { amplitudes, covariance, solved, noise: noise.to_vec(), ..of.clone() })
 }
 
-/// What is left of held-out readings without the term at `place`, the rest fitted again.
-fn left_without(problem: &Problem<'_>, fit: &Fit, noise: &[Noise], place: usize) -> Option<Vec<Vec<f64>>> {
+/// What is left of held-out readings without the term at `place`, the rest fitted again, and the weighting that is fair to it: the noise that was
+/// found beside the term is the wrong one without it.
+fn without(problem: &Problem<'_>, fit: &Fit, place: usize) -> Option<(Vec<Noise>, Vec<Vec<f64>>)> {
     let rest: Vec<Placed> = fit.placed.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, p)| p.clone()).collect();
-    held_out(problem, &rest, noise, false)
+    fairest_of(problem, &rest, &fit.noise, false)
 }
 
 /// Channels whose prediction changes when the term at `place` goes and everything else stays.
@@ -218,7 +226,10 @@ fn falls(problem: &Problem<'_>, fit: &Fit, before: &[f64], judged: &Judged, aske
         let shapes = &problem.library.candidates()[p.candidate].shapes;
         p.shape.iter().zip(shapes).any(|(v, s)| !s.inside(*v))
     };
-    let weak = |k: &usize| best(*k) < WORSE || edge(*k) || spans_zero(fit, *k);
+    // what has no name stands for what is left over, and beneath the noise floor nothing is
+    let named = |k: usize| problem.library.candidates()[fit.placed[k].candidate].is_named();
+    let beneath = |k: usize| !named(k) && touched[k].iter().all(|c| without[k][*c] <= problem.channels[*c].floor);
+    let weak = |k: &usize| best(*k) < WORSE || edge(*k) || spans_zero(fit, *k) || beneath(*k);
     open().filter(weak).min_by(|a, b| best(*a).total_cmp(&best(*b)))
 }
 
@@ -237,7 +248,7 @@ fn account(
     (fit, judged): (Fit, Judged),
 ) -> Conclusion {
     let (before_held, after_held, without) = (errors(&before), judged.errors(), judged.errors_without());
-    let Judged { touched, left: after, left_without, .. } = judged;
+    let Judged { touched, left: after, left_without, weighting_without, .. } = judged;
     let all = problem.library.candidates();
     let mut kept: Vec<Kept> = (0..fit.placed.len())
         .map(|place| {
@@ -264,6 +275,7 @@ fn account(
         declared,
         after: figures(&fit, after_held),
         held_out: HeldOut { before, after, without: left_without },
+        weighting_without,
         alternatives: alternatives(&posterior.seen, &fit),
         ambiguous,
         kept,
@@ -329,4 +341,69 @@ fn left(problem: &Problem<'_>, fit: &Fit, held: &[f64]) -> Vec<Left> {
         })
     };
     (0..problem.channels.len()).filter_map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::channel::Channel;
+    use super::super::design::{Column, Design, Owner, Prior};
+    use super::super::library::{Candidate, Library, UNKNOWN};
+    use super::super::posterior::posterior;
+    use super::*;
+    use std::sync::Arc;
+
+    /// A constant, and beside it one wave, with a name or without.
+    struct Wave {
+        candidates: [Candidate; 1],
+        values: Arc<Vec<f64>>,
+    }
+
+    impl Wave {
+        fn column(&self, owner: Owner) -> Column {
+            let (sd, values) = match owner {
+                Owner::Declared => (1.0, Arc::new(vec![1.0; self.values.len()])),
+                Owner::Term(_) => (0.3, self.values.clone()),
+            };
+            Column { owner, name: "size", prior: Prior::about_zero(sd), parts: vec![(0, values)] }
+        }
+    }
+
+    impl Library for Wave {
+        fn candidates(&self) -> &[Candidate] {
+            &self.candidates
+        }
+
+        fn design(&self, hypothesis: &[Placed]) -> Design {
+            let terms = (0..hypothesis.len()).map(|k| self.column(Owner::Term(k)));
+            Design { columns: std::iter::once(self.column(Owner::Declared)).chain(terms).collect() }
+        }
+
+        fn addition(&self, hypothesis: &[Placed], _: &Placed) -> Option<Vec<Column>> {
+            Some(vec![self.column(Owner::Term(hypothesis.len()))])
+        }
+    }
+
+    /// Terms that are kept of a wave of 0.3 in noise of 0.05, where the noise floor is said to be `floor`.
+    fn kept(id: &'static str, floor: f64) -> usize {
+        let t: Vec<f64> = (0..600).map(|i| 0.05 * f64::from(i)).collect();
+        let noise = |i: usize| 0.05 * (((i * 7919) % 1009) as f64 / 504.5 - 1.0);
+        let values: Vec<f64> = t.iter().map(|t| (2.1 * t).sin()).collect();
+        let y = values.iter().enumerate().map(|(i, v)| 0.3 * v + noise(i)).collect();
+        let channels = [Channel { name: "force".into(), unit: "N", t, y, floor }];
+        let (form, shapes, starts) = (String::new(), Vec::new(), vec![Vec::new()]);
+        let candidate = Candidate { id, form, shapes, starts, needs: Vec::new(), excludes: Vec::new() };
+        let library = Wave { candidates: [candidate], values: Arc::new(values) };
+        let problem = Problem { channels: &channels, library: &library };
+        let found = posterior(&problem, &mut |_| {}).unwrap();
+        assert_eq!(found.best.placed.len(), 1, "the wave is seen");
+        assert_eq!(conclude(&problem, &found, &[0]).unwrap().kept.len(), 0, "a candidate that is barred is no part of it");
+        conclude(&problem, &found, &[]).unwrap().kept.len()
+    }
+
+    /// What has no name is not added where nothing is left over the noise floor; a name there may still be true.
+    #[test]
+    fn nothing_without_a_name_is_added_beneath_the_floor() {
+        assert_eq!((kept(UNKNOWN, 0.04), kept(UNKNOWN, 0.25)), (1, 0));
+        assert_eq!(kept("drag", 0.25), 1);
+    }
 }

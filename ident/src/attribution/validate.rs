@@ -86,11 +86,22 @@ fn even(noise: &Noise) -> Noise {
 /// it. A wander that the model cannot follow leaves weight to fast changes alone, which a wrong model fits at the price of all that is slow.
 #[must_use]
 pub fn fairest(problem: &Problem<'_>, fit: &Fit) -> Option<(Vec<Noise>, Vec<Vec<f64>>)> {
-    let left = |noise: &[Noise]| held_out(problem, &fit.placed, noise, true);
-    let evens: Vec<Noise> = fit.noise.iter().map(even).collect();
-    let (a, b) = (left(&fit.noise)?, left(&evens)?);
-    let noise: Vec<Noise> = (0..a.len()).map(|c| if rms(&a[c]) <= rms(&b[c]) { fit.noise[c] } else { evens[c] }).collect();
+    fairest_of(problem, &fit.placed, &fit.noise, true)
+}
+
+/// The same of any hypothesis beside a noise that another one was found with; `shapes` as in [`folds`].
+#[must_use]
+pub fn fairest_of(
+    problem: &Problem<'_>,
+    placed: &[Placed],
+    found: &[Noise],
+    shapes: bool,
+) -> Option<(Vec<Noise>, Vec<Vec<f64>>)> {
+    let left = |noise: &[Noise]| held_out(problem, placed, noise, shapes);
+    let evens: Vec<Noise> = found.iter().map(even).collect();
+    let (a, b) = (left(found)?, left(&evens)?);
+    let noise: Vec<Noise> = (0..a.len()).map(|c| if rms(&a[c]) <= rms(&b[c]) { found[c] } else { evens[c] }).collect();
     let mixed = left(&noise)?;
     let total = |left: &[Vec<f64>]| left.iter().map(|r| rms(r).max(f64::MIN_POSITIVE).ln()).sum::<f64>();
-    [(noise, mixed), (fit.noise.clone(), a), (evens, b)].into_iter().min_by(|x, y| total(&x.1).total_cmp(&total(&y.1)))
+    [(noise, mixed), (found.to_vec(), a), (evens, b)].into_iter().min_by(|x, y| total(&x.1).total_cmp(&total(&y.1)))
 }

@@ -105,11 +105,11 @@ fn run(
         None => FlightLibrary::new(&flight),
     };
     let problem = Problem { channels: &flight.channels.channels, library: &library };
-    let (found, concluded) = match names {
+    let (found, mut concluded) = match names {
         None => {
             let found = posterior(&problem, &mut |p| progress(0.8 * p)).ok_or_else(unfit)?;
             progress(0.8);
-            let concluded = conclude(&problem, &found).ok_or_else(unfit)?;
+            let concluded = conclude(&problem, &found, &[]).ok_or_else(unfit)?;
             (found, concluded)
         }
         Some(ids) => {
@@ -119,9 +119,20 @@ fn run(
         }
     };
     progress(0.9);
+    let rows_of = |concluded: &Conclusion| {
+        let whole = Whole { log, flight: &flight, library: &library, problem, concluded };
+        Rows::of(&whole.told(), &whole.model(model).0)
+    };
+    let mut rows = rows_of(&concluded);
+    // no name makes a channel worse that is told row by row either
+    let mut barred = Vec::new();
+    while let Some(place) = rows.makes_worse(&concluded.kept).filter(|_| names.is_none()) {
+        barred.push(concluded.fit.placed[place].candidate);
+        concluded = conclude(&problem, &found, &barred).ok_or_else(unfit)?;
+        rows = rows_of(&concluded);
+    }
     let whole = Whole { log, flight: &flight, library: &library, problem, concluded: &concluded };
     let (corrected, parameters) = whole.model(model);
-    let rows = Rows::of(&whole.told(), &corrected);
     let mut verdict = whole.verdict(&rows, &parameters);
     for other in others {
         verdict.validation.push(validated(&whole.declared_model(&corrected), &corrected, other)?);
@@ -283,7 +294,7 @@ impl<'w> Whole<'w> {
 
     fn verdict(&self, rows: &Rows, parameters: &[Vec<Parameter>]) -> Verdict {
         let channels = self.channels(rows);
-        let mut effects = self.effects(parameters, parameters.len() - self.concluded.fit.placed.len());
+        let mut effects = self.effects(rows, parameters, parameters.len() - self.concluded.fit.placed.len());
         let unexplained = self.unexplained(&channels);
         let named = effects.iter().any(|e| e.id != UNKNOWN);
         let kind = match (named, effects.is_empty() && unexplained.is_empty()) {
@@ -350,9 +361,10 @@ impl<'w> Whole<'w> {
         Channels { predicted, not_predicted: self.flight.channels.not_predicted.iter().cloned().collect() }
     }
 
-    fn effects(&self, parameters: &[Vec<Parameter>], first: usize) -> Vec<EffectEntry> {
+    fn effects(&self, rows: &Rows, parameters: &[Vec<Parameter>], first: usize) -> Vec<EffectEntry> {
         let c = self.concluded;
         let entry = |k: &crate::attribution::Kept| {
+            let k = &rows.told_by_row(k);
             let placed = &c.fit.placed[k.place];
             let candidate = self.candidate(placed);
             let names: Vec<String> = k.channels.iter().map(|(ch, _)| self.problem.channels[*ch].name.clone()).collect();
