@@ -160,7 +160,8 @@ pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Ve
     let told = order(verdict).into_iter().map(|k| &verdict.effects[k]).find(own).and_then(|e| e.channels.first());
     let weight = |t: &&Trace| {
         verdict.channels.get(&t.channel).map_or(0.0, |c| match verdict.verdict {
-            Kind::Attributed | Kind::Ambiguous => c.before.heldout_rms / c.after.heldout_rms.max(1e-300),
+            // a ratio of two figures beneath the floor tells nothing
+            Kind::Attributed | Kind::Ambiguous => (c.before.heldout_rms - c.after.heldout_rms) / c.noise_floor_rms,
             Kind::Unattributed | Kind::None => c.after.heldout_rms / c.noise_floor_rms,
         })
     };
