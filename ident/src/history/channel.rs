@@ -67,11 +67,11 @@ pub(super) fn told(context: &Context, curve: &Curve) -> Option<Vec<Told>> {
     let mut out: Vec<Told> = of
         .iter()
         .enumerate()
-        .map(|(j, what)| {
+        .filter_map(|(j, what)| {
             let se = (solution.inverse[(j, j)] * inflation).sqrt();
-            of_column(*what, curve, solution.coefficients[j], se)
+            let full = if what.is_share() { 1.0 } else { curve.full.abs() };
+            (se < UNTOLD * full).then(|| of_column(*what, curve, solution.coefficients[j], se))
         })
-        .filter(|(measure, v)| v.se < UNTOLD * if measure.unit == "%" { 100.0 } else { curve.full.abs() })
         .collect();
     out.extend(scatter(curve, target, &places, &picked(&x), &residual));
     out.extend(samples(context, target));
@@ -88,9 +88,10 @@ fn of_column(what: Of, curve: &Curve, c: f64, se: f64) -> Told {
         Of::Zero => of("zero", format!("zero of {name}"), unit, c, se),
         Of::Gain => of("gain", format!("gain of {name}"), "%", 100.0 * (c - 1.0), 100.0 * se),
         Of::Bend => of("bend", format!("bend of {name} halfway up"), "%", 100.0 * c, 100.0 * se),
-        Of::Late(k) => {
-            let words = format!("share of {name} that comes {} s late", LATE_S[k]);
-            of(["late fast", "late", "late slow"][k], words, "%", 100.0 * c, 100.0 * se)
+        // a lag that is longer than the column's has more than its whole share in it: what is known is the delay that the share makes
+        Of::Late(k, tau) => {
+            let words = format!("delay of {name} by what settles within some {} s", LATE_S[k]);
+            of(["late fast", "late", "late slow"][k], words, "s", tau * c, tau * se)
         }
         Of::Hysteresis => of("hysteresis", format!("{name} on the way up less down, half"), unit, c, se),
         Of::Drift => of("drift", format!("drift of {name} within a run"), unit, c, se),

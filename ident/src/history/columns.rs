@@ -12,7 +12,7 @@ use crate::effects::operator::{Course, Lag};
 use crate::noise::median;
 
 /// What a column is of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Of {
     /// Reading without load.
     Zero,
@@ -20,14 +20,21 @@ pub(super) enum Of {
     Gain,
     /// Departure halfway up, over the curve's full value.
     Bend,
-    /// Share that comes late, by a fast, a middle and a slow time constant.
-    Late(usize),
+    /// Share that comes late, by a fast, a middle and a slow time constant; that time constant, s.
+    Late(usize, f64),
     /// Half the distance between the way up and the way down.
     Hysteresis,
     /// Course over the run, from its first to its last second.
     Drift,
     /// With the temperature.
     Warmth,
+}
+
+impl Of {
+    /// Whether its coefficient is a share of the curve, rather than in the channel's unit.
+    pub(super) fn is_share(self) -> bool {
+        matches!(self, Self::Gain | Self::Bend | Self::Late(..))
+    }
 }
 
 /// Time constants of what comes late, s; the first at least as long as the samples ask for.
@@ -58,7 +65,7 @@ pub(super) fn columns(context: &Context, curve: &Curve, x: &[f64]) -> Vec<Column
     let t = &context.t;
     for (k, tau) in LATE_S.into_iter().enumerate() {
         let tau = if k == 0 { tau.max(FASTEST * context.step()) } else { tau };
-        out.push((Of::Late(k), late(t, &f, tau)));
+        out.push((Of::Late(k, tau), late(t, &f, tau)));
     }
     let way = direction(&u);
     out.push((Of::Hysteresis, u.iter().zip(&way).map(|(u, way)| way * lens(u.min(1.0))).collect()));
