@@ -10,6 +10,7 @@ mod channel;
 mod columns;
 mod constants;
 mod curve;
+mod differ;
 mod evidence;
 mod find;
 mod limits;
@@ -23,7 +24,7 @@ use crate::log::Log;
 use serde::Serialize;
 
 pub use find::{Change, Kind, Moved};
-pub use limits::Chart;
+pub use limits::{Chart, fewest_judged};
 pub use measure::{Measure, Scale, Value};
 pub use name::{Name, named};
 pub(crate) use words::by;

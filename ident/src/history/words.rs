@@ -5,9 +5,10 @@
 //! Units: as the measures state.
 //! Reference: none.
 
+use super::differ::differing;
 use super::find::{Change, Kind, Moved};
-use super::{Chart, History};
-use crate::words::{amount, lower, upper};
+use super::{Chart, History, fewest_judged};
+use crate::words::{amount, digits, list, lower, upper};
 
 /// Logarithm of the odds within which the runner-up of a name is told: e^3.
 const CLOSE: f64 = 3.0;
@@ -68,6 +69,34 @@ pub fn sentence(history: &History, change: &Change) -> String {
     format!("{place}: {what}.{wide}{doubt}")
 }
 
+/// Measures that are told to differ.
+const DIFFERING: usize = 2;
+
+/// What differs from run to run by more than its own intervals.
+fn differences(history: &History) -> String {
+    let all = differing(history);
+    let told: Vec<String> = all
+        .iter()
+        .take(DIFFERING)
+        .map(|d| {
+            let m = &history.measures[d.measure];
+            let [low, high] = [d.low, d.high].map(|v| digits(v.value, v.half()));
+            format!("{} from {low} to {high} {}", m.words, m.unit)
+        })
+        .collect();
+    let (others, differ) = match all.len().saturating_sub(DIFFERING) {
+        0 if told.len() == 1 => (String::new(), "differs"),
+        0 => (String::new(), "differ"),
+        k => (format!(", and {k} more measures"), "differ"),
+    };
+    if told.is_empty() {
+        return "Every measure is the same within its own intervals.".to_owned();
+    }
+    let (told, its) =
+        (if others.is_empty() { list(&told) } else { told.join(", ") }, if differ == "differs" { "its" } else { "their" });
+    format!("By more than {its} own intervals {differ}: {told}{others}.")
+}
+
 /// The whole history in one sentence.
 #[must_use]
 pub fn summary(history: &History) -> String {
@@ -77,12 +106,46 @@ pub fn summary(history: &History) -> String {
         0 => {
             let first = history.label(0);
             let span = if history.dated { format!(", from {first} to {last}") } else { String::new() };
-            format!("Nothing changed over {n} runs beyond what days differ by{span}.")
+            let fewest = fewest_judged();
+            if n >= fewest {
+                return format!("Nothing changed over {n} runs beyond what days differ by{span}.");
+            }
+            let few = format!(
+                "No change was found over {n} runs{span}, but so few cannot show that there was none: what days differ by is not known, and a control chart needs {fewest} runs before one of them can lie outside its limits."
+            );
+            [few, differences(history)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
         }
         1 => format!("{n} runs, one change. {}", sentence(history, &history.changes[0])),
         k => {
             let all: Vec<String> = history.changes.iter().map(|c| sentence(history, c)).collect();
             format!("{n} runs, {k} changes. {}", all.join(" "))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::Value;
+    use crate::history::tests::departing;
+
+    /// Three runs whose gains are apart by more than their intervals: neither a change nor nothing.
+    #[test]
+    fn a_few_runs_are_not_said_to_be_alike() {
+        let mut history = departing(3, false, |_| 0.0);
+        history.measures[0].name = "thrust_n gain".into();
+        history.measures[0].words = "gain of thrust".into();
+        history.measures[0].unit = "%".into();
+        for (run, gain) in history.runs.iter_mut().zip([-6.2, 5.0, 0.3]) {
+            for value in &mut run.values {
+                *value = Some(Value { value: 1.0, se: 0.1 });
+            }
+            run.values[0] = Some(Value { value: gain, se: 0.7 });
+        }
+        let said = summary(&history);
+        assert!(said.starts_with("No change was found over 3 runs, but so few cannot show that there was none"), "{said}");
+        assert!(said.contains("needs 11 runs"), "{said}");
+        assert!(said.ends_with("By more than its own intervals differs: gain of thrust from -6 to 5 %."), "{said}");
+        assert!(summary(&departing(11, false, |_| 0.0)).starts_with("Nothing changed over 11 runs beyond what days differ by."));
     }
 }

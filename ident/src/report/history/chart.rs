@@ -21,15 +21,15 @@ pub(super) fn chart(history: &History, measure: usize) -> Option<Figure> {
     let (factor, unit) = prefixed(chart.centre, &of.unit);
     let n = history.runs.len() as f64;
     let ends = vec![0.5, n + 0.5];
-    let band = Layer::Band {
+    let band = chart.low.zip(chart.high).map(|(low, high)| Layer::Band {
         name: String::new(),
         class: "d",
         x: ends.clone(),
-        lower: vec![factor * chart.low; 2],
-        upper: vec![factor * chart.high; 2],
-    };
+        lower: vec![factor * low; 2],
+        upper: vec![factor * high; 2],
+    });
     let line = |class, x, y: f64| Layer::Line { name: String::new(), class, x, y: vec![factor * y; 2] };
-    let mut layers = vec![band, line("d", ends, chart.centre)];
+    let mut layers: Vec<Layer> = band.into_iter().chain([line("d", ends, chart.centre)]).collect();
     layers.extend(levels(history, measure).into_iter().map(|(x, y)| line("b", x.to_vec(), y)));
     let (inside, outside): (Vec<Mark>, Vec<Mark>) = marks(history, measure).into_iter().partition(|m| !chart.is_outside(m.y));
     for (class, mut marks) in [("a", inside), ("b", outside)] {
@@ -97,6 +97,16 @@ mod tests {
         let (factor, unit) = prefixed(1.56e-5, "N.s2");
         assert!((factor - 1e6).abs() < 1e-3 && unit == "1e-6 N.s2", "{factor} {unit}");
         assert_eq!(prefixed(0.02, "ohm"), (1.0, "ohm".to_owned()));
+    }
+
+    /// No band is drawn out of which no run can lie.
+    #[test]
+    fn a_few_runs_have_no_band() {
+        let has_band = |runs: usize| {
+            let figure = chart(&stepped(runs, runs), 0).expect("a chart");
+            figure.layers.iter().any(|l| matches!(l, Layer::Band { .. }))
+        };
+        assert!(!has_band(10) && has_band(11));
     }
 
     #[test]

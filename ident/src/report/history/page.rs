@@ -8,7 +8,7 @@
 
 use super::chart::chart;
 use super::{MOVED, bracketed, foremost};
-use crate::history::{Change, History, gap, sentence, summary};
+use crate::history::{Change, History, fewest_judged, gap, sentence, summary};
 use crate::report::number;
 use crate::report::sheet::Sheet;
 use crate::words::{probability, upper};
@@ -56,6 +56,12 @@ fn span(history: &History) -> String {
 }
 
 fn key(history: &History) -> String {
+    let fewest = fewest_judged();
+    if history.changes.is_empty() && history.runs.len() < fewest {
+        return format!(
+            "A ring is a run with its 95 % interval, the line the mean of all. There are no limits: of fewer than {fewest} runs none can lie more than three of their own standard deviations from their mean."
+        );
+    }
     let before = if history.changes.is_empty() { "all runs" } else { "the runs before the first change" };
     format!(
         "A ring is a run with its 95 % interval. The line and the band are centre and limits (three standard deviations) of {before}. Orange lies outside, or is the level since a change; a dashed line is a change."
