@@ -115,6 +115,7 @@ pub fn unit_of(channel: &str) -> &'static str {
         "temp_c" => "degC",
         "t_s" => "s",
         "pulse_us" => "us",
+        "accx_g" | "accy_g" | "accz_g" | "vibration_g" | "vibration_a_g" => "g",
         _ => "",
     }
 }

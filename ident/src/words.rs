@@ -187,6 +187,12 @@ pub fn channel(name: &str) -> String {
         "mx" => "field (x)",
         "my" => "field (y)",
         "mz" => "field (z)",
+        // what other people's rigs log beside
+        "accx_g" => "acceleration (x)",
+        "accy_g" => "acceleration (y)",
+        "accz_g" => "acceleration (z)",
+        "vibration_g" => "vibration",
+        "vibration_a_g" => "vibration (A)",
         other => other,
     };
     said.to_owned()
