@@ -161,7 +161,8 @@ fn unexplained(channels: &BTreeMap<String, Channel>, effects: &[EffectEntry]) ->
         channel: name.clone(),
         over_floor: over(c),
         depends_on: depends_on(name),
-        looks_like: "more than the sensor's noise; what the attitude is not known to is part of it".to_owned(),
+        looks_like: "more than the sensor's noise; the attitude is off by some tenths of a degree, and that is a part of it"
+            .to_owned(),
     })
     .collect()
 }

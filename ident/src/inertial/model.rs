@@ -63,6 +63,9 @@ pub struct Added {
     /// Its shape: an instant or a distance of knots, s; absent where it has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape_s: Option<f64>,
+    /// When it ended, s; absent where it lasts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until_s: Option<f64>,
     /// Variable of the correction without a name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variable: Option<String>,
@@ -148,7 +151,7 @@ pub(crate) fn linear(
     let terms = |a: &Added| -> Vec<Term<'_>> {
         match (&a.variable, causes.iter().find(|c| c.id() == a.id)) {
             (Some(variable), _) => unknown::terms(variable, scene, channels),
-            (None, Some(cause)) => cause.instance(scene, a.shape_s.unwrap_or(f64::NAN)).terms,
+            (None, Some(cause)) => cause.lasting(scene, [a.shape_s, a.until_s].map(|v| v.unwrap_or(f64::NAN))).terms,
             (None, None) => Vec::new(),
         }
     };

@@ -57,13 +57,30 @@ pub(crate) trait Cause {
     }
     /// With a shape.
     fn instance<'a>(&self, scene: &Scene<'a>, shape: f64) -> Instance<'a>;
+    /// Whether it may end within the log; its shape is an instant then.
+    fn may_end(&self) -> bool {
+        false
+    }
+    /// Whether the log can tell a span from other causes.
+    fn can_be_told(&self, _: &Scene<'_>, _: Span) -> bool {
+        true
+    }
+    /// From one instant to another; not a number for one that lies outside the log.
+    fn lasting<'a>(&self, scene: &Scene<'a>, [from, _]: Span) -> Instance<'a> {
+        self.instance(scene, from)
+    }
 }
+
+/// A shape, and behind it the end of a cause that ends; not a number where there is none.
+pub(crate) type Span = [f64; 2];
 
 /// A cause that was found.
 pub(crate) struct Found<'a> {
     pub(crate) instance: Instance<'a>,
-    /// 95 % interval of the shape.
-    pub(crate) shape_ci: [f64; 2],
+    /// When it ends; not a number where it does not.
+    pub(crate) until: f64,
+    /// 95 % intervals of the shape and of the end.
+    pub(crate) shape_ci: [[f64; 2]; 2],
     /// 1 - (held-out error with all)/(without this one).
     pub(crate) reduction: f64,
     /// The same of each axis.
@@ -98,10 +115,11 @@ const THERE: f64 = 1.25;
 const MOST: usize = 3;
 
 /// Shapes that were tried, each with what it leaves.
-type Scan = Vec<(f64, f64)>;
+type Scan = Vec<(Span, f64)>;
 
 struct Try<'a> {
     instance: Instance<'a>,
+    span: Span,
     columns: Vec<Column>,
     solved: Solved,
     scanned: Scan,
@@ -187,6 +205,7 @@ pub(crate) fn search<'a>(
         chosen.push(won);
     }
     prune(readings, &base, &mut chosen, noise, slack);
+    drop_open(readings, &base, &mut chosen, noise);
     Some(conclude(readings, &base, chosen, before, rivals, noise))
 }
 
@@ -199,6 +218,74 @@ pub(crate) fn evidence(looks: f64, before: f64, after: f64, slack: f64) -> f64 {
     0.5 * looks * ((before + slack).max(1e-300) / (after + slack).max(1e-300)).ln()
 }
 
+/// How many numbers of a span lie within the log.
+fn numbers(span: &Span) -> usize {
+    span.iter().filter(|v| v.is_finite()).count()
+}
+
+/// The best of the spans with the fewest numbers: one more is believed where what is left says so.
+fn plainest(scanned: &Scan, gain: &dyn Fn(f64, f64) -> f64) -> Option<Span> {
+    let best = |count: usize| scanned.iter().filter(|s| numbers(&s.0) == count).min_by(|a, b| a.1.total_cmp(&b.1));
+    (0..=2).filter_map(best).copied().reduce(|few, more| if gain(few.1, more.1) < SHAPE { few } else { more }).map(|s| s.0)
+}
+
+/// Every how many of the instants at which a cause may have begun one is tried with an end, at first: pairs of them all would be a thousand fits.
+const COARSE: usize = 4;
+
+/// Tries shapes, and finer ones about the best; of a cause that may end both numbers in turn.
+fn scan(cause: &dyn Cause, scene: &Scene<'_>, left: &dyn Fn(Span) -> f64) -> Scan {
+    let shapes = cause.shapes(scene);
+    if shapes.len() < 2 {
+        return shapes.into_iter().map(|s| ([s, f64::NAN], 0.0)).collect();
+    }
+    let step = shapes.windows(2).map(|w| w[1] - w[0]).filter(|d| d.is_finite()).fold(0.0, f64::max);
+    let told = |span: &Span| cause.can_be_told(scene, *span);
+    let spans = shapes.iter().map(|s| [*s, f64::NAN]).filter(told);
+    let mut out: Scan = spans.map(|span| (span, left(span))).collect();
+    refine(cause, scene, &mut out, step, left);
+    if cause.may_end() {
+        let instants: Vec<f64> = shapes.iter().filter(|s| s.is_finite()).step_by(COARSE).copied().collect();
+        let begins = std::iter::once(f64::NAN).chain(instants.iter().copied());
+        let spans =
+            begins.flat_map(|from| instants.iter().filter(move |until| from.is_nan() || **until > from).map(move |u| [from, *u]));
+        let mut ending: Scan = spans.filter(told).map(|span| (span, left(span))).collect();
+        refine(cause, scene, &mut ending, COARSE as f64 * step, left);
+        out.extend(ending);
+    }
+    out
+}
+
+/// Finer shapes about the best, down to the cause's resolution, and then outward from it for its interval.
+fn refine(cause: &dyn Cause, scene: &Scene<'_>, scanned: &mut Scan, mut step: f64, left: &dyn Fn(Span) -> f64) {
+    let fits = |span: &Span| {
+        let inside = |v: &f64| !v.is_finite() || *v > scene.heard.0 && *v < scene.heard.1;
+        span.iter().all(inside) && !(span[0] >= span[1]) && cause.can_be_told(scene, *span)
+    };
+    let about = |scanned: &mut Scan, steps: &[f64]| {
+        for which in 0..2 {
+            let Some(best) = scanned.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|s| s.0) else { return };
+            let moved = |by: &f64| {
+                let mut span = best;
+                span[which] += by;
+                span
+            };
+            let spans: Vec<Span> = steps.iter().map(moved).filter(|s| s[which].is_finite() && fits(s)).collect();
+            scanned.extend(spans.into_iter().map(|span| (span, left(span))));
+        }
+    };
+    while cause.resolution() > 0.0 && step > cause.resolution() {
+        step /= 4.0;
+        about(scanned, &[-3.0, -2.0, -1.0, 1.0, 2.0, 3.0].map(|k| k * step));
+    }
+    let ends = scanned.iter().min_by(|a, b| a.1.total_cmp(&b.1)).is_some_and(|s| s.0[1].is_finite());
+    if ends {
+        about(scanned, &OUTWARD.map(|k| k * step));
+    }
+}
+
+/// Steps from the best span outward, between which the end of an interval lies.
+const OUTWARD: [f64; 14] = [-64.0, -32.0, -16.0, -8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
+
 fn attempt<'a>(
     readings: &Readings,
     fixed: &[&Column],
@@ -208,39 +295,21 @@ fn attempt<'a>(
     noise: f64,
     (now, slack): (f64, f64),
 ) -> Option<Try<'a>> {
-    let columns = |shape: f64| -> Vec<Column> { cause.instance(scene, shape).terms.iter().map(|t| readings.column(t)).collect() };
-    let with = |own: &[Column]| -> f64 {
-        let all: Vec<&Column> = fixed.iter().copied().chain(own).collect();
-        readings.quick(&all, noise)
+    let columns = |span: Span| -> Vec<Column> { cause.lasting(scene, span).terms.iter().map(|t| readings.column(t)).collect() };
+    let left = |span: Span| -> f64 {
+        let own = columns(span);
+        readings.quick(&fixed.iter().copied().chain(&own).collect::<Vec<_>>(), noise)
     };
-    let mut shapes = if known.is_none() { cause.shapes(scene) } else { Vec::new() };
-    let mut scanned: Scan = known.unwrap_or_default();
-    let lone = shapes.len() == 1;
-    let mut step = shapes.windows(2).map(|w| w[1] - w[0]).filter(|d| d.is_finite()).fold(0.0, f64::max);
-    while !shapes.is_empty() {
-        scanned.extend(shapes.iter().map(|s| (*s, if lone { 0.0 } else { with(&columns(*s)) })));
-        let best = scanned.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
-        shapes.clear();
-        if cause.resolution() > 0.0 && best.is_finite() && step > cause.resolution() {
-            step /= 4.0;
-            let inside = |s: &f64| *s > scene.heard.0 && *s < scene.heard.1;
-            shapes = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0].map(|k| best + k * step).into_iter().filter(inside).collect();
-        }
-    }
-    let best = scanned.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
-    // from the beginning rather than from an instant that predicts hardly better
-    let whole = scanned.iter().find(|s| s.0.is_nan()).map(|s| s.1);
-    let least = scanned.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
-    let simpler = whole.is_some_and(|w| evidence(readings.looks(), w, least, slack) < SHAPE);
-    let best = if simpler { f64::NAN } else { best };
-    let instance = cause.instance(scene, best);
-    let own = columns(best);
+    let mut scanned = known.unwrap_or_else(|| scan(cause, scene, &left));
+    let span = plainest(&scanned, &|a, b| evidence(readings.looks(), a, b, slack))?;
+    let instance = cause.lasting(scene, span);
+    let own = columns(span);
     let all: Vec<&Column> = fixed.iter().copied().chain(&own).collect();
     let solved = readings.solve(&all, noise)?;
     let after = Readings::square(&solved.heldout);
     let evidence = evidence(readings.looks(), now, after, slack);
-    scanned.sort_by(|a, b| a.0.total_cmp(&b.0));
-    Some(Try { instance, columns: own, solved, scanned, evidence, gain: 1.0 - after / now.max(1e-300) })
+    scanned.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.0[1].total_cmp(&b.0[1])));
+    Some(Try { instance, span, columns: own, solved, scanned, evidence, gain: 1.0 - after / now.max(1e-300) })
 }
 
 /// Drops what the others have made superfluous.
@@ -260,6 +329,26 @@ fn prune(readings: &Readings, base: &[Column], chosen: &mut Vec<Try<'_>>, noise:
             k = 0;
         } else {
             k += 1;
+        }
+    }
+}
+
+/// Drops a cause of a few constants each of which may be nothing, one after the other.
+fn drop_open(readings: &Readings, base: &[Column], chosen: &mut Vec<Try<'_>>, noise: f64) {
+    loop {
+        let Some(solved) = chosen.last().map(|c| &c.solved) else { return };
+        let mut at = base.len();
+        let open = chosen.iter().position(|c| {
+            let own = at..at + c.columns.len();
+            at = own.end;
+            !c.instance.flexible && own.into_iter().all(|i| solved.coefficients[i].abs() < 1.96 * solved.sigma[i])
+        });
+        let Some(k) = open else { return };
+        chosen.remove(k);
+        let columns = base.iter().chain(chosen.iter().flat_map(|c| &c.columns)).collect::<Vec<_>>();
+        let Some(without) = readings.solve(&columns, noise) else { return };
+        if let Some(last) = chosen.last_mut() {
+            last.solved = without;
         }
     }
 }
@@ -289,12 +378,13 @@ fn conclude<'a>(
     for (t, lost) in chosen.into_iter().zip(lost) {
         let (lost, without) = lost.map_or_else(|| (after.heldout.clone(), Vec::new()), |s| (s.heldout, s.coefficients));
         let left = Readings::square(&lost);
-        let least = t.scanned.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
-        let near = |s: &(f64, f64)| 0.5 * looks * (s.1 / least.max(1e-300)).ln() < 1.92;
-        let shape_ci = bracket(&t.scanned, near);
+        // of those that have as many numbers as the one that was chosen
+        let least = t.scanned.iter().filter(|s| numbers(&s.0) == numbers(&t.span)).map(|s| s.1).fold(f64::INFINITY, f64::min);
+        let near = |left: f64| 0.5 * looks * (left / least.max(1e-300)).ln() < 1.92;
         found.push(Found {
             instance: t.instance,
-            shape_ci,
+            until: t.span[1],
+            shape_ci: [0, 1].map(|which| bracket(&t.scanned, t.span, which, near)),
             reduction: 1.0 - (full / left.max(1e-300)).sqrt(),
             by_axis: reductions(&lost, &after.heldout),
             without,
@@ -303,10 +393,15 @@ fn conclude<'a>(
     Outcome { found, before, after, probability, alternatives }
 }
 
-/// From the last shape below those that explain nearly as well as the best to the first above them: the truth lies between tries.
-fn bracket(scanned: &[(f64, f64)], near: impl Fn(&(f64, f64)) -> bool) -> [f64; 2] {
-    let known: Vec<&(f64, f64)> = scanned.iter().filter(|s| s.0.is_finite()).collect();
-    let (Some(first), Some(last)) = (known.iter().position(|s| near(s)), known.iter().rposition(|s| near(s))) else {
+/// From the last shape below those that explain nearly as well as the best to the first above them, with the other number of the span as it is: the
+/// truth lies between tries.
+fn bracket(scanned: &[(Span, f64)], best: Span, which: usize, near: impl Fn(f64) -> bool) -> [f64; 2] {
+    let other = 1 - which;
+    let same =
+        |span: &Span| span[which].is_finite() && (span[other] == best[other] || span[other].is_nan() && best[other].is_nan());
+    let mut known: Vec<(f64, f64)> = scanned.iter().filter(|s| same(&s.0)).map(|s| (s.0[which], s.1)).collect();
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (Some(first), Some(last)) = (known.iter().position(|s| near(s.1)), known.iter().rposition(|s| near(s.1))) else {
         return [f64::INFINITY, f64::NEG_INFINITY];
     };
     [known[first.saturating_sub(1)].0, known[(last + 1).min(known.len() - 1)].0]
@@ -327,9 +422,12 @@ pub(crate) fn parameters(found: &Found<'_>, coefficients: &[f64], sigma: &[f64])
             i.terms.iter().zip(coefficients.iter().zip(sigma)).map(|(t, (c, s))| parameter(&t.name, *c, t.unit, *s)).collect()
         }
     };
-    if let Some((name, unit, value)) = i.shape.filter(|s| s.2.is_finite()) {
-        let [lo, hi] = found.shape_ci;
-        out.push(Parameter { name: name.to_owned(), value, unit: unit.to_owned(), ci95: [lo.min(value), hi.max(value)] });
+    let until = Some(("t1", "s", found.until));
+    for (which, (name, unit, value)) in [i.shape, until].into_iter().enumerate().filter_map(|(k, s)| Some((k, s?))) {
+        if value.is_finite() {
+            let [lo, hi] = found.shape_ci[which];
+            out.push(Parameter { name: name.to_owned(), value, unit: unit.to_owned(), ci95: [lo.min(value), hi.max(value)] });
+        }
     }
     out
 }

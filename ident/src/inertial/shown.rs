@@ -103,9 +103,9 @@ fn over(id: &str, term: &Term<'_>, axis: usize, scene: &Scene<'_>, claimed: &[bo
     let own = AXES[axis];
     let of = goes_with(term).unwrap_or(axis);
     let letter = AXES[of];
-    let always = term.support.0 == f64::NEG_INFINITY;
+    let always = term.support == (f64::NEG_INFINITY, f64::INFINITY);
     match id {
-        // before it was attached nothing was there: over time
+        // before it was attached, and after it was taken off, nothing was there: over time
         "hard_iron" if always => {
             let heading = |i: usize| scene.to_earth[i].m21.atan2(scene.to_earth[i].m11).to_degrees();
             make("heading".to_owned(), "deg", &heading)

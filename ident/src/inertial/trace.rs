@@ -14,7 +14,7 @@ use super::unknown::correct;
 use crate::effects::Scope;
 use crate::unexplained::LOUD;
 use crate::verdict::{Alternative, EffectEntry, Kin, Kind};
-use crate::words::{channel, list};
+use crate::words::{channel, digits, list};
 use nalgebra::Vector3;
 
 /// What a sensor is and how well it can be predicted at best.
@@ -183,6 +183,7 @@ fn added(outcome: &Outcome<'_>, base: usize) -> Vec<Added> {
         Added {
             id: f.instance.id.to_owned(),
             shape_s: f.instance.shape.map(|s| s.2).filter(|s| s.is_finite()),
+            until_s: Some(f.until).filter(|s| s.is_finite()),
             variable: None,
             coefficients: outcome.after.coefficients[from..at].to_vec(),
         }
@@ -199,6 +200,11 @@ fn contribution(outcome: &Outcome<'_>, base: usize, t: f64, row: usize) -> Vecto
         at += f.instance.terms.len();
     }
     sum
+}
+
+/// A share in per cent to two digits.
+fn two_digits(percent: f64) -> String {
+    format!("{} %", digits(percent, 10f64.powf(percent.abs().max(1.0).log10().floor() - 1.0)))
 }
 
 fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectEntry> {
@@ -222,8 +228,8 @@ fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectE
             parameters: parameters(f, c, s),
             heldout_error_reduction: axes.first().map_or(0.0, |k| f.by_axis[*k].max(0.0)),
             evidence: format!(
-                "without it left-out stretches are predicted {:.1} % worse{but}",
-                100.0 * (1.0 / (1.0 - f.reduction).max(1e-9) - 1.0)
+                "without it left-out stretches are predicted {} worse{but}",
+                two_digits(100.0 * (1.0 / (1.0 - f.reduction).max(1e-9) - 1.0))
             ),
         }
     };

@@ -146,6 +146,7 @@ impl Correction<'_> {
         Added {
             id: self.entry.id.clone(),
             shape_s: None,
+            until_s: None,
             variable: Some(self.variable.to_owned()),
             coefficients: self.solved.coefficients[base..].to_vec(),
         }

@@ -34,7 +34,8 @@ impl AirframeEffect for HardIron {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
-        let since = found.tell("t0", |v| format!(" from {v} on"), "");
+        let on = if found.parameter("t1").is_some() { "" } else { " on" };
+        let since = found.tell("t0", |v| format!(" from {v}{on}"), "") + &found.tell("t1", |v| format!(" until {v}"), "");
         let does = found.tell_length("offset", "uT", |v| format!("adds {v} to the field"), "shifts the field");
         Clause::new("a magnet on board", format!("{does}{since}"))
     }
