@@ -30,6 +30,8 @@ const LOWEST_HZ: f64 = 15.0;
 const PERIODS: f64 = 30.0;
 /// A line stands this far over the median of the spectrum.
 const LINE: f64 = 6.0;
+/// Share of the error from which on a line is predicted: what changes less counts as no change (specification, "Verdict").
+const LEAST_SHARE: f64 = 0.02;
 /// Mean square of all windows over that of the quietest, and the same for the loudest twentieth, from which it shakes.
 const SHAKES: (f64, f64) = (9.0, 16.0);
 
@@ -48,14 +50,19 @@ pub(crate) fn shake(recording: &Recording, used: &[bool], setting: &Setting, sen
     let (all, loud) = (mean / (quiet * quiet), (quantile(&level, 0.95) / quiet).powi(2));
     let (frequency, ratio) = line(&left, rate);
     let has_line = ratio > LINE;
-    if !has_line && (all < SHAKES.0 || loud < SHAKES.1) {
+    let shakes = all >= SHAKES.0 && loud >= SHAKES.1;
+    if !has_line && !shakes {
         return None;
     }
     let square = |v: &[Vector3<f64>]| v.iter().map(Vector3::norm_squared).sum::<f64>();
     let wave = if has_line { sinusoid(&rows, &left, &recording.t, frequency) } else { vec![Vector3::zeros(); left.len()] };
     let after: Vec<Vector3<f64>> = left.iter().zip(&wave).map(|(l, w)| l - w).collect();
     let reduction = 1.0 - (square(&after) / square(&left).max(1e-300)).sqrt();
-    let predicted = has_line && reduction > 0.02;
+    let predicted = has_line && reduction > LEAST_SHARE;
+    // a line that removes nothing explains nothing, unless the whole shakes
+    if !predicted && !shakes {
+        return None;
+    }
     let mut added = vec![Vector3::repeat(f64::NAN); used.len()];
     rows.iter().for_each(|i| added[*i] = Vector3::zeros());
     if predicted {
