@@ -27,6 +27,7 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     of_every_rig: |found| found.id == "spinup_lag",
     // a curve is seen in its figure
     parameter: |id, name| if id == "unknown" { String::new() } else { parameter(name) },
+    by_floors: false,
 };
 
 /// Rotors of one figure: as many lines as the eye tells apart.

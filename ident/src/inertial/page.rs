@@ -23,6 +23,7 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     clause,
     of_every_rig: |_| false,
     parameter: named,
+    by_floors: true,
 };
 
 /// A parameter in words: what it is, and of which axis.

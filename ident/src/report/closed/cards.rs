@@ -26,7 +26,7 @@ const OPEN: f64 = 0.05;
 /// The cards: those of this rig, those of every rig, and corrections without a name.
 pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     let v = page.verdict;
-    let order = order(v);
+    let order = order(v, page.words);
     let group = |e: &EffectEntry| match e.id.as_str() {
         "unknown" => 2,
         _ if (page.words.of_every_rig)(e) => 1,

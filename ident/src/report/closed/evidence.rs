@@ -157,7 +157,7 @@ pub(crate) fn part(trace: &Trace, id: &str, names: [&'static str; 2], wide: f64)
 /// The channel that the sentence begins with, over time and enlarged; without names the loudest.
 pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Vec<Figure> {
     let own = |e: &&EffectEntry| e.id != "unknown" && !(words.of_every_rig)(e) && !e.is_of_single_readings();
-    let told = order(verdict).into_iter().map(|k| &verdict.effects[k]).find(own).and_then(|e| e.channels.first());
+    let told = order(verdict, words).into_iter().map(|k| &verdict.effects[k]).find(own).and_then(|e| e.channels.first());
     let weight = |t: &&Trace| {
         verdict.channels.get(&t.channel).map_or(0.0, |c| match verdict.verdict {
             // a ratio of two figures beneath the floor tells nothing

@@ -55,17 +55,27 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
 }
 
 /// Effects in the order in which they are told: what removes most first, what a few readings hold last.
-pub(crate) fn order(v: &Verdict) -> Vec<usize> {
+pub(crate) fn order(v: &Verdict, words: Vocabulary) -> Vec<usize> {
     let mut order: Vec<usize> = (0..v.effects.len()).collect();
-    let removed = |k: &usize| v.effects[*k].heldout_error_reduction;
+    let removed = |k: &usize| {
+        let e = &v.effects[*k];
+        if words.by_floors { floors_removed(v, e) } else { e.heldout_error_reduction }
+    };
     let of_readings = |k: &usize| v.effects[*k].is_of_single_readings();
     order.sort_by(|a, b| of_readings(a).cmp(&of_readings(b)).then(removed(b).total_cmp(&removed(a))).then(a.cmp(b)));
     order
 }
 
+/// By how many noise floors the error of an effect's first channel is larger without it.
+fn floors_removed(v: &Verdict, e: &EffectEntry) -> f64 {
+    let Some(c) = e.channels.first().and_then(|name| v.channels.get(name)) else { return 0.0 };
+    let without = c.after.heldout_rms / (1.0 - e.heldout_error_reduction).max(1e-9);
+    (without - c.after.heldout_rms) / c.noise_floor_rms.max(f64::MIN_POSITIVE)
+}
+
 /// The effects with a name: those of this rig, and those of every rig.
 fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&EffectEntry>) {
-    let all = order(verdict).into_iter().map(|k| &verdict.effects[k]).filter(|e| e.id != "unknown");
+    let all = order(verdict, words).into_iter().map(|k| &verdict.effects[k]).filter(|e| e.id != "unknown");
     all.partition(|e| !(words.of_every_rig)(e))
 }
 
@@ -79,8 +89,9 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         return [said, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
     }
     let all = if own.is_empty() { &common } else { &own };
-    // what takes next to nothing stands on its card alone, unless there is nothing else
-    let large = |e: &&&EffectEntry| (e.heldout_error_reduction >= SMALL && !e.is_of_single_readings()) || all.len() == 1;
+    // what takes next to nothing, or is of sizes that may be nothing, stands on its card alone, unless there is nothing else
+    let known = |e: &EffectEntry| !e.is_of_single_readings() && e.open_sizes().is_none();
+    let large = |e: &&&EffectEntry| (e.heldout_error_reduction >= SMALL && known(e)) || all.len() == 1;
     let mut told: Vec<&EffectEntry> = all.iter().filter(large).take(MOST).copied().collect();
     if told.is_empty() {
         told = all.iter().take(1).copied().collect();

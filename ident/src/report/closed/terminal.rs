@@ -39,7 +39,7 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
         out += &format!("{}\n", wrapped(&left_out.to_string(), 2));
     }
     let of = |k: &usize| &verdict.effects[*k];
-    let (named, nameless): (Vec<usize>, Vec<usize>) = order(verdict).into_iter().partition(|k| of(k).id != "unknown");
+    let (named, nameless): (Vec<usize>, Vec<usize>) = order(verdict, words).into_iter().partition(|k| of(k).id != "unknown");
     let (own, common): (Vec<usize>, Vec<usize>) = named.into_iter().partition(|k| !(words.of_every_rig)(of(k)));
     let noun = words.noun;
     let [this, every] = [format!("what this {noun} has"), format!("what every {noun} has")];

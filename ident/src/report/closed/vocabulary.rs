@@ -26,6 +26,9 @@ pub struct Vocabulary {
     pub of_every_rig: fn(&EffectEntry) -> bool,
     /// A parameter in words, by the effect's identifier and its own name; empty where no reader asks for it.
     pub parameter: fn(&str, &str) -> String,
+    /// Whether what removes most noise floors is told first, rather than what removes the largest share of its own channel: for a log whose channels
+    /// are of unlike sizes.
+    pub by_floors: bool,
 }
 
 impl Vocabulary {
@@ -42,6 +45,7 @@ impl Vocabulary {
             ("unknown", _) => String::new(),
             _ => parameter(name),
         },
+        by_floors: false,
     };
 
     /// What a found effect does, and of several runs on which.
