@@ -6,7 +6,7 @@
 //! Units: as the measures state.
 //! Reference: effective sample size of an autoregressive residual, Bayley & Hammersley 1946.
 
-use super::columns::{LATE_S, Of, columns};
+use super::columns::{Of, columns};
 use super::curve::{Curve, SAMPLES, usable};
 use super::measure::{Measure, Scale, Value};
 use crate::context::{Context, Relation, Target, unit_of};
@@ -90,7 +90,7 @@ fn of_column(what: Of, curve: &Curve, c: f64, se: f64) -> Told {
         Of::Bend => of("bend", format!("bend of {name} halfway up"), "%", 100.0 * c, 100.0 * se),
         // a lag that is longer than the column's has more than its whole share in it: what is known is the delay that the share makes
         Of::Late(k, tau) => {
-            let words = format!("delay of {name} by what settles within some {} s", LATE_S[k]);
+            let words = format!("delay of {name}, {} part", ["fast", "middle", "slow"][k]);
             of(["late fast", "late", "late slow"][k], words, "s", tau * c, tau * se)
         }
         Of::Hysteresis => of("hysteresis", format!("{name} on the way up less down, half"), unit, c, se),

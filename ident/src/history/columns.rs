@@ -38,7 +38,7 @@ impl Of {
 }
 
 /// Time constants of what comes late, s; the first at least as long as the samples ask for.
-pub(super) const LATE_S: [f64; 3] = [0.15, 1.0, 15.0];
+const LATE_S: [f64; 3] = [0.15, 1.0, 15.0];
 /// Samples that the fastest must hold.
 const FASTEST: f64 = 1.5;
 /// Move of the load that turns its direction, over the top.

@@ -111,7 +111,7 @@ pub fn summary(history: &History) -> String {
                 return format!("Nothing changed over {n} runs beyond what days differ by{span}.");
             }
             let few = format!(
-                "No change was found over {n} runs{span}, but so few cannot show that there was none: what days differ by is not known, and a control chart needs {fewest} runs before one of them can lie outside its limits."
+                "No change was found over {n} runs{span}, but so few cannot show that there was none. What days differ by is not known from them: a control chart needs {fewest} runs before one of them can lie outside its limits."
             );
             [few, differences(history)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
         }
