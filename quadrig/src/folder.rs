@@ -13,6 +13,11 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// The last part of a path, as a page tells it.
+pub(crate) fn name_of(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
 /// Files to be written.
 pub(crate) struct Folder<'a> {
     path: &'a Path,

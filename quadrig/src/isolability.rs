@@ -8,15 +8,16 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
-use crate::folder::Folder;
+use crate::folder::{Folder, name_of};
 use crate::open::open;
 use crate::progress::Bar;
 use crate::sim::fly;
+use crate::trouble::unread;
 use hal_sim::Scenario;
 use hal_sim::scenario::AnyScenario;
 use ident::import::Options;
 use ident::isolability::{Apart, Cause, Isolability, Standing, isolability, short};
-use ident::log::Log;
+use ident::log::{Log, digest};
 use ident::report;
 use ident::report::wrapped;
 use std::path::{Path, PathBuf};
@@ -50,7 +51,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         isolability(&log, &mut |share| bar.set(share))?
     };
     if let Some(mut folder) = folder {
-        let texts = [report::isolability(&found).html(), report::isolability_svg(&found), report::isolability_csv(&found)];
+        let texts = [
+            report::isolability(&found, &comes_from(&args.input)?).html(),
+            report::isolability_svg(&found),
+            report::isolability_csv(&found),
+        ];
         FILES.into_iter().zip(texts).for_each(|(name, text)| folder.add(name, text));
         folder.write()?;
     }
@@ -58,6 +63,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         crate::say::text(&(flown(&hidden) + &text(&found)));
     }
     Ok(())
+}
+
+/// Where the page comes from: the file with its digest, and the command.
+fn comes_from(input: &Path) -> Result<Vec<(&'static str, String)>, Failure> {
+    let of = if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) { "scenario" } else { "log" };
+    let bytes = std::fs::read(input).map_err(unread(input))?;
+    let again = format!("quadrig isolability {} -o out", name_of(input));
+    Ok(vec![(of, name_of(input)), ("SHA-256", digest(&bytes)), ("again", again)])
 }
 
 /// The log, and the effects that a scenario would have hidden in it.
@@ -68,8 +81,7 @@ fn log_of(input: &Path, quiet: bool) -> Result<(Log, Vec<String>), Failure> {
         };
         let hidden = scenario.effects.iter().map(|e| e.id().to_owned()).collect();
         let healthy = Scenario { effects: Vec::new(), ..*scenario };
-        let name = input.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        return Ok((fly(&healthy, None, &name, "flying", quiet)?, hidden));
+        return Ok((fly(&healthy, None, &name_of(input), "flying", quiet)?, hidden));
     }
     if inertial::is_attitude_log(input) || flight::is_flight_log(input) {
         return Err(format!("{}: an attitude or flight log; expected a rig log or a scenario", input.display()).into());

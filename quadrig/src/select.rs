@@ -8,7 +8,7 @@
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::folder::figures;
+use crate::folder::{figures, name_of};
 use crate::open::{Columns, open};
 use crate::progress::Bar;
 use crate::run_log::to_log;
@@ -18,7 +18,7 @@ use hal_sim::plant::{Propeller, motor};
 use hal_sim::scenario::Schedule;
 use ident::context::Context;
 use ident::identify::settled;
-use ident::log::write_whole;
+use ident::log::{digest, write_whole};
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::report::{WIDEST, selection, wrapped};
@@ -146,7 +146,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let batteries = args.batteries.max(3);
     let rows: Vec<Row> = pairs.iter().filter_map(|p| row(p, &airframe, batteries)).collect();
     let chosen = choose(&rows, &need);
-    let sheet = selection(&pairs, &rows, &airframe, &need, batteries);
+    let from = comes_from(args)?;
+    let sheet = selection(&pairs, &rows, &airframe, (&need, batteries), &from);
     if let Some(path) = &args.output {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
@@ -166,6 +167,21 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         left_out.iter().for_each(|why| note!("left out: {why}"));
     }
     Ok(())
+}
+
+/// Where the pairs come from, for the page: files with their digests.
+fn comes_from(args: &Args) -> Result<Vec<(&'static str, String)>, Failure> {
+    let mut out = Vec::new();
+    for path in &args.files {
+        let bytes = std::fs::read(path).map_err(unread(path))?;
+        out.extend([("file", name_of(path)), ("SHA-256", digest(&bytes))]);
+    }
+    if args.files.is_empty() {
+        let source =
+            if args.simulated { "the simulator's catalogue, every pair flown" } else { "the figures that the thesis states" };
+        out.push(("pairs", source.to_owned()));
+    }
+    Ok(out)
 }
 
 /// Logs and tables, told apart by their first line, and why others are left out; refused only where none is left.

@@ -1,6 +1,6 @@
 //! The page of the isolability matrix.
 //!
-//! What it is: the answer, the matrix as a drawing, the sizes as a table, the groups with the run that would split them; and the matrix as CSV.
+//! What it is: the answer, the matrix as a grid and, for a file of its own, as a drawing, the sizes as a table, the groups with the run that would split them; and the matrix as CSV.
 //! What can go wrong: nothing.
 //! Units: noise floors, and each cause's own.
 //! Reference: docs/isolability.md; isolability matrix, Krysander & Frisk 2008, IEEE Trans. SMC-A 38:1183.
@@ -19,14 +19,11 @@ const TOP: f64 = 84.0;
 /// Height of a row: a line of a phone's letters.
 const ROW: f64 = 19.0;
 
-/// The page.
+/// The page; `from` is what else is known of where it comes from, the digest of its log for instance.
 #[must_use]
-pub fn isolability(found: &Isolability) -> Sheet {
-    let mut sheet = Sheet::new(&format!("Which causes can {} tell apart?", found.run));
-    sheet.say(&found.summary());
-    let floors: Vec<String> =
-        found.channels.iter().map(|(name, floor, unit)| format!("{name} {} {unit}", short(*floor))).collect();
-    sheet.say(&format!("{} rows over {:.0} s. Noise floors: {}.", found.rows, found.duration_s, floors.join(", ")));
+pub fn isolability(found: &Isolability, from: &[(&str, String)]) -> Sheet {
+    let mut sheet = Sheet::told(&format!("Which causes can {} tell apart?", found.run), &found.summary());
+    sheet.soft(&format!("{} - {} rows in {:.0} s", found.run, found.rows, found.duration_s));
     if !found.found.is_empty() {
         sheet.say(&format!(
             "The log as it is holds {}. They stay in it, each beside every cause but itself.",
@@ -34,8 +31,8 @@ pub fn isolability(found: &Isolability) -> Sheet {
         ));
     }
     sheet.section("The matrix");
-    sheet.say("A row is a cause that is there, a column what it could be taken for. Touch a cell for its size.");
-    sheet.drawing("matrix", &drawn(found, ""));
+    sheet.say("A row is a cause that is there, a column what it could be taken for. Columns have the numbers of the rows.");
+    sheet.with_file("matrix", &isolability_csv(found), |sheet| sheet.html_part(&gridded(found)));
     sheet.section("From which size on");
     sheet.say("Size is the root mean square of what the declared model cannot take up, in noise floors of the channel. From it on the search names the cause, right to a factor of about two.");
     let head = [
@@ -48,10 +45,58 @@ pub fn isolability(found: &Isolability) -> Sheet {
         "told later from",
     ];
     let rows: Vec<Vec<String>> = (0..found.causes.len()).map(|k| row(found, k)).collect();
-    sheet.table(&head, &rows, |k| found.standing(k) == Standing::Alike);
+    sheet.chosen("sizes", &head, &rows, |k| found.standing(k) == Standing::Alike);
     groups(&mut sheet, found);
     rest(&mut sheet, found);
+    sheet.section("Noise floors");
+    let floors: Vec<Vec<String>> =
+        found.channels.iter().map(|(name, floor, unit)| vec![name.clone(), short(*floor), (*unit).to_owned()]).collect();
+    sheet.data("floors", &["channel", "noise floor", "unit"], &floors, None);
+    sheet.comes_from(from);
     sheet
+}
+
+/// The look of the matrix: a name beside its cells, on a phone above them.
+const GRID: &str = "<style>
+.matrix{display:grid;grid-template-columns:max-content repeat(var(--n),minmax(0,1fr));gap:2px;align-items:center;max-width:64rem;margin:.6rem 0;font-size:.9rem}
+.matrix span{padding-right:.5rem;white-space:nowrap}.matrix b{font-weight:400;font-size:.8rem;text-align:center;color:var(--soft);overflow:visible;white-space:nowrap;width:0;justify-self:center;display:flex;justify-content:center}
+.matrix i,.look i{display:block;print-color-adjust:exact;-webkit-print-color-adjust:exact}.look{display:flex;flex-wrap:wrap;gap:.2rem 1.2rem;font-size:.9rem}.look span{display:flex;align-items:center;gap:.4rem}.look i{width:.9rem}
+i.l0{height:.35rem;background:var(--c)}i.l1{height:.7rem;background:var(--f)}i.l2{height:1.1rem;background:var(--b)}i.l3{height:.15rem;background:var(--d);opacity:.4}
+@media screen and (max-width:700px){.matrix{grid-template-columns:repeat(var(--n),minmax(0,1fr));gap:1px}.matrix span{grid-column:1/-1;padding-top:.5rem}.matrix .corner{display:none}}
+</style>
+";
+
+/// The matrix as a grid of the page's own letters, which keep their size whatever its width.
+fn gridded(found: &Isolability) -> String {
+    let shown = judged(found);
+    let mut out = format!("{GRID}<p class=\"look\">");
+    for (look, (_, _, text)) in LOOKS.iter().enumerate() {
+        let _ = write!(out, "<span><i class=\"l{look}\"></i>{text}</span>");
+    }
+    let _ = write!(out, "</p>\n<div class=\"matrix\" style=\"--n:{}\"><span class=\"corner\"></span>", shown.len().max(1));
+    for k in &shown {
+        let number = if is_numbered(*k) { (k + 1).to_string() } else { String::new() };
+        let _ = write!(out, "<b>{number}</b>");
+    }
+    for k in &shown {
+        let cause = &found.causes[*k];
+        let _ = write!(out, "\n<span>{} {}</span>", k + 1, escape(&cause.name));
+        for other in &shown {
+            match cell(found, *k, *other) {
+                Some((look, text)) => {
+                    let rival = escape(&found.causes[*other].name);
+                    let _ = write!(out, "<i class=\"l{look}\" title=\"{} for {rival}: {text}\"></i>", escape(&cause.name));
+                }
+                None => out += "<i></i>",
+            }
+        }
+    }
+    out + "</div>\n"
+}
+
+/// Whether the column of a cause has its number above it: every fifth, which the eye counts from.
+fn is_numbered(k: usize) -> bool {
+    k == 0 || (k + 1) % 5 == 0
 }
 
 fn row(found: &Isolability, k: usize) -> Vec<String> {
@@ -136,7 +181,7 @@ fn drawn(found: &Isolability, head: &str) -> String {
             y + 5.0,
             k + 1
         );
-        if *k == 0 || (k + 1) % 5 == 0 {
+        if is_numbered(*k) {
             let _ =
                 write!(out, "<text class=\"tick\" text-anchor=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>", TOP - 5.0, k + 1);
         }
@@ -169,18 +214,24 @@ fn legend(out: &mut String) {
     }
 }
 
-fn draw_cell(out: &mut String, found: &Isolability, (k, other): (usize, usize), (x, y, cell): (f64, f64, f64)) {
-    let (cause, rival) = (&found.causes[k], &found.causes[other]);
+/// How a cause looks beside another, and the size that says so; nothing for one name.
+fn cell(found: &Isolability, k: usize, other: usize) -> Option<(usize, String)> {
+    let cause = &found.causes[k];
     let named = cause.seen.as_ref().map_or(f64::INFINITY, |s| s.floors);
-    let (look, text) = match &cause.apart[other] {
-        Apart::SameName => return,
+    Some(match &cause.apart[other] {
+        Apart::SameName => return None,
         Apart::Elsewhere => (3, "no common channel".to_owned()),
         Apart::From(size) if size.floors <= named * std::f64::consts::SQRT_2 && named.is_finite() => {
             (0, format!("from {} floors", short(named)))
         }
         Apart::From(size) => (1, format!("from {} floors", short(size.floors))),
         Apart::Never => (2, format!("not up to {} floors", short(cause.tried.floors))),
-    };
+    })
+}
+
+fn draw_cell(out: &mut String, found: &Isolability, (k, other): (usize, usize), (x, y, cell_width): (f64, f64, f64)) {
+    let (cause, rival) = (&found.causes[k], &found.causes[other]);
+    let Some((look, text)) = cell(found, k, other) else { return };
     let (class, share, _) = LOOKS[look];
     let tall = (ROW - 3.0) * share;
     // what cannot meet is there to complete the grid, and no more
@@ -188,9 +239,9 @@ fn draw_cell(out: &mut String, found: &Isolability, (k, other): (usize, usize), 
     let _ = write!(
         out,
         "<rect class=\"{class} col\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{tall:.1}\"{faint}><title>{} for {}: {text}</title></rect>",
-        x + 0.08 * cell,
+        x + 0.08 * cell_width,
         y + 0.5 * (ROW - tall),
-        0.84 * cell,
+        0.84 * cell_width,
         escape(&cause.name),
         escape(&rival.name)
     );
@@ -226,4 +277,37 @@ pub fn isolability_csv(found: &Isolability) -> String {
         out.push('\n');
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::isolability::isolability as ask;
+    use crate::log::{Column, Log};
+
+    /// A staircase with thrust of the square of its speed.
+    fn staircase() -> Log {
+        let n = 600;
+        let level = |i: usize| 1.0 + ((i / 60) % 10) as f64;
+        let ripple = |i: usize, k: usize| ((i * 7919 + k * 104_729) % 1009) as f64 / 504.5 - 1.0;
+        let column = |name: &str, values: Vec<f64>| Column { name: name.into(), values };
+        let columns = vec![
+            column("pulse_us", (0..n).map(|i| 1000.0 + 80.0 * level(i)).collect()),
+            column("rpm", (0..n).map(|i| 600.0 * level(i) + ripple(i, 0)).collect()),
+            column("thrust_n", (0..n).map(|i| 0.1 * level(i).powi(2) + 0.01 * ripple(i, 1)).collect()),
+        ];
+        Log { name: "stairs.csv".into(), t: (0..n).map(|i| 0.05 * i as f64).collect(), columns, ..Log::default() }
+    }
+
+    #[test]
+    fn the_page_has_the_matrix_in_letters_of_its_own_and_where_it_comes_from() {
+        let found = ask(&staircase(), &mut |_| {}).unwrap();
+        let html = isolability(&found, &[("log", "stairs.csv".to_owned()), ("SHA-256", "abc".to_owned())]).html();
+        let names = judged(&found).len();
+        assert!(names > 3 && html.matches("<span>").count() == names + LOOKS.len(), "{names}");
+        assert!(html.contains("class=\"told\"") && html.contains(&format!("--n:{names}")) && html.contains("class=\"stack\""));
+        assert!(html.contains("download=\"matrix.csv\"") && html.contains("download=\"sizes.csv\""));
+        assert!(html.contains(&format!("quadrig {}", env!("CARGO_PKG_VERSION"))) && html.contains(">abc</td>"));
+        assert!(isolability_svg(&found).contains("<svg"));
+    }
 }

@@ -13,35 +13,44 @@ use crate::select::{Airframe, Need, Pair, Row, choose};
 /// Colours in the order of the motors.
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 
-/// The page of a selection.
+/// The page of a selection; `from` is where its pairs come from, files with their digests for instance.
 #[must_use]
-pub fn selection(pairs: &[Pair], rows: &[Row], airframe: &Airframe, need: &Need, batteries: u32) -> Sheet {
+pub fn selection(
+    pairs: &[Pair],
+    rows: &[Row],
+    airframe: &Airframe,
+    (need, batteries): (&Need, u32),
+    from: &[(&str, String)],
+) -> Sheet {
     let chosen = choose(rows, need);
-    let mut sheet = Sheet::new("Motor, propeller and battery");
-    sheet.say(&match chosen.first() {
-        Some(best) => format!(
-            "Of {} pairs with a result, {} give at least {:.2} N in total {}with {} x {:.1} A.h. The most efficient of them: {} with {} ({:.2} N/A).",
-            rows.len(),
-            chosen.len(),
-            need.total_thrust_n.0,
-            if need.full_throttle_min.0 > 0.0 {
-                format!("and last {:.1} min at full throttle ", need.full_throttle_min.0)
-            } else {
-                String::new()
-            },
-            need.batteries,
-            airframe.capacity_ah.0,
-            best.pair.motor,
-            best.pair.propeller,
-            best.efficiency_n_per_a
-        ),
-        None => format!("No pair gives {:.2} N in total under these needs.", need.total_thrust_n.0),
-    });
+    let mut sheet = Sheet::told(
+        "Motor, propeller and battery",
+        &match chosen.first() {
+            Some(best) => format!(
+                "{} with {} is the most efficient of the pairs that give enough ({:.2} N/A). Of {} pairs with a result, {} give at least {:.2} N in total {}with {} x {:.1} A.h.",
+                best.pair.motor,
+                best.pair.propeller,
+                best.efficiency_n_per_a,
+                rows.len(),
+                chosen.len(),
+                need.total_thrust_n.0,
+                if need.full_throttle_min.0 > 0.0 {
+                    format!("and last {:.1} min at full throttle ", need.full_throttle_min.0)
+                } else {
+                    String::new()
+                },
+                need.batteries,
+                airframe.capacity_ah.0
+            ),
+            None => format!("No pair gives {:.2} N in total under these needs.", need.total_thrust_n.0),
+        },
+    );
+    sheet.soft(&format!("{} pairs, {} with a result", pairs.len(), rows.len()));
     sheet.section("Mass by battery count (Table 8)");
     let masses: Vec<Vec<String>> = (0..=batteries)
         .map(|n| vec![n.to_string(), format!("{:.3}", airframe.mass(n).0), format!("{:.0}", airframe.charge(n).0 * 1000.0)])
         .collect();
-    sheet.table(&["batteries", "mass, kg", "charge, mA.h"], &masses, |_| false);
+    sheet.data("mass", &["batteries", "mass, kg", "charge, mA.h"], &masses, None);
     sheet.section("Performance of each pair (Table 9)");
     table(&mut sheet, rows, &chosen, batteries);
     let missing: Vec<String> =
@@ -68,6 +77,7 @@ pub fn selection(pairs: &[Pair], rows: &[Row], airframe: &Airframe, need: &Need,
     sheet.section("Endurance and efficiency against resultant force (Figures A.13 to A.30)");
     let figures = motors(rows).iter().flat_map(|m| (1..=batteries).map(|n| endurance(rows, m, n)).collect::<Vec<_>>()).collect();
     sheet.figures(figures);
+    sheet.comes_from(from);
     sheet
 }
 
@@ -99,7 +109,7 @@ fn table(sheet: &mut Sheet, rows: &[Row], chosen: &[&Row], batteries: u32) {
         })
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    sheet.table(&header, &cells, |i| chosen.iter().any(|c| std::ptr::eq(*c, &rows[i])));
+    sheet.chosen("pairs", &header, &cells, |i| chosen.iter().any(|c| std::ptr::eq(*c, &rows[i])));
 }
 
 fn motors(rows: &[Row]) -> Vec<String> {

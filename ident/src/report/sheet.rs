@@ -12,6 +12,7 @@ use super::style::{COLOURS, DRAWING, PAGE};
 use super::svg::escape;
 use crate::log::write_whole;
 use crate::verdict::Channels;
+use crate::words::upper;
 use std::path::{Path, PathBuf};
 
 /// Most columns of a table that a phone shows as one.
@@ -45,7 +46,8 @@ impl Sheet {
     }
 
     /// An empty page that begins with a sentence.
-    pub(crate) fn told(title: &str, sentence: &str) -> Self {
+    #[must_use]
+    pub fn told(title: &str, sentence: &str) -> Self {
         // what was found stands large, how much that is and what is left beneath
         let (found, rest) = sentence.split_once(". ").map_or((sentence, ""), |(found, rest)| (found, rest));
         let dot = if rest.is_empty() { "" } else { "." };
@@ -57,7 +59,7 @@ impl Sheet {
     }
 
     /// A line in the second rank.
-    pub(crate) fn soft(&mut self, text: &str) {
+    pub fn soft(&mut self, text: &str) {
         self.body += &format!("<p class=\"soft\">{}</p>\n", escape(text));
     }
 
@@ -76,23 +78,40 @@ impl Sheet {
 
     /// A table that can be copied, and downloaded as CSV: `raw` with all digits where it is given, else what is seen. A very long one is cut, and
     /// so is its CSV where that is long.
-    pub(crate) fn data(&mut self, name: &str, header: &[&str], rows: &[Vec<String>], raw: Option<(&[&str], &[Vec<String>])>) {
+    pub fn data(&mut self, name: &str, header: &[&str], rows: &[Vec<String>], raw: Option<(&[&str], &[Vec<String>])>) {
         let (head, lines) = raw.unwrap_or((header, rows));
-        let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
-        let text = |lines: &[Vec<String>]| -> String { std::iter::once(&head).chain(lines).map(|row| csv_line(row)).collect() };
-        let (all, most) = (text(lines), LONGEST.min(lines.len()));
-        let (csv, has) =
-            if all.len() > MOST_CSV { (text(&lines[..most]), "the CSV has no more") } else { (all, "the CSV has all") };
-        self.body += "<div class=\"tab\">";
-        self.table(header, &rows[..rows.len().min(LONGEST)], |_| false);
-        self.body += &format!(
-            "<p class=\"tools\"><a download=\"{}.csv\" href=\"{}\">CSV</a><button class=\"copy\" hidden>copy</button></p></div>\n",
-            escape(name),
-            data_uri("text/csv", &csv)
-        );
+        let (all, most) = (csv(head, lines), LONGEST.min(lines.len()));
+        let (file, has) =
+            if all.len() > MOST_CSV { (csv(head, &lines[..most]), "the CSV has no more") } else { (all, "the CSV has all") };
+        self.with_file(name, &file, |sheet| sheet.table(header, &rows[..rows.len().min(LONGEST)], |_| false));
         if rows.len() > LONGEST {
             self.say(&format!("The first {LONGEST} of {} rows; {has}.", rows.len()));
         }
+    }
+
+    /// The same with rows that stand out.
+    pub fn chosen(&mut self, name: &str, header: &[&str], rows: &[Vec<String>], chosen: impl Fn(usize) -> bool) {
+        self.with_file(name, &csv(header, rows), |sheet| sheet.table(header, rows, chosen));
+    }
+
+    /// What `fill` writes, a table or what stands for one, with a file that holds it.
+    pub(crate) fn with_file(&mut self, name: &str, csv: &str, fill: impl FnOnce(&mut Self)) {
+        self.body += "<div class=\"tab\">";
+        let from = self.body.len();
+        fill(self);
+        // what is no table has no rows to copy
+        let copy = if self.body[from..].contains("<table") { "<button class=\"copy\" hidden>copy</button>" } else { "" };
+        let (name, file) = (escape(name), data_uri("text/csv", csv));
+        self.body += &format!("<p class=\"tools\"><a download=\"{name}.csv\" href=\"{file}\">CSV</a>{copy}</p></div>\n");
+    }
+
+    /// Where a page comes from: the program, then what else is known of it, files with their digests for instance.
+    pub fn comes_from(&mut self, known: &[(&str, String)]) {
+        self.section("Where this comes from");
+        let program = ("program", format!("quadrig {}", env!("CARGO_PKG_VERSION")));
+        let rows = std::iter::once(&program).chain(known).filter(|(_, value)| !value.is_empty());
+        let rows: Vec<Vec<String>> = rows.map(|(what, value)| vec![upper(what), value.clone()]).collect();
+        self.data("provenance", &["what", "value"], &rows, None);
     }
 
     /// A table that can be copied on a closed loop's page.
@@ -205,11 +224,6 @@ impl Sheet {
         self.body += "</div>\n";
     }
 
-    /// A drawing of its own kind, as wide as the text.
-    pub(crate) fn drawing(&mut self, id: &str, svg: &str) {
-        self.body += &format!("<figure id=\"{}\" style=\"max-width:48rem\">{svg}</figure>\n", escape(id));
-    }
-
     /// The page.
     #[must_use]
     pub fn html(&self) -> String {
@@ -237,6 +251,12 @@ fn unbroken(cell: &str) -> String {
         if signed { format!("<span class=\"n\">{}</span>", escape(word)) } else { escape(word) }
     };
     cell.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// Rows as CSV.
+fn csv(head: &[&str], rows: &[Vec<String>]) -> String {
+    let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
+    std::iter::once(&head).chain(rows).map(|row| csv_line(row)).collect()
 }
 
 /// A line of CSV.

@@ -14,13 +14,15 @@ mod summary;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
-use crate::folder::Folder;
+use crate::folder::{Folder, name_of};
 use crate::open::read_model;
 use crate::progress::Bar;
+use crate::trouble::unread;
 use hal_sim::Powerplant;
 use hal_sim::flight::Airframe;
 use hal_sim::mission::{AirframeFile, Catalogue, Flight, Mission, RotorCurves, catalogue_plants, fly_whole};
 use hal_sim::plant::air::SEA_LEVEL_DENSITY;
+use ident::log::digest;
 use ident::model::Model;
 use rotor::ModelRotor;
 use std::io::Write;
@@ -108,7 +110,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         if !flight.seen.is_empty() {
             folder.add("attitude.csv", record::attitudes(&flight.seen).into_bytes());
         }
-        folder.add("flight.html", page::page(&summary, &flight).into_bytes());
+        folder.add("flight.html", page::page(&summary, &flight, &comes_from(args)?).into_bytes());
         folder.write()?;
     }
     let said = if args.json { summary.json() } else { summary.text() };
@@ -128,6 +130,21 @@ fn has_numbers(flight: &Flight, from: &Path) -> Result<(), Failure> {
         let expected = "expected speeds and thrusts that a rotor can have: was the model changed by hand?";
         Err(format!("{}: the flight on it has no finite numbers from {:.2} s on; {expected}", from.display(), row.t_s).into())
     })
+}
+
+/// Where the page comes from: the mission and the model with their digests, and the command.
+fn comes_from(args: &Args) -> Result<Vec<(&'static str, String)>, Failure> {
+    let mut out = Vec::new();
+    let mut again = format!("quadrig fly {}", name_of(&args.mission));
+    for (what, path) in std::iter::once(("mission", &args.mission)).chain(args.model.iter().map(|path| ("model", path))) {
+        let bytes = std::fs::read(path).map_err(unread(path))?;
+        out.extend([(what, name_of(path)), ("SHA-256", digest(&bytes))]);
+        if what == "model" {
+            again += &format!(" --model {}", name_of(path));
+        }
+    }
+    out.push(("again", again + " -o out"));
+    Ok(out)
 }
 
 /// A rig's model. A flight's or an inertial unit's is refused as what it is.

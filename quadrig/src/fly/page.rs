@@ -16,13 +16,12 @@ use ident::report::{Figure, Layer, Sheet};
 /// Colours in the order of the rotors and axes.
 const CLASSES: [&str; 6] = ["a", "b", "c", "e", "f", "d"];
 
-/// The page of a flight with its summary.
-pub(super) fn page(summary: &Summary, flight: &Flight) -> String {
+/// The page of a flight with its summary; `from` is where it comes from, the mission and the model with their digests.
+pub(super) fn page(summary: &Summary, flight: &Flight, from: &[(&str, String)]) -> String {
     let rows = &flight.rows[..];
-    let mut sheet = Sheet::new(&format!("Flight: {}", summary.mission));
-    sheet.say(&summary.told());
-    sheet.say(&summary.lead());
-    sheet.table(&["", ""], &summary.table(), |_| false);
+    let mut sheet = Sheet::told(&format!("Flight: {}", summary.mission), &summary.told());
+    sheet.soft(&summary.lead());
+    sheet.data("summary", &["of", "what"], &summary.table(), None);
     // the row of the touch itself is a jolt beside which nothing else would show
     let rows = if summary.ends_in_touch { &rows[..rows.len() - 1] } else { rows };
     sheet.section("Pulses and margins");
@@ -92,6 +91,7 @@ pub(super) fn page(summary: &Summary, flight: &Flight) -> String {
         );
         sheet.figures(board);
     }
+    sheet.comes_from(from);
     sheet.html()
 }
 
