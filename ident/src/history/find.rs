@@ -14,9 +14,7 @@ use super::{FEWEST, History};
 use crate::history::name::Name;
 use serde::Serialize;
 
-/// Prior odds of a change among some runs.
-const PRIOR: f64 = 1.0 / 9.0;
-/// Probability from which on a change is told.
+/// Probability from which on a change is told; before the runs are seen a change and none are as likely.
 const TOLD: f64 = 0.98;
 /// Prior share of the measures that a change moves.
 const MOVED: f64 = 0.1;
@@ -147,7 +145,7 @@ fn sought(history: &History, [from, to]: [usize; 2]) -> Option<Change> {
     let step = log_mean((0..gaps).map(mean));
     let drift = if n > FEWEST { mean(gaps) } else { f64::NEG_INFINITY };
     // either is as likely before
-    let whole = log_mean([step, drift].into_iter()) + PRIOR.ln();
+    let whole = log_mean([step, drift].into_iter());
     let probability = 1.0 / (1.0 + (-whole).exp());
     if probability < TOLD {
         return None;

@@ -159,7 +159,7 @@ fn judge(line: &mut Line, history: &History) {
     line.names = shown.names.iter().map(|n| format!("{} {:.1}", n.id, n.score)).collect::<Vec<_>>().join("|");
     line.named = it.is_some()
         && match line.kind.as_str() {
-            "drift" => shown.moved.first().is_some_and(|m| m.name == "thrust_n gain"),
+            "drift" => shown.moved.first().is_some_and(|m| m.name.starts_with("thrust_n gain")),
             _ => shown.names.first().is_some_and(|n| n.id == line.truth),
         };
 }
