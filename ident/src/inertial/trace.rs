@@ -124,9 +124,9 @@ pub(crate) fn trace<'a>(
     Some(Traced { sensor, effect, named })
 }
 
-/// What a cause belongs to: what stands in the room is not the board's.
-fn scope(id: &str) -> Scope {
-    if id == "stationary_magnet" { Scope::Run } else { Scope::Rig }
+/// What a cause belongs to: what stands in the room, or was taken off again, is not the board's.
+fn scope(found: &Found<'_>) -> Scope {
+    if found.instance.id == "stationary_magnet" || found.until.is_finite() { Scope::Run } else { Scope::Rig }
 }
 
 /// The axes of which a cause speaks, the one that it helps most first: none that is predicted worse with all that was found.
@@ -219,7 +219,7 @@ fn entries(outcome: &Outcome<'_>, base: usize, setting: &Setting) -> Vec<EffectE
         EffectEntry {
             kin: Kin::Own,
             id: f.instance.id.to_owned(),
-            scope: scope(f.instance.id),
+            scope: scope(f),
             run: None,
             channels: axes.iter().map(|k| setting.channels[*k].to_owned()).collect(),
             depends_on: f.instance.depends_on.iter().map(|d| (*d).to_owned()).collect(),
