@@ -65,7 +65,9 @@ fn the_missions_of_the_thesis() {
     assert!((0.02..0.2).contains(&r[soon].to_degrees()) && roll[soon].abs() < 2e-4, "{} {}", r[soon], roll[soon]);
     let landed = fly("landing");
     let told = std::fs::read_to_string(at.join("out/landing/flight.html")).expect("the page");
-    assert!(told.contains("<p>It touched the ground after 16.7 s, at 4.7 m/s downwards. At the most it was 63.0 m high"));
+    assert!(told.contains(
+        "<h1>It touched the ground after 16.7 s, at 4.7 m/s downwards.</h1>\n<p class=\"lead\">At the most it was 63.0 m high"
+    ));
     assert!(number(&landed, "/touched_m_s") > 4.0 && number(&landed, "/touched_s") < 30.0);
 
     assert_eq!(names(&at.join("out")), ["excitation", "hover", "landing", "takeoff"], "nothing else is left");
