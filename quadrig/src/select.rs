@@ -119,9 +119,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         full_throttle_min: Minute(args.minutes),
         resultant_n: Newton(args.resultant),
     };
-    let (mut pairs, left_out) = match (&args.files[..], args.simulated) {
-        ([], true) => (fly_catalogue(quiet), Vec::new()),
-        ([], false) => (thesis(), Vec::new()),
+    let Found { mut pairs, from, left_out } = match (&args.files[..], args.simulated) {
+        ([], true) => Found::of(fly_catalogue(quiet), "the simulator's catalogue, every pair flown"),
+        ([], false) => Found::of(thesis(), "the figures that the thesis states"),
         (files, _) => read(files, args, quiet)?,
     };
     // 390KV before 1000KV
@@ -146,7 +146,6 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let batteries = args.batteries.max(3);
     let rows: Vec<Row> = pairs.iter().filter_map(|p| row(p, &airframe, batteries)).collect();
     let chosen = choose(&rows, &need);
-    let from = comes_from(args)?;
     let sheet = selection(&pairs, &rows, &airframe, (&need, batteries), &from);
     if let Some(path) = &args.output {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
@@ -169,27 +168,30 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Where the pairs come from, for the page: files with their digests.
-fn comes_from(args: &Args) -> Result<Vec<(&'static str, String)>, Failure> {
-    let mut out = Vec::new();
-    for path in &args.files {
-        let bytes = std::fs::read(path).map_err(unread(path))?;
-        out.extend([("file", name_of(path)), ("SHA-256", digest(&bytes))]);
+/// Pairs, where they come from, and why other files are left out.
+struct Found {
+    pairs: Vec<Pair>,
+    /// For the page: files with their digests.
+    from: Vec<(&'static str, String)>,
+    left_out: Vec<String>,
+}
+
+impl Found {
+    /// Pairs that no file holds.
+    fn of(pairs: Vec<Pair>, source: &str) -> Self {
+        Self { pairs, from: vec![("pairs", source.to_owned())], left_out: Vec::new() }
     }
-    if args.files.is_empty() {
-        let source =
-            if args.simulated { "the simulator's catalogue, every pair flown" } else { "the figures that the thesis states" };
-        out.push(("pairs", source.to_owned()));
-    }
-    Ok(out)
 }
 
 /// Logs and tables, told apart by their first line, and why others are left out; refused only where none is left.
-fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<(Vec<Pair>, Vec<String>), Failure> {
-    let (mut pairs, mut left_out) = (Vec::new(), Vec::new());
+fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<Found, Failure> {
+    let (mut pairs, mut from, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for path in files {
         match pairs_of(path, args, quiet) {
-            Ok(found) => pairs.extend(found),
+            Ok(found) => {
+                pairs.extend(found);
+                from.extend([("file", name_of(path)), ("SHA-256", digest(&std::fs::read(path).map_err(unread(path))?))]);
+            }
             Err(why) => left_out.push(why.to_string()),
         }
     }
@@ -198,7 +200,7 @@ fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<(Vec<Pair>, Vec<S
         Some(first) if pairs.is_empty() => {
             Err(format!("none of the {} files holds a pair; the first: {first}", files.len()).into())
         }
-        _ => Ok((pairs, left_out)),
+        _ => Ok(Found { pairs, from, left_out }),
     }
 }
 

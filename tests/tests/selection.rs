@@ -107,8 +107,10 @@ fn a_bad_file_costs_its_own_row_alone() {
     write("bad.csv", &format!("{head}D,10x5,x,8\n"));
     let run = quadrig_tests::bench::good_log();
     write("no-names.csv", &run);
-    let words = ["select", "good.csv", "bad.csv", "nowhere.csv", "no-names.csv"];
+    let words = ["select", "good.csv", "bad.csv", "nowhere.csv", "no-names.csv", "-o", "page.html"];
     let said = call(folder.path(), &words).succeeded();
+    let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(page.contains(&ident::log::digest(run.as_bytes())) && !page.contains("bad.csv"), "the files that gave a pair");
     assert!(said.out.lines().all(|l| l.chars().count() <= 100), "{}", said.out);
     let told = said.out.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(

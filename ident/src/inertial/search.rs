@@ -259,7 +259,7 @@ fn scan(cause: &dyn Cause, scene: &Scene<'_>, left: &dyn Fn(Span) -> f64) -> Sca
 fn refine(cause: &dyn Cause, scene: &Scene<'_>, scanned: &mut Scan, mut step: f64, left: &dyn Fn(Span) -> f64) {
     let fits = |span: &Span| {
         let inside = |v: &f64| !v.is_finite() || *v > scene.heard.0 && *v < scene.heard.1;
-        span.iter().all(inside) && !(span[0] >= span[1]) && cause.can_be_told(scene, *span)
+        span.iter().all(inside) && (numbers(span) < 2 || span[0] < span[1]) && cause.can_be_told(scene, *span)
     };
     let about = |scanned: &mut Scan, steps: &[f64]| {
         for which in 0..2 {

@@ -96,7 +96,7 @@ fn gridded(found: &Isolability) -> String {
 
 /// Whether the column of a cause has its number above it: every fifth, which the eye counts from.
 fn is_numbered(k: usize) -> bool {
-    k == 0 || (k + 1) % 5 == 0
+    k == 0 || (k + 1).is_multiple_of(5)
 }
 
 fn row(found: &Isolability, k: usize) -> Vec<String> {

@@ -17,11 +17,17 @@ pub(crate) struct HardIron;
 /// for the other.
 const OWN: f64 = 0.5;
 
+/// A span with its open ends.
+fn span_of([begins, ends]: Span) -> Span {
+    [if begins.is_nan() { f64::NEG_INFINITY } else { begins }, if ends.is_nan() { f64::INFINITY } else { ends }]
+}
+
 /// Share of the squares of a vector that is constant in body axes which no vector that is constant in earth axes stands for, where all directions
 /// are as likely: a constant in earth axes is at best its mean there.
-fn own_share(scene: &Scene<'_>, [from, until]: Span) -> f64 {
+fn own_share(scene: &Scene<'_>, span: Span) -> f64 {
+    let [from, until] = span_of(span);
     let rows = scene.to_earth.iter().zip(&scene.recording.t);
-    let inside = rows.filter(|(r, t)| r.m11.is_finite() && !(**t < from) && !(**t >= until));
+    let inside = rows.filter(|(r, t)| r.m11.is_finite() && (from..until).contains(*t));
     let (sum, n) = inside.fold((Matrix3::zeros(), 0.0), |(sum, n), (r, _)| (sum + r, n + 1.0));
     1.0 - (sum / f64::max(n, 1.0)).norm_squared() / 3.0
 }
@@ -52,8 +58,7 @@ impl Cause for HardIron {
     }
 
     fn lasting<'a>(&self, scene: &Scene<'a>, [begins, ends]: Span) -> Instance<'a> {
-        let from = if begins.is_nan() { f64::NEG_INFINITY } else { begins };
-        let until = if ends.is_nan() { f64::INFINITY } else { ends };
+        let [from, until] = span_of([begins, ends]);
         let t = &scene.recording.t;
         let there = move |i: usize| t[i] >= from && t[i] < until;
         let term = |k: usize| Term {
