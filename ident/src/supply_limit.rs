@@ -148,7 +148,12 @@ fn highest(step: &[Level], levels: &[Level]) -> Option<Limit> {
     let (expected, error_v) = by_the_lead(levels, c)?;
     let fell = expected - c.voltage.0;
     let is_limit = rises && is_most && short > CLEARLY * error && fell > CLEARLY * error_v.hypot(c.voltage.1);
-    is_limit.then(|| Limit { current: c.current, pulses: [b.pulse, c.pulse], volts: [b.voltage.0, c.voltage.0], begins: c.pulse })
+    is_limit.then_some(Limit {
+        current: c.current,
+        pulses: [b.pulse, c.pulse],
+        volts: [b.voltage.0, c.voltage.0],
+        begins: c.pulse,
+    })
 }
 
 /// The voltage that a lead leaves at a level by all the others, with its standard error: a straight line over the current.

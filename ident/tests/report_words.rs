@@ -108,7 +108,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             with_left(verdict(Kind::Attributed, vec![filter(0.7)])),
             true,
             &[
-                "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.030 N is left (slow).",
+                "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.030 N rms is left (slow).",
             ],
             &["noise."],
         ),
@@ -181,7 +181,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             },
             false,
             &[
-                "Something is left on thrust that no known effect explains. It goes with time; a smooth term without a name was fitted. On thrust 0.030 N is left (slow).",
+                "Something is left on thrust that no known effect explains. It goes with time; a smooth term without a name was fitted. On thrust 0.030 N rms is left (slow).",
             ],
             &["explains thrust", "%"],
         ),
@@ -201,14 +201,14 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         (
             with_left(verdict(Kind::None, vec![])),
             false,
-            &["No name was found for what the declared model leaves over. On thrust 0.030 N is left (slow)."],
+            &["No name was found for what the declared model leaves over. On thrust 0.030 N rms is left (slow)."],
             &["more than its noise", "explains"],
         ),
         (
             with_left(verdict(Kind::None, vec![])),
             true,
             &[
-                "Nothing is new since the declared model: what is left it left over on its own day, too. On thrust 0.030 N is left",
+                "Nothing is new since the declared model: what is left it left over on its own day, too. On thrust 0.030 N rms is left",
             ],
             &["explains"],
         ),
@@ -253,7 +253,7 @@ fn a_channel_without_a_model_is_told() {
     // what no model predicts is not told as what a model leaves
     v.unexplained = vec![left("rpm", 380.0), left("voltage_v", 8.0)];
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.ends_with("On voltage 80 mV is left (slow). Speed has no model: no command was logged."), "{said}");
+    assert!(said.ends_with("On voltage 80 mV rms is left (slow). Speed has no model: no command was logged."), "{said}");
     v.unexplained.truncate(1);
     let said = sentence(&v, Vocabulary::RIG, false);
     assert!(said.ends_with("Little is left beyond the noise. Speed has no model: no command was logged."), "{said}");
@@ -416,7 +416,7 @@ fn the_sentence_counts_what_the_state_calls_unexplained() {
         thrust.after.heldout_rms = 0.02;
     }
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.contains("On voltage 80 mV is left (slow).") && !said.contains("thrust"), "{said}");
+    assert!(said.contains("On voltage 80 mV rms is left (slow).") && !said.contains("thrust"), "{said}");
 }
 
 /// A share of a whole vector does not hide that one of its axes is worse for it.
@@ -444,7 +444,7 @@ fn a_size_and_its_look_are_of_one_sensor() {
     let on_its_way = Unexplained { looks_like: "while the load is on its way".into(), ..left("rpm_beam", 6.0) };
     v.unexplained = vec![Unexplained { looks_like: "in single rows".into(), ..left("rpm_hall", 8.0) }, on_its_way];
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.contains("up to 9.0 rev/min is left (while the load is on its way)"), "{said}");
+    assert!(said.contains("up to 9.0 rev/min rms is left (while the load is on its way)"), "{said}");
 }
 
 /// Rotors of which the same is told have one entry.

@@ -73,9 +73,15 @@ fn what_the_rig_has_is_shared_and_what_one_run_has_is_dated() {
         assert!(run.channels.values().all(|b| b.after < 1.05 * b.before), "{run:?}");
     }
     for (channel, factor) in [("thrust_n", 3.0), ("voltage_v", 5.0)] {
+        let of = |b: &ident::verdict::BeforeAfter| (b.before / b.after).ln();
+        let logs: Vec<f64> = v.runs.iter().filter_map(|r| r.channels.get(channel)).map(of).collect();
+        let times = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+        assert!(times > factor, "{channel}: {times} on an average run");
+        // over all runs the root of the mean square
         let c = &v.channels[channel];
-        let across = [c.before, c.after].map(|f| f.across_runs_rms.unwrap());
-        assert!(across[0] > factor * across[1], "{channel}: {across:?}");
+        let squares = v.runs.iter().map(|r| r.channels[channel].after.powi(2)).sum::<f64>();
+        let across = c.after.across_runs_rms.unwrap();
+        assert!((across / (squares / v.runs.len() as f64).sqrt() - 1.0).abs() < 1e-9, "{channel}: {across}");
     }
 
     // the file knows the event on its own run only: the run itself is predicted with it, a fresh run without
