@@ -161,7 +161,10 @@ fn what_is_no_history_is_refused() {
                 Ok(v) if k == column && seed == 2 => format!("{:.4}", 4.0 * v),
                 _ => c.to_owned(),
             };
-            if line.starts_with('#') {
+            if line.starts_with("# quadrig-log") {
+                // so much thrust is refused unless somebody vouches for it
+                format!("{line}\n# vouched = [\"thrust_n\"]")
+            } else if line.starts_with('#') {
                 line.to_owned()
             } else {
                 line.split(',').enumerate().map(cell).collect::<Vec<_>>().join(",")
