@@ -9,11 +9,14 @@
 mod clock;
 mod disc;
 mod gaps;
+mod head;
 pub(crate) mod plausible;
 mod whole;
 
 pub use disc::Disc;
 pub use gaps::Gaps;
+pub(crate) use head::event;
+pub use head::{event_line, meta_line};
 pub use whole::{folder_of, no_regular_file, place_of, what_lies_at, write_whole};
 
 use sha2::{Digest, Sha256};
@@ -242,31 +245,6 @@ impl Log {
         }
         Ok(())
     }
-}
-
-/// The comment line of a key and its value: one line, whatever the value.
-#[must_use]
-pub fn meta_line(key: &str, value: &toml::Value) -> String {
-    match value {
-        // a basic string, in which a line's end is escaped: the file would end the comment there
-        toml::Value::String(text) if text.contains(['\n', '\r']) => {
-            let escaped = text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n").replace('\r', "\\r");
-            format!("# {key} = \"{escaped}\"")
-        }
-        value => format!("# {key} = {value}"),
-    }
-}
-
-/// The comment line of an event.
-#[must_use]
-pub fn event_line(text: &str) -> String {
-    meta_line("event", &toml::Value::String(text.to_owned()))
-}
-
-/// The event that a comment tells, if it tells one.
-pub(crate) fn event(comment: &str) -> Option<String> {
-    let table = comment.strip_prefix("event").and_then(|_| comment.parse::<toml::Table>().ok())?;
-    table.get("event")?.as_str().map(str::to_owned)
 }
 
 fn decimals(name: &str) -> usize {
