@@ -82,10 +82,7 @@ impl Model {
             let mut volts = self.follows_by_itself(target).then(|| readings(context))??;
             self.less_what_it_says(context, target, &mut volts)?;
             let levels = levels(&volts, &context.regressor(target.relation)?);
-            let mut by_load: ByLoad = levels.iter().map(|l| (l.load, l.volts)).collect();
-            if target.relation == Relation::Current {
-                falling(&mut by_load);
-            }
+            let by_load: ByLoad = levels.iter().map(|l| (l.load, l.volts)).collect();
             (!by_load.is_empty()).then(|| (target.name.to_owned(), by_load))
         };
         self.supply = context.targets.iter().filter_map(of_target).collect();
@@ -192,16 +189,6 @@ fn trend(context: &Context, volts: &[(usize, f64)], level: impl Fn(usize) -> f64
     }
     let slope = if square > 0.0 { with / square } else { 0.0 };
     context.t.iter().map(|t| slope * (t - middle)).collect()
-}
-
-/// A supply's voltage falls with the load: where it is lower at a load than at a higher one, the supply had come to its limit, and the motor
-/// ran slower than it was driven to.
-fn falling(by_load: &mut ByLoad) {
-    let mut most = 0.0_f64;
-    for (_, volts) in by_load.iter_mut().rev() {
-        most = most.max(*volts);
-        *volts = most;
-    }
 }
 
 /// Median voltage of rows of about one load.
@@ -325,13 +312,6 @@ mod tests {
         let last = |all: Option<Vec<f64>>| all.and_then(|v| v.last().copied()).expect("a prediction");
         assert!(last(model.predict_at_its_own_supply(&context, "rpm")) < 2000.0, "1 Ah at 5 per Ah");
         assert!((last(model.predict(&context, "rpm")) - 5000.0).abs() < 1.0);
-    }
-
-    #[test]
-    fn a_limit_is_no_fall_with_the_load() {
-        let mut by_load = vec![(1.0, 11.0), (2.0, 7.5), (2.1, 10.8), (3.0, 10.0)];
-        falling(&mut by_load);
-        assert_eq!(by_load, [(1.0, 11.0), (2.0, 10.8), (2.1, 10.8), (3.0, 10.0)]);
     }
 
     #[test]
