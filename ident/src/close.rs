@@ -367,4 +367,20 @@ mod tests {
             assert!(held.is_finite() && held > 1.001 * seen && held < 3.0 * seen, "{held} held out, {seen} seen");
         }
     }
+
+    #[test]
+    fn a_motor_that_never_turned_is_told() {
+        let t: Vec<f64> = (0..400).map(|i| 0.1 * f64::from(i)).collect();
+        let wave = |k: f64| (0..400).map(|i| 0.01 * (k * f64::from(i * i)).sin()).collect::<Vec<f64>>();
+        let run = |rpm: f64| {
+            let speeds: Vec<f64> = (0..400).map(|i| rpm * f64::from(i / 40)).collect();
+            let columns = [("rpm", speeds), ("thrust_n", wave(0.7)), ("current_a", wave(1.3))];
+            let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+            Log { name: "rest.csv".to_owned(), t: t.clone(), columns, ..Log::default() }
+        };
+        let at_rest = |rpm: f64| close(&run(rpm), None, &[], &mut |_| {}).map(|closed| closed.verdict.at_rest);
+        assert!(!at_rest(500.0).expect("a run"));
+        // a log that is refused says as much
+        assert!(at_rest(0.0).unwrap_or(true));
+    }
 }

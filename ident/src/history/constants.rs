@@ -235,3 +235,39 @@ fn day(log: &Log) -> Vec<Told> {
     };
     [("temp_c", "temperature", "degC"), ("pressure_hpa", "pressure", "hPa")].into_iter().filter_map(of).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Column;
+
+    /// Four sensors of a speed that moves; the last of them a twentieth of a second late, and all of them whole numbers.
+    #[test]
+    fn a_sensor_that_is_late_is_told_in_milliseconds() {
+        let t: Vec<f64> = (0..1200).map(|i| 0.02 * f64::from(i)).collect();
+        let ramp = |t: f64| (1000.0 + 4000.0 * ((0.5 * t).sin() + 1.0)).round();
+        let of = |late: f64| t.iter().map(|t| ramp(t - late)).collect::<Vec<f64>>();
+        let columns = [("rpm_beam", of(0.0)), ("rpm_opto", of(0.0)), ("rpm_hall", of(0.0)), ("rpm_encoder", of(0.05))];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.into(), values }).collect();
+        let log = Log { name: "late.csv".into(), t, columns, ..Log::default() };
+        let told = differences(&log, &Context::new(&log, None));
+        let of = |name: &str| told.iter().find(|(m, _)| m.name == name).map(|(_, v)| *v).expect(name);
+        let late = of("rpm_encoder late beside");
+        assert!((late.value - 50.0).abs() < 3.0 && late.se < 3.0, "{late:?}");
+        assert!(of("rpm_beam late beside").value.abs() < 3.0);
+        // sensors that read the same to the last digit scatter by that digit, not by nothing
+        assert!(of("rpm_beam scatter beside").value > 1e-3, "{:?}", of("rpm_beam scatter beside"));
+    }
+
+    /// Dense air lifts thrust and torque alike: how their gains differ does not know of it.
+    #[test]
+    fn the_days_air_falls_out_of_two_gains() {
+        let gain = |channel: &str, value: f64| {
+            let of = measure(channel, "gain", "gain".to_owned(), "%", Scale::Linear);
+            (of, Value { value, se: 0.1 })
+        };
+        let beside = |thrust: f64, torque: f64| contrasts(&[gain("thrust_n", thrust), gain("torque_nm", torque)])[0].1;
+        assert_eq!(beside(2.0, 2.0).value, beside(-1.0, -1.0).value);
+        assert!((beside(-3.0, 1.0).value + 4.0).abs() < 1e-12 && (beside(0.0, 0.0).se - 0.1 * 2.0_f64.sqrt()).abs() < 1e-12);
+    }
+}

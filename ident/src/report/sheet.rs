@@ -294,3 +294,20 @@ pub fn write_figures(folder: &Path, figures: &[Figure]) -> Result<Vec<PathBuf>, 
     }
     Ok(out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_very_long_table_is_cut_and_says_so() {
+        let rows: Vec<Vec<String>> = (0..20_000).map(|k| vec![k.to_string(), "0.123456789".to_owned()]).collect();
+        let mut sheet = Sheet::told("a", "A page.");
+        sheet.data("levels", &["level", "value"], &rows, None);
+        let html = sheet.html();
+        assert!(html.contains("The first 300 of 20000 rows; the CSV has no more.") && html.len() < 200_000, "{}", html.len());
+        let mut sheet = Sheet::told("a", "A page.");
+        sheet.data("levels", &["level", "value"], &rows[..1000], None);
+        assert!(sheet.html().contains("The first 300 of 1000 rows; the CSV has all."));
+    }
+}
