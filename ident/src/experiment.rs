@@ -163,12 +163,7 @@ fn difference(context: &Context, a: &Model, b: &Model, schedule: &[ScheduleStep]
 
 /// The channels of what one of two models has and the other lacks: elsewhere their fits differ by chance, and by more where they are continued.
 fn apart_on(a: &Model, b: &Model) -> Vec<String> {
-    let lacks = |e: &AddedEffect, other: &Model| {
-        !other
-            .effects
-            .iter()
-            .any(|o| o.placed.effect.id() == e.placed.effect.id() && o.placed.instance.channels == e.placed.instance.channels)
-    };
+    let lacks = |e: &AddedEffect, other: &Model| !other.effects.iter().any(|o| o.placed.is_like(&e.placed));
     let own = a.effects.iter().filter(|e| lacks(e, b)).chain(b.effects.iter().filter(|e| lacks(e, a)));
     own.flat_map(|e| e.placed.instance.channels.iter().cloned()).collect()
 }

@@ -32,6 +32,11 @@ impl Placed {
         self.effect.id() == e.id && e.channels.iter().all(|c| self.instance.touches(c))
     }
 
+    /// Whether it is the same effect, in the same form on the same channels, whatever its shapes.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        self.effect.id() == other.effect.id() && self.instance == other.instance
+    }
+
     /// What is known of its shapes before any run, nats.
     pub(crate) fn prior(&self) -> f64 {
         self.effect.prior(&self.instance, &self.shape)

@@ -142,12 +142,15 @@ fn highest(step: &[Level], levels: &[Level]) -> Option<Limit> {
     let [a, b, c] = step else { return None };
     let rises = a.pulse + CALM_US < b.pulse && b.pulse + CALM_US < c.pulse && a.current.0 < b.current.0;
     let is_most = levels.iter().all(|l| l.pulse <= c.pulse && l.current.0 <= c.current.0);
+    if !rises || !is_most {
+        return None;
+    }
     let further = (c.pulse - b.pulse) / (b.pulse - a.pulse);
     let short = b.current.0 + further * (b.current.0 - a.current.0) - c.current.0;
     let error = ((1.0 + further) * b.current.1).hypot(further * a.current.1).hypot(c.current.1);
     let (expected, error_v) = by_the_lead(levels, c)?;
     let fell = expected - c.voltage.0;
-    let is_limit = rises && is_most && short > CLEARLY * error && fell > CLEARLY * error_v.hypot(c.voltage.1);
+    let is_limit = short > CLEARLY * error && fell > CLEARLY * error_v.hypot(c.voltage.1);
     is_limit.then_some(Limit {
         current: c.current,
         pulses: [b.pulse, c.pulse],

@@ -6,9 +6,7 @@
 //! Units: none.
 //! Reference: `fuzz/README.md`.
 
-use embedded_storage_async::nor_flash::{
-    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
-};
+use crate::chip::{Chip, PAGE};
 use firmware_rig::Config;
 use firmware_rig::rig_config::RigConfig;
 use firmware_rig::{AdcBlock, Beside, Delivered, RigConsole, Start};
@@ -22,7 +20,6 @@ use ident::inertial::InertialModel;
 use ident::log::Log;
 use ident::model::Model;
 use settings_store::{load, save};
-use std::convert::Infallible;
 use std::path::Path;
 
 /// A way in.
@@ -103,14 +100,15 @@ pub fn imu_line(data: &[u8]) {
 
 /// Two sectors of flash with anything in them: loaded, stored over, and loaded again.
 pub fn settings(data: &[u8]) {
-    let mut flash = Flash([0xff; 2 * PAGE]);
-    flash.0.iter_mut().zip(data).for_each(|(cell, byte)| *cell = *byte);
+    let mut flash = Chip::new();
+    flash.cells.iter_mut().zip(data).for_each(|(cell, byte)| *cell = *byte);
     let range = 0..2 * PAGE as u32;
     let _ = load::<RigConfig, _>(&mut flash, range.clone());
     let (found, _) = load::<firmware_ahrs::Settings, _>(&mut flash, range.clone());
     let own = found.unwrap_or_default();
     if save(&mut flash, range.clone(), &own) == SettingsNews::Saved {
         let (again, _) = load::<firmware_ahrs::Settings, _>(&mut flash, range);
+        // by their words, for what is no number is not equal to itself
         assert_eq!(again.map(|s| format!("{s:?}")), Some(format!("{own:?}")), "what was stored is what is loaded");
     }
 }
@@ -169,54 +167,3 @@ pub fn schedule(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let _ = ::schedule::Plan::parse(text, Path::new("fuzzed.toml"));
 }
-
-const PAGE: usize = 4096;
-
-/// Flash that never fails.
-struct Flash([u8; 2 * PAGE]);
-
-impl NorFlashError for Never {
-    fn kind(&self) -> NorFlashErrorKind {
-        match self.0 {}
-    }
-}
-
-/// It does not fail.
-#[derive(Debug)]
-struct Never(Infallible);
-
-impl ErrorType for Flash {
-    type Error = Never;
-}
-
-impl ReadNorFlash for Flash {
-    const READ_SIZE: usize = 1;
-
-    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Never> {
-        let at = offset as usize;
-        bytes.copy_from_slice(&self.0[at..at + bytes.len()]);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        self.0.len()
-    }
-}
-
-impl NorFlash for Flash {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = PAGE;
-
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Never> {
-        self.0[from as usize..to as usize].fill(0xff);
-        Ok(())
-    }
-
-    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Never> {
-        // programming only clears bits
-        self.0[offset as usize..].iter_mut().zip(bytes).for_each(|(cell, byte)| *cell &= byte);
-        Ok(())
-    }
-}
-
-impl MultiwriteNorFlash for Flash {}

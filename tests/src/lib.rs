@@ -11,6 +11,7 @@ pub mod bench;
 pub mod blind;
 pub mod book;
 pub mod budget;
+pub mod chip;
 pub mod desk;
 pub mod flights;
 pub mod fuzzed;

@@ -1,95 +1,15 @@
 //! Settings of both boards in flash: power cuts at every single operation, wear, damage.
 
-use embedded_storage_async::nor_flash::{
-    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
-};
 use firmware_ahrs::Settings as ImuSettings;
 use firmware_rig::rig_config::Calibrated;
 use firmware_rig::{Config, RigConfig};
 use frame::calibration::AdcScale;
 use frame::message::SettingsNews;
+use quadrig_tests::chip::{Chip, PAGE};
 use settings_store::{Stored, load, save};
 use std::fmt::Debug;
 
-const PAGE: usize = 4096;
 const RANGE: std::ops::Range<u32> = 0..2 * PAGE as u32;
-
-/// Flash as the part has it: erased to ones, programming clears bits a word at a time. The power can be cut after any number of
-/// words programmed or erased.
-#[derive(Clone)]
-struct Chip {
-    cells: Vec<u8>,
-    /// Operations until the cut.
-    left: Option<usize>,
-    operations: usize,
-    erases: [usize; 2],
-    dead: bool,
-}
-
-#[derive(Debug)]
-struct Gone;
-impl NorFlashError for Gone {
-    fn kind(&self) -> NorFlashErrorKind {
-        NorFlashErrorKind::Other
-    }
-}
-
-impl Chip {
-    fn new() -> Self {
-        Self { cells: vec![0xff; 2 * PAGE], left: None, operations: 0, erases: [0; 2], dead: false }
-    }
-
-    /// One word's worth of work, if there is still power.
-    fn work(&mut self) -> Result<(), Gone> {
-        if self.dead || self.left == Some(0) {
-            self.left = Some(0);
-            return Err(Gone);
-        }
-        self.left = self.left.map(|n| n - 1);
-        self.operations += 1;
-        Ok(())
-    }
-}
-
-impl ErrorType for Chip {
-    type Error = Gone;
-}
-impl ReadNorFlash for Chip {
-    const READ_SIZE: usize = 1;
-    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Gone> {
-        if self.left == Some(0) {
-            return Err(Gone);
-        }
-        let at = offset as usize;
-        bytes.copy_from_slice(&self.cells[at..at + bytes.len()]);
-        Ok(())
-    }
-    fn capacity(&self) -> usize {
-        self.cells.len()
-    }
-}
-impl NorFlash for Chip {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = PAGE;
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Gone> {
-        for word in (from as usize..to as usize).step_by(4) {
-            self.work()?;
-            self.cells[word..word + 4].fill(0xff); // a cut leaves the page half erased
-        }
-        self.erases[from as usize / PAGE] += 1;
-        Ok(())
-    }
-    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Gone> {
-        for (i, word) in bytes.chunks(4).enumerate() {
-            self.work()?;
-            for (cell, byte) in self.cells[offset as usize + 4 * i..].iter_mut().zip(word) {
-                *cell &= byte;
-            }
-        }
-        Ok(())
-    }
-}
-impl MultiwriteNorFlash for Chip {}
 
 /// Settings that differ by a number.
 trait Numbered: Stored + Debug + Clone {

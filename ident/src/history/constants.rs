@@ -138,18 +138,14 @@ fn differences(log: &Log, context: &Context) -> Vec<Told> {
     let top = top[top.len() * 49 / 50];
     let mut out = Vec::new();
     for (name, own) in &channels {
+        let others = others_of(&channels, name, log.len());
         let mut columns = [Vec::new(), Vec::new()];
         let mut y = Vec::new();
-        for row in (0..log.len()).filter(|row| context.rpm[*row] > 0.2 * top && own[*row].is_finite()) {
-            let mut others: Vec<f64> =
-                channels.iter().filter(|c| c.0 != *name).map(|c| c.1[row]).filter(|v| v.is_finite()).collect();
-            if others.is_empty() {
-                continue;
-            }
-            let others = median(&mut others);
+        let both = |row: &usize| own[*row].is_finite() && others[*row].is_finite();
+        for row in (0..log.len()).filter(both).filter(|row| context.rpm[*row] > 0.2 * top) {
             columns[0].push(1.0);
             columns[1].push(context.rpm[row] / top - 0.5);
-            y.push(100.0 * (own[row] - others) / context.rpm[row]);
+            y.push(100.0 * (own[row] - others[row]) / context.rpm[row]);
         }
         if y.len() < SAMPLES {
             continue;
@@ -172,7 +168,7 @@ fn differences(log: &Log, context: &Context) -> Vec<Told> {
         let rms = variance.sqrt().max(100.0 * quantum(own) / (12.0_f64.sqrt() * top));
         let scatter = measure(name, "scatter beside", format!("scatter of {words} about the others"), "%", Scale::Log);
         out.push((scatter, Value { value: rms, se: rms / (2.0 * n).sqrt() }));
-        out.extend(lag(context, own, &others_of(&channels, name, log.len()), words.as_str(), name));
+        out.extend(lag(context, own, &others, &words, name));
         let far = y.len() as f64 - n + 0.5;
         let odd = measure(name, "odd rows", format!("rows in which {words} stands alone"), "%", Scale::Count);
         let share = 100.0 / y.len() as f64;
@@ -181,7 +177,7 @@ fn differences(log: &Log, context: &Context) -> Vec<Told> {
     out
 }
 
-/// The median of the other speed sensors on each row.
+/// The median of the other speed sensors on each row; no number where none reads.
 fn others_of(channels: &[(&'static str, &[f64])], name: &str, rows: usize) -> Vec<f64> {
     let of = |row: usize| {
         let mut all: Vec<f64> = channels.iter().filter(|c| c.0 != name).map(|c| c.1[row]).filter(|v| v.is_finite()).collect();

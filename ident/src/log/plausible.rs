@@ -94,6 +94,12 @@ fn rotor(log: &Log) -> Option<&[f64]> {
     SPEED.into_iter().find_map(|s| log.column(s))
 }
 
+/// The speed that is told first, and what it typically reads over rows.
+fn turning(log: &Log, rows: &[usize]) -> Option<(&'static str, f64)> {
+    let name = SPEED.into_iter().find(|s| log.column(s).is_some())?;
+    Some((name, typical(log, name, rows)?))
+}
+
 /// Rows of the upper load: speed, or else thrust, or else current above 70 % of its highest. And rows at rest.
 fn loaded(log: &Log) -> (Vec<usize>, Vec<usize>) {
     let Some(load) = rotor(log).or_else(|| log.column("thrust_n")).or_else(|| log.column("current_a")) else {
@@ -176,7 +182,7 @@ fn thrust(log: &Log) -> Option<Doubt> {
     if thrust <= 0.0 {
         return None;
     }
-    if let Some(n) = rotor(log).and_then(|_| typical(log, SPEED.into_iter().find(|s| log.column(s).is_some())?, &rows)) {
+    if let Some((_, n)) = turning(log, &rows) {
         let k = thrust / (n * n);
         let said = |likely: &str| format!("{thrust:.3} N at {n:.0} rev/min: {likely}");
         if k > 1.1e-3 {
@@ -232,8 +238,8 @@ fn disc(log: &Log) -> Option<Doubt> {
     let (rows, _) = loaded(log);
     let known = Disc::of(log);
     let (diameter, area, air) = (known.diameter_m?, known.area_m2()?, known.density_kg_m3?);
-    let name = SPEED.into_iter().find(|s| log.column(s).is_some())?;
-    let (thrust, n) = (typical(log, "thrust_n", &rows)?, typical(log, name, &rows)? / 60.0);
+    let (name, rpm) = turning(log, &rows)?;
+    let (thrust, n) = (typical(log, "thrust_n", &rows)?, rpm / 60.0);
     if thrust <= 0.0 || n <= 0.0 {
         return None;
     }
@@ -265,8 +271,7 @@ fn disc(log: &Log) -> Option<Doubt> {
 
 fn torque(log: &Log) -> Option<Doubt> {
     let (rows, _) = loaded(log);
-    let name = SPEED.into_iter().find(|s| log.column(s).is_some())?;
-    let (torque, n) = (typical(log, "torque_nm", &rows)?, typical(log, name, &rows)?);
+    let (torque, (_, n)) = (typical(log, "torque_nm", &rows)?, turning(log, &rows)?);
     let power = typical(log, "voltage_v", &rows)? * typical(log, "current_a", &rows)?;
     let shaft = torque * n * std::f64::consts::TAU / 60.0;
     if power <= 0.0 || torque <= 0.0 || (power < FAINT && shaft < FAINT) {
@@ -330,6 +335,25 @@ mod tests {
         }
         let reversed = rig("", |n, t, u, i| [n, t, -u, i]).expect_err("a sign");
         assert!(reversed.contains("voltage_v") && reversed.contains("sign"), "{reversed}");
+    }
+
+    /// The same rig with a torque: 2.7 N for 17 W at the shaft have a merit of 0.67.
+    #[test]
+    fn no_propeller_beats_an_ideal_disc() {
+        let of = |times: f64| {
+            let row = |k: i32| {
+                let rpm = 1000.0 * f64::from(k / 80);
+                let (thrust, torque) = (times * 1.7e-7 * rpm * rpm, 2.5e-9 * rpm * rpm);
+                format!("{},{rpm},{thrust:.5},{torque:.6}\n", 0.1 * f64::from(k))
+            };
+            let rows: String = (0..400).map(row).collect();
+            let head = "# quadrig-log 1\n# propeller = \"11x4.7\"\n# air_density_kg_m3 = 1.2\nt_s,rpm,thrust_n,torque_nm\n";
+            let log = Log::parse("rig.csv", (head.to_owned() + &rows).as_bytes()).expect("a log");
+            disc(&log).map(|doubt| (doubt.never, doubt.what))
+        };
+        assert_eq!(of(1.0), None);
+        assert!(of(1.8).is_some_and(|(never, what)| !never && what.contains("an ideal disc has 1")), "{:?}", of(1.8));
+        assert!(of(2.5).is_some_and(|(never, _)| never) && of(0.06).is_some_and(|(never, _)| !never), "{:?}", of(0.06));
     }
 
     #[test]

@@ -6,7 +6,6 @@
 //! Units: scores in nats.
 //! Reference: forward selection by cross-validation over groups, Hastie et al. 2009, section 7.10.
 
-use super::differing::is_same;
 use super::joint::{Across, Compared, Joint, Shared, compared};
 use super::{FEWEST, Member};
 use crate::close::Closed;
@@ -52,10 +51,10 @@ fn pool(joint: &Joint<'_, '_>, runs: &[&Closed]) -> Vec<Vec<Placed>> {
             return;
         }
         // and what has a size of its own on each run with those
-        if joint.members.iter().any(|m| m.own.iter().any(|own| is_same(own, p))) {
+        if joint.members.iter().any(|m| m.own.iter().any(|own| own.is_like(p))) {
             return;
         }
-        match out.iter_mut().find(|o| is_same(&o[0], p)) {
+        match out.iter_mut().find(|o| o[0].is_like(p)) {
             Some(known) => known.push(p.clone()),
             None => out.push(vec![p.clone()]),
         }

@@ -31,22 +31,17 @@ pub(super) fn found(runs: &[&Closed]) -> Vec<Vec<Placed>> {
     let all: Vec<Vec<Own>> = runs.iter().map(|run| of_run(run)).collect();
     let mut asked: Vec<&Placed> = Vec::new();
     for p in all.iter().flatten().map(|own| &own.placed) {
-        if asked.iter().any(|a| is_same(a, p)) {
+        if asked.iter().any(|a| a.is_like(p)) {
             continue;
         }
         asked.push(p);
-        let each: Vec<Option<&Own>> = all.iter().map(|run| run.iter().find(|own| is_same(&own.placed, p))).collect();
+        let each: Vec<Option<&Own>> = all.iter().map(|run| run.iter().find(|own| own.placed.is_like(p))).collect();
         let has: Vec<&Own> = each.iter().flatten().copied().collect();
         if has.len() >= FEWEST && differs(&has) {
             out.iter_mut().zip(each).for_each(|(list, own)| list.extend(own.map(|own| own.placed.clone())));
         }
     }
     out
-}
-
-/// Whether an effect has one name and one form on two runs.
-pub(super) fn is_same(a: &Placed, b: &Placed) -> bool {
-    a.effect.id() == b.effect.id() && a.instance == b.instance
 }
 
 fn of_run(run: &Closed) -> Vec<Own> {
