@@ -38,9 +38,9 @@ impl NorFlashError for Gone {
 }
 
 impl Chip {
-    /// Erased, with power.
+    /// Erased to ones, with power.
     #[must_use]
-    pub fn new() -> Self {
+    pub fn erased() -> Self {
         Self { cells: vec![0xff; 2 * PAGE], left: None, operations: 0, erases: [0; 2], dead: false }
     }
 

@@ -100,7 +100,7 @@ pub fn imu_line(data: &[u8]) {
 
 /// Two sectors of flash with anything in them: loaded, stored over, and loaded again.
 pub fn settings(data: &[u8]) {
-    let mut flash = Chip::new();
+    let mut flash = Chip::erased();
     flash.cells.iter_mut().zip(data).for_each(|(cell, byte)| *cell = *byte);
     let range = 0..2 * PAGE as u32;
     let _ = load::<RigConfig, _>(&mut flash, range.clone());

@@ -52,7 +52,7 @@ fn what_is_saved_is_loaded() {
 }
 
 fn saved_and_loaded<T: Numbered>() {
-    let mut chip = Chip::new();
+    let mut chip = Chip::erased();
     assert_eq!(load::<T, _>(&mut chip, RANGE), (None, SettingsNews::Absent));
     for n in 0..300 {
         assert_eq!(save(&mut chip, RANGE, &T::number(n)), SettingsNews::Saved, "save {n}");
@@ -72,7 +72,7 @@ fn a_power_cut_at_any_operation_loses_nothing() {
 }
 
 fn cut_everywhere<T: Numbered>() {
-    let mut chip = Chip::new();
+    let mut chip = Chip::erased();
     let mut cuts = 0;
     for n in 0..80 {
         let before = chip.clone();
@@ -101,7 +101,7 @@ fn damage_is_never_taken_for_settings() {
 }
 
 fn damaged<T: Numbered>() {
-    let mut chip = Chip::new();
+    let mut chip = Chip::erased();
     (0..3).for_each(|n| assert_eq!(save(&mut chip, RANGE, &T::number(n)), SettingsNews::Saved));
     let valid: Vec<T> = (0..3).map(T::number).collect();
     for at in 0..2 * PAGE {
@@ -120,6 +120,6 @@ fn damaged<T: Numbered>() {
 
 #[test]
 fn a_flash_that_cannot_be_written_is_told() {
-    let mut chip = Chip { dead: true, ..Chip::new() };
+    let mut chip = Chip { dead: true, ..Chip::erased() };
     assert_eq!(save(&mut chip, RANGE, &RigConfig::number(1)), SettingsNews::Failed);
 }
