@@ -9,7 +9,7 @@
 
 use crate::beside::is_named;
 use crate::context::{Context, Target};
-use crate::effects::{Effect, Estimate, Instance};
+use crate::effects::{Effect, Estimate, Instance, Shape};
 use crate::heldout::Held;
 use crate::hypothesis::{Declared, Fit, Placed, is_plausible, part_of};
 
@@ -134,10 +134,7 @@ fn contribution(context: &Context, declared: Declared<'_>, fit: &Fit, k: usize, 
 pub(crate) fn is_nothing(context: &Context, placed: &Placed, estimates: &[Estimate]) -> bool {
     let (effect, instance): (&dyn Effect, &Instance) = (placed.effect, &placed.instance);
     let shapes = effect.shapes(context, instance);
-    let is_size = |e: &Estimate| {
-        let shape = shapes.iter().find(|s| s.name == e.name);
-        shape.is_none_or(|s| s.range.1 > 0.0 && s.range.0 == -s.range.1)
-    };
+    let is_size = |e: &Estimate| shapes.iter().find(|s| s.name == e.name).is_none_or(Shape::is_size);
     let reported = effect.report(context, instance, estimates.to_vec());
     let mut sizes = reported.iter().filter(|e| is_size(e)).peekable();
     let held = |e: &Estimate| {

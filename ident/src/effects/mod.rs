@@ -153,6 +153,12 @@ pub struct Shape {
 }
 
 impl Shape {
+    /// Whether it is a size, that may have either sign; an instant, an onset or a time constant is none.
+    #[must_use]
+    pub fn is_size(&self) -> bool {
+        self.range.1 > 0.0 && self.range.0 == -self.range.1
+    }
+
     /// Whether it only places something within a row: it may lie on a bound without making the effect implausible.
     #[must_use]
     pub fn is_nuisance(&self) -> bool {

@@ -6,7 +6,7 @@
 //! Units: as the measures state.
 //! Reference: effective sample size of an autoregressive residual, Bayley & Hammersley 1946.
 
-use super::columns::{Of, columns};
+use super::columns::{Column, Of, columns};
 use super::curve::{Curve, SAMPLES, usable};
 use super::measure::{Measure, Scale, Value};
 use crate::context::{Context, Relation, Target, unit_of};
@@ -31,6 +31,7 @@ pub(super) fn measure(channel: &str, what: &str, words: String, unit: &str, scal
         unit: unit.to_owned(),
         scale,
         channel: channel.to_owned(),
+        of_two: false,
         asked: true,
         of_day: false,
     }
@@ -47,35 +48,50 @@ pub(super) fn told(context: &Context, curve: &Curve) -> Option<Vec<Told>> {
     let picked = |v: &[f64]| -> Vec<f64> { places.iter().map(|k| v[target.rows[*k]]).collect() };
     let y: Vec<f64> = places.iter().map(|k| target.y[*k]).collect();
     let weights: Vec<f64> = places.iter().map(|k| 1.0 / target.levelled[*k]).collect();
-    let mut of = Vec::new();
-    let mut design = Vec::new();
-    for (what, column) in columns(context, curve, &x) {
-        let column = picked(&column);
-        let first = column[0];
-        if what == Of::Zero || column.iter().any(|v| (v - first).abs() > 1e-9 * curve.full.abs()) {
-            of.push(what);
-            design.push(column);
+    let all: Vec<Column> = columns(context, curve, &x).into_iter().map(|(of, column)| (of, picked(&column))).collect();
+    let full = fitted(&all, curve, &y, &weights)?;
+    let mut out = full.told.clone();
+    // a day that warms steadily does so over its time: each of the two is told without the other, where the run shows none of that
+    for (asked, other) in [(Of::Drift, Of::Warmth), (Of::Warmth, Of::Drift)] {
+        let has = |of: Of| all.iter().any(|(own, _)| *own == of);
+        let shown = full.told.iter().any(|(of, (_, v))| *of == other && v.value.abs() > v.half());
+        if has(asked) && has(other) && !shown {
+            let alone: Vec<Column> = all.iter().filter(|(of, _)| *of != other).cloned().collect();
+            out.retain(|(of, _)| *of != asked);
+            out.extend(fitted(&alone, curve, &y, &weights)?.told.into_iter().filter(|(of, _)| *of == asked));
         }
     }
-    let solution = Normal::of_columns(&design, &y, &weights).solve()?;
-    let mut residual = y.clone();
+    let mut out: Vec<Told> = out.into_iter().map(|(_, told)| told).collect();
+    out.extend(scatter(curve, target, &places, &picked(&x), &full.residual));
+    out.extend(samples(context, target));
+    Some(out)
+}
+
+/// Columns fitted to a run.
+struct Fitted {
+    /// What each column tells.
+    told: Vec<(Of, Told)>,
+    /// What is left.
+    residual: Vec<f64>,
+}
+
+fn fitted(columns: &[Column], curve: &Curve, y: &[f64], weights: &[f64]) -> Option<Fitted> {
+    let varies = |column: &[f64]| column.iter().any(|v| (v - column[0]).abs() > 1e-9 * curve.full.abs());
+    let told = columns.iter().filter(|(what, column)| *what == Of::Zero || varies(column));
+    let (of, design): (Vec<Of>, Vec<Vec<f64>>) = told.cloned().unzip();
+    let solution = Normal::of_columns(&design, y, weights).solve()?;
+    let mut residual = y.to_vec();
     for (column, c) in design.iter().zip(&solution.coefficients) {
         residual.iter_mut().zip(column).for_each(|(r, v)| *r -= c * v);
     }
     let freedom = (y.len() - design.len()).max(1) as f64;
     let inflation = (solution.rss / freedom).max(0.25) * coloured(&residual);
-    let mut out: Vec<Told> = of
-        .iter()
-        .enumerate()
-        .filter_map(|(j, what)| {
-            let se = (solution.inverse[(j, j)] * inflation).sqrt();
-            let full = if what.is_share() { 1.0 } else { curve.full.abs() };
-            (se < UNTOLD * full).then(|| of_column(*what, curve, solution.coefficients[j], se))
-        })
-        .collect();
-    out.extend(scatter(curve, target, &places, &picked(&x), &residual));
-    out.extend(samples(context, target));
-    Some(out)
+    let told = of.into_iter().enumerate().filter_map(|(j, what)| {
+        let se = (solution.inverse[(j, j)] * inflation).sqrt();
+        let full = if what.is_share() { 1.0 } else { curve.full.abs() };
+        (se < UNTOLD * full).then(|| (what, of_column(what, curve, solution.coefficients[j], se)))
+    });
+    Some(Fitted { told: told.collect(), residual })
 }
 
 fn of_column(what: Of, curve: &Curve, c: f64, se: f64) -> Told {
@@ -171,4 +187,41 @@ pub(super) fn samples(context: &Context, target: &Target) -> Vec<Told> {
         out.push((step_of, Value { value: step, se: STEP_ERROR * step }));
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::curve::curves;
+    use crate::log::{Column as Channel, Log};
+
+    /// A run that warms steadily, whose thrust goes with the temperature or with time.
+    fn run(by_kelvin: f64, over_time: f64) -> Log {
+        let n = 2400;
+        let noise = |i: usize, k: usize| ((i * i * (7 + k)) as f64 * 0.37).sin();
+        let share = |i: usize| i as f64 / n as f64;
+        let rpm: Vec<f64> = (0..n).map(|i| 3000.0 + 2000.0 * (0.004 * i as f64).sin() + noise(i, 1)).collect();
+        let temperature: Vec<f64> = (0..n).map(|i| 20.0 + 2.0 * share(i) + 0.1 * (9.0 * share(i)).sin()).collect();
+        let of = |i: usize| 2e-7 * rpm[i] * rpm[i] + by_kelvin * temperature[i] + over_time * share(i) + 0.02 * noise(i, 4);
+        let thrust = (0..n).map(of).collect();
+        let columns = [("rpm", rpm), ("thrust_n", thrust), ("temp_c", temperature)];
+        let columns = columns.into_iter().map(|(name, values)| Channel { name: name.into(), values }).collect();
+        Log { name: "warm.csv".into(), t: (0..n).map(|i| 0.05 * i as f64).collect(), columns, ..Log::default() }
+    }
+
+    /// Time and temperature run together: what the run does not show of the one does not blur the other.
+    #[test]
+    fn a_warming_zero_is_told_sharply_where_nothing_drifts() {
+        let of = |by_kelvin: f64, over_time: f64, what: &str| {
+            let contexts: Vec<Context> = (0..3).map(|_| Context::new(&run(by_kelvin, over_time), None)).collect();
+            let told = told(&contexts[0], &curves(&contexts)[0]).expect("a channel");
+            told.into_iter().find(|(m, _)| m.name == what).map(|(_, v)| v).expect(what)
+        };
+        let warm = of(0.1, 0.0, "thrust_n warmth");
+        assert!((warm.value - 0.1).abs() < 0.01 && warm.se < 0.004, "{warm:?}");
+        let drift = of(0.0, 0.2, "thrust_n drift");
+        assert!((drift.value - 0.2).abs() < 0.02 && drift.se < 0.01, "{drift:?}");
+        let other = of(0.0, 0.2, "thrust_n warmth");
+        assert!(other.value.abs() < 3.0 * other.se + 0.02, "{other:?}");
+    }
 }

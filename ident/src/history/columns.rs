@@ -44,7 +44,7 @@ const FASTEST: f64 = 1.5;
 /// Move of the load that turns its direction, over the top.
 const SLACK: f64 = 0.02;
 /// Least range of the temperature that says something of it, K (standard deviation).
-const WARM_K: f64 = 0.3;
+const WARM_K: f64 = 0.1;
 
 /// A column on every row of a log.
 pub(super) type Column = (Of, Vec<f64>);

@@ -81,6 +81,7 @@ fn constants(log: &Log) -> Vec<Told> {
             unit: c.unit.to_owned(),
             scale: Scale::Linear,
             channel: String::new(),
+            of_two: false,
             asked: false,
             of_day: false,
         };
@@ -214,6 +215,7 @@ fn contrasts(told: &[Told]) -> Vec<Told> {
         let (one, other) = (gain(a)?, gain(b)?);
         let (of_a, of_b) = (words::channel(a), words::channel(b));
         let m = measure(a, &format!("gain beside {b}"), format!("gain of {of_a} beside that of {of_b}"), "%", Scale::Linear);
+        let m = Measure { of_two: true, ..m };
         Some((m, Value { value: one.value - other.value, se: one.se.hypot(other.se) }))
     };
     PAIRS.into_iter().filter_map(of).collect()

@@ -8,11 +8,14 @@
 //! Units: evidence in nats.
 //! Reference: Barry & Hartigan 1993, JASA 88:309; binary segmentation, Scott & Knott 1974, Biometrics 30:507.
 
+use super::counts::{self, log_mean};
 use super::evidence::{Departure, Series};
 use super::measure::{Scale, Value};
 use super::{FEWEST, History};
 use crate::history::name::Name;
+use crate::log::SPEED;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Probability from which on a change is told; before the runs are seen a change and none are as likely.
 const TOLD: f64 = 0.98;
@@ -74,6 +77,9 @@ pub struct Change {
     pub gap_probability: f64,
     /// Measures that moved, the surest first.
     pub moved: Vec<Moved>,
+    /// Each channel's evidence that one of its measures moved, nats; the sensors of one speed are one.
+    #[serde(skip)]
+    pub channels: Vec<(String, f64)>,
     /// Names, the likeliest first; empty where it was not asked for or nothing fits.
     pub names: Vec<Name>,
 }
@@ -81,19 +87,20 @@ pub struct Change {
 /// All changes of a history, oldest first.
 pub(super) fn changes(history: &History) -> Vec<Change> {
     let mut out = Vec::new();
-    split(history, [0, history.runs.len()], &mut out);
+    split(history, [0, history.runs.len()], [false; 2], &mut out);
     out.sort_by_key(|c: &Change| c.first);
     out
 }
 
-fn split(history: &History, among: [usize; 2], out: &mut Vec<Change>) {
-    let Some(change) = sought(history, among) else { return };
+/// Splits some runs; `cut` says at which of their ends a change was found already.
+fn split(history: &History, among: [usize; 2], cut: [bool; 2], out: &mut Vec<Change>) {
+    let Some(change) = sought(history, among, cut) else { return };
     let (kind, first) = (change.kind, change.first);
     out.push(change);
     // what drifts has no level that a further split could stand on
     if kind == Kind::Step {
-        split(history, [among[0], first], out);
-        split(history, [first, among[1]], out);
+        split(history, [among[0], first], [cut[0], true], out);
+        split(history, [first, among[1]], [true, cut[1]], out);
     }
 }
 
@@ -101,6 +108,19 @@ fn split(history: &History, among: [usize; 2], out: &mut Vec<Change>) {
 struct Asked {
     measure: usize,
     series: Series,
+    /// Of what was counted, the evidence for a step at each gap.
+    counted: Option<Vec<f64>>,
+}
+
+impl Asked {
+    /// Steps at every gap, then other forms.
+    fn departures(&self, forms: &[Vec<f64>]) -> Vec<Departure> {
+        let mut out = self.series.departures(forms);
+        for (departure, evidence) in out.iter_mut().zip(self.counted.iter().flatten()) {
+            departure.evidence = *evidence;
+        }
+        out
+    }
 }
 
 /// The days that explain others: each column over the runs, where every run tells it.
@@ -120,13 +140,15 @@ fn asked(history: &History, [from, to]: [usize; 2]) -> Vec<Asked> {
         let most = values.iter().flatten().count().saturating_sub(FEWEST + 2) / 2;
         let beside = &beside[..most.min(beside.len())];
         let least = if measure.scale == Scale::Log { LEAST_LOG } else { 0.0 };
-        Some(Asked { measure: m, series: Series::of(&values, beside, least)? })
+        let own: Vec<Option<Value>> = history.runs[from..to].iter().map(|r| r.values[m]).collect();
+        let counted = if measure.scale == Scale::Count { counts::steps(&own) } else { None };
+        Some(Asked { measure: m, series: Series::of(&values, beside, least)?, counted })
     };
     (0..history.measures.len()).filter(|m| history.measures[*m].asked).filter_map(of).collect()
 }
 
 /// The likeliest change among some runs, if one is likely enough.
-fn sought(history: &History, [from, to]: [usize; 2]) -> Option<Change> {
+fn sought(history: &History, [from, to]: [usize; 2], cut: [bool; 2]) -> Option<Change> {
     let n = to - from;
     if n < FEWEST {
         return None;
@@ -137,12 +159,14 @@ fn sought(history: &History, [from, to]: [usize; 2]) -> Option<Change> {
     }
     let steps: Vec<Vec<f64>> = (1..n).map(|gap| (0..n).map(|k| f64::from(u8::from(k >= gap))).collect()).collect();
     let forms: Vec<Vec<f64>> = steps.into_iter().chain([times(history, [from, to])]).collect();
-    let all: Vec<Vec<Departure>> = asked.iter().map(|a| a.series.departures(&forms)).collect();
+    let all: Vec<Vec<Departure>> = asked.iter().map(|a| a.departures(&forms)).collect();
     let gaps = n - 1;
+    // one run between two changes is an odd day
+    let alone = |gap: usize| gap == 0 && cut[0] || gap + 1 == gaps && cut[1];
     // a change moves a share of the measures, and no less than one: any one of them is as likely as that to be among them
     let moved_share = (MOVED * asked.len() as f64).max(1.0).ln();
     let mean = |form: usize| log_mean(all.iter().map(|d| d[form].evidence)) + moved_share;
-    let step = log_mean((0..gaps).map(mean));
+    let step = log_mean((0..gaps).map(|gap| if alone(gap) { f64::NEG_INFINITY } else { mean(gap) }));
     let drift = if n > FEWEST { mean(gaps) } else { f64::NEG_INFINITY };
     // either is as likely before
     let whole = log_mean([step, drift].into_iter());
@@ -151,6 +175,7 @@ fn sought(history: &History, [from, to]: [usize; 2]) -> Option<Change> {
         return None;
     }
     let moved_at = |form: usize| moved(history, &asked, &all, form, form == gaps);
+    let channels_at = |form: usize| channels(history, &asked, &all, form);
     if drift > step {
         let moved = moved_at(gaps);
         let between = [from, to];
@@ -162,10 +187,14 @@ fn sought(history: &History, [from, to]: [usize; 2]) -> Option<Change> {
             probability,
             gap_probability: 1.0,
             moved,
+            channels: channels_at(gaps),
             names: Vec::new(),
         });
     }
     let weight = |gap: usize| {
+        if alone(gap) {
+            return f64::NEG_INFINITY;
+        }
         let of = |d: &Vec<Departure>| (1.0 - MOVED + MOVED * d[gap].evidence.min(LOUDEST).exp()).ln();
         all.iter().map(of).sum::<f64>()
     };
@@ -183,6 +212,7 @@ fn sought(history: &History, [from, to]: [usize; 2]) -> Option<Change> {
         probability,
         gap_probability: shares[best] / sum,
         moved: moved_at(best),
+        channels: channels_at(best),
         names: Vec::new(),
     })
 }
@@ -248,14 +278,18 @@ fn moved(history: &History, asked: &[Asked], all: &[Vec<Departure>], form: usize
     out
 }
 
-/// Logarithm of the mean of exponentials.
-fn log_mean(values: impl Iterator<Item = f64>) -> f64 {
-    let values: Vec<f64> = values.collect();
-    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if !top.is_finite() {
-        return top;
+/// What each channel says of a form: any one of its measures is as likely to have moved.
+fn channels(history: &History, asked: &[Asked], all: &[Vec<Departure>], form: usize) -> Vec<(String, f64)> {
+    let mut own: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for (a, d) in asked.iter().zip(all).filter(|(a, _)| !history.measures[a.measure].of_two) {
+        own.entry(one_speed(&history.measures[a.measure].channel)).or_default().push(d[form].evidence);
     }
-    top + (values.iter().map(|v| (v - top).exp()).sum::<f64>() / values.len() as f64).ln()
+    own.into_iter().map(|(channel, evidence)| (channel.to_owned(), log_mean(evidence.into_iter()))).collect()
+}
+
+/// A channel's name; one for all sensors of the speed.
+pub(super) fn one_speed(channel: &str) -> &str {
+    if SPEED.contains(&channel) { "rpm" } else { channel }
 }
 
 #[cfg(test)]
@@ -284,6 +318,31 @@ mod tests {
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!((found[0].kind, found[0].moved[0].unit.as_str()), (Kind::Drift, "N a week"));
         assert!((found[0].moved[0].by - 2.0).abs() < 0.3, "{:?}", found[0].moved[0]);
+    }
+
+    #[test]
+    fn one_odd_run_between_two_changes_is_none() {
+        let departs = |k: usize| match k {
+            0..6 => 0.0,
+            6 => 80.0,
+            _ => 60.0,
+        };
+        let found = changes(&history(false, departs));
+        assert_eq!(found.iter().map(|c| c.first).collect::<Vec<_>>(), [6], "{found:?}");
+    }
+
+    #[test]
+    fn a_channel_speaks_for_a_change_by_any_one_of_its_measures() {
+        let mut history = departing(12, false, |k| if k >= 7 { 9.0 } else { 0.0 });
+        history.measures[1].channel = "torque_nm".into();
+        history.measures[2].channel = "current_a".into();
+        history.measures[2].of_two = true;
+        let found = changes(&history);
+        let of = |channel: &str| found[0].channels.iter().find(|c| c.0 == channel).expect(channel).1;
+        assert!(of("thrust_n") > 5.0 && of("torque_nm") < 0.0, "{:?}", found[0].channels);
+        // how two channels differ speaks for neither
+        assert!(found[0].channels.iter().all(|c| c.0 != "current_a"));
+        assert_eq!((one_speed("rpm_hall"), one_speed("thrust_n")), ("rpm", "thrust_n"));
     }
 
     #[test]

@@ -45,6 +45,9 @@ pub struct Measure {
     pub scale: Scale,
     /// Channel that it is of; empty for a constant of several.
     pub channel: String,
+    /// Whether it is how two channels differ: it speaks for neither of them alone.
+    #[serde(skip)]
+    pub of_two: bool,
     /// Whether a change of it counts. What is made up of others is shown and does not.
     pub asked: bool,
     /// Whether it is about the surroundings of a day, which explain others and are no part of the rig.

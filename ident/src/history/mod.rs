@@ -9,6 +9,7 @@
 mod channel;
 mod columns;
 mod constants;
+mod counts;
 mod curve;
 mod differ;
 mod evidence;
@@ -159,6 +160,7 @@ pub(crate) mod tests {
             unit: "N".into(),
             scale: Scale::Linear,
             channel: "thrust_n".into(),
+            of_two: false,
             asked: true,
             of_day: false,
         };
