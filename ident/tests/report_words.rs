@@ -225,7 +225,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
                 ..verdict(Kind::Ambiguous, vec![filter(0.5), sag(0.99), effect("unknown", "thrust_n", 0.9, 0.4, vec![])])
             },
             false,
-            &["What has no name is told below, too."],
+            &["What has no name is told below."],
             &[],
         ),
     ]
@@ -286,7 +286,7 @@ fn the_terminal_claims_no_more_than_it_knows() {
         ..sag(0.9)
     };
     let told = terminal(&verdict(Kind::Attributed, vec![seen]), Vocabulary::RIG, false);
-    assert!(told.contains("evidence: the residual goes up\n") && told.contains("Without it the error of voltage is"), "{told}");
+    assert!(told.contains("known by: the residual goes up\n") && told.contains("Without it the error of voltage is"), "{told}");
     assert!(text.contains("tau_up < 25 ms  (95 %)") && !text.contains("-0.02") && !text.contains("-21"), "{text}");
 }
 

@@ -130,7 +130,8 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     sheet.figures(figures);
     sheet.html_part("<div>\n");
     parameters(sheet, page.words, e);
-    let mut html = format!("<p class=\"soft\">{}</p>\n<p>{}.</p>\n", written(e), escape(&upper(&plain(signs(&e.evidence)))));
+    let mut html = format!("<p class=\"soft\">{}</p>\n", written(e));
+    let _ = writeln!(html, "<p><b>Known by:</b> {}.</p>", escape(&plain(signs(&e.evidence))));
     if !nameless {
         let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
     }

@@ -102,11 +102,10 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     if own.is_empty() {
         out += &format!(" Every {noun} has that; nothing of this {noun}'s own was named.");
     }
-    [out, explained(verdict, &told), smaller(more), left(verdict)]
-        .into_iter()
-        .filter(|s| !s.is_empty())
-        .collect::<Vec<_>>()
-        .join(" ")
+    let explained = explained(verdict, &told);
+    // what says that more is named below has said so
+    let more = if explained.contains(" below ") { 0 } else { more };
+    [out, explained, below(more, false), left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 /// A clause for each effect; what differs from run to run is one clause with a part for each.
@@ -174,19 +173,23 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         format!("{}. Beside that, {}.", since(news, &question), joined_lower(&said))
     };
     let nameless = verdict.effects.iter().any(|e| e.id == "unknown" && !e.is_without_correction());
-    let nameless = if nameless { "What has no name is told below, too." } else { "" };
-    let out = [out, smaller(all.len().saturating_sub(told)), nameless.to_owned()];
-    let left = left(verdict);
-    out.into_iter().chain([left]).filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+    let below = below(all.len().saturating_sub(told), nameless);
+    [out, below, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// How many causes the cards have beside those of the sentence.
-fn smaller(more: usize) -> String {
-    match more {
-        0 => String::new(),
-        1 => "A smaller cause is told below.".to_owned(),
-        n => format!("{n} smaller causes are told below."),
+/// What the cards have beside what the sentence tells: smaller causes, and what has no name.
+fn below(more: usize, nameless: bool) -> String {
+    let causes = match more {
+        0 => None,
+        1 => Some("a smaller cause".to_owned()),
+        n => Some(format!("{n} smaller causes")),
+    };
+    let parts: Vec<String> = causes.into_iter().chain(nameless.then(|| "what has no name".to_owned())).collect();
+    if parts.is_empty() {
+        return String::new();
     }
+    let verb = if parts.len() == 1 && more < 2 { "is" } else { "are" };
+    format!("{} {verb} told below.", upper(&list(&parts)))
 }
 
 fn unattributed(verdict: &Verdict, news: bool) -> String {

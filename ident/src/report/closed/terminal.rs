@@ -156,7 +156,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, group: &[usize]) -> String {
     for said in open_sizes(e).into_iter().chain(Some(removed(verdict, group))).filter(|said| !said.is_empty()) {
         out += &format!("    {}\n", wrapped(&said, 4));
     }
-    out + &format!("    {}\n", wrapped(&format!("evidence: {}", plain(signs(&e.evidence))), 4))
+    out + &format!("    {}\n", wrapped(&format!("known by: {}", plain(signs(&e.evidence))), 4))
 }
 
 fn left(verdict: &Verdict) -> String {
