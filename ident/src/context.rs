@@ -359,6 +359,8 @@ pub(crate) struct Facts {
     pub(crate) draw: OnceLock<Option<(crate::effects::Draw, f64)>>,
     /// R/Kt^2 of the winding, W/(N.m)^2.
     pub(crate) winding: OnceLock<f64>,
+    /// Angular acceleration on the way to where the command sends the rotor, rad/s^2; nothing without a command.
+    pub(crate) driven: OnceLock<Option<Vec<f64>>>,
     /// Slope of the static speed curve on each row, rev/min per us.
     pub(crate) slope: OnceLock<Vec<f64>>,
     /// Where the thrust reads one and the same largest value.

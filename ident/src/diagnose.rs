@@ -26,10 +26,12 @@ use crate::together::{Ground, choose_pair};
 use crate::verdict::Kin;
 use std::collections::BTreeSet;
 
-/// Most effects on one channel.
+/// Most effects on one channel, beside what every rig has.
 const MOST_ON_A_CHANNEL: usize = 3;
-/// Most effects in one hypothesis, over all channels.
+/// Most effects in one hypothesis, over all channels, beside what every rig has.
 const MOST_EFFECTS: usize = 6;
+/// Share of the work that the rounds of the search are told to be at the most.
+const LATE: f64 = 0.95;
 /// Share of the held-out error on its first channel that an effect must remove to be worth a name.
 pub(crate) const NEEDED_REDUCTION: f64 = 0.05;
 /// Effects that are named with small errors removed; a further one must remove much, because small misfits of the declared
@@ -152,13 +154,15 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         errors = heldout::errors(context, declared, &best.fit, &folds);
         rounds.extend(best.fit.placed.iter().map(|_| (1.0, Vec::new())));
     }
-    for round in 0..MOST_EFFECTS {
-        let ranked =
-            round_of(context, declared, &best, &mut offers, &mut |p| progress((round as f64 + p) / (MOST_EFFECTS as f64 + 1.0)));
+    let mut round = 0;
+    while of_this_rig(&best.fit.placed) < MOST_EFFECTS {
+        let begun = (round as f64 / (MOST_EFFECTS as f64 + 1.0)).min(LATE);
+        round += 1;
+        let done = (round as f64 / (MOST_EFFECTS as f64 + 1.0)).min(LATE);
+        let ranked = round_of(context, declared, &best, &mut offers, &mut |p| progress(begun + p * (done - begun)));
         candidates.push(ranked.iter().take(SHOWN).cloned().collect());
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else {
-            let room = best.fit.placed.len() + 2 <= MOST_EFFECTS;
-            let done = (round as f64 + 1.0) / (MOST_EFFECTS as f64 + 1.0);
+            let room = of_this_rig(&best.fit.placed) + 2 <= MOST_EFFECTS;
             let mut heard = |p: f64| progress(done + 0.9 * p * (1.0 - done));
             let ground = Ground { context, declared, start: &start, folds: &folds };
             let pair = if room { choose_pair(ground, (&best, &errors), &ranked, &mut offers, &mut heard) } else { None };
@@ -374,8 +378,14 @@ pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instan
                 && !p.effect.never_beside().contains(&effect.id())
                 && !effect.never_beside().contains(&p.effect.id())
         };
-        there.len() < MOST_ON_A_CHANNEL && there.iter().all(apart)
+        let room = effect.is_of_every_rig() || there.iter().filter(|p| !p.effect.is_of_every_rig()).count() < MOST_ON_A_CHANNEL;
+        room && there.iter().all(apart)
     })
+}
+
+/// How many effects there are beside what every rig has.
+fn of_this_rig(placed: &[Placed]) -> usize {
+    placed.iter().filter(|p| !p.effect.is_of_every_rig()).count()
 }
 
 /// Every instance added to `best`, refined where promising, best first.

@@ -11,6 +11,7 @@ use crate::context::{GAP, STILL_US, bridge, starts};
 use crate::log::Log;
 use crate::noise::{median, quantum};
 use crate::start::start_pulse;
+use std::ops::Range;
 
 /// Fewest rows in which the command stands still that a level is taken from; the later half of them.
 const HELD: usize = 6;
@@ -38,22 +39,34 @@ pub(crate) struct Drive {
     pub(crate) speed: Vec<f64>,
     /// Standard deviation of that on every row, rev/min, where the rotor has no other cause to turn otherwise.
     pub(crate) sd: Vec<f64>,
+    /// Speed that it goes to, rev/min: where a command is held long enough the speed that is reached there, else that of the curve.
+    goal: Vec<f64>,
+    /// Rows on which more of the way is left than the speed of a held command scatters by, and the motor is on.
+    on_its_way: Vec<bool>,
+    /// Time constants up and down, s.
+    constants: [f64; 2],
 }
 
 impl Drive {
     /// What the commands of a log make of a speed; `None` without a command or with too few readings. A missing reading is not finite.
     pub(crate) fn of(log: &Log, speed: &[f64]) -> Option<Self> {
         let pulse = bridge(&log.t, log.column("pulse_us").filter(|c| c.iter().any(|v| v.is_finite()))?);
-        let start = start_pulse(&log.t, Some(&pulse), speed);
+        Self::of_command(&log.t, &pulse, speed)
+    }
+
+    /// The same of a command without gaps, us.
+    pub(crate) fn of_command(t: &[f64], pulse: &[f64], speed: &[f64]) -> Option<Self> {
+        let start = start_pulse(t, Some(pulse), speed);
         let turns = |p: f64| p >= start;
-        let held: Vec<usize> = held(&pulse).into_iter().filter(|i| speed[*i].is_finite()).collect();
+        let stretches = held(pulse);
+        let held: Vec<usize> = stretches.iter().cloned().flatten().filter(|i| speed[*i].is_finite()).collect();
         let pairs = held.iter().filter(|i| turns(pulse[**i])).map(|i| (pulse[*i], speed[*i])).collect();
         let curve = Curve::through(pairs)?;
         let goal: Vec<f64> = pulse.iter().map(|p| if turns(*p) { curve.at(*p).max(0.0) } else { 0.0 }).collect();
         // what the rotor did in a gap is not known: behind it the speed is the one that is measured there
         let first = speed.first().copied().filter(|v| v.is_finite()).map(|v| (0, v));
-        let begins: Vec<(usize, f64)> = first.into_iter().chain(starts(&log.t, speed)).collect();
-        let speed_of = |up: f64, down: f64| follow(&log.t, &goal, &begins, up, down);
+        let begins: Vec<(usize, f64)> = first.into_iter().chain(starts(t, speed)).collect();
+        let speed_of = |up: f64, down: f64| follow(t, &goal, &begins, up, down);
         let error = |up: f64, down: f64| -> f64 {
             speed_of(up, down).iter().zip(speed).filter(|(_, y)| y.is_finite()).map(|(p, y)| (p - y).abs()).sum()
         };
@@ -78,21 +91,50 @@ impl Drive {
         let usual = (SIGMA * median(&mut left)).max(quantum(speed));
         let jump = |i: usize| (goal[i] - goal[i.saturating_sub(1)]).abs();
         let sd = (0..goal.len()).map(|i| usual.hypot(ON_ITS_WAY * (goal[i] - speed_made[i])).hypot(0.5 * jump(i))).collect();
-        Some(Self { speed: speed_made, sd })
+        let on_its_way = (0..goal.len()).map(|i| turns(pulse[i]) && (goal[i] - speed_made[i]).abs() > usual).collect();
+        let goal = reached(goal, &stretches, speed);
+        Some(Self { speed: speed_made, sd, goal, on_its_way, constants: [up, down] })
     }
+
+    /// Angular acceleration of a rotor that has these speeds on its way to where the command sends it, rad/s^2; none once it is there, where a
+    /// reading is off by its own error.
+    pub(crate) fn acceleration(&self, speed: &[f64]) -> Vec<f64> {
+        let [up, down] = self.constants;
+        let of = |i: usize| {
+            let left = (self.goal[i] - speed[i]) * std::f64::consts::TAU / 60.0;
+            if self.on_its_way[i] { left / if left > 0.0 { up } else { down } } else { 0.0 }
+        };
+        (0..speed.len()).map(of).collect()
+    }
+}
+
+/// Goals with those of held commands exchanged for the speed that is reached there: the same command does not always make the same speed.
+fn reached(mut goal: Vec<f64>, settled: &[Range<usize>], speed: &[f64]) -> Vec<f64> {
+    for range in settled {
+        let mut there: Vec<f64> = speed[range.clone()].iter().copied().filter(|v| v.is_finite()).collect();
+        if there.is_empty() {
+            continue;
+        }
+        let level = median(&mut there);
+        // the settled half of a stretch follows its other half
+        let from = range.start - range.len().min(range.start);
+        let asked = goal[range.start];
+        goal[from..range.end].iter_mut().filter(|g| **g == asked).for_each(|g| *g = level);
+    }
+    goal
 }
 
 /// Standard deviation over the median absolute one, of a normal distribution.
 pub(crate) const SIGMA: f64 = 1.4826;
 
 /// The later half of each stretch in which the command stands still.
-fn held(pulse: &[f64]) -> Vec<usize> {
+fn held(pulse: &[f64]) -> Vec<Range<usize>> {
     let mut out = Vec::new();
     let mut from = 0;
     for i in 1..=pulse.len() {
         if i == pulse.len() || (pulse[i] - pulse[i - 1]).abs() > STILL_US {
             if i - from >= HELD {
-                out.extend(from + (i - from) / 2..i);
+                out.push(from + (i - from) / 2..i);
             }
             from = i;
         }

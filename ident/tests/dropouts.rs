@@ -88,3 +88,16 @@ fn they_are_listed_and_add_no_name() {
         assert!(with < most * without, "{probes:?}: {with} N with drop-outs, {without} without");
     }
 }
+
+/// Three probes know what the fourth should read to a thousandth: its way back ends there, and not where it is nearly back. No step of the
+/// command is in its way.
+#[test]
+fn a_way_back_is_followed_to_its_end() {
+    let log = run(&["rpm_beam", "rpm_hall", "rpm_encoder", "rpm_opto"], &[(1105, 15, 0.0, 12.0)]);
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    let [beam, hall] = ["rpm_beam", "rpm_hall"].map(|c| log.column(c).expect("a probe"));
+    let listed = |row: usize| closed.context.set_aside.iter().any(|a| a.channel == "rpm_beam" && a.span().contains(&row));
+    let off = (0..log.t.len()).filter(|i| !listed(*i)).map(|i| ((beam[i] - hall[i]).abs() / hall[i].max(600.0), i));
+    let (worst, row) = off.max_by(|a, b| a.0.total_cmp(&b.0)).expect("rows");
+    assert!(worst < 0.02, "row {row} is {worst} off and not listed");
+}

@@ -136,6 +136,17 @@ fn cuts_too_many_above_one_speed_are_those_of_a_twisted_blade() {
     assert_eq!(names(&doubled), ["double_pulses"]);
 }
 
+/// Sensors whose gains differ by as much as healthy ones do: a median of their readings would be now one of them and now another.
+#[test]
+fn a_beam_that_leaves_the_others_takes_none_along() {
+    let gains = |k: usize, _: f64, rpm: f64| rpm * (1.0 + [0.0, -0.003, 0.003, 0.0][k]);
+    let bends = |k: usize, t: f64, rpm: f64| gains(k, t, rpm) + if k == 0 { 0.02 * (rpm - 4000.0).max(0.0) } else { 0.0 };
+    let closed = close(&log(&Day { seed: 8, reads: &bends, ..HEALTHY }), None, &[], &mut |_| {}).expect("a verdict");
+    assert_eq!(names(&closed), ["blade_twist"]);
+    let healthy = close(&log(&Day { seed: 8, reads: &gains, ..HEALTHY }), None, &[], &mut |_| {}).expect("a verdict");
+    assert!(names(&healthy).is_empty(), "{:?}", names(&healthy));
+}
+
 #[test]
 fn a_hold_is_seen_beneath_the_noise() {
     let period = 0.834;

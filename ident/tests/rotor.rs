@@ -130,3 +130,43 @@ fn a_run_that_only_climbs_has_its_lag() {
     let closed = verdict(&log(&staircase(), f64::INFINITY, 0.0));
     assert_eq!(names(&closed), ["spinup_lag"], "{:?}", closed.verdict.alternatives);
 }
+
+/// What speeds the rotor up is drawn from the supply at the duty that it has: a log of single readings knows from command and speed how far the
+/// rotor is off, and the current of another run follows.
+#[test]
+fn the_current_of_a_rotor_on_its_way_is_known_on_another_run() {
+    let (tau, gain) = (0.15, 6e-6);
+    let day = |seed: u64| {
+        let mut chance = Chance::new(seed);
+        let levels = random(seed);
+        let pulse = |now: f64| levels.iter().rev().find(|l| l.0 <= now).map_or(1000.0, |l| l.1);
+        let (fine, h) = (50, STEP / 50.0);
+        let mut speed = 6.0 * (levels[0].1 - 1000.0);
+        let mut columns = [const { Vec::new() }; 4];
+        let t: Vec<f64> = (0..2400).map(|i| STEP * f64::from(i)).collect();
+        for t in &t {
+            let goal = 6.0 * (pulse(*t) - 1000.0);
+            let per = std::f64::consts::TAU / 60.0;
+            let power = speed * per * (goal - speed) * per / tau;
+            let row = [
+                pulse(*t),
+                speed + chance.normal(),
+                0.15 * (speed / 1000.0).powi(2) + 0.005 * chance.normal(),
+                0.3 + 0.04 * (speed / 1000.0).powi(3) + gain * power + 0.02 * chance.normal(),
+            ];
+            columns.iter_mut().zip(row).for_each(|(c, v)| c.push(v));
+            (0..fine).for_each(|k| speed += (6.0 * (pulse(t + h * f64::from(k)) - 1000.0) - speed) * h / tau);
+        }
+        let names = ["pulse_us", "rpm", "thrust_n", "current_a"];
+        let columns = names.into_iter().zip(columns).map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        Log { name: "rotor.csv".to_owned(), t, columns, ..Log::default() }
+    };
+    let (own, other) = (day(5), day(6));
+    let closed = close(&own, None, std::slice::from_ref(&other), &mut |_| {}).expect("a verdict");
+    let inertia =
+        closed.verdict.effects.iter().find(|e| e.id == "rotor_inertia").unwrap_or_else(|| panic!("{:?}", names(&closed)));
+    let found = inertia.parameters.iter().find(|p| p.name == "power_gain").expect("power_gain").value;
+    assert!((found / gain - 1.0).abs() < 0.1, "{found}");
+    let there = &closed.verdict.validation.first().expect("another run").channels["current_a"];
+    assert!(there.after < 0.2 * there.before, "{there:?}");
+}

@@ -222,8 +222,10 @@ impl Judge<'_> {
         if next.len() < ALONG {
             return false;
         }
+        // from one reading to the next: a way back that goes on is no noise
+        let mut steps: Vec<f64> = next.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        let noise = SIGMA * std::f64::consts::FRAC_1_SQRT_2 * median(&mut steps);
         let ahead = median(&mut next);
-        let noise = SIGMA * median(&mut next.iter().map(|v| (v - ahead).abs()).collect::<Vec<_>>());
         off(row) < RECOVERED * depth && off(row) - ahead < BACK * noise.max(self.step)
     }
 }

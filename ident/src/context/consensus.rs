@@ -1,6 +1,6 @@
 //! One speed from up to four sensors.
 //!
-//! What it is: the median of the channels that agree, drop-outs bridged. A sample that its board flags as wrong is left out where another
+//! What it is: the median of the channels that agree, each over its own gain, drop-outs bridged. A sample that its board flags as wrong is left out where another
 //! channel has one that is not.
 //! What can go wrong: of two channels that disagree none can be outvoted, and both are kept.
 //! Units: rev/min.
@@ -26,6 +26,13 @@ pub struct Consensus {
 /// Fewest rows in a row without a speed that the command bridges: fewer are a straight line.
 const STRETCH: usize = 4;
 
+/// Share within which healthy sensors on real rigs agree (specification `rig.md`).
+const HEALTHY: f64 = 0.01;
+/// Share of the speed within which most readings of a healthy sensor stay about its gain.
+const UNSTEADY: f64 = 0.005;
+/// Times that gains and speed are found from each other.
+const PASSES: usize = 2;
+
 /// A speed on every row.
 pub(super) struct Fused {
     /// rev/min; empty without a speed.
@@ -43,10 +50,10 @@ pub(super) fn of(log: &Log) -> Fused {
     if present.is_empty() {
         return Fused { rpm: Vec::new(), sd: Vec::new(), how: Consensus::default() };
     }
-    let all = median_of(log, &present);
+    let all = median_of(log, &present, &vec![1.0; present.len()]);
     let scale = all.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max).max(1.0);
     let excluded: Vec<&str> = if present.len() >= 3 {
-        present.iter().copied().filter(|name| disagreement(log, name, &all, scale) > 0.005).collect()
+        present.iter().copied().filter(|name| disagrees(log, name, &all, scale)).collect()
     } else {
         Vec::new()
     };
@@ -56,7 +63,12 @@ pub(super) fn of(log: &Log) -> Fused {
         present.clone()
     };
     let excluded = if kept.len() == present.len() { Vec::new() } else { excluded };
-    let mut rpm = if excluded.is_empty() { all } else { median_of(log, &kept) };
+    let mut rpm = if excluded.is_empty() { all } else { median_of(log, &kept, &vec![1.0; kept.len()]) };
+    // a median of sensors that differ by their gains is now one of them and now another, where one is lost or bends away
+    for _ in 0..PASSES {
+        let gains: Vec<f64> = kept.iter().map(|name| gain(log, name, &rpm, scale)).collect();
+        rpm = median_of(log, &kept, &gains);
+    }
     let dropped = remove_dropouts(&mut rpm, scale);
     let sd = bridge_by_command(log, &mut rpm);
     let bridged_rows = dropped + sd.iter().filter(|sd| **sd > 0.0).count();
@@ -91,31 +103,45 @@ fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
     sd
 }
 
-fn median_of(log: &Log, names: &[&str]) -> Vec<f64> {
-    let columns: Vec<(&[f64], Option<&[f64]>)> =
-        names.iter().filter_map(|n| Some((log.column(n)?, board::flags(log, n)))).collect();
+/// Median of some channels on each row, each over its gain.
+fn median_of(log: &Log, names: &[&str], gains: &[f64]) -> Vec<f64> {
+    let columns: Vec<(&[f64], Option<&[f64]>, f64)> =
+        names.iter().zip(gains).filter_map(|(n, gain)| Some((log.column(n)?, board::flags(log, n), *gain))).collect();
     let present = |i: usize| columns.iter().filter(move |c| c.0[i].is_finite());
     (0..log.len())
         .map(|i| {
-            let mut v: Vec<f64> = present(i).filter(|c| !c.1.is_some_and(|f| board::is_wrong(f[i]))).map(|c| c.0[i]).collect();
+            let mut v: Vec<f64> =
+                present(i).filter(|c| !c.1.is_some_and(|f| board::is_wrong(f[i]))).map(|c| c.0[i] / c.2).collect();
             if v.is_empty() {
-                v = present(i).map(|c| c.0[i]).collect();
+                v = present(i).map(|c| c.0[i] / c.2).collect();
             }
             if v.is_empty() { f64::NAN } else { noise::median(&mut v) }
         })
         .collect()
 }
 
-/// Median relative deviation of a channel from the median of all, while the rotor turns.
-fn disagreement(log: &Log, name: &str, all: &[f64], scale: f64) -> f64 {
-    let Some(column) = log.column(name) else { return 0.0 };
-    let mut d: Vec<f64> = column
-        .iter()
-        .zip(all)
-        .filter(|(v, m)| v.is_finite() && m.is_finite() && **m > 0.1 * scale)
-        .map(|(v, m)| ((v - m) / m).abs())
-        .collect();
-    if d.is_empty() { 0.0 } else { noise::median(&mut d) }
+/// Readings of a channel over the speed of all, while the rotor turns.
+fn shares(log: &Log, name: &str, all: &[f64], scale: f64) -> Vec<f64> {
+    let readings = log.column(name).unwrap_or_default().iter().zip(all);
+    readings.filter(|(v, m)| v.is_finite() && m.is_finite() && **m > 0.1 * scale).map(|(v, m)| v / m).collect()
+}
+
+/// Gain of a channel against the speed of all; one that reads next to nothing has none.
+fn gain(log: &Log, name: &str, all: &[f64], scale: f64) -> f64 {
+    let gain = noise::median(&mut shares(log, name, all, scale));
+    if gain > 0.5 { gain } else { 1.0 }
+}
+
+/// Whether a channel disagrees with the median of all, while the rotor turns: by more than the gains of healthy sensors, or mostly by more than
+/// [`UNSTEADY`] about its own gain.
+fn disagrees(log: &Log, name: &str, all: &[f64], scale: f64) -> bool {
+    let mut shares = shares(log, name, all, scale);
+    if shares.is_empty() {
+        return false;
+    }
+    let gain = noise::median(&mut shares);
+    let unsteady = noise::median(&mut shares.iter().map(|share| (share - gain).abs()).collect::<Vec<f64>>());
+    (gain - 1.0).abs() > HEALTHY || unsteady > UNSTEADY
 }
 
 /// A speed that leaves by more than 2 % for at most three rows and comes back to within 1 % is a sensor's drop-out:

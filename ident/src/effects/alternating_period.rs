@@ -66,7 +66,7 @@ impl Effect for AlternatingPeriod {
         instances(context, "")
             .into_iter()
             .filter(|i| {
-                difference(context, i).is_some_and(|t| kurtosis(&held(context, t).map(|s| s.1).collect::<Vec<_>>()) < TWO_VALUED)
+                difference(context, i).is_some_and(|t| kurtosis(&usual(held(context, t).map(|s| s.1).collect())) < TWO_VALUED)
             })
             .collect()
     }
@@ -100,6 +100,18 @@ impl Effect for AlternatingPeriod {
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         fitted.iter().all(|e| e.value > LEAST && e.value < 60.0)
     }
+}
+
+/// Values without those that lie farther beyond nine in ten of them than half as far as these lie apart: a lost mark is none of the two values.
+fn usual(mut x: Vec<f64>) -> Vec<f64> {
+    x.sort_unstable_by(f64::total_cmp);
+    let [Some(low), Some(high)] = [x.get(x.len() / 20), x.get(x.len().saturating_sub(1 + x.len() / 20))].map(|v| v.copied())
+    else {
+        return x;
+    };
+    let beyond = 0.5 * (high - low);
+    x.retain(|v| (low - beyond..=high + beyond).contains(v));
+    x
 }
 
 fn kurtosis(x: &[f64]) -> f64 {

@@ -9,7 +9,7 @@
 
 use super::blade_flex::upper_speeds;
 use super::pulses::{SCATTERED, struck_readings, struck_speeds};
-use super::speed_channel::{HINGE, LEAST, add_hinge, hinge_at_top, instance};
+use super::speed_channel::{HINGE, add_hinge, instance, leaves};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;
@@ -89,6 +89,6 @@ impl Effect for BladeTwist {
     }
 
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
-        instance.form == SCATTERED || hinge_at_top(context, fitted) > LEAST
+        instance.form == SCATTERED || leaves(context, instance, fitted, 1.0)
     }
 }

@@ -6,7 +6,7 @@
 //! Reference: Beharie 2013, section 5.7.1 (shaft encoder against the optical sensors).
 
 use super::blade_flex::upper_speeds;
-use super::speed_channel::{HINGE, LEAST, add_hinge, hinge_at_top, instance};
+use super::speed_channel::{HINGE, add_hinge, instance, leaves};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::context::Context;
 use crate::design::TargetDesign;
@@ -59,7 +59,7 @@ impl Effect for CouplingSlip {
         add_hinge(context, *onset, position, design);
     }
 
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        hinge_at_top(context, fitted) < -LEAST
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        leaves(context, instance, fitted, -1.0)
     }
 }

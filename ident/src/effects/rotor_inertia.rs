@@ -1,16 +1,17 @@
 //! `rotor_inertia`: speeding the rotor up costs torque and current.
 //!
-//! What it is: torque_nm += inertia * domega/dt, current_a += current_gain * domega/dt.
+//! What it is: torque_nm += inertia * domega/dt, current_a += power_gain * omega * domega/dt. The supply pays for the power that goes into the
+//! rotor: J omega domega/dt = V dI. The acceleration is that of the measured speed, or what a rotor has that is off its command's speed.
 //! What can go wrong: shows only in transients; a lag between the channels looks alike, and so does, with the other sign, a current that a turning
 //! rotor draws beyond its curve: a negative inertia is refused, but against a declared model, whose rotor may have been heavier.
-//! Units: kg.m2, A.s2/rad.
-//! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt).
+//! Units: kg.m2, A.s3/rad2.
+//! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt); first-order rotor, section 5.7.3 (dw/dt = (goal - w)/tau).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
 use crate::attribution::noise::usual_step;
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
-use crate::drive::acceleration_of_rows;
+use crate::drive::{Drive, acceleration_of_rows};
 
 /// See the module.
 pub(crate) struct RotorInertia;
@@ -23,8 +24,8 @@ impl Effect for RotorInertia {
     fn about(&self) -> About {
         About {
             title: "Accelerating the rotor takes torque and current",
-            equation: "torque_nm += inertia * d(omega)/dt, current_a += current_gain * d(omega)/dt",
-            source: "Beharie 2013, Eq. 2.21 as corrected",
+            equation: "torque_nm += inertia * d(omega)/dt, current_a += power_gain * omega * d(omega)/dt",
+            source: "Beharie 2013, Eq. 2.21 as corrected; power into the rotor over the voltage",
             depends_on: &["rpm_rate"],
             signature: "spikes of torque and current at each step, with the sign of the step; thrust(rpm) holds",
             look_alikes: &["channel_delay", "channel_filter"],
@@ -56,12 +57,14 @@ impl Effect for RotorInertia {
         }
         let (torque, current) = (present(context, &["torque_nm"]), present(context, &["current_a"]));
         let both = present(context, &["torque_nm", "current_a"]);
-        let mut out = Vec::new();
         // where the speed steps between rows, meters that average over a row see the step in the row in which it ends
         let forms: &[&str] = if operator::commands_abruptly(context) { &["", OVER_THE_ROW] } else { &[""] };
-        for (set, form) in [both, torque, current].iter().flat_map(|set| forms.iter().map(move |form| (set, *form))) {
-            let instance = Instance::new(set, form);
-            if !set.is_empty() && !out.contains(&instance) {
+        let of_any =
+            [&both, &torque, &current].into_iter().flat_map(|set| forms.iter().map(move |form| Instance::new(set, form)));
+        let of_current = driven(context).map(|_| Instance::new(&current, DRIVEN));
+        let mut out: Vec<Instance> = Vec::new();
+        for instance in of_any.chain(of_current).filter(|i| !i.channels.is_empty()) {
+            if !out.contains(&instance) {
                 out.push(instance);
             }
         }
@@ -73,17 +76,20 @@ impl Effect for RotorInertia {
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
-        vec![Amplitude { name: "inertia", unit: "kg.m2" }, Amplitude { name: "current_gain", unit: "A.s2/rad" }]
+        vec![Amplitude { name: "inertia", unit: "kg.m2" }, Amplitude { name: "power_gain", unit: "A.s3/rad2" }]
     }
 
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
-        let amplitude = usize::from(design.relation == Relation::Current);
-        let of_row = if instance.form == OVER_THE_ROW {
-            acceleration_of_rows(&context.t, &context.rpm, usual_step(&context.t))
-        } else {
-            acceleration(context)
+        let mut of_row = match instance.form.as_str() {
+            OVER_THE_ROW => acceleration_of_rows(&context.t, &context.rpm, usual_step(&context.t)),
+            DRIVEN => driven(context).cloned().unwrap_or_else(|| acceleration(context)),
+            _ => acceleration(context),
         };
-        design.add(position, amplitude, of_row);
+        let of_power = design.relation == Relation::Current;
+        if of_power {
+            of_row.iter_mut().zip(&context.rpm).for_each(|(a, rpm)| *a *= rpm * std::f64::consts::TAU / 60.0);
+        }
+        design.add(position, usize::from(of_power), of_row);
     }
 
     /// Speeding up takes, it does not give. Against a model it is a difference of two inertias.
@@ -94,6 +100,14 @@ impl Effect for RotorInertia {
 
 /// Form of meters that average over each row.
 const OVER_THE_ROW: &str = "over_the_row";
+/// Form of a rotor that is on its way to where its command sends it: a reading within a row's step knows how far it is off.
+const DRIVEN: &str = "driven";
+
+/// Acceleration by the command, rad/s^2; nothing without a command.
+fn driven(context: &Context) -> Option<&Vec<f64>> {
+    let of_command = || Some(Drive::of_command(&context.t, context.pulse.as_deref()?, &context.rpm)?.acceleration(&context.rpm));
+    context.facts.driven.get_or_init(of_command).as_ref()
+}
 
 /// Angular acceleration by central differences of the consensus speed, rad/s^2.
 ///

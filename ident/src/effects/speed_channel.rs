@@ -9,6 +9,7 @@
 use super::{Amplitude, Estimate, Instance};
 use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::design::TargetDesign;
+use crate::noise::median;
 use crate::solve::Normal;
 
 /// Share of the speed below which a channel agrees with the others: a third of the 1 % within which healthy sensors on real
@@ -84,10 +85,32 @@ pub(super) const HINGE: [Amplitude; 4] = [
     Amplitude { name: "bend_of_pulse", unit: "1" },
 ];
 
-/// Departure at the top speed as a share of it.
-pub(super) fn hinge_at_top(context: &Context, fitted: &[Estimate]) -> f64 {
+/// Whether a channel leaves the others to one side (`sign`) by more than healthy sensors may. Where another channel leaves to the other side by
+/// more, it takes the others along, and this one only seems to leave.
+pub(super) fn leaves(context: &Context, instance: &Instance, fitted: &[Estimate], sign: f64) -> bool {
+    let Some(own) = difference(context, instance) else { return false };
+    let top = context.rpm.iter().copied().fold(1.0, f64::max);
+    let by = sign * hinge_at_top(context, fitted);
+    let onset = fitted.iter().find(|e| e.name == "onset").map_or(0.0, |e| e.value);
+    let others = context.targets.iter().filter(|t| t.relation == Relation::SpeedDifference && t.name != own.name);
+    by > LEAST * top && others.map(|t| -sign * bends(context, t, onset)).all(|other| other < by)
+}
+
+/// How much farther a difference is off at the top speed than its gain below an onset says, rev/min.
+fn bends(context: &Context, target: &Target, onset: f64) -> f64 {
+    let top = context.rpm.iter().copied().fold(1.0, f64::max);
+    let share = |of: &dyn Fn(f64) -> bool| {
+        let rows = target.rows.iter().zip(&target.y).filter(|(row, _)| of(context.rpm[**row]));
+        median(&mut rows.map(|(row, y)| y / context.rpm[*row].max(1.0)).collect::<Vec<_>>())
+    };
+    let bent = top * (share(&|rpm| rpm > 0.5 * (onset + top)) - share(&|rpm| rpm < onset && rpm > 0.25 * onset));
+    if bent.is_finite() { bent } else { 0.0 }
+}
+
+/// Departure at the top speed, rev/min.
+fn hinge_at_top(context: &Context, fitted: &[Estimate]) -> f64 {
     let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or(0.0, |e| e.value);
     let top = context.rpm.iter().copied().fold(1.0, f64::max);
     let (onset, over) = (value("onset"), (top - value("onset")).max(0.0));
-    (value("slope") * over + value("bend") * over * over / onset.max(1.0)) / top
+    value("slope") * over + value("bend") * over * over / onset.max(1.0)
 }

@@ -125,14 +125,11 @@ impl Messy {
     /// What acts on a run: the second one has what an event left behind, and no drift of the first.
     #[must_use]
     pub fn acting(&self, which: usize) -> Vec<Effect> {
-        let event = self.top == Top::Event && which == 1;
         let mut out = self.effects.clone();
         if which == 1 {
-            out.retain(|e| e.id != "zero_drift" && !(e.id == "gain_change" && e.form == 1));
-        }
-        if event {
-            out.retain(|e| e.id != "tare_shift");
-            out[self.own.min(self.effects.len())..].iter_mut().for_each(|e| e.t0 = 0.0);
+            out.retain(|e| !["zero_drift", "tare_shift"].contains(&e.id) && !(e.id == "gain_change" && e.form == 1));
+            // what happened at an instant of the first run has happened
+            out.iter_mut().for_each(|e| e.t0 = 0.0);
         }
         out
     }

@@ -34,7 +34,7 @@ pub struct Line {
     pub on_top: [String; 2],
     /// Verdict, or `refused` or `panic`.
     pub verdict: String,
-    /// Names with their first channel, joined by `+`; a `!` before each that is not true.
+    /// Names with their first channel and their probability, joined by `+`; a `!` before each that is not true.
     pub named: String,
     /// Own effects that the run shows, and how many of them are named.
     pub own_named: [usize; 2],
@@ -110,8 +110,8 @@ impl Line {
     }
 }
 
-/// One name of a verdict: identifier and channels.
-type Name = (String, Vec<String>);
+/// One name of a verdict: identifier, channels and probability.
+type Name = (String, Vec<String>, f64);
 
 /// Runs the tool on a seed.
 #[must_use]
@@ -175,12 +175,15 @@ fn judge(m: &Messy, verdict: &Value, line: &mut Line) {
         .as_array()
         .into_iter()
         .flatten()
-        .map(|e| (e["id"].as_str().unwrap_or_default().to_owned(), strings(&e["channels"])))
+        .map(|e| {
+            (e["id"].as_str().unwrap_or_default().to_owned(), strings(&e["channels"]), e["probability"].as_f64().unwrap_or(0.0))
+        })
         .collect();
     let names: Vec<&Name> = entries.iter().filter(|n| n.0 != "unknown").collect();
     let is_true = |n: &Name| m.effects.iter().any(|e| says(n, e));
     line.verdict = verdict["verdict"].as_str().unwrap_or_default().to_owned();
-    let word = |n: &&Name| format!("{}{}@{}", if is_true(n) { "" } else { "!" }, n.0, n.1.first().map_or("", String::as_str));
+    let word =
+        |n: &&Name| format!("{}{}@{}*{:.2}", if is_true(n) { "" } else { "!" }, n.0, n.1.first().map_or("", String::as_str), n.2);
     line.named = names.iter().map(word).collect::<Vec<_>>().join("+");
     line.own_named[1] = shown(m, 0..m.own).filter(|e| names.iter().any(|n| says(n, e))).count();
     line.names = [names.len(), names.iter().filter(|n| is_true(n)).count()];
@@ -306,15 +309,15 @@ mod tests {
         m.effects = vec![of("supply_sag", "voltage_v"), of("channel_filter", "thrust_n"), of("stall", "thrust_n")];
         (m.own, m.sizes) = (2, vec![(20.0, "voltage_v"), (2.0, "thrust_n"), (5.0, "thrust_n")]);
         let verdict = serde_json::json!({"verdict": "attributed", "effects": [
-            {"id": "supply_sag", "channels": ["voltage_v"]},
+            {"id": "supply_sag", "channels": ["voltage_v"], "probability": 0.9},
             {"id": "channel_filter", "channels": ["current_a"]},
             {"id": "stall", "channels": ["thrust_n", "torque_nm"]},
             {"id": "unknown", "channels": ["thrust_n"]}]});
         let mut line = Line { own_named: [1, 0], ..Line::default() };
         judge(&m, &verdict, &mut line);
         assert_eq!((line.own_named, line.names, line.top_first), ([1, 1], [3, 2], [1, 0]));
-        assert_eq!(line.named, "supply_sag@voltage_v+!channel_filter@current_a+stall@thrust_n");
-        let entries = [("unknown".to_owned(), vec!["thrust_n".to_owned()])];
+        assert_eq!(line.named, "supply_sag@voltage_v*0.90+!channel_filter@current_a*0.00+stall@thrust_n*0.00");
+        let entries = [("unknown".to_owned(), vec!["thrust_n".to_owned()], 0.9)];
         assert!(noticed(&verdict, &entries, "thrust_n") && !noticed(&verdict, &entries, "voltage_v"));
         let listed = serde_json::json!({"verdict": "attributed", "unexplained": [{"channel": "rpm_beam - others"}]});
         assert!(noticed(&listed, &[], "rpm_beam") && !noticed(&listed, &[], "current_a"));
