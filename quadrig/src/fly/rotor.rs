@@ -106,7 +106,9 @@ impl ModelRotor {
         if !flying.polynomials.iter().any(|p| p.channel == "thrust_n") {
             return Err("no thrust; expected one identified from a log with thrust_n");
         }
-        let holds_inertia = flying.effects.iter().any(|e| e.placed.effect.id() == "rotor_inertia");
+        // one that is on the current alone says nothing of the torque
+        let holds_inertia =
+            flying.effects.iter().any(|e| e.placed.effect.id() == "rotor_inertia" && e.placed.instance.touches("torque_nm"));
         let mut rotor = Self { model: flying, inertia_kgm2: if holds_inertia { 0.0 } else { inertia_kgm2 }, settled: Vec::new() };
         let levels = (1000.0 / LEVEL_US) as usize + 1;
         let pulses = (0..levels * LEVEL_ROWS).map(|i| 1000.0 + LEVEL_US * (i / LEVEL_ROWS) as f64).collect();
