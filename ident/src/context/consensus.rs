@@ -1,7 +1,7 @@
 //! One speed from up to four sensors.
 //!
-//! What it is: the median of the channels that agree, each over its own gain, drop-outs bridged. A sample that its board flags as wrong is left out where another
-//! channel has one that is not.
+//! What it is: the median of the channels that agree, each over its own gain, drop-outs bridged. A sample that its board flags as wrong is left
+//! out where another channel has one that is not.
 //! What can go wrong: of two channels that disagree none can be outvoted, and both are kept.
 //! Units: rev/min.
 //! Reference: specification `formats.md` (primary relations).
@@ -103,17 +103,34 @@ fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
     sd
 }
 
+/// One sensor of the speed.
+struct Sensor<'l> {
+    readings: &'l [f64],
+    flags: Option<&'l [f64]>,
+    gain: f64,
+}
+
+impl Sensor<'_> {
+    /// Its reading over its gain; nothing where it is missing.
+    fn at(&self, row: usize) -> Option<f64> {
+        self.readings[row].is_finite().then(|| self.readings[row] / self.gain)
+    }
+
+    fn is_wrong(&self, row: usize) -> bool {
+        self.flags.is_some_and(|f| board::is_wrong(f[row]))
+    }
+}
+
 /// Median of some channels on each row, each over its gain.
 fn median_of(log: &Log, names: &[&str], gains: &[f64]) -> Vec<f64> {
-    let columns: Vec<(&[f64], Option<&[f64]>, f64)> =
-        names.iter().zip(gains).filter_map(|(n, gain)| Some((log.column(n)?, board::flags(log, n), *gain))).collect();
-    let present = |i: usize| columns.iter().filter(move |c| c.0[i].is_finite());
+    let of =
+        |(name, gain): (&&str, &f64)| Some(Sensor { readings: log.column(name)?, flags: board::flags(log, name), gain: *gain });
+    let sensors: Vec<Sensor<'_>> = names.iter().zip(gains).filter_map(of).collect();
     (0..log.len())
         .map(|i| {
-            let mut v: Vec<f64> =
-                present(i).filter(|c| !c.1.is_some_and(|f| board::is_wrong(f[i]))).map(|c| c.0[i] / c.2).collect();
+            let mut v: Vec<f64> = sensors.iter().filter(|s| !s.is_wrong(i)).filter_map(|s| s.at(i)).collect();
             if v.is_empty() {
-                v = present(i).map(|c| c.0[i] / c.2).collect();
+                v = sensors.iter().filter_map(|s| s.at(i)).collect();
             }
             if v.is_empty() { f64::NAN } else { noise::median(&mut v) }
         })

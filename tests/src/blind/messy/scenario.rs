@@ -127,7 +127,8 @@ impl Messy {
     pub fn acting(&self, which: usize) -> Vec<Effect> {
         let mut out = self.effects.clone();
         if which == 1 {
-            out.retain(|e| !["zero_drift", "tare_shift"].contains(&e.id) && !(e.id == "gain_change" && e.form == 1));
+            let of_the_first = |e: &Effect| ["zero_drift", "tare_shift"].contains(&e.id) || e.id == "gain_change" && e.form == 1;
+            out.retain(|e| !of_the_first(e));
             // what happened at an instant of the first run has happened
             out.iter_mut().for_each(|e| e.t0 = 0.0);
         }
