@@ -64,8 +64,8 @@ pub(super) fn of(log: &Log) -> Fused {
     };
     let excluded = if kept.len() == present.len() { Vec::new() } else { excluded };
     let mut rpm = if excluded.is_empty() { all } else { median_of(log, &kept, &vec![1.0; kept.len()]) };
-    // a median of sensors that differ by their gains is now one of them and now another, where one is lost or bends away
-    for _ in 0..PASSES {
+    // a median of sensors that differ by their gains is now one of them and now another, where one is lost or bends away; one alone is itself
+    for _ in 0..if kept.len() > 1 { PASSES } else { 0 } {
         let gains: Vec<f64> = kept.iter().map(|name| gain(log, name, &rpm, scale)).collect();
         rpm = median_of(log, &kept, &gains);
     }

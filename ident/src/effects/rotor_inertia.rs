@@ -61,7 +61,7 @@ impl Effect for RotorInertia {
         let forms: &[&str] = if operator::commands_abruptly(context) { &["", OVER_THE_ROW] } else { &[""] };
         let of_any =
             [&both, &torque, &current].into_iter().flat_map(|set| forms.iter().map(move |form| Instance::new(set, form)));
-        let of_current = driven(context).map(|_| Instance::new(&current, DRIVEN));
+        let of_current = (!current.is_empty() && driven(context).is_some()).then(|| Instance::new(&current, DRIVEN));
         let mut out: Vec<Instance> = Vec::new();
         for instance in of_any.chain(of_current).filter(|i| !i.channels.is_empty()) {
             if !out.contains(&instance) {

@@ -43,7 +43,8 @@ const LATE_S: [f64; 3] = [0.15, 1.0, 15.0];
 const FASTEST: f64 = 1.5;
 /// Move of the load that turns its direction, over the top.
 const SLACK: f64 = 0.02;
-/// Least range of the temperature that says something of it, K (standard deviation).
+/// Least range of the temperature that says something of it, K (standard deviation): beneath it the last digit of a usual meter, 1/16 K, is what
+/// varies. How well a warmth is known beyond that its own error says.
 const WARM_K: f64 = 0.1;
 
 /// A column on every row of a log.

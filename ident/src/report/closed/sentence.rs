@@ -103,9 +103,13 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         out += &format!(" Every {noun} has that; nothing of this {noun}'s own was named.");
     }
     let explained = explained(verdict, &told);
-    // what says that more is named below has said so
-    let more = if explained.contains(" below ") { 0 } else { more };
-    [out, explained, below(more, false), left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+    // what says that more is told below has said so
+    let more = if explained.as_ref().is_some_and(|e| e.says_more) { 0 } else { more };
+    [out, explained.map(|e| e.said).unwrap_or_default(), below(more, false), left(verdict)]
+        .into_iter()
+        .filter(|s| !s.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// A clause for each effect; what differs from run to run is one clause with a part for each.
@@ -275,15 +279,22 @@ fn share(verdict: &Verdict, name: &str) -> Option<f64> {
     (before > 0.0 && after.is_finite()).then(|| (1.0 - after / before).max(0.0))
 }
 
-/// How much the effects explain of what their first channels had left over.
-fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
+/// A sentence on what is explained.
+struct Explained {
+    said: String,
+    /// Whether it speaks of effects beside those of the sentence before.
+    says_more: bool,
+}
+
+/// How much the effects explain of what their first channels had left over; nothing where that is not worth a figure.
+fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> Option<Explained> {
     let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).map(String::as_str).collect();
     on.sort_unstable();
     on.dedup_by_key(|c| whole(verdict, c));
     let told_of = |c| Some((c, share(verdict, c).filter(|s| *s >= TELLING)?));
     let shares: Vec<(&str, f64)> = on.into_iter().filter_map(told_of).collect();
     let is_told = |c: &String| shares.iter().any(|s| whole(verdict, s.0) == whole(verdict, c));
-    let Some(least) = shares.iter().map(|s| s.1).min_by(f64::total_cmp) else { return String::new() };
+    let least = shares.iter().map(|s| s.1).min_by(f64::total_cmp)?;
     let most = shares.iter().map(|s| s.1).fold(least, f64::max);
     // what else was added on these channels has its part in the figure
     let beside = |e: &&EffectEntry| !told.iter().any(|t| std::ptr::eq(*t, *e)) && e.channels.iter().any(is_told);
@@ -305,14 +316,15 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> String {
     let but: String = worse(verdict, &is_told).collect();
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
-        return format!("{subject} {} of what {} had left over.{but}", per_cent(mean), list(&names));
+        let said = format!("{subject} {} of what {} had left over.{but}", per_cent(mean), list(&names));
+        return Some(Explained { said, says_more: others });
     }
     let parts: Vec<String> =
         shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), whole(verdict, s.0))).collect();
     let short: Vec<String> = std::iter::once(parts[0].clone())
         .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))))
         .collect();
-    format!("{subject} {}.{but}", list(&short))
+    Some(Explained { said: format!("{subject} {}.{but}", list(&short)), says_more: others })
 }
 
 /// The channels of what a share is told of that are predicted worse for all that: the share of the whole does not show it.
