@@ -101,7 +101,7 @@ fn signature(context: &Context, effect: &'static dyn Effect, instance: Instance)
     for (i, target) in context.targets.iter().enumerate().filter(|(_, t)| instance.touches(t.name)) {
         let plain = TargetDesign::baseline(context, target.name, target.relation);
         let with = design(context, Declared::default(), &placed, target);
-        let base = least_squares(&plain, &target.rows, &target.y)?;
+        let base = least_squares(&plain, &target.rows, &target.y, target.noise.rms.powi(2))?;
         let predicted = plain.predict(&base, context.len());
         // the declared part through the effect's operators, with the coefficients of the healthy rig, and each amplitude at one
         let coefficients: Vec<f64> = with
@@ -117,19 +117,21 @@ fn signature(context: &Context, effect: &'static dyn Effect, instance: Instance)
         }
         change.iter_mut().for_each(|c| *c /= target.noise.rms);
         let rows: Vec<usize> = (0..context.len()).collect();
-        let fitted = plain.predict(&least_squares(&plain, &rows, &change)?, context.len());
+        let fitted = plain.predict(&least_squares(&plain, &rows, &change, target.noise.rms.powi(2))?, context.len());
         let left: Vec<f64> = change.iter().zip(&fitted).map(|(c, f)| c - f).collect();
         changes.push((i, change, left));
     }
     changes.iter().any(|c| norm(&c.2) > 1e-6).then_some(Signature { instance, shape, changes })
 }
 
-fn least_squares(design: &TargetDesign, rows: &[usize], y: &[f64]) -> Option<Vec<f64>> {
+/// `unit`: variance that a weight of one stands for.
+fn least_squares(design: &TargetDesign, rows: &[usize], y: &[f64], unit: f64) -> Option<Vec<f64>> {
     let mut normal = Normal::new(design.columns.len());
     for (i, v) in rows.iter().zip(y) {
         let row: Vec<f64> = design.columns.iter().map(|c| c.values[*i]).collect();
         normal.add(&row, *v, 1.0);
     }
+    design.expect(&mut normal, unit);
     Some(normal.solve()?.coefficients)
 }
 

@@ -14,7 +14,7 @@ use crate::diagnose::Diagnosis;
 use crate::effects::unknown::Words;
 use crate::effects::{Estimate, Shape};
 use crate::heldout;
-use crate::hypothesis::{Declared, Fit, Placed, Rows};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, anywhere_in_a_row};
 use crate::identify::is_table;
 use crate::leftover;
 use crate::log::Log;
@@ -226,7 +226,7 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
         .zip(estimates)
         .enumerate()
         .map(|(k, (p, estimates))| {
-            let estimates = p.effect.report(context, &p.instance, estimates);
+            let estimates = anywhere_in_a_row(context, p.effect.report(context, &p.instance, estimates));
             let shapes = p.effect.shapes(context, &p.instance);
             let Quoted { channel: first, of_news, reduction } = quoted(context, p, &d.heldout_after, &d.heldout_without[k]);
             let mut channels: Vec<String> = p.instance.channels.iter().filter(|c| !is_contrast(c)).cloned().collect();

@@ -51,17 +51,29 @@ pub enum Relation {
     Thrust,
     /// rms of the strain from rpm: quadratic. Evidence only; no verdict speaks of it.
     ThrustRms,
-    /// one speed channel less the consensus of at least three: a constant. Evidence only; no verdict speaks of it.
+    /// one speed channel less the consensus of at least three: a constant and the sensor's own gain (see [`GAIN_SD`]). Evidence only; no
+    /// verdict speaks of it.
     SpeedDifference,
 }
 
+/// Standard deviation of the gain that a healthy speed sensor has of its own: 0.3 % (specification `closing-the-loop.md`, step 2).
+const GAIN_SD: f64 = 0.003;
+
 impl Relation {
+    /// What is known before any run of the coefficient of a power of the regressor: one over its variance about zero; 0 where nothing is.
+    #[must_use]
+    pub fn precision(self, power: usize) -> f64 {
+        // a gain is a share, its coefficient is of krpm
+        if self == Self::SpeedDifference && power == 1 { (1000.0 * GAIN_SD).powi(-2) } else { 0.0 }
+    }
+
     /// Degree of the declared polynomial.
     #[must_use]
     pub fn degree(self) -> usize {
         match self {
             Self::SpeedFromPulse | Self::Current => 3,
-            Self::SpeedAlone | Self::Voltage | Self::SpeedDifference => 0,
+            Self::SpeedAlone | Self::Voltage => 0,
+            Self::SpeedDifference => 1,
             Self::Torque | Self::Thrust | Self::ThrustRms => 2,
         }
     }
@@ -361,6 +373,8 @@ pub(crate) struct Facts {
     pub(crate) winding: OnceLock<f64>,
     /// Angular acceleration on the way to where the command sends the rotor, rad/s^2; nothing without a command.
     pub(crate) driven: OnceLock<Option<Vec<f64>>>,
+    /// Share of the voltage that goes with each Ah drawn, 1/Ah.
+    pub(crate) discharge: OnceLock<f64>,
     /// Slope of the static speed curve on each row, rev/min per us.
     pub(crate) slope: OnceLock<Vec<f64>>,
     /// Where the thrust reads one and the same largest value.

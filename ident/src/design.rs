@@ -7,6 +7,7 @@
 
 use crate::context::{Context, Relation};
 use crate::hypothesis::Placed;
+use crate::solve::Normal;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -102,6 +103,15 @@ impl TargetDesign {
         self.fixed = self.predict(coefficients, self.columns.first().map_or(0, |c| c.values.len()));
         self.columns.clear();
         self
+    }
+
+    /// Adds to equations of the columns, of weights that are `unit` over a variance, what is known of the coefficients before any run.
+    pub(crate) fn expect(&self, normal: &mut Normal, unit: f64) {
+        for (k, column) in self.columns.iter().enumerate() {
+            if let Label::Base(power) = column.label {
+                normal.expect(k, unit * self.relation.precision(power));
+            }
+        }
     }
 
     /// What a declared model expects, or one that predicts makes of its columns so far but for the zeros of the day; `None` while coefficients are

@@ -365,9 +365,11 @@ pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
         .collect()
 }
 
-/// Whether an instance may join: not twice the same effect on a channel, not too many effects on one channel.
+/// Whether an instance may join: not twice the same effect on a channel, not too many effects on one channel, no part without its whole.
 pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
-    instance.channels.iter().all(|c| {
+    let wholes = effect.part_of();
+    let has_its_whole = wholes.is_empty() || placed.iter().any(|p| wholes.contains(&p.effect.id()));
+    has_its_whole && instance.channels.iter().all(|c| {
         let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
         // what is older than the run may have happened once more
         let older = |p: &Placed| {

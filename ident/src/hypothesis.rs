@@ -432,6 +432,14 @@ pub(crate) fn allow_for_the_form(context: &Context, estimates: &mut [Estimate]) 
     }
 }
 
+/// Estimates as a reader has them: a reading is of any instant of its row, or of all of it, and no log says which. So no delay, window or time
+/// constant is known better than that. Another run of the same logger has its readings at the same instants: predictions do not ask for this.
+pub(crate) fn anywhere_in_a_row(context: &Context, mut estimates: Vec<Estimate>) -> Vec<Estimate> {
+    let spread = context.duration() / context.len().max(2) as f64 / 12.0_f64.sqrt();
+    estimates.iter_mut().filter(|e| e.unit == "s" && e.name != "t0").for_each(|e| e.se = e.se.hypot(spread));
+    estimates
+}
+
 /// Distance at which a log-likelihood has fallen by 1.92, at most `bound`: doubled from a small step, then halved between.
 fn half_width(fall: &dyn Fn(f64) -> f64, step: f64, bound: f64) -> f64 {
     const FALL: f64 = 1.92;

@@ -463,7 +463,7 @@ fn relation_text(channel: &str, has_pulse: bool) -> &'static str {
         Some(Relation::Current) => "current(rpm), cubic in the consensus speed",
         Some(Relation::Torque) => "torque(rpm), quadratic in the consensus speed",
         Some(Relation::Thrust) => "thrust(rpm), quadratic in the consensus speed",
-        Some(Relation::SpeedDifference) => "one speed channel less the consensus, constant",
+        Some(Relation::SpeedDifference) => "one speed channel less the consensus: a constant and its own gain",
         Some(Relation::ThrustRms) => "rms of the strain about its mean, quadratic in the consensus speed",
         None => "none",
     }

@@ -185,7 +185,7 @@ impl<'c> Samples<'c> {
             weights = levelled.iter().map(|v| 1.0 / v).collect();
             half_logs = 0.5 * log_product(&levelled);
         }
-        let (columns, [normal, late]) = if design.fixed.is_empty() && design.extra_variance.is_empty() {
+        let (columns, [mut normal, late]) = if design.fixed.is_empty() && design.extra_variance.is_empty() {
             self.equations(design)
         } else {
             let columns: Vec<_> = design.columns.iter().map(|c| self.of_samples(&c.values)).collect();
@@ -194,6 +194,7 @@ impl<'c> Samples<'c> {
             let whole = Normal::of_columns(&columns, &y, &weights);
             (columns, [whole, late])
         };
+        design.expect(&mut normal, 1.0 / self.stride as f64);
         let mut kept = Kept { columns, y, floored, jumps: None };
         let mut solution = normal.solve()?;
         let n = self.chosen.len() as f64;

@@ -110,6 +110,11 @@ impl Normal {
         whole
     }
 
+    /// Adds what is known of a coefficient beforehand: that it is about zero, with one over its variance.
+    pub(crate) fn expect(&mut self, column: usize, precision: f64) {
+        self.gram[(column, column)] += precision;
+    }
+
     /// Adds what went into another of the same columns.
     pub(crate) fn absorb(&mut self, other: &Self) {
         self.gram += &other.gram;

@@ -12,14 +12,11 @@ use crate::heldout;
 use crate::hypothesis::{Declared, Fit, effective_share};
 use crate::inspect::goes_with;
 use crate::opponent::{is_second_meter, left_over};
-use crate::solve::Normal;
 use crate::verdict::{Channels, Unexplained};
 use std::ops::Range;
 
 /// Error on left-out rows, in noise floors, from which on a channel must be told.
 pub const LOUD: f64 = 3.0;
-/// Largest gain that a healthy speed sensor has of its own: three standard deviations of 0.3 % (specification, step 2).
-const OWN_GAIN: f64 = 0.009;
 /// Share of the rows that may be anything when sensors are held against each other.
 const FEW: f64 = 0.01;
 /// The same, of rows one after the other, as a multiple.
@@ -42,7 +39,7 @@ pub(crate) fn unexplained(context: &Context, declared: Declared<'_>, fit: &Fit, 
     let mut out = Vec::new();
     for (i, target) in context.targets.iter().enumerate() {
         let over_floor = match target.relation {
-            Relation::SpeedDifference => contrast(context, target, &residuals[i]).filter(|over| *over > LOUD),
+            Relation::SpeedDifference => Some(contrast(target, &residuals[i])).filter(|over| *over > LOUD),
             _ => channels
                 .get(target.name)
                 .map(|c| c.after.heldout_rms / c.noise_floor_rms)
@@ -73,25 +70,15 @@ fn spoken(target: &str) -> String {
     of.map_or_else(|| target.to_owned(), |(channel, _)| format!("{channel} - others"))
 }
 
-/// What one speed sensor reads beyond the others once its own gain is known, in noise floors of that difference, where the load is held.
-fn contrast(context: &Context, target: &Target, residual: &[f64]) -> Option<f64> {
+/// What one speed sensor reads beyond the others and its own gain, in noise floors of that difference, where the load is held.
+fn contrast(target: &Target, residual: &[f64]) -> f64 {
     let held = |j: &usize| target.claims(target.rows[*j]) && target.unsettled.get(*j).is_none_or(|u| !u);
-    let rows: Vec<(f64, f64)> = (0..residual.len())
-        .filter(held)
-        .map(|j| (context.rpm[target.rows[j]] / 1000.0, target.news(target.rows[j], residual[j])))
-        .collect();
-    let mut normal = Normal::new(2);
-    rows.iter().for_each(|(krpm, r)| normal.add(&[1.0, *krpm], *r, 1.0));
-    let line = normal.solve()?.coefficients;
-    let gain = line[1].clamp(-1000.0 * OWN_GAIN, 1000.0 * OWN_GAIN);
-    // beside another slope than the best the best constant is another one too
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| rows.iter().map(of).sum::<f64>() / rows.len() as f64;
-    let constant = mean(&|r| r.1) - gain * mean(&|r| r.0);
-    let mut squares: Vec<f64> = rows.iter().map(|(krpm, r)| (r - constant - gain * krpm).powi(2)).collect();
+    let mut squares: Vec<f64> =
+        (0..residual.len()).filter(held).map(|j| target.news(target.rows[j], residual[j]).powi(2)).collect();
     squares.sort_unstable_by(f64::total_cmp);
     squares.truncate(squares.len() - (FEW * squares.len() as f64).ceil() as usize);
     let rms = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-    Some(rms / target.noise.rms)
+    rms / target.noise.rms
 }
 
 /// The shape of a residual in words.

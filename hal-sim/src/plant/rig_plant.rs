@@ -108,7 +108,7 @@ impl RigPlant {
     /// Everything that moves in seconds, once a millisecond.
     fn settle(&mut self, duty: f64) {
         let (p, fixed, l, dt_s) = (&mut self.parts, &self.fixed, &self.levers, self.elapsed_s);
-        p.supply.draw(self.charge_as, 1.0);
+        p.supply.draw(self.charge_as, dt_s);
         let run_s = l.run_s.max(0.0);
         let loss_w = self.motor_a * self.motor_a * p.motor.resistance_ohm + fixed.friction_nm * self.speed;
         self.thermal.step(loss_w, run_s, dt_s);

@@ -1,15 +1,17 @@
 //! `battery_discharge`: the battery empties during the run.
 //!
 //! What it is: voltage_v falls with the charge drawn, along the cells' open-circuit curve (a parabola over the part of it that
-//! a run covers), and the speed at a given pulse follows the voltage.
-//! What can go wrong: the capacity follows from the slope only as well as one knows the cell's curve: 15 % are added to its error.
+//! a run covers), and the speed at a given pulse follows the voltage; the current at a speed rises by what is known of brushless motors.
+//! What can go wrong: whatever else drifts with time looks like it on speed and current, so these may not follow by more than the voltage falls. the capacity follows from the slope only as well as one knows the cell's curve: 15 % are added to its error.
 //! Units: V/Ah, V/Ah2, Ah.
 //! Reference: open-circuit voltage of lithium-polymer cells falls by 0.65 V +- 15 % per unit of charge between full and the
 //! knee: 4.20 V full, 3.87 V at 50 % (Chen & Rincon-Mora 2006, Fig. 8, and common discharge tables).
 
+use super::supply_voltage::{OF_CURRENT, OF_SPEED};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present, speeds};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
+use crate::solve::Normal;
 
 /// See the module.
 pub(crate) struct BatteryDischarge;
@@ -19,6 +21,11 @@ const CELL_V: f64 = 3.95;
 /// Fall of one cell's open-circuit voltage per unit of charge, V, and how well it is known.
 const CELL_SLOPE: (f64, f64) = (0.65, 0.15);
 
+/// By how much the current at a speed rises where the speed at a pulse falls, both as shares: the powers of the voltage that they go with.
+const CURRENT_BY_SPEED: f64 = OF_CURRENT.0 / OF_SPEED.0;
+/// Share of the speed over a whole run within which a loss is none.
+const LEAST_LOSS: f64 = 0.02;
+
 impl Effect for BatteryDischarge {
     fn id(&self) -> &'static str {
         "battery_discharge"
@@ -27,7 +34,7 @@ impl Effect for BatteryDischarge {
     fn about(&self) -> About {
         About {
             title: "Battery discharges during the run",
-            equation: "voltage_v = V0 - slope q - bend q^2, rpm *= 1 - speed_loss q, current_a += current_rise q rpm^3, q = charge drawn",
+            equation: "voltage_v = V0 - slope q - bend q^2 (curved) or V0 - slope q (straight), rpm(pulse) *= 1 - speed_loss q, current_a *= 1 + 0.875 speed_loss q, q = charge drawn",
             source: "open-circuit voltage of lithium-polymer cells, Chen & Rincon-Mora 2006",
             depends_on: &["charge"],
             signature: "voltage and speed at the same pulse fall together, fastest at high current, and never come back",
@@ -61,20 +68,21 @@ impl Effect for BatteryDischarge {
         let mut channels = vec!["voltage_v"];
         channels.extend(present(context, &["current_a"]));
         channels.extend(speeds(context));
-        vec![Instance::new(&channels, if context.against_model { OTHER_SUPPLY } else { "" })]
+        let forms: &[&str] = if context.against_model { &[OTHER_SUPPLY] } else { &[STRAIGHT, CURVED] };
+        // where something else drifts on speed or current, the voltage alone still tells of the battery
+        let sets = if channels.len() > 1 { vec![channels.as_slice(), &channels[..1]] } else { vec![channels.as_slice()] };
+        sets.iter().flat_map(|set| forms.iter().map(|form| Instance::new(set, form))).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
-        if !instance.channels.iter().any(|c| c.starts_with("rpm")) {
+        if !instance.channels.iter().any(|c| c.starts_with("rpm") || c == "current_a") {
             return Vec::new();
         }
         let total = charge(context).last().copied().unwrap_or(0.0).max(1e-6);
-        let loss = Shape {
-            name: "speed_loss",
-            unit: "1/Ah",
-            range: (-0.02 / total, 0.5 / total),
-            starts: [0.001, 0.004, 0.015, 0.06].map(|k| k / total).to_vec(),
-        };
+        // a motor at a held duty turns no slower than its voltage falls
+        let most = fall(context).max(LEAST_LOSS / total);
+        let starts = [0.02, 0.1, 0.3, 0.7].map(|k| k * most).to_vec();
+        let loss = Shape { name: "speed_loss", unit: "1/Ah", range: (-LEAST_LOSS / total, 1.5 * most), starts };
         if instance.form != OTHER_SUPPLY {
             return vec![loss];
         }
@@ -83,11 +91,10 @@ impl Effect for BatteryDischarge {
     }
 
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
-        let mut out = vec![
-            Amplitude { name: "slope", unit: "V/Ah" },
-            Amplitude { name: "bend", unit: "V/Ah2" },
-            Amplitude { name: "current_rise", unit: "A/Ah.krpm3" },
-        ];
+        let mut out = vec![Amplitude { name: "slope", unit: "V/Ah" }, Amplitude { name: "bend", unit: "V/Ah2" }];
+        if instance.form == STRAIGHT {
+            out.truncate(1);
+        }
         if instance.form == OTHER_SUPPLY {
             out.push(Amplitude { name: "level", unit: "V" });
             out.push(Amplitude { name: "current_level", unit: "A/krpm3" });
@@ -99,25 +106,33 @@ impl Effect for BatteryDischarge {
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let charge = charge(context);
         let other = instance.form == OTHER_SUPPLY;
-        let cube = |r: &f64| (r / 1000.0).powi(3);
-        if design.relation == Relation::Voltage {
-            design.add(position, 0, charge.iter().map(|q| -q).collect());
-            design.add(position, 1, charge.iter().map(|q| -q * q).collect());
-            if other {
-                design.add(position, 3, vec![1.0; charge.len()]);
-                if let Some((current, _)) = context.draw() {
-                    design.add(position, 5, current.iter().map(|i| -i).collect());
+        let scale = |design: &mut TargetDesign, of: &dyn Fn(f64) -> f64| {
+            design.map_columns(|column| column.iter().zip(&charge).map(|(v, q)| v * of(*q)).collect());
+        };
+        match (design.relation, shape) {
+            (Relation::Voltage, _) => {
+                design.add(position, 0, charge.iter().map(|q| -q).collect());
+                if instance.form != STRAIGHT {
+                    design.add(position, 1, charge.iter().map(|q| -q * q).collect());
+                }
+                if other {
+                    design.add(position, 2, vec![1.0; charge.len()]);
+                    if let Some((current, _)) = context.draw() {
+                        design.add(position, 4, current.iter().map(|i| -i).collect());
+                    }
                 }
             }
-        } else if design.relation == Relation::Current {
-            // the same power from a lower voltage
-            design.add(position, 2, charge.iter().zip(&context.rpm).map(|(q, r)| q * cube(r)).collect());
-            if other {
-                design.add(position, 4, context.rpm.iter().map(cube).collect());
+            (Relation::Current, [loss, ..]) => {
+                scale(design, &|q| 1.0 + CURRENT_BY_SPEED * loss * q);
+                if other {
+                    design.add(position, 3, context.rpm.iter().map(|r| (r / 1000.0).powi(3)).collect());
+                }
             }
-        } else if let [loss, level @ ..] = shape {
-            let level = 1.0 + level.first().copied().unwrap_or(0.0);
-            design.map_columns(|column| column.iter().zip(&charge).map(|(v, q)| v * (level - loss * q)).collect());
+            (_, [loss, level @ ..]) => {
+                let level = 1.0 + level.first().copied().unwrap_or(0.0);
+                scale(design, &|q| level - loss * q);
+            }
+            _ => {}
         }
     }
 
@@ -143,15 +158,39 @@ impl Effect for BatteryDischarge {
         // a level and a resistance of its own make a sag of it; what is discharged must show
         let fall = (value("slope") + value("bend") * drawn) * drawn;
         let shows = context.target("voltage_v").is_some_and(|k| fall > context.targets[k].noise.rms);
-        (instance.form != OTHER_SUPPLY || shows) && reported.iter().any(|e| e.name == "capacity" && e.value < LARGEST_BATTERY)
+        let capacity = reported.iter().find(|e| e.name == "capacity").map_or(f64::INFINITY, |e| e.value);
+        // more than that is no open-circuit voltage: it would be far off on a longer run
+        let bends = (value("bend") * capacity).abs() < MOST_BENT * (value("slope") + value("bend") * drawn).abs();
+        let is_battery = instance.form == OTHER_SUPPLY || bends;
+        (instance.form != OTHER_SUPPLY || shows) && is_battery && capacity < LARGEST_BATTERY
     }
 }
 
 /// Form against a declared model: the battery is another supply than that of the model's day, with a level and a resistance of its own.
 const OTHER_SUPPLY: &str = "in the place of another supply";
 
+/// Form in which the voltage falls in a straight line over the charge that a run draws.
+const STRAIGHT: &str = "straight";
+/// Form in which it falls along a parabola.
+const CURVED: &str = "";
+
+/// Most of the mean slope by which the slope of a cell's curve may have changed after half its capacity: from 0.9 V to 0.4 V per unit of charge
+/// around a mean of 0.65 V (4.20 V full, 3.87 V half empty, 3.7 V at the knee).
+const MOST_BENT: f64 = 0.8;
+
 /// The largest battery that a motor rig is fed from, Ah.
 const LARGEST_BATTERY: f64 = 40.0;
+
+/// Share of the voltage that goes with each Ah drawn, 1/Ah, beside what the current takes of it at once; 0 without a voltage.
+fn fall(context: &Context) -> f64 {
+    *context.facts.discharge.get_or_init(|| {
+        let (Some(volts), Some((current, _))) = (&context.voltage, context.draw()) else { return 0.0 };
+        let columns = [vec![1.0; volts.len()], current.into_owned(), charge(context)];
+        let solution = Normal::of_columns(&columns, volts, &vec![1.0; volts.len()]).solve();
+        let mean = volts.iter().sum::<f64>() / volts.len() as f64;
+        solution.map_or(0.0, |s| (-s.coefficients[2] / mean).max(0.0))
+    })
+}
 
 /// Charge drawn since the first row, Ah.
 pub(crate) fn charge(context: &Context) -> Vec<f64> {

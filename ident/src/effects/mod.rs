@@ -10,6 +10,7 @@ pub mod airframe;
 pub(crate) mod alternating_period;
 mod amplifier_saturation;
 mod battery_discharge;
+mod battery_polarisation;
 mod beam_resonance;
 mod bearing_friction;
 mod blade_damage;
@@ -265,6 +266,10 @@ pub trait Effect: Sync {
     fn never_beside(&self) -> &'static [&'static str] {
         &[]
     }
+    /// Effects one of which must stand before this one is asked for: it is a further part of them.
+    fn part_of(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Evidence, nats, that the readings themselves show, whatever the model says of them.
     fn seen(&self, _context: &Context, _instance: &Instance) -> f64 {
         0.0
@@ -295,6 +300,7 @@ pub fn library() -> &'static [&'static dyn Effect] {
         &supply_sag::SupplySag,
         &supply_voltage::SupplyVoltage,
         &battery_discharge::BatteryDischarge,
+        &battery_polarisation::BatteryPolarisation,
         &spinup_lag::SpinupLag,
         &rotor_inertia::RotorInertia,
         &zero_drift::ZeroDrift,

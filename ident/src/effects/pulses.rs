@@ -7,8 +7,8 @@
 //! Reference: Beharie 2013, section 5.7.1; Garwood 1936 (interval of a count).
 
 use super::blade_damage::STANDSTILL;
-use super::speed_channel::{LEAST, beyond_a_gain, difference, instances};
-use super::{Amplitude, Estimate, Instance, NEEDED_EVIDENCE};
+use super::speed_channel::{difference, instances};
+use super::{Amplitude, Estimate, Instance};
 use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::design::TargetDesign;
 use crate::noise::median;
@@ -64,6 +64,9 @@ const LATE: f64 = 3.0;
 /// Share by which a reading must be off at least to be counted as one pulse too few or too many.
 const GROSS: f64 = 0.03;
 
+/// Share of the readings below which those that are off are single bad samples, and no cause that recurs.
+const SELDOM: f64 = 0.0033;
+
 /// Form in which single samples are off.
 pub(super) const SCATTERED: &str = "scattered";
 /// Form in which one sample of the whole run is off: its own reading is all that is known of it.
@@ -79,7 +82,7 @@ fn form(context: &Context, target: &Target, sign: f64) -> Option<&'static str> {
     let alone = |d: f64| d.abs() > ALONE * 1.4826 * median(&mut departures.iter().map(|d| d.abs()).collect::<Vec<_>>());
     match off.as_slice() {
         [one] if departures.len() > 100 && alone(*one) && PULSES.contains(&(1.0 + one)) => Some(ONCE),
-        [_, _, ..] if off.len() * 2 < departures.len() => Some(SCATTERED),
+        [_, _, ..] if off.len() * 2 < departures.len() && off.len() as f64 > SELDOM * departures.len() as f64 => Some(SCATTERED),
         _ => None,
     }
 }
@@ -134,10 +137,8 @@ pub(super) fn report_pulses(context: &Context, instance: &Instance, sign: f64, m
 
 /// Whether what was fitted can be pulses.
 pub(super) fn plausible_pulses(instance: &Instance, fitted: &[Estimate]) -> bool {
-    let is_whole = instance.form.is_empty();
     let most = if instance.form == SCATTERED { 3.0 } else { 0.3 };
-    let beyond = |share: f64| share > LEAST && (!is_whole || beyond_a_gain(share) > NEEDED_EVIDENCE);
-    fitted.iter().all(|e| beyond(e.value) && e.value < most)
+    fitted.iter().all(|e| e.value > 0.0 && e.value < most)
 }
 
 /// 1 on rows that read grossly too low (`sign` -1) or too high (+1), 0 elsewhere.

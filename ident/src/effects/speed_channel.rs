@@ -12,18 +12,6 @@ use crate::design::TargetDesign;
 use crate::noise::median;
 use crate::solve::Normal;
 
-/// Share of the speed below which a channel agrees with the others: a third of the 1 % within which healthy sensors on real
-/// rigs agree (specification `rig.md`).
-pub(super) const LEAST: f64 = 0.0033;
-
-/// Prior standard deviation of a healthy sensor's own gain: [`LEAST`] is that of the difference of two.
-pub(super) const GAIN_SD: f64 = LEAST * std::f64::consts::FRAC_1_SQRT_2;
-
-/// Evidence, nats, that a constant share of the speed is more than a healthy sensor's own gain: what the gain's prior leaves of it.
-pub(super) fn beyond_a_gain(share: f64) -> f64 {
-    0.5 * (share / GAIN_SD).powi(2)
-}
-
 /// The instance that touches a speed channel and its difference from the consensus.
 pub(super) fn instance(context: &Context, channel: &str, form: &str) -> Option<Instance> {
     let difference = DIFFERENCES.iter().find(|d| d.0 == channel)?.1;
@@ -68,8 +56,12 @@ pub(super) fn expected_at(context: &Context, more: f64) -> Vec<f64> {
     u.iter().map(|u| if *u > 0.0 { at(*u) } else { 0.0 }).collect()
 }
 
-/// Adds `slope` and `bend` of a departure that grows from an onset speed up: (rpm - onset) and its square over the onset.
+/// Adds `slope` and `bend` of a departure that grows from an onset speed up: (rpm - onset) and its square over the onset. A speed that nothing
+/// predicts shows none: there the speed itself would be explained by the speed.
 pub(super) fn add_hinge(context: &Context, onset: f64, position: usize, design: &mut TargetDesign) {
+    if design.relation == Relation::SpeedAlone {
+        return;
+    }
     let over: Vec<f64> = speed(context, design.relation).iter().map(|r| (r - onset).max(0.0)).collect();
     let first = if design.relation == Relation::SpeedDifference { 0 } else { 2 };
     design.add(position, first + 1, over.iter().map(|v| v * v / onset.max(1.0)).collect());
@@ -85,15 +77,14 @@ pub(super) const HINGE: [Amplitude; 4] = [
     Amplitude { name: "bend_of_pulse", unit: "1" },
 ];
 
-/// Whether a channel leaves the others to one side (`sign`) by more than healthy sensors may. Where another channel leaves to the other side by
-/// more, it takes the others along, and this one only seems to leave.
+/// Whether a channel leaves the others to one side (`sign`). Where another channel leaves to the other side by more, it takes the others along, and
+/// this one only seems to leave.
 pub(super) fn leaves(context: &Context, instance: &Instance, fitted: &[Estimate], sign: f64) -> bool {
     let Some(own) = difference(context, instance) else { return false };
-    let top = context.rpm.iter().copied().fold(1.0, f64::max);
     let by = sign * hinge_at_top(context, fitted);
     let onset = fitted.iter().find(|e| e.name == "onset").map_or(0.0, |e| e.value);
     let others = context.targets.iter().filter(|t| t.relation == Relation::SpeedDifference && t.name != own.name);
-    by > LEAST * top && others.map(|t| -sign * bends(context, t, onset)).all(|other| other < by)
+    by > 0.0 && others.map(|t| -sign * bends(context, t, onset)).all(|other| other < by)
 }
 
 /// How much farther a difference is off at the top speed than its gain below an onset says, rev/min.

@@ -30,7 +30,9 @@ pub(crate) fn declared(context: &Context, target: &Target) -> Option<DeclaredFit
     let x = |j: usize| abscissa(context, target.relation, target.rows[j]);
     // a row below the starting pulse is predicted as zero and teaches no coefficient
     let point = |j: usize| x(j).map_or((0.0, 0.0, 0.0), |x| (x, target.y[j], 1.0 / target.levelled[j]));
-    let solution = Normal::of_polynomial(target.relation.degree(), (0..n).map(point)).solve()?;
+    let mut normal = Normal::of_polynomial(target.relation.degree(), (0..n).map(point));
+    (0..terms).for_each(|power| normal.expect(power, target.relation.precision(power)));
+    let solution = normal.solve()?;
     let predicted = |x: f64| solution.coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
     let mut residual: Vec<f64> = (0..n).map(|j| target.y[j] - x(j).map_or(0.0, predicted)).collect();
     let left: f64 = residual.iter().map(|r| r * r).sum();
@@ -54,8 +56,8 @@ fn abscissa(context: &Context, relation: Relation, row: usize) -> Option<f64> {
             let pulse = context.pulse.as_ref()?[row];
             (pulse >= context.start_pulse_us).then_some((pulse - 1000.0) / 1000.0)
         }
-        Relation::SpeedAlone | Relation::Voltage | Relation::SpeedDifference => Some(0.0),
-        Relation::Torque | Relation::Current | Relation::Thrust | Relation::ThrustRms => {
+        Relation::SpeedAlone | Relation::Voltage => Some(0.0),
+        Relation::Torque | Relation::Current | Relation::Thrust | Relation::ThrustRms | Relation::SpeedDifference => {
             context.rpm.get(row).map(|rpm| rpm / 1000.0)
         }
     }

@@ -254,7 +254,9 @@ fn left_beside(declared: &TargetDesign, rows: &[usize], change: &[f64], levelled
     let weights: Vec<f64> = levelled.iter().map(|v| 1.0 / v).collect();
     let columns: Vec<Vec<f64>> = declared.columns.iter().map(|c| rows.iter().map(|r| c.values[*r]).collect()).collect();
     let mut left = change.to_vec();
-    if let Some(solution) = Normal::of_columns(&columns, change, &weights).solve() {
+    let mut normal = Normal::of_columns(&columns, change, &weights);
+    declared.expect(&mut normal, 1.0);
+    if let Some(solution) = normal.solve() {
         for (column, b) in columns.iter().zip(&solution.coefficients) {
             left.iter_mut().zip(column).for_each(|(l, v)| *l -= b * v);
         }

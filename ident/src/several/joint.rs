@@ -7,6 +7,7 @@
 
 use super::equations::{left_on, of_run, rms, shared, solved};
 use super::{FEWEST, Member, is_judged};
+use crate::context::Relation;
 use crate::design::Label;
 use crate::effects::Shape;
 use crate::hypothesis::Placed;
@@ -128,8 +129,8 @@ impl<'m, 'a> Joint<'m, 'a> {
     /// Log-likelihood of the shapes, nats: the noise of each run has a scale of its own.
     fn loglik(&self, rig: &[Placed], channels: &[&str], most: usize) -> f64 {
         let of_channel = |channel: &&str| {
-            let (_, normals) = self.equations(channel, rig, most);
-            let Some((coefficients, _)) = sum(normals.iter().flatten().map(|n| &n.0)).and_then(|n| solved(&n)) else {
+            let (labels, normals) = self.equations(channel, rig, most);
+            let Some((coefficients, _)) = joint(channel, &labels, &normals).and_then(|n| solved(&n)) else {
                 return 0.0;
             };
             let weight = self.weight(channel);
@@ -211,7 +212,7 @@ impl<'m, 'a> Joint<'m, 'a> {
     pub(super) fn shared(&self, rig: &[Placed]) -> Vec<Shared> {
         let of_channel = |channel: &'static str| {
             let (labels, normals) = self.equations(channel, rig, usize::MAX);
-            let whole = sum(normals.iter().flatten().map(|n| &n.0))?;
+            let whole = joint(channel, &labels, &normals)?;
             let (coefficients, inverse) = solved(&whole)?;
             let samples: f64 = normals.iter().flatten().map(|n| n.1).sum();
             let covariance = inverse * (whole.left_by(&coefficients) / samples).max(1.0);
@@ -226,7 +227,7 @@ impl<'m, 'a> Joint<'m, 'a> {
         let mut out = Vec::new();
         for channel in channels.map_or_else(|| self.channels(), <[_]>::to_vec) {
             let (labels, normals) = self.equations(channel, rig, usize::MAX);
-            let Some(whole) = sum(normals.iter().flatten().map(|n| &n.0)) else { continue };
+            let Some(whole) = joint(channel, &labels, &normals) else { continue };
             if normals.iter().flatten().count() < FEWEST {
                 continue;
             }
@@ -292,8 +293,16 @@ fn of_run_on(
     Some(Across { run, channel, rms: rms(&left), floor: target.noise.rms, samples })
 }
 
-fn sum<'n>(mut normals: impl Iterator<Item = &'n Normal>) -> Option<Normal> {
-    let mut out = normals.next()?.clone();
-    normals.for_each(|n| out.absorb(n));
+/// The equations of a channel from all runs together, with what is known of its coefficients before any run.
+fn joint(channel: &str, labels: &[Label], normals: &[Option<(Normal, f64)>]) -> Option<Normal> {
+    let mut of_runs = normals.iter().flatten().map(|n| &n.0);
+    let mut out = of_runs.next()?.clone();
+    of_runs.for_each(|n| out.absorb(n));
+    let relation = Relation::of(channel, true)?;
+    for (k, label) in labels.iter().enumerate() {
+        if let Label::Base(power) = label {
+            out.expect(k, relation.precision(*power));
+        }
+    }
     Some(out)
 }

@@ -1,0 +1,105 @@
+//! What a battery does to the voltage, and what it does not do to the rest.
+//!
+//! What it is: a motor on a battery with a resistance that answers at once, one that answers late, and a charge that runs out, on random levels.
+//! What can go wrong: a case whose effect the search misses fails with the verdict in its message.
+//! Units: SI, rev/min, us.
+//! Reference: Chen & Rincon-Mora 2006, IEEE Trans. Energy Conversion 21:504; specification `closing-the-loop.md`, "What counts as proof".
+
+mod rig;
+
+use ident::close::{Closed, close};
+use ident::log::{Column, Log};
+use rig::Chance;
+
+const STEP: f64 = 0.05;
+
+/// A battery and a day.
+#[derive(Clone, Copy)]
+struct Day {
+    seed: u64,
+    rows: usize,
+    /// Resistance that answers late, ohm, and its time constant, s.
+    late: (f64, f64),
+    /// Voltage that an ampere hour takes, V/Ah.
+    slope: f64,
+    /// Share by which the current at a speed grows each second, for a reason that no battery has.
+    drifts: f64,
+}
+
+const DAY: Day = Day { seed: 1, rows: 3000, late: (0.0, 1.0), slope: 0.0, drifts: 0.0 };
+
+/// A log: the speed is held by the command, the current follows from the power.
+fn log(day: &Day) -> Log {
+    let mut chance = Chance::new(day.seed);
+    let t: Vec<f64> = (0..day.rows).map(|i| STEP * i as f64).collect();
+    let mut pulse = Vec::new();
+    while pulse.len() < day.rows {
+        let level = (1200.0 + 700.0 * chance.uniform()).round();
+        pulse.extend(std::iter::repeat_n(level, (80.0 + 80.0 * chance.uniform()) as usize));
+    }
+    pulse.truncate(day.rows);
+    let (mut late, mut charge) = (0.0, 0.0);
+    let [mut rpm, mut current, mut voltage] = [const { Vec::new() }; 3];
+    for i in 0..day.rows {
+        let open = 12.4 - day.slope * charge - day.late.0 * late;
+        let krpm = 6.0e-3 * (pulse[i] - 1000.0) * (1.0 - 0.5 * day.slope * charge / 12.4);
+        let amps = (0.3 + 0.15 * krpm * krpm * krpm) * (12.4 / open) * (1.0 + day.drifts * t[i]);
+        let kept = (-STEP / day.late.1).exp();
+        late = kept * late + (1.0 - kept) * amps;
+        charge += amps * STEP / 3600.0;
+        rpm.push(1000.0 * krpm + 2.0 * chance.normal());
+        current.push(amps + 0.02 * chance.normal());
+        voltage.push(open - 0.03 * amps + 0.004 * chance.normal());
+    }
+    let columns = [("pulse_us", pulse), ("rpm", rpm), ("current_a", current), ("voltage_v", voltage)];
+    let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+    Log { name: format!("battery-{}.csv", day.seed), t, columns, ..Log::default() }
+}
+
+fn names(closed: &Closed) -> Vec<&str> {
+    let mut out: Vec<&str> = closed.verdict.effects.iter().map(|e| e.id.as_str()).collect();
+    out.sort_unstable();
+    out
+}
+
+#[test]
+fn a_battery_that_answers_late_is_named_with_its_time() {
+    let closed = close(&log(&Day { late: (0.04, 4.0), ..DAY }), None, &[], &mut |_| {}).expect("a verdict");
+    assert_eq!(names(&closed), ["battery_polarisation", "supply_sag"]);
+    let of = |id: &str, name: &str| {
+        let effect = closed.verdict.effects.iter().find(|e| e.id == id).expect(id);
+        effect.parameters.iter().find(|p| p.name == name).cloned().expect(name)
+    };
+    for (found, truth) in [
+        (of("battery_polarisation", "tau"), 4.0),
+        (of("battery_polarisation", "resistance"), 0.04),
+        (of("supply_sag", "resistance"), 0.03),
+    ] {
+        assert!(found.ci95[0] < truth && truth < found.ci95[1], "{truth}: {found:?}");
+        assert!((found.value / truth - 1.0).abs() < 0.05, "{truth}: {found:?}");
+    }
+    let at_once = close(&log(&DAY), None, &[], &mut |_| {}).expect("a verdict");
+    assert_eq!(names(&at_once), ["supply_sag"]);
+}
+
+/// A current that creeps up for another reason is not the battery's: carried over to a longer run it would be far too high.
+#[test]
+fn a_battery_takes_no_more_current_than_its_voltage_falls() {
+    let day = Day { slope: 1.5, drifts: 5e-4, ..DAY };
+    let longer = log(&Day { seed: 2, rows: 9000, drifts: 0.0, ..day });
+    let closed = close(&log(&day), None, &[longer], &mut |_| {}).expect("a verdict");
+    assert!(names(&closed).contains(&"battery_discharge"), "{:?}", names(&closed));
+    let current = closed.verdict.validation[0].channels["current_a"];
+    assert!(current.after < 1.05 * current.before, "{current:?}");
+}
+
+/// An open-circuit voltage is all but straight over the part of it that a run draws; what bends more is something else, and on a longer run
+/// a parabola would be volts off.
+#[test]
+fn a_short_run_tells_of_no_curve() {
+    let day = Day { late: (0.05, 12.0), slope: 3.0, rows: 900, ..DAY };
+    let longer = log(&Day { seed: 3, rows: 6000, ..day });
+    let closed = close(&log(&day), None, &[longer], &mut |_| {}).expect("a verdict");
+    let voltage = closed.verdict.validation[0].channels["voltage_v"];
+    assert!(voltage.after < 0.5 * voltage.before, "{:?} {voltage:?}", names(&closed));
+}
