@@ -155,6 +155,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         rounds.extend(best.fit.placed.iter().map(|_| (1.0, Vec::new())));
     }
     let mut round = 0;
+    let mut paired = false;
     while of_this_rig(&best.fit.placed) < MOST_EFFECTS {
         let begun = (round as f64 / (MOST_EFFECTS as f64 + 1.0)).min(LATE);
         round += 1;
@@ -162,16 +163,14 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let ranked = round_of(context, declared, &best, &mut offers, &mut |p| progress(begun + p * (done - begun)));
         candidates.push(ranked.iter().take(SHOWN).cloned().collect());
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else {
-            let room = of_this_rig(&best.fit.placed) + 2 <= MOST_EFFECTS;
+            let room = !paired && of_this_rig(&best.fit.placed) + 2 <= MOST_EFFECTS;
             let mut heard = |p: f64| progress(done + 0.9 * p * (1.0 - done));
             let ground = Ground { context, declared, start: &start, folds: &folds };
             let pair = if room { choose_pair(ground, (&best, &errors), &ranked, &mut offers, &mut heard) } else { None };
-            if let Some((pair, held)) = pair {
-                best = pair;
-                errors = held;
-                rounds.extend(vec![(1.0, Vec::new()); 2]);
-            }
-            break;
+            let Some((pair, held)) = pair else { break };
+            (best, errors, paired) = (pair, held, true);
+            rounds.extend(vec![(1.0, Vec::new()); 2]);
+            continue;
         };
         best = chosen.winner;
         errors = chosen.held;
@@ -369,20 +368,22 @@ pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
 pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
     let wholes = effect.part_of();
     let has_its_whole = wholes.is_empty() || placed.iter().any(|p| wholes.contains(&p.effect.id()));
-    has_its_whole && instance.channels.iter().all(|c| {
-        let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
-        // what is older than the run may have happened once more
-        let older = |p: &Placed| {
-            p.instance.form != instance.form && [&p.instance.form, &instance.form].iter().any(|f| *f == effects::BEFORE)
-        };
-        let apart = |p: &&Placed| {
-            (p.effect.id() != effect.id() || older(p))
-                && !p.effect.never_beside().contains(&effect.id())
-                && !effect.never_beside().contains(&p.effect.id())
-        };
-        let room = effect.is_of_every_rig() || there.iter().filter(|p| !p.effect.is_of_every_rig()).count() < MOST_ON_A_CHANNEL;
-        room && there.iter().all(apart)
-    })
+    has_its_whole
+        && instance.channels.iter().all(|c| {
+            let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
+            // what is older than the run may have happened once more
+            let older = |p: &Placed| {
+                p.instance.form != instance.form && [&p.instance.form, &instance.form].iter().any(|f| *f == effects::BEFORE)
+            };
+            let apart = |p: &&Placed| {
+                (p.effect.id() != effect.id() || older(p))
+                    && !p.effect.never_beside().contains(&effect.id())
+                    && !effect.never_beside().contains(&p.effect.id())
+            };
+            let room =
+                effect.is_of_every_rig() || there.iter().filter(|p| !p.effect.is_of_every_rig()).count() < MOST_ON_A_CHANNEL;
+            room && there.iter().all(apart)
+        })
 }
 
 /// How many effects there are beside what every rig has.

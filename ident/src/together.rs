@@ -56,7 +56,8 @@ pub(crate) fn choose_pair(
         context.targets.iter().zip(&has_room).any(|(t, room)| *room && newest.is_some_and(|n| n.instance.touches(t.name)))
     };
     let mut firsts: Vec<&Candidate> = singles.iter().filter(|c| could_help(c)).collect();
-    firsts.sort_by(|a, b| gain(context, &b.fit, &best.fit).total_cmp(&gain(context, &a.fit, &best.fit)));
+    let taken = |c: &Candidate| most_taken(context, &has_room, &c.fit, &best.fit);
+    firsts.sort_by(|a, b| taken(b).total_cmp(&taken(a)));
     let mut seen: Vec<&str> = Vec::new();
     firsts.retain(|c| {
         let id = c.fit.placed.last().map_or("", |p| p.effect.id());
@@ -66,12 +67,14 @@ pub(crate) fn choose_pair(
     });
     let mut pairs: Vec<Candidate> = Vec::new();
     for (k, first) in firsts.into_iter().take(FIRSTS).enumerate() {
-        let ranked = round_of(context, declared, first, offers, &mut |p| progress((k as f64 + p) / FIRSTS as f64));
-        pairs.extend(ranked.into_iter().take(2).map(|c| Candidate { evidence: evidence_over(context, &c.fit, start), ..c }));
-        // what was scanned beside this first says nothing beside the next
+        // two that show only together share a channel
         let newest = first.fit.placed.last();
         let beside = |o: &Scanned| newest.is_some_and(|n| o.instance.channels.iter().any(|c| n.instance.touches(c)));
-        offers.iter_mut().filter(|o| beside(o)).for_each(|o| o.found = None);
+        let mut near: Vec<&mut Scanned> = offers.iter_mut().map(|o| &mut **o).filter(|o| beside(o)).collect();
+        let ranked = round_of(context, declared, first, &mut near, &mut |p| progress((k as f64 + p) / FIRSTS as f64));
+        pairs.extend(ranked.into_iter().take(2).map(|c| Candidate { evidence: evidence_over(context, &c.fit, start), ..c }));
+        // what was scanned beside this first says nothing beside the next
+        near.iter_mut().for_each(|o| o.found = None);
     }
     offers.iter_mut().for_each(|o| o.found = None);
     let needed = 2.0 * NEEDED_EVIDENCE + if best.fit.placed.is_empty() { 0.0 } else { evidence_over(context, &best.fit, start) };
@@ -89,13 +92,15 @@ pub(crate) fn choose_pair(
     stands.then_some((pair, held))
 }
 
-/// Gain in likelihood over the declared model, each sample counted as independent.
-fn gain(context: &Context, fit: &Fit, start: &Fit) -> f64 {
-    let targets = context.targets.iter().zip(fit.targets.iter().zip(&start.targets));
+/// The largest gain in likelihood a reading of one of the channels that have room: the logarithm of the factor by which a fit makes its error
+/// smaller, whatever the colour and the number of its readings.
+fn most_taken(context: &Context, has_room: &[bool], fit: &Fit, before: &Fit) -> f64 {
+    let targets = context.targets.iter().zip(has_room).zip(fit.targets.iter().zip(&before.targets));
     targets
-        .map(|(t, (new, old))| {
+        .filter(|((_, room), _)| **room)
+        .map(|((t, _), (new, old))| {
             let scattering = t.relation == Relation::Thrust && scatters(&fit.placed, t.name);
-            new.loglik.of(scattering) - old.loglik.of(scattering)
+            (new.loglik.of(scattering) - old.loglik.of(scattering)) / (t.weight * t.rows.len() as f64)
         })
-        .sum()
+        .fold(0.0, f64::max)
 }
