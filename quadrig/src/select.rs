@@ -8,7 +8,7 @@
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::folder::{figures, name_of};
+use crate::folder::{Folder, figures, name_of};
 use crate::open::{Columns, open};
 use crate::progress::Bar;
 use crate::run_log::to_log;
@@ -111,6 +111,7 @@ impl Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let given = [("--bare", args.bare, &MASS), ("--battery", args.battery, &MASS), ("--capacity", args.capacity, &CHARGE)];
     given.into_iter().try_for_each(|(name, value, limit)| limit.check(name, value))?;
+    let svg = args.svg.as_deref().map(|path| Folder::new(path, "select --svg")).transpose()?;
     let airframe =
         Airframe { bare_kg: Kilogram(args.bare), battery_kg: Kilogram(args.battery), capacity_ah: AmpereHour(args.capacity) };
     let need = Need {
@@ -150,7 +151,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(path) = &args.output {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
-    if let Some(folder) = &args.svg {
+    if let Some(folder) = svg {
         figures(folder, sheet.drawn())?;
     }
     let mut out = crate::say::out();

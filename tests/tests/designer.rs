@@ -124,13 +124,24 @@ fn every_plateau_has_its_power_and_what_is_not_known_is_said() {
     let text = std::fs::read_to_string(at.join("run.csv")).expect("a log").replace("torque_nm", "other_nm");
     std::fs::write(at.join("no-torque.csv"), text).expect("a log");
     let said = call(at, &["identify", "no-torque.csv", "-o", "x.toml"]).succeeded().out;
-    assert!(said.contains("thrust over throttle and voltage: not known: the motor's constants need torque_nm"), "{said}");
+    assert!(said.contains("the motor's constants are not: the log has no torque_nm"), "{said}");
     call(at, &["identify", "no-torque.csv", "-o", "y.toml", "--surface", "s.csv"]).refused(&[
-        "not known",
-        "torque_nm",
+        "--surface: not known, for the motor's constants are not: the log has no torque_nm",
         "expected",
+        "everything else is written",
     ]);
-    assert!(!at.join("y.toml").exists());
+    assert!(at.join("y.toml").exists() && !at.join("s.csv").exists());
+    // a run that stops short of full throttle lacks that, and nothing else
+    let short: String = std::fs::read_to_string(at.join("run.csv"))
+        .expect("a log")
+        .lines()
+        .filter(|line| line.split(',').nth(1).and_then(|us| us.parse::<f64>().ok()).is_none_or(|us| us < 1900.0))
+        .map(|line| format!("{line}\n"))
+        .filter(|line| !line.starts_with("# sample_hz"))
+        .collect();
+    std::fs::write(at.join("short.csv"), short).expect("a log");
+    call(at, &["identify", "short.csv", "-o", "z.toml", "--surface", "s.csv"])
+        .refused(&["no level at full throttle (1990 us and more): the highest is at 18"]);
 }
 
 /// Where thrust is no square of the speed, k_T's interval holds what the levels themselves say.
