@@ -295,14 +295,16 @@ pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, 
     if let Some((byte, key)) = blame::endless(text) {
         return Err(refused(byte, format!("{key}: expected a number with an end")));
     }
-    toml::from_str(text).map_err(|error| {
+    let value = toml::from_str(text).map_err(|error| {
         let (byte, key) = blame::blame::<T>(text, &error);
         let mut reason = in_words(&error.message().replace('\n', " "));
         if let Some(key) = key.filter(|key| !reason.contains(&format!("`{key}`"))) {
             reason = format!("{key}: {reason}");
         }
         refused(byte, reason)
-    })
+    })?;
+    possible::windows(text).map_err(|(byte, reason)| refused(byte, reason))?;
+    Ok(value)
 }
 
 /// The parser's names of kinds of numbers, as people say them.
