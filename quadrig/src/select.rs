@@ -206,6 +206,10 @@ fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<Found, Failure> {
 }
 
 fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure> {
+    if path.is_dir() {
+        let expected = "expected rig logs, exports or tables: name the files in it";
+        return Err(format!("{}: is a folder; {expected}, such as {}", path.display(), path.join("*.csv").display()).into());
+    }
     if is_table(path)? {
         let file = std::fs::File::open(path).map_err(unread(path))?;
         return Ok(read_table(&path.display().to_string(), BufReader::new(file))?);
@@ -228,7 +232,7 @@ fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure>
 fn is_table(path: &Path) -> Result<bool, Failure> {
     let file = std::fs::File::open(path).map_err(unread(path))?;
     let mut head = Vec::new();
-    std::io::Read::take(file, 4096).read_to_end(&mut head)?;
+    std::io::Read::take(file, 4096).read_to_end(&mut head).map_err(unread(path))?;
     let head = String::from_utf8_lossy(&head).into_owned();
     let own = head.starts_with("# quadrig-");
     Ok(!own && head.lines().find(|l| !l.starts_with('#') && !l.trim().is_empty()).is_some_and(|l| l.trim().starts_with("motor")))
