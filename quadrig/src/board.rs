@@ -186,7 +186,7 @@ impl Board {
         while self.port.now() < until {
             match self.hear() {
                 Heard::Gone => return Err(self.gone().into()),
-                Heard::Messages(messages) if messages.iter().any(|m| matches!(m.message, Message::Sample(_))) => return Ok(()),
+                Heard::Messages(messages) if messages.iter().any(|m| matches!(m.message, Message::Rig(_))) => return Ok(()),
                 Heard::Messages(_) => {}
             }
         }

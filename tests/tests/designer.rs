@@ -124,6 +124,7 @@ fn every_plateau_has_its_power_and_what_is_not_known_is_said() {
     let text = std::fs::read_to_string(at.join("run.csv")).expect("a log").replace("torque_nm", "other_nm");
     std::fs::write(at.join("no-torque.csv"), text).expect("a log");
     let said = call(at, &["identify", "no-torque.csv", "-o", "x.toml"]).succeeded().out;
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("the motor's constants are not: the log has no torque_nm"), "{said}");
     call(at, &["identify", "no-torque.csv", "-o", "y.toml", "--surface", "s.csv"]).refused(&[
         "--surface: not known, for the motor's constants are not: the log has no torque_nm",
@@ -162,10 +163,10 @@ fn a_constant_whose_law_does_not_hold_is_widened() {
     let plain = identified(at, "plain", &scenario(11.5, ""), &[]);
     let plain = constant(&plain, "k_T ");
     assert!(plain.contains("the law holds"), "{plain}");
-    // a part of a blade breaks off on the way up: a third of the levels is on the other side of it, and those are no stray ones
+    // a part of a blade breaks off on the way up: a third of the levels is on the other side of it, and none of them is a stray one
     let breaks = std::fs::read_to_string(root().join("examples/broken-blade.toml")).expect("an example");
     let broken = constant(&identified(at, "broken", &breaks, &[]), "k_T ");
-    assert!(broken.contains("levels left out, the law does not hold"), "{broken}");
+    assert!(broken.contains("the law does not hold") && !broken.contains("left out"), "{broken}");
     let (low, high) = interval(&broken);
     let fast = rows(at, "broken-table.csv").into_iter().filter(|r| r["rpm"] > 3500.0).collect::<Vec<_>>();
     assert!(fast.len() >= 8);

@@ -85,7 +85,7 @@ fn kinds() -> Vec<Case> {
             "bad.html",
             "<!doctype html>\n<html><p>a, b</p></html>\n",
             "identify bad.html -o out.toml",
-            &["bad.html:1:1: a page"],
+            &["bad.html:1:1: a web page"],
         ),
         alone(
             "a log to configure a board",
@@ -215,21 +215,21 @@ fn logs() -> Vec<Case> {
             "bad.csv",
             rows(|rows| rows.into_iter().enumerate().filter(|(n, _)| n % 5 != 2).map(|(_, r)| r).collect()),
             IDENTIFY,
-            &["bad.csv:4: column t_s: 84 of the 420 rows are missing", "rows were dropped"],
+            &["bad.csv:5: column t_s: 84 of the 420 rows are missing", "rows were dropped"],
         ),
         with(
             "a fifth of the rows dropped",
             "bad.csv",
             rows(|rows| rows.into_iter().enumerate().filter(|(n, _)| n * 7919 % 97 >= 20).map(|(_, r)| r).collect()),
             "close-loop bad.csv -o out",
-            &["bad.csv:4: column t_s", "rows are missing that sample_hz = 10 promises"],
+            &["bad.csv:7: column t_s", "rows are missing that sample_hz = 10 promises"],
         ),
         with(
             "the third fifth dropped",
             "bad.csv",
             rows(|rows| [&rows[..168], &rows[252..]].concat()),
             "plateaus bad.csv",
-            &["bad.csv:4: column t_s: 84 of the 420 rows", "in one hole"],
+            &["bad.csv:171: column t_s: 84 of the 420 rows", "in one hole"],
         ),
         with(
             "thinned without a word",
@@ -569,7 +569,7 @@ fn plain_words() -> Vec<Case> {
             &["good.csv is a rig log", "no --map"],
         ),
         with("a web page", "bad.csv", web, IDENTIFY, &["bad.csv:1:1: a web page", "was a link saved"]),
-        with("a web page for a scenario", "bad.toml", web, SIM, &["bad.toml:1:1: "]),
+        with("a web page for a scenario", "bad.toml", web, SIM, &["bad.toml:1:1: a web page", "a description in TOML"]),
         alone("a folder for pairs", "select full", &["full: is a folder", "rig logs, exports or tables", "full/*.csv"]),
         alone("a staircase that is never climbed", "rig --port sim --speed 0 run --step 0 -o out.csv", &["--step 0: "]),
         with(

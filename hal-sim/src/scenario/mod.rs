@@ -292,6 +292,10 @@ pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, 
             format!("a file of the format quadrig-{format}; expected a description in TOML, as in docs/scenario.md"),
         ));
     }
+    if text.trim_start_matches('\u{feff}').trim_start().starts_with('<') {
+        let expected = "expected a description in TOML, as in docs/scenario.md: was a link saved, and not the file behind it?";
+        return Err(refused(0, format!("a web page, or another file in tags; {expected}")));
+    }
     if let Some((byte, key)) = blame::endless(text) {
         return Err(refused(byte, format!("{key}: expected a number with an end")));
     }

@@ -27,11 +27,12 @@ impl Zero {
         let mut readings: Vec<(f64, Valued)> = resting.filter_map(|(p, _)| Some((p.middle_s(), p.of(log, channel)?))).collect();
         readings.sort_by(|a, b| a.0.total_cmp(&b.0));
         let steps = readings.windows(2).filter(|w| w[1].0 > w[0].0);
-        // what the readings' own errors explain of a change is no wandering
+        // a change within two standard errors is no wandering
         let rates: Vec<f64> = steps
             .map(|w| {
                 let ((before, a), (after, b)) = (w[0], w[1]);
-                ((b.0 - a.0).powi(2) - a.1.powi(2) - b.1.powi(2)).max(0.0) / (after - before)
+                let (step, chance) = ((b.0 - a.0).powi(2), a.1.powi(2) + b.1.powi(2));
+                if step > 4.0 * chance { (step - chance) / (after - before) } else { 0.0 }
             })
             .collect();
         let wander = if rates.is_empty() { 0.0 } else { rates.iter().sum::<f64>() / rates.len() as f64 };

@@ -23,7 +23,7 @@ pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figu
         sheet.say(&format!("{}.", capital(&zero)));
     }
     in_doubt(&found.levels).iter().for_each(|line| sheet.warn(&format!("{}.", capital(line).trim_end_matches('?'))));
-    sheet.say(&format!("Standard errors beside the values. In still air a propeller moves nothing forward, so that its propulsive efficiency is 0: the figure of merit says how near it comes to an ideal one."));
+    sheet.say("Standard errors beside the values. In still air a propeller moves nothing forward, so that its propulsive efficiency is 0: the figure of merit says how near it comes to an ideal one.");
     for lack in found.disc.lacks() {
         sheet.say(&format!("{}. What needs it is left empty.", capital(lack)));
     }
