@@ -9,7 +9,7 @@ use crate::close::CloseError;
 use crate::context::{Context, unit_of};
 use crate::fit::power::{Disc, Level, levels};
 use crate::fit::surface::{Surface, surface};
-use crate::fit::{Curve, Estimate, Fitted, Law, Spin, declared, motor, relations, speeds, spin, square_law};
+use crate::fit::{Estimate, Fitted, Law, Spin, Zero, declared, motor, relations, speeds, spin, square_law};
 use crate::log::Log;
 use crate::model::{FittedTo, Model};
 use crate::plateau::{Plateau, detect};
@@ -82,8 +82,8 @@ pub struct Identified {
     pub quality: Vec<Quality>,
     /// Curves through the plateaus.
     pub curves: Vec<Fitted>,
-    /// Thrust and torque as straight lines over omega^2 / 1e5.
-    pub square_laws: Vec<(&'static str, Curve)>,
+    /// What thrust and torque read at rest, where a level is at rest: taken off in the constants, the levels and the surface.
+    pub zeros: [Option<Zero>; 2],
     /// k_T, k_Q, KV, R, I0, spin-up and spin-down time constants, where they can be had.
     pub constants: Vec<Constant>,
     /// What is known of propeller and air.
@@ -91,7 +91,7 @@ pub struct Identified {
     /// What a designer asks of each plateau.
     pub levels: Vec<Level>,
     /// Thrust over throttle and voltage, or why it is not known.
-    pub surface: Result<Surface, &'static str>,
+    pub surface: Result<Surface, String>,
 }
 
 /// Identifies a log.
@@ -119,19 +119,18 @@ pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, Clos
     let (plateaus, speeds) = if plateaus.is_empty() { table_rows(log, &context) } else { (plateaus, speeds) };
     let curves = relations(log, &plateaus, &speeds);
     let mut constants = Vec::new();
-    let mut square_laws = Vec::new();
-    let (mut zeros, mut k_torque) = ([None; 2], None);
-    for (name, channel, unit) in [("k_T", "thrust_n", "N.s2"), ("k_Q", "torque_nm", "N.m.s2")] {
-        if let Some((k, curve, law)) = square_law(log, &plateaus, &speeds, channel) {
+    let zeros = ["thrust_n", "torque_nm"].map(|channel| Zero::of(log, &plateaus, &speeds, channel));
+    let [of_thrust, of_torque] = [zeros[0].as_ref(), zeros[1].as_ref()];
+    let mut k_torque = None;
+    for (name, channel, unit, zero) in [("k_T", "thrust_n", "N.s2", of_thrust), ("k_Q", "torque_nm", "N.m.s2", of_torque)] {
+        if let Some((k, law)) = square_law(log, &plateaus, &speeds, channel, zero) {
             constants.push(Constant::new(name, k, unit, Some(law)));
-            zeros[usize::from(channel == "torque_nm")] = Some(curve.coefficient(0));
             if channel == "torque_nm" {
                 k_torque = Some(k);
             }
-            square_laws.push((name, curve));
         }
     }
-    let motor = motor(log, &plateaus, &speeds);
+    let motor = motor(log, &plateaus, &speeds, of_torque);
     if let Some(m) = &motor {
         constants.push(Constant::new("KV", m.kv, "rev/min/V", Some(m.law)));
         constants.push(Constant::new("R", m.resistance, "ohm", Some(m.law)));
@@ -139,8 +138,8 @@ pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, Clos
     }
     let told = Disc::of(log);
     let disc = Disc { density_kg_m3: air_kg_m3.or(told.density_kg_m3), ..told };
-    let levels = levels(log, &plateaus, &speeds, zeros, &disc);
-    let surface = surface(log, &plateaus, &speeds, motor.as_ref(), k_torque, &curves);
+    let levels = levels(log, &plateaus, &speeds, [of_thrust, of_torque], &disc);
+    let surface = surface(log, &plateaus, &speeds, motor.as_ref(), k_torque, of_thrust);
     // row numbers are no seconds
     let Spin { up, down } = if log.time_is_row() { Spin::default() } else { spin(log, &plateaus, &context.rpm) };
     constants.extend(up.map(|e| Constant::new("tau_up", e, "s", None)));
@@ -152,12 +151,28 @@ pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, Clos
         speeds,
         quality,
         curves,
-        square_laws,
+        zeros,
         constants,
         disc,
         levels,
         surface,
     })
+}
+
+impl Identified {
+    /// Which zero the figures of thrust and torque stand on, in words; nothing where neither was measured.
+    #[must_use]
+    pub fn zero_words(&self) -> String {
+        let there = |name: &str| self.levels.iter().any(|l| l.of(name).is_some());
+        let said = [("thrust", "thrust_n", "N"), ("torque", "torque_nm", "N.m")].into_iter().zip(&self.zeros);
+        said.filter(|((_, column, _), _)| there(column))
+            .map(|((what, _, unit), zero)| match zero {
+                Some(zero) => format!("{what} less {}", zero.words(unit)),
+                None => format!("{what} as read, for no level is at rest"),
+            })
+            .collect::<Vec<_>>()
+            .join("; ")
+    }
 }
 
 /// Longest log whose rows may each be a level of their own.

@@ -178,7 +178,7 @@ impl Log {
         for name in header.iter().skip(1) {
             log.columns.push(Column { name: name.clone(), values: Vec::new() });
         }
-        let (mut line, mut first_row) = (String::new(), None);
+        let (mut line, mut row_lines) = (String::new(), Vec::new());
         while lines.read_into(&mut line)? {
             if line.is_empty() {
                 continue;
@@ -192,14 +192,14 @@ impl Log {
             if let Some(t) = clock::first_field(&line).filter(|t| log.t.last().is_some_and(|last| t < last)) {
                 return Err(clock::stepped_back(t, &log, &place, &mut lines)?);
             }
-            first_row.get_or_insert(place.line);
+            row_lines.push(place.line);
             read_row(&line, &header, &place, &mut log)?;
         }
         if log.is_empty() {
             return Err(lines.place().refuse(None, "no data rows", "at least one line of numbers under the header"));
         }
         if format == FORMAT {
-            clock::check(&log, &Place { file, line: first_row.unwrap_or(1) })?;
+            clock::check(&log, file, &row_lines)?;
         }
         log.sha256 = Some(hexadecimal(lines.digest));
         Ok(log)
@@ -460,6 +460,11 @@ fn wrong_unit(name: &str) -> Option<&'static str> {
     KNOWN.iter().find_map(|(stem, right, wrong)| wrong.contains(&name.strip_prefix(stem)?).then_some(*right))
 }
 
+/// Largest reading of a modelled channel: a hundred times the electrical turns of the fastest rotor.
+const READ: f64 = 1e7;
+/// Largest number of any column: sums of a million of its squares still have an end.
+pub(crate) const FARTHEST: f64 = 1e30;
+
 fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> Result<(), ReadError> {
     let fields = 1 + line.bytes().filter(|b| *b == b',').count();
     if let Some(missing) = header.get(fields) {
@@ -480,6 +485,10 @@ fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> 
             f64::NAN
         } else {
             match text.parse::<f64>() {
+                Ok(v) if v.is_finite() && (v.abs() > FARTHEST || (v.abs() > READ && MODELLED.contains(&name.as_str()))) => {
+                    let expected = "a number that a sensor can read (1e7 at most), or an empty field for a missing sample";
+                    return Err(place.refuse(Some(name), format!("'{}'", short(text)), expected));
+                }
                 Ok(v) if v.is_finite() => v,
                 Ok(_) => {
                     return Err(place.refuse(
@@ -606,6 +615,7 @@ mod tests {
                 "run.csv:4: column thrust_n: the row ends before it (2 fields); expected 3",
             ),
             (format!("{head}0,1000,NaN\n"), "run.csv:3: column thrust_n: 'NaN'; expected a finite number"),
+            (format!("{head}0,1000,1e308\n"), "run.csv:3: column thrust_n: '1e308'; expected a number that a sensor can read"),
             (format!("{head}0,1000,inf\n"), "column thrust_n: 'inf'"),
             (format!("{head}0,1000,x\n"), "run.csv:3: column thrust_n: 'x'; expected a decimal number"),
             (format!("{head}0,1000,1\n0,1000,1\n"), "run.csv:4: column t_s: 0 repeats"),

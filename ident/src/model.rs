@@ -75,6 +75,8 @@ pub struct Model {
     pub meta: Table,
     /// Pulse at which the motor starts, us.
     pub start_pulse_us: f64,
+    /// Highest pulse that its runs held, us, where they have a command: what lies above is computed, not measured.
+    pub highest_pulse_us: Option<f64>,
     /// Channels of the consensus speed.
     pub consensus: Vec<String>,
     /// Declared polynomials.
@@ -139,6 +141,13 @@ pub enum ModelError {
     },
 }
 
+/// The highest pulse of a log that as many rows as a level needs have reached.
+fn highest_held(log: &Log) -> Option<f64> {
+    let mut pulses: Vec<f64> = log.column("pulse_us")?.iter().copied().filter(|v| v.is_finite()).collect();
+    pulses.sort_unstable_by(f64::total_cmp);
+    pulses.get(pulses.len().saturating_sub(crate::plateau::SHORTEST)).copied()
+}
+
 fn slug(unit: &str) -> String {
     let mut out = String::new();
     for c in unit.chars() {
@@ -186,6 +195,7 @@ impl Model {
             source: log.name.clone(),
             meta: log.meta.iter().filter(|(k, _)| !board::is_evidence(k)).map(|(k, v)| (k.clone(), v.clone())).collect(),
             start_pulse_us: context.start_pulse_us,
+            highest_pulse_us: highest_held(log),
             consensus: context.consensus.channels.clone(),
             polynomials,
             ..Self::default()
@@ -350,6 +360,9 @@ impl Model {
         }
         root.insert("source".into(), self.source.clone().into());
         root.insert("start_pulse_us".into(), digits::plain(self.start_pulse_us).into());
+        if let Some(pulse) = self.highest_pulse_us {
+            root.insert("highest_pulse_us".into(), digits::plain(pulse).into());
+        }
         if !self.meta.is_empty() {
             root.insert("rig".into(), Value::Table(self.meta.clone()));
         }

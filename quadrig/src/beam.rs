@@ -7,7 +7,7 @@
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::folder::figures;
+use crate::folder::{Folder, figures};
 use crate::open::open;
 use crate::trouble::unwritten;
 use ident::beam::Beam;
@@ -91,6 +91,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let svg = args.svg.as_deref().map(|path| Folder::new(path, "beam --svg")).transpose()?;
     let design = design(args)?;
     let speeds = speeds(args)?;
     let met = design.crossings(args.blades, &speeds, args.near / 100.0);
@@ -98,7 +99,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(path) = &args.output {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
-    if let Some(folder) = &args.svg {
+    if let Some(folder) = svg {
         figures(folder, sheet.drawn())?;
     }
     let mut out = crate::say::out();

@@ -180,6 +180,19 @@ impl Board {
         format!("{}: no answer from the board; expected one in {s} s: is it powered, and a rig board?", self.port.name()).into()
     }
 
+    /// Waits until the board has told a reading: a tare before its first one is refused. What it does not tell in time it is asked all the same.
+    pub(crate) fn wait_for_a_reading(&mut self) -> Result<(), Failure> {
+        let until = self.port.now() + ANSWER_TIME;
+        while self.port.now() < until {
+            match self.hear() {
+                Heard::Gone => return Err(self.gone().into()),
+                Heard::Messages(messages) if messages.iter().any(|m| matches!(m.message, Message::Rig(_))) => return Ok(()),
+                Heard::Messages(_) => {}
+            }
+        }
+        Ok(())
+    }
+
     /// Sends a command that is accepted or refused.
     pub(crate) fn obey(&mut self, command: Command, seen: impl FnMut(&Message)) -> Result<(), Failure> {
         self.ask(command, seen, |m| matches!(m, Message::Event(Event::Accepted)).then_some(()))

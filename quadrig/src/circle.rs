@@ -66,7 +66,7 @@ struct Round {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let scenario = Scenario::load(&args.scenario)?;
     args.paths().reads(&scenario.schedule.file(&args.scenario)).check()?;
-    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, "loop")).transpose()?;
     let silent = quiet || args.json;
     let say = |line: String| {
         if !silent {
@@ -134,12 +134,6 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         say(conclusion(&runs, &standing, &scenario));
     }
     Ok(())
-}
-
-/// Names that earlier results may have.
-fn is_result(name: &str) -> bool {
-    let a_run = || name.strip_prefix("run-").is_some_and(|n| n.parse::<usize>().is_ok());
-    ["model.toml", "model.discrepancy.toml", "loop.json"].contains(&name) || a_run()
 }
 
 /// The scenario of a run: the same rig with fresh noise, on the schedule that was asked for.

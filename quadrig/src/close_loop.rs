@@ -69,7 +69,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if flight::is_flight_log(args.log()) {
         return flight::run(args, quiet);
     }
-    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, "close-loop")).transpose()?;
     let options = args.columns.options(&args.names);
     let log = open(args.log(), &options, quiet)?;
     let model = args.model.as_deref().map(|path| read_model(path, quiet)).transpose()?;
@@ -104,21 +104,6 @@ pub(super) fn say_unwritten(args: &Args, quiet: bool) {
     if args.output.is_none() && !args.json && !quiet {
         note!("nothing was written; with -o FOLDER model, verdict and page are kept");
     }
-}
-
-/// Names that the results of any kind of log may have.
-pub(crate) fn is_result(name: &str) -> bool {
-    const NAMES: [&str; 8] = [
-        "runs",
-        "model.toml",
-        "model.discrepancy.toml",
-        "verdict.json",
-        "report.html",
-        "declared.csv",
-        "pred.csv",
-        "channels.csv",
-    ];
-    NAMES.contains(&name)
 }
 
 /// What the contract promises of a run.

@@ -7,7 +7,7 @@
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::close_loop::{is_result, results};
+use crate::close_loop::results;
 use crate::folder::Folder;
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         args.seed.unwrap_or_else(|| SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |d| d.as_millis() as u64 % 1_000_000));
     let id = args.effect.clone().unwrap_or_else(|| HIDDEN[(mixed(seed) % HIDDEN.len() as u64) as usize].to_owned());
     let scenario = Scenario::demo(seed, Some(&id))?;
-    let mut folder = Folder::new(&args.output, |name| is_result(name) || ["run.csv", "again.csv"].contains(&name))?;
+    let mut folder = Folder::new(&args.output, "demo")?;
     let say = |line: String| {
         if !quiet {
             say!("{line}");

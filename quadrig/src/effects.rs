@@ -1,7 +1,7 @@
 //! `quadrig effects`: the library's pages.
 //!
 //! What it is: one page and one figure an effect, and the index, written from the library; those on a flight in a folder of their own.
-//! What can go wrong: a folder that cannot be written.
+//! What can go wrong: a folder that cannot be written, or that holds pages changed by hand.
 //! Units: on the pages.
 //! Reference: specification `closing-the-loop.md`, step 5.
 
@@ -28,7 +28,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let mut folder = Folder::of_added(&args.output);
+    let mut folder = Folder::new(&args.output, "effects")?;
     let count = add(&mut folder, "", almanac()) + add(&mut folder, "airframe/", ident::flight::almanac());
     folder.write()?;
     if !quiet {

@@ -1,17 +1,23 @@
 //! A folder of results that is there whole or not at all.
 //!
 //! What it is: files that are gathered in memory, written into a folder beside the wanted one, which then takes its place at once: what lies
-//! in it is of one run.
-//! What can go wrong: a folder that holds anything but earlier results of the same command is left as it is and refused.
+//! in it is of one run. A list of what was written lies among them, with digests: a later run replaces what is on it, unchanged, and no more.
+//! What can go wrong: a folder that holds a file which the same command did not write, or one that was changed since, is left as it is and
+//! refused.
 //! Units: none.
-//! Reference: specification `formats.md`: outputs are written whole or not at all.
+//! Reference: specification `formats.md`: outputs are written whole or not at all; sha256sum(1), whose format the list has.
 
 use crate::Failure;
 use crate::trouble::unwritten;
+use ident::log::digest;
 use ident::report::Figure;
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+
+/// The list of what was written: `sha256sum -c` reads it.
+const LIST: &str = ".quadrig.sha256";
 
 /// The last part of a path, as a page tells it.
 pub(crate) fn name_of(path: &Path) -> String {
@@ -21,22 +27,17 @@ pub(crate) fn name_of(path: &Path) -> String {
 /// Files to be written.
 pub(crate) struct Folder<'a> {
     path: &'a Path,
-    /// Names that earlier results may have.
-    known: fn(&str) -> bool,
+    /// Whose results they are.
+    command: &'static str,
     files: Vec<(String, Vec<u8>)>,
 }
 
 impl<'a> Folder<'a> {
-    /// A folder at `path` that may hold nothing but files of earlier results, whose names are `known`.
-    pub(crate) fn new(path: &'a Path, known: fn(&str) -> bool) -> Result<Self, Failure> {
-        let folder = Self { path, known, files: Vec::new() };
+    /// A folder at `path` that may hold nothing but what an earlier run of this command wrote.
+    pub(crate) fn new(path: &'a Path, command: &'static str) -> Result<Self, Failure> {
+        let folder = Self { path, command, files: Vec::new() };
         folder.is_ours()?;
         Ok(folder)
-    }
-
-    /// A folder at `path` that may hold nothing but files of the names that are added.
-    pub(crate) fn of_added(path: &'a Path) -> Self {
-        Self { path, known: |_| false, files: Vec::new() }
     }
 
     /// One more file; a name may begin with folders within this one.
@@ -50,9 +51,31 @@ impl<'a> Folder<'a> {
     }
 
     /// Writes them.
-    pub(crate) fn write(self) -> Result<(), Failure> {
+    pub(crate) fn write(mut self) -> Result<(), Failure> {
         self.is_ours()?;
+        let list = self.list();
+        self.add(LIST, list);
         self.place().map_err(|e| unwritten(self.path)(e).into())
+    }
+
+    /// First line of the list.
+    fn first_line(&self) -> String {
+        format!("# written by `quadrig {}`; what is not listed here, or has changed since, is never replaced", self.command)
+    }
+
+    fn list(&self) -> String {
+        let lines: String = self.files.iter().map(|(name, bytes)| format!("{}  {name}\n", digest(bytes))).collect();
+        format!("{}\n{lines}", self.first_line())
+    }
+
+    /// Names and digests of what an earlier run of this command wrote here.
+    fn earlier(&self) -> BTreeMap<String, String> {
+        let text = fs::read_to_string(self.path.join(LIST)).unwrap_or_default();
+        let mut lines = text.lines();
+        if lines.next() != Some(&self.first_line()) {
+            return BTreeMap::new();
+        }
+        lines.filter_map(|line| line.split_once("  ").map(|(digest, name)| (name.to_owned(), digest.to_owned()))).collect()
     }
 
     /// Nothing in the folder is anyone else's.
@@ -60,18 +83,31 @@ impl<'a> Folder<'a> {
         if !self.path.exists() {
             return Ok(());
         }
-        let refuse = |e: io::Error| format!("{}: {e}; expected a folder", self.path.display());
-        for entry in fs::read_dir(self.path).map_err(refuse)? {
-            let name = entry.map_err(refuse)?.file_name();
-            let name = name.to_string_lossy();
-            let added = || self.files.iter().any(|(own, _)| own.split('/').next() == Some(&name));
-            if !(self.known)(&name) && !added() {
-                let expected = "expected a new folder, or one of earlier results of this command";
-                return Err(format!(
-                    "{}: holds {name}, which would be mixed up with these results; {expected}",
-                    self.path.display()
-                )
-                .into());
+        let unread = |e: io::Error| format!("{}: {e}; expected a folder", self.path.display());
+        let mut earlier = self.earlier();
+        if !earlier.is_empty() {
+            let list = fs::read(self.path.join(LIST)).map_err(unread)?;
+            earlier.insert(LIST.to_owned(), digest(&list));
+        }
+        let expected = "expected a new or an empty folder: name another one, or move this file away";
+        let (at, command) = (self.path.display(), self.command);
+        let mut open = vec![String::new()];
+        while let Some(within) = open.pop() {
+            for entry in fs::read_dir(self.path.join(&within)).map_err(unread)? {
+                let entry = entry.map_err(unread)?;
+                let name = format!("{within}{}", entry.file_name().to_string_lossy());
+                let inner = format!("{name}/");
+                if entry.file_type().map_err(unread)?.is_dir() && earlier.keys().any(|known| known.starts_with(&inner)) {
+                    open.push(inner);
+                    continue;
+                }
+                match earlier.get(&name) {
+                    None => return Err(format!("{at}: holds {name}, which no `quadrig {command}` wrote; {expected}").into()),
+                    Some(known) if *known != digest(&fs::read(entry.path()).map_err(unread)?) => {
+                        return Err(format!("{at}: {name} was changed since `quadrig {command}` wrote it; {expected}").into());
+                    }
+                    Some(_) => {}
+                }
             }
         }
         Ok(())
@@ -110,8 +146,7 @@ impl<'a> Folder<'a> {
 }
 
 /// Figures into a folder of their own.
-pub(crate) fn figures(path: &Path, figures: &[Figure]) -> Result<(), Failure> {
-    let mut folder = Folder::of_added(path);
+pub(crate) fn figures(mut folder: Folder, figures: &[Figure]) -> Result<(), Failure> {
     folder.extend(figures.iter().map(|figure| (format!("{}.svg", figure.id), figure.file().into_bytes())));
     folder.write()
 }
@@ -148,7 +183,7 @@ mod tests {
     }
 
     fn written(path: &Path, files: &[(&str, &str)]) -> Result<(), Failure> {
-        let mut folder = Folder::new(path, |name| ["a", "b", "c"].contains(&name))?;
+        let mut folder = Folder::new(path, "test")?;
         files.iter().for_each(|(name, text)| folder.add(*name, *text));
         folder.write()
     }
@@ -159,7 +194,7 @@ mod tests {
         let path = at.path().join("deep/out");
         written(&path, &[("a", "1"), ("b", "1")]).expect("it is new");
         written(&path, &[("b", "2"), ("c/within", "2")]).expect("it holds earlier results");
-        assert_eq!(names(&path), ["b", "c"], "nothing of the run before is left");
+        assert_eq!(names(&path), [LIST, "b", "c"], "nothing of the run before is left");
         assert_eq!(fs::read_to_string(path.join("c/within")).expect("a file"), "2");
         assert_eq!(names(path.parent().expect("a parent")), ["out"], "and nothing beside it");
     }
@@ -171,13 +206,35 @@ mod tests {
         written(&path, &[("a", "1")]).expect("it is new");
         fs::write(path.join("notes.txt"), "mine").expect("a file");
         let why = written(&path, &[("a", "2")]).expect_err("it holds notes").to_string();
-        assert!(why.contains("notes.txt") && why.contains("expected a new folder"), "{why}");
-        assert_eq!(
-            (names(&path), fs::read_to_string(path.join("a")).expect("a file").as_str()),
-            (vec!["a".to_owned(), "notes.txt".to_owned()], "1")
-        );
+        assert!(why.contains("holds notes.txt") && why.contains("expected a new or an empty folder"), "{why}");
+        assert_eq!(names(&path), [LIST, "a", "notes.txt"]);
+        assert_eq!(fs::read_to_string(path.join("a")).expect("a file"), "1");
         fs::write(at.path().join("file"), "").expect("a file");
         assert!(written(&at.path().join("file"), &[]).expect_err("no folder").to_string().contains("expected a folder"));
+    }
+
+    /// A name says nothing: what counts is who wrote the file, and whether it is still the same.
+    #[test]
+    fn a_file_of_our_name_that_is_not_ours_is_left_alone() {
+        let at = tempfile::tempdir().expect("a folder");
+        let path = at.path().join("out");
+        let refused = |command, path: &Path| Folder::new(path, command).err().map(|why| why.to_string()).unwrap_or_default();
+        fs::create_dir(&path).expect("a folder");
+        fs::write(path.join("a"), "a recording").expect("a file");
+        assert!(refused("test", &path).contains("holds a, which no `quadrig test` wrote"), "{}", refused("test", &path));
+        fs::remove_file(path.join("a")).expect("a file");
+        written(&path, &[("a", "1"), ("c/within", "1")]).expect("it is empty");
+        assert!(refused("other", &path).contains("which no `quadrig other` wrote"), "{}", refused("other", &path));
+        fs::write(path.join("c/within"), "by hand").expect("a file");
+        assert!(refused("test", &path).contains("c/within was changed since `quadrig test` wrote it"));
+        assert!(written(&path, &[("a", "2")]).is_err());
+        assert_eq!(fs::read_to_string(path.join("c/within")).expect("a file"), "by hand");
+        fs::remove_file(path.join("c/within")).expect("a file");
+        fs::create_dir(path.join("d")).expect("a folder");
+        assert!(refused("test", &path).contains("holds d, which"), "a folder is somebody's");
+        fs::remove_dir(path.join("d")).expect("a folder");
+        written(&path, &[("b", "2")]).expect("what is left is ours");
+        assert_eq!(names(&path), [LIST, "b"]);
     }
 
     /// A link to a folder stays a link, and the folder behind it gets the results.
@@ -190,7 +247,7 @@ mod tests {
         std::os::unix::fs::symlink(at.path().join("there"), &link).expect("a link");
         written(&link, &[("a", "1")]).expect("it is empty");
         assert!(fs::symlink_metadata(&link).expect("the link").is_symlink());
-        assert_eq!(names(&at.path().join("there")), ["a"]);
+        assert_eq!(names(&at.path().join("there")), [LIST, "a"]);
     }
 
     /// Where folders cannot change places their files do, and those that were there are gone.

@@ -68,7 +68,7 @@ struct Charted<'h> {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, "history")).transpose()?;
     let files = files(&args.runs)?;
     let history = {
         let bar = Bar::new("comparing", quiet);
@@ -92,11 +92,6 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         crate::say::text(&history_terminal(&history));
     }
     Ok(())
-}
-
-/// Names that the results may have.
-fn is_result(name: &str) -> bool {
-    ["history.csv", "history.json", "report.html"].contains(&name)
 }
 
 /// The runs, and a line for each file that is none.

@@ -7,11 +7,11 @@
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::folder::figures;
+use crate::folder::{Folder, figures};
 use crate::open::{Columns, Names, open};
 use crate::trouble::unwritten;
 use ident::context::unit_of;
-use ident::fit::power::csv;
+use ident::fit::power::{csv, in_doubt};
 use ident::fit::ratio;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
@@ -67,35 +67,35 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    let svg = args.svg.as_deref().map(|path| Folder::new(path, "identify --svg")).transpose()?;
     let log = open(&args.log, &args.columns.options(&args.names), quiet)?;
     if let Some(air) = args.air.filter(|air| !(0.1..=10.0).contains(air)) {
         return Err(format!("--air {air}: expected a density in kg/m^3, such as 1.2").into());
     }
     let found = identify_in(&log, args.air)?;
-    let surface = match (&args.surface, &found.surface) {
-        (Some(_), Err(why)) => {
-            return Err(format!("{}: --surface: {why}; expected a log that tells it", args.log.display()).into());
-        }
-        (Some(path), Ok(surface)) => Some((path, surface.csv())),
-        (None, _) => None,
-    };
+    let surface = args.surface.as_ref().zip(found.surface.as_ref().ok()).map(|(path, surface)| (path, surface.csv()));
     let table = args.table.as_ref().map(|path| (path, csv(&found.plateaus, &found.levels)));
     for (path, text) in table.into_iter().chain(surface) {
         write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
     }
     write_whole(&args.output, |out| out.write_all(found.model.files().0.as_bytes())).map_err(unwritten(&args.output))?;
     if args.report.is_some() || args.svg.is_some() {
-        draw(args, &log, &found)?;
+        draw(args, &log, &found, svg)?;
     }
-    if quiet {
-        return Ok(());
+    if !quiet {
+        crate::say::text(&(text(&found) + &told(&log)));
     }
-    crate::say::text(&(text(&found) + &told(&log)));
-    Ok(())
+    match (&args.surface, &found.surface) {
+        (Some(path), Err(why)) => {
+            let expected = "expected a log that tells it; everything else is written";
+            Err(format!("{}: --surface: {why}, so that {} is not there; {expected}", args.log.display(), path.display()).into())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The page and the figures.
-fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
+fn draw(args: &Args, log: &Log, found: &Identified, svg: Option<Folder>) -> Result<(), Failure> {
     let second = match &args.beside {
         Some(path) => {
             let log = open(path, &args.columns.options(&args.names), true)?;
@@ -108,7 +108,7 @@ fn draw(args: &Args, log: &Log, found: &Identified) -> Result<(), Failure> {
     if let Some(path) = &args.report {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
-    if let Some(folder) = &args.svg {
+    if let Some(folder) = svg {
         figures(folder, sheet.drawn())?;
     }
     Ok(())
@@ -132,7 +132,7 @@ fn text(found: &Identified) -> String {
         );
     }
     if !found.curves.is_empty() {
-        out += "\ncurves through the plateaus (95 % intervals)\n";
+        out += "\ncurves through the plateaus as read (95 % intervals)\n";
     }
     for f in &found.curves {
         let chosen = f.orders.iter().find(|o| o.chosen).map_or_else(String::new, |o| format!(", order by AICc {}", o.degree));
@@ -178,7 +178,7 @@ const LEAST: usize = 14;
 /// The plateaus, a few channels at a time; channels without a reading are left out.
 fn levels(found: &Identified) -> String {
     let mut out = format!(
-        "{} plateaus (in brackets: half of the 95 % interval, in units of the last digit)\n{:>3}{:>9}{:>9}{:>7}{:>10}\n",
+        "{} plateaus as read (in brackets: half of the 95 % interval, in units of the last digit)\n{:>3}{:>9}{:>9}{:>7}{:>10}\n",
         found.plateaus.len(),
         "",
         "from s",
@@ -238,6 +238,11 @@ fn asked(found: &Identified) -> String {
         out += &format!("\n{}", SHOWN.map(cell).concat());
     }
     out.push('\n');
+    let zero = found.zero_words();
+    if !zero.is_empty() {
+        out += &format!("{}\n", wrapped(&zero, 2));
+    }
+    in_doubt(&found.levels).iter().for_each(|line| out += &format!("{}\n", wrapped(line, 2)));
     found.disc.lacks().iter().for_each(|lack| out += &format!("{}\n", wrapped(lack, 2)));
     match &found.surface {
         Ok(s) => {

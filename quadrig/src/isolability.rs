@@ -10,7 +10,7 @@ use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
 use crate::folder::{Folder, name_of};
 use crate::open::open;
-use crate::progress::Bar;
+use crate::progress::{Bar, Outlook};
 use crate::sim::fly;
 use crate::trouble::unread;
 use hal_sim::Scenario;
@@ -44,11 +44,15 @@ const FILES: [&str; 3] = ["isolability.html", "matrix.svg", "matrix.csv"];
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let folder = args.output.as_deref().map(|path| Folder::new(path, |name| FILES.contains(&name))).transpose()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, "isolability")).transpose()?;
     let (log, hidden) = log_of(&args.input, quiet)?;
     let found = {
         let bar = Bar::new("asking", quiet);
-        isolability(&log, &mut |share| bar.set(share))?
+        let mut outlook = Outlook::new(quiet);
+        isolability(&log, &mut |share| {
+            outlook.say(share);
+            bar.set(share);
+        })?
     };
     if let Some(mut folder) = folder {
         let texts = [

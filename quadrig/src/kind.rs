@@ -49,7 +49,7 @@ fn head(path: &Path) -> Option<String> {
 fn kind_of(text: &str) -> Option<&'static str> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
     if text.starts_with('<') {
-        return Some("a page");
+        return Some(if is_ours(text) { "a page" } else { "a web page" });
     }
     if text.starts_with('{') && text.contains("\"quadrig-verdict") {
         return Some("a verdict");
@@ -73,6 +73,11 @@ pub(crate) fn another(path: &Path) -> Option<String> {
     of_the_imu(path).or_else(|| no_table(path))
 }
 
+/// Whether a page in HTML is one of this program's.
+fn is_ours(page: &str) -> bool {
+    page.contains("quadrig")
+}
+
 /// Bytes of the longest file that is looked at as a whole.
 const LOOKED_AT: u64 = 1 << 20;
 
@@ -81,7 +86,8 @@ fn no_table(path: &Path) -> Option<String> {
     let mut text = String::new();
     std::fs::File::open(path).ok()?.take(LOOKED_AT).read_to_string(&mut text).ok()?;
     let what = match text.trim_start().chars().next()? {
-        '<' => "a page; expected the log that it tells of, which its part \"Where this comes from\" names",
+        '<' if is_ours(&text) => "a page; expected the log that it tells of, which its part \"Where this comes from\" names",
+        '<' => "a web page, or another file in tags; expected a log or an export: was a link saved, and not the file behind it?",
         '{' if text.contains("\"quadrig-verdict") => "a verdict; expected the log that it is of: `run` in it names that",
         _ => {
             let table = toml::from_str::<toml::Table>(&text).ok().filter(|t| !t.is_empty())?;
@@ -118,7 +124,8 @@ mod tests {
         for (text, kind) in [
             ("# quadrig-log 1\nt_s,rpm\n", Some("a log")),
             ("# quadrig-flight 1\nt_s,rpm_1\n", Some("a flight's log")),
-            ("\u{feff}<!doctype html>", Some("a page")),
+            ("\u{feff}<!doctype html>", Some("a web page")),
+            ("<!doctype html><title>a run</title><p>by quadrig", Some("a page")),
             ("{\n \"format\": \"quadrig-verdict 2\"\n}", Some("a verdict")),
             ("format = \"quadrig-model 1\"\n", Some("a model")),
             ("Time (s),Thrust (N),Speed\n0,1,2\n", Some("a table of values, such as a log")),

@@ -45,7 +45,7 @@ pub(crate) fn completions(args: &Completions) -> Result<(), Failure> {
 
 /// Writes the manual pages.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let mut folder = Folder::new(&args.output, |name| name.starts_with("quadrig") && name.ends_with(".1"))?;
+    let mut folder = Folder::new(&args.output, "man")?;
     let mut command = help::taught(Cli::command()).disable_help_subcommand(true);
     command.build();
     let count = add(&mut folder, &command)?;

@@ -88,7 +88,8 @@ pub(crate) fn is_own(path: &Path) -> Result<bool, Failure> {
 pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, Failure> {
     if is_own(path)? {
         if let Some(m) = options.mappings.first() {
-            return Err(format!("--map {}=...: {} is a rig log, which needs none", m.target, path.display()).into());
+            let expected = "expected no --map: its columns have their names (an export takes one)";
+            return Err(format!("--map {}=...: {} is a rig log, which needs none; {expected}", m.target, path.display()).into());
         }
         let mut log = Log::read(path)?;
         options.name(&mut log);
@@ -101,6 +102,10 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
     }
     let (log, report) = import_as(path, options).map_err(|why| crate::kind::another(path).map_or(why.into(), Failure::from))?;
     let log = as_written(&log)?;
+    if let Some(gaps) = Gaps::of(&log).filter(Gaps::are_dropped_rows) {
+        let why = "expected a row at every tick: use the whole export, or take what is left by `quadrig import` and its log";
+        return Err(format!("{}: t_s: {gaps}; {why}", path.display()).into());
+    }
     if !quiet {
         say(path, &report);
     }

@@ -100,10 +100,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut folder = args
         .output
         .as_deref()
-        .map(|path| {
-            let known = |name: &str| name == "README.md" || name.ends_with(".svg") || name.ends_with("-filters.csv");
-            Folder::new(path, known).map(|_| Folder::of_added(path)) // what cannot be of a run like this is refused before it begins
-        })
+        .map(|path| Folder::new(path, "plateaus")) // what is not of a run like this is refused before it begins
         .transpose()?;
     let (mut page, mut pictures) = (format!("{HEAD}{TABLE}"), String::new());
     let mut headed = false;

@@ -31,7 +31,7 @@ pub(crate) struct PortArgs {
     /// Virtual board: the rig board's flash image in the emulator, in the place of the native firmware.
     #[arg(long, global = true, value_name = "ELF")]
     pub(crate) image: Option<PathBuf>,
-    /// Virtual board: times as fast as the clock; 0 for as fast as it goes.
+    /// Virtual board: times as fast as the clock, 1 where it is not given; 0 for as fast as it goes.
     #[arg(long, global = true, value_name = "N", allow_negative_numbers = true)]
     pub(crate) speed: Option<f64>,
     /// Virtual board: an assistant at the bench switches the ESC on where that is due, and passes on what it beeps.

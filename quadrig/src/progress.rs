@@ -7,6 +7,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
+use std::time::Instant;
 
 /// A bar for work that may take longer than a second.
 pub(crate) struct Bar(Option<ProgressBar>);
@@ -50,6 +51,36 @@ fn outlook(run_s: f64, times: f64) -> Option<String> {
     })
 }
 
+/// Work whose length nobody knows before it begins: its first seconds tell, and one line says it.
+pub(crate) struct Outlook {
+    begun: Instant,
+    said: bool,
+}
+
+/// Time after which the share that is done tells how long the rest takes, s.
+const TELLS_S: f64 = 3.0;
+
+impl Outlook {
+    /// From now on.
+    pub(crate) fn new(quiet: bool) -> Self {
+        Self { begun: Instant::now(), said: quiet }
+    }
+
+    /// Says once how long the work takes, if that is long.
+    pub(crate) fn say(&mut self, share: f64) {
+        let past_s = self.begun.elapsed().as_secs_f64();
+        if !self.said && past_s >= TELLS_S && share > 0.0 {
+            self.said = true;
+            rest(past_s, share).into_iter().for_each(|line| note!("{line}"));
+        }
+    }
+}
+
+fn rest(past_s: f64, share: f64) -> Option<String> {
+    let whole_s = past_s / share.min(1.0);
+    (whole_s >= LONG_S).then(|| format!("{:.0} % done: about {} in all", 100.0 * share.min(1.0), duration(whole_s)))
+}
+
 /// A time as people say it.
 fn duration(seconds: f64) -> String {
     match seconds {
@@ -83,5 +114,6 @@ mod tests {
         assert_eq!(outlook(36_000.0, 204.0).as_deref(), Some("10.0 h of a run, at 200 times real time: about 3 min"));
         assert_eq!(outlook(86_400.0, 1.0).as_deref(), Some("24.0 h of a run, at 1.0 times real time: about 24.0 h"));
         assert_eq!(outlook(50.0, 2.5).as_deref(), Some("50 s of a run, at 2.5 times real time: about 20 s"));
+        assert_eq!((rest(3.0, 0.5), rest(3.0, 0.02).as_deref()), (None, Some("2 % done: about 2 min in all")));
     }
 }

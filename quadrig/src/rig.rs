@@ -109,7 +109,7 @@ enum Order {
         #[arg(long)]
         down: bool,
         /// How often.
-        #[arg(long, default_value_t = 1)]
+        #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
         visits: u16,
         #[command(flatten)]
         session: Session,
@@ -183,7 +183,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Order::Identify => identify(&mut board),
         Order::Status => status::run(&mut board),
         Order::Stop => board.obey(Command::Stop, silent).map(|()| done("stopped: minimum throttle, latched until cleared")),
-        Order::Tare => board.obey(Command::Tare, silent).map(|()| done("tared")),
+        Order::Tare => board.wait_for_a_reading().and_then(|()| board.obey(Command::Tare, silent)).map(|()| done("tared")),
         Order::Clear => board.obey(Command::ClearFaults, silent).map(|()| done("cleared")),
         Order::Set { us, hold } => {
             board.obey(Command::SetPulse(pulse(*us)?), silent)?;
@@ -238,7 +238,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             }
             let run = Command::RunVisits { step: height, hold_ms: (hold * 1000.0) as u32, top: pulse(*top)?, down: *down, visits: *visits };
             let levels = 1.0 + ((*top - 1000.0) / *step).floor();
-            let levels = if *down { 2.0 * levels - 1.0 } else { levels } * f64::from((*visits).max(1));
+            let levels = if *down { 2.0 * levels - 1.0 } else { levels } * f64::from(*visits);
             let way = if *down { "up and down" } else { "up" };
             let words = format!("staircase {way} in steps of {step} us to {top} us, {hold} s each, {visits} times");
             let course = Some((words, levels * *hold));

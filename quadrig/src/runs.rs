@@ -47,7 +47,7 @@ fn hold(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let mut folder = Folder::new(&args.output, |name| pairs().any(|pair| name == file_name(&pair)))?;
+    let mut folder = Folder::new(&args.output, "runs")?;
     let all: Vec<Pair> = pairs().collect();
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).clamp(1, all.len());
     let whole_s: f64 = all.iter().map(|pair| scenario(pair, args).run_s()).sum();

@@ -8,7 +8,7 @@
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::folder::{figures, name_of};
+use crate::folder::{Folder, figures, name_of};
 use crate::open::{Columns, open};
 use crate::progress::Bar;
 use crate::run_log::to_log;
@@ -111,6 +111,7 @@ impl Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let given = [("--bare", args.bare, &MASS), ("--battery", args.battery, &MASS), ("--capacity", args.capacity, &CHARGE)];
     given.into_iter().try_for_each(|(name, value, limit)| limit.check(name, value))?;
+    let svg = args.svg.as_deref().map(|path| Folder::new(path, "select --svg")).transpose()?;
     let airframe =
         Airframe { bare_kg: Kilogram(args.bare), battery_kg: Kilogram(args.battery), capacity_ah: AmpereHour(args.capacity) };
     let need = Need {
@@ -150,7 +151,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(path) = &args.output {
         write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
     }
-    if let Some(folder) = &args.svg {
+    if let Some(folder) = svg {
         figures(folder, sheet.drawn())?;
     }
     let mut out = crate::say::out();
@@ -205,6 +206,10 @@ fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<Found, Failure> {
 }
 
 fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure> {
+    if path.is_dir() {
+        let expected = "expected rig logs, exports or tables: name the files in it";
+        return Err(format!("{}: is a folder; {expected}, such as {}", path.display(), path.join("*.csv").display()).into());
+    }
     if is_table(path)? {
         let file = std::fs::File::open(path).map_err(unread(path))?;
         return Ok(read_table(&path.display().to_string(), BufReader::new(file))?);
@@ -227,7 +232,7 @@ fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure>
 fn is_table(path: &Path) -> Result<bool, Failure> {
     let file = std::fs::File::open(path).map_err(unread(path))?;
     let mut head = Vec::new();
-    std::io::Read::take(file, 4096).read_to_end(&mut head)?;
+    std::io::Read::take(file, 4096).read_to_end(&mut head).map_err(unread(path))?;
     let head = String::from_utf8_lossy(&head).into_owned();
     let own = head.starts_with("# quadrig-");
     Ok(!own && head.lines().find(|l| !l.starts_with('#') && !l.trim().is_empty()).is_some_and(|l| l.trim().starts_with("motor")))

@@ -11,6 +11,7 @@ use crate::plan::Plan;
 use crate::table;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
+use serde_json::error::Category;
 use std::path::Path;
 
 #[derive(Deserialize)]
@@ -52,15 +53,40 @@ fn hold<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
     within(d, 0.001, 86_400.0, "a hold from 0.001 to 86400 s")
 }
 
+/// Why a text is no verdict, and what to try.
+fn why(text: &str, error: &serde_json::Error) -> String {
+    const WANTED: &str = "expected verdict.json of `quadrig close-loop LOG -o FOLDER`";
+    if !text.trim_start_matches('\u{feff}').trim_start().starts_with('{') {
+        return format!("no verdict, which is JSON and begins with a brace; {WANTED}");
+    }
+    let said = error.to_string();
+    let said = said.rsplit_once(" at line ").map_or(said.as_str(), |(reason, _)| reason);
+    match error.classify() {
+        Category::Eof => format!("the file ends in the midst of its JSON; {WANTED}, whole: was it cut short?"),
+        Category::Data if said.starts_with("expected ") => format!("no verdict that proposes pulses: {said}"),
+        Category::Data => format!("no verdict that proposes pulses: {}", plain(said)),
+        Category::Syntax | Category::Io => format!("no JSON from here on; {WANTED}, as it was written: was it changed by hand?"),
+    }
+}
+
+/// What the parser says, without its names of types.
+fn plain(said: &str) -> String {
+    let kinds =
+        [("f64", "a number"), ("a sequence", "a list in brackets"), ("a boolean", "true or false"), ("a string", "a text")];
+    let Some((before, kind)) = said.rsplit_once("expected ") else {
+        return format!("{said}; expected verdict.json as `quadrig close-loop` writes it");
+    };
+    let kind = kinds.iter().find(|(own, _)| *own == kind).map_or("a table in braces", |(_, plain)| plain);
+    let found = before.trim_end_matches([',', ' ']).replace("invalid type: ", "");
+    format!("{found}; expected {kind}")
+}
+
 /// Reads a verdict.
 pub(crate) fn parse(text: &str, path: &Path) -> Result<Plan, ScheduleError> {
     let refused =
         |line: usize, column: usize, reason: String| ScheduleError::Refused { file: path.to_owned(), line, column, reason };
-    let verdict: Verdict = serde_json::from_str(text).map_err(|error| {
-        let said = error.to_string();
-        let reason = said.rsplit_once(" at line ").map_or(said.as_str(), |(reason, _)| reason).to_owned();
-        refused(error.line().max(1), error.column().max(1), format!("no verdict that proposes pulses: {reason}"))
-    })?;
+    let verdict: Verdict =
+        serde_json::from_str(text).map_err(|error| refused(error.line().max(1), error.column().max(1), why(text, &error)))?;
     let Some(experiment) = verdict.next_experiment.filter(|e| !e.schedule.is_empty()) else {
         return Err(refused(
             1,

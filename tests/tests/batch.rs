@@ -52,7 +52,12 @@ fn a_batch_is_a_row_a_run_however_it_is_shared() {
         said.err,
         "broken.csv: refused: broken.csv:3: column thrust_n: 'x'; expected a decimal number, or an empty field for a missing sample\n"
     );
-    assert!(said.out.contains("6 of 6 runs: 6 closed") && said.out.contains("0 were there already"), "{}", said.out);
+    assert!(
+        said.out.contains("6 of 6 runs: 5 closed, 1 refused (why: column message of one/manifest.csv)")
+            && said.out.contains("0 were there already"),
+        "{}",
+        said.out
+    );
     let [manifest, effects] = tables(&bench, "one");
     let rows: Vec<&str> = manifest.lines().collect();
     assert_eq!(rows.len(), 7);
@@ -93,14 +98,22 @@ fn a_batch_is_a_row_a_run_however_it_is_shared() {
 
     // what is there is not done again, what changed is
     let said = call(&bench, &["batch", "runs", "-o", "one", "--motor", "M"], &[]).succeeded();
-    assert!(said.out.contains("0 closed") && said.out.contains("6 were there already") && said.err.is_empty(), "{}", said.out);
+    assert!(
+        said.out.contains("5 closed, 1 refused") && said.out.contains("6 were there already") && said.err.is_empty(),
+        "{}",
+        said.out
+    );
     fs::write(bench.path("runs/broken.csv"), good_log()).unwrap();
     fs::remove_file(bench.path("one/runs/run-2.csv.json")).unwrap();
     let said = call(&bench, &["batch", "runs", "-o", "one", "--motor", "M", "--folders"], &[]).succeeded();
-    assert!(said.out.contains("6 closed"), "other options, other results: {}", said.out);
+    assert!(
+        said.out.contains("6 closed; ") && said.out.contains("0 were there already"),
+        "other options, other results: {}",
+        said.out
+    );
     assert!(bench.path("one/runs/day 2/export, first.csv/report.html").exists());
     let said = call(&bench, &["batch", "runs", "-o", "one", "--motor", "M", "--folders"], &[]).succeeded();
-    assert!(said.out.contains("0 closed"), "{}", said.out);
+    assert!(said.out.contains("6 runs: 6 closed;") && said.out.contains("6 were there already"), "{}", said.out);
     assert!(tables(&bench, "one")[0].lines().nth(1).unwrap().starts_with("broken.csv,closed,"));
 }
 

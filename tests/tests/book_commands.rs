@@ -9,7 +9,9 @@
 //! | `sh` | run by a shell; must succeed |
 //! | `sh refused` | run; must end with status 1 |
 //! | `sh data` | run where `$QUADRIG_DATA` (or `../shared/data`) is there, else only parsed |
-//! | `sh long`, `sh hardware` | only parsed, see [`parse`]: takes minutes, needs a real board or a second terminal |
+//! | `sh board` | run, a virtual board with an assistant in the place of the real one; `rig.toml` is a preset where the page wrote none |
+//! | `sh files` | run; the files that it reads and the page did not make are a simulated run |
+//! | `sh long`, `sh hardware` | only parsed, see [`parse`]: takes minutes, needs hands at a real board, a second terminal or files of other programs |
 //! | `text says` | its lines stand in this order in what the last block wrote |
 //! | `toml FILE`, `csv FILE` | written to that file |
 //!
@@ -97,6 +99,34 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// Names under which pages speak of a real board's port.
+const PORTS: [&str; 2] = ["--port /dev/ttyUSB0", "--port PORT"];
+/// What stands in its place here.
+const VIRTUAL: &str = "--port sim --speed 0 --assist";
+/// Names under which pages speak of a log that the reader has.
+const GIVEN: [&str; 4] = ["FILE", "FOLDER/run.csv", "healthy.csv", "today.csv"];
+
+/// The script for a virtual board.
+fn at_a_virtual_board(clone: &Clone, script: &str) -> String {
+    let rig = clone.folder.path().join("rig.toml");
+    if !rig.exists() {
+        std::fs::copy(root().join("examples/rig/thesis.toml"), rig).unwrap();
+    }
+    PORTS.iter().fold(script.to_owned(), |script, port| script.replace(port, VIRTUAL))
+}
+
+/// Lays the logs there that a reader of the page has.
+fn give(clone: &Clone, script: &str) {
+    let scenario = "rest_s = 2\nschedule = { kind = \"up_down\", step_us = 200, hold_s = 4, top_us = 1800 }\n";
+    let at = clone.folder.path();
+    std::fs::write(at.join("given.toml"), scenario).unwrap();
+    for name in GIVEN.iter().filter(|name| script.contains(name.split('/').next().unwrap_or_default())) {
+        std::fs::create_dir_all(at.join(name).parent().unwrap()).unwrap();
+        let output = clone.shell(&format!("quadrig --quiet sim given.toml -o {name}"), None);
+        assert!(output.status.success(), "{}", said(&output));
+    }
+}
+
 /// Both streams of what was said.
 fn said(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
@@ -171,6 +201,7 @@ fn run(page: &Page) -> Result<Tally, String> {
         let words: Vec<&str> = kind.split_whitespace().collect();
         let (runs, wanted) = match words.as_slice() {
             ["sh"] => (true, 0),
+            ["sh", "board" | "files"] => (true, 0),
             ["sh", "refused"] => (true, 1),
             ["sh", "data"] => (data.is_some(), 0),
             ["sh", "long" | "hardware"] => (false, 0),
@@ -196,7 +227,16 @@ fn run(page: &Page) -> Result<Tally, String> {
             last = Some(begin(&clone, &script).map_err(|e| format!("{at}: {script}\n{e}"))?);
             tally[0] += commands.len();
         } else if runs {
-            let output = clone.shell(&lines.join("\n"), data.as_deref());
+            let script = lines.join("\n");
+            let script = match words.as_slice() {
+                ["sh", "board"] => at_a_virtual_board(&clone, &script),
+                ["sh", "files"] => {
+                    give(&clone, &script);
+                    script
+                }
+                _ => script,
+            };
+            let output = clone.shell(&script, data.as_deref());
             let said = said(&output);
             if output.status.code() != Some(wanted) {
                 return Err(format!("{at}: {}\n{}\n{said}", output.status, lines.join("\n")));
@@ -268,7 +308,10 @@ fn what_is_wrong_on_a_page_is_told() {
     assert_eq!(told("```sh\nquadrig --version\n```\n```text says\nquadrig\n```\n"), Ok([1, 0, 1]));
     assert_eq!(told("```sh refused\nquadrig close-loop gone.csv\n```\n"), Ok([1, 0, 0]));
     assert_eq!(told("```sh hardware\nquadrig log --port PORT -o run.csv\ncargo xtask image # a comment\n```\n"), Ok([0, 2, 0]));
+    assert_eq!(told("```sh board\nquadrig rig --port /dev/ttyUSB0 configure rig.toml\n```\n"), Ok([1, 0, 0]));
+    assert_eq!(told("```sh files\nquadrig --quiet identify healthy.csv -o m.toml\n```\n"), Ok([1, 0, 0]));
     for wrong in [
+        "```sh board\nquadrig rig --port /dev/ttyUSB0 configure gone.toml\n```\n",
         "```sh\nquadrig close-loop gone.csv\n```\n",
         "```sh refused\nquadrig --version\n```\n",
         "```sh\nquadrig --version\n```\n```text says\nquadrig\nquadrig\n```\n",

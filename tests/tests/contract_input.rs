@@ -374,6 +374,7 @@ fn the_same_input_twice_gives_the_same_bytes() {
             "good.csv",
             "imported.csv",
             "model.toml",
+            "out/.quadrig.sha256",
             "out/model.discrepancy.toml",
             "out/model.toml",
             "out/report.html",

@@ -130,10 +130,16 @@ fn px4_reads_it_back() {
     let torque = model.polynomial("torque_nm");
     let arm = (value(&torque, model.rpm(1.0) / 1000.0) - torque[0]) / model.thrust(1.0);
     assert!((keys["CA_ROTOR0_KM"] / arm - 1.0).abs() < 0.03, "{} m, the model's {arm}", keys["CA_ROTOR0_KM"]);
+    // front right and rear left turn counter-clockwise, the others clockwise: yaw can be steered
+    let turning = [0, 1, 2, 3].map(|k| keys[&format!("CA_ROTOR{k}_KM")] / keys["CA_ROTOR0_KM"]);
+    assert_eq!(turning, [1.0, 1.0, -1.0, -1.0]);
     assert!(
         (after(&text, "motorConstant") / (full / (model.rpm(1.0) * std::f64::consts::TAU / 60.0).powi(2)) - 1.0).abs() < 0.02
     );
-    assert_eq!(px4(&exported("px4", &["--rotors", "6"]))["CA_ROTOR_COUNT"], 6.0);
+    // of other airframes it is not known which rotor turns which way, and nothing is made up
+    let six = exported("px4", &["--rotors", "6"]);
+    assert!(px4(&six)["CA_ROTOR_COUNT"] == 6.0 && !px4(&six).contains_key("CA_ROTOR0_KM"), "{six}");
+    assert!((after(&six, "its size is") / arm - 1.0).abs() < 0.03, "{six}");
 }
 
 #[test]
@@ -359,6 +365,34 @@ fn a_latency_of_rows_is_not_the_rotors() {
             let fields = ["latency_s", "log_latency_s"].map(|name| after(&text, &format!("powerplant.{name} =")));
             assert!(fields[0] == 0.0 && (fields[1] - of_rows).abs() < 1e-4, "{fields:?}");
         }
+    }
+}
+
+/// A run that ends below full throttle: every file and the terminal say so, and what would be mostly computed is refused.
+#[test]
+fn what_is_computed_beyond_the_run_is_told() {
+    let model = std::fs::read_to_string(bench().join("model.toml")).expect("a model");
+    assert!(model.contains("\nhighest_pulse_us = 2000"), "{model}");
+    for (name, us) in [("short.toml", "1800"), ("shorter.toml", "1400")] {
+        let text = model.replace("\nhighest_pulse_us = 2000", &format!("\nhighest_pulse_us = {us}"));
+        std::fs::write(bench().join(name), text).expect("a model");
+    }
+    for peer in PEERS {
+        assert!(!exported(peer, &[]).contains("is computed"), "{peer}: the whole range was measured");
+        let said = call(&bench(), &["export", "short.toml", "--to", peer]).succeeded();
+        let told = "measured up to 1800 us, ";
+        assert!(
+            said.out.contains(told) && said.out.contains("beyond is computed") && said.err.contains(told),
+            "{peer}: {said:?}"
+        );
+        call(&bench(), &["export", "shorter.toml", "--to", peer, "-o", "x"]).refused(&[
+            "shorter.toml: the run ends at 1400 us",
+            "more than twice that",
+            "--extrapolate",
+        ]);
+        assert!(!bench().join("x").exists());
+        let said = call(&bench(), &["export", "shorter.toml", "--to", peer, "--extrapolate", "-o", "y"]).succeeded();
+        assert!(said.out.contains("measured up to 1400 us, "), "{peer}: {said:?}");
     }
 }
 

@@ -100,6 +100,24 @@ fn an_earlier_recording_is_kept() {
     assert!(!at.join("real-4.csv").exists());
 }
 
+/// A folder of results is written again; one whose file was changed by hand is not, and stays as it is.
+#[test]
+fn a_result_that_was_changed_by_hand_is_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(at.join("short.toml"), "duration_s = 1\n").expect("a mission");
+    let again = ["--quiet", "fly", "short.toml", "-o", "out"];
+    call(at, &again).succeeded();
+    call(at, &again).succeeded();
+    std::fs::write(at.join("out/states.csv"), "by hand\n").expect("a file");
+    call(at, &again).refused(&["out: states.csv was changed since `quadrig fly` wrote it", "expected a new or an empty folder"]);
+    assert_eq!(std::fs::read_to_string(at.join("out/states.csv")).expect("it is there"), "by hand\n");
+    // another command's results are no earlier results of this one
+    std::fs::remove_file(at.join("out/states.csv")).expect("it is there");
+    call(at, &["effects", "-o", "out"]).refused(&["which no `quadrig effects` wrote"]);
+    call(at, &again).succeeded();
+}
+
 /// A run of a day says how long it will take before it starts; a short one says nothing.
 #[test]
 fn a_long_simulation_is_announced() {

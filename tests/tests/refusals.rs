@@ -85,7 +85,7 @@ fn kinds() -> Vec<Case> {
             "bad.html",
             "<!doctype html>\n<html><p>a, b</p></html>\n",
             "identify bad.html -o out.toml",
-            &["bad.html:1:1: a page"],
+            &["bad.html:1:1: a web page"],
         ),
         alone(
             "a log to configure a board",
@@ -215,21 +215,21 @@ fn logs() -> Vec<Case> {
             "bad.csv",
             rows(|rows| rows.into_iter().enumerate().filter(|(n, _)| n % 5 != 2).map(|(_, r)| r).collect()),
             IDENTIFY,
-            &["bad.csv:4: column t_s: 84 of the 420 rows are missing", "rows were dropped"],
+            &["bad.csv:5: column t_s: 84 of the 420 rows are missing", "rows were dropped"],
         ),
         with(
             "a fifth of the rows dropped",
             "bad.csv",
             rows(|rows| rows.into_iter().enumerate().filter(|(n, _)| n * 7919 % 97 >= 20).map(|(_, r)| r).collect()),
             "close-loop bad.csv -o out",
-            &["bad.csv:4: column t_s", "rows are missing that sample_hz = 10 promises"],
+            &["bad.csv:7: column t_s", "rows are missing that sample_hz = 10 promises"],
         ),
         with(
             "the third fifth dropped",
             "bad.csv",
             rows(|rows| [&rows[..168], &rows[252..]].concat()),
             "plateaus bad.csv",
-            &["bad.csv:4: column t_s: 84 of the 420 rows", "in one hole"],
+            &["bad.csv:171: column t_s: 84 of the 420 rows", "in one hole"],
         ),
         with(
             "thinned without a word",
@@ -498,6 +498,152 @@ fn scenarios() -> Vec<Case> {
     ]
 }
 
+/// Another kind than was wanted, in plain words: no type of the program's own.
+fn plain_words() -> Vec<Case> {
+    const SIM: &str = "sim bad.toml -o out.csv";
+    const CONFIGURE: &str = "rig --port sim --speed 0 configure bad.toml";
+    const NEXT: &str = "rig --port sim --speed 0 run --next bad.json -o out.csv";
+    let web = "<!doctype html><html><head><title>404</title></head><body>Not Found</body></html>\n";
+    vec![
+        with("a supply that is a number", "bad.toml", "supply = 12\n", SIM, &["bad.toml:1:10: supply: ", "expected a table"]),
+        with("an ESC that is a word", "bad.toml", "esc = \"x\"\n", SIM, &["bad.toml:1:7: esc: a text", "expected a table"]),
+        with(
+            "a controller that is a number",
+            "bad.toml",
+            "duration_s = 2\ncontroller = 5\n",
+            "fly bad.toml -o out",
+            &["bad.toml:2:14: controller: ", "expected a table"],
+        ),
+        with(
+            "a limit that is a number",
+            "bad.toml",
+            "[limits]\nspeed_rpm = 5\n",
+            CONFIGURE,
+            &["bad.toml:2:13: ", "expected a table"],
+        ),
+        with("a rate that is a word", "bad.toml", "rate_hz = \"x\"\n", CONFIGURE, &["bad.toml:1:11: ", "expected a"]),
+        with(
+            "a step above the whole range",
+            "bad.toml",
+            "[schedule]\nkind = \"staircase\"\nstep_us = 50000\nhold_s = 3\ntop_us = 2000\n",
+            SIM,
+            &["bad.toml:3:11: step_us: ", "above 0 and up to 1000 us, found 50000"],
+        ),
+        with(
+            "a fault that ends before it begins",
+            "bad.toml",
+            "[[fault]]\nid = \"link_lost\"\nfrom_s = 5\nuntil_s = 3\n",
+            SIM,
+            &["bad.toml:4:11: until_s: ", "after from_s = 5, found 3"],
+        ),
+        with(
+            "an unknown key with a list",
+            "bad.toml",
+            "duration_s = 2\n[wind]\nmean_m_s = [3, 0, 0]\n[[command]]\nrotors = [1, 2, 3, 4]\nsteps = [{ pulse_us = 1700, hold_s = 2 }]\n",
+            "fly bad.toml -o out",
+            &["bad.toml:3:1: unknown field `mean_m_s`"],
+        ),
+        alone(
+            "a model in the place of a verdict",
+            "rig --port sim --speed 0 run --next model.toml -o out.csv",
+            &["model.toml:1:", "no verdict, which is JSON", "verdict.json of `quadrig close-loop"],
+        ),
+        with(
+            "a verdict cut short",
+            "bad.json",
+            "{\"next_experiment\": {",
+            NEXT,
+            &["bad.json:1:", "ends in the midst", "cut short?"],
+        ),
+        with("a verdict with a comma too many", "bad.json", "{\"a\": 1,,}", NEXT, &["bad.json:1:", "no JSON from here on"]),
+        with(
+            "a verdict with a word for its schedule",
+            "bad.json",
+            "{\"next_experiment\": {\"why\": \"x\", \"schedule\": \"y\"}}",
+            NEXT,
+            &["bad.json:1:", "expected a list in brackets"],
+        ),
+        alone(
+            "a mapping for a rig log",
+            "identify good.csv -o out.toml --map thrust_n=x",
+            &["good.csv is a rig log", "no --map"],
+        ),
+        with("a web page", "bad.csv", web, IDENTIFY, &["bad.csv:1:1: a web page", "was a link saved"]),
+        with("a web page for a scenario", "bad.toml", web, SIM, &["bad.toml:1:1: a web page", "a description in TOML"]),
+        alone("a folder for pairs", "select full", &["full: is a folder", "rig logs, exports or tables", "full/*.csv"]),
+        alone("a staircase that is never climbed", "rig --port sim --speed 0 run --step 0 -o out.csv", &["--step 0: "]),
+        with(
+            "a pair twice",
+            "bad.csv",
+            "motor,propeller,thrust_n,current_a\nA,B,3,1\nA,B,4,1\n",
+            "select bad.csv",
+            &["bad.csv:3: 'A' with 'B' stands on line 2, too", "each pair once"],
+        ),
+    ]
+}
+
+/// Readings that no rig has.
+fn impossible() -> Vec<Case> {
+    let column = |k: usize, of: &dyn Fn(&str) -> String| {
+        let changed = |row: &String| {
+            let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+            cells[k] = of(&cells[k]);
+            cells.join(",")
+        };
+        rows(|rows| rows.iter().map(changed).collect())
+    };
+    let turned = column(3, &|thrust| format!("{:.4}", -thrust.parse::<f64>().expect("a number")));
+    let unseen = column(2, &|_| "0".to_owned());
+    let holed = rows(|mut rows| {
+        rows.drain(200..300);
+        rows
+    });
+    // an export of another program: rows of an even clock are gone here and there
+    let thinned: String = good_log()
+        .lines()
+        .skip(2)
+        .enumerate()
+        .filter(|(n, _)| *n == 0 || (n * n + n / 7) % 4 != 3)
+        .map(|(_, line)| line.replacen("t_s", "Time (s)", 1) + "\n")
+        .collect();
+    vec![
+        with("thrust of the other sign", "bad.csv", turned, IDENTIFY, &["bad.csv:3: column thrust_n: ", "the other way round?"]),
+        with("a rotor that no sensor sees", "bad.csv", unseen, IDENTIFY, &["column rpm: 0 rev/min on every sensor", "A"]),
+        with(
+            "a thrust without measure",
+            "bad.csv",
+            row(80, |row| {
+                let mut cells: Vec<&str> = row.split(',').collect();
+                cells[3] = "1e308";
+                cells.join(",")
+            }),
+            IDENTIFY,
+            &["bad.csv:84: column thrust_n: '1e308'", "a number that a sensor can read"],
+        ),
+        with(
+            "no rows a second",
+            "bad.csv",
+            good_log().replacen("sample_hz = 10.0", "sample_hz = 0", 1),
+            IDENTIFY,
+            &["bad.csv:1: sample_hz = 0", "above 0"],
+        ),
+        with(
+            "a hole in the midst",
+            "bad.csv",
+            holed,
+            IDENTIFY,
+            &["bad.csv:203: column t_s: 100 of the ", "in one hole, from 19.9 s on"],
+        ),
+        with(
+            "an export with a quarter of its rows gone",
+            "bad.csv",
+            thinned,
+            IDENTIFY,
+            &["bad.csv: t_s: ", "use the whole export"],
+        ),
+    ]
+}
+
 fn missions() -> Vec<Case> {
     let case = |name, text: &str, said| with(name, "bad.toml", text, "fly bad.toml -o out", said);
     vec![
@@ -679,6 +825,18 @@ fn outputs() -> Vec<Case> {
         alone("detectors among notes", "plateaus good.csv -o full", &["full: holds notes.txt"]),
         alone("pages of effects among notes", "effects -o full", &["full: holds notes.txt"]),
         alone("figures among notes", "select --svg full", &["full: holds notes.txt"]),
+        alone(
+            "a demonstration over a recording",
+            "demo --seed 1 -o kept",
+            &["kept: holds run.csv, which no `quadrig demo` wrote", "name another one"],
+        ),
+        alone(
+            "results over a model",
+            "close-loop good.csv -o models",
+            &["models: holds model.toml, which no `quadrig close-loop`"],
+        ),
+        alone("a flight over a flight", "fly short.toml -o flown", &["flown: holds flight.csv, which no `quadrig fly` wrote"]),
+        alone("figures over figures", "identify good.csv -o out.toml --svg drawn", &["drawn: holds thrust.svg, which no"]),
         alone("a folder that is a file", "close-loop good.csv -o model.toml", &["model.toml: ", "a folder"]),
         alone(
             "two folders that are not there",
@@ -780,6 +938,10 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
     let write = |name: &str, bytes: &[u8]| std::fs::write(bench.path(name), bytes).expect("a file");
     std::fs::create_dir(bench.path("full")).expect("a folder");
     write("full/notes.txt", b"mine");
+    for (folder, name) in [("kept", "run.csv"), ("models", "model.toml"), ("flown", "flight.csv"), ("drawn", "thrust.svg")] {
+        std::fs::create_dir(bench.path(folder)).expect("a folder");
+        write(&format!("{folder}/{name}"), b"mine");
+    }
     write("empty.toml", b"");
     write("short.toml", b"duration_s = 1\n");
     write("plan.toml", b"[[part]]\nkind = \"hold\"\npulse_us = 1200\nhold_s = 1\n");
@@ -790,7 +952,7 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
     };
     write("no-command.csv", good_log().lines().map(without_command).collect::<String>().as_bytes());
     let lists = [logs(), kinds(), models(), scenarios(), missions(), schedules(), boards(), arguments(), outputs()];
-    let cases: Vec<Case> = lists.into_iter().flatten().collect();
+    let cases: Vec<Case> = lists.into_iter().chain([plain_words(), impossible()]).flatten().collect();
     assert!(cases.len() >= 70, "{} cases", cases.len());
     let mut wrong = Vec::new();
     for case in &cases {
@@ -806,6 +968,11 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
                 "{}: `quadrig {}`: status {:?}, lacks {lacks:?}\n  {}{}",
                 case.name, case.words, said.status, said.err, said.out
             ));
+        }
+        for leaked in ["f64", "u32", "struct ", "enum ", "os error"] {
+            if said.err.contains(leaked) && !said.err.contains("cannot be read") {
+                wrong.push(format!("{}: `quadrig {}` says {leaked}: {}", case.name, case.words, said.err));
+            }
         }
         if contents(bench.folder()) != before {
             wrong.push(format!("{}: `quadrig {}` changed the folder", case.name, case.words));

@@ -35,8 +35,16 @@ pub(super) fn blame<T: DeserializeOwned>(text: &str, error: &Error) -> (usize, O
         return (start, Some(piece.key.clone()));
     }
     let unknown = error.message().strip_prefix("unknown field `").and_then(|rest| rest.split_once('`'));
-    let named: Vec<&Piece> = pieces.iter().filter(|piece| unknown.is_some_and(|(key, _)| piece.key == key)).collect();
-    if let [piece] = named[..] {
+    // an item of a list has the list's key, and is none itself
+    let is_key = |piece: &&Piece| piece.whole.start < piece.value.start;
+    let named: Vec<&Piece> = pieces.iter().filter(is_key).filter(|p| unknown.is_some_and(|(key, _)| p.key == key)).collect();
+    let is_guilty = |piece: &&&Piece| {
+        let blanked = without(text, piece).map(|text| toml::from_str::<T>(&text));
+        blanked.is_some_and(|parsed| parsed.err().is_none_or(|other| other.message() != error.message()))
+    };
+    // of several tables with such a key the one that can do without it, or the first where none can
+    let one = if named.len() > 1 { named.iter().find(is_guilty).or(named.first()) } else { named.first() };
+    if let Some(piece) = one {
         return (piece.whole.start, Some(piece.key.clone()));
     }
     let is_placed = pieces.iter().any(|piece| [piece.place, piece.whole.start].contains(&start) && is_value(piece));

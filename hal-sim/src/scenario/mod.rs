@@ -292,21 +292,31 @@ pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, 
             format!("a file of the format quadrig-{format}; expected a description in TOML, as in docs/scenario.md"),
         ));
     }
+    if text.trim_start_matches('\u{feff}').trim_start().starts_with('<') {
+        let expected = "expected a description in TOML, as in docs/scenario.md: was a link saved, and not the file behind it?";
+        return Err(refused(0, format!("a web page, or another file in tags; {expected}")));
+    }
     if let Some((byte, key)) = blame::endless(text) {
         return Err(refused(byte, format!("{key}: expected a number with an end")));
     }
-    toml::from_str(text).map_err(|error| {
+    let value = toml::from_str(text).map_err(|error| {
         let (byte, key) = blame::blame::<T>(text, &error);
         let mut reason = in_words(&error.message().replace('\n', " "));
         if let Some(key) = key.filter(|key| !reason.contains(&format!("`{key}`"))) {
             reason = format!("{key}: {reason}");
         }
         refused(byte, reason)
-    })
+    })?;
+    possible::windows(text).map_err(|(byte, reason)| refused(byte, reason))?;
+    Ok(value)
 }
 
-/// The parser's names of kinds of numbers, as people say them.
-fn in_words(message: &str) -> String {
+/// What a parser of TOML says, without its names of types: "a number" for "f64", "a table" for "struct Limit".
+#[must_use]
+pub fn in_words(message: &str) -> String {
+    if message.starts_with("data did not match any variant of ") {
+        return "a value of another kind; expected one of the forms of docs/scenario.md".to_owned();
+    }
     let Some((before, kind)) = message.rsplit_once("expected ") else {
         return format!("{message}; expected TOML, as in docs/scenario.md");
     };
@@ -316,9 +326,22 @@ fn in_words(message: &str) -> String {
         "i64" | "i32" => "a whole number",
         "a boolean" | "bool" => "true or false",
         "path string" => "the name of a file, in quotes",
+        "a string" | "string" => "a text in quotes",
+        "a sequence" | "sequence" => "a list in brackets",
+        "a map" | "map" => "a table",
+        _ if ["struct ", "internally tagged enum ", "struct variant "].iter().any(|of| kind.starts_with(of)) => {
+            "a table: a head in brackets and keys under it"
+        }
+        _ if kind.starts_with("enum ") => "a word in quotes",
+        _ if kind.starts_with("tuple ") || kind.starts_with("a tuple ") || kind.starts_with("an array ") => "a list of numbers",
         other => other,
     };
     let before = before.replace("invalid type: map", "a table").replace("invalid type: sequence", "a list");
+    let before = before
+        .replace("invalid type: string", "a text")
+        .replace("invalid type: integer", "a number")
+        .replace("invalid type: floating point", "a number")
+        .replace("invalid type: boolean", "true or false,");
     format!("{before}expected {kind}")
 }
 

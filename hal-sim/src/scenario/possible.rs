@@ -58,6 +58,22 @@ pub(super) fn sizes(text: &str) -> Result<(), Refusal> {
     })
 }
 
+/// Refuses a fault that ends before it begins.
+pub(super) fn windows(text: &str) -> Result<(), Refusal> {
+    let Ok(table) = DeTable::parse(text) else { return Ok(()) };
+    let faults = table.get_ref().get("fault").and_then(|list| list.get_ref().as_array());
+    let number = |value: &Spanned<DeValue<'_>>| text.get(value.span())?.replace('_', "").parse::<f64>().ok();
+    for fault in faults.into_iter().flatten().filter_map(|item| item.get_ref().as_table()) {
+        let of = |key: &str| fault.get(key).and_then(|value| Some((value.span().start, number(value)?)));
+        if let (Some((_, from)), Some((place, until))) = (of("from_s"), of("until_s"))
+            && until <= from
+        {
+            return Err((place, format!("until_s: expected an end after from_s = {from}, found {until}")));
+        }
+    }
+    Ok(())
+}
+
 /// Refuses what begins when a run of `run_s` is over.
 pub(super) fn onsets(text: &str, run_s: f64) -> Result<(), Refusal> {
     numbers(text, &["effect", "fault"], |key, value| {
@@ -99,6 +115,14 @@ mod tests {
         }
         assert_eq!(sizes("[[effect]]\nresistance_ohm = 0\nthrust_change = -0.99\noffset_n = -3\n"), Ok(()));
         assert_eq!(sizes("[supply]\nresistance_ohm = -3\n"), Ok(()), "a section has its own range");
+    }
+
+    #[test]
+    fn a_fault_that_ends_before_it_begins_is_refused() {
+        let text = "[[fault]]\nid = \"link_lost\"\nfrom_s = 5\nuntil_s = 3\n";
+        let (place, reason) = windows(text).expect_err("it ends first");
+        assert!(text[place..].starts_with('3') && reason == "until_s: expected an end after from_s = 5, found 3", "{reason}");
+        assert_eq!(windows("[[fault]]\nfrom_s = 5\nuntil_s = 6\n"), Ok(()));
     }
 
     #[test]

@@ -70,7 +70,7 @@ pub enum Schedule {
     /// Levels upwards from 1000 us.
     Staircase {
         /// Height of a step, us.
-        #[serde(deserialize_with = "positive")]
+        #[serde(deserialize_with = "step")]
         step_us: f64,
         /// Hold of each level, s.
         #[serde(deserialize_with = "duration")]
@@ -82,7 +82,7 @@ pub enum Schedule {
     /// The same, and down again.
     UpDown {
         /// Height of a step, us.
-        #[serde(deserialize_with = "positive")]
+        #[serde(deserialize_with = "step")]
         step_us: f64,
         /// Hold of each level, s.
         #[serde(deserialize_with = "duration")]
@@ -382,6 +382,11 @@ fn celsius<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
 
 fn pulse<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
     checked(d, |v| (1000.0..=2000.0).contains(&v), "a pulse from 1000 to 2000 us")
+}
+
+/// The staircase of a board has no higher step than the whole range.
+fn step<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    checked(d, |v| v > 0.0 && v <= 1000.0, "a step above 0 and up to 1000 us")
 }
 
 fn frequency<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {

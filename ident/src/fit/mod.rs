@@ -11,16 +11,19 @@ mod declared;
 mod motor;
 pub mod power;
 mod spin;
+mod square;
 pub mod surface;
+mod zero;
 
 pub(crate) use declared::declared;
 
 pub use curve::{Curve, Order, Point};
-pub use motor::{Motor, motor};
+pub use motor::{Motor, lacks, motor};
 pub use spin::{Spin, spin};
+pub use square::square_law;
+pub use zero::Zero;
 
 use crate::log::{Log, SPEED};
-use crate::noise::median;
 use crate::plateau::Plateau;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -120,6 +123,17 @@ pub fn relations(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) 
         .collect()
 }
 
+/// Where the zero of a law comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Origin {
+    /// The law has none.
+    Without,
+    /// The levels at rest: their lowest and highest reading, and the unit.
+    Read((f64, f64), &'static str),
+    /// No level is at rest: readings are taken as they are.
+    Unread,
+}
+
 /// How well a law describes its levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Law {
@@ -131,8 +145,8 @@ pub struct Law {
     pub holds: bool,
     /// Levels that were left out: far off in the light of the others.
     pub left_out: usize,
-    /// What the channel reads at rest by this law, and its unit, where the law has a zero of its own.
-    pub zero: Option<(f64, &'static str)>,
+    /// Where its zero comes from.
+    pub origin: Origin,
 }
 
 /// Probability below which a law is said not to hold.
@@ -146,7 +160,7 @@ impl Law {
     pub fn of(chi2: f64, freedom: usize) -> Self {
         let freely = freedom.max(1) as f64;
         let holds = ChiSquared::new(freely).is_ok_and(|law| law.sf(chi2 * freely) >= HOLDS);
-        Self { chi2, freedom, holds, left_out: 0, zero: None }
+        Self { chi2, freedom, holds, left_out: 0, origin: Origin::Without }
     }
 
     /// The same where some levels were left out. More than a fifth of all are no stray ones: something else acts on them.
@@ -164,7 +178,12 @@ impl Law {
             1 => ", 1 level left out".to_owned(),
             n => format!(", {n} levels left out"),
         };
-        let zero = self.zero.map_or_else(String::new, |(v, unit)| format!("; at rest {v:.4} {unit}"));
+        let zero = match self.origin {
+            Origin::Without => String::new(),
+            Origin::Read((low, high), unit) if low == high => format!("; zero {low:.4} {unit}, read at rest"),
+            Origin::Read((low, high), unit) => format!("; zero {low:.4} to {high:.4} {unit}, read at rest"),
+            Origin::Unread => "; no level is at rest, so that the zero is taken as 0".to_owned(),
+        };
         format!("chi2/dof {}, dof {}{left_out}, {law}{zero}", ratio(self.chi2), self.freedom)
     }
 }
@@ -173,59 +192,6 @@ impl Law {
 #[must_use]
 pub fn ratio(chi2: f64) -> String {
     if chi2 < 100.0 { format!("{chi2:.2}") } else { format!("{chi2:.0}") }
-}
-
-/// Coefficient of omega^2 with a free zero: k_T for thrust, k_Q for torque. Where the square is not the law, its interval is as wide as the
-/// levels' own quotients ask for, their errors aside.
-#[must_use]
-pub fn square_law(
-    log: &Log,
-    plateaus: &[Plateau],
-    speed: &[Option<(f64, f64)>],
-    channel: &str,
-) -> Option<(Estimate, Curve, Law)> {
-    let points: Vec<Point> = plateaus
-        .iter()
-        .zip(speed)
-        .filter_map(|(p, s)| {
-            let ((rpm, rpm_error), (y, y_error)) = ((*s)?, p.of(log, channel)?);
-            let omega = rpm * std::f64::consts::TAU / 60.0;
-            let error = 2.0 * omega * rpm_error * std::f64::consts::TAU / 60.0;
-            // in units of 1e5 rad^2/s^2, so that the numbers are of order one
-            Some(Point { x: omega * omega / 1e5, x_error: error / 1e5, y, y_error })
-        })
-        .collect();
-    let curve = Curve::fit(&points, 1)?;
-    let left_out = curve.outliers.len();
-    let unit = if channel == "thrust_n" { "N" } else { "N.m" };
-    let zero = Some((curve.coefficient(0).value, unit));
-    let law = Law { zero, ..Law::of(curve.chi2, curve.freedom).without(left_out, curve.points.len()) };
-    let mut k = curve.coefficient(1);
-    if !law.holds {
-        let wide = farthest(&curve, STRAY * left_out > curve.points.len()).max(k.half);
-        k.se *= wide / k.half;
-        k.half = wide;
-    }
-    for v in [&mut k.value, &mut k.se, &mut k.half] {
-        *v /= 1e5;
-    }
-    Some((k, curve, law))
-}
-
-/// How far the farthest level's own quotient stands from the slope, its 95 % error aside. Where `all` count, those that were left out do in the
-/// upper half of the levels: at low speeds a zero that is a little off decides the quotient.
-fn farthest(curve: &Curve, all: bool) -> f64 {
-    let (zero, slope) = (curve.coefficient(0), curve.coefficients[1]);
-    let middle = median(&mut curve.points.iter().map(|p| p.x).collect::<Vec<_>>());
-    let least = power::TOO_SMALL * curve.points.iter().map(|p| p.x).fold(0.0, f64::max);
-    let counts = |i: &usize, p: &Point| p.x > least && (all && p.x > middle || !curve.outliers.contains(i));
-    let turning = curve.points.iter().enumerate().filter(|(i, p)| counts(i, p));
-    turning
-        .map(|(_, p)| {
-            let error = p.y_error.hypot(slope * p.x_error).hypot(zero.se) / p.x;
-            ((p.y - zero.value) / p.x - slope).abs() - 1.96 * error
-        })
-        .fold(0.0, f64::max)
 }
 
 /// Thrust coefficient C_T = T/(rho n^2 D^4) of a k_T, n in revolutions a second (UIUC's definition).

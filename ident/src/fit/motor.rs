@@ -6,7 +6,7 @@
 //! Units: SI; KV in rev/min per volt.
 //! Reference: Beharie 2013, Eq. 5.11 corrected (rpm = KV (V - I R)); errors by the delta method over the plateaus' means.
 
-use super::{Estimate, Law, square_law};
+use super::{Estimate, Law, Zero};
 use crate::log::Log;
 use crate::noise::median;
 use crate::plateau::Plateau;
@@ -38,11 +38,11 @@ struct Level {
     full: bool,
 }
 
-/// Motor constants from plateaus; `None` where a channel or a full-throttle level is missing.
+/// Motor constants from plateaus, the torque on its zero; `None` where a channel or a full-throttle level is missing.
 #[must_use]
-pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> Option<Motor> {
-    // a torque arm that is not tared would pose as friction: what the square law leaves at rest is its zero
-    let zero = square_law(log, plateaus, speed, "torque_nm").map(|(_, curve, _)| curve.coefficient(0))?;
+pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>], zero: Option<&Zero>) -> Option<Motor> {
+    // a torque arm that is not tared would pose as friction
+    let zero_at = |p: &Plateau| zero.map_or((0.0, 0.0), |zero| zero.at(p.middle_s()));
     let levels: Vec<Level> = plateaus
         .iter()
         .zip(speed)
@@ -55,7 +55,7 @@ pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> O
                 p.of(log, "voltage_v")?,
             ];
             let mut values = of.map(|v| v.0);
-            values[1] -= zero.value;
+            values[1] -= zero_at(p).0;
             let full = p.of(log, "pulse_us").is_some_and(|(v, _)| v >= FULL_US);
             Some(Level { values, errors: of.map(|v| v.1), full })
         })
@@ -78,7 +78,8 @@ pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> O
     }
     // the zero moves every level together
     let mut moved = levels.clone();
-    moved.iter_mut().for_each(|l| l.values[1] -= zero.se);
+    let off = median(&mut plateaus.iter().map(|p| zero_at(p).1).collect::<Vec<_>>());
+    moved.iter_mut().for_each(|l| l.values[1] -= off);
     let there = constants(&moved)?;
     for (v, (a, b)) in variance.iter_mut().zip(there.iter().zip(&centre)) {
         *v += (a - b).powi(2);
@@ -96,6 +97,32 @@ pub fn motor(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> O
     };
     let physical = centre.iter().all(|v| v.is_finite()) && centre[0] > 0.0 && centre[1] > 0.0;
     physical.then(|| Motor { kv: estimate(0), resistance: estimate(1), no_load: estimate(2), law })
+}
+
+/// What of a log keeps [`motor`] from its constants, in words.
+#[must_use]
+pub fn lacks(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> String {
+    const NEEDED: [&str; 4] = ["torque_nm", "current_a", "voltage_v", "pulse_us"];
+    let absent: Vec<&str> = NEEDED.into_iter().filter(|name| log.column(name).is_none()).collect();
+    if speed.iter().all(Option::is_none) {
+        return "the log has no speed".to_owned();
+    }
+    if !absent.is_empty() {
+        return format!("the log has no {}", absent.join(", no "));
+    }
+    let turning = |(p, s): (&Plateau, &Option<(f64, f64)>)| {
+        s.filter(|s| s.0 > 1.0)?;
+        NEEDED.into_iter().map(|name| p.of(log, name)).collect::<Option<Vec<_>>>().map(|of| of[3].0)
+    };
+    let pulses: Vec<f64> = plateaus.iter().zip(speed).filter_map(turning).collect();
+    let highest = pulses.iter().copied().fold(0.0, f64::max);
+    match pulses.len() {
+        0..6 => format!("{} turning levels with torque, current and voltage, of 6 that it takes", pulses.len()),
+        _ if highest < FULL_US => {
+            format!("no level at full throttle ({FULL_US:.0} us and more): the highest is at {highest:.0} us")
+        }
+        _ => "the power balance of the levels gives no resistance above 0".to_owned(),
+    }
 }
 
 /// How well the balance describes the levels.

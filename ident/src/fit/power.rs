@@ -1,14 +1,14 @@
 //! What a designer asks of each level: power in and out, thrust for each watt, efficiencies, and the propeller's coefficients.
 //!
-//! What it is: quotients of plateau means with the standard errors that follow from theirs; thrust and torque less what the square law leaves
-//! at rest, which is the zero of their channel.
+//! What it is: quotients of plateau means with the standard errors that follow from theirs; thrust and torque less what they read at
+//! rest, which is the zero of their channel.
 //! What can go wrong: a channel that is missing, a propeller whose diameter is not known, air whose density is not: what needs them is not known
 //! either, and is not guessed.
 //! Units: SI; g for each W with standard gravity.
 //! Reference: UIUC propeller data base (C_T = T/(rho n^2 D^4), C_P = P/(rho n^3 D^5), n in rev/s); Leishman 2006, "Principles of Helicopter
 //! Aerodynamics", 2.8 (figure of merit = T^1.5 / (sqrt(2 rho A) P)).
 
-use super::Estimate;
+use super::Zero;
 pub use crate::log::Disc;
 use crate::log::Log;
 use crate::plateau::Plateau;
@@ -86,25 +86,15 @@ fn product(constant: f64, factors: &[(Option<Valued>, f64)]) -> Option<Valued> {
     Some((value, value * relative.sqrt()))
 }
 
-/// Whether a log has a level at rest, so that the zero of a channel is known and not guessed from faster ones.
-#[must_use]
-pub fn rests(speed: &[Option<Valued>]) -> bool {
+/// Which levels are at rest: no faster than a fiftieth of the fastest.
+pub(super) fn at_rest(speed: &[Option<Valued>]) -> impl Iterator<Item = bool> {
     let top = speed.iter().flatten().map(|v| v.0).fold(0.0, f64::max);
-    speed.iter().flatten().any(|v| v.0 <= TOO_SMALL * top)
+    speed.iter().map(move |v| v.is_some_and(|v| v.0 <= TOO_SMALL * top))
 }
 
-/// The figures of every plateau; `zeros` are what thrust and torque read at rest, which are taken off where the log has a level at rest.
+/// The figures of every plateau; `zeros` are what thrust and torque read at rest, and are taken off.
 #[must_use]
-pub fn levels(
-    log: &Log,
-    plateaus: &[Plateau],
-    speed: &[Option<Valued>],
-    zeros: [Option<Estimate>; 2],
-    disc: &Disc,
-) -> Vec<Level> {
-    let zeros = if rests(speed) { zeros } else { [None; 2] };
-    let less =
-        |v: Option<Valued>, zero: Option<Estimate>| v.map(|(v, se)| zero.map_or((v, se), |z| (v - z.value, se.hypot(z.se))));
+pub fn levels(log: &Log, plateaus: &[Plateau], speed: &[Option<Valued>], zeros: [Option<&Zero>; 2], disc: &Disc) -> Vec<Level> {
     let raw: Vec<[Option<Valued>; 6]> = plateaus
         .iter()
         .zip(speed)
@@ -113,8 +103,8 @@ pub fn levels(
             [
                 of("pulse_us"),
                 *rpm,
-                less(of("thrust_n"), zeros[0]),
-                less(of("torque_nm"), zeros[1]),
+                of("thrust_n").map(|v| Zero::off(zeros[0], p.middle_s(), v)),
+                of("torque_nm").map(|v| Zero::off(zeros[1], p.middle_s(), v)),
                 of("current_a"),
                 of("voltage_v"),
             ]
@@ -154,6 +144,28 @@ fn figures(raw: &[Option<Valued>; 6], least: &[f64; 6], disc: &Disc) -> [Option<
         product(turns.powi(-2), &[(thrust, 1.0), (rho, -1.0), (rpm, -2.0), (diameter, -4.0)]),
         product(TAU * turns.powi(-2), &[(torque, 1.0), (rho, -1.0), (rpm, -2.0), (diameter, -5.0)]),
     ]
+}
+
+/// What no propeller's level does, a line for each figure: the likely reason is another unit, another propeller, or a zero that is off.
+#[must_use]
+pub fn in_doubt(levels: &[Level]) -> Vec<String> {
+    [("c_t", "thrust coefficient", 0.01, 0.4), ("figure_of_merit", "figure of merit", 0.1, 1.0)]
+        .into_iter()
+        .filter_map(|(name, what, low, high)| {
+            let beyond = |v: &Valued| v.0 - 1.96 * v.1 > high || v.0 + 1.96 * v.1 < low;
+            let all = levels.iter().filter_map(|l| Some((l.plateau, l.of(name)?))).filter(|(_, v)| beyond(v));
+            let worst = all.clone().max_by(|(_, a), (_, b)| (a.0 / high).max(low / a.0).total_cmp(&(b.0 / high).max(low / b.0)))?;
+            let (plateau, (v, _)) = worst;
+            let more = match all.count() {
+                1 => String::new(),
+                n => format!(" ({n} levels in all)"),
+            };
+            Some(format!(
+                "in doubt: a {what} of {v:.3} on plateau {}{more}, where propellers have {low} to {high}: thrust or torque of another unit, another propeller, or a zero that is off?",
+                plateau + 1
+            ))
+        })
+        .collect()
 }
 
 /// The table of plateaus as CSV: each figure and its standard error; an empty field is what is not known.
@@ -201,10 +213,11 @@ mod tests {
             means: vec![Some((1800.0, 0.0)), Some((5.1, 0.05)), Some((0.08, 0.0)), Some((9.0, 0.0)), Some((11.0, 0.0))],
         };
         let disc = Disc { diameter_m: Some(0.2794), density_kg_m3: Some(1.2) };
-        let zero = Estimate { value: 0.1, se: 0.0, half: 0.0 };
         let rest = Plateau { means: [1000.0, 0.1, 0.0, 0.0, 11.0].map(|v| Some((v, 0.0))).to_vec(), ..plateau.clone() };
         let speeds = [Some((8000.0, 0.0)), Some((0.0, 0.0))];
-        let found = levels(&log, &[plateau.clone(), rest], &speeds, [Some(zero), None], &disc);
+        let both = [plateau.clone(), rest];
+        let zero = Zero::of(&log, &both, &speeds, "thrust_n");
+        let found = levels(&log, &both, &speeds, [zero.as_ref(), None], &disc);
         let near = |name: &str, wanted: f64| {
             let (v, _) = found[0].of(name).unwrap_or_else(|| panic!("{name}"));
             assert!((v / wanted - 1.0).abs() < 1e-3, "{name}: {v}, by hand {wanted}");
@@ -219,8 +232,8 @@ mod tests {
         near("figure_of_merit", 5.0_f64.powf(1.5) / ((2.0 * 1.2 * PI * 0.1397 * 0.1397_f64).sqrt() * 67.02));
         let (g_per_w, se) = found[0].of("g_per_w").expect("known");
         assert!((se / g_per_w - 0.01).abs() < 1e-6, "one per cent of thrust is one per cent of it");
-        // a zero that no level at rest shows is guessed, and not taken off
-        let turning = levels(&log, std::slice::from_ref(&plateau), &speeds[..1], [Some(zero), None], &disc);
+        // without a level at rest nothing is taken off
+        let turning = levels(&log, std::slice::from_ref(&plateau), &speeds[..1], [None; 2], &disc);
         assert!(turning[0].of("g_per_w").is_some_and(|(v, _)| (v / 5.253 - 1.0).abs() < 1e-3), "{:?}", turning[0]);
         let unknown = levels(&log, std::slice::from_ref(&plateau), &[Some((8000.0, 0.0))], [None; 2], &Disc::default());
         assert_eq!(["c_t", "c_p", "figure_of_merit"].map(|n| unknown[0].of(n)), [None; 3]);

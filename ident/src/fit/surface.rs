@@ -1,14 +1,15 @@
 //! Thrust over throttle and supply voltage, with bands.
 //!
 //! What it is: each plateau gives the share of the supply that its controller passed on, d = (Kt w + R (k_Q w^2 + f) / Kt) / V; a cubic of d
-//! over the pulse and the same balance solved for the speed give thrust at any voltage, thrust(rpm) being the propeller's own.
+//! over the pulse and the same balance solved for the speed give thrust at any voltage, thrust over the speed being the
+//! propeller's own, on the zero that was read at rest.
 //! What can go wrong: without motor constants (torque, current, voltage, a level at full throttle) nothing says what another voltage would do.
 //! Units: us, V, N; half widths of 95 % bands.
 //! Reference: Beharie 2013, Eq. 5.11 corrected (rpm = KV (V - I R)); errors by the delta method.
 
 use super::curve::{Curve, Point};
 use super::motor::Motor;
-use super::{Estimate, Fitted, scaled};
+use super::{Estimate, Zero, scaled};
 use crate::log::Log;
 use crate::plateau::Plateau;
 use std::f64::consts::TAU;
@@ -86,6 +87,19 @@ fn passed(levels: &[Level], balance: &Balance) -> Option<Curve> {
     Curve::fit(&points, 3)
 }
 
+/// Thrust over the speed on its zero: a quadratic, as the declared relation.
+fn thrusts(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>], zero: Option<&Zero>) -> Option<Curve> {
+    let points: Vec<Point> = plateaus
+        .iter()
+        .zip(speed)
+        .filter_map(|(p, rpm)| {
+            let (rpm, (y, y_error)) = ((*rpm)?, Zero::off(zero, p.middle_s(), p.of(log, "thrust_n")?));
+            Some(Point { x: scaled("rpm", rpm.0), x_error: rpm.1 / 1000.0, y, y_error })
+        })
+        .collect();
+    Curve::fit(&points, 2)
+}
+
 /// The surface; or why there is none.
 ///
 /// # Errors
@@ -96,11 +110,11 @@ pub fn surface(
     speed: &[Option<(f64, f64)>],
     motor: Option<&Motor>,
     k_torque: Option<Estimate>,
-    curves: &[Fitted],
-) -> Result<Surface, &'static str> {
+    zero: Option<&Zero>,
+) -> Result<Surface, String> {
     let motor =
-        motor.ok_or("not known: the motor's constants need torque_nm, current_a, voltage_v and a level at full throttle")?;
-    let thrust = curves.iter().find(|f| f.name == "thrust(rpm)").ok_or("not known: no thrust(rpm)")?;
+        motor.ok_or_else(|| format!("not known, for the motor's constants are not: {}", super::lacks(log, plateaus, speed)))?;
+    let thrust = thrusts(log, plateaus, speed, zero).ok_or("not known: too few levels with a thrust and a speed")?;
     let k_torque = k_torque.ok_or("not known: no torque over the speed")?;
     let levels: Vec<Level> = plateaus
         .iter()
@@ -117,7 +131,7 @@ pub fn surface(
     let nominal = 0.5 * (measured.0 + measured.1);
     let (low, high) = share.range();
     let pulses: Vec<f64> = (0..PULSES).map(|k| 1000.0 + 1000.0 * (low + (high - low) * k as f64 / (PULSES - 1) as f64)).collect();
-    let at = |balance: &Balance, share: f64, v: f64| thrust.curve.at(scaled("rpm", balance.rpm(share * v)));
+    let at = |balance: &Balance, share: f64, v: f64| thrust.at(scaled("rpm", balance.rpm(share * v)));
     // each constant one half width away, the levels' shares with it
     let moved: Vec<(Balance, Curve)> = [
         Balance::of(motor.kv.value + motor.kv.half, motor.resistance.value, motor.no_load.value, k_torque.value),
@@ -132,7 +146,7 @@ pub fn surface(
         let x = scaled("pulse_us", pulse);
         let value = at(&centre, share.at(x), v);
         let of_share = at(&centre, share.at(x) + share.prediction(x), v) - value;
-        let of_thrust = thrust.curve.band(scaled("rpm", centre.rpm(share.at(x) * v)));
+        let of_thrust = thrust.band(scaled("rpm", centre.rpm(share.at(x) * v)));
         let of_constants = moved.iter().map(|(balance, share)| (at(balance, share.at(x), v) - value).powi(2)).sum::<f64>();
         (value, (of_share.powi(2) + of_thrust.powi(2) + of_constants).sqrt())
     };

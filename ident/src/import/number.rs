@@ -6,6 +6,8 @@
 //! Units: none.
 //! Reference: Unicode CLDR, number symbols.
 
+use crate::log::FARTHEST;
+
 /// What parts a number's digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Marks {
@@ -67,7 +69,7 @@ pub(super) fn cell(text: &str, marks: Marks) -> Cell {
     // the usual case first
     let plain = marks == POINT && text.bytes().all(|b| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'+' | b'e' | b'E'));
     let parsed = if plain { text.parse().ok() } else { of_marks(text, marks) };
-    parsed.filter(|v: &f64| v.is_finite()).map_or(Cell::Text, Cell::Number)
+    parsed.filter(|v: &f64| v.is_finite() && v.abs() <= FARTHEST).map_or(Cell::Text, Cell::Number)
 }
 
 fn of_marks(text: &str, marks: Marks) -> Option<f64> {

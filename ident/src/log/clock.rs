@@ -61,8 +61,9 @@ pub(super) fn first_field(line: &str) -> Option<f64> {
     line.split(',').next()?.trim().parse().ok()
 }
 
-/// Refuses time stamps that contradict the log's own rate, or that are no seconds.
-pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
+/// Refuses time stamps that contradict the log's own rate, or that are no seconds. Each row has its line.
+pub(super) fn check(log: &Log, file: &str, lines: &[usize]) -> Result<(), ReadError> {
+    let place = Place { file, line: lines.first().copied().unwrap_or(1) };
     if log.time_is_row() || log.len() < 3 {
         return Ok(());
     }
@@ -70,17 +71,17 @@ pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
     steps.sort_by(f64::total_cmp);
     let middle = steps[steps.len() / 2];
     let stated = log.meta.get("sample_hz").and_then(|v| v.as_float().or_else(|| v.as_integer().map(|n| n as f64)));
-    if stated.is_none()
+    if stated.is_none_or(|hz| !(hz.is_finite() && hz > 0.0))
         && let Some(found) = log.meta.get("sample_hz")
     {
-        return Err(Place { file: place.file, line: 1 }.refuse(
+        return Err(Place { file, line: 1 }.refuse(
             None,
             format!("sample_hz = {found}"),
-            "a number of rows a second in the head",
+            "a number of rows a second above 0 in the head",
         ));
     }
     let refuse = |found: String, expected: String| Err(place.refuse(Some("t_s"), found, expected));
-    match stated.filter(|hz| hz.is_finite() && *hz > 0.0) {
+    match stated {
         Some(hz) => {
             for (times, unit) in [(1e3, "milliseconds"), (1e6, "microseconds")] {
                 if (0.8 * times..1.25 * times).contains(&(middle * hz)) {
@@ -92,10 +93,11 @@ pub(super) fn check(log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
                 let found = format!("rows {} s apart, where sample_hz says {} s", number(middle), number(1.0 / hz));
                 return refuse(found, format!("seconds; {}: multiply t_s, or mend sample_hz", coarser(middle * hz)));
             }
-            if let Some(found) = dropped(log, hz) {
-                let expected =
-                    format!("a row each {} s; rows were dropped (a bad line, a filter, a thinned export)", number(1.0 / hz));
-                return refuse(found, format!("{expected}: use the whole log, or take sample_hz out of its head"));
+            if let Some((found, row)) = dropped(log, hz) {
+                let why = "rows were dropped (a bad line, a filter, a thinned export)";
+                let way_out = "use the whole log, or take sample_hz out of its head";
+                let before = Place { file, line: lines.get(row).copied().unwrap_or(place.line) };
+                return Err(before.refuse(Some("t_s"), found, format!("a row each {} s; {why}: {way_out}", number(1.0 / hz))));
             }
         }
         None if no_seconds(log, middle) => {
@@ -124,8 +126,8 @@ fn no_seconds(log: &Log, middle: f64) -> bool {
     log.t.iter().all(|t| t.fract() == 0.0) && (middle >= NO_SECONDS[0] || length >= NO_SECONDS[1])
 }
 
-/// What is missing of the rows that the rate promises, if it is much.
-fn dropped(log: &Log, hz: f64) -> Option<String> {
+/// What is missing of the rows that the rate promises, if it is much, and the row before the first hole.
+fn dropped(log: &Log, hz: f64) -> Option<(String, usize)> {
     if log.len() < ENOUGH {
         return None;
     }
@@ -152,12 +154,13 @@ fn dropped(log: &Log, hz: f64) -> Option<String> {
     let untold = absent.min(counts) >= UNTOLD * promised && !told;
     (scattered || untold).then(|| {
         let holes = if holes.len() == 1 { "one hole".to_owned() } else { format!("{} holes", holes.len()) };
-        let first = steps.iter().position(|step| missed(step) >= 1.0).map_or(0.0, |i| log.t[i]);
-        let after = number(first);
-        format!(
+        let first = steps.iter().position(|step| missed(step) >= 1.0).unwrap_or(0);
+        let after = number(log.t[first]);
+        let found = format!(
             "{missing} of the {promised} rows are missing that sample_hz = {} promises, in {holes}, from {after} s on",
             number(hz)
-        )
+        );
+        (found, first)
     })
 }
 
@@ -186,6 +189,8 @@ mod tests {
         assert!(fifth.contains("in 60 holes, from 0.2 s on; expected a row each 0.1 s; rows were dropped"), "{fifth}");
         let block = log(RATE, 1.0, |n| !(100..160).contains(&n)).expect_err("a fifth is gone");
         assert!(block.contains("60 of the 300 rows are missing") && block.contains("one hole"), "{block}");
+        // three lines of head, and the hole is after the hundredth row
+        assert!(block.starts_with("run.csv:103: "), "{block}");
         let thinned = log(RATE, 1.0, |n| n % 2 == 0).expect_err("every other row is gone");
         assert!(thinned.contains("149 of the 299 rows"), "{thinned}");
         // blocks of seconds, none of them large
@@ -240,6 +245,7 @@ mod tests {
                 .expect_err("a word")
                 .contains("run.csv:1: sample_hz = \"ten\"; expected a number")
         );
+        assert!(log("# sample_hz = 0\n", 1.0, |_| true).expect_err("none").contains("sample_hz = 0; expected a number of rows"));
         log("# time = \"row\"\n", 10_000.0, |_| true).expect("a table without time");
     }
 

@@ -15,6 +15,8 @@ use std::fmt;
 const HOLE: f64 = 5.0;
 /// Share of the time, or of the rows, that is worth a line: half of the fifth from which on a run is no longer what it seems.
 const TOLD: f64 = 0.1;
+/// Share of the time from which on dropped rows are no accident: a fifth, but for a row at either end.
+const DROPPED: f64 = 0.19;
 /// Share of steps that are whole multiples of the shortest, and by how much of it they may be off, of a clock that ticks evenly.
 const EVEN: [f64; 2] = [0.95, 0.15];
 /// Steps below which nothing is judged.
@@ -62,6 +64,12 @@ impl Gaps {
         let coarse = is_even(&log.t, tick).then_some(tick);
         let single = Self { single: true, coarse, ..Self::among(log, &steps, tick, 1.5) };
         (even && single.missing_s >= TOLD * single.whole_s).then_some(single)
+    }
+
+    /// Whether rows of an even clock were dropped here and there, and so many that the run is no longer what it seems.
+    #[must_use]
+    pub fn are_dropped_rows(&self) -> bool {
+        self.single && self.coarse.is_none() && self.missing_s >= DROPPED * self.whole_s
     }
 
     /// The holes that are longer than so many steps.
@@ -188,7 +196,7 @@ mod tests {
         );
         // here and there
         let scattered = Gaps::of(&log(|n| (n * n + n / 7) % 5 != 3)).expect("rows are gone");
-        assert!(scattered.single && scattered.coarse.is_none(), "{scattered}");
+        assert!(scattered.single && scattered.coarse.is_none() && scattered.are_dropped_rows(), "{scattered}");
         assert!(scattered.to_string().contains("at uneven places: dropped by a filter"), "{scattered}");
         // steps of any length are uneven sampling, not holes
         let mut uneven = log(|_| true);

@@ -33,9 +33,21 @@ pub(crate) struct Doubt {
 
 /// Everything that is odd about a log.
 pub(crate) fn doubts(log: &Log) -> impl Iterator<Item = Doubt> {
-    [head(log), rate(log), speed(log), supply(log), reversed(log), swapped(log), thrust(log), disc(log), torque(log)]
-        .into_iter()
-        .flatten()
+    [
+        head(log),
+        rate(log),
+        still(log),
+        speed(log),
+        supply(log),
+        reversed(log),
+        pushed(log),
+        swapped(log),
+        thrust(log),
+        disc(log),
+        torque(log),
+    ]
+    .into_iter()
+    .flatten()
 }
 
 impl Log {
@@ -153,6 +165,22 @@ fn speed(log: &Log) -> Option<Doubt> {
     }
 }
 
+/// A current that lifts something while no sensor sees the rotor turn.
+fn still(log: &Log) -> Option<Doubt> {
+    let mut speeds = SPEED.into_iter().filter_map(|s| Some((s, high(log.column(s)?)?)));
+    let (name, first) = speeds.next()?;
+    let top = speeds.fold(first, |top, (_, v)| top.max(v));
+    let current = log.column("current_a").and_then(high).filter(|i| *i > 2.0 * FAINT)?;
+    if top.abs() >= 1.0 {
+        return None;
+    }
+    let thrust = log.column("thrust_n").and_then(high).filter(|n| *n > FAINT);
+    let lifts = thrust.map_or_else(String::new, |n| format!(" and {n:.1} N"));
+    let what = format!("0 rev/min on every sensor at {current:.1} A{lifts}: sensors without signal, or a blocked rotor?");
+    // a rotor that is blocked draws a current, and lifts nothing
+    doubt(name, thrust.is_some(), what)
+}
+
 fn supply(log: &Log) -> Option<Doubt> {
     if let Some(top) = log.column("voltage_v").and_then(high) {
         if top > 1000.0 {
@@ -231,6 +259,20 @@ fn reversed(log: &Log) -> Option<Doubt> {
     let negative = |name: &'static str| typical(log, name, &rows).filter(|v| *v < -FAINT).map(|v| (name, v));
     let (name, value) = SPEED.into_iter().chain(["voltage_v", "current_a"]).find_map(negative)?;
     doubt(name, true, format!("{} under load: the sign, or wires that are swapped?", trimmed(value, 3)))
+}
+
+/// Thrust of the other sign: a load cell that is mounted the other way round, or a rotor that blows at it.
+fn pushed(log: &Log) -> Option<Doubt> {
+    let (rows, rest) = loaded(log);
+    let thrust = typical(log, "thrust_n", &rows).filter(|v| *v < 0.0)?;
+    let zero = typical(log, "thrust_n", &rest).unwrap_or(0.0);
+    // a zero that is off by more than the rotor lifts is a tare, and no sign
+    let turned = thrust < zero && (thrust - zero).abs() > 3.0 * zero.abs();
+    let what = format!(
+        "{} N under load: the sign, or a load cell the other way round? A rotor that lifts reads above 0",
+        trimmed(thrust, 3)
+    );
+    turned.then_some(Doubt { column: "thrust_n", what, never: thrust < -FAINT })
 }
 
 /// What an actuator disc can do, and a propeller does.
@@ -314,6 +356,16 @@ mod tests {
             let found = rig("", |n, t, u, i| [n, t, of[0] * u, of[1] * i]).expect_err(column);
             assert!(found.contains("thrust_n") && found.contains("kilo"), "{column}: {found}");
         }
+    }
+
+    #[test]
+    fn thrust_of_the_other_sign_and_a_rotor_that_nobody_sees_are_refused() {
+        let turned = rig("", |n, t, u, i| [n, -t, u, i]).expect_err("a sign");
+        assert!(turned.contains("thrust_n") && turned.contains("the other way round?"), "{turned}");
+        let unseen = rig("", |_, t, u, i| [0.0, t, u, i]).expect_err("no tachometer");
+        assert!(unseen.contains("0 rev/min on every sensor at 12.8 A and 2.7 N: sensors without signal"), "{unseen}");
+        let blocked = rig("", |_, _, u, i| [0.0, 0.0, u, i]).expect("a rotor may be blocked");
+        assert!(blocked.in_doubt().iter().any(|d| d.contains("a blocked rotor?")), "{:?}", blocked.in_doubt());
     }
 
     /// 2 N at 4000 rev/min of an 11 inch propeller: C_T is 0.06.

@@ -23,11 +23,12 @@ use toml::{Table, Value};
 pub(super) type Refusal = (String, String, String);
 
 /// Keys of the file.
-const ROOT: [&str; 11] = [
+const ROOT: [&str; 12] = [
     "format",
     discrepancy::DIGEST,
     "source",
     "start_pulse_us",
+    "highest_pulse_us",
     "air_density_ratio",
     "rig",
     "consensus",
@@ -104,6 +105,11 @@ impl Model {
             meta: root.get("rig").and_then(Value::as_table).cloned().unwrap_or_default(),
             ..Self::default()
         };
+        if let Some(pulse) = root.get("highest_pulse_us") {
+            let highest = finite(pulse).filter(|p| *p > 0.0);
+            model.highest_pulse_us =
+                Some(highest.ok_or_else(|| refusal("highest_pulse_us", Some(pulse), "a finite number of microseconds"))?);
+        }
         if let Some(air) = root.get("air_density_ratio") {
             let ratio = finite(air).filter(|r| *r > 0.0);
             model.air = Some(ratio.ok_or_else(|| refusal("air_density_ratio", Some(air), "a finite number above zero"))?);

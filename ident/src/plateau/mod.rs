@@ -43,6 +43,12 @@ pub struct Plateau {
 }
 
 impl Plateau {
+    /// Middle of its time, s.
+    #[must_use]
+    pub fn middle_s(&self) -> f64 {
+        0.5 * (self.from_s + self.to_s)
+    }
+
     /// Mean and standard error of a column.
     #[must_use]
     pub fn of(&self, log: &Log, column: &str) -> Option<(f64, f64)> {

@@ -9,7 +9,7 @@
 use super::figure::{Figure, Layer, Mark};
 use super::number;
 use super::sheet::Sheet;
-use crate::fit::power::{ASKED, Level, rests};
+use crate::fit::power::{ASKED, Level, in_doubt};
 use crate::fit::surface::Surface;
 use crate::identify::Identified;
 
@@ -18,12 +18,12 @@ pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figu
     if found.levels.is_empty() {
         return;
     }
-    let zero = if rests(&found.speeds) {
-        "Thrust and torque less the zero of their square laws: where the line through all levels meets rest"
-    } else {
-        "Thrust and torque as read: no level is at rest"
-    };
-    sheet.say(&format!("{zero}; standard errors beside the values. In still air a propeller moves nothing forward, so that its propulsive efficiency is 0: the figure of merit says how near it comes to an ideal one."));
+    let zero = found.zero_words();
+    if !zero.is_empty() {
+        sheet.say(&format!("{}.", capital(&zero)));
+    }
+    in_doubt(&found.levels).iter().for_each(|line| sheet.warn(&format!("{}.", capital(line).trim_end_matches('?'))));
+    sheet.say("Standard errors beside the values. In still air a propeller moves nothing forward, so that its propulsive efficiency is 0: the figure of merit says how near it comes to an ideal one.");
     for lack in found.disc.lacks() {
         sheet.say(&format!("{}. What needs it is left empty.", capital(lack)));
     }

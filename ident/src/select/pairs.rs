@@ -6,6 +6,7 @@
 //! Reference: `thesis.csv` beside this file; errata, "Table 9 agrees with itself".
 
 use super::{Maximum, Pair};
+use crate::fit::{Zero, speeds};
 use crate::log::{Lines, Log, Place, ReadError, SPEED, short};
 use crate::plateau::Plateau;
 use crate::quantity::{Ampere, Newton};
@@ -30,7 +31,8 @@ pub fn thesis() -> Vec<Pair> {
 pub fn read_table(file: &str, source: impl BufRead) -> Result<Vec<Pair>, ReadError> {
     let mut lines = Lines::new(file, source);
     let mut header = false;
-    let mut out = Vec::new();
+    let mut out: Vec<Pair> = Vec::new();
+    let mut places: Vec<usize> = Vec::new();
     while let Some(line) = lines.next_line()? {
         if line.trim().is_empty() || line.starts_with('#') {
             continue;
@@ -43,6 +45,11 @@ pub fn read_table(file: &str, source: impl BufRead) -> Result<Vec<Pair>, ReadErr
             }
             header = true;
         } else if let [motor, propeller, thrust, current] = cells[..] {
+            if let Some(k) = out.iter().position(|p| p.motor == motor && p.propeller == propeller) {
+                let found = format!("'{motor}' with '{propeller}' stands on line {}, too", places[k]);
+                return Err(place.refuse(None, found, "each pair once: take one line out, or give them names of their own"));
+            }
+            places.push(place.line);
             out.push(Pair {
                 motor: motor.to_owned(),
                 propeller: propeller.to_owned(),
@@ -76,7 +83,7 @@ fn maximum(thrust: &str, current: &str, place: &Place<'_>) -> Result<Option<Maxi
     Ok(Some(Maximum { thrust_n: Newton(positive(thrust, HEADER[2])?), current_a: Ampere(positive(current, HEADER[3])?) }))
 }
 
-/// The pair that a run measured: its plateaus, the one with most thrust, names from the log's metadata.
+/// The pair that a run measured: its plateaus, thrust less what it reads at rest, the one with most thrust, names from the log's metadata.
 #[must_use]
 pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
     // a run that names neither is told from others by its file
@@ -85,10 +92,14 @@ pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
         name.map_or_else(|| format!("{key} of {}", log.name), str::to_owned)
     };
     let index = |name: &str| log.columns.iter().position(|c| c.name == name);
+    let zero = Zero::of(log, plateaus, &speeds(log, plateaus, &[]), "thrust_n");
     let levels: Vec<Maximum> = match (index("thrust_n"), index("current_a")) {
         (Some(t), Some(i)) => plateaus
             .iter()
-            .filter_map(|p| Some((p.means.get(t).copied().flatten()?.0, p.means.get(i).copied().flatten()?.0)))
+            .filter_map(|p| {
+                let thrust = Zero::off(zero.as_ref(), p.middle_s(), p.means.get(t).copied().flatten()?);
+                Some((thrust.0, p.means.get(i).copied().flatten()?.0))
+            })
             .map(|(thrust, current)| Maximum { thrust_n: Newton(thrust), current_a: Ampere(current) })
             .collect(),
         _ => Vec::new(),
@@ -168,6 +179,7 @@ mod tests {
             ("a,b\n".to_owned(), "p.csv:1: header 'a,b'; expected 'motor,propeller,thrust_n,current_a'"),
             (format!("{head}m,p,1\n"), "p.csv:2: 3 fields"),
             (format!("{head}m,p,1,\n"), "p.csv:2: column current_a: ''; expected a positive number"),
+            (format!("{head}m,p,1,2\nm,p,3,4\n"), "p.csv:3: 'm' with 'p' stands on line 2, too; expected each pair once"),
             (format!("{head}m,p,-1,2\n"), "p.csv:2: column thrust_n: '-1'"),
         ] {
             let message = read_table("p.csv", text.as_bytes()).unwrap_err().to_string();

@@ -214,6 +214,8 @@ fn model(
         own,
         ..Model::of(&contexts[0], &runs[0].log, polynomials)
     };
+    let highest = runs.iter().filter_map(|run| Model::of(&contexts[0], &run.log, Vec::new()).highest_pulse_us);
+    model.highest_pulse_us = highest.reduce(f64::max);
     contexts.iter().for_each(|context| model.saw(context, 0));
     model
 }

@@ -104,14 +104,17 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     told.sort();
     told.iter().for_each(|line| note!("{line}"));
     let left = gather(args, &all)?;
+    let states: Vec<String> = own.iter().filter_map(|file| Done::read(&result_path(args, file))).map(|done| done.state).collect();
+    let counted = |state: &str| states.iter().filter(|s| *s == state).count();
     if !quiet {
         let known = known.into_inner();
         let wall = begun.elapsed().as_secs_f64();
         say!(
-            "{shard}{} of {} runs: {} closed in {wall:.1} s on {threads} threads, {known} were there already",
+            "{shard}{} of {} runs: {} closed{}; {wall:.1} s on {threads} threads, {known} were there already",
             own.len(),
             all.len(),
-            own.len() - known
+            counted("closed"),
+            others(counted("refused"), counted("failed"), &args.output)
         );
         match left {
             0 => say!("{}: {} rows", args.output.join("manifest.csv").display(), all.len()),
@@ -119,6 +122,13 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// How many runs were not closed, and where it stands why.
+fn others(refused: usize, failed: usize, output: &Path) -> String {
+    let said = [(refused, "refused"), (failed, "failed")].map(|(n, state)| (n > 0).then(|| format!(", {n} {state}")));
+    let said: String = said.into_iter().flatten().collect();
+    if said.is_empty() { said } else { format!("{said} (why: column message of {})", output.join("manifest.csv").display()) }
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {

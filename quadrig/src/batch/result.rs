@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict".
 
 use crate::Failure;
-use crate::close_loop::{is_result, results};
+use crate::close_loop::results;
 use crate::folder::Folder;
 use ident::close::{Closed, close};
 use ident::identify::identify;
@@ -119,7 +119,7 @@ pub(super) fn close_one(file: &str, key: String, folder: Option<&Path>, read: &d
         let log = read()?;
         let closed = close(&log, None, &[], &mut |_| {})?;
         if let Some(folder) = folder {
-            let mut own = Folder::new(folder, is_result)?;
+            let mut own = Folder::new(folder, "batch")?;
             own.extend(results(&log, &closed, Origin::of(&log))?);
             own.write()?;
         }

@@ -6,7 +6,7 @@
 //! Reference: specification `flight.md`, "The loop on flights".
 
 use super::inertial::is_attitude_log;
-use super::{Args, is_result, say_unwritten};
+use super::{Args, say_unwritten};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::progress::Bar;
@@ -36,7 +36,7 @@ fn begins_as(path: &Path, format: &str) -> bool {
 
 /// Runs the command.
 pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, "close-loop")).transpose()?;
     let log = flight_log::read(args.log())?;
     let model = args.model.as_deref().map(read_model).transpose()?;
     let others = args.validate.iter().map(|p| other_flight(p)).collect::<Result<Vec<_>, _>>()?;

@@ -6,7 +6,7 @@
 //! Units: rad/s, m/s^2, uT.
 //! Reference: specification `formats.md`, "Attitude log" and "Verdict".
 
-use super::{Args, is_result, say_unwritten};
+use super::{Args, say_unwritten};
 use crate::Failure;
 use crate::ahrs::imu_log::{ImuLog, Row};
 use crate::folder::Folder;
@@ -31,7 +31,7 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if args.model.is_some() || !args.validate.is_empty() {
         return Err(format!("{}: an attitude log; expected a rig log with --model and --validate", args.log().display()).into());
     }
-    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, "close-loop")).transpose()?;
     let log = ImuLog::read(args.log())?;
     let recording = recording(&log, args.log());
     let closed = {

@@ -5,7 +5,7 @@
 //! Units: as the channels state.
 //! Reference: specification `formats.md`, "Command line".
 
-use super::{Args, flight, inertial, is_result, model_files, results, say_unwritten};
+use super::{Args, flight, inertial, model_files, results, say_unwritten};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::open::open;
@@ -25,7 +25,7 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             format!("{}: --model with several logs; expected one log with --model, or several without", model.display()).into()
         );
     }
-    let folder = args.output.as_deref().map(|path| Folder::new(path, is_result)).transpose()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, "close-loop")).transpose()?;
     let options = args.columns.options(&args.names);
     let logs = args.logs.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
     let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;

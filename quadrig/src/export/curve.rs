@@ -16,6 +16,8 @@ use std::path::Path;
 pub(super) const LEAD: &str = "resistance of the supply's lead";
 /// Points of the curve.
 const POINTS: usize = 101;
+/// Signal from which on a run has seen full throttle: rigs end at 1990 us and more.
+const FULL: f64 = 0.99;
 /// Share of full thrust at which thrust has begun.
 const BEGUN: f64 = 0.002;
 
@@ -54,6 +56,8 @@ pub(super) struct Powerplant {
     pub(super) lead_ohm: Option<f64>,
     /// Fall of the supply for the charge drawn, V/Ah, where the model holds one.
     pub(super) fall_v_per_ah: Option<f64>,
+    /// Share of the pulse's range up to which the model's run went; nothing where its file does not tell.
+    pub(super) measured: Option<f64>,
     /// Channels whose meter on the rig is late, and by how much, s.
     pub(super) late: Vec<(String, f64)>,
 }
@@ -99,6 +103,7 @@ impl Powerplant {
             pole_pairs: model.meta.get("pole_pairs").and_then(toml::Value::as_integer),
             lead_ohm: estimate("supply_sag", "resistance"),
             fall_v_per_ah: estimate("battery_discharge", "slope"),
+            measured: model.highest_pulse_us.map(|us| ((us - 1000.0) / 1000.0).clamp(0.0, 1.0)),
             late: model.effects.iter().filter(|e| e.placed.effect.id() == "channel_delay").flat_map(late).collect(),
         };
         if found.full_n() <= 0.0 {
@@ -114,6 +119,24 @@ impl Powerplant {
     /// Thrust at full throttle, N.
     pub(super) fn full_n(&self) -> f64 {
         self.points.last().map_or(0.0, |p| p.thrust_n)
+    }
+
+    /// Pulse in us and thrust in N up to which the run went, where that is not full throttle: what lies beyond is computed.
+    pub(super) fn ends_at(&self) -> Option<(f64, f64)> {
+        let signal = self.measured.filter(|signal| *signal < FULL)?;
+        Some((1000.0 + 1000.0 * signal, self.share(signal) * self.full_n()))
+    }
+
+    /// What is measured and what is not, in words.
+    pub(super) fn reach(&self) -> Option<String> {
+        let full = self.full_n();
+        match (self.ends_at(), self.measured) {
+            (Some((us, n)), _) => {
+                Some(format!("measured up to {us:.0} us, {n:.2} N; beyond is computed, {full:.2} N at 2000 us"))
+            }
+            (None, None) => Some("how far its run went the model does not tell: the upper end may be computed".to_owned()),
+            _ => None,
+        }
     }
 
     /// Least signal at which the rotor turns: what a peer calls its idle keeps it turning.

@@ -2,7 +2,8 @@
 //!
 //! What it is: thrust curve, motor constants, battery and delay as PX4, ArduPilot, Betaflight, Crazyflie, Simulink or a spreadsheet has them; each
 //! file says where its keys are defined, how far the peer's curve is from the model's, and what the model does not tell.
-//! What can go wrong: a model without thrust or command, or without what the peer cannot do without: refused, and nothing is written.
+//! What can go wrong: a model without thrust or command, or without what the peer cannot do without, or a run so short that most of full thrust
+//! would be computed: refused, and nothing is written.
 //! Units: as the peer's.
 //! Reference: docs/export.md, with a link to each definition.
 
@@ -58,6 +59,9 @@ pub(crate) struct Args {
     /// Capacity of that battery, mAh, as printed on it: no model knows it.
     #[arg(long, value_name = "MAH", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     capacity: Option<u32>,
+    /// Writes the file although more of its full thrust is computed than was measured.
+    #[arg(long)]
+    extrapolate: bool,
     /// Rotors of the vehicle, for the peers that name each.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
     rotors: u32,
@@ -74,6 +78,14 @@ impl Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let model = Model::read(&args.model)?;
     let plant = Powerplant::of(&args.model, &model)?;
+    if let Some((us, measured_n)) = plant.ends_at().filter(|(_, n)| plant.full_n() > 2.0 * n && !args.extrapolate) {
+        return Err(format!(
+            "{}: the run ends at {us:.0} us and {measured_n:.2} N, and full thrust would be computed as {:.2} N, more than twice that; expected a run up to full throttle: run one, or take the computed rest with --extrapolate",
+            args.model.display(),
+            plant.full_n()
+        )
+        .into());
+    }
     let battery = Battery { cells: args.cells, capacity_mah: args.capacity };
     let text = match args.to {
         Peer::Px4 => px4::text(&plant, args.rotors, battery),
@@ -88,9 +100,15 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
             if !quiet {
                 say!("{}: {}", path.display(), plant.title());
+                plant.reach().into_iter().for_each(|line| say!("{line}"));
             }
         }
-        None => crate::say::text(&text),
+        None => {
+            crate::say::text(&text);
+            if !quiet {
+                plant.reach().into_iter().for_each(|line| note!("{line}"));
+            }
+        }
     }
     Ok(())
 }
@@ -120,9 +138,10 @@ fn off(percent: f64) -> String {
     format!("its curve is within {percent:.2} % of full thrust of the model's")
 }
 
-/// Full thrust, for who reads the curve back.
+/// Full thrust, for who reads the curve back, and how far it was measured.
 fn full(plant: &Powerplant) -> String {
-    format!("full thrust {:.5} N", plant.full_n())
+    let reach = plant.reach().map_or_else(String::new, |reach| format!("; {reach}"));
+    format!("full thrust {:.5} N{reach}", plant.full_n())
 }
 
 /// What the peer has no key for, or the model no answer to.

@@ -18,6 +18,12 @@ const DEFINED: [&str; 3] = [
 const INT32: u32 = 6;
 const REAL32: u32 = 9;
 
+/// Which way the rotors of PX4's quad X turn, in its own order (front right, rear left, front left, rear right): seen from above, 1 for
+/// counter-clockwise. With all of one sign the allocator could not turn the vehicle about its vertical axis.
+fn turning(rotors: u32) -> Option<[f64; 4]> {
+    (rotors == 4).then_some([1.0, 1.0, -1.0, -1.0])
+}
+
 /// The file.
 pub(super) fn text(plant: &Powerplant, rotors: u32, battery: Battery) -> String {
     // a whole pulse, at which the rotor turns: what the autopilot gives without thrust keeps it turning
@@ -42,8 +48,16 @@ pub(super) fn text(plant: &Powerplant, rotors: u32, battery: Battery) -> String 
         plant.lag_s.map_or_else(String::new, |lag_s| format!(", timeConstantUp {lag_s:.4}"))
     ));
     let no_moment = arm.is_none().then(|| "CA_ROTORn_KM: the model predicts no torque".to_owned());
-    let sign = "CA_ROTORn_KM is positive for rotors that turn counter-clockwise; turn the sign for the others".to_owned();
-    head.extend(arm.map(|_| sign));
+    head.extend(arm.map(|_| match turning(rotors) {
+        Some(signs) => format!(
+            "CA_ROTORn_KM is positive for rotors that turn counter-clockwise: here those of PX4's quad X, rotors 1 to 4 {}: https://docs.px4.io/main/en/airframes/airframe_reference.html#quadrotor-x",
+            signs.map(|s| if s > 0.0 { "counter-clockwise" } else { "clockwise" }).join(", ")
+        ),
+        None => format!(
+            "CA_ROTORn_KM is left out: it is positive for rotors that turn counter-clockwise, and which of {rotors} do the airframe says (https://docs.px4.io/main/en/airframes/airframe_reference.html); its size is {:.6} m",
+            arm.unwrap_or(0.0)
+        ),
+    }));
     let per_cell = battery.cells.zip(plant.lead_ohm).map(|(cells, lead_ohm)| lead_ohm / f64::from(cells));
     head.extend(
         per_cell.map(|_| "BAT1_R_INTERNAL: the resistance of the rig's supply and its lead, shared among the cells".to_owned()),
@@ -73,8 +87,8 @@ pub(super) fn text(plant: &Powerplant, rotors: u32, battery: Battery) -> String 
     out += &line("CA_ROTOR_COUNT", &rotors.to_string(), INT32);
     for k in 0..rotors {
         out += &line(&format!("CA_ROTOR{k}_CT"), &format!("{:.6}", plant.full_n()), REAL32);
-        if let Some(arm) = arm {
-            out += &line(&format!("CA_ROTOR{k}_KM"), &format!("{arm:.6}"), REAL32);
+        if let Some((arm, signs)) = arm.zip(turning(rotors)) {
+            out += &line(&format!("CA_ROTOR{k}_KM"), &format!("{:.6}", signs[k as usize] * arm), REAL32);
         }
     }
     for k in 1..=rotors {

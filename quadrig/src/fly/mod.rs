@@ -52,9 +52,6 @@ impl Args {
     }
 }
 
-/// The files of a flight.
-const FILES: [&str; 4] = ["states.csv", "flight.csv", "attitude.csv", "flight.html"];
-
 /// What turns the rotors.
 enum Rotors {
     Catalogue,
@@ -78,7 +75,7 @@ const LONG_S: f64 = 600.0;
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let (mission, file) = Mission::load(&args.mission)?;
     args.paths().reads(mission.files(&args.mission).iter().flatten()).check()?;
-    let folder = args.output.as_deref().map(|path| Folder::new(path, |name| FILES.contains(&name))).transpose()?;
+    let folder = args.output.as_deref().map(|path| Folder::new(path, "fly")).transpose()?;
     let airframe = file.airframe();
     if airframe.body().is_none() {
         return Err(format!(

@@ -506,7 +506,8 @@ fn placed(text: &str, path: &Path, (span, reason): Refused) -> String {
 }
 
 fn section<T: serde::de::DeserializeOwned>(text: &str, path: &Path) -> Result<T, String> {
-    toml::from_str(text).map_err(|error| placed(text, path, (error.span().unwrap_or(0..0), error.message().replace('\n', " "))))
+    let said = |error: &toml::de::Error| hal_sim::scenario::in_words(&error.message().replace('\n', " "));
+    toml::from_str(text).map_err(|error| placed(text, path, (error.span().unwrap_or(0..0), said(&error))))
 }
 
 /// What a file says of calibrated scales, whatever else stands in it.
