@@ -118,7 +118,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             &["With all that is told below the model explains 99 % of what thrust had left over."],
             &["That explains", "named below"],
         ),
-        (verdict(Kind::Attributed, vec![filter(0.41)]), false, &["The load cell perhaps reads"], &["probably"]),
+        (verdict(Kind::Attributed, vec![filter(0.55)]), false, &["The load cell perhaps reads"], &["probably"]),
         (
             verdict(Kind::Attributed, vec![sag(0.9), effect("creep", "thrust_n", 0.9, 0.001, vec![])]),
             false,

@@ -99,8 +99,8 @@ pub fn in_force(e: &EffectEntry) -> (String, Option<String>) {
     };
     let ways = EITHER.iter().find_map(|between| Some((between, whole.split_once(between)?)));
     // ways that share a part, such as that of the heat, are told together
-    let apart = |(first, second): &(&str, &str)| first.contains(" = ") == second.contains(" = ") && second.contains('=');
-    let (told, form) = match ways.filter(|(_, ways)| apart(ways)) {
+    let apart = |second: &str| second.contains('=') && second.starts_with(|c: char| c.is_ascii_alphabetic());
+    let (told, form) = match ways.filter(|(_, (_, second))| apart(second)) {
         Some((between, (first, second))) => {
             let marked = form.as_ref().is_some_and(|f| between.replace('_', " ").contains(f.as_str()));
             (if marked || has(second) > has(first) { second } else { first }, form.filter(|_| !marked))
@@ -155,12 +155,15 @@ mod tests {
         assert_eq!(of(filter, &["window"]).0, "reading = mean of the truth over the last window seconds");
         let lag = of(&format!("{filter} [lag]"), &["tau", "phase"]);
         assert_eq!(lag, ("tau d(reading)/dt = truth - reading".to_owned(), Some("lag".to_owned())));
-        let bends = "thrust_n += width * direction / 2; or, as play: thrust_n += width * lags with slacks up to `slack`";
+        let bends = "thrust_n += width * direction / 2 * f, f = (rpm / rpm_max)^2; or, as play: thrust_n += width * lags with slacks up to `slack`";
         assert_eq!(
             of(&format!("{bends} [play]"), &["slack", "width"]),
             ("thrust_n += width * lags with slacks up to slack".to_owned(), None)
         );
-        assert_eq!(of(bends, &["width"]).0, "thrust_n += width * direction / 2");
+        assert_eq!(of(bends, &["width"]).0, "thrust_n += width * direction / 2 * f, f = (rpm / rpm_max)^2");
+        let warms =
+            "rpm *= 1 - derate heat (controller), or 1 - derate heat (rpm/top) with current_a += current_rise heat (winding)";
+        assert_eq!(of(&format!("{warms} [winding]"), &["derate"]).0, warms, "its ways share a part");
         let sag = "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a";
         assert_eq!(of(sag, &["resistance"]).0, "voltage_v = V0 - resistance * current_a");
         assert_eq!(of(sag, &["resistance", "speed_loss"]).0, sag);

@@ -5,7 +5,7 @@
 //! Units: as the parameters state.
 //! Reference: specification `formats.md`, "Verdict" (`effects`, `alternatives`).
 
-use super::contest::{Rival, open, rivals};
+use super::contest::{Rival, reserve, rivals};
 use super::page::{Page, Reading};
 use super::sentence::{order, without};
 use super::state::figures;
@@ -41,7 +41,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     };
     let noun = page.words.noun;
     for (k, (heading, lead)) in [
-        (format!("What this {noun} has"), reserve(page).unwrap_or_default()),
+        (format!("What this {noun} has"), kept(page).unwrap_or_default()),
         (format!("What every {noun} has"), format!("A rotor has inertia and takes time, a reading lies somewhere within its row, and no two clocks run alike: no {noun} is without these.")),
         ("Without a name".to_owned(), "What no known effect explains. Where a smooth function predicts rows it has not seen, it is added to the model; it names no cause.".to_owned()),
     ]
@@ -68,13 +68,13 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
 }
 
 /// That a part of every probability is kept for causes that nobody has described: said once, for it stands against no name in particular.
-fn reserve(page: &Page<'_>) -> Option<String> {
-    let v = page.verdict;
-    let named = v.effects.iter().enumerate().filter(|(_, e)| e.id != "unknown" && !e.is_of_single_readings());
-    let kept = named.map(|(k, e)| open(e, &rivals(v, page.words, k))).filter(|open| (OPEN..=1.0 - SURE).contains(open));
-    let most = kept.max_by(f64::total_cmp)?;
+fn kept(page: &Page<'_>) -> Option<String> {
+    let most = reserve(page.verdict, page.words);
+    if most < OPEN || page.verdict.effects.iter().all(|e| e.id == "unknown" || e.is_of_single_readings()) {
+        return None;
+    }
     Some(format!(
-        "Of every probability a part is kept for causes that the library lacks, up to {}: it stands against no name in particular.",
+        "Of every probability a part is kept for causes that the library lacks, here {}: it stands against no name in particular.",
         probability(most)
     ))
 }
@@ -354,9 +354,9 @@ fn others(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> String {
     let alike: Vec<String> = known.iter().filter(|id| !told(id)).map(|id| title(page, id)).collect();
     let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
     // what every name leaves to causes that the library lacks is said once, above the cards
-    let open = open(e, against);
+    let none = Rival::none(page.verdict, page.words, e, against).probability;
     let none =
-        if open > 1.0 - SURE { format!(" Perhaps it has no cause of its own ({}).", probability(open)) } else { String::new() };
+        if none >= OPEN { format!(" Further names, or no cause of its own: {}.", probability(none)) } else { String::new() };
     if found.is_empty() {
         return format!("no other name that was tried came close.{none}{alike}");
     }

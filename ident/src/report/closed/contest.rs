@@ -8,7 +8,7 @@
 use super::sentence::{instead, without};
 use super::vocabulary::Vocabulary;
 use crate::verdict::{Alternative, EffectEntry, Verdict};
-use crate::words::{channel, list};
+use crate::words::{SURE, channel, list};
 
 /// What could stand in the place of an effect.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,11 +22,19 @@ pub(super) struct Rival {
 }
 
 impl Rival {
-    /// That an effect is none: what neither it nor its rivals have.
-    pub(super) fn none(e: &EffectEntry, rivals: &[Self]) -> Self {
+    /// That an effect is none: what neither it nor its rivals have, but for the reserve.
+    pub(super) fn none(v: &Verdict, words: Vocabulary, e: &EffectEntry, rivals: &[Self]) -> Self {
         let on = e.channels.first().map_or_else(String::new, |c| format!(" on {}", channel(c)));
-        Self { ids: Vec::new(), said: format!("what is left{on} has no cause of its own"), probability: open(e, rivals) }
+        let probability = (open(e, rivals) - reserve(v, words)).max(0.0);
+        Self { ids: Vec::new(), said: format!("what is left{on} has no cause of its own"), probability }
     }
+}
+
+/// The part of every probability that is kept for causes that the library lacks: what is open of the name of which least is, and no more than a
+/// sure name may lack.
+pub(super) fn reserve(v: &Verdict, words: Vocabulary) -> f64 {
+    let named = v.effects.iter().enumerate().filter(|(_, e)| e.id != "unknown" && !e.is_of_single_readings());
+    named.map(|(k, e)| open(e, &rivals(v, words, k))).fold(1.0 - SURE, f64::min)
 }
 
 /// The rivals of the effect at a position, the likeliest first, none twice.
@@ -68,7 +76,7 @@ pub(super) fn open(e: &EffectEntry, rivals: &[Rival]) -> f64 {
 pub(super) fn likeliest(v: &Verdict, words: Vocabulary, place: usize) -> Option<Rival> {
     let e = v.effects.get(place)?;
     let rivals = rivals(v, words, place);
-    let none = Rival::none(e, &rivals);
+    let none = Rival::none(v, words, e, &rivals);
     rivals.into_iter().chain([none]).max_by(|a, b| a.probability.total_cmp(&b.probability))
 }
 

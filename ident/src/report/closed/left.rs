@@ -164,3 +164,44 @@ pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
         escape("quadrig rig run --next verdict.json -o next.csv")
     ));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::closed::vocabulary::bare_verdict;
+
+    fn left(channel: &str, looks_like: &str) -> Unexplained {
+        Unexplained { channel: channel.into(), over_floor: 4.0, depends_on: Vec::new(), looks_like: looks_like.into() }
+    }
+
+    /// What is true of every remainder of an attitude log is told once, and its axes that look alike share a row.
+    #[test]
+    fn what_is_said_of_all_is_said_once() {
+        let of = |name: &str, when: &str| left(name, &format!("more than noise, {when}; the attitude is off"));
+        let v = bare_verdict(vec![
+            of("ax", "over the whole run"),
+            of("ay", "over the whole run"),
+            of("az", "mostly from 4.0 to 5.0 s"),
+        ]);
+        let shared = shared(&v);
+        assert_eq!(shared.as_deref(), Some("the attitude is off"));
+        let rows = alike(&v, &v.unexplained.iter().collect::<Vec<_>>(), shared.as_deref());
+        let told: Vec<[&str; 3]> = rows.iter().map(|r| [r[0].as_str(), r[1].as_str(), r[3].as_str()]).collect();
+        assert_eq!(
+            told,
+            [
+                ["Specific force (x and y)", "up to 4.0", "more than noise, over the whole run"],
+                ["Specific force (z)", "4.0", "more than noise, mostly from 4.0 to 5.0 s"]
+            ]
+        );
+        assert_eq!(super::shared(&bare_verdict(vec![left("ax", "slow"), left("ay", "slow; a tail")])), None);
+    }
+
+    /// What a short table cannot prove it says as far as it goes, where a reader looks for it.
+    #[test]
+    fn what_it_seems_to_go_with_stands_in_its_column() {
+        let said = looks_and_goes(&left("voltage_v", "over several rows; goes with current, as far as 36 rows can show"), None);
+        assert_eq!(said, ("over several rows".to_owned(), "current, as far as 36 rows can show".to_owned()));
+        assert_eq!(looks_and_goes(&left("voltage_v", "slow"), None).1, "nothing in the log");
+    }
+}

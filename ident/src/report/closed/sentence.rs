@@ -195,7 +195,7 @@ fn question(verdict: &Verdict, words: Vocabulary, disputed: &[&EffectEntry]) -> 
     }];
     if let Some(first) = disputed.first() {
         let against = rivals(verdict, words, place(verdict, first));
-        let none = Rival::none(first, &against);
+        let none = Rival::none(verdict, words, first, &against);
         // that it has no cause of its own is a way where nothing is likelier
         let stands = against.iter().map(|r| r.probability).fold(best, f64::max) < none.probability;
         ways.extend(against.into_iter().chain(stands.then_some(none)));
@@ -448,7 +448,10 @@ fn largest(verdict: &Verdict) -> Option<Largest<'_>> {
 fn looks(u: &Unexplained) -> String {
     let first = u.looks_like.split(';').next().unwrap_or_default();
     let first = first.strip_prefix("loudest on ").and_then(|rest| Some(rest.split_once(": ")?.1)).unwrap_or(first);
-    first.replace("in one stretch", "mostly in one stretch")
+    let seems = u.looks_like.split("; ").find(|part| part.starts_with("goes with ")).filter(|_| u.depends_on.is_empty());
+    let first =
+        first.replace("in one stretch", "mostly in one stretch").replace("while the load is on its way", "as the load changes");
+    seems.map_or(first.clone(), |seems| format!("{first}; it {seems}"))
 }
 
 fn size_and_looks(verdict: &Verdict, u: &Unexplained) -> String {

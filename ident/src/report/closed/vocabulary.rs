@@ -96,3 +96,24 @@ pub(crate) fn bare_entry(id: &str) -> EffectEntry {
         evidence: String::new(),
     }
 }
+
+/// A verdict that only says what is left.
+#[cfg(test)]
+pub(crate) fn bare_verdict(unexplained: Vec<crate::verdict::Unexplained>) -> crate::verdict::Verdict {
+    crate::verdict::Verdict {
+        format: crate::verdict::FORMAT,
+        run: "run.csv".to_owned(),
+        verdict: crate::verdict::Kind::Unattributed,
+        channels: crate::verdict::Channels::default(),
+        effects: Vec::new(),
+        unexplained,
+        alternatives: Vec::new(),
+        next_experiment: None,
+        left_out: Vec::new(),
+        set_aside: Vec::new(),
+        guessed_floors: None,
+        at_rest: false,
+        validation: Vec::new(),
+        runs: Vec::new(),
+    }
+}
