@@ -86,8 +86,8 @@ fn set_apart(sheet: &mut Sheet, page: &Page<'_>, members: &[usize]) {
     let said: Vec<String> = members.iter().map(|k| page.words.said(&v.effects[*k]).with("")).collect();
     let id = &v.effects[*first].id;
     sheet.html_part(&format!("<p>{}. <code>{}</code></p>\n", escape(&upper(&said.join("; "))), escape(id)));
-    let signs = plain(signs(&v.effects[*first].evidence));
-    sheet.say(&format!("Nothing is claimed about these rows, before or after: {}.", signs.rsplit("; ").next().unwrap_or(&signs)));
+    let signature = (page.words.about)(id).map_or("", |about| about.signature);
+    sheet.say(&format!("{}. Nothing is claimed about these rows, before or after.", upper(signature)));
     if page.readings.is_empty() {
         return;
     }

@@ -98,7 +98,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         return contested(verdict, words, news, &[*first]);
     }
     let told = if told.is_empty() { vec![*first] } else { told };
-    let more = all.len() - told.len();
+    let more = causes(all).saturating_sub(told.len());
     let clauses = by_subject(&told, words);
     let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
     if own.is_empty() {
@@ -112,6 +112,11 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         .filter(|s| !s.is_empty())
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// How many causes there are: single readings are none.
+fn causes(all: &[&EffectEntry]) -> usize {
+    all.iter().filter(|e| !e.is_of_single_readings()).count()
 }
 
 /// The position of an effect among those of the verdict.
@@ -180,7 +185,7 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
         format!("{}. Beside that, {}.", since(news, &question), joined_lower(&said))
     };
     let nameless = verdict.effects.iter().any(|e| e.id == "unknown" && !e.is_without_correction());
-    let below = below(all.len().saturating_sub(told), nameless);
+    let below = below(causes(all).saturating_sub(told), nameless);
     [out, below, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
