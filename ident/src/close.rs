@@ -6,6 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, steps 1 to 8.
 
 use crate::bad;
+use crate::beside::is_named;
 use crate::conclude::{Quoted, quoted};
 use crate::context::{Context, DIFFERENCES, Relation, STANDSTILL, Target, is_contrast, unit_of};
 use crate::correction::without_correction;
@@ -22,13 +23,13 @@ use crate::long::diagnose_any;
 use crate::marks;
 use crate::model::{FittedTo, Model};
 use crate::residual::whiteness;
-use crate::rivals::UNEXPLAINED;
+use crate::rivals::{Rival, UNEXPLAINED};
 use crate::search::refine;
 use crate::sparse;
 use crate::supply_limit;
 use crate::unexplained::{LOUD, Left, unexplained};
 use crate::verdict::{
-    Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict,
+    Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict,
 };
 use crate::words::worth;
 
@@ -110,7 +111,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         channels,
         effects: entries(&context, &diagnosis, estimates),
         unexplained: left_over.into_iter().map(|l| l.told).collect(),
-        alternatives: diagnosis.rivals.iter().map(|r| Alternative { ids: r.ids.clone(), probability: r.probability }).collect(),
+        alternatives: Vec::new(),
         next_experiment: None,
         left_out,
         set_aside: context.set_aside.clone(),
@@ -119,6 +120,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
         runs: Vec::new(),
     };
+    verdict.alternatives = alternatives(&diagnosis, &verdict.effects);
     marks::tell(&mut verdict, &mut after_model, &marks);
     if let Some(limit) = &limit {
         supply_limit::tell(&mut verdict, limit, &supply_limit::missed(log, &context, &before_model, &at_limit));
@@ -257,6 +259,37 @@ fn entries(context: &Context, d: &Diagnosis, estimates: Vec<Vec<Estimate>>) -> V
     let nameless = |e: &EffectEntry| e.id == "unknown";
     out.sort_by(|a, b| nameless(&a.1).cmp(&nameless(&b.1)).then(b.0.total_cmp(&a.0)));
     out.into_iter().map(|(_, entry)| entry).collect()
+}
+
+/// The other hypotheses; of one that differs from the best in one place what it changes there.
+fn alternatives(d: &Diagnosis, effects: &[EffectEntry]) -> Vec<Alternative> {
+    let placed = d.best.fit.placed.iter().zip(&d.inclusion);
+    let named: Vec<(&Placed, f64)> = placed.filter(|(p, _)| is_named(p)).map(|(p, inclusion)| (p, *inclusion)).collect();
+    let of = |r: &Rival| Alternative {
+        ids: r.ids.clone(),
+        probability: r.probability,
+        change: change(&named, r, d.probability, effects),
+    };
+    d.rivals.iter().map(of).collect()
+}
+
+/// What a hypothesis changes in one place of the best one, which has such names, each with its probability, and the probability `whole`.
+fn change(named: &[(&Placed, f64)], rival: &Rival, whole: f64, effects: &[EffectEntry]) -> Option<Change> {
+    if rival.ids.len() != named.len() {
+        return None;
+    }
+    let mut differing = (0..named.len()).filter(|k| rival.ids[*k] != named[*k].0.effect.id());
+    let (Some(k), None) = (differing.next(), differing.next()) else { return None };
+    let (own, probability) = named[k];
+    let instead = rival.fit.placed.iter().rev().find(|p| p.effect.id() == rival.ids[k])?;
+    // that of the whole hypothesis is the product over its names; in the place of one of them the others count no more
+    let in_its_place = (rival.probability * probability / whole.max(f64::MIN_POSITIVE)).min(1.0 - probability);
+    Some(Change {
+        place: effects.iter().position(|e| own.is_told_by(e))?,
+        id: rival.ids[k].clone(),
+        channels: instead.instance.channels.iter().filter(|c| !is_contrast(c)).cloned().collect(),
+        probability: in_its_place,
+    })
 }
 
 /// The channel of an unexplained dependence that has grown noisier by most, and by how much.

@@ -17,7 +17,29 @@ pub fn of_log(log: &Log) -> Option<f64> {
         _ => None,
     };
     let recorded = || log.name.strip_prefix("rig-").and_then(|rest| rest.get(..17)).map(str::to_owned);
-    with_time(&told.or_else(recorded)?)
+    // what is no date, as that of a simulated run, leaves the name to say it
+    told.as_deref().and_then(with_time).or_else(|| with_time(&recorded()?))
+}
+
+/// The day, and the time where it is there, that a file's name carries: `Log_2019-11-09_181347.csv` is of `2019-11-09 18:13:47`. Only a hint:
+/// names are given by people.
+#[must_use]
+pub fn in_name(name: &str) -> Option<String> {
+    let starts = name.char_indices().map(|(at, _)| at);
+    let number = |c: Option<&str>| c.is_some_and(|c| c.chars().all(|c| c.is_ascii_digit()));
+    let of = |at: usize| {
+        let date = name.get(at..at + 10).filter(|text| day(text).is_some())?;
+        // no part of a longer number
+        let before = name[..at].chars().next_back();
+        let behind = name[at + 10..].chars().next();
+        if [before, behind].into_iter().flatten().any(|c| c.is_ascii_digit()) {
+            return None;
+        }
+        let clock = name.get(at + 11..at + 17).filter(|text| number(Some(text)));
+        let clock = clock.filter(|c| c[..2] < *"24" && c[2..4] < *"60" && c[4..] < *"60");
+        Some(clock.map_or_else(|| date.to_owned(), |c| format!("{date} {}:{}:{}", &c[..2], &c[2..4], &c[4..])))
+    };
+    starts.filter_map(of).next()
 }
 
 /// `YYYY-MM-DD`, with a time of day behind a `T`, a space or a dash where there is one: `HH:MM`, `HH:MM:SS` or `HHMMSS`.
@@ -77,6 +99,21 @@ mod tests {
         assert_eq!(of("2026-03-12T12:00"), Some(0.5));
         assert_eq!(of("2026-03-12-060000"), Some(0.25));
         assert_eq!(of("2026-02-30T12:00"), None);
+    }
+
+    #[test]
+    fn a_name_may_carry_a_day() {
+        for (name, said) in [
+            ("Log_2019-11-09_181347.csv", Some("2019-11-09 18:13:47")),
+            ("StepsTestV2_2023-12-14_112823.csv", Some("2023-12-14 11:28:23")),
+            ("day 2026-03-12.csv", Some("2026-03-12")),
+            ("2026-03-12_996100.csv", Some("2026-03-12")),
+            ("2026-02-30.csv", None),
+            ("12026-03-12.csv", None),
+            ("run.csv", None),
+        ] {
+            assert_eq!(in_name(name).as_deref(), said, "{name}");
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@ mod depends;
 mod left;
 mod orders;
 
-pub(crate) use depends::goes_with;
+pub(crate) use depends::{goes_with, seems_to_go_with};
 
 use crate::close::{Closed, close};
 use crate::context::{Context, Relation, unit_of};

@@ -10,7 +10,7 @@
 use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::heldout;
 use crate::hypothesis::{Declared, Fit, effective_share};
-use crate::inspect::goes_with;
+use crate::inspect::{goes_with, seems_to_go_with};
 use crate::opponent::{is_second_meter, left_over};
 use crate::verdict::{Channels, Unexplained};
 use std::ops::Range;
@@ -48,7 +48,11 @@ pub(crate) fn unexplained(context: &Context, declared: Declared<'_>, fit: &Fit, 
         if let Some(over_floor) = over_floor.filter(|over| over.is_finite()) {
             let (meters, depends_on): (Vec<String>, Vec<String>) =
                 goes_with(context, i, &residuals[i]).into_iter().partition(|name| is_second_meter(context, target.name, name));
-            let looks_like = looks_like(context, target, &residuals[i]) + &borne_out(&meters);
+            let mut looks_like = looks_like(context, target, &residuals[i]) + &borne_out(&meters);
+            if let Some(variable) = seems_to_go_with(context, i, &residuals[i]) {
+                let said = crate::words::channel(&variable);
+                looks_like += &format!("; goes with {said}, as far as {} rows can show", target.rows.len());
+            }
             let told = Unexplained { channel: spoken(target.name), over_floor, depends_on, looks_like };
             out.push(Left { target: i, told });
         }
@@ -100,8 +104,24 @@ fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
             "in single rows".to_owned()
         };
     }
-    let pace = if effective_share(residual) < SLOW { "slow" } else { "from row to row" };
+    let pace = match effective_share(residual) {
+        share if share < SLOW => "slow",
+        _ if neighbours_agree(residual) => "over several rows",
+        _ => "from row to row",
+    };
     if grows { format!("{pace}, grows with the load") } else { pace.to_owned() }
+}
+
+/// Whether a residual lasts longer than a row: its correlation with itself a row later is above 1/e, where it falls to in one row if it is
+/// forgotten in one, and above what so many rows of noise show by chance once in forty, which is 1.96 over their root.
+fn neighbours_agree(residual: &[f64]) -> bool {
+    let mean = residual.iter().sum::<f64>() / residual.len().max(1) as f64;
+    let (whole, product) =
+        residual.iter().zip(residual.iter().skip(1).map(Some).chain([None])).fold((0.0, 0.0), |(w, p), (a, b)| {
+            let a = a - mean;
+            (w + a * a, p + b.map_or(0.0, |b| a * (b - mean)))
+        });
+    product > whole * (-1.0_f64).exp().max(1.96 / (residual.len() as f64).sqrt())
 }
 
 /// Where a stretch of a target's samples lies in the log.
@@ -117,7 +137,7 @@ fn in_one(context: &Context, target: &Target, stretch: &Range<usize>) -> String 
 
 /// The most that rows one after the other hold, a few times as many as count as few, and those of them that hold nine tenths of it: spikes over a
 /// run are never so close.
-fn loudest_stretch(squares: &[f64]) -> (f64, Range<usize>) {
+pub(crate) fn loudest_stretch(squares: &[f64]) -> (f64, Range<usize>) {
     let rows = ((STRETCH * FEW * squares.len() as f64).ceil() as usize).clamp(1, squares.len().max(1));
     let mut sum: f64 = squares.iter().take(rows).sum();
     let (mut most, mut from) = (sum, 0);
@@ -153,7 +173,17 @@ fn grows_with_the_load(context: &Context, target: &Target, squares: &[f64]) -> b
 
 #[cfg(test)]
 mod tests {
-    use super::loudest_stretch;
+    use super::{loudest_stretch, neighbours_agree};
+
+    #[test]
+    fn what_lasts_over_rows_is_not_told_as_from_row_to_row() {
+        let of = |n: i32, f: &dyn Fn(f64) -> f64| (0..n).map(|i| f(f64::from(i))).collect::<Vec<f64>>();
+        assert!(neighbours_agree(&of(36, &|i| (i / 8.0).sin())), "a smooth residual of a short table");
+        assert!(neighbours_agree(&of(2000, &|i| 3.0 + (i / 8.0).sin())));
+        assert!(!neighbours_agree(&of(2000, &|i| (0.7 * i * i).sin())), "noise");
+        assert!(!neighbours_agree(&of(36, &|i| if i % 2.0 == 0.0 { 1.0 } else { -1.0 })), "by turns");
+        assert!(!neighbours_agree(&[]));
+    }
 
     #[test]
     fn a_stretch_is_told_by_the_rows_that_hold_it() {

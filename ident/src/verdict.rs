@@ -176,6 +176,22 @@ pub struct Alternative {
     pub ids: Vec<String>,
     /// Its probability.
     pub probability: f64,
+    /// Where it differs from the best hypothesis in one place: which that is, and what it puts there. For people; the file has [`Self::ids`].
+    #[serde(skip)]
+    pub change: Option<Change>,
+}
+
+/// What another hypothesis puts in the place of one effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// Position of that effect among those of the verdict.
+    pub place: usize,
+    /// Identifier of what stands there instead.
+    pub id: String,
+    /// The channels that it acts on.
+    pub channels: Vec<String>,
+    /// Its probability in that place where all else is as the verdict has it: to be held against that of the effect, 0 to 1.
+    pub probability: f64,
 }
 
 /// One step of a schedule that the rig can run.

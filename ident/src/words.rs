@@ -10,7 +10,7 @@ mod plain;
 
 use crate::effects::Scope;
 use crate::verdict::{EffectEntry, Parameter};
-pub use plain::{channels, curve, formula, plain};
+pub use plain::{channels, curve, in_force, plain};
 
 /// What a cause does, in two parts: an adverb fits between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -77,6 +77,12 @@ pub fn parameter(name: &str) -> String {
         "tau" => "time constant".to_owned(),
         "tau_up" => "time constant on the way up".to_owned(),
         "tau_down" => "time constant on the way down".to_owned(),
+        "tau_air" => "time constant of coasting".to_owned(),
+        "power_gain" => "current for each unit of power that speeds the rotor up".to_owned(),
+        "slope_of_pulse" => "slope with the pulse".to_owned(),
+        "bend_of_pulse" => "bend with the pulse".to_owned(),
+        "viscous" => "friction that grows with speed".to_owned(),
+        "constant" => "friction at any speed".to_owned(),
         "slack" => "play before it turns".to_owned(),
         "derate" => "loss of speed with heat".to_owned(),
         "speed_loss" => "loss of speed".to_owned(),

@@ -62,7 +62,8 @@ pub(crate) fn join(
     quiet: bool,
 ) -> Result<(String, Vec<Report>), Failure> {
     let alone = stand.clone();
-    let options = Options { mappings: Vec::new(), motor: None, propeller: None, side: None, ..options.clone() };
+    let options =
+        Options { mappings: Vec::new(), motor: None, propeller: None, supply: None, date: None, side: None, ..options.clone() };
     let (mut logs, mut reports): (Vec<(Log, Joint)>, Vec<Report>) = (Vec::new(), Vec::new());
     for (k, w) in with.iter().enumerate() {
         if with[..k].iter().any(|b| b.label == w.label) {

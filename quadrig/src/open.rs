@@ -51,6 +51,26 @@ pub(crate) struct Names {
     /// Name of the propeller; travels with the log.
     #[arg(long)]
     propeller: Option<String>,
+    /// What feeds it, such as "3S 2200 mAh" or "bench supply, 12 V"; travels with the log.
+    #[arg(long)]
+    supply: Option<String>,
+    /// Day of the run, YYYY-MM-DD, with THH:MM:SS behind it where the time is known; travels with the log.
+    #[arg(long, value_parser = day_of_run)]
+    date: Option<String>,
+}
+
+/// A day, with a time of day behind it or none.
+pub(crate) fn day_of_run(text: &str) -> Result<String, String> {
+    let clock = |time: &str| {
+        let digits = time.strip_prefix(['T', ' ', '-']);
+        time.is_empty() || digits.is_some_and(|of| of.len() >= 4 && of.chars().all(|c| c.is_ascii_digit() || c == ':'))
+    };
+    let parts = text.get(..10).zip(text.get(10..));
+    if parts.is_some_and(|(day, time)| ident::date::day(day).is_some() && clock(time)) {
+        Ok(text.to_owned())
+    } else {
+        Err("expected a day such as 2026-03-12 or 2026-03-12T14:30:00".to_owned())
+    }
 }
 
 fn side(text: &str) -> Result<u32, String> {
@@ -64,13 +84,15 @@ fn side(text: &str) -> Result<u32, String> {
 impl Columns {
     /// With the rig's names, what the importer is told.
     pub(crate) fn options(&self, names: &Names) -> Options {
-        self.named(names.motor.clone(), names.propeller.clone())
+        let Names { motor, propeller, supply, date } = names.clone();
+        Options { supply, date, ..self.named(motor, propeller) }
     }
 
     /// The same where the names come from elsewhere.
     pub(crate) fn named(&self, motor: Option<String>, propeller: Option<String>) -> Options {
         let pole_pairs = self.pole_pairs.map(f64::from);
-        Options { mappings: self.mappings.clone(), motor, propeller, pole_pairs, side: self.side }
+        let mappings = self.mappings.clone();
+        Options { mappings, motor, propeller, pole_pairs, side: self.side, ..Options::default() }
     }
 }
 

@@ -72,6 +72,12 @@ pub(crate) struct Rig {
     /// Propeller, for the log's head.
     #[arg(long)]
     propeller: Option<String>,
+    /// What feeds it, for the log's head.
+    #[arg(long)]
+    supply: Option<String>,
+    /// Day of the run, YYYY-MM-DD, with THH:MM:SS behind it where the time is known, for the log's head.
+    #[arg(long, value_parser = crate::open::day_of_run)]
+    date: Option<String>,
     /// Record the raw codes as well (columns `raw_*`), so that a better calibration can be replayed with `quadrig recalibrate`.
     #[arg(long)]
     raw: bool,
@@ -80,7 +86,7 @@ pub(crate) struct Rig {
 impl Rig {
     /// A recorder into `target`; `more` joins the head of the log.
     pub(crate) fn recorder(&self, target: &Path, more: &[(&str, String)]) -> Result<Recorder, Failure> {
-        let named = [("motor", &self.motor), ("propeller", &self.propeller)];
+        let named = [("motor", &self.motor), ("propeller", &self.propeller), ("supply", &self.supply), ("date", &self.date)];
         let own = named.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value.clone()?)));
         let head = own.chain(more.iter().map(|(key, value)| ((*key).to_owned(), value.clone())));
         Recorder::new(target, head.map(|(key, value)| (key, toml::Value::String(value))).collect(), self.raw)

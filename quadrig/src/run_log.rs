@@ -12,6 +12,7 @@ use frame::rig::{FaultSet, RigSample, RigState};
 use hal_sim::native::firmware_config;
 use hal_sim::plant::PlantLevers;
 use hal_sim::plant::air::Air;
+use hal_sim::scenario::SupplySection;
 use hal_sim::{PlantState, Powerplant, RunRecord, Scenario};
 use ident::log::{Column, Log};
 use ident::model::Model;
@@ -24,6 +25,9 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: b
     let text = |s: &str| toml::Value::String(s.to_owned());
     log.meta.insert("motor".into(), text(&scenario.motor));
     log.meta.insert("propeller".into(), text(&scenario.propeller));
+    log.meta.insert("supply".into(), text(&supply(scenario.supply)));
+    // a run that is computed has no day, and the same seed gives the same bytes on every one
+    log.meta.insert("date".into(), text(SIMULATED));
     // what a laboratory reads off its barometer before the run
     let air = Air { temperature_c: scenario.air.temperature_c, pressure_pa: scenario.air.pressure_pa };
     log.meta.insert("air_density_kg_m3".into(), toml::Value::Float((1e4 * air.density()).round() / 1e4));
@@ -70,6 +74,17 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: b
         beside(evidence::raw_columns(&fitted), &|s| evidence::raw_codes(&fitted, s).into_iter().map(f64::from).collect());
     }
     log
+}
+
+/// What stands in the place of the day of a run that nobody made.
+const SIMULATED: &str = "simulated";
+
+/// What feeds a simulated rig, as an operator would write it down.
+fn supply(of: SupplySection) -> String {
+    match of {
+        SupplySection::Bench { voltage_v } => format!("bench supply, {voltage_v} V"),
+        SupplySection::Lipo { cells, capacity_ah, .. } => format!("{cells}S lithium battery, {capacity_ah} A.h"),
+    }
 }
 
 /// What happened in a run, with its times.

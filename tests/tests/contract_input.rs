@@ -427,6 +427,14 @@ fn exports_are_taken_directly() {
     bench.call(&[&["--quiet", "import", "export.csv", "-o", "imported.csv"], &named[..]].concat()).succeeded();
     let head = fs::read_to_string(bench.path("imported.csv")).unwrap();
     assert!(head.contains("# motor = \"M 1\"\n") && head.contains("# propeller = \"P 2\"\n"), "{head}");
+    // what fed the rig, and when, travel with the log too
+    let fed = ["import", "export.csv", "-o", "fed.csv", "--supply", "3S 2200 mAh", "--date", "2026-03-12"];
+    bench.call(&[&["--quiet"], &fed[..]].concat()).succeeded();
+    let head = fs::read_to_string(bench.path("fed.csv")).unwrap();
+    assert!(head.contains("# supply = \"3S 2200 mAh\"\n") && head.contains("# date = \"2026-03-12\"\n"), "{head}");
+    let refused = bench.call(&["import", "export.csv", "-o", "never.csv", "--date", "12.3.26"]);
+    assert!(refused.err.contains("expected a day such as 2026-03-12"), "{}", refused.err);
+    assert!(!bench.path("never.csv").exists());
     let twice = |words: &[&str]| -> [Said; 2] {
         ["export.csv", "imported.csv"].map(|log| {
             let words: Vec<&str> = words.iter().map(|w| if *w == "LOG" { log } else { w }).collect();

@@ -309,6 +309,7 @@ impl<'w> Whole<'w> {
         let alternatives = self.concluded.alternatives.iter().map(|(terms, probability)| Alternative {
             ids: terms.iter().map(|t| self.library.candidates()[*t].id.to_owned()).collect(),
             probability: *probability,
+            change: None,
         });
         let next_experiment = (kind == Kind::Ambiguous).then(|| self.next());
         let aside = self.flight.record.spikes.iter().map(|s| SetAside {

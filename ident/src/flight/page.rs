@@ -55,6 +55,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         hero: parts::most(v, VOCABULARY, &traces),
         cards: cards(closed, &traces),
         left: parts::rest(v, &alone),
+        readings: Vec::new(),
         parameters: Vec::new(),
         speeds: ("The rotors' speeds", speeds(closed, &of_rotors)),
     };

@@ -117,6 +117,10 @@ pub struct Options {
     pub motor: Option<String>,
     /// The propeller's name.
     pub propeller: Option<String>,
+    /// What fed it, in the user's words.
+    pub supply: Option<String>,
+    /// The day of the run, as `YYYY-MM-DD`, with a time behind it where it is known.
+    pub date: Option<String>,
     /// Pole pairs of the motor: electrical turns to one of the shaft.
     pub pole_pairs: Option<f64>,
     /// Which of several powertrains of a stand is the rig, 1 for A.
@@ -126,7 +130,8 @@ pub struct Options {
 impl Options {
     /// What is known of the rig, into a log's head; what the file itself says gives way to the user.
     pub fn name(&self, log: &mut Log) {
-        for (key, value) in [("motor", &self.motor), ("propeller", &self.propeller)] {
+        let told = [("motor", &self.motor), ("propeller", &self.propeller), ("supply", &self.supply), ("date", &self.date)];
+        for (key, value) in told {
             if let Some(text) = value {
                 log.meta.insert(key.to_owned(), toml::Value::String(text.clone()));
             }

@@ -11,7 +11,7 @@ use super::least::Readings;
 use super::model::{FORMAT as MODEL_FORMAT, InertialModel, Part};
 use super::shown::Shown;
 use crate::residual::whiteness;
-use crate::unexplained::LOUD;
+use crate::unexplained::{LOUD, loudest_stretch};
 use crate::verdict::{
     Alternative, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, NextExperiment, ScheduleStep, Unexplained, Verdict,
 };
@@ -108,7 +108,7 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         _ => Kind::Attributed,
     };
     effects.extend(nameless);
-    let unexplained = unexplained(&channels, &effects);
+    let unexplained = unexplained(&channels, &effects, &|name| when(recording, &sensors, name));
     let mut alternatives = alternatives(&sensors);
     alternatives.retain(|a| a.probability >= 1e-3);
     alternatives.sort_by(|a, b| b.probability.total_cmp(&a.probability));
@@ -143,14 +143,29 @@ fn alternatives(sensors: &[Sensor]) -> Vec<Alternative> {
     let found = |s: &Sensor| s.effects.iter().filter(|e| e.id != "unknown").map(|e| e.id.clone()).collect::<Vec<_>>();
     let beside = |one: usize, a: &Alternative| {
         let of = |(k, s): (usize, &Sensor)| if k == one { a.ids.clone() } else { found(s) };
-        Alternative { ids: sensors.iter().enumerate().flat_map(of).collect(), probability: a.probability }
+        Alternative { ids: sensors.iter().enumerate().flat_map(of).collect(), probability: a.probability, change: None }
     };
     let all = sensors.iter().enumerate();
     all.flat_map(|(k, s)| s.alternatives.iter().map(move |a| beside(k, a)).collect::<Vec<_>>()).collect()
 }
 
+/// When most is left of a channel: the stretch that holds more than half of its squares, else over the whole run.
+fn when(recording: &Recording, sensors: &[Sensor], name: &str) -> String {
+    let axis = |s: &Sensor| s.channels.iter().position(|c| *c == name);
+    let whole = || "over the whole run".to_owned();
+    let Some((sensor, k)) = sensors.iter().find_map(|s| Some((s, axis(s)?))) else { return whole() };
+    let left =
+        recording.t.iter().zip(sensor.measured(recording)).zip(&sensor.corrected).map(|((t, m), p)| (*t, (m[k] - p[k]).powi(2)));
+    let (t, squares): (Vec<f64>, Vec<f64>) = left.filter(|(_, square)| square.is_finite()).unzip();
+    let (held, stretch) = loudest_stretch(&squares);
+    match (t.get(stretch.start), t.get(stretch.end.saturating_sub(1))) {
+        (Some(from), Some(to)) if 2.0 * held > squares.iter().sum::<f64>() => format!("mostly from {from:.1} to {to:.1} s"),
+        _ => whole(),
+    }
+}
+
 /// The channels on which more than three noise floors are left.
-fn unexplained(channels: &BTreeMap<String, Channel>, effects: &[EffectEntry]) -> Vec<Unexplained> {
+fn unexplained(channels: &BTreeMap<String, Channel>, effects: &[EffectEntry], when: &dyn Fn(&str) -> String) -> Vec<Unexplained> {
     let depends_on = |name: &String| {
         let nameless = effects.iter().find(|e| e.id == "unknown" && e.channels.contains(name));
         nameless.map_or_else(Vec::new, |e| e.depends_on.clone())
@@ -161,8 +176,10 @@ fn unexplained(channels: &BTreeMap<String, Channel>, effects: &[EffectEntry]) ->
         channel: name.clone(),
         over_floor: over(c),
         depends_on: depends_on(name),
-        looks_like: "more than the sensor's noise; the attitude is off by some tenths of a degree, and that is a part of it"
-            .to_owned(),
+        looks_like: format!(
+            "more than the sensor's noise, {}; the attitude is off by some tenths of a degree, and that is a part of it",
+            when(name)
+        ),
     })
     .collect()
 }
@@ -251,7 +268,7 @@ mod tests {
             heldout_after: [1.0; 3],
             effects: vec![effect],
             shown: Vec::new(),
-            alternatives: vec![Alternative { ids: vec![instead.to_owned()], probability: 0.1 }],
+            alternatives: vec![Alternative { ids: vec![instead.to_owned()], probability: 0.1, change: None }],
             kind: Kind::Attributed,
             excess: [2.0, 1.0],
             part: Part::default(),

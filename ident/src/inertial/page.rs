@@ -81,6 +81,7 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         hero: parts::most(v, VOCABULARY, &traces),
         cards: cards(recording, closed),
         left: parts::rest(v, &traces),
+        readings: Vec::new(),
         parameters: Vec::new(),
         speeds: ("", Vec::new()),
     };

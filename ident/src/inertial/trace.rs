@@ -119,7 +119,7 @@ pub(crate) fn trace<'a>(
         .alternatives
         .iter()
         .filter(|(ids, _)| !ids.is_empty())
-        .map(|(ids, p)| Alternative { ids: ids.iter().map(|i| (*i).to_owned()).collect(), probability: *p })
+        .map(|(ids, p)| Alternative { ids: ids.iter().map(|i| (*i).to_owned()).collect(), probability: *p, change: None })
         .collect();
     Some(Traced { sensor, effect, named })
 }

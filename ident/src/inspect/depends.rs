@@ -140,6 +140,40 @@ pub(crate) fn goes_with(context: &Context, target: usize, residual: &[f64]) -> V
     found.into_iter().take(TOLD.1).map(|(_, name)| name.clone()).collect()
 }
 
+/// Of too few rows to leave blocks out: the variable that a residual follows most closely, as far as they show. A correlation counts from where
+/// so many rows of noise reach it, with any of the variables, once in forty.
+pub(crate) fn seems_to_go_with(context: &Context, target: usize, residual: &[f64]) -> Option<String> {
+    let rows = &context.targets[target].rows;
+    if rows.len() > FEWEST || rows.len() < 8 {
+        return None;
+    }
+    let own = context.targets[target].name;
+    let all = all_variables(context);
+    let of = |(name, values): &(String, Vec<f64>)| {
+        let x: Vec<f64> = rows.iter().map(|i| values[*i]).collect();
+        (square(&x, residual), name.clone())
+    };
+    let asked = all.iter().filter(|(name, _)| name != own);
+    let (most, name) = asked.clone().map(of).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    // Fisher: atanh(r) of noise is normal with variance 1/(n - 3); all variables share the chance of one in forty
+    let z = (2.0 * (40.0 * asked.count() as f64).ln()).sqrt();
+    let least = (z / (rows.len() as f64 - 3.0).sqrt()).tanh().powi(2);
+    (most > least).then_some(name)
+}
+
+/// The square of the correlation of two lists.
+fn square(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len() as f64;
+    let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
+    for (x, y) in a.iter().zip(b) {
+        aa += (x - ma).powi(2);
+        ab += (x - ma) * (y - mb);
+        bb += (y - mb).powi(2);
+    }
+    ab * ab / (aa * bb).max(f64::MIN_POSITIVE)
+}
+
 /// Each channel with each variable: name of the channel, of the variable, and the share.
 fn shares(start: &Start) -> Vec<(usize, usize, f64)> {
     let variables = all_variables(&start.context);
@@ -169,17 +203,6 @@ fn thinned(rows: &[usize], residual: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f
 
 /// Variables that go together with one on this run.
 fn confounded(all: &[(String, Vec<f64>)], v: usize) -> String {
-    let square = |a: &[f64], b: &[f64]| {
-        let n = a.len() as f64;
-        let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
-        let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
-        for (x, y) in a.iter().zip(b) {
-            aa += (x - ma).powi(2);
-            ab += (x - ma) * (y - mb);
-            bb += (y - mb).powi(2);
-        }
-        ab * ab / (aa * bb).max(f64::MIN_POSITIVE)
-    };
     let list: Vec<&str> =
         (0..all.len()).filter(|o| *o != v && square(&all[v].1, &all[*o].1) > CONFOUNDED).map(|o| all[o].0.as_str()).collect();
     if list.is_empty() { "-".to_owned() } else { list.join(" ") }
@@ -242,6 +265,26 @@ pub(super) fn nameless(start: &Start) -> Content {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::{Column, Log};
+
+    /// A table of 36 levels: what follows the current is said to, noise goes with nothing.
+    #[test]
+    fn a_short_table_tells_as_far_as_it_can() {
+        let rpm: Vec<f64> = (0..36).map(|i| 1000.0 + 100.0 * f64::from(i)).collect();
+        let thrust: Vec<f64> = rpm.iter().map(|r| 1e-7 * r * r).collect();
+        let current: Vec<f64> = (0..36).map(|i| 5.0 + 4.0 * (f64::from(i) * 0.9).sin()).collect();
+        let voltage = vec![12.0; 36];
+        let columns = [("rpm", rpm), ("thrust_n", thrust), ("current_a", current.clone()), ("voltage_v", voltage)];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        let log = Log { name: "table.csv".to_owned(), t: (0..36).map(f64::from).collect(), columns, ..Log::default() };
+        let context = Context::new(&log, None);
+        let target = context.target("voltage_v").expect("a channel");
+        let noise = |i: usize| (0.7 * (i * i) as f64).sin();
+        let following: Vec<f64> = current.iter().enumerate().map(|(i, a)| -0.02 * a + 0.03 * noise(i)).collect();
+        assert_eq!(seems_to_go_with(&context, target, &following).as_deref(), Some("current_a"));
+        let nothing: Vec<f64> = (0..36).map(noise).collect();
+        assert_eq!(seems_to_go_with(&context, target, &nothing), None);
+    }
 
     #[test]
     fn a_dependence_is_predicted_and_an_unrelated_variable_is_not() {

@@ -237,7 +237,9 @@ impl Figure {
         let x = (x.0 - side, x.1 + side);
         let margin = 0.05 * (y.1 - y.0);
         let height = if self.height > 0.0 { self.height } else { 330.0 };
-        let low = if self.categories.is_empty() { y.0 - margin } else { y.0 };
+        // columns stand on the axis, points have room above it
+        let stands = self.layers.iter().any(|l| matches!(l, Layer::Columns { .. }));
+        let low = if stands { y.0 } else { y.0 - margin };
         let rows = self.entries().last().map_or(0, |e| e.row);
         let legend = self.row() * rows as f64;
         let left = if self.captioned { LEFT_CAPTIONED } else { LEFT };

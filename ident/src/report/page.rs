@@ -7,7 +7,8 @@
 //! Reference: specification `closing-the-loop.md`, step 8.
 
 use super::closed::{
-    self as parts, ALONE, Origin, Page, Trace, Vocabulary, against, enlarged, lifted, moves, over_time, pair, thinned,
+    self as parts, ALONE, Origin, Page, Reading, Trace, Vocabulary, against, enlarged, lifted, moves, over_time, pair, thinned,
+    two_ways,
 };
 use super::designer::designer;
 use super::figure::{Figure, Layer};
@@ -21,9 +22,10 @@ use crate::hypothesis::{Declared, Rows, fit};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
+use crate::noise::median;
 use crate::several::Shown;
 use crate::verdict::{EffectEntry, Unexplained, Verdict};
-use crate::words::{channel, heading};
+use crate::words::{self, channel, heading};
 
 /// The report of a closed loop as one self-contained page.
 #[must_use]
@@ -38,6 +40,7 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         hero: hero(closed),
         cards: cards(closed),
         left: left(closed),
+        readings: readings_apart(&closed.context, v, ""),
         parameters: Vec::new(),
         speeds: (SPEEDS, speeds(log, closed)),
     };
@@ -109,6 +112,32 @@ fn hero(closed: &Closed) -> Vec<Figure> {
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> = targets.filter_map(|t| trace(closed, t)).collect();
     parts::most(&closed.verdict, Vocabulary::RIG, &traces)
+}
+
+/// Rows before and after whose median a single reading is held against.
+const BESIDE: usize = 2;
+
+/// The readings of a run about which nothing is claimed, on the channels that the verdict names for it; `run` is its name among several.
+pub(super) fn readings_apart(context: &Context, v: &Verdict, run: &str) -> Vec<Reading> {
+    let told = |e: &&EffectEntry| e.is_of_single_readings() && e.run.as_deref().is_none_or(|of| of == run);
+    let named: Vec<&String> = v.effects.iter().filter(told).flat_map(|e| &e.channels).collect();
+    let of_target = |target: &Target| -> Vec<Reading> {
+        let of = |row: &usize| {
+            let k = target.rows.iter().position(|r| r == row)?;
+            let around = target.y.get(k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(target.y.len()))?;
+            Some(Reading {
+                run: run.to_owned(),
+                channel: target.name.to_owned(),
+                t: context.t[*row],
+                is_row: context.time_is_row,
+                value: target.y[k],
+                expected: median(&mut around.to_vec()),
+                unit: unit_of(target.name),
+            })
+        };
+        target.unclaimed.iter().filter_map(of).collect()
+    };
+    context.targets.iter().filter(|t| named.iter().any(|name| *name == t.name)).flat_map(of_target).collect()
 }
 
 /// What an effect's channels read at each command.
@@ -196,11 +225,20 @@ fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<V
 
 /// What is left of a channel without an effect and with it, over what the effect goes with.
 fn drawn(context: &Context, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Figure {
+    if e.depends_on.iter().any(|v| v == "direction") && moves(&context.rpm) {
+        let up = upwards(&context.rpm);
+        let up: Vec<bool> = claimed(target).map(|k| up[target.rows[k]]).collect();
+        return two_ways(trace, id, &words::axis("rpm"), &of_rows(target, &context.rpm), &up);
+    }
     let of_steps = e.depends_on.iter().any(|v| ["time_since_step", "rpm_rate"].contains(&v.as_str()));
     let over = if of_steps {
         None
     } else {
-        e.depends_on.iter().find_map(|name| Some((name, values(context, target, name).filter(|x| moves(x))?)))
+        let x = |name: &str| match (name, e.parameter("tau")) {
+            ("heat", Some(tau)) => Some(of_rows(target, &heat(context, tau.value))),
+            _ => values(context, target, name),
+        };
+        e.depends_on.iter().find_map(|name| Some((name, x(name).filter(|x| moves(x))?)))
     };
     match over {
         Some((name, x)) => against(trace, id, (name, unit_of_variable(name)), &x, ALONE),
@@ -234,6 +272,39 @@ fn taken_out(closed: &Closed, target: &Target, position: usize) -> Option<Vec<f6
 /// Of one value a sample those of the rows that count.
 fn of_samples(target: &Target, values: &[f64]) -> Vec<f64> {
     claimed(target).map(|k| values[k]).collect()
+}
+
+/// Share of the top speed by which the speed must turn back until it counts as the other way.
+const TURN: f64 = 0.02;
+
+/// Whether each row is on the way up: the speed is above where it last turned.
+fn upwards(rpm: &[f64]) -> Vec<bool> {
+    let turn = TURN * rpm.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let (mut up, mut end) = (true, rpm.first().copied().unwrap_or(0.0));
+    let of = |v: &f64| {
+        let further = if up { *v >= end } else { *v <= end };
+        if further || (*v - end).abs() > turn {
+            (up, end) = (*v > end || (up && further), *v);
+        }
+        up
+    };
+    rpm.iter().map(of).collect()
+}
+
+/// What a load leaves behind as heat: the square of the current, or of a speed's cube where no current was measured, through a lag, from cold;
+/// as a share of the most.
+fn heat(context: &Context, tau: f64) -> Vec<f64> {
+    let load: Vec<f64> = context.current.clone().unwrap_or_else(|| context.rpm.iter().map(|n| n.powi(3)).collect());
+    let (mut now, mut out) = (0.0, Vec::with_capacity(context.len()));
+    for i in 0..context.len().min(load.len()) {
+        if i > 0 {
+            let keeps = (-(context.t[i] - context.t[i - 1]) / tau).exp();
+            now = keeps * now + (1.0 - keeps) * load[i - 1] * load[i - 1];
+        }
+        out.push(now);
+    }
+    let most = out.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    out.into_iter().map(|heat| heat / most).collect()
 }
 
 /// Unit of a variable: of a column its own, of what adds up over a run that of the sum.
@@ -428,6 +499,22 @@ mod tests {
             values: values.into_iter().enumerate().map(|(i, v)| v + size * wave(i, 0.7 + k as f64)).collect(),
         };
         Log { name: "run.csv".into(), t, columns: columns.into_iter().enumerate().map(noisy).collect(), ..Log::default() }
+    }
+
+    #[test]
+    fn a_speed_that_turns_is_on_the_other_way() {
+        let speeds = [0.0, 1000.0, 2000.0, 1990.0, 2010.0, 4000.0, 3000.0, 3010.0, 2000.0, 0.0, 500.0];
+        let up = [true, true, true, true, true, true, false, false, false, false, true];
+        assert_eq!(upwards(&speeds), up);
+    }
+
+    /// A staircase upwards: the heat rises, and never beyond the most.
+    #[test]
+    fn heat_rises_under_load_and_falls_without() {
+        let context = Context::new(&run(0.05), None);
+        let heat = heat(&context, 5.0);
+        assert!(heat.len() == context.len() && heat[0] == 0.0 && heat.iter().all(|h| (0.0..=1.0).contains(h)));
+        assert!(heat[999] > 0.9 && heat[500] < heat[700], "{} {}", heat[500], heat[999]);
     }
 
     /// A declared model that knows its own supply must not be drawn as if it knew the lead that is new.

@@ -8,7 +8,7 @@
 
 use super::closed::{self as parts, Origin, Page, Vocabulary, pair};
 use super::figure::{Figure, Layer, Mark};
-use super::page::{SPEEDS, card_across, card_alone, is_drawn_together, left_across, over_runs, rest, speeds};
+use super::page::{SPEEDS, card_across, card_alone, is_drawn_together, left_across, over_runs, readings_apart, rest, speeds};
 use super::svg::escape;
 use crate::close::Closed;
 use crate::effects::{EffectEntry, Estimate};
@@ -36,6 +36,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         hero: outcome.shown.iter().flat_map(|shown| over_runs(v, shown)).map(|figure| on(first, figure)).collect(),
         cards: v.effects.iter().enumerate().map(|(k, e)| card(&alone, outcome, v, k, e)).collect(),
         left: v.unexplained.iter().zip(&outcome.left).filter(|(u, _)| own(u)).filter_map(|(u, shown)| left_of(&alone, u, shown.as_ref())).map(|(run, figure)| on(run, figure)).collect(),
+        readings: outcome.contexts.iter().zip(&v.runs).flat_map(|(c, run)| readings_apart(c, v, &run.run)).collect(),
         parameters: parameters(outcome, v),
         speeds: (SPEEDS, speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| on(first, figure)).collect()),
     };

@@ -36,6 +36,8 @@ pub struct Sheet {
     told: bool,
     /// Anchors that are taken.
     anchors: Vec<String>,
+    /// Names of files that are taken.
+    files: Vec<String>,
 }
 
 impl Sheet {
@@ -101,7 +103,7 @@ impl Sheet {
         fill(self);
         // what is no table has no rows to copy
         let copy = if self.body[from..].contains("<table") { "<button class=\"copy\" hidden>copy</button>" } else { "" };
-        let (name, file) = (escape(name), data_uri("text/csv", csv));
+        let (name, file) = (escape(&taken(&mut self.files, name)), data_uri("text/csv", csv));
         self.body += &format!("<p class=\"tools\"><a download=\"{name}.csv\" href=\"{file}\">CSV</a>{copy}</p></div>\n");
     }
 
@@ -125,10 +127,7 @@ impl Sheet {
 
     /// An anchor that no other part has.
     fn anchor(&mut self, heading: &str) -> String {
-        let base = super::closed::slug(heading);
-        let taken = self.anchors.iter().filter(|a| **a == base).count();
-        self.anchors.push(base.clone());
-        if taken == 0 { base } else { format!("{base}-{}", taken + 1) }
+        taken(&mut self.anchors, &super::closed::slug(heading))
     }
 
     /// A section's heading.
@@ -175,7 +174,9 @@ impl Sheet {
             (0..header.len()).map(|k| k > 0 && rows.iter().any(|r| r.get(k).is_some_and(|c| c.chars().count() > 34))).collect();
         let class = |k: usize| if texts.get(k) == Some(&true) { " class=\"text\"" } else { "" };
         let wide = |cell: &String| cell.split(' ').any(|word| word.chars().count() > LONG);
-        let narrow = header.len() < NARROW || (header.len() == NARROW && !rows.iter().flatten().any(wide));
+        // the first column has a line of its own on a phone, so that its title asks for no room
+        let long = rows.iter().flatten().any(wide) || header.iter().skip(1).any(|name| wide(&(*name).to_owned()));
+        let narrow = header.len() < NARROW || (header.len() == NARROW && !long);
         let stacked = self.told && !narrow && rows.len() * header.len() <= STACKED;
         self.body += &format!("<div class=\"wide\"><table{}><thead><tr>", if stacked { " class=\"stack\"" } else { "" });
         for (k, cell) in header.iter().enumerate() {
@@ -244,6 +245,13 @@ impl Sheet {
     }
 }
 
+/// A name that nothing else on the page has: with a number behind it where others had it before.
+fn taken(names: &mut Vec<String>, name: &str) -> String {
+    let before = names.iter().filter(|known| *known == name).count();
+    names.push(name.to_owned());
+    if before == 0 { name.to_owned() } else { format!("{name}-{}", before + 1) }
+}
+
 /// A cell in which no number with a sign breaks: browsers break lines after a hyphen.
 fn unbroken(cell: &str) -> String {
     let word = |word: &str| {
@@ -298,6 +306,34 @@ pub fn write_figures(folder: &Path, figures: &[Figure]) -> Result<Vec<PathBuf>, 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Four columns with names of runs are too wide for a phone.
+    #[test]
+    fn long_titles_of_columns_stack_on_a_phone() {
+        let html = |titles: [&str; 4]| {
+            let mut sheet = Sheet::told("a", "A page.");
+            sheet.data(
+                "runs",
+                &titles,
+                &[vec!["thrust, N".to_owned(), "0.3".to_owned(), "0.1".to_owned(), "0.2".to_owned()]],
+                None,
+            );
+            sheet.html()
+        };
+        assert!(html(["channel", "05_171350", "07_174807", "09_181347"]).contains("class=\"stack\""));
+        assert!(!html(["parameter", "value", "95 % interval", "unit"]).contains("class=\"stack\""));
+    }
+
+    #[test]
+    fn no_two_files_of_a_page_have_one_name() {
+        let rows = vec![vec!["1".to_owned()]];
+        let mut sheet = Sheet::told("a", "A page.");
+        (0..3).for_each(|_| sheet.data("filter-parameters", &["value"], &rows, None));
+        let html = sheet.html();
+        for name in ["filter-parameters.csv", "filter-parameters-2.csv", "filter-parameters-3.csv"] {
+            assert_eq!(html.matches(&format!("download=\"{name}\"")).count(), 1, "{name}");
+        }
+    }
 
     #[test]
     fn a_very_long_table_is_cut_and_says_so() {

@@ -18,7 +18,7 @@ use crate::hypothesis::Placed;
 use crate::model::{AddedEffect, RunLevel};
 use crate::rivals::TEMPERATURE;
 use crate::unexplained::LOUD;
-use crate::verdict::{Alternative, Channels, Kin, Unexplained};
+use crate::verdict::{Alternative, Change, Channels, Kin, Unexplained};
 use crate::words::channel as spoken;
 
 /// What could stand in the place of a name, with its probability.
@@ -143,7 +143,10 @@ pub(super) fn alternatives(told: &[(EffectEntry, Others)]) -> Vec<Alternative> {
     };
     let all = told.iter().enumerate().flat_map(|(k, (_, others))| others.iter().map(move |(id, p)| (k, *id, *p)));
     let listed = all.filter(|(.., p)| *p >= LISTED);
-    let mut out: Vec<Alternative> = listed.map(|(k, id, probability)| Alternative { ids: swapped(k, id), probability }).collect();
+    let channels = |k: usize| told.get(k).map(|(e, _)| e.channels.clone()).unwrap_or_default();
+    let change = |place, id: &str, probability| Some(Change { place, id: id.to_owned(), channels: channels(place), probability });
+    let of = |(k, id, probability)| Alternative { ids: swapped(k, id), probability, change: change(k, id, probability) };
+    let mut out: Vec<Alternative> = listed.map(of).collect();
     out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     out
 }

@@ -16,6 +16,7 @@ mod folds;
 mod joint;
 mod outcome;
 mod own;
+mod scatter;
 mod words;
 
 use crate::close::Closed;

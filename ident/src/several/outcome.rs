@@ -10,7 +10,7 @@ use super::equations::left_on;
 use super::folds::{self, Tenable};
 use super::joint::{Across, Joint, Shared, compared};
 use super::words::{self, Told};
-use super::{Member, Run, choose, differing, own};
+use super::{Member, Run, choose, differing, own, scatter};
 use crate::bad;
 use crate::close::Closed;
 use crate::context::{Context, is_contrast};
@@ -20,9 +20,11 @@ use crate::log::Log;
 use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors};
 use crate::noise::median;
 use crate::parallel::in_parallel;
+use crate::report::Vocabulary;
 use crate::sparse;
 use crate::supply_limit;
 use crate::verdict::Verdict;
+use crate::words::digits;
 
 /// What several runs amount to.
 #[derive(Debug, Clone)]
@@ -116,7 +118,10 @@ pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> O
     let rig: Vec<Placed> = tenable.named.iter().map(|n| n.placed.clone()).collect();
     let joint = Joint::of(&tenable.members);
     let shared = joint.shared(&rig);
-    let estimates: Vec<Vec<Estimate>> = (0..rig.len()).map(|k| tenable.folds.estimates(&joint, &rig, k, &shared)).collect();
+    let mut estimates: Vec<Vec<Estimate>> = (0..rig.len()).map(|k| tenable.folds.estimates(&joint, &rig, k, &shared)).collect();
+    let alone = alone(&joint, &rig, &closed);
+    let disagreements: Vec<_> = (0..rig.len()).map(|k| disagreement(&contexts[0], &rig[k], &estimates[k], &alone[k])).collect();
+    estimates.iter_mut().zip(&alone).for_each(|(shared, alone)| scatter::widened(shared, alone));
     let own = joint.members.iter().map(|m| own::of(m, &rig, &shared)).collect();
     let model = model(runs, &contexts, &shared, &rig, &estimates, own);
     let declared = declared(runs, &contexts, &members);
@@ -128,9 +133,10 @@ pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> O
         models: [&declared, &model],
         estimates: &estimates,
         without: &without,
+        disagreements: &disagreements,
     };
     let verdict = words::verdict(&told);
-    let (alone, shown) = (alone(&joint, &rig), shown(&tenable));
+    let shown = shown(&tenable);
     let quoted =
         |k: usize| verdict.effects.iter().find(|e| e.run.is_none() && rig[k].is_told_by(e)).and_then(|e| e.channels.first());
     let each = (0..rig.len()).map(|k| shown_without(&tenable, k, &without[k], quoted(k)?)).collect();
@@ -164,14 +170,42 @@ fn prepared(log: &Log, start: f64) -> Context {
     context
 }
 
-/// Parameters of each effect of the rig on each run alone.
-fn alone(joint: &Joint<'_, '_>, rig: &[Placed]) -> Vec<Vec<Vec<Estimate>>> {
+/// On which of an effect's parameters the runs disagree, as it is reported, in words.
+fn disagreement(context: &Context, placed: &Placed, shared: &[Estimate], alone: &[Vec<Estimate>]) -> Option<String> {
+    let reported = |e: &[Estimate]| placed.effect.report(context, &placed.instance, e.to_vec());
+    let runs: Vec<Vec<Estimate>> = alone.iter().map(|run| reported(run)).collect();
+    let shared = reported(shared);
+    let (name, [least, most]) = scatter::disagreement(&shared, &runs)?;
+    let unit = shared.iter().find(|e| e.name == name).map_or("", |e| e.unit.as_str());
+    let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+    let told = |v: f64| digits(v, 0.005 * v.abs());
+    let what = (Vocabulary::RIG.parameter)(placed.effect.id(), &name);
+    Some(format!("the runs disagree: alone they have {} to {}{unit} for the {what}", told(least), told(most)))
+}
+
+/// Parameters of each effect of the rig on each run alone. The error of a shape is that which the run's own verdict has for it.
+fn alone(joint: &Joint<'_, '_>, rig: &[Placed], closed: &[&Closed]) -> Vec<Vec<Vec<Estimate>>> {
+    let error = |run: usize, k: usize, name: &str| {
+        let of = &closed.get(run)?.diagnosis;
+        let at = of.best.fit.placed.iter().position(|p| p.is_like(&rig[k]))?;
+        of.estimates.get(at)?.iter().find(|e| e.name == name).map(|e| e.se)
+    };
+    let with_errors = |run: usize, k: usize, mut told: Vec<Estimate>| {
+        told.iter_mut().filter(|e| !e.se.is_finite()).for_each(|e| e.se = error(run, k, &e.name).unwrap_or(e.se));
+        told
+    };
     let of_run = |run: usize| {
         let one = joint.only(run);
         let refined = one.refined_whole(rig, choose::SOUGHT, choose::EVALUATIONS);
         let shared = one.shared(&refined);
         (0..rig.len())
-            .map(|k| if one.tells(run, &rig[k]) { choose::estimates(&one, &refined, k, &shared) } else { Vec::new() })
+            .map(|k| {
+                if one.tells(run, &rig[k]) {
+                    with_errors(run, k, choose::estimates(&one, &refined, k, &shared))
+                } else {
+                    Vec::new()
+                }
+            })
             .collect()
     };
     let by_run: Vec<Vec<Vec<Estimate>>> = in_parallel(joint.members.len(), &of_run);

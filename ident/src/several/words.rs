@@ -11,10 +11,11 @@ use super::folds::Tenable;
 use super::joint::{Across, Compared, Joint};
 use crate::close::{NO_COMMAND, validation};
 use crate::context::{Context, Relation, is_contrast, unit_of};
+use crate::diagnose::RIVAL;
 use crate::effects::Estimate;
 use crate::model::Model;
 use crate::residual::whiteness;
-use crate::verdict::{BeforeAfter, Channel, Channels, FORMAT, Figures, Kind, Validation, Verdict};
+use crate::verdict::{Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Validation, Verdict};
 use std::collections::BTreeMap;
 
 /// A joint fit, to be put into words.
@@ -31,16 +32,23 @@ pub(super) struct Told<'f, 'a> {
     pub(super) estimates: &'f [Vec<Estimate>],
     /// For each name the errors of the runs without it.
     pub(super) without: &'f [Vec<Across>],
+    /// For each name on what the runs disagree, in words.
+    pub(super) disagreements: &'f [Option<String>],
 }
 
 /// The contract's words.
 pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
-    let Told { runs, contexts, tenable, models, estimates, without } = *told;
+    let Told { runs, contexts, tenable, models, estimates, without, disagreements } = *told;
     let Tenable { named, members, worths, compared, .. } = tenable;
     let joint = Joint::of(members);
     let after: Vec<Across> = compared.iter().map(|c| c.after).collect();
     let channels = channels(told);
-    let mut names: Vec<_> = (0..named.len()).map(|k| entry(&joint, &named[k], [&without[k], &after], &estimates[k])).collect();
+    let of = |k: usize| {
+        let (mut entry, others) = entry(&joint, &named[k], [&without[k], &after], &estimates[k]);
+        disagreements.get(k).iter().copied().flatten().for_each(|said| entry.evidence += &format!("; {said}"));
+        (entry, others)
+    };
+    let mut names: Vec<_> = (0..named.len()).map(of).collect();
     names.sort_by(|a, b| b.0.heldout_error_reduction.total_cmp(&a.0.heldout_error_reduction));
     let own = models[1].own.iter().zip(worths).enumerate();
     names.extend(own.flat_map(|(run, (own, worths))| own_entries(&contexts[run], own, worths)));
@@ -50,6 +58,7 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
     // what nothing predicts has nothing left over
     unexplained.retain(|u| !channels.not_predicted.contains_key(&u.channel));
     let kind = match (effects.is_empty(), unexplained.is_empty()) {
+        (false, _) if alternatives.iter().any(|a| is_as_likely(a, &effects)) => Kind::Ambiguous,
         (false, _) => Kind::Attributed,
         (true, false) => Kind::Unattributed,
         (true, true) => Kind::None,
@@ -74,6 +83,12 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
         validation: Vec::new(),
         runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared, &silent)).collect(),
     }
+}
+
+/// Whether something else explains as much as the name in whose place it would stand, about, as on one run alone.
+fn is_as_likely(other: &Alternative, effects: &[EffectEntry]) -> bool {
+    let own = |place: usize| effects.get(place).map_or(1.0, |e| e.probability);
+    other.change.as_ref().is_some_and(|change| change.probability >= RIVAL * own(change.place))
 }
 
 fn of_run(run: &Run, k: usize, compared: &[Compared], silent: &[String]) -> Validation {

@@ -74,13 +74,45 @@ fn relation<'t>(of: &str, behind: &'t str) -> Option<(String, &'t str)> {
 }
 
 /// An equation without the mark of its form, and that form in words.
-#[must_use]
-pub fn formula(equation: &str) -> (&str, Option<String>) {
+fn formula(equation: &str) -> (&str, Option<String>) {
     let marked = equation.strip_suffix(']').and_then(|e| e.rsplit_once(" ["));
     match marked {
         Some((equation, form)) => (equation, Some(plain(form).replace('_', " "))),
         None => (equation, None),
     }
+}
+
+/// What stands between two ways in which an effect may act, the second of which is a form of its own.
+const EITHER: [&str; 5] = ["; or, as play: ", "; smooth: ", "; form whole_blade: ", "; coasting ", ", or "];
+/// What stands before what an effect does besides against a declared model.
+const BESIDES: &str = "; against a declared model also ";
+
+/// The equation that is in force: of an effect that may act in several ways the one whose parameters it has, without quotation marks, and its
+/// form in words where the equation alone does not tell it.
+#[must_use]
+pub fn in_force(e: &EffectEntry) -> (String, Option<String>) {
+    let (whole, form) = formula(&e.equation);
+    let has = |text: &str| e.parameters.iter().filter(|p| is_told_in(&p.name, text)).count();
+    let whole = match whole.split_once(BESIDES) {
+        Some((alone, besides)) if has(besides) == 0 => alone,
+        _ => whole,
+    };
+    let ways = EITHER.iter().find_map(|between| Some((between, whole.split_once(between)?)));
+    // ways that share a part, such as that of the heat, are told together
+    let apart = |second: &str| second.contains('=') && second.starts_with(|c: char| c.is_ascii_alphabetic());
+    let (told, form) = match ways.filter(|(_, (_, second))| apart(second)) {
+        Some((between, (first, second))) => {
+            let marked = form.as_ref().is_some_and(|f| between.replace('_', " ").contains(f.as_str()));
+            (if marked || has(second) > has(first) { second } else { first }, form.filter(|_| !marked))
+        }
+        None => (whole, form),
+    };
+    (told.replace('`', ""), form)
+}
+
+/// Whether a parameter stands in an equation as a word of its own.
+fn is_told_in(name: &str, equation: &str) -> bool {
+    equation.split(|c| !is_of_a_name(c)).any(|word| word == name)
 }
 
 /// A correction without a name in words: "a smooth curve of pulse, 3 terms"; nothing of any other effect.
@@ -105,6 +137,38 @@ mod tests {
         let (equation, form) = formula("torque_nm += inertia d(omega)/dt [over_the_row]");
         assert_eq!((equation, form.as_deref()), ("torque_nm += inertia d(omega)/dt", Some("over the row")));
         assert_eq!(formula("a[k] = 1"), ("a[k] = 1", None));
+    }
+
+    #[test]
+    fn the_equation_in_force_is_told_alone() {
+        let of = |equation: &str, names: &[&str]| {
+            let parameter = |name: &&str| crate::verdict::Parameter {
+                name: (*name).to_owned(),
+                value: 1.0,
+                unit: "1".to_owned(),
+                ci95: [0.9, 1.1],
+            };
+            let parameters = names.iter().map(parameter).collect();
+            in_force(&EffectEntry { equation: equation.to_owned(), parameters, ..crate::report::bare_entry("creep") })
+        };
+        let filter = "reading = mean of the truth over the last `window` seconds, or tau d(reading)/dt = truth - reading";
+        assert_eq!(of(filter, &["window"]).0, "reading = mean of the truth over the last window seconds");
+        let lag = of(&format!("{filter} [lag]"), &["tau", "phase"]);
+        assert_eq!(lag, ("tau d(reading)/dt = truth - reading".to_owned(), Some("lag".to_owned())));
+        let bends = "thrust_n += width * direction / 2 * f, f = (rpm / rpm_max)^2; or, as play: thrust_n += width * lags with slacks up to `slack`";
+        assert_eq!(
+            of(&format!("{bends} [play]"), &["slack", "width"]),
+            ("thrust_n += width * lags with slacks up to slack".to_owned(), None)
+        );
+        assert_eq!(of(bends, &["width"]).0, "thrust_n += width * direction / 2 * f, f = (rpm / rpm_max)^2");
+        let warms =
+            "rpm *= 1 - derate heat (controller), or 1 - derate heat (rpm/top) with current_a += current_rise heat (winding)";
+        assert_eq!(of(&format!("{warms} [winding]"), &["derate"]).0, warms, "its ways share a part");
+        let sag = "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a";
+        assert_eq!(of(sag, &["resistance"]).0, "voltage_v = V0 - resistance * current_a");
+        assert_eq!(of(sag, &["resistance", "speed_loss"]).0, sag);
+        let turns = "rpm_x = rpm (1 + angle/180) or rpm (1 - angle/180), by turns";
+        assert_eq!(of(turns, &["angle"]).0, turns);
     }
 
     #[test]

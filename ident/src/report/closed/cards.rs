@@ -5,8 +5,9 @@
 //! Units: as the parameters state.
 //! Reference: specification `formats.md`, "Verdict" (`effects`, `alternatives`).
 
-use super::page::Page;
-use super::sentence::{instead, order, without};
+use super::contest::{Rival, reserve, rivals};
+use super::page::{Page, Reading};
+use super::sentence::{order, without};
 use super::state::figures;
 use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
@@ -15,13 +16,18 @@ use crate::report::svg::escape;
 use crate::rivals::UNEXPLAINED;
 use crate::verdict::{Alternative, EffectEntry, Parameter, Verdict};
 use crate::words::{
-    SURE, channel, channels, counted, curve, digits, formula, lower, plain, probability, scaled, scope, signs, sized, sureness,
-    upper, upper_bound, with_interval,
+    SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled, scope, signs, sized,
+    sureness, upper, upper_bound, with_interval,
 };
 use std::fmt::Write;
 
 /// Probability from which on what no hypothesis has is told.
 const OPEN: f64 = 0.05;
+/// Probability from which on a rival is told beside a name: below it its figure is zero to two digits.
+const COUNTED: f64 = 0.005;
+
+/// What stands before that the runs disagree on a size.
+pub(crate) const DISAGREE: &str = "; the runs disagree:";
 
 /// The cards: those of this rig, those of every rig, and corrections without a name.
 pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
@@ -29,12 +35,13 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     let order = order(v, page.words);
     let group = |e: &EffectEntry| match e.id.as_str() {
         "unknown" => 2,
+        _ if e.is_of_single_readings() => 3,
         _ if (page.words.of_every_rig)(e) => 1,
         _ => 0,
     };
     let noun = page.words.noun;
     for (k, (heading, lead)) in [
-        (format!("What this {noun} has"), String::new()),
+        (format!("What this {noun} has"), kept(page).unwrap_or_default()),
         (format!("What every {noun} has"), format!("A rotor has inertia and takes time, a reading lies somewhere within its row, and no two clocks run alike: no {noun} is without these.")),
         ("Without a name".to_owned(), "What no known effect explains. Where a smooth function predicts rows it has not seen, it is added to the model; it names no cause.".to_owned()),
     ]
@@ -56,6 +63,64 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
             card(sheet, page, group, number);
         }
     }
+    let of_readings: Vec<usize> = order.iter().copied().filter(|i| group(&v.effects[*i]) == 3).collect();
+    set_apart(sheet, page, &of_readings);
+}
+
+/// That a part of every probability is kept for causes that nobody has described: said once, for it stands against no name in particular.
+fn kept(page: &Page<'_>) -> Option<String> {
+    let most = reserve(page.verdict, page.words);
+    if most < OPEN || page.verdict.effects.iter().all(|e| e.id == "unknown" || e.is_of_single_readings()) {
+        return None;
+    }
+    Some(format!(
+        "Of every probability a part is kept for causes that the library lacks, here {}: it stands against no name in particular.",
+        probability(most)
+    ))
+}
+
+/// Single readings that leave their neighbours and come back: one account of all channels and runs, and a table with each of them.
+fn set_apart(sheet: &mut Sheet, page: &Page<'_>, members: &[usize]) {
+    let (Some(first), v) = (members.first(), page.verdict) else { return };
+    sheet.section("Readings set apart");
+    let said: Vec<String> = members.iter().map(|k| page.words.said(&v.effects[*k]).with("")).collect();
+    let id = &v.effects[*first].id;
+    sheet.html_part(&format!("<p>{}. <code>{}</code></p>\n", escape(&upper(&said.join("; "))), escape(id)));
+    let signature = (page.words.about)(id).map_or("", |about| about.signature);
+    sheet.say(&format!("{}. Nothing is claimed about these rows, before or after.", upper(signature)));
+    if page.readings.is_empty() {
+        return;
+    }
+    let several = page.readings.iter().any(|r| !r.run.is_empty());
+    let clock = if page.readings.iter().all(|r| r.is_row) { "row" } else { "time, s" };
+    let cells = |r: &Reading| {
+        let unit = if r.unit == "rpm" { "rev/min" } else { r.unit };
+        let digits = |v: f64| digits(v, 0.005 * v.abs().max(r.expected.abs()));
+        let of = [
+            heading(&r.channel),
+            digits_of_time(r),
+            format!("{} {unit}", digits(r.value)),
+            format!("{} {unit}", digits(r.expected)),
+        ];
+        (if several { vec![r.run.clone()] } else { Vec::new() }).into_iter().chain(of).collect::<Vec<String>>()
+    };
+    let rows: Vec<Vec<String>> = page.readings.iter().map(cells).collect();
+    let raw: Vec<Vec<String>> = page
+        .readings
+        .iter()
+        .map(|r| {
+            let of = [r.t, r.value, r.expected].map(|v| v.to_string());
+            [r.run.clone(), r.channel.clone()].into_iter().chain(of).chain([r.unit.to_owned()]).collect()
+        })
+        .collect();
+    let head = ["run", "channel", clock, "reading", "its neighbours"];
+    let raw_head = ["run", "channel", "t_s", "value", "neighbours", "unit"];
+    sheet.data("readings-set-apart", &head[usize::from(!several)..], &rows, Some((&raw_head, &raw)));
+}
+
+/// When a reading was taken, as the log tells it.
+fn digits_of_time(r: &Reading) -> String {
+    if r.is_row { format!("{:.0}", r.t) } else { format!("{:.2}", r.t) }
 }
 
 /// Effects by their position, those without a name that are alike but for their channel together: the rotors of a vehicle, for instance.
@@ -100,8 +165,12 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     // what has no name is sure of nothing but that something is there
     let nameless = e.id == "unknown";
     let sure = if nameless { "unsure" } else { sureness(e.probability) };
-    let p = format!("p {}", equals(&probability(e.probability)));
-    let chip = if nameless { format!("no name; {}", that_it_is_there(e.probability)) } else { format!("{sure}{there}: {p}") };
+    let against = rivals(v, page.words, k);
+    let chip = if nameless {
+        format!("no name; {}", that_it_is_there(e.probability))
+    } else {
+        contest(e, &format!("{sure}{there}"), &against)
+    };
     let title = if nameless {
         format!("Something on {on} that goes with {}.", channels(&e.depends_on))
     } else {
@@ -131,9 +200,20 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     sheet.html_part("<div>\n");
     parameters(sheet, page.words, e);
     let mut html = format!("<p class=\"soft\">{}</p>\n", written(e));
-    let _ = writeln!(html, "<p><b>Known by:</b> {}.</p>", escape(&plain(signs(&e.evidence))));
+    let (known, disagree) = match e.evidence.split_once(DISAGREE) {
+        Some((known, rest)) => (known, Some(rest)),
+        None => (e.evidence.as_str(), None),
+    };
+    let _ = writeln!(html, "<p><b>Known by:</b> {}.</p>", escape(&plain(signs(known))));
+    if let Some(rest) = disagree {
+        let _ = writeln!(
+            html,
+            "<p class=\"warn\"><b>The runs disagree:</b>{}. The interval allows for it.</p>",
+            escape(&plain(rest))
+        );
+    }
     if !nameless {
-        let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e)));
+        let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e, &against)));
     }
     if let Some(how) = settle(page, e) {
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
@@ -141,14 +221,24 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     sheet.html_part(&format!("{html}</div></div></article>\n"));
 }
 
+/// How sure a name is, beside what stands against it; a name that nothing stands against has no figure here, the folded table has it.
+fn contest(e: &EffectEntry, sure: &str, against: &[Rival]) -> String {
+    let p = equals(&probability(e.probability));
+    match against.first().filter(|r| r.probability >= COUNTED) {
+        Some(rival) => format!("{sure}: p {p}, rival {}", equals(&probability(rival.probability))),
+        None if e.probability >= SURE => format!("{sure}, no rival"),
+        None => format!("{sure}: p {p}"),
+    }
+}
+
 /// What the model holds of an effect: its formula, or of a curve without a name what it is.
 fn written(e: &EffectEntry) -> String {
     if let Some(said) = curve(e) {
         return format!("Added: {}.", escape(&said));
     }
-    let (equation, form) = formula(&e.equation);
+    let (equation, form) = in_force(e);
     let form = form.map(|form| format!(" ({})", escape(&form))).unwrap_or_default();
-    format!("<code>{}</code>{form}", escape(equation))
+    format!("<code>{}</code>{form}", escape(&equation))
 }
 
 /// How sure it is that something without a name is there: what the verdicts so far say where nothing in the library was tried against it,
@@ -256,45 +346,21 @@ fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
 }
 
 /// What would stand in its place, with probabilities, and what it is easily taken for.
-pub(super) fn others(page: &Page<'_>, e: &EffectEntry) -> String {
-    let v = page.verdict;
-    let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
-    let here = v.effects.iter().filter(|b| b.id == e.id).count();
-    let (mut found, mut given): (Vec<String>, f64) = (Vec::new(), 0.0);
-    for a in &v.alternatives {
-        let lacks = a.ids.iter().filter(|id| **id == e.id).count() < here;
-        let instead = instead(&best, &a.ids);
-        if lacks {
-            let what = if instead.is_empty() {
-                "nothing in its place".to_owned()
-            } else {
-                instead.iter().map(|id| title(page, id)).collect::<Vec<_>>().join(", and ")
-            };
-            found.push(format!("{what} ({})", probability(a.probability)));
-            given += a.probability;
-        }
-    }
+fn others(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> String {
+    let found: Vec<String> = against.iter().map(|r| format!("{} ({})", plain(&r.said), probability(r.probability))).collect();
     let known = (page.words.about)(&e.id).map(|a| a.look_alikes).unwrap_or_default();
     // what was told with a probability is told
-    let told = |title: &String| found.iter().any(|f| f.starts_with(&format!("{title} (")));
-    let alike: Vec<String> = known.iter().map(|id| title(page, id)).filter(|title| !told(title)).collect();
+    let told = |id: &str| against.iter().any(|r| r.ids.iter().any(|known| known == id));
+    let alike: Vec<String> = known.iter().filter(|id| !told(id)).map(|id| title(page, id)).collect();
     let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
-    // what neither the effect nor a hypothesis without it has
-    let open = 1.0 - e.probability - given;
-    let kept = if open >= OPEN { kept_open(e, &probability(open)) } else { String::new() };
+    // what every name leaves to causes that the library lacks is said once, above the cards
+    let none = Rival::none(page.verdict, page.words, e, against).probability;
+    let none =
+        if none >= OPEN { format!(" Further names, or no cause of its own: {}.", probability(none)) } else { String::new() };
     if found.is_empty() {
-        return format!("no other name that was tried came close.{kept}{alike}");
+        return format!("no other name that was tried came close.{none}{alike}");
     }
-    format!("{}.{kept}{alike}", found.join("; "))
-}
-
-/// What no hypothesis has: of a sure effect the part that the search keeps for causes that it does not know, of another one that it may be none.
-fn kept_open(e: &EffectEntry, open: &str) -> String {
-    if e.probability >= SURE {
-        format!(" {open} is kept for a cause that the library lacks.")
-    } else {
-        format!(" Perhaps it has no cause of its own ({open}).")
-    }
+    format!("{}.{none}{alike}", found.join("; "))
 }
 
 /// What would settle an effect that is not sure.
@@ -304,11 +370,26 @@ fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
     }
     let v = page.verdict;
     let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
-    let asked = |a: &Alternative| without(&best, &a.ids).iter().any(|d| std::ptr::eq(*d, e));
+    let asked = |a: &Alternative| match &a.change {
+        Some(change) => v.effects.get(change.place).is_some_and(|d| std::ptr::eq(d, e)),
+        None => without(&best, &a.ids).iter().any(|d| std::ptr::eq(*d, e)),
+    };
     if v.proposed().is_some() && v.alternatives.first().is_some_and(asked) {
         return Some("<a href=\"#what-would-settle-it\">the run that is proposed below</a>.".to_owned());
     }
     let noun = page.words.noun;
+    // the other runs are here, and have been asked
+    if v.runs.len() > 1 && e.run.is_none() {
+        return Some(format!(
+            "a run of another kind. The {} runs at hand leave it open, and one more like them hardly tells: change what the rivals differ in, the supply, the order of the levels or how long each is held.",
+            v.runs.len()
+        ));
+    }
+    if !v.validation.is_empty() && e.scope == crate::effects::Scope::Rig {
+        return Some(format!(
+            "<a href=\"#on-other-runs-of-the-{noun}\">the other runs below</a>: what belongs to the {noun} is there again."
+        ));
+    }
     Some(match e.scope {
         crate::effects::Scope::Rig => {
             format!("another run of this {noun}: what belongs to the {noun} is there again (<code>--validate OTHER.csv</code>).")

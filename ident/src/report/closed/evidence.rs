@@ -217,6 +217,25 @@ pub(crate) fn against(trace: &Trace, id: &str, (variable, unit): (&str, &str), x
     trace.figure(&format!("{id}-against-{}", slug(variable)), title, x_label, layers)
 }
 
+/// Over the load of a residual whose way up and way down part: the two told apart, before; and both, after. `up` tells which way a row is on.
+pub(crate) fn two_ways(trace: &Trace, id: &str, x_label: &str, x: &[f64], up: &[bool]) -> Figure {
+    let way = |asked: bool| -> Vec<f64> {
+        trace.before.iter().zip(up).map(|(v, up)| if *up == asked { *v } else { f64::NAN }).collect()
+    };
+    let ends =
+        x.iter().copied().filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    let mut layers: Vec<Layer> = trace.band(ends.0, ends.1).into_iter().collect();
+    let [without, with] = ALONE;
+    let clouds = [
+        (format!("way up, {without}"), "b", way(true)),
+        (format!("way down, {without}"), "c", way(false)),
+        (with.to_owned(), "a", trace.after.clone()),
+    ];
+    layers.extend(clouds.map(|(name, class, y)| Layer::Dots { name, class, x: x.to_vec(), y }));
+    let title = format!("{} left over on the way up and on the way down", heading(&trace.channel));
+    trace.figure(&format!("{id}-two-ways"), title, x_label.to_owned(), layers)
+}
+
 /// Size that all but one in two hundred of the values keep.
 fn usual(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
@@ -447,6 +466,23 @@ mod tests {
         assert!(figure.title.ends_with("(1 off the scale)"), "{}", figure.title);
         let Some(Layer::Dots { y, .. }) = figure.layers.iter().find(|l| matches!(l, Layer::Dots { .. })) else { panic!("dots") };
         assert!(y.iter().all(|v| v.abs() < 1.0));
+    }
+
+    #[test]
+    fn the_way_up_is_told_from_the_way_down() {
+        let x: Vec<f64> = (0..20).map(|i| f64::from(if i < 10 { i } else { 19 - i })).collect();
+        let up: Vec<bool> = (0..20).map(|i| i < 10).collect();
+        let before: Vec<f64> = up.iter().map(|up| if *up { -1.0 } else { 1.0 }).collect();
+        let trace = Trace { channel: "thrust_n".into(), t: x.clone(), after: vec![0.0; 20], before, ..Trace::default() };
+        let figure = two_ways(&trace, "x", "speed, rpm", &x, &up);
+        let of = |word: &str| {
+            figure.layers.iter().find_map(|l| match l {
+                Layer::Dots { name, y, .. } if name.starts_with(word) => Some(y.clone()),
+                _ => None,
+            })
+        };
+        assert_eq!((of("way up"), of("way down")), (Some(vec![-1.0; 10]), Some(vec![1.0; 10])));
+        assert_eq!(figure.x_label, "speed, rpm");
     }
 
     /// A magnetometer that is read on every third row: its samples are a line, and a long hole parts it.

@@ -5,13 +5,15 @@
 //! Units: as stated.
 //! Reference: specification `report.md`.
 
+use super::contest::{open, rivals};
+use super::page::Page;
 use super::state::figures;
 use crate::bad::SetAside;
 use crate::diagnose::Diagnosis;
 use crate::report::number;
 use crate::report::sheet::Sheet;
-use crate::verdict::Verdict;
-use crate::words::channel;
+use crate::verdict::{EffectEntry, Verdict};
+use crate::words::{channel, channels as spoken, probability};
 
 /// Most lines of a list on a page.
 const MOST: usize = 100;
@@ -50,6 +52,25 @@ pub(crate) fn channels(sheet: &mut Sheet, verdict: &Verdict, held_out: &str) {
     ];
     sheet.say(&format!("Held-out: {held_out}, each predicted by a fit that did not see it. The share that the sentence states is that of the squared held-out error above the noise floor."));
     sheet.data("channels", &head, &rows, Some((&raw_head, &raw)));
+}
+
+/// How sure each name is, and what stands against it.
+pub(super) fn sureness(sheet: &mut Sheet, page: &Page<'_>) {
+    let v = page.verdict;
+    let row = |(k, e): (usize, &EffectEntry)| {
+        let against = rivals(v, page.words, k);
+        let told: Vec<String> = against.iter().map(|r| format!("{} {}", r.ids.join(" + "), probability(r.probability))).collect();
+        let told = if told.is_empty() { "none".to_owned() } else { told.join(", ") };
+        vec![e.id.clone(), spoken(&e.channels), probability(e.probability), told, probability(open(e, &against))]
+    };
+    let rows: Vec<Vec<String>> = v.effects.iter().enumerate().filter(|(_, e)| e.id != "unknown").map(row).collect();
+    if rows.is_empty() {
+        return;
+    }
+    sheet.fold("How sure each name is", |sheet| {
+        sheet.say("A rival's probability is that of it in the place of the name, all else as it is. What no name has is kept for causes that the library lacks, and for there being none.");
+        sheet.data("probabilities", &["effect", "on", "p", "rivals", "kept open"], &rows, None);
+    });
 }
 
 /// Samples and channels that took no part.
@@ -105,6 +126,6 @@ pub(crate) fn candidates(sheet: &mut Sheet, diagnosis: &Diagnosis) {
     }
     sheet.fold("Candidates that were asked", |sheet| {
         sheet.say("Each round asks every effect beside what was found before. Evidence in nats over the declared model.");
-        sheet.data("candidates", &["round", "effect", "evidence", "", "channels"], &rows, None);
+        sheet.data("candidates", &["round", "effect", "evidence", "fate", "channels"], &rows, None);
     });
 }

@@ -11,8 +11,8 @@ use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
-use crate::verdict::{ScheduleStep, Verdict};
-use crate::words::{amount, channel, heading, lower, plain, upper};
+use crate::verdict::{ScheduleStep, Unexplained, Verdict};
+use crate::words::{amount, channel, channels, heading, lower, plain, upper, vector};
 
 /// What is left.
 pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
@@ -23,25 +23,16 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
         return;
     }
     // a channel that has no model has nothing left over: its whole reading is
-    let with_model = |u: &&crate::verdict::Unexplained| !v.channels.not_predicted.contains_key(&u.channel);
-    let cells = |u: &crate::verdict::Unexplained| {
-        let with: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
-        let with = match with.as_slice() {
-            // what it looks like says so
-            [] if u.looks_like.contains("grows with the load") => "the load".to_owned(),
-            [] => "nothing in the log".to_owned(),
-            with => with.join(", "),
-        };
-        vec![heading(&u.channel), format!("{:.1}", floors_left(v, u)), size_left(v, u), u.looks_like.clone(), with]
-    };
-    let mut told: Vec<&crate::verdict::Unexplained> = v.unexplained.iter().filter(with_model).collect();
+    let with_model = |u: &&Unexplained| !v.channels.not_predicted.contains_key(&u.channel);
+    let mut told: Vec<&Unexplained> = v.unexplained.iter().filter(with_model).collect();
     told.sort_by(|a, b| floors_left(v, b).total_cmp(&floors_left(v, a)));
-    let rows: Vec<Vec<String>> = told.iter().copied().map(cells).collect();
+    let shared = shared(v);
+    let rows: Vec<Vec<String>> = alike(v, &told, shared.as_deref());
     if rows.is_empty() {
         sheet.say("Nothing on a channel that has a model.");
         return;
     }
-    let raw = |u: &crate::verdict::Unexplained| {
+    let raw = |u: &Unexplained| {
         let figures = v.channels.get(&u.channel).map(|c| (c.after.heldout_rms.to_string(), c.unit.clone())).unwrap_or_default();
         let floors = floors_left(v, u).to_string();
         vec![u.channel.clone(), floors, figures.0, figures.1, u.looks_like.clone(), u.depends_on.join(" ")]
@@ -49,6 +40,7 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     let raw: Vec<Vec<String>> = told.iter().copied().map(raw).collect();
     let raw_head = ["channel", "over_floor", "size", "unit", "looks_like", "depends_on"];
     sheet.data("unexplained", &["channel", "noise floors", "size", "looks like", "goes with"], &rows, Some((&raw_head, &raw)));
+    shared.iter().for_each(|said| sheet.say(&format!("Of all of them: {said}.")));
     let untold = v.effects.iter().filter(|e| e.is_without_correction());
     untold.for_each(|e| sheet.say(&format!("{}.", upper(&plain(&e.evidence)))));
     // a figure of rows that the fit saw says nothing of those that it did not see
@@ -59,6 +51,62 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     // what the convincing figure shows is not drawn again
     let shown = |f: &Figure| page.hero.iter().any(|h| h.title == f.title);
     sheet.figures(page.left.iter().filter(|f| !shown(f)).cloned().collect());
+}
+
+/// What is said of every remainder alike, behind what each looks like: it is told once.
+pub(super) fn shared(v: &Verdict) -> Option<String> {
+    let mut tails = v.unexplained.iter().map(|u| u.looks_like.split_once("; ").map(|(_, tail)| tail));
+    let first = tails.next()??;
+    (v.unexplained.len() > 1 && tails.all(|tail| tail == Some(first))).then(|| first.to_owned())
+}
+
+/// What a remainder looks like, without what is said of all, and what it seems to go with.
+pub(super) fn looks_and_goes(u: &Unexplained, shared: Option<&str>) -> (String, String) {
+    let own =
+        shared.and_then(|tail| u.looks_like.strip_suffix(tail)).map_or(u.looks_like.as_str(), |own| own.trim_end_matches("; "));
+    let (goes, looks): (Vec<&str>, Vec<&str>) = own.split("; ").partition(|part| part.starts_with("goes with "));
+    let seen: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
+    let goes = match (seen.as_slice(), goes.first()) {
+        ([], Some(part)) => part.trim_start_matches("goes with ").to_owned(),
+        // what it looks like says so
+        ([], None) if own.contains("grows with the load") => "the load".to_owned(),
+        ([], None) => "nothing in the log".to_owned(),
+        (with, _) => with.join(", "),
+    };
+    (looks.join("; "), goes)
+}
+
+/// A row for each remainder; the axes of a vector that look alike share one.
+fn alike(v: &Verdict, told: &[&Unexplained], shared: Option<&str>) -> Vec<Vec<String>> {
+    let mut groups: Vec<Vec<&Unexplained>> = Vec::new();
+    let same = |a: &Unexplained, b: &Unexplained| {
+        let is_axis = vector(&a.channel) != channel(&a.channel);
+        is_axis && vector(&a.channel) == vector(&b.channel) && looks_and_goes(a, shared) == looks_and_goes(b, shared)
+    };
+    for u in told {
+        match groups.iter_mut().find(|g| g.first().is_some_and(|first| same(first, u))) {
+            Some(group) => group.push(u),
+            None => groups.push(vec![u]),
+        }
+    }
+    let row = |group: &Vec<&Unexplained>| {
+        let first = group.first()?;
+        let (looks, goes) = looks_and_goes(first, shared);
+        let (up_to, name) = match group.len() {
+            1 => ("", heading(&first.channel)),
+            _ => ("up to ", upper(&channels(&group.iter().map(|u| u.channel.clone()).collect::<Vec<_>>()))),
+        };
+        let largest = |of: fn(&Verdict, &Unexplained) -> f64| group.iter().copied().max_by(|a, b| of(v, a).total_cmp(&of(v, b)));
+        let size = largest(rms_left).map(|u| size_left(v, u)).unwrap_or_default();
+        let floors = largest(floors_left).map_or(0.0, |u| floors_left(v, u));
+        Some(vec![name, format!("{up_to}{floors:.1}"), format!("{up_to}{size}"), looks, goes])
+    };
+    groups.iter().filter_map(row).collect()
+}
+
+/// The error that is left, in the channel's unit.
+fn rms_left(v: &Verdict, u: &Unexplained) -> f64 {
+    v.channels.get(&u.channel).map_or(0.0, |c| c.after.heldout_rms)
 }
 
 /// Times the error on rows that the fit saw from which on that on rows it did not see is told apart.
@@ -115,4 +163,45 @@ pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
         data_uri("application/toml", &file),
         escape("quadrig rig run --next verdict.json -o next.csv")
     ));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::closed::vocabulary::bare_verdict;
+
+    fn left(channel: &str, looks_like: &str) -> Unexplained {
+        Unexplained { channel: channel.into(), over_floor: 4.0, depends_on: Vec::new(), looks_like: looks_like.into() }
+    }
+
+    /// What is true of every remainder of an attitude log is told once, and its axes that look alike share a row.
+    #[test]
+    fn what_is_said_of_all_is_said_once() {
+        let of = |name: &str, when: &str| left(name, &format!("more than noise, {when}; the attitude is off"));
+        let v = bare_verdict(vec![
+            of("ax", "over the whole run"),
+            of("ay", "over the whole run"),
+            of("az", "mostly from 4.0 to 5.0 s"),
+        ]);
+        let shared = shared(&v);
+        assert_eq!(shared.as_deref(), Some("the attitude is off"));
+        let rows = alike(&v, &v.unexplained.iter().collect::<Vec<_>>(), shared.as_deref());
+        let told: Vec<[&str; 3]> = rows.iter().map(|r| [r[0].as_str(), r[1].as_str(), r[3].as_str()]).collect();
+        assert_eq!(
+            told,
+            [
+                ["Specific force (x and y)", "up to 4.0", "more than noise, over the whole run"],
+                ["Specific force (z)", "4.0", "more than noise, mostly from 4.0 to 5.0 s"]
+            ]
+        );
+        assert_eq!(super::shared(&bare_verdict(vec![left("ax", "slow"), left("ay", "slow; a tail")])), None);
+    }
+
+    /// What a short table cannot prove it says as far as it goes, where a reader looks for it.
+    #[test]
+    fn what_it_seems_to_go_with_stands_in_its_column() {
+        let said = looks_and_goes(&left("voltage_v", "over several rows; goes with current, as far as 36 rows can show"), None);
+        assert_eq!(said, ("over several rows".to_owned(), "current, as far as 36 rows can show".to_owned()));
+        assert_eq!(looks_and_goes(&left("voltage_v", "slow"), None).1, "nothing in the log");
+    }
 }

@@ -9,6 +9,7 @@
 mod brief;
 mod cards;
 mod cautions;
+mod contest;
 mod evidence;
 mod fold;
 mod left;
@@ -20,13 +21,17 @@ mod state;
 mod terminal;
 mod vocabulary;
 
-pub(crate) use evidence::{ALONE, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, slug, thinned};
+pub(crate) use evidence::{
+    ALONE, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, slug, thinned, two_ways,
+};
 pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};
-pub(crate) use page::{Page, begin};
+pub(crate) use page::{Page, Reading, begin};
 pub use provenance::{Hidden, Origin};
 pub use sentence::sentence;
 pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal, wrapped};
 pub use vocabulary::Vocabulary;
 pub(crate) use vocabulary::bare;
+#[cfg(test)]
+pub(crate) use vocabulary::bare_entry;

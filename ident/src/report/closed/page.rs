@@ -33,10 +33,31 @@ pub(crate) struct Page<'p> {
     pub(crate) cards: Vec<Vec<Figure>>,
     /// Figures of what is left.
     pub(crate) left: Vec<Figure>,
+    /// Single readings that were set apart.
+    pub(crate) readings: Vec<Reading>,
     /// Of several runs: each parameter run by run, the head first.
     pub(crate) parameters: Vec<Vec<String>>,
     /// Figures of several speeds together, under a heading of their own.
     pub(crate) speeds: (&'static str, Vec<Figure>),
+}
+
+/// A single reading that was set apart.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Reading {
+    /// With several runs the one that it is of, else empty.
+    pub(crate) run: String,
+    /// Channel.
+    pub(crate) channel: String,
+    /// When, s, or its row where time is the row.
+    pub(crate) t: f64,
+    /// Whether time is the row.
+    pub(crate) is_row: bool,
+    /// What was read.
+    pub(crate) value: f64,
+    /// The median of it and its neighbours.
+    pub(crate) expected: f64,
+    /// Unit of both.
+    pub(crate) unit: &'static str,
 }
 
 /// The page up to where the folds begin.
@@ -47,7 +68,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     let declared = if page.news { "the one that was given" } else { page.words.declared };
     let mut sheet = Sheet::told(&format!("{of_what}: what the model lacks"), &said);
     sheet.soft(&page.origin.line());
-    sheet.html_part(&state::state(v, declared, said.contains(PER_CENT)));
+    sheet.html_part(&state::state(v, declared, said.contains(PER_CENT), state::is_as_before(v, page.news)));
     match page.origin.lacks.as_slice() {
         [lack] => sheet.warn(&format!("{lack}.")),
         [lack, others @ ..] => {
@@ -105,6 +126,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     if page.origin.lacks.len() > 1 {
         sheet.fold("Rows that are missing", |sheet| page.origin.lacks.iter().for_each(|lack| sheet.say(&format!("{lack}."))));
     }
+    fold::sureness(&mut sheet, page);
     sheet.fold("Every channel in numbers", |sheet| {
         sheet.say(&page.declared);
         fold::channels(sheet, v, page.words.held_out);

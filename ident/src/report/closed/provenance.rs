@@ -7,6 +7,7 @@
 
 use super::cards::{is_shown, value};
 use super::vocabulary::Vocabulary;
+use crate::date;
 use crate::log::{Gaps, Log, digest_of};
 use crate::model::FittedTo;
 use crate::report::sheet::Sheet;
@@ -159,12 +160,18 @@ impl Origin {
             _ => list(&self.logs().map(|l| l.name.clone()).collect::<Vec<_>>()),
         }];
         parts.extend(["motor", "propeller", "supply"].iter().filter_map(|k| self.states.get(*k).cloned()));
-        parts.extend(self.log.date.clone());
+        parts.extend(self.log.date.clone().or_else(|| self.day_by_name()));
         parts.push(match self.seconds {
             Some(s) => format!("{} rows in {s:.0} s", self.logs().map(|l| l.rows).sum::<usize>()),
             None => format!("{} rows", self.logs().map(|l| l.rows).sum::<usize>()),
         });
         parts.join(" - ")
+    }
+
+    /// The day of a single log by its file name, where its head states none.
+    fn day_by_name(&self) -> Option<String> {
+        let name = self.others.is_empty().then(|| date::in_name(&self.log.name))?;
+        name.map(|day| format!("{day}, by its file name"))
     }
 
     /// The command that writes the page again.
@@ -196,6 +203,9 @@ pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict) 
     };
     for log in origin.logs() {
         row("log", log.name.clone());
+        if let Some(day) = date::in_name(&log.name).filter(|_| log.date.is_none()) {
+            row("date", format!("{day}, by its file name"));
+        }
         row("SHA-256", log.sha256.clone());
         row("rows", log.rows.to_string());
     }
@@ -204,7 +214,8 @@ pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict) 
         row(&label, origin.states.get(key).cloned().unwrap_or_default());
     }
     for key in ["motor", "propeller", "supply", "date"] {
-        if !origin.states.contains_key(key) && (origin.of_a_rig || key == "date") {
+        let named = key == "date" && origin.logs().any(|log| date::in_name(&log.name).is_some());
+        if !origin.states.contains_key(key) && !named && (origin.of_a_rig || key == "date") {
             row(key, "not stated in the log".to_owned());
         }
     }

@@ -5,19 +5,18 @@
 //! Units: each size carries its own.
 //! Reference: specification `formats.md`, "Verdict".
 
+use super::cards::{is_shown, value};
+use super::contest::{Rival, is_beaten, rivals};
 use super::vocabulary::Vocabulary;
 use crate::rivals::beyond;
 use crate::unexplained::LOUD;
-use crate::verdict::{Channel, EffectEntry, Kin, Kind, Unexplained, Verdict};
-use crate::words::{Clause, adverb, amount, channel, heading, list, upper, vector};
-use std::collections::BTreeSet;
+use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Kind, Unexplained, Verdict};
+use crate::words::{Clause, adverb, amount, channel, counted, heading, list, upper, vector};
 
 /// Most effects that the sentence names; the cards have all.
-const MOST: usize = 3;
+const MOST: usize = 2;
 /// Share of its channel's error below which an effect is a smaller cause.
 const SMALL: f64 = 0.02;
-/// Most ways in which an open question is put.
-const WAYS: usize = 3;
 /// Share of the first alternative's probability from which on a further one is put beside it.
 const CLOSE: f64 = 0.5;
 /// Least share of what a channel had left over that is worth a figure in the sentence.
@@ -92,11 +91,14 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     // what takes next to nothing, or is of sizes that may be nothing, stands on its card alone, unless there is nothing else
     let known = |e: &EffectEntry| !e.is_of_single_readings() && e.open_sizes().is_none();
     let large = |e: &&&EffectEntry| (e.heldout_error_reduction >= SMALL && known(e)) || all.len() == 1;
-    let mut told: Vec<&EffectEntry> = all.iter().filter(large).take(MOST).copied().collect();
-    if told.is_empty() {
-        told = all.iter().take(1).copied().collect();
+    // no name stands above a likelier one
+    let told: Vec<&EffectEntry> = all.iter().filter(large).filter(|e| !beaten(verdict, words, e)).take(MOST).copied().collect();
+    let Some(first) = told.first().or(all.first()) else { return String::new() };
+    if told.is_empty() && beaten(verdict, words, first) {
+        return contested(verdict, words, news, &[*first]);
     }
-    let more = all.len() - told.len();
+    let told = if told.is_empty() { vec![*first] } else { told };
+    let more = causes(all).saturating_sub(told.len());
     let clauses = by_subject(&told, words);
     let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
     if own.is_empty() {
@@ -112,73 +114,119 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         .join(" ")
 }
 
+/// How many causes there are: single readings are none.
+fn causes(all: &[&EffectEntry]) -> usize {
+    all.iter().filter(|e| !e.is_of_single_readings()).count()
+}
+
+/// The position of an effect among those of the verdict.
+fn place(verdict: &Verdict, e: &EffectEntry) -> usize {
+    verdict.effects.iter().position(|other| std::ptr::eq(other, e)).unwrap_or(usize::MAX)
+}
+
+/// Whether something else is likelier than an effect.
+fn beaten(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> bool {
+    is_beaten(verdict, words, place(verdict, e))
+}
+
+/// What an effect does, with its size, or with a bound where the run shows no more.
+fn sized_clause(words: Vocabulary, e: &EffectEntry) -> Clause {
+    let clause = words.said(e);
+    if (words.clause)(e).does.contains(|c: char| c.is_ascii_digit()) {
+        return clause;
+    }
+    let bound = e.parameters.iter().find(|p| is_shown(words, e, p) && counted(p).is_none()).map(|p| {
+        let name = (words.parameter)(&e.id, &p.name);
+        let [_, interval, unit] = value(p);
+        format!("{} ({name} {})", clause.does, format!("{interval} {unit}").trim_end())
+    });
+    Clause { does: bound.unwrap_or(clause.does), ..clause }
+}
+
 /// A clause for each effect; what differs from run to run is one clause with a part for each.
 fn by_subject(told: &[&EffectEntry], words: Vocabulary) -> Vec<String> {
     let mut out: Vec<(&EffectEntry, Vec<String>)> = Vec::new();
     for e in told {
         match out.iter_mut().find(|(first, _)| first.run.is_some() && e.run.is_some() && first.id == e.id) {
-            Some((_, parts)) => parts.push(words.said(e).does),
-            None => out.push((e, vec![words.said(e).does])),
+            Some((_, parts)) => parts.push(sized_clause(words, e).does),
+            None => out.push((e, vec![sized_clause(words, e).does])),
         }
     }
     out.iter().map(|(e, parts)| Clause::new(words.said(e).who, list(parts)).with(adverb(e.probability))).collect()
 }
 
 fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
-    let (own, common) = named(verdict, words);
     let best: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
-    let first = verdict.alternatives.first();
-    let floor = CLOSE * first.map_or(0.0, |a| a.probability);
-    let close = verdict.alternatives.iter().filter(|a| a.probability >= floor).take(WAYS - 1);
     // what the first alternative does without is what the question is about
-    let disputed: Vec<&EffectEntry> = first.map_or(best.clone(), |a| without(&best, &a.ids));
-    let mut ways = vec![disputed.iter().map(|e| words.said(e).with("")).collect::<Vec<_>>()];
-    // a hypothesis that differs elsewhere is another question
-    let same = |ids: &[String]| without(&best, ids).iter().map(|e| &e.id).eq(disputed.iter().map(|e| &e.id));
-    for other in close.filter(|a| same(&a.ids)) {
-        let clause = |id: &String| words.of_another(id, disputed.first().copied()).with("");
-        let instead: Vec<String> = instead(&best, &other.ids).iter().map(clause).collect();
-        if !ways.contains(&instead) {
-            ways.push(instead);
-        }
-    }
-    ways.retain(|w| !w.is_empty());
-    let doubt = if verdict.proposed().is_some() {
-        "this run cannot tell, the run proposed below may"
-    } else if verdict.next_experiment.is_some() {
-        "this run cannot tell, nor can any schedule that was tried"
-    } else {
-        "this run cannot tell"
+    let disputed: Vec<&EffectEntry> = match verdict.alternatives.first() {
+        Some(Alternative { change: Some(change), .. }) => verdict.effects.get(change.place).into_iter().collect(),
+        Some(other) => without(&best, &other.ids),
+        None => best,
     };
-    let question = match ways.as_slice() {
-        [] => "the causes named below are not sure on this run".to_owned(),
-        [one] => format!("perhaps {}: {doubt}", list(one)),
-        [first, rest @ ..] => {
-            // words and figures must agree
-            let best = disputed.iter().map(|e| e.probability).fold(0.0, f64::max);
-            let behind = verdict.alternatives.first().is_some_and(|a| a.probability < CLOSE * best);
-            let (either, or) = if behind { ("perhaps", "or, less likely,") } else { ("either", "or") };
-            let rest: Vec<String> = rest.iter().map(|w| format!("{or} {}", list(w))).collect();
-            format!("{either} {}, {}: {doubt}", list(first), rest.join(", "))
-        }
-    };
+    contested(verdict, words, news, &disputed)
+}
+
+/// The sentence where a question is open: what could stand in the place of some effects, the likeliest first, and the largest sure cause.
+fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&EffectEntry]) -> String {
+    let (own, common) = named(verdict, words);
+    let question = question(verdict, words, disputed);
     let all = if own.is_empty() { &common } else { &own };
     let sure = all.iter().copied().filter(|e| !disputed.iter().any(|d| std::ptr::eq(*d, *e)));
     // what takes most comes first, be it sure or open
     let removed = |all: &[&EffectEntry]| all.iter().map(|e| e.heldout_error_reduction).fold(0.0, f64::max);
-    let sure: Vec<&EffectEntry> = sure.take(MOST).collect();
+    let sure: Vec<&EffectEntry> = sure.filter(|e| !beaten(verdict, words, e)).take(MOST - 1).collect();
     let told = sure.len() + all.iter().filter(|e| disputed.iter().any(|d| std::ptr::eq(*d, **e))).count();
-    let said: Vec<String> = sure.iter().map(|e| words.said(e).with(adverb(e.probability))).collect();
+    let said: Vec<String> = sure.iter().map(|e| sized_clause(words, e).with(adverb(e.probability))).collect();
     let out = if sure.is_empty() {
         format!("{}.", since(news, &question))
-    } else if removed(&sure) > removed(&disputed) {
+    } else if removed(&sure) > removed(disputed) {
         format!("{}. {}.", since(news, &joined_lower(&said)), upper(&question))
     } else {
         format!("{}. Beside that, {}.", since(news, &question), joined_lower(&said))
     };
     let nameless = verdict.effects.iter().any(|e| e.id == "unknown" && !e.is_without_correction());
-    let below = below(all.len().saturating_sub(told), nameless);
+    let below = below(causes(all).saturating_sub(told), nameless);
     [out, below, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+/// What is asked of some effects: each way in which it may be, the likeliest first.
+fn question(verdict: &Verdict, words: Vocabulary, disputed: &[&EffectEntry]) -> String {
+    let doubt = doubt(verdict);
+    let best = disputed.iter().map(|e| e.probability).fold(0.0, f64::max);
+    let mut ways = vec![Rival {
+        ids: Vec::new(),
+        said: list(&disputed.iter().map(|e| sized_clause(words, e).with("")).collect::<Vec<_>>()),
+        probability: best,
+    }];
+    if let Some(first) = disputed.first() {
+        let against = rivals(verdict, words, place(verdict, first));
+        let none = Rival::none(verdict, words, first, &against);
+        // that it has no cause of its own is a way where nothing is likelier
+        let stands = against.iter().map(|r| r.probability).fold(best, f64::max) < none.probability;
+        ways.extend(against.into_iter().chain(stands.then_some(none)));
+    }
+    ways.retain(|way| !way.said.is_empty());
+    ways.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    ways.dedup_by(|a, b| a.said == b.said);
+    match ways.as_slice() {
+        [] => "the causes named below are not sure on this run".to_owned(),
+        [one] => format!("perhaps {}: {doubt}", one.said),
+        // words and figures must agree
+        [first, second, ..] if second.probability < CLOSE * first.probability => {
+            format!("perhaps {}, or, less likely, {}: {doubt}", first.said, second.said)
+        }
+        [first, second, ..] => format!("either {}, or {}: {doubt}", first.said, second.said),
+    }
+}
+
+/// That the question is open, and what may settle it.
+fn doubt(verdict: &Verdict) -> &'static str {
+    match &verdict.next_experiment {
+        Some(next) if next.separates => "this run cannot tell, the run proposed below may",
+        Some(_) => "this run cannot tell, nor can any schedule that was tried",
+        None if verdict.runs.len() > 1 => "these runs cannot tell",
+        None => "this run cannot tell",
+    }
 }
 
 /// What the cards have beside what the sentence tells: smaller causes, and what has no name.
@@ -198,16 +246,27 @@ fn below(more: usize, nameless: bool) -> String {
 
 fn unattributed(verdict: &Verdict, news: bool) -> String {
     let corrections: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id == "unknown").collect();
-    let mut on: Vec<String> = corrections.iter().flat_map(|e| e.channels.iter().map(|c| channel(c))).collect();
+    let mut on: Vec<String> = corrections.iter().flat_map(|e| e.channels.clone()).collect();
     if on.is_empty() {
-        on = verdict.unexplained.iter().map(|u| channel(&u.channel)).collect();
+        on = verdict.unexplained.iter().map(|u| u.channel.clone()).collect();
     }
+    let elsewhere = loudest(verdict).filter(|u| !on.iter().any(|c| quantity(c) == quantity(&u.channel)));
+    on = on.iter().map(|c| channel(c)).collect();
     on.dedup();
-    let place = if on.is_empty() { String::new() } else { format!(" on {}", list(&on)) };
-    let mut out = since(news, &format!("something is left{place} that no known effect explains."));
     let mut goes: Vec<String> =
         corrections.iter().filter(|e| e.heldout_error_reduction > 0.0).flat_map(|e| &e.depends_on).map(|v| channel(v)).collect();
     goes.dedup();
+    // what is largest stands first, also where it was on another channel that a curve helped
+    if let Some(loudest) = elsewhere {
+        let fitted = match goes.is_empty() {
+            true => "Nothing that was tried predicts it, so nothing was added to the model.".to_owned(),
+            false => format!("A smooth term without a name was fitted on {}; it goes with {}.", list(&on), list(&goes)),
+        };
+        let first = since(news, &format!("most is left on {}: {}.", channel(&loudest.channel), size_and_looks(verdict, loudest)));
+        return format!("{first} No known effect explains it. {fitted}");
+    }
+    let place = if on.is_empty() { String::new() } else { format!(" on {}", list(&on)) };
+    let mut out = since(news, &format!("something is left{place} that no known effect explains."));
     if goes.is_empty() {
         out += " Nothing that was tried predicts it, so nothing was added to the model.";
     } else {
@@ -226,7 +285,8 @@ fn none(verdict: &Verdict, news: bool) -> String {
         }
         (false, true) => "The declared model explains the run: no channel is left with more than its noise.".to_owned(),
         (true, false) => {
-            format!("Nothing is new since the declared model: what is left it left over on its own day, too. {}", left(verdict))
+            let most = largest(verdict).map(|l| format!(", most on {}: {}", l.on, l.size)).unwrap_or_default();
+            format!("Nothing has changed since the model was made; the same errors remain{most}.")
         }
         (false, false) => format!("No name was found for what the declared model leaves over. {}", left(verdict)),
     }
@@ -301,7 +361,7 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> Option<Explained> {
     let others = verdict.effects.iter().any(|e| beside(&e));
     let nameless = verdict.effects.iter().filter(beside).any(|e| e.id == "unknown");
     let subject = match (others, told.len()) {
-        (true, _) if nameless => "With all that is told below, what has no name included, the model explains",
+        (true, _) if nameless => "With all that is told below the model explains",
         (true, _) => "With all that is named below the model explains",
         (false, 1) => "That explains",
         (false, _) => "Together they explain",
@@ -366,27 +426,52 @@ pub(super) fn floors_left(verdict: &Verdict, u: &Unexplained) -> f64 {
     verdict.channels.get(&u.channel).map_or(u.over_floor, |c| c.after.heldout_rms / c.noise_floor_rms)
 }
 
-fn left(verdict: &Verdict) -> String {
-    let Some(loudest) = loudest(verdict) else {
-        let said = if goes_beyond_noise(verdict) { "Little is left beyond the noise." } else { "What is left is noise." };
-        return said.to_owned();
-    };
+/// The remainder that the sentence tells.
+struct Largest<'v> {
+    /// The channel, or the speeds where several sensors are left with something.
+    on: String,
+    /// Its size, with unit.
+    size: String,
+    /// What it looks like is told of the sensor whose size is told.
+    told: &'v Unexplained,
+}
+
+/// The loudest remainder.
+fn largest(verdict: &Verdict) -> Option<Largest<'_>> {
+    let loudest = loudest(verdict)?;
     let what = quantity(&loudest.channel);
-    let others: BTreeSet<&str> = loud(verdict).map(|u| quantity(&u.channel)).filter(|q| *q != what).collect();
     let sensors = loud(verdict).filter(|u| quantity(&u.channel) == what && verdict.channels.contains_key(&u.channel)).count();
     let on = if sensors > 1 { "the speeds".to_owned() } else { channel(&loudest.channel) };
     let of = |u: &&Unexplained| verdict.channels.get(&u.channel).map_or(0.0, |c| c.after.heldout_rms);
     let largest = loud(verdict).filter(|u| sensors > 1 && quantity(&u.channel) == what).max_by(|a, b| of(a).total_cmp(&of(b)));
-    // what it looks like is told of the sensor whose size is told
     let told = largest.unwrap_or(loudest);
     let up_to = if largest.is_some() { "up to " } else { "" };
-    let size = format!("{up_to}{} rms", size_left(verdict, told));
-    // the first words; the section on what is left has all
-    let looks = told.looks_like.split(';').next().unwrap_or_default().replace("in one stretch", "mostly in one stretch");
-    let named: Vec<String> = others.iter().map(|q| channel(q)).collect();
-    match named.len() {
-        0 => format!("On {on} {size} is left ({looks})."),
-        1..=3 => format!("Most is left on {on}: {size} ({looks}); something is left on {}.", list(&named)),
-        n => format!("Most is left on {on}: {size} ({looks}); something is left on {n} more quantities."),
+    Some(Largest { on, size: format!("{up_to}{} rms", size_left(verdict, told)), told })
+}
+
+/// What a remainder looks like, in its first words; the section on what is left has all.
+fn looks(u: &Unexplained) -> String {
+    let first = u.looks_like.split(';').next().unwrap_or_default();
+    let first = first.strip_prefix("loudest on ").and_then(|rest| Some(rest.split_once(": ")?.1)).unwrap_or(first);
+    let seems = u.looks_like.split("; ").find(|part| part.starts_with("goes with ")).filter(|_| u.depends_on.is_empty());
+    let first =
+        first.replace("in one stretch", "mostly in one stretch").replace("while the load is on its way", "as the load changes");
+    seems.map_or(first.clone(), |seems| format!("{first}; it {seems}"))
+}
+
+fn size_and_looks(verdict: &Verdict, u: &Unexplained) -> String {
+    format!("{} rms ({})", size_left(verdict, u), looks(u))
+}
+
+fn left(verdict: &Verdict) -> String {
+    let Some(Largest { on, size, told }) = largest(verdict) else {
+        let said = if goes_beyond_noise(verdict) { "Little is left beyond the noise." } else { "What is left is noise." };
+        return said.to_owned();
+    };
+    let what = quantity(&told.channel);
+    // what is left on the other channels stands beside their bars
+    match loud(verdict).any(|u| quantity(&u.channel) != what) {
+        false => format!("On {on} {size} is left ({}).", looks(told)),
+        true => format!("Most is left on {on}: {size} ({}).", looks(told)),
     }
 }

@@ -8,7 +8,7 @@
 use super::evidence::pair;
 use crate::report::svg::escape;
 use crate::unexplained::LOUD;
-use crate::verdict::{Channels, Verdict};
+use crate::verdict::{Channels, Kind, Verdict};
 use crate::words::{channel, digits, scaled, upper};
 use std::fmt::Write;
 
@@ -47,16 +47,23 @@ pub(super) fn figures(unit: &str, floor: f64, before: f64, after: f64) -> [Strin
     [floor, before, after].map(|v| format!("{} {unit}", digits(factor * v, 0.005 * (factor * v).abs())))
 }
 
-/// What is said of a channel in a word. `left`: what remains is no noise; `named`: a name improves it.
-pub(super) fn word([before, after]: [f64; 2], left: bool, named: bool) -> &'static str {
+/// What is said of a channel in a word. `left`: what remains is no noise; `named`: a name improves it; `known`: nothing has changed since the
+/// declared model was made, so that what remains was there before.
+pub(super) fn word([before, after]: [f64; 2], left: bool, named: bool, known: bool) -> &'static str {
     match after {
         f if !f.is_finite() => "not known",
+        f if known && (left || f > EXPLAINED) => "as before",
         f if f > LOUD => "unexplained rest",
         f if f > EXPLAINED => "little left",
         _ if left => "a trace left",
         _ if before <= EXPLAINED && !named => "only noise",
         _ => "explained",
     }
+}
+
+/// Whether nothing has changed since the declared model was made: what remains is what it was off by then.
+pub(super) fn is_as_before(v: &Verdict, news: bool) -> bool {
+    news && v.verdict == Kind::None
 }
 
 /// The channels that a name improves most.
@@ -72,7 +79,7 @@ fn spoken(name: &str) -> String {
 }
 
 /// The bars of a verdict's channels.
-pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool) -> String {
+pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool, known: bool) -> String {
     let left: Vec<&str> = v.unexplained.iter().map(|u| u.channel.as_str()).collect();
     let share = if per_cent {
         " A share in per cent is of the squared error above the noise floor: 75 % less is half the error."
@@ -80,11 +87,15 @@ pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool) -> String {
         ""
     };
     let key = format!("<p class=\"soft\">The declared model: {declared}.{share}</p>\n");
-    bars(&v.channels, &left, &named(v), pair(v)) + &key
+    drawn(&v.channels, &left, &named(v), known, pair(v)) + &key
 }
 
 /// The bars; `left` are the channels on which more than noise is left, `named` those that a name improves.
-pub(crate) fn bars(channels: &Channels, left: &[&str], named: &[&str], [_, after]: [&str; 2]) -> String {
+pub(crate) fn bars(channels: &Channels, left: &[&str], named: &[&str], names: [&str; 2]) -> String {
+    drawn(channels, left, named, false, names)
+}
+
+fn drawn(channels: &Channels, left: &[&str], named: &[&str], known: bool, [_, after]: [&str; 2]) -> String {
     let scale = Scale::of(channels);
     let mut out = String::from("<div class=\"state\" role=\"table\" aria-label=\"error of each channel before and after\">\n");
     out +=
@@ -127,7 +138,7 @@ pub(crate) fn bars(channels: &Channels, left: &[&str], named: &[&str], [_, after
             out,
             "</span><span class=\"num\" role=\"cell\" data-of=\"before\">{before}</span><span class=\"num\" role=\"cell\" data-of=\"after\">{after}</span><span class=\"num\" role=\"cell\" data-of=\"factor\">{}</span><span class=\"word\" role=\"cell\">{}</span></div>",
             factor(c.before.heldout_rms, c.after.heldout_rms),
-            word(floors, left, named),
+            word(floors, left, named, known),
         );
     }
     for (name, reason) in &channels.not_predicted {
@@ -177,7 +188,13 @@ mod tests {
             ([40.0, 3.5], false, true, "unexplained rest"),
             ([40.0, f64::NAN], false, true, "not known"),
         ] {
-            assert_eq!(word(floors, left, named), said, "{floors:?} {left} {named}");
+            assert_eq!(word(floors, left, named, false), said, "{floors:?} {left} {named}");
+        }
+        // nothing is unexplained of what the model is known to be off by
+        for (floors, left, said) in
+            [([3.5, 3.5], true, "as before"), ([2.0, 2.0], false, "as before"), ([1.2, 0.9], false, "only noise")]
+        {
+            assert_eq!(word(floors, left, false, true), said, "{floors:?} {left}");
         }
     }
 

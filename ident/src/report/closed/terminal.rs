@@ -7,9 +7,9 @@
 
 use super::cards::{alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value};
 use super::cautions::cautions;
-use super::left::in_words;
+use super::left::{in_words, looks_and_goes, shared};
 use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
-use super::state::{factor, figures, named, word};
+use super::state::{factor, figures, is_as_before, named, word};
 use super::vocabulary::Vocabulary;
 use crate::bad::SetAside;
 use crate::context::unit_of;
@@ -28,7 +28,7 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
     let verdict = &*whole.briefly();
     let said = sentence(verdict, words, news);
     let mut out = format!("{}\n{}\n", wrapped(&said, 0), wrapped(&whose(whole), 0));
-    out += &channels(verdict);
+    out += &channels(verdict, is_as_before(verdict, news));
     if said.contains(PER_CENT) {
         out += "(per cent of the squared error above the noise floor: 75 % less is half the error)\n";
     }
@@ -40,6 +40,7 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     let of = |k: &usize| &verdict.effects[*k];
     let (named, nameless): (Vec<usize>, Vec<usize>) = order(verdict, words).into_iter().partition(|k| of(k).id != "unknown");
+    let (readings, named): (Vec<usize>, Vec<usize>) = named.into_iter().partition(|k| of(k).is_of_single_readings());
     let (own, common): (Vec<usize>, Vec<usize>) = named.into_iter().partition(|k| !(words.of_every_rig)(of(k)));
     let noun = words.noun;
     let [this, every] = [format!("what this {noun} has"), format!("what every {noun} has")];
@@ -49,6 +50,7 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
             alike(verdict, &members).iter().for_each(|group| out += &effect(verdict, words, group));
         }
     }
+    out += &set_apart(verdict, words, &readings);
     out += &left(verdict);
     out += &set_aside(verdict);
     let all: Vec<String> = verdict.alternatives.iter().filter_map(|a| alternative(verdict, a)).collect();
@@ -80,6 +82,11 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
 
 /// By what another hypothesis differs: what it has, and what it does without; nothing where its names are the same.
 fn alternative(verdict: &Verdict, other: &Alternative) -> Option<String> {
+    if let Some(change) = &other.change {
+        let place = verdict.effects.get(change.place)?;
+        let on = channels_of(verdict, &[change.place]);
+        return Some(format!("{} in the place of {} on {on} ({})", change.id, place.id, probability(change.probability)));
+    }
     let best: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
     let more = instead(&best, &other.ids).join(" + ");
     let less = without(&best, &other.ids).iter().map(|e| e.id.as_str()).collect::<Vec<_>>().join(" + ");
@@ -102,7 +109,7 @@ fn whose(verdict: &Verdict) -> String {
     }
 }
 
-fn channels(verdict: &Verdict) -> String {
+fn channels(verdict: &Verdict, known: bool) -> String {
     let error = if verdict.runs.is_empty() { "held-out error" } else { "across runs" };
     let named = named(verdict);
     let row = |(name, c): (&String, &Channel)| {
@@ -111,7 +118,7 @@ fn channels(verdict: &Verdict) -> String {
         let left = verdict.unexplained.iter().any(|u| u.channel == *name);
         let named = named.contains(&name.as_str());
         let times = factor(c.before.heldout_rms, c.after.heldout_rms);
-        [channel(name), floor, before, after, times, word(floors, left, named).to_owned()]
+        [channel(name), floor, before, after, times, word(floors, left, named, known).to_owned()]
     };
     let head = [error, "noise floor", "before", "after", "factor", "state"].map(str::to_owned);
     let rows: Vec<[String; 6]> = std::iter::once(head).chain(verdict.channels.iter().map(row)).collect();
@@ -159,23 +166,29 @@ fn effect(verdict: &Verdict, words: Vocabulary, group: &[usize]) -> String {
     out + &format!("    {}\n", wrapped(&format!("known by: {}", plain(signs(&e.evidence))), 4))
 }
 
+/// Single readings about which nothing is claimed, a line for each channel and run.
+fn set_apart(verdict: &Verdict, words: Vocabulary, members: &[usize]) -> String {
+    let Some(first) = members.first() else { return String::new() };
+    let mut out = format!("\nreadings set apart ({})\n", verdict.effects[*first].id);
+    members.iter().for_each(|k| out += &format!("  {}\n", wrapped(&words.said(&verdict.effects[*k]).sentence(), 4)));
+    out
+}
+
 fn left(verdict: &Verdict) -> String {
     if verdict.unexplained.iter().all(|u| verdict.channels.not_predicted.contains_key(&u.channel)) {
         return String::new();
     }
     let mut out = String::from("\nwhat is left\n");
+    let shared = shared(verdict);
     for u in verdict.unexplained.iter().filter(|u| !verdict.channels.not_predicted.contains_key(&u.channel)) {
-        let on: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
-        let on = if on.is_empty() { String::new() } else { format!(", goes with {}", list(&on)) };
-        let size = size_left(verdict, u);
-        out += &format!(
-            "  {}\n",
-            wrapped(
-                &format!("{}: {size}, {:.1} noise floors, {}{on}", channel(&u.channel), floors_left(verdict, u), u.looks_like),
-                4
-            )
-        );
+        let (looks, goes) = looks_and_goes(u, shared.as_deref());
+        let silent = goes == "nothing in the log" || looks.contains("grows with the load") && u.depends_on.is_empty();
+        let on = if silent { String::new() } else { format!(", goes with {goes}") };
+        let of = [channel(&u.channel), size_left(verdict, u), format!("{:.1} noise floors", floors_left(verdict, u))];
+        let [name, size, floors] = of;
+        out += &format!("  {}\n", wrapped(&format!("{name}: {size}, {floors}, {looks}{on}"), 4));
     }
+    shared.iter().for_each(|said| out += &format!("  {}\n", wrapped(&format!("of all of them: {said}"), 4)));
     out
 }
 

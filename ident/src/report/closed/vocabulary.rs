@@ -68,19 +68,9 @@ impl Vocabulary {
 
     /// What an effect that was not found would do, on the channels of one that was.
     pub(crate) fn of_another(self, id: &str, beside: Option<&EffectEntry>) -> Clause {
-        let entry = EffectEntry {
-            kin: Kin::Own,
-            id: id.to_owned(),
-            scope: beside.map_or(Scope::Rig, |e| e.scope),
-            run: None,
-            channels: beside.map(|e| e.channels.clone()).unwrap_or_default(),
-            depends_on: Vec::new(),
-            equation: String::new(),
-            probability: 0.0,
-            parameters: Vec::new(),
-            heldout_error_reduction: 0.0,
-            evidence: String::new(),
-        };
+        let scope = beside.map_or(Scope::Rig, |e| e.scope);
+        let channels = beside.map(|e| e.channels.clone()).unwrap_or_default();
+        let entry = EffectEntry { scope, channels, ..bare_entry(id) };
         (self.clause)(&entry)
     }
 }
@@ -88,4 +78,42 @@ impl Vocabulary {
 /// The words for an effect of which only the identifier is known.
 pub(crate) fn bare(found: &EffectEntry) -> Clause {
     Clause::titled(&found.id.replace('_', " "), found)
+}
+
+/// An effect of which only the identifier is known.
+pub(crate) fn bare_entry(id: &str) -> EffectEntry {
+    EffectEntry {
+        kin: Kin::Own,
+        id: id.to_owned(),
+        scope: Scope::Rig,
+        run: None,
+        channels: Vec::new(),
+        depends_on: Vec::new(),
+        equation: String::new(),
+        probability: 0.0,
+        parameters: Vec::new(),
+        heldout_error_reduction: 0.0,
+        evidence: String::new(),
+    }
+}
+
+/// A verdict that only says what is left.
+#[cfg(test)]
+pub(crate) fn bare_verdict(unexplained: Vec<crate::verdict::Unexplained>) -> crate::verdict::Verdict {
+    crate::verdict::Verdict {
+        format: crate::verdict::FORMAT,
+        run: "run.csv".to_owned(),
+        verdict: crate::verdict::Kind::Unattributed,
+        channels: crate::verdict::Channels::default(),
+        effects: Vec::new(),
+        unexplained,
+        alternatives: Vec::new(),
+        next_experiment: None,
+        left_out: Vec::new(),
+        set_aside: Vec::new(),
+        guessed_floors: None,
+        at_rest: false,
+        validation: Vec::new(),
+        runs: Vec::new(),
+    }
 }

@@ -44,6 +44,17 @@ fn a_level_line_leaves_the_scale_to_the_others() {
     assert!(alone.0 < 8.0 && alone.1 > 9.0, "{alone:?}");
 }
 
+/// Points over categories do not lie on the axis, columns stand on it.
+#[test]
+fn points_have_room_above_the_names_of_categories() {
+    let mark = |x: f64, y: f64| Mark { x, y, error: 0.0, text: String::new() };
+    let marks = Layer::Marks { name: String::new(), class: "a", marks: vec![mark(0.0, 0.45), mark(1.0, 0.53)] };
+    let columns = Layer::Columns { name: String::new(), class: "a", place: (0, 1), values: vec![(0, 1.0, String::new())] };
+    let low =
+        |layer: Layer| Figure { layers: vec![layer], categories: vec!["1".into(), "2".into()], ..Figure::default() }.frame().y.0;
+    assert!(low(marks) < 0.449 && low(columns) == 0.0);
+}
+
 #[test]
 fn nothing_to_show_is_said() {
     assert!(Figure::default().is_empty());

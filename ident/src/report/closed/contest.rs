@@ -1,0 +1,87 @@
+//! What stands against each name: its rivals, each with its probability, and what no rival has.
+//!
+//! What it is: the other hypotheses of a verdict sorted by the effect in whose place they put something, said in clauses.
+//! What can go wrong: of a hypothesis that differs in several places only the names are known; it counts for every effect that it lacks.
+//! Units: probabilities 0 to 1.
+//! Reference: specification `formats.md`, "Verdict" (`alternatives`).
+
+use super::sentence::{instead, without};
+use super::vocabulary::Vocabulary;
+use crate::verdict::{Alternative, EffectEntry, Verdict};
+use crate::words::{SURE, channel, list};
+
+/// What could stand in the place of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Rival {
+    /// Identifiers of what it is made of.
+    pub(super) ids: Vec<String>,
+    /// What it would do, as a clause.
+    pub(super) said: String,
+    /// Its probability, to be held against that of the effect.
+    pub(super) probability: f64,
+}
+
+impl Rival {
+    /// That an effect is none: what neither it nor its rivals have, but for the reserve.
+    pub(super) fn none(v: &Verdict, words: Vocabulary, e: &EffectEntry, rivals: &[Self]) -> Self {
+        let on = e.channels.first().map_or_else(String::new, |c| format!(" on {}", channel(c)));
+        let probability = (open(e, rivals) - reserve(v, words)).max(0.0);
+        Self { ids: Vec::new(), said: format!("what is left{on} has no cause of its own"), probability }
+    }
+}
+
+/// The part of every probability that is kept for causes that the library lacks: what is open of the name of which least is, and no more than a
+/// sure name may lack.
+pub(super) fn reserve(v: &Verdict, words: Vocabulary) -> f64 {
+    let named = v.effects.iter().enumerate().filter(|(_, e)| e.id != "unknown" && !e.is_of_single_readings());
+    named.map(|(k, e)| open(e, &rivals(v, words, k))).fold(1.0 - SURE, f64::min)
+}
+
+/// The rivals of the effect at a position, the likeliest first, none twice.
+pub(super) fn rivals(v: &Verdict, words: Vocabulary, place: usize) -> Vec<Rival> {
+    let mut out: Vec<Rival> = Vec::new();
+    for rival in v.alternatives.iter().filter_map(|a| rival(v, words, place, a)) {
+        match out.iter_mut().find(|known| known.said == rival.said) {
+            Some(known) => known.probability += rival.probability,
+            None => out.push(rival),
+        }
+    }
+    out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    out
+}
+
+fn rival(v: &Verdict, words: Vocabulary, place: usize, other: &Alternative) -> Option<Rival> {
+    let e = v.effects.get(place)?;
+    if let Some(change) = &other.change {
+        let beside = EffectEntry { channels: change.channels.clone(), ..e.clone() };
+        let said = words.of_another(&change.id, Some(&beside)).with("");
+        return (change.place == place).then(|| Rival { ids: vec![change.id.clone()], said, probability: change.probability });
+    }
+    let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
+    if !without(&best, &other.ids).iter().any(|lacking| std::ptr::eq(*lacking, e)) {
+        return None;
+    }
+    let ids = instead(&best, &other.ids);
+    let clauses: Vec<String> = ids.iter().map(|id| words.of_another(id, Some(e)).with("")).collect();
+    let said = if clauses.is_empty() { "nothing stands in its place".to_owned() } else { list(&clauses) };
+    Some(Rival { ids, said, probability: other.probability })
+}
+
+/// The part of the probability that neither an effect nor its rivals have.
+pub(super) fn open(e: &EffectEntry, rivals: &[Rival]) -> f64 {
+    (1.0 - e.probability - rivals.iter().map(|r| r.probability).sum::<f64>()).max(0.0)
+}
+
+/// The likeliest that stands against an effect, that it is none included.
+pub(super) fn likeliest(v: &Verdict, words: Vocabulary, place: usize) -> Option<Rival> {
+    let e = v.effects.get(place)?;
+    let rivals = rivals(v, words, place);
+    let none = Rival::none(v, words, e, &rivals);
+    rivals.into_iter().chain([none]).max_by(|a, b| a.probability.total_cmp(&b.probability))
+}
+
+/// Whether something else is likelier than an effect, so that it heads nothing.
+pub(super) fn is_beaten(v: &Verdict, words: Vocabulary, place: usize) -> bool {
+    let own = v.effects.get(place).map_or(0.0, |e| e.probability);
+    likeliest(v, words, place).is_some_and(|other| other.probability > own)
+}
