@@ -564,7 +564,7 @@ fn a_size_and_its_look_are_of_one_sensor() {
     let on_its_way = Unexplained { looks_like: "while the load is on its way".into(), ..left("rpm_beam", 6.0) };
     v.unexplained = vec![Unexplained { looks_like: "in single rows".into(), ..left("rpm_hall", 8.0) }, on_its_way];
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.contains("up to 9.0 rev/min rms is left (while the load is on its way)"), "{said}");
+    assert!(said.contains("up to 9.0 rev/min rms is left (as the load changes)"), "{said}");
 }
 
 /// Rotors of which the same is told have one entry.

@@ -148,7 +148,11 @@ pub(crate) fn seems_to_go_with(context: &Context, target: usize, residual: &[f64
         return None;
     }
     let own = context.targets[target].name;
-    let all = all_variables(context);
+    // what the log itself has: so few rows tell nothing of what is made of them
+    let mut measured = variables(context);
+    measured.push("torque_nm".to_owned());
+    measured.retain(|name| name != "charge" && name != "t_s");
+    let all: Vec<(String, Vec<f64>)> = all_variables(context).into_iter().filter(|(name, _)| measured.contains(name)).collect();
     let of = |(name, values): &(String, Vec<f64>)| {
         let x: Vec<f64> = rows.iter().map(|i| values[*i]).collect();
         (square(&x, residual), name.clone())

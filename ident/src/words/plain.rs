@@ -100,7 +100,7 @@ pub fn in_force(e: &EffectEntry) -> (String, Option<String>) {
     let ways = EITHER.iter().find_map(|between| Some((between, whole.split_once(between)?)));
     // ways that share a part, such as that of the heat, are told together
     let apart = |second: &str| second.contains('=') && second.starts_with(|c: char| c.is_ascii_alphabetic());
-    let (told, form) = match ways.filter(|(_, (_, second))| apart(second)) {
+    let (told, form) = match ways.filter(|(between, (_, second))| **between != ", or " || apart(second)) {
         Some((between, (first, second))) => {
             let marked = form.as_ref().is_some_and(|f| between.replace('_', " ").contains(f.as_str()));
             (if marked || has(second) > has(first) { second } else { first }, form.filter(|_| !marked))
@@ -161,6 +161,9 @@ mod tests {
             ("thrust_n += width * lags with slacks up to slack".to_owned(), None)
         );
         assert_eq!(of(bends, &["width"]).0, "thrust_n += width * direction / 2 * f, f = (rpm / rpm_max)^2");
+        let lags =
+            "tau d(rpm)/dt = rpm_static - rpm, tau = tau_up or tau_down; coasting (driven), dv/dt = -v^2/tau_air - friction";
+        assert_eq!(of(lags, &["tau_up", "tau_down"]).0, "tau d(rpm)/dt = rpm_static - rpm, tau = tau_up or tau_down");
         let warms =
             "rpm *= 1 - derate heat (controller), or 1 - derate heat (rpm/top) with current_a += current_rise heat (winding)";
         assert_eq!(of(&format!("{warms} [winding]"), &["derate"]).0, warms, "its ways share a part");

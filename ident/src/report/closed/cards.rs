@@ -14,7 +14,7 @@ use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::rivals::UNEXPLAINED;
-use crate::verdict::{Alternative, EffectEntry, Parameter, Verdict};
+use crate::verdict::{Alternative, EffectEntry, Kin, Parameter, Verdict};
 use crate::words::{
     SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled, scope, signs, sized,
     sureness, upper, upper_bound, with_interval,
@@ -70,7 +70,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
 /// That a part of every probability is kept for causes that nobody has described: said once, for it stands against no name in particular.
 fn kept(page: &Page<'_>) -> Option<String> {
     let most = reserve(page.verdict, page.words);
-    if most < OPEN || page.verdict.effects.iter().all(|e| e.id == "unknown" || e.is_of_single_readings()) {
+    if most < OPEN || page.verdict.effects.iter().all(|e| e.id == "unknown" || e.kin != Kin::Own || e.is_of_single_readings()) {
         return None;
     }
     Some(format!(

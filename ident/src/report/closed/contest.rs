@@ -7,7 +7,7 @@
 
 use super::sentence::{instead, without};
 use super::vocabulary::Vocabulary;
-use crate::verdict::{Alternative, EffectEntry, Verdict};
+use crate::verdict::{Alternative, EffectEntry, Kin, Verdict};
 use crate::words::{SURE, channel, list};
 
 /// What could stand in the place of an effect.
@@ -33,7 +33,9 @@ impl Rival {
 /// The part of every probability that is kept for causes that the library lacks: what is open of the name of which least is, and no more than a
 /// sure name may lack.
 pub(super) fn reserve(v: &Verdict, words: Vocabulary) -> f64 {
-    let named = v.effects.iter().enumerate().filter(|(_, e)| e.id != "unknown" && !e.is_of_single_readings());
+    // what every rig has was not chosen among causes, and bears no part of it
+    let chosen = |e: &EffectEntry| e.id != "unknown" && e.kin == Kin::Own && !e.is_of_single_readings();
+    let named = v.effects.iter().enumerate().filter(|(_, e)| chosen(e));
     named.map(|(k, e)| open(e, &rivals(v, words, k))).fold(1.0 - SURE, f64::min)
 }
 
@@ -84,4 +86,24 @@ pub(super) fn likeliest(v: &Verdict, words: Vocabulary, place: usize) -> Option<
 pub(super) fn is_beaten(v: &Verdict, words: Vocabulary, place: usize) -> bool {
     let own = v.effects.get(place).map_or(0.0, |e| e.probability);
     likeliest(v, words, place).is_some_and(|other| other.probability > own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::closed::vocabulary::{bare_entry, bare_verdict};
+
+    /// What every name leaves to causes that the library lacks stands against none of them; what every rig has bears no part of it.
+    #[test]
+    fn the_reserve_is_no_rival() {
+        let named = |id: &str, kin: Kin, probability: f64| EffectEntry { kin, probability, ..bare_entry(id) };
+        let effects =
+            vec![named("supply_sag", Kin::Own, 0.88), named("creep", Kin::Own, 0.6), named("spinup_lag", Kin::OfEvery, 1.0)];
+        let v = Verdict { effects, ..bare_verdict(Vec::new()) };
+        let words = Vocabulary::RIG;
+        assert!((reserve(&v, words) - 0.12).abs() < 1e-9, "{}", reserve(&v, words));
+        let none = |k: usize| Rival::none(&v, words, &v.effects[k], &[]).probability;
+        assert!(none(0) < 1e-9 && (none(1) - 0.28).abs() < 1e-9, "{} {}", none(0), none(1));
+        assert!(!is_beaten(&v, words, 0) && !is_beaten(&v, words, 1));
+    }
 }
