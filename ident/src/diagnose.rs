@@ -22,7 +22,7 @@ use crate::revise::revise;
 use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
 use crate::search::{base, connected, refine, refine_newest, scan, stride};
 use crate::suspects::{nearest, stand_beside, suspects};
-use crate::together::{Ground, choose_pair};
+use crate::together::{Ground, choose_together};
 use crate::verdict::Kin;
 use std::collections::BTreeSet;
 
@@ -155,7 +155,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         rounds.extend(best.fit.placed.iter().map(|_| (1.0, Vec::new())));
     }
     let mut round = 0;
-    let mut paired = false;
+    let mut together = false;
     while of_this_rig(&best.fit.placed) < MOST_EFFECTS {
         let begun = (round as f64 / (MOST_EFFECTS as f64 + 1.0)).min(LATE);
         round += 1;
@@ -163,13 +163,16 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let ranked = round_of(context, declared, &best, &mut offers, &mut |p| progress(begun + p * (done - begun)));
         candidates.push(ranked.iter().take(SHOWN).cloned().collect());
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else {
-            let room = !paired && of_this_rig(&best.fit.placed) + 2 <= MOST_EFFECTS;
+            let room = if together { 0 } else { MOST_EFFECTS - of_this_rig(&best.fit.placed) };
             let mut heard = |p: f64| progress(done + 0.9 * p * (1.0 - done));
             let ground = Ground { context, declared, start: &start, folds: &folds };
-            let pair = if room { choose_pair(ground, (&best, &errors), &ranked, &mut offers, &mut heard) } else { None };
-            let Some((pair, held)) = pair else { break };
-            (best, errors, paired) = (pair, held, true);
-            rounds.extend(vec![(1.0, Vec::new()); 2]);
+            if room < 2 {
+                break;
+            }
+            let found = choose_together(ground, (&best, &errors), &ranked, &mut offers, room, &mut heard);
+            let Some((group, held)) = found else { break };
+            rounds.extend(vec![(1.0, Vec::new()); group.fit.placed.len() - best.fit.placed.len()]);
+            (best, errors, together) = (group, held, true);
             continue;
         };
         best = chosen.winner;

@@ -1,9 +1,9 @@
-//! Two effects that show only together.
+//! Two or three effects that show only together.
 //!
 //! What it is: where one effect alone leaves most of the residual as coloured as it was, few of its samples count as independent and no
-//! single name brings enough evidence. Here the most promising ones each get a second effect beside them, and the pair is judged
-//! as one.
-//! What can go wrong: a pair has many parameters and fits much; it must predict held-out rows clearly better, each of the two must
+//! single name brings enough evidence. A battery's resistance, its lag and its charge are such. Here the most promising ones each get a second
+//! effect beside them on the same channels, and a third, and the group is judged as one.
+//! What can go wrong: a group has many parameters and fits much; it must predict held-out rows clearly better, each of its effects must
 //! be needed, and the nameless function still stands against it.
 //! Units: evidence in nats.
 //! Reference: forward selection misses jointly significant sets, Miller 2002, Subset Selection in Regression, section 3.2.
@@ -13,11 +13,11 @@ use crate::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, loud, 
 use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, scatters};
 
-/// Firsts of a pair that are tried.
+/// Firsts of a group that are tried.
 const FIRSTS: usize = 3;
-/// Share of the held-out error on one of its channels that each of the two must remove.
+/// Share of the held-out error on one of its channels that each of a group must remove.
 const NEEDED_OF_EACH: f64 = 0.2;
-/// Held-out error over the noise floor, root mean square and typical, below which no pair can take so much away: bare noise leaves
+/// Held-out error over the noise floor, root mean square and typical, below which no group can take so much away: bare noise leaves
 /// 1.00 and 0.84, which would have to be four fifths of what there is; a tenth is allowed for a floor that was estimated too high.
 const ROOM: (f64, f64) = (1.12, 0.94);
 
@@ -32,12 +32,14 @@ pub(crate) struct Ground<'g> {
     pub folds: &'g [Vec<bool>],
 }
 
-/// The best pair that stands up beside what was found already (with its held-out errors), and its own held-out errors.
-pub(crate) fn choose_pair(
+/// The best group of at most `most` effects that stands up beside what was found already (with its held-out errors), and its own held-out
+/// errors.
+pub(crate) fn choose_together(
     ground: Ground<'_>,
     (best, before): (&Candidate, &[Held]),
     singles: &[Candidate],
     offers: &mut [&mut Scanned],
+    most: usize,
     progress: &mut dyn FnMut(f64),
 ) -> Option<(Candidate, Vec<Held>)> {
     let Ground { context, declared, start, folds } = ground;
@@ -65,31 +67,38 @@ pub(crate) fn choose_pair(
         seen.push(id);
         new
     });
-    let mut pairs: Vec<Candidate> = Vec::new();
+    let mut groups: Vec<Candidate> = Vec::new();
+    let whole = |c: Candidate| Candidate { evidence: evidence_over(context, &c.fit, start), ..c };
     for (k, first) in firsts.into_iter().take(FIRSTS).enumerate() {
-        // two that show only together share a channel
+        // what shows only together shares a channel
         let newest = first.fit.placed.last();
         let beside = |o: &Scanned| newest.is_some_and(|n| o.instance.channels.iter().any(|c| n.instance.touches(c)));
         let mut near: Vec<&mut Scanned> = offers.iter_mut().map(|o| &mut **o).filter(|o| beside(o)).collect();
-        let ranked = round_of(context, declared, first, &mut near, &mut |p| progress((k as f64 + p) / FIRSTS as f64));
-        pairs.extend(ranked.into_iter().take(2).map(|c| Candidate { evidence: evidence_over(context, &c.fit, start), ..c }));
+        let mut done = |p: f64| progress((k as f64 + p) / FIRSTS as f64);
+        let pairs = round_of(context, declared, first, &mut near, &mut |p| done(0.5 * p));
+        let third = pairs
+            .first()
+            .filter(|_| most > 2)
+            .map(|pair| round_of(context, declared, pair, &mut near, &mut |p| done(0.5 + 0.5 * p)));
+        groups.extend(pairs.into_iter().take(2).chain(third.into_iter().flatten().take(1)).map(whole));
         // what was scanned beside this first says nothing beside the next
         near.iter_mut().for_each(|o| o.found = None);
     }
     offers.iter_mut().for_each(|o| o.found = None);
-    let needed = 2.0 * NEEDED_EVIDENCE + if best.fit.placed.is_empty() { 0.0 } else { evidence_over(context, &best.fit, start) };
-    let pair = pairs.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence)).filter(|p| p.evidence > needed)?;
-    let held = heldout::errors(context, declared, &pair.fit, folds);
+    let known = if best.fit.placed.is_empty() { 0.0 } else { evidence_over(context, &best.fit, start) };
+    let beyond = |c: &Candidate| c.evidence - known - NEEDED_EVIDENCE * (c.fit.placed.len() - best.fit.placed.len()) as f64;
+    let group = groups.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b))).filter(|g| beyond(g) > 0.0)?;
+    let held = heldout::errors(context, declared, &group.fit, folds);
     let helps = |less: &[Held], position: usize| {
-        let touched = context.targets.iter().enumerate().filter(|(_, t)| pair.fit.placed[position].instance.touches(t.name));
+        let touched = context.targets.iter().enumerate().filter(|(_, t)| group.fit.placed[position].instance.touches(t.name));
         touched.map(|(i, _)| held[i].share_gone(&less[i])).fold(0.0, f64::max) > NEEDED_OF_EACH
     };
-    let both = best.fit.placed.len()..pair.fit.placed.len();
-    let stands = both.into_iter().all(|k| {
-        without(context, declared, &pair.fit, k, start)
+    let mut new = best.fit.placed.len()..group.fit.placed.len();
+    let stands = new.all(|k| {
+        without(context, declared, &group.fit, k, start)
             .is_some_and(|f| helps(&heldout::errors(context, declared, &f, folds), k) && helps(before, k))
     });
-    stands.then_some((pair, held))
+    stands.then_some((group, held))
 }
 
 /// The largest gain in likelihood a reading of one of the channels that have room: the logarithm of the factor by which a fit makes its error

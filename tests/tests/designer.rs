@@ -126,7 +126,7 @@ fn every_plateau_has_its_power_and_what_is_not_known_is_said() {
     let said = call(at, &["identify", "no-torque.csv", "-o", "x.toml"]).succeeded().out;
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("the motor's constants are not: the log has no torque_nm"), "{said}");
-    call(at, &["identify", "no-torque.csv", "-o", "y.toml", "--surface", "s.csv"]).refused(&[
+    call(at, &["--quiet", "identify", "no-torque.csv", "-o", "y.toml", "--surface", "s.csv"]).refused(&[
         "--surface: not known, for the motor's constants are not: the log has no torque_nm",
         "expected",
         "everything else is written",
@@ -141,7 +141,7 @@ fn every_plateau_has_its_power_and_what_is_not_known_is_said() {
         .filter(|line| !line.starts_with("# sample_hz"))
         .collect();
     std::fs::write(at.join("short.csv"), short).expect("a log");
-    call(at, &["identify", "short.csv", "-o", "z.toml", "--surface", "s.csv"])
+    call(at, &["--quiet", "identify", "short.csv", "-o", "z.toml", "--surface", "s.csv"])
         .refused(&["no level at full throttle (1990 us and more): the highest is at 18"]);
 }
 
