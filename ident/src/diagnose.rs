@@ -367,26 +367,22 @@ pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
         .collect()
 }
 
-/// Whether an instance may join: not twice the same effect on a channel, not too many effects on one channel, no part without its whole.
+/// Whether an instance may join: not twice the same effect on a channel, not too many effects on one channel.
 pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
-    let wholes = effect.part_of();
-    let has_its_whole = wholes.is_empty() || placed.iter().any(|p| wholes.contains(&p.effect.id()));
-    has_its_whole
-        && instance.channels.iter().all(|c| {
-            let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
-            // what is older than the run may have happened once more
-            let older = |p: &Placed| {
-                p.instance.form != instance.form && [&p.instance.form, &instance.form].iter().any(|f| *f == effects::BEFORE)
-            };
-            let apart = |p: &&Placed| {
-                (p.effect.id() != effect.id() || older(p))
-                    && !p.effect.never_beside().contains(&effect.id())
-                    && !effect.never_beside().contains(&p.effect.id())
-            };
-            let room =
-                effect.is_of_every_rig() || there.iter().filter(|p| !p.effect.is_of_every_rig()).count() < MOST_ON_A_CHANNEL;
-            room && there.iter().all(apart)
-        })
+    instance.channels.iter().all(|c| {
+        let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
+        // what is older than the run may have happened once more
+        let older = |p: &Placed| {
+            p.instance.form != instance.form && [&p.instance.form, &instance.form].iter().any(|f| *f == effects::BEFORE)
+        };
+        let apart = |p: &&Placed| {
+            (p.effect.id() != effect.id() || older(p))
+                && !p.effect.never_beside().contains(&effect.id())
+                && !effect.never_beside().contains(&p.effect.id())
+        };
+        let room = effect.is_of_every_rig() || there.iter().filter(|p| !p.effect.is_of_every_rig()).count() < MOST_ON_A_CHANNEL;
+        room && there.iter().all(apart)
+    })
 }
 
 /// How many effects there are beside what every rig has.

@@ -42,7 +42,7 @@ pub(crate) fn choose_together(
     most: usize,
     progress: &mut dyn FnMut(f64),
 ) -> Option<(Candidate, Vec<Held>)> {
-    let Ground { context, declared, start, folds } = ground;
+    let Ground { context, declared, start, .. } = ground;
     let left = loud(context, declared, &best.fit);
     let has_room: Vec<bool> = context
         .targets
@@ -87,18 +87,26 @@ pub(crate) fn choose_together(
     offers.iter_mut().for_each(|o| o.found = None);
     let known = if best.fit.placed.is_empty() { 0.0 } else { evidence_over(context, &best.fit, start) };
     let beyond = |c: &Candidate| c.evidence - known - NEEDED_EVIDENCE * (c.fit.placed.len() - best.fit.placed.len()) as f64;
-    let group = groups.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b))).filter(|g| beyond(g) > 0.0)?;
+    groups.retain(|g| beyond(g) > 0.0);
+    groups.sort_by(|a, b| beyond(b).total_cmp(&beyond(a)));
+    // one that has an effect too many leaves the place to the next
+    groups.into_iter().find_map(|group| stands(ground, (best, before), &group).map(|held| (group, held)))
+}
+
+/// The held-out errors of a group beside what was found already; nothing where one of its effects is not needed.
+fn stands(ground: Ground<'_>, (best, before): (&Candidate, &[Held]), group: &Candidate) -> Option<Vec<Held>> {
+    let Ground { context, declared, start, folds } = ground;
     let held = heldout::errors(context, declared, &group.fit, folds);
     let helps = |less: &[Held], position: usize| {
         let touched = context.targets.iter().enumerate().filter(|(_, t)| group.fit.placed[position].instance.touches(t.name));
         touched.map(|(i, _)| held[i].share_gone(&less[i])).fold(0.0, f64::max) > NEEDED_OF_EACH
     };
     let mut new = best.fit.placed.len()..group.fit.placed.len();
-    let stands = new.all(|k| {
+    let needed = |k: usize| {
         without(context, declared, &group.fit, k, start)
             .is_some_and(|f| helps(&heldout::errors(context, declared, &f, folds), k) && helps(before, k))
-    });
-    stands.then_some((group, held))
+    };
+    new.all(needed).then_some(held)
 }
 
 /// The largest gain in likelihood a reading of one of the channels that have room: the logarithm of the factor by which a fit makes its error

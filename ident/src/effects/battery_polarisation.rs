@@ -1,19 +1,23 @@
 //! `battery_polarisation`: the battery gives way a little later than its current asks, and recovers as slowly.
 //!
 //! What it is: beside the resistance that answers at once a battery has one that answers through a first-order lag: ions that have to move. After
-//! a load the voltage climbs back within seconds.
+//! a load the voltage climbs back within seconds, and the speed at a pulse and the current at a speed follow it.
 //! What can go wrong: a slow voltmeter beside a sag without a resistance that answers at once looks alike; the charge drawn does where the lag is
 //! longer than the run.
 //! Units: ohm, s.
 //! Reference: Chen & Rincon-Mora 2006, IEEE Trans. Energy Conversion 21:504, the resistor-capacitor pair behind the series resistance.
 
 use super::operator::{self, Course};
-use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, present};
-use crate::context::Context;
+use super::supply_voltage::{OF_CURRENT, OF_SPEED};
+use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, present, speeds};
+use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct BatteryPolarisation;
+
+/// Shortest time constant, s, of a battery that is told from a resistance: what is faster (the double layer) is over before a meter has read it.
+const SHORTEST: f64 = 0.5;
 
 impl Effect for BatteryPolarisation {
     fn id(&self) -> &'static str {
@@ -23,7 +27,7 @@ impl Effect for BatteryPolarisation {
     fn about(&self) -> About {
         About {
             title: "Battery recovers slowly from a load",
-            equation: "voltage_v = V0 - resistance * i, tau d(i)/dt = current_a - i",
+            equation: "voltage_v = V0 - resistance * i, rpm(pulse) *= 1 - speed_loss * i, current_a *= 1 + 0.875 speed_loss * i, tau d(i)/dt = current_a - i",
             source: "resistor-capacitor pair of a battery, Chen & Rincon-Mora 2006",
             depends_on: &["current_a", "t_s"],
             signature: "voltage goes on falling for seconds after a load has come, and climbs back for seconds after it has gone",
@@ -41,7 +45,7 @@ impl Effect for BatteryPolarisation {
     }
 
     fn stage(&self) -> Stage {
-        Stage::Term
+        Stage::Gain
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
@@ -49,18 +53,21 @@ impl Effect for BatteryPolarisation {
         if context.time_is_row || context.is_table() || !measured {
             return Vec::new();
         }
-        vec![Instance::new(&["voltage_v"], "")]
+        let all: Vec<&str> = ["voltage_v", "current_a"].into_iter().chain(speeds(context)).collect();
+        // where something else is slow on speed or current, the voltage alone still tells of the battery
+        [all.as_slice(), &all[..1]].map(|set| Instance::new(set, "")).to_vec()
     }
 
-    fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
-        // a lag within two rows answers at once, and one longer than a third of the run is a charge
-        let (lo, hi) = (2.0 * context.step(), context.duration() / 3.0);
-        vec![Shape { name: "tau", unit: "s", range: (lo, hi.max(2.0 * lo)), starts: geometric(1.5 * lo, 0.8 * hi, 10) }]
-    }
-
-    /// A battery that answers late answers at once too.
-    fn part_of(&self) -> &'static [&'static str] {
-        &["supply_sag"]
+    fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        // a lag longer than a third of the run is a charge
+        let (lo, hi) = (SHORTEST.max(2.0 * context.step()), context.duration() / 3.0);
+        let tau = Shape { name: "tau", unit: "s", range: (lo, hi.max(2.0 * lo)), starts: geometric(1.2 * lo, 0.8 * hi, 8) };
+        if instance.channels.len() < 2 {
+            return vec![tau];
+        }
+        let most = context.current.iter().flatten().copied().fold(1e-3, f64::max);
+        let starts = [0.002, 0.01, 0.05].map(|k| k / most).to_vec();
+        vec![tau, Shape { name: "speed_loss", unit: "1/A", range: (-0.02 / most, 0.5 / most), starts }]
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
@@ -68,12 +75,26 @@ impl Effect for BatteryPolarisation {
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
-        let ([tau], Some(current)) = (shape, &context.current) else { return };
+        let ([tau, loss @ ..], Some(current)) = (shape, &context.current) else { return };
         let late = operator::Lag::new(&context.t, *tau, Course::Line).of(&[current.as_slice()]).concat();
-        design.add(position, 0, late.into_iter().map(|i| -i).collect());
+        if design.relation == Relation::Voltage {
+            design.add(position, 0, late.into_iter().map(|i| -i).collect());
+            return;
+        }
+        let follows = match design.relation {
+            Relation::Current => OF_CURRENT.0 / OF_SPEED.0,
+            _ => -1.0,
+        };
+        let factor = follows * loss.first().copied().unwrap_or(0.0);
+        design.map_columns(|column| column.iter().zip(&late).map(|(v, i)| v * (1.0 + factor * i)).collect());
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        fitted.iter().all(|e| e.name != "resistance" || e.value > 2.0 * e.se)
+        // a search that ends at its shortest has found a lag of the meters
+        fitted.iter().all(|e| match &*e.name {
+            "resistance" => e.value > 2.0 * e.se,
+            "tau" => e.value > 1.5 * SHORTEST,
+            _ => true,
+        })
     }
 }

@@ -266,10 +266,6 @@ pub trait Effect: Sync {
     fn never_beside(&self) -> &'static [&'static str] {
         &[]
     }
-    /// Effects one of which must stand before this one is asked for: it is a further part of them.
-    fn part_of(&self) -> &'static [&'static str] {
-        &[]
-    }
     /// Evidence, nats, that the readings themselves show, whatever the model says of them.
     fn seen(&self, _context: &Context, _instance: &Instance) -> f64 {
         0.0
