@@ -69,8 +69,10 @@ impl Effect for BatteryDischarge {
         channels.extend(present(context, &["current_a"]));
         channels.extend(speeds(context));
         let forms: &[&str] = if context.against_model { &[OTHER_SUPPLY] } else { &[STRAIGHT, CURVED] };
-        // where something else drifts on speed or current, the voltage alone still tells of the battery
-        let sets = if channels.len() > 1 { vec![channels.as_slice(), &channels[..1]] } else { vec![channels.as_slice()] };
+        // where something else drifts on speed or current, the voltage alone still tells of the battery; not so in a table of levels, where charge
+        // and current rise together
+        let alone = channels.len() > 1 && !context.is_table();
+        let sets = if alone { vec![channels.as_slice(), &channels[..1]] } else { vec![channels.as_slice()] };
         sets.iter().flat_map(|set| forms.iter().map(|form| Instance::new(set, form))).collect()
     }
 
