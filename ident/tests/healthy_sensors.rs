@@ -147,6 +147,16 @@ fn a_beam_that_leaves_the_others_takes_none_along() {
     assert!(names(&healthy).is_empty(), "{:?}", names(&healthy));
 }
 
+/// A constant share of the speed is a healthy sensor's own gain up to some of its standard deviations of 0.3 %, and lost pulses beyond.
+#[test]
+fn what_a_healthy_gain_explains_is_no_loss_of_pulses() {
+    for (share, expected) in [(0.003, vec![]), (0.006, vec![]), (0.03, vec!["missed_pulses"])] {
+        let low = |k: usize, _: f64, rpm: f64| if k == 2 { rpm * (1.0 - share) } else { rpm };
+        let closed = close(&log(&Day { seed: 12, reads: &low, ..HEALTHY }), None, &[], &mut |_| {}).expect("a verdict");
+        assert_eq!(names(&closed), expected, "{share}");
+    }
+}
+
 #[test]
 fn a_hold_is_seen_beneath_the_noise() {
     let period = 0.834;

@@ -259,17 +259,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_healthy_gain_explains_is_no_loss_of_pulses() {
-        let whole = |share: f64| {
-            let fitted = [Estimate { name: "probability".into(), unit: "1".into(), value: share, se: 1e-5 }];
-            plausible_pulses(&Instance::new(&["rpm_hall"], ""), &fitted)
-        };
-        // healthy sensors differ by 0.05 to 0.3 %, and agree within 1 % (specification, rig.md)
-        assert!(![0.0005, 0.003, 0.006, 0.008].into_iter().any(whole));
-        assert!([0.01, 0.02, 0.1].into_iter().all(whole));
-    }
-
-    #[test]
     fn a_few_events_may_be_many_more() {
         // exact upper ends: 5.572 of one event, 7.225 of two, 18.39 of ten
         for (count, upper) in [(1, 5.572), (2, 7.225), (10, 18.39)] {

@@ -217,7 +217,9 @@ mod tests {
     fn without_a_level_at_rest_the_interval_holds_the_levels_own_quotients() {
         let speeds: Vec<f64> = (0..12).map(|k| 2700.0 + 350.0 * f64::from(k)).collect();
         let (k, law, quotients) = law(&speeds, |rpm| square(rpm) * (0.96 + rpm / 170_000.0));
-        assert!(quotients.iter().all(|q| (q - k.value).abs() <= 1.02 * k.half), "{quotients:?} {k:?}");
+        // but for what the mean of a level may be off by chance, most of a quotient at the lowest speed
+        let by_chance = 3.0 * 0.002 / (2700.0 * TAU / 60.0).powi(2);
+        assert!(quotients.iter().all(|q| (q - k.value).abs() <= k.half + by_chance), "{quotients:?} {k:?}");
         assert!(law.words().contains("no level is at rest"), "{}", law.words());
     }
 }

@@ -240,7 +240,7 @@ mod tests {
             [effect.seen.voltage_v]
             lowest_v = -0.5
             highest_v = 0.0
-            covariance = [[1.0, -12.0, 0.0], [-12.0, 160.0, 0.0], [0.0, 0.0, 0.0]]
+            covariance = [[1.0, -12.0], [-12.0, 160.0]]
         "#;
         Model::parse("m.toml", text).expect("a model")
     }
