@@ -58,13 +58,16 @@ pub enum Relation {
 
 /// Standard deviation of the gain that a healthy speed sensor has of its own: 0.3 % (specification `closing-the-loop.md`, step 2).
 const GAIN_SD: f64 = 0.003;
+/// Largest such gain: three standard deviations.
+const MOST_GAIN: f64 = 3.0 * GAIN_SD;
 
 impl Relation {
-    /// What is known before any run of the coefficient of a power of the regressor: one over its variance about zero; 0 where nothing is.
+    /// What is known before any run of the coefficient of a power of the regressor: its standard deviation about zero, and the most that it can
+    /// be; `None` where nothing is. What a sensor reads beyond that is no gain of its own.
     #[must_use]
-    pub fn precision(self, power: usize) -> f64 {
+    pub fn known(self, power: usize) -> Option<(f64, f64)> {
         // a gain is a share, its coefficient is of krpm
-        if self == Self::SpeedDifference && power == 1 { (1000.0 * GAIN_SD).powi(-2) } else { 0.0 }
+        (self == Self::SpeedDifference && power == 1).then_some((1000.0 * GAIN_SD, 1000.0 * MOST_GAIN))
     }
 
     /// Degree of the declared polynomial.

@@ -108,8 +108,10 @@ impl TargetDesign {
     /// Adds to equations of the columns, of weights that are `unit` over a variance, what is known of the coefficients before any run.
     pub(crate) fn expect(&self, normal: &mut Normal, unit: f64) {
         for (k, column) in self.columns.iter().enumerate() {
-            if let Label::Base(power) = column.label {
-                normal.expect(k, unit * self.relation.precision(power));
+            if let Label::Base(power) = column.label
+                && let Some((sd, most)) = self.relation.known(power)
+            {
+                normal.expect(k, sd, most, unit);
             }
         }
     }

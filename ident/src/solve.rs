@@ -31,6 +31,9 @@ pub struct Solution {
 /// Share of a column's square below which what others leave of it is rounding.
 const NOTHING: f64 = 1e-10;
 
+/// Times all that the rows say of a coefficient by which it is held where it may not go beyond.
+const HELD: f64 = 1e6;
+
 impl Normal {
     /// For `k` columns.
     #[must_use]
@@ -110,9 +113,15 @@ impl Normal {
         whole
     }
 
-    /// Adds what is known of a coefficient beforehand: that it is about zero, with one over its variance.
-    pub(crate) fn expect(&mut self, column: usize, precision: f64) {
-        self.gram[(column, column)] += precision;
+    /// Adds what is known of a coefficient beforehand: that it is about zero, with a standard deviation, and within `most` of it. Weights of
+    /// the rows are `unit` over a variance.
+    pub(crate) fn expect(&mut self, column: usize, sd: f64, most: f64, unit: f64) {
+        self.gram[(column, column)] += unit / (sd * sd);
+        let Some(found) = self.solve().map(|s| s.coefficients[column]).filter(|c| c.abs() > most) else { return };
+        let (held, weight) = (most.copysign(found), HELD * self.gram[(column, column)]);
+        self.gram[(column, column)] += weight;
+        self.rhs[column] += weight * held;
+        self.yy += weight * held * held;
     }
 
     /// Adds what went into another of the same columns.

@@ -31,7 +31,11 @@ pub(crate) fn declared(context: &Context, target: &Target) -> Option<DeclaredFit
     // a row below the starting pulse is predicted as zero and teaches no coefficient
     let point = |j: usize| x(j).map_or((0.0, 0.0, 0.0), |x| (x, target.y[j], 1.0 / target.levelled[j]));
     let mut normal = Normal::of_polynomial(target.relation.degree(), (0..n).map(point));
-    (0..terms).for_each(|power| normal.expect(power, target.relation.precision(power)));
+    for power in 0..terms {
+        if let Some((sd, most)) = target.relation.known(power) {
+            normal.expect(power, sd, most, 1.0);
+        }
+    }
     let solution = normal.solve()?;
     let predicted = |x: f64| solution.coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
     let mut residual: Vec<f64> = (0..n).map(|j| target.y[j] - x(j).map_or(0.0, predicted)).collect();

@@ -300,8 +300,10 @@ fn joint(channel: &str, labels: &[Label], normals: &[Option<(Normal, f64)>]) -> 
     of_runs.for_each(|n| out.absorb(n));
     let relation = Relation::of(channel, true)?;
     for (k, label) in labels.iter().enumerate() {
-        if let Label::Base(power) = label {
-            out.expect(k, relation.precision(*power));
+        if let Label::Base(power) = label
+            && let Some((sd, most)) = relation.known(*power)
+        {
+            out.expect(k, sd, most, 1.0);
         }
     }
     Some(out)
