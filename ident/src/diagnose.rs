@@ -163,12 +163,12 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let ranked = round_of(context, declared, &best, &mut offers, &mut |p| progress(begun + p * (done - begun)));
         candidates.push(ranked.iter().take(SHOWN).cloned().collect());
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else {
-            let room = if together { 0 } else { MOST_EFFECTS - of_this_rig(&best.fit.placed) };
-            let mut heard = |p: f64| progress(done + 0.9 * p * (1.0 - done));
-            let ground = Ground { context, declared, start: &start, folds: &folds };
-            if room < 2 {
+            let room = MOST_EFFECTS - of_this_rig(&best.fit.placed);
+            if together || room < 2 {
                 break;
             }
+            let mut heard = |p: f64| progress(done + 0.9 * p * (1.0 - done));
+            let ground = Ground { context, declared, start: &start, folds: &folds };
             let found = choose_together(ground, (&best, &errors), &ranked, &mut offers, room, &mut heard);
             let Some((group, held)) = found else { break };
             rounds.extend(vec![(1.0, Vec::new()); group.fit.placed.len() - best.fit.placed.len()]);

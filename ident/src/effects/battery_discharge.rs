@@ -2,12 +2,13 @@
 //!
 //! What it is: voltage_v falls with the charge drawn, along the cells' open-circuit curve (a parabola over the part of it that
 //! a run covers), and the speed at a given pulse follows the voltage; the current at a speed rises by what is known of brushless motors.
-//! What can go wrong: whatever else drifts with time looks like it on speed and current, so these may not follow by more than the voltage falls. the capacity follows from the slope only as well as one knows the cell's curve: 15 % are added to its error.
+//! What can go wrong: whatever else drifts with time looks like it on speed and current, so these may not follow by more than the voltage falls.
+//! The capacity follows from the slope only as well as one knows the cell's curve: 15 % are added to its error.
 //! Units: V/Ah, V/Ah2, Ah.
 //! Reference: open-circuit voltage of lithium-polymer cells falls by 0.65 V +- 15 % per unit of charge between full and the
 //! knee: 4.20 V full, 3.87 V at 50 % (Chen & Rincon-Mora 2006, Fig. 8, and common discharge tables).
 
-use super::supply_voltage::{OF_CURRENT, OF_SPEED};
+use super::supply_voltage::CURRENT_BY_SPEED;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present, speeds};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
@@ -21,8 +22,6 @@ const CELL_V: f64 = 3.95;
 /// Fall of one cell's open-circuit voltage per unit of charge, V, and how well it is known.
 const CELL_SLOPE: (f64, f64) = (0.65, 0.15);
 
-/// By how much the current at a speed rises where the speed at a pulse falls, both as shares: the powers of the voltage that they go with.
-const CURRENT_BY_SPEED: f64 = OF_CURRENT.0 / OF_SPEED.0;
 /// Share of the speed over a whole run within which a loss is none.
 const LEAST_LOSS: f64 = 0.02;
 

@@ -8,7 +8,7 @@
 //! Reference: Chen & Rincon-Mora 2006, IEEE Trans. Energy Conversion 21:504, the resistor-capacitor pair behind the series resistance.
 
 use super::operator::{self, Course};
-use super::supply_voltage::{OF_CURRENT, OF_SPEED};
+use super::supply_voltage::CURRENT_BY_SPEED;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, present, speeds};
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
@@ -82,7 +82,7 @@ impl Effect for BatteryPolarisation {
             return;
         }
         let follows = match design.relation {
-            Relation::Current => OF_CURRENT.0 / OF_SPEED.0,
+            Relation::Current => CURRENT_BY_SPEED,
             _ => -1.0,
         };
         let factor = follows * loss.first().copied().unwrap_or(0.0);

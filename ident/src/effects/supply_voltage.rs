@@ -26,6 +26,8 @@ pub(crate) const OF_SPEED: (f64, f64) = (0.8, 0.1);
 /// The same of the current at a speed: one for the same power, less where switching loses more at a higher voltage. On 56 pairs of runs at 7 and
 /// 11 V (fivein-static-tables, MIT 2018, Cao and Strawson) it is 0.70, and from motor to motor 0.1 about that.
 pub(crate) const OF_CURRENT: (f64, f64) = (0.7, 0.1);
+/// By how much the current at a speed rises where the speed at a pulse falls with the voltage, both as shares.
+pub(super) const CURRENT_BY_SPEED: f64 = OF_CURRENT.0 / OF_SPEED.0;
 
 /// What is known of an exponent.
 fn known(instance: &Instance) -> (f64, f64) {
