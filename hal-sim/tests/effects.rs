@@ -62,7 +62,7 @@ const NOISE: [f64; 5] = [0.007, 3e-4, 0.03, 0.01, 0.1];
 fn expectation(id: &str) -> (&'static [&'static str], [bool; 5]) {
     let load_cell = [false, true, true, true, true];
     match id {
-        "supply_sag" | "battery_discharge" | "battery_polarisation" => (&["rpm", "voltage"], [false, false, false, false, true]),
+        "supply_sag" | "battery_discharge" => (&["rpm", "voltage"], [false, false, false, false, true]),
         "spinup_lag" | "throttle_quantisation" => (&["rpm"], [false, false, false, true, true]),
         "thermal_derate" => (&["rpm"], [false, false, false, true, true]),
         "current_limit" => (&["rpm", "current"], [false, false, false, true, true]),
@@ -133,7 +133,7 @@ fn each_effect_moves_its_channels_and_no_other() {
 fn supply_effects_leave_thrust_of_speed_whole() {
     let clean = coefficients(&fly(&sweep(3, None)));
     let mean = |v: &[(f64, f64, f64)], f: fn(&(f64, f64, f64)) -> f64| v.iter().map(f).sum::<f64>() / v.len() as f64;
-    for id in ["supply_sag", "battery_discharge", "battery_polarisation", "bearing_friction", "spinup_lag"] {
+    for id in ["supply_sag", "battery_discharge", "bearing_friction", "spinup_lag"] {
         let with = coefficients(&fly(&sweep(3, Some(id))));
         assert!((mean(&with, |c| c.1) / mean(&clean, |c| c.1) - 1.0).abs() < 1e-9, "{id}");
         if id != "spinup_lag" {

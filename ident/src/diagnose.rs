@@ -16,7 +16,7 @@ use crate::effects::{self, Effect, Estimate, Instance};
 use crate::heldout::{self, Around, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
 use crate::moment::lasts;
-use crate::parallel::in_parallel;
+use crate::parallel::{cores, in_parallel};
 use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
@@ -40,7 +40,7 @@ const EASILY_NAMED: usize = 3;
 /// Share of the held-out error below which a further effect is named only if nothing else explains it as well.
 const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
-const REFINED: usize = 7;
+pub(crate) const REFINED: usize = 7;
 /// Share of the best gain of a grid from which on the first form of an effect is refined although others stand before it: a coarse grid shows
 /// that much of the right shape (set once on four runs that it cost, tuning seeds 70022, 70788, 71170 and 71984).
 const NOTABLE: f64 = 0.25;
@@ -160,7 +160,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         let begun = (round as f64 / (MOST_EFFECTS as f64 + 1.0)).min(LATE);
         round += 1;
         let done = (round as f64 / (MOST_EFFECTS as f64 + 1.0)).min(LATE);
-        let ranked = round_of(context, declared, &best, &mut offers, &mut |p| progress(begun + p * (done - begun)));
+        let ranked = round_of(context, declared, &best, (&mut offers, REFINED), &mut |p| progress(begun + p * (done - begun)));
         candidates.push(ranked.iter().take(SHOWN).cloned().collect());
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else {
             let room = MOST_EFFECTS - of_this_rig(&best.fit.placed);
@@ -390,29 +390,44 @@ fn of_this_rig(placed: &[Placed]) -> usize {
     placed.iter().filter(|p| !p.effect.is_of_every_rig()).count()
 }
 
-/// Every instance added to `best`, refined where promising, best first.
+/// Scans the grids of some offers beside what is there already, on all cores, each with what it remembers of the rows.
+fn scan_all(context: &Context, declared: Declared<'_>, (placed, loud): (&[Placed], &[bool]), mut due: Vec<&mut &mut Scanned>) {
+    let shares = cores().min(due.len());
+    let of_share = |share: usize| {
+        let base = base(context, declared, placed);
+        let own = due.iter().skip(share).step_by(shares);
+        own.map(|o| scan(context, &base, o.effect, &o.instance, loud)).collect::<Vec<_>>()
+    };
+    let found = in_parallel(shares, &of_share);
+    for (share, found) in found.into_iter().enumerate() {
+        due.iter_mut().skip(share).step_by(shares).zip(found).for_each(|(offer, found)| offer.found = found);
+    }
+}
+
+/// Every instance added to `best`, so many of them refined, and more where promising, best first.
 pub(crate) fn round_of(
     context: &Context,
     declared: Declared<'_>,
     best: &Candidate,
-    offers: &mut [&mut Scanned],
+    (offers, refined): (&mut [&mut Scanned], usize),
     progress: &mut dyn FnMut(f64),
 ) -> Vec<Candidate> {
     let count = offers.len().max(1) as f64;
     let newest = best.fit.placed.last();
     let whole = vec![1.0; context.targets.len()];
     let loud = loud(context, declared, &best.fit);
-    let base = base(context, declared, &best.fit.placed);
     let mut ranked: Vec<(f64, Vec<Placed>)> = Vec::new();
-    for (k, offer) in offers.iter_mut().enumerate() {
-        progress(0.7 * k as f64 / count);
-        if !may_join(&best.fit.placed, offer.effect, &offer.instance) {
-            continue;
-        }
-        let stale = newest.is_some_and(|n| offer.instance.channels.iter().any(|c| n.instance.touches(c)));
-        if stale || offer.found.is_none() {
-            offer.found = scan(context, &base, offer.effect, &offer.instance, &loud);
-        }
+    let joining = |o: &Scanned| may_join(&best.fit.placed, o.effect, &o.instance);
+    let stale = |o: &Scanned| newest.is_some_and(|n| o.instance.channels.iter().any(|c| n.instance.touches(c)));
+    offers.iter_mut().filter(|o| stale(o)).for_each(|o| o.found = None);
+    scan_all(
+        context,
+        declared,
+        (&best.fit.placed, &loud),
+        offers.iter_mut().filter(|o| joining(o) && o.found.is_none()).collect(),
+    );
+    progress(0.7);
+    for offer in offers.iter().filter(|o| joining(o)) {
         if let Some((shape, gain)) = &offer.found {
             let added = Placed { effect: offer.effect, instance: offer.instance.clone(), shape: shape.clone() };
             let net = gain + added.effect.seen(context, &added.instance) - penalty(context, &added, &whole);
@@ -422,7 +437,7 @@ pub(crate) fn round_of(
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     let sketch = Rows::Every(stride(context, SKETCH));
     // against a model many a name fits a moment on its grid, and stands before the one that fits the run once it is refined
-    let refined = if context.against_model { 2 * REFINED } else { REFINED };
+    let refined = if context.against_model { 2 * refined } else { refined };
     let mut out: Vec<Candidate> = Vec::new();
     let (mut most, mut heard) = (f64::NEG_INFINITY, BTreeSet::new());
     let notable = ranked.first().map_or(0.0, |r| NOTABLE * r.0);

@@ -8,9 +8,14 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// Cores that work at once.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
 /// What a function makes of 0 to `n`, in order, on all cores.
 pub(crate) fn in_parallel<T: Send>(n: usize, of: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(n.max(1));
+    let threads = cores().min(n.max(1));
     let next = AtomicUsize::new(0);
     let worker = || {
         let take = || Some(next.fetch_add(1, Ordering::Relaxed)).filter(|i| *i < n);

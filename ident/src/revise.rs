@@ -8,7 +8,7 @@
 //! Reference: stepwise regression with exchange, Miller 2002, Subset Selection in Regression, section 3.6.
 
 use crate::context::Context;
-use crate::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, may_join, offers, round_of};
+use crate::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, evidence_over, may_join, offers, round_of};
 use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::rivals::probabilities;
@@ -122,7 +122,7 @@ fn apply_for(
     let (mut near, _): (Vec<&mut Scanned>, Vec<&mut Scanned>) = all.iter_mut().partition(|o| {
         may_join(&placed, o.effect, &o.instance) && o.instance.channels.iter().any(|c| group.contains(&c.as_str()))
     });
-    let ranked = round_of(context, declared, &Candidate { fit: base.clone(), evidence: 0.0 }, &mut near, &mut |_| {});
+    let ranked = round_of(context, declared, &Candidate { fit: base.clone(), evidence: 0.0 }, (&mut near, REFINED), &mut |_| {});
     Some((base, ranked))
 }
 

@@ -15,6 +15,8 @@ use crate::hypothesis::{Declared, Fit, scatters};
 
 /// Firsts of a group that are tried.
 const FIRSTS: usize = 3;
+/// Seconds and thirds whose shapes are refined: twice those that are kept.
+const OF_A_FIRST: usize = 4;
 /// Share of the held-out error on one of its channels that each of a group must remove.
 const NEEDED_OF_EACH: f64 = 0.2;
 /// Held-out error over the noise floor, root mean square and typical, below which no group can take so much away: bare noise leaves
@@ -69,21 +71,15 @@ pub(crate) fn choose_together(
     });
     let mut groups: Vec<Candidate> = Vec::new();
     let whole = |c: Candidate| Candidate { evidence: evidence_over(context, &c.fit, start), ..c };
+    let rounds = (FIRSTS + 1) as f64;
     for (k, first) in firsts.into_iter().take(FIRSTS).enumerate() {
-        // what shows only together shares a channel
-        let newest = first.fit.placed.last();
-        let beside = |o: &Scanned| newest.is_some_and(|n| o.instance.channels.iter().any(|c| n.instance.touches(c)));
-        let mut near: Vec<&mut Scanned> = offers.iter_mut().map(|o| &mut **o).filter(|o| beside(o)).collect();
-        let mut done = |p: f64| progress((k as f64 + p) / FIRSTS as f64);
-        let pairs = round_of(context, declared, first, &mut near, &mut |p| done(0.5 * p));
-        let third = pairs
-            .first()
-            .filter(|_| most > 2)
-            .map(|pair| round_of(context, declared, pair, &mut near, &mut |p| done(0.5 + 0.5 * p)));
-        groups.extend(pairs.into_iter().take(2).chain(third.into_iter().flatten().take(1)).map(whole));
-        // what was scanned beside this first says nothing beside the next
-        near.iter_mut().for_each(|o| o.found = None);
+        let pairs = beside(context, declared, first, offers, &mut |p| progress((k as f64 + p) / rounds));
+        groups.extend(pairs.into_iter().take(2).map(whole));
     }
+    // a third effect stands beside the most promising pair
+    let third = groups.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence)).filter(|_| most > 2).cloned();
+    let thirds = third.map(|pair| beside(context, declared, &pair, offers, &mut |p| progress((FIRSTS as f64 + p) / rounds)));
+    groups.extend(thirds.into_iter().flatten().take(1).map(whole));
     offers.iter_mut().for_each(|o| o.found = None);
     let known = if best.fit.placed.is_empty() { 0.0 } else { evidence_over(context, &best.fit, start) };
     let beyond = |c: &Candidate| c.evidence - known - NEEDED_EVIDENCE * (c.fit.placed.len() - best.fit.placed.len()) as f64;
@@ -91,6 +87,22 @@ pub(crate) fn choose_together(
     groups.sort_by(|a, b| beyond(b).total_cmp(&beyond(a)));
     // one that has an effect too many leaves the place to the next
     groups.into_iter().find_map(|group| stands(ground, (best, before), &group).map(|held| (group, held)))
+}
+
+/// What joins a candidate on the channels of its newest effect, best first: what shows only together shares a channel. What was scanned beside this
+/// one says nothing beside the next, and is forgotten.
+fn beside(
+    context: &Context,
+    declared: Declared<'_>,
+    first: &Candidate,
+    offers: &mut [&mut Scanned],
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Candidate> {
+    let newest = first.fit.placed.last();
+    let shares = |o: &Scanned| newest.is_some_and(|n| o.instance.channels.iter().any(|c| n.instance.touches(c)));
+    let mut near: Vec<&mut Scanned> = offers.iter_mut().map(|o| &mut **o).filter(|o| shares(o)).collect();
+    near.iter_mut().for_each(|o| o.found = None);
+    round_of(context, declared, first, (&mut near, OF_A_FIRST), progress)
 }
 
 /// The held-out errors of a group beside what was found already; nothing where one of its effects is not needed.

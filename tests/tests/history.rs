@@ -104,10 +104,8 @@ fn runs_alike_show_no_change() {
 #[test]
 fn dated_runs_stand_in_the_order_of_their_days() {
     // run 1 is the latest, run 6 the earliest
-    let folder = changed("runs", |seed, text| {
-        let (head, rest) = text.split_once('\n').unwrap();
-        format!("{head}\n# date = \"2026-03-{:02}\"\n{rest}", 19 - seed)
-    });
+    let folder =
+        changed("runs", |seed, text| text.replace("# date = \"simulated\"", &format!("# date = \"2026-03-{:02}\"", 19 - seed)));
     let told = json(&call(folder.path(), &["history", "runs", "--json"]).succeeded());
     assert_eq!(
         (&told["dated"], &told["runs"][0]["run"], &told["changes"][0]["first"]),

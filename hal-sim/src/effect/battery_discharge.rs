@@ -48,7 +48,9 @@ impl Effect for BatteryDischarge {
 
     fn fit(&self, parts: &mut BenchParts) {
         let source = Source::LiPo { cells: self.cells, capacity_ah: self.capacity_ah, charge: self.charge };
-        parts.plant.supply = Supply::new(source, self.resistance_ohm);
+        // what answers late is another effect's
+        let pair = parts.plant.supply.pair;
+        parts.plant.supply = Supply { pair, ..Supply::new(source, self.resistance_ohm) };
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64, &'static str)> {

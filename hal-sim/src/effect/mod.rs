@@ -160,7 +160,6 @@ macro_rules! effects {
 effects! {
     supply_sag::SupplySag,
     battery_discharge::BatteryDischarge,
-    battery_polarisation::BatteryPolarisation,
     current_limit::CurrentLimit,
     thermal_derate::ThermalDerate,
     throttle_quantisation::ThrottleQuantisation,

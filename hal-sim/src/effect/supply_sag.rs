@@ -1,12 +1,15 @@
 //! `supply_sag`: resistance between source and ESC.
 //!
-//! What it is: a lead or connector whose drop lowers the voltage at the ESC, and with it speed, thrust and current.
+//! What it is: a lead or connector whose drop lowers the voltage at the ESC, and with it speed, thrust and current; a battery has a second
+//! resistance that answers late.
 //! What can go wrong: thrust(rpm) stays whole; only what depends on the voltage moves.
 //! Units: ohm, s.
-//! Reference: Ohm's law; Beharie 2013 section 5.6 measures the supply at the ESC.
+//! Reference: Ohm's law; Beharie 2013 section 5.6 measures the supply at the ESC; pair of a battery: `plant/supply.rs`.
 
 use super::{Effect, Levers};
 use crate::noise::Stream;
+use crate::parts::BenchParts;
+use crate::plant::supply::Pair;
 use serde::{Deserialize, Serialize};
 
 /// Parameters.
@@ -18,6 +21,17 @@ pub struct SupplySag {
     /// Onset, s into the run.
     #[serde(default)]
     pub t0_s: f64,
+    /// Resistance that answers late, ohm.
+    #[serde(default)]
+    pub late_ohm: f64,
+    /// Time constant of that, s.
+    #[serde(default = "some_seconds")]
+    pub late_s: f64,
+}
+
+/// Time constant of a battery whose file says none, s.
+fn some_seconds() -> f64 {
+    4.0
 }
 
 impl Effect for SupplySag {
@@ -25,7 +39,13 @@ impl Effect for SupplySag {
     const EQUATION: &'static str = "voltage_v = source - resistance * current_a";
 
     fn draw(stream: &mut Stream, _run_s: f64) -> Self {
-        Self { resistance_ohm: stream.log_between(0.03, 0.12), t0_s: 0.0 }
+        Self { resistance_ohm: stream.log_between(0.03, 0.12), t0_s: 0.0, late_ohm: 0.0, late_s: some_seconds() }
+    }
+
+    fn fit(&self, parts: &mut BenchParts) {
+        if self.late_ohm > 0.0 {
+            parts.plant.supply.pair = Some(Pair { resistance_ohm: self.late_ohm, tau_s: self.late_s, volts: 0.0 });
+        }
     }
 
     fn act(&self, run_s: f64, levers: &mut Levers) {

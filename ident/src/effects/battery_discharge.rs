@@ -69,8 +69,8 @@ impl Effect for BatteryDischarge {
         channels.extend(speeds(context));
         let forms: &[&str] = if context.against_model { &[OTHER_SUPPLY] } else { &[STRAIGHT, CURVED] };
         // where something else drifts on speed or current, the voltage alone still tells of the battery; not so in a table of levels, where charge
-        // and current rise together
-        let alone = channels.len() > 1 && !context.is_table();
+        // and current rise together, and not against a model, where another supply moves the speed
+        let alone = channels.len() > 1 && !context.is_table() && !context.against_model;
         let sets = if alone { vec![channels.as_slice(), &channels[..1]] } else { vec![channels.as_slice()] };
         sets.iter().flat_map(|set| forms.iter().map(|form| Instance::new(set, form))).collect()
     }

@@ -10,7 +10,6 @@ pub mod airframe;
 pub(crate) mod alternating_period;
 mod amplifier_saturation;
 mod battery_discharge;
-mod battery_polarisation;
 mod beam_resonance;
 mod bearing_friction;
 mod blade_damage;
@@ -296,7 +295,6 @@ pub fn library() -> &'static [&'static dyn Effect] {
         &supply_sag::SupplySag,
         &supply_voltage::SupplyVoltage,
         &battery_discharge::BatteryDischarge,
-        &battery_polarisation::BatteryPolarisation,
         &spinup_lag::SpinupLag,
         &rotor_inertia::RotorInertia,
         &zero_drift::ZeroDrift,

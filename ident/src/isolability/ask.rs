@@ -12,7 +12,7 @@
 use super::size::Line;
 use crate::beside::ask;
 use crate::context::{Context, Facts};
-use crate::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, choose, offers, round_of};
+use crate::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, choose, offers, round_of};
 use crate::heldout;
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, is_plausible, part_of};
 use crate::together::Ground;
@@ -116,7 +116,7 @@ impl Rig {
         let shares = |s: &Scanned| s.instance.channels.iter().any(|c| there.instance.touches(c));
         let mut all: Vec<Scanned> = offers(&context).into_iter().filter(shares).collect();
         let mut offered: Vec<&mut Scanned> = all.iter_mut().collect();
-        let ranked = round_of(&context, declared, &known, &mut offered, &mut |_| {});
+        let ranked = round_of(&context, declared, &known, (&mut offered, REFINED), &mut |_| {});
         let mut answer = Answer { named: false, own: None, others: Vec::new() };
         for candidate in &ranked {
             let Some(name) = candidate.fit.placed.last().and_then(|p| name_of(p, names)) else { continue };

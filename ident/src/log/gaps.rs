@@ -17,6 +17,10 @@ const HOLE: f64 = 5.0;
 const TOLD: f64 = 0.1;
 /// Share of the time from which on dropped rows are no accident: a fifth, but for a row at either end.
 const DROPPED: f64 = 0.19;
+/// Share of the steps that are no longer than a tick of the clock.
+const SHORTEST: f64 = 0.25;
+/// Share of missing rows up to which that holds of rows that are dropped here and there. Beyond it the clock is only finer than its rows.
+const MOST_MISSING: f64 = 1.0 - SHORTEST;
 /// Share of steps that are whole multiples of the shortest, and by how much of it they may be off, of a clock that ticks evenly.
 const EVEN: [f64; 2] = [0.95, 0.15];
 /// Steps below which nothing is judged.
@@ -58,12 +62,13 @@ impl Gaps {
         }
         let mut sorted = steps.clone();
         sorted.sort_by(f64::total_cmp);
-        let tick = sorted[sorted.len() / 4];
+        let tick = sorted[(SHORTEST * sorted.len() as f64) as usize];
         let off = |step: f64| (step / tick - (step / tick).round()).abs();
         let even = steps.iter().filter(|s| off(**s) <= EVEN[1]).count() as f64 >= EVEN[0] * steps.len() as f64;
         let coarse = is_even(&log.t, tick).then_some(tick);
         let single = Self { single: true, coarse, ..Self::among(log, &steps, tick, 1.5) };
-        (even && single.missing_s >= TOLD * single.whole_s).then_some(single)
+        let told = (TOLD..=MOST_MISSING).contains(&(single.missing_s / single.whole_s));
+        (even && told).then_some(single)
     }
 
     /// Whether rows of an even clock were dropped here and there, and so many that the run is no longer what it seems.
@@ -198,6 +203,11 @@ mod tests {
         let scattered = Gaps::of(&log(|n| (n * n + n / 7) % 5 != 3)).expect("rows are gone");
         assert!(scattered.single && scattered.coarse.is_none() && scattered.are_dropped_rows(), "{scattered}");
         assert!(scattered.to_string().contains("at uneven places: dropped by a filter"), "{scattered}");
+        // rows that come when they like, by a clock that is finer than they are
+        let mut fine = log(|_| true);
+        let steps = (0..fine.len()).map(|n| [1.0, 4.0, 25.0, 1.0, 30.0, 3.0, 17.0][n % 7] + (n % 11) as f64 * (n % 3) as f64);
+        fine.t = steps.scan(0.0, |t, step| Some(std::mem::replace(t, *t + 0.001 * step))).collect();
+        assert_eq!(Gaps::of(&fine), None);
         // steps of any length are uneven sampling, not holes
         let mut uneven = log(|_| true);
         uneven.t.iter_mut().enumerate().for_each(|(i, t)| *t += 0.04 * (i as f64 * 2.4).sin());
