@@ -60,8 +60,8 @@ impl Constant {
             "KV" => "speed for each volt",
             "R" => "resistance",
             "I0" => "current without load",
-            "tau_up" => "time constant on the way up",
-            "tau_down" => "time constant on the way down",
+            "tau_up" => "time constant as it speeds up",
+            "tau_down" => "time constant as it slows down",
             _ => "",
         }
     }

@@ -20,7 +20,7 @@ const EVALUATIONS: usize = 200;
 /// Instances of an effect that are refined.
 const PROMISING: usize = 4;
 
-/// Errors on another run of the same rig, before, and after a fit of the effects that were told.
+/// Errors on another run of the same rig, before, and after a fit of the effects that were told: of both what carries over to another run.
 ///
 /// Nothing where a name cannot be placed on the log.
 #[must_use]
@@ -35,7 +35,7 @@ pub fn told(log: &Log, names: &[&str], other: &Log) -> Option<Validation> {
     let fitted = fit(&context, declared, &placed, Some(&start), Rows::All)?;
     let before = Model::from_fit(&context, log, declared, &start);
     let after = Model::from_fit(&context, log, declared, &fitted);
-    Some(validation(other, &before, &after))
+    Some(validation(other, &before.elsewhere(), &after.elsewhere()))
 }
 
 /// What is placed, with the instance of an effect that explains most beside it.

@@ -56,7 +56,14 @@ fn rival(v: &Verdict, words: Vocabulary, place: usize, other: &Alternative) -> O
     let e = v.effects.get(place)?;
     if let Some(change) = &other.change {
         let beside = EffectEntry { channels: change.channels.clone(), ..e.clone() };
-        let said = words.of_another(&change.id, Some(&beside)).with("");
+        // a name that stands beside it already is no other cause
+        let there = |(k, o): (usize, &EffectEntry)| {
+            k != place && o.id == change.id && change.channels.iter().any(|c| o.channels.contains(c))
+        };
+        let said = match v.effects.iter().enumerate().any(there) {
+            true => "the causes beside it explain that alone".to_owned(),
+            false => words.of_another(&change.id, Some(&beside)).with(""),
+        };
         return (change.place == place).then(|| Rival { ids: vec![change.id.clone()], said, probability: change.probability });
     }
     let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
@@ -92,6 +99,7 @@ pub(super) fn is_beaten(v: &Verdict, words: Vocabulary, place: usize) -> bool {
 mod tests {
     use super::*;
     use crate::report::closed::vocabulary::{bare_entry, bare_verdict};
+    use crate::verdict::Change;
 
     /// What every name leaves to causes that the library lacks stands against none of them; what every rig has bears no part of it.
     #[test]
@@ -105,5 +113,18 @@ mod tests {
         let none = |k: usize| Rival::none(&v, words, &v.effects[k], &[]).probability;
         assert!(none(0) < 1e-9 && (none(1) - 0.28).abs() < 1e-9, "{} {}", none(0), none(1));
         assert!(!is_beaten(&v, words, 0) && !is_beaten(&v, words, 1));
+    }
+
+    /// What would be put in the place of a name and stands beside it already is no other cause.
+    #[test]
+    fn a_name_that_stands_beside_is_no_other_cause() {
+        let on = |id: &str| EffectEntry { channels: vec!["voltage_v".into()], probability: 0.5, ..bare_entry(id) };
+        let change = |id: &str| Change { place: 0, id: id.into(), channels: vec!["voltage_v".into()], probability: 0.3 };
+        let of = |id: &str| Alternative { ids: vec![id.into()], probability: 0.3, change: Some(change(id)) };
+        let effects = vec![on("battery_discharge"), on("supply_sag")];
+        let v = Verdict { effects, alternatives: vec![of("supply_sag"), of("creep")], ..bare_verdict(Vec::new()) };
+        let said: Vec<String> = rivals(&v, Vocabulary::RIG, 0).into_iter().map(|r| r.said).collect();
+        assert!(said.iter().any(|s| s == "the causes beside it explain that alone"), "{said:?}");
+        assert!(!said.iter().any(|s| s.contains("supply lead")), "{said:?}");
     }
 }

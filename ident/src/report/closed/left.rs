@@ -161,7 +161,7 @@ pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
     sheet.html_part(&format!(
         "<p><a download=\"next.toml\" href=\"{}\">Download the schedule</a>, or fly it from the verdict: <code>{}</code></p>\n",
         data_uri("application/toml", &file),
-        escape("quadrig rig run --next verdict.json -o next.csv")
+        escape("quadrig rig run --port PORT --next verdict.json -o next.csv")
     ));
 }
 
