@@ -89,8 +89,8 @@ pub(crate) fn choose_together(
     groups.into_iter().find_map(|group| stands(ground, (best, before), &group).map(|held| (group, held)))
 }
 
-/// What joins a candidate on the channels of its newest effect, best first: what shows only together shares a channel. What was scanned beside this
-/// one says nothing beside the next, and is forgotten.
+/// What joins a candidate on the channels of its newest effect, best first: what shows only together shares a channel, and a round
+/// scans that anew.
 fn beside(
     context: &Context,
     declared: Declared<'_>,
@@ -101,7 +101,6 @@ fn beside(
     let newest = first.fit.placed.last();
     let shares = |o: &Scanned| newest.is_some_and(|n| o.instance.channels.iter().any(|c| n.instance.touches(c)));
     let mut near: Vec<&mut Scanned> = offers.iter_mut().map(|o| &mut **o).filter(|o| shares(o)).collect();
-    near.iter_mut().for_each(|o| o.found = None);
     round_of(context, declared, first, (&mut near, OF_A_FIRST), progress)
 }
 

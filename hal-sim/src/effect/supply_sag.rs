@@ -21,25 +21,25 @@ pub struct SupplySag {
     /// Onset, s into the run.
     #[serde(default)]
     pub t0_s: f64,
-    /// Resistance that answers late, ohm.
+    /// Resistance that answers late, ohm; it has no onset.
     #[serde(default)]
     pub late_ohm: f64,
     /// Time constant of that, s.
-    #[serde(default = "some_seconds")]
+    #[serde(default = "usual_late_s")]
     pub late_s: f64,
 }
 
-/// Time constant of a battery whose file says none, s.
-fn some_seconds() -> f64 {
+/// Time constant where the file says none, s.
+fn usual_late_s() -> f64 {
     4.0
 }
 
 impl Effect for SupplySag {
     const ID: &'static str = "supply_sag";
-    const EQUATION: &'static str = "voltage_v = source - resistance * current_a";
+    const EQUATION: &'static str = "voltage_v = source - resistance * current_a - late resistance * lag(current_a)";
 
     fn draw(stream: &mut Stream, _run_s: f64) -> Self {
-        Self { resistance_ohm: stream.log_between(0.03, 0.12), t0_s: 0.0, late_ohm: 0.0, late_s: some_seconds() }
+        Self { resistance_ohm: stream.log_between(0.03, 0.12), t0_s: 0.0, late_ohm: 0.0, late_s: usual_late_s() }
     }
 
     fn fit(&self, parts: &mut BenchParts) {
@@ -55,6 +55,8 @@ impl Effect for SupplySag {
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64, &'static str)> {
-        vec![("resistance", self.resistance_ohm, "ohm"), ("t0", self.t0_s, "s")]
+        let late = [("late resistance", self.late_ohm, "ohm"), ("late time constant", self.late_s, "s")];
+        let told = if self.late_ohm > 0.0 { &late[..] } else { &[] };
+        [&[("resistance", self.resistance_ohm, "ohm"), ("t0", self.t0_s, "s")], told].concat()
     }
 }

@@ -209,9 +209,9 @@ impl Powerplant for RigPlant {
     }
 
     fn refit(&mut self, parts: &Parts) {
-        let drawn_as = self.parts.supply.drawn_as;
-        self.parts = parts.clone();
-        self.parts.supply.drawn_as = drawn_as;
+        let mut supply = self.parts.supply;
+        supply.refit(parts.supply);
+        self.parts = Parts { supply, ..parts.clone() };
         self.fixed = Fixed::of(parts);
         self.thermal.refit(parts.thermal);
     }

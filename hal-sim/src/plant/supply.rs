@@ -69,6 +69,13 @@ impl Supply {
         Self { source, resistance_ohm, drawn_as: 0.0, pair: None }
     }
 
+    /// Exchanges the parts; the charge drawn and what the pair holds stay. A pair that is new is empty.
+    pub fn refit(&mut self, parts: Self) {
+        let volts = self.pair.map_or(0.0, |pair| pair.volts);
+        let pair = parts.pair.map(|pair| Pair { volts, ..pair });
+        *self = Self { drawn_as: self.drawn_as, pair, ..parts };
+    }
+
     /// Sets a bench supply's voltage, V; a battery has no knob.
     pub fn set(&mut self, volts: f64) {
         if let Source::Bench { voltage_v } = &mut self.source {
@@ -133,6 +140,23 @@ mod tests {
         assert!((12.0 - s.open_circuit_v() - filled).abs() < 1e-9);
         s.draw(0.0, 4.0);
         assert!((12.0 - s.open_circuit_v() - filled * (-1.0_f64).exp()).abs() < 1e-9);
+    }
+
+    /// Whatever is exchanged in mid-run, the voltage goes on from where it was.
+    #[test]
+    fn other_parts_keep_the_charge_and_what_the_pair_holds() {
+        let pair = Pair { resistance_ohm: 0.05, tau_s: 4.0, volts: 0.0 };
+        let fresh = Supply { pair: Some(pair), ..Supply::new(Source::LiPo { cells: 3, capacity_ah: 1.0, charge: 1.0 }, 0.0) };
+        let mut s = fresh;
+        s.draw(100.0, 10.0);
+        let before = s;
+        s.refit(fresh);
+        assert_eq!(s, before);
+        // without the pair its part is gone, and a new one begins empty
+        s.refit(Supply { pair: None, ..fresh });
+        assert!(s.open_circuit_v() > before.open_circuit_v() && s.drawn_as == 100.0);
+        s.refit(fresh);
+        assert_eq!(s.pair, Some(pair));
     }
 
     #[test]
