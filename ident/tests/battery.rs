@@ -97,9 +97,9 @@ fn a_battery_takes_no_more_current_than_its_voltage_falls() {
 /// a parabola would be volts off.
 #[test]
 fn a_short_run_tells_of_no_curve() {
-    let day = Day { late: (0.05, 12.0), slope: 3.0, rows: 900, ..DAY };
+    let day = Day { seed: 2, late: (0.05, 12.0), slope: 3.0, rows: 900, ..DAY };
     let longer = log(&Day { seed: 3, rows: 6000, ..day });
     let closed = close(&log(&day), None, &[longer], &mut |_| {}).expect("a verdict");
     let voltage = closed.verdict.validation[0].channels["voltage_v"];
-    assert!(voltage.after < 1.05 * voltage.before, "{:?} {voltage:?}", names(&closed));
+    assert!(voltage.after < voltage.before, "{:?} {voltage:?}", names(&closed));
 }
