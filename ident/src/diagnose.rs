@@ -14,7 +14,7 @@ use crate::context::{Context, Relation, Target};
 pub(crate) use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::{self, Effect, Estimate, Instance};
 use crate::heldout::{self, Around, Held};
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, plausible, scatters};
+use crate::hypothesis::{Colour, Declared, Fit, Placed, Rows, TargetFit, fit, plausible, scatters};
 use crate::moment::lasts;
 use crate::parallel::{cores, in_parallel};
 use crate::residual::whiteness;
@@ -471,13 +471,21 @@ pub(crate) fn round_of(
     out
 }
 
-/// Evidence of each candidate beyond what it was added to, best first.
-pub(crate) fn weigh(context: &Context, best: &Candidate, candidates: &mut [Candidate]) {
-    let shares = shares(context, candidates.iter().map(|c| &c.fit));
-    for c in candidates.iter_mut() {
-        c.evidence = best.evidence + net_gain(context, &c.fit, &best.fit, &shares);
-    }
-    candidates.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+/// Evidence of each candidate beyond what it was added to. In the order in which they are asked: by the evidence that they have where the noise
+/// alone says how many samples count, so that a quick change is asked no earlier than a slow one that takes as much away.
+pub(crate) fn weigh(context: &Context, best: &Candidate, candidates: &mut Vec<Candidate>) {
+    let shares = along(context, candidates, &best.fit);
+    let plain = self::shares(context, candidates.iter().map(|c| &c.fit));
+    let mut weighed: Vec<(f64, Candidate)> = std::mem::take(candidates)
+        .into_iter()
+        .zip(&shares)
+        .map(|(c, shares)| {
+            let gain = |shares: &[f64]| net_gain(context, &c.fit, &best.fit, shares);
+            (gain(&plain), Candidate { evidence: best.evidence + gain(shares), fit: c.fit })
+        })
+        .collect();
+    weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    candidates.extend(weighed.into_iter().map(|w| w.1));
 }
 
 /// Residual over noise floor, and whiteness, below and above which a channel has nothing left to explain.
@@ -501,15 +509,45 @@ pub(crate) fn loud(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<
 /// For each target the share of independent samples that the colour of the best fit's residual leaves: the same for every
 /// candidate of a round, so that none wins by leaving a larger but whiter residual.
 pub(crate) fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64> {
-    let mut best = vec![(f64::NEG_INFINITY, 1.0); context.targets.len()];
+    noises(context, fits).into_iter().map(|best| best.map_or(1.0, |t| t.share)).collect()
+}
+
+/// For each target the fit that leaves the least.
+fn noises<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<Option<&'f TargetFit>> {
+    let mut best: Vec<Option<&TargetFit>> = vec![None; context.targets.len()];
     for f in fits {
         for (b, t) in best.iter_mut().zip(&f.targets) {
-            if t.loglik.mean > b.0 {
-                *b = (t.loglik.mean, t.share);
+            if b.is_none_or(|b| t.loglik.mean > b.loglik.mean) {
+                *b = Some(t);
             }
         }
     }
-    best.into_iter().map(|b| b.1).collect()
+    best
+}
+
+/// For each candidate and target the share of independent samples along what the candidate changes: noise that wanders slowly hides what is as slow,
+/// and little of what steps. No candidate has more than the one that leaves the least, or it would win by changing something quick.
+/// Between sensors of one speed it is that of the noise: what they differ by are single readings that are lost.
+fn along(context: &Context, candidates: &[Candidate], old: &Fit) -> Vec<Vec<f64>> {
+    let quietest = noises(context, candidates.iter().map(|c| &c.fit));
+    let mut out = vec![vec![1.0; context.targets.len()]; candidates.len()];
+    for (k, quietest) in quietest.into_iter().enumerate() {
+        let Some(quietest) = quietest else { continue };
+        let (before, plain) = (&old.targets[k].left, context.targets[k].relation.is_evidence());
+        let colour = Colour::of(&quietest.left);
+        let share = |left: &[f64]| {
+            if plain || left.len() != before.len() {
+                return quietest.share;
+            }
+            let change: Vec<f64> = left.iter().zip(&**before).map(|(n, o)| n - o).collect();
+            colour.share_along(&change).max(quietest.share)
+        };
+        let most = share(&quietest.left);
+        for (shares, c) in out.iter_mut().zip(candidates) {
+            shares[k] = share(&c.fit.targets[k].left).min(most);
+        }
+    }
+    out
 }
 
 /// Evidence, in nats, that the newest effect adds over a fit without it, its price paid.
@@ -550,7 +588,7 @@ pub(crate) fn choose(
     errors: &[Held],
     folds: &[Vec<bool>],
 ) -> Option<Chosen> {
-    for (k, winner) in ranked.iter().enumerate().take_while(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
+    for (k, winner) in ranked.iter().enumerate().filter(|(_, c)| c.evidence > best.evidence + NEEDED_EVIDENCE) {
         let around = heldout::errors_around_newest(context, declared, &winner.fit, folds, errors);
         let gain = winner.evidence - best.evidence;
         if !worth_a_name(context, winner, gain, &around) || !lasts(context, declared, &best.fit, &winner.fit) {

@@ -51,10 +51,9 @@ pub(crate) fn revise(
         let Some((base, ranked)) = apply_for(context, declared, start, &best.fit, k, &mut all) else { continue };
         let own = ranked.iter().position(|c| newest_is(c, &best.fit.placed[k]));
         let standing = own.map_or(f64::NEG_INFINITY, |o| ranked[o].evidence);
-        let better = ranked
-            .iter()
-            .take_while(|c| c.evidence > standing + CLEARLY_BETTER && c.evidence > NEEDED_EVIDENCE)
-            .position(|c| predicts_as_well(context, declared, folds, &c.fit, &best.fit));
+        let clearly = |c: &Candidate| c.evidence > standing + CLEARLY_BETTER && c.evidence > NEEDED_EVIDENCE;
+        let ahead = &ranked[..own.unwrap_or(ranked.len())];
+        let better = ahead.iter().position(|c| clearly(c) && predicts_as_well(context, declared, folds, &c.fit, &best.fit));
         let Some(winner) = better.or(own).filter(|w| ranked[*w].evidence > NEEDED_EVIDENCE) else {
             if own.is_some() {
                 *best = Candidate { evidence: evidence_over(context, &base, start), fit: base };

@@ -90,15 +90,46 @@ pub(super) fn choose(runs: &[&Closed], members: &[Member<'_>], progress: &mut dy
         now = then;
         drop_useless(&joint, &mut rig, &mut now);
     }
+    exchange(&joint, &mut rig, &mut now, &mut pool);
     let named = |k: usize| {
         let (score, without) = gain_of(&joint, &rig, &now, k);
-        Named { placed: rig[k].clone(), score, rivals: rivals(&joint, &rig, k, &without, &pool) }
+        let rivals = rivals(&joint, &rig, k, &without, &pool).into_iter().map(|(p, gain)| (p.effect.id(), gain)).collect();
+        Named { placed: rig[k].clone(), score, rivals }
     };
     (0..rig.len()).map(named).collect()
 }
 
+/// What predicts the runs better in the place of a name takes it: a name may have joined for what a later one explains. The runs predict each
+/// other better after each exchange, so that none comes twice.
+fn exchange(joint: &Joint<'_, '_>, rig: &mut Vec<Placed>, now: &mut Vec<Across>, pool: &mut Vec<Vec<Placed>>) {
+    let score = |errors: &[Across]| errors.iter().map(Across::score).sum::<f64>();
+    let better = |rig: &[Placed], now: &[Across], pool: &[Vec<Placed>], k: usize| {
+        let (worth, without) = gain_of(joint, rig, now, k);
+        let (newcomer, gain) = rivals(joint, rig, k, &without, pool).into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        if gain <= worth {
+            return None;
+        }
+        let mut with = rig.to_vec();
+        with[k] = newcomer;
+        let better = |with: Vec<Placed>| {
+            let then = joint.across(&with, None);
+            let compared = compared(&without, &then);
+            let stands = is_worth(&compared) && harms(&compared).is_none() && is_plausible(joint, &with);
+            (stands && score(&then) > score(now)).then_some((k, with, then))
+        };
+        // with the shapes of all runs, or with those of the run that it is from
+        better(joint.refined(&with, &[k], SOUGHT, EVALUATIONS)).or_else(|| better(with))
+    };
+    while let Some((k, with, then)) = (0..rig.len()).find_map(|k| better(rig, now, pool, k)) {
+        pool.retain(|starts| !starts[0].is_like(&with[k]));
+        pool.push(vec![rig[k].clone()]);
+        (*rig, *now) = (with, then);
+        drop_useless(joint, rig, now);
+    }
+}
+
 /// By how much better the runs predict each other with each candidate in the place of one of the rig's effects on its channels.
-fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], pool: &[Vec<Placed>]) -> Vec<(&'static str, f64)> {
+fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], pool: &[Vec<Placed>]) -> Vec<(Placed, f64)> {
     let mut others = rig.to_vec();
     let left = others.remove(k);
     let close = |starts: &&Vec<Placed>| {
@@ -115,8 +146,9 @@ fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], p
     };
     let gain = |starts: &Vec<Placed>| {
         let tried = starts.iter().map(|p| (p, tried(joint, &others, without, p)));
-        let gain = tried.filter(|(p, (_, then))| stands(p, then)).map(|(_, (gain, _))| gain).max_by(f64::total_cmp)?;
-        Some((starts[0].effect.id(), gain))
+        let standing = tried.filter(|(p, (_, then))| stands(p, then)).map(|(p, (gain, _))| (p, gain));
+        let (best, gain) = standing.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some((best.clone(), gain))
     };
     pool.iter().filter(close).filter_map(gain).collect()
 }
