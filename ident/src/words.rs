@@ -228,6 +228,11 @@ pub fn vector(name: &str) -> String {
     axis.map_or_else(|| said.clone(), str::to_owned)
 }
 
+/// That runs alone have sizes which scatter more than their errors allow.
+pub(crate) const DISAGREE: &str = "the runs disagree";
+/// That runs alone agree, on another size than they have together.
+pub(crate) const OTHERWISE: &str = "together the runs differ from each of them";
+
 /// A channel at the head of something: with a large letter, or as its column where it has no other word.
 #[must_use]
 pub fn heading(name: &str) -> String {

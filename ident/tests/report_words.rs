@@ -142,7 +142,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             &[
                 "Either the load cell reads the mean of its last 0.50 s, or the load cell answers late: this run cannot tell. Beside that, the supply lead drops 41 mV per ampere.",
             ],
-            &["explain", "battery", "proposed"],
+            &["Together they explain", "battery", "proposed"],
         ),
         (
             // words and figures agree
@@ -165,8 +165,8 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         (
             Verdict { next_experiment: Some(next), ..open(0.45) },
             false,
-            &["this run cannot tell, the run proposed below may."],
-            &["explain"],
+            &["this run cannot tell, the run proposed below may.", "The model as it is now explains 98 % of what"],
+            &["Together they explain"],
         ),
         (
             Verdict { next_experiment: Some(alike), ..open(0.45) },
@@ -223,7 +223,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
                 ..verdict(Kind::Ambiguous, vec![filter(0.5), sag(0.99), effect("unknown", "thrust_n", 0.9, 0.4, vec![])])
             },
             false,
-            &["What has no name is told below."],
+            &["With all that is told below the model explains"],
             &[],
         ),
     ]

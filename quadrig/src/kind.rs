@@ -70,7 +70,7 @@ fn kind_of(text: &str) -> Option<&'static str> {
 
 /// What a file is that is no run, where it is one that this program knows.
 pub(crate) fn another(path: &Path) -> Option<String> {
-    of_the_imu(path).or_else(|| no_table(path))
+    of_the_imu(path).or_else(|| of_a_flight(path)).or_else(|| no_table(path))
 }
 
 /// Whether a page in HTML is one of this program's.
@@ -113,6 +113,13 @@ fn of_the_imu(path: &Path) -> Option<String> {
     } else {
         None
     }
+}
+
+/// What a file is that is no rig's log, where it is a flight's of another program.
+fn of_a_flight(path: &Path) -> Option<String> {
+    let file = path.display();
+    let flight = ident::import::flight(path).ok()?.is_some();
+    flight.then(|| format!("{file}:1:1: a flight; expected a rig's log: `quadrig import {file} -o LOG` makes a flight log, which close-loop takes"))
 }
 
 #[cfg(test)]

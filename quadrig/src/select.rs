@@ -305,12 +305,12 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
     for r in rows {
         let misses = misses(r, need);
         let mark = if misses.is_empty() { "  meets the need".to_owned() } else { format!("  {}", misses.join(", ")) };
-        let clipped = if r.pair.clipped { "  thrust reading clipped: a lower bound" } else { "" };
+        let clipped = if r.pair.clipped { "; thrust reading clipped: a lower bound" } else { "" };
         let with = r.with_batteries.iter().find(|w| w.batteries == need.batteries);
         let (motor, propeller) = (r.pair.motor.as_str(), r.pair.propeller.as_str());
         let fits = motor.chars().count() <= m && propeller.chars().count() <= p;
         if !fits {
-            out += &format!("{motor} {propeller}\n");
+            out += &format!("{}\n", wrapped(&format!("{motor} {propeller}"), 2));
         }
         let [motor, propeller] = if fits { [motor, propeller] } else { [""; 2] };
         out += &format!(

@@ -37,6 +37,7 @@ fn alone(name: &'static str, words: &'static str, said: &'static [&'static str])
 /// Files of another kind than the command takes: each refusal names what takes or makes them.
 fn kinds() -> Vec<Case> {
     const ATTITUDE: &str = "t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg\n0.005,1,0,0,0,0,0,0\n0.010,1,0,0,0,0,0,0\n";
+    const OF_ANOTHER: &str = "t_s,gyro.x,gyro.y,gyro.z,acc.x,acc.y,acc.z\n0,0,0,0,0,0,1\n0.01,0,0,0,0,0,1\n";
     const READINGS: &str = "t_s,gx,gy,gz,ax,ay,az\n0.005,0,0,0,0,0,-9.8\n0.010,0,0,0,0,0,-9.8\n";
     const FLIGHT: &str = "# quadrig-flight 1\nt_s,pulse_us_1,rpm_1\n0.0,1500,4000\n0.1,1500,4000\n";
     const INERTIAL: &str = "format = \"quadrig-inertial 1\"\nsource = \"run.csv\"\nspan_s = [0.0, 1.0]\nsensor = []\n";
@@ -129,6 +130,13 @@ fn kinds() -> Vec<Case> {
         with("an attitude to identify", "bad.csv", ATTITUDE, IDENTIFY, &["bad.csv:1:1", "--readings READINGS"]),
         with("an attitude to filter", "bad.csv", ATTITUDE, "ahrs bad.csv out.csv", &["bad.csv:1:", "--readings READINGS"]),
         with("readings to identify", "bad.csv", READINGS, IDENTIFY, &["bad.csv:1:1: readings of an IMU", "`quadrig close-loop`"]),
+        with(
+            "another program's flight",
+            "bad.csv",
+            OF_ANOTHER,
+            "close-loop bad.csv -o out",
+            &["bad.csv:1:1: a flight", "`quadrig import"],
+        ),
         with("a flight to identify", "bad.csv", FLIGHT, IDENTIFY, &["bad.csv:1", "a flight: `quadrig close-loop` takes it"]),
         with(
             "a flight to step through",

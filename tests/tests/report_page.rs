@@ -70,8 +70,10 @@ fn a_page_begins_with_the_sentence_that_heads_the_terminal() {
         let over = format!("{:.1}", u["over_floor"].as_f64().expect("a figure"));
         assert!(read.split("What is left").last().is_some_and(|left| left.contains(&over)), "{u}");
     }
-    // where nothing stands against a name there is no figure to weigh, and what the library lacks is said once
-    assert!(read.contains("sure, no rival supply_sag"), "{read}");
+    // each card has its probability, and what the library lacks is said once
+    let sag = verdict["effects"].as_array().and_then(|e| e.iter().find(|e| e["id"] == "supply_sag")).expect("the lead");
+    let p = sag["probability"].as_f64().filter(|p| *p < 0.995).map_or("> 0.99".to_owned(), |p| format!("= {p:.2}"));
+    assert!(read.contains(&format!("sure: p {p}, no rival supply_sag")), "{read}");
     assert!(read.matches("causes that the library lacks").count() <= 2, "above the cards, and over the table: {read}");
     // a simulated run says what fed it, and that it has no day
     assert!(read.contains("Supply bench supply, ") && read.contains("Date simulated"), "{read}");

@@ -123,7 +123,7 @@ fn a_bad_file_costs_its_own_row_alone() {
         "{}",
         said.out
     );
-    let row = told.split_once("motor of no-names.csv propeller of no-names.csv").expect("the run by its file's name").1;
+    let row = told.split_once("no-names.csv not named").expect("the run by its file's name").1;
     assert!(row.contains("18.02 N of 19.62 N in total"), "{row}");
     // runs of one pair are told apart by their files
     let named = run.replacen('\n', "\n# motor = \"570KV\"\n# propeller = \"11x4.7\"\n", 1);

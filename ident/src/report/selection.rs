@@ -27,9 +27,8 @@ pub fn selection(
         "Motor, propeller and battery",
         &match chosen.first() {
             Some(best) => format!(
-                "{} with {} is the most efficient of the pairs that give enough ({:.2} N/A). Of {} pairs with a result, {} give at least {:.2} N in total {}with {} x {:.1} A.h.",
-                best.pair.motor,
-                best.pair.propeller,
+                "{} is the most efficient of the pairs that give enough ({:.2} N/A). Of {} pairs with a result, {} give at least {:.2} N in total {}with {} x {:.1} A.h.",
+                best.pair.name(),
                 best.efficiency_n_per_a,
                 rows.len(),
                 chosen.len(),
@@ -53,12 +52,11 @@ pub fn selection(
     sheet.data("mass", &["batteries", "mass, kg", "charge, mA.h"], &masses, None);
     sheet.section("Performance of each pair (Table 9)");
     table(&mut sheet, rows, &chosen, batteries);
-    let missing: Vec<String> =
-        pairs.iter().filter(|p| p.maximum.is_none()).map(|p| format!("{} with {}", p.motor, p.propeller)).collect();
+    let missing: Vec<String> = pairs.iter().filter(|p| p.maximum.is_none()).map(Pair::name).collect();
     if !missing.is_empty() {
         sheet.say(&format!("No result: {}.", missing.join(", ")));
     }
-    let clipped: Vec<String> = pairs.iter().filter(|p| p.clipped).map(|p| format!("{} with {}", p.motor, p.propeller)).collect();
+    let clipped: Vec<String> = pairs.iter().filter(|p| p.clipped).map(Pair::name).collect();
     if !clipped.is_empty() {
         sheet.warn(&format!(
             "The thrust reading stopped following the speed (a clipped load cell, or a stall); its maximum is a lower bound: {}.",

@@ -86,10 +86,14 @@ fn maximum(thrust: &str, current: &str, place: &Place<'_>) -> Result<Option<Maxi
 /// The pair that a run measured: its plateaus, thrust less what it reads at rest, the one with most thrust, names from the log's metadata.
 #[must_use]
 pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
+    let told = |key: &str| log.meta.get(key).and_then(toml::Value::as_str).filter(|n| !n.trim().is_empty()).map(str::to_owned);
     // a run that names neither is told from others by its file
-    let named = |key: &str| {
-        let name = log.meta.get(key).and_then(toml::Value::as_str).filter(|n| !n.trim().is_empty());
-        name.map_or_else(|| format!("{key} of {}", log.name), str::to_owned)
+    let (motor, propeller) = match [told("motor"), told("propeller")] {
+        [None, None] => (log.name.clone(), UNNAMED.to_owned()),
+        [motor, propeller] => (
+            motor.unwrap_or_else(|| format!("motor of {}", log.name)),
+            propeller.unwrap_or_else(|| format!("propeller of {}", log.name)),
+        ),
     };
     let index = |name: &str| log.columns.iter().position(|c| c.name == name);
     let zero = Zero::of(log, plateaus, &speeds(log, plateaus, &[]), "thrust_n");
@@ -106,14 +110,25 @@ pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
     };
     let maximum = levels.iter().copied().filter(|m| m.current_a.0 > 0.0 && m.thrust_n.0 > 0.0);
     Pair {
-        motor: named("motor"),
-        propeller: named("propeller"),
+        motor,
+        propeller,
         clipped: clipped(log, plateaus),
         maximum: maximum.max_by(|a, b| a.thrust_n.0.total_cmp(&b.thrust_n.0)),
         levels,
         source: log.name.clone(),
     }
 }
+
+impl Pair {
+    /// Motor and propeller in words; a run that names neither is called by its file.
+    #[must_use]
+    pub fn name(&self) -> String {
+        if self.propeller == UNNAMED { self.motor.clone() } else { format!("{} with {}", self.motor, self.propeller) }
+    }
+}
+
+/// What stands for the propeller of a run that names neither motor nor propeller.
+const UNNAMED: &str = "not named";
 
 /// Share of the rise that the square of the speed asks for, below which a thrust reading no longer follows.
 const FOLLOWS: f64 = 0.5;

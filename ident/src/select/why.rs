@@ -31,7 +31,7 @@ pub fn misses(row: &Row, need: &Need) -> Vec<String> {
 /// A pair's name, and where its figures come from where another row has the same name.
 fn named(rows: &[Row], row: &Row) -> String {
     let from = if is_repeated(rows, row) { format!(" ({})", row.pair.source) } else { String::new() };
-    format!("{} with {}{from}", row.pair.motor, row.pair.propeller)
+    format!("{}{from}", row.pair.name())
 }
 
 /// Whether another row is of a pair of the same name.

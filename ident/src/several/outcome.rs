@@ -24,7 +24,7 @@ use crate::report::Vocabulary;
 use crate::sparse;
 use crate::supply_limit;
 use crate::verdict::Verdict;
-use crate::words::digits;
+use crate::words::{DISAGREE, OTHERWISE, digits};
 
 /// What several runs amount to.
 #[derive(Debug, Clone)]
@@ -180,7 +180,9 @@ fn disagreement(context: &Context, placed: &Placed, shared: &[Estimate], alone: 
     let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
     let told = |v: f64| digits(v, 0.005 * v.abs());
     let what = (Vocabulary::RIG.parameter)(placed.effect.id(), &name);
-    Some(format!("the runs disagree: alone they have {} to {}{unit} for the {what}", told(least), told(most)))
+    let together = shared.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.value);
+    let how = if (least..=most).contains(&together) { DISAGREE } else { OTHERWISE };
+    Some(format!("{how}: alone they have {} to {}{unit} for the {what}", told(least), told(most)))
 }
 
 /// Parameters of each effect of the rig on each run alone. The error of a shape is that which the run's own verdict has for it.

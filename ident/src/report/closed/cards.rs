@@ -16,8 +16,8 @@ use crate::report::svg::escape;
 use crate::rivals::UNEXPLAINED;
 use crate::verdict::{Alternative, EffectEntry, Kin, Parameter, Verdict};
 use crate::words::{
-    SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled, scope, signs, sized,
-    sureness, upper, upper_bound, with_interval,
+    DISAGREE, OTHERWISE, SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled,
+    scope, signs, sized, sureness, upper, upper_bound, with_interval,
 };
 use std::fmt::Write;
 
@@ -26,8 +26,8 @@ const OPEN: f64 = 0.05;
 /// Probability from which on a rival is told beside a name: below it its figure is zero to two digits.
 const COUNTED: f64 = 0.005;
 
-/// What stands before that the runs disagree on a size.
-pub(crate) const DISAGREE: &str = "; the runs disagree:";
+/// Times the error before from which on an error without an effect is said to be larger.
+const MORE: f64 = 1.02;
 
 /// The cards: those of this rig, those of every rig, and corrections without a name.
 pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
@@ -200,17 +200,13 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     sheet.html_part("<div>\n");
     parameters(sheet, page.words, e);
     let mut html = format!("<p class=\"soft\">{}</p>\n", written(e));
-    let (known, disagree) = match e.evidence.split_once(DISAGREE) {
-        Some((known, rest)) => (known, Some(rest)),
-        None => (e.evidence.as_str(), None),
-    };
+    // how the sizes of the runs stand to each other, in a line of its own
+    let apart = [DISAGREE, OTHERWISE].into_iter().find_map(|how| Some((how, e.evidence.split_once(&format!("; {how}:"))?)));
+    let known = apart.map_or(e.evidence.as_str(), |(_, (known, _))| known);
     let _ = writeln!(html, "<p><b>Known by:</b> {}.</p>", escape(&plain(signs(known))));
-    if let Some(rest) = disagree {
-        let _ = writeln!(
-            html,
-            "<p class=\"warn\"><b>The runs disagree:</b>{}. The interval allows for it.</p>",
-            escape(&plain(rest))
-        );
+    if let Some((how, (_, rest))) = apart {
+        let (how, rest) = (escape(&upper(how)), escape(&plain(rest)));
+        let _ = writeln!(html, "<p class=\"warn\"><b>{how}:</b>{rest}. The interval allows for it.</p>");
     }
     if !nameless {
         let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e, &against)));
@@ -221,13 +217,12 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     sheet.html_part(&format!("{html}</div></div></article>\n"));
 }
 
-/// How sure a name is, beside what stands against it; a name that nothing stands against has no figure here, the folded table has it.
+/// How sure a name is, its probability, and what stands against it.
 fn contest(e: &EffectEntry, sure: &str, against: &[Rival]) -> String {
     let p = equals(&probability(e.probability));
     match against.first().filter(|r| r.probability >= COUNTED) {
         Some(rival) => format!("{sure}: p {p}, rival {}", equals(&probability(rival.probability))),
-        None if e.probability >= SURE => format!("{sure}, no rival"),
-        None => format!("{sure}: p {p}"),
+        None => format!("{sure}: p {p}, no rival"),
     }
 }
 
@@ -241,11 +236,11 @@ fn written(e: &EffectEntry) -> String {
     format!("<code>{}</code>{form}", escape(&equation))
 }
 
-/// How sure it is that something without a name is there: what the verdicts so far say where nothing in the library was tried against it,
-/// else its probability.
+/// How sure it is that something without a name is there. What nothing in the library was tried against has no probability: rows that no fit
+/// saw show it.
 pub(super) fn that_it_is_there(p: f64) -> String {
     if p == UNEXPLAINED {
-        "nine in ten such verdicts are right".to_owned()
+        "left-out rows show it".to_owned()
     } else if p < 0.5 {
         "other forms would do as well".to_owned()
     } else {
@@ -293,8 +288,11 @@ pub(super) fn removes(v: &Verdict, e: &EffectEntry) -> String {
         return format!("It removes nothing of the error of {}.", channel(first));
     }
     let without = c.after.heldout_rms / (1.0 - reduction).max(1e-9);
+    // the other causes were fitted for a model that has it
+    let more = without > MORE * c.before.heldout_rms && v.effects.len() > 1;
+    let more = if more { " (more than before: the other causes fit only beside it)" } else { "" };
     let [_, without, with] = figures(&c.unit, c.noise_floor_rms, without, c.after.heldout_rms);
-    format!("Without it the error of {} is {without}, with it {with}.", channel(first))
+    format!("Without it the error of {} is {without}{more}, with it {with}.", channel(first))
 }
 
 /// A parameter's value and interval, with one digit more than the interval supports; what cannot be below zero and may be zero has a bound alone.

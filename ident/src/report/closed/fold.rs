@@ -125,7 +125,9 @@ pub(crate) fn candidates(sheet: &mut Sheet, diagnosis: &Diagnosis) {
         return;
     }
     sheet.fold("Candidates that were asked", |sheet| {
-        sheet.say("Each round asks every effect beside what was found before. Evidence in nats over the declared model.");
+        sheet.say(
+            "Each round asks every effect beside what was found before, in this order. Evidence in nats over the declared model.",
+        );
         sheet.data("candidates", &["round", "effect", "evidence", "fate", "channels"], &rows, None);
     });
 }

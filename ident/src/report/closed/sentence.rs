@@ -25,6 +25,12 @@ const TELLING: f64 = 0.1;
 const ALIKE: f64 = 0.1;
 /// Share from which on all is explained but the noise.
 const ALL: f64 = 0.995;
+/// Channels without a model up to which each is told with its reason.
+const MOST_BARE: usize = 2;
+/// Words of a head above which the share that an open question leaves explained is left to the bars.
+const LONGEST: usize = 60;
+/// Share of a channel's error below which most of it is still there.
+const HALF: f64 = 0.5;
 /// Noise floors up to which what is left is not worth a word.
 const QUIET: f64 = 1.5;
 
@@ -46,11 +52,20 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     } else {
         said
     };
-    let without = verdict.channels.not_predicted.iter().map(|(name, reason)| match reason.contains(':') {
+    std::iter::once(said).chain(without_a_model(verdict)).collect::<Vec<_>>().join(" ")
+}
+
+/// That some channels have no model. Where they are many, the state of the channels says why.
+fn without_a_model(verdict: &Verdict) -> Vec<String> {
+    let bare = &verdict.channels.not_predicted;
+    if bare.len() > MOST_BARE {
+        return vec![format!("{} channels have no model: why is told below.", bare.len())];
+    }
+    let of = |(name, reason): (&String, &String)| match reason.contains(':') {
         true => format!("{} has no model ({reason}).", heading(name)),
         false => format!("{} has no model: {reason}.", heading(name)),
-    });
-    std::iter::once(said).chain(without).collect::<Vec<_>>().join(" ")
+    };
+    bare.iter().map(of).collect()
 }
 
 /// Effects in the order in which they are told: what removes most first, what a few readings hold last.
@@ -186,7 +201,15 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
     };
     let nameless = verdict.effects.iter().any(|e| e.id == "unknown" && !e.is_without_correction());
     let below = below(causes(all).saturating_sub(told), nameless);
-    [out, below, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ")
+    let joined = |parts: [String; 3]| parts.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
+    let bare = joined([out.clone(), below.clone(), left(verdict)]);
+    let asked: Vec<&EffectEntry> = sure.iter().chain(disputed).copied().collect();
+    let Some(explained) = explained(verdict, &asked) else { return bare };
+    // what says that more is told below has said so
+    let below = if explained.says_more { String::new() } else { below };
+    let share = explained.said.replacen(TOGETHER, OPEN, 1).replacen(THAT, OPEN, 1);
+    let said = joined([format!("{out} {share}"), below, left(verdict)]);
+    if said.split_whitespace().count() <= LONGEST { said } else { bare }
 }
 
 /// What is asked of some effects: each way in which it may be, the likeliest first.
@@ -339,6 +362,11 @@ fn share(verdict: &Verdict, name: &str) -> Option<f64> {
     (before > 0.0 && after.is_finite()).then(|| (1.0 - after / before).max(0.0))
 }
 
+/// What explains a share: one effect, several, or a model whose effects are open.
+const THAT: &str = "That explains";
+const TOGETHER: &str = "Together they explain";
+const OPEN: &str = "The model as it is now explains";
+
 /// A sentence on what is explained.
 struct Explained {
     said: String,
@@ -363,8 +391,8 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> Option<Explained> {
     let subject = match (others, told.len()) {
         (true, _) if nameless => "With all that is told below the model explains",
         (true, _) => "With all that is named below the model explains",
-        (false, 1) => "That explains",
-        (false, _) => "Together they explain",
+        (false, 1) => THAT,
+        (false, _) => TOGETHER,
     };
     // nothing is all as long as something is told of what is left
     let rest = verdict.unexplained.iter().any(|u| is_told(&u.channel));
@@ -470,8 +498,9 @@ fn left(verdict: &Verdict) -> String {
     };
     let what = quantity(&told.channel);
     // what is left on the other channels stands beside their bars
+    let unknown = if share(verdict, &told.channel).is_none_or(|s| s < HALF) { " No known effect explains it." } else { "" };
     match loud(verdict).any(|u| quantity(&u.channel) != what) {
-        false => format!("On {on} {size} is left ({}).", looks(told)),
-        true => format!("Most is left on {on}: {size} ({}).", looks(told)),
+        false => format!("On {on} {size} is left ({}).{unknown}", looks(told)),
+        true => format!("Most is left on {on}: {size} ({}).{unknown}", looks(told)),
     }
 }
