@@ -226,7 +226,37 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             &["With all that is told below the model explains"],
             &[],
         ),
+        (
+            // what is still there in the main is not passed over
+            with_left(verdict_with_thrust_after(0.28, vec![sag(0.99)])),
+            false,
+            &["On thrust 0.28 N rms is left (slow). No known effect explains it."],
+            &[],
+        ),
+        (with_left(verdict(Kind::Attributed, vec![filter(0.99)])), false, &["is left (slow)."], &["No known effect"]),
+        (without_model(&["rpm_1", "rpm_2"]), false, &["no command was logged."], &["channels have no model"]),
+        (
+            without_model(&["rpm_1", "rpm_2", "rpm_3"]),
+            false,
+            &["3 channels have no model: why is told below."],
+            &["no command was logged"],
+        ),
     ]
+}
+
+/// A verdict whose thrust is left with an error.
+fn verdict_with_thrust_after(after: f64, effects: Vec<EffectEntry>) -> Verdict {
+    let mut v = verdict(Kind::Attributed, effects);
+    let thrust = v.channels.predicted.get_mut("thrust_n").expect("a channel");
+    thrust.after.heldout_rms = after;
+    v
+}
+
+/// A verdict beside which some channels have no model.
+fn without_model(names: &[&str]) -> Verdict {
+    let mut v = verdict(Kind::Attributed, vec![filter(0.99)]);
+    v.channels.not_predicted = names.iter().map(|n| ((*n).to_owned(), "no command was logged".to_owned())).collect();
+    v
 }
 
 #[test]

@@ -188,6 +188,23 @@ fn the_command_writes_the_rig_and_each_run_and_refuses_what_is_no_set_of_runs() 
     }
 }
 
+/// Three of these runs: a delay of the load cell joined for what a clock that runs apart explains better beside the others.
+#[test]
+fn no_name_of_several_runs_stands_below_its_rival() {
+    let Some(data) = data("the recorded lever rig, three runs together") else { return };
+    let logs = files(&data.join("rig/lever-rig-10x45/tidy"), |name| name.starts_with("robbe11.") && name.ends_with(".csv"));
+    assert_eq!(logs.len(), 3);
+    let logs = logs.iter().map(|f| ident::import::import(f, &[]).unwrap().0).collect();
+    let (_, outcome) = together(logs);
+    let v = &outcome.verdict;
+    let changes: Vec<_> = v.alternatives.iter().filter_map(|a| a.change.as_ref()).collect();
+    println!("{} rivals", changes.len());
+    for change in changes {
+        let standing = &v.effects[change.place];
+        assert!(change.probability <= standing.probability, "{} {} / {change:?}", standing.id, standing.probability);
+    }
+}
+
 /// Four runs of one rig at four supply voltages, that nobody here made: every error falls on a run that took no part, by three times on
 /// average, and none grows.
 #[test]

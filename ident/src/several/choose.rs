@@ -99,8 +99,8 @@ pub(super) fn choose(runs: &[&Closed], members: &[Member<'_>], progress: &mut dy
     (0..rig.len()).map(named).collect()
 }
 
-/// What predicts the runs better in the place of a name takes it: a name may have joined for what a later one explains. The runs predict each
-/// other better after each exchange, so that none comes twice.
+/// What predicts the runs better in the place of a name takes it: a name may have joined for what a later one explains. No more exchanges than
+/// there are candidates.
 fn exchange(joint: &Joint<'_, '_>, rig: &mut Vec<Placed>, now: &mut Vec<Across>, pool: &mut Vec<Vec<Placed>>) {
     let score = |errors: &[Across]| errors.iter().map(Across::score).sum::<f64>();
     let better = |rig: &[Placed], now: &[Across], pool: &[Vec<Placed>], k: usize| {
@@ -120,7 +120,8 @@ fn exchange(joint: &Joint<'_, '_>, rig: &mut Vec<Placed>, now: &mut Vec<Across>,
         // with the shapes of all runs, or with those of the run that it is from
         better(joint.refined(&with, &[k], SOUGHT, EVALUATIONS)).or_else(|| better(with))
     };
-    while let Some((k, with, then)) = (0..rig.len()).find_map(|k| better(rig, now, pool, k)) {
+    for _ in 0..pool.len() {
+        let Some((k, with, then)) = (0..rig.len()).find_map(|k| better(rig, now, pool, k)) else { return };
         pool.retain(|starts| !starts[0].is_like(&with[k]));
         pool.push(vec![rig[k].clone()]);
         (*rig, *now) = (with, then);

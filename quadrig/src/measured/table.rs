@@ -59,6 +59,17 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     }
     let _ = writeln!(out, "{}", line(&format!("**all but {TABLES}**"), &sum(&|o| o.set.folder != TABLES)));
     let _ = writeln!(out, "{}", line("**all**", &all));
+    let held = |wanted: &dyn Fn(&Outcome) -> bool| {
+        let tried = || outcomes.iter().filter(|o| wanted(o)).flat_map(|o| &o.tried).filter(|t| t.holds());
+        share(tried().filter(|t| t.named_there).count(), tried().count())
+    };
+    let _ = writeln!(
+        out,
+        "\nA name may be of something that another run does not show: a current limit at a lower voltage, for instance. Of the causes that hold on another run \
+         (table above) that run's own verdict names {}, and {} of all but {TABLES}.",
+        held(&|_| true),
+        held(&|o| o.set.folder != TABLES)
+    );
     out.push_str(
         "\nNames: each name of a run, sought in the verdict of each other run of its rig. A correction without a name is none. \
          A rig at two supply voltages turns at another speed for the same pulse: no constant takes that off. The corrected model follows the voltage \
