@@ -9,12 +9,13 @@
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
 use crate::beside::{NEEDED, ask, is_named, left_of, with_rests};
+use crate::colour::Colour;
 use crate::conclude::{Errors, is_nothing, quoted, untenable};
 use crate::context::{Context, Relation, Target};
 pub(crate) use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::{self, Effect, Estimate, Instance};
 use crate::heldout::{self, Around, Held};
-use crate::hypothesis::{Colour, Declared, Fit, Placed, Rows, TargetFit, fit, plausible, scatters};
+use crate::hypothesis::{Declared, Fit, Placed, Rows, TargetFit, fit, plausible, scatters};
 use crate::moment::lasts;
 use crate::parallel::{cores, in_parallel};
 use crate::residual::whiteness;
@@ -474,8 +475,9 @@ pub(crate) fn round_of(
 /// Evidence of each candidate beyond what it was added to. In the order in which they are asked: by the evidence that they have where the noise
 /// alone says how many samples count, so that a quick change is asked no earlier than a slow one that takes as much away.
 pub(crate) fn weigh(context: &Context, best: &Candidate, candidates: &mut Vec<Candidate>) {
-    let shares = along(context, candidates, &best.fit);
-    let plain = self::shares(context, candidates.iter().map(|c| &c.fit));
+    let quietest = quietest(context, candidates.iter().map(|c| &c.fit));
+    let plain = plain(&quietest);
+    let shares = along(context, candidates, &best.fit, &quietest);
     let mut weighed: Vec<(f64, Candidate)> = std::mem::take(candidates)
         .into_iter()
         .zip(&shares)
@@ -509,11 +511,16 @@ pub(crate) fn loud(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<
 /// For each target the share of independent samples that the colour of the best fit's residual leaves: the same for every
 /// candidate of a round, so that none wins by leaving a larger but whiter residual.
 pub(crate) fn shares<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<f64> {
-    noises(context, fits).into_iter().map(|best| best.map_or(1.0, |t| t.share)).collect()
+    plain(&quietest(context, fits))
+}
+
+/// The share that the colour of each target's residual leaves.
+fn plain(quietest: &[Option<&TargetFit>]) -> Vec<f64> {
+    quietest.iter().map(|best| best.map_or(1.0, |t| t.share)).collect()
 }
 
 /// For each target the fit that leaves the least.
-fn noises<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<Option<&'f TargetFit>> {
+fn quietest<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<Option<&'f TargetFit>> {
     let mut best: Vec<Option<&TargetFit>> = vec![None; context.targets.len()];
     for f in fits {
         for (b, t) in best.iter_mut().zip(&f.targets) {
@@ -528,10 +535,9 @@ fn noises<'f>(context: &Context, fits: impl Iterator<Item = &'f Fit>) -> Vec<Opt
 /// For each candidate and target the share of independent samples along what the candidate changes: noise that wanders slowly hides what is as slow,
 /// and little of what steps. No candidate has more than the one that leaves the least, or it would win by changing something quick.
 /// Between sensors of one speed it is that of the noise: what they differ by are single readings that are lost.
-fn along(context: &Context, candidates: &[Candidate], old: &Fit) -> Vec<Vec<f64>> {
-    let quietest = noises(context, candidates.iter().map(|c| &c.fit));
+fn along(context: &Context, candidates: &[Candidate], old: &Fit, quietest: &[Option<&TargetFit>]) -> Vec<Vec<f64>> {
     let mut out = vec![vec![1.0; context.targets.len()]; candidates.len()];
-    for (k, quietest) in quietest.into_iter().enumerate() {
+    for (k, quietest) in quietest.iter().enumerate() {
         let Some(quietest) = quietest else { continue };
         let (before, plain) = (&old.targets[k].left, context.targets[k].relation.is_evidence());
         let colour = Colour::of(&quietest.left);

@@ -14,6 +14,7 @@ mod beside;
 pub mod board;
 pub mod circle;
 pub mod close;
+mod colour;
 mod conclude;
 pub mod context;
 mod correction;

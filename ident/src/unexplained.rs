@@ -7,9 +7,10 @@
 //! Units: noise floors of the channel.
 //! Reference: specification `formats.md`, "Verdict" (`unexplained`); `closing-the-loop.md`, steps 2 and 7.
 
+use crate::colour::effective_share;
 use crate::context::{Context, DIFFERENCES, Relation, Target};
 use crate::heldout;
-use crate::hypothesis::{Declared, Fit, effective_share};
+use crate::hypothesis::{Declared, Fit};
 use crate::inspect::{goes_with, seems_to_go_with};
 use crate::opponent::{is_second_meter, left_over};
 use crate::verdict::{Channels, Unexplained};

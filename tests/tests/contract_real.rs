@@ -57,6 +57,26 @@ fn a_supply_lead_keeps_its_size_beside_what_has_no_name() {
     assert!((0.1..0.4).contains(&ohms), "{ohms} ohm");
 }
 
+/// A lead that steps with the load, beside a voltage that wanders by far more than its noise: three staircases on two motors.
+#[test]
+fn a_lead_shows_through_a_voltage_that_wanders() {
+    let Some(data) = data("the lead of a recorded stand") else { return };
+    for run in [
+        "micro/tidy/StepsTestV2_2023-12-17_162536",
+        "micro/tidy/StepsTestV2_2024-02-06_131025",
+        "sov5/tidy/StepsTestV2_2023-12-14_111824",
+    ] {
+        let log = data.join(format!("rig/stand1585-{run}.csv"));
+        let folder = TempDir::new().unwrap();
+        let said = call(folder.path(), &["--quiet", "close-loop", text(&log), "-o", "out", "--json"]).succeeded();
+        let verdict: Value = serde_json::from_str(&said.out).expect("the verdict is JSON");
+        let effects = verdict["effects"].as_array().expect("effects");
+        let sag = effects.iter().find(|e| e["id"] == "supply_sag").unwrap_or_else(|| panic!("{run}: {effects:?}"));
+        let ohms = sag["parameters"][0]["value"].as_f64().expect("a resistance");
+        assert!((0.04..0.15).contains(&ohms), "{run}: {ohms} ohm");
+    }
+}
+
 #[test]
 fn the_loop_closes_on_three_recorded_runs() {
     let Some(data) = data("the loop on recorded runs") else { return };

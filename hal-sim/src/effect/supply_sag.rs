@@ -36,7 +36,7 @@ fn usual_late_s() -> f64 {
 
 impl Effect for SupplySag {
     const ID: &'static str = "supply_sag";
-    const EQUATION: &'static str = "voltage_v = source - resistance * current_a - late resistance * lag(current_a)";
+    const EQUATION: &'static str = "voltage_v = source - resistance * current_a - late_resistance * lag(current_a)";
 
     fn draw(stream: &mut Stream, _run_s: f64) -> Self {
         Self { resistance_ohm: stream.log_between(0.03, 0.12), t0_s: 0.0, late_ohm: 0.0, late_s: usual_late_s() }
@@ -55,7 +55,7 @@ impl Effect for SupplySag {
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64, &'static str)> {
-        let late = [("late resistance", self.late_ohm, "ohm"), ("late time constant", self.late_s, "s")];
+        let late = [("late_resistance", self.late_ohm, "ohm"), ("late_tau", self.late_s, "s")];
         let told = if self.late_ohm > 0.0 { &late[..] } else { &[] };
         [&[("resistance", self.resistance_ohm, "ohm"), ("t0", self.t0_s, "s")], told].concat()
     }

@@ -5,8 +5,8 @@
 //! Units: the channel's, per power of rpm/1000 or (pulse - 1000 us)/1000.
 //! Reference: Beharie 2013, section 5.7.3; specification `formats.md`, "primary relations".
 
+use crate::colour::effective_share;
 use crate::context::{Context, Relation, Target};
-use crate::hypothesis::effective_share;
 use crate::model::Polynomial;
 use crate::solve::Normal;
 

@@ -111,14 +111,12 @@ fn exchange(joint: &Joint<'_, '_>, rig: &mut Vec<Placed>, now: &mut Vec<Across>,
         }
         let mut with = rig.to_vec();
         with[k] = newcomer;
-        let better = |with: Vec<Placed>| {
+        let taken = |with: Vec<Placed>| {
             let then = joint.across(&with, None);
-            let compared = compared(&without, &then);
-            let stands = is_worth(&compared) && harms(&compared).is_none() && is_plausible(joint, &with);
-            (stands && score(&then) > score(now)).then_some((k, with, then))
+            (score(&then) > score(now) && stands(joint, &with, &without, &then)).then_some((k, with, then))
         };
         // with the shapes of all runs, or with those of the run that it is from
-        better(joint.refined(&with, &[k], SOUGHT, EVALUATIONS)).or_else(|| better(with))
+        taken(joint.refined(&with, &[k], SOUGHT, EVALUATIONS)).or_else(|| taken(with))
     };
     for _ in 0..pool.len() {
         let Some((k, with, then)) = (0..rig.len()).find_map(|k| better(rig, now, pool, k)) else { return };
@@ -141,9 +139,8 @@ fn rivals(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, without: &[Across], p
     };
     // what could not join could not stand there either
     let stands = |p: &Placed, then: &[Across]| {
-        let compared = compared(without, then);
         let with: Vec<Placed> = others.iter().chain([p]).cloned().collect();
-        is_worth(&compared) && harms(&compared).is_none() && is_plausible(joint, &with)
+        self::stands(joint, &with, without, then)
     };
     let gain = |starts: &Vec<Placed>| {
         let tried = starts.iter().map(|p| (p, tried(joint, &others, without, p)));
@@ -171,8 +168,7 @@ fn best(joint: &Joint<'_, '_>, rig: &[Placed], now: &[Across], pool: &[Vec<Place
         let with = joint.refined(&with, &[rig.len()], SOUGHT, EVALUATIONS);
         let newest = &with[rig.len()];
         let (gain, then) = tried(joint, rig, now, newest);
-        let compared = compared(now, &then);
-        if gain > NEEDED_EVIDENCE && is_worth(&compared) && harms(&compared).is_none() && is_plausible(joint, &with) {
+        if gain > NEEDED_EVIDENCE && stands(joint, &with, now, &then) {
             return Some((at, newest.clone(), then));
         }
     }
@@ -196,6 +192,12 @@ fn typical(values: impl Iterator<Item = f64>) -> f64 {
 pub(super) fn is_worth(compared: &[Compared]) -> bool {
     let gone = |channel: &str| 1.0 - 1.0 / typical(compared.iter().filter(|c| c.before.channel == channel).map(Compared::times));
     compared.iter().any(|c| gone(c.before.channel) > NEEDED_REDUCTION)
+}
+
+/// Whether a rig with a newcomer may stand: it is worth a name, spoils no channel and makes sense.
+fn stands(joint: &Joint<'_, '_>, with: &[Placed], before: &[Across], then: &[Across]) -> bool {
+    let compared = compared(before, then);
+    is_worth(&compared) && harms(&compared).is_none() && is_plausible(joint, with)
 }
 
 /// What a newcomer adds to how well the runs predict each other, and their errors then.

@@ -119,7 +119,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     if own.is_empty() {
         out += &format!(" Every {noun} has that; nothing of this {noun}'s own was named.");
     }
-    let explained = explained(verdict, &told);
+    let explained = explained(verdict, &told, false);
     // what says that more is told below has said so
     let more = if explained.as_ref().is_some_and(|e| e.says_more) { 0 } else { more };
     [out, explained.map(|e| e.said).unwrap_or_default(), below(more, false), left(verdict)]
@@ -204,11 +204,10 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
     let joined = |parts: [String; 3]| parts.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
     let bare = joined([out.clone(), below.clone(), left(verdict)]);
     let asked: Vec<&EffectEntry> = sure.iter().chain(disputed).copied().collect();
-    let Some(explained) = explained(verdict, &asked) else { return bare };
+    let Some(explained) = explained(verdict, &asked, true) else { return bare };
     // what says that more is told below has said so
     let below = if explained.says_more { String::new() } else { below };
-    let share = explained.said.replacen(TOGETHER, OPEN, 1).replacen(THAT, OPEN, 1);
-    let said = joined([format!("{out} {share}"), below, left(verdict)]);
+    let said = joined([format!("{out} {}", explained.said), below, left(verdict)]);
     if said.split_whitespace().count() <= LONGEST { said } else { bare }
 }
 
@@ -362,11 +361,6 @@ fn share(verdict: &Verdict, name: &str) -> Option<f64> {
     (before > 0.0 && after.is_finite()).then(|| (1.0 - after / before).max(0.0))
 }
 
-/// What explains a share: one effect, several, or a model whose effects are open.
-const THAT: &str = "That explains";
-const TOGETHER: &str = "Together they explain";
-const OPEN: &str = "The model as it is now explains";
-
 /// A sentence on what is explained.
 struct Explained {
     said: String,
@@ -374,8 +368,9 @@ struct Explained {
     says_more: bool,
 }
 
-/// How much the effects explain of what their first channels had left over; nothing where that is not worth a figure.
-fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> Option<Explained> {
+/// How much the effects explain of what their first channels had left over; nothing where that is not worth a figure. `open`: which of
+/// them are there is a question.
+fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool) -> Option<Explained> {
     let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).map(String::as_str).collect();
     on.sort_unstable();
     on.dedup_by_key(|c| whole(verdict, c));
@@ -391,8 +386,9 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry]) -> Option<Explained> {
     let subject = match (others, told.len()) {
         (true, _) if nameless => "With all that is told below the model explains",
         (true, _) => "With all that is named below the model explains",
-        (false, 1) => THAT,
-        (false, _) => TOGETHER,
+        (false, _) if open => "The model as it is now explains",
+        (false, 1) => "That explains",
+        (false, _) => "Together they explain",
     };
     // nothing is all as long as something is told of what is left
     let rest = verdict.unexplained.iter().any(|u| is_told(&u.channel));
