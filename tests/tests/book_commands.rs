@@ -268,7 +268,7 @@ fn pictures(page: &Page, written: &Path) -> Result<(), String> {
         }
         if std::fs::read(&kept).ok() != Some(fresh) {
             return Err(format!(
-                "{at} is not what the commands write: QUADRIG_BLESS=1 cargo test -p quadrig-tests --test book_commands"
+                "{at} is not what the commands write: QUADRIG_BLESS=1 cargo test -p quadrig-tests --test suite book_commands"
             ));
         }
     }

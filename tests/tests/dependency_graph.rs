@@ -1,4 +1,4 @@
-//! No inverse crime: the identification cannot import the simulator, nor the simulator the identification.
+//! How the workspace hangs together. No inverse crime: the identification cannot import the simulator, nor the simulator the identification.
 //!
 //! What it is: the dependency graph as cargo resolves it, followed from both crates to everything that they reach, build and test
 //! dependencies included.
@@ -101,4 +101,22 @@ fn needs(package: &str) -> Vec<String> {
 fn pulses_need_the_traits_of_a_pin_and_nothing_else() {
     assert_eq!(needs("esc-pwm"), ["embedded_hal"]);
     assert!(needs("frame").iter().any(|name| name == "postcard"), "the test sees what there is");
+}
+
+/// A file that no program lists would compile nowhere, and its tests would never run.
+#[test]
+fn every_file_of_the_integration_tests_is_a_module_of_one_program() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let listed = |program: &str| std::fs::read_to_string(folder.join(program)).expect("a program");
+    let (suite, boards) = (listed("suite.rs"), listed("boards.rs"));
+    let mut files = 0;
+    for entry in std::fs::read_dir(&folder).expect("a folder") {
+        let name = entry.expect("an entry").file_name().into_string().expect("a name");
+        let Some(stem) = name.strip_suffix(".rs").filter(|stem| !["suite", "boards"].contains(stem)) else { continue };
+        let in_its = if stem.starts_with("emulated_") { &boards } else { &suite };
+        assert!(in_its.contains(&format!("\nmod {stem};\n")), "tests/tests/{name} is in no program");
+        files += 1;
+    }
+    let modules = [suite, boards].iter().flat_map(|text| text.lines()).filter(|line| line.starts_with("mod ")).count();
+    assert!(files > 60 && files == modules, "{files} files, {modules} modules");
 }

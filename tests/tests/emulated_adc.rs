@@ -1,6 +1,5 @@
 //! Effective bits of the strain channel on the emulated board: the flash image, five channels, a constant input, the converter's
 //! 12-bit quantisation, and noise drawn at every single conversion.
-#![cfg(feature = "emulated")]
 
 use frame::message::{Command, Message, Setting};
 use frame::rig::{ADC_NAMES, AdcVerdict, RigSample};

@@ -1,7 +1,6 @@
 //! The flash image of the IMU board, run on the emulated STM32F405 with three sensor models on its bus.
 //!
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use frame::message::BoardId;
 use frame::wire::{Decoder, LinkStats};

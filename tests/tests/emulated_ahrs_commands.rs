@@ -2,7 +2,6 @@
 //! in its flash, there again after a reset and after a supply that fails in the midst of a save.
 //!
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use frame::message::SettingsNews;
 use frame::wire::{Decoder, Encoder, MAX_WIRE};

@@ -1,7 +1,6 @@
 //! Instructions of one update of the attitude filter, counted, against `budgets/ahrs.toml`.
 //!
 //! Build the images first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use hal_sim::emulated::cost::instructions;
 

@@ -5,7 +5,6 @@
 //! What can go wrong: a conversion that is left out between two ticks would shift the phase of everything behind it: the sine that is
 //! fitted to the first half must go on through the second.
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use firmware_rig::burst::LENGTH;
 use frame::message::{BURST_PART, BurstPart, Command, Event, Health, Message, Setting};

@@ -1,5 +1,4 @@
 //! The fault campaign on the flash image: a plan of each kind that the pins of the emulated board can show, under the native rules.
-#![cfg(feature = "emulated")]
 
 use hal_sim::emulated::pilot::{fly, fly_spared};
 use hal_sim::fault::{Mishap, Phase, Plan, Rule, Wrong};

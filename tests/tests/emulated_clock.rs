@@ -1,5 +1,4 @@
 //! The crystal on the flash image: another frequency, none at all, one that fails in flight; and a hard fault in flight.
-#![cfg(feature = "emulated")]
 
 use frame::message::{ClockNews, Command, CrashCause, Event, Message};
 use frame::rig::{Fault, RigState};

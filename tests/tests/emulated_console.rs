@@ -5,7 +5,6 @@
 //! pulses, and once with DShot from the board's first configuration on: then every word on the ESC's line is compared as well.
 //! What can go wrong: the image starts some milliseconds after power-up: times on the board's clock may differ by that, nothing else.
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use esc_pwm::dshot::{EscOutput, Frame, Throttle};
 use firmware_rig::{AdcBlock, Config, RigConfig};

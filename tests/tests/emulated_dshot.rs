@@ -4,7 +4,6 @@
 //! and frames whose checksum the wire has spoilt.
 //! What can go wrong: the first bit of a frame is heard to the nanosecond; what the world does at an instant is done within 0.1 ms.
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use esc_pwm::dshot::{EscOutput, Frame, Throttle};
 use firmware_rig::rig_config::Answers;

@@ -1,6 +1,5 @@
 //! The last resort tried on purpose, and what the board measures of itself in a run, on the flash image. Faults at the pins fly in
 //! `emulated_campaign.rs`.
-#![cfg(feature = "emulated")]
 
 use frame::message::{Command, Event, Message, SettingsNews, Trial};
 use frame::rig::RigState;

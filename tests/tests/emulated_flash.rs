@@ -1,5 +1,4 @@
 //! `quadrig flash rig` builds the image that the emulated boards run, to the byte.
-#![cfg(feature = "emulated")]
 
 use hal_sim::emulated::firmware;
 use quadrig_tests::probe::Probe;

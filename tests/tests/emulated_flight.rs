@@ -4,7 +4,6 @@
 //! the emulated board; its words and its attitude are held against those of the native run and against the truth.
 //! What can go wrong: the two read a chip some microseconds apart, so that a word of a shaking axis differs by what it changes in between.
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use frame::wire::Decoder;
 use frame::{ImuSample, Message};

@@ -4,7 +4,6 @@
 //! the sensors' health of both runs are compared, in good order and with the bus faults of a scenario file.
 //! What can go wrong: the two read a chip some microseconds apart, so a word of a moving axis may round the other way.
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use firmware_ahrs::GyroReading;
 use firmware_ahrs::{Ahrs, AhrsConfig, Inputs, Readings};

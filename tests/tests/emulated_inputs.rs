@@ -1,5 +1,4 @@
 //! Inputs that misbehave, on the flash image: a speed input that screams, a conversion that the DMA missed, a sensor that is not fitted.
-#![cfg(feature = "emulated")]
 
 use frame::message::{Command, Event, Health, Message, Setting};
 use frame::rig::{CaptureVerdict, Fault, FaultSet, RigSample, RigState};

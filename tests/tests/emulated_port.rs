@@ -2,7 +2,6 @@
 //!
 //! No step waits for a clock. Each goes on with what the board or its ESC was heard to do, so that neither a slow emulator nor a slow
 //! host changes what happens; the board is switched off when the last step is done.
-#![cfg(feature = "emulated")]
 
 use frame::message::{Beep, Event, Message};
 use frame::rig::RigState;

@@ -1,7 +1,6 @@
 //! The flash image of the motor rig, run on the emulated STM32F405 against the simulated bench.
 //!
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use frame::message::{BoardId, Command, Event, Message};
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES, CaptureVerdict, Fault, FaultSet, RigSample, RigState};

@@ -1,6 +1,5 @@
 //! Settings in the flash of the emulated board: saved by the flash image, there again after a reset, and whole after a supply that fails
 //! in the midst of a save.
-#![cfg(feature = "emulated")]
 
 use frame::message::{Command, Event, Message, Setting, SettingsNews};
 use hal_sim::Scenario;

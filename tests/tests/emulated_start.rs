@@ -1,7 +1,6 @@
 //! How the flash image starts, and what its log may not do: seen at the registers that it writes.
 //!
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use frame::message::{Command, Event, Message};
 use frame::units::{PulseWidth, Ticks};

@@ -1,5 +1,4 @@
 //! The stop on the flash image, at every phase: by key and by command, so and so long before the start of a pulse.
-#![cfg(feature = "emulated")]
 
 use frame::message::Command;
 use hal_sim::Scenario;

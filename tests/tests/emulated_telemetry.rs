@@ -4,7 +4,6 @@
 //! capture at their instants, and then something happens to each of the lines.
 //! What can go wrong: an error flag that is not cleared would leave the receiver deaf: after each fault the values have to come back.
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use esc_pwm::dshot::{EscOutput, Frame};
 use firmware_rig::{Config, EscTelemetry, RigConfig};

@@ -5,7 +5,6 @@
 //! What can go wrong: an edge within a microsecond of a sample may fall before it on one side and behind it on the other; such
 //! samples are counted apart. When an edge came is what the board's own counter read at that instant, checked against the script.
 //! Build the image first: `cargo xtask image`
-#![cfg(feature = "emulated")]
 
 use firmware_rig::{AdcBlock, Beside, Config, Inputs, Rig};
 use frame::message::Message;

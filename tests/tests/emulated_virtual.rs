@@ -1,5 +1,4 @@
 //! The flash image as a virtual board: in lock step, with hands at its bench and its settings in a file that the native board reads.
-#![cfg(feature = "emulated")]
 
 use frame::message::{Beep, Command, Event, Message, Setting, SettingsNews};
 use frame::rig::RigState;

@@ -1,6 +1,6 @@
 //! The tables of docs/rig.md are what the code says.
 //!
-//! `QUADRIG_BLESS=1 cargo test -p quadrig-tests --test rig_docs` writes them anew.
+//! `QUADRIG_BLESS=1 cargo test -p quadrig-tests --test suite rig_docs` writes them anew.
 
 use firmware_rig::Config;
 use frame::rig::{CaptureCode, CaptureVerdict};
@@ -66,7 +66,7 @@ fn the_tables_are_current() {
     if std::env::var_os("QUADRIG_BLESS").is_some() {
         std::fs::write(&file, &wanted).expect("docs/rig.md can be written");
     } else {
-        assert!(text == wanted, "docs/rig.md: QUADRIG_BLESS=1 cargo test -p quadrig-tests --test rig_docs");
+        assert!(text == wanted, "docs/rig.md: QUADRIG_BLESS=1 cargo test -p quadrig-tests --test suite rig_docs");
     }
 }
 

@@ -19,6 +19,8 @@ use std::process::Command;
 /// The package that runs the program, which is no library for it to depend on.
 const INTEGRATION: &str = "quadrig-tests";
 const PROGRAM: &str = "quadrig";
+/// The files that list its modules.
+const ROOTS: [&str; 2] = ["suite", "boards"];
 
 /// Folder below the root and the packages that it is built on, of each package.
 type Packages = BTreeMap<String, (String, BTreeSet<String>)>;
@@ -44,8 +46,8 @@ pub(crate) fn words(place: &Place, base: &str) -> Result<Vec<String>, Failure> {
     Ok(match asked {
         Asked::Nothing => Vec::new(),
         Asked::Tests(names) => {
-            let each = names.into_iter().flat_map(|name| ["--test".to_owned(), name]);
-            ["-p", INTEGRATION].map(str::to_owned).into_iter().chain(each).collect()
+            let each = names.into_iter().map(|name| format!("{name}::"));
+            ["-p", INTEGRATION, "--test", "suite", "--"].map(str::to_owned).into_iter().chain(each).collect()
         }
         Asked::Packages(names) => names.into_iter().flat_map(|name| ["-p".to_owned(), name]).collect(),
     })
@@ -71,7 +73,8 @@ fn packages(place: &Place, metadata: &str) -> Result<Packages, Failure> {
 
 /// What `files` can break.
 fn asked(files: &[&str], packages: &Packages) -> Asked {
-    let name = |file: &str| Some(file.strip_prefix("tests/tests/")?.strip_suffix(".rs")?.to_owned()).filter(|n| !n.contains('/'));
+    let module = |name: &String| !name.contains('/') && !ROOTS.contains(&name.as_str());
+    let name = |file: &str| Some(file.strip_prefix("tests/tests/")?.strip_suffix(".rs")?.to_owned()).filter(module);
     let own: Option<BTreeSet<String>> = files.iter().map(|file| name(file)).collect();
     match own {
         _ if files.is_empty() => return Asked::Nothing,
@@ -119,6 +122,7 @@ mod tests {
         let asked = |files: &[&str]| asked(files, &few());
         assert_eq!(asked(&[]), Asked::Nothing);
         assert_eq!(asked(&["tests/tests/readme.rs"]), Asked::Tests(set(&["readme"])));
+        assert_eq!(asked(&["tests/tests/suite.rs"]), Asked::Packages(set(&[INTEGRATION])));
         assert_eq!(asked(&["README.md", "tests/tests/readme.rs"]), Asked::Packages(set(&[INTEGRATION])));
         assert_eq!(asked(&["ident/src/lib.rs"]), Asked::Packages(set(&["ident", PROGRAM, INTEGRATION])));
         assert_eq!(asked(&["frame/src/wire.rs"]), Asked::Packages(set(&["frame", "firmware-rig", PROGRAM, INTEGRATION])));

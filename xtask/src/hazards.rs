@@ -65,8 +65,8 @@ impl Check {
 
     /// Program and words that run it in `copy`, the images built beforehand where it flies one.
     fn command(&self, copy: &Place) -> Result<Command, Failure> {
-        let Self::Test { path, name } = self else { return Ok(cargo(copy, &["xtask", "image"])) };
-        let stem = Path::new(path).file_stem().and_then(|s| s.to_str()).unwrap_or_default();
+        let Self::Test { path, .. } = self else { return Ok(cargo(copy, &["xtask", "image"])) };
+        let (program, name) = self.place();
         let package = match path.split('/').next() {
             Some("tests") => "quadrig-tests",
             Some(package) => package,
@@ -83,10 +83,20 @@ impl Check {
         if path.contains("/src/") {
             command.arg("--lib");
         } else {
-            command.args(["--test", stem]);
+            command.args(["--test", program]);
         }
-        command.args(["--", "--exact", name]);
+        command.args(["--", "--exact", &name]);
         Ok(command)
+    }
+
+    /// The test program, and the name of the test in it.
+    fn place(&self) -> (&str, String) {
+        let Self::Test { path, name } = self else { return ("", String::new()) };
+        let stem = Path::new(path).file_stem().and_then(|s| s.to_str()).unwrap_or_default();
+        match path.strip_prefix("tests/tests/") {
+            Some(_) => (if self.flies() { "boards" } else { "suite" }, format!("{stem}::{name}")),
+            None => (stem, name.clone()),
+        }
     }
 
     /// It needs the flash images.
@@ -97,7 +107,7 @@ impl Check {
     /// What the output of a check that notices says.
     fn says(&self) -> String {
         match self {
-            Self::Test { name, .. } => format!("test {name} ... FAILED"),
+            Self::Test { .. } => format!("test {} ... FAILED", self.place().1),
             Self::Image(says) => says.clone(),
         }
     }

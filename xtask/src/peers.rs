@@ -57,7 +57,7 @@ struct Cost {
 
 fn over_empty(place: &Place, images: &Path, empty: &str, names: &[&str]) -> Result<Vec<Cost>, Failure> {
     let mut count = cargo(place, &["test", "--release", "--workspace", "--features", "quadrig-tests/emulated"]);
-    count.args(["--ignore-rust-version", "--test", "emulated_ahrs_cost", "--", "--ignored", "--nocapture"]);
+    count.args(["--ignore-rust-version", "--test", "boards", "--", "emulated_ahrs_cost::", "--ignored", "--nocapture"]);
     count.env("QUADRIG_FW_DIR", images).env("QUADRIG_COST_IMAGES", [&[empty], names].concat().join(" "));
     let counted = output(&mut count)?;
     let count = |name: &str| {

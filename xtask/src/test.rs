@@ -147,7 +147,7 @@ pub(crate) fn proofs(place: &Place) -> Result<(), Failure> {
 }
 
 /// Tests of which the suite tries some cases, with all of them.
-const LONG: [&str; 3] = ["watch", "isolability", "demo"];
+const LONG: [&str; 3] = ["watch::", "isolability::", "demo::"];
 /// Tests that the suite leaves out for their length, by program: a thousand runs for intervals, two hundred joined clocks, the plateaus' table.
 const LEFT_OUT: [&str; 3] = ["intervals", "join", "plateaus"];
 
@@ -155,9 +155,8 @@ const LEFT_OUT: [&str; 3] = ["intervals", "join", "plateaus"];
 pub(crate) fn campaign(place: &Place) -> Result<(), Failure> {
     let mut steps = Steps::default();
     let done = steps.step("campaigns", |tally| {
-        let words = ["test", "--release", "--workspace", "--no-fail-fast"];
-        let mut command = cargo(place, &words);
-        tests(command.args(LONG.iter().flat_map(|name| ["--test", name])).env("QUADRIG_CAMPAIGN", "1"), tally)?;
+        let words = ["test", "--release", "--workspace", "--no-fail-fast", "--test", "suite", "--"];
+        tests(cargo(place, &words).args(LONG).env("QUADRIG_CAMPAIGN", "1"), tally)?;
         let mut command = cargo(place, &["test", "--release", "--no-fail-fast", "-p", "ident"]);
         tests(command.args(LEFT_OUT.iter().flat_map(|name| ["--test", name])).args(["--", "--ignored"]), tally)
     });
@@ -234,17 +233,7 @@ fn host_tests(place: &Place, words: &[String], steps: &mut Steps) -> Result<(), 
 
 /// The tests that load the flash images into the emulator.
 fn emulated(place: &Place, tally: &mut Tally) -> Result<(), Failure> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(place.root.join("tests/tests"))? {
-        let path = entry?.path();
-        if let Some(name) = path.file_stem().and_then(|n| n.to_str()).filter(|n| n.starts_with("emulated_")) {
-            files.extend(["--test".to_owned(), name.to_owned()]);
-        }
-    }
-    if files.is_empty() {
-        return Err(Failure("tests/tests holds no emulated_*.rs".to_owned()));
-    }
     let words = emulator::words(place)?;
-    let all = programs::build(place, &words, &files)?;
+    let all = programs::build(place, &words, &["--test".to_owned(), "boards".to_owned()])?;
     programs::run(place, &all, &words, tally)
 }
