@@ -6,7 +6,7 @@
 //! Units: as the channels state.
 //! Reference: specification `report.md`.
 
-use quadrig_tests::call;
+use quadrig_tests::{call, data};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
@@ -112,6 +112,24 @@ fn a_table_of_levels_is_told_as_one() {
     let log = sagging(folder.path());
     let (_, page, _) = closed(folder.path(), &log, "run");
     assert!(!text(&page).contains("one for each level"));
+}
+
+/// On this recorded run the figure that convinces is the one of what is left of thrust.
+#[test]
+fn what_is_left_has_its_figure_or_says_where_it_is() {
+    let Some(log) = data("the page of a recorded run").map(|d| d.join("rig/lever-rig-10x45/tidy/robbe11.8.csv")) else { return };
+    let folder = TempDir::new().unwrap();
+    let (_, page, verdict) = closed(folder.path(), log.to_str().expect("a plain name"), "out");
+    let left = page.split("id=\"what-is-left\"").nth(1).and_then(|p| p.split("<h2").next()).expect("what is left");
+    let all = verdict["unexplained"].as_array().expect("a list");
+    let (mut drawn, mut above) = (0, 0);
+    for channel in all.iter().filter_map(|u| u["channel"].as_str()) {
+        let anchor = channel.replace('_', "-");
+        drawn += usize::from(left.contains(&format!("<figure id=\"left-{anchor}\"")));
+        above += usize::from(page.contains(&format!("<figure id=\"most-{anchor}\"")));
+    }
+    let said = left.matches(": drawn at the head of this page.").count();
+    assert!(all.len() > 2 && above > 0 && drawn + said == all.len(), "{drawn} drawn, {said} said of {}", all.len());
 }
 
 /// A load cell that reads the speed squared, on stairs, at 200 Hz for 50 minutes.

@@ -172,6 +172,10 @@ fn the_command_writes_the_rig_and_each_run_and_refuses_what_is_no_set_of_runs() 
     }
     let left = page.split("id=\"what-is-left\"").nth(1).and_then(|p| p.split("<h2").next()).unwrap();
     assert!(left.contains("<svg") && left.contains("whole run, r1"), "what is left has its figure: {left}");
+    let beside = page.split("<summary>Constants and fits, run by run").nth(1).and_then(|p| p.split("</details>").next()).unwrap();
+    assert!(beside.contains("k_T, N.s2") && beside.contains(">r2<") && beside.contains("\u{b1}"), "{beside}");
+    let fit = beside.split("<figure id=\"runs-thrust").nth(1).and_then(|p| p.split("</figure>").next()).unwrap();
+    assert!(fit.contains(">r1</text>") && fit.contains(">r2</text>"), "a line a run: {fit}");
     for said in ["The supply lead drops", "Each run, predicted by the others", "runs/r1/report.html", "runs/r2/report.html"] {
         assert!(page.contains(said), "the page does not say {said}");
     }

@@ -6,6 +6,7 @@
 //! Reference: specification `identification.md`, item 5.
 
 mod beam;
+mod beside_runs;
 pub(crate) mod closed;
 mod designer;
 mod figure;

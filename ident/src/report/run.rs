@@ -301,15 +301,34 @@ fn unscaled(x: &str, value: f64) -> f64 {
 }
 
 /// A relation in words: "thrust over speed".
-fn over(f: &Fitted) -> String {
+pub(super) fn over(f: &Fitted) -> String {
     format!("{} over {}", channel(&f.y), channel(f.x))
 }
 
-pub(super) fn relation(f: &Fitted) -> Figure {
+/// Places along a fitted relation, in the fit's own scale.
+fn grid(f: &Fitted) -> Vec<f64> {
     let (low, high) = f.curve.range();
-    let grid: Vec<f64> = (0..=120).map(|k| low + (high - low) * f64::from(k) / 120.0).collect();
-    let x: Vec<f64> = grid.iter().map(|g| unscaled(f.x, *g)).collect();
-    let y: Vec<f64> = grid.iter().map(|g| f.curve.at(*g)).collect();
+    (0..=120).map(|k| low + (high - low) * f64::from(k) / 120.0).collect()
+}
+
+/// A fitted relation as a line.
+pub(super) fn line(f: &Fitted) -> (Vec<f64>, Vec<f64>) {
+    grid(f).into_iter().map(|g| (unscaled(f.x, g), f.curve.at(g))).unzip()
+}
+
+/// Labels of its axes.
+pub(super) fn axes(f: &Fitted) -> [String; 2] {
+    [axis(f.x), axis(&f.y)]
+}
+
+/// Its name as an anchor.
+pub(super) fn anchor_of(f: &Fitted) -> String {
+    f.name.replace(['(', ')'], "-").trim_end_matches('-').to_owned()
+}
+
+pub(super) fn relation(f: &Fitted) -> Figure {
+    let grid = grid(f);
+    let (x, y) = line(f);
     let band = |half: &dyn Fn(f64) -> f64| -> (Vec<f64>, Vec<f64>) {
         grid.iter().zip(&y).map(|(g, y)| (y - half(*g), y + half(*g))).unzip()
     };
@@ -333,6 +352,7 @@ pub(super) fn relation(f: &Fitted) -> Figure {
             })
             .collect()
     };
+    let [x_label, y_label] = axes(f);
     let mut layers = vec![
         Layer::Band { name: "further plateau".into(), class: "d", x: x.clone(), lower: next_low, upper: next_high },
         Layer::Band { name: "curve".into(), class: "a", x: x.clone(), lower: curve_low, upper: curve_high },
@@ -343,10 +363,10 @@ pub(super) fn relation(f: &Fitted) -> Figure {
         layers.push(Layer::Marks { name: "left out".into(), class: "e", marks: marks(true) });
     }
     Figure {
-        id: f.name.replace(['(', ')'], "-").trim_end_matches('-').to_owned(),
+        id: anchor_of(f),
         title: format!("{}, order {} (R2 {:.5})", upper(&over(f)), f.degree, f.curve.r2),
-        x_label: axis(f.x),
-        y_label: axis(&f.y),
+        x_label,
+        y_label,
         layers,
         ..Figure::default()
     }

@@ -6,12 +6,14 @@
 //! Units: as told.
 //! Reference: specification `formats.md`, `across_runs_rms`.
 
+use super::beside_runs::beside_runs;
 use super::closed::{self as parts, Origin, Page, Vocabulary, pair};
 use super::figure::{Figure, Layer, Mark};
 use super::page::{SPEEDS, card_across, card_alone, is_drawn_together, left_across, over_runs, readings_apart, rest, speeds};
 use super::svg::escape;
 use crate::close::Closed;
 use crate::effects::{EffectEntry, Estimate};
+use crate::log::Log;
 use crate::several::{Outcome, Run, Shown};
 use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Unexplained, Validation, Verdict};
 use crate::words::{digits, scaled, upper};
@@ -41,6 +43,8 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         speeds: (SPEEDS, speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| on(first, figure)).collect()),
     };
     let mut sheet = parts::begin(&page);
+    let each: Vec<(&str, &Log)> = v.runs.iter().zip(runs).map(|(of, run)| (of.run.as_str(), &run.log)).collect();
+    beside_runs(&mut sheet, &each);
     for (run, of) in v.runs.iter().enumerate() {
         sheet.fold(&of.run, |sheet| {
             if let Some(link) = links.get(run) {

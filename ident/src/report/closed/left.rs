@@ -50,7 +50,9 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     }
     // what the convincing figure shows is not drawn again
     let shown = |f: &Figure| page.hero.iter().any(|h| h.title == f.title);
-    sheet.figures(page.left.iter().filter(|f| !shown(f)).cloned().collect());
+    let (above, here): (Vec<&Figure>, Vec<&Figure>) = page.left.iter().partition(|f| shown(f));
+    above.iter().for_each(|f| sheet.say(&format!("{}: drawn at the head of this page.", f.title)));
+    sheet.figures(here.into_iter().cloned().collect());
 }
 
 /// What is said of every remainder alike, behind what each looks like: it is told once.
