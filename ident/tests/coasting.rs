@@ -17,13 +17,13 @@ use rig::Chance;
 const IDLE: f64 = 0.05;
 const GAIN: f64 = 8e-6;
 
-/// Levels of 6 s at 10 Hz with a rotor of 0.15 s; current is no less than `least`.
+/// Levels of 6 s at 20 Hz with a rotor of 0.3 s; current is no less than `least`.
 fn flown(levels: &[f64], seed: u64, least: f64) -> Log {
     let mut chance = Chance::new(seed);
-    let (dt, tau) = (0.1, 0.15);
+    let (dt, tau) = (0.05, 0.3);
     let (mut rpm, mut columns) = (0.0, vec![Vec::new(); 4]);
     for level in levels {
-        for _ in 0..60 {
+        for _ in 0..120 {
             let goal = 7.0 * (level - 1000.0);
             rpm = goal + (rpm - goal) * f64::exp(-dt / tau);
             let (krpm, turns) = (rpm / 1000.0, std::f64::consts::TAU / 60.0);

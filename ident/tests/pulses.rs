@@ -1,4 +1,4 @@
-//! Pulses too few or too many on a ramp, and a single one in a whole run, which is a bad sample.
+//! Pulses too few or too many on a ramp; a single one in a whole run, which is a bad sample; and drop-outs that come back, which are no pulses.
 //!
 //! What it is: three speed sensors on a command that climbs and falls evenly; single readings of one of them are half or twice the speed.
 //! What can go wrong: a late reading on a ramp is off as well, but by no more than the speed changed; a resonance is no row of glitches.
@@ -15,12 +15,17 @@ const ROWS: usize = 1600;
 
 /// Three sensors on a ramp up and down; the third reads `factor` times the speed on `rows`, and all of it `late` rows late.
 fn ramp(rows: &[usize], factor: f64, late: usize) -> Log {
+    read_by(&|i| if rows.contains(&i) { factor } else { 1.0 }, late)
+}
+
+/// The same where the third sensor reads `share` of the speed on each row.
+fn read_by(share: &dyn Fn(usize) -> f64, late: usize) -> Log {
     let mut chance = Chance::new(7);
     let speed = |i: usize| 8.0 * (100.0 + 900.0 * (1.0 - (2.0 * i as f64 / ROWS as f64 - 1.0).abs()));
     let names = ["pulse_us", "rpm_beam", "rpm_opto", "rpm_hall"];
     let mut columns = names.map(|name| Column { name: name.to_owned(), values: Vec::new() });
     for i in 0..ROWS {
-        let off = if rows.contains(&i) { factor } else { 1.0 };
+        let off = share(i);
         let wander = 1.0 + 3e-4 * chance.normal();
         let mut read = |truth: f64| truth * wander + 0.5 * chance.normal();
         let readings = [1000.0 + speed(i) / 8.0, read(speed(i)), read(speed(i)), off * read(speed(i.saturating_sub(late)))];
@@ -61,6 +66,14 @@ fn one_reading_in_a_run_has_no_name_and_is_listed() {
             closed.verdict.set_aside.iter().map(|a| (a.channel.as_str(), a.row, a.rows)).collect();
         assert_eq!(listed, [("rpm_hall", 700, 1)]);
     }
+}
+
+/// Drop-outs of a sixth of the speed that come back within some rows: the sensor loses its hold, and no pulse by chance.
+#[test]
+fn a_drop_out_that_comes_back_slowly_is_no_lost_pulse() {
+    let lost = |i: usize, from: usize| if i < from { 0.0 } else { 0.15 * (-((i - from) as f64) / 4.0).exp() };
+    let closed = verdict(&read_by(&|i| 1.0 - [300, 640, 1010, 1300].iter().map(|from| lost(i, *from)).sum::<f64>(), 0));
+    assert!(!names(&closed).contains(&"missed_pulses"), "{:?}", names(&closed));
 }
 
 #[test]

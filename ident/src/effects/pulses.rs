@@ -70,22 +70,16 @@ const SELDOM: f64 = 0.001;
 
 /// Form in which single samples are off.
 pub(super) const SCATTERED: &str = "scattered";
-/// Form in which one sample of the whole run is off: its own reading is all that is known of it.
-pub(super) const ONCE: &str = "once";
 
-/// Standard deviations of the scatter by which a reading that is the only one must be off.
-const ALONE: f64 = 20.0;
-
-/// The form in which a channel reads grossly too low (`sign` -1) or too high (+1): on a share of less than half of its rows, on one, on none.
+/// The form in which a channel reads grossly too low (`sign` -1) or too high (+1): on some of less than half of its rows, or on none. One reading
+/// alone is a bad sample. Pulses are lost by chance: where most readings that are low stand beside another one, the sensor has dropped out.
 fn form(context: &Context, target: &Target, sign: f64) -> Option<&'static str> {
-    let departures: Vec<f64> = readings(context, target).map(|r| r.share - 1.0).collect();
-    let off: Vec<f64> = readings(context, target).filter(|r| r.is_gross(sign)).map(|r| r.share - 1.0).collect();
-    let alone = |d: f64| d.abs() > ALONE * 1.4826 * median(&mut departures.iter().map(|d| d.abs()).collect::<Vec<_>>());
-    match off.as_slice() {
-        [one] if departures.len() > 100 && alone(*one) && PULSES.contains(&(1.0 + one)) => Some(ONCE),
-        [_, _, ..] if off.len() * 2 < departures.len() && off.len() as f64 > SELDOM * departures.len() as f64 => Some(SCATTERED),
-        _ => None,
-    }
+    let off: Vec<bool> = readings(context, target).map(|r| r.is_gross(sign)).collect();
+    let count = off.iter().filter(|off| **off).count();
+    let in_a_row = off.windows(2).filter(|pair| pair[0] && pair[1]).count();
+    let by_chance = sign > 0.0 || 2 * in_a_row < count;
+    let recurs = count > 1 && count * 2 < off.len() && count as f64 > SELDOM * off.len() as f64;
+    (recurs && by_chance).then_some(SCATTERED)
 }
 
 /// Readings beyond these shares of the speed are absurd: no pulse too few or too many.
@@ -107,11 +101,7 @@ pub(super) fn pulse_instances(context: &Context, sign: f64) -> Vec<Instance> {
 pub(super) fn apply_pulses(context: &Context, instance: &Instance, sign: f64, position: usize, design: &mut TargetDesign) {
     let (Relation::SpeedDifference, Some(target)) = (design.relation, difference(context, instance)) else { return };
     let on = if instance.form.is_empty() { vec![1.0; context.len()] } else { gross(context, target, sign) };
-    if instance.form == ONCE {
-        as_they_read(target, &on, design);
-    } else {
-        design.add(position, 0, on.iter().zip(&context.rpm).map(|(s, r)| sign * s * r).collect());
-    }
+    design.add(position, 0, on.iter().zip(&context.rpm).map(|(s, r)| sign * s * r).collect());
 }
 
 /// Whether single readings are off, and not the channel as a whole.
@@ -122,7 +112,6 @@ pub(super) fn is_of_single_readings(instance: &Instance) -> bool {
 /// Amplitude of such an instance.
 pub(super) fn pulse_amplitudes(instance: &Instance) -> Vec<Amplitude> {
     match instance.form.as_str() {
-        ONCE => Vec::new(),
         SCATTERED => vec![Amplitude { name: "depth", unit: "1" }],
         _ => vec![Amplitude { name: "probability", unit: "1" }],
     }

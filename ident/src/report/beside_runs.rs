@@ -50,7 +50,7 @@ fn relations(found: &[(&str, Identified)]) -> Vec<Figure> {
         }
         let with: Vec<_> =
             found.iter().filter_map(|(name, of)| Some((*name, of.curves.iter().find(|c| c.name == f.name)?))).collect();
-        let layer = |((name, f), class): (&(&str, &crate::identify::Fitted), &'static str)| {
+        let layer = |((name, f), class): (&(&str, &crate::fit::Fitted), &'static str)| {
             let (x, y) = run::line(f);
             Layer::Line { name: (*name).to_owned(), class, x, y }
         };
