@@ -31,7 +31,7 @@ impl Effect for RotorInertia {
             equation: "torque_nm += inertia * d(omega)/dt, current_a += power_gain * omega * d(omega)/dt",
             source: "Beharie 2013, Eq. 2.21 as corrected; power into the rotor over the voltage",
             depends_on: &["rpm_rate"],
-            signature: "spikes of torque and current at each step, with the sign of the step; thrust(rpm) holds",
+            signature: "spikes of torque and current at each step, with the sign of the step (down to the idle current, where none flows back); thrust(rpm) holds",
             look_alikes: &["channel_delay", "channel_filter"],
         }
     }
