@@ -67,7 +67,8 @@ impl Effect for RotorInertia {
             [&both, &torque, &current].into_iter().flat_map(|set| forms.iter().map(move |form| Instance::new(set, form)));
         let of_current = (!current.is_empty() && driven(context).is_some()).then(|| Instance::new(&current, DRIVEN));
         let mut out: Vec<Instance> = Vec::new();
-        let one_way = nothing_back::idle(context).is_some();
+        // against a model it is a difference of two inertias, and the model knows already where the current ends
+        let one_way = !context.against_model && nothing_back::idle(context).is_some();
         let known = |mut i: Instance| {
             if one_way && i.touches("current_a") {
                 i.form = with_nothing_back(&i.form).into_owned();
