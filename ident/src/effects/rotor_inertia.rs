@@ -1,8 +1,7 @@
 //! `rotor_inertia`: speeding the rotor up costs torque and current.
 //!
 //! What it is: torque_nm += inertia * domega/dt, current_a += power_gain * omega * domega/dt. The supply pays for the power that goes into the
-//! rotor: J omega domega/dt = V dI. The acceleration is that of the measured speed, or what a rotor has that is off its command's speed. Where the
-//! readings show no current that flows back, none does (`rotor_inertia/nothing_back.rs`).
+//! rotor: J omega domega/dt = V dI. The acceleration is that of the measured speed, or what a rotor has that is off its command's speed.
 //! What can go wrong: shows only in transients; a lag between the channels looks alike, and so does, with the other sign, a current that a turning
 //! rotor draws beyond its curve: a negative inertia is refused, but against a declared model, whose rotor may have been heavier.
 //! Units: kg.m2, A.s3/rad2.
@@ -13,9 +12,6 @@ use crate::attribution::noise::usual_step;
 use crate::context::{Context, Relation};
 use crate::design::TargetDesign;
 use crate::drive::{Drive, acceleration_of_rows};
-use std::borrow::Cow;
-
-mod nothing_back;
 
 /// See the module.
 pub(crate) struct RotorInertia;
@@ -31,7 +27,7 @@ impl Effect for RotorInertia {
             equation: "torque_nm += inertia * d(omega)/dt, current_a += power_gain * omega * d(omega)/dt",
             source: "Beharie 2013, Eq. 2.21 as corrected; power into the rotor over the voltage",
             depends_on: &["rpm_rate"],
-            signature: "spikes of torque and current at each step, with the sign of the step (down to the idle current, where none flows back); thrust(rpm) holds",
+            signature: "spikes of torque and current at each step, with the sign of the step; thrust(rpm) holds",
             look_alikes: &["channel_delay", "channel_filter"],
         }
     }
@@ -67,15 +63,7 @@ impl Effect for RotorInertia {
             [&both, &torque, &current].into_iter().flat_map(|set| forms.iter().map(move |form| Instance::new(set, form)));
         let of_current = (!current.is_empty() && driven(context).is_some()).then(|| Instance::new(&current, DRIVEN));
         let mut out: Vec<Instance> = Vec::new();
-        // against a model it is a difference of two inertias, and the model knows already where the current ends
-        let one_way = !context.against_model && nothing_back::idle(context).is_some();
-        let known = |mut i: Instance| {
-            if one_way && i.touches("current_a") {
-                i.form = with_nothing_back(&i.form).into_owned();
-            }
-            i
-        };
-        for instance in of_any.chain(of_current).filter(|i| !i.channels.is_empty()).map(known) {
+        for instance in of_any.chain(of_current).filter(|i| !i.channels.is_empty()) {
             if !out.contains(&instance) {
                 out.push(instance);
             }
@@ -92,8 +80,7 @@ impl Effect for RotorInertia {
     }
 
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
-        let (form, one_way) = parts(&instance.form);
-        let mut of_row = match form {
+        let mut of_row = match instance.form.as_str() {
             OVER_THE_ROW => acceleration_of_rows(&context.t, &context.rpm, usual_step(&context.t)),
             DRIVEN => driven(context).cloned().unwrap_or_else(|| acceleration(context)),
             _ => acceleration(context),
@@ -101,9 +88,6 @@ impl Effect for RotorInertia {
         let of_power = design.relation == Relation::Current;
         if of_power {
             of_row.iter_mut().zip(&context.rpm).for_each(|(a, rpm)| *a *= rpm * std::f64::consts::TAU / 60.0);
-            if one_way {
-                of_row = nothing_back::held(context, of_row, position, design);
-            }
         }
         design.add(position, usize::from(of_power), of_row);
     }
@@ -118,22 +102,6 @@ impl Effect for RotorInertia {
 const OVER_THE_ROW: &str = "over_the_row";
 /// Form of a rotor that is on its way to where its command sends it: a reading within a row's step knows how far it is off.
 const DRIVEN: &str = "driven";
-
-/// Form of a supply that gets nothing back, alone or behind another form.
-const NOTHING_BACK: &str = "no_current_flows_back";
-
-/// A form with [`NOTHING_BACK`] behind it.
-fn with_nothing_back(form: &str) -> Cow<'static, str> {
-    if form.is_empty() { NOTHING_BACK.into() } else { format!("{form}, {NOTHING_BACK}").into() }
-}
-
-/// How the acceleration is found, and whether nothing flows back.
-fn parts(form: &str) -> (&str, bool) {
-    match form.strip_suffix(NOTHING_BACK) {
-        Some(rest) => (rest.trim_end_matches(", "), true),
-        None => (form, false),
-    }
-}
 
 /// Acceleration by the command, rad/s^2; nothing without a command.
 fn driven(context: &Context) -> Option<&Vec<f64>> {
