@@ -17,7 +17,24 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// The list of what was written: `sha256sum -c` reads it.
-const LIST: &str = ".quadrig.sha256";
+pub(crate) const LIST: &str = ".quadrig.sha256";
+/// What a folder must be that holds something else.
+const EXPECTED: &str = "expected a new or an empty folder: name another one, or move this file away";
+
+/// First line of the list of a command.
+pub(crate) fn first_line(command: &str) -> String {
+    format!("# written by `quadrig {command}`; what is not listed here, or has changed since, is never replaced")
+}
+
+/// Refusal of a folder with a file that is somebody else's.
+pub(crate) fn foreign(folder: &Path, name: &str, command: &str) -> Failure {
+    format!("{}: holds {name}, which no `quadrig {command}` wrote; {EXPECTED}", folder.display()).into()
+}
+
+/// Refusal of a folder with a file that is no longer what was written.
+pub(crate) fn changed(folder: &Path, name: &str, command: &str) -> Failure {
+    format!("{}: {name} was changed since `quadrig {command}` wrote it; {EXPECTED}", folder.display()).into()
+}
 
 /// The last part of a path, as a page tells it.
 pub(crate) fn name_of(path: &Path) -> String {
@@ -58,21 +75,16 @@ impl<'a> Folder<'a> {
         self.place().map_err(|e| unwritten(self.path)(e).into())
     }
 
-    /// First line of the list.
-    fn first_line(&self) -> String {
-        format!("# written by `quadrig {}`; what is not listed here, or has changed since, is never replaced", self.command)
-    }
-
     fn list(&self) -> String {
         let lines: String = self.files.iter().map(|(name, bytes)| format!("{}  {name}\n", digest(bytes))).collect();
-        format!("{}\n{lines}", self.first_line())
+        format!("{}\n{lines}", first_line(self.command))
     }
 
     /// Names and digests of what an earlier run of this command wrote here.
     fn earlier(&self) -> BTreeMap<String, String> {
         let text = fs::read_to_string(self.path.join(LIST)).unwrap_or_default();
         let mut lines = text.lines();
-        if lines.next() != Some(&self.first_line()) {
+        if lines.next() != Some(&first_line(self.command)) {
             return BTreeMap::new();
         }
         lines.filter_map(|line| line.split_once("  ").map(|(digest, name)| (name.to_owned(), digest.to_owned()))).collect()
@@ -89,8 +101,6 @@ impl<'a> Folder<'a> {
             let list = fs::read(self.path.join(LIST)).map_err(unread)?;
             earlier.insert(LIST.to_owned(), digest(&list));
         }
-        let expected = "expected a new or an empty folder: name another one, or move this file away";
-        let (at, command) = (self.path.display(), self.command);
         let mut open = vec![String::new()];
         while let Some(within) = open.pop() {
             for entry in fs::read_dir(self.path.join(&within)).map_err(unread)? {
@@ -102,9 +112,9 @@ impl<'a> Folder<'a> {
                     continue;
                 }
                 match earlier.get(&name) {
-                    None => return Err(format!("{at}: holds {name}, which no `quadrig {command}` wrote; {expected}").into()),
+                    None => return Err(foreign(self.path, &name, self.command)),
                     Some(known) if *known != digest(&fs::read(entry.path()).map_err(unread)?) => {
-                        return Err(format!("{at}: {name} was changed since `quadrig {command}` wrote it; {expected}").into());
+                        return Err(changed(self.path, &name, self.command));
                     }
                     Some(_) => {}
                 }

@@ -115,6 +115,17 @@ fn a_batch_is_a_row_a_run_however_it_is_shared() {
     let said = call(&bench, &["batch", "runs", "-o", "one", "--motor", "M", "--folders"], &[]).succeeded();
     assert!(said.out.contains("6 runs: 6 closed;") && said.out.contains("6 were there already"), "{}", said.out);
     assert!(tables(&bench, "one")[0].lines().nth(1).unwrap().starts_with("broken.csv,closed,"));
+
+    // a batch that was cut off before its tables and their list goes on; a table that was changed since is left alone
+    fs::remove_file(bench.path("one/.quadrig.sha256")).unwrap();
+    fs::remove_file(bench.path("one/effects.csv")).unwrap();
+    let again = ["batch", "runs", "-o", "one", "--motor", "M", "--folders"];
+    let said = call(&bench, &again, &[]).succeeded();
+    assert!(said.out.contains("6 were there already") && bench.path("one/effects.csv").exists(), "{}", said.out);
+    let mine = tables(&bench, "one")[0].clone() + "by hand\n";
+    fs::write(bench.path("one/manifest.csv"), &mine).unwrap();
+    call(&bench, &again, &[]).refused(&["one: manifest.csv was changed since `quadrig batch` wrote it", "expected a new"]);
+    assert_eq!(tables(&bench, "one")[0], mine);
 }
 
 #[test]

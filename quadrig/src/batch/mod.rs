@@ -3,10 +3,11 @@
 //! What it is: closes the loop on every log and export of a folder and writes two tables of what came of it. Each run's result is a file of
 //! its own, so that an interrupted batch goes on where it stopped and a cluster's array can share the work.
 //! What can go wrong: a bad file costs one line and one row (`refused`); a fault of the program on one run another (`failed`); the others
-//! go on.
+//! go on. A folder that holds what no batch wrote is refused.
 //! Units: as the tables' headers state.
 //! Reference: Slurm, "Job Array Support" (`SLURM_ARRAY_TASK_ID` and its kin).
 
+mod own;
 mod result;
 mod shard;
 mod table;
@@ -33,7 +34,7 @@ pub(crate) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Runs at a time; all cores when not given (SLURM_CPUS_PER_TASK where it is set).
-    #[arg(short, long, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(short, long, value_parser = crate::number::whole::<u32>(1, 4096, "jobs"))]
     jobs: Option<u32>,
     /// Only the I-th of N shares of the runs; a Slurm array sets it by itself.
     #[arg(long, value_name = "I/N")]
@@ -60,6 +61,7 @@ impl Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let all = files(&args.folder, &args.output)?;
+    own::refuse_others(&args.output)?;
     let shard = match args.shard {
         Some(shard) => shard,
         None => Shard::of_slurm(&|name| std::env::var(name).ok())?.unwrap_or_default(),
@@ -196,7 +198,10 @@ fn gather(args: &Args, all: &[String]) -> Result<usize, Failure> {
     if done.len() < all.len() {
         return Ok(all.len() - done.len());
     }
-    for (name, text) in [("manifest.csv", table::manifest(&done)?), ("effects.csv", table::effects(&done)?)] {
+    own::refuse_others(&args.output)?;
+    let tables = [("manifest.csv", table::manifest(&done)?), ("effects.csv", table::effects(&done)?)];
+    own::list(&args.output, &tables).map_err(unwritten(&args.output))?;
+    for (name, text) in tables {
         let path = args.output.join(name);
         write_whole(&path, |out| out.write_all(&text)).map_err(unwritten(&path))?;
     }

@@ -25,6 +25,11 @@ fn number(v: f64) -> String {
     if v.is_finite() { format!("{v:?}") } else { String::new() }
 }
 
+/// Both tables by their names, with their heads.
+pub(super) fn heads() -> Result<[(&'static str, Vec<u8>); 2], Failure> {
+    Ok([("manifest.csv", manifest(&[])?), ("effects.csv", effects(&[])?)])
+}
+
 /// A row for each run.
 pub(super) fn manifest(done: &[Done]) -> Result<Vec<u8>, Failure> {
     let mut out = csv::Writer::from_writer(Vec::new());

@@ -2,12 +2,14 @@
 //!
 //! What it is: each set under `DATA/rig` is imported, its loop is closed run by run, causes named on one run of a rig are tried on
 //! the rig's other runs, each corrected model predicts them, and `measured.md` with one page and its figures a set is written.
-//! What can go wrong: a set that is absent is said to be absent; a run that cannot be closed says why on its page.
+//! What can go wrong: a set that is absent is said to be absent; a run that cannot be closed says why on its page; pages that somebody else
+//! wrote are left alone.
 //! Units: as the channels state.
 //! Reference: specification `closing-the-loop.md`, "Real measurements".
 
 mod cross;
 mod flights;
+mod own;
 mod page;
 mod set;
 mod table;
@@ -86,6 +88,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if !rig.is_dir() {
         return Err(format!("{}: no such folder; expected the recorded sets in it", rig.display()).into());
     }
+    own::refuse_others(&args.output)?;
     let wanted: Vec<&'static Set> =
         SETS.iter().filter(|s| args.set.is_empty() || args.set.iter().any(|n| n == s.folder)).collect();
     let folder = args.output.join("measured");

@@ -53,10 +53,14 @@ fn most(closed: &Closed) -> Option<(&String, f64, f64)> {
     channels.max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))
 }
 
+/// How the summary page begins.
+pub(super) const BEGINNING: &str = "# The loop on recorded data\n\nWritten by `quadrig measured DATA`";
+
 /// The summary page.
 pub(crate) fn index(outcomes: &[Outcome]) -> String {
-    let mut out = String::from(
-        "# The loop on recorded data\n\nWritten by `quadrig measured DATA`, where `DATA/rig` holds logs that nobody here made. Each set has a page with \
+    let mut out = BEGINNING.to_owned();
+    out.push_str(
+        ", where `DATA/rig` holds logs that nobody here made. Each set has a page with \
          every run's declared model, residual, verdict, error before and after on rows that no fit saw, and the figure that convinces. \
          Nothing on these pages is blind: the sets were at hand while the tool was made.\n\n\
 ",
