@@ -434,3 +434,21 @@ fn a_rotor_with_inertia_is_told_as_it_settles() {
         assert!(falls.is_none(), "{name} falls: {falls:?}");
     }
 }
+
+/// The curve is that of the supply as the run began: how long it takes to work the curve out draws no charge.
+#[test]
+fn no_charge_is_drawn_while_the_curve_is_worked_out() {
+    let folder = bench();
+    let more = "\n[[effect]]\nid = \"battery_discharge\"\nchannels = [\"voltage_v\", \"current_a\", \"rpm_beam\", \"rpm_opto\", \"rpm_hall\", \"rpm_encoder\"]\nform = \"straight\"\nscope = \"rig\"\nshape = [0.06]\n[effect.amplitude.voltage_v]\nslope_v_per_ah = 1.1\n[effect.parameter]\nslope_v_per_ah = 1.1\n";
+    let model = std::fs::read_to_string(folder.join("model.toml")).expect("a model");
+    std::fs::write(folder.join("drawn.toml"), model + more).expect("a model");
+    let thrusts = |model: &str| -> Vec<String> {
+        let table = call(&folder, &["export", model, "--to", "csv"]).succeeded().out;
+        let rows = table.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit()));
+        rows.map(|l| l.split(',').nth(3).unwrap_or_default().to_owned()).collect()
+    };
+    let (fresh, drawn) = (thrusts("model.toml"), thrusts("drawn.toml"));
+    assert_eq!(fresh.len(), 101);
+    assert_eq!(fresh, drawn);
+    assert!(call(&folder, &["export", "drawn.toml", "--to", "px4"]).succeeded().out.contains("battery as the run began"));
+}

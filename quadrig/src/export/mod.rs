@@ -54,16 +54,16 @@ pub(crate) struct Args {
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Cells in series of the battery that will fly; every file says them, or what hangs on them. The model knows its own supply alone.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=14))]
+    #[arg(long, value_parser = crate::number::whole::<u32>(1, 14, "cells"))]
     cells: Option<u32>,
     /// Capacity of that battery, mAh, as printed on it: no model knows it.
-    #[arg(long, value_name = "MAH", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "MAH", value_parser = crate::number::whole::<u32>(1, 100_000, "mAh"))]
     capacity: Option<u32>,
     /// Writes the file although more of its full thrust is computed than was measured.
     #[arg(long)]
     extrapolate: bool,
     /// Rotors of the vehicle, for the peers that name each.
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
+    #[arg(long, default_value_t = 4, value_parser = crate::number::whole::<u32>(1, 12, "rotors"))]
     rotors: u32,
 }
 
@@ -76,6 +76,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    crate::kind::refuse_no_model(&args.model)?;
     let model = Model::read(&args.model)?;
     let plant = Powerplant::of(&args.model, &model)?;
     if let Some((us, measured_n)) = plant.ends_at().filter(|(_, n)| plant.full_n() > 2.0 * n && !args.extrapolate) {
@@ -141,7 +142,8 @@ fn off(percent: f64) -> String {
 /// Full thrust, for who reads the curve back, and how far it was measured.
 fn full(plant: &Powerplant) -> String {
     let reach = plant.reach().map_or_else(String::new, |reach| format!("; {reach}"));
-    format!("full thrust {:.5} N{reach}", plant.full_n())
+    let fresh = if plant.fall_v_per_ah.is_some() { "; battery as the run began" } else { "" };
+    format!("full thrust {:.5} N{fresh}{reach}", plant.full_n())
 }
 
 /// What the peer has no key for, or the model no answer to.

@@ -154,7 +154,7 @@ fn model_of_a_rig(path: &Path, quiet: bool) -> Result<Model, Failure> {
         )
         .into());
     }
-    Ok(read_model(path, quiet)?)
+    read_model(path, quiet)
 }
 
 fn rotors_of(model: Option<&Model>, path: Option<&Path>, airframe: &Airframe) -> Result<Rotors, Failure> {

@@ -35,6 +35,9 @@ const FLIES: [&str; 13] = [
     "throttle_quantisation",
 ];
 
+/// Of these, those that grow with what the rotor has done: the charge that it has drawn, its heat.
+const GATHERS: [&str; 2] = ["battery_discharge", "thermal_derate"];
+
 /// Density of ISO 2533 air at 20 degC, of which a model's density is a share, kg/m^3.
 const DENSITY_20_C: f64 = 1.2041;
 /// Interval at which a flight's pulses are given to the model, s.
@@ -48,7 +51,7 @@ pub(crate) struct ModelRotor {
     model: Model,
     /// Inertia about the shaft where the model does not hold it, kg.m^2.
     inertia_kgm2: f64,
-    /// Settled states at equal steps of the pulse.
+    /// Settled states at equal steps of the pulse, with the supply and the motor as the model's run began.
     settled: Vec<PlantState>,
 }
 
@@ -72,6 +75,11 @@ const LEVEL_ROW_S: f64 = 0.1;
 fn flies(added: &AddedEffect) -> bool {
     let effect = added.placed.effect;
     FLIES.contains(&effect.id()) || effect.id() == "unknown" && effect.scope(&added.placed.instance) == Scope::Rig
+}
+
+/// Whether an effect grows with what the rotor has done so far.
+fn gathers(added: &AddedEffect) -> bool {
+    GATHERS.contains(&added.placed.effect.id())
 }
 
 /// Time by which the rows of a model's log follow a command that jumps between two of them, s. When it came there, and the mean over a row,
@@ -113,7 +121,15 @@ impl ModelRotor {
         let levels = (1000.0 / LEVEL_US) as usize + 1;
         let pulses = (0..levels * LEVEL_ROWS).map(|i| 1000.0 + LEVEL_US * (i / LEVEL_ROWS) as f64).collect();
         let turns = |rows: &Vec<PlantState>| rows.first().zip(rows.last()).is_some_and(|(a, b)| b.rpm > a.rpm);
-        let rows = rotor.rows(LEVEL_ROW_S, pulses).filter(turns);
+        // a sweep of minutes would draw a charge and heat a motor as no run did
+        let fresh = Self {
+            model: Model {
+                effects: rotor.model.effects.iter().filter(|e| !gathers(e)).cloned().collect(),
+                ..rotor.model.clone()
+            },
+            ..rotor.clone()
+        };
+        let rows = fresh.rows(LEVEL_ROW_S, pulses).filter(turns);
         let rows = rows.ok_or("no speed from a command; expected one identified from a log with pulse_us")?;
         // the rows beside the next level see its speed come
         rotor.settled = rows.chunks(LEVEL_ROWS).filter_map(|level| level.iter().rev().nth(BESIDE).copied()).collect();
