@@ -9,6 +9,7 @@
 mod calibration;
 pub(crate) mod imu_log;
 mod number;
+mod readable;
 mod text;
 
 use crate::Failure;
@@ -37,8 +38,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// Magnetic declination, degrees, east positive.
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    declination: f32,
+    #[arg(long, default_value_t = 0.0, value_parser = crate::number::from(-180.0, 180.0, "degrees"))]
+    declination: f64,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -94,9 +95,6 @@ impl Filter {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    if !(-180.0..=180.0).contains(&args.declination) {
-        return Err(format!("--declination {}: expected degrees from -180 to 180", args.declination).into());
-    }
     let calibration = match &args.calibration {
         Some(path) => calibration::read(path)?,
         None => Calibration::default(),
@@ -104,7 +102,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let log = ImuLog::read(&args.input)?;
     let bar = crate::progress::Bar::new("attitude", quiet || log.rows.len() < 1_000_000);
     let earth = if args.earth == Axes::Enu { Earth::Enu } else { Earth::Ned };
-    let mut filter = Filter::new(args.preset, args.declination.to_radians());
+    let mut filter = Filter::new(args.preset, (args.declination as f32).to_radians());
     let mut out = String::with_capacity(96 * log.rows.len() + 64);
     out.push_str("t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg\n");
     let (mut forces, mut fields) = (Fresh::default(), Fresh::default());

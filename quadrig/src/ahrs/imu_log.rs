@@ -2,11 +2,12 @@
 //!
 //! What it is: a CSV with a time and the readings of up to three sensors, columns by name in any order.
 //! What can go wrong: no time, no sensor, a sensor with some of its three columns, a word that is no number, time that stands
-//! still: refused with file, line and column. An empty field or `nan` is a missing reading.
+//! still, what no IMU reads ([`readable`]): refused with file, line and column. An empty field is a missing reading, and so is `nan` of a
+//! magnetometer, which recorders write between its readings.
 //! Units: s, rad/s, m/s^2, uT.
 //! Reference: specification `formats.md`, "Attitude log".
 
-use super::number;
+use super::{number, readable};
 use crate::Failure;
 use crate::trouble::unread;
 use dcm::Vec3;
@@ -35,6 +36,9 @@ pub(crate) struct ImuLog {
 }
 
 const SENSORS: [[&str; 3]; 3] = [["gx", "gy", "gz"], ["ax", "ay", "az"], ["mx", "my", "mz"]];
+
+/// The place of the magnetometer among them.
+const MAG: usize = 2;
 
 /// Where the columns are.
 struct Columns {
@@ -134,24 +138,27 @@ fn parse(text: &str) -> Result<Parsed, (usize, String)> {
         let word = |at: usize| line[fields[at].0..fields[at].1].trim();
         let time = word(columns.time);
         let t = number::parse(time.as_bytes()).filter(|t| t.is_finite());
-        let t = t.ok_or_else(|| fail(format!("column t_s: {time:?} is no time; expected seconds")))?;
+        let t = t.ok_or_else(|| fail(format!("column t_s: {:?} is no time; expected seconds", short(time))))?;
         if let Some(before) = rows.last().filter(|r| r.t >= t) {
             return Err(fail(format!(
-                "column t_s: {time} does not come after {}; expected strictly increasing time: sort the rows, or cut the run there",
+                "column t_s: {} does not come after {}; expected strictly increasing time: sort the rows, or cut the run there",
+                short(time),
                 before.t
             )));
         }
         let mut sensors = [None; 3];
-        for ((slot, place), names) in sensors.iter_mut().zip(columns.sensors).zip(SENSORS) {
+        for (sensor, ((slot, place), names)) in sensors.iter_mut().zip(columns.sensors).zip(SENSORS).enumerate() {
             let Some(place) = place else { continue };
             let mut v = [0.0f32; 3];
             for ((v, at), name) in v.iter_mut().zip(place).zip(names) {
-                *v = reading(word(at)).ok_or_else(|| {
+                let value = reading(word(at), sensor == MAG).ok_or_else(|| {
                     fail(format!(
                         "column {name}: {:?} is no number; expected one, or an empty field for a missing reading",
-                        word(at)
+                        short(word(at))
                     ))
                 })?;
+                readable::cell(sensor, value).map_err(|what| fail(format!("column {name}: {what}")))?;
+                *v = value as f32;
             }
             *slot = v.iter().all(|c| c.is_finite()).then(|| Vec3::from(v));
         }
@@ -163,6 +170,7 @@ fn parse(text: &str) -> Result<Parsed, (usize, String)> {
     if rows.is_empty() {
         return Err((n + 1, "no rows after the header; expected at least one".to_owned()));
     }
+    readable::whole(&rows).map_err(|what| (n + 2, what))?;
     Ok((times, rows))
 }
 
@@ -182,12 +190,17 @@ fn split(line: &[u8], fields: &mut [(usize, usize)]) -> usize {
     count + 1
 }
 
-/// A reading; empty and `nan` are a missing one, infinity is none.
-fn reading(field: &str) -> Option<f32> {
+/// A reading; empty is a missing one, and `nan` of a sensor that gives fewer readings than there are rows.
+fn reading(field: &str, is_slower: bool) -> Option<f64> {
     if field.is_empty() {
-        return Some(f32::NAN);
+        return Some(f64::NAN);
     }
-    number::parse(field.as_bytes()).map(|v| v as f32).filter(|v| !v.is_infinite())
+    number::parse(field.as_bytes()).filter(|v| v.is_finite() || (is_slower && v.is_nan()))
+}
+
+/// A word of the file as a refusal repeats it.
+fn short(word: &str) -> String {
+    if word.chars().count() > 40 { word.chars().take(40).chain("...".chars()).collect() } else { word.to_owned() }
 }
 
 #[cfg(test)]
@@ -199,6 +212,8 @@ mod tests {
         let (_, rows) = parse("az,ay,ax,extra,gx,gy,gz,t_s\n3,2,1,x,4,5,6,0.5\n3,,1,y,4,5,6,1.0\n").unwrap();
         assert_eq!(rows[0], Row { t: 0.5, gyro: Some([4., 5., 6.].into()), accel: Some([1., 2., 3.].into()), mag: None });
         assert_eq!(rows[1].accel, None, "an empty field is a missing reading");
+        let (_, rows) = parse("t_s,gx,gy,gz,ax,ay,az,mx,my,mz\n0,0,0,0,0,0,9.8,nan,nan,nan\n").unwrap();
+        assert_eq!(rows[0].mag, None, "a magnetometer is slower");
     }
 
     #[test]
@@ -213,6 +228,16 @@ mod tests {
             (head.into(), 1, "no rows"),
             (format!("{head}0,1,2,3,4,5,six\n"), 2, "column az: \"six\""),
             (format!("{head}0,1,2,3,4,5,inf\n"), 2, "column az: \"inf\""),
+            (format!("{head}0,1,2,nan,4,5,6\n"), 2, "column gz: \"nan\""),
+            (format!("{head}0,1,2,3,NaN,5,6\n"), 2, "column ax: \"NaN\""),
+            (
+                format!("{head}0,1,2,1e39,4,5,6\n"),
+                2,
+                "column gz: 1e39 is more than such a sensor reads; expected rad/s, 100 at most: is the file damaged?",
+            ),
+            (format!("{head}0,1,2,250,4,5,6\n"), 2, "column gz: 250.0 is more than such a sensor reads; expected rad/s"),
+            (format!("{head}0,1,2,{},4,5,6\n", "x".repeat(5000)), 2, "xxx...\""),
+            (format!("{head}0,0,0,0,0,0,9.8\n5,0,0,0,0,0,9.8\n10,0,0,0,0,0,9.8\n"), 2, "column t_s: rows 5 s apart"),
             (format!("{head}0,1,2,3,4,5\n"), 2, "6 fields, expected at least 7"),
             (format!("{head}1,0,0,0,0,0,9\n1,0,0,0,0,0,9\n"), 3, "does not come after"),
             (format!("{head}nan,0,0,0,0,0,9\n"), 2, "column t_s"),
