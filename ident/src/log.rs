@@ -29,6 +29,8 @@ use std::path::Path;
 pub const FORMAT: &str = "quadrig-log 1";
 /// Longest line that a reader takes, bytes.
 pub const MAX_LINE: usize = 1 << 20;
+/// Longest name of a column, characters.
+const LONGEST_NAME: usize = 200;
 /// The measured channels that a verdict speaks of, in the order of the questions that are asked of them.
 pub const MODELLED: [&str; 9] =
     ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder", "rpm", "thrust_n", "torque_nm", "current_a", "voltage_v"];
@@ -429,6 +431,7 @@ fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError>
         if name.is_empty() {
             return Err(place.refuse(None, format!("column {} has no name", i + 1), "a name for every column"));
         }
+        named_shortly(name, place)?;
         if names[..i].contains(name) {
             return Err(place.refuse(Some(name), "it stands twice", "each column once"));
         }
@@ -444,6 +447,16 @@ fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError>
         return Err(place.refuse(None, format!("{} column(s)", names.len()), "t_s and at least two measured columns"));
     }
     Ok(names)
+}
+
+/// Refuses a name that no line of an output can hold.
+pub(crate) fn named_shortly(name: &str, place: &Place<'_>) -> Result<(), ReadError> {
+    let length = name.chars().count();
+    if length <= LONGEST_NAME {
+        return Ok(());
+    }
+    let expected = format!("a name of {LONGEST_NAME} at most: is this the header, or a row of another file?");
+    Err(place.refuse(Some(name), format!("a name of {length} characters"), expected))
 }
 
 /// The contract's name for a column that carries a known quantity in a unit that the contract does not use.
@@ -493,7 +506,7 @@ fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> 
                 Ok(_) => {
                     return Err(place.refuse(
                         Some(name),
-                        format!("'{text}'"),
+                        format!("'{}'", short(text)),
                         "a finite number, or an empty field for a missing sample",
                     ));
                 }
@@ -556,6 +569,15 @@ mod tests {
         assert!(said.starts_with("run.csv:1: lines that end with a carriage return alone; expected"), "{said}");
         let said = parse(&format!("# {}\nt_s,rpm,thrust_n\n0,1,2\n", "x".repeat(5000))).unwrap_err();
         assert!(said.len() < 200 && said.contains("xxx...'"), "{said}");
+        let said = parse(&format!("# quadrig-log 1\nt_s,rpm,thrust_n\n0,1,{}\n", "9".repeat(100_000))).unwrap_err();
+        assert!(said.len() < 200 && said.contains("run.csv:3: column thrust_n: '999") && said.contains("999...'"), "{said}");
+        let named = |length: usize| format!("# quadrig-log 1\nt_s,rpm,{}\n0,1,2\n", "x".repeat(length));
+        let said = parse(&named(66_000)).unwrap_err();
+        assert!(
+            said.len() < 250 && said.contains("run.csv:2: column xxx") && said.contains("a name of 66000 characters; expected"),
+            "{said}"
+        );
+        assert_eq!((parse(&named(200)).unwrap().len(), parse(&named(201)).is_err()), (1, true));
         assert_eq!(parse("# quadrig-log 1\r\nt_s,rpm,thrust_n\r\n0,1,2\r\n").unwrap().len(), 1);
     }
 

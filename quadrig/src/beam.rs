@@ -24,52 +24,52 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Width, mm.
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long, default_value_t = 20.0, value_parser = crate::number::positive(1e4, "mm"))]
     width: f64,
     /// Height, mm.
-    #[arg(long, default_value_t = 3.0)]
+    #[arg(long, default_value_t = 3.0, value_parser = crate::number::positive(1e4, "mm"))]
     height: f64,
     /// Length from clamp to thrust axis, mm.
-    #[arg(long, default_value_t = 115.0)]
+    #[arg(long, default_value_t = 115.0, value_parser = crate::number::positive(1e4, "mm"))]
     length: f64,
     /// Young's modulus, GPa.
-    #[arg(long, default_value_t = 200.0)]
+    #[arg(long, default_value_t = 200.0, value_parser = crate::number::positive(1e4, "GPa"))]
     modulus: f64,
     /// Density, kg/m^3.
-    #[arg(long, default_value_t = 7850.0)]
+    #[arg(long, default_value_t = 7850.0, value_parser = crate::number::positive(1e5, "kg/m^3"))]
     density: f64,
     /// Yield strength, MPa.
-    #[arg(long, default_value_t = 250.0)]
+    #[arg(long, default_value_t = 250.0, value_parser = crate::number::positive(1e5, "MPa"))]
     yield_strength: f64,
     /// Safety factor against yield.
-    #[arg(long, default_value_t = 2.0)]
+    #[arg(long, default_value_t = 2.0, value_parser = crate::number::positive(1000.0, "times the load"))]
     safety: f64,
     /// Gauge factor.
-    #[arg(long, default_value_t = 2.1)]
+    #[arg(long, default_value_t = 2.1, value_parser = crate::number::positive(1e4, "gauge factors"))]
     gauge_factor: f64,
     /// Bridge excitation, V.
-    #[arg(long, default_value_t = 11.5)]
+    #[arg(long, default_value_t = 11.5, value_parser = crate::number::positive(1000.0, "V"))]
     excitation: f64,
     /// Amplifier gain.
-    #[arg(long, default_value_t = 1000.0)]
+    #[arg(long, default_value_t = 1000.0, value_parser = crate::number::positive(1e6, "times"))]
     gain: f64,
     /// Load at the tip, g.
-    #[arg(long, default_value_t = 800.0)]
+    #[arg(long, default_value_t = 800.0, value_parser = crate::number::positive(1e6, "g"))]
     load: f64,
     /// Mass at the tip (motor, tachometer, propeller), g.
-    #[arg(long, default_value_t = 244.0)]
+    #[arg(long, default_value_t = 244.0, value_parser = crate::number::positive(1e6, "g"))]
     tip: f64,
     /// Blades of the propeller.
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=12))]
+    #[arg(long, default_value_t = 2, value_parser = crate::number::whole::<u32>(1, 12, "blades"))]
     blades: u32,
     /// Levels of the schedule, rev/min, separated by commas; the run passes every speed up to the highest.
-    #[arg(long, value_delimiter = ',', conflicts_with = "run")]
+    #[arg(long, value_delimiter = ',', conflicts_with = "run", value_parser = crate::number::from(0.0, 1e6, "rev/min"))]
     speeds: Vec<f64>,
     /// A rig log: the levels are those of its plateaus.
     #[arg(long)]
     run: Option<PathBuf>,
     /// How near a level may stand to a resonance, per cent of its speed.
-    #[arg(long, default_value_t = 10.0)]
+    #[arg(long, default_value_t = 10.0, value_parser = crate::number::from(0.0, 100.0, "per cent"))]
     near: f64,
     /// Writes the page with Figures 5.40 to 5.42.
     #[arg(short, long)]
@@ -92,7 +92,7 @@ impl Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let svg = args.svg.as_deref().map(|path| Folder::new(path, "beam --svg")).transpose()?;
-    let design = design(args)?;
+    let design = design(args);
     let speeds = speeds(args)?;
     let met = design.crossings(args.blades, &speeds, args.near / 100.0);
     let sheet = beam(&design, args.blades, &met);
@@ -137,24 +137,21 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-fn design(args: &Args) -> Result<Beam, Failure> {
-    let positive = |name: &str, v: f64| {
-        if v.is_finite() && v > 0.0 { Ok(v) } else { Err(format!("--{name} {v}: expected a positive number")) }
-    };
-    Ok(Beam {
-        width_m: Metre(positive("width", args.width)? / 1e3),
-        height_m: Metre(positive("height", args.height)? / 1e3),
-        length_m: Metre(positive("length", args.length)? / 1e3),
-        modulus_pa: Pascal(positive("modulus", args.modulus)? * 1e9),
-        density_kg_m3: Density(positive("density", args.density)?),
-        yield_pa: Pascal(positive("yield-strength", args.yield_strength)? * 1e6),
-        safety: positive("safety", args.safety)?,
-        gauge_factor: positive("gauge-factor", args.gauge_factor)?,
-        excitation_v: Volt(positive("excitation", args.excitation)?),
-        gain: positive("gain", args.gain)?,
-        load_n: Newton::weight_of(Kilogram(positive("load", args.load)? / 1e3)),
-        tip_kg: Kilogram(positive("tip", args.tip)? / 1e3),
-    })
+fn design(args: &Args) -> Beam {
+    Beam {
+        width_m: Metre(args.width / 1e3),
+        height_m: Metre(args.height / 1e3),
+        length_m: Metre(args.length / 1e3),
+        modulus_pa: Pascal(args.modulus * 1e9),
+        density_kg_m3: Density(args.density),
+        yield_pa: Pascal(args.yield_strength * 1e6),
+        safety: args.safety,
+        gauge_factor: args.gauge_factor,
+        excitation_v: Volt(args.excitation),
+        gain: args.gain,
+        load_n: Newton::weight_of(Kilogram(args.load / 1e3)),
+        tip_kg: Kilogram(args.tip / 1e3),
+    }
 }
 
 fn speeds(args: &Args) -> Result<Vec<RevPerMin>, Failure> {

@@ -45,7 +45,7 @@ pub(crate) struct Args {
     #[arg(long)]
     points: Option<String>,
     /// Arm at which masses for the torque hang, m; the configured arm without it.
-    #[arg(long)]
+    #[arg(long, value_parser = crate::number::positive(10.0, "m"))]
     arm: Option<f64>,
     /// Day of the calibration; today without it.
     #[arg(long, value_name = "YYYY-MM-DD")]

@@ -33,7 +33,7 @@ pub(crate) struct Args {
     #[arg(long)]
     auto: bool,
     /// Most runs beyond the first.
-    #[arg(long, default_value_t = 4)]
+    #[arg(long, default_value_t = 4, value_parser = crate::number::whole::<usize>(0, 1000, "runs"))]
     extra_runs: usize,
     /// Leaves out the last step, the flight of the corrected model.
     #[arg(long)]

@@ -29,7 +29,7 @@ const HIDDEN: [&str; 6] = ["supply_sag", "battery_discharge", "thermal_zero", "z
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Draws the hidden effect and every noise; from the clock when not given.
-    #[arg(long)]
+    #[arg(long, value_parser = crate::number::whole::<u64>(0, u64::MAX, "a seed"))]
     seed: Option<u64>,
     /// Hides this effect instead of drawing one of six.
     #[arg(long, value_parser = PossibleValuesParser::new(effect::catalogue().iter().map(|e| e.id)))]

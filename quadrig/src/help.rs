@@ -7,6 +7,7 @@
 
 use clap::Command;
 use ident::report::WIDEST;
+use std::any::TypeId;
 
 /// What is taught of one command.
 struct Entry {
@@ -137,7 +138,10 @@ pub(crate) fn taught(command: Command) -> Command {
 
 fn descend(command: Command, path: &[&'static str], entry: &Entry) -> Command {
     match path {
-        [] => command.after_help(entry.text()),
+        // a number below 0 is a value of an option that takes numbers
+        [] => command.after_help(entry.text()).mut_args(|arg| {
+            if arg.get_value_parser().type_id() == TypeId::of::<f64>() { arg.allow_negative_numbers(true) } else { arg }
+        }),
         [first, rest @ ..] => command.mut_subcommand(*first, |inner| descend(inner, rest, entry)),
     }
 }
@@ -147,7 +151,6 @@ mod tests {
     use super::*;
     use crate::Cli;
     use clap::CommandFactory;
-    use std::any::TypeId;
     use std::path::Path;
 
     /// Every command with its path, groups included, clap's own `help` excepted.
@@ -263,7 +266,7 @@ mod tests {
             for arg in command.get_arguments().filter(|a| !["help", "version"].contains(&a.get_id().as_str())) {
                 let help = arg.get_help().map(|h| h.to_string()).unwrap_or_default();
                 assert!(help.len() > 3, "quadrig {path}: {} says nothing", arg.get_id());
-                let number = [TypeId::of::<f64>(), TypeId::of::<f32>()].iter().any(|t| arg.get_value_parser().type_id() == *t);
+                let number = arg.get_value_parser().type_id() == TypeId::of::<f64>();
                 let said = format!("{}.", help.trim_end_matches('.')).to_lowercase();
                 let unit = UNITS.iter().any(|unit| said.contains(&unit.to_lowercase()));
                 assert!(!number || unit, "quadrig {path}: {} has no unit: {help}", arg.get_id());

@@ -1,7 +1,8 @@
 //! `quadrig identify`.
 //!
 //! What it is: plateaus, declared fits with standard errors, quality figures; writes `model.toml`.
-//! What can go wrong: refused input; the model appears whole or not at all.
+//! What can go wrong: refused input; the model appears whole or not at all, and last: where another output cannot be written it is not there,
+//! and the line tells what is.
 //! Units: as the channels state.
 //! Reference: specification `identification.md`.
 
@@ -15,7 +16,7 @@ use ident::fit::power::{csv, in_doubt};
 use ident::fit::ratio;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::{Log, write_whole};
-use ident::report::{WIDEST, headline, number, wrapped};
+use ident::report::{Sheet, WIDEST, headline, number, wrapped};
 use ident::words::{bracketed, channel};
 use std::path::PathBuf;
 
@@ -40,7 +41,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     surface: Option<PathBuf>,
     /// Density of the air, kg/m^3, where the log does not tell it.
-    #[arg(long, value_name = "KG_M3")]
+    #[arg(long, value_name = "KG_M3", value_parser = crate::number::from(0.1, 10.0, "a density in kg/m^3"))]
     air: Option<f64>,
     /// A second run to lay beside it on the page.
     #[arg(long, value_name = "LOG")]
@@ -69,18 +70,20 @@ impl Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let svg = args.svg.as_deref().map(|path| Folder::new(path, "identify --svg")).transpose()?;
     let log = open(&args.log, &args.columns.options(&args.names), quiet)?;
-    if let Some(air) = args.air.filter(|air| !(0.1..=10.0).contains(air)) {
-        return Err(format!("--air {air}: expected a density in kg/m^3, such as 1.2").into());
-    }
     let found = identify_in(&log, args.air)?;
+    let sheet = (args.report.is_some() || args.svg.is_some()).then(|| draw(args, &log, &found)).transpose()?;
     let surface = args.surface.as_ref().zip(found.surface.as_ref().ok()).map(|(path, surface)| (path, surface.csv()));
     let table = args.table.as_ref().map(|path| (path, csv(&found.plateaus, &found.levels)));
-    for (path, text) in table.into_iter().chain(surface) {
-        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
+    let page = args.report.as_ref().zip(sheet.as_ref()).map(|(path, sheet)| (path, sheet.html()));
+    let model = (&args.output, found.model.files().0);
+    let mut written = Vec::new();
+    if let Some((folder, sheet)) = svg.zip(sheet.as_ref()) {
+        figures(folder, sheet.drawn())?;
+        written.extend(&args.svg);
     }
-    write_whole(&args.output, |out| out.write_all(found.model.files().0.as_bytes())).map_err(unwritten(&args.output))?;
-    if args.report.is_some() || args.svg.is_some() {
-        draw(args, &log, &found, svg)?;
+    for (path, text) in table.into_iter().chain(surface).chain(page).chain([model]) {
+        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|e| unwritten(path)(e) + &there(&written))?;
+        written.push(path);
     }
     if !quiet {
         crate::say::text(&(text(&found) + &told(&log)));
@@ -94,8 +97,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
 }
 
+/// What is written already when something else cannot be.
+fn there(written: &[&PathBuf]) -> String {
+    let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+    if names.is_empty() { String::new() } else { format!("; written already: {}", names.join(", ")) }
+}
+
 /// The page and the figures.
-fn draw(args: &Args, log: &Log, found: &Identified, svg: Option<Folder>) -> Result<(), Failure> {
+fn draw(args: &Args, log: &Log, found: &Identified) -> Result<Sheet, Failure> {
     let second = match &args.beside {
         Some(path) => {
             let log = open(path, &args.columns.options(&args.names), true)?;
@@ -104,14 +113,7 @@ fn draw(args: &Args, log: &Log, found: &Identified, svg: Option<Folder>) -> Resu
         }
         None => None,
     };
-    let sheet = ident::report::run(log, found, second.as_ref().map(|(log, found)| (log, found)));
-    if let Some(path) = &args.report {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
-    }
-    if let Some(folder) = svg {
-        figures(folder, sheet.drawn())?;
-    }
-    Ok(())
+    Ok(ident::report::run(log, found, second.as_ref().map(|(log, found)| (log, found))))
 }
 
 fn text(found: &Identified) -> String {

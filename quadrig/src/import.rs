@@ -26,7 +26,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     names: Names,
     /// Of a PX4 or Betaflight recording this rotor's ESC alone, as a rig log; with --with of such a further logger.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=12))]
+    #[arg(long, value_name = "N", value_parser = crate::number::whole::<u32>(1, 12, "rotors"))]
     rotor: Option<u32>,
     /// Another logger of the same run (ESC, flight controller, board), put on this one's clock by what both saw; its channels are named after
     /// it (rpm_esc, current_esc_a, ...), and a page beside the output shows the joint. May be given more than once.
@@ -52,6 +52,9 @@ impl std::str::FromStr for Meta {
             return Err("expected letters, digits and _ before the =".to_owned());
         }
         let read = format!("v = {value}").parse::<toml::Table>().ok().and_then(|mut table| table.remove("v"));
+        if read.as_ref().and_then(toml::Value::as_float).is_some_and(|v| !v.is_finite()) {
+            return Err("expected a number with an end".to_owned());
+        }
         Ok(Self(key.to_owned(), read.unwrap_or_else(|| toml::Value::String(value.to_owned()))))
     }
 }
@@ -77,7 +80,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let (mut log, report) = match (flight, rotor) {
         (Some(found), _) => found,
         (None, Some(n)) => ident::import::rotor(&args.file, n as usize)?
-            .ok_or_else(|| format!("--rotor {n}: {} is no PX4 ULog and no Betaflight Blackbox log", args.file.display()))?,
+            .ok_or_else(|| format!("--rotor {n}: {} is no PX4 ULog and no Betaflight Blackbox log; expected one of them: leave --rotor away for an export of a stand or an ESC", args.file.display()))?,
         (None, None) => ident::import::import_as(&args.file, &options)
             .map_err(|why| crate::kind::another(&args.file).map_or(why.into(), Failure::from))?,
     };

@@ -24,7 +24,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     port: PortArgs,
     /// Longest calibration that is followed, s.
-    #[arg(long, default_value_t = 300.0)]
+    #[arg(long, default_value_t = 300.0, value_parser = crate::number::positive(86_400.0, "seconds"))]
     patience: f64,
     /// identify; format text|binary; send raw|calibrated|both; stream on|off; once; calibrate gyro|accel|mag|align; finish; cancel; save;
     /// load; reset; errors.
@@ -37,9 +37,6 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let typed = args.words.join(" ");
     let command = line::command(&typed)
         .ok_or_else(|| format!("{typed:?} is no command of the IMU board; expected one of `quadrig imu --help`"))?;
-    if !(args.patience.is_finite() && args.patience > 0.0) {
-        return Err(format!("--patience {}: expected seconds above 0", args.patience).into());
-    }
     let mut board = Board::at(args.port.open(BAUD, true)?);
     let text_wanted = command == Command::Imu(ImuCommand::Format(ImuFormat::Text));
     if !text_wanted {

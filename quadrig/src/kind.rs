@@ -38,6 +38,16 @@ pub(crate) fn refuse_other(path: &Path, expected: &str) -> Result<(), Failure> {
     what.map_or(Ok(()), |what| Err(format!("{}:1:1: {what}; expected {expected}", path.display()).into()))
 }
 
+/// Refuses a file that is of another kind than a model, in the words of its kind.
+pub(crate) fn refuse_no_model(path: &Path) -> Result<(), Failure> {
+    let expected = "expected a model written by `quadrig identify` or `close-loop`";
+    let what = head(path).as_deref().and_then(kind_of).filter(|what| *what != MODEL);
+    what.map_or(Ok(()), |what| Err(format!("{}:1:1: {what}; {expected}", path.display()).into()))
+}
+
+/// A file of settings that this program wrote from a run.
+const MODEL: &str = "a model";
+
 /// The beginning of a file.
 fn head(path: &Path) -> Option<String> {
     let mut bytes = Vec::new();
@@ -56,7 +66,7 @@ fn kind_of(text: &str) -> Option<&'static str> {
     }
     if let Ok(table) = toml::from_str::<toml::Table>(text) {
         let format = table.get("format").and_then(toml::Value::as_str).unwrap_or_default();
-        return format.starts_with("quadrig-").then_some("a model");
+        return format.starts_with("quadrig-").then_some(MODEL);
     }
     if text.starts_with("# quadrig-flight") {
         return Some("a flight's log");

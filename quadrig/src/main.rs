@@ -38,6 +38,7 @@ mod kind;
 mod live;
 mod man;
 mod measured;
+mod number;
 mod open;
 mod plateaus;
 mod port;
@@ -209,8 +210,15 @@ impl Command {
 }
 
 fn main() -> ExitCode {
-    let matches = help::taught(Cli::command()).get_matches();
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    let taken = help::taught(Cli::command()).try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = match taken {
+        Ok(cli) => cli,
+        Err(why) => {
+            let Some(line) = number::refusal(&why) else { why.exit() };
+            note!("quadrig: {line}");
+            return ExitCode::from(1);
+        }
+    };
     match cli.command.run(cli.quiet) {
         Ok(()) => say::status(),
         Err(e) => {

@@ -10,7 +10,7 @@ use crate::Failure;
 use crate::trouble::unread;
 use ident::import::{Mapping, Options, Report, import_as};
 use ident::log::{Gaps, Log};
-use ident::model::{Model, ModelError, beside};
+use ident::model::{Model, beside};
 use ident::report::wrapped;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -35,7 +35,7 @@ pub(crate) struct Columns {
     #[arg(long = "map", value_name = "TARGET=SOURCE*FACTOR")]
     mappings: Vec<Mapping>,
     /// Pole pairs of the motor (half its magnets), for speeds in electrical turns.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=60))]
+    #[arg(long, value_name = "N", value_parser = crate::number::whole::<u32>(1, 60, "pole pairs"))]
     pole_pairs: Option<u32>,
     /// Which powertrain of a stand with two is the rig: 1 or A, 2 or B.
     #[arg(long, value_name = "A|B", value_parser = side)]
@@ -155,7 +155,8 @@ pub(crate) fn as_written(log: &Log) -> Result<Log, Failure> {
 }
 
 /// A model of a rig; one that goes without the file beside it is said to.
-pub(crate) fn read_model(path: &Path, quiet: bool) -> Result<Model, ModelError> {
+pub(crate) fn read_model(path: &Path, quiet: bool) -> Result<Model, Failure> {
+    crate::kind::refuse_no_model(path)?;
     let model = Model::read(path)?;
     if model.goes_without() && !quiet {
         note!(

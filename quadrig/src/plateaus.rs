@@ -36,10 +36,10 @@ pub(crate) struct Args {
     #[arg(long, default_value = "zero")]
     padding: PaddingName,
     /// Threshold of Filter 2, in the channel's unit per sample; found by itself where not given.
-    #[arg(long)]
+    #[arg(long, value_parser = crate::number::positive(1e9, "the channel's unit per sample"))]
     threshold: Option<f64>,
     /// Offset of Filters 3 and 4, samples; found by itself where not given.
-    #[arg(long)]
+    #[arg(long, value_parser = crate::number::whole::<usize>(1, 1_000_000, "samples"))]
     offset: Option<usize>,
     /// Folder for the page with the scores, and each run's filters and threshold study as SVG.
     #[arg(short, long)]
@@ -114,6 +114,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             let there: Vec<&str> = log.columns.iter().map(|c| c.name.as_str()).collect();
             return Err(format!("{}: no column {channel}; expected one of {}", path.display(), there.join(", ")).into());
         };
+        if let Some(offset) = args.offset.filter(|offset| *offset >= values.len()) {
+            let rows = values.len();
+            return Err(format!("--offset {offset}: expected samples, fewer than the {rows} rows of {}", path.display()).into());
+        }
         let shifted = filters(values, &settings);
         if !quiet {
             crate::say::text(&text(path, &log, channel, &shifted));

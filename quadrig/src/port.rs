@@ -32,7 +32,7 @@ pub(crate) struct PortArgs {
     #[arg(long, global = true, value_name = "ELF")]
     pub(crate) image: Option<PathBuf>,
     /// Virtual board: times as fast as the clock, 1 where it is not given; 0 for as fast as it goes.
-    #[arg(long, global = true, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, global = true, value_name = "N", value_parser = crate::number::from(0.0, 1e6, "times the clock"))]
     pub(crate) speed: Option<f64>,
     /// Virtual board: an assistant at the bench switches the ESC on where that is due, and passes on what it beeps.
     #[arg(long, global = true)]
@@ -77,9 +77,6 @@ impl PortArgs {
             return Port::serial(&self.port, baud);
         };
         let speed = self.speed.unwrap_or(1.0);
-        if !(speed.is_finite() && speed >= 0.0) {
-            return Err(format!("--speed {speed}: expected a number not below 0").into());
-        }
         let order = Order { scenario, imu, flash: self.flash.clone(), image: self.image.clone() };
         let board = switch_on(&order)?;
         if (board.kind() == Kind::Imu) != imu {

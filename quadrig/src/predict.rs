@@ -79,6 +79,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
         return flight::predict(&args.model, &text, &args.log, &args.output);
     }
+    crate::kind::refuse_no_model(&args.model)?;
     let model = Model::read(&args.model)?;
     let log = open(&args.log, &args.columns.options(&args.names), false)?;
     let model = if args.events { Cow::Borrowed(&model) } else { model.on(&log) };

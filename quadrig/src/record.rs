@@ -42,10 +42,10 @@ pub(crate) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Stop after so many seconds of the board's time; without it, record until the port is gone or Ctrl-D or Ctrl-C is typed.
-    #[arg(long)]
+    #[arg(long, value_parser = crate::number::positive(1e7, "seconds"))]
     seconds: Option<f64>,
     /// How long an unplugged port is waited for, s.
-    #[arg(long, default_value_t = 5.0)]
+    #[arg(long, default_value_t = 5.0, value_parser = crate::number::from(0.0, 86_400.0, "seconds"))]
     wait: f64,
     /// No terminal view.
     #[arg(long)]

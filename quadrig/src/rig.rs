@@ -97,19 +97,19 @@ enum Order {
         #[arg(long, conflicts_with_all = ["step", "hold", "top", "down", "visits"])]
         next: Option<PathBuf>,
         /// Height of a step, us.
-        #[arg(long, default_value_t = 50.0)]
+        #[arg(long, default_value_t = 50.0, value_parser = crate::number::positive(1000.0, "us"))]
         step: f64,
         /// Hold of each level, s.
-        #[arg(long, default_value_t = 30.0)]
+        #[arg(long, default_value_t = 30.0, value_parser = crate::number::positive(86_399.0, "seconds"))]
         hold: f64,
         /// Highest level, us.
-        #[arg(long, default_value_t = 2000.0)]
+        #[arg(long, default_value_t = 2000.0, value_parser = crate::number::from(1000.0, 2000.0, "a pulse in us"))]
         top: f64,
         /// Come down again.
         #[arg(long)]
         down: bool,
         /// How often.
-        #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+        #[arg(long, default_value_t = 1, value_parser = crate::number::whole::<u16>(1, 65_535, "visits"))]
         visits: u16,
         #[command(flatten)]
         session: Session,
@@ -117,9 +117,10 @@ enum Order {
     /// Sets the pulse of an armed rig and holds it for a while.
     Set {
         /// Pulse, us.
+        #[arg(value_parser = crate::number::from(1000.0, 2000.0, "a pulse in us"))]
         us: f64,
         /// How long, s; then minimum again.
-        #[arg(long, default_value_t = 0.0)]
+        #[arg(long, default_value_t = 0.0, value_parser = crate::number::from(0.0, 3600.0, "seconds"))]
         hold: f64,
     },
     /// Minimum throttle, now.
@@ -133,6 +134,7 @@ enum Order {
         /// The file (TOML), or a setting: log-ms, speed-limit, current-limit, voltage-limit, slew, link-ms, factory.
         what: Option<String>,
         /// The setting's value (none for factory).
+        #[arg(value_parser = crate::number::from(0.0, 1e9, "a number"))]
         value: Option<f64>,
         /// Read what is in force.
         #[arg(long)]
@@ -187,7 +189,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         Order::Clear => board.obey(Command::ClearFaults, silent).map(|()| done("cleared")),
         Order::Set { us, hold } => {
             board.obey(Command::SetPulse(pulse(*us)?), silent)?;
-            let until = board.now() + Duration::from_secs_f64(hold.clamp(0.0, 3600.0));
+            let until = board.now() + Duration::from_secs_f64(*hold);
             let mut seat = Seat::new(board, None, None)?;
             while seat.now() < until {
                 for news in seat.turn()? {
@@ -232,10 +234,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             session.hold(board, args, Errand { first, ..Errand::default() }, quiet)
         }
         Order::Run { schedule: None, next: None, step, hold, top, down, visits, session } => {
-            let height = if *step > 0.0 && *step <= 1000.0 { PulseWidth((step * 1000.0).round() as u32) } else { return Err(format!("--step {step}: expected a step above 0 and up to 1000 us").into()) };
-            if !(*hold > 0.0 && *hold < 86_400.0) {
-                return Err(format!("--hold {hold}: expected a time above 0 and below 86400 s").into());
-            }
+            let height = PulseWidth((step * 1000.0).round() as u32);
             let run = Command::RunVisits { step: height, hold_ms: (hold * 1000.0) as u32, top: pulse(*top)?, down: *down, visits: *visits };
             let levels = 1.0 + ((*top - 1000.0) / *step).floor();
             let levels = if *down { 2.0 * levels - 1.0 } else { levels } * f64::from(*visits);

@@ -27,10 +27,10 @@ pub(crate) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Hold of each level, s.
-    #[arg(long, default_value_t = 30.0, value_parser = hold)]
+    #[arg(long, default_value_t = 30.0, value_parser = crate::number::from(1.0, 600.0, "seconds"))]
     hold: f64,
     /// Threads; all cores when not given.
-    #[arg(long)]
+    #[arg(long, value_parser = crate::number::whole::<usize>(1, 4096, "threads"))]
     threads: Option<usize>,
 }
 
@@ -39,10 +39,6 @@ impl Args {
     pub(crate) fn paths(&self) -> Paths<'_> {
         Paths::default().fills("-o", [&self.output])
     }
-}
-
-fn hold(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|h: &f64| (1.0..=600.0).contains(h)).ok_or_else(|| "expected 1 to 600 s".to_owned())
 }
 
 /// Runs the command.

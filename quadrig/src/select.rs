@@ -41,9 +41,6 @@ const CHARGE: Limit = Limit { most: 200.0, unit: "A.h", thousandth: "mAh" };
 impl Limit {
     fn check(&self, name: &str, value: f64) -> Result<(), Failure> {
         let Self { most, unit, thousandth } = self;
-        if !(value.is_finite() && value > 0.0) {
-            return Err(format!("{name} {value}: expected a positive number").into());
-        }
         if value > *most {
             let likely = format!("is it in {thousandth}? {value} {thousandth} are {} {unit}", value / 1000.0);
             return Err(format!("{name} {value}: expected {unit}, {most} at most: {likely}").into());
@@ -69,25 +66,25 @@ pub(crate) struct Args {
     #[command(flatten)]
     columns: Columns,
     /// Least thrust of all four motors together, N.
-    #[arg(long, default_value_t = 19.62)]
+    #[arg(long, default_value_t = 19.62, value_parser = crate::number::from(0.0, 100_000.0, "N"))]
     thrust: f64,
     /// Batteries on board.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=12))]
+    #[arg(long, default_value_t = 1, value_parser = crate::number::whole::<u32>(1, 12, "batteries"))]
     batteries: u32,
     /// Least endurance at full throttle, min.
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = crate::number::from(0.0, 10_000.0, "minutes"))]
     minutes: f64,
     /// Least thrust above the weight, N.
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = crate::number::from(0.0, 100_000.0, "N"))]
     resultant: f64,
     /// Mass without a battery, kg.
-    #[arg(long, default_value_t = 0.774)]
+    #[arg(long, default_value_t = 0.774, value_parser = crate::number::positive(1e6, "kg"))]
     bare: f64,
     /// Mass of one battery, kg.
-    #[arg(long, default_value_t = 0.4)]
+    #[arg(long, default_value_t = 0.4, value_parser = crate::number::positive(1e6, "kg"))]
     battery: f64,
     /// Charge of one battery, A.h.
-    #[arg(long, default_value_t = 4.4)]
+    #[arg(long, default_value_t = 4.4, value_parser = crate::number::positive(1e6, "A.h"))]
     capacity: f64,
     /// Writes the page with Tables 8 and 9 and the figures.
     #[arg(short, long)]

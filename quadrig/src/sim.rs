@@ -57,7 +57,7 @@ pub(crate) struct Args {
     #[arg(long, conflicts_with = "model")]
     live: bool,
     /// Times real time in the live view; 0 for as fast as it goes.
-    #[arg(long, default_value_t = 1.0, requires = "live")]
+    #[arg(long, default_value_t = 1.0, requires = "live", value_parser = crate::number::from(0.0, 1e6, "times real time"))]
     speed: f64,
 }
 
@@ -91,9 +91,6 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         .into());
     }
     let name = args.output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    if !(args.speed.is_finite() && args.speed >= 0.0) {
-        return Err(format!("--speed {}: expected a number not below 0", args.speed).into());
-    }
     let record = match &args.replay {
         Some(path) => replayed(&scenario, path, quiet)?,
         None => flown(args, &scenario, quiet)?,

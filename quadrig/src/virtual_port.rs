@@ -24,10 +24,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
     /// Times as fast as the clock.
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = crate::number::positive(1e6, "times the clock (other programs live by it)"))]
     speed: f64,
     /// Switch the board off after so many seconds of its time.
-    #[arg(long)]
+    #[arg(long, value_parser = crate::number::positive(1e7, "seconds"))]
     seconds: Option<f64>,
 }
 
@@ -79,9 +79,6 @@ mod pty {
     }
 
     pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-        if !(args.speed.is_finite() && args.speed > 0.0) {
-            return Err(format!("--speed {}: expected a number above 0; other programs live by the clock", args.speed).into());
-        }
         let ended = Ended::watch()?;
         let order = Order { scenario: args.scenario.clone(), imu: false, flash: args.flash.clone(), image: args.image.clone() };
         let mut board = switch_on(&order)?;

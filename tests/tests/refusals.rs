@@ -318,6 +318,31 @@ fn logs() -> Vec<Case> {
             IDENTIFY,
             &["bad.csv:54: column pulse_us: 'NaN'"],
         ),
+        with(
+            "a column whose name has no end",
+            "bad.csv",
+            head("current_a", &"x".repeat(66_000)),
+            IDENTIFY,
+            &["bad.csv:3: column xxx", "a name of 66000 characters", "200 at most"],
+        ),
+        with(
+            "an export's column whose name has no end",
+            "bad.csv",
+            good_log().lines().skip(2).map(|line| line.replace("current_a", &"x".repeat(66_000)) + "\n").collect::<String>(),
+            IDENTIFY,
+            &["bad.csv:1: column xxx", "a name of 66000 characters"],
+        ),
+        with(
+            "a number whose digits have no end",
+            "bad.csv",
+            row(60, |row| {
+                let fields = row.split(',').enumerate();
+                let long = |(k, field): (usize, &str)| if k == 1 { "9".repeat(100_000) } else { field.to_owned() };
+                fields.map(long).collect::<Vec<String>>().join(",")
+            }),
+            IDENTIFY,
+            &["bad.csv:64: column pulse_us: '99999", "999...'"],
+        ),
         with("a word", "bad.csv", row(60, |row| format!("{}x", row)), IDENTIFY, &["bad.csv:64: column voltage_v: '"]),
         with(
             "a row cut short",
@@ -396,12 +421,21 @@ fn models() -> Vec<Case> {
         alone(
             "a log in the place of a model",
             "predict good.csv good.csv -o out.csv",
-            &["good.csv:3:4: ", "a model written by `quadrig identify`"],
+            &["good.csv:1:1: a log", "a model written by `quadrig identify`"],
         ),
+        alone("a log to export", "export good.csv --to px4 -o out", &["good.csv:1:1: a log; expected a model", "identify"]),
+        alone("a log to predict from", "predict full/notes.csv good.csv -o out.csv", &["full/notes.csv:1:1: a table of values"]),
+        alone("a log for a watch", "log --port sim --speed 0 --model good.csv -o out.csv", &["good.csv:1:1: a log"]),
         alone("a model that is not there", "close-loop good.csv --model nowhere.toml", &["nowhere.toml: cannot be read"]),
         with("a model of another format", "bad.toml", "format = \"mine 1\"\n", PREDICT, &["bad.toml"]),
         with("a model cut short", "bad.toml", "format = \"quadrig-model 1\"\n[channel.rpm", PREDICT, &["bad.toml:2"]),
-        with("a flight that is no flight", "bad.toml", "duration_s = 2\n", "fly bad.toml --model good.csv", &["good.csv:3:4: "]),
+        with(
+            "a flight that is no flight",
+            "bad.toml",
+            "duration_s = 2\n",
+            "fly bad.toml --model good.csv",
+            &["good.csv:1:1: a log"],
+        ),
     ]
 }
 
@@ -493,6 +527,22 @@ fn scenarios() -> Vec<Case> {
             "[imu]\n",
             "isolability bad.toml",
             &["bad.toml: describes the IMU board"],
+        ),
+        alone(
+            "a model to simulate",
+            "sim model.toml -o out.csv",
+            &["model.toml:1:1: a model (quadrig-model", "docs/scenario.md"],
+        ),
+        alone("a model to loop", "loop model.toml -o out", &["model.toml:1:1: a model"]),
+        alone("a model for a virtual board", "virtual model.toml --seconds 1", &["model.toml:1:1: a model"]),
+        alone("a model to isolate causes of", "isolability model.toml -o out", &["model.toml:1:1: a model"]),
+        alone("a model to fly", "fly model.toml -o out", &["model.toml:1:1: a model", "`--model`"]),
+        with(
+            "a scenario of bytes",
+            "bad.toml",
+            [0xFF_u8, 0xFE, 0x00, 0x81],
+            SIM,
+            &["bad.toml:1:1: bytes that are no text", "TOML"],
         ),
         alone("a scenario that is not there", "loop nowhere.toml", &["nowhere.toml: cannot be read"]),
         with(
@@ -716,7 +766,7 @@ fn boards() -> Vec<Case> {
     vec![
         alone("no port", "rig status", &["--port with the serial port of the board"]),
         alone("a port that is not there", "rig --port /dev/nothing status", &["/dev/nothing", "or sim for a virtual board"]),
-        alone("a pulse for no ESC", "rig --port sim --speed 0 set 5000", &["5000 us", "1000 to 2000 us"]),
+        alone("a pulse for no ESC", "rig --port sim --speed 0 set 5000", &["US 5000: ", "a pulse in us from 1000 to 2000"]),
         alone(
             "a pulse before arming",
             "rig --port sim --speed 0 set 1500",
@@ -773,13 +823,50 @@ fn boards() -> Vec<Case> {
 fn arguments() -> Vec<Case> {
     vec![
         alone("a beam without width", "beam --width 0", &["--width 0", "a positive number"]),
-        alone("a beam of no number", "beam --modulus nan", &["--modulus NaN"]),
+        alone("a beam of no number", "beam --modulus nan", &["--modulus nan: ", "a positive number of GPa"]),
         alone("a motor that nobody measured", "select --motor 1KV", &["--motor 1KV", "570KV"]),
         alone("a battery without charge", "select --capacity 0", &["--capacity 0", "a positive number"]),
         alone("a battery in mAh", "select --capacity 4400", &["--capacity 4400: expected A.h", "4400 mAh are 4.4 A.h"]),
         alone("a frame in grams", "select --bare 774", &["--bare 774: expected kg", "774 g are 0.774 kg"]),
         alone("a declination beyond the pole", "ahrs good.csv out.csv --declination 700", &["--declination 700", "-180 to 180"]),
         alone("a channel that is none", "plateaus good.csv --channel thrust", &["no column thrust", "thrust_n"]),
+        alone("a thrust that is none", "select --thrust nan", &["--thrust nan: expected N from 0"]),
+        alone("a thrust without an end", "select --thrust inf", &["--thrust inf: expected N from 0"]),
+        alone("a time that is none", "select --minutes nan", &["--minutes nan: expected minutes"]),
+        alone("a charge that is none", "select --capacity nan", &["--capacity nan: expected a positive number of A.h"]),
+        alone(
+            "a charge in words",
+            "export model.toml --to px4 --capacity nan -o out",
+            &["--capacity nan: ", "mAh, a whole number"],
+        ),
+        alone(
+            "an end that never comes",
+            "log --port sim --seconds nan -o out.csv",
+            &["--seconds nan: ", "a positive number of seconds"],
+        ),
+        alone("an end before the beginning", "log --port sim --seconds -3 -o out.csv", &["--seconds -3: "]),
+        alone("a wait that is none", "log --port sim --wait nan -o out.csv", &["--wait nan: expected seconds from 0"]),
+        alone("a departure that is none", "log --port sim --model model.toml --stop-at nan -o out.csv", &["--stop-at nan: "]),
+        alone("a threshold that is none", "plateaus good.csv --threshold nan", &["--threshold nan: ", "unit per sample"]),
+        alone("a threshold without an end", "plateaus good.csv --threshold inf", &["--threshold inf: "]),
+        alone("a threshold of nothing", "plateaus good.csv --threshold 0", &["--threshold 0: "]),
+        alone("an offset beyond all logs", "plateaus good.csv --offset 99999999", &["--offset 99999999: ", "samples"]),
+        alone("an offset beyond this log", "plateaus good.csv --offset 420", &["--offset 420: ", "the 420 rows of good.csv"]),
+        alone("a speed that is none", "beam --speeds nan", &["--speeds nan: expected rev/min"]),
+        alone("a speed below 0", "beam --speeds -1000", &["--speeds -1000: expected rev/min from 0"]),
+        alone("a speed in words", "beam --speeds 1000,abc", &["--speeds abc: expected rev/min"]),
+        alone("a nearness that is none", "beam --near nan", &["--near nan: expected per cent from 0 to 100"]),
+        alone("a density that is none", "identify good.csv -o out.toml --air nan", &["--air nan: expected a density"]),
+        alone("a pulse that is none", "rig --port sim --speed 0 set nan", &["US nan: "]),
+        alone("a board that stands still", "virtual --speed nan", &["--speed nan: ", "times the clock"]),
+        alone("an arm in mm", "calibrate torque -i good.csv --points 0 --arm 185 -o out.toml", &["--arm 185: ", "m, 10 at most"]),
+        with(
+            "one rotor of a stand",
+            "bad.csv",
+            good_log(),
+            "import bad.csv --rotor 1 -o out.csv",
+            &["--rotor 1: bad.csv is no PX4 ULog", "leave --rotor away"],
+        ),
         alone("data that are not there", "measured nowhere -o out", &["nowhere", "no such folder"]),
         alone(
             "from a command that was not logged",
@@ -787,6 +874,45 @@ fn arguments() -> Vec<Case> {
             &["no-command.csv: no column pulse_us"],
         ),
     ]
+}
+
+/// A call whose page has a longer name than any disk takes: what is written before it shows.
+fn unwritable() -> &'static str {
+    Box::leak(format!("identify good.csv -o out.toml --report {}.html", "x".repeat(300)).into_boxed_str())
+}
+
+/// Recordings of an IMU that none has made, for each command that reads such.
+fn attitudes() -> Vec<Case> {
+    const GOOD: &str = "0.01,0,0,0,0,9.8,20,0,40";
+    const HEADER: &str = "t_s,gx,gy,gz,ax,ay,az,mx,my,mz\n";
+    const AHRS: &str = "ahrs bad.csv out.csv";
+    const CLOSE: &str = "close-loop bad.csv -o out";
+    const CALIBRATE: &str = "calibrate gyro -i bad.csv -o out.toml";
+    let log = |step: f64, cells: &str| -> String {
+        let rows: String = (0..40).map(|n| format!("{},{cells}\n", f64::from(n) * step)).collect();
+        HEADER.to_owned() + &rows
+    };
+    let one = |cells: &str| {
+        let mut lines: Vec<String> = log(0.005, GOOD).lines().map(str::to_owned).collect();
+        lines[20] = format!("0.095,{cells}");
+        lines.join("\n") + "\n"
+    };
+    let kinds: [(&'static str, String, &'static [&'static str]); 11] = [
+        ("milliseconds", log(5.0, GOOD), &["column t_s: rows 5 s apart", "milliseconds: divide t_s by 1000"]),
+        ("microseconds", log(5000.0, GOOD), &["column t_s: rows 5000 s apart", "microseconds"]),
+        ("a rate that is none", one("nan,0,0,0,0,9.8,20,0,40"), &["bad.csv:21: column gx: \"nan\""]),
+        ("a force that is none", one("0,0,0,0,NaN,9.8,20,0,40"), &["bad.csv:21: column ay: \"NaN\"", "an empty field"]),
+        ("a rate without an end", one("0,0,inf,0,0,9.8,20,0,40"), &["bad.csv:21: column gz: \"inf\""]),
+        ("degrees a second", one("0,250,0,0,0,9.8,20,0,40"), &["bad.csv:21: column gy: 250", "deg/s are 4.3633 rad/s"]),
+        ("a force beyond all", one("0,0,0,0,0,9806,20,0,40"), &["bad.csv:21: column az: 9806", "mg"]),
+        ("forces in g", log(0.005, "0,0,0,0,0,1,20,0,40"), &["columns ax,ay,az: 1.000 long", "multiply them by 9.80665"]),
+        ("forces in mg", log(0.005, "0,0,0,0,0,999,20,0,40"), &["columns ax,ay,az: 999.000 long", "look like mg"]),
+        ("no gravity", log(0.005, "0,0,0,0,0,0,20,0,40"), &["columns ax,ay,az: 0.000 long", "9.8 at rest"]),
+        ("a field in nT", log(0.005, "0,0,0,0,0,9.8,20000,0,40000"), &["columns mx,my,mz: 44721 long", "nT"]),
+    ];
+    let each =
+        |(name, text, said)| [AHRS, CLOSE, CALIBRATE].map(|words| with(name, "bad.csv", String::clone(&text), words, said));
+    kinds.into_iter().flat_map(each).collect()
 }
 
 fn outputs() -> Vec<Case> {
@@ -824,15 +950,30 @@ fn outputs() -> Vec<Case> {
             "close-loop good.csv -o .",
             &["good.csv: is an input and lies in the folder of the results"],
         ),
-        alone("results among the notes of somebody", "close-loop good.csv -o full", &["full: holds notes.txt"]),
-        alone("a demonstration among notes", "demo --seed 1 -o full", &["full: holds notes.txt"]),
-        alone("isolability among notes", "isolability good.csv -o full", &["full: holds notes.txt"]),
-        alone("a loop among notes", "loop empty.toml -o full", &["full: holds notes.txt"]),
-        alone("a flight among notes", "fly short.toml -o full", &["full: holds notes.txt"]),
-        alone("runs among notes", "runs -o full", &["full: holds notes.txt"]),
-        alone("detectors among notes", "plateaus good.csv -o full", &["full: holds notes.txt"]),
-        alone("pages of effects among notes", "effects -o full", &["full: holds notes.txt"]),
-        alone("figures among notes", "select --svg full", &["full: holds notes.txt"]),
+        alone("results among the notes of somebody", "close-loop good.csv -o full", &["full: holds notes.csv"]),
+        alone("a demonstration among notes", "demo --seed 1 -o full", &["full: holds notes.csv"]),
+        alone("isolability among notes", "isolability good.csv -o full", &["full: holds notes.csv"]),
+        alone("a loop among notes", "loop empty.toml -o full", &["full: holds notes.csv"]),
+        alone("a flight among notes", "fly short.toml -o full", &["full: holds notes.csv"]),
+        alone("runs among notes", "runs -o full", &["full: holds notes.csv"]),
+        alone("detectors among notes", "plateaus good.csv -o full", &["full: holds notes.csv"]),
+        alone("pages of effects among notes", "effects -o full", &["full: holds notes.csv"]),
+        alone("figures among notes", "select --svg full", &["full: holds notes.csv"]),
+        alone("a batch among notes", "batch . -o full", &["full: holds notes.csv, which no `quadrig batch` wrote"]),
+        alone("a batch over a table", "batch . -o listed", &["listed: holds manifest.csv, which no `quadrig batch` wrote"]),
+        alone("a batch over another table", "batch . -o caused", &["caused: holds effects.csv, which no `quadrig batch`"]),
+        alone(
+            "a batch over a result",
+            "batch . -o kept-runs",
+            &["kept-runs: holds runs/good.csv.json, which no `quadrig batch`"],
+        ),
+        alone("recorded sets over a page", "measured data -o told", &["told: holds measured.md, which no `quadrig measured`"]),
+        alone(
+            "recorded sets among notes",
+            "measured data -o paged",
+            &["paged: holds measured/notes.txt, which no `quadrig measured`"],
+        ),
+        alone("a page that cannot be written", unwritable(), &["html: cannot be written", "expected a folder"]),
         alone(
             "a demonstration over a recording",
             "demo --seed 1 -o kept",
@@ -940,15 +1081,36 @@ fn a_missing_folder_of_an_output_is_made() {
     }
 }
 
+/// Where one of several outputs cannot be written the model is not there, and what is there is said.
+#[test]
+fn what_is_written_before_a_refusal_is_said() {
+    let bench = Bench::new();
+    let words = format!("identify good.csv -o out.toml --table out.csv --report {}.html", "x".repeat(300));
+    let said = bench.call(&words.split(' ').collect::<Vec<_>>());
+    said.refused(&["html: cannot be written", "written already: out.csv"]);
+    assert_eq!(bench.names(), ["good.csv", "model.toml", "out.csv"]);
+}
+
 #[test]
 fn malformed_input_is_refused_in_one_line_that_teaches() {
     let bench = Bench::new();
     let write = |name: &str, bytes: &[u8]| std::fs::write(bench.path(name), bytes).expect("a file");
     std::fs::create_dir(bench.path("full")).expect("a folder");
-    write("full/notes.txt", b"mine");
-    for (folder, name) in [("kept", "run.csv"), ("models", "model.toml"), ("flown", "flight.csv"), ("drawn", "thrust.svg")] {
-        std::fs::create_dir(bench.path(folder)).expect("a folder");
-        write(&format!("{folder}/{name}"), b"mine");
+    write("full/notes.csv", b"mine,yours,ours\n1,2,3\n");
+    std::fs::create_dir_all(bench.path("data/rig")).expect("a folder");
+    for name in [
+        "kept/run.csv",
+        "models/model.toml",
+        "flown/flight.csv",
+        "drawn/thrust.svg",
+        "listed/manifest.csv",
+        "caused/effects.csv",
+        "kept-runs/runs/good.csv.json",
+        "told/measured.md",
+        "paged/measured/notes.txt",
+    ] {
+        std::fs::create_dir_all(bench.path(name).parent().expect("a folder")).expect("a folder");
+        write(name, b"mine");
     }
     write("empty.toml", b"");
     write("short.toml", b"duration_s = 1\n");
@@ -959,7 +1121,7 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
         _ => format!("{line}\n"),
     };
     write("no-command.csv", good_log().lines().map(without_command).collect::<String>().as_bytes());
-    let lists = [logs(), kinds(), models(), scenarios(), missions(), schedules(), boards(), arguments(), outputs()];
+    let lists = [logs(), kinds(), models(), scenarios(), missions(), schedules(), boards(), arguments(), outputs(), attitudes()];
     let cases: Vec<Case> = lists.into_iter().chain([plain_words(), impossible()]).flatten().collect();
     assert!(cases.len() >= 70, "{} cases", cases.len());
     let mut wrong = Vec::new();
@@ -978,7 +1140,9 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
             ));
         }
         for leaked in ["f64", "u32", "struct ", "enum ", "os error"] {
-            if said.err.contains(leaked) && !said.err.contains("cannot be read") {
+            if said.err.contains(leaked)
+                && !["read", "written"].iter().any(|done| said.err.contains(&format!("cannot be {done}")))
+            {
                 wrong.push(format!("{}: `quadrig {}` says {leaked}: {}", case.name, case.words, said.err));
             }
         }

@@ -52,7 +52,7 @@ fn one_command_each() {
     std::thread::sleep(Duration::from_millis(150)); // a whole log interval, for the tare
     assert!(rig(&["tare"]).succeeded().out.contains("tared"));
     rig(&["set", "1300"]).refused(&["not in this state"]);
-    rig(&["set", "2500"]).refused(&["2500 us", "1000 to 2000"]);
+    rig(&["set", "2500"]).refused(&["US 2500", "1000 to 2000"]);
     rig(&["calibrate"]).refused(&["MAXIMUM", "--esc-is-unpowered"]);
     rig(&["configure", "log-ms", "0"]).refused(&["out of range"]);
     rig(&["configure", "colour", "5"]).refused(&["no such setting"]);

@@ -86,7 +86,7 @@ fn what_a_virtual_board_is_not_is_said_in_one_line() {
     refused(&["rig", "--port", "sim:imu.toml", "stop"], &["virtual IMU board", "rig board"]);
     refused(&["imu", "--port", "sim:imu.toml", "--image", "x.elf", "errors"], &["imu.toml", "--image"]);
     refused(&["rig", "--port", "sim", "--speed", "-1", "stop"], &["--speed -1"]);
-    refused(&["virtual", "--speed", "0"], &["--speed 0", "above 0"]);
+    refused(&["virtual", "--speed", "0"], &["--speed 0", "a positive number"]);
     std::fs::write(folder.path().join("file"), "mine").expect("a file");
     refused(&["virtual", "--link", "file", "--seconds", "1"], &["--link file", "no link"]);
     assert_eq!(std::fs::read_to_string(folder.path().join("file")).expect("still there"), "mine");

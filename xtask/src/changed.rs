@@ -21,6 +21,8 @@ const INTEGRATION: &str = "quadrig-tests";
 const PROGRAM: &str = "quadrig";
 /// The files that list its modules.
 const ROOTS: [&str; 2] = ["suite", "boards"];
+/// What the modules of the emulated boards begin with.
+const EMULATED: &str = "emulated_";
 
 /// Folder below the root and the packages that it is built on, of each package.
 type Packages = BTreeMap<String, (String, BTreeSet<String>)>;
@@ -46,6 +48,13 @@ pub(crate) fn words(place: &Place, base: &str) -> Result<Vec<String>, Failure> {
     Ok(match asked {
         Asked::Nothing => Vec::new(),
         Asked::Tests(names) => {
+            let (on_boards, names): (Vec<_>, Vec<_>) = names.into_iter().partition(|name| name.starts_with(EMULATED));
+            if !on_boards.is_empty() {
+                println!("not run: {}; `cargo xtask test --emulated` runs the emulated boards", on_boards.join(", "));
+            }
+            if names.is_empty() {
+                return Ok(Vec::new());
+            }
             let each = names.into_iter().map(|name| format!("{name}::"));
             ["-p", INTEGRATION, "--test", "suite", "--"].map(str::to_owned).into_iter().chain(each).collect()
         }

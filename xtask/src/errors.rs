@@ -16,7 +16,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// What a part of the page is called, and the files or folders whose refusals stand in it.
-const AREAS: [(&str, &[&str]); 13] = [
+const AREAS: [(&str, &[&str]); 14] = [
     (
         "Any file and folder",
         &[
@@ -29,6 +29,7 @@ const AREAS: [(&str, &[&str]); 13] = [
             "quadrig/src/say.rs",
         ],
     ),
+    ("Numbers of the command line", &["quadrig/src/number.rs"]),
     (
         "Rig logs",
         &["ident/src/log.rs", "ident/src/log", "ident/src/close.rs", "quadrig/src/identify.rs", "quadrig/src/plateaus.rs"],
@@ -111,6 +112,12 @@ const BOARD: [(&str, &str); 16] = [
     ("DShot has no throttle range to calibrate", "nothing is to be done"),
 ];
 
+/// What stands for a text that the source does not hold.
+const UNKNOWN: &str = "...";
+
+/// What stands above what was expected in the place of a value that a refusal repeats.
+const ECHOED: &str = "\nOther lines begin with a value as it was found. What was expected in its place is one of these:\n\n";
+
 const HEAD: &str = "\
 # Refusals
 
@@ -135,10 +142,15 @@ fn page(root: &Path) -> Result<String, String> {
             rows.extend(refusals(&text));
         }
         let _ = write!(out, "\n## {heading}\n\n| it says | it expected, and what to try |\n| --- | --- |\n"); // a string takes everything
-        // what only repeats the reader's own words comes last
-        let (spoken, echoed): (Vec<_>, Vec<_>) = rows.into_iter().partition(|(found, _)| found.contains(char::is_alphabetic));
-        for (found, expected) in spoken.iter().chain(&echoed) {
-            let _ = writeln!(out, "| {} | {} |", said(found, expected), cell(expected));
+        // what only repeats the reader's own words is known by what was expected in its place
+        let (spoken, echoed): (Vec<_>, Vec<_>) = rows.into_iter().partition(|(found, expected)| said(found, expected).is_some());
+        for (found, expected) in &spoken {
+            let _ = writeln!(out, "| {} | {} |", said(found, expected).unwrap_or_default(), cell(expected));
+        }
+        let wanted: BTreeSet<String> = echoed.iter().map(|(_, expected)| cell(expected)).filter(|e| e != UNKNOWN).collect();
+        if !wanted.is_empty() {
+            out += ECHOED;
+            wanted.iter().for_each(|expected| out += &format!("- {expected}\n"));
         }
     }
     out += "\n## What a board refuses\n\nThe board gives every reason at once, behind `the board refuses:`.\n\n| it says | what to do |\n| --- | --- |\n";
@@ -148,15 +160,16 @@ fn page(root: &Path) -> Result<String, String> {
     Ok(out)
 }
 
-/// What the page says of what is found: its words; where the source holds none, what stands in their place.
-fn said(found: &str, expected: &str) -> String {
+/// What the page says of what is found: its words; where the source holds none, what stands in their place. Nothing where a refusal says what
+/// it found as it stands there.
+fn said(found: &str, expected: &str) -> Option<String> {
     match found {
-        found if found.contains(char::is_alphabetic) => cell(found),
+        found if found.contains(char::is_alphabetic) => Some(cell(found)),
         // it is told at the end, behind the name of its key, option or field
-        "" | "..." if expected.contains("found ") => "the name of what holds the value".to_owned(),
-        "... ..." => "the option and its value".to_owned(),
-        found if found.contains('\'') => format!("the value: {}", cell(found)),
-        _ => "what it found, word for word".to_owned(),
+        "" | "..." if expected.contains("found ") => Some("the name of what holds the value".to_owned()),
+        "... ..." => Some("the option and its value".to_owned()),
+        found if found.contains('\'') => Some(format!("the value: {}", cell(found))),
+        _ => None,
     }
 }
 
@@ -425,7 +438,7 @@ fn plain(literal: &str) -> String {
 
 fn cell(text: &str) -> String {
     let text = text.trim().replace('|', "\\|").replace('<', "&lt;");
-    if text.is_empty() { "...".to_owned() } else { text }
+    if text.is_empty() { UNKNOWN.to_owned() } else { text }
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ use std::time::Instant;
 const WORDS: &str = "QUADRIG_CARGO_WORDS";
 
 /// What judges how long something takes, or flies in real time: it has the machine to itself.
-const ALONE: [&str; 2] = ["demo of suite", "rig_presets of suite"];
+pub(crate) const ALONE: [&str; 2] = ["demo of suite", "rig_presets of suite"];
 
 /// A test program, or a module of one.
 #[derive(Debug, Clone, PartialEq)]

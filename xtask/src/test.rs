@@ -106,7 +106,7 @@ pub(crate) fn quick(place: &Place) -> Result<(), Failure> {
 pub(crate) fn changed(place: &Place, base: &str) -> Result<(), Failure> {
     let words = changed::words(place, base)?;
     if words.is_empty() {
-        println!("nothing differs from {base}");
+        println!("nothing to run: no test of the host's differs from {base}");
         return Ok(());
     }
     let mut steps = Steps::default();
@@ -236,4 +236,23 @@ fn emulated(place: &Place, tally: &mut Tally) -> Result<(), Failure> {
     let words = emulator::words(place)?;
     let all = programs::build(place, &words, &["--test".to_owned(), "boards".to_owned()])?;
     programs::run(place, &all, &words, tally)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A filter that names no module would run nothing and pass.
+    #[test]
+    fn what_is_named_is_a_module_of_the_suite() {
+        let root = Place::find().root;
+        let suite = std::fs::read_to_string(root.join("tests/tests/suite.rs")).expect("the list of modules");
+        let alone = programs::ALONE.iter().map(|name| name.strip_suffix(" of suite").expect("a module of the suite"));
+        for module in LONG.iter().map(|name| name.trim_end_matches("::")).chain(alone) {
+            assert!(suite.contains(&format!("mod {module};")), "{module}");
+        }
+        for program in LEFT_OUT {
+            assert!(root.join(format!("ident/tests/{program}.rs")).is_file(), "{program}");
+        }
+    }
 }

@@ -273,8 +273,15 @@ impl AnyScenario {
     }
 }
 
+/// What is said of a file that is no text.
+const NO_TEXT: &str =
+    "bytes that are no text in UTF-8; expected a text: a scenario or a mission in TOML, as in docs/scenario.md, or pulses in CSV";
+
 pub(crate) fn text_of(file: &Path) -> Result<String, ScenarioError> {
-    std::fs::read_to_string(file).map_err(|source| ScenarioError::Unreadable { file: file.to_owned(), source })
+    std::fs::read_to_string(file).map_err(|source| match source.kind() {
+        std::io::ErrorKind::InvalidData => refused("", file, 0, NO_TEXT.to_owned()),
+        _ => ScenarioError::Unreadable { file: file.to_owned(), source },
+    })
 }
 
 /// A refusal of what stands at a byte of `text`.
@@ -295,6 +302,12 @@ pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, 
     if text.trim_start_matches('\u{feff}').trim_start().starts_with('<') {
         let expected = "expected a description in TOML, as in docs/scenario.md: was a link saved, and not the file behind it?";
         return Err(refused(0, format!("a web page, or another file in tags; {expected}")));
+    }
+    let format = text.parse::<toml::Table>().ok().and_then(|table| Some(table.get("format")?.as_str()?.to_owned()));
+    if let Some(format) = format.filter(|format| format.starts_with("quadrig-")) {
+        let way_out = "`--model` of close-loop, sim and fly takes a model, and so do predict and export";
+        let reason = format!("a model ({format}); expected a description in TOML, as in docs/scenario.md: {way_out}");
+        return Err(refused(0, reason));
     }
     if let Some((byte, key)) = blame::endless(text) {
         return Err(refused(byte, format!("{key}: expected a number with an end")));

@@ -88,6 +88,9 @@ pub struct Mapping {
     pub offset: f64,
 }
 
+/// Factors between two units of a quantity, their signs apart.
+const FACTORS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+
 impl std::str::FromStr for Mapping {
     type Err = String;
 
@@ -96,14 +99,19 @@ impl std::str::FromStr for Mapping {
         let wanted =
             "expected TARGET=SOURCE, TARGET=SOURCE*FACTOR or TARGET=SOURCE*FACTOR+OFFSET, such as thrust_n=Load*0.00980665";
         let (target, rest) = text.split_once('=').ok_or(wanted)?;
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wanted);
         let (rest, offset) = match rest.rsplit_once('+') {
-            Some((s, o)) if s.contains('*') => (s, o.trim().parse::<f64>().map_err(|_| wanted)?),
+            Some((s, o)) if s.contains('*') => (s, number(o)?),
             _ => (rest, 0.0),
         };
         let (source, factor) = match rest.rsplit_once('*') {
-            Some((s, f)) => (s, f.trim().parse::<f64>().map_err(|_| wanted)?),
+            Some((s, f)) => (s, number(f)?),
             None => (rest, 1.0),
         };
+        if !FACTORS.contains(&factor.abs()) || offset.is_nan() || offset.abs() > *FACTORS.end() {
+            let expected = "expected a FACTOR from 1e-12 to 1e12 (or the same below 0) and an OFFSET of 1e12 at most";
+            return Err(format!("{expected}, such as thrust_n=Load*0.00980665"));
+        }
         Ok(Self { target: target.trim().to_owned(), source: source.trim().to_owned(), factor, offset })
     }
 }
@@ -223,4 +231,20 @@ fn judge(place: &Place<'_>, log: &Log, mapped: &[String], report: &mut Report) -
         report.add(doubt.column, format!("in doubt: {}", doubt.what), 1);
     }
     Ok(vouched)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Mapping;
+
+    #[test]
+    fn a_factor_is_a_number_between_two_units() {
+        let mapping: Mapping = "thrust_n = Load (g) * -0.00980665 + 2".parse().expect("a mapping");
+        assert_eq!((mapping.target.as_str(), mapping.source.as_str()), ("thrust_n", "Load (g)"));
+        assert_eq!((mapping.factor, mapping.offset), (-0.009_806_65, 2.0));
+        for wrong in ["nan", "inf", "1e999", "0", "1e-13", "-1e13", "2+inf", "2+nan", "2+1e13", "heavy", ""] {
+            let said = format!("thrust_n=Thrust (N)*{wrong}").parse::<Mapping>().expect_err("no factor");
+            assert!(said.starts_with("expected ") && said.contains("thrust_n=Load*0.00980665"), "{wrong}: {said}");
+        }
+    }
 }

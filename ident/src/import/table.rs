@@ -11,7 +11,7 @@ use super::header::{ELECTRICAL, Target, clean, sort_all};
 use super::layout::{Layout, Records};
 use super::number::{Cell, cell};
 use super::{Options, Report};
-use crate::log::{Place, ReadError, short};
+use crate::log::{Place, ReadError, named_shortly, short};
 
 /// How a field becomes a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +57,7 @@ pub(super) fn plan(
     report: &mut Report,
 ) -> Result<(Vec<Option<usize>>, Vec<Field>), ReadError> {
     let place = Place { file, line: layout.line as usize };
+    layout.cells.iter().filter(|_| !layout.headless).try_for_each(|cell| named_shortly(cell, &place))?;
     for m in &options.mappings {
         if !layout.cells.contains(&m.source) {
             return Err(place.refuse(

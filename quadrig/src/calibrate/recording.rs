@@ -60,7 +60,7 @@ fn arm(channel: Channel, log: &Log, said: Option<f64>) -> Result<f64, String> {
     let configured = || log.meta.get("rig_config").and_then(toml::Value::as_str).and_then(file::arm_of);
     match said.or_else(configured) {
         Some(arm) if arm.is_finite() && arm > 0.0 => Ok(arm),
-        Some(arm) => Err(format!("--arm {arm}: expected a length above 0 m")),
+        Some(arm) => Err(format!("its head tells an arm of {arm} m; expected --arm METRES, above 0")),
         None if channel == Channel::Torque => Err("its head tells no arm; expected --arm METRES".to_owned()),
         None => Ok(1.0),
     }

@@ -82,6 +82,7 @@ fn other_flight(path: &Path) -> Result<Log, Failure> {
 }
 
 fn read_model(path: &Path) -> Result<FlightModel, Failure> {
+    crate::kind::refuse_no_model(path)?;
     let text = std::fs::read_to_string(path).map_err(unread(&path))?;
     Ok(FlightModel::parse(&path.display().to_string(), &text)?)
 }

@@ -44,7 +44,7 @@ pub(super) struct Args {
     #[arg(long)]
     spectrum: Option<PathBuf>,
     /// Highest frequency of the spectrum, Hz.
-    #[arg(long, default_value_t = 1000.0)]
+    #[arg(long, default_value_t = 1000.0, value_parser = crate::number::positive(1e6, "Hz"))]
     to: f64,
 }
 
@@ -70,9 +70,6 @@ pub(super) fn run(board: &mut Board, args: &Args, quiet: bool) -> Result<(), Fai
         .iter()
         .position(|n| *n == args.channel)
         .ok_or_else(|| format!("{:?}: no such channel; expected one of {}", args.channel, super::file::ANALOGUE.join(", ")))?;
-    if !(args.to.is_finite() && args.to > 0.0) {
-        return Err(format!("--to {}: expected a frequency above 0 Hz", args.to).into());
-    }
     if !configure::in_force(board)?.fitted[place] {
         return Err(
             format!("{} is not fitted on this board; expected a channel of `quadrig rig identify`", ADC_NAMES[place]).into()

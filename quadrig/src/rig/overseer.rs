@@ -28,7 +28,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "MODEL")]
     pub(crate) model: Option<PathBuf>,
     /// Stop the motor when the run leaves its model by so many noise floors.
-    #[arg(long, value_name = "FLOORS", requires = "model")]
+    #[arg(long, value_name = "FLOORS", requires = "model", value_parser = crate::number::positive(1e6, "noise floors"))]
     stop_at: Option<f64>,
 }
 
@@ -67,9 +67,6 @@ impl Overseer {
     pub(crate) fn new(args: &Args, in_step: bool) -> Result<Option<Self>, Failure> {
         let Some(path) = &args.model else { return Ok(None) };
         let floors = args.stop_at.unwrap_or(TOLD_AT);
-        if !(floors.is_finite() && floors > 0.0) {
-            return Err(format!("--stop-at {floors}: expected noise floors above 0").into());
-        }
         Self::with(path, floors, args.stop_at.is_some(), in_step).map(Some)
     }
 
