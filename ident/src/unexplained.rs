@@ -87,8 +87,10 @@ fn contrast(target: &Target, residual: &[f64]) -> f64 {
 }
 
 /// The shape of a residual in words.
-fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
-    let mut squares: Vec<f64> = residual.iter().map(|r| r * r).collect();
+pub(crate) fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
+    // of rows about which nothing is claimed nothing is told
+    let of_row = |(r, row): (&f64, &usize)| if target.claims(*row) { r * r } else { 0.0 };
+    let mut squares: Vec<f64> = residual.iter().zip(&target.rows).map(of_row).collect();
     let whole = squares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let on_the_way: f64 = squares.iter().zip(&target.unsettled).filter(|(_, u)| **u).map(|(s, _)| s).sum();
     if 2.0 * on_the_way > whole {
@@ -96,10 +98,11 @@ fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
     }
     let grows = grows_with_the_load(context, target, &squares);
     let (in_a_row, stretch) = loudest_stretch(&squares);
+    let in_order = squares.clone();
     squares.sort_unstable_by(|a, b| b.total_cmp(a));
     let few = (FEW * squares.len() as f64).ceil() as usize;
     if 2.0 * squares.iter().take(few).sum::<f64>() > whole {
-        return if 2.0 * in_a_row > whole && stretch.len() > 1 {
+        return if 2.0 * in_a_row > whole && stretch.len() > 1 && in_order.get(stretch.clone()).is_some_and(is_filled) {
             in_one(context, target, &stretch)
         } else {
             "in single rows".to_owned()
@@ -123,6 +126,19 @@ fn neighbours_agree(residual: &[f64]) -> bool {
             (w + a * a, p + b.map_or(0.0, |b| a * (b - mean)))
         });
     product > whole * (-1.0_f64).exp().max(1.96 / (residual.len() as f64).sqrt())
+}
+
+/// Whether a stretch is loud throughout: the rows that hold nine tenths of it are at least half of its rows. Two edges with nothing between are
+/// no stretch.
+pub(crate) fn is_filled(stretch: &[f64]) -> bool {
+    let mut largest = stretch.to_vec();
+    largest.sort_unstable_by(|a, b| b.total_cmp(a));
+    let enough = NINE_TENTHS * largest.iter().sum::<f64>();
+    let sums = largest.iter().scan(0.0, |sum, square| {
+        *sum += square;
+        Some(*sum)
+    });
+    2 * (sums.take_while(|sum| *sum < enough).count() + 1) >= stretch.len()
 }
 
 /// Where a stretch of a target's samples lies in the log.
@@ -174,7 +190,14 @@ fn grows_with_the_load(context: &Context, target: &Target, squares: &[f64]) -> b
 
 #[cfg(test)]
 mod tests {
-    use super::{loudest_stretch, neighbours_agree};
+    use super::{is_filled, loudest_stretch, neighbours_agree};
+
+    #[test]
+    fn two_edges_with_nothing_between_are_no_stretch() {
+        let mut edges = vec![0.001; 80];
+        (edges[0], edges[79]) = (1.0, 1.0);
+        assert!(!is_filled(&edges) && is_filled(&[1.0; 80]) && is_filled(&[0.5, 1.0, 0.2]));
+    }
 
     #[test]
     fn what_lasts_over_rows_is_not_told_as_from_row_to_row() {

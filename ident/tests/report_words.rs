@@ -133,7 +133,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
                 vec![effect("spinup_lag", "thrust_n", 0.99, 0.5, vec![parameter("tau_up", 0.037, 0.001, "s")])],
             ),
             false,
-            &["The rotor takes 37 ms to follow the command. Every rig has that; nothing of this rig's own was named."],
+            &["Nothing of this rig's own was named. What every rig has: the rotor takes 37 ms to follow the command."],
             &[],
         ),
         (
@@ -304,7 +304,7 @@ fn the_head_is_short_and_names_the_largest_remainder() {
     let said = sentence(&v, Vocabulary::RIG, false);
     assert_eq!(
         said,
-        "Most is left on voltage: 80 mV rms (slow). No known effect explains it. A smooth term without a name was fitted on thrust; it goes with time."
+        "No known effect explains what the model leaves over. Most is left on voltage: 80 mV rms (slow). A smooth term without a name was fitted on thrust; it goes with time."
     );
 }
 
@@ -373,7 +373,7 @@ fn a_cause_has_a_size_or_a_bound() {
         Vocabulary::RIG,
         false,
     );
-    assert!(said.starts_with("The supply lead sags with the current (resistance up to 0.21 ohm)."), "{said}");
+    assert!(said.starts_with("The supply lead sags with the current (resistance: up to 0.21 ohm)."), "{said}");
 }
 
 /// Single readings are told once for all channels and runs, apart from the causes.
@@ -707,7 +707,7 @@ fn a_flight_is_of_a_vehicle() {
     let one = v.channels.predicted["thrust_n"].clone();
     v.channels.predicted = [("acc_x".to_owned(), one.clone()), ("rpm_1".to_owned(), one)].into();
     let text = terminal(&v, ident::flight::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ");
-    for said in ["Every vehicle has that", "what every vehicle has", "on speed of rotor 1, vehicle"] {
+    for said in ["What every vehicle has:", "what every vehicle has", "on speed of rotor 1, vehicle"] {
         assert!(text.contains(said), "{said}: {text}");
     }
     assert!(!text.contains("rig"), "{text}");

@@ -46,8 +46,9 @@ impl Effect for CurrentLimit {
         Clause::new("the current", found.tell("limit", |v| format!("is held to {v}"), "is limited"))
     }
 
-    fn scope(&self, _: &Instance) -> Scope {
-        Scope::Rig
+    fn scope(&self, instance: &Instance) -> Scope {
+        // how a bench supply is set is a matter of the day
+        if instance.form == OF_THE_SUPPLY { Scope::Run } else { Scope::Rig }
     }
 
     fn stage(&self) -> Stage {

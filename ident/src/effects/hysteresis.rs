@@ -32,9 +32,11 @@ impl Effect for Hysteresis {
     fn said(&self, found: &EffectEntry) -> Clause {
         Clause::new(
             "the load cell",
-            found.tell(
+            found.tell_signed(
                 "width",
-                |v| format!("reads up to {v} apart on the way up and down"),
+                (1.0, found.unit()),
+                ["up to", "up to"],
+                |word, v| format!("reads {word} {v} apart on the way up and down"),
                 "reads otherwise on the way up than down",
             ),
         )

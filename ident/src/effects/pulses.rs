@@ -75,6 +75,11 @@ pub(super) const SCATTERED: &str = "scattered";
 /// alone is a bad sample. Pulses are lost by chance: where most readings that are low stand beside another one, the sensor has dropped out.
 fn form(context: &Context, target: &Target, sign: f64) -> Option<&'static str> {
     let off: Vec<bool> = readings(context, target).map(|r| r.is_gross(sign)).collect();
+    form_of(&off, sign)
+}
+
+/// The form that readings have which are grossly off, or not, in the order of their rows.
+fn form_of(off: &[bool], sign: f64) -> Option<&'static str> {
     let count = off.iter().filter(|off| **off).count();
     let in_a_row = off.windows(2).filter(|pair| pair[0] && pair[1]).count();
     let by_chance = sign > 0.0 || 2 * in_a_row < count;
@@ -247,6 +252,15 @@ pub(super) fn against_the_others(context: &Context, target: &Target, limit: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Four readings too low in a thousand: by chance they stand alone, and in a row they are a drop-out. Too many pulses may stand in a row.
+    #[test]
+    fn pulses_are_lost_by_chance_and_a_drop_out_is_a_row_of_readings() {
+        let off = |rows: [usize; 4]| (0..1000).map(|row| rows.contains(&row)).collect::<Vec<bool>>();
+        let (apart, in_a_row) = (off([100, 320, 321, 800]), off([320, 321, 322, 800]));
+        assert_eq!((form_of(&apart, -1.0), form_of(&in_a_row, -1.0)), (Some(SCATTERED), None));
+        assert_eq!((form_of(&apart, 1.0), form_of(&in_a_row, 1.0)), (Some(SCATTERED), Some(SCATTERED)));
+    }
 
     #[test]
     fn a_few_events_may_be_many_more() {

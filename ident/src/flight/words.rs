@@ -48,7 +48,7 @@ pub(super) fn evidence(kept: &Kept, kind: &Kind, channels: &[Channel]) -> String
 /// The shape of what is left, from the memory of its wander.
 pub(super) fn looks_like(memory_s: f64) -> String {
     if memory_s == 0.0 {
-        "from window to window".to_owned()
+        "nothing of it lasts beyond a window".to_owned()
     } else if memory_s > SLOW_S {
         format!("slow, within {memory_s:.1} s")
     } else {

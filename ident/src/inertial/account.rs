@@ -17,6 +17,7 @@ use crate::verdict::{
 };
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// One sensor's trace.
 #[derive(Debug, Clone)]
@@ -149,7 +150,11 @@ fn alternatives(sensors: &[Sensor]) -> Vec<Alternative> {
     all.flat_map(|(k, s)| s.alternatives.iter().map(move |a| beside(k, a)).collect::<Vec<_>>()).collect()
 }
 
-/// When most is left of a channel: the stretch that holds more than half of its squares, else over the whole run.
+/// Share of a run beyond which what holds nine tenths of the squares is no part of it.
+const A_PART: f64 = 0.75;
+
+/// When most is left of a channel: the stretch that holds more than half of its squares, or the part of the run that holds nine tenths; else over
+/// the whole run.
 fn when(recording: &Recording, sensors: &[Sensor], name: &str) -> String {
     let axis = |s: &Sensor| s.channels.iter().position(|c| *c == name);
     let whole = || "over the whole run".to_owned();
@@ -158,10 +163,26 @@ fn when(recording: &Recording, sensors: &[Sensor], name: &str) -> String {
         recording.t.iter().zip(sensor.measured(recording)).zip(&sensor.corrected).map(|((t, m), p)| (*t, (m[k] - p[k]).powi(2)));
     let (t, squares): (Vec<f64>, Vec<f64>) = left.filter(|(_, square)| square.is_finite()).unzip();
     let (held, stretch) = loudest_stretch(&squares);
-    match (t.get(stretch.start), t.get(stretch.end.saturating_sub(1))) {
-        (Some(from), Some(to)) if 2.0 * held > squares.iter().sum::<f64>() => format!("mostly from {from:.1} to {to:.1} s"),
+    let sum = squares.iter().sum::<f64>();
+    let part = if 2.0 * held > sum { stretch } else { middle(&squares, sum) };
+    match (t.get(part.start), t.get(part.end.saturating_sub(1))) {
+        (Some(from), Some(to)) if (part.len() as f64) < A_PART * t.len() as f64 => format!("mostly from {from:.1} to {to:.1} s"),
         _ => whole(),
     }
+}
+
+/// What lies between the first and the last twentieth of the squares.
+fn middle(squares: &[f64], sum: f64) -> Range<usize> {
+    let place = |share: f64| {
+        let mut so_far = 0.0;
+        let reaches = |square: &f64| {
+            so_far += square;
+            so_far >= share * sum
+        };
+        squares.iter().position(reaches).unwrap_or(squares.len())
+    };
+    let (from, to) = (place(0.05), place(0.95));
+    from..to.max(from)
 }
 
 /// The channels on which more than three noise floors are left.

@@ -16,12 +16,18 @@ use crate::words;
 /// The fold of the page; nothing where no run has a constant.
 pub(super) fn beside_runs(sheet: &mut Sheet, runs: &[(&str, &Log)]) {
     let found: Vec<(&str, Identified)> = runs.iter().filter_map(|(name, log)| Some((*name, identify(log).ok()?))).collect();
-    let Some(first) = found.iter().map(|(_, f)| f).max_by_key(|f| f.constants.len()).filter(|f| !f.constants.is_empty()) else {
+    // one run may show what another does not
+    let mut known: Vec<(&str, &str)> = Vec::new();
+    for (symbol, unit) in found.iter().flat_map(|(_, f)| &f.constants).map(|c| (c.name, c.unit)) {
+        if !known.iter().any(|(other, _)| *other == symbol) {
+            known.push((symbol, unit));
+        }
+    }
+    if known.is_empty() {
         return;
-    };
+    }
     sheet.fold("Constants and fits, run by run", |sheet| {
         sheet.say("Each run alone, as identify has it: value and half of the 95 % interval.");
-        let known: Vec<_> = first.constants.iter().map(|c| (c.name, c.unit)).collect();
         let head: Vec<String> = known.iter().map(|(name, unit)| format!("{name}, {unit}")).collect();
         let head: Vec<&str> = std::iter::once("run").chain(head.iter().map(String::as_str)).collect();
         let row = |(name, found): &(&str, Identified)| {

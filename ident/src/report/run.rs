@@ -445,7 +445,10 @@ fn side_by_side(a: (&Log, &Identified), b: (&Log, &Identified)) -> Vec<Figure> {
 pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
     let mut header =
         vec!["plateau".to_owned(), "from, s".to_owned(), "to, s".to_owned(), "settling, s".to_owned(), "rows".to_owned()];
-    header.extend(log.columns.iter().map(|c| axis(&c.name)));
+    // what no plateau has a mean of stands in the file alone
+    let has = |k: &usize| found.plateaus.iter().any(|p| p.means.get(*k).is_some_and(Option::is_some));
+    let shown: Vec<usize> = (0..log.columns.len()).filter(has).collect();
+    header.extend(shown.iter().map(|k| axis(&log.columns[*k].name)));
     let rows: Vec<Vec<String>> = found
         .plateaus
         .iter()
@@ -458,7 +461,8 @@ pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
                 format!("{:.2}", p.settling_s),
                 p.rows.to_string(),
             ];
-            row.extend(p.means.iter().map(|m| m.map_or_else(|| "-".to_owned(), |(v, se)| paired(v, se))));
+            let mean = |k: &usize| p.means[*k].map_or_else(|| "-".to_owned(), |(v, se)| paired(v, se));
+            row.extend(shown.iter().map(mean));
             row
         })
         .collect();

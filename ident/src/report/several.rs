@@ -16,7 +16,7 @@ use crate::effects::{EffectEntry, Estimate};
 use crate::log::Log;
 use crate::several::{Outcome, Run, Shown};
 use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Unexplained, Validation, Verdict};
-use crate::words::{digits, scaled, upper};
+use crate::words::{channel, digits, scaled, upper};
 
 /// Most runs that have their numbers beneath a figure; of more every fifth has.
 const MOST_NAMES: usize = 12;
@@ -145,7 +145,8 @@ fn parameters(outcome: &Outcome, v: &Verdict) -> Vec<Vec<String>> {
         let reported = added.placed.effect.report(context, &added.placed.instance, added.estimates.clone());
         for e in reported.iter().filter(|e| e.name != "phase") {
             let effect = added.placed.effect;
-            let of = format!("{}: {}", effect.about().title, (Vocabulary::RIG.parameter)(effect.id(), &e.name));
+            let on = added.placed.instance.channels.first().map_or_else(String::new, |c| format!(" ({})", channel(c)));
+            let of = format!("{}{on}: {}", effect.about().title, (Vocabulary::RIG.parameter)(effect.id(), &e.name));
             let mut row = vec![of, e.unit.clone(), value(e)];
             for run in alone {
                 let run = added.placed.effect.report(context, &added.placed.instance, run.clone());

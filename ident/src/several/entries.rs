@@ -158,7 +158,12 @@ pub(super) fn loudest<'a>(after: &'a [Across], channel: &str) -> Option<&'a Acro
 
 /// Every channel that is loud on a run after all, once, as large as over all runs, with the run on which it is loudest; and every contrast of a
 /// speed sensor that a run alone left unexplained.
-pub(super) fn unexplained(runs: &[Run], after: &[Across], channels: &Channels) -> Vec<Unexplained> {
+pub(super) fn unexplained(
+    runs: &[Run],
+    looks: &dyn Fn(&Across) -> Option<String>,
+    after: &[Across],
+    channels: &Channels,
+) -> Vec<Unexplained> {
     let mut out: Vec<Unexplained> = Vec::new();
     for a in after.iter().filter(|a| a.rms > LOUD * a.floor && !is_contrast(a.channel)) {
         let (Some(loudest), Some(whole)) = (loudest(after, a.channel), channels.get(a.channel)) else { continue };
@@ -167,10 +172,11 @@ pub(super) fn unexplained(runs: &[Run], after: &[Across], channels: &Channels) -
         }
         let run = &runs[loudest.run].closed.verdict;
         let told = run.unexplained.iter().find(|u| u.channel == a.channel);
-        let looks_like = match told {
-            Some(told) => format!("loudest on {}: {}", run.run, told.looks_like),
-            None => format!("loudest on {}; a fit to that run alone removes it, the runs differ", run.run),
+        let looks_like = match looks(loudest) {
+            Some(looks) => format!("loudest on {}: {looks}", run.run),
+            None => format!("loudest on {}", run.run),
         };
+        let looks_like = looks_like + if told.is_some() { "" } else { "; a fit to that run alone removes it, the runs differ" };
         let depends_on = told.map(|t| t.depends_on.clone()).unwrap_or_default();
         let over_floor = whole.after.heldout_rms / whole.noise_floor_rms;
         out.push(Unexplained { channel: a.channel.to_owned(), over_floor, depends_on, looks_like });

@@ -84,20 +84,34 @@ pub(super) fn centring(own: &mut [Vec<f64>], powers: &[&Vec<f64>], weights: &[f6
     own.iter_mut().map(of_column).collect()
 }
 
-/// What shared coefficients leave of a run that may have had no part in them, one constant apart, on the rows of which a claim is made.
-/// Nothing of what belongs to the run alone is known. `None` where no sample is left.
-pub(super) fn left_on(member: &Member<'_>, k: usize, rig: &[Placed], labels: &[Label], coefficients: &[f64]) -> Option<Vec<f64>> {
+/// What a run leaves over of a channel on every sample, one constant apart, which the rows that are claimed tell.
+pub(super) fn residual_on(
+    member: &Member<'_>,
+    k: usize,
+    rig: &[Placed],
+    labels: &[Label],
+    coefficients: &[f64],
+) -> Option<Vec<f64>> {
     let target = &member.context.targets[k];
     let design = design(member.context, Declared::default(), rig, target);
     let mut residual = samples_less_fixed(target, &design, 1);
     for (column, c) in columns_of(target, &design, labels, 1).iter().zip(coefficients) {
         residual.iter_mut().zip(column).for_each(|(r, v)| *r -= c * v);
     }
-    let mut claimed: Vec<f64> =
-        residual.iter().zip(&target.rows).filter(|(_, row)| target.claims(**row)).map(|(r, _)| *r).collect();
-    let mean = claimed.iter().sum::<f64>() / claimed.len() as f64;
-    claimed.iter_mut().for_each(|r| *r -= mean);
-    (mean.is_finite()).then_some(claimed)
+    let (sum, count) = claimed(target, &residual).fold((0.0, 0.0), |(sum, count), r| (sum + r, count + 1.0));
+    let mean: f64 = sum / count;
+    residual.iter_mut().for_each(|r| *r -= mean);
+    mean.is_finite().then_some(residual)
+}
+
+/// The same of the rows that are claimed alone.
+pub(super) fn left_on(member: &Member<'_>, k: usize, rig: &[Placed], labels: &[Label], coefficients: &[f64]) -> Option<Vec<f64>> {
+    let residual = residual_on(member, k, rig, labels, coefficients)?;
+    Some(claimed(&member.context.targets[k], &residual).collect())
+}
+
+fn claimed<'t>(target: &'t Target, residual: &'t [f64]) -> impl Iterator<Item = f64> + 't {
+    residual.iter().zip(&target.rows).filter(|(_, row)| target.claims(**row)).map(|(r, _)| *r)
 }
 
 /// Root mean square.

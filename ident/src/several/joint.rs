@@ -5,7 +5,7 @@
 //! Units: log-likelihood in nats; errors as the channels.
 //! Reference: leave-one-group-out cross-validation; profile likelihood of the shapes, Barndorff-Nielsen & Cox 1994, section 3.4.
 
-use super::equations::{left_on, of_run, rms, shared, solved};
+use super::equations::{left_on, of_run, residual_on, rms, shared, solved};
 use super::{FEWEST, Member, is_judged};
 use crate::context::Relation;
 use crate::design::Label;
@@ -238,6 +238,15 @@ impl<'m, 'a> Joint<'m, 'a> {
             }
         }
         out
+    }
+
+    /// What a fit to the other runs leaves over of a channel of one run, on every sample.
+    pub(super) fn left(&self, run: usize, rig: &[Placed], channel: &'static str) -> Option<Vec<f64>> {
+        let (labels, normals) = self.equations(channel, rig, usize::MAX);
+        let (own, _) = normals.get(run)?.as_ref()?;
+        let (coefficients, _) = solved(&joint(channel, &labels, &normals)?.less(own, 1.0))?;
+        let member = &self.members[run];
+        residual_on(member, member.context.target(channel)?, rig, &labels, &coefficients)
     }
 
     /// One run by shared coefficients.

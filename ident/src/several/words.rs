@@ -13,8 +13,10 @@ use crate::close::{NO_COMMAND, validation};
 use crate::context::{Context, Relation, is_contrast, unit_of};
 use crate::diagnose::RIVAL;
 use crate::effects::Estimate;
+use crate::hypothesis::Placed;
 use crate::model::Model;
 use crate::residual::whiteness;
+use crate::unexplained::looks_like;
 use crate::verdict::{Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Validation, Verdict};
 use std::collections::BTreeMap;
 
@@ -54,7 +56,13 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
     names.extend(own.flat_map(|(run, (own, worths))| own_entries(&contexts[run], own, worths)));
     let alternatives = alternatives(&names);
     let mut effects: Vec<_> = names.into_iter().map(|(entry, _)| entry).collect();
-    let mut unexplained = unexplained(runs, &after, &channels);
+    // what it looks like is told of what is left, which a fit to that run alone does not show
+    let rig: Vec<Placed> = named.iter().map(|n| n.placed.clone()).collect();
+    let looks = |a: &Across| {
+        let (context, left) = (&contexts[a.run], joint.left(a.run, &rig, a.channel)?);
+        Some(looks_like(context, &context.targets[context.target(a.channel)?], &left))
+    };
+    let mut unexplained = unexplained(runs, &looks, &after, &channels);
     // what nothing predicts has nothing left over
     unexplained.retain(|u| !channels.not_predicted.contains_key(&u.channel));
     let kind = match (effects.is_empty(), unexplained.is_empty()) {

@@ -6,20 +6,24 @@
 //! Reference: specification `formats.md`, "Verdict" (`unexplained`, `next_experiment`).
 
 use super::page::Page;
-use super::sentence::{floors_left, size_left};
+use super::sentence::{floors_left, goes_beyond_noise, instead, size_left, without};
 use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
-use crate::verdict::{ScheduleStep, Unexplained, Verdict};
-use crate::words::{amount, channel, channels, heading, lower, plain, upper, vector};
+use crate::verdict::{Alternative, EffectEntry, ScheduleStep, Unexplained, Verdict};
+use crate::words::{amount, channel, channels, heading, list, lower, plain, probability, upper, vector};
 
 /// What is left.
 pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     let v = page.verdict;
     sheet.section("What is left");
+    perhaps_also(page).iter().for_each(|said| sheet.say(said));
     if v.unexplained.is_empty() {
-        sheet.say("Nothing: no channel is left with more than its noise.");
+        sheet.say(match goes_beyond_noise(v) {
+            true => "Little: on no channel more than a trace beyond its noise.",
+            false => "Nothing: no channel is left with more than its noise.",
+        });
         return;
     }
     // a channel that has no model has nothing left over: its whole reading is
@@ -53,6 +57,21 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     let (above, here): (Vec<&Figure>, Vec<&Figure>) = page.left.iter().partition(|f| shown(f));
     above.iter().for_each(|f| sheet.say(&format!("{}: drawn at the head of this page.", f.title)));
     sheet.figures(here.into_iter().cloned().collect());
+}
+
+/// What was tried beside the names and is not sure enough to be one.
+fn perhaps_also(page: &Page<'_>) -> Vec<String> {
+    let v = page.verdict;
+    let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
+    let beside = |other: &&Alternative| other.change.is_none() && without(&best, &other.ids).is_empty();
+    let said = |other: &Alternative| {
+        let more = instead(&best, &other.ids);
+        let clauses: Vec<String> = more.iter().map(|id| page.words.of_another(id, None).with("")).collect();
+        let also = if best.is_empty() { "" } else { " as well" };
+        let p = probability(other.probability);
+        (!more.is_empty()).then(|| format!("Not sure enough for a name: {}{also} (probability {p}).", list(&clauses)))
+    };
+    v.alternatives.iter().filter(beside).filter_map(said).collect()
 }
 
 /// What is said of every remainder alike, behind what each looks like: it is told once.

@@ -105,9 +105,10 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let all = if own.is_empty() { &common } else { &own };
     // what takes next to nothing, or is of sizes that may be nothing, stands on its card alone, unless there is nothing else
     let known = |e: &EffectEntry| !e.is_of_single_readings() && e.open_sizes().is_none();
-    let large = |e: &&&EffectEntry| (e.heldout_error_reduction >= SMALL && known(e)) || all.len() == 1;
+    let large = |e: &&&EffectEntry| ((e.heldout_error_reduction >= SMALL || shown_by_readings(e)) && known(e)) || all.len() == 1;
     // no name stands above a likelier one
-    let told: Vec<&EffectEntry> = all.iter().filter(large).filter(|e| !beaten(verdict, words, e)).take(MOST).copied().collect();
+    let likely: Vec<&EffectEntry> = all.iter().filter(large).filter(|e| !beaten(verdict, words, e)).copied().collect();
+    let told = headed(verdict, &likely);
     let Some(first) = told.first().or(all.first()) else { return String::new() };
     if told.is_empty() && beaten(verdict, words, first) {
         return contested(verdict, words, news, &[*first]);
@@ -115,18 +116,39 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let told = if told.is_empty() { vec![*first] } else { told };
     let more = causes(all).saturating_sub(told.len());
     let clauses = by_subject(&told, words);
-    let mut out = format!("{}.", since(news, &joined_lower(&clauses)));
-    if own.is_empty() {
-        out += &format!(" Every {noun} has that; nothing of this {noun}'s own was named.");
-    }
+    let out = match own.is_empty() {
+        true => format!(
+            "{} What every {noun} has: {}.",
+            since(news, &format!("nothing of this {noun}'s own was named.")),
+            joined_lower(&clauses)
+        ),
+        false => format!("{}.", since(news, &joined_lower(&clauses))),
+    };
     let explained = explained(verdict, &told, false);
     // what says that more is told below has said so
     let more = if explained.as_ref().is_some_and(|e| e.says_more) { 0 } else { more };
-    [out, explained.map(|e| e.said).unwrap_or_default(), below(more, false), left(verdict)]
+    [out, explained.map(|e| e.said).unwrap_or_default(), below(more, "smaller", false), left(verdict)]
         .into_iter()
         .filter(|s| !s.is_empty())
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// Of the causes, largest first, those that the sentence names. What explains most of a quantity that the largest are not on has no other place
+/// where a reader would miss it.
+fn headed<'v>(verdict: &Verdict, likely: &[&'v EffectEntry]) -> Vec<&'v EffectEntry> {
+    let (first, rest) = likely.split_at(MOST.min(likely.len()));
+    let on = |e: &EffectEntry| e.channels.iter().map(|name| whole(verdict, name)).collect::<Vec<_>>();
+    let taken: Vec<String> = first.iter().flat_map(|e| on(e)).collect();
+    let is_apart = |e: &&&EffectEntry| {
+        shown_by_readings(e) || e.heldout_error_reduction > HALF && !on(e).iter().any(|quantity| taken.contains(quantity))
+    };
+    first.iter().chain(rest.iter().find(is_apart)).copied().collect()
+}
+
+/// Whether the readings of whole levels show it, so that no error tells how much it matters.
+fn shown_by_readings(e: &EffectEntry) -> bool {
+    e.is_read_off() && !e.is_of_single_readings()
 }
 
 /// How many causes there are: single readings are none.
@@ -153,7 +175,9 @@ fn sized_clause(words: Vocabulary, e: &EffectEntry) -> Clause {
     let bound = e.parameters.iter().find(|p| is_shown(words, e, p) && counted(p).is_none()).map(|p| {
         let name = (words.parameter)(&e.id, &p.name);
         let [_, interval, unit] = value(p);
-        format!("{} ({name} {})", clause.does, format!("{interval} {unit}").trim_end())
+        // a name that ends in "up" is no place to go on with "up to"
+        let colon = if interval.starts_with("up to") { ":" } else { "" };
+        format!("{} ({name}{colon} {})", clause.does, format!("{interval} {unit}").trim_end())
     });
     Clause { does: bound.unwrap_or(clause.does), ..clause }
 }
@@ -200,7 +224,10 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
         format!("{}. Beside that, {}.", since(news, &question), joined_lower(&said))
     };
     let nameless = verdict.effects.iter().any(|e| e.id == "unknown" && !e.is_without_correction());
-    let below = below(causes(all).saturating_sub(told), nameless);
+    // what takes more than the question does is no smaller cause
+    let is_told = |e: &EffectEntry| sure.iter().chain(disputed).any(|d| std::ptr::eq(*d, e));
+    let larger = all.iter().any(|e| !is_told(e) && e.heldout_error_reduction > removed(disputed));
+    let below = below(causes(all).saturating_sub(told), if larger { "more" } else { "smaller" }, nameless);
     let joined = |parts: [String; 3]| parts.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
     let bare = joined([out.clone(), below.clone(), left(verdict)]);
     let asked: Vec<&EffectEntry> = sure.iter().chain(disputed).copied().collect();
@@ -252,11 +279,12 @@ fn doubt(verdict: &Verdict) -> &'static str {
 }
 
 /// What the cards have beside what the sentence tells: smaller causes, and what has no name.
-fn below(more: usize, nameless: bool) -> String {
-    let causes = match more {
-        0 => None,
-        1 => Some("a smaller cause".to_owned()),
-        n => Some(format!("{n} smaller causes")),
+fn below(more: usize, how: &str, nameless: bool) -> String {
+    let causes = match (more, how) {
+        (0, _) => None,
+        (1, "more") => Some("one more cause".to_owned()),
+        (1, _) => Some(format!("a {how} cause")),
+        (n, _) => Some(format!("{n} {how} causes")),
     };
     let parts: Vec<String> = causes.into_iter().chain(nameless.then(|| "what has no name".to_owned())).collect();
     if parts.is_empty() {
@@ -284,8 +312,8 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
             true => "Nothing that was tried predicts it, so nothing was added to the model.".to_owned(),
             false => format!("A smooth term without a name was fitted on {}; it goes with {}.", list(&on), list(&goes)),
         };
-        let first = since(news, &format!("most is left on {}: {}.", channel(&loudest.channel), size_and_looks(verdict, loudest)));
-        return format!("{first} No known effect explains it. {fitted}");
+        let first = since(news, "no known effect explains what the model leaves over.");
+        return format!("{first} Most is left on {}: {}. {fitted}", channel(&loudest.channel), size_and_looks(verdict, loudest));
     }
     let place = if on.is_empty() { String::new() } else { format!(" on {}", list(&on)) };
     let mut out = since(news, &format!("something is left{place} that no known effect explains."));
@@ -425,7 +453,7 @@ fn loud(verdict: &Verdict) -> impl Iterator<Item = &Unexplained> {
 }
 
 /// Whether anything is left that is more than noise, loud or not.
-fn goes_beyond_noise(verdict: &Verdict) -> bool {
+pub(super) fn goes_beyond_noise(verdict: &Verdict) -> bool {
     !verdict.unexplained.is_empty() || verdict.channels.values().any(|c| c.after.heldout_rms > QUIET * c.noise_floor_rms)
 }
 

@@ -203,7 +203,11 @@ fn set_aside(verdict: &Verdict) -> String {
     let mut out = String::from("\nset aside\n");
     all.iter().take(ASIDE).for_each(|aside| out += &format!("  {}\n", wrapped(&upper(&aside.to_string()), 4)));
     if all.len() > ASIDE {
-        out += &format!("  and {} more stretches like these, listed in verdict.json and in the report\n", all.len() - ASIDE);
+        let more = match all.len() - ASIDE {
+            1 => "one more stretch".to_owned(),
+            n => format!("{n} more stretches"),
+        };
+        out += &format!("  and {more} like these, listed in verdict.json and in the report\n");
     }
     out
 }
