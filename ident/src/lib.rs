@@ -62,7 +62,6 @@ pub mod shift;
 pub mod simulate;
 pub mod solve;
 pub mod sparse;
-mod split;
 mod start;
 mod steps;
 mod supply_limit;
