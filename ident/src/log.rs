@@ -551,7 +551,9 @@ fn check_range(name: &str, value: f64, place: &Place<'_>) -> Result<(), ReadErro
     Ok(())
 }
 
-pub(crate) fn short(text: &str) -> String {
+/// A text as a refusal repeats it: 40 characters, and three dots in the place of more.
+#[must_use]
+pub fn short(text: &str) -> String {
     if text.chars().count() > 40 { text.chars().take(40).chain("...".chars()).collect() } else { text.to_owned() }
 }
 

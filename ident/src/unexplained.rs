@@ -130,7 +130,7 @@ fn neighbours_agree(residual: &[f64]) -> bool {
 
 /// Whether a stretch is loud throughout: the rows that hold nine tenths of it are at least half of its rows. Two edges with nothing between are
 /// no stretch.
-pub(crate) fn is_filled(stretch: &[f64]) -> bool {
+fn is_filled(stretch: &[f64]) -> bool {
     let mut largest = stretch.to_vec();
     largest.sort_unstable_by(|a, b| b.total_cmp(a));
     let enough = NINE_TENTHS * largest.iter().sum::<f64>();

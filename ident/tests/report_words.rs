@@ -365,6 +365,40 @@ fn a_rival_stands_against_its_own_channel() {
 }
 
 /// A cause whose size the run bounds only has the bound at the head.
+/// What explains most of a third quantity, and a limit that the readings show, have no other place where they would be read.
+#[test]
+fn a_third_large_cause_and_a_limit_that_is_read_off_are_in_the_head() {
+    let two = || vec![filter(0.99), sag(0.99)];
+    let said = |third: EffectEntry| {
+        let v = verdict(Kind::Attributed, two().into_iter().chain([third]).collect());
+        sentence(&v, Vocabulary::RIG, false)
+    };
+    let heat = |reduction: f64| effect("thermal_derate", "current_a", 0.99, reduction, vec![]);
+    assert!(said(heat(0.6)).contains("the motor slows down as it heats up"), "{}", said(heat(0.6)));
+    assert!(!said(heat(0.4)).contains("heats up"), "{}", said(heat(0.4)));
+    let on_the_thrust = effect("creep", "thrust_n", 0.99, 0.6, vec![]);
+    assert!(!said(on_the_thrust.clone()).contains("creeps"), "{}", said(on_the_thrust));
+    let mut limit = effect("current_limit", "current_a", 0.95, 0.0, vec![parameter("limit", 11.0, 0.1, "A")]);
+    limit.equation = "current_a <= limit, voltage_v gives way [of the supply, read off its meters]".into();
+    assert!(said(limit.clone()).contains("the supply holds the current to 11.0 A"), "{}", said(limit));
+}
+
+/// Beside an open question what takes more than the question does is no smaller cause.
+#[test]
+fn a_larger_cause_is_no_smaller_one() {
+    let said = |reduction: f64| {
+        let causes = vec![
+            filter(0.99),
+            effect("battery_discharge", "voltage_v", 0.99, reduction, vec![]),
+            effect("creep", "thrust_n", 0.5, 0.2, vec![]),
+        ];
+        let alternatives = vec![in_place_of(2, "hysteresis", "thrust_n", 0.4)];
+        sentence(&Verdict { alternatives, ..verdict(Kind::Ambiguous, causes) }, Vocabulary::RIG, false)
+    };
+    assert!(said(0.1).contains("A smaller cause is told below."), "{}", said(0.1));
+    assert!(said(0.4).contains("One more cause is told below."), "{}", said(0.4));
+}
+
 #[test]
 fn a_cause_has_a_size_or_a_bound() {
     let open = Parameter { ci95: [-0.05, 0.21], ..parameter("resistance", 0.08, 0.1, "ohm") };

@@ -6,11 +6,9 @@
 //! Reference: clap, `TypedValueParser`.
 
 use clap::error::{ContextKind, ContextValue};
+use ident::log::short;
 use std::error::Error;
 use std::fmt;
-
-/// Longest value that a refusal repeats, characters.
-const SHOWN: usize = 40;
 
 /// What was expected in the place of a value.
 #[derive(Debug)]
@@ -62,8 +60,7 @@ pub(crate) fn refusal(error: &clap::Error) -> Option<String> {
     };
     let (option, value) = (text(ContextKind::InvalidArg), text(ContextKind::InvalidValue));
     let name = option.split(' ').next().unwrap_or_default().trim_matches(['<', '>', '[', ']', '.']);
-    let cut = if value.chars().count() > SHOWN { "..." } else { "" };
-    Some(format!("{name} {}{cut}: {expected}", value.chars().take(SHOWN).collect::<String>()))
+    Some(format!("{name} {}: {expected}", short(&value)))
 }
 
 #[cfg(test)]

@@ -439,7 +439,7 @@ fn a_rotor_with_inertia_is_told_as_it_settles() {
 #[test]
 fn no_charge_is_drawn_while_the_curve_is_worked_out() {
     let folder = bench();
-    let more = "\n[[effect]]\nid = \"battery_discharge\"\nchannels = [\"voltage_v\", \"current_a\", \"rpm_beam\", \"rpm_opto\", \"rpm_hall\", \"rpm_encoder\"]\nform = \"straight\"\nscope = \"rig\"\nshape = [0.06]\n[effect.amplitude.voltage_v]\nslope_v_per_ah = 1.1\n[effect.parameter]\nslope_v_per_ah = 1.1\n";
+    let more = "\n[[effect]]\nid = \"battery_discharge\"\nchannels = [\"voltage_v\", \"current_a\", \"rpm_beam\", \"rpm_opto\", \"rpm_hall\", \"rpm_encoder\"]\nform = \"straight\"\nscope = \"rig\"\nshape = [0.06]\n[effect.amplitude.voltage_v]\nslope_v_per_ah = 1.1\n";
     let model = std::fs::read_to_string(folder.join("model.toml")).expect("a model");
     std::fs::write(folder.join("drawn.toml"), model + more).expect("a model");
     let thrusts = |model: &str| -> Vec<String> {
@@ -450,5 +450,7 @@ fn no_charge_is_drawn_while_the_curve_is_worked_out() {
     let (fresh, drawn) = (thrusts("model.toml"), thrusts("drawn.toml"));
     assert_eq!(fresh.len(), 101);
     assert_eq!(fresh, drawn);
-    assert!(call(&folder, &["export", "drawn.toml", "--to", "px4"]).succeeded().out.contains("battery as the run began"));
+    assert!(
+        call(&folder, &["export", "drawn.toml", "--to", "px4"]).succeeded().out.contains("supply and motor as the run began")
+    );
 }

@@ -123,7 +123,7 @@ const HEAD: &str = "\
 
 Written by `cargo xtask errors` from the source. A refusal is one line on standard error: `quadrig: FILE:LINE: what is there; expected what should be`, with what
 to try where it is not plain; exit status 1. Nothing is written then, and what was there stays. `...` stands for a name, a place or a value. Wrong usage (an option
-that is none, a value that no option takes) is status 2, and `--help` says what there is.
+that is none, a word that an option does not take) is status 2, and `--help` says what there is.
 ";
 
 /// Writes the page.

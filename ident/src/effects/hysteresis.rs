@@ -35,8 +35,8 @@ impl Effect for Hysteresis {
             found.tell_signed(
                 "width",
                 (1.0, found.unit()),
-                ["up to", "up to"],
-                |word, v| format!("reads {word} {v} apart on the way up and down"),
+                ["more", "less"],
+                |word, v| format!("reads up to {v} {word} on the way down than up"),
                 "reads otherwise on the way up than down",
             ),
         )

@@ -265,6 +265,16 @@ mod tests {
     use crate::effects::Scope;
     use crate::verdict::Kin;
 
+    #[test]
+    fn a_part_of_a_run_is_where_nine_tenths_are() {
+        let mut squares = vec![0.01; 100];
+        squares[30..70].fill(1.0);
+        let part = middle(&squares, squares.iter().sum());
+        assert!(part.start >= 30 && part.end <= 70 && part.len() > 32, "{part:?}");
+        assert!(middle(&[1.0; 100], 100.0).len() > 85, "all along");
+        assert!(middle(&[], 0.0).is_empty());
+    }
+
     fn sensor(channels: [&'static str; 3], id: &str, instead: &str) -> Sensor {
         let effect = EffectEntry {
             kin: Kin::Own,

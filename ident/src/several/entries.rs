@@ -172,11 +172,9 @@ pub(super) fn unexplained(
         }
         let run = &runs[loudest.run].closed.verdict;
         let told = run.unexplained.iter().find(|u| u.channel == a.channel);
-        let looks_like = match looks(loudest) {
-            Some(looks) => format!("loudest on {}: {looks}", run.run),
-            None => format!("loudest on {}", run.run),
-        };
-        let looks_like = looks_like + if told.is_some() { "" } else { "; a fit to that run alone removes it, the runs differ" };
+        let shape = looks(loudest).map_or_else(String::new, |looks| format!(": {looks}"));
+        let differ = if told.is_some() { "" } else { "; a fit to that run alone removes it, the runs differ" };
+        let looks_like = format!("loudest on {}{shape}{differ}", run.run);
         let depends_on = told.map(|t| t.depends_on.clone()).unwrap_or_default();
         let over_floor = whole.after.heldout_rms / whole.noise_floor_rms;
         out.push(Unexplained { channel: a.channel.to_owned(), over_floor, depends_on, looks_like });

@@ -11,6 +11,7 @@ use super::{number, readable};
 use crate::Failure;
 use crate::trouble::unread;
 use dcm::Vec3;
+use ident::log::short;
 use std::path::Path;
 
 /// One row.
@@ -196,11 +197,6 @@ fn reading(field: &str, is_slower: bool) -> Option<f64> {
         return Some(f64::NAN);
     }
     number::parse(field.as_bytes()).filter(|v| v.is_finite() || (is_slower && v.is_nan()))
-}
-
-/// A word of the file as a refusal repeats it.
-fn short(word: &str) -> String {
-    if word.chars().count() > 40 { word.chars().take(40).chain("...".chars()).collect() } else { word.to_owned() }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, "Powerplant model".
 
 use crate::Failure;
-use crate::fly::rotor::{ModelRotor, latency_of_rows_s};
+use crate::fly::rotor::{ModelRotor, gathers, latency_of_rows_s};
 use hal_sim::mission::RotorCurves;
 use ident::model::{AddedEffect, Model};
 use std::f64::consts::TAU;
@@ -56,6 +56,8 @@ pub(super) struct Powerplant {
     pub(super) lead_ohm: Option<f64>,
     /// Fall of the supply for the charge drawn, V/Ah, where the model holds one.
     pub(super) fall_v_per_ah: Option<f64>,
+    /// The model holds a discharge or a heat, and the curve is that of the run's beginning.
+    pub(super) begins: bool,
     /// Share of the pulse's range up to which the model's run went; nothing where its file does not tell.
     pub(super) measured: Option<f64>,
     /// Channels whose meter on the rig is late, and by how much, s.
@@ -103,6 +105,7 @@ impl Powerplant {
             pole_pairs: model.meta.get("pole_pairs").and_then(toml::Value::as_integer),
             lead_ohm: estimate("supply_sag", "resistance"),
             fall_v_per_ah: estimate("battery_discharge", "slope"),
+            begins: model.effects.iter().any(gathers),
             measured: model.highest_pulse_us.map(|us| ((us - 1000.0) / 1000.0).clamp(0.0, 1.0)),
             late: model.effects.iter().filter(|e| e.placed.effect.id() == "channel_delay").flat_map(late).collect(),
         };

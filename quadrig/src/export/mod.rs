@@ -142,8 +142,8 @@ fn off(percent: f64) -> String {
 /// Full thrust, for who reads the curve back, and how far it was measured.
 fn full(plant: &Powerplant) -> String {
     let reach = plant.reach().map_or_else(String::new, |reach| format!("; {reach}"));
-    let fresh = if plant.fall_v_per_ah.is_some() { "; battery as the run began" } else { "" };
-    format!("full thrust {:.5} N{fresh}{reach}", plant.full_n())
+    let begins = if plant.begins { "; supply and motor as the run began" } else { "" };
+    format!("full thrust {:.5} N{begins}{reach}", plant.full_n())
 }
 
 /// What the peer has no key for, or the model no answer to.

@@ -77,8 +77,8 @@ fn flies(added: &AddedEffect) -> bool {
     FLIES.contains(&effect.id()) || effect.id() == "unknown" && effect.scope(&added.placed.instance) == Scope::Rig
 }
 
-/// Whether an effect grows with what the rotor has done so far.
-fn gathers(added: &AddedEffect) -> bool {
+/// Whether an effect grows with what the rotor has done so far, so that the settled states are without it.
+pub(crate) fn gathers(added: &AddedEffect) -> bool {
     GATHERS.contains(&added.placed.effect.id())
 }
 
@@ -122,13 +122,8 @@ impl ModelRotor {
         let pulses = (0..levels * LEVEL_ROWS).map(|i| 1000.0 + LEVEL_US * (i / LEVEL_ROWS) as f64).collect();
         let turns = |rows: &Vec<PlantState>| rows.first().zip(rows.last()).is_some_and(|(a, b)| b.rpm > a.rpm);
         // a sweep of minutes would draw a charge and heat a motor as no run did
-        let fresh = Self {
-            model: Model {
-                effects: rotor.model.effects.iter().filter(|e| !gathers(e)).cloned().collect(),
-                ..rotor.model.clone()
-            },
-            ..rotor.clone()
-        };
+        let mut fresh = rotor.clone();
+        fresh.model.effects.retain(|e| !gathers(e));
         let rows = fresh.rows(LEVEL_ROW_S, pulses).filter(turns);
         let rows = rows.ok_or("no speed from a command; expected one identified from a log with pulse_us")?;
         // the rows beside the next level see its speed come

@@ -18,7 +18,7 @@ use crate::words::{amount, channel, channels, heading, list, lower, plain, proba
 pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     let v = page.verdict;
     sheet.section("What is left");
-    perhaps_also(page).iter().for_each(|said| sheet.say(said));
+    perhaps_also(v, page.words).iter().for_each(|said| sheet.say(said));
     if v.unexplained.is_empty() {
         sheet.say(match goes_beyond_noise(v) {
             true => "Little: on no channel more than a trace beyond its noise.",
@@ -60,13 +60,12 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
 }
 
 /// What was tried beside the names and is not sure enough to be one.
-fn perhaps_also(page: &Page<'_>) -> Vec<String> {
-    let v = page.verdict;
+fn perhaps_also(v: &Verdict, words: Vocabulary) -> Vec<String> {
     let best: Vec<&EffectEntry> = v.effects.iter().filter(|e| e.id != "unknown").collect();
     let beside = |other: &&Alternative| other.change.is_none() && without(&best, &other.ids).is_empty();
     let said = |other: &Alternative| {
         let more = instead(&best, &other.ids);
-        let clauses: Vec<String> = more.iter().map(|id| page.words.of_another(id, None).with("")).collect();
+        let clauses: Vec<String> = more.iter().map(|id| words.of_another(id, None).with("")).collect();
         let also = if best.is_empty() { "" } else { " as well" };
         let p = probability(other.probability);
         (!more.is_empty()).then(|| format!("Not sure enough for a name: {}{also} (probability {p}).", list(&clauses)))
@@ -189,10 +188,25 @@ pub(super) fn settle(sheet: &mut Sheet, page: &Page<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::closed::vocabulary::bare_verdict;
+    use crate::report::closed::vocabulary::{bare_entry, bare_verdict};
 
     fn left(channel: &str, looks_like: &str) -> Unexplained {
         Unexplained { channel: channel.into(), over_floor: 4.0, depends_on: Vec::new(), looks_like: looks_like.into() }
+    }
+
+    /// What was tried beside the names is told; what would stand in the place of one is told on its card.
+    #[test]
+    fn what_may_be_there_as_well_is_told() {
+        let of = |ids: &[&str], probability: f64| {
+            let ids = ids.iter().map(|id| (*id).to_owned()).collect();
+            Alternative { ids, probability, change: None }
+        };
+        let alternatives = vec![of(&["supply_sag", "creep"], 0.1), of(&["battery_discharge"], 0.2)];
+        let v = Verdict { effects: vec![bare_entry("supply_sag")], alternatives, ..bare_verdict(Vec::new()) };
+        let said = perhaps_also(&v, Vocabulary::RIG);
+        assert!(said.len() == 1 && said[0].contains("creeps") && said[0].ends_with(" as well (probability 0.10)."), "{said:?}");
+        let nothing_named = Verdict { effects: Vec::new(), ..v };
+        assert!(perhaps_also(&nothing_named, Vocabulary::RIG).iter().all(|s| !s.contains("as well")), "nothing stands beside it");
     }
 
     /// What is true of every remainder of an attitude log is told once, and its axes that look alike share a row.

@@ -127,7 +127,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let explained = explained(verdict, &told, false);
     // what says that more is told below has said so
     let more = if explained.as_ref().is_some_and(|e| e.says_more) { 0 } else { more };
-    [out, explained.map(|e| e.said).unwrap_or_default(), below(more, "smaller", false), left(verdict)]
+    [out, explained.map(|e| e.said).unwrap_or_default(), below(more, true, false), left(verdict)]
         .into_iter()
         .filter(|s| !s.is_empty())
         .collect::<Vec<_>>()
@@ -227,7 +227,7 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
     // what takes more than the question does is no smaller cause
     let is_told = |e: &EffectEntry| sure.iter().chain(disputed).any(|d| std::ptr::eq(*d, e));
     let larger = all.iter().any(|e| !is_told(e) && e.heldout_error_reduction > removed(disputed));
-    let below = below(causes(all).saturating_sub(told), if larger { "more" } else { "smaller" }, nameless);
+    let below = below(causes(all).saturating_sub(told), !larger, nameless);
     let joined = |parts: [String; 3]| parts.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
     let bare = joined([out.clone(), below.clone(), left(verdict)]);
     let asked: Vec<&EffectEntry> = sure.iter().chain(disputed).copied().collect();
@@ -278,13 +278,14 @@ fn doubt(verdict: &Verdict) -> &'static str {
     }
 }
 
-/// What the cards have beside what the sentence tells: smaller causes, and what has no name.
-fn below(more: usize, how: &str, nameless: bool) -> String {
-    let causes = match (more, how) {
+/// What the cards have beside what the sentence tells: further causes, all of them smaller or not, and what has no name.
+fn below(more: usize, smaller: bool, nameless: bool) -> String {
+    let causes = match (more, smaller) {
         (0, _) => None,
-        (1, "more") => Some("one more cause".to_owned()),
-        (1, _) => Some(format!("a {how} cause")),
-        (n, _) => Some(format!("{n} {how} causes")),
+        (1, true) => Some("a smaller cause".to_owned()),
+        (1, false) => Some("one more cause".to_owned()),
+        (n, true) => Some(format!("{n} smaller causes")),
+        (n, false) => Some(format!("{n} more causes")),
     };
     let parts: Vec<String> = causes.into_iter().chain(nameless.then(|| "what has no name".to_owned())).collect();
     if parts.is_empty() {
