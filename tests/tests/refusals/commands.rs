@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`; `--help`.
 
 use super::{Case, alone, with};
-use quadrig_tests::bench::{HEAD, good_log};
+use quadrig_tests::bench::good_log;
 
 pub(super) fn boards() -> Vec<Case> {
     vec![
