@@ -21,7 +21,7 @@ use crate::parallel::{cores, in_parallel};
 use crate::residual::whiteness;
 use crate::revise::revise;
 use crate::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
-use crate::search::{base, connected, refine, refine_newest, scan, stride};
+use crate::search::{base, between_starts, connected, refine, refine_newest, scan, stride};
 use crate::suspects::{nearest, stand_beside, suspects};
 use crate::together::{Ground, choose_together};
 use crate::verdict::Kin;
@@ -42,9 +42,6 @@ const EASILY_NAMED: usize = 3;
 const CLEAR_REDUCTION: f64 = 0.15;
 /// Candidates whose shapes are refined after the scan of their grids.
 pub(crate) const REFINED: usize = 7;
-/// Share of the best gain of a grid from which on the first form of an effect is refined although others stand before it: a coarse grid shows
-/// that much of the right shape (set once on four runs that it cost, tuning seeds 70022, 70788, 71170 and 71984).
-const NOTABLE: f64 = 0.25;
 /// Of these, those whose shapes are refined on all rows in the end.
 const POLISHED: usize = 3;
 /// Samples of a channel that the refinement of every candidate looks at.
@@ -440,22 +437,32 @@ pub(crate) fn round_of(
     // against a model many a name fits a moment on its grid, and stands before the one that fits the run once it is refined
     let refined = if context.against_model { 2 * refined } else { refined };
     let mut out: Vec<Candidate> = Vec::new();
-    let (mut most, mut heard) = (f64::NEG_INFINITY, BTreeSet::new());
-    let notable = ranked.first().map_or(0.0, |r| NOTABLE * r.0);
     ranked.retain(|r| r.0 >= -20.0);
     let stands = |placed: &[Placed]| {
         fit(context, declared, placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
     };
-    let wide = |placed: &[Placed]| refine_newest(context, declared, placed, sketch, 120);
-    // those that are refined whatever comes of the others
-    let mut sure = in_parallel(ranked.len().min(refined), &|k| stands(&wide(&ranked[k].1))).into_iter();
-    for (k, (gain, placed)) in ranked.iter().enumerate() {
+    let wide =
+        |placed: &[Placed]| refine_newest(context, declared, &between_starts(context, declared, placed, sketch), sketch, 120);
+    // the best on their grids, and of each of the best effects its best form: forms of one effect must not crowd out the others
+    let mut heard = BTreeSet::new();
+    let is_sure = |(k, (_, placed)): (usize, &(f64, Vec<Placed>))| {
+        let of = placed.last().map(|p| (p.effect.id(), p.instance.channels.first().cloned()));
+        let first = heard.len() < refined && heard.insert(of);
+        first || k < refined
+    };
+    let sure: Vec<bool> = ranked.iter().enumerate().map(is_sure).collect();
+    let queue: Vec<&Vec<Placed>> = ranked.iter().zip(&sure).filter(|(_, sure)| **sure).map(|(r, _)| &r.1).collect();
+    let mut found = in_parallel(queue.len(), &|k| stands(&wide(queue[k]))).into_iter();
+    let mut most = f64::NEG_INFINITY;
+    for (k, ((gain, placed), sure)) in ranked.iter().zip(sure).enumerate() {
         progress(0.7 + 0.3 * (k as f64 / count));
-        // what explains on its grid alone twice as much as all that came out so far is worth a refinement, whatever stands before it; so is the
-        // first form of an effect that explains there a notable share of what the best does
-        let first = placed.last().is_some_and(|p| heard.insert(p.effect.id()));
-        let promising = k < 3 * refined && *gain > 0.0 && (*gain > 2.0 * most || first && *gain > notable);
-        let fitted = sure.next().unwrap_or_else(|| if promising { stands(&wide(placed)) } else { stands(placed) });
+        // what explains on its grid alone twice as much as all that came out so far is worth a refinement, whatever stands before it
+        let promising = k < 3 * refined && *gain > 0.0 && *gain > 2.0 * most;
+        let fitted = match sure {
+            true => found.next().flatten(),
+            false if promising => stands(&wide(placed)),
+            false => stands(placed),
+        };
         if let Some(fitted) = fitted {
             most = most.max(net_gain(context, &fitted, &best.fit, &whole));
             out.push(Candidate { fit: fitted, evidence: 0.0 });
@@ -570,10 +577,14 @@ pub(crate) fn net_gain(context: &Context, new: &Fit, old: &Fit, shares: &[f64]) 
 
 /// Evidence, in nats, that all effects of a fit together add over the declared model, their price paid.
 pub(crate) fn evidence_over(context: &Context, new: &Fit, start: &Fit) -> f64 {
-    let shares = shares(context, std::iter::once(new));
+    evidence_counted(context, new, start, &shares(context, std::iter::once(new)))
+}
+
+/// The same where each target counts so many of its samples as independent.
+pub(crate) fn evidence_counted(context: &Context, new: &Fit, start: &Fit, shares: &[f64]) -> f64 {
     let earlier = &new.placed[..new.placed.len().saturating_sub(1)];
-    let price = |p: &Placed| penalty(context, p, &shares) - p.effect.seen(context, &p.instance);
-    net_gain(context, new, start, &shares) - earlier.iter().map(price).sum::<f64>()
+    let price = |p: &Placed| penalty(context, p, shares) - p.effect.seen(context, &p.instance);
+    net_gain(context, new, start, shares) - earlier.iter().map(price).sum::<f64>()
 }
 
 /// What one round chose.

@@ -62,6 +62,7 @@ pub mod shift;
 pub mod simulate;
 pub mod solve;
 pub mod sparse;
+mod split;
 mod start;
 mod steps;
 mod supply_limit;

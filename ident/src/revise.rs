@@ -13,11 +13,12 @@ use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, Rows, fit};
 use crate::rivals::probabilities;
 use crate::search::{connected, refine};
+use crate::split::split;
 
 /// Looks at most so many times at all names.
 const PASSES: usize = 2;
 /// Evidence by which a newcomer must be better than the one in place.
-const CLEARLY_BETTER: f64 = 3.0;
+pub(crate) const CLEARLY_BETTER: f64 = 3.0;
 
 /// Share by which a newcomer may spoil the held-out error of a channel.
 const SPOILT: f64 = 0.02;
@@ -35,6 +36,7 @@ pub(crate) fn revise(
     rounds: &mut Vec<Round>,
 ) {
     let mut all = offers(context);
+    split((context, declared, start), folds, best, rounds, &all);
     let mut settled = vec![false; best.fit.placed.len()];
     // the last one was chosen beside all the others
     if let Some(last) = settled.last_mut() {
@@ -52,8 +54,8 @@ pub(crate) fn revise(
         let own = ranked.iter().position(|c| newest_is(c, &best.fit.placed[k]));
         let standing = own.map_or(f64::NEG_INFINITY, |o| ranked[o].evidence);
         let clearly = |c: &Candidate| c.evidence > standing + CLEARLY_BETTER && c.evidence > NEEDED_EVIDENCE;
-        let ahead = &ranked[..own.unwrap_or(ranked.len())];
-        let better = ahead.iter().position(|c| clearly(c) && predicts_as_well(context, declared, folds, &c.fit, &best.fit));
+        // the ranking asks first what the noise's own colour speaks for: more evidence may stand behind
+        let better = ranked.iter().position(|c| clearly(c) && predicts_as_well(context, declared, folds, &c.fit, &best.fit));
         let Some(winner) = better.or(own).filter(|w| ranked[*w].evidence > NEEDED_EVIDENCE) else {
             if own.is_some() {
                 *best = Candidate { evidence: evidence_over(context, &base, start), fit: base };
@@ -75,14 +77,15 @@ pub(crate) fn revise(
 }
 
 /// All that applied for a place but its winner, and what has clearly more evidence than the effect in place and was refused all
-/// the same: it predicts worse, and is no rival.
+/// the same: it predicts worse, and is no rival. Where the effect in place stays, all such were.
 fn standing_beside(ranked: &[Candidate], winner: usize, standing: f64) -> Vec<Candidate> {
-    let refused = |i: usize| i < winner && ranked[i].evidence > standing + CLEARLY_BETTER;
+    let stays = ranked[winner].evidence <= standing;
+    let refused = |i: usize| (i < winner || stays) && ranked[i].evidence > standing + CLEARLY_BETTER;
     ranked.iter().enumerate().filter(|(i, _)| *i != winner && !refused(*i)).map(|(_, c)| c.clone()).collect()
 }
 
 /// Whether a hypothesis predicts held-out rows of every channel about as well as the one in place.
-fn predicts_as_well(context: &Context, declared: Declared<'_>, folds: &[Vec<bool>], new: &Fit, old: &Fit) -> bool {
+pub(crate) fn predicts_as_well(context: &Context, declared: Declared<'_>, folds: &[Vec<bool>], new: &Fit, old: &Fit) -> bool {
     let (new, old) = (heldout::errors(context, declared, new, folds), heldout::errors(context, declared, old, folds));
     let judged = context.targets.iter().zip(new.iter().zip(&old)).filter(|(t, _)| !t.relation.is_evidence());
     judged.into_iter().all(|(_, (n, o))| as_well(n, o))

@@ -6,7 +6,7 @@
 //! Reference: Nelder & Mead 1965, Computer Journal 7:308.
 
 use crate::context::Context;
-use crate::effects::{Effect, Instance};
+use crate::effects::{Effect, Instance, Shape};
 use crate::hypothesis::{Declared, Placed, Rows};
 use crate::remembered::Question;
 use crate::samples::{Base, Taught};
@@ -68,6 +68,44 @@ pub(crate) fn scan(
         }
     }
     best
+}
+
+/// Times that the distance to the next point of a grid is halved.
+const HALVED: i32 = 3;
+
+/// The newest effect's shapes between the points of its grid: each in turn goes half of the way to its neighbours, then a quarter, then an eighth,
+/// wherever the likelihood is larger. What sets in at an instant has a likelihood with an edge at each sample, on which a simplex hangs.
+#[must_use]
+pub(crate) fn between_starts(context: &Context, declared: Declared<'_>, placed: &[Placed], rows: Rows<'_>) -> Vec<Placed> {
+    let mut out = placed.to_vec();
+    let Some(newest) = placed.last().filter(|p| !p.shape.is_empty()) else { return out };
+    let moving: Vec<&str> = newest.instance.channels.iter().map(String::as_str).collect();
+    let scattering = placed.iter().any(|p| p.effect.scatters());
+    let taught = Taught::new(context, declared, rows);
+    let likelihood = |placed: &[Placed]| taught.loglik(placed, &moving, scattering) + placed.last().map_or(0.0, Placed::prior);
+    let (shapes, grid) = (newest.effect.shapes(context, &newest.instance), &newest.shape);
+    let mut most = likelihood(&out);
+    for half in 1..=HALVED {
+        for (i, (shape, at)) in shapes.iter().zip(grid).enumerate() {
+            for gap in gaps(shape, *at) {
+                let mut moved = out.clone();
+                let Some(v) = moved.last_mut().and_then(|p| p.shape.get_mut(i)) else { continue };
+                *v = (*v + gap * 0.5_f64.powi(half)).clamp(shape.range.0, shape.range.1);
+                let found = likelihood(&moved);
+                if found > most {
+                    (most, out) = (found, moved);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Ways from a start to the next ones below and above, or to the ends of the range.
+fn gaps(shape: &Shape, at: f64) -> [f64; 2] {
+    let below = shape.starts.iter().copied().filter(|s| *s < at).fold(shape.range.0, f64::max);
+    let above = shape.starts.iter().copied().filter(|s| *s > at).fold(shape.range.1, f64::min);
+    [below - at, above - at]
 }
 
 /// Improves the shapes of a hypothesis together (Nelder-Mead within the plausible ranges): those of its newest effect and of

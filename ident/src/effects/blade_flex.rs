@@ -100,7 +100,12 @@ impl Effect for BladeFlex {
         let beyond = |name: &str, errors: f64| fitted.iter().find(|e| e.name == name).map(|e| e.value > errors * e.se);
         let lighter = ["current_loss", "speed_gain"].iter().all(|name| beyond(name, 3.0) == Some(true));
         let ratio = beyond("torque_ratio", if lighter { 0.0 } else { 2.0 }).unwrap_or(true);
-        ratio && fitted.iter().any(|e| e.name == "exponent" && e.value > 3.0 * e.se)
+        // a lighter load draws no more, and at the same torque turns faster by half of what the torque falls short by, at the most
+        let of = |name: &str| fitted.iter().find(|e| e.name == name);
+        let most = of("torque_ratio").map_or(1.0, |e| e.value + 2.0 * e.se) / 2.0;
+        let draws_more = of("current_loss").is_some_and(|e| e.value < -2.0 * e.se);
+        let runs_away = of("speed_gain").is_some_and(|e| e.value - 2.0 * e.se > most);
+        ratio && !draws_more && !runs_away && fitted.iter().any(|e| e.name == "exponent" && e.value > 3.0 * e.se)
     }
 }
 
@@ -147,5 +152,7 @@ mod tests {
         assert!(judged((0.3, 0.2), 0.05, 0.05), "the load tells");
         assert!(!judged((0.3, 0.2), 0.05, 0.02) && !judged((0.3, 0.2), -0.05, 0.05), "neither does");
         assert!(!judged((-0.3, 0.2), 0.05, 0.05), "a torque that grows where thrust falls is a stall");
+        assert!(!judged((0.3, 0.05), -0.05, 0.05), "a lighter load draws no more current");
+        assert!(!judged((0.3, 0.05), 0.05, 0.3), "nor does it turn faster by all that its torque falls short by");
     }
 }

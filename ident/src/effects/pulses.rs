@@ -64,10 +64,6 @@ const LATE: f64 = 3.0;
 /// Share by which a reading must be off at least to be counted as one pulse too few or too many.
 const GROSS: f64 = 0.03;
 
-/// Share of the readings below which those that are off are single bad samples, and no cause that recurs. Set on tuning seeds of messy rigs: at one in
-/// 300 true causes were lost, without it drop-outs got a name.
-const SELDOM: f64 = 0.001;
-
 /// Form in which single samples are off.
 pub(super) const SCATTERED: &str = "scattered";
 
@@ -83,7 +79,7 @@ fn form_of(off: &[bool], sign: f64) -> Option<&'static str> {
     let count = off.iter().filter(|off| **off).count();
     let in_a_row = off.windows(2).filter(|pair| pair[0] && pair[1]).count();
     let by_chance = sign > 0.0 || 2 * in_a_row < count;
-    let recurs = count > 1 && count * 2 < off.len() && count as f64 > SELDOM * off.len() as f64;
+    let recurs = count > 1 && count * 2 < off.len();
     (recurs && by_chance).then_some(SCATTERED)
 }
 
