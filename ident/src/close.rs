@@ -318,8 +318,10 @@ const OF_CHANNEL: &str = "channel";
 /// or for an amplitude everything from nothing to twice its size.
 pub(crate) fn parameter(e: &Estimate, shapes: &[Shape], channel: &str) -> Parameter {
     let range = shapes.iter().find(|s| s.name == e.name && s.range.1 > s.range.0).map(|s| s.range);
+    // what cannot be below zero is not
+    let least = if shapes.iter().any(|s| s.name == e.name && s.range.0 >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
     let ci95 = match range {
-        _ if e.se.is_finite() => [e.value - 1.96 * e.se, e.value + 1.96 * e.se],
+        _ if e.se.is_finite() => [(e.value - 1.96 * e.se).max(least.min(e.value)), e.value + 1.96 * e.se],
         Some((from, to)) => [from.min(e.value), to.max(e.value)],
         None => [e.value - e.value.abs(), e.value + e.value.abs()],
     };
@@ -360,6 +362,7 @@ mod tests {
         let of = |name: &str, value: f64, se: f64| {
             parameter(&Estimate { name: name.to_owned(), unit: "s".to_owned(), value, se }, &shapes, "").ci95
         };
+        assert_eq!(of("tau", 1.0, 1.0), [0.0, 2.96], "no time constant is below zero");
         for unknown in [f64::NAN, f64::INFINITY] {
             assert_eq!(of("tau", 2.0, unknown), [0.5, 9.0]);
             assert_eq!(of("rate", -2.0, unknown), [-4.0, 0.0]);

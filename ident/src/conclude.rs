@@ -8,10 +8,13 @@
 //! Reference: specification `closing-the-loop.md`, step 6; `formats.md`, "Verdict" ("no name may make things worse").
 
 use crate::beside::is_named;
+use crate::colour::{Colour, effective_share};
 use crate::context::{Context, Target};
-use crate::effects::{Effect, Estimate, Instance, Shape};
-use crate::heldout::Held;
+use crate::diagnose::NEEDED_REDUCTION;
+use crate::effects::{Effect, Estimate, Instance, NEEDED_EVIDENCE, Shape};
+use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, is_plausible, part_of};
+use crate::unexplained::looks_like;
 
 /// Share by which the error of a channel may be larger with the names than before.
 const WORSE: f64 = 0.02;
@@ -66,6 +69,45 @@ pub(crate) fn untenable(context: &Context, declared: Declared<'_>, fit: &Fit, er
     let all = 0..fit.placed.len();
     let senseless = |k: &usize| is_named(&fit.placed[*k]) && !is_plausible(context, declared, fit, *k);
     all.clone().find(senseless).or_else(|| harmful(context, fit, errors)).or_else(|| cancelled(context, declared, fit, errors))
+}
+
+/// Evidence, nats, that a random walk gives the best straight line or the best step by chance, in 98 walks of 100: what no more speaks for says
+/// nothing of why something wanders.
+const OF_A_WALK: f64 = 25.0;
+/// Share of its size that the best straight line takes off a random walk, in 19 walks of 20; the best step takes 0.6.
+const OFF_A_WALK: f64 = 2.0 / 3.0;
+
+/// The position of a name that is lost in what is left: that wanders as slowly as the name itself, the name takes no more away than a line takes off a
+/// random walk, and so few samples are independent along it that such a walk would speak for it as loudly. Of several the one for which least
+/// speaks; another channel that it clears, or what one sensor reads beyond the others, is witness enough.
+pub(crate) fn drowned(context: &Context, declared: Declared<'_>, fit: &Fit, errors: &Errors<'_>) -> Option<usize> {
+    if context.against_model {
+        return None;
+    }
+    let left = heldout::residuals(context, declared, fit);
+    let asked = |k: &usize| {
+        let placed = &fit.placed[*k];
+        // that a rotor takes time, and a supply gives way, needs no witness
+        let of_every = placed.effect.is_of_every_rig() || placed.instance.touches("voltage_v");
+        let chosen = is_named(placed) && !placed.is_tare() && !of_every && !placed.effect.scatters();
+        chosen && placed.effect.seen(context, &placed.instance) <= NEEDED_EVIDENCE
+    };
+    let speaks = |k: usize| {
+        let (mut most, mut lost, mut cleared) = (0.0_f64, false, false);
+        for (i, target) in touched(context, &fit.placed[k]) {
+            let taken = 1.0 - errors.after[i].claimed / errors.without[k][i].claimed;
+            let change = contribution(context, declared, fit, k, i);
+            // a quick change shows through something slow
+            let wanders = looks_like(context, target, &left[i]).starts_with("slow")
+                && effective_share(&change) <= effective_share(&left[i]);
+            let independent = left[i].len() as f64 * Colour::of(&left[i]).share_along(&change);
+            most = most.max(-independent * (1.0 - taken).ln());
+            lost |= wanders;
+            cleared |= taken > if wanders { OFF_A_WALK } else { NEEDED_REDUCTION };
+        }
+        (lost && !cleared && most < OF_A_WALK).then_some((k, most))
+    };
+    (0..fit.placed.len()).filter(asked).filter_map(speaks).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
 }
 
 /// The position of an effect that makes left-out rows of a channel worse, if there is one.
@@ -147,6 +189,53 @@ pub(crate) fn is_nothing(context: &Context, placed: &Placed, estimates: &[Estima
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The figure of [`OF_A_WALK`]: of random walks hardly any speaks as loudly for the best line or the best step.
+    #[test]
+    fn a_random_walk_speaks_for_no_name() {
+        const N: usize = 600;
+        let mut state = 1_u64;
+        let mut chance = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
+        };
+        let centred = |mut v: Vec<f64>| {
+            let mean = v.iter().sum::<f64>() / v.len() as f64;
+            v.iter_mut().for_each(|v| *v -= mean);
+            v
+        };
+        let square = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>();
+        let line = centred((0..N).map(|i| i as f64).collect());
+        let steps: Vec<Vec<f64>> =
+            (12..N - 12).map(|at| centred((0..N).map(|i| if i < at { 0.0 } else { 1.0 }).collect())).collect();
+        let spoken = |walk: &[f64], name: &[f64]| {
+            let size = walk.iter().zip(name).map(|(w, c)| w * c).sum::<f64>() / square(name);
+            let left: Vec<f64> = walk.iter().zip(name).map(|(w, c)| w - size * c).collect();
+            (square(&left), -0.5 * N as f64 * Colour::of(&left).share_along(name) * (square(&left) / square(walk)).ln())
+        };
+        let mut loud = 0;
+        for _ in 0..200 {
+            let mut at = 0.0;
+            let walk = centred(
+                (0..N)
+                    .map(|_| {
+                        at += chance();
+                        at
+                    })
+                    .collect(),
+            );
+            let best_step = steps.iter().min_by(|a, b| {
+                let taken = |c: &[f64]| walk.iter().zip(c).map(|(w, c)| w * c).sum::<f64>().powi(2) / square(c);
+                taken(b).total_cmp(&taken(a))
+            });
+            loud += usize::from(spoken(&walk, &line).1 > OF_A_WALK);
+            loud += usize::from(best_step.is_some_and(|step| spoken(&walk, step).1 > OF_A_WALK));
+        }
+        assert!(loud <= 12, "{loud} of 400");
+        // what is there speaks louder: a step of three times the noise
+        let stepped: Vec<f64> = steps[280].iter().map(|c| 3.0 * c + chance()).collect();
+        assert!(spoken(&centred(stepped), &steps[280]).1 > 4.0 * OF_A_WALK);
+    }
 
     #[test]
     fn two_that_are_large_and_together_small_cancel() {

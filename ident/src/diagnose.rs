@@ -10,7 +10,7 @@
 
 use crate::beside::{NEEDED, ask, is_named, left_of, with_rests};
 use crate::colour::Colour;
-use crate::conclude::{Errors, is_nothing, quoted, untenable};
+use crate::conclude::{Errors, drowned, is_nothing, quoted, untenable};
 use crate::context::{Context, Relation, Target};
 pub(crate) use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::{self, Effect, Estimate, Instance};
@@ -214,7 +214,10 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
             names > 1 && is_named(&best.fit.placed[*k]) && is_idle(context, &best.fit.placed[*k], &errors, &without[*k])
         };
         let figures = Errors { before: &heldout_before, after: &errors, without: &without };
-        let mut goes = (0..without.len()).find(idle).or_else(|| untenable(context, declared, &best.fit, &figures));
+        let mut goes = (0..without.len())
+            .find(idle)
+            .or_else(|| untenable(context, declared, &best.fit, &figures))
+            .or_else(|| drowned(context, declared, &best.fit, &figures));
         if goes.is_none() && !rests_told {
             rests_told = true;
             let with = with_rests(ground, &best.fit, &errors, &asked.contested);

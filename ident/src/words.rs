@@ -311,12 +311,12 @@ pub fn counted(p: &Parameter) -> Option<String> {
 /// Units of what cannot be below zero: durations, resistances, inertias, charges, lengths, areas.
 const POSITIVE: [&str; 7] = ["s", "ohm", "kg.m2", "Ah", "A.h", "m^2", "Hz"];
 
-/// The upper bound of a quantity that cannot be below zero and of which the run shows no more: the interval of a positive value that begins below
-/// zero. An instant has a sign.
+/// The upper bound of a quantity that cannot be below zero and of which the run shows no more: the interval of a positive value that begins no
+/// higher. An instant has a sign.
 #[must_use]
 pub fn upper_bound(p: &Parameter) -> Option<f64> {
     let instant = ["t0", "t1"].contains(&p.name.as_str());
-    let open = p.value >= 0.0 && p.ci95[0] < 0.0 && p.ci95[1] > 0.0;
+    let open = p.value >= 0.0 && p.ci95[0] <= 0.0 && p.ci95[1] > 0.0;
     (open && !instant && POSITIVE.contains(&p.unit.as_str())).then_some(p.ci95[1])
 }
 

@@ -186,8 +186,9 @@ fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<Found, Failure> {
     let (mut pairs, mut from, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for path in files {
         match pairs_of(path, args, quiet) {
-            Ok(found) => {
+            Ok((found, without)) => {
                 pairs.extend(found);
+                left_out.extend(without);
                 from.extend([("file", name_of(path)), ("SHA-256", digest(&std::fs::read(path).map_err(unread(path))?))]);
             }
             Err(why) => left_out.push(why.to_string()),
@@ -202,14 +203,16 @@ fn read(files: &[PathBuf], args: &Args, quiet: bool) -> Result<Found, Failure> {
     }
 }
 
-fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure> {
+/// The pairs of a file, and why lines of a table hold none.
+fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<(Vec<Pair>, Vec<String>), Failure> {
     if path.is_dir() {
         let expected = "expected rig logs, exports or tables: name the files in it";
         return Err(format!("{}: is a folder; {expected}, such as {}", path.display(), path.join("*.csv").display()).into());
     }
     if is_table(path)? {
         let file = std::fs::File::open(path).map_err(unread(path))?;
-        return Ok(read_table(&path.display().to_string(), BufReader::new(file))?);
+        let table = read_table(&path.display().to_string(), BufReader::new(file))?;
+        return Ok((table.pairs, table.left_out.iter().map(ToString::to_string).collect()));
     }
     let mut log = open(path, &args.columns.named(None, None), quiet)?;
     let given = [("motor", &args.motor), ("propeller", &args.propeller)];
@@ -222,7 +225,7 @@ fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<Vec<Pair>, Failure>
             "expected a run with thrust_n and current_a on levels of at least 5 rows, or a table with a row for each level";
         return Err(format!("{}: no plateau with thrust and current; {expected}", path.display()).into());
     }
-    Ok(vec![pair])
+    Ok((vec![pair], Vec::new()))
 }
 
 /// Whether the first line that is no comment names motors.

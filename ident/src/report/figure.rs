@@ -350,6 +350,7 @@ impl Figure {
         for layer in &self.layers {
             let (name, class, key) = match layer {
                 Layer::Line { name, class, .. } => (name, *class, "key"),
+                Layer::Dots { name, class: "b", .. } => (name, "b", "square"),
                 Layer::Dots { name, class, .. } | Layer::Marks { name, class, .. } => (name, *class, "spot"),
                 Layer::Columns { name, class, .. } => (name, *class, "col"),
                 Layer::Band { name, class, .. } => (name, *class, "patch"),
@@ -375,6 +376,10 @@ impl Figure {
             let _ = match key {
                 "key" => {
                     write!(out, "<line class=\"{class} key\" x1=\"{at:.1}\" x2=\"{:.1}\" y1=\"{y}\" y2=\"{y}\"/>", at + 16.0)
+                }
+                // as the dots of this class are drawn
+                "square" => {
+                    write!(out, "<rect class=\"{class} spot\" x=\"{:.1}\" y=\"{}\" width=\"8\" height=\"8\"/>", at + 4.0, y - 4.0)
                 }
                 "spot" => write!(out, "<circle class=\"{class} spot\" cx=\"{:.1}\" cy=\"{y}\" r=\"4\"/>", at + 8.0),
                 "col" => {

@@ -107,7 +107,7 @@ fn hero(closed: &Closed) -> Vec<Figure> {
     if let Some(first) = named.peek().copied()
         && named.all(EffectEntry::is_read_off)
     {
-        return readings(closed, first);
+        return readings(closed, first, "read");
     }
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> = targets.filter_map(|t| trace(closed, t)).collect();
@@ -141,12 +141,12 @@ pub(super) fn readings_apart(context: &Context, v: &Verdict, run: &str) -> Vec<R
 }
 
 /// What an effect's channels read at each command.
-fn readings(closed: &Closed, e: &EffectEntry) -> Vec<Figure> {
+fn readings(closed: &Closed, e: &EffectEntry, id: &str) -> Vec<Figure> {
     let Some(pulse) = &closed.context.pulse else { return Vec::new() };
     let figure = |name: &String| {
         let target = target(closed, name)?;
         Some(thinned(Figure {
-            id: format!("read-{}", parts::slug(name)),
+            id: format!("{id}-{}", parts::slug(name)),
             title: format!("{} as measured, against the command", heading(name)),
             x_label: axis("pulse_us"),
             y_label: axis(name),
@@ -199,7 +199,7 @@ pub(super) fn card_alone(closed: &Closed, e: &EffectEntry, id: &str) -> Option<F
     Some(drawn(&closed.context, e, target, &whole.with_before(without), id))
 }
 
-/// Figures of each effect: what its first channel leaves over without it and with it.
+/// Figures of each effect: what its first channel leaves over without it and with it; of what whole levels show their readings.
 fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
     let mut used = vec![false; closed.model.effects.len()];
     closed
@@ -208,10 +208,16 @@ fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
         .iter()
         .enumerate()
         .map(|(k, e)| {
+            let id = format!("effect-{}", k + 1);
             let same = |i: &usize| !used[*i] && closed.model.effects[*i].placed.is_told_by(e);
-            let Some(i) = (0..used.len()).find(same) else { return Vec::new() };
-            used[i] = true;
-            card(closed, e, i, &format!("effect-{}", k + 1)).unwrap_or_default()
+            match (0..used.len()).find(same) {
+                Some(i) => {
+                    used[i] = true;
+                    card(closed, e, i, &id).unwrap_or_default()
+                }
+                None if e.is_read_off() && !e.is_of_single_readings() => readings(closed, e, &id),
+                None => Vec::new(),
+            }
         })
         .collect()
 }

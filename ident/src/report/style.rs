@@ -4,7 +4,8 @@
 //! What can go wrong: nothing.
 //! Units: CSS pixels.
 //! Reference: CSS Color Adjustment (`prefers-color-scheme`), CSS Paged Media. The line colours are Okabe & Ito's, which readers
-//! with colour-blindness tell apart, lightened for the dark.
+//! with colour-blindness tell apart, lightened for the dark. What stands before is a thin line or a square, what stands after a thick line or a disc:
+//! they differ without colour, too.
 
 /// Colours as variables: light, dark, print.
 pub(crate) const COLOURS: &str = "
@@ -19,8 +20,8 @@ svg.fig{display:block;width:100%;height:auto;background:var(--bg);break-inside:a
 .fig .paper{fill:var(--bg)}
 .fig text{fill:var(--fg);font:13px system-ui,-apple-system,'Segoe UI',sans-serif}.fig .title{font-size:15px;font-weight:600}.fig .tick{font-size:12px}.fig .axis{fill:var(--soft)}
 .fig .grid{stroke:var(--grid);stroke-width:1}.fig .rule{stroke:var(--soft);stroke-width:1.2;stroke-dasharray:5 4}
-.fig path{fill:none;stroke-width:1.6;stroke-linejoin:round}.fig .key{stroke-width:3}
-.fig .dots{stroke-width:2.4;stroke-linecap:round;opacity:.55}.fig .dots.few{stroke-width:6;opacity:.9}
+.fig path{fill:none;stroke-width:1.6;stroke-linejoin:round}.fig path.a{stroke-width:2.1}.fig path.b{stroke-width:1.1}.fig .key{stroke-width:3}.fig .a.key{stroke-width:4}.fig .b.key{stroke-width:1.5}
+.fig path.dots{stroke-width:2.4;stroke-linecap:round;opacity:.55}.fig path.dots.few{stroke-width:6;opacity:.9}.fig path.b.dots{stroke-linecap:square}
 .fig .a{stroke:var(--a)}.fig .b{stroke:var(--b)}.fig .c{stroke:var(--c)}.fig .d{stroke:var(--d)}.fig .e{stroke:var(--e)}.fig .f{stroke:var(--f)}
 .fig path.band,.fig .patch{stroke:none;opacity:.25}.fig .a.band,.fig .a.patch{fill:var(--a)}.fig .b.band,.fig .b.patch{fill:var(--b)}.fig .c.band,.fig .c.patch{fill:var(--c)}.fig .d.band,.fig .d.patch{fill:var(--d)}.fig .e.band,.fig .e.patch{fill:var(--e)}
 .fig rect.span{fill:var(--span)}.fig rect.span.patch{fill:var(--a);opacity:.25}

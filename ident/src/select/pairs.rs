@@ -21,17 +21,26 @@ const HEADER: [&str; 4] = ["motor", "propeller", "thrust_n", "current_a"];
 /// Never: the table is part of the program and read by a test.
 #[must_use]
 pub fn thesis() -> Vec<Pair> {
-    read_table("thesis.csv", include_str!("thesis.csv").as_bytes()).unwrap_or_default()
+    read_table("thesis.csv", include_str!("thesis.csv").as_bytes()).unwrap_or_default().pairs
 }
 
-/// Reads a table of pairs; `file` is the name for messages.
+/// Pairs of a table, and why lines of it hold none.
+#[derive(Debug, Default)]
+pub struct Table {
+    /// The pairs, in the order of the lines.
+    pub pairs: Vec<Pair>,
+    /// What each line that was left out has wrong.
+    pub left_out: Vec<ReadError>,
+}
+
+/// Reads a table of pairs; `file` is the name for messages. A line that holds no pair is left out: it costs no other line.
 ///
 /// # Errors
-/// [`ReadError`] with file, line and column.
-pub fn read_table(file: &str, source: impl BufRead) -> Result<Vec<Pair>, ReadError> {
+/// [`ReadError`] with file, line and column where the header is another one or no line holds a pair.
+pub fn read_table(file: &str, source: impl BufRead) -> Result<Table, ReadError> {
     let mut lines = Lines::new(file, source);
     let mut header = false;
-    let mut out: Vec<Pair> = Vec::new();
+    let mut table = Table::default();
     let mut places: Vec<usize> = Vec::new();
     while let Some(line) = lines.next_line()? {
         if line.trim().is_empty() || line.starts_with('#') {
@@ -44,28 +53,41 @@ pub fn read_table(file: &str, source: impl BufRead) -> Result<Vec<Pair>, ReadErr
                 return Err(place.refuse(None, format!("header '{}'", short(&line)), format!("'{}'", HEADER.join(","))));
             }
             header = true;
-        } else if let [motor, propeller, thrust, current] = cells[..] {
-            if let Some(k) = out.iter().position(|p| p.motor == motor && p.propeller == propeller) {
-                let found = format!("'{motor}' with '{propeller}' stands on line {}, too", places[k]);
-                return Err(place.refuse(None, found, "each pair once: take one line out, or give them names of their own"));
+            continue;
+        }
+        match pair(&cells, file, &place, &table.pairs, &places) {
+            Ok(pair) => {
+                places.push(place.line);
+                table.pairs.push(pair);
             }
-            places.push(place.line);
-            out.push(Pair {
-                motor: motor.to_owned(),
-                propeller: propeller.to_owned(),
-                maximum: maximum(thrust, current, &place)?,
-                clipped: false,
-                levels: Vec::new(),
-                source: file.to_owned(),
-            });
-        } else {
-            return Err(place.refuse(None, format!("{} fields", cells.len()), "4 as in the header"));
+            Err(why) => table.left_out.push(why),
         }
     }
-    if out.is_empty() {
-        return Err(lines.place().refuse(None, "no pair", format!("'{}' and one line for each pair", HEADER.join(","))));
+    if table.pairs.is_empty() {
+        let none = || lines.place().refuse(None, "no pair", format!("'{}' and one line for each pair", HEADER.join(",")));
+        return Err(table.left_out.into_iter().next().unwrap_or_else(none));
     }
-    Ok(out)
+    Ok(table)
+}
+
+/// The pair of one line; `places` are the lines of those that were read before.
+fn pair(cells: &[&str], file: &str, place: &Place<'_>, known: &[Pair], places: &[usize]) -> Result<Pair, ReadError> {
+    let [motor, propeller, thrust, current] = *cells else {
+        return Err(place.refuse(None, format!("{} fields", cells.len()), "4 as in the header"));
+    };
+    let same = known.iter().zip(places).find(|(p, _)| p.motor == motor && p.propeller == propeller);
+    if let Some((_, line)) = same {
+        let found = format!("'{motor}' with '{propeller}' stands on line {line}, too");
+        return Err(place.refuse(None, found, "each pair once: take one line out, or give them names of their own"));
+    }
+    Ok(Pair {
+        motor: motor.to_owned(),
+        propeller: propeller.to_owned(),
+        maximum: maximum(thrust, current, place)?,
+        clipped: false,
+        levels: Vec::new(),
+        source: file.to_owned(),
+    })
 }
 
 fn maximum(thrust: &str, current: &str, place: &Place<'_>) -> Result<Option<Maximum>, ReadError> {
@@ -194,11 +216,26 @@ mod tests {
             ("a,b\n".to_owned(), "p.csv:1: header 'a,b'; expected 'motor,propeller,thrust_n,current_a'"),
             (format!("{head}m,p,1\n"), "p.csv:2: 3 fields"),
             (format!("{head}m,p,1,\n"), "p.csv:2: column current_a: ''; expected a positive number"),
-            (format!("{head}m,p,1,2\nm,p,3,4\n"), "p.csv:3: 'm' with 'p' stands on line 2, too; expected each pair once"),
             (format!("{head}m,p,-1,2\n"), "p.csv:2: column thrust_n: '-1'"),
         ] {
             let message = read_table("p.csv", text.as_bytes()).unwrap_err().to_string();
             assert!(message.contains(wanted), "{message:?} lacks {wanted:?}");
         }
+    }
+
+    /// What is wrong with one line costs no other one, and is told.
+    #[test]
+    fn a_line_without_a_pair_is_left_out_alone() {
+        let text = "motor,propeller,thrust_n,current_a\nm,p,1,2\nm,p,3,4\nm,q,x,2\nn,q,1\nn,p,3,4\n";
+        let table = read_table("p.csv", text.as_bytes()).unwrap();
+        assert_eq!(table.pairs.iter().map(Pair::name).collect::<Vec<_>>(), ["m with p", "n with p"]);
+        let told: Vec<String> = table.left_out.iter().map(ToString::to_string).collect();
+        let wanted = [
+            "p.csv:3: 'm' with 'p' stands on line 2, too; expected each pair once",
+            "p.csv:4: column thrust_n: 'x'",
+            "p.csv:5: 3 fields",
+        ];
+        assert_eq!(told.len(), wanted.len());
+        assert!(told.iter().zip(wanted).all(|(told, wanted)| told.starts_with(wanted)), "{told:?}");
     }
 }

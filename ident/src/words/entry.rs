@@ -82,7 +82,9 @@ impl EffectEntry {
     /// The meter of its first channel: "the load cell".
     #[must_use]
     pub fn meter(&self) -> String {
-        self.channels.first().map_or_else(|| "a meter".to_owned(), |c| meter(c))
+        // of one amplifier for both cells of a stand the one that measures thrust is the one that is known
+        let known = self.channels.iter().find(|c| *c == "thrust_n").or(self.channels.first());
+        known.map_or_else(|| "a meter".to_owned(), |c| meter(c))
     }
 
     /// Unit of its first channel.

@@ -26,7 +26,7 @@ impl AirframeEffect for TranslationalLift {
 
     fn about(&self) -> About {
         About {
-            title: "Thrust grows across the air and falls in a climb",
+            title: "Thrust changes across the air and in a climb",
             equation: "T = k_T sum w^2 + across * v_xy^2 - climb * (sum w / usual sum w) * v_up, v through the air, up along the rotors",
             source: "Leishman 2006, section 3.3; Svacha, Mohta & Kumar, ICUAS 2017.",
             depends_on: &["vel", "rpm"],
@@ -36,13 +36,17 @@ impl AirframeEffect for TranslationalLift {
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
+        // what has an interval of both signs has no direction
         let word = |name: &str, [up, down]: [&'static str; 2]| match found.parameter(name) {
+            Some(p) if p.ci95[0] * p.ci95[1] <= 0.0 => "changes",
             Some(p) if p.value < 0.0 => down,
             _ => up,
         };
-        let across = word("across", ["grows", "falls"]);
-        let climb = word("climb", ["falls", "grows"]);
-        Clause::new("thrust", format!("{across} across the air and {climb} in a climb"))
+        let said = match [word("across", ["grows", "falls"]), word("climb", ["falls", "grows"])] {
+            [across, climb] if across == climb => format!("{across} across the air and in a climb"),
+            [across, climb] => format!("{across} across the air and {climb} in a climb"),
+        };
+        Clause::new("thrust", said)
     }
 
     fn scope(&self, _: &Form) -> Scope {

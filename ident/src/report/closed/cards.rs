@@ -169,7 +169,8 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     let chip = if nameless {
         format!("no name; {}", that_it_is_there(e.probability))
     } else {
-        contest(e, &format!("{sure}{there}"), &against)
+        let none = Rival::none(v, page.words, e, &against).probability;
+        contest(e, &format!("{sure}{there}"), &against, none)
     };
     let title = if nameless {
         format!("Something on {on} that goes with {}.", channels(&e.depends_on))
@@ -217,11 +218,12 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     sheet.html_part(&format!("{html}</div></div></article>\n"));
 }
 
-/// How sure a name is, its probability, and what stands against it.
-fn contest(e: &EffectEntry, sure: &str, against: &[Rival]) -> String {
+/// How sure a name is, its probability, and what stands against it; `none`: that it has no cause of its own, or another set of names.
+fn contest(e: &EffectEntry, sure: &str, against: &[Rival], none: f64) -> String {
     let p = equals(&probability(e.probability));
     match against.first().filter(|r| r.probability >= COUNTED) {
         Some(rival) => format!("{sure}: p {p}, rival {}", equals(&probability(rival.probability))),
+        None if none >= OPEN => format!("{sure}: p {p}, other names or none {}", equals(&probability(none))),
         None => format!("{sure}: p {p}, no rival"),
     }
 }

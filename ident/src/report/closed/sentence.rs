@@ -10,8 +10,8 @@ use super::contest::{Rival, is_beaten, rivals};
 use super::vocabulary::Vocabulary;
 use crate::rivals::beyond;
 use crate::unexplained::LOUD;
-use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Kind, Unexplained, Verdict};
-use crate::words::{Clause, adverb, amount, channel, counted, heading, list, upper, vector};
+use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Kind, Parameter, Unexplained, Verdict};
+use crate::words::{Clause, adverb, amount, channel, counted, heading, list, upper, upper_bound, vector};
 
 /// Most effects that the sentence names; the cards have all.
 const MOST: usize = 2;
@@ -172,7 +172,10 @@ fn sized_clause(words: Vocabulary, e: &EffectEntry) -> Clause {
     if (words.clause)(e).does.contains(|c: char| c.is_ascii_digit()) {
         return clause;
     }
-    let bound = e.parameters.iter().find(|p| is_shown(words, e, p) && counted(p).is_none()).map(|p| {
+    // an interval of both signs says no more than the card does
+    let tells = |p: &&Parameter| upper_bound(p).is_some() || p.ci95[0] * p.ci95[1] > 0.0;
+    let asked = |p: &&Parameter| is_shown(words, e, p) && counted(p).is_none() && tells(p);
+    let bound = e.parameters.iter().find(asked).map(|p| {
         let name = (words.parameter)(&e.id, &p.name);
         let [_, interval, unit] = value(p);
         // a name that ends in "up" is no place to go on with "up to"

@@ -14,8 +14,8 @@ use std::fmt::Write;
 
 /// Left end of the scale, noise floors.
 const FROM: f64 = 0.5;
-/// Per cent of the scale that the words at the floor need for themselves.
-const CLEAR: f64 = 14.0;
+/// Per cent of the scale that the word at the floor needs for itself where the scale is narrowest.
+const CLEAR: f64 = 22.0;
 /// Noise floors up to which a channel counts as explained.
 const EXPLAINED: f64 = 1.5;
 
@@ -101,7 +101,7 @@ fn drawn(channels: &Channels, left: &[&str], named: &[&str], known: bool, [_, af
     out +=
         "<div class=\"head\" role=\"row\"><span role=\"columnheader\">channel</span><span class=\"axis\" role=\"columnheader\">";
     for tick in scale.ticks() {
-        let name = if tick == 1.0 { "noise floor".to_owned() } else { format!("{tick:.0}") };
+        let name = if tick == 1.0 { "floor".to_owned() } else { format!("{tick:.0}") };
         let (at, end) = match scale.at(tick) {
             at if at > 94.0 => (at, " class=\"end\""),
             at if at < 6.0 => (at, " class=\"begin\""),
@@ -212,9 +212,7 @@ mod tests {
         let scale = Scale::of(&channels);
         assert!(scale.at(1.0) > 0.0 && scale.at(100.0) < 100.0 && scale.at(0.1) == 0.0);
         assert!((scale.at(100.0) - scale.at(10.0) - (scale.at(10.0) - scale.at(1.0))).abs() < 1e-9, "logarithmic");
-        assert!(
-            html.contains("noise floor") && html.contains("not predicted: no command was logged") && html.contains("explained")
-        );
+        assert!(html.contains(">floor<") && html.contains("not predicted: no command was logged") && html.contains("explained"));
         assert_eq!(html.matches("<div").count(), html.matches("</div>").count());
     }
 }
