@@ -7,6 +7,7 @@
 
 use ident::close::{Closed, close};
 use ident::log::{Column, Log};
+use ident::report::{Origin, closed_loop};
 use ident::verdict::Kind;
 
 /// The table with a supply that gives so much, A.
@@ -54,6 +55,18 @@ fn a_limit_that_both_meters_show_is_named_on_eleven_rows() {
     let lead = closed.verdict.effects.iter().find(|e| e.id == "supply_sag").expect("30 mohm");
     assert!((lead.parameters[0].value - 0.03).abs() < 0.001, "{:?}", lead.parameters);
     assert!(closed.verdict.channels["rpm"].after.heldout_rms < 100.0, "{:?}", closed.verdict.channels["rpm"]);
+}
+
+/// Its card shows what both meters read, at the limit too.
+#[test]
+fn a_limit_has_its_figure() {
+    let log = table(11.0);
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a log");
+    let page = closed_loop(&log, &closed, Origin::default());
+    let card = page.split("id=\"effect-current-limit\"").nth(1).and_then(|rest| rest.split("</article>").next()).expect("a card");
+    let dots = card.split("class=\"a dots few\"").nth(1).and_then(|rest| rest.split('/').next()).expect("readings");
+    assert_eq!(dots.matches('M').count(), 11, "{dots}");
+    assert!(card.contains("Current as measured, against the command") && card.contains("Voltage as measured"), "{card}");
 }
 
 #[test]

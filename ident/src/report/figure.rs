@@ -338,8 +338,22 @@ impl Figure {
             f.height - 8.0,
             escape(&self.x_label),
             (f.top + floor) / 2.0,
-            escape(&self.y_label)
+            self.upright(f.height)
         );
+    }
+
+    /// The ordinate's label, on two lines where the larger letters of a phone are longer than the drawing is high.
+    fn upright(&self, height: f64) -> String {
+        let middle = self.y_label.len() / 2;
+        let gap = |(at, _): &(usize, char)| at.abs_diff(middle);
+        let space = self.y_label.char_indices().filter(|(_, c)| *c == ' ').min_by_key(gap);
+        match space.filter(|_| self.captioned && on_a_phone(&self.y_label) > height - NO_TITLE) {
+            Some((at, _)) => {
+                let (first, rest) = self.y_label.split_at(at);
+                format!("<tspan x=\"0\">{}</tspan><tspan x=\"0\" dy=\"1.05em\">{}</tspan>", escape(first), escape(rest.trim()))
+            }
+            None => escape(&self.y_label),
+        }
     }
 
     /// The legend's entries, laid out in as many rows as they need.
@@ -468,7 +482,8 @@ fn draw_layer(out: &mut String, layer: &Layer, f: &Frame) {
             let at = py(*y);
             let _ = write!(
                 out,
-                "<line class=\"rule\" x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/><text class=\"tick\" text-anchor=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                "<line class=\"rule\" x1=\"{:.1}\" x2=\"{:.1}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/><text class=\"tick\" text-anchor=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                f.left,
                 WIDTH - RIGHT,
                 WIDTH - RIGHT - 4.0,
                 at - 5.0,

@@ -37,8 +37,8 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         news: closed.context.against_model,
         origin,
         declared: declared(closed),
-        hero: hero(closed),
-        cards: cards(closed),
+        hero: hero(log, closed),
+        cards: cards(log, closed),
         left: left(closed),
         readings: readings_apart(&closed.context, v, ""),
         parameters: Vec::new(),
@@ -102,12 +102,12 @@ fn trace(closed: &Closed, target: &Target) -> Option<Trace> {
 }
 
 /// The figure that convinces most; of names that the readings themselves show those readings.
-fn hero(closed: &Closed) -> Vec<Figure> {
+fn hero(log: &Log, closed: &Closed) -> Vec<Figure> {
     let mut named = closed.verdict.effects.iter().filter(|e| e.id != "unknown").peekable();
     if let Some(first) = named.peek().copied()
         && named.all(EffectEntry::is_read_off)
     {
-        return readings(closed, first, "read");
+        return readings(log, first, "read");
     }
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> = targets.filter_map(|t| trace(closed, t)).collect();
@@ -140,22 +140,17 @@ pub(super) fn readings_apart(context: &Context, v: &Verdict, run: &str) -> Vec<R
     context.targets.iter().filter(|t| named.iter().any(|name| *name == t.name)).flat_map(of_target).collect()
 }
 
-/// What an effect's channels read at each command.
-fn readings(closed: &Closed, e: &EffectEntry, id: &str) -> Vec<Figure> {
-    let Some(pulse) = &closed.context.pulse else { return Vec::new() };
+/// What an effect's channels read at each command, the levels included that nothing is predicted of.
+fn readings(log: &Log, e: &EffectEntry, id: &str) -> Vec<Figure> {
+    let Some(pulse) = log.column("pulse_us") else { return Vec::new() };
     let figure = |name: &String| {
-        let target = target(closed, name)?;
+        let y = log.column(name)?.to_vec();
         Some(thinned(Figure {
             id: format!("{id}-{}", parts::slug(name)),
             title: format!("{} as measured, against the command", heading(name)),
             x_label: axis("pulse_us"),
             y_label: axis(name),
-            layers: vec![Layer::Dots {
-                name: "measured".to_owned(),
-                class: "a",
-                x: of_rows(target, pulse),
-                y: claimed(target).map(|k| target.y[k]).collect(),
-            }],
+            layers: vec![Layer::Dots { name: "measured".to_owned(), class: "a", x: pulse.to_vec(), y }],
             height: 280.0,
             ..Figure::default()
         }))
@@ -200,7 +195,7 @@ pub(super) fn card_alone(closed: &Closed, e: &EffectEntry, id: &str) -> Option<F
 }
 
 /// Figures of each effect: what its first channel leaves over without it and with it; of what whole levels show their readings.
-fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
+fn cards(log: &Log, closed: &Closed) -> Vec<Vec<Figure>> {
     let mut used = vec![false; closed.model.effects.len()];
     closed
         .verdict
@@ -215,7 +210,7 @@ fn cards(closed: &Closed) -> Vec<Vec<Figure>> {
                     used[i] = true;
                     card(closed, e, i, &id).unwrap_or_default()
                 }
-                None if e.is_read_off() && !e.is_of_single_readings() => readings(closed, e, &id),
+                None if e.is_read_off() && !e.is_of_single_readings() => readings(log, e, &id),
                 None => Vec::new(),
             }
         })

@@ -8,7 +8,7 @@
 use super::evidence::pair;
 use crate::report::svg::escape;
 use crate::unexplained::LOUD;
-use crate::verdict::{Channels, Kind, Verdict};
+use crate::verdict::{Channel, Channels, Kind, Verdict};
 use crate::words::{channel, digits, scaled, upper};
 use std::fmt::Write;
 
@@ -154,9 +154,11 @@ fn drawn(channels: &Channels, left: &[&str], named: &[&str], known: bool, [_, af
         "corrected, after" => "corrected model, after".to_owned(),
         after => after.to_owned(),
     };
+    let ends = |c: &Channel| [c.before, c.after].iter().any(|f| f.heldout_rms < FROM * c.noise_floor_rms);
+    let cut = if channels.values().any(ends) { " A bar that ends at the left edge is below half a floor." } else { "" };
     let _ = writeln!(
         out,
-        "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: {}. Logarithmic, in noise floors of each channel. Error on rows that no fit saw.</p>",
+        "</div>\n<p class=\"soft key\"><b class=\"before\"></b> hollow: declared model, before <b class=\"after\"></b> solid: {}. Logarithmic, in noise floors of each channel. Error on rows that no fit saw.{cut}</p>",
         escape(&after)
     );
     out
@@ -175,7 +177,7 @@ pub(super) fn factor(before: f64, after: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict::{Channel, Figures};
+    use crate::verdict::Figures;
 
     #[test]
     fn no_state_contradicts_what_stands_beside_it() {
@@ -209,6 +211,7 @@ mod tests {
         channels.not_predicted.insert("rpm".into(), "no command was logged".into());
         let html = bars(&channels, &[], &[], ["declared, nothing added", ""]);
         assert!(!html.contains("corrected"), "{html}");
+        assert!(!html.contains("half a floor"), "none of these is");
         let scale = Scale::of(&channels);
         assert!(scale.at(1.0) > 0.0 && scale.at(100.0) < 100.0 && scale.at(0.1) == 0.0);
         assert!((scale.at(100.0) - scale.at(10.0) - (scale.at(10.0) - scale.at(1.0))).abs() < 1e-9, "logarithmic");

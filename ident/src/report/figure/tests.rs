@@ -61,6 +61,28 @@ fn nothing_to_show_is_said() {
     assert!(!example().is_empty());
 }
 
+/// A label that is longer than the drawing is high, in the letters of a phone, stands on two lines.
+#[test]
+fn no_label_is_cut_off() {
+    let of = |label: &str, captioned: bool| Figure { y_label: label.into(), captioned, ..example() }.svg();
+    let long = "time constant as it speeds up, s";
+    assert!(of(long, true).contains("time constant as</tspan>") && of(long, true).contains(">it speeds up, s</tspan>"));
+    for one_line in [of(long, false), of("left over, N", true)] {
+        assert!(!one_line.contains("tspan"), "{one_line}");
+    }
+}
+
+/// What is told by colour is told without it: the legend's marks of what stands before and after are of two kinds.
+#[test]
+fn before_and_after_differ_without_colour() {
+    let dots = |class| Layer::Dots { name: class.to_owned(), class, x: vec![0.0, 1.0], y: vec![0.0, 1.0] };
+    let svg = Figure { layers: vec![dots("a"), dots("b")], ..Figure::default() }.svg();
+    assert!(svg.contains("<circle class=\"a spot\"") && svg.contains("<rect class=\"b spot\""), "{svg}");
+    let wide =
+        |rule: &str| super::super::style::DRAWING.split(rule).nth(1).unwrap().split('}').next().unwrap().parse::<f64>().unwrap();
+    assert!(wide("path.a{stroke-width:") > 1.5 * wide("path.b{stroke-width:"));
+}
+
 /// A read-out near an edge must not be cut off.
 #[test]
 fn read_outs_stay_inside() {
