@@ -410,6 +410,29 @@ fn a_cause_has_a_size_or_a_bound() {
     assert!(said.starts_with("The supply lead sags with the current (resistance: up to 0.21 ohm)."), "{said}");
 }
 
+/// What may be of either sign has no direction and no size: it changes, and the interval stands on the card alone.
+#[test]
+fn an_interval_of_both_signs_is_not_in_the_head() {
+    let sizes = vec![parameter("across", -0.02, 0.05, "N/(m/s)^2"), parameter("climb", 0.3, 0.01, "N/(m/s)")];
+    let e = effect("translational_lift", "thrust_n", 0.99, 0.5, sizes);
+    let said = sentence(&verdict(Kind::Attributed, vec![e.clone()]), ident::flight::VOCABULARY, false);
+    assert!(said.starts_with("Thrust changes across the air and falls in a climb (") && said.contains("0.29 to 0.31"), "{said}");
+    assert!(!said.contains("-0.07"), "{said}");
+    let sizes = vec![parameter("across", -0.2, 0.05, "N/(m/s)^2"), parameter("climb", -0.3, 0.01, "N/(m/s)")];
+    let said =
+        sentence(&verdict(Kind::Attributed, vec![EffectEntry { parameters: sizes, ..e }]), ident::flight::VOCABULARY, false);
+    assert!(said.starts_with("Thrust falls across the air and grows in a climb"), "{said}");
+}
+
+/// One amplifier of both cells of a stand is the load cell's, whichever of them comes first.
+#[test]
+fn the_meter_of_thrust_and_torque_is_the_load_cell() {
+    let of =
+        |channels: &[&str]| EffectEntry { channels: channels.iter().map(|c| (*c).to_owned()).collect(), ..filter(0.9) }.meter();
+    assert_eq!(of(&["torque_nm", "thrust_n"]), "the load cell");
+    assert_eq!(of(&["torque_nm"]), "the torque cell");
+}
+
 /// Single readings are told once for all channels and runs, apart from the causes.
 #[test]
 fn absurd_readings_are_one_account() {

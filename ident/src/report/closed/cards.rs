@@ -398,3 +398,19 @@ fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
         crate::effects::Scope::Event => "the same schedule once more: what happened once is not there again.".to_owned(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::closed::vocabulary::bare_entry;
+
+    /// A name that lacks a third of the certainty says to what: a rival, or names that nobody has thought of, or none.
+    #[test]
+    fn what_a_name_lacks_is_told() {
+        let e = EffectEntry { probability: 0.63, ..bare_entry("creep") };
+        let rival = |probability: f64| Rival { ids: vec!["stall".into()], said: "the blades stall".into(), probability };
+        assert_eq!(contest(&e, "likely", &[rival(0.3)], 0.0), "likely: p = 0.63, rival = 0.30");
+        assert_eq!(contest(&e, "likely", &[], 0.25), "likely: p = 0.63, other names or none = 0.25");
+        assert_eq!(contest(&e, "likely", &[rival(0.001)], 0.0), "likely: p = 0.63, no rival");
+    }
+}
