@@ -103,7 +103,8 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         )
     };
     let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
-    let mut after_model = left(Model::of_estimates(&context, log, declared, fit, estimates.clone()), fit).supplied_by(&context);
+    let after_model = Model::of_estimates(&context, log, declared, fit, estimates.clone()).believing(&diagnosis.inclusion);
+    let mut after_model = left(after_model, fit).supplied_by(&context);
     let mut verdict = Verdict {
         format: FORMAT,
         run: log.name.clone(),

@@ -54,6 +54,31 @@ fn every_page_is_in_the_contents_once() {
     assert_eq!(once, there, "left: docs/SUMMARY.md, right: the pages below docs/");
 }
 
+/// A page that names a test program names one that cargo builds, and modules that are in it.
+#[test]
+fn every_test_that_a_page_names_is_there() {
+    let contributing = ("CONTRIBUTING.md".to_owned(), read("CONTRIBUTING.md"));
+    let all = pages().into_iter().map(|p| (format!("docs/{}", p.name), read(&format!("docs/{}", p.name)))).chain([contributing]);
+    let (mut wrong, mut asked) = (Vec::new(), 0);
+    for (page, text) in all {
+        for line in text.lines().filter(|line| line.contains("cargo test") && line.contains("--test ")) {
+            let words: Vec<&str> = line.split(['`', ' ', ')']).filter(|w| !w.is_empty()).collect();
+            let after = |flag: &str| words.windows(2).filter(|w| w[0] == flag).map(|w| w[1]).collect::<Vec<_>>();
+            // of the whole workspace it is one of the integration tests'
+            let package = after("-p").first().map_or("tests".to_owned(), |p| p.replace("quadrig-tests", "tests"));
+            let programs = after("--test");
+            asked += programs.len();
+            let is_there = |program: &&str| root().join(format!("{package}/tests/{program}.rs")).is_file();
+            let merged = |program: &&str| package != "tests" || ["suite", "boards"].contains(program);
+            wrong.extend(programs.iter().filter(|p| !is_there(p) || !merged(p)).map(|p| format!("{page}: --test {p}")));
+            let modules = words.iter().filter_map(|w| w.strip_suffix("::")).filter(|_| package == "tests");
+            wrong.extend(modules.filter(|m| !is_there(m)).map(|m| format!("{page}: {m}::")));
+        }
+    }
+    assert!(asked > 10, "{asked} test programs are named");
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
 #[test]
 fn every_link_leads_to_a_file_of_the_book() {
     let dead: Vec<String> = pages()
