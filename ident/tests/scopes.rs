@@ -88,6 +88,22 @@ fn a_drift_stays_at_home_and_damage_travels() {
     assert!(error(&carried, &later, "torque_nm") < 0.5 * error(model, &later, "torque_nm"));
 }
 
+/// On a run that only climbs a zero that jumps looks like a part of the load's curve. Where it surely happened, it is none on another run.
+#[test]
+fn a_jump_on_a_climb_leaves_the_curve_as_it_is() {
+    const JUMP: (f64, f64) = (0.15, 32.5);
+    let mut climb = run("climb.csv", 1, 0.0, None);
+    climb.t.truncate(700);
+    climb.columns.iter_mut().for_each(|c| c.values.truncate(700));
+    let thrust = climb.columns.iter_mut().find(|c| c.name == "thrust_n").expect("a thrust");
+    thrust.values.iter_mut().zip(&climb.t).filter(|(_, t)| **t >= JUMP.1).for_each(|(y, _)| *y += JUMP.0);
+    let closed = close(&climb, None, &[], &mut |_| {}).expect("a verdict");
+    let jump = closed.verdict.effects.iter().find(|e| e.id == "tare_shift").expect("the jump");
+    assert!(jump.probability > 0.8 && jump.scope == Scope::Event, "{jump:?}");
+    let off = error(&closed.model.elsewhere(), &run("other.csv", 5, 0.0, None), "thrust_n");
+    assert!(off < 0.02, "{off} N, and the noise is 0.01 N");
+}
+
 #[test]
 fn the_file_says_it_too() {
     let (log, closed) = closed();

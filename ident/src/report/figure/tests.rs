@@ -75,7 +75,7 @@ fn no_label_is_cut_off() {
 /// What is told by colour is told without it: the legend's marks of what stands before and after are of two kinds.
 #[test]
 fn before_and_after_differ_without_colour() {
-    let dots = |class| Layer::Dots { name: class.to_owned(), class, x: vec![0.0, 1.0], y: vec![0.0, 1.0] };
+    let dots = |class: &'static str| Layer::Dots { name: class.to_owned(), class, x: vec![0.0, 1.0], y: vec![0.0, 1.0] };
     let svg = Figure { layers: vec![dots("a"), dots("b")], ..Figure::default() }.svg();
     assert!(svg.contains("<circle class=\"a spot\"") && svg.contains("<rect class=\"b spot\""), "{svg}");
     let wide =
