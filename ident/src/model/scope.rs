@@ -1,8 +1,8 @@
 //! What of a model holds on which run.
 //!
 //! What it is: an effect of the rig acts on every run; one of a run, or an event, belongs to the run that it was fitted to. On another run
-//! of the rig an event acts as far as it left something behind, from the start. Of all else the mean goes into the declared polynomial, as far as
-//! the name is in doubt: where it is no such cause, the course was the load's.
+//! of the rig an event acts as far as it left something behind, from the start. Of all else the mean goes into the declared polynomial, so that
+//! leaving it out costs nothing; of an event, which does not happen again, as far as its name is in doubt.
 //! What can go wrong: a log is the model's own only where its SHA-256 is the same; a copy with another head is another run.
 //! Units: as the channels.
 //! Reference: specification `formats.md`, "Scope".
@@ -110,11 +110,12 @@ impl Model {
         out
     }
 
-    /// The model with names that are there with such probabilities, those of its last effects. What a name took for its own is the load's curve as
-    /// far as it is not there; a step on a run that only climbs looks like a part of the curve, and is none where it surely happened.
+    /// The model with names that are there with such probabilities, those of its last effects. What an event took for its own is the load's curve as
+    /// far as it did not happen; a step on a run that only climbs looks like a part of the curve, and is none where it surely happened.
     pub(crate) fn believing(mut self, inclusion: &[f64]) -> Self {
         let first = self.effects.len().saturating_sub(inclusion.len());
-        for (added, probability) in self.effects.iter_mut().skip(first).zip(inclusion).filter(|(a, _)| is_named(&a.placed)) {
+        let is_event = |a: &AddedEffect| is_named(&a.placed) && a.placed.effect.scope(&a.placed.instance) == Scope::Event;
+        for (added, probability) in self.effects.iter_mut().skip(first).zip(inclusion).filter(|(a, _)| is_event(a)) {
             let doubt = (1.0 - probability).clamp(0.0, 1.0);
             added.mean.iter_mut().flat_map(|(_, mean)| mean).for_each(|m| *m *= doubt);
         }
