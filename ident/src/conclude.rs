@@ -1,8 +1,8 @@
 //! The last look at a complete hypothesis: no name makes things worse.
 //!
 //! What it is: each effect of what the search has come to is held against all the others. One that acts before its cause, lies on a bound,
-//! takes away no error, makes another channel worse, cancels another one, or could as well be nothing, goes; what is left is fitted again and
-//! asked again.
+//! takes away no error, makes another channel worse, cancels another one, is lost in what is left, or could as well be nothing, goes; what is left
+//! is fitted again and asked again.
 //! What can go wrong: of two that do harm together one goes, the one that helps least; which of them was right is not asked.
 //! Units: errors in the channel's unit, shares of them.
 //! Reference: specification `closing-the-loop.md`, step 6; `formats.md`, "Verdict" ("no name may make things worse").

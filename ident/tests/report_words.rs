@@ -416,7 +416,10 @@ fn an_interval_of_both_signs_is_not_in_the_head() {
     let sizes = vec![parameter("across", -0.02, 0.05, "N/(m/s)^2"), parameter("climb", 0.3, 0.01, "N/(m/s)")];
     let e = effect("translational_lift", "thrust_n", 0.99, 0.5, sizes);
     let said = sentence(&verdict(Kind::Attributed, vec![e.clone()]), ident::flight::VOCABULARY, false);
-    assert!(said.starts_with("Thrust changes across the air and falls in a climb (") && said.contains("0.290 to 0.310"), "{said}");
+    assert!(
+        said.starts_with("Thrust changes across the air and falls in a climb (") && said.contains("0.290 to 0.310"),
+        "{said}"
+    );
     assert!(!said.contains("-0.07"), "{said}");
     let sizes = vec![parameter("across", -0.2, 0.05, "N/(m/s)^2"), parameter("climb", -0.3, 0.01, "N/(m/s)")];
     let said =
