@@ -14,7 +14,7 @@ use crate::diagnose::NEEDED_REDUCTION;
 use crate::effects::{Effect, Estimate, Instance, NEEDED_EVIDENCE, Shape};
 use crate::heldout::{self, Held};
 use crate::hypothesis::{Declared, Fit, Placed, is_plausible, part_of};
-use crate::unexplained::looks_like;
+use crate::unexplained::wanders;
 
 /// Share by which the error of a channel may be larger with the names than before.
 const WORSE: f64 = 0.02;
@@ -85,25 +85,26 @@ pub(crate) fn drowned(context: &Context, declared: Declared<'_>, fit: &Fit, erro
         return None;
     }
     let left = heldout::residuals(context, declared, fit);
+    let slow: Vec<bool> = context.targets.iter().zip(&left).map(|(target, left)| wanders(target, left)).collect();
     let asked = |k: &usize| {
         let placed = &fit.placed[*k];
         // that a rotor takes time, and a supply gives way, needs no witness
         let of_every = placed.effect.is_of_every_rig() || placed.instance.touches("voltage_v");
         let chosen = is_named(placed) && !placed.is_tare() && !of_every && !placed.effect.scatters();
-        chosen && placed.effect.seen(context, &placed.instance) <= NEEDED_EVIDENCE
+        let on_slow = touched(context, placed).any(|(i, _)| slow[i]);
+        chosen && on_slow && placed.effect.seen(context, &placed.instance) <= NEEDED_EVIDENCE
     };
     let speaks = |k: usize| {
         let (mut most, mut lost, mut cleared) = (0.0_f64, false, false);
-        for (i, target) in touched(context, &fit.placed[k]) {
+        for (i, _) in touched(context, &fit.placed[k]) {
             let taken = 1.0 - errors.after[i].claimed / errors.without[k][i].claimed;
             let change = contribution(context, declared, fit, k, i);
             // a quick change shows through something slow
-            let wanders = looks_like(context, target, &left[i]).starts_with("slow")
-                && effective_share(&change) <= effective_share(&left[i]);
+            let hidden = slow[i] && effective_share(&change) <= effective_share(&left[i]);
             let independent = left[i].len() as f64 * Colour::of(&left[i]).share_along(&change);
             most = most.max(-independent * (1.0 - taken).ln());
-            lost |= wanders;
-            cleared |= taken > if wanders { OFF_A_WALK } else { NEEDED_REDUCTION };
+            lost |= hidden;
+            cleared |= taken > if hidden { OFF_A_WALK } else { NEEDED_REDUCTION };
         }
         (lost && !cleared && most < OF_A_WALK).then_some((k, most))
     };

@@ -86,33 +86,67 @@ fn contrast(target: &Target, residual: &[f64]) -> f64 {
     rms / target.noise.rms
 }
 
-/// The shape of a residual in words.
-pub(crate) fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
-    // of rows about which nothing is claimed nothing is told
-    let of_row = |(r, row): (&f64, &usize)| if target.claims(*row) { r * r } else { 0.0 };
-    let mut squares: Vec<f64> = residual.iter().zip(&target.rows).map(of_row).collect();
+/// What a residual is like.
+#[derive(Debug, Clone, PartialEq)]
+enum Look {
+    /// Most of it while the load is on its way.
+    OnTheWay,
+    /// Most of it in one stretch of the samples.
+    InOne(Range<usize>),
+    /// Most of it in few rows that lie apart.
+    InSingleRows,
+    /// It wanders: few of its samples are independent.
+    Slow,
+    /// It lasts longer than a row.
+    OverSeveralRows,
+    /// From row to row.
+    Quick,
+}
+
+fn look(target: &Target, residual: &[f64], squares: &[f64]) -> Look {
     let whole = squares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let on_the_way: f64 = squares.iter().zip(&target.unsettled).filter(|(_, u)| **u).map(|(s, _)| s).sum();
     if 2.0 * on_the_way > whole {
-        return "while the load is on its way".to_owned();
+        return Look::OnTheWay;
     }
-    let grows = grows_with_the_load(context, target, &squares);
-    let (in_a_row, stretch) = loudest_stretch(&squares);
-    let in_order = squares.clone();
-    squares.sort_unstable_by(|a, b| b.total_cmp(a));
-    let few = (FEW * squares.len() as f64).ceil() as usize;
-    if 2.0 * squares.iter().take(few).sum::<f64>() > whole {
-        return if 2.0 * in_a_row > whole && stretch.len() > 1 && in_order.get(stretch.clone()).is_some_and(is_filled) {
-            in_one(context, target, &stretch)
-        } else {
-            "in single rows".to_owned()
-        };
+    let mut largest = squares.to_vec();
+    largest.sort_unstable_by(|a, b| b.total_cmp(a));
+    let few = (FEW * largest.len() as f64).ceil() as usize;
+    if 2.0 * largest.iter().take(few).sum::<f64>() > whole {
+        let (in_a_row, stretch) = loudest_stretch(squares);
+        let is_one = 2.0 * in_a_row > whole && stretch.len() > 1 && squares.get(stretch.clone()).is_some_and(is_filled);
+        return if is_one { Look::InOne(stretch) } else { Look::InSingleRows };
     }
-    let pace = match effective_share(residual) {
-        share if share < SLOW => "slow",
-        _ if neighbours_agree(residual) => "over several rows",
-        _ => "from row to row",
+    match effective_share(residual) {
+        share if share < SLOW => Look::Slow,
+        _ if neighbours_agree(residual) => Look::OverSeveralRows,
+        _ => Look::Quick,
+    }
+}
+
+/// The squares of a target's residual; of rows about which nothing is claimed nothing is told.
+fn told_squares(target: &Target, residual: &[f64]) -> Vec<f64> {
+    let of_row = |(r, row): (&f64, &usize)| if target.claims(*row) { r * r } else { 0.0 };
+    residual.iter().zip(&target.rows).map(of_row).collect()
+}
+
+/// Whether a residual wanders: it is slow throughout, neither in few rows nor while the load is on its way.
+pub(crate) fn wanders(target: &Target, residual: &[f64]) -> bool {
+    look(target, residual, &told_squares(target, residual)) == Look::Slow
+}
+
+/// The shape of a residual in words.
+pub(crate) fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
+    let squares = told_squares(target, residual);
+    let pace = match look(target, residual, &squares) {
+        Look::OnTheWay => return "while the load is on its way".to_owned(),
+        Look::InOne(stretch) => return in_one(context, target, &stretch),
+        Look::InSingleRows => return "in single rows".to_owned(),
+        Look::Slow => "slow",
+        Look::OverSeveralRows => "over several rows",
+        Look::Quick => "from row to row",
     };
+    let grows = grows_with_the_load(context, target, &squares);
     if grows { format!("{pace}, grows with the load") } else { pace.to_owned() }
 }
 

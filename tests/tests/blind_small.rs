@@ -50,32 +50,34 @@ fn messy_rigs_get_names_and_no_panic() {
     assert!(names[1] * 5 >= names[0] * 2, "{} of {} names are true", names[1], names[0]);
 }
 
+/// Of messy rigs by seed: a name that is there, and what stands in none. False names begin with `!`.
+fn names_are(cases: &[(u64, &str, &str)]) {
+    for (seed, is, is_not) in cases {
+        let named = messy::score::score(*seed).named;
+        assert!(named.contains(is) && !named.contains(is_not), "{seed}: {named}");
+    }
+}
+
 /// Rigs of the tuning half on which a search in order of the grids' gains, of one window for two meters, or behind the first in rank stops too early:
 /// a gain of the load cell behind forms of one other effect, two slow meters with times of their own, two lost pulses in a run, a damaged blade.
 #[test]
 fn what_the_first_guess_hides_is_found() {
-    for (seed, is, is_not) in [
+    names_are(&[
         (96722, "gain_change@thrust_n", "tare_shift"),
         (96766, "channel_filter@torque_nm", "channel_delay"),
         (96754, "missed_pulses@rpm_encoder", "!"),
         (97758, "blade_damage", "hysteresis"),
-    ] {
-        let named = messy::score::score(seed).named;
-        assert!(named.contains(is) && !named.contains(is_not), "{seed}: {named}");
-    }
+    ]);
 }
 
 /// Rigs of the tuning half with something nameless that wanders on thrust: nothing that is lost in it is named. What shows through something that
 /// wanders is: a zero that jumps, a lead's resistance.
 #[test]
 fn what_is_lost_in_a_wander_has_no_name() {
-    for (seed, is, is_not) in [
+    names_are(&[
         (96741, "channel_filter@current_a", "thrust_n"),
         (97712, "channel_filter@torque_nm", "thrust_n"),
         (97737, "tare_shift@thrust_n", "!"),
         (97739, "supply_sag@voltage_v", "!"),
-    ] {
-        let named = messy::score::score(seed).named;
-        assert!(named.contains(is) && !named.contains(is_not), "{seed}: {named}");
-    }
+    ]);
 }
