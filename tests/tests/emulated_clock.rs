@@ -4,6 +4,7 @@ use frame::message::{ClockNews, Command, CrashCause, Event, Message};
 use frame::rig::{Fault, RigState};
 use frame::units::PulseWidth;
 use hal_sim::Scenario;
+use hal_sim::emulated::ahrs::{BusFault, ChipKind, Motion, ahrs};
 use hal_sim::emulated::operator::ArmAndRun;
 use hal_sim::emulated::rig::{Action, Heard, Operator, RigRun, rig_on};
 use hal_sim::emulated::{Machine, Quartz};
@@ -138,4 +139,20 @@ fn a_hard_fault_in_flight_gives_minimum_and_is_told_with_its_place() {
     assert_ne!(crash.status & 0x8200, 0, "a precise bus fault (CFSR.BFSR): {:#x}", crash.status);
     let live = run.pulses.iter().filter(|p| p.at_ns > done && p.width_ns > MS).count();
     assert_eq!(live, 0, "no live pulse starts after the fault");
+}
+
+/// Translations pass from board to board of one process: a later board runs as the first, also with another image in between.
+#[test]
+fn a_later_board_runs_as_the_first() {
+    let runs = [0, 1, 2].map(|n| {
+        if n == 2 {
+            let other = ahrs(Motion::LEVEL, &ChipKind::ALL, BusFault::None, 300).unwrap_or_else(|error| panic!("{error}"));
+            other.outcome.accesses.only(&[]).unwrap();
+        }
+        fly(Quartz::Good(8_000_000), None, 1_500)
+    });
+    for later in &runs[1..] {
+        assert_eq!(later.outcome.instructions, runs[0].outcome.instructions);
+        assert!(later.outcome.telemetry == runs[0].outcome.telemetry && later.pulses == runs[0].pulses);
+    }
 }
