@@ -14,10 +14,9 @@ mod text;
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::trouble::unwritten;
+use crate::replace::put;
 use dcm::calibration::Calibration;
 use dcm::{Classic, ClassicConfig, Config, Dcm, Earth, Fresh, Mat3, Measurement, euler_of, quaternion_of};
-use ident::log::write_whole;
 use imu_log::{ImuLog, Row};
 use std::path::PathBuf;
 
@@ -119,7 +118,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             bar.set(n as f64 / log.rows.len() as f64);
         }
     }
-    write_whole(&args.output, |file| file.write_all(out.as_bytes())).map_err(unwritten(&args.output))?;
+    put(&args.output, &out)?;
     if !quiet {
         let has = |name: &str, of: fn(&Row) -> bool| if log.rows.iter().any(of) { "" } else { name }.to_owned();
         let lacks = has(" without gyro", |r| r.gyro.is_some())

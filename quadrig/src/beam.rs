@@ -9,11 +9,10 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::{Folder, figures};
 use crate::open::open;
-use crate::trouble::unwritten;
+use crate::replace::put;
 use ident::beam::Beam;
 use ident::context::Context;
 use ident::import::Options;
-use ident::log::write_whole;
 use ident::plateau::plateaus;
 use ident::quantity::{Density, Kilogram, Metre, Newton, Pascal, RevPerMin, Volt};
 use ident::report::{beam, beam_figures, beam_warning};
@@ -97,7 +96,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let met = design.crossings(args.blades, &speeds, args.near / 100.0);
     let sheet = beam(&design, args.blades, &met);
     if let Some(path) = &args.output {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
+        put(path, &sheet.html())?;
     }
     if let Some(folder) = svg {
         figures(folder, sheet.drawn())?;

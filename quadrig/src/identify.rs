@@ -10,12 +10,12 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::{Folder, figures};
 use crate::open::{Columns, Names, open};
-use crate::trouble::unwritten;
+use crate::replace::put;
 use ident::context::unit_of;
 use ident::fit::power::{csv, in_doubt};
 use ident::fit::ratio;
 use ident::identify::{Identified, identify, identify_in};
-use ident::log::{Log, write_whole};
+use ident::log::Log;
 use ident::report::{Sheet, WIDEST, headline, number, wrapped};
 use ident::words::{bracketed, channel};
 use std::path::PathBuf;
@@ -82,7 +82,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         written.extend(&args.svg);
     }
     for (path, text) in table.into_iter().chain(surface).chain(page).chain([model]) {
-        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|e| unwritten(path)(e) + &there(&written))?;
+        put(path, &text).map_err(|why| format!("{why}{}", there(&written)))?;
         written.push(path);
     }
     if !quiet {

@@ -9,8 +9,7 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::join::{With, join};
 use crate::open::{Columns, Names, as_written};
-use crate::trouble::unwritten;
-use ident::log::write_whole;
+use crate::replace::{put, put_as, put_log};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -97,18 +96,17 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     if is_flight {
         args.meta.iter().for_each(|Meta(key, value)| drop(log.meta.insert(key.clone(), value.clone())));
-        ident::flight_log::write(&log, &args.output)
+        put_as(&args.output, &format!("# {}", ident::flight_log::FORMAT), |out| ident::flight_log::write_to(&log, out))?;
     } else if let Some(Meta(key, _)) = args.meta.first() {
         return Err(format!("--meta {key}: {} is no flight; expected a flight", args.file.display()).into());
     } else {
         // what every reader takes, or nothing
         as_written(&log)?;
-        log.write(&args.output)
+        put_log(&args.output, &log)?;
     }
-    .map_err(unwritten(&args.output))?;
     if let Some(page) = &shown {
         let path = args.output.with_extension("joint.html");
-        write_whole(&path, |out| out.write_all(page.as_bytes())).map_err(unwritten(&path))?;
+        put(&path, page)?;
     }
     if !quiet {
         crate::say::text(&report.table());

@@ -7,6 +7,7 @@
 //! Reference: specification `formats.md`, "Attitude log"; docs/scenario.md.
 
 use crate::Failure;
+use crate::run_log::SIMULATED;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -45,8 +46,32 @@ pub(crate) fn refuse_no_model(path: &Path) -> Result<(), Failure> {
     what.map_or(Ok(()), |what| Err(format!("{}:1:1: {what}; {expected}", path.display()).into()))
 }
 
+/// Whether what lies at `path` was computed, and is of the kind of what comes now (all of it, or its first line): it can be computed again. A recording
+/// cannot, and what somebody wrote by hand cannot.
+pub(crate) fn is_computed(path: &Path, now: &str) -> bool {
+    let Some(text) = head(path) else { return false };
+    let kind = kind_of(&text);
+    let begins_alike = || text.lines().next() == now.lines().next();
+    kind == kind_of(now)
+        && match kind {
+            Some(MODEL | PAGE | VERDICT | PINS) => true,
+            Some(LOG | FLIGHT) => text.lines().any(|line| line == format!("# date = {SIMULATED:?}")),
+            // values over time may be a recording, whoever computes some of the same columns
+            Some(TABLE) => begins_alike() && !now.starts_with("t_s,"),
+            _ => false,
+        }
+}
+
 /// A file of settings that this program wrote from a run.
 const MODEL: &str = "a model";
+/// A page of this program's.
+const PAGE: &str = "a page";
+const VERDICT: &str = "a verdict";
+const LOG: &str = "a log";
+const FLIGHT: &str = "a flight's log";
+const TABLE: &str = "a table of values, such as a log";
+/// A record of a simulated board's pins, by its first words.
+pub(crate) const PINS: &str = "quadrig pins";
 
 /// The beginning of a file.
 fn head(path: &Path) -> Option<String> {
@@ -59,23 +84,26 @@ fn head(path: &Path) -> Option<String> {
 fn kind_of(text: &str) -> Option<&'static str> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
     if text.starts_with('<') {
-        return Some(if is_ours(text) { "a page" } else { "a web page" });
+        return Some(if is_ours(text) { PAGE } else { "a web page" });
     }
     if text.starts_with('{') && text.contains("\"quadrig-verdict") {
-        return Some("a verdict");
+        return Some(VERDICT);
     }
     if let Ok(table) = toml::from_str::<toml::Table>(text) {
         let format = table.get("format").and_then(toml::Value::as_str).unwrap_or_default();
         return format.starts_with("quadrig-").then_some(MODEL);
     }
+    if text.starts_with(PINS) {
+        return Some(PINS);
+    }
     if text.starts_with("# quadrig-flight") {
-        return Some("a flight's log");
+        return Some(FLIGHT);
     }
     if text.starts_with("# quadrig-") {
-        return Some("a log");
+        return Some(LOG);
     }
     let first = text.lines().find(|line| !line.starts_with('#') && !line.trim().is_empty())?;
-    (first.matches([',', ';', '\t']).count() >= 2 && !first.contains('=')).then_some("a table of values, such as a log")
+    (first.matches([',', ';', '\t']).count() >= 2 && !first.contains('=')).then_some(TABLE)
 }
 
 /// What a file is that is no run, where it is one that this program knows.

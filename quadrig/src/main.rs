@@ -46,6 +46,7 @@ mod predict;
 mod progress;
 mod recalibrate;
 mod record;
+mod replace;
 mod rig;
 mod run_log;
 mod runs;

@@ -9,10 +9,10 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
 use crate::open::{Columns, Names, open};
-use crate::trouble::unwritten;
+use crate::replace::put_as;
 use clap::ValueEnum;
 use ident::context::Context;
-use ident::log::{Column, Log, write_whole};
+use ident::log::{Column, Log};
 use ident::model::Model;
 use ident::simulate::from_command;
 use std::borrow::Cow;
@@ -95,9 +95,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         )
         .into());
     }
-    write_whole(&args.output, |out| {
-        let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
-        writeln!(out, "t_s,{}", names.join(","))?;
+    let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+    let head = format!("t_s,{}", names.join(","));
+    put_as(&args.output, &head, |out| {
+        writeln!(out, "{head}")?;
         for (i, t) in log.t.iter().enumerate() {
             write!(out, "{t}")?;
             for c in &columns {
@@ -107,7 +108,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
         Ok(())
     })
-    .map_err(|e| unwritten(&args.output)(e).into())
 }
 
 fn by_relations(model: &Model, log: &Log) -> Vec<Column> {

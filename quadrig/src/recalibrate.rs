@@ -9,8 +9,8 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::kind::refuse_other;
+use crate::replace::put_log;
 use crate::rig::{date, file};
-use crate::trouble::unwritten;
 use firmware_rig::Config;
 use firmware_rig::rig_config::Calibrated;
 use frame::calibration::AdcScale;
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     let words = format!("{} with {}", args.log.display(), args.with.display());
     log.meta.insert("recalibrated".to_owned(), Value::String(words));
-    log.write(&args.output).map_err(unwritten(&args.output))?;
+    put_log(&args.output, &log)?;
     if !quiet {
         changed.iter().for_each(|line| say!("{line}"));
     }

@@ -77,7 +77,7 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: b
 }
 
 /// What stands in the place of the day of a run that nobody made.
-const SIMULATED: &str = "simulated";
+pub(crate) const SIMULATED: &str = "simulated";
 
 /// What feeds a simulated rig, as an operator would write it down.
 fn supply(of: SupplySection) -> String {

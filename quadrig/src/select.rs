@@ -11,14 +11,15 @@ use crate::apart::Paths;
 use crate::folder::{Folder, figures, name_of};
 use crate::open::{Columns, open};
 use crate::progress::Bar;
+use crate::replace::put;
 use crate::run_log::to_log;
-use crate::trouble::{unread, unwritten};
+use crate::trouble::unread;
 use hal_sim::Scenario;
 use hal_sim::plant::{Propeller, motor};
 use hal_sim::scenario::Schedule;
 use ident::context::Context;
 use ident::identify::settled;
-use ident::log::{digest, write_whole};
+use ident::log::digest;
 use ident::plateau::plateaus;
 use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::report::{WIDEST, selection, wrapped};
@@ -146,7 +147,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let chosen = choose(&rows, &need);
     let sheet = selection(&pairs, &rows, &airframe, (&need, batteries), &from);
     if let Some(path) = &args.output {
-        write_whole(path, |out| out.write_all(sheet.html().as_bytes())).map_err(unwritten(&path))?;
+        put(path, &sheet.html())?;
     }
     if let Some(folder) = svg {
         figures(folder, sheet.drawn())?;

@@ -11,16 +11,17 @@ mod imu;
 
 use crate::Failure;
 use crate::apart::Paths;
+use crate::kind::PINS;
 use crate::live;
 use crate::open::read_model;
 use crate::progress::{Bar, foretell};
+use crate::replace::{put_as, put_log};
 use crate::run_log::{IdentifiedPlant, to_log};
-use crate::trouble::unwritten;
 use crate::view;
 use hal_sim::native::{PinRecord, Session};
 use hal_sim::scenario::AnyScenario;
 use hal_sim::{Powerplant, RunRecord, Scenario, ScenarioError, SimError, Truth};
-use ident::log::{Log, SPEED, write_whole};
+use ident::log::{Log, SPEED};
 use ident::model::Model;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -96,7 +97,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         None => flown(args, &scenario, quiet)?,
     };
     if let Some(path) = &args.truth {
-        write_whole(path, |out| write_truth(out, &record.truth)).map_err(unwritten(&path))?;
+        put_as(path, TRUTH, |out| write_truth(out, &record.truth))?;
     }
     let mut log = to_log(&scenario, &record, &name, args.raw);
     if log.is_empty() {
@@ -105,7 +106,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     if let Some(path) = &args.model {
         log = fly_model(&scenario, &read_model(path, quiet)?, &log, &name, quiet)?;
     }
-    log.write(&args.output).map_err(unwritten(&args.output))?;
+    put_log(&args.output, &log)?;
     if !quiet {
         say!("{}: {} samples over {:.1} s", args.output.display(), log.len(), log.t[log.len() - 1]);
     }
@@ -143,7 +144,7 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
         }
     }
     if let (Some(path), Some(pins)) = (&args.pins, session.pins()) {
-        write_whole(path, |mut out| pins.write(&mut out)).map_err(unwritten(&path))?;
+        put_as(path, PINS, |mut out| pins.write(&mut out))?;
     }
     let now_s = session.now_s();
     match session.finish() {
@@ -178,9 +179,12 @@ fn replayed(scenario: &Scenario, path: &Path, quiet: bool) -> Result<RunRecord, 
     Ok(RunRecord::from_telemetry(scenario, telemetry)?)
 }
 
+/// Columns of what was really there.
+const TRUTH: &str = "t_s,pulse_us,rpm,thrust_n,torque_nm,current_a,voltage_v,temp_c,beam_n,back_emf_rpm";
+
 /// What was really there, a row a sample.
 fn write_truth(out: &mut dyn Write, truth: &[Truth]) -> std::io::Result<()> {
-    writeln!(out, "t_s,pulse_us,rpm,thrust_n,torque_nm,current_a,voltage_v,temp_c,beam_n,back_emf_rpm")?;
+    writeln!(out, "{TRUTH}")?;
     for t in truth {
         let p = t.plant;
         writeln!(

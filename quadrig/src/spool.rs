@@ -134,24 +134,29 @@ impl Spool {
     }
 }
 
-/// Gives an earlier recording at `target` a second name, the first that is free of `NAME-1`, `NAME-2` and so on, and says so: the new one may
-/// take its place.
-pub(crate) fn keep_earlier(target: &Path, quiet: bool) -> Result<(), Failure> {
-    if !std::fs::metadata(target).is_ok_and(|found| found.is_file() && found.len() > 0) {
-        return Ok(());
-    }
-    let kept = second_name(target).map_err(|e| {
-        let expected = "expected a folder in which it can be renamed, or another name for the new recording";
-        format!("{}: the earlier recording cannot be kept under another name ({e}); {expected}", target.display())
-    })?;
-    if !quiet {
-        note!("{}: there was an earlier recording of this name; it is now {}", target.display(), kept.display());
+/// Gives an earlier recording at `target` a second name and says so: the new one may take its place.
+fn keep_earlier(target: &Path, quiet: bool) -> Result<(), Failure> {
+    if let Some(kept) = second_name(target)?.filter(|_| !quiet) {
+        crate::replace::tell(target, &kept);
     }
     Ok(())
 }
 
-/// Where the file is found from now on. A link leaves no instant without either name; where the disk knows none the file is renamed.
-fn second_name(target: &Path) -> std::io::Result<PathBuf> {
+/// Gives what lies at `target` a second name, the first that is free of `NAME-1`, `NAME-2` and so on; where it is found from now on. Nothing where
+/// nothing lies there.
+pub(crate) fn second_name(target: &Path) -> Result<Option<PathBuf>, Failure> {
+    if !std::fs::metadata(target).is_ok_and(|found| found.is_file() && found.len() > 0) {
+        return Ok(None);
+    }
+    let kept = renamed(target).map_err(|e| {
+        let expected = "expected a folder in which it can be renamed, or another name for the new one";
+        format!("{}: what lies there cannot be kept under another name ({e}); {expected}", target.display())
+    })?;
+    Ok(Some(kept))
+}
+
+/// A link leaves no instant without either name; where the disk knows none the file is renamed.
+fn renamed(target: &Path) -> std::io::Result<PathBuf> {
     let words = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
     let (stem, ending) = (words(target.file_stem()), words(target.extension()));
     for n in 1_u64.. {

@@ -87,17 +87,51 @@ fn an_earlier_recording_is_kept() {
     for (n, words) in [&log[..], &run, &burst].into_iter().enumerate() {
         let said = call(at, words).succeeded();
         let kept = format!("real-{}.csv", n + 1);
-        let told = format!("real.csv: there was an earlier recording of this name; it is now {kept}");
+        let told = format!("real.csv: there was an earlier file of this name; it is now {kept}");
         assert!(said.err.lines().any(|line| line.ends_with(&told)), "{words:?}: {}", said.err);
         assert!(read(&kept) == before && read("real.csv") != before, "{words:?}");
         before = read("real.csv");
     }
     assert_eq!(std::fs::read_dir(at).expect("the folder").count(), 4);
-    // what is computed is computed again
-    std::fs::write(at.join("run.toml"), "schedule = { kind = \"steps\", steps = [{ pulse_us = 1300, hold_s = 2 }] }\n")
-        .expect("a scenario");
-    call(at, &["sim", "run.toml", "-o", "real.csv"]).succeeded();
-    assert!(!at.join("real-4.csv").exists());
+}
+
+/// A typing error loses nothing: what an output would take the place of, and what no command can compute again, is found under another name.
+#[test]
+fn only_what_was_computed_is_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let steps = |pulse: u32| {
+        let text = format!("schedule = {{ kind = \"staircase\", step_us = 100, hold_s = 2, top_us = {pulse} }}\n");
+        std::fs::write(at.join("run.toml"), text).expect("a scenario");
+    };
+    let files = || std::fs::read_dir(at).expect("the folder").count();
+    steps(1700);
+    for _ in 0..2 {
+        call(at, &["sim", "run.toml", "-o", "run.csv", "--truth", "truth.csv"]).succeeded();
+        call(at, &["identify", "run.csv", "-o", "model.toml", "--table", "table.csv", "--report", "page.html"]).succeeded();
+        call(at, &["export", "model.toml", "--to", "px4", "--extrapolate", "-o", "px4.params"]).succeeded();
+    }
+    assert_eq!(files(), 7, "the same again leaves nothing beside it");
+    steps(1800);
+    call(at, &["sim", "run.toml", "-o", "run.csv"]).succeeded();
+    call(at, &["identify", "run.csv", "-o", "model.toml", "--table", "table.csv", "--report", "page.html"]).succeeded();
+    assert_eq!(files(), 7, "what is computed is computed again");
+    for (name, words) in [
+        ("mine.toml", &["identify", "run.csv", "-o", "mine.toml"][..]),
+        ("mine.csv", &["sim", "run.toml", "-o", "mine.csv"]),
+        ("mine.params", &["export", "model.toml", "--to", "px4", "--extrapolate", "-o", "mine.params"]),
+        ("notes.html", &["identify", "run.csv", "-o", "model.toml", "--report", "notes.html"]),
+        ("thrust.csv", &["predict", "model.toml", "run.csv", "-o", "thrust.csv"]),
+    ] {
+        let mine = format!("# quadrig-log 1\n# of = {name:?}\nt_s,thrust_n,rpm\n0,0.1,0\n");
+        std::fs::write(at.join(name), &mine).expect("a file");
+        let said = call(at, words).succeeded();
+        let (stem, ending) = name.split_once('.').expect("a name");
+        let kept = format!("{stem}-1.{ending}");
+        assert!(said.err.contains(&format!("{name}: there was an earlier file of this name; it is now {kept}")), "{}", said.err);
+        assert_eq!(std::fs::read_to_string(at.join(kept)).expect("it is kept"), mine);
+        assert_ne!(std::fs::read_to_string(at.join(name)).expect("it is written"), mine);
+    }
 }
 
 /// A folder of results is written again; one whose file was changed by hand is not, and stays as it is.

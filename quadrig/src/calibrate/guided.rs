@@ -14,12 +14,11 @@ use super::settle::Reading;
 use super::settling::{Settling, at_rest};
 use crate::Failure;
 use crate::board::{Board, Heard};
+use crate::replace::put;
 use crate::rig::{configure, lines};
-use crate::trouble::unwritten;
 use firmware_rig::Config;
 use frame::message::Message;
 use frame::rig::RigSample;
-use ident::log::write_whole;
 use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
@@ -68,7 +67,7 @@ pub(super) fn run(channel: Channel, points: Option<&str>, day: u16, args: &Args,
     config.calibrated[place] = Some(found.calibrated());
     configure::send(&mut board, &config)?;
     if let Some(output) = &args.output {
-        write_whole(output, |out| out.write_all(found.toml(&board.name()).as_bytes())).map_err(unwritten(&output))?;
+        put(output, &found.toml(&board.name()))?;
     }
     if !quiet {
         say!("in force and stored; tare anew before the next run");

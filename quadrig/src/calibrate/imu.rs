@@ -10,10 +10,9 @@ mod rest;
 
 use crate::Failure;
 use crate::ahrs::imu_log::ImuLog;
-use crate::trouble::unwritten;
+use crate::replace::put;
 use dcm::calibration::{Calibration, CalibrationError, Collector, GyroZero, alignment, ellipsoid, six_positions};
 use dcm::{Mat3, Vec3};
-use ident::log::write_whole;
 use rest::{Rest, length};
 use std::fmt::Write;
 use std::path::Path;
@@ -61,7 +60,7 @@ pub(super) fn run(sensors: &[Sensor], input: &Path, output: &Path, quiet: bool) 
         let section = done.map_err(|e| format!("{}: {}: {e}", input.display(), sensor.name()))?;
         let _ = write!(text, "\n[{}]\n{section}", sensor.name());
     }
-    write_whole(output, |out| out.write_all(text.as_bytes())).map_err(unwritten(&output))?;
+    put(output, &text)?;
     if !quiet {
         crate::say::text(&text);
     }

@@ -13,10 +13,10 @@ use super::point::{Point, list};
 use super::settle::{LENGTH_S, Reading, Sample, reading};
 use crate::Failure;
 use crate::board::Board;
+use crate::replace::put;
 use crate::rig::{configure, file};
-use crate::trouble::unwritten;
 use frame::flag::{FLAG_SUFFIX, Flag};
-use ident::log::{Log, write_whole};
+use ident::log::Log;
 use std::path::Path;
 
 /// Seconds at the end of a stretch that are its reading.
@@ -36,7 +36,7 @@ pub(super) fn run(channel: Channel, input: &Path, points: &str, day: u16, args: 
         super::usage("a calibration from a recording goes to -o FILE, or to the board at --port");
     }
     if let Some(output) = &args.output {
-        write_whole(output, |out| out.write_all(found.toml(&name).as_bytes())).map_err(unwritten(&output))?;
+        put(output, &found.toml(&name))?;
     }
     if args.port.is_given() {
         let mut board = Board::open(&args.port)?;

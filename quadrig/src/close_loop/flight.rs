@@ -10,13 +10,14 @@ use super::{Args, say_unwritten};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::progress::Bar;
-use crate::trouble::{unread, unwritten};
+use crate::replace::put;
+use crate::trouble::unread;
 use ident::flight::columns::Flight;
 use ident::flight::library::FlightLibrary;
 use ident::flight::predict::{columns, is_by_row, is_own, over_windows, seen_by};
 use ident::flight::{FlightModel, MODEL_FORMAT, VOCABULARY, close, page};
 use ident::flight_log;
-use ident::log::{Log, write_whole};
+use ident::log::Log;
 use ident::report::{Origin, terminal};
 use std::fmt::Write;
 use std::io::{BufRead, BufReader};
@@ -99,7 +100,7 @@ pub(crate) fn predict(model: &Path, text: &str, path: &Path, output: &Path) -> R
     let model = FlightModel::parse(&model.display().to_string(), text)?;
     let log = flight_log::read(path)?;
     let predicted = predictions(&model, &seen_by(&model, &log)?);
-    write_whole(output, |out| out.write_all(predicted.as_bytes())).map_err(|e| unwritten(&output)(e).into())
+    put(output, &predicted)
 }
 
 /// One line a row of the log: speeds and voltage as logged, all else as the mean of its window; empty where there is no claim.

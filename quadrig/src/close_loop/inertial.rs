@@ -12,10 +12,9 @@ use crate::ahrs::imu_log::{ImuLog, Row};
 use crate::folder::Folder;
 use crate::kind::{columns, has_readings};
 use crate::progress::Bar;
-use crate::trouble::unwritten;
+use crate::replace::put;
 use dcm::{Config, Dcm, Measurement, Vec3};
 use ident::inertial::{Attitude, InertialModel, MODEL_FORMAT, Predicted, Recording, Sensor, VOCABULARY, close, page};
-use ident::log::write_whole;
 use ident::report::{Origin, terminal};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
@@ -108,7 +107,7 @@ pub(crate) fn predict(model: &Path, text: &str, path: &Path, output: &Path) -> R
     let model = InertialModel::parse(&model.display().to_string(), text)?;
     let log = ImuLog::read(path)?;
     let predicted = model.predict(&recording(&log, path), &|rates| attitude(&log, rates))?;
-    write_whole(output, |out| out.write_all(predictions(&log, &predicted).as_bytes())).map_err(|e| unwritten(&output)(e).into())
+    put(output, &predictions(&log, &predicted))
 }
 
 /// The corrected model's prediction of every channel, row for row; empty where it makes no claim.

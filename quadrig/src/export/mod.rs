@@ -17,10 +17,9 @@ mod table;
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::trouble::unwritten;
+use crate::replace::put;
 use clap::ValueEnum;
 use curve::Powerplant;
-use ident::log::write_whole;
 use ident::model::Model;
 use std::path::PathBuf;
 
@@ -98,7 +97,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     };
     match &args.output {
         Some(path) => {
-            write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(path))?;
+            put(path, &text)?;
             if !quiet {
                 say!("{}: {}", path.display(), plant.title());
                 plant.reach().into_iter().for_each(|line| say!("{line}"));

@@ -10,14 +10,12 @@ use super::configure;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::board::{Board, Heard, refused};
-use crate::spool::keep_earlier;
-use crate::trouble::unwritten;
+use crate::replace::put;
 use firmware_rig::burst::LENGTH;
 use frame::Consensus;
 use frame::calibration::Calibration;
 use frame::message::{BurstPart, Command, Event, Message};
 use frame::rig::{ADC_NAMES, RigSample};
-use ident::log::write_whole;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -81,15 +79,14 @@ pub(super) fn run(board: &mut Board, args: &Args, quiet: bool) -> Result<(), Fai
     let lines = spectrum(&values, burst.rate_hz, args.to);
     if let Some(path) = &args.output {
         let text = conversions(place, &burst, &values);
-        keep_earlier(path, quiet)?;
-        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?;
+        put(path, &text)?;
     }
     if let Some(path) = &args.spectrum {
         let mut text = format!("frequency_hz,{}\n", ADC_NAMES[place]);
         for (hz, amplitude) in &lines {
             let _ = writeln!(text, "{hz:.3},{amplitude:.7}");
         }
-        write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?;
+        put(path, &text)?;
     }
     if !quiet {
         crate::say::text(&shown(place, &burst, &values, &lines));

@@ -10,10 +10,9 @@ use super::file;
 use crate::Failure;
 use crate::board::Board;
 use crate::kind::refuse_other;
-use crate::trouble::unwritten;
+use crate::replace::put;
 use firmware_rig::RigConfig;
 use frame::message::{Command, Event, Message, SettingsNews};
-use ident::log::write_whole;
 use std::path::Path;
 
 /// What is in force on the board.
@@ -83,7 +82,7 @@ pub(crate) fn from_file(board: &mut Board, path: &Path) -> Result<u32, Failure> 
 pub(crate) fn to_file(board: &mut Board, path: Option<&Path>) -> Result<(), Failure> {
     let text = file::text(&in_force(board)?);
     match path {
-        Some(path) => Ok(write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path))?),
+        Some(path) => put(path, &text),
         None => {
             crate::say::text(&text);
             Ok(())

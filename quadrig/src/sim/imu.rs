@@ -10,17 +10,15 @@ use super::Args;
 use crate::Failure;
 use crate::ahrs;
 use crate::progress::Bar;
-use crate::trouble::unwritten;
+use crate::replace::put;
 use dcm::{Mat3, STANDARD_GRAVITY};
 use firmware_ahrs::{ACCEL, GYRO, GyroReading, MAG, chips};
 use frame::ImuSample;
 use hal_sim::imu::Motion;
 use hal_sim::native::ahrs::fly;
 use hal_sim::scenario::ImuScenario;
-use ident::log::write_whole;
 use imu_sensors::{adxl345, itg3200};
 use std::fmt::Write;
-use std::path::Path;
 
 const HEADER: &str = "t_s,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg";
 /// 2^30, the scale of the quaternion on the wire.
@@ -47,14 +45,13 @@ pub(super) fn run(args: &Args, scenario: &ImuScenario, quiet: bool) -> Result<()
     if run.samples.is_empty() {
         return Err("no sensor of the board answered; no log was written; expected one sensor at least without a fault".into());
     }
-    let write = |path: &Path, text: String| write_whole(path, |out| out.write_all(text.as_bytes())).map_err(unwritten(&path));
     if let Some(path) = &args.truth {
-        write(path, truth(&run.samples, &rig.motion))?;
+        put(path, &truth(&run.samples, &rig.motion))?;
     }
     if let Some(path) = &args.readings {
-        write(path, readings(&run.samples))?;
+        put(path, &readings(&run.samples))?;
     }
-    write(&args.output, attitudes(&run.samples))?;
+    put(&args.output, &attitudes(&run.samples))?;
     if !quiet {
         let last = run.samples.last().map_or(0.0, |s| s.at.as_s());
         say!("{}: {} samples over {last:.1} s", args.output.display(), run.samples.len());
