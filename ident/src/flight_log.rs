@@ -7,7 +7,7 @@
 //! Units: m/s^2 and rad/s in body FRD; m and m/s in earth NED; us, rev/min, V, A.
 //! Reference: specification `flight.md`, "Flight log".
 
-use crate::log::{Log, Place, ReadError, write_whole};
+use crate::log::{Log, Place, ReadError};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -49,14 +49,6 @@ pub fn parse(file: &str, source: impl BufRead) -> Result<Log, ReadError> {
         }
     }
     Ok(log)
-}
-
-/// Writes a flight log whole or not at all.
-///
-/// # Errors
-/// What the system says.
-pub fn write(log: &Log, path: &Path) -> std::io::Result<()> {
-    write_whole(path, |out| log.write_as(FORMAT, out))
 }
 
 /// Writes a flight log to any sink.

@@ -82,6 +82,20 @@ fn a_battery_that_answers_late_leaves_the_lead_its_name() {
     assert!(voltage.after.heldout_rms < 0.5 * voltage.before.heldout_rms, "{voltage:?}");
 }
 
+/// A rig without a current sensor and a torque cell: a propeller's current goes with the cube of its speed, and so does what the lead takes.
+#[test]
+fn a_lead_shows_without_a_current() {
+    let mut log = log(&DAY);
+    log.columns.retain(|column| column.name != "current_a");
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    assert_eq!(names(&closed), ["supply_sag"]);
+    let sag = &closed.verdict.effects[0].parameters[0];
+    let truth = 0.03 * 0.15; // ohm times A for each (1000 rev/min)^3
+    assert!(sag.name == "sag" && sag.unit == "V/krpm3" && (sag.value / truth - 1.0).abs() < 0.05, "{sag:?}");
+    let voltage = &closed.verdict.channels["voltage_v"];
+    assert!(voltage.after.heldout_rms < 1.2 * voltage.noise_floor_rms, "{voltage:?}");
+}
+
 /// A current that creeps up for another reason is not the battery's: a motor asks for no more than its voltage falls.
 #[test]
 fn a_battery_takes_no_more_current_than_its_voltage_falls() {

@@ -2,8 +2,9 @@
 //!
 //! What it is: voltage_v -= resistance * current_a: leads, connectors, the source itself.
 //! What can go wrong: without a measured voltage it cannot be told from a lower KV, and is a suspect only; without a measured
-//! current the resistance is as uncertain as the efficiency that the current is estimated with.
-//! Units: ohm.
+//! current the resistance is as uncertain as the efficiency that the current is estimated with. Where no torque was measured either, a
+//! propeller's current goes with the cube of its speed, and how many amperes it is stays unknown: the sag is told by the speed.
+//! Units: ohm; V for each (1000 rev/min)^3.
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
@@ -16,6 +17,8 @@ pub(crate) struct SupplySag;
 
 /// Form of a sag that no voltage shows.
 const UNSEEN: &str = "unseen";
+/// Form of a sag whose current nobody measured, nor a torque from which it follows.
+const BY_SPEED: &str = "by_speed";
 
 impl Effect for SupplySag {
     fn id(&self) -> &'static str {
@@ -25,7 +28,7 @@ impl Effect for SupplySag {
     fn about(&self) -> About {
         About {
             title: "Supply voltage sags with the current",
-            equation: "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a, current_a += current_rise * current_a rpm^3",
+            equation: "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a, current_a += current_rise * current_a rpm^3, or voltage_v = V0 - sag * rpm^3 (no current measured)",
             source: "Ohm's law; Beharie 2013, Eq. 5.11 as corrected",
             depends_on: &["current_a"],
             signature: "the voltage residual mirrors the current; thrust(rpm) and torque(rpm) hold",
@@ -36,7 +39,11 @@ impl Effect for SupplySag {
     fn said(&self, found: &EffectEntry) -> Clause {
         Clause::new(
             "the supply lead",
-            found.tell_in("resistance", "V", |v| format!("drops {v} per ampere"), "sags with the current"),
+            if found.parameters.iter().any(|p| p.name == "sag") {
+                found.tell("sag", |v| format!("sags with the load (by {v} times the cube of the speed)"), "sags with the load")
+            } else {
+                found.tell_in("resistance", "V", |v| format!("drops {v} per ampere"), "sags with the current")
+            },
         )
     }
 
@@ -49,8 +56,10 @@ impl Effect for SupplySag {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        if context.draw().is_none() || present(context, &["voltage_v"]).is_empty() {
+        if present(context, &["voltage_v"]).is_empty() {
             Vec::new()
+        } else if context.draw().is_none() {
+            if context.rpm.is_empty() { Vec::new() } else { vec![Instance::new(&["voltage_v"], BY_SPEED)] }
         } else {
             let mut channels = vec!["voltage_v"];
             // against a declared model the speed that the sag takes is news; without one the static curve holds it
@@ -82,6 +91,9 @@ impl Effect for SupplySag {
         if instance.form == UNSEEN {
             return Vec::new();
         }
+        if instance.form == BY_SPEED {
+            return vec![Amplitude { name: "sag", unit: "V/krpm3" }];
+        }
         let mut out = vec![Amplitude { name: "resistance", unit: "ohm" }];
         if instance.touches("current_a") {
             out.push(Amplitude { name: "current_rise", unit: "1/krpm3" });
@@ -89,7 +101,13 @@ impl Effect for SupplySag {
         out
     }
 
-    fn apply(&self, context: &Context, _: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
+        if instance.form == BY_SPEED {
+            if design.relation == Relation::Voltage {
+                design.add(position, 0, context.rpm.iter().map(|r| -(r / 1000.0).powi(3)).collect());
+            }
+            return;
+        }
         let Some((current, _)) = context.draw() else { return };
         if design.relation == Relation::Current {
             // the same power from a lower voltage
@@ -116,7 +134,7 @@ impl Effect for SupplySag {
     }
 
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
-        if instance.form == UNSEEN {
+        if [UNSEEN, BY_SPEED].contains(&instance.form.as_str()) {
             return fitted.iter().all(|e| e.value > 0.0);
         }
         let of = |name: &str| fitted.iter().find(|e| e.name == name);
