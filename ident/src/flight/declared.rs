@@ -117,8 +117,7 @@ fn speeds(sink: &mut Sink<'_>) {
     }
     let usual = &flight.usual;
     let [middle, spread] = usual.command;
-    let powers: Vec<Vec<Vec<f64>>> =
-        (0..flight.record.rotors()).map(|i| (0..=3).map(|k| power(flight, scene, i, k)).collect()).collect();
+    let powers: Vec<[Vec<f64>; 4]> = (0..flight.record.rotors()).map(|i| powers_of(flight, scene, i)).collect();
     let slope = 0.7 * usual.rpm * spread / middle.max(spread);
     let priors = [(usual.rpm, 0.3 * usual.rpm), (slope, slope), (0.0, 0.3 * slope), (0.0, 0.1 * slope)];
     for (k, (name, (mean, sd))) in ["speed", "speed_1", "speed_2", "speed_3"].into_iter().zip(priors).enumerate() {
@@ -133,22 +132,28 @@ fn speeds(sink: &mut Sink<'_>) {
     }
 }
 
-/// What a rotor's speed channel reads for a power of its command about the middle of all commands.
-fn power(flight: &Flight, scene: &Scene<'_>, rotor: usize, power: i32) -> Vec<f64> {
+/// What a rotor's speed channel reads for each power of its command, 0 to 3, about the middle of all commands.
+fn powers_of(flight: &Flight, scene: &Scene<'_>, rotor: usize) -> [Vec<f64>; 4] {
     let [middle, spread] = flight.usual.command;
     let command = &scene.record.command[rotor];
-    let value = |u: &f64| if *u > flight.usual.start { ((u - middle) / spread).powi(power) } else { 0.0 };
-    let settles: Vec<f64> = command.iter().map(value).collect();
+    let turns = |u: &f64| *u > flight.usual.start;
+    let about: Vec<f64> = command.iter().map(|u| (u - middle) / spread).collect();
+    let power = |of: fn(f64) -> f64| -> Vec<f64> {
+        command.iter().zip(&about).map(|(u, x)| if turns(u) { of(*x) } else { 0.0 }).collect()
+    };
+    let settles = [power(|_| 1.0), power(|x| x), power(|x| x * x), power(|x| x * (x * x))];
     let mut out = match scene.lag {
-        Some(lag) => Follows::of(&scene.record.t, command, &lag).of_rows(&settles),
+        Some(lag) => Follows::of(&scene.record.t, command, &lag).side_by_side(&settles),
         None => settles,
     };
-    match scene.broken[rotor] {
-        Some(Broken::Factor(factor, from)) => {
-            out.iter_mut().zip(&scene.record.t).filter(|(_, t)| **t >= from).for_each(|(v, _)| *v *= factor);
+    for values in &mut out {
+        match scene.broken[rotor] {
+            Some(Broken::Factor(factor, from)) => {
+                values.iter_mut().zip(&scene.record.t).filter(|(_, t)| **t >= from).for_each(|(v, _)| *v *= factor);
+            }
+            Some(Broken::Refused(a, b)) => values[a..b].fill(0.0),
+            None => {}
         }
-        Some(Broken::Refused(a, b)) => out[a..b].fill(0.0),
-        None => {}
     }
     out
 }

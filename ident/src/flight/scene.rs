@@ -240,17 +240,32 @@ impl Follows {
     /// What follows `target`.
     #[must_use]
     pub fn of_rows(&self, target: &[f64]) -> Vec<f64> {
-        let mut state = target.first().copied().unwrap_or(0.0);
-        let follow = |(left, ends): (&[f64; 2], &[f64])| {
-            if ends.iter().all(|e| e.is_finite()) {
-                for (left, goal) in left.iter().zip(ends) {
-                    state = goal + (state - goal) * left;
+        let [out] = self.side_by_side(&[target]);
+        out
+    }
+
+    /// The same of several targets at once: each waits for its own row before alone, so that many take hardly longer than one.
+    #[must_use]
+    pub fn side_by_side<const N: usize, T: AsRef<[f64]>>(&self, targets: &[T; N]) -> [Vec<f64>; N] {
+        let targets = targets.each_ref().map(AsRef::as_ref);
+        let mut out = targets.map(|target| {
+            let mut out = Vec::with_capacity(target.len());
+            out.extend(target.first());
+            out
+        });
+        let mut state = targets.map(|target| target.first().copied().unwrap_or(0.0));
+        for (i, left) in self.left.iter().enumerate() {
+            for n in 0..N {
+                let ends = [targets[n][i], targets[n][i + 1]];
+                if ends.iter().all(|e| e.is_finite()) {
+                    for (left, goal) in left.iter().zip(ends) {
+                        state[n] = goal + (state[n] - goal) * left;
+                    }
                 }
+                out[n].push(state[n]);
             }
-            state
-        };
-        let first = target.first().copied();
-        first.into_iter().chain(self.left.iter().zip(target.windows(2)).map(follow)).collect()
+        }
+        out
     }
 }
 
