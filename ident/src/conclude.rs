@@ -116,10 +116,18 @@ pub(crate) fn harmful(context: &Context, fit: &Fit, errors: &Errors<'_>) -> Opti
     useless(context, fit, errors).or_else(|| spoils(context, fit, errors))
 }
 
-/// An effect without which left-out rows are predicted better: the one that does most harm.
+/// Whether readings beside those of other sensors show an effect.
+pub(crate) fn is_shown_by_others(context: &Context, placed: &Placed, after: &[Held], without: &[Held]) -> bool {
+    let mut witnesses = touched(context, placed).filter(|(_, t)| t.relation.is_evidence());
+    witnesses.any(|(i, _)| 1.0 - after[i].claimed / without[i].claimed > NEEDED_REDUCTION)
+}
+
+/// An effect without which left-out rows are predicted better: the one that does most harm. One that another sensor shows leaves its own channel's
+/// error as it is, but for what the others make of its absence.
 fn useless(context: &Context, fit: &Fit, errors: &Errors<'_>) -> Option<usize> {
     let reduction = |k: usize| quoted(context, &fit.placed[k], errors.after, &errors.without[k]).reduction;
-    let harmful = (0..fit.placed.len()).map(|k| (k, reduction(k))).filter(|(_, r)| *r < 0.0);
+    let shown = |k: usize| is_shown_by_others(context, &fit.placed[k], errors.after, &errors.without[k]);
+    let harmful = (0..fit.placed.len()).map(|k| (k, reduction(k))).filter(|(k, r)| *r < 0.0 && !shown(*k));
     harmful.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
 }
 

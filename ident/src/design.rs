@@ -116,6 +116,23 @@ impl TargetDesign {
         }
     }
 
+    /// Covariance of the coefficients: the inverse of their equations, of weights that are `unit` over a variance, where the rows say so many times
+    /// less than their variances promise. What was known before any run is as sure as it was, however coloured the rows are (Sherman & Morrison
+    /// 1950).
+    pub(crate) fn covariance(&self, inverse: DMatrix<f64>, unit: f64, times: f64) -> DMatrix<f64> {
+        let mut out = inverse * times;
+        for (k, column) in self.columns.iter().enumerate() {
+            if let Label::Base(power) = column.label
+                && let Some((sd, _)) = self.relation.known(power)
+            {
+                let more = (1.0 - unit / times) / (sd * sd);
+                let beside = out.column(k).into_owned();
+                out -= &beside * beside.transpose() * (more / (1.0 + more * beside[k]));
+            }
+        }
+        out
+    }
+
     /// What a declared model expects, or one that predicts makes of its columns so far but for the zeros of the day; `None` while coefficients are
     /// sought without a model.
     pub(crate) fn known(&self) -> Option<Vec<f64>> {

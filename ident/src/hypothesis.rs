@@ -194,7 +194,8 @@ pub fn fit_target(target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Opt
     }
     let rss: f64 = residual.iter().map(|r| r * r).sum();
     let share = effective_share(&residual);
-    let covariance = inverse * ((rss / residual.len() as f64).max(0.01) / share);
+    let times = (rss / residual.len() as f64).max(0.01) / share;
+    let covariance = design.covariance(inverse, samples.unit(), times);
     Some(TargetFit {
         coefficients,
         labels: design.columns.iter().map(|c| c.label).collect(),

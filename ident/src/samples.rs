@@ -108,6 +108,11 @@ impl<'c> Samples<'c> {
         }
     }
 
+    /// What a row weighs of which every so many are taken: what is known before any run must not count for more beside fewer of them.
+    pub(crate) fn unit(&self) -> f64 {
+        1.0 / self.stride as f64
+    }
+
     /// Of one value a row of the log those of the samples.
     fn gather<'d>(&self, values: &'d [f64]) -> Cow<'d, [f64]> {
         match self.stride {
@@ -194,7 +199,7 @@ impl<'c> Samples<'c> {
             let whole = Normal::of_columns(&columns, &y, &weights);
             (columns, [whole, late])
         };
-        design.expect(&mut normal, 1.0 / self.stride as f64);
+        design.expect(&mut normal, self.unit());
         let mut kept = Kept { columns, y, floored, jumps: None };
         let mut solution = normal.solve()?;
         let n = self.chosen.len() as f64;

@@ -70,6 +70,17 @@ fn every_hidden_effect_is_named_and_its_error_falls() {
     assert!(missed.is_empty(), "{missed:#?}");
 }
 
+/// What one speed sensor alone reads differs from the others on its own channel of evidence: the loop does not take it for the rotor's.
+#[test]
+fn what_one_speed_sensor_reads_is_named() {
+    for id in ["dead_rotor_speed", "missed_pulses", "double_pulses"] {
+        let folder = TempDir::new().unwrap();
+        let out = demo(folder.path(), &["--seed", "1", "--effect", id]);
+        assert!(out.contains(&format!("hidden was {id}: found")), "{out}");
+        assert!(!out.contains("against the other sensors"), "nothing of it is left: {out}");
+    }
+}
+
 #[test]
 fn the_files_are_whole_and_the_page_needs_nothing() {
     let folder = TempDir::new().unwrap();
