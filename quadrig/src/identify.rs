@@ -68,6 +68,9 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
+    if args.beside.is_some() && args.report.is_none() && args.svg.is_none() {
+        return Err("--beside: nothing is drawn that it could stand on; expected --report or --svg with it".into());
+    }
     let svg = args.svg.as_deref().map(|path| Folder::new(path, "identify --svg")).transpose()?;
     let log = open(&args.log, &args.columns.options(&args.names), quiet)?;
     let found = identify_in(&log, args.air)?;

@@ -8,6 +8,7 @@
 
 use crate::Failure;
 use crate::run_log::SIMULATED;
+use ident::model::Model;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -46,25 +47,33 @@ pub(crate) fn refuse_no_model(path: &Path) -> Result<(), Failure> {
     what.map_or(Ok(()), |what| Err(format!("{}:1:1: {what}; {expected}", path.display()).into()))
 }
 
-/// Whether what lies at `path` was computed, and is of the kind of what comes now (all of it, or its first line): it can be computed again. A recording
-/// cannot, and what somebody wrote by hand cannot.
+/// Whether what lies at `path` was computed, and is of the kind of what comes now (all of it, or how it begins): it can be computed again. A recording
+/// cannot, and what somebody wrote by hand cannot, nor what somebody added.
 pub(crate) fn is_computed(path: &Path, now: &str) -> bool {
     let Some(text) = head(path) else { return false };
     let kind = kind_of(&text);
     let begins_alike = || text.lines().next() == now.lines().next();
     kind == kind_of(now)
         && match kind {
-            Some(MODEL | PAGE | VERDICT | PINS) => true,
+            Some(MODEL) => Model::read(path).is_ok_and(|model| model.files().0 == text),
+            Some(PAGE) => text.contains(GENERATOR),
+            Some(VERDICT | PINS) => true,
             Some(LOG | FLIGHT) => text.lines().any(|line| line == format!("# date = {SIMULATED:?}")),
             // values over time may be a recording, whoever computes some of the same columns
-            Some(TABLE) => begins_alike() && !now.starts_with("t_s,"),
+            Some(TABLE) => {
+                let mut fields = text.lines().map(|line| line.matches(',').count());
+                let first = fields.next();
+                begins_alike() && !now.starts_with("t_s,") && !now.starts_with('#') && fields.all(|n| Some(n) == first)
+            }
             _ => false,
         }
 }
 
 /// A file of settings that this program wrote from a run.
 const MODEL: &str = "a model";
-/// A page of this program's.
+/// What a page of this program's says in its head.
+const GENERATOR: &str = "<meta name=\"generator\" content=\"quadrig\">";
+/// A page that speaks of this program.
 const PAGE: &str = "a page";
 const VERDICT: &str = "a verdict";
 const LOG: &str = "a log";
@@ -89,15 +98,19 @@ fn kind_of(text: &str) -> Option<&'static str> {
     if text.starts_with('{') && text.contains("\"quadrig-verdict") {
         return Some(VERDICT);
     }
+    // its head alone would be an empty file of settings
+    if text.starts_with("# quadrig-flight") {
+        return Some(FLIGHT);
+    }
+    if text.starts_with("# quadrig-log") {
+        return Some(LOG);
+    }
     if let Ok(table) = toml::from_str::<toml::Table>(text) {
         let format = table.get("format").and_then(toml::Value::as_str).unwrap_or_default();
         return format.starts_with("quadrig-").then_some(MODEL);
     }
     if text.starts_with(PINS) {
         return Some(PINS);
-    }
-    if text.starts_with("# quadrig-flight") {
-        return Some(FLIGHT);
     }
     if text.starts_with("# quadrig-") {
         return Some(LOG);
@@ -168,6 +181,7 @@ mod tests {
     fn a_file_is_known_by_its_beginning() {
         for (text, kind) in [
             ("# quadrig-log 1\nt_s,rpm\n", Some("a log")),
+            ("# quadrig-log 1\n", Some("a log")),
             ("# quadrig-flight 1\nt_s,rpm_1\n", Some("a flight's log")),
             ("\u{feff}<!doctype html>", Some("a web page")),
             ("<!doctype html><title>a run</title><p>by quadrig", Some("a page")),

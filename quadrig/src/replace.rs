@@ -59,6 +59,20 @@ fn is_same(a: &Path, b: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ident::log::Column;
+
+    #[test]
+    fn a_simulated_log_is_replaced() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.csv");
+        for rpm in [1.0, 2.0] {
+            let columns = ["thrust_n", "rpm"].map(|name| Column { name: name.into(), values: vec![rpm] });
+            let mut log = Log { t: vec![0.0], columns: columns.into(), ..Log::default() };
+            log.meta.insert("date".into(), toml::Value::String(crate::run_log::SIMULATED.to_owned()));
+            put_log(&path, &log).expect("it is written");
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
+    }
 
     /// Names of what lies in the folder after `earlier` lay at `out` and `text` was written there.
     fn after(earlier: &str, text: &str) -> Vec<String> {
@@ -78,13 +92,14 @@ mod tests {
 
     #[test]
     fn what_was_computed_is_replaced_and_all_else_is_kept() {
-        let (model, log) = ("format = \"quadrig-model 1\"\n", "# quadrig-log 1\nt_s,rpm\n0,1\n");
+        let model = "format = \"quadrig-model 1\"\nsource = \"a\"\nstart_pulse_us = 1060.0\n";
+        let log = "# quadrig-log 1\nt_s,rpm\n0,1\n";
         let simulated = "# quadrig-log 1\n# date = \"simulated\"\nt_s,rpm\n0,1\n";
-        let page = "<!doctype html><title>a run</title><p>by quadrig";
+        let page = "<!doctype html><meta name=\"generator\" content=\"quadrig\"><title>a run</title>";
         for (earlier, text) in [
             ("", model),
-            (model, "format = \"quadrig-model 1\"\nsource = \"b\"\n"),
-            (page, "<!doctype html><title>another</title><p>by quadrig"),
+            (model, &model.replace('a', "b")),
+            (page, &page.replace("a run", "another")),
             (simulated, log),
             ("run,k_t,k_q\na,1,2\n", "run,k_t,k_q\nb,1,2\n"),
             (log, log),
@@ -98,7 +113,10 @@ mod tests {
             ("rest_s = 1.0\n", model),
             (model, simulated),
             ("# quadrig-calibration 1\n[calibrated.current]\nper_count = 0.016\n", "# quadrig-calibration 1\n"),
-            ("<!doctype html><title>mine</title>", page),
+            ("<!doctype html><title>my diary of runs by quadrig</title>", page),
+            (&format!("{model}# tuned by hand\n"), model),
+            ("run,k_t,k_q\na,1,2\nthe best one\n", "run,k_t,k_q\nb,1,2\n"),
+            ("# Onboard parameters\n1\t1\tA\t1\t6\n", "# Onboard parameters\n1\t1\tA\t2\t6\n"),
             ("t,thrust,torque\n0,1,2\n", "run,k_t,k_q\nb,1,2\n"),
         ] {
             assert_eq!(after(earlier, text), ["out", "out-1"], "{earlier}");

@@ -58,13 +58,16 @@ mod pty {
     impl Link {
         fn new(place: Option<&Path>, port: &str) -> Result<Self, Failure> {
             let Some(place) = place else { return Ok(Self(None)) };
-            let taken = std::fs::symlink_metadata(place).is_ok_and(|found| !found.is_symlink());
-            if taken {
-                return Err(
-                    format!("--link {}: something is there that is no link; expected another name", place.display()).into()
-                );
+            // what a board before left behind leads to a port; anything else is somebody's
+            let left_behind = std::fs::read_link(place).is_ok_and(|port| port.starts_with("/dev"));
+            if std::fs::symlink_metadata(place).is_ok() && !left_behind {
+                return Err(format!(
+                    "--link {}: something is there that is no link to a port; expected another name",
+                    place.display()
+                )
+                .into());
             }
-            let _ = std::fs::remove_file(place); // one that a board before left behind
+            let _ = std::fs::remove_file(place);
             std::os::unix::fs::symlink(port, place).map_err(|e| format!("--link {}: {e}", place.display()))?;
             Ok(Self(Some(place.to_owned())))
         }

@@ -331,7 +331,12 @@ pub fn in_words(message: &str) -> String {
         return "a value of another kind; expected one of the forms of docs/scenario.md".to_owned();
     }
     let Some((before, kind)) = message.rsplit_once("expected ") else {
-        return format!("{message}; expected TOML, as in docs/scenario.md");
+        let expected = if message.starts_with("missing field") {
+            "expected this key as well: docs/scenario.md lists those of each table"
+        } else {
+            "expected TOML, as in docs/scenario.md"
+        };
+        return format!("{message}; {expected}");
     };
     let kind = match kind {
         "f64" | "f32" => "a number",

@@ -22,6 +22,8 @@ const SCALE: f64 = 1e5;
 struct Level {
     x: Valued,
     y: Valued,
+    /// Standard error of the zero at its time.
+    zero: f64,
 }
 
 impl Level {
@@ -29,9 +31,9 @@ impl Level {
         self.y.0 / self.x.0
     }
 
-    /// Standard error of the quotient: of both readings and of the zero that all levels share.
-    fn error(&self, slope: f64, zero: f64) -> f64 {
-        self.y.1.hypot(slope * self.x.1).hypot(zero) / self.x.0
+    /// Standard error of the quotient: of both readings and of the zero.
+    fn error(&self, slope: f64) -> f64 {
+        self.y.1.hypot(slope * self.x.1).hypot(self.zero) / self.x.0
     }
 }
 
@@ -48,7 +50,7 @@ pub fn square_law(
     zero: Option<&Zero>,
 ) -> Option<(Estimate, Law)> {
     let (levels, shared) = turning(log, plateaus, speed, channel, zero);
-    let (outliers, slope) = strays(&levels, shared)?;
+    let (outliers, slope) = strays(&levels)?;
     let kept: Vec<&Level> = levels.iter().enumerate().filter(|(k, _)| !outliers.contains(k)).map(|(_, level)| level).collect();
     let fitted = Line::fit(&kept, slope, zero.map_or(Zeroed::Origin, |_| Zeroed::Read(shared)))?;
     let unit = if channel == "thrust_n" { "N" } else { "N.m" };
@@ -62,7 +64,7 @@ pub fn square_law(
     // at low speeds a zero that is a little off decides the quotient
     let counts = |(i, level): &(usize, &Level)| all && level.x.0 > middle || !outliers.contains(i);
     let errors = if table { 0.0 } else { farthest(law.holds, kept.len()) };
-    let off = |level: &Level| (level.quotient() - k.value).abs() - errors * level.error(slope, shared);
+    let off = |level: &Level| (level.quotient() - k.value).abs() - errors * level.error(slope);
     let mut wide = levels.iter().enumerate().filter(counts).map(|(_, level)| off(level)).fold(k.half, f64::max);
     if zero.is_none() {
         let free = Line::fit(&kept, slope, Zeroed::Free).map(|line| line.estimate());
@@ -82,7 +84,7 @@ fn farthest(holds: bool, n: usize) -> f64 {
     Gauss::standard().inverse_cdf(1.0 - tail)
 }
 
-/// The levels whose quotient says more than its own error, on their zero; and the error of the zero.
+/// The levels whose quotient says more than its own error, on their zero; and the usual error of the zero.
 fn turning(log: &Log, plateaus: &[Plateau], speed: &[Option<Valued>], channel: &str, zero: Option<&Zero>) -> (Vec<Level>, f64) {
     let mut shared = Vec::new();
     let mut levels: Vec<Level> = Vec::new();
@@ -91,7 +93,8 @@ fn turning(log: &Log, plateaus: &[Plateau], speed: &[Option<Valued>], channel: &
         let omega = rpm * TAU / 60.0;
         let (z, z_error) = zero.map_or((0.0, 0.0), |zero| zero.at(p.middle_s()));
         shared.push(z_error);
-        levels.push(Level { x: (omega * omega / SCALE, 2.0 * omega * rpm_error * TAU / 60.0 / SCALE), y: (y - z, error) });
+        let x = (omega * omega / SCALE, 2.0 * omega * rpm_error * TAU / 60.0 / SCALE);
+        levels.push(Level { x, y: (y - z, error), zero: z_error });
     }
     let top = levels.iter().map(|l| l.x.0).fold(0.0, f64::max);
     levels.retain(|l| l.x.0 > TOO_SMALL * top);
@@ -99,9 +102,9 @@ fn turning(log: &Log, plateaus: &[Plateau], speed: &[Option<Valued>], channel: &
 }
 
 /// Levels whose quotient does not belong to the others', and the usual quotient.
-fn strays(levels: &[Level], shared: f64) -> Option<(Vec<usize>, f64)> {
+fn strays(levels: &[Level]) -> Option<(Vec<usize>, f64)> {
     let usual = median(&mut levels.iter().map(Level::quotient).collect::<Vec<_>>());
-    let point = |l: &Level| Point { x: l.x.0, x_error: 0.0, y: l.quotient(), y_error: l.error(usual, shared) };
+    let point = |l: &Level| Point { x: l.x.0, x_error: 0.0, y: l.quotient(), y_error: l.error(usual) };
     let curve = Curve::fit(&levels.iter().map(point).collect::<Vec<_>>(), 0)?;
     Some((curve.outliers.clone(), curve.coefficients[0]))
 }

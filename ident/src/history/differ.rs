@@ -13,7 +13,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Chance that one of all measures is said to differ where none does.
 const CHANCE: f64 = 0.05;
 
-/// A measure that differs: its place, and its runs with the lowest and the highest value.
+/// Standard errors on either side of a value between which it lies in 95 of 100.
+const SURE: f64 = 1.96;
+
+/// A measure that differs: its place, and the runs whose values are surely the lowest and the highest, their errors counted against them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Differs {
     pub(super) measure: usize,
@@ -29,8 +32,10 @@ pub(super) fn differing(history: &History) -> Vec<Differs> {
     for m in asked {
         let own: Vec<Value> = history.series(m).into_iter().flatten().collect();
         let Some(times) = scatter(&own, history.measures[m].scale, chance) else { continue };
-        let by = |a: &&Value, b: &&Value| a.value.total_cmp(&b.value);
-        if let (Some(low), Some(high)) = (own.iter().min_by(by), own.iter().max_by(by)) {
+        let most = |v: &Value| v.value + SURE * v.se;
+        let least = |v: &Value| v.value - SURE * v.se;
+        let low = own.iter().min_by(|a, b| most(a).total_cmp(&most(b)));
+        if let (Some(low), Some(high)) = (low, own.iter().max_by(|a, b| least(a).total_cmp(&least(b)))) {
             let differs = Differs { measure: m, low: *low, high: *high };
             out.push((!history.measures[m].name.ends_with(" gain"), times, differs));
         }

@@ -225,7 +225,12 @@ fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {
         value.and_then(finite).ok_or_else(|| refusal(key, value, "a finite number"))
     };
     let coefficients = keys[..count].iter().map(read).collect::<Result<_, _>>()?;
-    let errors = keys[..count].iter().map(|k| table.get(&format!("{k}_se")).and_then(number).unwrap_or(0.0)).collect();
+    let error = |key: &String| {
+        let key = format!("{key}_se");
+        let value = table.get(&key).and_then(number).unwrap_or(0.0);
+        if value < 0.0 { Err(refusal(&key, table.get(&key), "a standard error, not negative")) } else { Ok(value) }
+    };
+    let errors = keys[..count].iter().map(error).collect::<Result<_, _>>()?;
     Ok(Polynomial { channel: channel.to_owned(), coefficients, errors })
 }
 

@@ -86,7 +86,11 @@ fn target<'c>(closed: &'c Closed, name: &str) -> Option<&'c Target> {
     closed.context.targets.iter().find(|t| t.name == name)
 }
 
+/// What is left of a channel before and after; nothing of one that no model predicts.
 fn trace(closed: &Closed, target: &Target) -> Option<Trace> {
+    if closed.verdict.channels.not_predicted.contains_key(target.name) {
+        return None;
+    }
     let context = &closed.context;
     let said =
         DIFFERENCES.iter().find(|d| d.1 == target.name).map_or_else(|| target.name.to_owned(), |d| format!("{} - others", d.0));
@@ -405,6 +409,9 @@ pub(super) fn speeds(log: &Log, closed: &Closed) -> Vec<Figure> {
         };
         let present = SPEED.into_iter().filter(|c| log.column(c).is_some());
         let mut layers: Vec<Layer> = present.zip(run::CLASSES).filter_map(layer).collect();
+        if layers.is_empty() {
+            continue;
+        }
         let beyond = pinned(&mut layers);
         let title = match beyond {
             0 => title.to_owned(),

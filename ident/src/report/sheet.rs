@@ -229,7 +229,7 @@ impl Sheet {
     #[must_use]
     pub fn html(&self) -> String {
         format!(
-            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{}</title><style>{COLOURS}{DRAWING}{PAGE}{}</style></head><body{}>\n{}{}</body></html>\n",
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"generator\" content=\"quadrig\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{}</title><style>{COLOURS}{DRAWING}{PAGE}{}</style></head><body{}>\n{}{}</body></html>\n",
             escape(&self.title),
             if self.told { LOOK } else { "" },
             if self.told { " class=\"told\"" } else { "" },

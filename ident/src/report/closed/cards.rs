@@ -207,7 +207,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     let _ = writeln!(html, "<p><b>Known by:</b> {}.</p>", escape(&plain(signs(known))));
     if let Some((how, (_, rest))) = apart {
         let (how, rest) = (escape(&upper(how)), escape(&plain(rest)));
-        let _ = writeln!(html, "<p class=\"warn\"><b>{how}:</b>{rest}. The interval allows for it.</p>");
+        let _ = writeln!(html, "<p class=\"warn\"><b>{how}:</b>{rest}. The value above is of what they share.</p>");
     }
     if !nameless {
         let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e, &against)));
@@ -287,7 +287,13 @@ pub(super) fn removes(v: &Verdict, e: &EffectEntry) -> String {
         return "The readings themselves show it: the model has no term for it.".to_owned();
     }
     if reduction <= 0.0 || !c.after.heldout_rms.is_finite() {
-        return format!("It removes nothing of the error of {}.", channel(first));
+        // one sensor's own curve over the command holds what it alone reads
+        let beside = v.channels.keys().filter(|name| name.starts_with("rpm")).count() > 1 && first.starts_with("rpm");
+        return if beside {
+            format!("The other sensors show it: the curve of {} alone holds it already.", channel(first))
+        } else {
+            format!("It removes nothing of the error of {}.", channel(first))
+        };
     }
     let without = c.after.heldout_rms / (1.0 - reduction).max(1e-9);
     // the other causes were fitted for a model that has it
