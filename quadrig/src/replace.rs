@@ -74,6 +74,15 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
     }
 
+    /// A model of a run as it is written.
+    fn as_written(source: &str) -> String {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("model.toml");
+        let text = format!("format = \"quadrig-model 1\"\nsource = {source:?}\nstart_pulse_us = 1060.0\n");
+        std::fs::write(&path, text).expect("a file");
+        ident::model::Model::read(&path).expect("a model").files().0
+    }
+
     /// Names of what lies in the folder after `earlier` lay at `out` and `text` was written there.
     fn after(earlier: &str, text: &str) -> Vec<String> {
         let folder = tempfile::tempdir().expect("a folder");
@@ -92,14 +101,15 @@ mod tests {
 
     #[test]
     fn what_was_computed_is_replaced_and_all_else_is_kept() {
-        let model = "format = \"quadrig-model 1\"\nsource = \"a\"\nstart_pulse_us = 1060.0\n";
+        let written = as_written("a");
+        let model = written.as_str();
         let log = "# quadrig-log 1\nt_s,rpm\n0,1\n";
         let simulated = "# quadrig-log 1\n# date = \"simulated\"\nt_s,rpm\n0,1\n";
         let page = "<!doctype html><meta name=\"generator\" content=\"quadrig\"><title>a run</title>";
         for (earlier, text) in [
             ("", model),
-            (model, &model.replace('a', "b")),
-            (page, &page.replace("a run", "another")),
+            (model, as_written("b").as_str()),
+            (page, page.replace("a run", "another").as_str()),
             (simulated, log),
             ("run,k_t,k_q\na,1,2\n", "run,k_t,k_q\nb,1,2\n"),
             (log, log),

@@ -5,7 +5,7 @@
 //! Units: the channel's.
 //! Reference: component-plus-residual plots: Larsen & McCleary 1972, Technometrics 14:781.
 
-use super::sentence::order;
+use super::sentence::{order, whole};
 use super::vocabulary::Vocabulary;
 use crate::noise::median;
 use crate::report::figure::{Figure, Layer, Mark};
@@ -157,7 +157,11 @@ pub(crate) fn part(trace: &Trace, id: &str, names: [&'static str; 2], wide: f64)
 /// The channel that the sentence begins with, over time and enlarged; without names the loudest.
 pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Vec<Figure> {
     let own = |e: &&EffectEntry| e.id != "unknown" && !(words.of_every_rig)(e) && !e.is_of_single_readings();
-    let told = order(verdict, words).into_iter().map(|k| &verdict.effects[k]).find(own).and_then(|e| e.channels.first());
+    let told = order(verdict, words).into_iter().map(|k| &verdict.effects[k]).find(own);
+    // of several sensors or axes of one quantity the one that shows most
+    let is_told = |e: &EffectEntry, c: &String| {
+        e.channels.contains(c) && e.channels.first().is_some_and(|first| whole(verdict, first) == whole(verdict, c))
+    };
     let weight = |t: &&Trace| {
         verdict.channels.get(&t.channel).map_or(0.0, |c| match verdict.verdict {
             // a ratio of two figures beneath the floor tells nothing
@@ -166,7 +170,7 @@ pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Ve
         })
     };
     let Some(trace) =
-        traces.iter().filter(|t| told.is_none_or(|c| *c == t.channel)).max_by(|a, b| weight(a).total_cmp(&weight(b)))
+        traces.iter().filter(|t| told.is_none_or(|e| is_told(e, &t.channel))).max_by(|a, b| weight(a).total_cmp(&weight(b)))
     else {
         return Vec::new();
     };

@@ -27,7 +27,7 @@ const ALIKE: f64 = 0.1;
 const ALL: f64 = 0.995;
 /// Channels without a model up to which each is told with its reason.
 const MOST_BARE: usize = 2;
-/// Words of a head above which the share that an open question leaves explained is left to the bars.
+/// Words of a head above which the share that an open question leaves explained is told in fewest words.
 const LONGEST: usize = 60;
 /// Share of a channel's error below which most of it is still there.
 const HALF: f64 = 0.5;
@@ -232,13 +232,15 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
     let larger = all.iter().any(|e| !is_told(e) && e.heldout_error_reduction > removed(disputed));
     let below = below(causes(all).saturating_sub(told), !larger, nameless);
     let joined = |parts: [String; 3]| parts.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
-    let bare = joined([out.clone(), below.clone(), left(verdict)]);
     let asked: Vec<&EffectEntry> = sure.iter().chain(disputed).copied().collect();
-    let Some(explained) = explained(verdict, &asked, true) else { return bare };
+    let Some(explained) = explained(verdict, &asked, true) else { return joined([out, below, left(verdict)]) };
     // what says that more is told below has said so
-    let below = if explained.says_more { String::new() } else { below };
-    let said = joined([format!("{out} {}", explained.said), below, left(verdict)]);
-    if said.split_whitespace().count() <= LONGEST { said } else { bare }
+    let rest = if explained.says_more { String::new() } else { below.clone() };
+    let said = joined([format!("{out} {}", explained.said), rest, left(verdict)]);
+    if said.split_whitespace().count() <= LONGEST {
+        return said;
+    }
+    joined([format!("{out} {}", explained.brief), below, left(verdict)])
 }
 
 /// What is asked of some effects: each way in which it may be, the likeliest first.
@@ -379,7 +381,7 @@ pub(super) fn instead(best: &[&EffectEntry], ids: &[String]) -> Vec<String> {
 }
 
 /// What a channel is a part of: a vector of which it is an axis, the speed that several sensors read.
-fn whole(verdict: &Verdict, name: &str) -> String {
+pub(super) fn whole(verdict: &Verdict, name: &str) -> String {
     let sensors = verdict.channels.keys().filter(|c| quantity(c) == "rpm").count();
     if quantity(name) == "rpm" && sensors > 1 { "the speeds".to_owned() } else { vector(name) }
 }
@@ -396,6 +398,8 @@ fn share(verdict: &Verdict, name: &str) -> Option<f64> {
 /// A sentence on what is explained.
 struct Explained {
     said: String,
+    /// The same in fewest words, where a sentence is long already.
+    brief: String,
     /// Whether it speaks of effects beside those of the sentence before.
     says_more: bool,
 }
@@ -430,17 +434,19 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool) -> Option<Exp
     };
     let names: Vec<String> = shares.iter().map(|s| whole(verdict, s.0)).collect();
     let but: String = worse(verdict, &is_told).collect();
+    let of_each: Vec<String> = shares.iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))).collect();
+    let brief = format!("Explained: {}.{but}", list(&of_each));
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
         let said = format!("{subject} {} of what {} had left over.{but}", per_cent(mean), list(&names));
-        return Some(Explained { said, says_more: others });
+        return Some(Explained { said, brief, says_more: others });
     }
     let parts: Vec<String> =
         shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), whole(verdict, s.0))).collect();
     let short: Vec<String> = std::iter::once(parts[0].clone())
         .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))))
         .collect();
-    Some(Explained { said: format!("{subject} {}.{but}", list(&short)), says_more: others })
+    Some(Explained { said: format!("{subject} {}.{but}", list(&short)), brief, says_more: others })
 }
 
 /// The channels of what a share is told of that are predicted worse for all that: the share of the whole does not show it.
