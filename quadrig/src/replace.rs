@@ -79,7 +79,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("model.toml");
         let head = format!("format = \"quadrig-model 1\"\nsource = {source:?}\nstart_pulse_us = 1060.0\n");
-        let text = head + "[channel.thrust_n]\nrelation = \"polynomial of rpm/1000\"\nc0_n = 0.0\nc1_n_per_krpm = 0.1\nc2_n_per_krpm2 = 0.2\n";
+        let text = head
+            + "[channel.thrust_n]\nrelation = \"polynomial of rpm/1000\"\nc0_n = 0.0\nc1_n_per_krpm = 0.1\nc2_n_per_krpm2 = 0.2\n";
         std::fs::write(&path, text).expect("a file");
         ident::model::Model::read(&path).expect("a model").files().0
     }

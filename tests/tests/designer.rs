@@ -6,7 +6,7 @@
 //! Units: as the columns state.
 //! Reference: specification `identification.md`, item 3; docs/identification.md.
 
-use quadrig_tests::{call, root};
+use quadrig_tests::{call, data, root};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -173,6 +173,31 @@ fn a_constant_whose_law_does_not_hold_is_widened() {
     for level in fast {
         let quotient = level["thrust_n"] / (level["rpm"] * std::f64::consts::TAU / 60.0).powi(2);
         assert!((0.99 * low..=1.01 * high).contains(&quotient), "{quotient:e} is not in {broken}");
+    }
+}
+
+/// The same on recorded runs, whose levels at the end have a surer zero than those in the middle: each level's own error counts.
+#[test]
+fn a_constant_of_a_recorded_run_reaches_its_levels() {
+    let Some(data) = data("recorded stand logs") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for name in ["Log_2019-11-05_171350", "Log_2019-11-07_174807", "Log_2019-11-09_181347"] {
+        let log = data.join(format!("rig/spitz-esc-test/original/{name}.csv"));
+        let log = log.to_str().expect("a plain name");
+        let said = call(at, &["identify", log, "-o", "m.toml", "--table", "t.csv"]).succeeded().out;
+        let line = constant(&said, "k_T ");
+        let (low, high) = interval(&line);
+        let square = |rpm: f64| (rpm * std::f64::consts::TAU / 60.0).powi(2);
+        let mut levels = rows(at, "t.csv");
+        levels.retain(|r| ["rpm", "thrust_n", "thrust_n_se"].iter().all(|name| r.contains_key(*name)));
+        assert!(levels.len() > 15, "{} levels", levels.len());
+        let top = levels.iter().map(|r| square(r["rpm"])).fold(0.0, f64::max);
+        let counts = levels.iter().filter(|r| square(r["rpm"]) > top / 50.0);
+        for level in counts {
+            let (quotient, error) = (level["thrust_n"] / square(level["rpm"]), 2.0 * level["thrust_n_se"] / square(level["rpm"]));
+            assert!((low - error..=high + error).contains(&quotient), "{name}: {quotient:e} +- {error:e} is not in {line}");
+        }
     }
 }
 
