@@ -36,11 +36,13 @@ pub(crate) struct Quoted {
 
 /// The figure that is quoted for an effect: `after` with all effects, `without` without this one.
 pub(crate) fn quoted(context: &Context, placed: &Placed, after: &[Held], without: &[Held]) -> Quoted {
+    let shown = is_shown_by_others(context, placed, after, without);
     let of_channel = |(i, t): (usize, &Target)| {
         let of_news = 1.0 - after[i].rms / without[i].rms;
         let reduction = if t.trust.is_empty() { of_news } else { 1.0 - after[i].claimed / without[i].claimed };
-        // what another sensor shows of it may leave the channel's own error as it is, to the last digits of a sum
-        let reduction = if reduction.abs() < EQUAL { 0.0 } else { reduction };
+        // what the other sensors show its own channel's curve holds: the error there changes with the fit of all else alone
+        let same = reduction.abs() < EQUAL || shown && reduction < 0.0;
+        let reduction = if same { 0.0 } else { reduction };
         Quoted { channel: t.name.to_owned(), of_news, reduction }
     };
     let touched = touched(context, placed).filter(|(_, t)| !t.relation.is_evidence());
@@ -117,17 +119,15 @@ pub(crate) fn harmful(context: &Context, fit: &Fit, errors: &Errors<'_>) -> Opti
 }
 
 /// Whether readings beside those of other sensors show an effect.
-pub(crate) fn is_shown_by_others(context: &Context, placed: &Placed, after: &[Held], without: &[Held]) -> bool {
+fn is_shown_by_others(context: &Context, placed: &Placed, after: &[Held], without: &[Held]) -> bool {
     let mut witnesses = touched(context, placed).filter(|(_, t)| t.relation.is_evidence());
     witnesses.any(|(i, _)| 1.0 - after[i].claimed / without[i].claimed > NEEDED_REDUCTION)
 }
 
-/// An effect without which left-out rows are predicted better: the one that does most harm. One that another sensor shows leaves its own channel's
-/// error as it is, but for what the others make of its absence.
+/// An effect without which left-out rows are predicted better: the one that does most harm.
 fn useless(context: &Context, fit: &Fit, errors: &Errors<'_>) -> Option<usize> {
     let reduction = |k: usize| quoted(context, &fit.placed[k], errors.after, &errors.without[k]).reduction;
-    let shown = |k: usize| is_shown_by_others(context, &fit.placed[k], errors.after, &errors.without[k]);
-    let harmful = (0..fit.placed.len()).map(|k| (k, reduction(k))).filter(|(k, r)| *r < 0.0 && !shown(*k));
+    let harmful = (0..fit.placed.len()).map(|k| (k, reduction(k))).filter(|(_, r)| *r < 0.0);
     harmful.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
 }
 

@@ -138,9 +138,12 @@ pub(crate) fn taught(command: Command) -> Command {
 
 fn descend(command: Command, path: &[&'static str], entry: &Entry) -> Command {
     match path {
-        // a number below 0 is a value of an option that takes numbers
+        // a number below 0 is a value of an option that takes numbers, which says what it takes
         [] => command.after_help(entry.text()).mut_args(|arg| {
-            if arg.get_value_parser().type_id() == TypeId::of::<f64>() { arg.allow_negative_numbers(true) } else { arg }
+            let taken = arg.get_value_parser().type_id();
+            let is_number =
+                [TypeId::of::<f64>(), TypeId::of::<u64>(), TypeId::of::<u32>(), TypeId::of::<usize>()].map(|id| taken == id);
+            if is_number.contains(&true) { arg.allow_negative_numbers(true) } else { arg }
         }),
         [first, rest @ ..] => command.mut_subcommand(*first, |inner| descend(inner, rest, entry)),
     }

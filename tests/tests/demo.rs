@@ -78,6 +78,13 @@ fn what_one_speed_sensor_reads_is_named() {
         let out = demo(folder.path(), &["--seed", "1", "--effect", id]);
         assert!(out.contains(&format!("hidden was {id}: found")), "{out}");
         assert!(!out.contains("against the other sensors"), "nothing of it is left: {out}");
+        if id == "dead_rotor_speed" {
+            let verdict = verdict(folder.path());
+            let named = verdict["effects"].as_array().and_then(|all| all.iter().find(|e| e["id"] == id)).expect("it is named");
+            let end = |n: usize| named["parameters"][0]["ci95"][n].as_f64().expect("an interval");
+            // a healthy sensor's own gain is 0.3 %, and half a per cent is allowed for the form
+            assert!(end(1) - end(0) < 0.03, "{}", named["parameters"][0]);
+        }
     }
 }
 

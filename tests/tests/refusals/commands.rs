@@ -77,6 +77,12 @@ pub(super) fn arguments() -> Vec<Case> {
         alone("a declination beyond the pole", "ahrs good.csv out.csv --declination 700", &["--declination 700", "-180 to 180"]),
         alone("a channel that is none", "plateaus good.csv --channel thrust", &["no column thrust", "thrust_n"]),
         alone("a thrust that is none", "select --thrust nan", &["--thrust nan: expected N from 0"]),
+        alone("a seed below 0", "demo --seed -1 -o out", &["--seed -1: expected a seed, a whole number from 0"]),
+        alone(
+            "cells below 0",
+            "export model.toml --to px4 --cells -3",
+            &["--cells -3: expected cells, a whole number from 1 to 14"],
+        ),
         alone("a thrust without an end", "select --thrust inf", &["--thrust inf: expected N from 0"]),
         alone("a time that is none", "select --minutes nan", &["--minutes nan: expected minutes"]),
         alone("a charge that is none", "select --capacity nan", &["--capacity nan: expected a positive number of A.h"]),
