@@ -36,13 +36,17 @@ pub(crate) struct Quoted {
 
 /// The figure that is quoted for an effect: `after` with all effects, `without` without this one.
 pub(crate) fn quoted(context: &Context, placed: &Placed, after: &[Held], without: &[Held]) -> Quoted {
-    let shown = is_shown_by_others(context, placed, after, without);
+    // the error of a channel to which an effect adds nothing changes with the fit of all else alone; where other sensors show it, what is no
+    // worse is the same
+    let same = match placed.effect.shows_beside_others_alone() {
+        true => f64::INFINITY,
+        false if is_shown_by_others(context, placed, after, without) => WORSE,
+        false => EQUAL,
+    };
     let of_channel = |(i, t): (usize, &Target)| {
         let of_news = 1.0 - after[i].rms / without[i].rms;
         let reduction = if t.trust.is_empty() { of_news } else { 1.0 - after[i].claimed / without[i].claimed };
-        // what the other sensors show its own channel's curve holds: the error there changes with the fit of all else alone
-        let same = reduction.abs() < EQUAL || shown && reduction < 0.0;
-        let reduction = if same { 0.0 } else { reduction };
+        let reduction = if (-same..EQUAL).contains(&reduction) { 0.0 } else { reduction };
         Quoted { channel: t.name.to_owned(), of_news, reduction }
     };
     let touched = touched(context, placed).filter(|(_, t)| !t.relation.is_evidence());

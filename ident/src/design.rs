@@ -11,6 +11,28 @@ use crate::solve::Normal;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
+/// Covariance of the coefficients of a channel: the inverse of their equations, of weights that are `unit` over a variance, where the rows say so many
+/// times less than their variances promise. What was known of a coefficient before any run is as sure as it was, however coloured the rows are
+/// (Sherman & Morrison 1950).
+pub(crate) fn covariance(
+    relation: Relation,
+    labels: impl Iterator<Item = Label>,
+    inverse: DMatrix<f64>,
+    (unit, times): (f64, f64),
+) -> DMatrix<f64> {
+    let mut out = inverse * times;
+    for (k, label) in labels.enumerate() {
+        if let Label::Base(power) = label
+            && let Some((sd, _)) = relation.known(power)
+        {
+            let more = (1.0 - unit / times) / (sd * sd);
+            let beside = out.column(k).into_owned();
+            out -= &beside * beside.transpose() * (more / (1.0 + more * beside[k]));
+        }
+    }
+    out
+}
+
 /// What a column's coefficient means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Label {
@@ -116,23 +138,6 @@ impl TargetDesign {
         }
     }
 
-    /// Covariance of the coefficients: the inverse of their equations, of weights that are `unit` over a variance, where the rows say so many times
-    /// less than their variances promise. What was known before any run is as sure as it was, however coloured the rows are (Sherman & Morrison
-    /// 1950).
-    pub(crate) fn covariance(&self, inverse: DMatrix<f64>, unit: f64, times: f64) -> DMatrix<f64> {
-        let mut out = inverse * times;
-        for (k, column) in self.columns.iter().enumerate() {
-            if let Label::Base(power) = column.label
-                && let Some((sd, _)) = self.relation.known(power)
-            {
-                let more = (1.0 - unit / times) / (sd * sd);
-                let beside = out.column(k).into_owned();
-                out -= &beside * beside.transpose() * (more / (1.0 + more * beside[k]));
-            }
-        }
-        out
-    }
-
     /// What a declared model expects, or one that predicts makes of its columns so far but for the zeros of the day; `None` while coefficients are
     /// sought without a model.
     pub(crate) fn known(&self) -> Option<Vec<f64>> {
@@ -225,4 +230,30 @@ fn weighted_sum(columns: &[Column], coefficients: &[f64], n: usize) -> Vec<f64> 
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sensor's own gain and a factor that looks just like it: no more than the gain's prior leaves open, however little the rows say.
+    #[test]
+    fn what_was_known_stays_as_sure() {
+        let (sd, most) = Relation::SpeedDifference.known(1).expect("a gain of its own");
+        let labels = [Label::Base(0), Label::Base(1), Label::Effect { effect: 0, amplitude: 0 }];
+        let mut normal = Normal::new(3);
+        for row in 0..1000 {
+            let x = 1.0 + 0.005 * f64::from(row);
+            normal.add(&[1.0, x, x], 0.5 * x, 1.0);
+        }
+        normal.expect(1, sd, most, 1.0);
+        let inverse = normal.solve().expect("a solution").inverse;
+        let of = |times: f64| covariance(Relation::SpeedDifference, labels.into_iter(), inverse.clone(), (1.0, times));
+        let (once, often) = (of(1.0), of(1000.0));
+        for k in [1, 2] {
+            let ratio = (often[(k, k)] / once[(k, k)]).sqrt();
+            assert!((0.9..1.2).contains(&ratio), "{k}: {ratio} times");
+        }
+        assert!((often[(0, 0)] / once[(0, 0)] - 1000.0).abs() < 1.0, "what nothing was known of is as unsure as the rows");
+    }
 }

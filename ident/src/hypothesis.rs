@@ -8,7 +8,7 @@
 
 use crate::colour::effective_share;
 use crate::context::{Context, Relation, Target};
-use crate::design::{Label, TargetDesign};
+use crate::design::{Label, TargetDesign, covariance};
 use crate::effects::{BEFORE, Effect, EffectEntry, Estimate, Instance, Stage};
 use crate::model::Model;
 use crate::samples::{Samples, Taught};
@@ -195,15 +195,9 @@ pub fn fit_target(target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Opt
     let rss: f64 = residual.iter().map(|r| r * r).sum();
     let share = effective_share(&residual);
     let times = (rss / residual.len() as f64).max(0.01) / share;
-    let covariance = design.covariance(inverse, samples.unit(), times);
-    Some(TargetFit {
-        coefficients,
-        labels: design.columns.iter().map(|c| c.label).collect(),
-        covariance,
-        loglik,
-        share,
-        left: residual.into(),
-    })
+    let labels = || design.columns.iter().map(|c| c.label);
+    let covariance = covariance(target.relation, labels(), inverse, (samples.unit(), times));
+    Some(TargetFit { coefficients, labels: labels().collect(), covariance, loglik, share, left: residual.into() })
 }
 
 /// Fits every target that the effects touch; the others come from `rest`.

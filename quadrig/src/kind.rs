@@ -57,7 +57,7 @@ pub(crate) fn is_computed(path: &Path, now: &str) -> bool {
         && match kind {
             Some(MODEL) => Model::read(path).is_ok_and(|model| model.files().0 == text),
             Some(PAGE) => text.contains(GENERATOR),
-            Some(VERDICT | PINS) => true,
+            Some(PINS) => true,
             Some(LOG | FLIGHT) => text.lines().any(|line| line == format!("# date = {SIMULATED:?}")),
             // values over time may be a recording, whoever computes some of the same columns
             Some(TABLE) => {
@@ -75,7 +75,6 @@ const MODEL: &str = "a model";
 const GENERATOR: &str = "<meta name=\"generator\" content=\"quadrig\">";
 /// A page that speaks of this program.
 const PAGE: &str = "a page";
-const VERDICT: &str = "a verdict";
 const LOG: &str = "a log";
 const FLIGHT: &str = "a flight's log";
 const TABLE: &str = "a table of values, such as a log";
@@ -96,7 +95,7 @@ fn kind_of(text: &str) -> Option<&'static str> {
         return Some(if is_ours(text) { PAGE } else { "a web page" });
     }
     if text.starts_with('{') && text.contains("\"quadrig-verdict") {
-        return Some(VERDICT);
+        return Some("a verdict");
     }
     // its head alone would be an empty file of settings
     if text.starts_with("# quadrig-flight") {

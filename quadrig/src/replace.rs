@@ -1,6 +1,6 @@
 //! A file that takes the place of an earlier one of its name.
 //!
-//! What it is: what is computed is computed again and replaced: a model, a page, a verdict, a simulated log, a table of the same columns.
+//! What it is: what is computed is computed again and replaced: a model, a page, a simulated log, a record of pins, a table of the same columns.
 //! Anything else that lies under the name of an output gets a second name first (`NAME-1`), and one line says so: a recording, a calibration, a
 //! configuration, notes. Nothing is lost by a typing error.
 //! What can go wrong: a folder in which the earlier file cannot be renamed; nothing is written then.

@@ -58,6 +58,10 @@ impl Effect for AlternatingPeriod {
         Scope::Rig
     }
 
+    fn shows_beside_others_alone(&self) -> bool {
+        true
+    }
+
     fn stage(&self) -> Stage {
         Stage::Term
     }

@@ -40,6 +40,10 @@ impl Effect for DeadRotorSpeed {
         Scope::Rig
     }
 
+    fn shows_beside_others_alone(&self) -> bool {
+        true
+    }
+
     fn stage(&self) -> Stage {
         Stage::Term
     }

@@ -45,6 +45,10 @@ impl Effect for DoublePulses {
         Scope::Rig
     }
 
+    fn shows_beside_others_alone(&self) -> bool {
+        true
+    }
+
     fn stage(&self) -> Stage {
         Stage::Term
     }

@@ -42,6 +42,10 @@ impl Effect for MissedPulses {
         Scope::Rig
     }
 
+    fn shows_beside_others_alone(&self) -> bool {
+        true
+    }
+
     fn stage(&self) -> Stage {
         Stage::Term
     }

@@ -269,6 +269,10 @@ pub trait Effect: Sync {
     fn seen(&self, _context: &Context, _instance: &Instance) -> f64 {
         0.0
     }
+    /// Whether it adds nothing to its channel, whose own curve over the command holds it already: what a sensor reads beside the others shows it alone.
+    fn shows_beside_others_alone(&self) -> bool {
+        false
+    }
     /// Whether it says something of the scatter of the thrust, not only of its mean.
     fn scatters(&self) -> bool {
         false

@@ -8,7 +8,7 @@
 use super::equations::{left_on, of_run, residual_on, rms, shared, solved};
 use super::{FEWEST, Member, is_judged};
 use crate::context::Relation;
-use crate::design::Label;
+use crate::design::{Label, covariance};
 use crate::effects::Shape;
 use crate::hypothesis::Placed;
 use crate::search::{connected, nelder_mead};
@@ -215,7 +215,8 @@ impl<'m, 'a> Joint<'m, 'a> {
             let whole = joint(channel, &labels, &normals)?;
             let (coefficients, inverse) = solved(&whole)?;
             let samples: f64 = normals.iter().flatten().map(|n| n.1).sum();
-            let covariance = inverse * (whole.left_by(&coefficients) / samples).max(1.0);
+            let times = (whole.left_by(&coefficients) / samples).max(1.0);
+            let covariance = covariance(Relation::of(channel, true)?, labels.iter().copied(), inverse, (1.0, times));
             Some(Shared { channel, labels, coefficients, covariance })
         };
         self.channels().into_iter().filter_map(of_channel).collect()
