@@ -327,6 +327,13 @@ pub fn amount(value: f64, unit: &str) -> String {
     with_unit(&digits(factor * value, 0.05 * (factor * value).abs()), unit)
 }
 
+/// An error with unit to three significant digits, as the tables have it.
+#[must_use]
+pub fn rms(value: f64, unit: &str) -> String {
+    let (factor, unit) = scaled(value, unit);
+    with_unit(&digits(factor * value, 0.0), unit)
+}
+
 fn with_unit(number: &str, unit: &str) -> String {
     match unit {
         "" | "1" => number.to_owned(),
@@ -448,6 +455,7 @@ mod tests {
         assert_eq!(sized(&parameter(0.04, 0.03, "ohm")), None, "an interval this wide supports no number");
         assert_eq!(amount(0.0237, "N"), "0.024 N");
         assert_eq!(amount(0.35241, "A"), "0.35 A");
+        assert_eq!([rms(0.35241, "A"), rms(314.7, "rpm"), rms(0.0825, "V")], ["0.352 A", "315 rev/min", "82.5 mV"]);
     }
 
     #[test]

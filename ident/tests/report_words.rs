@@ -108,7 +108,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             with_left(verdict(Kind::Attributed, vec![filter(0.7)])),
             true,
             &[
-                "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.030 N rms is left (slow).",
+                "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.0304 N rms is left (slow).",
             ],
             &["noise."],
         ),
@@ -181,7 +181,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             },
             false,
             &[
-                "Something is left on thrust that no known effect explains. It goes with time; a smooth term without a name was fitted. On thrust 0.030 N rms is left (slow).",
+                "Something is left on thrust that no known effect explains. It goes with time; a smooth term without a name was fitted. On thrust 0.0304 N rms is left (slow).",
             ],
             &["explains thrust", "%"],
         ),
@@ -201,13 +201,13 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
         (
             with_left(verdict(Kind::None, vec![])),
             false,
-            &["No name was found for what the declared model leaves over. On thrust 0.030 N rms is left (slow)."],
+            &["No name was found for what the declared model leaves over. On thrust 0.0304 N rms is left (slow)."],
             &["more than its noise", "explains"],
         ),
         (
             with_left(verdict(Kind::None, vec![])),
             true,
-            &["Nothing has changed since the model was made; the same errors remain, most on thrust: 0.030 N rms."],
+            &["Nothing has changed since the model was made; the same errors remain, most on thrust: 0.0304 N rms."],
             &["explains", "New since", "is left"],
         ),
         (
@@ -230,7 +230,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             // what is still there in the main is not passed over
             with_left(verdict_with_thrust_after(0.28, vec![sag(0.99)])),
             false,
-            &["On thrust 0.28 N rms is left (slow). No known effect explains it."],
+            &["On thrust 0.280 N rms is left (slow). No known effect explains it."],
             &[],
         ),
         (with_left(verdict(Kind::Attributed, vec![filter(0.99)])), false, &["is left (slow)."], &["No known effect"]),
@@ -295,7 +295,7 @@ fn the_head_is_short_and_names_the_largest_remainder() {
     {
         let said = sentence(&Verdict { verdict: kind, alternatives, ..crowded() }, Vocabulary::RIG, false);
         assert!(said.split_whitespace().count() <= 60, "{} words: {said}", said.split_whitespace().count());
-        assert!(said.contains("Most is left on voltage: 80 mV rms (slow).") && !said.contains("something is left"), "{said}");
+        assert!(said.contains("Most is left on voltage: 80.0 mV rms (slow).") && !said.contains("something is left"), "{said}");
         assert!(!said.contains("creeps"), "two causes at the most: {said}");
     }
     // a curve without a name on a small remainder does not hide a large one
@@ -304,7 +304,7 @@ fn the_head_is_short_and_names_the_largest_remainder() {
     let said = sentence(&v, Vocabulary::RIG, false);
     assert_eq!(
         said,
-        "No known effect explains what the model leaves over. Most is left on voltage: 80 mV rms (slow). A smooth term without a name was fitted on thrust; it goes with time."
+        "No known effect explains what the model leaves over. Most is left on voltage: 80.0 mV rms (slow). A smooth term without a name was fitted on thrust; it goes with time."
     );
 }
 
@@ -463,7 +463,7 @@ fn a_channel_without_a_model_is_told() {
     // what no model predicts is not told as what a model leaves
     v.unexplained = vec![left("rpm", 380.0), left("voltage_v", 8.0)];
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.ends_with("On voltage 80 mV rms is left (slow). Speed has no model: no command was logged."), "{said}");
+    assert!(said.ends_with("On voltage 80.0 mV rms is left (slow). Speed has no model: no command was logged."), "{said}");
     v.unexplained.truncate(1);
     let said = sentence(&v, Vocabulary::RIG, false);
     assert!(said.ends_with("Little is left beyond the noise. Speed has no model: no command was logged."), "{said}");
@@ -626,7 +626,7 @@ fn the_sentence_counts_what_the_state_calls_unexplained() {
         thrust.after.heldout_rms = 0.02;
     }
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.contains("On voltage 80 mV rms is left (slow).") && !said.contains("thrust"), "{said}");
+    assert!(said.contains("On voltage 80.0 mV rms is left (slow).") && !said.contains("thrust"), "{said}");
 }
 
 /// A share of a whole vector does not hide that one of its axes is worse for it.
@@ -654,7 +654,7 @@ fn a_size_and_its_look_are_of_one_sensor() {
     let on_its_way = Unexplained { looks_like: "while the load is on its way".into(), ..left("rpm_beam", 6.0) };
     v.unexplained = vec![Unexplained { looks_like: "in single rows".into(), ..left("rpm_hall", 8.0) }, on_its_way];
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.contains("up to 9.0 rev/min rms is left (as the load changes)"), "{said}");
+    assert!(said.contains("up to 9.00 rev/min rms is left (as the load changes)"), "{said}");
 }
 
 /// Rotors of which the same is told have one entry.

@@ -9,12 +9,13 @@
 use crate::Failure;
 use ident::log::{folder_of, no_regular_file, what_lies_at};
 use ident::model::beside;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// The files and folders of one call.
 #[derive(Default)]
 pub(crate) struct Paths<'a> {
-    inputs: Vec<&'a Path>,
+    inputs: Vec<Cow<'a, Path>>,
     files: Vec<(&'static str, &'a Path)>,
     folders: Vec<(&'static str, &'a Path)>,
     kept: Vec<(&'static str, &'a Path)>,
@@ -23,7 +24,13 @@ pub(crate) struct Paths<'a> {
 impl<'a> Paths<'a> {
     /// Files that are read.
     pub(crate) fn reads<T: AsRef<Path> + ?Sized + 'a>(mut self, files: impl IntoIterator<Item = &'a T>) -> Self {
-        self.inputs.extend(files.into_iter().map(AsRef::as_ref));
+        self.inputs.extend(files.into_iter().map(|file| Cow::Borrowed(file.as_ref())));
+        self
+    }
+
+    /// Files that an input names, and that are read with it.
+    pub(crate) fn reads_too(mut self, files: impl IntoIterator<Item = PathBuf>) -> Self {
+        self.inputs.extend(files.into_iter().map(Cow::Owned));
         self
     }
 

@@ -104,7 +104,7 @@ impl What {
 impl Args {
     /// What it reads and writes.
     pub(crate) fn paths(&self) -> Paths<'_> {
-        Paths::default().reads(&self.input).reads(self.port.reads()).writes("-o", &self.output)
+        self.port.paths(Paths::default()).reads(&self.input).writes("-o", &self.output)
     }
 }
 

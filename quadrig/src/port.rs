@@ -7,10 +7,12 @@
 //! Reference: specification `rig.md`, "The operator's side"; docs/virtual.md.
 
 use crate::Failure;
+use crate::apart::Paths;
 use frame::message::Beep;
+use hal_sim::scenario::AnyScenario;
 use serialport::SerialPort;
 use std::io::{Error, ErrorKind, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use virtual_board::{Hand, Kind, Order, Pace, VirtualBoard, switch_on};
 
@@ -40,10 +42,15 @@ pub(crate) struct PortArgs {
 }
 
 impl PortArgs {
-    /// The files that a virtual board reads.
-    pub(crate) fn reads(&self) -> impl Iterator<Item = &Path> {
-        let scenario = self.port.strip_prefix(VIRTUAL).and_then(|rest| rest.strip_prefix(':')).map(Path::new);
-        scenario.into_iter().chain(self.flash.as_deref()).chain(self.image.as_deref())
+    /// The files that a virtual board reads, with the schedule that its scenario names. A scenario that cannot be read is refused later, in its own
+    /// words.
+    pub(crate) fn paths<'a>(&'a self, paths: Paths<'a>) -> Paths<'a> {
+        let scenario = self.scenario().flatten();
+        let schedule = scenario.as_deref().and_then(|path| match AnyScenario::load(path).ok()? {
+            AnyScenario::Rig(scenario) => scenario.schedule.file(path),
+            AnyScenario::Imu(_) => None,
+        });
+        paths.reads_too(scenario).reads_too(schedule).reads(&self.flash).reads(&self.image)
     }
 
     /// Whether one was named.

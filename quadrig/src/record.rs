@@ -59,7 +59,7 @@ pub(crate) struct Args {
 impl Args {
     /// What it reads and writes.
     pub(crate) fn paths(&self) -> Paths<'_> {
-        Paths::default().reads(&self.under.model).reads(self.port.reads()).writes("-o", [&self.output])
+        self.port.paths(Paths::default()).reads(&self.under.model).writes("-o", [&self.output])
     }
 }
 

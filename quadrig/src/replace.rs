@@ -127,6 +127,7 @@ mod tests {
             ("# quadrig-calibration 1\n[calibrated.current]\nper_count = 0.016\n", "# quadrig-calibration 1\n"),
             ("<!doctype html><title>my diary of runs by quadrig</title>", page),
             (&format!("{model}# tuned by hand\n"), model),
+            (&model.replace("c1_n_per_krpm = 0.1", "c1_n_per_krpm = 0.3"), model),
             ("run,k_t,k_q\na,1,2\nthe best one\n", "run,k_t,k_q\nb,1,2\n"),
             ("# Onboard parameters\n1\t1\tA\t1\t6\n", "# Onboard parameters\n1\t1\tA\t2\t6\n"),
             ("t,thrust,torque\n0,1,2\n", "run,k_t,k_q\nb,1,2\n"),

@@ -256,7 +256,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 impl Args {
     /// What it reads and writes.
     pub(crate) fn paths(&self) -> Paths<'_> {
-        let paths = Paths::default().reads(self.port.reads());
+        let paths = self.port.paths(Paths::default());
         match &self.order {
             Order::View { session } | Order::Arm { session } | Order::Calibrate { session, .. } => session.paths(paths),
             Order::Run { schedule, next, session, .. } => session.paths(paths.reads(schedule).reads(next)),

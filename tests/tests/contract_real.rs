@@ -43,6 +43,19 @@ fn stated(run: &Path) -> f64 {
     row.split('|').nth(4).and_then(|cell| cell.trim().parse().ok()).expect("a factor in the fourth column")
 }
 
+/// The lines of the report that the README shows.
+fn excerpt() -> Vec<String> {
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md")).expect("the README");
+    let block = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an excerpt in the README");
+    block.lines().filter(|line| !line.is_empty()).map(str::to_owned).collect()
+}
+
+/// The first of `lines` that `text` does not hold, in their order.
+fn missing<'a>(lines: &'a [String], text: &str) -> Option<&'a str> {
+    let mut said = text.lines();
+    lines.iter().find(|line| !said.any(|said| said == *line)).map(String::as_str)
+}
+
 /// A Crazyflie's battery and wires drop some two tenths of a volt per ampere; a term without a name in the power of the same deck would trade
 /// places with it.
 #[test]
@@ -83,12 +96,23 @@ fn the_loop_closes_on_three_recorded_runs() {
     let runs = files(&data.join("rig/spitz-esc-test/original"), |name| name.starts_with("Log_") && name.ends_with(".csv"));
     assert_eq!(runs.len(), 3);
     let mut faults = Vec::new();
+    let shown = excerpt();
     for run in runs {
         let folder = TempDir::new().unwrap();
-        call(folder.path(), &["--quiet", "import", text(&run), "-o", "run.csv"]).succeeded();
-        call(folder.path(), &["--quiet", "identify", "run.csv", "-o", "model.toml"]).succeeded();
-        let said = call(folder.path(), &["close-loop", "run.csv", "-o", "out", "--json"]).succeeded();
-        let verdict: Value = serde_json::from_str(&said.out).expect("the verdict is JSON");
+        let name = run.file_name().and_then(|name| name.to_str()).expect("a plain name");
+        call(folder.path(), &["--quiet", "import", text(&run), "-o", name]).succeeded();
+        call(folder.path(), &["--quiet", "identify", name, "-o", "model.toml"]).succeeded();
+        let said = call(folder.path(), &["close-loop", name, "-o", "out"]).succeeded();
+        if shown.iter().any(|line| line == name) {
+            assert_eq!(
+                missing(&shown, &said.out),
+                None,
+                "the README's excerpt is not what `close-loop {name}` says:\n{}",
+                said.out
+            );
+        }
+        let verdict = std::fs::read_to_string(folder.path().join("out/verdict.json")).expect("the verdict");
+        let verdict: Value = serde_json::from_str(&verdict).expect("the verdict is JSON");
         let thrust = &verdict["channels"]["thrust_n"];
         let error = |when: &str| thrust[when]["heldout_rms"].as_f64().expect("a held-out error");
         let factor = error("before") / error("after");

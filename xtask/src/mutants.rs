@@ -135,7 +135,7 @@ fn asked<'w>(words: &[&'w str]) -> Result<Asked<'w>, Failure> {
 pub(crate) fn mutants(place: &Place, words: &[&str]) -> Result<(), Failure> {
     let asked = asked(words)?;
     let (packages, accepted) = read(place)?;
-    let results = Results { place, folder: place.root.join("target/mutation/results") };
+    let results = Results { place, folder: place.root.join("budgets/mutants") };
     if asked.page {
         return results.write_page(&packages, &accepted);
     }

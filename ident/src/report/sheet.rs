@@ -171,7 +171,7 @@ impl Sheet {
     /// A table; `chosen` rows stand out.
     pub fn table(&mut self, header: &[&str], rows: &[Vec<String>], chosen: impl Fn(usize) -> bool) {
         let texts: Vec<bool> =
-            (0..header.len()).map(|k| k > 0 && rows.iter().any(|r| r.get(k).is_some_and(|c| c.chars().count() > 34))).collect();
+            (0..header.len()).map(|k| rows.iter().any(|r| r.get(k).is_some_and(|c| c.chars().count() > 34))).collect();
         let class = |k: usize| if texts.get(k) == Some(&true) { " class=\"text\"" } else { "" };
         let wide = |cell: &String| cell.split(' ').any(|word| word.chars().count() > LONG);
         // the first column has a line of its own on a phone, so that its title asks for no room

@@ -192,6 +192,7 @@ pub(super) fn outputs() -> Vec<Case> {
             &["plan.toml: is an input"],
         ),
         alone("a recording over its board", "log --port sim:empty.toml --speed 0 -o empty.toml", &["empty.toml: is an input"]),
+        alone("one over its board's schedule", "log --port sim:on-file.toml --speed 0 -o plan.toml", &["plan.toml: is an input"]),
         alone(
             "two outputs in one file",
             "sim empty.toml -o out.csv --truth out.csv",

@@ -12,7 +12,7 @@ use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
 use crate::verdict::{Alternative, EffectEntry, ScheduleStep, Unexplained, Verdict};
-use crate::words::{amount, channel, channels, heading, list, lower, plain, probability, upper, vector};
+use crate::words::{channel, channels, heading, list, lower, plain, probability, rms, upper, vector};
 
 /// What is left.
 pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
@@ -135,7 +135,7 @@ const BEYOND: f64 = 2.0;
 /// The errors of a channel whose left-out rows are missed by much more than those that the fit saw.
 fn beyond_what_was_seen(v: &Verdict, name: &str) -> Option<String> {
     let c = v.channels.get(name)?;
-    let [out, seen] = [c.after.heldout_rms, c.after.rms].map(|rms| amount(rms, &c.unit));
+    let [out, seen] = [c.after.heldout_rms, c.after.rms].map(|error| rms(error, &c.unit));
     (c.after.heldout_rms > BEYOND * c.after.rms).then(|| format!("{}: {out} for {seen}", channel(name)))
 }
 

@@ -11,7 +11,7 @@ use super::vocabulary::Vocabulary;
 use crate::rivals::beyond;
 use crate::unexplained::LOUD;
 use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Kind, Parameter, Unexplained, Verdict};
-use crate::words::{Clause, adverb, amount, channel, counted, heading, list, upper, upper_bound, vector};
+use crate::words::{Clause, adverb, channel, counted, heading, list, rms, upper, upper_bound, vector};
 
 /// Most effects that the sentence names; the cards have all.
 const MOST: usize = 2;
@@ -480,7 +480,7 @@ fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
 /// The error that is left on a channel, with unit: the one that the state of the channels tells.
 pub(super) fn size_left(verdict: &Verdict, u: &Unexplained) -> String {
     let of = verdict.channels.get(&u.channel);
-    of.map_or_else(|| format!("{:.1} times the noise", u.over_floor), |c| amount(c.after.heldout_rms, &c.unit))
+    of.map_or_else(|| format!("{:.1} times the noise", u.over_floor), |c| rms(c.after.heldout_rms, &c.unit))
 }
 
 /// The same in noise floors: of several runs that of all of them, as the state of the channels tells it.
