@@ -77,6 +77,8 @@ pub struct Model {
     pub start_pulse_us: f64,
     /// Highest pulse that its runs held, us, where they have a command: what lies above is computed, not measured.
     pub highest_pulse_us: Option<f64>,
+    /// Whether its runs saw the rotor stand still: what force and torque read then is the zero of the day, and no thrust.
+    pub stood: bool,
     /// Channels of the consensus speed.
     pub consensus: Vec<String>,
     /// Declared polynomials.
@@ -148,6 +150,11 @@ fn highest_held(log: &Log) -> Option<f64> {
     pulses.get(pulses.len().saturating_sub(crate::plateau::SHORTEST)).copied()
 }
 
+/// Whether as many rows as a level needs have a rotor that stands still.
+pub(crate) fn stood(context: &Context) -> bool {
+    context.rpm.iter().filter(|speed| **speed == 0.0).nth(crate::plateau::SHORTEST - 1).is_some()
+}
+
 fn slug(unit: &str) -> String {
     let mut out = String::new();
     for c in unit.chars() {
@@ -182,6 +189,9 @@ fn leftover_keys(channel: &str) -> [String; 3] {
     [format!("left_scatter_{unit}"), format!("left_at_{}", load_unit(channel)), format!("left_{unit}")]
 }
 
+/// Key of a model whose runs saw the rotor stand still.
+pub(crate) const STOOD: &str = "stood";
+
 /// Unit of the load that a channel's polynomial is of.
 fn load_unit(channel: &str) -> &'static str {
     if channel.starts_with("rpm") { "kus" } else { "krpm" }
@@ -196,6 +206,7 @@ impl Model {
             meta: log.meta.iter().filter(|(k, _)| !board::is_evidence(k)).map(|(k, v)| (k.clone(), v.clone())).collect(),
             start_pulse_us: context.start_pulse_us,
             highest_pulse_us: highest_held(log),
+            stood: stood(context),
             consensus: context.consensus.channels.clone(),
             polynomials,
             ..Self::default()
@@ -362,6 +373,9 @@ impl Model {
         root.insert("start_pulse_us".into(), digits::plain(self.start_pulse_us).into());
         if let Some(pulse) = self.highest_pulse_us {
             root.insert("highest_pulse_us".into(), digits::plain(pulse).into());
+        }
+        if self.stood {
+            root.insert(STOOD.into(), true.into());
         }
         if !self.meta.is_empty() {
             root.insert("rig".into(), Value::Table(self.meta.clone()));

@@ -95,6 +95,8 @@ enum Look {
     InOne(Range<usize>),
     /// Most of it in few rows that lie apart.
     InSingleRows,
+    /// Most of it in few rows, several of them one after the other.
+    InBursts,
     /// It wanders: few of its samples are independent.
     Slow,
     /// It lasts longer than a row.
@@ -115,7 +117,11 @@ fn look(target: &Target, residual: &[f64], squares: &[f64]) -> Look {
     if 2.0 * largest.iter().take(few).sum::<f64>() > whole {
         let (in_a_row, stretch) = loudest_stretch(squares);
         let is_one = 2.0 * in_a_row > whole && stretch.len() > 1 && squares.get(stretch.clone()).is_some_and(is_filled);
-        return if is_one { Look::InOne(stretch) } else { Look::InSingleRows };
+        return match is_one {
+            true => Look::InOne(stretch),
+            false if neighbours_agree(residual) => Look::InBursts,
+            false => Look::InSingleRows,
+        };
     }
     match effective_share(residual) {
         share if share < SLOW => Look::Slow,
@@ -142,6 +148,7 @@ pub(crate) fn looks_like(context: &Context, target: &Target, residual: &[f64]) -
         Look::OnTheWay => return "while the load is on its way".to_owned(),
         Look::InOne(stretch) => return in_one(context, target, &stretch),
         Look::InSingleRows => return "in single rows".to_owned(),
+        Look::InBursts => return "in short bursts".to_owned(),
         Look::Slow => "slow",
         Look::OverSeveralRows => "over several rows",
         Look::Quick => "from row to row",

@@ -182,6 +182,7 @@ pub fn channel(name: &str) -> String {
         "vel_forward" => "speed forward through the air",
         "vel_right" => "speed to the right through the air",
         "vel_down" => "speed down through the air",
+        "commands" => "the commands together",
         "speed_across" => "speed across the rotors",
         // attitude logs
         "ax" => "specific force (x)",
@@ -311,12 +312,12 @@ pub fn counted(p: &Parameter) -> Option<String> {
 /// Units of what cannot be below zero: durations, resistances, inertias, charges, lengths, areas.
 const POSITIVE: [&str; 7] = ["s", "ohm", "kg.m2", "Ah", "A.h", "m^2", "Hz"];
 
-/// The upper bound of a quantity that cannot be below zero and of which the run shows no more: the interval of a positive value that begins no
-/// higher. An instant has a sign.
+/// The upper bound of a quantity that cannot be below zero and of which the run shows no more: its interval begins no higher. An instant has a
+/// sign, and so has a time that is early.
 #[must_use]
 pub fn upper_bound(p: &Parameter) -> Option<f64> {
     let instant = ["t0", "t1"].contains(&p.name.as_str());
-    let open = p.value >= 0.0 && p.ci95[0] <= 0.0 && p.ci95[1] > 0.0;
+    let open = (p.value >= 0.0 || p.unit != "s") && p.ci95[0] <= 0.0 && p.ci95[1] > 0.0;
     (open && !instant && POSITIVE.contains(&p.unit.as_str())).then_some(p.ci95[1])
 }
 
@@ -479,6 +480,7 @@ mod tests {
         assert_eq!(upper_bound(&parameter(0.02, 0.01, "s")), None, "an interval above zero is one");
         assert_eq!(upper_bound(&parameter(0.002, 0.02, "N/s")), None, "a drift has a sign");
         assert_eq!(upper_bound(&parameter(-0.002, 0.02, "s")), None, "what is early is no bound");
+        assert!(upper_bound(&parameter(-3.6e-6, 5.3e-6, "kg.m2")).is_some(), "no inertia is below zero");
         let instant = Parameter { name: "t0".into(), ..parameter(0.2, 1.0, "s") };
         assert_eq!(upper_bound(&instant), None);
     }

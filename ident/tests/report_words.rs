@@ -496,7 +496,7 @@ fn the_terminal_claims_no_more_than_it_knows() {
         ..sag(0.9)
     };
     let told = terminal(&verdict(Kind::Attributed, vec![seen]), Vocabulary::RIG, false);
-    assert!(told.contains("known by: the residual goes up\n") && told.contains("Without it the error of voltage is"), "{told}");
+    assert!(told.contains("shows as: the residual goes up\n") && told.contains("Without it the error of voltage is"), "{told}");
     assert!(text.contains("tau_up < 25 ms  (95 %)") && !text.contains("-0.02") && !text.contains("-21"), "{text}");
 }
 
@@ -549,7 +549,7 @@ fn every_effect_of_a_flight_has_words() {
     let said = |id: &str, parameters: Vec<Parameter>| (words.clause)(&effect(id, "mag_x", 0.9, 0.5, parameters)).sentence();
     assert_eq!(said("hard_iron", offset(9.0)), "A magnet on board adds 19.2 uT to the field.");
     let weaker = vec![parameter("rotor", 3.0, 0.0, "1"), parameter("thrust_change", -0.1, 0.004, "1")];
-    assert_eq!(said("rotor_gain", weaker), "Rotor 3 gives 10.0 % less thrust than its speed says.");
+    assert_eq!(said("rotor_gain", weaker), "Rotor 3 gives 10.0 % less thrust than it should.");
     let sagging = vec![parameter("resistance", 0.02, 0.0002, "ohm")];
     assert_eq!(said("supply_sag", sagging), "The supply's voltage drops by 20.0 mV for each ampere drawn.");
     assert_eq!(said("supply_sag", Vec::new()), "The supply's voltage drops with the load.");

@@ -98,7 +98,7 @@ impl<'a> Paths<'a> {
 }
 
 /// A pipe or a device gives its bytes once, and an input is looked at before it is read.
-fn is_readable_again(input: &Path) -> Result<(), Failure> {
+pub(crate) fn is_readable_again(input: &Path) -> Result<(), Failure> {
     let kind = std::fs::metadata(input).ok().filter(|found| !found.is_dir()).as_ref().and_then(no_regular_file);
     kind.map_or(Ok(()), |kind| {
         Err(format!("{}: is {kind}, which can be read only once; expected a file: save it to one first", input.display()).into())
@@ -106,6 +106,9 @@ fn is_readable_again(input: &Path) -> Result<(), Failure> {
 }
 
 fn is_regular(option: &str, file: &Path) -> Result<(), Failure> {
+    if file == Path::new("-") {
+        return Err(format!("-: expected the name of a file for {option}: nothing is written to standard output").into());
+    }
     what_lies_at(file).as_ref().and_then(no_regular_file).map_or(Ok(()), |kind| {
         Err(format!("{}: is {kind}, which stays as it is; expected the name of a regular file for {option}", file.display())
             .into())

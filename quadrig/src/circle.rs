@@ -65,7 +65,7 @@ struct Round {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let scenario = Scenario::load(&args.scenario)?;
-    args.paths().reads(&scenario.schedule.file(&args.scenario)).check()?;
+    args.paths().reads_too(scenario.schedule.files(&args.scenario)).check()?;
     let folder = args.output.as_deref().map(|path| Folder::new(path, "loop")).transpose()?;
     let silent = quiet || args.json;
     let say = |line: String| {

@@ -17,7 +17,7 @@ use crate::open::{Columns, Names, open, read_model};
 use crate::progress::Bar;
 use ident::close::{Closed, close};
 use ident::log::Log;
-use ident::model::Model;
+use ident::model::{FittedTo, Model};
 use ident::report::{Origin, Vocabulary, closed_loop, terminal};
 use std::path::{Path, PathBuf};
 
@@ -86,7 +86,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     let json = serde_json::to_string_pretty(&closed.verdict)?;
     if let Some(mut folder) = folder {
-        let origin = Origin { model: args.model.as_ref().map(|m| m.display().to_string()), ..Origin::of(&log) };
+        let origin = Origin {
+            model: args.model.as_ref().map(|m| m.display().to_string()),
+            validated: others.iter().map(FittedTo::of).collect(),
+            ..Origin::of(&log)
+        };
         folder.extend(results(&log, &closed, origin)?);
         folder.write()?;
     }

@@ -79,7 +79,7 @@ fn argument(argument: &Arg) -> String {
         let _ = write!(line, " One of {}.", quoted(possible));
     }
     let default: Vec<String> = argument.get_default_values().iter().map(|v| v.to_string_lossy().into_owned()).collect();
-    if takes && !default.is_empty() {
+    if takes && default.iter().any(|value| !value.is_empty()) {
         let _ = write!(line, " Default {}.", quoted(default));
     }
     line

@@ -26,17 +26,18 @@ pub(crate) struct Args {
     /// Longest calibration that is followed, s.
     #[arg(long, default_value_t = 300.0, value_parser = crate::number::positive(86_400.0, "seconds"))]
     patience: f64,
-    /// identify; format text|binary; send raw|calibrated|both; stream on|off; once; calibrate gyro|accel|mag|align; finish; cancel; save;
-    /// load; reset; errors.
-    #[arg(required = true)]
+    #[arg(required = true, help = WORDS)]
     words: Vec<String>,
 }
+
+/// What the board understands.
+const WORDS: &str = "identify; format text|binary; send raw|calibrated|both; stream on|off; once; calibrate gyro|accel|mag|align; finish; cancel; save; load; reset; errors";
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let typed = args.words.join(" ");
-    let command = line::command(&typed)
-        .ok_or_else(|| format!("{typed:?} is no command of the IMU board; expected one of `quadrig imu --help`"))?;
+    let command =
+        line::command(&typed).ok_or_else(|| format!("{typed:?} is no command of the IMU board; expected one of: {WORDS}"))?;
     let mut board = Board::at(args.port.open(BAUD, true)?);
     let text_wanted = command == Command::Imu(ImuCommand::Format(ImuFormat::Text));
     if !text_wanted {

@@ -8,7 +8,9 @@
 
 use crate::Failure;
 use crate::run_log::SIMULATED;
+use ident::log::digest;
 use ident::model::is_as_written;
+use std::borrow::Cow;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -56,7 +58,7 @@ pub(crate) fn is_computed(path: &Path, now: &str) -> bool {
     kind == kind_of(now)
         && match kind {
             Some(MODEL) => is_as_written(&text),
-            Some(PAGE) => text.contains(GENERATOR),
+            Some(PAGE) => text.contains(GENERATOR) && std::fs::read_to_string(path).is_ok_and(|page| is_as_stamped(&page)),
             Some(PINS) => true,
             Some(LOG | FLIGHT) => text.lines().any(|line| line == format!("# date = {SIMULATED:?}")),
             // values over time may be a recording, whoever computes some of the same columns
@@ -67,6 +69,23 @@ pub(crate) fn is_computed(path: &Path, now: &str) -> bool {
             }
             _ => false,
         }
+}
+
+/// How the last line of a page begins, and how it ends.
+const STAMP: [&str; 2] = ["<!-- as it was written: SHA-256 of all above ", " -->\n"];
+
+/// A page with a last line that tells whether somebody changed it; any other text as it is.
+pub(crate) fn stamped(text: &str) -> Cow<'_, str> {
+    if kind_of(text) != Some(PAGE) {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(format!("{text}{}{}{}", STAMP[0], digest(text.as_bytes()), STAMP[1]))
+}
+
+/// Whether a page is as it was written.
+fn is_as_stamped(page: &str) -> bool {
+    let parts = page.rsplit_once(STAMP[0]);
+    parts.is_some_and(|(above, told)| told.strip_suffix(STAMP[1]) == Some(digest(above.as_bytes()).as_str()))
 }
 
 /// A file of settings that this program wrote from a run.

@@ -10,7 +10,6 @@ use crate::folder::Folder;
 use crate::{Cli, Failure, help};
 use clap::CommandFactory;
 use clap_complete::{Shell, generate};
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Arguments of `completions`.
@@ -40,7 +39,8 @@ impl Args {
 pub(crate) fn completions(args: &Completions) -> Result<(), Failure> {
     let mut text = Vec::new();
     generate(args.shell, &mut help::taught(Cli::command()), "quadrig", &mut text);
-    Ok(crate::say::out().write_all(&text)?)
+    crate::say::text(&String::from_utf8_lossy(&text));
+    Ok(())
 }
 
 /// Writes the manual pages.

@@ -108,6 +108,7 @@ pub(crate) fn is_own(path: &Path) -> Result<bool, Failure> {
 
 /// Reads a run.
 pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, Failure> {
+    crate::apart::is_readable_again(path)?;
     if is_own(path)? {
         if let Some(m) = options.mappings.first() {
             let expected = "expected no --map: its columns have their names (an export takes one)";

@@ -145,7 +145,10 @@ fn read(path: &Path) -> Result<Log, Failure> {
     let mut first = String::new();
     let file = std::fs::File::open(path).map_err(unread(&path))?;
     let _ = std::io::Read::take(BufReader::new(file), 64).read_line(&mut first); // what is no text the readers refuse
-    Ok(if first.contains(FORMAT) { Log::read(path)? } else { import(path, &[])?.0 })
+    if first.contains(FORMAT) {
+        return Ok(Log::read(path)?);
+    }
+    Ok(import(path, &[]).map_err(|why| crate::kind::another(path).map_or(why.into(), Failure::from))?.0)
 }
 
 fn stem(path: &Path) -> String {

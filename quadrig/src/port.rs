@@ -46,10 +46,10 @@ impl PortArgs {
     /// words.
     pub(crate) fn paths<'a>(&'a self, paths: Paths<'a>) -> Paths<'a> {
         let scenario = self.scenario().flatten();
-        let schedule = scenario.as_deref().and_then(|path| match AnyScenario::load(path).ok()? {
-            AnyScenario::Rig(scenario) => scenario.schedule.file(path),
-            AnyScenario::Imu(_) => None,
-        });
+        let schedule = match scenario.as_deref().map(|path| (path, AnyScenario::load(path))) {
+            Some((path, Ok(AnyScenario::Rig(scenario)))) => scenario.schedule.files(path),
+            _ => Vec::new(),
+        };
         paths.reads_too(scenario).reads_too(schedule).reads(&self.flash).reads(&self.image)
     }
 

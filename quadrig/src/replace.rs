@@ -8,7 +8,7 @@
 //! Reference: specification `formats.md` ("nothing half-written").
 
 use crate::Failure;
-use crate::kind::is_computed;
+use crate::kind::{is_computed, stamped};
 use crate::spool::second_name;
 use crate::trouble::unwritten;
 use ident::log::{FORMAT, Log, write_whole};
@@ -17,7 +17,8 @@ use std::path::Path;
 
 /// Writes a file whole. What lies there and was not computed is kept under a second name, unless it is the same.
 pub(crate) fn put(path: &Path, text: &str) -> Result<(), Failure> {
-    put_as(path, text, |out| out.write_all(text.as_bytes()))
+    let text = stamped(text);
+    put_as(path, &text, |out| out.write_all(text.as_bytes()))
 }
 
 /// The same of a file that is too long for the memory: how it begins, and what writes all of it.
@@ -91,7 +92,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("out"), earlier).expect("a file");
         put(&at("out"), text).expect("it is written");
-        assert_eq!(std::fs::read_to_string(at("out")).expect("a file"), text);
+        assert!(std::fs::read_to_string(at("out")).expect("a file").starts_with(text));
         if let Ok(kept) = std::fs::read_to_string(at("out-1")) {
             assert_eq!(kept, earlier);
         }
@@ -111,7 +112,7 @@ mod tests {
         for (earlier, text) in [
             ("", model),
             (model, as_written("b").as_str()),
-            (page, page.replace("a run", "another").as_str()),
+            (&stamped(page), page.replace("a run", "another").as_str()),
             (simulated, log),
             ("run,k_t,k_q\na,1,2\n", "run,k_t,k_q\nb,1,2\n"),
             (log, log),
@@ -125,6 +126,8 @@ mod tests {
             ("rest_s = 1.0\n", model),
             (model, simulated),
             ("# quadrig-calibration 1\n[calibrated.current]\nper_count = 0.016\n", "# quadrig-calibration 1\n"),
+            (&stamped(page).replace("a run", "the best run"), page),
+            (page, page.replace("a run", "another").as_str()),
             ("<!doctype html><title>my diary of runs by quadrig</title>", page),
             (&format!("{model}# tuned by hand\n"), model),
             (&model.replace("c1_n_per_krpm = 0.1", "c1_n_per_krpm = 0.3"), model),

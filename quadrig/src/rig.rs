@@ -259,7 +259,10 @@ impl Args {
         let paths = self.port.paths(Paths::default());
         match &self.order {
             Order::View { session } | Order::Arm { session } | Order::Calibrate { session, .. } => session.paths(paths),
-            Order::Run { schedule, next, session, .. } => session.paths(paths.reads(schedule).reads(next)),
+            Order::Run { schedule, next, session, .. } => {
+                let named = schedule.as_deref().map(Plan::files).unwrap_or_default();
+                session.paths(paths.reads(schedule).reads_too(named).reads(next))
+            }
             Order::Configure { output, .. } => paths.writes("-o", output),
             Order::Burst(args) => args.paths(paths),
             _ => paths,

@@ -18,6 +18,7 @@ use crate::progress::{Bar, foretell};
 use crate::replace::{put_as, put_log};
 use crate::run_log::{IdentifiedPlant, to_log};
 use crate::view;
+use hal_sim::mission::Mission;
 use hal_sim::native::{PinRecord, Session};
 use hal_sim::scenario::AnyScenario;
 use hal_sim::{Powerplant, RunRecord, Scenario, ScenarioError, SimError, Truth};
@@ -82,7 +83,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         AnyScenario::Rig(scenario) => *scenario,
         AnyScenario::Imu(scenario) => return imu::run(args, &scenario, quiet),
     };
-    args.paths().reads(&scenario.schedule.file(&args.scenario)).check()?;
+    args.paths().reads_too(scenario.schedule.files(&args.scenario)).check()?;
     scenario.begins_in_time(&args.scenario)?;
     if args.readings.is_some() {
         return Err(format!(
@@ -121,6 +122,9 @@ fn no_scenario(path: &Path, why: ScenarioError) -> Failure {
             path.display()
         )
         .into(),
+        Err(_) if Mission::load(path).is_ok() => {
+            format!("{0}:1:1: a mission, which `quadrig fly {0}` flies; expected a scenario: docs/scenario.md lists its keys", path.display()).into()
+        }
         Err(_) => why.into(),
     }
 }

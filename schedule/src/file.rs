@@ -39,6 +39,13 @@ pub(crate) fn parse(text: &str, path: &Path) -> Result<Plan, ScheduleError> {
     })
 }
 
+/// The files that the parts of a schedule name; of what is no schedule none.
+pub(crate) fn named(text: &str) -> Vec<String> {
+    let Ok(table) = text.parse::<toml::Table>() else { return Vec::new() };
+    let parts = table.get("part").and_then(toml::Value::as_array).into_iter().flatten();
+    parts.filter_map(|part| Some(part.get("file")?.as_str()?.to_owned())).collect()
+}
+
 fn whole(table: &DeTable<'_>, path: &Path) -> Result<Plan, Wrong> {
     let mut keys = Keys::new(table, "a schedule", 0..0);
     let stem = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();

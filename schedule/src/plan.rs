@@ -12,7 +12,7 @@ use crate::{file, next};
 use frame::schedule::Segment;
 use frame::units::PulseWidth;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A part's place in a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,6 +58,13 @@ impl Plan {
         } else {
             file::parse(&text, path)
         }
+    }
+
+    /// The files that the schedule at `path` names: the logs whose pulses it replays. One that is no schedule names none; [`Plan::read`] refuses it.
+    #[must_use]
+    pub fn files(path: &Path) -> Vec<PathBuf> {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        file::named(&text).into_iter().map(|file| path.parent().unwrap_or(Path::new("")).join(file)).collect()
     }
 
     /// Reads the next experiment of a verdict.

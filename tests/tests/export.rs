@@ -396,6 +396,29 @@ fn what_is_computed_beyond_the_run_is_told() {
     }
 }
 
+/// A load cell that nobody tared: its zero is no thrust, whichever command made the model.
+#[test]
+fn the_zero_of_the_load_cell_is_no_thrust() {
+    let folder = bench();
+    let log = std::fs::read_to_string(folder.join("run.csv")).expect("a log");
+    let column = log.lines().find(|l| l.starts_with("t_s,")).and_then(|h| h.split(',').position(|c| c == "thrust_n"));
+    let column = column.expect("a thrust");
+    let shifted = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Some(thrust) = cells.get_mut(column).filter(|_| !line.starts_with('#'))
+            && let Ok(read) = thrust.parse::<f64>()
+        {
+            *thrust = (read - 2.4).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(folder.join("untared.csv"), log.lines().map(shifted).collect::<String>()).expect("a log");
+    call(&folder, &["--quiet", "identify", "untared.csv", "-o", "untared.toml"]).succeeded();
+    let full = |model: &str| after(&call(&folder, &["export", model, "--to", "px4"]).succeeded().out, "full thrust");
+    let (tared, untared) = (full("model.toml"), full("untared.toml"));
+    assert!((untared / tared - 1.0).abs() < 1e-3, "{untared} N, tared {tared}");
+}
+
 /// Every file links to its peer's definition, twice gives the same bytes, and a file is written whole.
 #[test]
 fn every_peer_has_its_links() {

@@ -137,6 +137,8 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
     write("short.toml", b"duration_s = 1\n");
     write("plan.toml", b"[[part]]\nkind = \"hold\"\npulse_us = 1200\nhold_s = 1\n");
     write("on-file.toml", b"schedule = { kind = \"file\", file = \"plan.toml\" }\n");
+    write("replay.toml", b"[[part]]\nkind = \"replay\"\nfile = \"good.csv\"\n");
+    write("on-replay.toml", b"schedule = { kind = \"file\", file = \"replay.toml\" }\n");
     let without_command = |line: &str| match line.split(',').collect::<Vec<_>>()[..] {
         [t, _, ref rest @ ..] if !line.starts_with('#') => format!("{t},{}\n", rest.join(",")),
         _ => format!("{line}\n"),

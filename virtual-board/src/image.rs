@@ -106,6 +106,13 @@ pub struct ImageBoard {
     ms: u64,
 }
 
+/// Whether a file begins as an ELF file does.
+fn begins_as_an_image(image: &Path) -> bool {
+    let mut magic = [0; 4];
+    let read = std::fs::File::open(image).and_then(|mut file| std::io::Read::read_exact(&mut file, &mut magic));
+    read.is_ok() && magic == *b"\x7fELF"
+}
+
 impl ImageBoard {
     /// The rig of a scenario before the image.
     ///
@@ -114,6 +121,11 @@ impl ImageBoard {
     pub fn new(scenario: &Scenario, image: &Path, mut file: Option<FlashFile>) -> Result<Self, BoardError> {
         let fails = |what: String| BoardError::Emulator { image: image.to_owned(), what };
         std::fs::metadata(image).map_err(|e| fails(format!("cannot be read ({e}); `cargo xtask image` builds it")))?;
+        if !begins_as_an_image(image) {
+            return Err(fails(
+                "no program of a board; expected its ELF file: `cargo xtask image` builds it and says where".to_owned(),
+            ));
+        }
         let mut machine = Machine::new().map_err(|e| fails(e.to_string()))?;
         if file.is_some() && !machine.keeps_settings() {
             return Err(fails(

@@ -323,11 +323,13 @@ impl Schedule {
         }
     }
 
-    /// The file that it names, of the scenario in `scenario`.
+    /// The file that it names, of the scenario in `scenario`, and the files that this one names.
     #[must_use]
-    pub fn file(&self, scenario: &Path) -> Option<PathBuf> {
-        let (Self::File { file, .. } | Self::Replay(ReplaySection { file, .. })) = self else { return None };
-        Some(scenario.parent().unwrap_or(Path::new("")).join(file))
+    pub fn files(&self, scenario: &Path) -> Vec<PathBuf> {
+        let (Self::File { file, .. } | Self::Replay(ReplaySection { file, .. })) = self else { return Vec::new() };
+        let file = scenario.parent().unwrap_or(Path::new("")).join(file);
+        let more = if matches!(self, Self::File { .. }) { Plan::files(&file) } else { Vec::new() };
+        std::iter::once(file).chain(more).collect()
     }
 
     /// Reads the files that it names, from `folder`.

@@ -45,14 +45,17 @@ impl Effect for SupplyVoltage {
             equation: "rpm *= (voltage_v / reference)^exponent; current_a *= (voltage_v / reference)^-exponent",
             source: "brushless motor at a fixed duty, V = k omega + R I",
             depends_on: &["voltage_v"],
-            signature: "runs at another supply voltage turn at another speed for the same pulse",
+            signature: "at another supply voltage the speed for the same pulse, and the current at the same speed, are others",
             look_alikes: &["supply_sag", "battery_discharge"],
         }
     }
 
     fn said(&self, found: &EffectEntry) -> Clause {
         let of_current = found.channels.iter().any(|c| c == "current_a");
-        Clause::new(if of_current { "the current" } else { "the speed" }, "follows the supply's voltage")
+        match of_current {
+            true => Clause::new("the current at a speed", "falls as the supply's voltage rises"),
+            false => Clause::new("the speed", "follows the supply's voltage"),
+        }
     }
 
     fn is_of_every_rig(&self) -> bool {

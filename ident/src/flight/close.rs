@@ -9,6 +9,7 @@
 use super::columns::Flight;
 use super::library::{FlightLibrary, Kind as Behind, OF_THE_DAY};
 use super::model::{Added, Coefficient, FORMAT as MODEL_FORMAT, FlightModel};
+use super::nameless::{COMMANDS, Variable};
 use super::predict::{columns, is_own, over_windows, seen_by};
 use super::record::Record;
 use super::rows::{By, Rows, Told};
@@ -372,13 +373,16 @@ impl<'w> Whole<'w> {
             let (scope, depends_on, equation) = match &self.library.kinds[placed.candidate] {
                 Behind::Effect(effect, form) => {
                     let about = effect.about();
-                    (effect.scope(form), about.depends_on.iter().map(|d| (*d).to_owned()).collect(), about.equation.to_owned())
+                    let by_command = self.flight.record.speed.is_empty();
+                    let variable =
+                        |name: &&str| if by_command && *name == Variable::Drive.name() { COMMANDS } else { name }.to_owned();
+                    (effect.scope(form), about.depends_on.iter().map(variable).collect(), about.equation.to_owned())
                 }
                 Behind::Nameless(n) => {
                     // its parameters are its heights
                     let told = |p: &Parameter| Value { value: p.value, se: (p.ci95[1] - p.ci95[0]) / (2.0 * 1.96) };
                     let heights: Vec<Value> = parameters[first + k.place].iter().map(told).collect();
-                    (n.scope(), vec![n.variable.name().to_owned()], n.equation(&heights))
+                    (n.scope(), vec![n.depends_on()], n.equation(&heights))
                 }
             };
             EffectEntry {
@@ -405,9 +409,7 @@ impl<'w> Whole<'w> {
         let goes_with = |channel: usize| -> Vec<String> {
             let hits =
                 nameless.iter().filter(|a| a.score() > 0.0).filter_map(|a| match &self.library.kinds[a.joins[0].candidate] {
-                    Behind::Nameless(n) if self.flight.channels.position(n.target) == Some(channel) => {
-                        Some(n.variable.name().to_owned())
-                    }
+                    Behind::Nameless(n) if self.flight.channels.position(n.target) == Some(channel) => Some(n.depends_on()),
                     _ => None,
                 });
             hits.take(3).collect()

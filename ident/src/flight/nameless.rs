@@ -70,17 +70,18 @@ impl Variable {
         }
     }
 
-    /// What it is called at an axis.
-    pub(super) fn label(self) -> String {
+    /// What it is called at an axis; `by_command` where no speed of a rotor is known.
+    pub(super) fn label(self, by_command: bool) -> String {
         match self {
+            Self::Drive if by_command => "all commands together, 1 is one at full".to_owned(),
             Self::Drive => "speed of all rotors together".to_owned(),
             other => channel(other.name()),
         }
     }
 
-    /// Its unit.
-    pub(super) fn unit(self) -> &'static str {
-        self.said(false).1
+    /// Its unit; `by_command` as with its label.
+    pub(super) fn unit(self, by_command: bool) -> &'static str {
+        self.said(by_command).1
     }
 
     /// The one that an effect's variable means for a channel: of a vector the part along the channel's own axis.
@@ -91,6 +92,7 @@ impl Variable {
             ("vel", Some(k)) => Some(Self::Air(k)),
             ("gyro", Some(k)) => Some(Self::Rate(k)),
             ("pos_z", _) => Some(Self::Height),
+            (COMMANDS, _) => Some(Self::Drive),
             (name, _) => VARIABLES.into_iter().find(|v| v.name() == name && *v != Self::Time),
         }
     }
@@ -140,6 +142,9 @@ pub struct Nameless {
     size: f64,
     by_command: bool,
 }
+
+/// What drives the rotors where no speed was measured, as a verdict's variable.
+pub(super) const COMMANDS: &str = "commands";
 
 /// Share of the range between the outer knots to which a knot is told: where straight lines meet is chosen, not measured.
 const TOLD: f64 = 0.005;
@@ -238,12 +243,19 @@ impl Nameless {
         parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join(" ")
     }
 
+    /// The variable that it goes with, as a verdict has it.
+    #[must_use]
+    pub fn depends_on(&self) -> String {
+        let commands = self.variable == Variable::Drive && self.by_command;
+        if commands { COMMANDS } else { self.variable.name() }.to_owned()
+    }
+
     /// The function in words.
     #[must_use]
     pub fn equation(&self, heights: &[Told]) -> String {
         let point = |(x, y): (&f64, &Told)| format!("({}, {})", self.knot(*x), digits(y.value, y.se));
         let points: Vec<String> = self.knots.iter().zip(heights).map(point).collect();
-        format!("{} += straight lines over {} through {}", self.target.name(), self.variable.name(), points.join(", "))
+        format!("{} += straight lines over {} through {}", self.target.name(), self.depends_on(), points.join(", "))
     }
 }
 

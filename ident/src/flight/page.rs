@@ -22,6 +22,7 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     noun: "vehicle",
     declared: "a rigid body, thrust with the square of each rotor's speed, no drag",
     held_out: "five time blocks",
+    figures: "Figures, bars and cards all show rows that no fit saw.",
     about: airframe::about,
     clause: |found| airframe::said(found).unwrap_or_else(|| parts::bare(found)),
     of_every_rig: |found| found.id == "spinup_lag",
@@ -50,7 +51,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         news: origin.model.is_some(),
         origin,
         declared: format!(
-            "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged, but for rows in which a rotor coasts with its motor cut. Figures show what is left of windows that no fit saw."
+            "Declared: thrust with the square of each rotor's speed along -z, reaction torque, a rigid body, speeds that follow their pulses, a constant voltage; no drag. Specific force, rate and field are means over windows of {rows} rows (about {ms:.0} ms), angular acceleration is the slope of the gyro in them; speeds and voltage are told as logged, but for rows in which a rotor coasts with its motor cut."
         ),
         hero: parts::most(v, VOCABULARY, &traces),
         cards: cards(closed, &traces),
@@ -63,7 +64,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
     let every = alone.iter().map(|t| parts::over_time(t, "every", parts::pair(v))).collect();
     sheet.fold("Every channel in figures", |sheet| sheet.figures(every));
     sheet.fold("What this flight can show", |sheet| {
-        sheet.say("For each cause: the share of its signal that nothing in the declared model can stand for, and the signal over noise that it would have at its usual size. Where these are not enough it is not named, whatever the residual.");
+        sheet.say("For each cause: the share of its signal that nothing in the declared model can stand for, and the signal over noise that it would have at its usual size. Where these are not enough a cause of that size stays unnamed; a larger one shows.");
         let shown: Vec<Vec<String>> = closed
             .asked
             .iter()
@@ -72,7 +73,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
                 vec![a.name.clone(), format!("{:.3}", a.angle), format!("{:.1}", a.signal), enough.to_owned()]
             })
             .collect();
-        sheet.data("causes", &["cause", "share of its own", "signal over noise", "can be named"], &shown, None);
+        sheet.data("causes", &["cause", "share of its own", "signal over noise", "named at that size"], &shown, None);
     });
     parts::aside(&mut sheet, v);
     sheet.html()
@@ -147,7 +148,8 @@ fn against(closed: &Closed, scene: &Scene<'_>, name: &str, of: &str) -> Option<(
         "temp_c" => Some((channel(name), "degC", mean(&record.temperature)?)),
         _ => {
             let variable = Variable::meant(name, of)?;
-            Some((variable.label(), variable.unit(), variable.values(&closed.flight, scene)?))
+            let by_command = record.speed.is_empty();
+            Some((variable.label(by_command), variable.unit(by_command), variable.values(&closed.flight, scene)?))
         }
     }
 }

@@ -8,7 +8,7 @@
 use super::differ::differing;
 use super::find::{Change, Kind, Moved};
 use super::{Chart, History, fewest_judged};
-use crate::words::{amount, digits, list, lower, upper};
+use crate::words::{amount, digits, list, lower, probability, scaled, upper};
 
 /// Logarithm of the odds within which the runner-up of a name is told: e^3.
 const CLOSE: f64 = 3.0;
@@ -22,19 +22,27 @@ pub fn gap(history: &History, change: &Change) -> String {
     }
 }
 
-/// By how much a measure moved.
+/// By how much a measure moved; where it had a value before, from which to which.
 pub(crate) fn by(history: &History, moved: &Moved) -> String {
     let sign = |v: f64| if v > 0.0 { "+" } else { "-" };
     let per = moved.unit.split_once(' ').map_or(String::new(), |(_, per)| format!(" {per}"));
     match moved.unit.split(' ').next().unwrap_or_default() {
         "x" => format!("{:.3} times{per}", moved.by),
         "%" => format!("{}{:.2} %{per}", sign(moved.by), moved.by.abs()),
-        unit => {
-            let centre = Chart::of(history, moved.measure).map_or(0.0, |c| c.centre);
-            let was = if per.is_empty() && centre != 0.0 { format!(" from {}", amount(centre, unit)) } else { String::new() };
-            format!("{}{}{per}{was}", sign(moved.by), amount(moved.by.abs(), unit))
-        }
+        unit => match Chart::of(history, moved.measure).map_or(0.0, |c| c.centre) {
+            before if per.is_empty() && before != 0.0 => from_to(before, before + moved.by, moved, unit),
+            _ => format!("{}{}{per}", sign(moved.by), amount(moved.by.abs(), unit)),
+        },
     }
+}
+
+/// Both values in one unit, to the digits that the move supports.
+fn from_to(before: f64, after: f64, moved: &Moved, unit: &str) -> String {
+    let larger = if before.abs() > after.abs() { before } else { after };
+    let (factor, unit) = scaled(larger, unit);
+    let half = 0.5 * (moved.ci95[1] - moved.ci95[0]).abs();
+    let [before, after] = [before, after].map(|v| digits(factor * v, factor * half));
+    format!("from {before} to {after} {unit}")
 }
 
 /// One change as a sentence.
@@ -48,14 +56,14 @@ pub fn sentence(history: &History, change: &Change) -> String {
             first.map_or("something drifts".to_owned(), |m| format!("the {} drifts by {}", m.words, by(history, m)))
         }
         (Some(name), _) => match size {
-            Some(size) => format!("{} ({size})", lower(name.words.trim_end_matches('.'))),
-            None => lower(&name.words),
+            Some(size) => format!("{size}. In addition to before, {}", lower(name.words.trim_end_matches('.'))),
+            None => format!("in addition to before, {}", lower(name.words.trim_end_matches('.'))),
         },
         (None, _) => size.map_or("something changed".to_owned(), |size| format!("{size}; no effect of the library explains it")),
     };
     let doubt = match change.names.get(..2) {
         Some([best, next]) if best.score - next.score < CLOSE && change.kind == Kind::Step => {
-            format!(" It may be {} instead.", next.title)
+            format!(" Less likely ({}): {}.", probability(1.0 / (1.0 + (best.score - next.score).exp())), lower(&next.title))
         }
         _ => String::new(),
     };

@@ -19,6 +19,7 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     noun: "board",
     declared: "a constant field, gravity alone, constant offsets",
     held_out: "every fifth stretch of time, in five turns",
+    figures: parts::ALL_ROWS,
     about: airframe::about,
     clause,
     of_every_rig: |_| false,

@@ -74,7 +74,8 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Re
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // as any other file: the umask decides
-    let mut file = builder.tempfile_in(folder_of(&path))?;
+    // the name of the temporary file would tell nobody anything
+    let mut file = builder.tempfile_in(folder_of(&path)).map_err(|e| std::io::Error::from(e.kind()))?;
     {
         let mut buffered = std::io::BufWriter::new(file.as_file_mut());
         fill(&mut buffered)?;

@@ -7,8 +7,8 @@
 //! Reference: specification `formats.md`, "Powerplant model".
 
 use super::{
-    AddedEffect, FORMAT, Model, ModelError, Polynomial, coefficient_key, discrepancy, keyed, leftover_keys, place, reach, run,
-    supply,
+    AddedEffect, FORMAT, Model, ModelError, Polynomial, STOOD, coefficient_key, discrepancy, keyed, leftover_keys, place, reach,
+    run, supply,
 };
 use crate::context::{Context, Relation};
 use crate::course::{COURSE_KEYS, Course};
@@ -23,12 +23,13 @@ use toml::{Table, Value};
 pub(super) type Refusal = (String, String, String);
 
 /// Keys of the file.
-const ROOT: [&str; 12] = [
+const ROOT: [&str; 13] = [
     "format",
     discrepancy::DIGEST,
     "source",
     "start_pulse_us",
     "highest_pulse_us",
+    STOOD,
     "air_density_ratio",
     "rig",
     "consensus",
@@ -109,6 +110,9 @@ impl Model {
             let highest = finite(pulse).filter(|p| *p > 0.0);
             model.highest_pulse_us =
                 Some(highest.ok_or_else(|| refusal("highest_pulse_us", Some(pulse), "a finite number of microseconds"))?);
+        }
+        if let Some(stood) = root.get(STOOD) {
+            model.stood = stood.as_bool().ok_or_else(|| refusal(STOOD, Some(stood), "true or false"))?;
         }
         if let Some(air) = root.get("air_density_ratio") {
             let ratio = finite(air).filter(|r| *r > 0.0);

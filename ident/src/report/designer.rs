@@ -23,7 +23,7 @@ pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figu
         sheet.say(&format!("{}.", capital(&zero)));
     }
     in_doubt(&found.levels).iter().for_each(|line| sheet.warn(&format!("{}.", capital(line).trim_end_matches('?'))));
-    sheet.say("Standard errors beside the values. In still air a propeller moves nothing forward, so that its propulsive efficiency is 0: the figure of merit says how near it comes to an ideal one.");
+    sheet.say("Half widths of 95 % intervals beside the values. In still air a propeller moves nothing forward, so that its propulsive efficiency is 0: the figure of merit says how near it comes to an ideal one.");
     for lack in found.disc.lacks() {
         sheet.say(&format!("{}. What needs it is left empty.", capital(lack)));
     }
@@ -45,13 +45,14 @@ pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figu
 /// Channels that the table of plateaus shows.
 const ELSEWHERE: [&str; 4] = ["rpm", "torque_nm", "current_a", "voltage_v"];
 
-/// A value to the digits that its error supports.
-pub(super) fn paired(value: f64, error: f64) -> String {
-    if !(error.is_finite() && error > 0.0) {
+/// A value and half of its 95 % interval, to two digits of the latter; `se` is its standard error.
+pub(super) fn paired(value: f64, se: f64) -> String {
+    let half = 1.96 * se;
+    if !(half.is_finite() && half > 0.0) {
         return format!("{value}");
     }
-    let places = (1 - error.log10().floor() as i32).clamp(0, 7) as usize;
-    format!("{value:.places$} \u{b1} {error:.places$}")
+    let places = (1 - half.log10().floor() as i32).clamp(0, 7) as usize;
+    format!("{value:.places$} \u{b1} {half:.places$}")
 }
 
 fn capital(text: &str) -> String {
@@ -180,8 +181,8 @@ mod tests {
 
     #[test]
     fn a_value_has_the_digits_of_its_error() {
-        assert_eq!(paired(617.060_68, 0.0482), "617.061 \u{b1} 0.048");
-        assert_eq!(paired(84.7, 12.0), "85 \u{b1} 12");
+        assert_eq!(paired(617.060_68, 0.0482), "617.061 \u{b1} 0.094");
+        assert_eq!(paired(84.7, 12.0), "85 \u{b1} 24");
         assert_eq!(paired(2000.0, 0.0), "2000");
     }
 }

@@ -115,7 +115,18 @@ fn hero(log: &Log, closed: &Closed) -> Vec<Figure> {
     }
     let targets = closed.context.targets.iter().filter(|t| !t.relation.is_evidence());
     let traces: Vec<Trace> = targets.filter_map(|t| trace(closed, t)).collect();
-    parts::most(&closed.verdict, Vocabulary::RIG, &traces)
+    let most = parts::most(&closed.verdict, Vocabulary::RIG, &traces);
+    if !most.is_empty() {
+        return most;
+    }
+    let beside = closed.verdict.effects.iter().find_map(|e| trace(closed, beside_others(closed, e)?));
+    beside.map(|trace| parts::shown_most(&trace, pair(&closed.verdict))).unwrap_or_default()
+}
+
+/// What the sensor of an effect reads beyond the others, where its own channel does not show the effect.
+fn beside_others<'c>(closed: &'c Closed, e: &EffectEntry) -> Option<&'c Target> {
+    let unseen = 1.0 - e.heldout_error_reduction > 1.0 / parts::SEEN;
+    target(closed, &format!("{} - others", e.channels.first()?)).filter(|_| unseen)
 }
 
 /// Rows before and after whose median a single reading is held against.
@@ -222,7 +233,7 @@ fn cards(log: &Log, closed: &Closed) -> Vec<Vec<Figure>> {
 }
 
 fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<Vec<Figure>> {
-    let target = target(closed, e.channels.first()?)?;
+    let target = beside_others(closed, e).or_else(|| target(closed, e.channels.first()?))?;
     let whole = trace(closed, target)?;
     let trace = whole.with_before(without(closed, target, position)?);
     (trace.before != trace.after).then(|| vec![drawn(&closed.context, e, target, &trace, id)])

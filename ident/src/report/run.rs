@@ -54,6 +54,7 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
         sheet.figures(side_by_side((log, found), (log_b, found_b)));
     }
     sheet.section("Plateaus");
+    sheet.say("Half widths of 95 % intervals beside the means.");
     plateaus(&mut sheet, log, found);
     sheet.section("Coefficients");
     coefficients(&mut sheet, found);
@@ -63,7 +64,20 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
         let rows: Vec<Vec<String>> = told.into_iter().map(|line| vec![line]).collect();
         sheet.table(&["flags, and events with their times"], &rows, |_| false);
     }
+    origin(&mut sheet, std::iter::once(log).chain(other.map(|(log, _)| log)));
     sheet
+}
+
+/// The program, and the logs with their digests.
+fn origin<'l>(sheet: &mut Sheet, logs: impl Iterator<Item = &'l Log>) {
+    sheet.section("Where this comes from");
+    let mut rows = vec![["Program".to_owned(), format!("quadrig {}", env!("CARGO_PKG_VERSION"))].to_vec()];
+    for log in logs {
+        rows.push(["Log".to_owned(), log.name.clone()].to_vec());
+        rows.push(["SHA-256".to_owned(), log.digest()].to_vec());
+        rows.push(["Rows".to_owned(), log.len().to_string()].to_vec());
+    }
+    sheet.data("provenance", &["what", "value"], &rows, None);
 }
 
 fn lead(log: &Log, found: &Identified) -> String {

@@ -85,11 +85,11 @@ fn card(alone: &[Closed], outcome: &Outcome, v: &Verdict, k: usize, e: &EffectEn
     let Some(at) = outcome.model.effects.iter().position(|added| added.placed.is_told_by(e)) else { return Vec::new() };
     let shown = outcome.each.get(at).and_then(Option::as_ref);
     let most = shown.and_then(|s| Some(named(card_across(&alone[s.run], e, s, &id)?, &v.runs[s.run].run)));
-    most.into_iter().chain(sizes(outcome, v, at, &id)).collect()
+    most.into_iter().chain(sizes(outcome, v, at, &id, e)).collect()
 }
 
-/// The parameter that is known best, as each run alone has it, beside what all share.
-fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str) -> Option<Figure> {
+/// The parameter on which the runs differ, or else the one that is known best, as each run alone has it, beside what all share.
+fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str, e: &EffectEntry) -> Option<Figure> {
     let added = outcome.model.effects.get(at)?;
     let (effect, instance, context) = (added.placed.effect, &added.placed.instance, outcome.contexts.first()?);
     let told = |e: &[Estimate]| effect.report(context, instance, e.to_vec());
@@ -97,7 +97,10 @@ fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str) -> Option<Figure> 
     let sure = |e: &Estimate| e.value.abs() / e.se;
     let half = |e: &Estimate| if e.se.is_finite() { 1.96 * e.se } else { 0.0 };
     let all = told(&added.estimates);
-    let best = all.iter().filter(known).max_by(|a, b| sure(a).total_cmp(&sure(b)))?;
+    let words = |p: &Estimate| (Vocabulary::RIG.parameter)(effect.id(), &p.name);
+    let differs = |p: &&Estimate| e.evidence.ends_with(&format!(" for the {}", words(p)));
+    let differing = all.iter().filter(known).find(differs);
+    let best = differing.or_else(|| all.iter().filter(known).max_by(|a, b| sure(a).total_cmp(&sure(b))))?;
     let (factor, unit) = scaled(best.value, &best.unit);
     let mark = |(run, alone): (usize, &Vec<Estimate>)| {
         let own = told(alone).into_iter().find(|e| e.name == best.name)?;
@@ -107,7 +110,7 @@ fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str) -> Option<Figure> 
         Some(Mark { x: run as f64, y, error, text })
     };
     let marks: Vec<Mark> = outcome.alone.get(at)?.iter().enumerate().filter_map(mark).collect();
-    let name = (Vocabulary::RIG.parameter)(effect.id(), &best.name);
+    let name = words(best);
     let unit = if unit == "1" { String::new() } else { format!(", {unit}") };
     (marks.len() > 1).then(|| Figure {
         id: format!("{id}-runs"),
@@ -137,7 +140,7 @@ fn left_of(alone: &[Closed], u: &Unexplained, shown: Option<&Shown>) -> Option<(
 
 /// Each parameter of the rig's effects as all runs share it, and as each run alone has it.
 fn parameters(outcome: &Outcome, v: &Verdict) -> Vec<Vec<String>> {
-    let value = |e: &Estimate| digits(e.value, if e.se.is_finite() && e.se > 0.0 { e.se } else { 0.005 * e.value.abs() });
+    let value = |e: &Estimate| digits(e.value, if e.se.is_finite() && e.se > 0.0 { 0.2 * e.se } else { 0.005 * e.value.abs() });
     let head = ["parameter", "unit", "all runs"].into_iter().chain(v.runs.iter().map(|r| r.run.as_str()));
     let mut rows = vec![head.map(str::to_owned).collect()];
     for (added, alone) in outcome.model.effects.iter().zip(&outcome.alone) {

@@ -58,7 +58,7 @@ pub(super) fn entry(
         parameters: reported.iter().map(|e| parameter(e, &shapes, &first)).collect(),
         heldout_error_reduction: reduction,
         evidence: format!(
-            "{}; learnt from the other runs it makes {} smaller on {helped} of {} runs, {:.2} times over all",
+            "{}; learnt from the other runs it makes the error of {} smaller on {helped} of {} runs, {:.2} times over all",
             about.signature,
             spoken(&first),
             after.iter().filter(|a| a.channel == first).count(),

@@ -17,7 +17,7 @@ use crate::context::{Context, is_contrast};
 use crate::effects::Estimate;
 use crate::hypothesis::Placed;
 use crate::log::Log;
-use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors};
+use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors, stood};
 use crate::noise::median;
 use crate::parallel::in_parallel;
 use crate::report::Vocabulary;
@@ -252,6 +252,7 @@ fn model(
     };
     let highest = runs.iter().filter_map(|run| Model::of(&contexts[0], &run.log, Vec::new()).highest_pulse_us);
     model.highest_pulse_us = highest.reduce(f64::max);
+    model.stood = contexts.iter().any(stood);
     contexts.iter().for_each(|context| model.saw(context, 0));
     model
 }

@@ -18,6 +18,7 @@ use ident::flight::predict::{columns, is_by_row, is_own, over_windows, seen_by};
 use ident::flight::{FlightModel, MODEL_FORMAT, VOCABULARY, close, page};
 use ident::flight_log;
 use ident::log::Log;
+use ident::model::FittedTo;
 use ident::report::{Origin, terminal};
 use std::fmt::Write;
 use std::io::{BufRead, BufReader};
@@ -47,7 +48,11 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     };
     let json = serde_json::to_string_pretty(&closed.verdict)?;
     if let Some(mut folder) = folder {
-        let origin = Origin { model: args.model.as_ref().map(|m| m.display().to_string()), ..Origin::of(&log) };
+        let origin = Origin {
+            model: args.model.as_ref().map(|m| m.display().to_string()),
+            validated: others.iter().map(FittedTo::of).collect(),
+            ..Origin::of(&log)
+        };
         folder.add("verdict.json", format!("{json}\n"));
         folder.add("model.toml", closed.model.to_toml(&closed.parameters));
         folder.add("channels.csv", channels(&closed.flight));

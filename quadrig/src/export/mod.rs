@@ -130,7 +130,9 @@ impl Battery {
 
 /// Lines of a head behind a comment sign.
 fn comments(sign: &str, lines: &[String]) -> String {
-    lines.iter().map(|line| format!("{sign} {line}\n")).collect()
+    // a name may hold anything; what follows a line break would be no comment
+    let shown = |c: char| if c.is_control() { ' ' } else { c };
+    lines.iter().map(|line| format!("{sign} {}\n", line.chars().map(shown).collect::<String>())).collect()
 }
 
 /// How far the peer's curve is from the model's.

@@ -1,4 +1,4 @@
-//! `rotor_gain`: one rotor gives another thrust than its speed says: a damaged blade.
+//! `rotor_gain`: one rotor gives another thrust than its speed (where none was measured, its command) says: a damaged blade.
 //!
 //! What it is: its thrust and torque times 1 + thrust_change, through the whole flight or from an instant on.
 //! What can go wrong: through the whole flight it looks like a centre of gravity off the middle, but for the total and the torque.
@@ -37,12 +37,12 @@ impl AirframeEffect for RotorGain {
 
     fn said(&self, found: &EffectEntry) -> Clause {
         let rotor = found.parameter("rotor").map_or_else(|| "one rotor".to_owned(), |p| format!("rotor {:.0}", p.value));
-        let with = |word: &str, v: &str| format!("gives {v} {word} thrust than its speed says");
+        let with = |word: &str, v: &str| format!("gives {v} {word} thrust than it should");
         let since = match found.scope {
             Scope::Event => found.tell("t0", |v| format!(" from {v} on"), ""),
             _ => String::new(),
         };
-        let other = "gives another thrust than its speed says";
+        let other = "gives another thrust than it should";
         Clause::new(rotor, found.tell_signed("thrust_change", (100.0, "%"), ["more", "less"], with, other) + &since)
     }
 

@@ -42,7 +42,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     let noun = page.words.noun;
     for (k, (heading, lead)) in [
         (format!("What this {noun} has"), kept(page).unwrap_or_default()),
-        (format!("What every {noun} has"), format!("A rotor has inertia and takes time, a reading lies somewhere within its row, and no two clocks run alike: no {noun} is without these.")),
+        (format!("What every {noun} has"), format!("A rotor has inertia and takes time, meters average or come late within a row, and no two clocks run alike. Every {noun} has these; one run need not show how much.")),
         ("Without a name".to_owned(), "What no known effect explains. Where a smooth function predicts rows it has not seen, it is added to the model; it names no cause.".to_owned()),
     ]
     .into_iter()
@@ -74,7 +74,7 @@ fn kept(page: &Page<'_>) -> Option<String> {
         return None;
     }
     Some(format!(
-        "Of every probability a part is kept for causes that the library lacks, here {}: it stands against no name in particular.",
+        "Of every probability a part is kept for causes that the library lacks, here {} or more: it stands against no name in particular.",
         probability(most)
     ))
 }
@@ -175,7 +175,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     let title = if nameless {
         format!("Something on {on} that goes with {}.", channels(&e.depends_on))
     } else {
-        page.words.said(e).sentence()
+        leading(page, e, &against).unwrap_or_else(|| page.words.said(e).sentence())
     };
     let number = number.map(|n| format!("<span class=\"nr\">{n}</span> ")).unwrap_or_default();
     let mut html = format!(
@@ -204,7 +204,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     // how the sizes of the runs stand to each other, in a line of its own
     let apart = [DISAGREE, OTHERWISE].into_iter().find_map(|how| Some((how, e.evidence.split_once(&format!("; {how}:"))?)));
     let known = apart.map_or(e.evidence.as_str(), |(_, (known, _))| known);
-    let _ = writeln!(html, "<p><b>Known by:</b> {}.</p>", escape(&plain(signs(known))));
+    let _ = writeln!(html, "<p><b>Shows as:</b> {}.</p>", escape(&plain(signs(known))));
     if let Some((how, (_, rest))) = apart {
         let (how, rest) = (escape(&upper(how)), escape(&plain(rest)));
         let _ = writeln!(html, "<p class=\"warn\"><b>{how}:</b>{rest}. The value above is of what they share.</p>");
@@ -216,6 +216,14 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
     }
     sheet.html_part(&format!("{html}</div></div></article>\n"));
+}
+
+/// The title where a rival is likelier than the name that the model holds: both, the likelier first.
+fn leading(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> Option<String> {
+    let rival = against.first().filter(|r| r.probability > e.probability && !r.ids.is_empty())?;
+    let [theirs, own] = [rival.probability, e.probability].map(probability);
+    let said = page.words.said(e).with("");
+    Some(format!("{} ({theirs}), or {said} ({own}). The sizes below are of the second.", upper(&rival.said)))
 }
 
 /// How sure a name is, its probability, and what stands against it; `none`: that it has no cause of its own, or another set of names.
@@ -310,7 +318,11 @@ pub(super) fn value(p: &Parameter) -> [String; 3] {
         let bound = digits(factor * bound, 0.05 * factor * bound);
         return [format!("< {bound}"), format!("up to {bound}"), unit.to_owned()];
     }
-    let unit_of = |unit: &str| if unit == "1" { String::new() } else { unit.to_owned() };
+    let unit_of = |unit: &str| match unit {
+        "1" => String::new(),
+        "rpm" => "rev/min".to_owned(),
+        unit => unit.to_owned(),
+    };
     if let Some(count) = counted(p) {
         return [count.clone(), format!("{count} to {count}"), unit_of(&p.unit)];
     }
@@ -353,7 +365,8 @@ fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
 
 /// What would stand in its place, with probabilities, and what it is easily taken for.
 fn others(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> String {
-    let found: Vec<String> = against.iter().map(|r| format!("{} ({})", plain(&r.said), probability(r.probability))).collect();
+    let counted = against.iter().filter(|r| r.probability >= COUNTED);
+    let found: Vec<String> = counted.map(|r| format!("{} ({})", plain(&r.said), probability(r.probability))).collect();
     let known = (page.words.about)(&e.id).map(|a| a.look_alikes).unwrap_or_default();
     // what was told with a probability is told
     let told = |id: &str| against.iter().any(|r| r.ids.iter().any(|known| known == id));
@@ -363,8 +376,10 @@ fn others(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> String {
     let none = Rival::none(page.verdict, page.words, e, against).probability;
     let none =
         if none >= OPEN { format!(" Further names, or no cause of its own: {}.", probability(none)) } else { String::new() };
-    if found.is_empty() {
-        return format!("no other name that was tried came close.{none}{alike}");
+    match (found.is_empty(), none.is_empty()) {
+        (true, true) => return format!("no other name that was tried came close.{alike}"),
+        (true, false) => return format!("many names, none of which leads.{none}{alike}"),
+        (false, _) => {}
     }
     format!("{}.{none}{alike}", found.join("; "))
 }

@@ -24,8 +24,10 @@ pub(crate) const ALONE: [&str; 2] = ["without it", "with it"];
 const PARTS: f64 = 12.0;
 /// Times the size that all but one in two hundred readings keep beyond which a dot is off the scale.
 const OFF: f64 = 3.0;
+/// Times the error after that the error before must be for a figure to show the difference.
+pub(crate) const SEEN: f64 = 1.02;
 /// Usual steps from which on a gap lifts the pen.
-const GAP: f64 = 20.0;
+const GAP: f64 = 10.0;
 
 /// What a channel left over before and after.
 #[derive(Debug, Clone, Default)]
@@ -174,7 +176,16 @@ pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Ve
     else {
         return Vec::new();
     };
-    let names = pair(verdict);
+    // what a name does not take off its channel cannot be seen there
+    let seen = verdict.channels.get(&trace.channel).is_none_or(|c| c.before.heldout_rms > SEEN * c.after.heldout_rms);
+    if !seen && matches!(verdict.verdict, Kind::Attributed | Kind::Ambiguous) {
+        return Vec::new();
+    }
+    shown_most(trace, pair(verdict))
+}
+
+/// A trace as the figures that convince most: over the whole run, and the part in which most was taken away.
+pub(crate) fn shown_most(trace: &Trace, names: [&'static str; 2]) -> Vec<Figure> {
     std::iter::once(over_time(trace, "most", names)).chain(enlarged(trace, "most", names)).collect()
 }
 

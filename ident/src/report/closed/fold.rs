@@ -50,7 +50,14 @@ pub(crate) fn channels(sheet: &mut Sheet, verdict: &Verdict, held_out: &str) {
         "after_rms",
         "after_whiteness_p",
     ];
-    sheet.say(&format!("Held-out: {held_out}, each predicted by a fit that did not see it. The share that the sentence states is that of the squared held-out error above the noise floor."));
+    let what = if verdict.runs.is_empty() {
+        format!("{held_out}, each predicted by a fit that did not see it")
+    } else {
+        "each run whole, predicted by a fit to the others".to_owned()
+    };
+    sheet.say(&format!(
+        "Held-out: {what}. The share that the sentence states is that of the squared held-out error above the noise floor."
+    ));
     sheet.data("channels", &head, &rows, Some((&raw_head, &raw)));
 }
 

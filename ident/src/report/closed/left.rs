@@ -7,6 +7,7 @@
 
 use super::page::Page;
 use super::sentence::{floors_left, goes_beyond_noise, instead, size_left, without};
+use super::state::EXPLAINED;
 use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
@@ -20,10 +21,16 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     sheet.section("What is left");
     perhaps_also(v, page.words).iter().for_each(|said| sheet.say(said));
     if v.unexplained.is_empty() {
-        sheet.say(match goes_beyond_noise(v) {
-            true => "Little: on no channel more than a trace beyond its noise.",
-            false => "Nothing: no channel is left with more than its noise.",
+        let above = v.channels.iter().filter_map(|(name, c)| {
+            let floors = c.after.heldout_rms / c.noise_floor_rms;
+            (floors > EXPLAINED).then(|| format!("{} at {floors:.1} noise floors", channel(name)))
         });
+        let above: Vec<String> = above.collect();
+        match (above.is_empty(), goes_beyond_noise(v)) {
+            (false, _) => sheet.say(&format!("Little, and without a pattern: {}.", list(&above))),
+            (true, true) => sheet.say("Little: on no channel more than a trace beyond its noise."),
+            (true, false) => sheet.say("Nothing: no channel is left with more than its noise."),
+        }
         return;
     }
     // a channel that has no model has nothing left over: its whole reading is

@@ -22,7 +22,7 @@ mod terminal;
 mod vocabulary;
 
 pub(crate) use evidence::{
-    ALONE, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, slug, thinned, two_ways,
+    ALONE, SEEN, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, shown_most, slug, thinned, two_ways,
 };
 pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};
@@ -32,6 +32,6 @@ pub use sentence::sentence;
 pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal, wrapped};
 pub use vocabulary::Vocabulary;
-pub(crate) use vocabulary::bare;
 #[cfg(test)]
 pub(crate) use vocabulary::bare_entry;
+pub(crate) use vocabulary::{ALL_ROWS, bare};

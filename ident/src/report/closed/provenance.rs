@@ -8,12 +8,13 @@
 use super::cards::{is_shown, value};
 use super::vocabulary::Vocabulary;
 use crate::date;
+use crate::effects::by_id;
 use crate::log::{Gaps, Log, digest_of};
 use crate::model::FittedTo;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::verdict::{EffectEntry, Kin, Parameter, Verdict};
-use crate::words::{list, upper};
+use crate::words::{list, lower, upper};
 use std::collections::BTreeMap;
 
 /// What was hidden in a simulated rig.
@@ -74,6 +75,15 @@ impl Hidden {
     }
 }
 
+/// What the identifiers of what was hidden and of what was named stand for.
+fn meanings(hidden: &Hidden, verdict: &Verdict) -> String {
+    let mut ids: Vec<&str> = std::iter::once(hidden.id.as_str()).chain(verdict.effects.iter().map(|e| e.id.as_str())).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    let of = |id: &str| by_id(id).map(|effect| format!("{id} is \"{}\"", lower(effect.about().title)));
+    ids.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
+}
+
 /// The sizes with which an effect was found.
 fn as_found(e: &EffectEntry) -> Option<String> {
     let size = |p: &Parameter| {
@@ -95,6 +105,8 @@ pub struct Origin {
     pub states: BTreeMap<String, String>,
     /// The declared model's file, where one was given.
     pub model: Option<String>,
+    /// The other runs that the model was held against.
+    pub validated: Vec<FittedTo>,
     /// What was hidden, of a demonstration.
     pub hidden: Option<Hidden>,
     /// Whether it is of a rig, which has a motor, a propeller and a supply.
@@ -177,11 +189,12 @@ impl Origin {
     /// The command that writes the page again.
     pub(super) fn command(&self) -> String {
         let model = self.model.as_ref().map(|m| format!(" --model {m}")).unwrap_or_default();
+        let validated: String = self.validated.iter().map(|run| format!(" --validate {}", run.name)).collect();
         match &self.hidden {
             Some(h) => format!("quadrig demo --seed {} --effect {}", h.seed, h.id),
             None => {
                 let logs: Vec<&str> = self.logs().map(|l| l.name.as_str()).collect();
-                format!("quadrig close-loop {}{model} -o out", logs.join(" "))
+                format!("quadrig close-loop {}{model}{validated} -o out", logs.join(" "))
             }
         }
     }
@@ -193,6 +206,7 @@ pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict) 
         sheet.section("What was hidden");
         let lines: Vec<String> = hidden.judged(verdict).iter().map(|l| format!("<li>{}.</li>", escape(&upper(l)))).collect();
         sheet.html_part(&format!("<ul>{}</ul>\n", lines.concat()));
+        sheet.soft(&format!("Here {}.", meanings(hidden, verdict)));
     }
     sheet.section("Where this comes from");
     let mut rows = vec![vec!["program".to_owned(), format!("quadrig {}", env!("CARGO_PKG_VERSION"))]];
@@ -218,6 +232,10 @@ pub(super) fn provenance(sheet: &mut Sheet, origin: &Origin, verdict: &Verdict) 
         if !origin.states.contains_key(key) && !named && (origin.of_a_rig || key == "date") {
             row(key, "not stated in the log".to_owned());
         }
+    }
+    for run in &origin.validated {
+        row("held against", run.name.clone());
+        row("SHA-256", run.sha256.clone());
     }
     row("declared model", origin.model.clone().unwrap_or_default());
     row("seed", origin.hidden.as_ref().map_or_else(String::new, |h| h.seed.to_string()));

@@ -17,7 +17,7 @@ const FROM: f64 = 0.5;
 /// Per cent of the scale that the word at the floor needs for itself where the scale is narrowest.
 const CLEAR: f64 = 22.0;
 /// Noise floors up to which a channel counts as explained.
-const EXPLAINED: f64 = 1.5;
+pub(super) const EXPLAINED: f64 = 1.5;
 
 /// The scale that all bars share.
 struct Scale {
@@ -81,13 +81,18 @@ fn spoken(name: &str) -> String {
 /// The bars of a verdict's channels.
 pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool, known: bool) -> String {
     let left: Vec<&str> = v.unexplained.iter().map(|u| u.channel.as_str()).collect();
+    let beside = v.unexplained.iter().filter_map(|u| {
+        let one = u.channel.strip_suffix(" - others")?;
+        Some(format!("{} against the other sensors: {:.1} noise floors left", upper(&channel(one)), u.over_floor))
+    });
+    let beside: String = beside.map(|said| format!("<p class=\"soft\">{}.</p>\n", escape(&said))).collect();
     let share = if per_cent {
         " A share in per cent is of the squared error above the noise floor: 75 % less is half the error."
     } else {
         ""
     };
     let key = format!("<p class=\"soft\">The declared model: {declared}.{share}</p>\n");
-    drawn(&v.channels, &left, &named(v), known, pair(v)) + &key
+    drawn(&v.channels, &left, &named(v), known, pair(v)) + &beside + &key
 }
 
 /// The bars; `left` are the channels on which more than noise is left, `named` those that a name improves.

@@ -163,7 +163,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, group: &[usize]) -> String {
     for said in open_sizes(e).into_iter().chain(Some(removed(verdict, group))).filter(|said| !said.is_empty()) {
         out += &format!("    {}\n", wrapped(&said, 4));
     }
-    out + &format!("    {}\n", wrapped(&format!("known by: {}", plain(signs(&e.evidence))), 4))
+    out + &format!("    {}\n", wrapped(&format!("shows as: {}", plain(signs(&e.evidence))), 4))
 }
 
 /// Single readings about which nothing is claimed, a line for each channel and run.

@@ -18,6 +18,8 @@ pub struct Vocabulary {
     pub declared: &'static str,
     /// Which rows a fit did not see when it predicted them.
     pub held_out: &'static str,
+    /// Which rows the figures show.
+    pub figures: &'static str,
     /// What an effect is.
     pub about: fn(&str) -> Option<About>,
     /// What a found effect does.
@@ -31,12 +33,16 @@ pub struct Vocabulary {
     pub by_floors: bool,
 }
 
+/// Of figures that show a model on the rows that it was fitted to.
+pub(crate) const ALL_ROWS: &str = "Figures draw the models that were fitted to all rows. Bars and cards count the errors of fits on rows that they did not see, which are larger.";
+
 impl Vocabulary {
     /// Of a rig's log.
     pub const RIG: Self = Self {
         noun: "rig",
         declared: "static curves, fitted to what was measured",
         held_out: "five time blocks and every second interior level",
+        figures: ALL_ROWS,
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
         of_every_rig: |found| found.kin != Kin::Own,

@@ -123,7 +123,7 @@ mod tests {
         assert_eq!(marks("a"), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         assert_eq!(marks("b"), [8.0, 9.0, 10.0, 11.0, 12.0]);
         assert!(figure.layers.iter().any(|l| matches!(l, Layer::Rule { x, .. } if *x == 7.5)));
-        assert!(figure.title.starts_with("Measure 0; +"), "{}", figure.title);
+        assert!(figure.title.starts_with("Measure 0; from "), "{}", figure.title);
         let quiet = chart(&history, 1).expect("a chart");
         assert_eq!(quiet.title, "Measure 1");
     }

@@ -9,9 +9,8 @@
 use super::chart::chart;
 use super::{MOVED, bracketed, foremost};
 use crate::history::{Change, History, fewest_judged, gap, sentence, summary};
-use crate::report::number;
 use crate::report::sheet::Sheet;
-use crate::words::{probability, upper};
+use crate::words::{probability, upper, with_interval};
 
 /// Charts that stand above the fold.
 const ABOVE: usize = 9;
@@ -35,6 +34,7 @@ pub fn page(history: &History) -> String {
     }
     sheet.fold("Constants run by run", |sheet| table(sheet, history));
     sheet.fold("Logs", |sheet| {
+        sheet.say(&format!("Compared by quadrig {}.", env!("CARGO_PKG_VERSION")));
         let row = |k: usize| vec![history.label(k), history.runs[k].run.clone(), history.runs[k].sha256.clone()];
         sheet.data("logs", &["run", "log", "SHA-256"], &(0..history.runs.len()).map(row).collect::<Vec<_>>(), None);
     });
@@ -90,7 +90,8 @@ fn of_change(sheet: &mut Sheet, history: &History, change: &Change) {
         probability(change.gap_probability)
     ));
     let row = |m: &crate::history::Moved| {
-        vec![upper(&m.words), number(m.by), format!("{} to {}", number(m.ci95[0]), number(m.ci95[1])), m.unit.clone()]
+        let [by, low, high] = with_interval(m.by, m.ci95);
+        vec![upper(&m.words), by, format!("{low} to {high}"), m.unit.clone()]
     };
     let rows: Vec<Vec<String>> = change.moved.iter().map(row).collect();
     sheet.data("moved", &["moved", "by", "95 % interval", "unit"], &rows, None);
@@ -124,7 +125,11 @@ mod tests {
     fn the_heading_is_what_changed_and_every_measure_has_a_chart() {
         let history = stepped(12, 7);
         let html = page(&history);
-        assert!(html.contains("<h1>Between run 7 and run 8: measure 0 +9"), "{}", &html[html.find("<h1>").unwrap_or(0)..]);
+        assert!(
+            html.contains("<h1>Between run 7 and run 8: measure 0 from 5.1 to 14.4 N"),
+            "{}",
+            &html[html.find("<h1>").unwrap_or(0)..]
+        );
         assert_eq!(html.matches("<svg").count(), 4);
         assert!(html.contains("12 runs, run 1 to run 12") && !html.contains("http://www.example"));
         let quiet = page(&stepped(12, 12));

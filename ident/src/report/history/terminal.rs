@@ -8,6 +8,7 @@
 use super::{MOVED, bracketed, foremost};
 use crate::history::{Change, History, Kind, summary};
 use crate::report::closed::{WIDEST, wrapped};
+use crate::words::with_interval;
 
 /// Most measures told of a change.
 const TOLD: usize = 6;
@@ -33,18 +34,15 @@ fn moved(history: &History, change: &Change) -> String {
     };
     let mut out = format!("\n{when:<46}{:>14}  {:<24}unit\n", "by", "95 % interval");
     for m in change.moved.iter().take(TOLD) {
-        let interval = format!("{} to {}", short(m.ci95[0]), short(m.ci95[1]));
-        out += &format!("  {:<44.43}{:>14}  {interval:<24}{:.14}\n", m.words, short(m.by), m.unit);
+        let [by, low, high] = with_interval(m.by, m.ci95);
+        let interval = format!("{low} to {high}");
+        out += &format!("  {:<44.43}{by:>14}  {interval:<24}{:.14}\n", m.words, m.unit);
     }
     match change.moved.len().saturating_sub(TOLD) {
         0 => {}
         n => out += &format!("  and {n} more, which history.json lists\n"),
     }
     out
-}
-
-fn short(v: f64) -> String {
-    if v != 0.0 && !(1e-3..1e5).contains(&v.abs()) { format!("{v:.3e}") } else { format!("{v:.4}") }
 }
 
 /// A row a run, with a line where something changed.
