@@ -223,7 +223,7 @@ fn with_shapes(placed: &[Placed], full: &[f64]) -> Vec<Placed> {
 }
 
 /// Where `cost` is least: a simplex search from `x0` with first `steps`, after about so many evaluations.
-pub(crate) fn nelder_mead(cost: &dyn Fn(&[f64]) -> f64, x0: &[f64], steps: &[f64], evaluations: usize) -> Vec<f64> {
+pub fn nelder_mead(cost: &dyn Fn(&[f64]) -> f64, x0: &[f64], steps: &[f64], evaluations: usize) -> Vec<f64> {
     let n = x0.len();
     let mut simplex: Vec<(Vec<f64>, f64)> = vec![(x0.to_vec(), cost(x0))];
     for i in 0..n {

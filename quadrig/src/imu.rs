@@ -36,8 +36,8 @@ const WORDS: &str = "identify; format text|binary; send raw|calibrated|both; str
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let typed = args.words.join(" ");
-    let command =
-        line::command(&typed).ok_or_else(|| format!("{typed:?} is no command of the IMU board; expected one of: {WORDS}"))?;
+    let command = line::command(&typed)
+        .ok_or_else(|| format!("{typed:?} is no command of the IMU board; expected one of: {WORDS}: `quadrig imu --help`"))?;
     let mut board = Board::at(args.port.open(BAUD, true)?);
     let text_wanted = command == Command::Imu(ImuCommand::Format(ImuFormat::Text));
     if !text_wanted {

@@ -5,7 +5,7 @@ use frame::rig::RigState;
 use frame::units::{PulseWidth, Ticks};
 use frame::wire::{Decoder, Encoder, MAX_WIRE};
 use hal_sim::emulated::{Machine, firmware};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use virtual_board::{BoardError, Hand, Kind, Order, VirtualBoard, switch_on};
 
 /// Host of a virtual board.
@@ -130,7 +130,12 @@ fn an_image_that_is_none_is_refused_with_its_name() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = folder.path().join("text.elf");
     std::fs::write(&text, "no image").expect("a file");
-    let mut board = switch_on(&Order { image: Some(text.clone()), ..Order::default() }).unwrap_or_else(|e| panic!("{e}"));
+    let refused = switch_on(&Order { image: Some(text), ..Order::default() }).err().expect("refused").to_string();
+    assert!(refused.contains("text.elf: no program of a board; expected its ELF file"), "{refused}");
+    // one that begins as a program and is none
+    let broken = folder.path().join("broken.elf");
+    std::fs::write(&broken, b"\x7fELF and no more").expect("a file");
+    let mut board = switch_on(&Order { image: Some(broken), ..Order::default() }).unwrap_or_else(|e| panic!("{e}"));
     let ended = (0..100).find_map(|_| board.millisecond(&[]).err()).expect("it is told");
-    assert!(ended.to_string().contains(Path::new("text.elf").to_str().expect("text")), "{ended}");
+    assert!(ended.to_string().contains("broken.elf"), "{ended}");
 }
