@@ -30,6 +30,8 @@ const STRETCH: usize = 4;
 const HEALTHY: f64 = 0.01;
 /// Share of the speed within which most readings of a healthy sensor stay about its gain.
 const UNSTEADY: f64 = 0.005;
+/// Share beyond what a rotor does within a row or two by which a reading is a drop-out.
+const LEAVES: f64 = 0.02;
 /// Times that gains and speed are found from each other.
 const PASSES: usize = 2;
 
@@ -121,20 +123,46 @@ impl Sensor<'_> {
     }
 }
 
-/// Median of some channels on each row, each over its gain.
+/// Median of some channels on each row, each over its gain. Where no two agree, readings that the rows around rule out have no part.
 fn median_of(log: &Log, names: &[&str], gains: &[f64]) -> Vec<f64> {
     let of =
         |(name, gain): (&&str, &f64)| Some(Sensor { readings: log.column(name)?, flags: board::flags(log, name), gain: *gain });
     let sensors: Vec<Sensor<'_>> = names.iter().zip(gains).filter_map(of).collect();
-    (0..log.len())
+    let mut rows: Vec<Vec<f64>> = (0..log.len())
         .map(|i| {
-            let mut v: Vec<f64> = sensors.iter().filter(|s| !s.is_wrong(i)).filter_map(|s| s.at(i)).collect();
-            if v.is_empty() {
-                v = sensors.iter().filter_map(|s| s.at(i)).collect();
-            }
-            if v.is_empty() { f64::NAN } else { noise::median(&mut v) }
+            let good: Vec<f64> = sensors.iter().filter(|s| !s.is_wrong(i)).filter_map(|s| s.at(i)).collect();
+            if good.is_empty() { sensors.iter().filter_map(|s| s.at(i)).collect() } else { good }
         })
-        .collect()
+        .collect();
+    outvote(&mut rows);
+    rows.iter_mut().map(|v| if v.is_empty() { f64::NAN } else { noise::median(v) }).collect()
+}
+
+/// Where no two readings of a row agree, those that lie beyond what the nearest rows with agreement span are left out, if another lies within:
+/// of two sensors one of which drops out none can be outvoted, but no rotor leaves its way for a row.
+fn outvote(rows: &mut [Vec<f64>]) {
+    let agreed: Vec<Option<f64>> = rows.iter().map(|row| agreement(row)).collect();
+    let mut after: Vec<Option<f64>> = agreed.clone();
+    for i in (0..after.len().saturating_sub(1)).rev() {
+        after[i] = after[i].or(after[i + 1]);
+    }
+    let mut before = None;
+    for ((row, agreed), after) in rows.iter_mut().zip(agreed).zip(after) {
+        before = agreed.or(before);
+        let (None, true, Some(before), Some(after)) = (agreed, row.len() > 1, before, after) else { continue };
+        let span = (1.0 - LEAVES) * before.min(after)..=(1.0 + LEAVES) * before.max(after);
+        if row.iter().any(|v| span.contains(v)) {
+            row.retain(|v| span.contains(v));
+        }
+    }
+}
+
+/// The median of a row's readings where two of them agree as healthy sensors do.
+fn agreement(row: &[f64]) -> Option<f64> {
+    let mut sorted = row.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let agree = |w: &[f64]| w[1] - w[0] <= HEALTHY * w[1].abs();
+    sorted.windows(2).any(agree).then(|| noise::median(&mut sorted))
 }
 
 /// Readings of a channel over the speed of all, while the rotor turns.
@@ -169,7 +197,7 @@ fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
     let mut k = 1;
     while k + 1 < finite.len() {
         let before = rpm[finite[k - 1]];
-        if before > 0.05 * scale && (rpm[finite[k]] - before).abs() > 0.02 * before {
+        if before > 0.05 * scale && (rpm[finite[k]] - before).abs() > LEAVES * before {
             let back = (1..=3).find(|m| finite.get(k + m).is_some_and(|j| (rpm[*j] - before).abs() < 0.01 * before));
             if let Some(m) = back {
                 for j in &finite[k..k + m] {
@@ -182,4 +210,22 @@ fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
         k += 1;
     }
     removed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One of two sensors drops out while the rotor speeds up; of three one is lost and one on its way back. On the way up both of two may be right.
+    #[test]
+    fn the_rows_around_outvote_a_drop_out() {
+        let mut rows: Vec<Vec<f64>> = (0..9).map(|i| 4000.0 + 30.0 * f64::from(i)).map(|v| vec![v, v + 4.0, v + 2.0]).collect();
+        rows[2] = vec![2000.0, 4064.0];
+        rows[5] = vec![1700.0, 4020.0, 4152.0];
+        outvote(&mut rows);
+        assert_eq!((&rows[2], &rows[5]), (&vec![4064.0], &vec![4152.0]));
+        let mut step: Vec<Vec<f64>> = vec![vec![2000.0, 2001.0], vec![2600.0, 2900.0], vec![3500.0, 3501.0]];
+        outvote(&mut step);
+        assert_eq!(step[1].len(), 2);
+    }
 }

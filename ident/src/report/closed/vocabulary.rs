@@ -49,6 +49,12 @@ impl Vocabulary {
         parameter: |id, name| match (id, name) {
             // a curve is seen in its figure
             ("unknown", _) => String::new(),
+            // its sizes are added, with the sign that they have
+            ("stall", "thrust_loss") => "change of thrust".to_owned(),
+            ("stall", "torque_rise") => "change of torque".to_owned(),
+            ("stall", "current_rise") => "change of current".to_owned(),
+            ("stall", "current_rise_loss") => "change of current, beside that".to_owned(),
+            ("stall", "speed_loss") => "change of speed".to_owned(),
             _ => parameter(name),
         },
         by_floors: false,
