@@ -246,14 +246,7 @@ fn others(witnesses: &Witnesses<'_>, name: &str, read: &[f64]) -> Option<Witness
     let channels: Vec<&[f64]> = SPEED.iter().filter(|s| **s != name).filter_map(|s| witnesses.clean(s)).collect();
     let of = |i: usize| median(&mut channels.iter().map(|c| c[i]).filter(|v| v.is_finite()).collect::<Vec<_>>());
     let said: Vec<f64> = (0..read.len()).map(of).collect();
-    let mut said = bridged(witnesses, &said)?;
-    // each sensor has a gain of its own
-    let top = said.iter().copied().fold(0.0, f64::max);
-    let turns = said.iter().zip(read).filter(|(said, read)| read.is_finite() && **said > HALF * top);
-    let gain = median(&mut turns.map(|(said, read)| read / said).collect::<Vec<f64>>());
-    if (gain - 1.0).abs() < DEPTH {
-        said.iter_mut().for_each(|said| *said *= gain);
-    }
+    let said = bridged(witnesses, &said)?;
     let usual = usual(read, &said, &|_| true)?;
     let moves = |i: usize| 0.5 * (said[i] - said[i.saturating_sub(1)]).abs();
     let sd = (0..said.len()).map(|i| usual.hypot(moves(i))).collect();
