@@ -496,7 +496,7 @@ fn the_terminal_claims_no_more_than_it_knows() {
         ..sag(0.9)
     };
     let told = terminal(&verdict(Kind::Attributed, vec![seen]), Vocabulary::RIG, false);
-    assert!(told.contains("shows as: the residual goes up\n") && told.contains("Without it the error of voltage is"), "{told}");
+    assert!(told.contains("why: the residual goes up\n") && told.contains("Without it the error of voltage is"), "{told}");
     assert!(text.contains("tau_up < 25 ms  (95 %)") && !text.contains("-0.02") && !text.contains("-21"), "{text}");
 }
 

@@ -61,7 +61,11 @@ fn a_change_is_found_in_its_gap_and_has_its_name() {
     let runs = flown().join("runs");
     let runs = runs.to_str().unwrap();
     let said = call(folder.path(), &["history", runs, "-o", "out"]).succeeded();
-    assert!(said.out.starts_with("6 runs, one change. Between run 4 and run 5: resistance of the supply from"), "{}", said.out);
+    assert!(
+        said.out.starts_with("6 runs, one change. Between run 4 and run 5: the resistance of the supply went from"),
+        "{}",
+        said.out
+    );
     assert!(said.out.lines().all(|l| l.chars().count() <= 100), "{}", said.out);
     assert_eq!(said.err, "");
 
@@ -80,7 +84,7 @@ fn a_change_is_found_in_its_gap_and_has_its_name() {
 
     let page = String::from_utf8(files[2].clone()).unwrap();
     assert!(
-        page.contains("<h1>Between run 4 and run 5: resistance of the supply from")
+        page.contains("<h1>Between run 4 and run 5: the resistance of the supply went from")
             && page.contains("id=\"chart-voltage-v-resistance\"")
     );
 

@@ -2,7 +2,7 @@
 //!
 //! What it is: the median of the channels that agree, each over its own gain, drop-outs bridged. A sample that its board flags as wrong is left
 //! out where another channel has one that is not.
-//! What can go wrong: of two channels that disagree none can be outvoted, and both are kept.
+//! What can go wrong: of two channels that disagree before or after all rows on which they agree none can be outvoted, and both are kept.
 //! Units: rev/min.
 //! Reference: specification `formats.md` (primary relations).
 

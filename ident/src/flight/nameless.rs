@@ -73,7 +73,7 @@ impl Variable {
     /// What it is called at an axis; `by_command` where no speed of a rotor is known.
     pub(super) fn label(self, by_command: bool) -> String {
         match self {
-            Self::Drive if by_command => "all commands together, 1 is one at full".to_owned(),
+            Self::Drive if by_command => "sum of the rotors' commands, each 1 at full".to_owned(),
             Self::Drive => "speed of all rotors together".to_owned(),
             other => channel(other.name()),
         }

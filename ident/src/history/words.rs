@@ -36,6 +36,16 @@ pub(crate) fn by(history: &History, moved: &Moved) -> String {
     }
 }
 
+/// What a measure did, as a clause.
+fn went(history: &History, moved: &Moved) -> String {
+    let by = by(history, moved);
+    match by.strip_suffix(" times") {
+        Some(times) => format!("the {} is {times} times what it was", moved.words),
+        None if by.starts_with("from ") => format!("the {} went {by}", moved.words),
+        None => format!("the {} changed by {by}", moved.words),
+    }
+}
+
 /// Both values in one unit, to the digits that the move supports.
 fn from_to(before: f64, after: f64, moved: &Moved, unit: &str) -> String {
     let larger = if before.abs() > after.abs() { before } else { after };
@@ -50,14 +60,14 @@ fn from_to(before: f64, after: f64, moved: &Moved, unit: &str) -> String {
 pub fn sentence(history: &History, change: &Change) -> String {
     let place = upper(&gap(history, change));
     let first = change.moved.first();
-    let size = first.map(|m| format!("{} {}", m.words, by(history, m)));
+    let size = first.map(|m| went(history, m));
     let what = match (change.names.first(), change.kind) {
         (_, Kind::Drift) => {
             first.map_or("something drifts".to_owned(), |m| format!("the {} drifts by {}", m.words, by(history, m)))
         }
         (Some(name), _) => match size {
-            Some(size) => format!("{size}. In addition to before, {}", lower(name.words.trim_end_matches('.'))),
-            None => format!("in addition to before, {}", lower(name.words.trim_end_matches('.'))),
+            Some(size) => format!("{size}. What came on top: {}", lower(name.words.trim_end_matches('.'))),
+            None => format!("what came on top: {}", lower(name.words.trim_end_matches('.'))),
         },
         (None, _) => size.map_or("something changed".to_owned(), |size| format!("{size}; no effect of the library explains it")),
     };

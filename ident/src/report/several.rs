@@ -15,8 +15,8 @@ use crate::close::Closed;
 use crate::effects::{EffectEntry, Estimate};
 use crate::log::Log;
 use crate::several::{Outcome, Run, Shown};
-use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Unexplained, Validation, Verdict};
-use crate::words::{channel, digits, scaled, upper};
+use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Parameter, Unexplained, Validation, Verdict};
+use crate::words::{channel, digits, scaled, upper, upper_bound};
 
 /// Most runs that have their numbers beneath a figure; of more every fifth has.
 const MOST_NAMES: usize = 12;
@@ -140,7 +140,15 @@ fn left_of(alone: &[Closed], u: &Unexplained, shown: Option<&Shown>) -> Option<(
 
 /// Each parameter of the rig's effects as all runs share it, and as each run alone has it.
 fn parameters(outcome: &Outcome, v: &Verdict) -> Vec<Vec<String>> {
-    let value = |e: &Estimate| digits(e.value, if e.se.is_finite() && e.se > 0.0 { 0.2 * e.se } else { 0.005 * e.value.abs() });
+    let told = |e: &Estimate| {
+        let ci95 = [e.value - 1.96 * e.se, e.value + 1.96 * e.se];
+        let p = Parameter { name: e.name.clone(), value: e.value, unit: e.unit.clone(), ci95 };
+        upper_bound(&p).map(|bound| format!("< {}", digits(bound, 0.05 * bound)))
+    };
+    let value = |e: &Estimate| {
+        told(e)
+            .unwrap_or_else(|| digits(e.value, if e.se.is_finite() && e.se > 0.0 { 0.2 * e.se } else { 0.005 * e.value.abs() }))
+    };
     let head = ["parameter", "unit", "all runs"].into_iter().chain(v.runs.iter().map(|r| r.run.as_str()));
     let mut rows = vec![head.map(str::to_owned).collect()];
     for (added, alone) in outcome.model.effects.iter().zip(&outcome.alone) {

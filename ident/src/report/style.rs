@@ -40,6 +40,6 @@ h1{font-size:1.6rem;line-height:1.25;overflow-wrap:anywhere}h2{font-size:1.2rem;
 .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}th,td{padding:.25rem .7rem;text-align:right;border-bottom:1px solid var(--grid);white-space:nowrap}th:first-child,td:first-child{text-align:left}thead th{white-space:normal;max-width:9rem;vertical-align:bottom}td.text,th.text{text-align:left;white-space:normal;min-width:14rem}
 tr.chosen{background:var(--span);font-weight:600}.warn{border-left:4px solid var(--b);padding:.4rem .8rem;background:var(--card)}
 code{font-size:.92em}
-@media screen and (max-width:600px){body{font-size:15px;padding:.7rem}h1{font-size:1.3rem}.fig text{font-size:16px}.fig .title{font-size:18px}.fig .tick{font-size:16px}.fig .tip text{font-size:13px}th,td{padding:.25rem .45rem}}
+@media screen and (max-width:600px){body{font-size:15px;padding:.7rem}h1{font-size:1.3rem}.fig text{font-size:16px}.fig .title{font-size:18px}.fig .tick{font-size:16px}.fig .tip text{font-size:13px}th,td{padding:.25rem .45rem}td.text,th.text{min-width:9rem}}
 @media print{body{font-size:10.5pt;max-width:none;padding:0}.figs{grid-template-columns:1fr 1fr;gap:.5rem}h2{break-after:avoid}.wide{overflow:visible}table{font-size:7.5pt}th,td{padding:.1rem .3rem;white-space:normal}tr{break-inside:avoid}thead{display:table-header-group}@page{margin:14mm}}
 ";

@@ -31,7 +31,7 @@ impl AirframeEffect for SpinupLag {
             equation: "tau dw/dt = w_settled(pulse) - w, tau = tau_up or tau_down",
             source: "Beharie 2013, section 5.3; Eschmann, Albani & Loianno 2024.",
             depends_on: &["pulse_us"],
-            signature: "after every pulse forces and moments come late; with measured speeds they hold, and the speeds come late",
+            signature: "after every change of a pulse forces and moments come late",
             look_alikes: &["channel_delay"],
         }
     }

@@ -172,10 +172,11 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
         let none = Rival::none(v, page.words, e, &against).probability;
         contest(e, &format!("{sure}{there}"), &against, none)
     };
+    let rather = leading(page, e, &against);
     let title = if nameless {
         format!("Something on {on} that goes with {}.", channels(&e.depends_on))
     } else {
-        leading(page, e, &against).unwrap_or_else(|| page.words.said(e).sentence())
+        rather.clone().unwrap_or_else(|| page.words.said(e).sentence())
     };
     let number = number.map(|n| format!("<span class=\"nr\">{n}</span> ")).unwrap_or_default();
     let mut html = format!(
@@ -191,6 +192,9 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     if e.id != "unknown" {
         let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(&scope(e, page.words.noun))));
     }
+    if rather.is_some() && !nameless {
+        let _ = writeln!(html, "<p class=\"soft\">The sizes are of the second: {}.</p>", escape(&page.words.said(e).with("")));
+    }
     if let Some(open) = open_sizes(e) {
         let _ = writeln!(html, "<p class=\"soft\">{}</p>", escape(&open));
     }
@@ -204,7 +208,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     // how the sizes of the runs stand to each other, in a line of its own
     let apart = [DISAGREE, OTHERWISE].into_iter().find_map(|how| Some((how, e.evidence.split_once(&format!("; {how}:"))?)));
     let known = apart.map_or(e.evidence.as_str(), |(_, (known, _))| known);
-    let _ = writeln!(html, "<p><b>Shows as:</b> {}.</p>", escape(&plain(signs(known))));
+    let _ = writeln!(html, "<p><b>{}:</b> {}.</p>", upper(why(page.words, e)), escape(&plain(signs(known))));
     if let Some((how, (_, rest))) = apart {
         let (how, rest) = (escape(&upper(how)), escape(&plain(rest)));
         let _ = writeln!(html, "<p class=\"warn\"><b>{how}:</b>{rest}. The value above is of what they share.</p>");
@@ -223,7 +227,13 @@ fn leading(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> Option<String
     let rival = against.first().filter(|r| r.probability > e.probability && !r.ids.is_empty())?;
     let [theirs, own] = [rival.probability, e.probability].map(probability);
     let said = page.words.said(e).with("");
-    Some(format!("{} ({theirs}), or {said} ({own}). The sizes below are of the second.", upper(&rival.said)))
+    Some(format!("{} ({theirs}), or {said} ({own}).", upper(&rival.said)))
+}
+
+/// What the evidence of an effect is called: how such a cause shows, or what else speaks for it.
+pub(super) fn why(words: Vocabulary, e: &EffectEntry) -> &'static str {
+    let signature = (words.about)(&e.id).map_or("", |about| about.signature);
+    if !signature.is_empty() && e.evidence.contains(signature) { "shows as" } else { "why" }
 }
 
 /// How sure a name is, its probability, and what stands against it; `none`: that it has no cause of its own, or another set of names.
@@ -374,11 +384,14 @@ fn others(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> String {
     let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
     // what every name leaves to causes that the library lacks is said once, above the cards
     let none = Rival::none(page.verdict, page.words, e, against).probability;
-    let none =
-        if none >= OPEN { format!(" Further names, or no cause of its own: {}.", probability(none)) } else { String::new() };
+    let none = if none >= OPEN {
+        format!(" Further names together, or no cause of its own: {}.", probability(none))
+    } else {
+        String::new()
+    };
     match (found.is_empty(), none.is_empty()) {
         (true, true) => return format!("no other name that was tried came close.{alike}"),
-        (true, false) => return format!("many names, none of which leads.{none}{alike}"),
+        (true, false) => return format!("no other single name came close.{none}{alike}"),
         (false, _) => {}
     }
     format!("{}.{none}{alike}", found.join("; "))

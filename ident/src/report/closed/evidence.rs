@@ -27,7 +27,7 @@ const OFF: f64 = 3.0;
 /// Times the error after that the error before must be for a figure to show the difference.
 pub(crate) const SEEN: f64 = 1.02;
 /// Usual steps from which on a gap lifts the pen.
-const GAP: f64 = 10.0;
+const GAP: f64 = 5.0;
 
 /// What a channel left over before and after.
 #[derive(Debug, Clone, Default)]

@@ -27,7 +27,7 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
         });
         let above: Vec<String> = above.collect();
         match (above.is_empty(), goes_beyond_noise(v)) {
-            (false, _) => sheet.say(&format!("Little, and without a pattern: {}.", list(&above))),
+            (false, _) => sheet.say(&format!("Little: {}.", list(&above))),
             (true, true) => sheet.say("Little: on no channel more than a trace beyond its noise."),
             (true, false) => sheet.say("Nothing: no channel is left with more than its noise."),
         }

@@ -5,7 +5,7 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value};
+use super::cards::{alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value, why};
 use super::cautions::cautions;
 use super::left::{in_words, looks_and_goes, shared};
 use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
@@ -163,7 +163,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, group: &[usize]) -> String {
     for said in open_sizes(e).into_iter().chain(Some(removed(verdict, group))).filter(|said| !said.is_empty()) {
         out += &format!("    {}\n", wrapped(&said, 4));
     }
-    out + &format!("    {}\n", wrapped(&format!("shows as: {}", plain(signs(&e.evidence))), 4))
+    out + &format!("    {}\n", wrapped(&format!("{}: {}", why(words, e), plain(signs(&e.evidence))), 4))
 }
 
 /// Single readings about which nothing is claimed, a line for each channel and run.

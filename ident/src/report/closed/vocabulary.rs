@@ -34,7 +34,7 @@ pub struct Vocabulary {
 }
 
 /// Of figures that show a model on the rows that it was fitted to.
-pub(crate) const ALL_ROWS: &str = "Figures draw the models that were fitted to all rows. Bars and cards count the errors of fits on rows that they did not see, which are larger.";
+pub(crate) const ALL_ROWS: &str = "Figures draw the models that were fitted to all rows. Bars and cards count the errors of fits on rows that they did not see.";
 
 impl Vocabulary {
     /// Of a rig's log.

@@ -96,9 +96,9 @@ fn of_change(sheet: &mut Sheet, history: &History, change: &Change) {
     let rows: Vec<Vec<String>> = change.moved.iter().map(row).collect();
     sheet.data("moved", &["moved", "by", "95 % interval", "unit"], &rows, None);
     if !change.names.is_empty() {
-        let row = |n: &crate::history::Name| vec![upper(&n.title), n.id.clone(), format!("{:.1}", n.score)];
+        let row = |n: &crate::history::Name| vec![upper(&n.title), format!("{:.1}", n.score), n.id.clone()];
         let rows: Vec<Vec<String>> = change.names.iter().map(row).collect();
-        sheet.data("names", &["name", "effect", "evidence, nats"], &rows, None);
+        sheet.data("names", &["name", "evidence, nats", "effect"], &rows, None);
     }
 }
 
@@ -126,7 +126,7 @@ mod tests {
         let history = stepped(12, 7);
         let html = page(&history);
         assert!(
-            html.contains("<h1>Between run 7 and run 8: measure 0 from 5.1 to 14.4 N"),
+            html.contains("<h1>Between run 7 and run 8: the measure 0 went from 5.1 to 14.4 N"),
             "{}",
             &html[html.find("<h1>").unwrap_or(0)..]
         );
