@@ -123,7 +123,10 @@ fn kind_of(text: &str) -> Option<&'static str> {
     if text.starts_with("# quadrig-log") {
         return Some(LOG);
     }
-    if let Ok(table) = toml::from_str::<toml::Table>(text) {
+    // a long table is no TOML, and costs much to be told so
+    let first = text.lines().find(|line| !line.starts_with('#') && !line.trim().is_empty());
+    let may_be_settings = first.is_none_or(|line| line.trim_start().starts_with('[') || line.contains('='));
+    if may_be_settings && let Ok(table) = toml::from_str::<toml::Table>(text) {
         let format = table.get("format").and_then(toml::Value::as_str).unwrap_or_default();
         return format.starts_with("quadrig-").then_some(MODEL);
     }
@@ -133,7 +136,7 @@ fn kind_of(text: &str) -> Option<&'static str> {
     if text.starts_with("# quadrig-") {
         return Some(LOG);
     }
-    let first = text.lines().find(|line| !line.starts_with('#') && !line.trim().is_empty())?;
+    let first = first?;
     (first.matches([',', ';', '\t']).count() >= 2 && !first.contains('=')).then_some(TABLE)
 }
 
