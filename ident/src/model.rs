@@ -26,7 +26,7 @@ mod run;
 mod scope;
 mod supply;
 
-pub use discrepancy::{beside, is_as_written};
+pub use discrepancy::beside;
 pub use reach::Reach;
 pub(crate) use reach::shape_errors;
 pub use scope::{FittedTo, RunLevel};

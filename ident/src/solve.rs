@@ -125,7 +125,7 @@ impl Normal {
     }
 
     /// Adds what went into another of the same columns.
-    pub(crate) fn absorb(&mut self, other: &Self) {
+    pub fn absorb(&mut self, other: &Self) {
         self.gram += &other.gram;
         self.rhs += &other.rhs;
         self.yy += other.yy;
@@ -164,7 +164,8 @@ impl Normal {
     }
 
     /// Less a `share` of what another of the same columns holds: rows that went into both then weigh so much less.
-    pub(crate) fn less(&self, other: &Self, share: f64) -> Self {
+    #[must_use]
+    pub fn less(&self, other: &Self, share: f64) -> Self {
         Self {
             gram: &self.gram - &other.gram * share,
             rhs: &self.rhs - &other.rhs * share,

@@ -115,18 +115,24 @@ fn look(target: &Target, residual: &[f64], squares: &[f64]) -> Look {
     largest.sort_unstable_by(|a, b| b.total_cmp(a));
     let few = (FEW * largest.len() as f64).ceil() as usize;
     if 2.0 * largest.iter().take(few).sum::<f64>() > whole {
-        let (in_a_row, stretch) = loudest_stretch(squares);
-        let is_one = 2.0 * in_a_row > whole && stretch.len() > 1 && squares.get(stretch.clone()).is_some_and(is_filled);
-        return match is_one {
-            true => Look::InOne(stretch),
-            false if neighbours_agree(residual) => Look::InBursts,
-            false => Look::InSingleRows,
-        };
+        return of_few_rows(residual, squares);
     }
     match effective_share(residual) {
         share if share < SLOW => Look::Slow,
         _ if neighbours_agree(residual) => Look::OverSeveralRows,
         _ => Look::Quick,
+    }
+}
+
+/// How few rows lie that hold most of a residual.
+fn of_few_rows(residual: &[f64], squares: &[f64]) -> Look {
+    let (in_a_row, stretch) = loudest_stretch(squares);
+    let most = 2.0 * in_a_row > squares.iter().sum::<f64>();
+    let is_one = most && stretch.len() > 1 && squares.get(stretch.clone()).is_some_and(is_filled);
+    match is_one {
+        true => Look::InOne(stretch),
+        false if neighbours_agree(residual) => Look::InBursts,
+        false => Look::InSingleRows,
     }
 }
 
@@ -231,13 +237,25 @@ fn grows_with_the_load(context: &Context, target: &Target, squares: &[f64]) -> b
 
 #[cfg(test)]
 mod tests {
-    use super::{is_filled, loudest_stretch, neighbours_agree};
+    use super::{Look, is_filled, loudest_stretch, neighbours_agree, of_few_rows};
 
     #[test]
     fn two_edges_with_nothing_between_are_no_stretch() {
         let mut edges = vec![0.001; 80];
         (edges[0], edges[79]) = (1.0, 1.0);
         assert!(!is_filled(&edges) && is_filled(&[1.0; 80]) && is_filled(&[0.5, 1.0, 0.2]));
+    }
+
+    /// Ten bursts of eight rows each, ten rows that lie apart, one stretch.
+    #[test]
+    fn bursts_are_no_single_rows() {
+        let look = |loud: &dyn Fn(usize) -> bool| {
+            let residual: Vec<f64> = (0..4000).map(|i| if loud(i) { 50.0 } else { 0.1 * (0.7 * (i * i) as f64).sin() }).collect();
+            of_few_rows(&residual, &residual.iter().map(|r| r * r).collect::<Vec<f64>>())
+        };
+        assert_eq!(look(&|i| i % 400 < 8), Look::InBursts);
+        assert_eq!(look(&|i| i % 400 == 7), Look::InSingleRows);
+        assert!(matches!(look(&|i| (2000..2030).contains(&i)), Look::InOne(_)));
     }
 
     #[test]

@@ -8,8 +8,8 @@
 use ident::effects::Scope;
 use ident::report::{Hidden, Vocabulary, WIDEST, sentence, terminal};
 use ident::verdict::{
-    Alternative, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, NextExperiment, Parameter, ScheduleStep,
-    Unexplained, Validation, Verdict,
+    Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, NextExperiment, Parameter,
+    ScheduleStep, Unexplained, Validation, Verdict,
 };
 
 fn parameter(name: &str, value: f64, half: f64, unit: &str) -> Parameter {
@@ -467,6 +467,22 @@ fn a_channel_without_a_model_is_told() {
     v.unexplained.truncate(1);
     let said = sentence(&v, Vocabulary::RIG, false);
     assert!(said.ends_with("Little is left beyond the noise. Speed has no model: no command was logged."), "{said}");
+}
+
+/// Another run on which the model is ten floors off is told on terminal and page alike; one that is as near as its own is not.
+#[test]
+fn another_run_that_is_far_off_is_told() {
+    let mut v = verdict(Kind::Attributed, vec![sag(0.99)]);
+    let (name, own) =
+        v.channels.iter().next().map(|(name, c)| (name.clone(), c.noise_floor_rms.max(c.after.heldout_rms))).expect("a channel");
+    let validated = |after: f64| Validation {
+        run: "other.csv".into(),
+        channels: [(name.clone(), BeforeAfter { before: after, after })].into(),
+    };
+    v.validation = vec![validated(own)];
+    assert!(!terminal(&v, Vocabulary::RIG, false).contains("far off"));
+    v.validation = vec![validated(10.0 * own)];
+    assert!(terminal(&v, Vocabulary::RIG, false).contains("On other.csv the model is far off on"));
 }
 
 #[test]

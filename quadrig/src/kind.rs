@@ -9,7 +9,6 @@
 use crate::Failure;
 use crate::run_log::SIMULATED;
 use ident::log::digest;
-use ident::model::is_as_written;
 use std::borrow::Cow;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -57,8 +56,7 @@ pub(crate) fn is_computed(path: &Path, now: &str) -> bool {
     let begins_alike = || text.lines().next() == now.lines().next();
     kind == kind_of(now)
         && match kind {
-            Some(MODEL) => is_as_written(&text),
-            Some(PAGE) => text.contains(GENERATOR) && std::fs::read_to_string(path).is_ok_and(|page| is_as_stamped(&page)),
+            Some(MODEL | PAGE) => std::fs::read_to_string(path).is_ok_and(|whole| is_as_written(&whole)),
             Some(PINS) => true,
             Some(LOG | FLIGHT) => text.lines().any(|line| line == format!("# date = {SIMULATED:?}")),
             // values over time may be a recording, whoever computes some of the same columns
@@ -71,27 +69,32 @@ pub(crate) fn is_computed(path: &Path, now: &str) -> bool {
         }
 }
 
-/// How the last line of a page begins, and how it ends.
-const STAMP: [&str; 2] = ["<!-- as it was written: SHA-256 of all above ", " -->\n"];
-
-/// A page with a last line that tells whether somebody changed it; any other text as it is.
-pub(crate) fn stamped(text: &str) -> Cow<'_, str> {
-    if kind_of(text) != Some(PAGE) {
-        return Cow::Borrowed(text);
+/// How a comment begins and ends in the files that tell whether somebody changed them.
+fn comment(kind: &str) -> Option<[&'static str; 2]> {
+    match kind {
+        MODEL => Some(["# ", ""]),
+        PAGE => Some(["<!-- ", " -->"]),
+        _ => None,
     }
-    Cow::Owned(format!("{text}{}{}{}", STAMP[0], digest(text.as_bytes()), STAMP[1]))
 }
 
-/// Whether a page is as it was written.
-fn is_as_stamped(page: &str) -> bool {
-    let parts = page.rsplit_once(STAMP[0]);
-    parts.is_some_and(|(above, told)| told.strip_suffix(STAMP[1]) == Some(digest(above.as_bytes()).as_str()))
+/// What the last line of such a file says.
+const STAMP: &str = "as it was written: SHA-256 of all above ";
+
+/// A model or a page with a last line that tells whether somebody changed it; any other text as it is.
+pub(crate) fn stamped(text: &str) -> Cow<'_, str> {
+    let comment = kind_of(text).and_then(comment);
+    comment.map_or(Cow::Borrowed(text), |[begin, end]| format!("{text}{begin}{STAMP}{}{end}\n", digest(text.as_bytes())).into())
+}
+
+/// Whether such a file is as it was written: nobody changed a figure in it, nor added to it.
+fn is_as_written(text: &str) -> bool {
+    let Some([begin, _]) = kind_of(text).and_then(comment) else { return false };
+    text.rfind(&format!("{begin}{STAMP}")).is_some_and(|at| stamped(&text[..at]) == text)
 }
 
 /// A file of settings that this program wrote from a run.
 const MODEL: &str = "a model";
-/// What a page of this program's says in its head.
-const GENERATOR: &str = "<meta name=\"generator\" content=\"quadrig\">";
 /// A page that speaks of this program.
 const PAGE: &str = "a page";
 const LOG: &str = "a log";

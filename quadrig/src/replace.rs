@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn what_was_computed_is_replaced_and_all_else_is_kept() {
         let written = as_written("a");
-        let model = written.as_str();
+        let model = &*stamped(&written);
         let log = "# quadrig-log 1\nt_s,rpm\n0,1\n";
         let simulated = "# quadrig-log 1\n# date = \"simulated\"\nt_s,rpm\n0,1\n";
         let page = "<!doctype html><meta name=\"generator\" content=\"quadrig\"><title>a run</title>";

@@ -63,32 +63,36 @@ fn one(name: &str, columns: &[Vec<f64>]) {
     let normal = || Normal::of_columns(columns, &y, &weights).solve().expect("a solution").coefficients;
     let normal_folds = || {
         // each fold is added up once; what is left out is taken off
-        (0..5)
-            .map(|b| {
-                let part: Vec<Vec<f64>> = columns.iter().map(|c| c[fold(b)].to_vec()).collect();
-                Normal::of_columns(&part, &y[fold(b)], &weights[fold(b)])
-            })
-            .count()
+        let of_fold = |b: usize| {
+            let part: Vec<Vec<f64>> = columns.iter().map(|c| c[fold(b)].to_vec()).collect();
+            Normal::of_columns(&part, &y[fold(b)], &weights[fold(b)])
+        };
+        let folds: Vec<Normal> = (0..5).map(of_fold).collect();
+        let mut whole = Normal::new(k);
+        folds.iter().for_each(|fold| whole.absorb(fold));
+        folds.iter().map(|fold| whole.less(fold, 1.0).solve().expect("a solution").coefficients[0]).sum()
     };
-    let qr = || {
-        let qr = scaled.clone().qr();
-        let right = qr.q().transpose() * &right;
-        let found = qr.r().solve_upper_triangular(&right).expect("full rank");
-        found.iter().zip(&norms).map(|(b, n)| b / n).collect::<Vec<f64>>()
+    let by_qr = |matrix: DMatrix<f64>, mut right: DVector<f64>| {
+        let qr = matrix.qr();
+        qr.q_tr_mul(&mut right);
+        qr.r().solve_upper_triangular(&right.rows(0, k)).expect("full rank")
     };
+    let qr = || by_qr(scaled.clone(), right.clone()).iter().zip(&norms).map(|(b, n)| b / n).collect::<Vec<f64>>();
     let left_out = |b: usize| {
         let keep: Vec<usize> = (0..ROWS).filter(|i| !fold(b).contains(i)).collect();
-        scaled.select_rows(&keep)
+        (scaled.select_rows(&keep), right.select_rows(&keep))
     };
-    let qr_folds = || (0..5).map(|b| left_out(b).qr()).count();
+    let qr_folds = || (0..5).map(left_out).map(|(matrix, right)| by_qr(matrix, right)[0]).sum();
     let svd = || {
         let found = matrix.clone().svd(true, true).solve(&right, 1e-14).expect("a solution");
         found.iter().copied().collect::<Vec<f64>>()
     };
-    let svd_folds = || (0..5).map(|b| left_out(b).svd(true, true)).count();
+    let by_svd =
+        |(matrix, right): (DMatrix<f64>, DVector<f64>)| matrix.svd(true, true).solve(&right, 1e-14).expect("a solution")[0];
+    let svd_folds = || (0..5).map(left_out).map(by_svd).sum();
     println!("| {name}, condition {condition:.1e} | | | | |");
     for (way, fit, folds) in [
-        ("normal equations, columns scaled (the engine)", &normal as &dyn Fn() -> Vec<f64>, &normal_folds as &dyn Fn() -> usize),
+        ("normal equations, columns scaled (the engine)", &normal as &dyn Fn() -> Vec<f64>, &normal_folds as &dyn Fn() -> f64),
         ("QR of nalgebra, columns scaled", &qr, &qr_folds),
         ("SVD of nalgebra", &svd, &svd_folds),
     ] {

@@ -128,41 +128,43 @@ fn median_of(log: &Log, names: &[&str], gains: &[f64]) -> Vec<f64> {
     let of =
         |(name, gain): (&&str, &f64)| Some(Sensor { readings: log.column(name)?, flags: board::flags(log, name), gain: *gain });
     let sensors: Vec<Sensor<'_>> = names.iter().zip(gains).filter_map(of).collect();
-    let mut rows: Vec<Vec<f64>> = (0..log.len())
-        .map(|i| {
-            let good: Vec<f64> = sensors.iter().filter(|s| !s.is_wrong(i)).filter_map(|s| s.at(i)).collect();
-            if good.is_empty() { sensors.iter().filter_map(|s| s.at(i)).collect() } else { good }
-        })
-        .collect();
-    outvote(&mut rows);
-    rows.iter_mut().map(|v| if v.is_empty() { f64::NAN } else { noise::median(v) }).collect()
+    settled(log.len(), &|i| {
+        let good: Vec<f64> = sensors.iter().filter(|s| !s.is_wrong(i)).filter_map(|s| s.at(i)).collect();
+        if good.is_empty() { sensors.iter().filter_map(|s| s.at(i)).collect() } else { good }
+    })
 }
 
-/// Where no two readings of a row agree, those that lie beyond what the nearest rows with agreement span are left out, if another lies within:
-/// of two sensors one of which drops out none can be outvoted, but no rotor leaves its way for a row.
-fn outvote(rows: &mut [Vec<f64>]) {
-    let agreed: Vec<Option<f64>> = rows.iter().map(|row| agreement(row)).collect();
-    let mut after: Vec<Option<f64>> = agreed.clone();
-    for i in (0..after.len().saturating_sub(1)).rev() {
-        after[i] = after[i].or(after[i + 1]);
-    }
-    let mut before = None;
-    for ((row, agreed), after) in rows.iter_mut().zip(agreed).zip(after) {
-        before = agreed.or(before);
-        let (None, true, Some(before), Some(after)) = (agreed, row.len() > 1, before, after) else { continue };
-        let span = (1.0 - LEAVES) * before.min(after)..=(1.0 + LEAVES) * before.max(after);
-        if row.iter().any(|v| span.contains(v)) {
-            row.retain(|v| span.contains(v));
+/// The median of each row's readings. Where no two of them agree, those that lie beyond what the nearest rows with agreement span are left out, if
+/// another lies within: of two sensors one of which drops out none can be outvoted, but no rotor leaves its way for a row.
+fn settled(rows: usize, readings: &dyn Fn(usize) -> Vec<f64>) -> Vec<f64> {
+    let mut out: Vec<f64> = (0..rows).map(|i| agreement(readings(i))).collect();
+    let (mut before, mut i) = (None, 0);
+    while i < rows {
+        if out[i].is_finite() {
+            before = Some(out[i]);
+            i += 1;
+            continue;
         }
+        let end = (i..rows).find(|k| out[*k].is_finite()).unwrap_or(rows);
+        let after = out.get(end).copied();
+        let span = before.zip(after).map(|(a, b): (f64, f64)| (1.0 - LEAVES) * a.min(b)..=(1.0 + LEAVES) * a.max(b));
+        for k in i..end {
+            let mut row = readings(k);
+            if let Some(span) = span.as_ref().filter(|span| row.iter().any(|v| span.contains(v))) {
+                row.retain(|v| span.contains(v));
+            }
+            out[k] = if row.is_empty() { f64::NAN } else { noise::median(&mut row) };
+        }
+        i = end;
     }
+    out
 }
 
-/// The median of a row's readings where two of them agree as healthy sensors do.
-fn agreement(row: &[f64]) -> Option<f64> {
-    let mut sorted = row.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
+/// The median of a row's readings where two of them agree as healthy sensors do; nothing finite elsewhere.
+fn agreement(mut row: Vec<f64>) -> f64 {
+    row.sort_unstable_by(f64::total_cmp);
     let agree = |w: &[f64]| w[1] - w[0] <= HEALTHY * w[1].abs();
-    sorted.windows(2).any(agree).then(|| noise::median(&mut sorted))
+    if row.windows(2).any(agree) { noise::median(&mut row) } else { f64::NAN }
 }
 
 /// Readings of a channel over the speed of all, while the rotor turns.
@@ -222,10 +224,12 @@ mod tests {
         let mut rows: Vec<Vec<f64>> = (0..9).map(|i| 4000.0 + 30.0 * f64::from(i)).map(|v| vec![v, v + 4.0, v + 2.0]).collect();
         rows[2] = vec![2000.0, 4064.0];
         rows[5] = vec![1700.0, 4020.0, 4152.0];
-        outvote(&mut rows);
-        assert_eq!((&rows[2], &rows[5]), (&vec![4064.0], &vec![4152.0]));
-        let mut step: Vec<Vec<f64>> = vec![vec![2000.0, 2001.0], vec![2600.0, 2900.0], vec![3500.0, 3501.0]];
-        outvote(&mut step);
-        assert_eq!(step[1].len(), 2);
+        let speed = settled(rows.len(), &|i| rows[i].clone());
+        assert_eq!((speed[1], speed[2], speed[5]), (4032.0, 4064.0, 4152.0));
+        let step = [vec![2000.0, 2001.0], vec![2600.0, 2900.0], vec![3500.0, 3501.0]];
+        assert_eq!(settled(3, &|i| step[i].clone())[1], 2750.0);
+        let open = [vec![2000.0, 4000.0], vec![4000.0, 4001.0], vec![]];
+        assert_eq!(settled(3, &|i| open[i].clone())[0], 3000.0, "nothing tells before they first agree");
+        assert!(settled(3, &|i| open[i].clone())[2].is_nan());
     }
 }

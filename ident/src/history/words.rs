@@ -22,27 +22,43 @@ pub fn gap(history: &History, change: &Change) -> String {
     }
 }
 
-/// By how much a measure moved; where it had a value before, from which to which.
-pub(crate) fn by(history: &History, moved: &Moved) -> String {
+/// How a measure moved.
+enum Move {
+    /// So many times what it was.
+    Times(String),
+    /// By so much.
+    By(String),
+    /// From which value to which.
+    FromTo(String),
+}
+
+fn movement(history: &History, moved: &Moved) -> Move {
     let sign = |v: f64| if v > 0.0 { "+" } else { "-" };
     let per = moved.unit.split_once(' ').map_or(String::new(), |(_, per)| format!(" {per}"));
     match moved.unit.split(' ').next().unwrap_or_default() {
-        "x" => format!("{:.3} times{per}", moved.by),
-        "%" => format!("{}{:.2} %{per}", sign(moved.by), moved.by.abs()),
+        "x" => Move::Times(format!("{:.3} times{per}", moved.by)),
+        "%" => Move::By(format!("{}{:.2} %{per}", sign(moved.by), moved.by.abs())),
         unit => match Chart::of(history, moved.measure).map_or(0.0, |c| c.centre) {
-            before if per.is_empty() && before != 0.0 => from_to(before, before + moved.by, moved, unit),
-            _ => format!("{}{}{per}", sign(moved.by), amount(moved.by.abs(), unit)),
+            before if per.is_empty() && before != 0.0 => Move::FromTo(from_to(before, before + moved.by, moved, unit)),
+            _ => Move::By(format!("{}{}{per}", sign(moved.by), amount(moved.by.abs(), unit))),
         },
+    }
+}
+
+/// By how much a measure moved; where it had a value before, from which to which.
+pub(crate) fn by(history: &History, moved: &Moved) -> String {
+    match movement(history, moved) {
+        Move::Times(said) | Move::By(said) | Move::FromTo(said) => said,
     }
 }
 
 /// What a measure did, as a clause.
 fn went(history: &History, moved: &Moved) -> String {
-    let by = by(history, moved);
-    match by.strip_suffix(" times") {
-        Some(times) => format!("the {} is {times} times what it was", moved.words),
-        None if by.starts_with("from ") => format!("the {} went {by}", moved.words),
-        None => format!("the {} changed by {by}", moved.words),
+    let what = &moved.words;
+    match movement(history, moved) {
+        Move::Times(times) => format!("the {what} is {times} what it was"),
+        Move::By(by) => format!("the {what} changed by {by}"),
+        Move::FromTo(values) => format!("the {what} went {values}"),
     }
 }
 

@@ -29,22 +29,6 @@ pub fn beside(model: &Path) -> PathBuf {
     model.with_extension("discrepancy.toml")
 }
 
-/// How the last line of a model's file begins.
-const STAMP: &str = "# as it was written: SHA-256 of the lines above ";
-
-/// A model's text with the line that tells a figure which somebody changed.
-fn stamped(text: String) -> String {
-    let digest = digest_of(&text);
-    text + STAMP + &digest + "\n"
-}
-
-/// Whether a model's file is as this program wrote it: nobody changed a figure in it, nor added to it.
-#[must_use]
-pub fn is_as_written(text: &str) -> bool {
-    let parts = text.rsplit_once(STAMP);
-    parts.is_some_and(|(above, digest)| digest.strip_suffix('\n') == Some(digest_of(above).as_str()))
-}
-
 /// The keys of a channel.
 pub(super) fn channel_keys(channel: &str, left: &Leftover) -> [(String, Value); 3] {
     let [scatter, at, error] = leftover_keys(channel);
@@ -68,10 +52,10 @@ impl Model {
     #[must_use]
     pub fn files(&self) -> (String, Option<String>) {
         if self.leftovers.is_empty() && self.course.is_none() {
-            return (stamped(self.text(false, None)), None);
+            return (self.text(false, None), None);
         }
         let text = self.discrepancy();
-        (stamped(self.text(false, Some(&digest_of(&text)))), Some(text))
+        (self.text(false, Some(&digest_of(&text))), Some(text))
     }
 
     fn discrepancy(&self) -> String {

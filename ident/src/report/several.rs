@@ -14,7 +14,7 @@ use super::svg::escape;
 use crate::close::Closed;
 use crate::effects::{EffectEntry, Estimate};
 use crate::log::Log;
-use crate::several::{Outcome, Run, Shown};
+use crate::several::{Outcome, Run, Shown, disagreement};
 use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Parameter, Unexplained, Validation, Verdict};
 use crate::words::{channel, digits, scaled, upper, upper_bound};
 
@@ -85,11 +85,11 @@ fn card(alone: &[Closed], outcome: &Outcome, v: &Verdict, k: usize, e: &EffectEn
     let Some(at) = outcome.model.effects.iter().position(|added| added.placed.is_told_by(e)) else { return Vec::new() };
     let shown = outcome.each.get(at).and_then(Option::as_ref);
     let most = shown.and_then(|s| Some(named(card_across(&alone[s.run], e, s, &id)?, &v.runs[s.run].run)));
-    most.into_iter().chain(sizes(outcome, v, at, &id, e)).collect()
+    most.into_iter().chain(sizes(outcome, v, at, &id)).collect()
 }
 
 /// The parameter on which the runs differ, or else the one that is known best, as each run alone has it, beside what all share.
-fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str, e: &EffectEntry) -> Option<Figure> {
+fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str) -> Option<Figure> {
     let added = outcome.model.effects.get(at)?;
     let (effect, instance, context) = (added.placed.effect, &added.placed.instance, outcome.contexts.first()?);
     let told = |e: &[Estimate]| effect.report(context, instance, e.to_vec());
@@ -98,18 +98,19 @@ fn sizes(outcome: &Outcome, v: &Verdict, at: usize, id: &str, e: &EffectEntry) -
     let half = |e: &Estimate| if e.se.is_finite() { 1.96 * e.se } else { 0.0 };
     let all = told(&added.estimates);
     let words = |p: &Estimate| (Vocabulary::RIG.parameter)(effect.id(), &p.name);
-    let differs = |p: &&Estimate| e.evidence.ends_with(&format!(" for the {}", words(p)));
-    let differing = all.iter().filter(known).find(differs);
+    let each: Vec<Vec<Estimate>> = outcome.alone.get(at)?.iter().map(|run| told(run)).collect();
+    let differs = disagreement(&all, &each).map(|(name, _)| name);
+    let differing = all.iter().find(|e| differs.as_ref() == Some(&e.name));
     let best = differing.or_else(|| all.iter().filter(known).max_by(|a, b| sure(a).total_cmp(&sure(b))))?;
     let (factor, unit) = scaled(best.value, &best.unit);
     let mark = |(run, alone): (usize, &Vec<Estimate>)| {
-        let own = told(alone).into_iter().find(|e| e.name == best.name)?;
-        let (y, error) = (factor * own.value, factor * half(&own));
+        let own = alone.iter().find(|e| e.name == best.name)?;
+        let (y, error) = (factor * own.value, factor * half(own));
         let interval = if error > 0.0 { format!(" \u{b1} {}", digits(error, 0.1 * error)) } else { String::new() };
         let text = format!("{}: {}{interval} {unit}", v.runs.get(run)?.run, digits(y, 0.1 * error));
         Some(Mark { x: run as f64, y, error, text })
     };
-    let marks: Vec<Mark> = outcome.alone.get(at)?.iter().enumerate().filter_map(mark).collect();
+    let marks: Vec<Mark> = each.iter().enumerate().filter_map(mark).collect();
     let name = words(best);
     let unit = if unit == "1" { String::new() } else { format!(", {unit}") };
     (marks.len() > 1).then(|| Figure {

@@ -28,6 +28,7 @@ use crate::samples::Samples;
 pub use crate::runs::Run;
 pub use alone::{RunsError, close_each};
 pub use outcome::{Outcome, Shown, close_together};
+pub(crate) use scatter::disagreement;
 
 /// Fewest runs that can predict each other.
 pub const FEWEST: usize = 2;

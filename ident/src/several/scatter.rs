@@ -28,7 +28,7 @@ pub(super) fn widened(shared: &mut [Estimate], alone: &[Vec<Estimate>]) {
 }
 
 /// The first parameter on which the runs disagree, with the least and the largest value that a run alone has.
-pub(super) fn disagreement(shared: &[Estimate], alone: &[Vec<Estimate>]) -> Option<(String, [f64; 2])> {
+pub(crate) fn disagreement(shared: &[Estimate], alone: &[Vec<Estimate>]) -> Option<(String, [f64; 2])> {
     shared.iter().filter(|e| e.name != "phase").find_map(|e| {
         let own = of_runs(e, alone);
         let apart = |(v, se): &(f64, f64)| (v - e.value).abs() > APART * se.hypot(if e.se.is_finite() { e.se } else { 0.0 });

@@ -106,9 +106,7 @@ impl ModelRotor {
         }
         // where the run saw the rotor stand still, what its force and torque read then is the zero of the day
         for p in &mut flying.polynomials {
-            let stood = model.stood
-                || model.leftovers.iter().any(|(c, l)| *c == p.channel && l.curve.first().is_some_and(|(at, _)| *at == 0.0));
-            if stood && ["thrust_n", "torque_nm"].contains(&p.channel.as_str()) {
+            if model.stood && ["thrust_n", "torque_nm"].contains(&p.channel.as_str()) {
                 p.coefficients[0] = 0.0;
             }
         }

@@ -172,11 +172,11 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
         let none = Rival::none(v, page.words, e, &against).probability;
         contest(e, &format!("{sure}{there}"), &against, none)
     };
-    let rather = leading(page, e, &against);
-    let title = if nameless {
-        format!("Something on {on} that goes with {}.", channels(&e.depends_on))
-    } else {
-        rather.clone().unwrap_or_else(|| page.words.said(e).sentence())
+    let rather = if nameless { None } else { leading(page, e, &against) };
+    let title = match &rather {
+        _ if nameless => format!("Something on {on} that goes with {}.", channels(&e.depends_on)),
+        Some(both) => both.clone(),
+        None => page.words.said(e).sentence(),
     };
     let number = number.map(|n| format!("<span class=\"nr\">{n}</span> ")).unwrap_or_default();
     let mut html = format!(
@@ -192,7 +192,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     if e.id != "unknown" {
         let _ = writeln!(html, "<p class=\"soft\">{}.</p>", escape(&upper(&scope(e, page.words.noun))));
     }
-    if rather.is_some() && !nameless {
+    if rather.is_some() {
         let _ = writeln!(html, "<p class=\"soft\">The sizes are of the second: {}.</p>", escape(&page.words.said(e).with("")));
     }
     if let Some(open) = open_sizes(e) {

@@ -1,12 +1,14 @@
 //! What a reader must know before the figures.
 //!
-//! What it is: noise floors that are guesses, and floors that no meter has; a sentence or two each, for page and terminal alike.
+//! What it is: noise floors that are guesses, floors that no meter has, and other runs on which the model is far off; a sentence or two each, for page
+//! and terminal alike.
 //! What can go wrong: nothing; most runs have none.
 //! Units: rows, noise floors.
 //! Reference: quantisation noise of a uniform quantiser, a step over the square root of twelve.
 
-use crate::verdict::Verdict;
-use crate::words::{channels, upper};
+use crate::unexplained::LOUD;
+use crate::verdict::{Validation, Verdict};
+use crate::words::{channel, channels, list, upper};
 
 /// Error over noise floor from which on the floor lies beneath the rounding of a sensor of 16 bits: what it measured spans its error at the least,
 /// and its rounding is a 65536th of its span over the square root of twelve.
@@ -17,7 +19,7 @@ pub(super) fn cautions(v: &Verdict) -> Vec<String> {
     let guessed = v.guessed_floors.map(|rows| {
         format!("Only {rows} rows, one for each level: none has two to compare, so that the noise floors are guesses, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.")
     });
-    guessed.into_iter().chain(without_noise(v)).collect()
+    guessed.into_iter().chain(without_noise(v)).chain(far_off(v)).collect()
 }
 
 fn without_noise(v: &Verdict) -> Option<String> {
@@ -26,4 +28,22 @@ fn without_noise(v: &Verdict) -> Option<String> {
     (!names.is_empty()).then(|| {
         format!("{}: the noise floor lies beneath the rounding of any 16-bit sensor, as in a simulation without sensor noise. What is many floors may be next to nothing there: read the sizes, not the floors.", upper(&channels(&names)))
     })
+}
+
+/// Times its error on left-out rows of its own run above which a channel of another run is said to be far off.
+const FAR: f64 = 2.0;
+
+/// What another run has on which the model is far off, a line each run: above what is loud, and above what its own run promised.
+fn far_off(v: &Verdict) -> Vec<String> {
+    let of_run = |run: &Validation| {
+        let told = run.channels.iter().filter_map(|(name, error)| {
+            let own = v.channels.get(name)?;
+            let floors = error.after / own.noise_floor_rms;
+            let far = floors > LOUD && error.after > FAR * own.after.heldout_rms;
+            far.then(|| format!("{} ({floors:.0} noise floors)", channel(name)))
+        });
+        let told: Vec<String> = told.collect();
+        (!told.is_empty()).then(|| format!("On {} the model is far off on {}. Something differs there that this run does not show, or that the model does not carry over.", run.run, list(&told)))
+    };
+    v.validation.iter().filter_map(of_run).collect()
 }

@@ -12,9 +12,8 @@ use super::{cards, cautions, fold, left, sentence, state};
 use crate::context::unit_of;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
-use crate::unexplained::LOUD;
 use crate::verdict::{Kind, Validation, Verdict};
-use crate::words::{channel, digits, heading, list, scaled};
+use crate::words::{digits, heading, scaled};
 
 /// What a page is made of.
 pub(crate) struct Page<'p> {
@@ -124,7 +123,6 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
             "Predicted from this run's model alone: what belongs to the {noun} carries over. Before and after, rms."
         ));
         runs(&mut sheet, v, &v.validation, "other-runs");
-        far_off(v).iter().for_each(|line| sheet.warn(line));
     }
     provenance(&mut sheet, &page.origin, v);
     sheet.section("More");
@@ -137,24 +135,6 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         fold::channels(sheet, v, page.words.held_out);
     });
     sheet
-}
-
-/// Times its error on left-out rows of its own run above which a channel of another run is said to be far off.
-const FAR: f64 = 2.0;
-
-/// What another run has on which the model is far off, a line each run: above what is loud, and above what its own run promised.
-fn far_off(v: &Verdict) -> Vec<String> {
-    let of_run = |run: &Validation| {
-        let told = run.channels.iter().filter_map(|(name, error)| {
-            let own = v.channels.get(name)?;
-            let floors = error.after / own.noise_floor_rms;
-            let far = floors > LOUD && error.after > FAR * own.after.heldout_rms;
-            far.then(|| format!("{} ({floors:.0} noise floors)", channel(name)))
-        });
-        let told: Vec<String> = told.collect();
-        (!told.is_empty()).then(|| format!("On {} the model is far off on {}. Something differs there that this run does not show, or that the model does not carry over.", run.run, list(&told)))
-    };
-    v.validation.iter().filter_map(of_run).collect()
 }
 
 /// Before and after on runs of the rig, a column each run.
