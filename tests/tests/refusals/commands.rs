@@ -184,7 +184,11 @@ pub(super) fn outputs() -> Vec<Case> {
         alone("sim over the log that its schedule replays", "sim on-replay.toml -o good.csv", &["good.csv: is an input"]),
         alone("a record of truth over it", "sim on-replay.toml -o x.csv --truth good.csv", &["good.csv: is an input"]),
         alone("a recording over it", "rig --port sim --speed 0 run replay.toml -o good.csv", &["good.csv: is an input"]),
-        alone("one over what its board replays", "log --port sim:on-replay.toml -o good.csv", &["good.csv: is an input"]),
+        alone(
+            "one over what its board replays",
+            "log --port sim:on-replay.toml --speed 0 --seconds 1 -o good.csv",
+            &["good.csv: is an input"],
+        ),
         alone("a page over the log", "identify good.csv -o out.toml --report good.csv", &["good.csv: is an input", "--report"]),
         alone("a page over the pairs", "select good.csv -o good.csv", &["good.csv: is an input"]),
         alone("a page over the run", "beam --run good.csv -o good.csv", &["good.csv: is an input"]),
@@ -196,7 +200,11 @@ pub(super) fn outputs() -> Vec<Case> {
             &["plan.toml: is an input"],
         ),
         alone("a recording over its board", "log --port sim:empty.toml --speed 0 -o empty.toml", &["empty.toml: is an input"]),
-        alone("one over its board's schedule", "log --port sim:on-file.toml --speed 0 -o plan.toml", &["plan.toml: is an input"]),
+        alone(
+            "one over its board's schedule",
+            "log --port sim:on-file.toml --speed 0 --seconds 1 -o plan.toml",
+            &["plan.toml: is an input"],
+        ),
         alone(
             "two outputs in one file",
             "sim empty.toml -o out.csv --truth out.csv",
