@@ -148,12 +148,12 @@ fn settled(rows: usize, readings: &dyn Fn(usize) -> Vec<f64>) -> Vec<f64> {
         let end = (i..rows).find(|k| out[*k].is_finite()).unwrap_or(rows);
         let after = out.get(end).copied();
         let span = before.zip(after).map(|(a, b): (f64, f64)| (1.0 - LEAVES) * a.min(b)..=(1.0 + LEAVES) * a.max(b));
-        for k in i..end {
+        for (k, slot) in out.iter_mut().enumerate().take(end).skip(i) {
             let mut row = readings(k);
             if let Some(span) = span.as_ref().filter(|span| row.iter().any(|v| span.contains(v))) {
                 row.retain(|v| span.contains(v));
             }
-            out[k] = if row.is_empty() { f64::NAN } else { noise::median(&mut row) };
+            *slot = if row.is_empty() { f64::NAN } else { noise::median(&mut row) };
         }
         i = end;
     }
