@@ -22,6 +22,7 @@ use crate::log::Log;
 use crate::long::diagnose_any;
 use crate::marks;
 use crate::model::{FittedTo, Model};
+use crate::read_off;
 use crate::residual::whiteness;
 use crate::rivals::{Rival, UNEXPLAINED};
 use crate::search::refine;
@@ -123,6 +124,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     };
     verdict.alternatives = alternatives(&diagnosis, &verdict.effects);
     marks::tell(&mut verdict, &mut after_model, &marks);
+    read_off::tell(&mut verdict, &context, declared);
     if let Some(limit) = &limit {
         supply_limit::tell(&mut verdict, limit, &supply_limit::missed(log, &context, &before_model, &at_limit));
     }

@@ -382,6 +382,8 @@ pub(crate) struct Facts {
     pub(crate) slope: OnceLock<Vec<f64>>,
     /// Where the thrust reads one and the same largest value.
     pub(crate) rail: OnceLock<Option<crate::effects::Rail>>,
+    /// When each target takes new values, where it repeats them and does not change with every update.
+    pub(crate) clocks: OnceLock<Vec<Option<crate::effects::Clock>>>,
     /// See [`Context::step`].
     pub(crate) step: OnceLock<f64>,
     /// Shapes that a search has found.

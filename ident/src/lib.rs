@@ -48,6 +48,7 @@ mod opponent;
 pub(crate) mod parallel;
 pub mod plateau;
 pub mod quantity;
+mod read_off;
 mod remembered;
 pub mod report;
 pub mod residual;

@@ -497,6 +497,17 @@ fn the_terminal_begins_with_the_sentence_and_keeps_to_its_width() {
     }
 }
 
+/// What could stand in the place of a name is told beneath it, as on its card; what is hardly likely is not.
+#[test]
+fn the_terminal_tells_the_rival_of_a_name() {
+    let mut v = verdict(Kind::Attributed, vec![sag(0.7)]);
+    let told = |v: &Verdict| terminal(v, Vocabulary::RIG, false).split_whitespace().collect::<Vec<_>>().join(" ");
+    v.alternatives = vec![Alternative { ids: vec!["battery_discharge".into()], probability: 0.2, change: None }];
+    assert!(told(&v).contains("or else: the battery runs down during the run (p 0.20)"), "{}", told(&v));
+    v.alternatives[0].probability = 0.01;
+    assert!(!told(&v).contains("or else:"), "{}", told(&v));
+}
+
 /// What has no name is sure of nothing, and what cannot be below zero has an upper bound.
 #[test]
 fn the_terminal_claims_no_more_than_it_knows() {

@@ -1,12 +1,13 @@
-//! A rotor whose controller drives it and never brakes it.
+//! A rotor between winding and air.
 //!
-//! What it is: the way of a rotor from one speed to another as an operator on columns. Near its new speed it approaches with the time
-//! constant of winding and load; far above it no current flows, and the air and friction alone slow it down.
+//! What it is: the way of a rotor from one speed to another as an operator on columns. Winding and air both pull it to its new speed, the air the
+//! more the faster it turns. Where the controller does not brake, no current flows far above the new speed: air and friction alone slow it down.
+//! So they do wherever the command is below that of the start: no controller holds a motor that is off.
 //! What can go wrong: the rates are those of a rotor whose speed goes with the command above 1000 us; a curve that bends much makes
-//! them rough. That a driven rotor is quicker at high speed, where the air holds it more, is left out. How a standing rotor starts is the
-//! controller's programme and is not in it.
+//! them rough. How a standing rotor starts is the controller's programme and is not in it.
 //! Units: s; speeds as a share of that at 2000 us.
-//! Reference: J dw/dt = kt i - kQ w^2 - Q_f with i = max(0, (V - kt w)/R): Beharie 2013, Eq. 2.21 as corrected and 5.11.
+//! Reference: J dw/dt = kt i - kQ w^2 - Q_f with i = (V - kt w)/R, not below 0 where nothing brakes: Beharie 2013, Eq. 2.21 as corrected and
+//! 5.11. At a voltage that holds the speed g this is dv/dt = (g - v) (a + b (g + v)), with a = kt^2/(R J) and b = kQ w_max/J.
 
 use super::operator::{Decay, weight_of_ramp};
 use crate::context::Context;
@@ -23,7 +24,7 @@ const REACH: usize = 4;
 /// Constants of a rotor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rotor {
-    /// Time constant while current flows, s.
+    /// Time constant of a small change about half the full speed while current flows, s.
     pub(super) tau_up: f64,
     /// Time in which the air alone halves the full speed, s.
     pub(super) tau_air: f64,
@@ -31,34 +32,60 @@ pub(super) struct Rotor {
     pub(super) friction: f64,
     /// How late the speed answers to the logged command, s.
     pub(super) latency: f64,
+    /// Whether a running controller brakes: current flows back on the way down.
+    pub(super) braked: bool,
 }
+
+/// Speed at which [`Rotor::tau_up`] holds, a share of the full one.
+const HALF: f64 = 0.5;
+/// Least part of the approach that is the winding's: the air cannot have all of it.
+const LEAST_OF_WINDING: f64 = 0.02;
 
 impl Rotor {
     /// What slows it down without a current, 1/s, at speed `v`.
     fn braking(&self, v: f64) -> f64 {
-        v * v / self.tau_air.max(1e-6) + self.friction
+        v * v * self.air() + self.friction
+    }
+
+    /// Rate of the air at full speed, 1/s.
+    fn air(&self) -> f64 {
+        1.0 / self.tau_air.max(1e-6)
+    }
+
+    /// Rate of the winding, 1/s: what the air leaves of the approach at half speed.
+    fn winding(&self) -> f64 {
+        let whole = 1.0 / self.tau_up.max(1e-6);
+        (whole - 2.0 * HALF * self.air()).max(LEAST_OF_WINDING * whole)
     }
 
     /// Rate of approach, 1/s, at speed `v` towards `goal`.
     fn rate(&self, v: f64, goal: f64) -> f64 {
-        let driven = 1.0 / self.tau_up.max(1e-6);
-        if v > goal { driven.min(self.braking(v) / (v - goal)) } else { driven }
+        let driven = self.winding() + self.air() * (goal + v);
+        if v > goal && !self.holds(goal) { driven.min(self.braking(v) / (v - goal)) } else { driven }
+    }
+
+    /// Whether the controller takes current back on the way down to `goal`.
+    fn holds(&self, goal: f64) -> bool {
+        self.braked && goal > 0.0
     }
 
     /// Whether current flows at speed `v` on the way to `goal`.
     fn is_driven(&self, v: f64, goal: f64) -> bool {
-        v <= goal + self.tau_up.max(1e-6) * self.braking(v)
+        self.holds(goal) || v <= goal + self.braking(goal) / self.winding()
     }
 
     /// Where current flows from the beginning of some seconds to their end: the share of the way of the goal that one goal would stand
-    /// at for the same effect (exact for a straight line), and what is left of the distance from it.
+    /// at for the same effect, and what is left of the distance from it. Exact for one goal, and for a straight line near it.
     fn driven(&self, (v, s): (f64, f64), course: Course, (from, to): (f64, f64), decay: &mut Decay) -> Option<(f64, f64)> {
         if !self.is_driven(v, course.goal(from)) {
             return None;
         }
-        let h = s / self.tau_up.max(1e-6);
-        let left = decay.of(h);
-        let share = from + (to - from) * weight_of_ramp(h, left) / (1.0 - left).max(1e-12);
+        // of dx/dt = -x (c + b x), x the distance from the goal
+        let middle = course.goal(0.5 * (from + to));
+        let c = self.winding() + 2.0 * self.air() * middle;
+        let near = decay.of(s * c);
+        let left = near / (1.0 + self.air() * (v - middle) / c * (1.0 - near));
+        let share = from + (to - from) * weight_of_ramp(-left.ln(), left) / (1.0 - left).max(1e-12);
         let goal = course.goal(share);
         self.is_driven(goal + (v - goal) * left, course.goal(to)).then_some((share, left))
     }
@@ -160,7 +187,11 @@ impl Coasting {
                 let course =
                     Course { from: goals[row], change: goals[row + 1] - goals[row], jumps: jumps.then_some(now >= t[0]) };
                 let share = |at: f64| course.share((at - t[row]) / (t[row + 1] - t[row]));
-                let whole = to.min(next);
+                let mut whole = to.min(next);
+                // on a slope the rate changes with the goal
+                if !calm && share(now) != share(whole) {
+                    whole = whole.min(now + step);
+                }
                 let driven = rotor.driven((speed, whole - now), course, (share(now), share(whole)), &mut decay);
                 let (end, share, left) = driven.map_or_else(
                     || {
@@ -245,7 +276,7 @@ mod tests {
     use super::*;
     use crate::log::{Column, Log};
 
-    const ROTOR: Rotor = Rotor { tau_up: 0.04, tau_air: 0.4, friction: 0.1, latency: 0.0 };
+    const ROTOR: Rotor = Rotor { tau_up: 0.04, tau_air: 0.4, friction: 0.1, latency: 0.0, braked: false };
 
     /// A command that stands at one value, then at another, 50 rows a second, and the speed of a rotor whose curve is a straight line.
     fn speed(rotor: Rotor, from_us: f64, to_us: f64, jumps: bool) -> (Vec<f64>, Vec<f64>) {
@@ -262,14 +293,26 @@ mod tests {
     /// The rotor's equation in small steps, from the instant of the jump on.
     fn integrated(rotor: Rotor, mut v: f64, goal: f64, s: f64) -> f64 {
         let n = 20_000;
+        let air = 1.0 / rotor.tau_air;
         for _ in 0..n {
-            v += s / f64::from(n) * ((goal - v) / rotor.tau_up).max(-(v * v / rotor.tau_air + rotor.friction));
+            let driven = (goal - v) * (1.0 / rotor.tau_up - air + air * (goal + v));
+            let alone = -(v * v * air + rotor.friction);
+            v += s / f64::from(n) * if rotor.braked && goal > 0.0 { driven } else { driven.max(alone) };
         }
         v
     }
 
     #[test]
-    fn it_is_the_rotor_s_equation_driven_and_coasting() {
+    fn it_is_the_rotor_s_equation_driven_braked_and_coasting() {
+        let braked = Rotor { braked: true, tau_air: 0.15, ..ROTOR };
+        for (from, to) in [(1200.0, 1900.0), (1900.0, 1200.0)] {
+            let (t, v) = speed(braked, from, to, true);
+            let goal = |us: f64| if us < 1050.0 { 0.0 } else { (us - 1000.0) / 1000.0 };
+            for row in [50, 51, 53, 60, 90] {
+                let exact = integrated(braked, goal(from), goal(to), t[row] - t[49]);
+                assert!((v[row] - exact).abs() < 0.002, "{from} {to} row {row}: {} {exact}", v[row]);
+            }
+        }
         for (from, to) in [(1200.0, 1900.0), (1900.0, 1200.0), (2000.0, 1950.0), (1800.0, 1000.0)] {
             let (t, v) = speed(ROTOR, from, to, true);
             let goal = |us: f64| if us < 1050.0 { 0.0 } else { (us - 1000.0) / 1000.0 };
@@ -284,9 +327,9 @@ mod tests {
     #[test]
     fn its_constants_are_what_they_say() {
         // a small change is over but for 1/e after one time constant
-        let (t, v) = speed(Rotor { tau_up: 0.1, ..ROTOR }, 1980.0, 2000.0, true);
+        let (t, v) = speed(Rotor { tau_up: 0.1, ..ROTOR }, 1490.0, 1510.0, true);
         let row = t.iter().position(|s| s - t[49] >= 0.1 - 1e-9).unwrap();
-        assert!(((1.0 - v[row]) / 0.02 - (-1.0_f64).exp()).abs() < 0.01, "{}", v[row]);
+        assert!(((0.51 - v[row]) / 0.02 - (-1.0_f64).exp()).abs() < 0.01, "{}", v[row]);
         // the air alone halves the full speed
         let (t, v) = speed(Rotor { friction: 0.0, ..ROTOR }, 2000.0, 1000.0, true);
         let row = t.iter().position(|s| s - t[49] >= 0.4 - 1e-9).unwrap();

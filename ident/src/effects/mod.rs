@@ -34,7 +34,7 @@ mod pulses;
 pub(crate) mod quantisation;
 mod reynolds_thrust;
 mod rotor_inertia;
-mod sample_hold;
+pub(crate) mod sample_hold;
 mod speed_channel;
 mod spinup_lag;
 mod stall;
@@ -55,6 +55,7 @@ use crate::verdict::Kin;
 pub(crate) use crate::words::Clause;
 pub(crate) use amplifier_saturation::Rail;
 pub(crate) use current_limit::{CurrentLimit, Draw, OF_THE_SUPPLY};
+pub(crate) use sample_hold::Clock;
 pub(crate) use tare_shift::BEFORE;
 pub(crate) use throttle_quantisation::Best as SawTooth;
 
@@ -382,7 +383,7 @@ fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
         return Vec::new();
     }
     let mut sets: Vec<Vec<&str>> =
-        present(context, &["thrust_n", "torque_nm", "current_a"]).into_iter().map(|c| vec![c]).collect();
+        present(context, &["thrust_n", "torque_nm", "current_a", "voltage_v"]).into_iter().map(|c| vec![c]).collect();
     let both = present(context, &["thrust_n", "torque_nm"]);
     if both.len() == 2 {
         sets.push(both);

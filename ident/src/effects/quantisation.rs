@@ -172,6 +172,26 @@ pub(crate) fn step(target: &Target) -> Option<f64> {
     lattice(target).map(|l| l.step)
 }
 
+/// Share of readings that repeat the one before where rounding makes three times the error of what noise there is: noise of a tenth of a step
+/// crosses an edge on every ninth row (the mean distance of two readings, 1.13 standard deviations, over the step).
+const COARSE: f64 = 0.89;
+/// Fewest steps that a run shows, and fewest readings.
+const SHOWN: (f64, usize) = (8.0, 100);
+
+/// What a channel's own readings show, whatever its model says: that it resolves steps three times as coarse as its noise, as an instance and its
+/// estimates.
+pub(crate) fn by_readings(context: &Context, target: &Target) -> Option<(Instance, Vec<Estimate>)> {
+    let turns = |row: usize| context.rpm.get(row).is_none_or(|r| *r > crate::context::STANDSTILL);
+    let live: Vec<f64> = target.y.iter().zip(&target.rows).filter(|(_, row)| turns(**row)).map(|(y, _)| *y).collect();
+    let step = lattice(target)?.step;
+    let repeats = live.windows(2).filter(|w| (w[0] - w[1]).abs() < 0.5 * step).count() as f64 / live.len().max(1) as f64;
+    let (low, high) = live.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(*y), high.max(*y)));
+    let shown = live.len() >= SHOWN.1 && high - low > SHOWN.0 * step;
+    let unit = crate::context::unit_of(target.name).to_owned();
+    let estimate = Estimate { name: "step".to_owned(), unit, value: step, se: 1e-3 * step };
+    (shown && repeats > COARSE).then(|| (Instance::new(&[target.name], ""), vec![estimate]))
+}
+
 /// A grid that readings lie on.
 struct Lattice {
     step: f64,

@@ -1,17 +1,21 @@
 //! `sample_hold`: a channel repeats old values between its updates.
 //!
 //! What it is: the reading stands still until its next update, `period` seconds later; the updates are seen in the channel itself, as new
-//! values, or, where noise comes after the hold, as changes that are late by anything up to a period ([`beneath_noise`]).
+//! values; on a coarse display that not every update changes, as changes that are whole periods apart ([`clock`]); or, where noise comes after the
+//! hold, as changes that are late by anything up to a period ([`beneath_noise`]).
 //! What can go wrong: a coarse resolution repeats values too, but not at even intervals.
 //! Units: s.
 //! Reference: zero-order hold; asynchronous telemetry of speed controllers.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, through_meter};
-use crate::context::{Context, DIFFERENCES, Relation, Target};
+use crate::context::{Context, DIFFERENCES, Target};
 use crate::design::TargetDesign;
 use crate::noise::median;
 
 mod beneath_noise;
+mod clock;
+
+pub(crate) use clock::Clock;
 
 /// See the module.
 pub(crate) struct SampleHold;
@@ -48,15 +52,19 @@ impl Effect for SampleHold {
         if context.time_is_row {
             return Vec::new();
         }
-        let held = |t: &&Target| !t.relation.is_evidence() && t.relation != Relation::Voltage;
+        let held = |t: &&Target| !t.relation.is_evidence();
         let difference =
             |channel: &str| DIFFERENCES.iter().find(|d| d.0 == channel && context.target(d.1).is_some()).map(|d| d.1);
         let of_form =
             |t: &Target, form| Instance::new(&std::iter::once(t.name).chain(difference(t.name)).collect::<Vec<_>>(), form);
         let seen = |t: &Target| {
-            let beneath = || context.against_model.then(|| beneath_noise::clock(context, t)).flatten();
-            let form = if period(context, t).is_some() { Some("") } else { beneath().map(|_| BENEATH) };
-            form.map(|form| of_form(t, form))
+            let beneath = || context.against_model && beneath_noise::clock(context, t).is_some();
+            let forms: [(&str, &dyn Fn() -> bool); 3] = [
+                ("", &|| period(context, t).is_some()),
+                (SKIPPING, &|| Clock::of_updates(context, t).is_some()),
+                (BENEATH, &beneath),
+            ];
+            forms.into_iter().find(|(_, is_seen)| is_seen()).map(|(form, _)| of_form(t, form))
         };
         context.targets.iter().filter(held).filter_map(seen).collect()
     }
@@ -74,11 +82,15 @@ impl Effect for SampleHold {
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], _: usize, design: &mut TargetDesign) {
         let Some(target) = target(context, instance) else { return };
         let mut fresh = vec![false; context.len()];
-        if instance.form == BENEATH {
-            let Some(clock) = beneath_noise::clock(context, target) else { return };
-            clock.mark(&context.t, &mut fresh);
-        } else {
-            updates(target).into_iter().for_each(|i| fresh[i] = true);
+        let clock = match instance.form.as_str() {
+            BENEATH => beneath_noise::clock(context, target),
+            SKIPPING => Clock::of_updates(context, target),
+            _ => None,
+        };
+        match clock {
+            Some(clock) => clock.mark(&context.t, &mut fresh),
+            None if instance.form.is_empty() => updates(target).into_iter().for_each(|i| fresh[i] = true),
+            None => return,
         }
         let held = |column: &&[f64]| -> Vec<f64> {
             let mut value = column.first().copied().unwrap_or(0.0);
@@ -103,16 +115,19 @@ impl Effect for SampleHold {
     }
 }
 
+/// Form of a coarse display: not every update changes the reading.
+const SKIPPING: &str = "skipping";
 /// Form in which the noise comes after the hold, so that no value repeats.
 const BENEATH: &str = "beneath the noise";
 
 /// Interval of the updates and its standard error, s, as the form of an instance reads it off.
 fn found(context: &Context, instance: &Instance, target: &Target) -> Option<(f64, f64)> {
-    if instance.form == BENEATH {
-        beneath_noise::clock(context, target).map(|c| (c.period, c.error))
-    } else {
-        period(context, target)
-    }
+    let clock = match instance.form.as_str() {
+        BENEATH => beneath_noise::clock(context, target),
+        SKIPPING => Clock::of_updates(context, target),
+        _ => return period(context, target),
+    };
+    clock.map(|c| (c.period, c.error))
 }
 
 fn target<'c>(context: &'c Context, instance: &Instance) -> Option<&'c Target> {
@@ -135,7 +150,7 @@ fn period(context: &Context, target: &Target) -> Option<(f64, f64)> {
     if gaps.len() < 20 {
         return None;
     }
-    let dt = context.step();
+    let dt = spacing(context, target);
     let middle = median(&mut gaps.clone());
     // two updates that happen to read the same make one double gap
     let near: Vec<f64> = gaps.iter().copied().filter(|g| (g - middle).abs() < 1.5 * dt).collect();
@@ -143,6 +158,24 @@ fn period(context: &Context, target: &Target) -> Option<(f64, f64)> {
     let even = near.len() as f64 > 0.85 * gaps.len() as f64;
     // intervals between 1 and 2 rows show as ones and twos: nearly no interval may then be of another length
     (even && mean > 1.4 * dt).then(|| slope(context, &rows, &live, mean))
+}
+
+/// Usual time between two readings of a channel, s: a sparse one has blank rows between.
+fn spacing(context: &Context, target: &Target) -> f64 {
+    let mut gaps: Vec<f64> = target.rows.windows(2).map(|w| context.t[w[1]] - context.t[w[0]]).collect();
+    if gaps.is_empty() { context.step() } else { median(&mut gaps) }
+}
+
+/// Fewest readings of a value for which a channel is said to repeat it, by its readings alone.
+const REPEATS: f64 = 1.9;
+
+/// What a channel's own readings show, whatever its model says: that it repeats its values at even intervals, as an instance and its estimates.
+pub(crate) fn by_readings(context: &Context, target: &Target) -> Option<(Instance, Vec<Estimate>)> {
+    let exact = || period(context, target).map(|found| ("", found));
+    let skipping = || Clock::of_updates(context, target).map(|c| (SKIPPING, (c.period, c.error)));
+    let (form, (value, se)) = exact().or_else(skipping)?;
+    let estimate = Estimate { name: "period".to_owned(), unit: "s".to_owned(), value, se };
+    (value > REPEATS * spacing(context, target)).then(|| (Instance::new(&[target.name], form), vec![estimate]))
 }
 
 /// Updates whose times are first asked for their rate.

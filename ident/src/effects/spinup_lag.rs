@@ -1,7 +1,7 @@
 //! `spinup_lag`: the rotor takes time to follow the command.
 //!
-//! What it is: rpm follows its static value by a first-order lag, with different time constants up and down, or as a rotor that is
-//! driven and never braked (`coasting`: see [`super::coasting`]).
+//! What it is: rpm follows its static value by a first-order lag, with different time constants up and down, or as a rotor between winding and
+//! air does, with a controller that brakes (`braked`) or does not (`coasting`): see [`super::coasting`].
 //! What can go wrong: needs steps and samples inside the transient; with none it is not offered. After a gap in time
 //! its state is the speed that the first row measures.
 //! Units: s.
@@ -19,6 +19,10 @@ pub(crate) struct SpinupLag;
 const COASTING: &str = "coasting";
 /// The same where the command jumps from row to row.
 const COASTING_OF_STEPS: &str = "coasting_of_steps";
+/// Form of a rotor that a running controller brakes, too.
+const BRAKED: &str = "braked";
+/// The same where the command jumps from row to row.
+const BRAKED_OF_STEPS: &str = "braked_of_steps";
 /// Time constant of the quickest rotors, s.
 const QUICK: f64 = 0.04;
 /// What meters and a command that is let go slowly add to the latency, s.
@@ -37,8 +41,8 @@ impl Effect for SpinupLag {
     fn about(&self) -> About {
         About {
             title: "Rotor follows the command with a lag",
-            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down; coasting (driven, never braked), v = rpm over that at 2000 us: dv/dt = (v_static(t - latency) - v)/tau_up, but not below -v^2/tau_air - friction",
-            source: "Beharie 2013, section 5.7.3; coasting: J dw/dt = kt i - kQ w^2 - Q_f with i = max(0, (V - kt w)/R), Eq. 2.21 as corrected and 5.11",
+            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down; a rotor between winding and air, v = rpm over that at 2000 us, g = v_static(t - latency): dv/dt = (g - v) (1/tau_up + (g + v - 1)/tau_air); not below -v^2/tau_air - friction where nothing brakes (coasting) or the motor is off",
+            source: "Beharie 2013, section 5.7.3; rotor: J dw/dt = kt i - kQ w^2 - Q_f with i = (V - kt w)/R, coasting: not below 0, Eq. 2.21 as corrected and 5.11",
             depends_on: &["pulse_us", "time_since_step"],
             signature: "rpm(pulse) is off for a moment after every step and right before the next; thrust(rpm) holds throughout",
             look_alikes: &["channel_filter", "channel_delay"],
@@ -66,8 +70,9 @@ impl Effect for SpinupLag {
         if context.time_is_row || channels.is_empty() {
             return Vec::new();
         }
-        let coasting = if operator::commands_abruptly(context) { COASTING_OF_STEPS } else { COASTING };
-        ["", coasting].iter().map(|form| Instance::new(&channels, form)).collect()
+        let forms =
+            if operator::commands_abruptly(context) { ["", COASTING_OF_STEPS, BRAKED_OF_STEPS] } else { ["", COASTING, BRAKED] };
+        forms.iter().map(|form| Instance::new(&channels, form)).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
@@ -102,9 +107,9 @@ impl Effect for SpinupLag {
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
-        if let [tau_up, tau_air, friction, latency] = *shape {
-            let rotor = Rotor { tau_up, tau_air, friction, latency };
-            let coasting = Coasting::new(context, rotor, instance.form == COASTING_OF_STEPS).starting_at(&context.starts);
+        if let Some(rotor) = rotor(instance, shape) {
+            let jumps = [COASTING_OF_STEPS, BRAKED_OF_STEPS].contains(&instance.form.as_str());
+            let coasting = Coasting::new(context, rotor, jumps).starting_at(&context.starts);
             design.map_together(|columns| coasting.of(columns));
             starts(context, design, || coasting.carried(&context.starts));
             return;
@@ -132,6 +137,13 @@ impl Effect for SpinupLag {
         design.map_together(|columns| lag.of(columns));
         starts(context, design, || lag.carried(&context.starts));
     }
+}
+
+/// The rotor of a shape; nothing for a lag of first order.
+fn rotor(instance: &Instance, shape: &[f64]) -> Option<Rotor> {
+    let [tau_up, tau_air, friction, latency] = *shape else { return None };
+    let braked = [BRAKED, BRAKED_OF_STEPS].contains(&instance.form.as_str());
+    Some(Rotor { tau_up, tau_air, friction, latency, braked })
 }
 
 /// Where the log did not see what the rotor did before a row, it begins there with the speed that was measured.

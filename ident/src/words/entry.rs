@@ -8,6 +8,7 @@
 use super::{POSITIVE, meter, sized};
 use crate::effects::OF_THE_SUPPLY;
 use crate::effects::alternating_period::TOLD_BY_THE_BOARD;
+use crate::read_off::BY_READINGS;
 use crate::verdict::{EffectEntry, Parameter};
 
 impl EffectEntry {
@@ -96,7 +97,7 @@ impl EffectEntry {
     /// Whether the readings themselves show it, so that no prediction changes.
     #[must_use]
     pub fn is_read_off(&self) -> bool {
-        [TOLD_BY_THE_BOARD, OF_THE_SUPPLY].iter().any(|form| self.equation.ends_with(&format!("[{form}]")))
+        [TOLD_BY_THE_BOARD, OF_THE_SUPPLY, BY_READINGS].iter().any(|form| self.equation.ends_with(&format!("[{form}]")))
     }
 
     /// Whether it began within the run, and did not end.

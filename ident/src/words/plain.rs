@@ -83,7 +83,8 @@ fn formula(equation: &str) -> (&str, Option<String>) {
 }
 
 /// What stands between two ways in which an effect may act, the second of which is a form of its own.
-const EITHER: [&str; 5] = ["; or, as play: ", "; smooth: ", "; form whole_blade: ", "; coasting ", ", or "];
+const EITHER: [&str; 5] =
+    ["; or, as play: ", "; smooth: ", "; form whole_blade: ", "; a rotor between winding and air, ", ", or "];
 /// What stands before what an effect does besides against a declared model.
 const BESIDES: &str = "; against a declared model also ";
 
@@ -161,8 +162,7 @@ mod tests {
             ("thrust_n += width * lags with slacks up to slack".to_owned(), None)
         );
         assert_eq!(of(bends, &["width"]).0, "thrust_n += width * direction / 2 * f, f = (rpm / rpm_max)^2");
-        let lags =
-            "tau d(rpm)/dt = rpm_static - rpm, tau = tau_up or tau_down; coasting (driven), dv/dt = -v^2/tau_air - friction";
+        let lags = "tau d(rpm)/dt = rpm_static - rpm, tau = tau_up or tau_down; a rotor between winding and air, dv/dt = -v^2/tau_air - friction";
         assert_eq!(of(lags, &["tau_up", "tau_down"]).0, "tau d(rpm)/dt = rpm_static - rpm, tau = tau_up or tau_down");
         let warms =
             "rpm *= 1 - derate heat (controller), or 1 - derate heat (rpm/top) with current_a += current_rise heat (winding)";

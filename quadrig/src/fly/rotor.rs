@@ -61,10 +61,10 @@ const LEVEL_US: f64 = 5.0;
 const FIRST_S: f64 = 1.5e-3;
 /// Where the lag of a rotor that follows is taken, us.
 const MIDDLE_US: f64 = 1500.0;
-/// Form of a lag that was seen through rows between which the command jumps.
-const OF_STEPS: &str = "coasting_of_steps";
-/// Place of the latency among the shapes of a rotor that coasts.
-const LATENCY: usize = 3;
+/// Forms of a rotor between winding and air; its last shape is the latency.
+const ROTORS: [&str; 2] = ["coasting", "braked"];
+/// How such a form ends that was seen through rows between which the command jumps.
+const OF_STEPS: &str = "_of_steps";
 /// Rows and time that each level is held.
 const LEVEL_ROWS: usize = 20;
 /// Rows at the end of a level that the next one reaches into: a change of speed is told by the rows on both sides.
@@ -82,11 +82,21 @@ pub(crate) fn gathers(added: &AddedEffect) -> bool {
     GATHERS.contains(&added.placed.effect.id())
 }
 
+/// Whether an effect is a rotor between winding and air.
+fn is_rotor(added: &AddedEffect) -> bool {
+    added.placed.effect.id() == "spinup_lag" && ROTORS.iter().any(|form| added.placed.instance.form.starts_with(form))
+}
+
+/// The same of one that was seen through rows between which the command jumps.
+fn is_of_steps(added: &AddedEffect) -> bool {
+    is_rotor(added) && added.placed.instance.form.ends_with(OF_STEPS)
+}
+
 /// Time by which the rows of a model's log follow a command that jumps between two of them, s. When it came there, and the mean over a row,
 /// are in it: a rotor that is told its commands does not have it.
 pub(crate) fn latency_of_rows_s(model: &Model) -> Option<f64> {
-    let lag = model.effects.iter().find(|e| e.placed.instance.form == OF_STEPS)?;
-    lag.placed.shape.get(LATENCY).copied().filter(|s| *s > 0.0)
+    let lag = model.effects.iter().find(|e| is_of_steps(e))?;
+    lag.placed.shape.last().copied().filter(|s| *s > 0.0)
 }
 
 impl ModelRotor {
@@ -101,8 +111,8 @@ impl ModelRotor {
             added.placed.shape.iter_mut().for_each(|t0| *t0 = f64::MIN);
         }
         // a command that jumps between two rows of a log seems as late as its instant is unknown; a flight knows when its commands come
-        for lag in flying.effects.iter_mut().filter(|e| e.placed.instance.form == OF_STEPS) {
-            lag.placed.shape.iter_mut().skip(LATENCY).for_each(|latency| *latency = 0.0);
+        for lag in flying.effects.iter_mut().filter(|e| is_of_steps(e)) {
+            lag.placed.shape.last_mut().into_iter().for_each(|latency| *latency = 0.0);
         }
         // where the run saw the rotor stand still, what its force and torque read then is the zero of the day
         for p in &mut flying.polynomials {
@@ -199,8 +209,7 @@ impl ModelRotor {
 
     /// Time by which the rotor answers a command late beside its lag, s; nothing where the model holds none.
     pub(crate) fn latency_s(&self) -> Option<f64> {
-        let coasts = |e: &&AddedEffect| e.placed.instance.form.starts_with("coasting");
-        let latency = self.model.effects.iter().find(coasts)?.placed.shape.get(LATENCY)?;
+        let latency = self.model.effects.iter().find(|e| is_rotor(e))?.placed.shape.last()?;
         Some(*latency).filter(|s| *s > 0.0)
     }
 

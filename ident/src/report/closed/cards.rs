@@ -22,7 +22,7 @@ use crate::words::{
 use std::fmt::Write;
 
 /// Probability from which on what no hypothesis has is told.
-const OPEN: f64 = 0.05;
+pub(super) const OPEN: f64 = 0.05;
 /// Probability from which on a rival is told beside a name: below it its figure is zero to two digits.
 const COUNTED: f64 = 0.005;
 

@@ -5,8 +5,9 @@
 //! Units: as told.
 //! Reference: specification `report.md`.
 
-use super::cards::{alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value, why};
+use super::cards::{OPEN, alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value, why};
 use super::cautions::cautions;
+use super::contest::rivals;
 use super::left::{in_words, looks_and_goes, shared};
 use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
 use super::state::{factor, figures, is_as_before, named, word};
@@ -151,6 +152,11 @@ fn effect(verdict: &Verdict, words: Vocabulary, group: &[usize]) -> String {
     let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {scope}{since}", e.id, channels_of(verdict, group)), 4));
     if e.id != "unknown" {
         out += &format!("    {}\n", wrapped(&words.said(e).sentence(), 4));
+        let against = group.first().and_then(|k| rivals(verdict, words, *k).into_iter().next());
+        if let Some(rival) = against.filter(|r| r.probability >= OPEN) {
+            let said = format!("or else: {} (p {})", plain(&rival.said), probability(rival.probability));
+            out += &format!("    {}\n", wrapped(&said, 4));
+        }
     }
     for parameter in e.parameters.iter().filter(|p| is_shown(words, e, p)) {
         let [v, interval, unit] = value(parameter);
