@@ -5,7 +5,7 @@
 //! Units: as the headers say.
 //! Reference: specification `formats.md`, `quadrig import`; RCbenchmark 1585 and 1780, Tyto Flight Stand, VESC Tool, KISS, BLHeli, AM32.
 
-use ident::import::{Options, Report, import_from};
+use ident::log::import::{Options, Report, import_from};
 use ident::log::Log;
 
 fn import(bytes: &[u8], options: &Options) -> Result<(Log, Report), String> {

@@ -9,8 +9,8 @@
 mod rig;
 
 use ident::close::{Closed, close};
-use ident::context::Context;
-use ident::leftover::Leftover;
+use ident::channel::Context;
+use ident::model::leftover::Leftover;
 use ident::log::{Column, Log};
 use ident::model::Model;
 use ident::verdict::Kind;

@@ -9,10 +9,10 @@
 mod rig;
 
 use ident::close::{Closed, close};
-use ident::context::Context;
+use ident::channel::Context;
 use ident::effects::library;
-use ident::heldout;
-use ident::hypothesis::{Declared, Placed, Rows, fit};
+use ident::fit::heldout;
+use ident::fit::{Declared, Placed, Rows, fit};
 use ident::log::{Column, Log};
 use ident::verdict::Kind;
 use rig::Chance;

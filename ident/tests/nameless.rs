@@ -9,7 +9,7 @@
 mod rig;
 
 use ident::close::{Closed, close};
-use ident::context::Context;
+use ident::channel::Context;
 use ident::log::{Column, Log};
 use ident::verdict::Kind;
 use rig::Chance;

@@ -10,9 +10,9 @@
 
 mod rig;
 
-use ident::bad;
+use ident::signal::bad;
 use ident::close::close;
-use ident::import::import;
+use ident::log::import::import;
 use ident::log::Log;
 use ident::verdict::Verdict;
 use rig::{Chance, Trouble};

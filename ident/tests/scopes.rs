@@ -7,7 +7,7 @@
 //! Reference: specification `formats.md`, "Scope".
 
 use ident::close::{Closed, close};
-use ident::context::Context;
+use ident::channel::Context;
 use ident::effects::Scope;
 use ident::log::{Column, Log};
 use ident::model::Model;

@@ -15,7 +15,7 @@ use crate::sim::fly;
 use crate::trouble::unread;
 use hal_sim::Scenario;
 use hal_sim::scenario::AnyScenario;
-use ident::import::Options;
+use ident::log::import::Options;
 use ident::isolability::{Apart, Cause, Isolability, Standing, isolability, short};
 use ident::log::{Log, digest};
 use ident::report;

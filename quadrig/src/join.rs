@@ -8,8 +8,9 @@
 
 use crate::Failure;
 use crate::open::{as_written, open, say};
-use ident::import::{Options, Report, is_recording};
-use ident::join::{Joint, LABELS, align, merge, page};
+use ident::log::import::{Options, Report, is_recording};
+use ident::log::join::{Joint, LABELS, align, merge};
+use ident::report::joined::page;
 use ident::log::Log;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +47,7 @@ fn open_further(file: &Path, rotor: Option<u32>, options: &Options, quiet: bool)
     }
     let wanted = || format!("--with: {} records several rotors; expected --rotor N, the one on the stand", file.display());
     let n = rotor.ok_or_else(wanted)?;
-    let (log, report) = ident::import::rotor(file, n as usize)?.ok_or_else(wanted)?;
+    let (log, report) = ident::log::import::rotor(file, n as usize)?.ok_or_else(wanted)?;
     if !quiet {
         say(file, &report);
     }

@@ -6,7 +6,7 @@
 //! Units: as the flight log.
 //! Reference: specification `flight.md`, "Flight log"; the data set's own description of its columns.
 
-use ident::flight_log;
+use ident::log::flight_log;
 use ident::log::Log;
 use quadrig_tests::{call, data};
 

@@ -2,7 +2,7 @@
 
 use ident::log::Log;
 use ident::model::Model;
-use ident::watch::{Departure, Watch};
+use ident::close::watch::{Departure, Watch};
 use quadrig_tests::{call, cases};
 use std::path::Path;
 

@@ -8,8 +8,8 @@
 
 use super::speed_channel::expected;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
-use crate::context::{Context, Relation};
-use crate::design::TargetDesign;
+use crate::channel::{Context, Relation};
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct AirDensity;

@@ -2,15 +2,15 @@
 //!
 //! What it is: a sensor that times one of two unequal periods reads rpm (1 +- angle/180) by turns.
 //! What can go wrong: which of the two it caught is known from the reading alone, so only readings with two clear values are
-//! taken for it; a sensor that times whole turns shows nothing, and its board must tell ([`crate::marks`]).
+//! taken for it; a sensor that times whole turns shows nothing, and its board must tell ([`crate::close::marks`]).
 //! Units: deg, deviation from 180.
 //! Reference: Beharie 2013, section 5.7.1 (Hall sensor with two magnets).
 
 use super::pulses::{HELD, against_the_others, held};
 use super::speed_channel::{difference, instances};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
-use crate::context::{Context, Relation};
-use crate::design::TargetDesign;
+use crate::channel::{Context, Relation};
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct AlternatingPeriod;

@@ -6,8 +6,8 @@
 //! Reference: output swing of instrumentation amplifiers; Beharie 2013, section 4.4 (bridge and amplifier).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
-use crate::context::{Context, STANDSTILL, Target};
-use crate::design::{Label, TargetDesign};
+use crate::channel::{Context, STANDSTILL, Target};
+use crate::effects::design::{Label, TargetDesign};
 use std::sync::Arc;
 
 /// See the module.
@@ -89,7 +89,7 @@ impl Effect for AmplifierSaturation {
         let n = above.len() as f64;
         let level = above.iter().sum::<f64>() / n;
         // a rail is hit exactly: what is left is the last digit of the log
-        let digit = crate::noise::quantum(&target.y) / 12.0_f64.sqrt();
+        let digit = crate::signal::noise::quantum(&target.y) / 12.0_f64.sqrt();
         let se = ((above.iter().map(|v| (v - level).powi(2)).sum::<f64>()).sqrt() / n).max(digit);
         if level.is_finite() {
             fitted.insert(0, Estimate { name: "level".into(), unit: "N".into(), value: level, se });
@@ -150,7 +150,7 @@ fn unlikely_repeat(target: &Target) -> f64 {
     let top = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let below = || target.y.windows(2).filter(|w| !is_top(w[0]) && w[0] > 0.5 * top);
     let (count, repeats) = (below().count(), below().filter(|w| w[0] == w[1]).count());
-    let digit = crate::noise::quantum(&target.y);
+    let digit = crate::signal::noise::quantum(&target.y);
     if count < REPEATED || repeats as f64 > HELD * count as f64 || digit <= 0.0 || target.noise.rms < digit {
         return 0.0;
     }
@@ -188,7 +188,7 @@ pub(super) fn hold_above(fixed: &mut [f64], driver: &[f64], reached: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Facts;
+    use crate::channel::Facts;
     use crate::log::{Column, Log};
 
     /// Visits of eight levels, 80 readings each; `reading` makes of the row and the true thrust what the log says.

@@ -10,9 +10,9 @@
 
 use super::supply_voltage::CURRENT_BY_SPEED;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present, speeds};
-use crate::context::{Context, Relation};
-use crate::design::TargetDesign;
-use crate::solve::Normal;
+use crate::channel::{Context, Relation};
+use crate::effects::design::TargetDesign;
+use crate::numeric::solve::Normal;
 
 /// See the module.
 pub(crate) struct BatteryDischarge;

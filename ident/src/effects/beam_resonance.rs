@@ -6,8 +6,8 @@
 //! Reference: rotating imbalance on a one-degree-of-freedom oscillator, Den Hartog 1956, section 2.11; Beharie 2013, section 5.7.1.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, present};
-use crate::context::{Context, Relation};
-use crate::design::TargetDesign;
+use crate::channel::{Context, Relation};
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct BeamResonance;

@@ -10,9 +10,9 @@
 
 use super::blade_damage::STANDSTILL;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, load_channels};
-use crate::context::{Context, Relation};
-use crate::design::TargetDesign;
-use crate::solve::Normal;
+use crate::channel::{Context, Relation};
+use crate::effects::design::TargetDesign;
+use crate::numeric::solve::Normal;
 
 /// See the module.
 pub(crate) struct BearingFriction;

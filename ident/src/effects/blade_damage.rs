@@ -6,8 +6,8 @@
 //! Reference: thrust and torque coefficients, Beharie 2013, Eq. 2.17-2.18; step at an unknown instant, Basseville & Nikiforov 1993.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, load_channels, throttle};
-use crate::context::{Context, Relation};
-use crate::design::TargetDesign;
+use crate::channel::{Context, Relation};
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct BladeDamage;
@@ -143,7 +143,7 @@ pub(super) fn relative_to_rest(context: &Context, channel: &str, column: &[f64],
     })
 }
 
-pub(super) use crate::context::STANDSTILL;
+pub(super) use crate::channel::STANDSTILL;
 
 #[cfg(test)]
 mod tests {

@@ -11,8 +11,8 @@ use super::blade_flex::upper_speeds;
 use super::pulses::{SCATTERED, struck_readings, struck_speeds};
 use super::speed_channel::{HINGE, add_hinge, instance, leaves};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct BladeTwist;

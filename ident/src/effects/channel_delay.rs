@@ -9,8 +9,8 @@ use super::{
     About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, lone_speed, meters, operator,
     reads_meter, through_meter,
 };
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct ChannelDelay;

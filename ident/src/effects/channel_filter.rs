@@ -9,8 +9,8 @@ use super::{
     About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, lone_speed, meters,
     operator, reads_meter, through_meter,
 };
-use crate::context::{CALM_US, Context};
-use crate::design::TargetDesign;
+use crate::channel::{CALM_US, Context};
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct ChannelFilter;

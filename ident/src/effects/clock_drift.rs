@@ -6,8 +6,8 @@
 //! Reference: frequency tolerance of two free-running oscillators.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct ClockDrift;

@@ -9,7 +9,7 @@
 //! Reference: J dw/dt = kt i - kQ w^2 - Q_f with i = max(0, (V - kt w)/R): Beharie 2013, Eq. 2.21 as corrected and 5.11.
 
 use super::operator::{Decay, weight_of_ramp};
-use crate::context::Context;
+use crate::channel::Context;
 
 /// Parts that a row is cut into while the rotor coasts; the way of a driven one is exact.
 const PARTS: usize = 8;

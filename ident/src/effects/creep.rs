@@ -8,8 +8,8 @@
 use super::{
     About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, geometric, operator, thrust_over_time,
 };
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct Creep;

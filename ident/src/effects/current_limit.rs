@@ -7,8 +7,8 @@
 //! Reference: constant-current limit of bench supplies and of speed controllers' firmware.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
-use crate::context::Context;
-use crate::design::{Label, TargetDesign};
+use crate::channel::Context;
+use crate::effects::design::{Label, TargetDesign};
 use std::sync::Arc;
 
 mod spin_up;
@@ -19,7 +19,7 @@ use spin_up::SPIN_UP;
 /// See the module.
 pub(crate) struct CurrentLimit;
 
-/// Form of a limit that the meters of voltage and current show ([`crate::supply_limit`]): it changes no prediction.
+/// Form of a limit that the meters of voltage and current show ([`crate::close::supply_limit`]): it changes no prediction.
 pub(crate) const OF_THE_SUPPLY: &str = "of the supply, read off its meters";
 
 impl Effect for CurrentLimit {

@@ -9,8 +9,8 @@
 
 use super::pulses::{apply_pulses, is_of_single_readings, plausible_pulses, pulse_amplitudes, pulse_instances, report_pulses};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct DoublePulses;

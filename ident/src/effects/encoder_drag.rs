@@ -8,8 +8,8 @@
 
 use super::bearing_friction::{AMPLITUDES, CONSTANT, SEEN, TURNING, brakes, costs, drag, with_share};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, load_channels};
-use crate::context::{Context, Relation};
-use crate::design::TargetDesign;
+use crate::channel::{Context, Relation};
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct EncoderDrag;

@@ -7,8 +7,8 @@
 
 use super::tare_shift::{BEFORE, coarse_onset, step, with_first_instant};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct GainChange;

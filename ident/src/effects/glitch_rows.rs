@@ -9,9 +9,9 @@
 use super::pulses::PULSES;
 use super::quantisation;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
-use crate::context::{Context, Relation, Target};
-use crate::design::TargetDesign;
-use crate::noise::median;
+use crate::channel::{Context, Relation, Target};
+use crate::effects::design::TargetDesign;
+use crate::signal::noise::median;
 
 /// See the module.
 pub(crate) struct GlitchRows;

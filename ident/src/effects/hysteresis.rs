@@ -7,8 +7,8 @@
 //! Reference: OIML R 60 (load cells), hysteresis error.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, present};
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct Hysteresis;

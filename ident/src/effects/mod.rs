@@ -5,8 +5,9 @@
 //! Units: stated on each parameter.
 //! Reference: specification `closing-the-loop.md`, list of effects.
 
+pub mod design;
+pub(crate) mod steps;
 pub(crate) mod air_density;
-pub mod airframe;
 pub(crate) mod alternating_period;
 mod amplifier_saturation;
 mod battery_discharge;
@@ -48,11 +49,11 @@ mod torque_crosstalk;
 pub(crate) mod unknown;
 mod zero_drift;
 
-use crate::context::{Context, DIFFERENCES, Relation};
-use crate::design::TargetDesign;
+use crate::channel::{Context, DIFFERENCES, Relation};
+use crate::effects::design::TargetDesign;
 pub(crate) use crate::verdict::EffectEntry;
 use crate::verdict::Kin;
-pub(crate) use crate::words::Clause;
+pub(crate) use crate::verdict::words::Clause;
 pub(crate) use amplifier_saturation::Rail;
 pub(crate) use current_limit::{CurrentLimit, Draw, OF_THE_SUPPLY};
 pub(crate) use tare_shift::BEFORE;
@@ -238,7 +239,7 @@ pub trait Effect: Sync {
         Vec::new()
     }
     /// The ways in which this log may hold it without being able to show it: never named, but listed with an unknown cause where
-    /// they explain it (see [`crate::suspects`]).
+    /// they explain it (see [`crate::attribution::suspects`]).
     fn suspects(&self, _context: &Context) -> Vec<Instance> {
         Vec::new()
     }

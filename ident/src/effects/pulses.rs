@@ -9,9 +9,9 @@
 use super::blade_damage::STANDSTILL;
 use super::speed_channel::{difference, instances};
 use super::{Amplitude, Estimate, Instance};
-use crate::context::{Context, DIFFERENCES, Relation, Target};
-use crate::design::TargetDesign;
-use crate::noise::median;
+use crate::channel::{Context, DIFFERENCES, Relation, Target};
+use crate::effects::design::TargetDesign;
+use crate::signal::noise::median;
 
 /// A speed channel's reading on one row, beside the consensus.
 #[derive(Debug, Clone, Copy)]

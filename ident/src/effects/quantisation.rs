@@ -7,9 +7,9 @@
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
-use crate::context::{Context, Relation, Target};
-use crate::design::TargetDesign;
-use crate::solve::Normal;
+use crate::channel::{Context, Relation, Target};
+use crate::effects::design::TargetDesign;
+use crate::numeric::solve::Normal;
 
 mod beneath_noise;
 

@@ -6,10 +6,10 @@
 //! Reference: Deters, Ananda & Selig 2014 (AIAA 2014-2151), Reynolds number effects on small propellers.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
-use crate::context::Context;
-use crate::design::{Label, TargetDesign};
+use crate::channel::Context;
+use crate::effects::design::{Label, TargetDesign};
 use crate::verdict::Parameter;
-use crate::words::sized;
+use crate::verdict::words::sized;
 use std::sync::Arc;
 
 /// See the module.

@@ -7,9 +7,9 @@
 //! Reference: zero-order hold; asynchronous telemetry of speed controllers.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, through_meter};
-use crate::context::{Context, DIFFERENCES, Relation, Target};
-use crate::design::TargetDesign;
-use crate::noise::median;
+use crate::channel::{Context, DIFFERENCES, Relation, Target};
+use crate::effects::design::TargetDesign;
+use crate::signal::noise::median;
 
 mod beneath_noise;
 

@@ -7,10 +7,10 @@
 //! Reference: Beharie 2013, section 5.7.1 (four speed sensors compared; Fig. 5.54-5.63).
 
 use super::{Amplitude, Estimate, Instance};
-use crate::context::{Context, DIFFERENCES, Relation, Target};
-use crate::design::TargetDesign;
-use crate::noise::median;
-use crate::solve::Normal;
+use crate::channel::{Context, DIFFERENCES, Relation, Target};
+use crate::effects::design::TargetDesign;
+use crate::signal::noise::median;
+use crate::numeric::solve::Normal;
 
 /// The instance that touches a speed channel and its difference from the consensus.
 pub(super) fn instance(context: &Context, channel: &str, form: &str) -> Option<Instance> {

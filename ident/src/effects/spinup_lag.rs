@@ -9,8 +9,8 @@
 
 use super::coasting::{Coasting, Rotor};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, operator, speeds};
-use crate::context::{CALM_US, Context};
-use crate::design::TargetDesign;
+use crate::channel::{CALM_US, Context};
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct SpinupLag;

@@ -8,9 +8,9 @@
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
-use crate::context::{Context, Relation};
-use crate::design::TargetDesign;
-use crate::noise::median;
+use crate::channel::{Context, Relation};
+use crate::effects::design::TargetDesign;
+use crate::signal::noise::median;
 
 /// See the module.
 pub(crate) struct SupplySag;

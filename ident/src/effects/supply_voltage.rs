@@ -9,9 +9,9 @@
 //! the test `the_powers_of_the_supply_s_voltage_are_those_of_the_pairs` computes it).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
-use crate::context::Context;
-use crate::design::TargetDesign;
-use crate::noise::median;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
+use crate::signal::noise::median;
 
 /// See the module.
 pub(crate) struct SupplyVoltage;

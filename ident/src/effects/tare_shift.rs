@@ -7,8 +7,8 @@
 //! Reference: step change with unknown instant, Basseville & Nikiforov 1993, section 2.2.
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, thrust_over_time};
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct TareShift;

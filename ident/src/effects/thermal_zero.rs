@@ -6,8 +6,8 @@
 //! Reference: Beharie 2013, Table 6 (temperature coefficients of gauge and beam).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, present};
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct ThermalZero;

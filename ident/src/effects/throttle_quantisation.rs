@@ -7,9 +7,9 @@
 
 use super::speed_channel::expected_at as curve;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
-use crate::context::{Context, STILL_US};
-use crate::design::TargetDesign;
-use crate::noise::median;
+use crate::channel::{Context, STILL_US};
+use crate::effects::design::TargetDesign;
+use crate::signal::noise::median;
 use std::borrow::Cow;
 
 /// See the module.

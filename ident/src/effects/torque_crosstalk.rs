@@ -13,9 +13,9 @@
 
 use super::tare_shift::{coarse_onset, step};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
-use crate::context::{Context, Relation, Target};
-use crate::design::TargetDesign;
-use crate::solve::Normal;
+use crate::channel::{Context, Relation, Target};
+use crate::effects::design::TargetDesign;
+use crate::numeric::solve::Normal;
 
 /// See the module.
 pub(crate) struct TorqueCrosstalk;

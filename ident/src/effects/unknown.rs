@@ -6,8 +6,8 @@
 //! Reference: discrepancy modelling, Ebers et al. 2022 (arXiv 2203.05164).
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
-use crate::context::{Context, unit_of};
-use crate::design::TargetDesign;
+use crate::channel::{Context, unit_of};
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct Unknown;
@@ -228,7 +228,7 @@ mod tests {
         let keep: Vec<bool> = (0..100).map(|i| i < 80).collect();
         let taught = Unknown.taught(&context, &instance, &whole, &keep);
         assert!((whole[1] - 9.9).abs() < 1e-9 && (taught[1] - 7.9).abs() < 1e-9, "{whole:?} {taught:?}");
-        let mut design = TargetDesign::baseline(&context, "thrust_n", crate::context::Relation::Thrust);
+        let mut design = TargetDesign::baseline(&context, "thrust_n", crate::channel::Relation::Thrust);
         let base = design.columns.len();
         Unknown.apply(&context, &instance, &taught, 0, &mut design);
         for column in &design.columns[base..] {

@@ -6,8 +6,8 @@
 //! Reference: Beharie 2013, section 5.7.1 (drift of the strain channel).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, thrust_over_time};
-use crate::context::Context;
-use crate::design::TargetDesign;
+use crate::channel::Context;
+use crate::effects::design::TargetDesign;
 
 /// See the module.
 pub(crate) struct ZeroDrift;

@@ -12,7 +12,7 @@ use super::columns::Flight;
 use super::library::{Base, FlightLibrary};
 use super::model::{Added, FlightModel};
 use super::record::Record;
-use crate::attribution::{Column, Design, Placed, UNKNOWN};
+use crate::attribution::columns::{Column, Design, Placed, UNKNOWN};
 use crate::effects::Scope;
 use crate::log::Log;
 

@@ -20,7 +20,7 @@ mod name;
 mod same;
 mod words;
 
-use crate::date;
+use crate::log::date;
 use crate::log::Log;
 use serde::Serialize;
 

@@ -10,8 +10,8 @@ use super::Recording;
 use super::least::Readings;
 use super::model::{FORMAT as MODEL_FORMAT, InertialModel, Part};
 use super::shown::Shown;
-use crate::residual::whiteness;
-use crate::unexplained::{LOUD, loudest_stretch};
+use crate::signal::residual::whiteness;
+use crate::attribution::unexplained::{LOUD, loudest_stretch};
 use crate::verdict::{
     Alternative, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, NextExperiment, ScheduleStep, Unexplained, Verdict,
 };

@@ -12,9 +12,9 @@ use super::search::{Cause, Found, Outcome, Scene, descending, parameters, predic
 use super::shown::Shown;
 use super::unknown::correct;
 use crate::effects::Scope;
-use crate::unexplained::LOUD;
+use crate::attribution::unexplained::LOUD;
 use crate::verdict::{Alternative, EffectEntry, Kin, Kind};
-use crate::words::{channel, digits, list};
+use crate::verdict::words::{channel, digits, list};
 use nalgebra::Vector3;
 
 /// What a sensor is and how well it can be predicted at best.

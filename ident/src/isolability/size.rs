@@ -8,12 +8,12 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use super::Quantity;
-use crate::context::Context;
-use crate::design::{Label, TargetDesign};
-use crate::diagnose::span;
+use crate::channel::Context;
+use crate::effects::design::{Label, TargetDesign};
+use crate::attribution::diagnose::span;
 use crate::effects::{Effect, Instance};
-use crate::hypothesis::{Declared, Fit, Placed, design, plain};
-use crate::solve::Normal;
+use crate::fit::{Declared, Fit, Placed, design, plain};
+use crate::numeric::solve::Normal;
 
 /// What a cause makes of one channel.
 #[derive(Debug, Clone)]

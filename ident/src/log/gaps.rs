@@ -8,7 +8,7 @@
 //! Reference: specification `formats.md`, "Rig log"; docs/book/reference/log.md.
 
 use super::{Log, SPEED, trimmed};
-use crate::noise::median;
+use crate::signal::noise::median;
 use std::fmt;
 
 /// Usual steps from which on a step is a hole in time, as everywhere in the program.

@@ -8,8 +8,8 @@
 
 use super::read::{Refusal, course, leftover, no_channel, only, place_of, refusal, table_of, within};
 use super::{Model, ModelError, digits, leftover_keys};
-use crate::course::Course;
-use crate::leftover::Leftover;
+use crate::model::course::Course;
+use crate::model::leftover::Leftover;
 use crate::log::digest_of;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};

@@ -11,10 +11,10 @@
 
 use super::read::{Refusal, finite, refusal};
 use super::{AddedEffect, Model, digits, keyed};
-use crate::context::{Context, Target, unit_of};
-use crate::design::{Label, TargetDesign};
+use crate::channel::{Context, Target, unit_of};
+use crate::effects::design::{Label, TargetDesign};
 use crate::effects::{Estimate, Instance};
-use crate::hypothesis::Placed;
+use crate::fit::Placed;
 use nalgebra::DMatrix;
 use toml::{Table, Value};
 

@@ -10,11 +10,11 @@ use super::{
     AddedEffect, FORMAT, Model, ModelError, Polynomial, STOOD, coefficient_key, discrepancy, keyed, leftover_keys, place, reach,
     run, supply,
 };
-use crate::context::{Context, Relation};
-use crate::course::{COURSE_KEYS, Course};
+use crate::channel::{Context, Relation};
+use crate::model::course::{COURSE_KEYS, Course};
 use crate::effects::{self, Effect, Estimate, Instance};
-use crate::hypothesis::Placed;
-use crate::leftover::{CLASSES, Leftover, PARTS};
+use crate::fit::Placed;
+use crate::model::leftover::{CLASSES, Leftover, PARTS};
 use crate::log::Log;
 use std::path::Path;
 use toml::{Table, Value};

@@ -8,7 +8,7 @@
 
 use super::read::{Refusal, finite, no_channel, only, refusal, within};
 use super::{AddedEffect, FittedTo, RunLevel, coefficient_key, digits};
-use crate::context::Relation;
+use crate::channel::Relation;
 use toml::{Table, Value};
 
 /// Keys of `[[run]]`.

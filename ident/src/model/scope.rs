@@ -8,13 +8,13 @@
 //! Reference: specification `formats.md`, "Scope".
 
 use super::{AddedEffect, Model};
-use crate::beside::is_named;
-use crate::context::{Context, Target};
-use crate::design::TargetDesign;
+use crate::attribution::beside::is_named;
+use crate::channel::{Context, Target};
+use crate::effects::design::TargetDesign;
 use crate::effects::Scope;
-use crate::hypothesis::{Declared, Fit, Placed, part_of};
+use crate::fit::{Declared, Fit, Placed, part_of};
 use crate::log::Log;
-use crate::solve::Normal;
+use crate::numeric::solve::Normal;
 use std::borrow::Cow;
 
 /// A run that a model was fitted to.

@@ -11,10 +11,10 @@
 
 use super::read::{Refusal, finite, refusal};
 use super::{AddedEffect, Model, digits, load_unit};
-use crate::context::{Context, Relation, Target};
+use crate::channel::{Context, Relation, Target};
 use crate::effects::supply_voltage::{OF_CURRENT, OF_SPEED};
-use crate::leftover::{along, binned};
-use crate::noise::median;
+use crate::model::leftover::{along, binned};
+use crate::signal::noise::median;
 use std::borrow::Cow;
 use toml::{Table, Value};
 

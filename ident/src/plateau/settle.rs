@@ -8,7 +8,7 @@
 //! Reference: first-order step response; Beharie 2013, section 5.7.2 ("allowed to reach steady state").
 
 use super::mean::line;
-use crate::noise::median;
+use crate::signal::noise::median;
 
 /// Largest share of a stretch that may be settling.
 const LARGEST: f64 = 0.6;

@@ -5,13 +5,18 @@
 //! Units: on the axes.
 //! Reference: specification `identification.md`, item 5.
 
+pub mod almanac;
 mod beam;
 mod beside_runs;
 pub(crate) mod closed;
 mod designer;
 mod figure;
+pub mod flight;
+pub mod flight_almanac;
 mod history;
+pub mod inertial;
 mod isolability;
+pub mod joined;
 mod page;
 mod run;
 mod selection;

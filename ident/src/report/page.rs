@@ -15,17 +15,17 @@ use super::figure::{Figure, Layer};
 use super::run;
 use super::sheet::Sheet;
 use crate::close::Closed;
-use crate::context::{Context, DIFFERENCES, Target, unit_of};
+use crate::channel::{Context, DIFFERENCES, Target, unit_of};
 use crate::effects::unknown::variable;
-use crate::heldout::residuals;
-use crate::hypothesis::{Declared, Rows, fit};
+use crate::fit::heldout::residuals;
+use crate::fit::{Declared, Rows, fit};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
-use crate::noise::median;
+use crate::signal::noise::median;
 use crate::several::Shown;
 use crate::verdict::{EffectEntry, Unexplained, Verdict};
-use crate::words::{self, channel, heading};
+use crate::verdict::words::{self, channel, heading};
 
 /// The report of a closed loop as one self-contained page.
 #[must_use]

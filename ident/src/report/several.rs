@@ -16,7 +16,7 @@ use crate::effects::{EffectEntry, Estimate};
 use crate::log::Log;
 use crate::several::{Outcome, Run, Shown, disagreement};
 use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Parameter, Unexplained, Validation, Verdict};
-use crate::words::{channel, digits, scaled, upper, upper_bound};
+use crate::verdict::words::{channel, digits, scaled, upper, upper_bound};
 
 /// Most runs that have their numbers beneath a figure; of more every fifth has.
 const MOST_NAMES: usize = 12;

@@ -8,7 +8,7 @@
 use super::Run;
 use crate::close::{CloseError, close};
 use crate::log::Log;
-use crate::parallel::in_parallel;
+use crate::numeric::parallel::in_parallel;
 use std::sync::Mutex;
 
 /// Why several runs cannot be fitted together.

@@ -7,6 +7,7 @@
 //! Units: as the channels.
 //! Reference: specification `formats.md`, "Scope" and `across_runs_rms`; cross-validation over groups, Roberts et al. 2017, Ecography 40:913.
 
+pub mod runs;
 mod alone;
 mod choose;
 mod differing;
@@ -20,12 +21,12 @@ mod scatter;
 mod words;
 
 use crate::close::Closed;
-use crate::context::{Context, Relation, Target};
+use crate::channel::{Context, Relation, Target};
 use crate::effects::{Scope, Stage};
-use crate::hypothesis::{Declared, Placed, Rows, design};
-use crate::samples::Samples;
+use crate::fit::{Declared, Placed, Rows, design};
+use crate::fit::samples::Samples;
 
-pub use crate::runs::Run;
+pub use runs::Run;
 pub use alone::{RunsError, close_each};
 pub use outcome::{Outcome, Shown, close_together};
 pub(crate) use scatter::disagreement;

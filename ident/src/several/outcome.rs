@@ -11,20 +11,20 @@ use super::folds::{self, Tenable};
 use super::joint::{Across, Joint, Shared, compared};
 use super::words::{self, Told};
 use super::{Member, Run, choose, differing, own, scatter};
-use crate::bad;
+use crate::signal::bad;
 use crate::close::Closed;
-use crate::context::{Context, is_contrast};
+use crate::channel::{Context, is_contrast};
 use crate::effects::Estimate;
-use crate::hypothesis::Placed;
+use crate::fit::Placed;
 use crate::log::Log;
 use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors, stood};
-use crate::noise::median;
-use crate::parallel::in_parallel;
+use crate::signal::noise::median;
+use crate::numeric::parallel::in_parallel;
 use crate::report::Vocabulary;
-use crate::sparse;
-use crate::supply_limit;
+use crate::log::sparse;
+use crate::close::supply_limit;
 use crate::verdict::Verdict;
-use crate::words::{DISAGREE, OTHERWISE, digits};
+use crate::verdict::words::{DISAGREE, OTHERWISE, digits};
 
 /// What several runs amount to.
 #[derive(Debug, Clone)]

@@ -10,13 +10,13 @@ use super::entries::{alternatives, entry, own_entries, unexplained, unnamed};
 use super::folds::Tenable;
 use super::joint::{Across, Compared, Joint};
 use crate::close::{NO_COMMAND, validation};
-use crate::context::{Context, Relation, is_contrast, unit_of};
-use crate::diagnose::RIVAL;
+use crate::channel::{Context, Relation, is_contrast, unit_of};
+use crate::attribution::diagnose::RIVAL;
 use crate::effects::Estimate;
-use crate::hypothesis::Placed;
+use crate::fit::Placed;
 use crate::model::Model;
-use crate::residual::whiteness;
-use crate::unexplained::looks_like;
+use crate::signal::residual::whiteness;
+use crate::attribution::unexplained::looks_like;
 use crate::verdict::{Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Validation, Verdict};
 use std::collections::BTreeMap;
 

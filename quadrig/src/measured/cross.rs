@@ -9,11 +9,11 @@
 
 use super::Recorded;
 use ident::close::Closed;
-use ident::context::{Context, Relation, Target};
-use ident::hypothesis::{Declared, Rows, fit};
+use ident::channel::{Context, Relation, Target};
+use ident::fit::{Declared, Rows, fit};
 use ident::log::Log;
 use ident::model::Model;
-use ident::search::refine;
+use ident::fit::search::refine;
 
 /// Share of the error that a cause must remove on another run to hold there.
 const HOLDS: f64 = 0.02;

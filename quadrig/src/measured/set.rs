@@ -6,7 +6,7 @@
 //! Reference: the `README.md` of each set.
 
 use crate::trouble::unread;
-use ident::import::import;
+use ident::log::import::import;
 use ident::log::Log;
 use std::path::{Path, PathBuf};
 

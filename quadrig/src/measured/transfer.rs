@@ -8,7 +8,7 @@
 
 use super::Recorded;
 use ident::close::Closed;
-use ident::context::Context;
+use ident::channel::Context;
 use ident::log::{Log, MODELLED};
 use ident::model::Model;
 

@@ -9,9 +9,9 @@
 //! Reference: energy balance of a rotor; Beharie 2013, Eq. 5.11 as corrected (the draw at a speed).
 
 use super::super::{Shape, bearing_friction};
-use crate::context::{Context, Relation};
-use crate::noise::median;
-use crate::solve::Normal;
+use crate::channel::{Context, Relation};
+use crate::signal::noise::median;
+use crate::numeric::solve::Normal;
 
 /// Form of an instance against a declared model, which knows how the rotor speeds up without a limit.
 pub(super) const SPIN_UP: &str = "while the rotor speeds up";

@@ -6,7 +6,7 @@
 //! Units: the channel's.
 //! Reference: directional statistics, Mardia & Jupp 2000, section 5.2.
 
-use crate::context::{Context, Target};
+use crate::channel::{Context, Target};
 
 /// A grid: multiples of `step` from `offset` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +65,7 @@ fn gather(readings: &[f64], frequency: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::{gather, grid};
-    use crate::context::Context;
+    use crate::channel::Context;
     use crate::log::{Column, Log};
 
     /// A thrust on levels of 100 rows, as a conditioner passes it on.

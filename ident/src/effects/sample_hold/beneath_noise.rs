@@ -8,7 +8,7 @@
 //! Reference: Rayleigh's test of a common phase, Mardia & Jupp 2000, *Directional Statistics*, sections 3.5.7 and 6.3.
 
 use super::{phase, slope};
-use crate::context::{Context, Target};
+use crate::channel::{Context, Target};
 
 /// Standard deviations of the noise by which two readings that follow each other differ where the held value changed.
 const CHANGED: f64 = 8.0;

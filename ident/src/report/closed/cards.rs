@@ -13,12 +13,9 @@ use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
-use crate::rivals::UNEXPLAINED;
+use crate::attribution::rivals::UNEXPLAINED;
 use crate::verdict::{Alternative, EffectEntry, Kin, Parameter, Verdict};
-use crate::words::{
-    DISAGREE, OTHERWISE, SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled,
-    scope, signs, sized, sureness, upper, upper_bound, with_interval,
-};
+use crate::verdict::words::{DISAGREE, OTHERWISE, SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled, scope, signs, sized, sureness, upper, upper_bound, with_interval};
 use std::fmt::Write;
 
 /// Probability from which on what no hypothesis has is told.

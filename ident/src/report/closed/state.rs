@@ -7,9 +7,9 @@
 
 use super::evidence::pair;
 use crate::report::svg::escape;
-use crate::unexplained::LOUD;
+use crate::attribution::unexplained::LOUD;
 use crate::verdict::{Channel, Channels, Kind, Verdict};
-use crate::words::{channel, digits, scaled, upper};
+use crate::verdict::words::{channel, digits, scaled, upper};
 use std::fmt::Write;
 
 /// Left end of the scale, noise floors.

@@ -7,7 +7,7 @@
 
 use crate::effects::{About, Scope, by_id};
 use crate::verdict::{EffectEntry, Kin};
-use crate::words::{Clause, parameter};
+use crate::verdict::words::{Clause, parameter};
 
 /// The words of a library of effects.
 #[derive(Debug, Clone, Copy)]

@@ -14,7 +14,7 @@ use crate::blind::rig::poly;
 use crate::blind::run::Run;
 use crate::blind::write::text;
 use ident::close::{Closed, close};
-use ident::context::Context;
+use ident::channel::Context;
 use ident::log::Log;
 use serde_json::Value;
 
