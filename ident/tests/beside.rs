@@ -9,7 +9,7 @@
 mod rig;
 
 use ident::close::{Closed, close};
-use ident::effects::Scope;
+use ident::verdict::Scope;
 use ident::log::{Column, Log};
 use ident::verdict::{Kind, Unexplained};
 use rig::Chance;

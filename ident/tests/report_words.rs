@@ -5,7 +5,7 @@
 //! Units: as stated.
 //! Reference: specification `formats.md`, "Verdict".
 
-use ident::effects::Scope;
+use ident::verdict::Scope;
 use ident::report::{Hidden, Vocabulary, WIDEST, sentence, terminal};
 use ident::verdict::{
     Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, NextExperiment, Parameter,

@@ -8,7 +8,7 @@
 
 use ident::close::{Closed, close};
 use ident::channel::Context;
-use ident::effects::Scope;
+use ident::verdict::Scope;
 use ident::log::{Column, Log};
 use ident::model::Model;
 

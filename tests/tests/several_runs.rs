@@ -7,7 +7,7 @@
 //! Reference: specification `formats.md`, "Scope" and `across_runs_rms`; `closing-the-loop.md`, "Real measurements".
 
 use ident::close::{close, validation};
-use ident::effects::Scope;
+use ident::verdict::Scope;
 use ident::log::Log;
 use ident::model::Model;
 use ident::several::{Outcome, Run, close_each, close_together};

@@ -7,7 +7,7 @@
 //! Reference: Golub & Pereyra 2003; O'Leary & Rust 2013; Nelder & Mead 1965; More 1978.
 
 use crate::lag::{ROWS, lagged, load};
-use ident::fit::search::nelder_mead;
+use ident::numeric::simplex::nelder_mead;
 use ident::numeric::solve::Normal;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra34::storage::Owned;

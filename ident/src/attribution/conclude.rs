@@ -7,13 +7,15 @@
 //! Units: errors in the channel's unit, shares of them.
 //! Reference: specification `closing-the-loop.md`, step 6; `formats.md`, "Verdict" ("no name may make things worse").
 
-use crate::attribution::beside::is_named;
+use crate::effects::placed::is_named;
 use crate::signal::colour::{Colour, effective_share};
 use crate::channel::{Context, Target};
 use crate::attribution::diagnose::NEEDED_REDUCTION;
 use crate::effects::{Effect, Estimate, Instance, NEEDED_EVIDENCE, Shape};
 use crate::fit::heldout::{self, Held};
-use crate::fit::{Declared, Fit, Placed, is_plausible, part_of};
+use crate::model::Declared;
+use crate::fit::{Fit, is_plausible, part_of};
+use crate::effects::placed::Placed;
 use crate::attribution::unexplained::wanders;
 
 /// Share by which the error of a channel may be larger with the names than before.
@@ -193,7 +195,7 @@ pub(crate) fn is_nothing(context: &Context, placed: &Placed, estimates: &[Estima
     let reported = effect.report(context, instance, estimates.to_vec());
     let mut sizes = reported.iter().filter(|e| is_size(e)).peekable();
     let held = |e: &Estimate| {
-        let [low, high] = crate::close::parameter(e, &shapes, "").ci95;
+        let [low, high] = crate::effects::reported::parameter(e, &shapes, "").ci95;
         low <= 0.0 && high >= 0.0
     };
     is_named(placed) && !estimates.is_empty() && sizes.peek().is_some() && sizes.all(held)

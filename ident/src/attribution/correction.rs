@@ -11,10 +11,14 @@
 
 use crate::channel::{Context, Relation};
 use crate::attribution::diagnose::NEEDED_REDUCTION;
-use crate::effects::unknown::{Unknown, form, variables};
-use crate::effects::{Effect, Instance, Scope};
+use crate::effects::unknown::{Unknown, variables};
+use crate::verdict::words::plain::form;
+use crate::effects::{Effect, Instance};
+use crate::verdict::Scope;
 use crate::fit::heldout::{self, Sum};
-use crate::fit::{Declared, Fit, Placed};
+use crate::model::Declared;
+use crate::fit::Fit;
+use crate::effects::placed::Placed;
 use crate::attribution::opponent::{correction, is_load};
 
 /// Numbers of terms that are tried.

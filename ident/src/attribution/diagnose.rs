@@ -8,14 +8,17 @@
 //! Units: evidence in nats.
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
-use crate::attribution::beside::{NEEDED, ask, is_named, left_of, with_rests};
+use crate::attribution::beside::{NEEDED, ask, left_of, with_rests};
+use crate::effects::placed::is_named;
 use crate::signal::colour::Colour;
 use crate::attribution::conclude::{Errors, drowned, is_nothing, quoted, untenable};
 use crate::channel::{Context, Relation, Target};
 pub(crate) use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::{self, Effect, Estimate, Instance};
 use crate::fit::heldout::{self, Around, Held};
-use crate::fit::{Declared, Fit, Placed, Rows, TargetFit, fit, plausible, scatters};
+use crate::model::Declared;
+use crate::fit::{Fit, Rows, TargetFit, fit, plausible, scatters};
+use crate::effects::placed::Placed;
 use crate::attribution::moment::lasts;
 use crate::numeric::parallel::{cores, in_parallel};
 use crate::signal::residual::whiteness;

@@ -11,6 +11,7 @@ pub(crate) mod beside;
 pub mod columns;
 pub(crate) mod conclude;
 pub(crate) mod correction;
+pub(crate) mod depends;
 pub mod diagnose;
 pub mod long;
 pub(crate) mod moment;

@@ -10,7 +10,8 @@
 use crate::channel::Context;
 use crate::attribution::diagnose::{NEEDED_EVIDENCE, penalty};
 use crate::fit::heldout;
-use crate::fit::{Declared, Fit};
+use crate::model::Declared;
+use crate::fit::Fit;
 
 /// Half the length of a moment, s.
 const HALF: f64 = 0.5;

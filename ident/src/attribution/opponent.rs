@@ -9,9 +9,12 @@
 use crate::channel::{Context, DIFFERENCES, Relation, Target};
 use crate::attribution::diagnose::{Candidate, FEWEST_SAMPLES, NEEDED_EVIDENCE, NEEDED_REDUCTION, net_gain, shares};
 use crate::effects::unknown::{Unknown, variables};
-use crate::effects::{Effect, Instance, quantisation};
+use crate::effects::{Effect, Instance};
+use crate::channel::lattice;
 use crate::fit::heldout::{self, Held};
-use crate::fit::{Declared, Designs, Fit, Placed, Rows, fit_target};
+use crate::model::Declared;
+use crate::fit::{Designs, Fit, Rows, fit_target};
+use crate::effects::placed::Placed;
 use crate::log::MODELLED;
 use crate::attribution::moment::best_moment;
 use crate::signal::residual::whiteness;
@@ -236,7 +239,7 @@ fn takes_most(context: &Context, target: &Target, (before, after): (&[f64], &[f6
     let n = rows.len().max(1) as f64;
     let (b, a) = rows.iter().fold((0.0, 0.0), |s, row| (s.0 + row.0 / n, s.1 + row.1 / n));
     // rounding to coarse steps cannot be taken away whole
-    let rounding = quantisation::step(target).map_or(0.0, |step| step * step / 12.0);
+    let rounding = lattice::step(target).map_or(0.0, |step| step * step / 12.0);
     let floor = target.noise.rms.powi(2).max(rounding);
     let needed = if context.against_model { NEEDED_AGAINST_MODEL } else { NEEDED_SHARE };
     // between jumps only what stood out there can have been explained there

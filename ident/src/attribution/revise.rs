@@ -10,7 +10,9 @@
 use crate::channel::Context;
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, evidence_over, may_join, offers, round_of};
 use crate::fit::heldout::{self, Held};
-use crate::fit::{Declared, Fit, Placed, Rows, fit};
+use crate::model::Declared;
+use crate::fit::{Fit, Rows, fit};
+use crate::effects::placed::Placed;
 use crate::attribution::rivals::probabilities;
 use crate::fit::search::{connected, refine};
 use crate::attribution::split::split;

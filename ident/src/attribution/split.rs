@@ -8,7 +8,9 @@
 
 use crate::channel::Context;
 use crate::attribution::diagnose::{Candidate, Scanned, evidence_counted, may_join, shares};
-use crate::fit::{Declared, Fit, Placed, Rows, fit, plausible};
+use crate::model::Declared;
+use crate::fit::{Fit, Rows, fit, plausible};
+use crate::effects::placed::Placed;
 use crate::attribution::revise::{CLEARLY_BETTER, Round, predicts_as_well};
 use crate::fit::search::{base, refine, scan};
 

@@ -12,7 +12,9 @@ use crate::channel::Context;
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, weigh};
 use crate::effects;
 use crate::fit::heldout::residuals;
-use crate::fit::{Declared, Fit, Placed, Rows, fit};
+use crate::model::Declared;
+use crate::fit::{Fit, Rows, fit};
+use crate::effects::placed::Placed;
 use crate::attribution::rivals::Rival;
 use crate::fit::search::{base, refine_newest, scan};
 

@@ -11,7 +11,8 @@
 use crate::channel::{Context, Relation};
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, loud, round_of, without};
 use crate::fit::heldout::{self, Held};
-use crate::fit::{Declared, Fit, scatters};
+use crate::model::Declared;
+use crate::fit::{Fit, scatters};
 
 /// Firsts of a group that are tried.
 const FIRSTS: usize = 3;

@@ -10,8 +10,9 @@
 use crate::signal::colour::effective_share;
 use crate::channel::{Context, DIFFERENCES, Relation, Target};
 use crate::fit::heldout;
-use crate::fit::{Declared, Fit};
-use crate::close::inspect::{goes_with, seems_to_go_with};
+use crate::model::Declared;
+use crate::fit::Fit;
+use crate::attribution::depends::{goes_with, seems_to_go_with};
 use crate::attribution::opponent::{is_second_meter, left_over};
 use crate::verdict::{Channels, Unexplained};
 use std::ops::Range;

@@ -6,27 +6,25 @@
 //! Units: SI, rev/min, us; regressors of the polynomials are rpm/1000 and (pulse - 1000)/1000.
 //! Reference: specification `formats.md` (primary relations), `closing-the-loop.md` step 2.
 
+use crate::numeric::order::median;
+use crate::signal::consensus::{self, Consensus};
+use crate::signal::stretches::{self, CALM_US, FEWEST_OF_A_KIND, STILL_US, bridge, starts};
 use crate::signal::bad::{self, SetAside};
 use crate::log::board;
-use crate::model::course::{self, Counterparts};
-use crate::effects::design::{Values, powers_of};
-use crate::effects::glitch_rows;
-use crate::fit::Declared;
-use crate::model::leftover::{self, Leftover};
+use powers::{Values, powers_of};
 use crate::log::{Log, MODELLED, SPEED};
-use crate::close::marks;
 use crate::signal::noise::{self, Noise};
-use crate::fit::remembered::Remembered;
 use crate::numeric::solve::Normal;
 use crate::signal::start::start_pulse;
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-mod consensus;
-mod stretches;
+mod facts;
+pub(crate) mod glitches;
+pub(crate) mod lattice;
+pub mod powers;
 
-pub use consensus::Consensus;
-pub(crate) use stretches::{CALM_US, GAP, STILL_US, starts};
+pub(crate) use facts::{Draw, Facts, Question, Rail, SawTooth};
 
 /// Time after which a rotor of this size has arrived at its new speed, s: five time constants of 0.05 s.
 const ARRIVED: f64 = 0.25;
@@ -182,8 +180,6 @@ const NOISIER: f64 = 4.0;
 const FEWEST_BEYOND: usize = 4;
 /// Below this speed, rev/min, a rotor counts as standing: slower than any brushless motor runs without position sensors.
 pub(crate) const STANDSTILL: f64 = 100.0;
-/// Fewest samples after jumps, and between them, that show how well either is predicted.
-pub(crate) const FEWEST_OF_A_KIND: usize = 10;
 
 impl Target {
     fn new(context: &Context, name: &'static str, relation: Relation, rows: Vec<usize>, y: Vec<f64>, noise: Noise) -> Self {
@@ -221,31 +217,6 @@ impl Target {
     #[must_use]
     pub fn claims(&self, row: usize) -> bool {
         self.unclaimed.binary_search(&row).is_err() && self.aside.binary_search(&row).is_err()
-    }
-
-    /// Takes what the declared model leaves over of its own run for known, and weighs the samples by how well: `load` and `classes` of
-    /// every row of the log, and how often the run repeats each class.
-    fn allow(
-        &mut self,
-        left: &Leftover,
-        load: &[f64],
-        classes: &[usize],
-        alike: &leftover::Alike,
-        course: Option<Counterparts<'_>>,
-    ) {
-        self.known = load.iter().map(|x| left.known(*x)).collect();
-        self.usual = left.held();
-        let noise = self.noise.rms;
-        let ahead = course.map_or_else(Vec::new, |c| course::ahead(c, self, classes));
-        let square = |row: usize| {
-            let usual = left.variance(load[row], classes[row], alike, noise);
-            ahead.get(row).copied().flatten().map_or(usual, |(_, differ)| differ.min(usual))
-        };
-        for variances in [&mut self.levelled, &mut self.floored] {
-            variances.iter_mut().zip(&self.rows).for_each(|(v, row)| *v += square(*row));
-        }
-        self.trust = (0..load.len()).map(|row| noise / (noise * noise + square(row)).sqrt()).collect();
-        self.known.iter_mut().zip(&ahead).for_each(|(known, ahead)| *known = ahead.map_or(*known, |(error, _)| error));
     }
 
     /// A residual in the measure in which it is news: against a declared model less where that is known to be rough.
@@ -355,39 +326,6 @@ pub struct Context {
     pub(crate) facts: Facts,
 }
 
-/// What effects read off a log once and ask for again and again.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Facts {
-    /// Step, offset and anchoring of the saw-tooth of the pulse that fits best.
-    pub(crate) tooth: OnceLock<crate::effects::SawTooth>,
-    /// Speed that the pulse alone makes one expect on each row, rev/min.
-    pub(crate) expected: OnceLock<Vec<f64>>,
-    /// Whether speed and command change within single rows.
-    pub(crate) abrupt: OnceLock<bool>,
-    /// The torque that acted on the rig on each row, N.m, less what is the torque sensor's own noise.
-    pub(crate) torque: OnceLock<Option<Vec<f64>>>,
-    /// Temperature on each row less its meter's noise, degC.
-    pub(crate) warmth: OnceLock<Option<Vec<f64>>>,
-    /// Logarithm of the air's density over that of standard air on each row.
-    pub(crate) density: OnceLock<Vec<f64>>,
-    /// Current that a held speed draws, and the highest such speed, krpm.
-    pub(crate) draw: OnceLock<Option<(crate::effects::Draw, f64)>>,
-    /// R/Kt^2 of the winding, W/(N.m)^2.
-    pub(crate) winding: OnceLock<f64>,
-    /// Angular acceleration on the way to where the command sends the rotor, rad/s^2; nothing without a command.
-    pub(crate) driven: OnceLock<Option<Vec<f64>>>,
-    /// Share of the voltage that goes with each Ah drawn, 1/Ah.
-    pub(crate) discharge: OnceLock<f64>,
-    /// Slope of the static speed curve on each row, rev/min per us.
-    pub(crate) slope: OnceLock<Vec<f64>>,
-    /// Where the thrust reads one and the same largest value.
-    pub(crate) rail: OnceLock<Option<crate::effects::Rail>>,
-    /// See [`Context::step`].
-    pub(crate) step: OnceLock<f64>,
-    /// Shapes that a search has found.
-    pub(crate) refined: Remembered,
-}
-
 impl Context {
     /// Prepares a log, its bad samples set aside. `start_pulse_us` is taken from a model where one is given.
     #[must_use]
@@ -406,7 +344,7 @@ impl Context {
         let follows = |t: &Target| matches!(t.relation, Relation::SpeedFromPulse | Relation::Current | Relation::Voltage);
         let fewer = |t: &Target| {
             let new = target(log, self, t.name, &counts).filter(|new| new.rows.len() >= t.relation.degree() + FEWEST_BEYOND)?;
-            Some(Target { unclaimed: glitch_rows::unclaimed(self, &new), ..new })
+            Some(Target { unclaimed: glitches::unclaimed(self, &new), ..new })
         };
         let new: Vec<Option<Target>> = self.targets.iter().map(|t| follows(t).then(|| fewer(t)).flatten()).collect();
         let left_out = new.iter().flatten().map(|t| t.name).collect();
@@ -440,14 +378,14 @@ impl Context {
                 let name = c.name.as_str();
                 !MODELLED.contains(&name)
                     && !["pulse_us", "temp_c", "thrust_rms_n"].contains(&name)
-                    && !marks::is_of_marks(name)
+                    && !board::is_of_marks(name)
                     && !board::is_of_the_board(name)
             })
             .filter(|c| c.values.iter().any(|v| v.is_finite()))
             .map(|c| (c.name.clone(), bridge(&log.t, &c.values)))
             .collect();
         context.targets = targets(log, &context);
-        let unclaimed: Vec<Vec<usize>> = context.targets.iter().map(|t| glitch_rows::unclaimed(&context, t)).collect();
+        let unclaimed: Vec<Vec<usize>> = context.targets.iter().map(|t| glitches::unclaimed(&context, t)).collect();
         context.targets.iter_mut().zip(unclaimed).for_each(|(target, rows)| target.unclaimed = rows);
         context
     }
@@ -532,37 +470,6 @@ impl Context {
         self.t.is_empty()
     }
 
-    /// Where a model is declared: what is sought may be older than the run, and every target is allowed what the model leaves over of
-    /// its own run.
-    pub(crate) fn against(&mut self, declared: Declared<'_>) {
-        let Some(model) = declared.model else { return };
-        let classes = leftover::classes(self);
-        let alike = leftover::Alike::of(self, &classes);
-        let loads: Vec<Vec<f64>> = self.targets.iter().map(|t| self.regressor(t.relation).unwrap_or_default()).collect();
-        let speaks_of_air = model.effects.iter().any(|e| e.placed.effect.id() == "air_density");
-        self.air = model.air.filter(|_| !speaks_of_air).map_or(0.0, f64::ln);
-        self.against_model = true;
-        let known = model.course.as_ref().map(|course| (course, course.counterparts(self)));
-        let step = self.step();
-        let predictions: Vec<Option<Vec<f64>>> =
-            self.targets.iter().map(|t| model.predict_at_its_own_supply(self, t.name)).collect();
-        for ((target, load), prediction) in self.targets.iter_mut().zip(loads).zip(&predictions) {
-            if let Some((_, left)) = model.leftovers.iter().find(|(channel, _)| channel == target.name) {
-                let course = known.as_ref().zip(prediction.as_ref()).and_then(|((course, rows), prediction)| {
-                    Some(Counterparts { errors: course.of_channel(target.name)?, rows, prediction, step })
-                });
-                target.allow(left, &load, &classes, &alike, course);
-            }
-            let expected =
-                || prediction.iter().flatten().enumerate().map(|(row, p)| target.as_it_stands(row, *p)).collect::<Vec<f64>>();
-            match target.relation {
-                Relation::Torque => self.expected_torque = expected(),
-                Relation::SpeedFromPulse if self.expected_speed.is_empty() => self.expected_speed = expected(),
-                _ => {}
-            }
-        }
-    }
-
     /// Index of a target by its channel name.
     #[must_use]
     pub fn target(&self, name: &str) -> Option<usize> {
@@ -610,7 +517,7 @@ impl Context {
     pub fn step(&self) -> f64 {
         *self.facts.step.get_or_init(|| {
             let mut d: Vec<f64> = self.t.windows(2).map(|w| w[1] - w[0]).collect();
-            if d.is_empty() { 1.0 } else { noise::median(&mut d) }
+            if d.is_empty() { 1.0 } else { median(&mut d) }
         })
     }
 
@@ -627,33 +534,6 @@ impl Context {
     pub fn duration(&self) -> f64 {
         self.t.last().unwrap_or(&0.0) - self.t.first().unwrap_or(&0.0)
     }
-}
-
-/// Linear bridge over missing samples, constant at the ends.
-#[must_use]
-pub fn bridge(t: &[f64], values: &[f64]) -> Vec<f64> {
-    let mut out = values.to_vec();
-    let mut last: Option<usize> = None;
-    for i in 0..out.len() {
-        if !values[i].is_finite() {
-            continue;
-        }
-        match last {
-            None => out[..i].fill(values[i]),
-            Some(j) => {
-                for k in j + 1..i {
-                    let u = (t[k] - t[j]) / (t[i] - t[j]);
-                    out[k] = values[j] + u * (values[i] - values[j]);
-                }
-            }
-        }
-        last = Some(i);
-    }
-    if let Some(j) = last {
-        let v = values[j];
-        out[j + 1..].fill(v);
-    }
-    out
 }
 
 /// A channel less its declared polynomial in the measured speed; others as they are.

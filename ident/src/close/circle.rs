@@ -10,7 +10,7 @@
 
 use crate::channel::{Context, Relation, unit_of};
 use crate::attribution::diagnose::{Diagnosis, diagnose};
-use crate::fit::Declared;
+use crate::model::Declared;
 use crate::log::{Log, SPEED};
 use crate::model::Model;
 use crate::signal::residual::whiteness;

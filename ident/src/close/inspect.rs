@@ -10,16 +10,15 @@ mod depends;
 mod left;
 mod orders;
 
-pub(crate) use depends::{goes_with, seems_to_go_with};
-
 use crate::close::{Closed, close};
 use crate::channel::{Context, Relation, unit_of};
 use crate::effects::library;
 use crate::fit::heldout;
-use crate::fit::{Declared, Fit, Rows, fit};
+use crate::model::Declared;
+use crate::fit::{Fit, Rows, fit};
 use crate::log::Log;
 use crate::model::Model;
-use crate::report::number;
+use crate::numeric::digits::number;
 use crate::fit::search::{base, scan};
 use crate::model::simulate::from_command;
 

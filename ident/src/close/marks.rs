@@ -8,22 +8,17 @@
 //! Units: deg, deviation of the second mark from 180.
 //! Reference: Beharie 2013, section 5.7.1 and Fig. 5.27; specification `rig.md`, "Four RPM capture channels".
 
+use crate::log::board::UNEVEN;
 use crate::channel::{Context, STANDSTILL};
-use crate::effects::alternating_period::{ANGLE, TOLD_BY_THE_BOARD};
+use crate::effects::alternating_period::ANGLE;
+use crate::verdict::TOLD_BY_THE_BOARD;
 use crate::effects::{self, Estimate, Instance};
-use crate::fit::{Declared, Placed};
+use crate::model::Declared;
+use crate::effects::placed::Placed;
 use crate::log::Log;
 use crate::model::{AddedEffect, Model};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::verdict::{EffectEntry, Kin, Kind, Verdict};
-
-/// Speed channels and the columns in which their board tells how far their two marks stand off their opposite places.
-pub(crate) const UNEVEN: [(&str, &str); 4] = [
-    ("rpm_beam", "uneven_beam_deg"),
-    ("rpm_opto", "uneven_opto_deg"),
-    ("rpm_hall", "uneven_hall_deg"),
-    ("rpm_encoder", "uneven_encoder_deg"),
-];
 
 /// Angle, or change of it since the declared model's day, beyond which it is worth a name, deg: a magnet set by hand on the rim of a rotor of
 /// 30 mm is off by a millimetre, which is 4 degrees.
@@ -52,11 +47,6 @@ pub(crate) struct Told {
     seen: f64,
     /// Angle that the declared model says, deg.
     known: f64,
-}
-
-/// Whether a column tells of marks: it explains no residual.
-pub(crate) fn is_of_marks(column: &str) -> bool {
-    UNEVEN.iter().any(|(_, name)| *name == column)
 }
 
 /// The marks that stand off their places as the declared model does not say.
@@ -147,7 +137,7 @@ fn entry(told: &Told) -> EffectEntry {
         depends_on: about.depends_on.iter().map(|v| (*v).to_owned()).collect(),
         equation: format!("{} [{TOLD_BY_THE_BOARD}]", about.equation),
         probability: CERTAIN,
-        parameters: added.estimates.iter().map(|e| crate::close::parameter(e, &[], channel)).collect(),
+        parameters: added.estimates.iter().map(|e| crate::effects::reported::parameter(e, &[], channel)).collect(),
         heldout_error_reduction: 0.0,
         evidence: words(told),
     }

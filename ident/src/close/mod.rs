@@ -12,17 +12,21 @@ pub(crate) mod supply_limit;
 pub mod told;
 pub mod watch;
 
+use crate::effects::reported::parameter;
+use crate::identify::CloseError;
 use crate::signal::bad;
-use crate::attribution::beside::is_named;
+use crate::effects::placed::is_named;
 use crate::attribution::conclude::{Quoted, quoted};
 use crate::channel::{Context, DIFFERENCES, Relation, STANDSTILL, Target, is_contrast, unit_of};
 use crate::attribution::correction::without_correction;
 use crate::model::course;
 use crate::attribution::diagnose::Diagnosis;
 use crate::effects::unknown::Words;
-use crate::effects::{Estimate, Shape};
+use crate::effects::{Estimate};
 use crate::fit::heldout;
-use crate::fit::{Declared, Fit, Placed, Rows, anywhere_in_a_row};
+use crate::model::Declared;
+use crate::fit::{Fit, Rows, anywhere_in_a_row};
+use crate::effects::placed::Placed;
 use crate::identify::is_table;
 use crate::model::leftover;
 use crate::log::Log;
@@ -34,23 +38,9 @@ use crate::fit::search::refine;
 use crate::log::sparse;
 use crate::attribution::unexplained::{LOUD, Left, unexplained};
 use crate::verdict::{
-    Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Parameter, Validation, Verdict,
+    Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Validation, Verdict,
 };
 use crate::verdict::words::worth;
-
-/// Why the loop cannot be closed on a log.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CloseError {
-    /// Nothing can be predicted from anything.
-    #[error(
-        "{run}: no channel can be fitted; expected at least two related channels (pulse, rpm, thrust, torque, current, voltage) with more than 8 common samples"
-    )]
-    NoRelation {
-        /// The log.
-        run: String,
-    },
-}
 
 /// Everything that closing the loop on one log gives.
 #[derive(Debug, Clone)]
@@ -101,10 +91,11 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let estimates: Vec<Vec<Estimate>> = (0..fit.placed.len()).map(|k| estimates.get(k).cloned().unwrap_or_default()).collect();
     let runs = vec![FittedTo::of(whole)];
     let left = |model: Model, fit: &Fit| {
+        let residuals = heldout::residuals(&context, declared, fit);
         Model { runs: runs.clone(), ..model }.leaving(
             &context,
-            leftover::of(&context, declared, fit),
-            course::of(&context, declared, fit),
+            leftover::of(&context, &residuals),
+            course::of(&context, &residuals),
         )
     };
     let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
@@ -315,24 +306,6 @@ fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
         equation: if form.is_empty() { about.equation.to_owned() } else { format!("{} [{form}]", about.equation) },
         evidence: format!("{}{}", about.signature, worth(first, reduction)),
     }
-}
-
-/// Unit of a parameter that has the unit of whatever channel its effect is on.
-const OF_CHANNEL: &str = "channel";
-
-/// A parameter with its interval. Where its standard error is not known the interval is what is known at all: the range of the shape,
-/// or for an amplitude everything from nothing to twice its size.
-pub(crate) fn parameter(e: &Estimate, shapes: &[Shape], channel: &str) -> Parameter {
-    let range = shapes.iter().find(|s| s.name == e.name && s.range.1 > s.range.0).map(|s| s.range);
-    // what cannot be below zero is not
-    let least = if shapes.iter().any(|s| s.name == e.name && s.range.0 >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
-    let ci95 = match range {
-        _ if e.se.is_finite() => [(e.value - 1.96 * e.se).max(least.min(e.value)), e.value + 1.96 * e.se],
-        Some((from, to)) => [from.min(e.value), to.max(e.value)],
-        None => [e.value - e.value.abs(), e.value + e.value.abs()],
-    };
-    let unit = if e.unit == OF_CHANNEL { unit_of(channel).to_owned() } else { e.unit.clone() };
-    Parameter { name: e.name.clone(), value: e.value, unit, ci95 }
 }
 
 /// Both models on another run of the same rig, as far as they carry over.

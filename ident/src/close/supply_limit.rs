@@ -9,9 +9,11 @@
 //! Units: A, V, us.
 //! Reference: constant-current mode of laboratory supplies.
 
-use crate::close::parameter;
-use crate::channel::{CALM_US, Context, unit_of};
-use crate::effects::{CurrentLimit, Effect, Estimate, Instance, OF_THE_SUPPLY};
+use crate::effects::reported::parameter;
+use crate::signal::stretches::CALM_US;
+use crate::channel::{Context, unit_of};
+use crate::effects::{CurrentLimit, Effect, Estimate, Instance};
+use crate::verdict::OF_THE_SUPPLY;
 use crate::identify::{TABLE_ERROR, settled};
 use crate::log::Log;
 use crate::close::marks::{self, CERTAIN};

@@ -9,7 +9,9 @@
 use crate::close::validation;
 use crate::channel::Context;
 use crate::effects;
-use crate::fit::{Declared, Placed, Rows, fit};
+use crate::model::Declared;
+use crate::effects::placed::Placed;
+use crate::fit::{Rows, fit};
 use crate::log::Log;
 use crate::model::Model;
 use crate::fit::search::{base, refine, scan};

@@ -10,15 +10,16 @@
 //! Reference: Page 1954, Biometrika 41:100; Moustakides 1986, Annals of Statistics 14:1379 (optimal for a known shift); Siegmund 1985,
 //! "Sequential Analysis", section II.6 (run length).
 
-use crate::channel::{CALM_US, Context, Target};
-use crate::fit::Declared;
+use crate::signal::stretches::CALM_US;
+use crate::channel::{Context, Target};
+use crate::model::Declared;
 use crate::model::leftover::{self, Leftover};
 use crate::log::{Column, Log};
 use crate::model::Model;
 
 /// Judged values of a year: eight hours on each of 250 days, ten values a second, each way on nine channels. A healthy rig is falsely accused once in it.
 const RUN_LENGTH: f64 = 250.0 * 8.0 * 3600.0 * 10.0 * 2.0 * 9.0;
-/// Most rows in a row that can be a sensor's drop-out (see [`crate::channel::Consensus`]): as many alone accuse nobody.
+/// Most rows in a row that can be a sensor's drop-out (see [`crate::signal::consensus::Consensus`]): as many alone accuse nobody.
 const DROP_OUT: f64 = 3.0;
 /// Excess of a random walk over its barrier, in standard deviations (Siegmund 1985).
 const EXCESS: f64 = 1.166;

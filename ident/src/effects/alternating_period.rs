@@ -15,9 +15,6 @@ use crate::effects::design::TargetDesign;
 /// See the module.
 pub(crate) struct AlternatingPeriod;
 
-/// Form of an effect that no residual shows and the board's account of the pattern does: it changes no prediction.
-pub(crate) const TOLD_BY_THE_BOARD: &str = "told by the board, which times whole revolutions";
-
 /// What is estimated.
 pub(crate) const ANGLE: Amplitude = Amplitude { name: "angle", unit: "deg" };
 

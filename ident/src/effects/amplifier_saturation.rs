@@ -5,6 +5,7 @@
 //! Units: N.
 //! Reference: output swing of instrumentation amplifiers; Beharie 2013, section 4.4 (bridge and amplifier).
 
+use crate::channel::Rail;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::channel::{Context, STANDSTILL, Target};
 use crate::effects::design::{Label, TargetDesign};
@@ -89,7 +90,7 @@ impl Effect for AmplifierSaturation {
         let n = above.len() as f64;
         let level = above.iter().sum::<f64>() / n;
         // a rail is hit exactly: what is left is the last digit of the log
-        let digit = crate::signal::noise::quantum(&target.y) / 12.0_f64.sqrt();
+        let digit = crate::numeric::order::quantum(&target.y) / 12.0_f64.sqrt();
         let se = ((above.iter().map(|v| (v - level).powi(2)).sum::<f64>()).sqrt() / n).max(digit);
         if level.is_finite() {
             fitted.insert(0, Estimate { name: "level".into(), unit: "N".into(), value: level, se });
@@ -116,17 +117,6 @@ const HELD: f64 = 0.1;
 /// Share of the rail's speed by which a fit may say another one: a fifth of the thrust more or less contradicts the readings.
 const NEAR_RAIL: f64 = 0.1;
 
-/// Where the thrust reads one and the same largest value.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Rail {
-    /// Speed from which on it does, rev/min: what noise does at the rail's edge is left out. A grid of speeds meets no rail close beneath
-    /// the top speed.
-    reached: f64,
-    /// Evidence, nats, that noise alone does not repeat a reading to the last digit so often; none where that cannot be told from a meter
-    /// that holds or rounds, nor against a model, which may have the rail already.
-    unlikely: f64,
-}
-
 /// The rail of a run, where it has one: most of what is read beyond a speed is the largest reading.
 fn rail(context: &Context) -> Option<Rail> {
     let target = &context.targets[context.target("thrust_n")?];
@@ -150,7 +140,7 @@ fn unlikely_repeat(target: &Target) -> f64 {
     let top = target.y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let below = || target.y.windows(2).filter(|w| !is_top(w[0]) && w[0] > 0.5 * top);
     let (count, repeats) = (below().count(), below().filter(|w| w[0] == w[1]).count());
-    let digit = crate::signal::noise::quantum(&target.y);
+    let digit = crate::numeric::order::quantum(&target.y);
     if count < REPEATED || repeats as f64 > HELD * count as f64 || digit <= 0.0 || target.noise.rms < digit {
         return 0.0;
     }

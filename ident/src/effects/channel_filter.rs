@@ -9,7 +9,8 @@ use super::{
     About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, lone_speed, meters,
     operator, reads_meter, through_meter,
 };
-use crate::channel::{CALM_US, Context};
+use crate::signal::stretches::CALM_US;
+use crate::channel::Context;
 use crate::effects::design::TargetDesign;
 
 /// See the module.

@@ -6,6 +6,8 @@
 //! Units: A; internally us.
 //! Reference: constant-current limit of bench supplies and of speed controllers' firmware.
 
+use crate::channel::Draw;
+use crate::verdict::OF_THE_SUPPLY;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
 use crate::channel::Context;
 use crate::effects::design::{Label, TargetDesign};
@@ -13,14 +15,10 @@ use std::sync::Arc;
 
 mod spin_up;
 
-pub(crate) use spin_up::Draw;
 use spin_up::SPIN_UP;
 
 /// See the module.
 pub(crate) struct CurrentLimit;
-
-/// Form of a limit that the meters of voltage and current show ([`crate::close::supply_limit`]): it changes no prediction.
-pub(crate) const OF_THE_SUPPLY: &str = "of the supply, read off its meters";
 
 impl Effect for CurrentLimit {
     fn id(&self) -> &'static str {

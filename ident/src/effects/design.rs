@@ -5,8 +5,9 @@
 //! Units: each column is in the target's unit for a unit coefficient.
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
+use crate::channel::powers::Values;
 use crate::channel::{Context, Relation};
-use crate::fit::Placed;
+use crate::effects::placed::Placed;
 use crate::numeric::solve::Normal;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -57,9 +58,6 @@ pub(crate) struct Told {
     /// Whether it belongs to what the channel measures, and not to the zero that it was tared to on the day.
     pub(crate) stands: bool,
 }
-
-/// One value a row of the log, in one piece of memory for all who hold it unchanged.
-pub type Values = Arc<Vec<f64>>;
 
 /// One column over all rows of the log.
 #[derive(Debug, Clone)]
@@ -209,17 +207,6 @@ impl TargetDesign {
         let values = || self.columns.iter().map(|c| c.values[row]).enumerate();
         values().map(|(i, x)| values().map(|(j, y)| x * covariance[(i, j)] * y).sum::<f64>()).sum::<f64>().max(0.0)
     }
-}
-
-/// See [`Context::powers`]; a log without a command or a speed has columns of zeros beyond the constant.
-pub(crate) fn powers_of(context: &Context, relation: Relation) -> Vec<Values> {
-    let n = context.len();
-    let x = context.regressor(relation).unwrap_or_else(|| vec![0.0; n]);
-    let live = |i: usize| match (&context.pulse, relation) {
-        (Some(p), Relation::SpeedFromPulse) => p[i] >= context.start_pulse_us,
-        _ => true,
-    };
-    (0..=3).map(|k| Arc::new((0..n).map(|i| if live(i) { x[i].powi(k) } else { 0.0 }).collect())).collect()
 }
 
 fn weighted_sum(columns: &[Column], coefficients: &[f64], n: usize) -> Vec<f64> {

@@ -6,6 +6,8 @@
 //! Reference: specification `closing-the-loop.md`, list of effects.
 
 pub mod design;
+pub mod placed;
+pub(crate) mod reported;
 pub(crate) mod steps;
 pub(crate) mod air_density;
 pub(crate) mod alternating_period;
@@ -51,13 +53,11 @@ mod zero_drift;
 
 use crate::channel::{Context, DIFFERENCES, Relation};
 use crate::effects::design::TargetDesign;
-pub(crate) use crate::verdict::EffectEntry;
 use crate::verdict::Kin;
+pub(crate) use crate::verdict::{EffectEntry, Scope};
 pub(crate) use crate::verdict::words::Clause;
-pub(crate) use amplifier_saturation::Rail;
-pub(crate) use current_limit::{CurrentLimit, Draw, OF_THE_SUPPLY};
+pub(crate) use current_limit::CurrentLimit;
 pub(crate) use tare_shift::BEFORE;
-pub(crate) use throttle_quantisation::Best as SawTooth;
 
 /// Net evidence, nats, that an effect must bring beyond its penalty: a library of about fifty instances then raises a false
 /// alarm in about one clean run of a hundred.
@@ -76,30 +76,6 @@ pub enum Stage {
     Output,
     /// On single readings, after all that the meter does.
     Readings,
-}
-
-/// What an effect belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Scope {
-    /// The rig: it is there on every run.
-    Rig,
-    /// One run: another run has a value of its own.
-    Run,
-    /// One instant of one run: it does not recur.
-    Event,
-}
-
-impl Scope {
-    /// As files have it.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Rig => "rig",
-            Self::Run => "run",
-            Self::Event => "event",
-        }
-    }
 }
 
 /// What an effect is, for reports and documentation.

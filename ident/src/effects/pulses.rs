@@ -11,7 +11,7 @@ use super::speed_channel::{difference, instances};
 use super::{Amplitude, Estimate, Instance};
 use crate::channel::{Context, DIFFERENCES, Relation, Target};
 use crate::effects::design::TargetDesign;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// A speed channel's reading on one row, beside the consensus.
 #[derive(Debug, Clone, Copy)]
@@ -82,9 +82,6 @@ fn form_of(off: &[bool], sign: f64) -> Option<&'static str> {
     let recurs = count > 1 && count * 2 < off.len();
     (recurs && by_chance).then_some(SCATTERED)
 }
-
-/// Readings beyond these shares of the speed are absurd: no pulse too few or too many.
-pub(super) const PULSES: std::ops::Range<f64> = 0.3..2.5;
 
 /// Instances of pulses too few (`sign` -1) or too many (+1) for every speed channel that can be compared: in single samples where some
 /// are seen, on the whole where none is.

@@ -8,7 +8,7 @@
 //! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt); first-order rotor, section 5.7.3 (dw/dt = (goal - w)/tau).
 
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
-use crate::attribution::columns::noise::usual_step;
+use crate::numeric::order::usual_step;
 use crate::channel::{Context, Relation};
 use crate::effects::design::TargetDesign;
 use crate::signal::drive::{Drive, acceleration_of_rows};

@@ -9,7 +9,7 @@
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, through_meter};
 use crate::channel::{Context, DIFFERENCES, Relation, Target};
 use crate::effects::design::TargetDesign;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 mod beneath_noise;
 

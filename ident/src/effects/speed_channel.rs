@@ -9,7 +9,7 @@
 use super::{Amplitude, Estimate, Instance};
 use crate::channel::{Context, DIFFERENCES, Relation, Target};
 use crate::effects::design::TargetDesign;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::numeric::solve::Normal;
 
 /// The instance that touches a speed channel and its difference from the consensus.

@@ -9,7 +9,8 @@
 
 use super::coasting::{Coasting, Rotor};
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, operator, speeds};
-use crate::channel::{CALM_US, Context};
+use crate::signal::stretches::CALM_US;
+use crate::channel::Context;
 use crate::effects::design::TargetDesign;
 
 /// See the module.

@@ -7,9 +7,10 @@
 //! Reference: memoisation, Michie 1968, Nature 218:19.
 
 use crate::channel::Context;
-use crate::effects::design::{Column, Label, TargetDesign, Values};
+use crate::effects::design::{Column, Label, TargetDesign};
+use crate::channel::powers::Values;
 use crate::effects::Stage;
-use crate::fit::Placed;
+use crate::effects::placed::Placed;
 use std::sync::Arc;
 
 /// How one target's design came about.

@@ -10,7 +10,7 @@
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::channel::{Context, Relation};
 use crate::effects::design::TargetDesign;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// See the module.
 pub(crate) struct SupplySag;

@@ -11,7 +11,7 @@
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
 use crate::channel::Context;
 use crate::effects::design::TargetDesign;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// See the module.
 pub(crate) struct SupplyVoltage;

@@ -5,11 +5,13 @@
 //! Units: us; offset in steps.
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*; timer resolution of speed controllers.
 
+use crate::channel::SawTooth;
 use super::speed_channel::expected_at as curve;
 use super::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, speeds};
-use crate::channel::{Context, STILL_US};
+use crate::channel::Context;
+use crate::signal::stretches::STILL_US;
 use crate::effects::design::TargetDesign;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use std::borrow::Cow;
 
 /// See the module.
@@ -54,7 +56,7 @@ impl Effect for ThrottleQuantisation {
 
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
         // the saw-tooth has a likelihood with many narrow peaks: the search starts on the highest
-        let Best { step, offset, anchored, .. } = *best_of(context);
+        let SawTooth { step, offset, anchored, .. } = *best_of(context);
         let free = if anchored { 0.0 } else { 0.3 };
         vec![
             Shape { name: "step", unit: "us", range: (0.985 * step, 1.015 * step), starts: vec![step] },
@@ -108,7 +110,7 @@ fn slope(context: &Context) -> Vec<f64> {
 }
 
 /// The saw-tooth of a run.
-fn best_of(context: &Context) -> &Best {
+fn best_of(context: &Context) -> &SawTooth {
     context.facts.tooth.get_or_init(|| {
         let levels = levels(context);
         let beside_a_curve = || best_tooth(&levels, Departures::new(&levels));
@@ -123,7 +125,7 @@ fn best_of(context: &Context) -> &Best {
             return best;
         }
         let beside = beside_a_curve();
-        Best { short: Departures::whole(&levels).best(beside.step, beside.offset).0, ..beside }
+        SawTooth { short: Departures::whole(&levels).best(beside.step, beside.offset).0, ..beside }
     })
 }
 
@@ -171,26 +173,11 @@ fn tooth(pulse: f64, step: f64, offset: f64) -> f64 {
     at.round() - at
 }
 
-/// The saw-tooth that fits the departures best.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Best {
-    step: f64,
-    offset: f64,
-    /// The offset is that of a plain counter.
-    anchored: bool,
-    /// By how many steps the command is too short beside that.
-    short: f64,
-    /// Squared departure that it explains.
-    score: f64,
-    /// Shortest and longest step that explain nearly as much: on few levels one tooth passes for another.
-    others: (f64, f64),
-}
-
 /// Share of the best score from which on another step could as well be the true one.
 const ALIAS: f64 = 0.8;
 
 /// The best saw-tooth: every step on a grid that is even in frequency, then a fine scan about the best ones.
-fn best_tooth(levels: &[(f64, f64, f64)], departures: Departures) -> Best {
+fn best_tooth(levels: &[(f64, f64, f64)], departures: Departures) -> SawTooth {
     let span = levels.last().map_or(1.0, |l| l.0) - levels.first().map_or(0.0, |l| l.0);
     let df = 0.15 / span.max(10.0);
     let (low, high) = (1.0 / LONGEST, 1.0 / SHORTEST);
@@ -232,7 +219,7 @@ fn best_tooth(levels: &[(f64, f64, f64)], departures: Departures) -> Best {
     let alike = peaks.iter().filter(|p| p.score > ALIAS * best.score).map(|p| p.step);
     let others = alike.fold((step, step), |(low, high), s| (low.min(s), high.max(s)));
     let (short, score) = departures.best(step, offset);
-    Best { step, offset, anchored: is_anchored, short, score, others }
+    SawTooth { step, offset, anchored: is_anchored, short, score, others }
 }
 
 /// Offsets of a plain counter: cut off or rounded, counted from 1000 us or from 0.
@@ -386,7 +373,7 @@ mod tests {
             .map(|k| 1100.0 + 6.0 * f64::from(k))
             .map(|p: f64| (p, 5.0, 5.0 * (13.0 * ((p - 1000.0) / 13.0).floor() - (p - 1000.0) + 6.0)))
             .collect();
-        let Best { step, offset, anchored, others, .. } = best_tooth(&levels, Departures::new(&levels));
+        let SawTooth { step, offset, anchored, others, .. } = best_tooth(&levels, Departures::new(&levels));
         assert!(anchored && (step - 13.0).abs() < 1e-9 && offset == -0.5, "{step} {offset} {anchored}");
         assert!(others.0 > 12.8 && others.1 < 13.2, "{others:?}");
     }
@@ -397,7 +384,7 @@ mod tests {
         let cut = |p: f64| 12.56 * ((p - 1000.0) / 12.56).floor() - (p - 1000.0);
         let levels: Vec<(f64, f64, f64)> =
             (0..16).map(|k| 1100.0 + 50.0 * f64::from(k)).map(|p| (p, 5.0, 5.0 * cut(p))).collect();
-        let Best { step, short, score, .. } = best_tooth(&levels, Departures::whole(&levels));
+        let SawTooth { step, short, score, .. } = best_tooth(&levels, Departures::whole(&levels));
         let all: f64 = levels.iter().map(|l| l.2 * l.2).sum();
         assert!((step - 12.56).abs() < 0.02 && short == CUT && score > 0.99 * all, "{step} {short} {score} of {all}");
         let swallowed = best_tooth(&levels, Departures::new(&levels));

@@ -5,6 +5,7 @@
 //! Units: each coefficient in the channel's unit; the variable is scaled to -1..1 over its fitted range, which is in its own unit.
 //! Reference: discrepancy modelling, Ebers et al. 2022 (arXiv 2203.05164).
 
+use crate::verdict::words::plain::{MOST_TERMS, parts};
 use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
 use crate::channel::{Context, unit_of};
 use crate::effects::design::TargetDesign;
@@ -13,7 +14,7 @@ use crate::effects::design::TargetDesign;
 pub(crate) struct Unknown;
 
 /// Names of the polynomial's coefficients: Legendre polynomials of order 1 to 6.
-const TERMS: [Amplitude; 6] = [
+const TERMS: [Amplitude; MOST_TERMS] = [
     Amplitude { name: "p1", unit: "channel" },
     Amplitude { name: "p2", unit: "channel" },
     Amplitude { name: "p3", unit: "channel" },
@@ -21,22 +22,6 @@ const TERMS: [Amplitude; 6] = [
     Amplitude { name: "p5", unit: "channel" },
     Amplitude { name: "p6", unit: "channel" },
 ];
-
-/// The form of a correction: so many terms of a polynomial in a variable.
-pub(crate) fn form(variable: &str, terms: usize) -> String {
-    format!("{variable}{SEPARATOR}{terms}")
-}
-
-const SEPARATOR: &str = ", terms ";
-
-/// Variable and number of terms of a form. An empty one is no correction; a variable alone has all terms.
-pub(crate) fn parts(form: &str) -> (&str, usize) {
-    match form.rsplit_once(SEPARATOR) {
-        Some((variable, terms)) => (variable, terms.parse().unwrap_or(0)),
-        None if form.is_empty() => (form, 0),
-        None => (form, TERMS.len()),
-    }
-}
 
 /// What a verdict says of a correction.
 pub(crate) struct Words {

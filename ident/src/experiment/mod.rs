@@ -11,7 +11,8 @@ pub(crate) mod weather;
 
 use crate::channel::Context;
 use crate::attribution::diagnose::Diagnosis;
-use crate::fit::{Declared, Fit};
+use crate::model::Declared;
+use crate::fit::Fit;
 use crate::log::{Column, Log, SPEED};
 use crate::model::{AddedEffect, Model};
 use crate::attribution::rivals::beyond;
@@ -233,7 +234,7 @@ mod tests {
             let effect = *crate::effects::library().iter().find(|e| e.id() == id).expect("in the library");
             let instance = effect.instances(&closed.context).into_iter().find(|i| i.touches("thrust_n")).expect("offered");
             let shapes = effect.shapes(&closed.context, &instance);
-            vec![crate::fit::Placed { effect, instance, shape: shapes.iter().map(|s| s.starts[0]).collect() }]
+            vec![crate::effects::placed::Placed { effect, instance, shape: shapes.iter().map(|s| s.starts[0]).collect() }]
         };
         let fitted = |id: &str| {
             crate::fit::fit(&closed.context, declared, &placed(id), None, crate::fit::Rows::All).expect("a fit")

@@ -10,68 +10,19 @@ pub mod heldout;
 pub(crate) mod remembered;
 pub(crate) mod samples;
 pub mod search;
+mod written;
 
 use crate::signal::colour::effective_share;
 use crate::channel::{Context, Relation, Target};
 use crate::effects::design::{Label, TargetDesign, covariance};
-use crate::effects::{BEFORE, Effect, EffectEntry, Estimate, Instance, Stage};
-use crate::model::Model;
+use crate::effects::Estimate;
+use crate::effects::placed::Placed;
+use crate::model::Declared;
 use crate::fit::samples::{Samples, Taught};
 use crate::numeric::solve::Solution;
 use crate::effects::steps::Steps;
 use nalgebra::DMatrix;
 use std::sync::Arc;
-
-/// An effect placed in a hypothesis.
-#[derive(Clone)]
-pub struct Placed {
-    /// The effect.
-    pub effect: &'static dyn Effect,
-    /// Which channels, which form.
-    pub instance: Instance,
-    /// Values of its shape parameters.
-    pub shape: Vec<f64>,
-}
-
-impl Placed {
-    /// Whether an entry of a verdict tells of it.
-    pub(crate) fn is_told_by(&self, e: &EffectEntry) -> bool {
-        self.effect.id() == e.id && e.channels.iter().all(|c| self.instance.touches(c))
-    }
-
-    /// Whether it is the same effect, in the same form on the same channels, whatever its shapes.
-    pub(crate) fn is_like(&self, other: &Self) -> bool {
-        self.effect.id() == other.effect.id() && self.instance == other.instance
-    }
-
-    /// What is known of its shapes before any run, nats.
-    pub(crate) fn prior(&self) -> f64 {
-        self.effect.prior(&self.instance, &self.shape)
-    }
-
-    /// Where it acts in the causal chain.
-    pub(crate) fn stage(&self) -> Stage {
-        self.effect.stage_of(&self.instance)
-    }
-
-    /// Whether it is a zero that is older than the run: a load cell is tared anew before every run.
-    pub(crate) fn is_tare(&self) -> bool {
-        self.effect.id() == "tare_shift" && self.instance.form == BEFORE
-    }
-}
-
-impl std::fmt::Debug for Placed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {:?} {} {:?}", self.effect.id(), self.instance.channels, self.instance.form, self.shape)
-    }
-}
-
-/// What the effects are added to.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Declared<'a> {
-    /// A model that stands as it is; `None` is the thesis baseline, refitted.
-    pub model: Option<&'a Model>,
-}
 
 /// Fit of one target.
 #[derive(Debug, Clone)]

@@ -6,23 +6,12 @@
 //! Units: none.
 //! Reference: memoisation, Michie 1968, Nature 218:19.
 
-use crate::channel::Context;
-use crate::effects::Instance;
-use crate::fit::{Declared, Placed, Rows};
-use std::collections::HashMap;
+use crate::channel::{Context, Question};
+use crate::model::Declared;
+use crate::effects::placed::Placed;
+use crate::fit::Rows;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
-use std::sync::{Mutex, PoisonError};
-
-/// All that a refinement depends on beside the log itself.
-#[derive(Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Question {
-    group: Vec<(&'static str, Instance, Vec<u64>)>,
-    /// Digest of the rows that may teach, of the readings, their variances and the declared model.
-    ground: u64,
-    scattering: bool,
-    evaluations: usize,
-}
 
 impl Question {
     /// What the refinement of the effects at the positions of `group` asks, the channels that they move named.
@@ -35,7 +24,7 @@ impl Question {
         evaluations: usize,
     ) -> Self {
         let bits = |p: &Placed| p.shape.iter().map(|v| v.to_bits()).collect();
-        let group = group.iter().map(|k| &placed[*k]).map(|p| (p.effect.id(), p.instance.clone(), bits(p))).collect();
+        let group = group.iter().map(|k| &placed[*k]).map(|p| (p.effect.id(), p.instance.channels.clone(), p.instance.form.clone(), bits(p))).collect();
         let mut digest = DefaultHasher::new();
         match rows {
             Rows::All => 1.hash(&mut digest),
@@ -49,30 +38,6 @@ impl Question {
             format!("{:?} {:?}", model.polynomials, model.effects).hash(&mut digest);
         }
         Self { group, ground: digest.finish(), scattering: placed.iter().any(|p| p.effect.scatters()), evaluations }
-    }
-}
-
-/// Refined shapes of the effects of a group, by what was asked.
-#[derive(Debug, Default)]
-pub(crate) struct Remembered(Mutex<HashMap<Question, Vec<Vec<f64>>>>);
-
-impl Clone for Remembered {
-    /// A log's copy is there to be changed: it remembers nothing.
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
-impl Remembered {
-    /// What was found, or what is found now.
-    pub(crate) fn or_found(&self, question: Question, find: impl FnOnce() -> Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(shapes) = known().get(&question) {
-            return shapes.clone();
-        }
-        let shapes = find();
-        known().insert(question, shapes.clone());
-        shapes
     }
 }
 

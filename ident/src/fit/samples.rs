@@ -7,8 +7,11 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use crate::channel::{Context, Relation, Target};
-use crate::effects::design::{TargetDesign, Values};
-use crate::fit::{Declared, Designs, Likelihood, Placed, Rows};
+use crate::effects::design::TargetDesign;
+use crate::channel::powers::Values;
+use crate::model::Declared;
+use crate::fit::{Designs, Likelihood, Rows};
+use crate::effects::placed::Placed;
 use crate::numeric::solve::{Normal, Solution, dot};
 use crate::effects::steps::Steps;
 use std::borrow::Cow;
@@ -357,7 +360,8 @@ fn log_product(values: &[f64]) -> f64 {
 mod tests {
     use crate::close::close;
     use crate::channel::Context;
-    use crate::fit::{Declared, Rows, fit};
+    use crate::model::Declared;
+    use crate::fit::{Rows, fit};
     use crate::log::{Column, Log};
 
     /// A rig on levels; three rows of the thrust are off by as much as is said.

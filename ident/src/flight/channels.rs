@@ -10,7 +10,7 @@ use super::record::{Axes, Record};
 use super::windows::Windows;
 use crate::attribution::columns::Channel;
 use crate::attribution::columns::channel::FEWEST;
-use crate::signal::noise::quantum;
+use crate::numeric::order::quantum;
 use crate::verdict::words::digits;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 

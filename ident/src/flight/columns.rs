@@ -11,7 +11,7 @@ use super::scene::{FORCE, GYRO, SPEED, Scene, delayed, followed};
 use super::vibration::Shaking;
 use super::windows::Windows;
 use crate::attribution::columns::{Column, Owner, Prior, Values};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

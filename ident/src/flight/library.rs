@@ -13,7 +13,7 @@ use super::nameless::Nameless;
 use super::predict::placed;
 use super::scene::Scene;
 use crate::attribution::columns::{Candidate, Column, Design, Library, Owner, Placed, Prior, UNKNOWN};
-use crate::effects::Scope;
+use crate::verdict::Scope;
 use crate::flight::effects::{AirframeEffect, FOLLOWED, Form, library};
 use std::cell::OnceCell;
 use std::collections::BTreeMap;

@@ -11,7 +11,7 @@ use super::channels::Target;
 use super::vehicle::Vehicle;
 use crate::log::flight_log::rotors;
 use crate::log::Log;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::signal::start::{TURNS, start_pulse};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;

@@ -8,7 +8,7 @@
 use super::columns::Usual;
 use super::library::Kind;
 use crate::attribution::columns::{Candidate, Channel, Kept, UNKNOWN};
-use crate::effects::Scope;
+use crate::verdict::Scope;
 use crate::flight::effects;
 use crate::verdict::{EffectEntry, Kin, NextExperiment, ScheduleStep, Unexplained};
 use crate::verdict::words::{plain, worth};

@@ -10,7 +10,7 @@ use super::columns::{Column, Of, columns};
 use super::curve::{Curve, SAMPLES, usable};
 use super::measure::{Measure, Scale, Value};
 use crate::channel::{Context, Relation, Target, unit_of};
-use crate::signal::noise::quantum;
+use crate::numeric::order::quantum;
 use crate::numeric::solve::Normal;
 use crate::verdict::words;
 

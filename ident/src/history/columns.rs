@@ -9,7 +9,7 @@
 use super::curve::Curve;
 use crate::channel::Context;
 use crate::effects::operator::{Course, Lag};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// What a column is of.
 #[derive(Debug, Clone, Copy, PartialEq)]

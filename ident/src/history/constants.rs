@@ -13,7 +13,7 @@ use super::measure::{Measure, Scale, Value};
 use crate::channel::{Context, STANDSTILL};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
-use crate::signal::noise::{median, quantum};
+use crate::numeric::order::{median, quantum};
 use crate::numeric::parallel::in_parallel;
 use crate::numeric::solve::Normal;
 use crate::verdict::words;

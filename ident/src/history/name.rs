@@ -17,7 +17,7 @@ use crate::attribution::diagnose::RIVAL;
 use crate::effects::{self, Effect, Shape};
 use crate::log::Log;
 use crate::model::Model;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::numeric::parallel::in_parallel;
 use crate::verdict::{EffectEntry, Parameter};
 use crate::verdict::words::lower;

@@ -7,7 +7,6 @@
 
 pub mod curves;
 
-use crate::close::CloseError;
 use crate::channel::{Context, unit_of};
 use crate::identify::curves::power::{Disc, Level, levels};
 use crate::identify::curves::surface::{Surface, surface};
@@ -15,6 +14,20 @@ use crate::identify::curves::{Estimate, Fitted, Law, Spin, Zero, declared, motor
 use crate::log::Log;
 use crate::model::{FittedTo, Model};
 use crate::plateau::{Plateau, detect};
+
+/// Why the loop cannot be closed on a log.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CloseError {
+    /// Nothing can be predicted from anything.
+    #[error(
+        "{run}: no channel can be fitted; expected at least two related channels (pulse, rpm, thrust, torque, current, voltage) with more than 8 common samples"
+    )]
+    NoRelation {
+        /// The log.
+        run: String,
+    },
+}
 
 /// Quality of one fit.
 #[derive(Debug, Clone, PartialEq)]

@@ -262,7 +262,7 @@ impl Sensor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::Scope;
+    use crate::verdict::Scope;
     use crate::verdict::Kin;
 
     #[test]

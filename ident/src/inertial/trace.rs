@@ -11,7 +11,7 @@ use super::model::{Added, Part};
 use super::search::{Cause, Found, Outcome, Scene, descending, parameters, predict, search, spoils};
 use super::shown::Shown;
 use super::unknown::correct;
-use crate::effects::Scope;
+use crate::verdict::Scope;
 use crate::attribution::unexplained::LOUD;
 use crate::verdict::{Alternative, EffectEntry, Kin, Kind};
 use crate::verdict::words::{channel, digits, list};

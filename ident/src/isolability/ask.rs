@@ -14,7 +14,9 @@ use crate::attribution::beside::ask;
 use crate::channel::{Context, Facts};
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, choose, offers, round_of};
 use crate::fit::heldout;
-use crate::fit::{Declared, Fit, Placed, Rows, fit, is_plausible, part_of};
+use crate::model::Declared;
+use crate::fit::{Fit, Rows, fit, is_plausible, part_of};
+use crate::effects::placed::Placed;
 use crate::attribution::together::Ground;
 
 /// A log's schedule, sensors and noise.

@@ -9,7 +9,7 @@ use super::climb::Climbed;
 use super::{Apart, Cause};
 use crate::channel::Context;
 use crate::experiment::{between, model_of};
-use crate::fit::Declared;
+use crate::model::Declared;
 use crate::verdict::NextExperiment;
 
 /// Causes that stay alike on this schedule.

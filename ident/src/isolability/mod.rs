@@ -20,11 +20,13 @@ pub use group::Group;
 pub use words::{Standing, short};
 
 use crate::attribution::columns::candidates::LEAST_ANGLE;
-use crate::close::{CloseError, Closed, close};
+use crate::identify::CloseError;
+use crate::close::{Closed, close};
 use crate::attribution::diagnose::offers;
 use crate::effects::library;
 use crate::fit::heldout;
-use crate::fit::{Declared, Placed};
+use crate::model::Declared;
+use crate::effects::placed::Placed;
 use crate::log::Log;
 use crate::attribution::long::{kept, thinned};
 use ask::{Question, Rig, is_one_cause};

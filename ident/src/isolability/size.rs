@@ -12,7 +12,9 @@ use crate::channel::Context;
 use crate::effects::design::{Label, TargetDesign};
 use crate::attribution::diagnose::span;
 use crate::effects::{Effect, Instance};
-use crate::fit::{Declared, Fit, Placed, design, plain};
+use crate::model::Declared;
+use crate::fit::{Fit, design, plain};
+use crate::effects::placed::Placed;
 use crate::numeric::solve::Normal;
 
 /// What a cause makes of one channel.

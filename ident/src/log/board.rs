@@ -11,6 +11,19 @@ use crate::log::join::is_second_reading;
 use crate::log::{Log, MODELLED};
 use std::fmt;
 
+/// Speed channels and the columns in which their board tells how far their two marks stand off their opposite places.
+pub(crate) const UNEVEN: [(&str, &str); 4] = [
+    ("rpm_beam", "uneven_beam_deg"),
+    ("rpm_opto", "uneven_opto_deg"),
+    ("rpm_hall", "uneven_hall_deg"),
+    ("rpm_encoder", "uneven_encoder_deg"),
+];
+
+/// Whether a column tells of marks: it explains no residual.
+pub(crate) fn is_of_marks(column: &str) -> bool {
+    UNEVEN.iter().any(|(_, name)| *name == column)
+}
+
 /// End of the name of a column of flags.
 const FLAG: &str = "_flag";
 /// Beginning of the name of a column of raw codes.

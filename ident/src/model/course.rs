@@ -10,10 +10,8 @@
 //! Nemirovski 1997, Mathematical Methods of Statistics 6:135; specification `closing-the-loop.md`, step 1.
 
 use crate::channel::{Context, Relation, Target};
-use crate::fit::heldout;
-use crate::fit::{Declared, Fit};
 use crate::model::leftover;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// How long the commands must have been the same for a row to have a counterpart, s.
 const HISTORY: f64 = 5.0;
@@ -39,7 +37,7 @@ pub struct Course {
 pub(crate) const COURSE_KEYS: [&str; 3] = ["changed_s", "pulse_us", "t_s"];
 
 /// The course of a run under a fit; `None` where nothing is commanded or nothing moves.
-pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Option<Course> {
+pub(crate) fn of(context: &Context, residuals: &[Vec<f64>]) -> Option<Course> {
     let pulse = context.pulse.as_ref()?;
     let classes = leftover::classes(context);
     let rows: Vec<usize> = (0..context.len()).filter(|row| leftover::on_its_way(classes[*row])).collect();
@@ -55,9 +53,8 @@ pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Option
     if commands.len() > MOST {
         return None;
     }
-    let residuals = heldout::residuals(context, declared, fit);
     // sensors differ from each other by where each of them looks: that is another thing every day
-    let repeats = context.targets.iter().zip(&residuals).filter(|(target, _)| target.relation != Relation::SpeedDifference);
+    let repeats = context.targets.iter().zip(residuals).filter(|(target, _)| target.relation != Relation::SpeedDifference);
     let errors = repeats.map(|(target, residual)| {
         let mut all = vec![f64::NAN; context.len()];
         for (row, r) in target.rows.iter().zip(residual).filter(|(row, _)| target.claims(**row)) {

@@ -6,8 +6,9 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Powerplant model".
 
+use crate::numeric::digits;
 use super::read::{Refusal, course, leftover, no_channel, only, place_of, refusal, table_of, within};
-use super::{Model, ModelError, digits, leftover_keys};
+use super::{Model, ModelError, leftover_keys};
 use crate::model::course::Course;
 use crate::model::leftover::Leftover;
 use crate::log::digest_of;

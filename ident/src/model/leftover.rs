@@ -10,8 +10,6 @@
 //! Reference: model discrepancy, Kennedy & O'Hagan 2001, JRSS B 63:425; specification `closing-the-loop.md`, step 1.
 
 use crate::channel::{Context, Target};
-use crate::fit::heldout;
-use crate::fit::{Declared, Fit};
 
 /// Times since the load last jumped that part the classes of a scatter, s.
 pub const AGES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
@@ -146,8 +144,8 @@ pub(crate) fn classes(context: &Context) -> Vec<usize> {
 }
 
 /// Of each target of the run, what a fit leaves over.
-pub(crate) fn of(context: &Context, declared: Declared<'_>, fit: &Fit) -> Vec<Leftover> {
-    let (residuals, classes) = (heldout::residuals(context, declared, fit), classes(context));
+pub(crate) fn of(context: &Context, residuals: &[Vec<f64>]) -> Vec<Leftover> {
+    let classes = classes(context);
     let of_target = |(residual, target): (&Vec<f64>, &Target)| {
         let load = context.regressor(target.relation).unwrap_or_default();
         let rows = target.rows.iter().zip(residual).filter(|(row, _)| target.claims(**row));

@@ -5,29 +5,30 @@
 //! Units: in the key of each number; polynomials in krpm (rev/min / 1000) or kus ((pulse - 1000 us) / 1000).
 //! Reference: specification `formats.md`, "Powerplant model".
 
+mod against;
 pub mod course;
 pub mod leftover;
 pub mod simulate;
 
+use crate::numeric::digits;
+use crate::model::course::Course;
+use crate::model::leftover::Leftover;
 use crate::log::board;
 use crate::channel::{Context, Relation, Target, unit_of};
-use crate::model::course::Course;
 use crate::effects::design::{Label, TargetDesign, Told};
-use crate::effects::alternating_period::TOLD_BY_THE_BOARD;
+use crate::verdict::TOLD_BY_THE_BOARD;
 use crate::effects::{self, Estimate, Stage, air_density};
-use crate::fit::{Declared, Fit, Placed};
-use crate::model::leftover::Leftover;
+use crate::effects::placed::Placed;
 use crate::log::Log;
 use crate::effects::steps::Steps;
 use toml::{Table, Value};
 
-pub(crate) mod digits;
 mod discrepancy;
 mod place;
 mod reach;
 mod read;
 mod run;
-mod scope;
+pub(crate) mod scope;
 mod supply;
 
 pub use discrepancy::beside;
@@ -37,6 +38,10 @@ pub use scope::{FittedTo, RunLevel};
 
 /// First key of the format.
 pub const FORMAT: &str = "quadrig-model 1";
+/// First key of the model of a flying vehicle.
+pub const OF_FLIGHT: &str = "quadrig-flight-model 1";
+/// First key of the model of an inertial unit.
+pub const OF_INERTIAL: &str = "quadrig-inertial 1";
 
 /// Declared polynomial of one channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,6 +104,13 @@ pub struct Model {
     pub course: Option<Course>,
     /// SHA-256 of the file that holds these two ([`beside`]), as the model's own file states it.
     pub beside: Option<String>,
+}
+
+/// What the effects are added to.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Declared<'a> {
+    /// A model that stands as it is; `None` is the thesis baseline, refitted.
+    pub model: Option<&'a Model>,
 }
 
 /// Why a model was refused.
@@ -215,65 +227,6 @@ impl Model {
             polynomials,
             ..Self::default()
         }
-    }
-
-    /// The model that a fitted hypothesis amounts to.
-    #[must_use]
-    pub fn from_fit(context: &Context, log: &Log, declared: Declared<'_>, fit: &Fit) -> Self {
-        let estimates = (0..fit.placed.len()).map(|k| fit.profiled_estimates(context, declared, k)).collect();
-        Self::of_estimates(context, log, declared, fit, estimates)
-    }
-
-    /// The same with the parameters of each effect and their errors known.
-    pub(crate) fn of_estimates(
-        context: &Context,
-        log: &Log,
-        declared: Declared<'_>,
-        fit: &Fit,
-        estimates: Vec<Vec<Estimate>>,
-    ) -> Self {
-        let mut model = match declared.model {
-            Some(m) => m.clone(),
-            None => Self::of(context, log, Vec::new()),
-        };
-        if declared.model.is_none() {
-            for (target, t) in context.targets.iter().zip(&fit.targets) {
-                let base = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
-                    t.labels.iter().enumerate().filter(|(_, l)| matches!(l, Label::Base(_))).map(|(j, _)| f(j)).collect()
-                };
-                model.polynomials.push(Polynomial {
-                    channel: target.name.to_owned(),
-                    coefficients: base(&|j| t.coefficients[j]),
-                    errors: base(&|j| t.covariance[(j, j)].max(0.0).sqrt()),
-                });
-            }
-        }
-        for (position, (placed, estimates)) in fit.placed.iter().zip(estimates).enumerate() {
-            let count = placed.effect.amplitudes(&placed.instance).len();
-            let mut amplitudes = Vec::new();
-            for (target, t) in context.targets.iter().zip(&fit.targets) {
-                if placed.instance.touches(target.name) {
-                    let mut values = vec![0.0; count];
-                    for (l, c) in t.labels.iter().zip(&t.coefficients) {
-                        if let Label::Effect { effect, amplitude } = l
-                            && *effect == position
-                        {
-                            values[*amplitude] = *c;
-                        }
-                    }
-                    amplitudes.push((target.name.to_owned(), values));
-                }
-            }
-            let mean = scope::mean(context, declared, fit, position);
-            // what does not act on another run goes nowhere beyond
-            let acting =
-                context.targets.iter().zip(&fit.targets).filter(|(t, _)| mean.is_empty() && placed.instance.touches(t.name));
-            let reach = acting.map(|(target, t)| Reach::fitted(target.name, &t.labels, &t.covariance, position, count)).collect();
-            let shape_errors = shape_errors(&estimates, placed);
-            model.effects.push(AddedEffect { placed: placed.clone(), amplitudes, estimates, mean, reach, shape_errors });
-        }
-        model.saw(context, model.effects.len() - fit.placed.len());
-        model
     }
 
     /// The model, with the air of its own run and what it leaves over of each target of it. A declared model keeps the air of the day that

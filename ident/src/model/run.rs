@@ -6,8 +6,9 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Scope".
 
+use crate::numeric::digits;
 use super::read::{Refusal, finite, no_channel, only, refusal, within};
-use super::{AddedEffect, FittedTo, RunLevel, coefficient_key, digits};
+use super::{AddedEffect, FittedTo, RunLevel, coefficient_key};
 use crate::channel::Relation;
 use toml::{Table, Value};
 

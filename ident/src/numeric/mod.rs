@@ -5,5 +5,8 @@
 //! Units: none.
 //! Reference: in each.
 
+pub mod digits;
+pub mod order;
 pub(crate) mod parallel;
+pub mod simplex;
 pub mod solve;

@@ -11,12 +11,12 @@ pub mod shift;
 mod change;
 mod mean;
 pub mod score;
-pub(crate) mod settle;
 pub mod study;
 
+use crate::signal::settle;
 use crate::channel::Context;
 use crate::log::{Log, SPEED};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use mean::{Colour, Residual, mean_of, residual};
 
 /// Fewest settled rows of a plateau.

@@ -7,7 +7,7 @@
 //! Units: Filter 1 and the threshold in the channel's unit per sample; the offset in samples.
 //! Reference: Beharie 2013, Eq. 5.60 to 5.62 (5.61 with the absolute difference, errata) and section 5.7.4.
 
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// Which Filter 5.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -11,7 +11,7 @@ use super::score::{Found, Score, Truth};
 use super::{detect, means_over};
 use crate::channel::Context;
 use crate::log::Log;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::plateau::shift::{self, Form, Settings, filters};
 
 /// Shortest held command that counts as a level, rows.

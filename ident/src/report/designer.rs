@@ -7,7 +7,7 @@
 //! Reference: `fit::power`, `fit::surface`.
 
 use super::figure::{Figure, Layer, Mark};
-use super::number;
+use crate::numeric::digits::number;
 use super::sheet::Sheet;
 use crate::identify::curves::power::{ASKED, Level, in_doubt};
 use crate::identify::curves::surface::Surface;

@@ -178,7 +178,7 @@ fn residual(closed: &Closed, channel: usize) -> Figure {
     let (c, t) = (&closed.flight.channels.channels[channel], &closed.flight.windows.t);
     let [before, after] = &closed.predicted[channel];
     // gaps lift the pen
-    let gap = 5.0 * crate::attribution::columns::noise::usual_step(t);
+    let gap = 5.0 * crate::numeric::order::usual_step(t);
     let line = |name: &str, class, predicted: &[f64]| {
         let (mut x, mut y) = (Vec::new(), Vec::new());
         for i in 0..t.len() {

@@ -15,7 +15,8 @@ use crate::attribution::columns::evidence::White;
 use crate::attribution::columns::fit::difference;
 use crate::attribution::columns::{Column, Fit, Library, Noise, Owner, Placed, Prior, Problem, fit};
 use crate::flight::effects::{AirframeEffect, library};
-use crate::report::{Figure, Layer, number};
+use crate::report::{Figure, Layer};
+use crate::numeric::digits::number;
 use crate::verdict::words::plain;
 use std::fmt::Write;
 

@@ -12,6 +12,24 @@ use crate::log::Log;
 use crate::report::{Figure, Layer, Mark, Sheet};
 use crate::verdict::words::{channel, heading};
 
+impl Joint {
+    /// The joint in one line.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let by: Vec<String> = self.seen.iter().map(|s| channel(s.channel)).collect();
+        format!(
+            "offset {:.4} s +- {:.1} ms at {:.1} s of its clock, drift {:.1} +- {:.1} ppm (95 %), by {} over {:.0} s",
+            self.offset_s.0,
+            1e3 * self.offset_s.1,
+            self.pivot_s,
+            self.drift_ppm.0,
+            self.drift_ppm.1,
+            by.join(", "),
+            self.overlap_s.1 - self.overlap_s.0
+        )
+    }
+}
+
 /// The page of a run's joints: the stand's log before it was joined, and each other log with its joint.
 #[must_use]
 pub fn page(stand: &Log, joined: &[(&Log, &Joint)]) -> String {

@@ -39,24 +39,3 @@ pub use selection::selection;
 pub use several::several;
 pub use sheet::{Sheet, write_figures};
 pub use shift::{filter_figures, study_figures};
-
-/// A number with five significant digits, as tables print it.
-#[must_use]
-pub fn number(v: f64) -> String {
-    if v == 0.0 {
-        return "0".to_owned();
-    }
-    if v.abs() < 1e-3 || v.abs() >= 1e5 { format!("{v:.4e}") } else { format!("{v:.5}") }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::number;
-
-    #[test]
-    fn small_numbers_keep_their_digits() {
-        assert_eq!(number(6.3e-5), "6.3000e-5");
-        assert_eq!(number(0.0), "0");
-        assert_eq!(number(1.5), "1.50000");
-    }
-}

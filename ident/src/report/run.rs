@@ -16,7 +16,7 @@ use crate::identify::curves::power::Level;
 use crate::identify::curves::{Fitted, Law, ratio};
 use crate::identify::Identified;
 use crate::log::{Gaps, Log, SPEED};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::plateau::Plateau;
 use crate::plateau::shift::{Settings, filters};
 use crate::verdict::words::{self, axis, channel, heading, upper};

@@ -7,7 +7,7 @@
 
 use super::closed::{LOOK, SCRIPT};
 use super::figure::Figure;
-use super::number;
+use crate::numeric::digits::number;
 use super::style::{COLOURS, DRAWING, PAGE};
 use super::svg::escape;
 use crate::log::write_whole;

@@ -6,7 +6,8 @@
 //! Reference: specification `closing-the-loop.md`.
 
 use super::Run;
-use crate::close::{CloseError, close};
+use crate::identify::CloseError;
+use crate::close::close;
 use crate::log::Log;
 use crate::numeric::parallel::in_parallel;
 use std::sync::Mutex;

@@ -11,8 +11,9 @@ use super::{FEWEST, Member};
 use crate::close::Closed;
 use crate::channel::Context;
 use crate::attribution::diagnose::NEEDED_REDUCTION;
-use crate::effects::{self, Amplitude, Estimate, NEEDED_EVIDENCE, Scope};
-use crate::fit::Placed;
+use crate::effects::{self, Amplitude, Estimate, NEEDED_EVIDENCE};
+use crate::verdict::Scope;
+use crate::effects::placed::Placed;
 use crate::attribution::unexplained::LOUD;
 
 /// Samples of a channel of one run that the shapes are sought on.

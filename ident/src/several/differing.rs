@@ -7,10 +7,11 @@
 //! Reference: random effects against fixed ones, Laird & Ware 1982, Biometrics 38:963; specification `formats.md`, "Scope".
 
 use super::FEWEST;
-use crate::attribution::beside::is_named;
+use crate::effects::placed::is_named;
 use crate::close::Closed;
-use crate::effects::{Estimate, Scope};
-use crate::fit::Placed;
+use crate::effects::Estimate;
+use crate::verdict::Scope;
+use crate::effects::placed::Placed;
 use crate::attribution::unexplained::LOUD;
 
 /// Share of its own size by which a run's may be off from the others' before theirs is nearer to none than to its own.

@@ -10,8 +10,9 @@ use super::{FEWEST, Member, is_judged};
 use crate::channel::Relation;
 use crate::effects::design::{Label, covariance};
 use crate::effects::Shape;
-use crate::fit::Placed;
-use crate::fit::search::{connected, nelder_mead};
+use crate::effects::placed::Placed;
+use crate::fit::search::connected;
+use crate::numeric::simplex::nelder_mead;
 use crate::numeric::solve::Normal;
 use nalgebra::DMatrix;
 

@@ -22,8 +22,11 @@ mod words;
 
 use crate::close::Closed;
 use crate::channel::{Context, Relation, Target};
-use crate::effects::{Scope, Stage};
-use crate::fit::{Declared, Placed, Rows, design};
+use crate::verdict::Scope;
+use crate::effects::Stage;
+use crate::model::Declared;
+use crate::effects::placed::Placed;
+use crate::fit::{Rows, design};
 use crate::fit::samples::Samples;
 
 pub use runs::Run;

@@ -11,8 +11,11 @@ use super::equations::{centring, columns_of, of_run, own_columns, samples_less_f
 use super::joint::{Joint, Shared};
 use crate::channel::Target;
 use crate::effects::design::Label;
-use crate::effects::{NEEDED_EVIDENCE, Scope, library};
-use crate::fit::{Declared, Placed, Rows, design, fit, is_plausible};
+use crate::effects::{NEEDED_EVIDENCE, library};
+use crate::verdict::Scope;
+use crate::model::Declared;
+use crate::effects::placed::Placed;
+use crate::fit::{Rows, design, fit, is_plausible};
 use crate::model::{AddedEffect, RunLevel};
 use crate::numeric::parallel::in_parallel;
 use crate::fit::search::{base, refine_newest, scan};

@@ -13,7 +13,7 @@ use crate::close::{NO_COMMAND, validation};
 use crate::channel::{Context, Relation, is_contrast, unit_of};
 use crate::attribution::diagnose::RIVAL;
 use crate::effects::Estimate;
-use crate::fit::Placed;
+use crate::effects::placed::Placed;
 use crate::model::Model;
 use crate::signal::residual::whiteness;
 use crate::attribution::unexplained::looks_like;

@@ -7,9 +7,9 @@
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3; least absolute deviations, Huber & Ronchetti 2009, chapter 7.
 
 use crate::signal::bad::Curve;
-use crate::channel::{GAP, STILL_US, bridge, starts};
+use crate::signal::stretches::{GAP, STILL_US, bridge, starts};
 use crate::log::Log;
-use crate::signal::noise::{median, quantum};
+use crate::numeric::order::{median, quantum};
 use crate::signal::start::start_pulse;
 use std::ops::Range;
 

@@ -7,7 +7,10 @@
 
 pub mod bad;
 pub(crate) mod colour;
+pub mod consensus;
 pub(crate) mod drive;
 pub mod noise;
 pub mod residual;
+pub(crate) mod settle;
 pub(crate) mod start;
+pub mod stretches;

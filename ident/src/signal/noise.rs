@@ -6,6 +6,7 @@
 //! Units: the channel's.
 //! Reference: von Neumann 1941 (mean square successive difference); notes on method: never from the fit residual.
 
+use crate::numeric::order::{median, quantum};
 use crate::numeric::solve::Normal;
 
 /// Noise of one channel.
@@ -37,23 +38,6 @@ impl Noise {
     #[must_use]
     pub fn weight_variance(&self, rpm: f64, share: f64) -> f64 {
         (1.0 - share) * self.variance(rpm) + share * self.rms * self.rms
-    }
-}
-
-/// Median of a slice, which it reorders; NaN for an empty one.
-#[must_use]
-pub fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let n = values.len();
-    let (_, mid, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
-    let mid = *mid;
-    if n % 2 == 1 {
-        mid
-    } else {
-        let low = values[..n / 2].iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        0.5 * (low + mid)
     }
 }
 
@@ -156,19 +140,6 @@ fn resolution(rows: &[usize], reading: &[f64], stretches: Stretches<'_>) -> f64 
     }
     let finest = values.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 1e-12).fold(f64::INFINITY, f64::min);
     if values.len() <= 8 && finest.is_finite() { finest } else { quantum(reading) }
-}
-
-/// Smallest non-zero step between sorted distinct values: the resolution of the log.
-#[must_use]
-pub fn quantum(y: &[f64]) -> f64 {
-    let mut v: Vec<f64> = y.iter().copied().take(20_000).collect();
-    v.sort_unstable_by(f64::total_cmp);
-    let mut steps: Vec<f64> = v.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 1e-12).collect();
-    if steps.len() < 8 {
-        return 0.0;
-    }
-    steps.sort_unstable_by(f64::total_cmp);
-    steps[steps.len() / 20]
 }
 
 /// Products of second differences at lags 0 and 1: they tell the colour of the noise and are blind to whatever varies slowly,

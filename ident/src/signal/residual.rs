@@ -35,7 +35,7 @@ pub fn whiteness(t: &[f64], residual: &[f64]) -> f64 {
 /// half again as long as the median step (a missing sample), or shorter than half of it.
 fn even_stretches(t: &[f64]) -> Vec<(usize, usize)> {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    let usual = crate::signal::noise::median(&mut steps);
+    let usual = crate::numeric::order::median(&mut steps);
     let mut out = Vec::new();
     let mut from = 0;
     for i in 1..=t.len() {

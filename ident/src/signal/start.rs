@@ -6,7 +6,7 @@
 //! Units: us.
 //! Reference: specification `formats.md`, "Verdict" (declared baseline).
 
-use crate::channel::{CALM_US, FEWEST_OF_A_KIND};
+use crate::signal::stretches::{CALM_US, FEWEST_OF_A_KIND};
 
 /// Pulse at which every speed controller keeps its motor still, us.
 const IDLE_US: f64 = 1000.0;

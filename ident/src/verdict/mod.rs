@@ -8,12 +8,40 @@
 pub mod words;
 
 use crate::signal::bad::SetAside;
-use crate::effects::Scope;
 use crate::log::sparse::LeftOut;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::ops::Deref;
+
+/// What an effect belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scope {
+    /// The rig: it is there on every run.
+    Rig,
+    /// One run: another run has a value of its own.
+    Run,
+    /// One instant of one run: it does not recur.
+    Event,
+}
+
+impl Scope {
+    /// As files have it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Rig => "rig",
+            Self::Run => "run",
+            Self::Event => "event",
+        }
+    }
+}
+
+/// Form of an effect that no residual shows and the board's account of the pattern does: it changes no prediction.
+pub(crate) const TOLD_BY_THE_BOARD: &str = "told by the board, which times whole revolutions";
+/// Form of a limit that the meters of voltage and current show ([`crate::close::supply_limit`]): it changes no prediction.
+pub(crate) const OF_THE_SUPPLY: &str = "of the supply, read off its meters";
 
 /// First key of the format.
 pub const FORMAT: &str = "quadrig-verdict 2";

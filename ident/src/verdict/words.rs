@@ -6,9 +6,9 @@
 //! Reference: GUM, clause 7.2.6 (digits of a result).
 
 mod entry;
-mod plain;
+pub(crate) mod plain;
 
-use crate::effects::Scope;
+use crate::verdict::Scope;
 use crate::verdict::{EffectEntry, Parameter};
 pub use plain::{channels, curve, in_force, plain};
 
@@ -92,6 +92,22 @@ pub fn parameter(name: &str) -> String {
             Some((of, axis @ ("x" | "y" | "z"))) => format!("{} ({axis})", of.replace('_', " ")),
             _ => name.replace('_', " "),
         },
+    }
+}
+
+/// A parameter of an effect of the rig's library in words, by the effect's identifier and its own name; empty where no reader asks for it.
+#[must_use]
+pub fn parameter_of(id: &str, name: &str) -> String {
+    match (id, name) {
+        // a curve is seen in its figure
+        ("unknown", _) => String::new(),
+        // its sizes are added, with the sign that they have
+        ("stall", "thrust_loss") => "change of thrust".to_owned(),
+        ("stall", "torque_rise") => "change of torque".to_owned(),
+        ("stall", "current_rise") => "change of current".to_owned(),
+        ("stall", "current_rise_loss") => "change of current, beside that".to_owned(),
+        ("stall", "speed_loss") => "change of speed".to_owned(),
+        _ => parameter(name),
     }
 }
 

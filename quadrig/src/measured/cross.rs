@@ -10,7 +10,8 @@
 use super::Recorded;
 use ident::close::Closed;
 use ident::channel::{Context, Relation, Target};
-use ident::fit::{Declared, Rows, fit};
+use ident::model::Declared;
+use ident::fit::{Rows, fit};
 use ident::log::Log;
 use ident::model::Model;
 use ident::fit::search::refine;

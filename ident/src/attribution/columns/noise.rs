@@ -7,6 +7,7 @@
 //! Reference: Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63:425 (discrepancy); Sarkka & Solin, *Applied Stochastic Differential Equations*,
 //! 2019, section 12.3 (Gaussian processes as state-space models).
 
+use crate::numeric::order::usual_step;
 use super::channel::Channel;
 
 /// Longest memory of a wander, as a share of the log: within it the wander turns round some twenty times.
@@ -104,12 +105,6 @@ impl Profile {
         let likelihood = -0.5 * squares / (white * white) - n * white.ln() - whitener.log_scale();
         Self { wander, memory_s, white, likelihood }
     }
-}
-
-/// Usual distance of two readings, s.
-pub(crate) fn usual_step(t: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    if steps.is_empty() { 1.0 } else { crate::signal::noise::median(&mut steps) }
 }
 
 /// Makes readings white: what is new in each, over its standard deviation.

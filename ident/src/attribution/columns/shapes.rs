@@ -5,7 +5,7 @@
 //! Units: shapes in shares of their range, the function in nats.
 //! Reference: Nelder & Mead 1965, Computer Journal 7:308.
 
-use crate::fit::search::nelder_mead;
+use crate::numeric::simplex::nelder_mead;
 
 /// Evaluations for each shape.
 const EVALUATIONS: usize = 16;

@@ -8,7 +8,7 @@
 
 use super::orders::order_p;
 use super::{Content, Start, rms};
-use crate::report::number;
+use crate::numeric::digits::number;
 use crate::signal::residual::whiteness;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -63,7 +63,7 @@ pub(super) fn anything(start: &Start) -> Content {
 /// Two-sided p-value of the number of runs about the median.
 fn runs(r: &[f64]) -> f64 {
     let mut sorted = r.to_vec();
-    let middle = crate::signal::noise::median(&mut sorted);
+    let middle = crate::numeric::order::median(&mut sorted);
     let signs: Vec<bool> = r.iter().filter(|v| **v != middle).map(|v| *v > middle).collect();
     let (up, n) = (signs.iter().filter(|s| **s).count() as f64, signs.len() as f64);
     let down = n - up;

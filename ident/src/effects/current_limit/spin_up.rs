@@ -8,9 +8,10 @@
 //! Units: rev/min, A, s.
 //! Reference: energy balance of a rotor; Beharie 2013, Eq. 5.11 as corrected (the draw at a speed).
 
+use crate::channel::Draw;
 use super::super::{Shape, bearing_friction};
 use crate::channel::{Context, Relation};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::numeric::solve::Normal;
 
 /// Form of an instance against a declared model, which knows how the rotor speeds up without a limit.
@@ -28,15 +29,6 @@ const PARTS: usize = 4;
 const SLOW: f64 = 0.1;
 /// Faster than any propeller of the kind, krpm.
 const FASTEST: f64 = 100.0;
-
-/// Current that a speed draws where it is held, and what of it the winding takes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Draw {
-    /// Second and third power of krpm, A.
-    powers: [f64; 2],
-    /// Square of the speed at which the winding takes most, by the current, krpm^2/A.
-    lossy: f64,
-}
 
 impl Draw {
     /// As the run shows it where the rotor has arrived, and the highest speed there, krpm; `None` where it shows none.

@@ -8,7 +8,7 @@
 
 use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope};
 use crate::attribution::columns::Shape;
-use crate::attribution::columns::noise::usual_step;
+use crate::numeric::order::usual_step;
 use crate::flight::columns::Flight;
 use crate::flight::scene::Scene;
 use crate::verdict::Parameter;

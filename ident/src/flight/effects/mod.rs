@@ -28,7 +28,8 @@ mod translational_lift;
 mod vibration_rectification;
 mod wind;
 
-use crate::effects::{About, Clause, EffectEntry, Scope};
+use crate::effects::{About, Clause, EffectEntry};
+use crate::verdict::Scope;
 use crate::attribution::columns::Shape;
 use crate::flight::columns::{Flight, Sink};
 use crate::flight::scene::Scene;

@@ -7,7 +7,7 @@
 //! Reference: York 1966 (effective variance); Huber & Ronchetti 2009 (bisquare); Hurvich & Tsai 1989 (AICc).
 
 use super::Estimate;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::numeric::solve::Normal;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};

@@ -70,7 +70,8 @@ fn abscissa(context: &Context, relation: Relation, row: usize) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::{Declared, Rows, design, fit_target};
+    use crate::model::Declared;
+    use crate::fit::{Rows, design, fit_target};
     use crate::log::{Column, Log};
 
     /// In blocks as the engine fits whole columns, over more than one block, with a standing rotor and missing samples.

@@ -8,7 +8,7 @@
 
 use super::{Estimate, Law, Zero};
 use crate::log::Log;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::plateau::Plateau;
 use crate::numeric::solve::Normal;
 use statrs::distribution::{ContinuousCDF, StudentsT};

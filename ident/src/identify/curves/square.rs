@@ -9,7 +9,7 @@
 use super::power::{TOO_SMALL, Valued};
 use super::{Curve, Estimate, Law, Origin, Point, STRAY, Zero};
 use crate::log::Log;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::plateau::Plateau;
 use crate::numeric::solve::Normal;
 use statrs::distribution::{ContinuousCDF, Normal as Gauss, StudentsT};

@@ -7,7 +7,7 @@
 
 use super::Report;
 use crate::log::{Gaps, Log};
-use crate::signal::noise::{median, quantum};
+use crate::numeric::order::{median, quantum};
 
 /// A gap is longer than so many usual steps.
 const GAP: f64 = 5.0;

@@ -8,7 +8,7 @@
 use super::header::{ELECTRICAL, OPTICAL};
 use super::{Report, findings};
 use crate::log::{Column, Log, MODELLED, Place, ReadError, SPEED};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// More than this share of rows dropped is no repair any more.
 const DROPPED: f64 = 0.2;

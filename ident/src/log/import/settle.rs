@@ -10,7 +10,7 @@ use super::clock::{over_midnight, since_1970};
 use super::table::{Field, Reading};
 use crate::log::plausible::units_of;
 use crate::log::{Place, ReadError, trimmed};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// Settles every column.
 pub(super) fn settle(

@@ -8,7 +8,7 @@
 //! Reference: Huber & Ronchetti, "Robust Statistics", 2009; Cameron & Miller 2015 (errors by clusters).
 
 use super::signal::Pair;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// Widths of the smoother, in steps of the slower log, widest first.

@@ -9,7 +9,7 @@
 use super::Joint;
 use crate::log::import::Report;
 use crate::log::{Column, Log, SPEED};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// What a logger may be called: an ESC, a flight controller, a board of the rig, a second stand.
 pub const LABELS: [&str; 4] = ["esc", "fc", "board", "stand2"];

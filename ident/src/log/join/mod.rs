@@ -98,22 +98,6 @@ impl Joint {
     pub fn to_stand(&self, t: f64) -> f64 {
         t + self.offset_s.0 + 1e-6 * self.drift_ppm.0 * (t - self.pivot_s)
     }
-
-    /// The joint in one line.
-    #[must_use]
-    pub fn sentence(&self) -> String {
-        let by: Vec<String> = self.seen.iter().map(|s| crate::verdict::words::channel(s.channel)).collect();
-        format!(
-            "offset {:.4} s +- {:.1} ms at {:.1} s of its clock, drift {:.1} +- {:.1} ppm (95 %), by {} over {:.0} s",
-            self.offset_s.0,
-            1e3 * self.offset_s.1,
-            self.pivot_s,
-            self.drift_ppm.0,
-            self.drift_ppm.1,
-            by.join(", "),
-            self.overlap_s.1 - self.overlap_s.0
-        )
-    }
 }
 
 /// Finds the joint of a second log's clock to the stand's.

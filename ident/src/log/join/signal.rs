@@ -6,7 +6,7 @@
 //! Reference: local linear regression with a Gaussian kernel, Fan & Gijbels, "Local Polynomial Modelling", 1996.
 
 use crate::log::{Log, SPEED};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// A kernel reaches this many widths.
 const REACH: f64 = 3.0;

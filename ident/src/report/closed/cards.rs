@@ -416,17 +416,17 @@ fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
             v.runs.len()
         ));
     }
-    if !v.validation.is_empty() && e.scope == crate::effects::Scope::Rig {
+    if !v.validation.is_empty() && e.scope == crate::verdict::Scope::Rig {
         return Some(format!(
             "<a href=\"#on-other-runs-of-the-{noun}\">the other runs below</a>: what belongs to the {noun} is there again."
         ));
     }
     Some(match e.scope {
-        crate::effects::Scope::Rig => {
+        crate::verdict::Scope::Rig => {
             format!("another run of this {noun}: what belongs to the {noun} is there again (<code>--validate OTHER.csv</code>).")
         }
-        crate::effects::Scope::Run => "the same schedule once more: what belongs to this run is another size then.".to_owned(),
-        crate::effects::Scope::Event => "the same schedule once more: what happened once is not there again.".to_owned(),
+        crate::verdict::Scope::Run => "the same schedule once more: what belongs to this run is another size then.".to_owned(),
+        crate::verdict::Scope::Event => "the same schedule once more: what happened once is not there again.".to_owned(),
     })
 }
 

@@ -7,7 +7,7 @@
 
 use super::sentence::{order, whole};
 use super::vocabulary::Vocabulary;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use crate::report::figure::{Figure, Layer, Mark};
 use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
 use crate::verdict::words::{channel, heading, scaled};

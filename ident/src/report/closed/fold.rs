@@ -10,7 +10,7 @@ use super::page::Page;
 use super::state::figures;
 use crate::signal::bad::SetAside;
 use crate::attribution::diagnose::Diagnosis;
-use crate::report::number;
+use crate::numeric::digits::number;
 use crate::report::sheet::Sheet;
 use crate::verdict::{EffectEntry, Verdict};
 use crate::verdict::words::{channel, channels as spoken, probability};

@@ -13,7 +13,7 @@ use super::state::{factor, figures, is_as_before, named, word};
 use super::vocabulary::Vocabulary;
 use crate::signal::bad::SetAside;
 use crate::channel::unit_of;
-use crate::effects::Scope;
+use crate::verdict::Scope;
 use crate::verdict::{Alternative, Channel, EffectEntry, Verdict};
 use crate::verdict::words::{channel, list, plain, probability, signs, upper, upper_bound};
 

@@ -6,7 +6,7 @@
 //! Reference: Tukey 1977 (running medians).
 
 use super::excursion::LONGEST;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// Most bins: those of a staircase of 50 us and as many between.
 const BINS: usize = 48;

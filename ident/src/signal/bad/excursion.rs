@@ -9,7 +9,7 @@
 
 use super::scale::{BEFORE, Scale, before};
 use super::witness::{Case, Witnesses};
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 use std::collections::BTreeSet;
 use std::ops::Range;
 

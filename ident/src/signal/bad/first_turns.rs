@@ -8,7 +8,7 @@
 
 use super::excursion::Event;
 use super::witness::Witnesses;
-use crate::channel::CALM_US;
+use crate::signal::stretches::CALM_US;
 use std::collections::BTreeMap;
 
 /// Turns, times two for a speed that grows evenly from nothing, in s rev/min.

@@ -6,7 +6,7 @@
 //! Units: the channel's.
 //! Reference: Student's t with eight degrees of freedom for the good readings, any value of the channel's range alike for a bad one.
 
-use crate::signal::noise::{median, quantum};
+use crate::numeric::order::{median, quantum};
 use std::ops::Range;
 
 /// Readings before one that it is held against.

@@ -9,7 +9,7 @@
 use super::excursion::{Event, left_out, since, without_recurring};
 use super::scale::Scale;
 use super::witness::Witnesses;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// Readings on either side.
 const BESIDE: usize = 3;

@@ -8,9 +8,9 @@
 
 use super::excursion::Event;
 use super::{CHANNEL_OF_SUPPLY, FEWEST};
-use crate::channel::CALM_US;
+use crate::signal::stretches::CALM_US;
 use crate::log::Log;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// Share of the usual voltage below which there is no supply, and of the largest current below which none flows: controllers cut off at half of
 /// their supply, and a tenth of it runs none.

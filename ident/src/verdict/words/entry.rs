@@ -6,8 +6,8 @@
 //! Reference: GUM, clause 7.2.6 (digits of a result).
 
 use super::{POSITIVE, meter, sized};
-use crate::effects::OF_THE_SUPPLY;
-use crate::effects::alternating_period::TOLD_BY_THE_BOARD;
+use crate::verdict::OF_THE_SUPPLY;
+use crate::verdict::TOLD_BY_THE_BOARD;
 use crate::verdict::{EffectEntry, Parameter};
 
 impl EffectEntry {

@@ -6,8 +6,26 @@
 //! Reference: `words::channel`.
 
 use super::{channel, list};
-use crate::effects::unknown::parts;
 use crate::verdict::EffectEntry;
+
+/// Most terms of a correction without a name.
+pub(crate) const MOST_TERMS: usize = 6;
+
+const SEPARATOR: &str = ", terms ";
+
+/// The form of a correction: so many terms of a polynomial in a variable.
+pub(crate) fn form(variable: &str, terms: usize) -> String {
+    format!("{variable}{SEPARATOR}{terms}")
+}
+
+/// Variable and number of terms of a form. An empty one is no correction; a variable alone has all terms.
+pub(crate) fn parts(form: &str) -> (&str, usize) {
+    match form.rsplit_once(SEPARATOR) {
+        Some((variable, terms)) => (variable, terms.parse().unwrap_or(0)),
+        None if form.is_empty() => (form, 0),
+        None => (form, MOST_TERMS),
+    }
+}
 
 /// A text whose columns, and relations such as thrust(rpm), are told as people say them.
 #[must_use]

@@ -6,11 +6,11 @@
 //! Units: rev/min.
 //! Reference: specification `formats.md` (primary relations).
 
-use super::bridge;
+use crate::numeric::order::median;
+use super::stretches::bridge;
 use crate::log::board;
 use crate::signal::drive::Drive;
 use crate::log::{Log, SPEED};
-use crate::signal::noise;
 
 /// How the consensus speed is made; stands in `model.toml`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -36,17 +36,17 @@ const LEAVES: f64 = 0.02;
 const PASSES: usize = 2;
 
 /// A speed on every row.
-pub(super) struct Fused {
+pub(crate) struct Fused {
     /// rev/min; empty without a speed.
-    pub(super) rpm: Vec<f64>,
+    pub(crate) rpm: Vec<f64>,
     /// Standard deviation beyond that of the sensors where the speed was bridged, rev/min; 0 where it was measured, empty where it was everywhere.
-    pub(super) sd: Vec<f64>,
+    pub(crate) sd: Vec<f64>,
     /// How it was made.
-    pub(super) how: Consensus,
+    pub(crate) how: Consensus,
 }
 
 /// The consensus speed.
-pub(super) fn of(log: &Log) -> Fused {
+pub(crate) fn of(log: &Log) -> Fused {
     let present: Vec<&str> =
         SPEED.into_iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).collect();
     if present.is_empty() {
@@ -153,7 +153,7 @@ fn settled(rows: usize, readings: &dyn Fn(usize) -> Vec<f64>) -> Vec<f64> {
             if let Some(span) = span.as_ref().filter(|span| row.iter().any(|v| span.contains(v))) {
                 row.retain(|v| span.contains(v));
             }
-            *slot = if row.is_empty() { f64::NAN } else { noise::median(&mut row) };
+            *slot = if row.is_empty() { f64::NAN } else { median(&mut row) };
         }
         i = end;
     }
@@ -164,7 +164,7 @@ fn settled(rows: usize, readings: &dyn Fn(usize) -> Vec<f64>) -> Vec<f64> {
 fn agreement(mut row: Vec<f64>) -> f64 {
     row.sort_unstable_by(f64::total_cmp);
     let agree = |w: &[f64]| w[1] - w[0] <= HEALTHY * w[1].abs();
-    if row.windows(2).any(agree) { noise::median(&mut row) } else { f64::NAN }
+    if row.windows(2).any(agree) { median(&mut row) } else { f64::NAN }
 }
 
 /// Readings of a channel over the speed of all, while the rotor turns.
@@ -175,7 +175,7 @@ fn shares(log: &Log, name: &str, all: &[f64], scale: f64) -> Vec<f64> {
 
 /// Gain of a channel against the speed of all; one that reads next to nothing has none.
 fn gain(log: &Log, name: &str, all: &[f64], scale: f64) -> f64 {
-    let gain = noise::median(&mut shares(log, name, all, scale));
+    let gain = median(&mut shares(log, name, all, scale));
     if gain > 0.5 { gain } else { 1.0 }
 }
 
@@ -186,8 +186,8 @@ fn disagrees(log: &Log, name: &str, all: &[f64], scale: f64) -> bool {
     if shares.is_empty() {
         return false;
     }
-    let gain = noise::median(&mut shares);
-    let unsteady = noise::median(&mut shares.iter().map(|share| (share - gain).abs()).collect::<Vec<f64>>());
+    let gain = median(&mut shares);
+    let unsteady = median(&mut shares.iter().map(|share| (share - gain).abs()).collect::<Vec<f64>>());
     (gain - 1.0).abs() > HEALTHY || unsteady > UNSTEADY
 }
 

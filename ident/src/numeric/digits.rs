@@ -55,6 +55,15 @@ pub(crate) fn lowest(value: f64) -> f64 {
     if near > value { significant(near - unit, 4) } else { near }
 }
 
+/// A number with five significant digits, as tables print it.
+#[must_use]
+pub fn number(v: f64) -> String {
+    if v == 0.0 {
+        return "0".to_owned();
+    }
+    if v.abs() < 1e-3 || v.abs() >= 1e5 { format!("{v:.4e}") } else { format!("{v:.5}") }
+}
+
 fn read(text: String, otherwise: f64) -> f64 {
     // no minus before nothing
     text.parse().map_or(otherwise, |v: f64| if v == 0.0 { 0.0 } else { v })
@@ -93,5 +102,12 @@ mod tests {
             assert!((v - value).abs() <= 1e-5 * se && (s / se - 1.0).abs() < 0.006, "{value} +- {se}");
             assert!(lowest(value) <= value);
         }
+    }
+
+    #[test]
+    fn small_numbers_keep_their_digits() {
+        assert_eq!(number(6.3e-5), "6.3000e-5");
+        assert_eq!(number(0.0), "0");
+        assert_eq!(number(1.5), "1.50000");
     }
 }

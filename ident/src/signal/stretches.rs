@@ -5,8 +5,8 @@
 //! Units: us a row; row ranges `[from, to)`.
 //! Reference: specification `closing-the-loop.md`, step 2 (noise within plateaus).
 
-use crate::signal::noise::median;
-use crate::plateau::settle;
+use crate::numeric::order::median;
+use super::settle;
 
 /// Change of the command from row to row, us, below which it holds still.
 pub(crate) const STILL_US: f64 = 0.5;
@@ -14,7 +14,7 @@ pub(crate) const STILL_US: f64 = 0.5;
 pub(crate) const CALM_US: f64 = 10.0;
 
 /// Row ranges in which the command changes by at most `most` us a row (or, without a command, the speed holds still).
-pub(super) fn steady(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) -> Vec<(usize, usize)> {
+pub(crate) fn steady(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) -> Vec<(usize, usize)> {
     let n = t.len();
     let (signal, tolerance): (&[f64], f64) = match pulse {
         Some(p) => (p, most),
@@ -37,6 +37,9 @@ pub(super) fn steady(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64], most: f64) -
     out
 }
 
+/// Fewest samples after jumps, and between them, that show how well either is predicted.
+pub(crate) const FEWEST_OF_A_KIND: usize = 10;
+
 /// Time steps that are a gap.
 pub(crate) const GAP: f64 = 5.0;
 
@@ -49,13 +52,40 @@ pub(crate) fn starts(t: &[f64], rpm: &[f64]) -> Vec<(usize, f64)> {
 }
 
 /// Rows at the head of each steady stretch in which the speed has not arrived yet.
-pub(super) fn settling(t: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Vec<bool> {
+pub(crate) fn settling(t: &[f64], rpm: &[f64], steady: &[(usize, usize)]) -> Vec<bool> {
     if rpm.is_empty() {
         return Vec::new();
     }
     let mut out = vec![false; t.len()];
     for (from, to) in steady {
         out[*from..from + settle::rows(t, rpm, *from, *to)].fill(true);
+    }
+    out
+}
+
+/// Linear bridge over missing samples, constant at the ends.
+#[must_use]
+pub fn bridge(t: &[f64], values: &[f64]) -> Vec<f64> {
+    let mut out = values.to_vec();
+    let mut last: Option<usize> = None;
+    for i in 0..out.len() {
+        if !values[i].is_finite() {
+            continue;
+        }
+        match last {
+            None => out[..i].fill(values[i]),
+            Some(j) => {
+                for k in j + 1..i {
+                    let u = (t[k] - t[j]) / (t[i] - t[j]);
+                    out[k] = values[j] + u * (values[i] - values[j]);
+                }
+            }
+        }
+        last = Some(i);
+    }
+    if let Some(j) = last {
+        let v = values[j];
+        out[j + 1..].fill(v);
     }
     out
 }

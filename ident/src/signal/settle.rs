@@ -7,13 +7,42 @@
 //! Units: rows.
 //! Reference: first-order step response; Beharie 2013, section 5.7.2 ("allowed to reach steady state").
 
-use super::mean::line;
-use crate::signal::noise::median;
+use crate::numeric::order::median;
 
 /// Largest share of a stretch that may be settling.
 const LARGEST: f64 = 0.6;
 /// Share of the mean's standard error that the rest of the approach may still move it by.
 const REST: f64 = 0.2;
+
+/// Robust line through a stretch: level at its middle, slope a row, spread about it.
+///
+/// The slope comes from the medians of the outer thirds, which no glitch moves.
+pub(crate) fn line(z: &[f64]) -> Option<(f64, f64, f64)> {
+    let third = z.len() / 3;
+    let finite = |v: &[f64]| -> Vec<f64> { v.iter().copied().filter(|v| v.is_finite()).collect() };
+    if z.iter().filter(|v| v.is_finite()).take(3).count() < 3 {
+        return None;
+    }
+    let slope = match (finite(&z[..third]), finite(&z[z.len() - third..])) {
+        (mut a, mut b) if a.len() >= 3 && b.len() >= 3 => (median(&mut b) - median(&mut a)) / (z.len() - third) as f64,
+        _ => 0.0,
+    };
+    let centre = (z.len() as f64 - 1.0) / 2.0;
+    let mut about: Vec<f64> =
+        z.iter().enumerate().filter(|(_, v)| v.is_finite()).map(|(i, v)| v - slope * (i as f64 - centre)).collect();
+    let level = median(&mut about);
+    let mut off: Vec<f64> = about.iter().map(|v| (v - level).abs()).collect();
+    let spread = 1.4826 * median(&mut off);
+    // more than half of the samples alike: what nine tenths keep to; beyond that a coarse channel has glitches and no noise
+    let spread = if spread > 0.0 {
+        spread
+    } else {
+        let rank = off.len() * 9 / 10;
+        *off.select_nth_unstable_by(rank, f64::total_cmp).1
+    };
+    let spread = spread.max(1e-12 * level.abs()).max(1e-12);
+    Some((level, slope, spread))
+}
 
 /// Rows at the head of `[from, to)` in which a channel is still on its way.
 pub(crate) fn rows(t: &[f64], values: &[f64], from: usize, to: usize) -> usize {
