@@ -4,7 +4,7 @@
 //! a page beside the output shows the joint.
 //! What can go wrong: logs that cannot be joined for certain are refused, and nothing is written.
 //! Units: s, ppm; the channels'.
-//! Reference: specification `formats.md`, `quadrig import`; `ident/src/join`.
+//! Reference: specification `formats.md`, `quadrig import`; `ident/src/log/join`.
 
 use crate::Failure;
 use crate::open::{as_written, open, say};
