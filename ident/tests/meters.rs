@@ -8,14 +8,14 @@
 
 mod rig;
 
-use ident::close::{Closed, close};
 use ident::channel::Context;
+use ident::close::{Closed, close};
 use ident::effects::library;
-use ident::fit::heldout;
-use ident::model::Declared;
 use ident::effects::placed::Placed;
+use ident::fit::heldout;
 use ident::fit::{Rows, fit};
 use ident::log::{Column, Log};
+use ident::model::Declared;
 use ident::verdict::Kind;
 use rig::Chance;
 

@@ -5,8 +5,8 @@
 //! Units: as stated.
 //! Reference: specification `formats.md`, "Verdict".
 
-use ident::verdict::Scope;
 use ident::report::{Hidden, Vocabulary, WIDEST, sentence, terminal};
+use ident::verdict::Scope;
 use ident::verdict::{
     Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, NextExperiment, Parameter,
     ScheduleStep, Unexplained, Validation, Verdict,
@@ -422,8 +422,11 @@ fn an_interval_of_both_signs_is_not_in_the_head() {
     );
     assert!(!said.contains("-0.07"), "{said}");
     let sizes = vec![parameter("across", -0.2, 0.05, "N/(m/s)^2"), parameter("climb", -0.3, 0.01, "N/(m/s)")];
-    let said =
-        sentence(&verdict(Kind::Attributed, vec![EffectEntry { parameters: sizes, ..e }]), ident::report::flight::VOCABULARY, false);
+    let said = sentence(
+        &verdict(Kind::Attributed, vec![EffectEntry { parameters: sizes, ..e }]),
+        ident::report::flight::VOCABULARY,
+        false,
+    );
     assert!(said.starts_with("Thrust falls across the air and grows in a climb"), "{said}");
 }
 

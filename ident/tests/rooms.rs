@@ -22,7 +22,8 @@ fn read(path: &Path) -> String {
 /// The rooms in the order of `lib.rs`.
 fn rooms() -> Vec<String> {
     let text = read(&root().join("lib.rs"));
-    let of_line = |line: &str| Some(line.strip_prefix("pub ").unwrap_or(line).strip_prefix("mod ")?.strip_suffix(';')?.to_owned());
+    let of_line =
+        |line: &str| Some(line.strip_prefix("pub ").unwrap_or(line).strip_prefix("mod ")?.strip_suffix(';')?.to_owned());
     text.lines().filter_map(of_line).collect()
 }
 
@@ -42,7 +43,9 @@ fn files(folder: &Path, out: &mut Vec<PathBuf>) {
 /// A source without its comments, and without the unit tests, which stand last.
 fn code(text: &str) -> String {
     let lines = text.lines().collect::<Vec<_>>();
-    let tests = |k: usize| lines[k] == "#[cfg(test)]" && lines.get(k + 1).is_some_and(|next| next.contains("mod ") && next.ends_with('{'));
+    let tests = |k: usize| {
+        lines[k] == "#[cfg(test)]" && lines.get(k + 1).is_some_and(|next| next.contains("mod ") && next.ends_with('{'))
+    };
     let end = (0..lines.len()).find(|k| tests(*k)).unwrap_or(lines.len());
     let bare = |line: &&str| line.split("//").next().unwrap_or_default().to_owned() + "\n";
     lines[..end].iter().map(bare).collect()
@@ -89,8 +92,11 @@ fn downward(rooms: &[String], room: &str, code: &str) -> Vec<(usize, String)> {
 
 #[test]
 fn every_module_stands_in_a_room() {
-    let mut names: Vec<String> =
-        std::fs::read_dir(root()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).filter(|n| n != "lib.rs").collect();
+    let mut names: Vec<String> = std::fs::read_dir(root())
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .filter(|n| n != "lib.rs")
+        .collect();
     names.sort();
     let mut stated = rooms();
     stated.sort();

@@ -16,8 +16,8 @@ use ident::identify::curves::power::{csv, in_doubt};
 use ident::identify::curves::ratio;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::Log;
-use ident::report::{Sheet, WIDEST, headline, wrapped};
 use ident::numeric::digits::number;
+use ident::report::{Sheet, WIDEST, headline, wrapped};
 use ident::verdict::words::{bracketed, channel};
 use std::path::PathBuf;
 

@@ -96,7 +96,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     if is_flight {
         args.meta.iter().for_each(|Meta(key, value)| drop(log.meta.insert(key.clone(), value.clone())));
-        put_as(&args.output, &format!("# {}", ident::log::flight_log::FORMAT), |out| ident::log::flight_log::write_to(&log, out))?;
+        put_as(&args.output, &format!("# {}", ident::log::flight_log::FORMAT), |out| {
+            ident::log::flight_log::write_to(&log, out)
+        })?;
     } else if let Some(Meta(key, _)) = args.meta.first() {
         return Err(format!("--meta {key}: {} is no flight; expected a flight", args.file.display()).into());
     } else {

@@ -8,10 +8,10 @@
 
 use crate::Failure;
 use crate::open::{as_written, open, say};
+use ident::log::Log;
 use ident::log::import::{Options, Report, is_recording};
 use ident::log::join::{Joint, LABELS, align, merge};
 use ident::report::joined::page;
-use ident::log::Log;
 use std::path::{Path, PathBuf};
 
 /// A further logger's file and what it is called.

@@ -110,8 +110,11 @@ fn events(record: &RunRecord) -> Vec<String> {
 /// speed from a command.
 pub(crate) fn along(model: &Model, log: &Log) -> Option<(Vec<PlantState>, Log)> {
     let pulse = ident::signal::stretches::bridge(&log.t, log.column("pulse_us")?);
-    let covariates: Vec<Column> =
-        log.columns.iter().map(|c| Column { name: c.name.clone(), values: ident::signal::stretches::bridge(&log.t, &c.values) }).collect();
+    let covariates: Vec<Column> = log
+        .columns
+        .iter()
+        .map(|c| Column { name: c.name.clone(), values: ident::signal::stretches::bridge(&log.t, &c.values) })
+        .collect();
     let predicted = from_command(model, &log.name, &log.t, &pulse, &covariates);
     // the speed that every other relation hangs on is the consensus of the channels
     let speed = ident::channel::Context::new(&predicted, Some(model.start_pulse_us)).rpm;

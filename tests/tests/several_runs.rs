@@ -7,11 +7,11 @@
 //! Reference: specification `formats.md`, "Scope" and `across_runs_rms`; `closing-the-loop.md`, "Real measurements".
 
 use ident::close::{close, validation};
-use ident::verdict::Scope;
 use ident::log::Log;
 use ident::model::Model;
 use ident::several::{Outcome, Run, close_each, close_together};
 use ident::verdict::EffectEntry;
+use ident::verdict::Scope;
 use quadrig_tests::{call, data, files};
 use std::path::Path;
 use tempfile::TempDir;

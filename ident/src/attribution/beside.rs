@@ -9,13 +9,13 @@
 
 use crate::attribution::correction::{correct, without_correction};
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE};
-use crate::fit::heldout::{self, Held};
-use crate::fit::{Fit, Rows, fit};
-use crate::effects::placed::Placed;
 use crate::attribution::opponent::{Contested, contested, correction, explains, groups, left_over, news_left, noisier};
-use crate::fit::search::{connected, refine};
 use crate::attribution::together::Ground;
 use crate::attribution::unexplained::LOUD;
+use crate::effects::placed::Placed;
+use crate::fit::heldout::{self, Held};
+use crate::fit::search::{connected, refine};
+use crate::fit::{Fit, Rows, fit};
 
 /// What is asked of the names, channel by channel.
 pub(crate) struct Asked {

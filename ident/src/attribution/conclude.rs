@@ -7,16 +7,16 @@
 //! Units: errors in the channel's unit, shares of them.
 //! Reference: specification `closing-the-loop.md`, step 6; `formats.md`, "Verdict" ("no name may make things worse").
 
-use crate::effects::placed::is_named;
-use crate::signal::colour::{Colour, effective_share};
-use crate::channel::{Context, Target};
 use crate::attribution::diagnose::NEEDED_REDUCTION;
+use crate::attribution::unexplained::wanders;
+use crate::channel::{Context, Target};
+use crate::effects::placed::Placed;
+use crate::effects::placed::is_named;
 use crate::effects::{Effect, Estimate, Instance, NEEDED_EVIDENCE, Shape};
 use crate::fit::heldout::{self, Held};
-use crate::model::Declared;
 use crate::fit::{Fit, is_plausible, part_of};
-use crate::effects::placed::Placed;
-use crate::attribution::unexplained::wanders;
+use crate::model::Declared;
+use crate::signal::colour::{Colour, effective_share};
 
 /// Share by which the error of a channel may be larger with the names than before.
 const WORSE: f64 = 0.02;

@@ -9,17 +9,17 @@
 //! Reference: one-standard-error rule, Breiman et al. 1984, *Classification and Regression Trees*, section 3.4.3; specification
 //! `closing-the-loop.md`, step 7.
 
-use crate::channel::{Context, Relation};
 use crate::attribution::diagnose::NEEDED_REDUCTION;
+use crate::attribution::opponent::{correction, is_load};
+use crate::channel::{Context, Relation};
+use crate::effects::placed::Placed;
 use crate::effects::unknown::{Unknown, variables};
-use crate::verdict::words::plain::form;
 use crate::effects::{Effect, Instance};
-use crate::verdict::Scope;
+use crate::fit::Fit;
 use crate::fit::heldout::{self, Sum};
 use crate::model::Declared;
-use crate::fit::Fit;
-use crate::effects::placed::Placed;
-use crate::attribution::opponent::{correction, is_load};
+use crate::verdict::Scope;
+use crate::verdict::words::plain::form;
 
 /// Numbers of terms that are tried.
 const TERMS: [usize; 4] = [1, 2, 3, 6];

@@ -9,24 +9,24 @@
 //! Reference: Schwarz 1978 (penalty); Davies 1987 (shape parameters that do not exist under the null).
 
 use crate::attribution::beside::{NEEDED, ask, left_of, with_rests};
-use crate::effects::placed::is_named;
-use crate::signal::colour::Colour;
 use crate::attribution::conclude::{Errors, drowned, is_nothing, quoted, untenable};
-use crate::channel::{Context, Relation, Target};
-pub(crate) use crate::effects::NEEDED_EVIDENCE;
-use crate::effects::{self, Effect, Estimate, Instance};
-use crate::fit::heldout::{self, Around, Held};
-use crate::model::Declared;
-use crate::fit::{Fit, Rows, TargetFit, fit, plausible, scatters};
-use crate::effects::placed::Placed;
 use crate::attribution::moment::lasts;
-use crate::numeric::parallel::{cores, in_parallel};
-use crate::signal::residual::whiteness;
 use crate::attribution::revise::revise;
 use crate::attribution::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
-use crate::fit::search::{base, between_starts, connected, refine, refine_newest, scan, stride};
 use crate::attribution::suspects::{nearest, stand_beside, suspects};
 use crate::attribution::together::{Ground, choose_together};
+use crate::channel::{Context, Relation, Target};
+pub(crate) use crate::effects::NEEDED_EVIDENCE;
+use crate::effects::placed::Placed;
+use crate::effects::placed::is_named;
+use crate::effects::{self, Effect, Estimate, Instance};
+use crate::fit::heldout::{self, Around, Held};
+use crate::fit::search::{base, between_starts, connected, refine, refine_newest, scan, stride};
+use crate::fit::{Fit, Rows, TargetFit, fit, plausible, scatters};
+use crate::model::Declared;
+use crate::numeric::parallel::{cores, in_parallel};
+use crate::signal::colour::Colour;
+use crate::signal::residual::whiteness;
 use crate::verdict::Kin;
 use std::collections::BTreeSet;
 

@@ -9,16 +9,18 @@
 //! Reference: notes on method, "for long logs scan on a part, refine on all rows"; rule of the rows in [`kept`].
 
 use crate::attribution::conclude::{Errors, harmful};
+use crate::attribution::diagnose::{
+    Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, may_join, net_gain, offers, shares, without, worth_a_name,
+};
 use crate::channel::{Context, Target};
-use crate::attribution::diagnose::{Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, may_join, net_gain, offers, shares, without, worth_a_name};
 use crate::effects::Estimate;
-use crate::fit::heldout::{self, Around, Held};
-use crate::model::Declared;
 use crate::effects::placed::Placed;
-use crate::fit::{Rows, allow_for_the_form, fit, plausible};
-use crate::log::{Column, Log};
+use crate::fit::heldout::{self, Around, Held};
 use crate::fit::search::refine;
+use crate::fit::{Rows, allow_for_the_form, fit, plausible};
 use crate::log::sparse::TOO_FEW;
+use crate::log::{Column, Log};
+use crate::model::Declared;
 
 /// Rows above which the search is given fewer.
 pub const SEARCHED: usize = 12_000;

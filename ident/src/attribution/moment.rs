@@ -7,11 +7,11 @@
 //! Units: nats, s.
 //! Reference: case deletion, Cook 1977, Technometrics 19:15.
 
-use crate::channel::Context;
 use crate::attribution::diagnose::{NEEDED_EVIDENCE, penalty};
+use crate::channel::Context;
+use crate::fit::Fit;
 use crate::fit::heldout;
 use crate::model::Declared;
-use crate::fit::Fit;
 
 /// Half the length of a moment, s.
 const HALF: f64 = 0.5;

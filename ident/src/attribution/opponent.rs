@@ -6,17 +6,17 @@
 //! Units: evidence in nats.
 //! Reference: discrepancy modelling, Ebers et al. 2022 (arXiv 2203.05164); specification `closing-the-loop.md`, step 7.
 
-use crate::channel::{Context, DIFFERENCES, Relation, Target};
 use crate::attribution::diagnose::{Candidate, FEWEST_SAMPLES, NEEDED_EVIDENCE, NEEDED_REDUCTION, net_gain, shares};
+use crate::attribution::moment::best_moment;
+use crate::channel::lattice;
+use crate::channel::{Context, DIFFERENCES, Relation, Target};
+use crate::effects::placed::Placed;
 use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{Effect, Instance};
-use crate::channel::lattice;
 use crate::fit::heldout::{self, Held};
-use crate::model::Declared;
 use crate::fit::{Designs, Fit, Rows, fit_target};
-use crate::effects::placed::Placed;
 use crate::log::MODELLED;
-use crate::attribution::moment::best_moment;
+use crate::model::Declared;
 use crate::signal::residual::whiteness;
 
 /// Where a smooth function of one variable, without a name, predicts held-out rows clearly better, and significantly, than whatever was named

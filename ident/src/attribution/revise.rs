@@ -7,15 +7,15 @@
 //! Units: evidence in nats.
 //! Reference: stepwise regression with exchange, Miller 2002, Subset Selection in Regression, section 3.6.
 
-use crate::channel::Context;
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, evidence_over, may_join, offers, round_of};
-use crate::fit::heldout::{self, Held};
-use crate::model::Declared;
-use crate::fit::{Fit, Rows, fit};
-use crate::effects::placed::Placed;
 use crate::attribution::rivals::probabilities;
-use crate::fit::search::{connected, refine};
 use crate::attribution::split::split;
+use crate::channel::Context;
+use crate::effects::placed::Placed;
+use crate::fit::heldout::{self, Held};
+use crate::fit::search::{connected, refine};
+use crate::fit::{Fit, Rows, fit};
+use crate::model::Declared;
 
 /// Looks at most so many times at all names.
 const PASSES: usize = 2;

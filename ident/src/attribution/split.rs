@@ -6,13 +6,13 @@
 //! Units: evidence in nats.
 //! Reference: Schwarz 1978 (penalty).
 
-use crate::channel::Context;
 use crate::attribution::diagnose::{Candidate, Scanned, evidence_counted, may_join, shares};
-use crate::model::Declared;
-use crate::fit::{Fit, Rows, fit, plausible};
-use crate::effects::placed::Placed;
 use crate::attribution::revise::{CLEARLY_BETTER, Round, predicts_as_well};
+use crate::channel::Context;
+use crate::effects::placed::Placed;
 use crate::fit::search::{base, refine, scan};
+use crate::fit::{Fit, Rows, fit, plausible};
+use crate::model::Declared;
 
 /// Gives each channel of a shared effect one of its own, wherever that is clearly better. What was named beside it on these channels may have stood
 /// for the difference, and goes where it is better without. `rounds` follows.

@@ -8,15 +8,15 @@
 //! Units: evidence in nats.
 //! Reference: specification `closing-the-loop.md`, step 7.
 
-use crate::channel::Context;
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, weigh};
-use crate::effects;
-use crate::fit::heldout::residuals;
-use crate::model::Declared;
-use crate::fit::{Fit, Rows, fit};
-use crate::effects::placed::Placed;
 use crate::attribution::rivals::Rival;
+use crate::channel::Context;
+use crate::effects;
+use crate::effects::placed::Placed;
+use crate::fit::heldout::residuals;
 use crate::fit::search::{base, refine_newest, scan};
+use crate::fit::{Fit, Rows, fit};
+use crate::model::Declared;
 
 /// Share of the squared residual above the noise that a suspect must take away on one of its channels.
 const MOST: f64 = 0.5;

@@ -8,11 +8,11 @@
 //! Units: evidence in nats.
 //! Reference: forward selection misses jointly significant sets, Miller 2002, Subset Selection in Regression, section 3.2.
 
-use crate::channel::{Context, Relation};
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, loud, round_of, without};
+use crate::channel::{Context, Relation};
 use crate::fit::heldout::{self, Held};
-use crate::model::Declared;
 use crate::fit::{Fit, scatters};
+use crate::model::Declared;
 
 /// Firsts of a group that are tried.
 const FIRSTS: usize = 3;

@@ -7,13 +7,13 @@
 //! Units: noise floors of the channel.
 //! Reference: specification `formats.md`, "Verdict" (`unexplained`); `closing-the-loop.md`, steps 2 and 7.
 
-use crate::signal::colour::effective_share;
-use crate::channel::{Context, DIFFERENCES, Relation, Target};
-use crate::fit::heldout;
-use crate::model::Declared;
-use crate::fit::Fit;
 use crate::attribution::depends::{goes_with, seems_to_go_with};
 use crate::attribution::opponent::{is_second_meter, left_over};
+use crate::channel::{Context, DIFFERENCES, Relation, Target};
+use crate::fit::Fit;
+use crate::fit::heldout;
+use crate::model::Declared;
+use crate::signal::colour::effective_share;
 use crate::verdict::{Channels, Unexplained};
 use std::ops::Range;
 

@@ -6,16 +6,16 @@
 //! Units: SI, rev/min, us; regressors of the polynomials are rpm/1000 and (pulse - 1000)/1000.
 //! Reference: specification `formats.md` (primary relations), `closing-the-loop.md` step 2.
 
-use crate::numeric::order::median;
-use crate::signal::consensus::{self, Consensus};
-use crate::signal::stretches::{self, CALM_US, FEWEST_OF_A_KIND, STILL_US, bridge, starts};
-use crate::signal::bad::{self, SetAside};
 use crate::log::board;
-use powers::{Values, powers_of};
 use crate::log::{Log, MODELLED, SPEED};
-use crate::signal::noise::{self, Noise};
+use crate::numeric::order::median;
 use crate::numeric::solve::Normal;
+use crate::signal::bad::{self, SetAside};
+use crate::signal::consensus::{self, Consensus};
+use crate::signal::noise::{self, Noise};
 use crate::signal::start::start_pulse;
+use crate::signal::stretches::{self, CALM_US, FEWEST_OF_A_KIND, STILL_US, bridge, starts};
+use powers::{Values, powers_of};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
@@ -24,6 +24,8 @@ pub(crate) mod glitches;
 pub(crate) mod lattice;
 pub mod powers;
 
+#[cfg(test)]
+pub(crate) use facts::Remembered;
 pub(crate) use facts::{Draw, Facts, Question, Rail, SawTooth};
 
 /// Time after which a rotor of this size has arrived at its new speed, s: five time constants of 0.05 s.

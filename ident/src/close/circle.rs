@@ -8,10 +8,10 @@
 //! Units: the channel's; whiteness is a p-value.
 //! Reference: specification `closing-the-loop.md`, step 9; `formats.md` (rows without a claim).
 
-use crate::channel::{Context, Relation, unit_of};
 use crate::attribution::diagnose::{Diagnosis, diagnose};
-use crate::model::Declared;
+use crate::channel::{Context, Relation, unit_of};
 use crate::log::{Log, SPEED};
+use crate::model::Declared;
 use crate::model::Model;
 use crate::signal::residual::whiteness;
 

@@ -10,17 +10,17 @@ mod depends;
 mod left;
 mod orders;
 
-use crate::close::{Closed, close};
 use crate::channel::{Context, Relation, unit_of};
+use crate::close::{Closed, close};
 use crate::effects::library;
 use crate::fit::heldout;
-use crate::model::Declared;
+use crate::fit::search::{base, scan};
 use crate::fit::{Fit, Rows, fit};
 use crate::log::Log;
+use crate::model::Declared;
 use crate::model::Model;
-use crate::numeric::digits::number;
-use crate::fit::search::{base, scan};
 use crate::model::simulate::from_command;
+use crate::numeric::digits::number;
 
 /// The steps in their order, with what each answers.
 pub const STEPS: [(&str, &str); 9] = [

@@ -8,16 +8,16 @@
 //! Units: deg, deviation of the second mark from 180.
 //! Reference: Beharie 2013, section 5.7.1 and Fig. 5.27; specification `rig.md`, "Four RPM capture channels".
 
-use crate::log::board::UNEVEN;
 use crate::channel::{Context, STANDSTILL};
-use crate::effects::alternating_period::ANGLE;
-use crate::verdict::TOLD_BY_THE_BOARD;
-use crate::effects::{self, Estimate, Instance};
-use crate::model::Declared;
 use crate::effects::placed::Placed;
+use crate::effects::tachometer::alternating_period::ANGLE;
+use crate::effects::{self, Estimate, Instance};
 use crate::log::Log;
+use crate::log::board::UNEVEN;
+use crate::model::Declared;
 use crate::model::{AddedEffect, Model};
 use crate::numeric::order::median;
+use crate::verdict::TOLD_BY_THE_BOARD;
 use crate::verdict::{EffectEntry, Kin, Kind, Verdict};
 
 /// Angle, or change of it since the declared model's day, beyond which it is worth a name, deg: a magnet set by hand on the rim of a rotor of
@@ -88,7 +88,7 @@ fn known(declared: Declared<'_>, channel: &str) -> f64 {
 
 fn added(channel: &str, angle: f64, se: f64) -> AddedEffect {
     let instance = Instance::new(&[channel], TOLD_BY_THE_BOARD);
-    let placed = Placed { effect: &effects::alternating_period::AlternatingPeriod, instance, shape: Vec::new() };
+    let placed = Placed { effect: &effects::tachometer::alternating_period::AlternatingPeriod, instance, shape: Vec::new() };
     let estimates = vec![Estimate { name: ANGLE.name.to_owned(), unit: ANGLE.unit.to_owned(), value: angle, se }];
     AddedEffect {
         placed,

@@ -12,35 +12,35 @@ pub(crate) mod supply_limit;
 pub mod told;
 pub mod watch;
 
-use crate::effects::reported::parameter;
-use crate::identify::CloseError;
-use crate::signal::bad;
-use crate::effects::placed::is_named;
 use crate::attribution::conclude::{Quoted, quoted};
-use crate::channel::{Context, DIFFERENCES, Relation, STANDSTILL, Target, is_contrast, unit_of};
 use crate::attribution::correction::without_correction;
-use crate::model::course;
 use crate::attribution::diagnose::Diagnosis;
-use crate::effects::unknown::Words;
-use crate::effects::{Estimate};
-use crate::fit::heldout;
-use crate::model::Declared;
-use crate::fit::{Fit, Rows, anywhere_in_a_row};
-use crate::effects::placed::Placed;
-use crate::identify::is_table;
-use crate::model::leftover;
-use crate::log::Log;
 use crate::attribution::long::diagnose_any;
-use crate::model::{FittedTo, Model};
-use crate::signal::residual::whiteness;
 use crate::attribution::rivals::{Rival, UNEXPLAINED};
-use crate::fit::search::refine;
-use crate::log::sparse;
 use crate::attribution::unexplained::{LOUD, Left, unexplained};
+use crate::channel::{Context, DIFFERENCES, Relation, STANDSTILL, Target, is_contrast, unit_of};
+use crate::effects::Estimate;
+use crate::effects::placed::Placed;
+use crate::effects::placed::is_named;
+use crate::effects::reported::parameter;
+use crate::effects::unknown::Words;
+use crate::fit::heldout;
+use crate::fit::search::refine;
+use crate::fit::{Fit, Rows, anywhere_in_a_row};
+use crate::identify::CloseError;
+use crate::identify::is_table;
+use crate::log::Log;
+use crate::log::sparse;
+use crate::model::Declared;
+use crate::model::course;
+use crate::model::leftover;
+use crate::model::{FittedTo, Model};
+use crate::signal::bad;
+use crate::signal::residual::whiteness;
+use crate::verdict::words::worth;
 use crate::verdict::{
     Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Validation, Verdict,
 };
-use crate::verdict::words::worth;
 
 /// Everything that closing the loop on one log gives.
 #[derive(Debug, Clone)]
@@ -332,6 +332,7 @@ pub fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Shape;
     use crate::effects::{self, Instance};
     use crate::log::Column;
 

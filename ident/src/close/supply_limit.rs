@@ -9,19 +9,19 @@
 //! Units: A, V, us.
 //! Reference: constant-current mode of laboratory supplies.
 
-use crate::effects::reported::parameter;
-use crate::signal::stretches::CALM_US;
 use crate::channel::{Context, unit_of};
+use crate::close::marks::{self, CERTAIN};
+use crate::effects::reported::parameter;
 use crate::effects::{CurrentLimit, Effect, Estimate, Instance};
-use crate::verdict::OF_THE_SUPPLY;
 use crate::identify::{TABLE_ERROR, settled};
 use crate::log::Log;
-use crate::close::marks::{self, CERTAIN};
 use crate::model::Model;
-use crate::plateau::Plateau;
 use crate::numeric::solve::Normal;
-use crate::verdict::{EffectEntry, Kin, Verdict};
+use crate::plateau::Plateau;
+use crate::signal::stretches::CALM_US;
+use crate::verdict::OF_THE_SUPPLY;
 use crate::verdict::words::{amount, channel};
+use crate::verdict::{EffectEntry, Kin, Verdict};
 
 /// Standard errors by which a voltage must have fallen to be said to fall.
 const CLEARLY: f64 = 3.0;

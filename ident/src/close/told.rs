@@ -6,15 +6,15 @@
 //! Units: as the channels state.
 //! Reference: specification `closing-the-loop.md`, "What counts as proof" (error of a fit with the true form).
 
-use crate::close::validation;
 use crate::channel::Context;
+use crate::close::validation;
 use crate::effects;
-use crate::model::Declared;
 use crate::effects::placed::Placed;
+use crate::fit::search::{base, refine, scan};
 use crate::fit::{Rows, fit};
 use crate::log::Log;
+use crate::model::Declared;
 use crate::model::Model;
-use crate::fit::search::{base, refine, scan};
 use crate::verdict::Validation;
 
 /// Steps of the refinement.

@@ -10,12 +10,12 @@
 //! Reference: Page 1954, Biometrika 41:100; Moustakides 1986, Annals of Statistics 14:1379 (optimal for a known shift); Siegmund 1985,
 //! "Sequential Analysis", section II.6 (run length).
 
-use crate::signal::stretches::CALM_US;
 use crate::channel::{Context, Target};
-use crate::model::Declared;
-use crate::model::leftover::{self, Leftover};
 use crate::log::{Column, Log};
+use crate::model::Declared;
 use crate::model::Model;
+use crate::model::leftover::{self, Leftover};
+use crate::signal::stretches::CALM_US;
 
 /// Judged values of a year: eight hours on each of 250 days, ten values a second, each way on nine channels. A healthy rig is falsely accused once in it.
 const RUN_LENGTH: f64 = 250.0 * 8.0 * 3600.0 * 10.0 * 2.0 * 9.0;

@@ -7,9 +7,9 @@
 //! Reference: memoisation, Michie 1968, Nature 218:19.
 
 use crate::channel::Context;
-use crate::effects::design::{Column, Label, TargetDesign};
 use crate::channel::powers::Values;
 use crate::effects::Stage;
+use crate::effects::design::{Column, Label, TargetDesign};
 use crate::effects::placed::Placed;
 use std::sync::Arc;
 

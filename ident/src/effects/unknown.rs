@@ -5,10 +5,10 @@
 //! Units: each coefficient in the channel's unit; the variable is scaled to -1..1 over its fitted range, which is in its own unit.
 //! Reference: discrepancy modelling, Ebers et al. 2022 (arXiv 2203.05164).
 
-use crate::verdict::words::plain::{MOST_TERMS, parts};
 use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
 use crate::channel::{Context, unit_of};
 use crate::effects::design::TargetDesign;
+use crate::verdict::words::plain::{MOST_TERMS, parts};
 
 /// See the module.
 pub(crate) struct Unknown;
@@ -183,7 +183,7 @@ pub(crate) fn variable(context: &Context, name: &str) -> Option<Vec<f64>> {
         "temp_c" => context.temperature.clone(),
         "voltage_v" => context.voltage.clone(),
         "current_a" => context.current.clone(),
-        "charge" => Some(super::battery_discharge::charge(context)),
+        "charge" => Some(crate::effects::supply::battery_discharge::charge(context)),
         _ => context.covariates.iter().find(|c| c.0 == name).map(|c| c.1.clone()),
     }
 }
@@ -192,6 +192,7 @@ pub(crate) fn variable(context: &Context, name: &str) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
     use crate::log::{Column, Log};
+    use crate::verdict::words::plain::form;
 
     #[test]
     fn forms_name_variable_and_terms() {

@@ -9,16 +9,16 @@
 
 pub(crate) mod weather;
 
-use crate::channel::Context;
 use crate::attribution::diagnose::Diagnosis;
-use crate::model::Declared;
+use crate::attribution::rivals::beyond;
+use crate::channel::Context;
+use crate::experiment::weather::continued;
 use crate::fit::Fit;
 use crate::log::{Column, Log, SPEED};
-use crate::model::{AddedEffect, Model};
-use crate::attribution::rivals::beyond;
+use crate::model::Declared;
 use crate::model::simulate::from_command;
+use crate::model::{AddedEffect, Model};
 use crate::verdict::{NextExperiment, ScheduleStep};
-use crate::experiment::weather::continued;
 use std::borrow::Cow;
 
 /// Schedules that the rig can run, each with the reason for which it is good.
@@ -236,9 +236,8 @@ mod tests {
             let shapes = effect.shapes(&closed.context, &instance);
             vec![crate::effects::placed::Placed { effect, instance, shape: shapes.iter().map(|s| s.starts[0]).collect() }]
         };
-        let fitted = |id: &str| {
-            crate::fit::fit(&closed.context, declared, &placed(id), None, crate::fit::Rows::All).expect("a fit")
-        };
+        let fitted =
+            |id: &str| crate::fit::fit(&closed.context, declared, &placed(id), None, crate::fit::Rows::All).expect("a fit");
         let mut diagnosis = closed.diagnosis.clone();
         diagnosis.best = crate::attribution::diagnose::Candidate { fit: fitted("thermal_zero"), evidence: 0.0 };
         let ids = vec!["zero_drift".to_owned()];

@@ -6,10 +6,10 @@
 //! Reference: specification `formats.md` (`heldout_rms`); blocked cross-validation, Roberts et al. 2017, Ecography 40:913.
 
 use crate::channel::{Context, Target};
-use crate::model::Declared;
-use crate::fit::{Designs, Fit, Rows, fit_target};
 use crate::effects::placed::Placed;
 use crate::fit::search::{refine, refine_group};
+use crate::fit::{Designs, Fit, Rows, fit_target};
+use crate::model::Declared;
 
 /// For each fold the rows that are left out.
 #[must_use]

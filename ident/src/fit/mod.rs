@@ -12,15 +12,15 @@ pub(crate) mod samples;
 pub mod search;
 mod written;
 
-use crate::signal::colour::effective_share;
 use crate::channel::{Context, Relation, Target};
-use crate::effects::design::{Label, TargetDesign, covariance};
 use crate::effects::Estimate;
+use crate::effects::design::{Label, TargetDesign, covariance};
 use crate::effects::placed::Placed;
-use crate::model::Declared;
-use crate::fit::samples::{Samples, Taught};
-use crate::numeric::solve::Solution;
 use crate::effects::steps::Steps;
+use crate::fit::samples::{Samples, Taught};
+use crate::model::Declared;
+use crate::numeric::solve::Solution;
+use crate::signal::colour::effective_share;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 

@@ -7,9 +7,9 @@
 //! Reference: memoisation, Michie 1968, Nature 218:19.
 
 use crate::channel::{Context, Question};
-use crate::model::Declared;
 use crate::effects::placed::Placed;
 use crate::fit::Rows;
+use crate::model::Declared;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 
@@ -24,7 +24,11 @@ impl Question {
         evaluations: usize,
     ) -> Self {
         let bits = |p: &Placed| p.shape.iter().map(|v| v.to_bits()).collect();
-        let group = group.iter().map(|k| &placed[*k]).map(|p| (p.effect.id(), p.instance.channels.clone(), p.instance.form.clone(), bits(p))).collect();
+        let group = group
+            .iter()
+            .map(|k| &placed[*k])
+            .map(|p| (p.effect.id(), p.instance.channels.clone(), p.instance.form.clone(), bits(p)))
+            .collect();
         let mut digest = DefaultHasher::new();
         match rows {
             Rows::All => 1.hash(&mut digest),
@@ -44,6 +48,8 @@ impl Question {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::channel::Remembered;
+    use crate::effects::Instance;
     use crate::effects::by_id;
     use crate::log::{Column, Log};
 

@@ -6,14 +6,14 @@
 //! Units: log-likelihood in nats; samples in the unit of their channel.
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
+use crate::channel::powers::Values;
 use crate::channel::{Context, Relation, Target};
 use crate::effects::design::TargetDesign;
-use crate::channel::powers::Values;
-use crate::model::Declared;
-use crate::fit::{Designs, Likelihood, Rows};
 use crate::effects::placed::Placed;
-use crate::numeric::solve::{Normal, Solution, dot};
 use crate::effects::steps::Steps;
+use crate::fit::{Designs, Likelihood, Rows};
+use crate::model::Declared;
+use crate::numeric::solve::{Normal, Solution, dot};
 use std::borrow::Cow;
 use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
@@ -358,11 +358,11 @@ fn log_product(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::close::close;
     use crate::channel::Context;
-    use crate::model::Declared;
+    use crate::close::close;
     use crate::fit::{Rows, fit};
     use crate::log::{Column, Log};
+    use crate::model::Declared;
 
     /// A rig on levels; three rows of the thrust are off by as much as is said.
     fn log(off: f64) -> Log {

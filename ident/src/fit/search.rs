@@ -5,14 +5,14 @@
 //! Units: log-likelihood in nats.
 //! Reference: Nelder & Mead 1965, Computer Journal 7:308.
 
-use crate::numeric::simplex::nelder_mead;
 use crate::channel::Context;
-use crate::effects::{Effect, Instance, Shape};
-use crate::model::Declared;
-use crate::effects::placed::Placed;
-use crate::fit::Rows;
 use crate::channel::Question;
+use crate::effects::placed::Placed;
+use crate::effects::{Effect, Instance, Shape};
+use crate::fit::Rows;
 use crate::fit::samples::{Base, Taught};
+use crate::model::Declared;
+use crate::numeric::simplex::nelder_mead;
 
 /// The stride over rows that keeps the longest target near `most` samples.
 pub(crate) fn stride(context: &Context, most: usize) -> usize {
@@ -224,4 +224,3 @@ fn with_shapes(placed: &[Placed], full: &[f64]) -> Vec<Placed> {
         })
         .collect()
 }
-

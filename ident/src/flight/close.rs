@@ -15,10 +15,13 @@ use super::record::Record;
 use super::rows::{By, Rows, Told};
 use super::{FlightError, SHORTEST_S, words};
 use crate::attribution::columns::channel::rms;
-use crate::attribution::columns::{self, Candidate, Column, Conclusion, HeldOut, Library, Owner, Placed, Problem, UNKNOWN, ask, conclude, conclude_told, parameters, posterior};
-use crate::signal::bad::SetAside;
+use crate::attribution::columns::{
+    self, Candidate, Column, Conclusion, HeldOut, Library, Owner, Placed, Problem, UNKNOWN, ask, conclude, conclude_told,
+    parameters, posterior,
+};
 use crate::flight::effects::{Found, Told as Value};
 use crate::log::Log;
+use crate::signal::bad::SetAside;
 use crate::signal::residual::whiteness;
 use crate::verdict::{
     Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, Parameter, Unexplained, Validation,

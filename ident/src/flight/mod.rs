@@ -1,7 +1,7 @@
 //! Closing the loop on a flight: what the declared model of a flying vehicle leaves over, why, and the corrected model.
 //!
 //! What it is: a flight log becomes channels through a stated filter (`windows`, `channels`); the declared model (`declared`) and the effects
-//! of `effects/airframe` become columns (`library`); the attribution does the rest (`crate::attribution::columns`).
+//! of `effects/` become columns (`library`); the attribution does the rest (`crate::attribution::columns`).
 //! What can go wrong: a log that is too short, or that lacks what the model is made of, is refused with what it lacks.
 //! Units: SI; rad/s; body FRD, earth NED.
 //! Reference: specification `flight.md`, "The loop on flights".

@@ -9,9 +9,9 @@
 use super::FlightError;
 use super::columns::Usual;
 use super::vehicle::Vehicle;
-use crate::verdict::Scope;
 use crate::numeric::digits;
 use crate::verdict::Parameter;
+use crate::verdict::Scope;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 

@@ -11,9 +11,9 @@ use super::model::Coefficient;
 use super::scene::Scene;
 use crate::attribution::columns::channel::rms;
 use crate::attribution::columns::{Candidate, Prior, UNKNOWN};
-use crate::verdict::Scope;
 use crate::flight::effects::Told;
 use crate::verdict::Parameter;
+use crate::verdict::Scope;
 use crate::verdict::words::{channel, digits};
 
 /// A variable.

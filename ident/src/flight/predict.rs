@@ -13,8 +13,8 @@ use super::library::{Base, FlightLibrary};
 use super::model::{Added, FlightModel};
 use super::record::Record;
 use crate::attribution::columns::{Column, Design, Placed, UNKNOWN};
-use crate::verdict::Scope;
 use crate::log::Log;
+use crate::verdict::Scope;
 
 /// A flight as a model sees it: the model's sizes, and its vehicle where the log does not say.
 ///

@@ -9,8 +9,8 @@
 use super::FlightError;
 use super::channels::Target;
 use super::vehicle::Vehicle;
-use crate::log::flight_log::rotors;
 use crate::log::Log;
+use crate::log::flight_log::rotors;
 use crate::numeric::order::median;
 use crate::signal::start::{TURNS, start_pulse};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};

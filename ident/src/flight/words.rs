@@ -8,10 +8,10 @@
 use super::columns::Usual;
 use super::library::Kind;
 use crate::attribution::columns::{Candidate, Channel, Kept, UNKNOWN};
-use crate::verdict::Scope;
 use crate::flight::effects;
-use crate::verdict::{EffectEntry, Kin, NextExperiment, ScheduleStep, Unexplained};
+use crate::verdict::Scope;
 use crate::verdict::words::{plain, worth};
+use crate::verdict::{EffectEntry, Kin, NextExperiment, ScheduleStep, Unexplained};
 
 /// Slower than this what is left is slow, s.
 const SLOW_S: f64 = 0.3;

@@ -11,16 +11,16 @@
 
 use super::History;
 use super::find::{Change, Kind, one_speed};
-use crate::close::{Closed, close};
-use crate::channel::is_contrast;
 use crate::attribution::diagnose::RIVAL;
+use crate::channel::is_contrast;
+use crate::close::{Closed, close};
 use crate::effects::{self, Effect, Shape};
 use crate::log::Log;
 use crate::model::Model;
 use crate::numeric::order::median;
 use crate::numeric::parallel::in_parallel;
-use crate::verdict::{EffectEntry, Parameter};
 use crate::verdict::words::lower;
+use crate::verdict::{EffectEntry, Parameter};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::ops::Range;

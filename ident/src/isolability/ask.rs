@@ -11,13 +11,13 @@
 
 use super::size::Line;
 use crate::attribution::beside::ask;
-use crate::channel::{Context, Facts};
 use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, choose, offers, round_of};
-use crate::fit::heldout;
-use crate::model::Declared;
-use crate::fit::{Fit, Rows, fit, is_plausible, part_of};
-use crate::effects::placed::Placed;
 use crate::attribution::together::Ground;
+use crate::channel::{Context, Facts};
+use crate::effects::placed::Placed;
+use crate::fit::heldout;
+use crate::fit::{Fit, Rows, fit, is_plausible, part_of};
+use crate::model::Declared;
 
 /// A log's schedule, sensors and noise.
 pub(crate) struct Rig {

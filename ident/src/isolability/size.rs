@@ -8,13 +8,13 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use super::Quantity;
+use crate::attribution::diagnose::span;
 use crate::channel::Context;
 use crate::effects::design::{Label, TargetDesign};
-use crate::attribution::diagnose::span;
-use crate::effects::{Effect, Instance};
-use crate::model::Declared;
-use crate::fit::{Fit, design, plain};
 use crate::effects::placed::Placed;
+use crate::effects::{Effect, Instance};
+use crate::fit::{Fit, design, plain};
+use crate::model::Declared;
 use crate::numeric::solve::Normal;
 
 /// What a cause makes of one channel.

@@ -7,17 +7,17 @@
 //! Reference: specification `formats.md`, "Rig log".
 
 pub mod board;
-pub mod date;
-pub mod flight_log;
-pub mod import;
-pub mod join;
-pub mod quantity;
-pub mod sparse;
 mod clock;
+pub mod date;
 mod disc;
+pub mod flight_log;
 mod gaps;
 mod head;
+pub mod import;
+pub mod join;
 pub(crate) mod plausible;
+pub mod quantity;
+pub mod sparse;
 mod whole;
 
 pub use disc::Disc;

@@ -6,12 +6,12 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Powerplant model".
 
-use crate::numeric::digits;
 use super::read::{Refusal, course, leftover, no_channel, only, place_of, refusal, table_of, within};
 use super::{Model, ModelError, leftover_keys};
+use crate::log::digest_of;
 use crate::model::course::Course;
 use crate::model::leftover::Leftover;
-use crate::log::digest_of;
+use crate::numeric::digits;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 

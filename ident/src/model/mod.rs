@@ -10,17 +10,18 @@ pub mod course;
 pub mod leftover;
 pub mod simulate;
 
-use crate::numeric::digits;
-use crate::model::course::Course;
-use crate::model::leftover::Leftover;
-use crate::log::board;
 use crate::channel::{Context, Relation, Target, unit_of};
 use crate::effects::design::{Label, TargetDesign, Told};
-use crate::verdict::TOLD_BY_THE_BOARD;
-use crate::effects::{self, Estimate, Stage, air_density};
 use crate::effects::placed::Placed;
-use crate::log::Log;
+use crate::effects::rotor::air_density;
 use crate::effects::steps::Steps;
+use crate::effects::{self, Estimate, Stage};
+use crate::log::Log;
+use crate::log::board;
+use crate::model::course::Course;
+use crate::model::leftover::Leftover;
+use crate::numeric::digits;
+use crate::verdict::TOLD_BY_THE_BOARD;
 use toml::{Table, Value};
 
 mod discrepancy;

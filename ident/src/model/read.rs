@@ -11,11 +11,11 @@ use super::{
     run, supply,
 };
 use crate::channel::{Context, Relation};
-use crate::model::course::{COURSE_KEYS, Course};
-use crate::effects::{self, Effect, Estimate, Instance};
 use crate::effects::placed::Placed;
-use crate::model::leftover::{CLASSES, Leftover, PARTS};
+use crate::effects::{self, Effect, Estimate, Instance};
 use crate::log::Log;
+use crate::model::course::{COURSE_KEYS, Course};
+use crate::model::leftover::{CLASSES, Leftover, PARTS};
 use std::path::Path;
 use toml::{Table, Value};
 

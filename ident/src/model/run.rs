@@ -6,10 +6,10 @@
 //! Units: in the key of each number.
 //! Reference: specification `formats.md`, "Scope".
 
-use crate::numeric::digits;
 use super::read::{Refusal, finite, no_channel, only, refusal, within};
 use super::{AddedEffect, FittedTo, RunLevel, coefficient_key};
 use crate::channel::Relation;
+use crate::numeric::digits;
 use toml::{Table, Value};
 
 /// Keys of `[[run]]`.

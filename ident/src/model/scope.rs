@@ -8,10 +8,10 @@
 //! Reference: specification `formats.md`, "Scope".
 
 use super::{AddedEffect, Model};
-use crate::effects::placed::is_named;
-use crate::verdict::Scope;
 use crate::effects::placed::Placed;
+use crate::effects::placed::is_named;
 use crate::log::Log;
+use crate::verdict::Scope;
 use std::borrow::Cow;
 
 /// A run that a model was fitted to.
@@ -152,4 +152,3 @@ impl AddedEffect {
         out
     }
 }
-

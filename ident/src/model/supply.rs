@@ -9,12 +9,12 @@
 //! Reference: V = k omega + R I at a fixed duty, d ln(omega) / d ln(V) = 1 / (1 + R I / V); the powers and where they come from:
 //! [`crate::effects`], `supply_voltage`.
 
-use crate::numeric::digits;
 use super::read::{Refusal, finite, refusal};
 use super::{AddedEffect, Model, load_unit};
 use crate::channel::{Context, Relation, Target};
-use crate::effects::supply_voltage::{OF_CURRENT, OF_SPEED};
+use crate::effects::supply::supply_voltage::{OF_CURRENT, OF_SPEED};
 use crate::model::leftover::{along, binned};
+use crate::numeric::digits;
 use crate::numeric::order::median;
 use std::borrow::Cow;
 use toml::{Table, Value};

@@ -6,8 +6,8 @@
 //! Units: the column's.
 //! Reference: Geyer 1992, "Practical Markov chain Monte Carlo" (initial positive sequence); Theil 1950.
 
-use crate::signal::settle::line;
 use crate::numeric::solve::dot;
+use crate::signal::settle::line;
 
 /// Farthest that a sample may lie, in robust standard deviations.
 const FAR: f64 = 6.0;

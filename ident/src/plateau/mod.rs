@@ -7,16 +7,16 @@
 //! Reference: specification `identification.md`, item 2; Beharie 2013, section 5.7.3; Killick, Fearnhead & Eckley 2012 (change
 //! points); Geyer 1992 (error of a coloured mean).
 
-pub mod shift;
 mod change;
 mod mean;
 pub mod score;
+pub mod shift;
 pub mod study;
 
-use crate::signal::settle;
 use crate::channel::Context;
 use crate::log::{Log, SPEED};
 use crate::numeric::order::median;
+use crate::signal::settle;
 use mean::{Colour, Residual, mean_of, residual};
 
 /// Fewest settled rows of a plateau.

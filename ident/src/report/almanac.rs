@@ -9,14 +9,14 @@
 
 use crate::channel::Context;
 use crate::effects::design::{Label, TargetDesign};
-use crate::effects::{Effect, Instance, library};
-use crate::model::Declared;
 use crate::effects::placed::Placed;
+use crate::effects::{Effect, Instance, library};
 use crate::fit::design;
 use crate::log::{Column, Log};
-use crate::report::{Figure, Layer};
+use crate::model::Declared;
 use crate::numeric::digits::number;
 use crate::numeric::solve::Normal;
+use crate::report::{Figure, Layer};
 use crate::verdict::words::plain;
 use std::fmt::Write;
 

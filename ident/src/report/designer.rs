@@ -7,11 +7,11 @@
 //! Reference: `fit::power`, `fit::surface`.
 
 use super::figure::{Figure, Layer, Mark};
-use crate::numeric::digits::number;
 use super::sheet::Sheet;
+use crate::identify::Identified;
 use crate::identify::curves::power::{ASKED, Level, in_doubt};
 use crate::identify::curves::surface::Surface;
-use crate::identify::Identified;
+use crate::numeric::digits::number;
 
 /// Adds the part; `thin` is what the page does with its figures.
 pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figure) -> Figure) {

@@ -6,12 +6,12 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
-use crate::flight::channels::Target;
 use crate::flight::Closed;
+use crate::flight::channels::Target;
+use crate::flight::effects;
 use crate::flight::nameless::Variable;
 use crate::flight::scene::Scene;
 use crate::flight::windows::LENGTH_S;
-use crate::flight::effects;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;

@@ -6,17 +6,17 @@
 //! Units: changes in noise floors of their channel, so that channels can be drawn together.
 //! Reference: specification `closing-the-loop.md`, step 5.
 
-use crate::flight::columns::Flight;
-use crate::flight::library::{FlightLibrary, Kind};
-use crate::flight::record::Record;
-use crate::flight::standard::standard_flight;
-use crate::report::almanac::{Page, looks_alike};
 use crate::attribution::columns::evidence::White;
 use crate::attribution::columns::fit::difference;
 use crate::attribution::columns::{Column, Fit, Library, Noise, Owner, Placed, Prior, Problem, fit};
+use crate::flight::columns::Flight;
 use crate::flight::effects::{AirframeEffect, library};
-use crate::report::{Figure, Layer};
+use crate::flight::library::{FlightLibrary, Kind};
+use crate::flight::record::Record;
+use crate::flight::standard::standard_flight;
 use crate::numeric::digits::number;
+use crate::report::almanac::{Page, looks_alike};
+use crate::report::{Figure, Layer};
 use crate::verdict::words::plain;
 use std::fmt::Write;
 

@@ -5,9 +5,9 @@
 //! Units: on the axes.
 //! Reference: specification `closing-the-loop.md`, step 8.
 
+use crate::flight::effects;
 use crate::inertial::Recording;
 use crate::inertial::{Closed, Sensor};
-use crate::flight::effects;
 use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;

@@ -5,10 +5,10 @@
 //! Units: on the axes.
 //! Reference: none needed.
 
-use crate::log::join::Joint;
-use crate::log::join::signal::{Signal, pairs};
 use crate::channel::unit_of;
 use crate::log::Log;
+use crate::log::join::Joint;
+use crate::log::join::signal::{Signal, pairs};
 use crate::report::{Figure, Layer, Mark, Sheet};
 use crate::verdict::words::{channel, heading};
 

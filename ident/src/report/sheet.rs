@@ -7,10 +7,10 @@
 
 use super::closed::{LOOK, SCRIPT};
 use super::figure::Figure;
-use crate::numeric::digits::number;
 use super::style::{COLOURS, DRAWING, PAGE};
 use super::svg::escape;
 use crate::log::write_whole;
+use crate::numeric::digits::number;
 use crate::verdict::Channels;
 use crate::verdict::words::upper;
 use std::path::{Path, PathBuf};

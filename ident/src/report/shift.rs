@@ -7,8 +7,8 @@
 
 use super::figure::{Figure, Layer};
 use crate::channel::unit_of;
-use crate::plateau::study::{OFFSETS, Tried};
 use crate::plateau::shift::Filters;
+use crate::plateau::study::{OFFSETS, Tried};
 use crate::verdict::words;
 
 /// Filters 2 to 6 one above the other over time, and Filter 1 with its threshold.

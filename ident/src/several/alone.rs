@@ -6,8 +6,8 @@
 //! Reference: specification `closing-the-loop.md`.
 
 use super::Run;
-use crate::identify::CloseError;
 use crate::close::close;
+use crate::identify::CloseError;
 use crate::log::Log;
 use crate::numeric::parallel::in_parallel;
 use std::sync::Mutex;

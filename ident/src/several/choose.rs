@@ -8,13 +8,13 @@
 
 use super::joint::{Across, Compared, Joint, Shared, compared};
 use super::{FEWEST, Member};
-use crate::close::Closed;
-use crate::channel::Context;
 use crate::attribution::diagnose::NEEDED_REDUCTION;
+use crate::attribution::unexplained::LOUD;
+use crate::channel::Context;
+use crate::close::Closed;
+use crate::effects::placed::Placed;
 use crate::effects::{self, Amplitude, Estimate, NEEDED_EVIDENCE};
 use crate::verdict::Scope;
-use crate::effects::placed::Placed;
-use crate::attribution::unexplained::LOUD;
 
 /// Samples of a channel of one run that the shapes are sought on.
 pub(super) const SOUGHT: usize = 1500;

@@ -9,9 +9,9 @@
 use super::Member;
 use crate::channel::Target;
 use crate::effects::design::{Label, TargetDesign};
-use crate::model::Declared;
 use crate::effects::placed::Placed;
 use crate::fit::design;
+use crate::model::Declared;
 use crate::numeric::solve::Normal;
 use nalgebra::DMatrix;
 

@@ -8,8 +8,8 @@
 use super::equations::{left_on, of_run, residual_on, rms, shared, solved};
 use super::{FEWEST, Member, is_judged};
 use crate::channel::Relation;
-use crate::effects::design::{Label, covariance};
 use crate::effects::Shape;
+use crate::effects::design::{Label, covariance};
 use crate::effects::placed::Placed;
 use crate::fit::search::connected;
 use crate::numeric::simplex::nelder_mead;

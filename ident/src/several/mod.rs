@@ -7,7 +7,6 @@
 //! Units: as the channels.
 //! Reference: specification `formats.md`, "Scope" and `across_runs_rms`; cross-validation over groups, Roberts et al. 2017, Ecography 40:913.
 
-pub mod runs;
 mod alone;
 mod choose;
 mod differing;
@@ -17,21 +16,22 @@ mod folds;
 mod joint;
 mod outcome;
 mod own;
+pub mod runs;
 mod scatter;
 mod words;
 
-use crate::close::Closed;
 use crate::channel::{Context, Relation, Target};
-use crate::verdict::Scope;
+use crate::close::Closed;
 use crate::effects::Stage;
-use crate::model::Declared;
 use crate::effects::placed::Placed;
-use crate::fit::{Rows, design};
 use crate::fit::samples::Samples;
+use crate::fit::{Rows, design};
+use crate::model::Declared;
+use crate::verdict::Scope;
 
-pub use runs::Run;
 pub use alone::{RunsError, close_each};
 pub use outcome::{Outcome, Shown, close_together};
+pub use runs::Run;
 pub(crate) use scatter::disagreement;
 
 /// Fewest runs that can predict each other.

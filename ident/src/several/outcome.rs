@@ -11,19 +11,19 @@ use super::folds::{self, Tenable};
 use super::joint::{Across, Joint, Shared, compared};
 use super::words::{self, Told};
 use super::{Member, Run, choose, differing, own, scatter};
-use crate::signal::bad;
-use crate::close::Closed;
 use crate::channel::{Context, is_contrast};
+use crate::close::Closed;
+use crate::close::supply_limit;
 use crate::effects::Estimate;
 use crate::effects::placed::Placed;
 use crate::log::Log;
+use crate::log::sparse;
 use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors, stood};
 use crate::numeric::order::median;
 use crate::numeric::parallel::in_parallel;
-use crate::verdict::words::parameter_of;
-use crate::log::sparse;
-use crate::close::supply_limit;
+use crate::signal::bad;
 use crate::verdict::Verdict;
+use crate::verdict::words::parameter_of;
 use crate::verdict::words::{DISAGREE, OTHERWISE, digits};
 
 /// What several runs amount to.

@@ -11,15 +11,15 @@ use super::equations::{centring, columns_of, of_run, own_columns, samples_less_f
 use super::joint::{Joint, Shared};
 use crate::channel::Target;
 use crate::effects::design::Label;
-use crate::effects::{NEEDED_EVIDENCE, library};
-use crate::verdict::Scope;
-use crate::model::Declared;
 use crate::effects::placed::Placed;
+use crate::effects::{NEEDED_EVIDENCE, library};
+use crate::fit::search::{base, refine_newest, scan};
 use crate::fit::{Rows, design, fit, is_plausible};
+use crate::model::Declared;
 use crate::model::{AddedEffect, RunLevel};
 use crate::numeric::parallel::in_parallel;
-use crate::fit::search::{base, refine_newest, scan};
 use crate::numeric::solve::Normal;
+use crate::verdict::Scope;
 
 /// Most drifts and events of one run.
 const MOST: usize = 3;

@@ -7,18 +7,18 @@
 //! Units: scores in nats.
 //! Reference: cross-validation over runs; discrimination by a second experiment, Atkinson & Fedorov 1975, Biometrika 62:57.
 
-use crate::effects::placed::is_named;
-use crate::close::Closed;
-use crate::channel::Context;
 use crate::attribution::diagnose::{Candidate, Diagnosis};
-use crate::experiment;
-use crate::model::Declared;
-use crate::fit::{Fit, Rows, fit};
-use crate::effects::placed::Placed;
-use crate::log::Log;
-use crate::model::Model;
 use crate::attribution::rivals::{Rival, TEMPERATURE};
+use crate::channel::Context;
+use crate::close::Closed;
+use crate::effects::placed::Placed;
+use crate::effects::placed::is_named;
+use crate::experiment;
 use crate::fit::search::refine;
+use crate::fit::{Fit, Rows, fit};
+use crate::log::Log;
+use crate::model::Declared;
+use crate::model::Model;
 use crate::verdict::NextExperiment;
 
 /// Rivals of one run that take part.

@@ -9,14 +9,14 @@ use super::Run;
 use super::entries::{alternatives, entry, own_entries, unexplained, unnamed};
 use super::folds::Tenable;
 use super::joint::{Across, Compared, Joint};
-use crate::close::{NO_COMMAND, validation};
-use crate::channel::{Context, Relation, is_contrast, unit_of};
 use crate::attribution::diagnose::RIVAL;
+use crate::attribution::unexplained::looks_like;
+use crate::channel::{Context, Relation, is_contrast, unit_of};
+use crate::close::{NO_COMMAND, validation};
 use crate::effects::Estimate;
 use crate::effects::placed::Placed;
 use crate::model::Model;
 use crate::signal::residual::whiteness;
-use crate::attribution::unexplained::looks_like;
 use crate::verdict::{Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, Validation, Verdict};
 use std::collections::BTreeMap;
 

@@ -6,11 +6,11 @@
 //! Units: rev/min.
 //! Reference: specification `formats.md` (primary relations).
 
-use crate::numeric::order::median;
 use super::stretches::bridge;
 use crate::log::board;
-use crate::signal::drive::Drive;
 use crate::log::{Log, SPEED};
+use crate::numeric::order::median;
+use crate::signal::drive::Drive;
 
 /// How the consensus speed is made; stands in `model.toml`.
 #[derive(Debug, Clone, PartialEq, Default)]

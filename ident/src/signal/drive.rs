@@ -6,11 +6,11 @@
 //! Units: us, s, rev/min.
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3; least absolute deviations, Huber & Ronchetti 2009, chapter 7.
 
-use crate::signal::bad::Curve;
-use crate::signal::stretches::{GAP, STILL_US, bridge, starts};
 use crate::log::Log;
 use crate::numeric::order::{median, quantum};
+use crate::signal::bad::Curve;
 use crate::signal::start::start_pulse;
+use crate::signal::stretches::{GAP, STILL_US, bridge, starts};
 use std::ops::Range;
 
 /// Fewest rows in which the command stands still that a level is taken from; the later half of them.

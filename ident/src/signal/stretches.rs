@@ -5,8 +5,8 @@
 //! Units: us a row; row ranges `[from, to)`.
 //! Reference: specification `closing-the-loop.md`, step 2 (noise within plateaus).
 
-use crate::numeric::order::median;
 use super::settle;
+use crate::numeric::order::median;
 
 /// Change of the command from row to row, us, below which it holds still.
 pub(crate) const STILL_US: f64 = 0.5;

@@ -7,8 +7,8 @@
 
 pub mod words;
 
-use crate::signal::bad::SetAside;
 use crate::log::sparse::LeftOut;
+use crate::signal::bad::SetAside;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;

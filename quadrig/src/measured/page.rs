@@ -8,11 +8,11 @@
 
 use super::set::SETS;
 use super::{Outcome, Recorded, Tried};
-use ident::close::Closed;
 use ident::channel::unit_of;
+use ident::close::Closed;
 use ident::report::{Figure, Layer};
-use ident::verdict::{EffectEntry, Kind, Parameter};
 use ident::verdict::words::{channel, list, plain, upper};
+use ident::verdict::{EffectEntry, Kind, Parameter};
 use std::fmt::Write;
 
 /// Runs above which a set is summed up instead of shown run by run.

@@ -13,8 +13,8 @@ use frame::calibration::{Calibration, Converted};
 use frame::message::Message;
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES, RigSample};
 use frame::units::Ticks;
-use ident::model::Model;
 use ident::close::watch::{Departure, Shown, Watch};
+use ident::model::Model;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 

@@ -7,8 +7,8 @@
 //! Reference: Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63:425 (discrepancy); Sarkka & Solin, *Applied Stochastic Differential Equations*,
 //! 2019, section 12.3 (Gaussian processes as state-space models).
 
-use crate::numeric::order::usual_step;
 use super::channel::Channel;
+use crate::numeric::order::usual_step;
 
 /// Longest memory of a wander, as a share of the log: within it the wander turns round some twenty times.
 pub const SLOWEST: f64 = 0.05;

@@ -8,9 +8,9 @@
 
 use super::{About, AirframeEffect, Clause, EffectEntry, Form, Found, Scope};
 use crate::attribution::columns::Shape;
-use crate::numeric::order::usual_step;
 use crate::flight::columns::Flight;
 use crate::flight::scene::Scene;
+use crate::numeric::order::usual_step;
 use crate::verdict::Parameter;
 
 pub(super) struct ChannelDelay;

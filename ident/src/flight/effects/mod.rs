@@ -28,12 +28,12 @@ mod translational_lift;
 mod vibration_rectification;
 mod wind;
 
-use crate::effects::{About, Clause, EffectEntry};
-use crate::verdict::Scope;
 use crate::attribution::columns::Shape;
+use crate::effects::{About, Clause, EffectEntry};
 use crate::flight::columns::{Flight, Sink};
 use crate::flight::scene::Scene;
 use crate::verdict::Parameter;
+use crate::verdict::Scope;
 
 /// One way in which a flight may hold an effect.
 #[derive(Debug, Clone, Default, PartialEq)]

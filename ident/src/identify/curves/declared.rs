@@ -5,10 +5,10 @@
 //! Units: the channel's, per power of rpm/1000 or (pulse - 1000 us)/1000.
 //! Reference: Beharie 2013, section 5.7.3; specification `formats.md`, "primary relations".
 
-use crate::signal::colour::effective_share;
 use crate::channel::{Context, Relation, Target};
 use crate::model::Polynomial;
 use crate::numeric::solve::Normal;
+use crate::signal::colour::effective_share;
 
 /// A declared relation with its quality.
 pub(crate) struct DeclaredFit {
@@ -70,9 +70,9 @@ fn abscissa(context: &Context, relation: Relation, row: usize) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Declared;
     use crate::fit::{Rows, design, fit_target};
     use crate::log::{Column, Log};
+    use crate::model::Declared;
 
     /// In blocks as the engine fits whole columns, over more than one block, with a standing rotor and missing samples.
     #[test]

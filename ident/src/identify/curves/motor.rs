@@ -9,8 +9,8 @@
 use super::{Estimate, Law, Zero};
 use crate::log::Log;
 use crate::numeric::order::median;
-use crate::plateau::Plateau;
 use crate::numeric::solve::Normal;
+use crate::plateau::Plateau;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::TAU;
 

@@ -10,8 +10,8 @@ use super::power::{TOO_SMALL, Valued};
 use super::{Curve, Estimate, Law, Origin, Point, STRAY, Zero};
 use crate::log::Log;
 use crate::numeric::order::median;
-use crate::plateau::Plateau;
 use crate::numeric::solve::Normal;
+use crate::plateau::Plateau;
 use statrs::distribution::{ContinuousCDF, Normal as Gauss, StudentsT};
 use std::f64::consts::TAU;
 

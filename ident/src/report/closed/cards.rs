@@ -10,12 +10,15 @@ use super::page::{Page, Reading};
 use super::sentence::{order, without};
 use super::state::figures;
 use super::vocabulary::Vocabulary;
+use crate::attribution::rivals::UNEXPLAINED;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
-use crate::attribution::rivals::UNEXPLAINED;
+use crate::verdict::words::{
+    DISAGREE, OTHERWISE, SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled,
+    scope, signs, sized, sureness, upper, upper_bound, with_interval,
+};
 use crate::verdict::{Alternative, EffectEntry, Kin, Parameter, Verdict};
-use crate::verdict::words::{DISAGREE, OTHERWISE, SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled, scope, signs, sized, sureness, upper, upper_bound, with_interval};
 use std::fmt::Write;
 
 /// Probability from which on what no hypothesis has is told.

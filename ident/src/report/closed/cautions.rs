@@ -7,8 +7,8 @@
 //! Reference: quantisation noise of a uniform quantiser, a step over the square root of twelve.
 
 use crate::attribution::unexplained::LOUD;
-use crate::verdict::{Validation, Verdict};
 use crate::verdict::words::{channel, channels, list, upper};
+use crate::verdict::{Validation, Verdict};
 
 /// Error over noise floor from which on the floor lies beneath the rounding of a sensor of 16 bits: what it measured spans its error at the least,
 /// and its rounding is a 65536th of its span over the square root of twelve.

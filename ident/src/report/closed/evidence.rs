@@ -9,8 +9,8 @@ use super::sentence::{order, whole};
 use super::vocabulary::Vocabulary;
 use crate::numeric::order::median;
 use crate::report::figure::{Figure, Layer, Mark};
-use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
 use crate::verdict::words::{channel, heading, scaled};
+use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
 
 /// Columns of pixels of a drawing.
 const COLUMNS: usize = 440;

@@ -12,8 +12,8 @@ use super::{cards, cautions, fold, left, sentence, state};
 use crate::channel::unit_of;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
-use crate::verdict::{Kind, Validation, Verdict};
 use crate::verdict::words::{digits, heading, scaled};
+use crate::verdict::{Kind, Validation, Verdict};
 
 /// What a page is made of.
 pub(crate) struct Page<'p> {

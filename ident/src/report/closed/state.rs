@@ -6,10 +6,10 @@
 //! Reference: none.
 
 use super::evidence::pair;
-use crate::report::svg::escape;
 use crate::attribution::unexplained::LOUD;
-use crate::verdict::{Channel, Channels, Kind, Verdict};
+use crate::report::svg::escape;
 use crate::verdict::words::{channel, digits, scaled, upper};
+use crate::verdict::{Channel, Channels, Kind, Verdict};
 use std::fmt::Write;
 
 /// Left end of the scale, noise floors.

@@ -7,8 +7,8 @@
 
 use crate::effects::{About, by_id};
 use crate::verdict::Scope;
-use crate::verdict::{EffectEntry, Kin};
 use crate::verdict::words::{Clause, parameter_of};
+use crate::verdict::{EffectEntry, Kin};
 
 /// The words of a library of effects.
 #[derive(Debug, Clone, Copy)]

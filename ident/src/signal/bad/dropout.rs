@@ -11,10 +11,10 @@ use super::curve::Curve;
 use super::excursion::{Event, LONGEST};
 use super::scale::times;
 use super::witness::Witnesses;
-use crate::signal::stretches::{bridge, starts};
-use crate::signal::drive::{Drive, SIGMA};
 use crate::log::SPEED;
 use crate::numeric::order::{median, quantum};
+use crate::signal::drive::{Drive, SIGMA};
+use crate::signal::stretches::{bridge, starts};
 
 /// Share of a channel's readings that may be lost: one that loses more has a fault with a name.
 const MOST: f64 = 1.0 / 3.0;

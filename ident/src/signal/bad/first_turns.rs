@@ -46,8 +46,8 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
 
 #[cfg(test)]
 mod tests {
-    use crate::signal::bad::found;
     use crate::log::Log;
+    use crate::signal::bad::found;
 
     /// A rotor that is started at 10 s; its tachometer is silent for `silent` rows of a tenth of a second, then reads 600 rev/min.
     fn started(silent: usize) -> Log {

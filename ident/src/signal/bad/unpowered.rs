@@ -8,9 +8,9 @@
 
 use super::excursion::Event;
 use super::{CHANNEL_OF_SUPPLY, FEWEST};
-use crate::signal::stretches::CALM_US;
 use crate::log::Log;
 use crate::numeric::order::median;
+use crate::signal::stretches::CALM_US;
 
 /// Share of the usual voltage below which there is no supply, and of the largest current below which none flows: controllers cut off at half of
 /// their supply, and a tenth of it runs none.
@@ -48,8 +48,8 @@ fn resting(log: &Log) -> impl Fn(usize) -> bool + '_ {
 
 #[cfg(test)]
 mod tests {
-    use crate::signal::bad::found;
     use crate::log::{Column, Log};
+    use crate::signal::bad::found;
 
     /// A staircase whose voltmeter reads nothing on some rows.
     fn log(off: impl Fn(usize) -> bool) -> Log {

@@ -8,10 +8,10 @@
 
 use super::curve::Curve;
 use super::excursion::Event;
-use crate::signal::stretches::{CALM_US, GAP, bridge};
-use crate::signal::drive::acceleration_of_rows;
 use crate::log::{Log, SPEED};
 use crate::numeric::order::median;
+use crate::signal::drive::acceleration_of_rows;
+use crate::signal::stretches::{CALM_US, GAP, bridge};
 use std::collections::BTreeMap;
 
 /// Change of a regressor within two rows, as a share of its span, that is a step where no command was logged.

@@ -7,9 +7,9 @@
 
 use super::{Maximum, Pair};
 use crate::identify::curves::{Zero, speeds};
+use crate::log::quantity::{Ampere, Newton};
 use crate::log::{Lines, Log, Place, ReadError, SPEED, short};
 use crate::plateau::Plateau;
-use crate::log::quantity::{Ampere, Newton};
 use std::io::BufRead;
 
 /// The header of a table of pairs.
