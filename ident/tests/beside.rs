@@ -9,8 +9,8 @@
 mod rig;
 
 use ident::close::{Closed, close};
-use ident::effects::Scope;
 use ident::log::{Column, Log};
+use ident::verdict::Scope;
 use ident::verdict::{Kind, Unexplained};
 use rig::Chance;
 

@@ -153,7 +153,7 @@ fn coarse_steps(model: &Model, coarse: &Day<'_>) {
     assert!(thrust.after.rms < 0.5 * thrust.before.rms, "{thrust:?}");
     // the written model rounds as the verdict says, but for what the curve knows of a level on an edge
     let written = Model::parse("model.toml", &closed.model.to_toml()).expect("what was written");
-    let context = ident::context::Context::new(&log(coarse), Some(written.start_pulse_us));
+    let context = ident::channel::Context::new(&log(coarse), Some(written.start_pulse_us));
     let predicted = written.predict(&context, "thrust_n").expect("a thrust");
     let target = &context.targets[context.target("thrust_n").expect("a thrust")];
     let squares = target.rows.iter().zip(&target.y).map(|(row, y)| (y - predicted[*row]).powi(2)).sum::<f64>();

@@ -8,8 +8,8 @@
 
 mod rig;
 
+use ident::channel::Context;
 use ident::close::{Closed, close};
-use ident::context::Context;
 use ident::log::{Column, Log};
 use ident::model::Model;
 use ident::verdict::EffectEntry;

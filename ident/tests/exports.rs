@@ -5,8 +5,8 @@
 //! Units: as the headers say.
 //! Reference: specification `formats.md`, `quadrig import`; RCbenchmark 1585 and 1780, Tyto Flight Stand, VESC Tool, KISS, BLHeli, AM32.
 
-use ident::import::{Options, Report, import_from};
 use ident::log::Log;
+use ident::log::import::{Options, Report, import_from};
 
 fn import(bytes: &[u8], options: &Options) -> Result<(Log, Report), String> {
     import_from("x.csv", bytes, options).map_err(|e| e.to_string())

@@ -8,11 +8,11 @@
 
 mod rig;
 
+use ident::channel::Context;
 use ident::close::{Closed, close};
-use ident::context::Context;
-use ident::leftover::Leftover;
 use ident::log::{Column, Log};
 use ident::model::Model;
+use ident::model::leftover::Leftover;
 use ident::verdict::Kind;
 use rig::{Chance, K_THRUST, K_TORQUE, KV, NO_LOAD, RESISTANCE, STEP};
 

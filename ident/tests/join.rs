@@ -6,8 +6,9 @@
 //! Units: s, ppm, rev/min, A, V.
 //! Reference: issue "One rig, many runs, several loggers", line 3: 99 % of 200 cases at 25 Hz and 5 minutes.
 
-use ident::join::{JoinError, Joint, align, merge, page};
+use ident::log::join::{JoinError, Joint, align, merge};
 use ident::log::{Column, Log};
+use ident::report::joined::page;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -8,12 +8,14 @@
 
 mod rig;
 
+use ident::channel::Context;
 use ident::close::{Closed, close};
-use ident::context::Context;
 use ident::effects::library;
-use ident::heldout;
-use ident::hypothesis::{Declared, Placed, Rows, fit};
+use ident::effects::placed::Placed;
+use ident::fit::heldout;
+use ident::fit::{Rows, fit};
 use ident::log::{Column, Log};
+use ident::model::Declared;
 use ident::verdict::Kind;
 use rig::Chance;
 

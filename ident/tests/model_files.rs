@@ -5,7 +5,7 @@
 //! Units: as stated.
 //! Reference: specification `formats.md`, "Powerplant model".
 
-use ident::context::Context;
+use ident::channel::Context;
 use ident::log::{Column, Log};
 use ident::model::{Model, beside};
 use sha2::{Digest, Sha256};

@@ -10,10 +10,10 @@
 
 mod rig;
 
-use ident::bad;
 use ident::close::close;
-use ident::import::import;
 use ident::log::Log;
+use ident::log::import::import;
+use ident::signal::bad;
 use ident::verdict::Verdict;
 use rig::{Chance, Trouble};
 use std::path::{Path, PathBuf};

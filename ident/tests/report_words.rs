@@ -5,8 +5,8 @@
 //! Units: as stated.
 //! Reference: specification `formats.md`, "Verdict".
 
-use ident::effects::Scope;
 use ident::report::{Hidden, Vocabulary, WIDEST, sentence, terminal};
+use ident::verdict::Scope;
 use ident::verdict::{
     Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, NextExperiment, Parameter,
     ScheduleStep, Unexplained, Validation, Verdict,
@@ -415,15 +415,18 @@ fn a_cause_has_a_size_or_a_bound() {
 fn an_interval_of_both_signs_is_not_in_the_head() {
     let sizes = vec![parameter("across", -0.02, 0.05, "N/(m/s)^2"), parameter("climb", 0.3, 0.01, "N/(m/s)")];
     let e = effect("translational_lift", "thrust_n", 0.99, 0.5, sizes);
-    let said = sentence(&verdict(Kind::Attributed, vec![e.clone()]), ident::flight::VOCABULARY, false);
+    let said = sentence(&verdict(Kind::Attributed, vec![e.clone()]), ident::report::flight::VOCABULARY, false);
     assert!(
         said.starts_with("Thrust changes across the air and falls in a climb (") && said.contains("0.290 to 0.310"),
         "{said}"
     );
     assert!(!said.contains("-0.07"), "{said}");
     let sizes = vec![parameter("across", -0.2, 0.05, "N/(m/s)^2"), parameter("climb", -0.3, 0.01, "N/(m/s)")];
-    let said =
-        sentence(&verdict(Kind::Attributed, vec![EffectEntry { parameters: sizes, ..e }]), ident::flight::VOCABULARY, false);
+    let said = sentence(
+        &verdict(Kind::Attributed, vec![EffectEntry { parameters: sizes, ..e }]),
+        ident::report::flight::VOCABULARY,
+        false,
+    );
     assert!(said.starts_with("Thrust falls across the air and grows in a climb"), "{said}");
 }
 
@@ -565,8 +568,8 @@ fn a_demonstration_judges_its_names() {
 /// Every effect of a flight says what it does, with its size where the flight shows it.
 #[test]
 fn every_effect_of_a_flight_has_words() {
-    let words = ident::flight::VOCABULARY;
-    for e in ident::effects::airframe::library() {
+    let words = ident::report::flight::VOCABULARY;
+    for e in ident::flight::effects::library() {
         let clause = (words.clause)(&effect(e.id(), "force_x", 0.9, 0.5, vec![]));
         assert!(!clause.who.is_empty() && !clause.does.is_empty(), "{}: {clause:?}", e.id());
     }
@@ -622,12 +625,12 @@ fn sizes_have_no_sign() {
 fn terms_of_a_curve_are_not_told() {
     let curve = effect("unknown", "thrust_n", 0.9, 0.4, vec![parameter("p1", 0.5, 0.01, "N")]);
     let v = verdict(Kind::Unattributed, vec![curve]);
-    for words in [Vocabulary::RIG, ident::flight::VOCABULARY] {
+    for words in [Vocabulary::RIG, ident::report::flight::VOCABULARY] {
         assert!(!terminal(&v, words, false).contains("p1 ="));
     }
     let linear = effect("unknown", "gx", 0.9, 0.4, vec![parameter("gx_ax", 0.5, 0.01, "1")]);
     let v = verdict(Kind::Unattributed, vec![linear]);
-    assert!(terminal(&v, ident::inertial::VOCABULARY, false).contains("gx_ax = 0.50"));
+    assert!(terminal(&v, ident::report::inertial::VOCABULARY, false).contains("gx_ax = 0.50"));
 }
 
 /// What is told of several sensors of one speed, or of the axes of a vector, is told of the whole.
@@ -665,7 +668,7 @@ fn an_axis_that_is_worse_is_told() {
         |before: f64, after: f64| Channel { unit: "uT".into(), noise_floor_rms: 0.2, before: of(before), after: of(after) };
     v.channels.predicted =
         [("mx", axis(3.56, 2.27)), ("my", axis(3.40, 3.47)), ("mz", axis(14.1, 3.70))].map(|(n, c)| (n.to_owned(), c)).into();
-    let said = sentence(&v, ident::inertial::VOCABULARY, false);
+    let said = sentence(&v, ident::report::inertial::VOCABULARY, false);
     assert!(said.contains("of what field had left over. Field (y) is predicted 2 % worse."), "{said}");
 }
 
@@ -694,7 +697,7 @@ fn what_is_alike_but_for_its_channel_is_told_once() {
         let after = if k == 4 { Figures { heldout_rms: 0.2, ..one.after } } else { one.after };
         v.channels.predicted.insert(format!("rpm_{k}"), Channel { after, ..one.clone() });
     }
-    let text = terminal(&v, ident::flight::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ");
+    let text = terminal(&v, ident::report::flight::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(text.contains("on speed of rotors 1, 2 and 3, vehicle Without it the error of speed of rotor 1 is"), "{text}");
     assert!(text.contains("The others are alike.") && text.contains("on speed of rotor 4, vehicle"), "{text}");
     assert_eq!(text.matches("unknown (").count(), 2, "{text}");
@@ -705,13 +708,13 @@ fn what_is_alike_but_for_its_channel_is_told_once() {
 fn an_effect_of_a_board_claims_no_more_than_its_intervals() {
     let z = parameter("offset_z", 17.9, 6.0, "uT");
     let magnet = effect("hard_iron", "mz", 0.999, 0.2, vec![z, parameter("t0", 40.8, 1.8, "s")]);
-    assert!(ident::words::scope(&magnet, "board").starts_with("since one instant"));
-    let said = (ident::inertial::VOCABULARY.clause)(&magnet).sentence();
+    assert!(ident::verdict::words::scope(&magnet, "board").starts_with("since one instant"));
+    let said = (ident::report::inertial::VOCABULARY.clause)(&magnet).sentence();
     assert!(said.ends_with("to the field from 41 s on."), "{said}");
     let sizes = |clear: f64| [clear, 0.011, 0.024, 0.021].map(|v| parameter("s_xy", v, 0.035, "1")).to_vec();
     let iron = |clear: f64| {
         let v = verdict(Kind::Attributed, vec![effect("soft_iron", "thrust_n", 0.999, 0.05, sizes(clear))]);
-        terminal(&v, ident::inertial::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ")
+        terminal(&v, ident::report::inertial::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ")
     };
     assert!(iron(0.05).contains("of its 4 sizes 3 may each be zero"), "{}", iron(0.05));
     assert!(!iron(0.2).contains("may each be zero"), "one is well known: {}", iron(0.2));
@@ -740,9 +743,9 @@ fn floors_that_are_no_measure_are_told() {
 fn a_curve_has_words() {
     let mut curve = effect("unknown", "rpm", 0.9, 0.4, vec![]);
     curve.equation = "reading += sum of p_k P_k(v) [pulse_us, terms 3]".into();
-    assert_eq!(ident::words::curve(&curve).as_deref(), Some("a smooth curve of pulse, 3 terms"));
+    assert_eq!(ident::verdict::words::curve(&curve).as_deref(), Some("a smooth curve of pulse, 3 terms"));
     curve.equation = "no correction".into();
-    assert_eq!((ident::words::curve(&curve), ident::words::curve(&sag(0.9))), (None, None));
+    assert_eq!((ident::verdict::words::curve(&curve), ident::verdict::words::curve(&sag(0.9))), (None, None));
 }
 
 /// Of several runs what happened on one alone names it, on the terminal and at the head.
@@ -778,11 +781,11 @@ fn what_is_not_predicted_is_not_left() {
 /// Names of columns become words; formulas and words stay.
 #[test]
 fn a_text_is_told_without_names_of_columns() {
-    let said = ident::words::plain("the thrust_n residual follows temp_c, as thrust(rpm) holds; time_since_step");
+    let said = ident::verdict::words::plain("the thrust_n residual follows temp_c, as thrust(rpm) holds; time_since_step");
     assert_eq!(said, "the thrust residual follows temperature, as thrust against the speed holds; time since the last step");
-    assert_eq!(ident::words::channel("mz"), "field (z)");
+    assert_eq!(ident::verdict::words::channel("mz"), "field (z)");
     let late = effect("channel_delay", "mx", 0.9, 0.5, vec![parameter("delay", 0.011, 0.001, "s")]);
-    assert_eq!((ident::flight::VOCABULARY.clause)(&late).sentence(), "The magnetometer answers 11 ms late.");
+    assert_eq!((ident::report::flight::VOCABULARY.clause)(&late).sentence(), "The magnetometer answers 11 ms late.");
 }
 
 /// A flight's text speaks of the vehicle and of its quantities, not of a rig and of columns.
@@ -793,7 +796,7 @@ fn a_flight_is_of_a_vehicle() {
     let mut v = verdict(Kind::Attributed, vec![lag]);
     let one = v.channels.predicted["thrust_n"].clone();
     v.channels.predicted = [("acc_x".to_owned(), one.clone()), ("rpm_1".to_owned(), one)].into();
-    let text = terminal(&v, ident::flight::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ");
+    let text = terminal(&v, ident::report::flight::VOCABULARY, false).split_whitespace().collect::<Vec<_>>().join(" ");
     for said in ["What every vehicle has:", "what every vehicle has", "on speed of rotor 1, vehicle"] {
         assert!(text.contains(said), "{said}: {text}");
     }
@@ -801,6 +804,6 @@ fn a_flight_is_of_a_vehicle() {
     let mut v = verdict(Kind::Attributed, vec![effect("hard_iron", "mx", 0.9, 0.7, vec![])]);
     let one = v.channels.predicted["thrust_n"].clone();
     v.channels.predicted = [("mx".to_owned(), one)].into();
-    let text = terminal(&v, ident::inertial::VOCABULARY, false);
+    let text = terminal(&v, ident::report::inertial::VOCABULARY, false);
     assert!(text.contains("what this board has") && text.contains("on field (x), board"), "{text}");
 }

@@ -6,11 +6,11 @@
 //! Units: N, s.
 //! Reference: specification `formats.md`, "Scope".
 
+use ident::channel::Context;
 use ident::close::{Closed, close};
-use ident::context::Context;
-use ident::effects::Scope;
 use ident::log::{Column, Log};
 use ident::model::Model;
+use ident::verdict::Scope;
 
 /// Zero drift of the first run, N/s, and the share of thrust and torque that a damaged blade loses at an instant of it, s.
 const DRIFT: f64 = 0.002;

@@ -10,12 +10,12 @@ use crate::apart::Paths;
 use crate::folder::{Folder, figures};
 use crate::open::open;
 use crate::replace::put;
-use ident::beam::Beam;
-use ident::context::Context;
-use ident::import::Options;
+use ident::channel::Context;
+use ident::log::import::Options;
+use ident::log::quantity::{Density, Kilogram, Metre, Newton, Pascal, RevPerMin, Volt};
 use ident::plateau::plateaus;
-use ident::quantity::{Density, Kilogram, Metre, Newton, Pascal, RevPerMin, Volt};
 use ident::report::{beam, beam_figures, beam_warning};
+use ident::sizing::beam::Beam;
 use std::io::Write;
 use std::path::PathBuf;
 

@@ -13,12 +13,13 @@ use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
 use clap::builder::PossibleValuesParser;
 use hal_sim::{Scenario, effect};
+use ident::channel::{Context, unit_of};
 use ident::close::close;
-use ident::context::{Context, unit_of};
 use ident::log::Log;
+use ident::numeric::digits::number;
 use ident::plateau::plateaus;
-use ident::report::{Hidden, Origin, Vocabulary, number, terminal, wrapped};
-use ident::words::{channel, digits, scaled};
+use ident::report::{Hidden, Origin, Vocabulary, terminal, wrapped};
+use ident::verdict::words::{channel, digits, scaled};
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 

@@ -8,7 +8,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::Folder;
-use ident::almanac::{Page, almanac};
+use ident::report::almanac::{Page, almanac};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -29,7 +29,7 @@ impl Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let mut folder = Folder::new(&args.output, "effects")?;
-    let count = add(&mut folder, "", almanac()) + add(&mut folder, "airframe/", ident::flight::almanac());
+    let count = add(&mut folder, "", almanac()) + add(&mut folder, "airframe/", ident::report::flight_almanac::almanac());
     folder.write()?;
     if !quiet {
         say!("{count} pages in {} and {}", args.output.display(), args.output.join("airframe").display());

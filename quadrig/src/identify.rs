@@ -11,13 +11,14 @@ use crate::apart::Paths;
 use crate::folder::{Folder, figures};
 use crate::open::{Columns, Names, open};
 use crate::replace::put;
-use ident::context::unit_of;
-use ident::fit::power::{csv, in_doubt};
-use ident::fit::ratio;
+use ident::channel::unit_of;
+use ident::identify::curves::power::{csv, in_doubt};
+use ident::identify::curves::ratio;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::Log;
-use ident::report::{Sheet, WIDEST, headline, number, wrapped};
-use ident::words::{bracketed, channel};
+use ident::numeric::digits::number;
+use ident::report::{Sheet, WIDEST, headline, wrapped};
+use ident::verdict::words::{bracketed, channel};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -267,7 +268,7 @@ fn listed(places: &[usize]) -> String {
 
 /// What the board told of the run, where it told anything.
 fn told(log: &Log) -> String {
-    let lines = ident::board::told(log);
+    let lines = ident::log::board::told(log);
     if lines.is_empty() {
         return String::new();
     }

@@ -72,15 +72,15 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let rotor = args.rotor.filter(|_| args.with.is_empty());
     let flight = match rotor {
         Some(_) => None,
-        None if options.mappings.is_empty() => ident::import::flight(&args.file)?,
+        None if options.mappings.is_empty() => ident::log::import::flight(&args.file)?,
         None => None,
     };
     let is_flight = flight.is_some();
     let (mut log, report) = match (flight, rotor) {
         (Some(found), _) => found,
-        (None, Some(n)) => ident::import::rotor(&args.file, n as usize)?
+        (None, Some(n)) => ident::log::import::rotor(&args.file, n as usize)?
             .ok_or_else(|| format!("--rotor {n}: {} is no PX4 ULog and no Betaflight Blackbox log; expected one of them: leave --rotor away for an export of a stand or an ESC", args.file.display()))?,
-        (None, None) => ident::import::import_as(&args.file, &options)
+        (None, None) => ident::log::import::import_as(&args.file, &options)
             .map_err(|why| crate::kind::another(&args.file).map_or(why.into(), Failure::from))?,
     };
     options.name(&mut log);
@@ -96,7 +96,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     if is_flight {
         args.meta.iter().for_each(|Meta(key, value)| drop(log.meta.insert(key.clone(), value.clone())));
-        put_as(&args.output, &format!("# {}", ident::flight_log::FORMAT), |out| ident::flight_log::write_to(&log, out))?;
+        put_as(&args.output, &format!("# {}", ident::log::flight_log::FORMAT), |out| {
+            ident::log::flight_log::write_to(&log, out)
+        })?;
     } else if let Some(Meta(key, _)) = args.meta.first() {
         return Err(format!("--meta {key}: {} is no flight; expected a flight", args.file.display()).into());
     } else {

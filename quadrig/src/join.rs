@@ -4,13 +4,14 @@
 //! a page beside the output shows the joint.
 //! What can go wrong: logs that cannot be joined for certain are refused, and nothing is written.
 //! Units: s, ppm; the channels'.
-//! Reference: specification `formats.md`, `quadrig import`; `ident/src/join`.
+//! Reference: specification `formats.md`, `quadrig import`; `ident/src/log/join`.
 
 use crate::Failure;
 use crate::open::{as_written, open, say};
-use ident::import::{Options, Report, is_recording};
-use ident::join::{Joint, LABELS, align, merge, page};
 use ident::log::Log;
+use ident::log::import::{Options, Report, is_recording};
+use ident::log::join::{Joint, LABELS, align, merge};
+use ident::report::joined::page;
 use std::path::{Path, PathBuf};
 
 /// A further logger's file and what it is called.
@@ -46,7 +47,7 @@ fn open_further(file: &Path, rotor: Option<u32>, options: &Options, quiet: bool)
     }
     let wanted = || format!("--with: {} records several rotors; expected --rotor N, the one on the stand", file.display());
     let n = rotor.ok_or_else(wanted)?;
-    let (log, report) = ident::import::rotor(file, n as usize)?.ok_or_else(wanted)?;
+    let (log, report) = ident::log::import::rotor(file, n as usize)?.ok_or_else(wanted)?;
     if !quiet {
         say(file, &report);
     }

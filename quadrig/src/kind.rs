@@ -193,7 +193,7 @@ fn of_the_imu(path: &Path) -> Option<String> {
 /// What a file is that is no rig's log, where it is a flight's of another program.
 fn of_a_flight(path: &Path) -> Option<String> {
     let file = path.display();
-    let flight = ident::import::flight(path).ok()?.is_some();
+    let flight = ident::log::import::flight(path).ok()?.is_some();
     flight.then(|| format!("{file}:1:1: a flight; expected a rig's log: `quadrig import {file} -o LOG` makes a flight log, which close-loop takes"))
 }
 

@@ -8,7 +8,7 @@
 
 use crate::Failure;
 use crate::trouble::unread;
-use ident::import::{Mapping, Options, Report, import_as};
+use ident::log::import::{Mapping, Options, Report, import_as};
 use ident::log::{Gaps, Log};
 use ident::model::{Model, beside};
 use ident::report::wrapped;
@@ -66,7 +66,7 @@ pub(crate) fn day_of_run(text: &str) -> Result<String, String> {
         time.is_empty() || digits.is_some_and(|of| of.len() >= 4 && of.chars().all(|c| c.is_ascii_digit() || c == ':'))
     };
     let parts = text.get(..10).zip(text.get(10..));
-    if parts.is_some_and(|(day, time)| ident::date::day(day).is_some() && clock(time)) {
+    if parts.is_some_and(|(day, time)| ident::log::date::day(day).is_some() && clock(time)) {
         Ok(text.to_owned())
     } else {
         Err("expected a day such as 2026-03-12 or 2026-03-12T14:30:00".to_owned())

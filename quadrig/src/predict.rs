@@ -11,10 +11,10 @@ use crate::close_loop::{flight, inertial};
 use crate::open::{Columns, Names, open};
 use crate::replace::put_as;
 use clap::ValueEnum;
-use ident::context::Context;
+use ident::channel::Context;
 use ident::log::{Column, Log};
 use ident::model::Model;
-use ident::simulate::from_command;
+use ident::model::simulate::from_command;
 use std::borrow::Cow;
 use std::path::PathBuf;
 
@@ -130,7 +130,7 @@ fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
 fn by_command(model: &Model, log: &Log) -> Result<Vec<Column>, Failure> {
     let pulse =
         log.column("pulse_us").ok_or_else(|| format!("{}: no column pulse_us; expected one with --from command", log.name))?;
-    let pulse = ident::context::bridge(&log.t, pulse);
+    let pulse = ident::signal::stretches::bridge(&log.t, pulse);
     let predicted = from_command(model, &log.name, &log.t, &pulse, &log.columns);
     Ok(log.measured().filter_map(|name| predicted.columns.iter().find(|c| c.name == name).cloned()).collect())
 }

@@ -16,7 +16,7 @@ use hal_sim::scenario::SupplySection;
 use hal_sim::{PlantState, Powerplant, RunRecord, Scenario};
 use ident::log::{Column, Log};
 use ident::model::Model;
-use ident::simulate::from_command;
+use ident::model::simulate::from_command;
 
 /// The log of a run, as `quadrig log` would record it; with the raw codes beside the readings where `raw` says so.
 pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: bool) -> Log {
@@ -109,12 +109,15 @@ fn events(record: &RunRecord) -> Vec<String> {
 /// What a model predicts along the command of a log, row for row, and each channel as it would read; `None` of a model that predicts no
 /// speed from a command.
 pub(crate) fn along(model: &Model, log: &Log) -> Option<(Vec<PlantState>, Log)> {
-    let pulse = ident::context::bridge(&log.t, log.column("pulse_us")?);
-    let covariates: Vec<Column> =
-        log.columns.iter().map(|c| Column { name: c.name.clone(), values: ident::context::bridge(&log.t, &c.values) }).collect();
+    let pulse = ident::signal::stretches::bridge(&log.t, log.column("pulse_us")?);
+    let covariates: Vec<Column> = log
+        .columns
+        .iter()
+        .map(|c| Column { name: c.name.clone(), values: ident::signal::stretches::bridge(&log.t, &c.values) })
+        .collect();
     let predicted = from_command(model, &log.name, &log.t, &pulse, &covariates);
     // the speed that every other relation hangs on is the consensus of the channels
-    let speed = ident::context::Context::new(&predicted, Some(model.start_pulse_us)).rpm;
+    let speed = ident::channel::Context::new(&predicted, Some(model.start_pulse_us)).rpm;
     if speed.is_empty() {
         return None;
     }

@@ -17,13 +17,13 @@ use crate::trouble::unread;
 use hal_sim::Scenario;
 use hal_sim::plant::{Propeller, motor};
 use hal_sim::scenario::Schedule;
-use ident::context::Context;
+use ident::channel::Context;
 use ident::identify::settled;
 use ident::log::digest;
+use ident::log::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::plateau::plateaus;
-use ident::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::report::{WIDEST, selection, wrapped};
-use ident::select::{Airframe, Need, Pair, Row, choose, from_log, is_repeated, misses, read_table, row, thesis, why};
+use ident::sizing::select::{Airframe, Need, Pair, Row, choose, from_log, is_repeated, misses, read_table, row, thesis, why};
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 

@@ -10,7 +10,7 @@ use crate::apart::Paths;
 use crate::open::{Columns, Names, open};
 use crate::progress::Bar;
 use clap::builder::PossibleValuesParser;
-use ident::inspect::{STEPS, Table, step};
+use ident::close::inspect::{STEPS, Table, step};
 use ident::report::{WIDEST, wrapped};
 use std::path::PathBuf;
 

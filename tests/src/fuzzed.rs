@@ -15,9 +15,9 @@ use frame::rig::{ADC_CHANNELS, CAPTURE_CHANNELS};
 use frame::wire::{Decoder, Encoder, MAX_WIRE};
 use frame::{Command, Message, Ticks};
 use ident::flight::FlightModel;
-use ident::import::{self, Options};
 use ident::inertial::InertialModel;
 use ident::log::Log;
+use ident::log::import::{self, Options};
 use ident::model::Model;
 use settings_store::{load, save};
 use std::path::Path;
@@ -125,7 +125,7 @@ pub fn log(data: &[u8]) {
 
 /// A flight log, and another program's text of a flight.
 pub fn flight_log(data: &[u8]) {
-    let _ = ident::flight_log::parse("fuzzed.csv", data);
+    let _ = ident::log::flight_log::parse("fuzzed.csv", data);
     let _ = import::flight_from("fuzzed.csv", data);
 }
 

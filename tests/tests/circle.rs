@@ -87,9 +87,10 @@ fn a_wrong_model_does_not_close_the_circle() {
         .succeeded();
     let read = |name: &str| ident::model::Model::read(&path(name)).unwrap();
     let again = ident::log::Log::read(&path("again.csv")).unwrap();
-    let right = ident::circle::circle(&again, &read("creeping-out/model.toml"));
-    let wrong = ident::circle::circle(&again, &read("healthy-out/model.toml"));
-    let thrust = |c: &ident::circle::Circle| c.channels.iter().find(|l| l.channel == "thrust_n").expect("thrust").whiteness_p;
+    let right = ident::close::circle::circle(&again, &read("creeping-out/model.toml"));
+    let wrong = ident::close::circle::circle(&again, &read("healthy-out/model.toml"));
+    let thrust =
+        |c: &ident::close::circle::Circle| c.channels.iter().find(|l| l.channel == "thrust_n").expect("thrust").whiteness_p;
     assert!(right.closes() && thrust(&right) > WHITE, "{:?}", right.channels);
     assert!(!wrong.closes() && thrust(&wrong) < 1.0e-6, "{:?}", wrong.channels);
 }

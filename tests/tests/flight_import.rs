@@ -6,8 +6,8 @@
 //! Units: as the flight log.
 //! Reference: specification `flight.md`, "Flight log"; the data set's own description of its columns.
 
-use ident::flight_log;
 use ident::log::Log;
+use ident::log::flight_log;
 use quadrig_tests::{call, data};
 
 const G: f64 = 9.806_65;

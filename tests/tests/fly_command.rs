@@ -73,12 +73,12 @@ fn the_missions_of_the_thesis() {
     assert_eq!(names(&at.join("out")), ["excitation", "hover", "landing", "takeoff"], "nothing else is left");
     for name in names(&at.join("out")) {
         let folder = at.join("out").join(&name);
-        let log = ident::flight_log::read(&folder.join("flight.csv")).unwrap_or_else(|e| panic!("{e}"));
+        let log = ident::log::flight_log::read(&folder.join("flight.csv")).unwrap_or_else(|e| panic!("{e}"));
         // the supply is never read as nothing: before the first step it has not been read
         let supply = log.column("voltage_v").expect("a supply");
         assert!(supply.iter().all(|v| v.is_nan() || *v > 5.0) && supply[1..].iter().all(|v| v.is_finite()), "{:?}", &supply[..3]);
         let (header, states) = columns(&folder.join("states.csv"));
-        assert_eq!((header.len(), log.len(), ident::flight_log::rotors(&log)), (17, states[0].len(), 4));
+        assert_eq!((header.len(), log.len(), ident::log::flight_log::rotors(&log)), (17, states[0].len(), 4));
         assert_eq!(log.meta["layout"].as_str(), Some("plus"));
         let page = std::fs::read_to_string(folder.join("flight.html")).expect("the page");
         for id in ["pulses", "thrust", "path-from-above", "path-from-the-east-side", "place", "velocity", "angles", "rates"] {

@@ -6,9 +6,9 @@
 //! Units: as in the files; thrust coefficients have none.
 //! Reference: `README.md` of each set; Brandt, Deters, Ananda & Selig, UIUC Propeller Data Site, volume 1.
 
-use ident::fit::thrust_coefficient;
+use ident::identify::curves::thrust_coefficient;
 use ident::identify::{Identified, identify};
-use ident::import::import;
+use ident::log::import::import;
 use quadrig_tests::{call, data, files};
 use std::path::Path;
 use tempfile::TempDir;

@@ -7,11 +7,11 @@
 //! Reference: specification `formats.md`, "Scope" and `across_runs_rms`; `closing-the-loop.md`, "Real measurements".
 
 use ident::close::{close, validation};
-use ident::effects::Scope;
 use ident::log::Log;
 use ident::model::Model;
 use ident::several::{Outcome, Run, close_each, close_together};
 use ident::verdict::EffectEntry;
+use ident::verdict::Scope;
 use quadrig_tests::{call, data, files};
 use std::path::Path;
 use tempfile::TempDir;
@@ -198,7 +198,7 @@ fn no_name_of_several_runs_stands_below_its_rival() {
     let Some(data) = data("the recorded lever rig, three runs together") else { return };
     let logs = files(&data.join("rig/lever-rig-10x45/tidy"), |name| name.starts_with("robbe11.") && name.ends_with(".csv"));
     assert_eq!(logs.len(), 3);
-    let logs = logs.iter().map(|f| ident::import::import(f, &[]).unwrap().0).collect();
+    let logs = logs.iter().map(|f| ident::log::import::import(f, &[]).unwrap().0).collect();
     let (_, outcome) = together(logs);
     let v = &outcome.verdict;
     let changes: Vec<_> = v.alternatives.iter().filter_map(|a| a.change.as_ref()).collect();
@@ -215,7 +215,7 @@ fn no_name_of_several_runs_stands_below_its_rival() {
 fn the_recorded_lever_rig_predicts_each_of_its_runs_from_the_others() {
     let Some(data) = data("the recorded lever rig, four runs together") else { return };
     let logs = files(&data.join("rig/lever-rig-10x45/tidy"), |name| name.ends_with(".csv"));
-    let logs = logs.iter().map(|f| ident::import::import(f, &[]).unwrap().0).collect();
+    let logs = logs.iter().map(|f| ident::log::import::import(f, &[]).unwrap().0).collect();
     let (_, outcome) = together(logs);
     let pairs: Vec<_> = outcome.verdict.runs.iter().flat_map(|r| r.channels.values()).collect();
     let factor = f64::exp(pairs.iter().map(|b| (b.before / b.after).ln()).sum::<f64>() / pairs.len() as f64);

@@ -1,8 +1,8 @@
 //! A run held against its model while it goes on: healthy runs, and blades that break in mid-run; a hundred and twenty by `cargo xtask campaign`.
 
+use ident::close::watch::{Departure, Watch};
 use ident::log::Log;
 use ident::model::Model;
-use ident::watch::{Departure, Watch};
 use quadrig_tests::{call, cases};
 use std::path::Path;
 

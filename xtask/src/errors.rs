@@ -32,14 +32,25 @@ const AREAS: [(&str, &[&str]); 14] = [
     ("Numbers of the command line", &["quadrig/src/number.rs"]),
     (
         "Rig logs",
-        &["ident/src/log.rs", "ident/src/log", "ident/src/close.rs", "quadrig/src/identify.rs", "quadrig/src/plateaus.rs"],
+        &[
+            "ident/src/log/mod.rs",
+            "ident/src/log/clock.rs",
+            "ident/src/log/disc.rs",
+            "ident/src/log/gaps.rs",
+            "ident/src/log/head.rs",
+            "ident/src/log/plausible.rs",
+            "ident/src/log/whole.rs",
+            "ident/src/identify/mod.rs",
+            "quadrig/src/identify.rs",
+            "quadrig/src/plateaus.rs",
+        ],
     ),
-    ("Imports", &["ident/src/import", "ident/src/join", "quadrig/src/import.rs", "quadrig/src/join.rs"]),
-    ("Models and exports", &["ident/src/model.rs", "ident/src/model", "quadrig/src/predict.rs", "quadrig/src/export"]),
+    ("Imports", &["ident/src/log/import", "ident/src/log/join", "quadrig/src/import.rs", "quadrig/src/join.rs"]),
+    ("Models and exports", &["ident/src/model", "quadrig/src/predict.rs", "quadrig/src/export"]),
     (
         "Attitude logs and flights",
         &[
-            "ident/src/flight_log.rs",
+            "ident/src/log/flight_log.rs",
             "ident/src/flight",
             "ident/src/inertial",
             "quadrig/src/ahrs.rs",
@@ -80,7 +91,7 @@ const AREAS: [(&str, &[&str]); 14] = [
         ],
     ),
     ("Calibration", &["quadrig/src/calibrate.rs", "quadrig/src/calibrate", "quadrig/src/recalibrate.rs"]),
-    ("Selection and beam", &["ident/src/select", "quadrig/src/select.rs", "quadrig/src/beam.rs"]),
+    ("Selection and beam", &["ident/src/sizing/select", "quadrig/src/select.rs", "quadrig/src/beam.rs"]),
     ("Recorded sets", &["quadrig/src/measured"]),
     ("Several runs and batches", &["ident/src/several", "quadrig/src/batch", "quadrig/src/runs.rs", "quadrig/src/step.rs"]),
     ("A rig's history", &["ident/src/history", "quadrig/src/history.rs"]),
@@ -501,7 +512,7 @@ mod tests {
     }
 
     /// What a program says besides, and refuses nothing by.
-    const NOTES: [&str; 3] = ["hal-sim/src/fault/rule.rs", "ident/src/bad.rs", "ident/src/sparse.rs"];
+    const NOTES: [&str; 3] = ["hal-sim/src/fault/rule.rs", "ident/src/signal/bad.rs", "ident/src/log/sparse.rs"];
 
     #[test]
     fn every_source_that_refuses_stands_in_an_area() {

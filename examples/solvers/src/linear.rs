@@ -7,7 +7,7 @@
 
 use crate::lag::{ROWS, STEP, lagged, load};
 use crate::timed;
-use ident::solve::Normal;
+use ident::numeric::solve::Normal;
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -7,8 +7,8 @@
 //! Reference: Golub & Pereyra 2003; O'Leary & Rust 2013; Nelder & Mead 1965; More 1978.
 
 use crate::lag::{ROWS, lagged, load};
-use ident::search::nelder_mead;
-use ident::solve::Normal;
+use ident::numeric::simplex::nelder_mead;
+use ident::numeric::solve::Normal;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra34::storage::Owned;
 use nalgebra34::{DMatrix, DVector, Dyn};

@@ -5,59 +5,25 @@
 //! Units: stated on each parameter.
 //! Reference: specification `closing-the-loop.md`, list of effects.
 
-pub(crate) mod air_density;
-pub mod airframe;
-pub(crate) mod alternating_period;
-mod amplifier_saturation;
-mod battery_discharge;
-mod beam_resonance;
-mod bearing_friction;
-mod blade_damage;
-mod blade_flex;
-mod blade_twist;
-mod channel_delay;
-mod channel_filter;
-mod clock_drift;
-mod coasting;
-mod coupling_slip;
-mod creep;
-mod current_limit;
-mod dead_rotor_speed;
-mod double_pulses;
-mod encoder_drag;
-mod gain_change;
-pub(crate) mod glitch_rows;
-mod hysteresis;
-mod missed_pulses;
+pub(crate) mod acquisition;
+pub mod design;
+pub(crate) mod load_cell;
 pub(crate) mod operator;
-mod pulses;
-pub(crate) mod quantisation;
-mod reynolds_thrust;
-mod rotor_inertia;
-pub(crate) mod sample_hold;
-mod speed_channel;
-mod spinup_lag;
-mod stall;
-mod supply_sag;
-pub(crate) mod supply_voltage;
-mod tare_shift;
-mod thermal_derate;
-mod thermal_zero;
-mod throttle_quantisation;
-mod torque_crosstalk;
+pub mod placed;
+pub(crate) mod reported;
+pub(crate) mod rotor;
+pub(crate) mod steps;
+pub(crate) mod supply;
+pub(crate) mod tachometer;
 pub(crate) mod unknown;
-mod zero_drift;
 
-use crate::context::{Context, DIFFERENCES, Relation};
-use crate::design::TargetDesign;
-pub(crate) use crate::verdict::EffectEntry;
+use crate::channel::{Context, DIFFERENCES, Relation};
+use crate::effects::design::TargetDesign;
 use crate::verdict::Kin;
-pub(crate) use crate::words::Clause;
-pub(crate) use amplifier_saturation::Rail;
-pub(crate) use current_limit::{CurrentLimit, Draw, OF_THE_SUPPLY};
-pub(crate) use sample_hold::Clock;
-pub(crate) use tare_shift::BEFORE;
-pub(crate) use throttle_quantisation::Best as SawTooth;
+pub(crate) use crate::verdict::words::Clause;
+pub(crate) use crate::verdict::{EffectEntry, Scope};
+pub(crate) use load_cell::tare_shift::BEFORE;
+pub(crate) use supply::current_limit::CurrentLimit;
 
 /// Net evidence, nats, that an effect must bring beyond its penalty: a library of about fifty instances then raises a false
 /// alarm in about one clean run of a hundred.
@@ -76,30 +42,6 @@ pub enum Stage {
     Output,
     /// On single readings, after all that the meter does.
     Readings,
-}
-
-/// What an effect belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Scope {
-    /// The rig: it is there on every run.
-    Rig,
-    /// One run: another run has a value of its own.
-    Run,
-    /// One instant of one run: it does not recur.
-    Event,
-}
-
-impl Scope {
-    /// As files have it.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Rig => "rig",
-            Self::Run => "run",
-            Self::Event => "event",
-        }
-    }
 }
 
 /// What an effect is, for reports and documentation.
@@ -239,7 +181,7 @@ pub trait Effect: Sync {
         Vec::new()
     }
     /// The ways in which this log may hold it without being able to show it: never named, but listed with an unknown cause where
-    /// they explain it (see [`crate::suspects`]).
+    /// they explain it (see [`crate::attribution::suspects`]).
     fn suspects(&self, _context: &Context) -> Vec<Instance> {
         Vec::new()
     }
@@ -297,42 +239,42 @@ pub trait Effect: Sync {
 #[must_use]
 pub fn library() -> &'static [&'static dyn Effect] {
     &[
-        &supply_sag::SupplySag,
-        &supply_voltage::SupplyVoltage,
-        &battery_discharge::BatteryDischarge,
-        &spinup_lag::SpinupLag,
-        &rotor_inertia::RotorInertia,
-        &zero_drift::ZeroDrift,
-        &thermal_zero::ThermalZero,
-        &tare_shift::TareShift,
-        &gain_change::GainChange,
-        &creep::Creep,
-        &hysteresis::Hysteresis,
-        &beam_resonance::BeamResonance,
-        &channel_filter::ChannelFilter,
-        &channel_delay::ChannelDelay,
-        &blade_damage::BladeDamage,
-        &bearing_friction::BearingFriction,
-        &encoder_drag::EncoderDrag,
-        &blade_flex::BladeFlex,
-        &reynolds_thrust::ReynoldsThrust,
-        &air_density::AirDensity,
-        &stall::Stall,
-        &amplifier_saturation::AmplifierSaturation,
-        &current_limit::CurrentLimit,
-        &thermal_derate::ThermalDerate,
-        &torque_crosstalk::TorqueCrosstalk,
-        &clock_drift::ClockDrift,
-        &sample_hold::SampleHold,
-        &quantisation::Quantisation,
-        &throttle_quantisation::ThrottleQuantisation,
-        &glitch_rows::GlitchRows,
-        &blade_twist::BladeTwist,
-        &coupling_slip::CouplingSlip,
-        &missed_pulses::MissedPulses,
-        &double_pulses::DoublePulses,
-        &alternating_period::AlternatingPeriod,
-        &dead_rotor_speed::DeadRotorSpeed,
+        &supply::supply_sag::SupplySag,
+        &supply::supply_voltage::SupplyVoltage,
+        &supply::battery_discharge::BatteryDischarge,
+        &rotor::spinup_lag::SpinupLag,
+        &rotor::rotor_inertia::RotorInertia,
+        &load_cell::zero_drift::ZeroDrift,
+        &load_cell::thermal_zero::ThermalZero,
+        &load_cell::tare_shift::TareShift,
+        &load_cell::gain_change::GainChange,
+        &load_cell::creep::Creep,
+        &load_cell::hysteresis::Hysteresis,
+        &load_cell::beam_resonance::BeamResonance,
+        &acquisition::channel_filter::ChannelFilter,
+        &acquisition::channel_delay::ChannelDelay,
+        &rotor::blade_damage::BladeDamage,
+        &rotor::bearing_friction::BearingFriction,
+        &tachometer::encoder_drag::EncoderDrag,
+        &rotor::blade_flex::BladeFlex,
+        &rotor::reynolds_thrust::ReynoldsThrust,
+        &rotor::air_density::AirDensity,
+        &rotor::stall::Stall,
+        &load_cell::amplifier_saturation::AmplifierSaturation,
+        &supply::current_limit::CurrentLimit,
+        &supply::thermal_derate::ThermalDerate,
+        &load_cell::torque_crosstalk::TorqueCrosstalk,
+        &acquisition::clock_drift::ClockDrift,
+        &acquisition::sample_hold::SampleHold,
+        &acquisition::quantisation::Quantisation,
+        &acquisition::throttle_quantisation::ThrottleQuantisation,
+        &acquisition::glitch_rows::GlitchRows,
+        &tachometer::blade_twist::BladeTwist,
+        &tachometer::coupling_slip::CouplingSlip,
+        &tachometer::missed_pulses::MissedPulses,
+        &tachometer::double_pulses::DoublePulses,
+        &tachometer::alternating_period::AlternatingPeriod,
+        &tachometer::dead_rotor_speed::DeadRotorSpeed,
     ]
 }
 

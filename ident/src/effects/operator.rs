@@ -6,7 +6,7 @@
 //! Reference: moving averages through prefix integrals; first-order hold for the lag.
 
 use super::Shape;
-use crate::context::Context;
+use crate::channel::Context;
 
 /// What a signal does between two rows.
 #[derive(Debug, Clone, Copy, PartialEq)]

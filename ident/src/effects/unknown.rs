@@ -6,14 +6,15 @@
 //! Reference: discrepancy modelling, Ebers et al. 2022 (arXiv 2203.05164).
 
 use super::{About, Amplitude, Effect, Estimate, Instance, Scope, Shape, Stage};
-use crate::context::{Context, unit_of};
-use crate::design::TargetDesign;
+use crate::channel::{Context, unit_of};
+use crate::effects::design::TargetDesign;
+use crate::verdict::words::plain::{MOST_TERMS, parts};
 
 /// See the module.
 pub(crate) struct Unknown;
 
 /// Names of the polynomial's coefficients: Legendre polynomials of order 1 to 6.
-const TERMS: [Amplitude; 6] = [
+const TERMS: [Amplitude; MOST_TERMS] = [
     Amplitude { name: "p1", unit: "channel" },
     Amplitude { name: "p2", unit: "channel" },
     Amplitude { name: "p3", unit: "channel" },
@@ -21,22 +22,6 @@ const TERMS: [Amplitude; 6] = [
     Amplitude { name: "p5", unit: "channel" },
     Amplitude { name: "p6", unit: "channel" },
 ];
-
-/// The form of a correction: so many terms of a polynomial in a variable.
-pub(crate) fn form(variable: &str, terms: usize) -> String {
-    format!("{variable}{SEPARATOR}{terms}")
-}
-
-const SEPARATOR: &str = ", terms ";
-
-/// Variable and number of terms of a form. An empty one is no correction; a variable alone has all terms.
-pub(crate) fn parts(form: &str) -> (&str, usize) {
-    match form.rsplit_once(SEPARATOR) {
-        Some((variable, terms)) => (variable, terms.parse().unwrap_or(0)),
-        None if form.is_empty() => (form, 0),
-        None => (form, TERMS.len()),
-    }
-}
 
 /// What a verdict says of a correction.
 pub(crate) struct Words {
@@ -198,7 +183,7 @@ pub(crate) fn variable(context: &Context, name: &str) -> Option<Vec<f64>> {
         "temp_c" => context.temperature.clone(),
         "voltage_v" => context.voltage.clone(),
         "current_a" => context.current.clone(),
-        "charge" => Some(super::battery_discharge::charge(context)),
+        "charge" => Some(crate::effects::supply::battery_discharge::charge(context)),
         _ => context.covariates.iter().find(|c| c.0 == name).map(|c| c.1.clone()),
     }
 }
@@ -207,6 +192,7 @@ pub(crate) fn variable(context: &Context, name: &str) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
     use crate::log::{Column, Log};
+    use crate::verdict::words::plain::form;
 
     #[test]
     fn forms_name_variable_and_terms() {
@@ -228,7 +214,7 @@ mod tests {
         let keep: Vec<bool> = (0..100).map(|i| i < 80).collect();
         let taught = Unknown.taught(&context, &instance, &whole, &keep);
         assert!((whole[1] - 9.9).abs() < 1e-9 && (taught[1] - 7.9).abs() < 1e-9, "{whole:?} {taught:?}");
-        let mut design = TargetDesign::baseline(&context, "thrust_n", crate::context::Relation::Thrust);
+        let mut design = TargetDesign::baseline(&context, "thrust_n", crate::channel::Relation::Thrust);
         let base = design.columns.len();
         Unknown.apply(&context, &instance, &taught, 0, &mut design);
         for column in &design.columns[base..] {

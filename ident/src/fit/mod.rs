@@ -1,201 +1,400 @@
-//! Fits over plateaus: curves with bands, physical constants, time constants, each with an error that holds.
+//! A hypothesis: the declared model and a set of effects, fitted jointly.
 //!
-//! What it is: the relations of section 5.7.3 through the means of the plateaus, weighted by their errors, robust to a plateau that
-//! does not belong, with covariance and order selection; k_T, k_Q, KV, R, I0; spin-up times from the steps.
-//! What can go wrong: too few plateaus or a missing channel leave a fit out; nothing is guessed.
-//! Units: krpm and kus as regressors of curves; SI in constants.
-//! Reference: specification `identification.md`, item 3; Beharie 2013, Figures 5.76 to 5.79.
+//! What it is: separable least squares. For given shape parameters each target is a linear problem; the shapes are searched
+//! by the profile likelihood over all targets that the effects touch.
+//! What can go wrong: a shape that ends on its bound, or an implausible amplitude, disqualifies the hypothesis.
+//! Units: log-likelihood in nats; parameters in the units that the effects state.
+//! Reference: Golub & Pereyra 1973; Nelder & Mead 1965; profile likelihood, Barndorff-Nielsen & Cox 1994, section 3.4.
 
-mod curve;
-mod declared;
-mod motor;
-pub mod power;
-mod spin;
-mod square;
-pub mod surface;
-mod zero;
+pub mod heldout;
+pub(crate) mod remembered;
+pub(crate) mod samples;
+pub mod search;
+mod written;
 
-pub(crate) use declared::declared;
+use crate::channel::{Context, Relation, Target};
+use crate::effects::Estimate;
+use crate::effects::design::{Label, TargetDesign, covariance};
+use crate::effects::placed::Placed;
+use crate::effects::steps::Steps;
+use crate::fit::samples::{Samples, Taught};
+use crate::model::Declared;
+use crate::numeric::solve::Solution;
+use crate::signal::colour::effective_share;
+use nalgebra::DMatrix;
+use std::sync::Arc;
 
-pub use curve::{Curve, Order, Point};
-pub use motor::{Motor, lacks, motor};
-pub use spin::{Spin, spin};
-pub use square::square_law;
-pub use zero::Zero;
-
-use crate::log::{Log, SPEED};
-use crate::plateau::Plateau;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-/// A value with its standard error and the half width of its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    /// The value.
-    pub value: f64,
-    /// Standard error.
-    pub se: f64,
-    /// Half width of the 95 % interval, by Student's t where few plateaus speak.
-    pub half: f64,
+/// Fit of one target.
+#[derive(Debug, Clone)]
+pub struct TargetFit {
+    /// Coefficients in the order of the design's columns.
+    pub coefficients: Vec<f64>,
+    /// Their meaning.
+    pub labels: Vec<Label>,
+    /// Covariance of the coefficients.
+    pub covariance: DMatrix<f64>,
+    /// Log-likelihood, weighted for shared rotors.
+    pub loglik: Likelihood,
+    /// Share of independent samples that the colour of this fit's residual leaves, 1 when white.
+    pub share: f64,
+    /// What is left over of each sample, scaled by its noise.
+    pub left: Arc<[f64]>,
 }
 
-impl Estimate {
-    /// Whether the 95 % interval holds a value.
+/// A fitted hypothesis.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The effects with their shapes.
+    pub placed: Vec<Placed>,
+    /// One fit for each target of the context.
+    pub targets: Vec<TargetFit>,
+}
+
+/// Log-likelihood under the two views of the noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Likelihood {
+    /// With levelled variances: asks how well the mean is predicted, and does not let a nearly noiseless stretch decide that.
+    pub mean: f64,
+    /// With the variances as they are: asks about the scatter too.
+    pub scatter: f64,
+}
+
+impl Likelihood {
+    /// The view that answers for a hypothesis that does or does not speak of scatter.
     #[must_use]
-    pub fn holds(&self, truth: f64) -> bool {
-        (self.value - truth).abs() <= self.half
+    pub fn of(self, scatters: bool) -> f64 {
+        if scatters { self.scatter } else { self.mean }
     }
 }
 
-/// A relation that the thesis fits.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fitted {
-    /// Short name, `thrust(rpm)`.
-    pub name: &'static str,
-    /// Column of the ordinate.
-    pub y: String,
-    /// Column of the abscissa: `rpm` for the consensus, or `pulse_us`.
-    pub x: &'static str,
-    /// Declared degree.
-    pub degree: usize,
-    /// The curve at that degree.
-    pub curve: Curve,
-    /// What other degrees would give.
-    pub orders: Vec<Order>,
-}
-
-/// Scale of an abscissa: krpm and kus.
+/// Whether any of the effects says something of the scatter of a channel.
 #[must_use]
-pub fn scaled(x: &str, value: f64) -> f64 {
-    if x == "pulse_us" { (value - 1000.0) / 1000.0 } else { value / 1000.0 }
+pub fn scatters(placed: &[Placed], channel: &str) -> bool {
+    placed.iter().any(|p| p.effect.scatters() && p.instance.touches(channel))
 }
 
-/// Speed at each plateau, and its error: the mean over the speed channels that were measured, weighted by their errors.
+/// Builds the design of one target under a hypothesis.
 #[must_use]
-pub fn speeds(log: &Log, plateaus: &[Plateau], channels: &[String]) -> Vec<Option<(f64, f64)>> {
-    let used: Vec<usize> = log
-        .columns
-        .iter()
-        .enumerate()
-        .filter(|(_, c)| SPEED.contains(&c.name.as_str()) && (channels.is_empty() || channels.contains(&c.name)))
-        .map(|(i, _)| i)
-        .collect();
-    plateaus
-        .iter()
-        .map(|p| {
-            let means: Vec<(f64, f64)> = used.iter().filter_map(|i| p.means[*i]).collect();
-            // channels of one rotor share its own fluctuation: the mean of the errors, not their combination
-            let n = means.len() as f64;
-            (n > 0.0).then(|| (means.iter().map(|m| m.0).sum::<f64>() / n, means.iter().map(|m| m.1).sum::<f64>() / n))
-        })
-        .collect()
+pub fn design(context: &Context, declared: Declared<'_>, placed: &[Placed], target: &Target) -> TargetDesign {
+    Steps::default().apply(context, placed, plain(context, declared, target))
 }
 
-/// The relations of section 5.7.3 that a log has.
-#[must_use]
-pub fn relations(log: &Log, plateaus: &[Plateau], speed: &[Option<(f64, f64)>]) -> Vec<Fitted> {
-    const WANTED: [(&str, &str, &str, usize); 6] = [
-        ("rpm(pulse)", "rpm", "pulse_us", 3),
-        ("thrust(rpm)", "thrust_n", "rpm", 2),
-        ("torque(rpm)", "torque_nm", "rpm", 2),
-        ("current(rpm)", "current_a", "rpm", 3),
-        ("thrust(pulse)", "thrust_n", "pulse_us", 3),
-        ("torque(pulse)", "torque_nm", "pulse_us", 3),
-    ];
-    WANTED
-        .iter()
-        .filter_map(|(name, y, x, degree)| {
-            let value = |channel: &str, k: usize| {
-                if channel == "rpm" { speed[k] } else { plateaus[k].of(log, channel) }
-            };
-            // a resting rotor says nothing of a curve over the command
-            let turning = |k: usize| *x != "pulse_us" || speed.get(k).copied().flatten().is_none_or(|(v, _)| v > 1.0);
-            let points: Vec<Point> = (0..plateaus.len())
-                .filter(|k| turning(*k))
-                .filter_map(|k| {
-                    let ((x_value, x_error), (y_value, y_error)) = (value(x, k)?, value(y, k)?);
-                    Some(Point { x: scaled(x, x_value), x_error: x_error / 1000.0, y: y_value, y_error })
-                })
-                .collect();
-            let curve = Curve::fit(&points, *degree)?;
-            let orders = Order::compare(&points, 4);
-            Some(Fitted { name, y: (*y).to_owned(), x, degree: *degree, curve, orders })
-        })
-        .collect()
+/// The design of one target without effects.
+pub(crate) fn plain(context: &Context, declared: Declared<'_>, target: &Target) -> TargetDesign {
+    match declared.model {
+        None => TargetDesign::baseline(context, target.name, target.relation),
+        Some(model) => model.pinned(context, target),
+    }
 }
 
-/// Where the zero of a law comes from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Origin {
-    /// The law has none.
-    Without,
-    /// The levels at rest: their lowest and highest reading, and the unit.
-    Read((f64, f64), &'static str),
-    /// No level is at rest: readings are taken as they are.
-    Unread,
+/// Designs of one hypothesis, target after target: the speed channels see one rotor, and where the same effects touch them their
+/// design is made once.
+pub(crate) struct Designs<'a> {
+    context: &'a Context,
+    declared: Declared<'a>,
+    placed: &'a [Placed],
+    last: Option<(Vec<bool>, TargetDesign)>,
 }
 
-/// How well a law describes its levels.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Law {
-    /// Scatter of the levels about it over what their errors promise, squared, for each degree of freedom; 1 where both agree.
-    pub chi2: f64,
-    /// Levels less coefficients.
-    pub freedom: usize,
-    /// Whether chance alone could make them scatter so (p of 0.01 and more), and no more than a fifth of them was left out.
-    pub holds: bool,
-    /// Levels that were left out: far off in the light of the others.
-    pub left_out: usize,
-    /// Where its zero comes from.
-    pub origin: Origin,
-}
-
-/// Probability below which a law is said not to hold.
-const HOLDS: f64 = 0.01;
-/// One in this many levels may be a stray one.
-const STRAY: usize = 5;
-
-impl Law {
-    /// Of a reduced chi-squared.
-    #[must_use]
-    pub fn of(chi2: f64, freedom: usize) -> Self {
-        let freely = freedom.max(1) as f64;
-        let holds = ChiSquared::new(freely).is_ok_and(|law| law.sf(chi2 * freely) >= HOLDS);
-        Self { chi2, freedom, holds, left_out: 0, origin: Origin::Without }
+impl<'a> Designs<'a> {
+    pub(crate) fn new(context: &'a Context, declared: Declared<'a>, placed: &'a [Placed]) -> Self {
+        Self { context, declared, placed, last: None }
     }
 
-    /// The same where some levels were left out. More than a fifth of all are no stray ones: something else acts on them.
-    fn without(self, left_out: usize, all: usize) -> Self {
-        Self { holds: self.holds && STRAY * left_out <= all, left_out, ..self }
+    /// The design of a target.
+    pub(crate) fn of(&mut self, target: &Target) -> &TargetDesign {
+        self.after(target, &mut Steps::default())
     }
 
-    /// In words.
-    #[must_use]
-    pub fn words(&self) -> String {
-        let law =
-            if self.holds { "the law holds" } else { "the law does not hold, the interval is widened to what the levels show" };
-        let left_out = match self.left_out {
-            0 => String::new(),
-            1 => ", 1 level left out".to_owned(),
-            n => format!(", {n} levels left out"),
+    /// The same, made from what the target's last design went through.
+    pub(crate) fn after(&mut self, target: &Target, steps: &mut Steps) -> &TargetDesign {
+        let touching: Vec<bool> = self.placed.iter().map(|p| p.instance.touches(target.name)).collect();
+        let alike = |last: &(Vec<bool>, TargetDesign)| {
+            last.1.relation == Relation::SpeedFromPulse
+                && target.relation == Relation::SpeedFromPulse
+                && self.declared.model.is_none()
+                && last.0 == touching
         };
-        let zero = match self.origin {
-            Origin::Without => String::new(),
-            Origin::Read((low, high), unit) if low == high => format!("; zero {low:.4} {unit}, read at rest"),
-            Origin::Read((low, high), unit) => format!("; zero {low:.4} to {high:.4} {unit}, read at rest"),
-            Origin::Unread => "; no level is at rest, so that the zero is taken as 0".to_owned(),
-        };
-        format!("chi2/dof {}, dof {}{left_out}, {law}{zero}", ratio(self.chi2), self.freedom)
+        let kept = self.last.take().filter(alike).map(|(_, design)| TargetDesign { name: target.name, ..design });
+        let made = kept.unwrap_or_else(|| {
+            let design = steps.plain(|| plain(self.context, self.declared, target));
+            steps.apply(self.context, self.placed, design)
+        });
+        &self.last.insert((touching, made)).1
     }
 }
 
-/// A chi-squared for each degree of freedom, to the digits that say something.
-#[must_use]
-pub fn ratio(chi2: f64) -> String {
-    if chi2 < 100.0 { format!("{chi2:.2}") } else { format!("{chi2:.0}") }
+/// Which rows may teach: all, or those that a mask leaves in.
+#[derive(Debug, Clone, Copy)]
+pub enum Rows<'a> {
+    /// Every row.
+    All,
+    /// Every n-th sample of a target, for quick scans.
+    Every(usize),
+    /// Rows for which the mask is true.
+    Where(&'a [bool]),
 }
 
-/// Thrust coefficient C_T = T/(rho n^2 D^4) of a k_T, n in revolutions a second (UIUC's definition).
+/// Fits one target for given shapes.
+///
+/// The likelihood counts samples as independent; [`TargetFit::share`] says how many of them the colour of the residual leaves.
 #[must_use]
-pub fn thrust_coefficient(k_thrust: f64, diameter_m: f64, density: f64) -> f64 {
-    k_thrust * std::f64::consts::TAU.powi(2) / (density * diameter_m.powi(4))
+pub fn fit_target(target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
+    let log_rows = design.columns.first().map_or(design.fixed.len(), |c| c.values.len());
+    let samples = Samples::new(target, rows, log_rows);
+    let (Solution { coefficients, inverse, .. }, loglik, kept) = samples.solve(design, true)?;
+    let mut residual = kept.residual(&coefficients);
+    residual.iter_mut().zip(&kept.floored).for_each(|(r, v)| *r /= v.sqrt());
+    if let Some((unsettled, excess)) = &kept.jumps {
+        residual.iter_mut().zip(unsettled.iter()).filter(|(_, u)| **u).for_each(|(r, _)| *r /= excess.sqrt());
+    }
+    let rss: f64 = residual.iter().map(|r| r * r).sum();
+    let share = effective_share(&residual);
+    let times = (rss / residual.len() as f64).max(0.01) / share;
+    let labels = || design.columns.iter().map(|c| c.label);
+    let covariance = covariance(target.relation, labels(), inverse, (samples.unit(), times));
+    Some(TargetFit { coefficients, labels: labels().collect(), covariance, loglik, share, left: residual.into() })
+}
+
+/// Fits every target that the effects touch; the others come from `rest`.
+#[must_use]
+pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: Option<&Fit>, rows: Rows<'_>) -> Option<Fit> {
+    let mut targets = Vec::with_capacity(context.targets.len());
+    let mut designs = Designs::new(context, declared, placed);
+    for (i, target) in context.targets.iter().enumerate() {
+        let touched = placed.iter().any(|p| p.instance.touches(target.name));
+        match rest {
+            Some(rest) if !touched => targets.push(rest.targets[i].clone()),
+            _ => targets.push(fit_target(target, designs.of(target), rows)?),
+        }
+    }
+    Some(Fit { placed: placed.to_vec(), targets })
+}
+
+/// Whether every shape lies within its range, and every effect makes physical sense.
+pub(crate) fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
+    (0..fit.placed.len()).all(|k| is_plausible(context, declared, fit, k))
+}
+
+/// Whether the effect at a position of a fit makes physical sense and none of its shapes lies on a bound.
+pub(crate) fn is_plausible(context: &Context, declared: Declared<'_>, fit: &Fit, k: usize) -> bool {
+    fit.placed.get(k).is_none_or(|p| {
+        let inside = p.effect.shapes(context, &p.instance).iter().zip(&p.shape).all(|(s, v)| {
+            let margin = 1e-3 * (s.range.1 - s.range.0);
+            s.is_nuisance() || s.range.1 <= s.range.0 || (*v > s.range.0 - margin && *v < s.range.1 - margin)
+        });
+        let errors = || {
+            if p.effect.judges_shape_errors() {
+                fit.shape_errors(context, declared, k, false)
+            } else {
+                vec![f64::NAN; p.shape.len()]
+            }
+        };
+        inside && p.effect.plausible(context, &p.instance, &fit.estimates_given(context, k, errors()))
+    })
+}
+
+impl Fit {
+    /// Fitted parameters of the effect at `position`: shapes with standard errors from the curvature of the profile
+    /// likelihood, then amplitudes with theirs. Quick enough for every candidate of a search.
+    #[must_use]
+    pub fn estimates(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<Estimate> {
+        self.estimates_given(context, position, self.shape_errors(context, declared, position, false))
+    }
+
+    /// The same for a report. Where the likelihood of a shape is not a parabola (an instant between two visits, an onset between
+    /// two levels), its error is at least half the width over which it falls by 1.92, over 1.96. The error of an amplitude
+    /// holds what the errors of the shapes make of it, and every parameter an allowance for its form.
+    #[must_use]
+    pub fn profiled_estimates(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<Estimate> {
+        let errors = self.shape_errors(context, declared, position, true);
+        let mut out = self.estimates_given(context, position, errors.clone());
+        for (i, error) in errors.iter().enumerate() {
+            for (e, moved) in out[errors.len()..].iter_mut().zip(self.amplitudes_moved(context, declared, position, i, *error)) {
+                e.se = e.se.hypot(moved);
+            }
+        }
+        allow_for_the_form(context, &mut out);
+        out
+    }
+
+    /// By how much the amplitudes of an effect move, in the order of [`Self::estimates`], when one of its shapes moves by its standard error.
+    fn amplitudes_moved(&self, context: &Context, declared: Declared<'_>, position: usize, shape: usize, error: f64) -> Vec<f64> {
+        let placed = &self.placed[position];
+        let Some(range) = placed.effect.shapes(context, &placed.instance).get(shape).map(|s| s.range) else { return Vec::new() };
+        let amplitudes = |sign: f64| -> Option<Vec<f64>> {
+            let mut moved = self.placed.clone();
+            let to = &mut moved[position].shape[shape];
+            *to = (*to + sign * error).clamp(range.0, range.1);
+            let fit = fit(context, declared, &moved, Some(self), Rows::All)?;
+            let all = fit.estimates_given(context, position, vec![0.0; placed.shape.len()]);
+            Some(all[placed.shape.len()..].iter().map(|e| e.value).collect())
+        };
+        match (amplitudes(1.0), amplitudes(-1.0)) {
+            (Some(up), Some(down)) => up.iter().zip(&down).map(|(u, d)| 0.5 * (u - d).abs()).collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The same with the standard errors of the shapes known.
+    pub(crate) fn estimates_given(&self, context: &Context, position: usize, errors: Vec<f64>) -> Vec<Estimate> {
+        let p = &self.placed[position];
+        let mut out = Vec::new();
+        for ((shape, value), se) in p.effect.shapes(context, &p.instance).iter().zip(&p.shape).zip(errors) {
+            out.push(Estimate { name: shape.name.into(), unit: shape.unit.into(), value: *value, se });
+        }
+        for (k, a) in p.effect.amplitudes(&p.instance).iter().enumerate() {
+            for t in &self.targets {
+                if let Some(j) = t.labels.iter().position(|l| *l == (Label::Effect { effect: position, amplitude: k })) {
+                    let estimate = Estimate {
+                        name: a.name.into(),
+                        unit: a.unit.into(),
+                        value: t.coefficients[j],
+                        se: t.covariance[(j, j)].max(0.0).sqrt(),
+                    };
+                    if !out.iter().any(|e| e.name == estimate.name) {
+                        out.push(estimate);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Standard errors of the shape parameters of one effect.
+    pub(crate) fn shape_errors(&self, context: &Context, declared: Declared<'_>, position: usize, profiled: bool) -> Vec<f64> {
+        let p = &self.placed[position];
+        let shapes = p.effect.shapes(context, &p.instance);
+        let n = p.shape.len();
+        if n == 0 {
+            return Vec::new();
+        }
+        let moving: Vec<&str> = p.instance.channels.iter().map(String::as_str).collect();
+        let scattering = self.placed.iter().any(|p| p.effect.scatters());
+        let taught = Taught::new(context, declared, Rows::All);
+        let of_colour = |name: &str| context.target(name).map_or(1.0, |k| self.targets[k].share);
+        let least = moving.iter().map(|name| of_colour(name)).fold(1.0, f64::min);
+        let value = |x: &[f64]| {
+            let mut placed = self.placed.clone();
+            placed[position].shape = x.to_vec();
+            let known = placed[position].prior();
+            if context.against_model {
+                // speeds are coloured by what the model leaves over of them, and a load cell that knows the shape is not
+                return known
+                    + moving.iter().map(|name| of_colour(name) * taught.loglik(&placed, &[name], scattering)).sum::<f64>();
+            }
+            known + least * taught.loglik(&placed, &moving, scattering)
+        };
+        let h: Vec<f64> =
+            shapes.iter().zip(&p.shape).map(|(s, v)| (0.02 * v.abs()).max(1e-4 * (s.range.1 - s.range.0)).max(1e-9)).collect();
+        let at = |moves: &[(usize, f64)]| {
+            let mut x = p.shape.clone();
+            for (i, d) in moves {
+                x[*i] += d * h[*i];
+            }
+            value(&x)
+        };
+        let centre = at(&[]);
+        let mut hessian = DMatrix::zeros(n, n);
+        for i in 0..n {
+            hessian[(i, i)] = -(at(&[(i, 1.0)]) - 2.0 * centre + at(&[(i, -1.0)])) / (h[i] * h[i]);
+            for j in 0..i {
+                let mixed = (at(&[(i, 1.0), (j, 1.0)]) - at(&[(i, 1.0), (j, -1.0)]) - at(&[(i, -1.0), (j, 1.0)])
+                    + at(&[(i, -1.0), (j, -1.0)]))
+                    / (4.0 * h[i] * h[j]);
+                hessian[(i, j)] = -mixed;
+                hessian[(j, i)] = -mixed;
+            }
+        }
+        let inverse = hessian.clone().try_inverse();
+        let curvature = |i: usize| match &inverse {
+            Some(v) if v[(i, i)] > 0.0 => v[(i, i)].sqrt(),
+            _ if hessian[(i, i)] > 0.0 => 1.0 / hessian[(i, i)].sqrt(),
+            _ => shapes[i].range.1 - shapes[i].range.0,
+        };
+        (0..n)
+            .map(|i| {
+                let quick = curvature(i);
+                if !profiled || shapes[i].is_nuisance() || shapes[i].range.1 <= shapes[i].range.0 {
+                    return quick;
+                }
+                let fall = |to: f64| {
+                    let mut x = p.shape.clone();
+                    x[i] = to;
+                    centre - value(&x)
+                };
+                let reach = |sign: f64| {
+                    let bound = if sign > 0.0 { shapes[i].range.1 - p.shape[i] } else { p.shape[i] - shapes[i].range.0 };
+                    half_width(&|d| fall(p.shape[i] + sign * d), h[i], bound.max(0.0))
+                };
+                // a symmetric interval must hold the longer side
+                quick.max(reach(1.0).max(reach(-1.0)) / 1.96)
+            })
+            .collect()
+    }
+}
+
+/// What an effect adds to the prediction of a target, on its rows, all other coefficients as they are.
+pub(crate) fn part_of(context: &Context, declared: Declared<'_>, fit: &Fit, k: usize, target: usize) -> Vec<f64> {
+    let (of, fitted) = (&context.targets[target], &fit.targets[target]);
+    let whole = Designs::new(context, declared, &fit.placed).of(of).predict(&fitted.coefficients, context.len());
+    let mut others = fit.placed.clone();
+    others.remove(k);
+    let mut designs = Designs::new(context, declared, &others);
+    let design = designs.of(of);
+    let as_before = |label: Label| match label {
+        Label::Effect { effect, amplitude } if effect >= k => Label::Effect { effect: effect + 1, amplitude },
+        other => other,
+    };
+    let coefficient = |label: Label| {
+        let at = fitted.labels.iter().position(|l| *l == as_before(label));
+        at.map_or(0.0, |at| fitted.coefficients[at])
+    };
+    let coefficients: Vec<f64> = design.columns.iter().map(|c| coefficient(c.label)).collect();
+    let rest = design.predict(&coefficients, context.len());
+    of.rows.iter().map(|row| whole[*row] - rest[*row]).collect()
+}
+
+/// Standard error, as a share of a parameter, that stands for the forms themselves: a quadratic load curve, a lag of first order, a
+/// moving average that starts with a row are true to some half a per cent, and no number of samples makes them truer.
+const FORM: f64 = 0.005;
+
+/// Share of a row by which every delay, window and time constant is uncertain: what a signal does between two rows is a guess.
+const BETWEEN_ROWS: f64 = 0.1;
+
+/// Adds what the forms leave open to the standard errors of parameters. An instant has no form, and lies anywhere between two rows.
+pub(crate) fn allow_for_the_form(context: &Context, estimates: &mut [Estimate]) {
+    let row = context.duration() / context.len().max(2) as f64;
+    for e in estimates {
+        let form = match (e.name.as_str(), e.unit.as_str()) {
+            ("t0", _) => row / 12.0_f64.sqrt(),
+            (_, "s") => (FORM * e.value).hypot(BETWEEN_ROWS * row),
+            _ => FORM * e.value,
+        };
+        e.se = e.se.hypot(form);
+    }
+}
+
+/// Estimates as a reader has them: a reading is of any instant of its row, or of all of it, and no log says which. So no delay, window or time
+/// constant is known better than that. Another run of the same logger has its readings at the same instants: predictions do not ask for this.
+pub(crate) fn anywhere_in_a_row(context: &Context, mut estimates: Vec<Estimate>) -> Vec<Estimate> {
+    let spread = context.duration() / context.len().max(2) as f64 / 12.0_f64.sqrt();
+    estimates.iter_mut().filter(|e| e.unit == "s" && e.name != "t0").for_each(|e| e.se = e.se.hypot(spread));
+    estimates
+}
+
+/// Distance at which a log-likelihood has fallen by 1.92, at most `bound`: doubled from a small step, then halved between.
+fn half_width(fall: &dyn Fn(f64) -> f64, step: f64, bound: f64) -> f64 {
+    const FALL: f64 = 1.92;
+    let mut outer = 0.05 * step;
+    while outer < bound && fall(outer) < FALL {
+        outer *= 2.0;
+    }
+    let mut inner = if outer <= 0.05 * step { 0.0 } else { 0.5 * outer };
+    outer = outer.min(bound);
+    for _ in 0..5 {
+        let mid = 0.5 * (inner + outer);
+        if fall(mid) < FALL { inner = mid } else { outer = mid }
+    }
+    outer
 }

@@ -8,10 +8,10 @@
 
 use super::record::{Axes, Record};
 use super::windows::Windows;
-use crate::attribution::Channel;
-use crate::attribution::channel::FEWEST;
-use crate::noise::quantum;
-use crate::words::digits;
+use crate::attribution::columns::Channel;
+use crate::attribution::columns::channel::FEWEST;
+use crate::numeric::order::quantum;
+use crate::verdict::words::digits;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// What a channel shows.

@@ -14,15 +14,15 @@ use super::predict::{columns, is_own, over_windows, seen_by};
 use super::record::Record;
 use super::rows::{By, Rows, Told};
 use super::{FlightError, SHORTEST_S, words};
-use crate::attribution::channel::rms;
-use crate::attribution::{
+use crate::attribution::columns::channel::rms;
+use crate::attribution::columns::{
     self, Candidate, Column, Conclusion, HeldOut, Library, Owner, Placed, Problem, UNKNOWN, ask, conclude, conclude_told,
     parameters, posterior,
 };
-use crate::bad::SetAside;
-use crate::effects::airframe::{Found, Told as Value};
+use crate::flight::effects::{Found, Told as Value};
 use crate::log::Log;
-use crate::residual::whiteness;
+use crate::signal::bad::SetAside;
+use crate::signal::residual::whiteness;
 use crate::verdict::{
     Alternative, BeforeAfter, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, Parameter, Unexplained, Validation,
     Verdict,
@@ -114,7 +114,7 @@ fn run(
             (found, concluded)
         }
         Some(ids) => {
-            let found = attribution::told(&problem, ids).ok_or_else(unfit)?;
+            let found = columns::told(&problem, ids).ok_or_else(unfit)?;
             let concluded = conclude_told(&problem, &found).ok_or_else(unfit)?;
             (found, concluded)
         }
@@ -346,9 +346,9 @@ impl<'w> Whole<'w> {
         let mut predicted = BTreeMap::new();
         let c = self.concluded;
         for (k, channel) in self.problem.channels.iter().enumerate() {
-            let white = |of: &crate::attribution::Fit| whiteness(&channel.t, &of.residual(self.problem.channels, k));
+            let white = |of: &crate::attribution::columns::Fit| whiteness(&channel.t, &of.residual(self.problem.channels, k));
             let by_row = rows.of.iter().find(|r| r.channel == k);
-            let figures = |e: crate::attribution::conclude::Errors, row: Option<[f64; 2]>, whiteness_p: f64| {
+            let figures = |e: crate::attribution::columns::conclude::Errors, row: Option<[f64; 2]>, whiteness_p: f64| {
                 let [rms, heldout_rms] = row.unwrap_or([e.rms, e.held_out]);
                 Figures { rms, heldout_rms, across_runs_rms: None, whiteness_p }
             };
@@ -365,7 +365,7 @@ impl<'w> Whole<'w> {
 
     fn effects(&self, rows: &Rows, parameters: &[Vec<Parameter>], first: usize) -> Vec<EffectEntry> {
         let c = self.concluded;
-        let entry = |k: &crate::attribution::Kept| {
+        let entry = |k: &crate::attribution::columns::Kept| {
             let k = &rows.told_by_row(k);
             let placed = &c.fit.placed[k.place];
             let candidate = self.candidate(placed);
@@ -421,7 +421,7 @@ impl<'w> Whole<'w> {
             let left = c.left.iter().find(|l| l.channel == k);
             // a pattern beneath the floor is none that a reader must see
             let patterned = left.is_some() && over_floor > 1.0;
-            (patterned || over_floor > crate::attribution::conclude::LOUD).then(|| Unexplained {
+            (patterned || over_floor > crate::attribution::columns::conclude::LOUD).then(|| Unexplained {
                 channel: channel.name.clone(),
                 over_floor,
                 depends_on: goes_with(k),

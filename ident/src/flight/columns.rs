@@ -10,8 +10,8 @@ use super::record::Record;
 use super::scene::{FORCE, GYRO, SPEED, Scene, delayed, followed};
 use super::vibration::Shaking;
 use super::windows::Windows;
-use crate::attribution::{Column, Owner, Prior, Values};
-use crate::noise::median;
+use crate::attribution::columns::{Column, Owner, Prior, Values};
+use crate::numeric::order::median;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

@@ -10,7 +10,7 @@
 use super::channels::Target;
 use super::columns::{Flight, Sink};
 use super::scene::{Broken, Follows, GYRO, SPEED, Scene, delayed};
-use crate::attribution::{Column, Owner, Prior};
+use crate::attribution::columns::{Column, Owner, Prior};
 
 /// Thrust coefficients lie this far from what carries the weight in the middle of the flight, as a share.
 const THRUST: f64 = 0.5;

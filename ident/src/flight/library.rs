@@ -1,6 +1,6 @@
 //! The causes of a flight, as the attribution asks for them.
 //!
-//! What it is: each form of each effect in `effects/airframe` is a candidate, and each nameless function is one; a hypothesis is turned into
+//! What it is: each form of each effect in `effects/` is a candidate, and each nameless function is one; a hypothesis is turned into
 //! what acts (`scene`) and from there into columns.
 //! What can go wrong: nothing; an effect without a form on this flight is no candidate.
 //! Units: those of the channels.
@@ -12,9 +12,9 @@ use super::model::{Added, Coefficient, FlightModel};
 use super::nameless::Nameless;
 use super::predict::placed;
 use super::scene::Scene;
-use crate::attribution::{Candidate, Column, Design, Library, Owner, Placed, Prior, UNKNOWN};
-use crate::effects::Scope;
-use crate::effects::airframe::{AirframeEffect, FOLLOWED, Form, library};
+use crate::attribution::columns::{Candidate, Column, Design, Library, Owner, Placed, Prior, UNKNOWN};
+use crate::flight::effects::{AirframeEffect, FOLLOWED, Form, library};
+use crate::verdict::Scope;
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};

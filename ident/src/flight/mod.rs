@@ -1,34 +1,31 @@
 //! Closing the loop on a flight: what the declared model of a flying vehicle leaves over, why, and the corrected model.
 //!
 //! What it is: a flight log becomes channels through a stated filter (`windows`, `channels`); the declared model (`declared`) and the effects
-//! of `effects/airframe` become columns (`library`); the attribution does the rest (`crate::attribution`).
+//! of `effects/` become columns (`library`); the attribution does the rest (`crate::attribution::columns`).
 //! What can go wrong: a log that is too short, or that lacks what the model is made of, is refused with what it lacks.
 //! Units: SI; rad/s; body FRD, earth NED.
 //! Reference: specification `flight.md`, "The loop on flights".
 
-mod almanac;
 pub mod channels;
 mod close;
 pub mod columns;
 mod declared;
+pub mod effects;
 pub mod library;
 pub mod model;
-mod nameless;
-mod page;
+pub(crate) mod nameless;
 pub mod predict;
 pub mod record;
 mod rows;
 pub mod scene;
-mod standard;
+pub(crate) mod standard;
 pub mod vehicle;
 pub(crate) mod vibration;
 pub mod windows;
 mod words;
 
-pub use almanac::almanac;
 pub use close::{Closed, Shown, close, told};
 pub use model::{FORMAT as MODEL_FORMAT, FlightModel};
-pub use page::{VOCABULARY, figures, page};
 
 /// Standard gravity, m/s^2.
 pub(crate) const G: f64 = 9.806_65;

@@ -9,14 +9,14 @@
 use super::FlightError;
 use super::columns::Usual;
 use super::vehicle::Vehicle;
-use crate::effects::Scope;
-use crate::model::digits;
+use crate::numeric::digits;
 use crate::verdict::Parameter;
+use crate::verdict::Scope;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
 /// First key of the format.
-pub const FORMAT: &str = "quadrig-flight-model 1";
+pub const FORMAT: &str = crate::model::OF_FLIGHT;
 
 /// The model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -86,7 +86,7 @@ impl FlightModel {
             if line == "[[effect]]" {
                 for p in told.next().into_iter().flatten() {
                     let [lo, hi] = p.ci95;
-                    let number = crate::report::number;
+                    let number = crate::numeric::digits::number;
                     let _ =
                         writeln!(out, "# {} = {} {} (95 %: {} to {})", p.name, number(p.value), p.unit, number(lo), number(hi));
                 }

@@ -9,12 +9,12 @@ use super::channels::Target;
 use super::columns::{Flight, Sink};
 use super::model::Coefficient;
 use super::scene::Scene;
-use crate::attribution::channel::rms;
-use crate::attribution::{Candidate, Prior, UNKNOWN};
-use crate::effects::Scope;
-use crate::effects::airframe::Told;
+use crate::attribution::columns::channel::rms;
+use crate::attribution::columns::{Candidate, Prior, UNKNOWN};
+use crate::flight::effects::Told;
 use crate::verdict::Parameter;
-use crate::words::{channel, digits};
+use crate::verdict::Scope;
+use crate::verdict::words::{channel, digits};
 
 /// A variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +71,7 @@ impl Variable {
     }
 
     /// What it is called at an axis; `by_command` where no speed of a rotor is known.
-    pub(super) fn label(self, by_command: bool) -> String {
+    pub(crate) fn label(self, by_command: bool) -> String {
         match self {
             Self::Drive if by_command => "sum of the rotors' commands, each 1 at full".to_owned(),
             Self::Drive => "speed of all rotors together".to_owned(),
@@ -80,12 +80,12 @@ impl Variable {
     }
 
     /// Its unit; `by_command` as with its label.
-    pub(super) fn unit(self, by_command: bool) -> &'static str {
+    pub(crate) fn unit(self, by_command: bool) -> &'static str {
         self.said(by_command).1
     }
 
     /// The one that an effect's variable means for a channel: of a vector the part along the channel's own axis.
-    pub(super) fn meant(name: &str, channel: &str) -> Option<Self> {
+    pub(crate) fn meant(name: &str, channel: &str) -> Option<Self> {
         let axis = ["_x", "_y", "_z"].iter().position(|end| channel.ends_with(end));
         match (name, axis) {
             ("vel", Some(2) | None) => Some(Self::Across),
@@ -115,7 +115,7 @@ impl Variable {
     }
 
     /// Its values in each window; `None` where the flight lacks it.
-    pub(super) fn values(self, flight: &Flight, scene: &Scene<'_>) -> Option<Vec<f64>> {
+    pub(crate) fn values(self, flight: &Flight, scene: &Scene<'_>) -> Option<Vec<f64>> {
         let windows = &flight.windows;
         match self {
             Self::Air(k) => scene.air.as_ref().map(|v| windows.mean(&v[k])),
@@ -144,7 +144,7 @@ pub struct Nameless {
 }
 
 /// What drives the rotors where no speed was measured, as a verdict's variable.
-pub(super) const COMMANDS: &str = "commands";
+pub(crate) const COMMANDS: &str = "commands";
 
 /// Share of the range between the outer knots to which a knot is told: where straight lines meet is chosen, not measured.
 const TOLD: f64 = 0.005;

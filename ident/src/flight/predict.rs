@@ -12,9 +12,9 @@ use super::columns::Flight;
 use super::library::{Base, FlightLibrary};
 use super::model::{Added, FlightModel};
 use super::record::Record;
-use crate::attribution::{Column, Design, Placed, UNKNOWN};
-use crate::effects::Scope;
+use crate::attribution::columns::{Column, Design, Placed, UNKNOWN};
 use crate::log::Log;
+use crate::verdict::Scope;
 
 /// A flight as a model sees it: the model's sizes, and its vehicle where the log does not say.
 ///

@@ -9,10 +9,10 @@
 use super::FlightError;
 use super::channels::Target;
 use super::vehicle::Vehicle;
-use crate::flight_log::rotors;
 use crate::log::Log;
-use crate::noise::median;
-use crate::start::{TURNS, start_pulse};
+use crate::log::flight_log::rotors;
+use crate::numeric::order::median;
+use crate::signal::start::{TURNS, start_pulse};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 

@@ -9,10 +9,10 @@ use super::columns::Flight;
 use super::library::FlightLibrary;
 use super::model::FlightModel;
 use super::predict::{columns, is_by_row, over_windows};
-use crate::attribution::channel::rms;
-use crate::attribution::conclude::WORSE;
-use crate::attribution::validate::{Fold, folds};
-use crate::attribution::{Conclusion, Design, Fit, Kept, Library, Placed, Problem};
+use crate::attribution::columns::channel::rms;
+use crate::attribution::columns::conclude::WORSE;
+use crate::attribution::columns::validate::{Fold, folds};
+use crate::attribution::columns::{Conclusion, Design, Fit, Kept, Library, Placed, Problem};
 
 /// What the account knows.
 pub(super) struct Told<'t> {

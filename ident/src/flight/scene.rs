@@ -7,7 +7,7 @@
 //! Reference: Beharie 2013, Eq. 2.29 to 2.35 as corrected in the errata.
 
 use super::record::{Axes, Record};
-use crate::solve::Normal;
+use crate::numeric::solve::Normal;
 use nalgebra::Vector3;
 
 /// Power of the command by which a refused speed is replaced.

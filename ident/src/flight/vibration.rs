@@ -11,8 +11,8 @@
 
 use super::record::Record;
 use super::windows::Windows;
-use crate::attribution::noise::usual_step;
-use crate::noise::median;
+use crate::numeric::order::median;
+use crate::numeric::order::usual_step;
 use nalgebra::{DMatrix, DVector};
 
 /// Windows on each side that are averaged where nothing of the rotors was logged: half a second.

@@ -28,7 +28,7 @@ impl Windows {
     /// Over rows at times `t`, those that are `usable` alone.
     #[must_use]
     pub fn new(t: &[f64], usable: &[bool]) -> Self {
-        let usual = crate::attribution::noise::usual_step(t);
+        let usual = crate::numeric::order::usual_step(t);
         let length = LENGTH_S.max(FEWEST as f64 * usual);
         let rows = ((length / usual).round() as usize).max(FEWEST);
         let mut bounds = Vec::new();

@@ -7,10 +7,11 @@
 
 use super::columns::Usual;
 use super::library::Kind;
-use crate::attribution::{Candidate, Channel, Kept, UNKNOWN};
-use crate::effects::{Scope, airframe};
+use crate::attribution::columns::{Candidate, Channel, Kept, UNKNOWN};
+use crate::flight::effects;
+use crate::verdict::Scope;
+use crate::verdict::words::{plain, worth};
 use crate::verdict::{EffectEntry, Kin, NextExperiment, ScheduleStep, Unexplained};
-use crate::words::{plain, worth};
 
 /// Slower than this what is left is slow, s.
 const SLOW_S: f64 = 0.3;
@@ -25,7 +26,7 @@ pub(super) fn name(candidate: &Candidate) -> String {
 /// The same in words; what has no name is told by its form.
 pub(super) fn title(candidate: &Candidate) -> String {
     let form = plain(&candidate.form);
-    match (airframe::about(candidate.id), form.is_empty()) {
+    match (effects::about(candidate.id), form.is_empty()) {
         (Some(about), true) => about.title.to_owned(),
         (Some(about), false) => format!("{} ({form})", about.title),
         (None, _) => format!("no name: {form}"),

@@ -9,10 +9,10 @@
 use super::columns::{Column, Of, columns};
 use super::curve::{Curve, SAMPLES, usable};
 use super::measure::{Measure, Scale, Value};
-use crate::context::{Context, Relation, Target, unit_of};
-use crate::noise::quantum;
-use crate::solve::Normal;
-use crate::words;
+use crate::channel::{Context, Relation, Target, unit_of};
+use crate::numeric::order::quantum;
+use crate::numeric::solve::Normal;
+use crate::verdict::words;
 
 /// A measure and its value.
 pub(super) type Told = (Measure, Value);

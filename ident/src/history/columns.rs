@@ -7,9 +7,9 @@
 //! Reference: the library's effects (`effects/`), each in its first order.
 
 use super::curve::Curve;
-use crate::context::Context;
+use crate::channel::Context;
 use crate::effects::operator::{Course, Lag};
-use crate::noise::median;
+use crate::numeric::order::median;
 
 /// What a column is of.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,13 +10,13 @@ use super::FEWEST;
 use super::channel::{Told, measure, samples, told};
 use super::curve::{Curve, SAMPLES, curves};
 use super::measure::{Measure, Scale, Value};
-use crate::context::{Context, STANDSTILL};
+use crate::channel::{Context, STANDSTILL};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
-use crate::noise::{median, quantum};
-use crate::parallel::in_parallel;
-use crate::solve::Normal;
-use crate::words;
+use crate::numeric::order::{median, quantum};
+use crate::numeric::parallel::in_parallel;
+use crate::numeric::solve::Normal;
+use crate::verdict::words;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rows by which a lag is told.

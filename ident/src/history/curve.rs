@@ -2,13 +2,13 @@
 //!
 //! What it is: the declared polynomial through the samples of all runs, each run with the same weight.
 //! What can go wrong: a channel that fewer than [`FEWEST`] runs have is left out.
-//! Units: regressors as in [`crate::context`]; the channel's.
+//! Units: regressors as in [`crate::channel`]; the channel's.
 //! Reference: specification `formats.md`, primary relations.
 
 use super::FEWEST;
-use crate::context::{Context, Relation, STANDSTILL, Target};
+use crate::channel::{Context, Relation, STANDSTILL, Target};
 use crate::log::SPEED;
-use crate::solve::Normal;
+use crate::numeric::solve::Normal;
 
 /// Share of a run's samples that lie below what counts as its top.
 const TOP: f64 = 0.98;

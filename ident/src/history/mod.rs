@@ -20,8 +20,8 @@ mod name;
 mod same;
 mod words;
 
-use crate::date;
 use crate::log::Log;
+use crate::log::date;
 use serde::Serialize;
 
 pub use find::{Change, Kind, Moved};

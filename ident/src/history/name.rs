@@ -11,16 +11,16 @@
 
 use super::History;
 use super::find::{Change, Kind, one_speed};
+use crate::attribution::diagnose::RIVAL;
+use crate::channel::is_contrast;
 use crate::close::{Closed, close};
-use crate::context::is_contrast;
-use crate::diagnose::RIVAL;
 use crate::effects::{self, Effect, Shape};
 use crate::log::Log;
 use crate::model::Model;
-use crate::noise::median;
-use crate::parallel::in_parallel;
+use crate::numeric::order::median;
+use crate::numeric::parallel::in_parallel;
+use crate::verdict::words::lower;
 use crate::verdict::{EffectEntry, Parameter};
-use crate::words::lower;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::ops::Range;

@@ -8,7 +8,7 @@
 use super::differ::differing;
 use super::find::{Change, Kind, Moved};
 use super::{Chart, History, fewest_judged};
-use crate::words::{amount, digits, list, lower, probability, scaled, upper};
+use crate::verdict::words::{amount, digits, list, lower, probability, scaled, upper};
 
 /// Logarithm of the odds within which the runner-up of a name is told: e^3.
 const CLOSE: f64 = 3.0;

@@ -10,8 +10,8 @@ use super::Recording;
 use super::least::Readings;
 use super::model::{FORMAT as MODEL_FORMAT, InertialModel, Part};
 use super::shown::Shown;
-use crate::residual::whiteness;
-use crate::unexplained::{LOUD, loudest_stretch};
+use crate::attribution::unexplained::{LOUD, loudest_stretch};
+use crate::signal::residual::whiteness;
 use crate::verdict::{
     Alternative, Channel, Channels, EffectEntry, FORMAT, Figures, Kind, NextExperiment, ScheduleStep, Unexplained, Verdict,
 };
@@ -262,8 +262,8 @@ impl Sensor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::Scope;
     use crate::verdict::Kin;
+    use crate::verdict::Scope;
 
     #[test]
     fn a_part_of_a_run_is_where_nine_tenths_are() {

@@ -16,7 +16,7 @@ use super::search::{Scene, descending, evidence, parameter, reductions};
 use super::shown::Shown;
 use super::trace::{Setting, Traced, trace};
 use super::{Attitude, Recording, effects, smooth, vibration};
-use crate::effects::Scope;
+use crate::verdict::Scope;
 use crate::verdict::{EffectEntry, Kin, Kind};
 use nalgebra::{Matrix3, Vector3};
 

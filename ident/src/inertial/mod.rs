@@ -16,7 +16,6 @@ mod force;
 mod least;
 mod model;
 mod noise;
-mod page;
 mod rate;
 mod search;
 mod shown;
@@ -27,7 +26,6 @@ mod vibration;
 
 pub use account::{Closed, Sensor};
 pub use model::{Added, FORMAT as MODEL_FORMAT, InertialModel, Part, Predicted};
-pub use page::{VOCABULARY, page};
 
 use nalgebra::{Matrix3, Vector3};
 

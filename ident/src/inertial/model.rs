@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// First key of the format.
-pub const FORMAT: &str = "quadrig-inertial 1";
+pub const FORMAT: &str = crate::model::OF_INERTIAL;
 
 /// The model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

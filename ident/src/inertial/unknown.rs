@@ -10,7 +10,7 @@ use super::least::{Column, Readings, Solved, Term};
 use super::model::Added;
 use super::search::{Scene, descending, parameter, predict, reductions};
 use super::shown::Shown;
-use crate::effects::Scope;
+use crate::verdict::Scope;
 use crate::verdict::{EffectEntry, Kin};
 use nalgebra::Vector3;
 

@@ -14,7 +14,7 @@ use super::noise::{levels, quantile};
 use super::search::{NAMED, descending, parameter, reductions};
 use super::shown::Shown;
 use super::trace::Setting;
-use crate::effects::Scope;
+use crate::verdict::Scope;
 use crate::verdict::{EffectEntry, Kin};
 use nalgebra::{Matrix2, Vector2, Vector3};
 use std::f64::consts::TAU;

@@ -10,12 +10,14 @@
 //! Krysander 2013, Automatica 49:1591.
 
 use super::size::Line;
-use crate::beside::ask;
-use crate::context::{Context, Facts};
-use crate::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, choose, offers, round_of};
-use crate::heldout;
-use crate::hypothesis::{Declared, Fit, Placed, Rows, fit, is_plausible, part_of};
-use crate::together::Ground;
+use crate::attribution::beside::ask;
+use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, choose, offers, round_of};
+use crate::attribution::together::Ground;
+use crate::channel::{Context, Facts};
+use crate::effects::placed::Placed;
+use crate::fit::heldout;
+use crate::fit::{Fit, Rows, fit, is_plausible, part_of};
+use crate::model::Declared;
 
 /// A log's schedule, sensors and noise.
 pub(crate) struct Rig {

@@ -7,9 +7,9 @@
 
 use super::climb::Climbed;
 use super::{Apart, Cause};
-use crate::context::Context;
+use crate::channel::Context;
 use crate::experiment::{between, model_of};
-use crate::hypothesis::Declared;
+use crate::model::Declared;
 use crate::verdict::NextExperiment;
 
 /// Causes that stay alike on this schedule.

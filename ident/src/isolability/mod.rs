@@ -19,14 +19,16 @@ pub use climb::FURTHEST;
 pub use group::Group;
 pub use words::{Standing, short};
 
-use crate::attribution::candidates::LEAST_ANGLE;
-use crate::close::{CloseError, Closed, close};
-use crate::diagnose::offers;
+use crate::attribution::columns::candidates::LEAST_ANGLE;
+use crate::attribution::diagnose::offers;
+use crate::attribution::long::{kept, thinned};
+use crate::close::{Closed, close};
 use crate::effects::library;
-use crate::heldout;
-use crate::hypothesis::{Declared, Placed};
+use crate::effects::placed::Placed;
+use crate::fit::heldout;
+use crate::identify::CloseError;
 use crate::log::Log;
-use crate::long::{kept, thinned};
+use crate::model::Declared;
 use ask::{Question, Rig, is_one_cause};
 use climb::{Climbed, climb};
 use size::Line;
@@ -68,7 +70,7 @@ pub enum Apart {
 
 impl Cause {
     /// Whether the declared model takes up so much of it that the rest is within what its form is off by (see
-    /// [`crate::attribution::candidates::LEAST_ANGLE`]).
+    /// [`crate::attribution::columns::candidates::LEAST_ANGLE`]).
     #[must_use]
     pub fn is_hidden(&self) -> bool {
         self.free < LEAST_ANGLE
@@ -147,7 +149,7 @@ pub fn isolability(log: &Log, progress: &mut dyn FnMut(f64)) -> Result<Isolabili
         run: log.name.clone(),
         rows: log.len(),
         duration_s: context.duration(),
-        channels: channels.map(|t| (t.name.to_owned(), t.noise.rms, crate::context::unit_of(t.name))).collect(),
+        channels: channels.map(|t| (t.name.to_owned(), t.noise.rms, crate::channel::unit_of(t.name))).collect(),
         causes,
         groups,
         not_offered,

@@ -8,12 +8,14 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use super::Quantity;
-use crate::context::Context;
-use crate::design::{Label, TargetDesign};
-use crate::diagnose::span;
+use crate::attribution::diagnose::span;
+use crate::channel::Context;
+use crate::effects::design::{Label, TargetDesign};
+use crate::effects::placed::Placed;
 use crate::effects::{Effect, Instance};
-use crate::hypothesis::{Declared, Fit, Placed, design, plain};
-use crate::solve::Normal;
+use crate::fit::{Fit, design, plain};
+use crate::model::Declared;
+use crate::numeric::solve::Normal;
 
 /// What a cause makes of one channel.
 #[derive(Debug, Clone)]

@@ -6,7 +6,7 @@
 //! Reference: docs/isolability.md.
 
 use super::{Apart, Cause, Group, Isolability};
-use crate::report::number;
+use crate::numeric::digits::number;
 
 /// What a run says of a cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,7 +8,7 @@
 //! Reference: specification `formats.md`, "Rig log"; docs/book/reference/log.md.
 
 use super::{Log, SPEED, trimmed};
-use crate::noise::median;
+use crate::numeric::order::median;
 use std::fmt;
 
 /// Usual steps from which on a step is a hole in time, as everywhere in the program.

@@ -9,7 +9,7 @@
 //! (momentum theory; a duct up to 0.7 of it); propellers need 1.3 to 4 times as much, and their C_T is 0.02 to 0.2.
 
 use super::{Disc, Log, Place, ReadError, SPEED, trimmed};
-use crate::noise::median;
+use crate::numeric::order::median;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;

@@ -7,10 +7,11 @@
 //! Reference: specification `formats.md`, "Powerplant model".
 
 use super::read::{Refusal, course, leftover, no_channel, only, place_of, refusal, table_of, within};
-use super::{Model, ModelError, digits, leftover_keys};
-use crate::course::Course;
-use crate::leftover::Leftover;
+use super::{Model, ModelError, leftover_keys};
 use crate::log::digest_of;
+use crate::model::course::Course;
+use crate::model::leftover::Leftover;
+use crate::numeric::digits;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 

@@ -10,11 +10,12 @@
 //! Reference: posterior mean of two normal distributions, Gelman et al. 2013, Bayesian Data Analysis, section 2.5.
 
 use super::read::{Refusal, finite, refusal};
-use super::{AddedEffect, Model, digits, keyed};
-use crate::context::{Context, Target, unit_of};
-use crate::design::{Label, TargetDesign};
+use super::{AddedEffect, Model, keyed};
+use crate::channel::{Context, Target, unit_of};
+use crate::effects::design::{Label, TargetDesign};
+use crate::effects::placed::Placed;
 use crate::effects::{Estimate, Instance};
-use crate::hypothesis::Placed;
+use crate::numeric::digits;
 use nalgebra::DMatrix;
 use toml::{Table, Value};
 

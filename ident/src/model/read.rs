@@ -10,12 +10,12 @@ use super::{
     AddedEffect, FORMAT, Model, ModelError, Polynomial, STOOD, coefficient_key, discrepancy, keyed, leftover_keys, place, reach,
     run, supply,
 };
-use crate::context::{Context, Relation};
-use crate::course::{COURSE_KEYS, Course};
+use crate::channel::{Context, Relation};
+use crate::effects::placed::Placed;
 use crate::effects::{self, Effect, Estimate, Instance};
-use crate::hypothesis::Placed;
-use crate::leftover::{CLASSES, Leftover, PARTS};
 use crate::log::Log;
+use crate::model::course::{COURSE_KEYS, Course};
+use crate::model::leftover::{CLASSES, Leftover, PARTS};
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -75,7 +75,7 @@ impl Model {
 
     fn from_table(root: &Table) -> Result<Self, Refusal> {
         let format = root.get("format").and_then(Value::as_str);
-        if format == Some(crate::flight::MODEL_FORMAT) {
+        if format == Some(super::OF_FLIGHT) {
             return Err(refusal(
                 "format",
                 root.get("format"),
@@ -84,7 +84,7 @@ impl Model {
                 ),
             ));
         }
-        if format == Some(crate::inertial::MODEL_FORMAT) {
+        if format == Some(super::OF_INERTIAL) {
             return Err(refusal(
                 "format",
                 root.get("format"),

@@ -7,8 +7,9 @@
 //! Reference: specification `formats.md`, "Scope".
 
 use super::read::{Refusal, finite, no_channel, only, refusal, within};
-use super::{AddedEffect, FittedTo, RunLevel, coefficient_key, digits};
-use crate::context::Relation;
+use super::{AddedEffect, FittedTo, RunLevel, coefficient_key};
+use crate::channel::Relation;
+use crate::numeric::digits;
 use toml::{Table, Value};
 
 /// Keys of `[[run]]`.

@@ -8,13 +8,10 @@
 //! Reference: specification `formats.md`, "Scope".
 
 use super::{AddedEffect, Model};
-use crate::beside::is_named;
-use crate::context::{Context, Target};
-use crate::design::TargetDesign;
-use crate::effects::Scope;
-use crate::hypothesis::{Declared, Fit, Placed, part_of};
+use crate::effects::placed::Placed;
+use crate::effects::placed::is_named;
 use crate::log::Log;
-use crate::solve::Normal;
+use crate::verdict::Scope;
 use std::borrow::Cow;
 
 /// A run that a model was fitted to.
@@ -69,6 +66,11 @@ fn elsewhere(placed: &Placed) -> Elsewhere {
         // a zero that is older than the run stands in the tare of each run, which no model knows
         Scope::Run | Scope::Event => Elsewhere::Mean,
     }
+}
+
+/// Whether nothing but its mean is left of an effect on another run of the rig.
+pub(crate) fn is_mean_elsewhere(placed: &Placed) -> bool {
+    elsewhere(placed) == Elsewhere::Mean
 }
 
 impl Model {
@@ -149,23 +151,4 @@ impl AddedEffect {
         out.placed.shape.iter_mut().zip(names).filter(|(_, name)| *name == "t0").for_each(|(t0, _)| *t0 = LONG_AGO);
         out
     }
-}
-
-/// What another run expects of an effect in the place of its course: for each channel the declared polynomial that comes nearest to what the
-/// effect adds on its own run. Nothing for an effect that acts on other runs.
-pub(super) fn mean(context: &Context, declared: Declared<'_>, fit: &Fit, position: usize) -> Vec<(String, Vec<f64>)> {
-    let placed = &fit.placed[position];
-    if elsewhere(placed) != Elsewhere::Mean {
-        return Vec::new();
-    }
-    let of_target = |(k, target): (usize, &Target)| {
-        let part = part_of(context, declared, fit, position, k);
-        let columns = TargetDesign::baseline(context, target.name, target.relation).columns;
-        let mut normal = Normal::new(columns.len());
-        for (row, part) in target.rows.iter().zip(&part).filter(|(row, _)| target.claims(**row)) {
-            normal.add(&columns.iter().map(|c| c.values[*row]).collect::<Vec<f64>>(), *part, 1.0);
-        }
-        Some((target.name.to_owned(), normal.solve()?.coefficients))
-    };
-    context.targets.iter().enumerate().filter(|(_, t)| placed.instance.touches(t.name)).filter_map(of_target).collect()
 }

@@ -10,11 +10,12 @@
 //! [`crate::effects`], `supply_voltage`.
 
 use super::read::{Refusal, finite, refusal};
-use super::{AddedEffect, Model, digits, load_unit};
-use crate::context::{Context, Relation, Target};
-use crate::effects::supply_voltage::{OF_CURRENT, OF_SPEED};
-use crate::leftover::{along, binned};
-use crate::noise::median;
+use super::{AddedEffect, Model, load_unit};
+use crate::channel::{Context, Relation, Target};
+use crate::effects::supply::supply_voltage::{OF_CURRENT, OF_SPEED};
+use crate::model::leftover::{along, binned};
+use crate::numeric::digits;
+use crate::numeric::order::median;
 use std::borrow::Cow;
 use toml::{Table, Value};
 

@@ -7,8 +7,8 @@
 //! Units: rows; us for the command.
 //! Reference: Killick, Fearnhead & Eckley 2012 (PELT); Hawkins 2001 (mean and variance).
 
-use super::mean::line;
-use crate::noise::median;
+use crate::numeric::order::median;
+use crate::signal::settle::line;
 
 /// Smallest step of a command, us.
 const COMMAND_STEP: f64 = 0.5;

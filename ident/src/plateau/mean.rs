@@ -6,8 +6,8 @@
 //! Units: the column's.
 //! Reference: Geyer 1992, "Practical Markov chain Monte Carlo" (initial positive sequence); Theil 1950.
 
-use crate::noise::median;
-use crate::solve::dot;
+use crate::numeric::solve::dot;
+use crate::signal::settle::line;
 
 /// Farthest that a sample may lie, in robust standard deviations.
 const FAR: f64 = 6.0;
@@ -117,36 +117,6 @@ pub(crate) fn residual(z: &[f64]) -> Option<Residual> {
     values.iter_mut().zip(&counts).for_each(|(v, c)| *v = if *c { *v - mean } else { 0.0 });
     let squares = dot(&values, &values);
     (kept >= 3.0).then_some(Residual { values, counts, kept, squares })
-}
-
-/// Robust line through a stretch: level at its middle, slope a row, spread about it.
-///
-/// The slope comes from the medians of the outer thirds, which no glitch moves.
-pub(crate) fn line(z: &[f64]) -> Option<(f64, f64, f64)> {
-    let third = z.len() / 3;
-    let finite = |v: &[f64]| -> Vec<f64> { v.iter().copied().filter(|v| v.is_finite()).collect() };
-    if z.iter().filter(|v| v.is_finite()).take(3).count() < 3 {
-        return None;
-    }
-    let slope = match (finite(&z[..third]), finite(&z[z.len() - third..])) {
-        (mut a, mut b) if a.len() >= 3 && b.len() >= 3 => (median(&mut b) - median(&mut a)) / (z.len() - third) as f64,
-        _ => 0.0,
-    };
-    let centre = (z.len() as f64 - 1.0) / 2.0;
-    let mut about: Vec<f64> =
-        z.iter().enumerate().filter(|(_, v)| v.is_finite()).map(|(i, v)| v - slope * (i as f64 - centre)).collect();
-    let level = median(&mut about);
-    let mut off: Vec<f64> = about.iter().map(|v| (v - level).abs()).collect();
-    let spread = 1.4826 * median(&mut off);
-    // more than half of the samples alike: what nine tenths keep to; beyond that a coarse channel has glitches and no noise
-    let spread = if spread > 0.0 {
-        spread
-    } else {
-        let rank = off.len() * 9 / 10;
-        *off.select_nth_unstable_by(rank, f64::total_cmp).1
-    };
-    let spread = spread.max(1e-12 * level.abs()).max(1e-12);
-    Some((level, slope, spread))
 }
 
 /// Mean of a stretch and its standard error.

@@ -10,12 +10,13 @@
 mod change;
 mod mean;
 pub mod score;
-pub(crate) mod settle;
+pub mod shift;
 pub mod study;
 
-use crate::context::Context;
+use crate::channel::Context;
 use crate::log::{Log, SPEED};
-use crate::noise::median;
+use crate::numeric::order::median;
+use crate::signal::settle;
 use mean::{Colour, Residual, mean_of, residual};
 
 /// Fewest settled rows of a plateau.

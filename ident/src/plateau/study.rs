@@ -9,10 +9,10 @@
 
 use super::score::{Found, Score, Truth};
 use super::{detect, means_over};
-use crate::context::Context;
+use crate::channel::Context;
 use crate::log::Log;
-use crate::noise::median;
-use crate::shift::{self, Form, Settings, filters};
+use crate::numeric::order::median;
+use crate::plateau::shift::{self, Form, Settings, filters};
 
 /// Shortest held command that counts as a level, rows.
 const SHORTEST: usize = 30;

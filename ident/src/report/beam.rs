@@ -7,8 +7,8 @@
 
 use super::figure::{Figure, Layer};
 use super::sheet::Sheet;
-use crate::beam::{Beam, Crossing};
-use crate::quantity::{Kilogram, Metre, Newton};
+use crate::log::quantity::{Kilogram, Metre, Newton};
+use crate::sizing::beam::{Beam, Crossing};
 
 const CLASSES: [&str; 4] = ["a", "b", "c", "e"];
 

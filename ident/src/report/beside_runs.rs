@@ -11,7 +11,7 @@ use super::run::{self, CLASSES};
 use super::sheet::Sheet;
 use crate::identify::{Identified, identify};
 use crate::log::Log;
-use crate::words;
+use crate::verdict::words;
 
 /// The fold of the page; nothing where no run has a constant.
 pub(super) fn beside_runs(sheet: &mut Sheet, runs: &[(&str, &Log)]) {
@@ -56,7 +56,7 @@ fn relations(found: &[(&str, Identified)]) -> Vec<Figure> {
         }
         let with: Vec<_> =
             found.iter().filter_map(|(name, of)| Some((*name, of.curves.iter().find(|c| c.name == f.name)?))).collect();
-        let layer = |((name, f), class): (&(&str, &crate::fit::Fitted), &'static str)| {
+        let layer = |((name, f), class): (&(&str, &crate::identify::curves::Fitted), &'static str)| {
             let (x, y) = run::line(f);
             Layer::Line { name: (*name).to_owned(), class, x, y }
         };

@@ -7,11 +7,11 @@
 //! Reference: `fit::power`, `fit::surface`.
 
 use super::figure::{Figure, Layer, Mark};
-use super::number;
 use super::sheet::Sheet;
-use crate::fit::power::{ASKED, Level, in_doubt};
-use crate::fit::surface::Surface;
 use crate::identify::Identified;
+use crate::identify::curves::power::{ASKED, Level, in_doubt};
+use crate::identify::curves::surface::Surface;
+use crate::numeric::digits::number;
 
 /// Adds the part; `thin` is what the page does with its figures.
 pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figure) -> Figure) {
@@ -75,7 +75,7 @@ fn table(sheet: &mut Sheet, found: &Identified) {
         .iter()
         .map(|l| std::iter::once((l.plateau + 1).to_string()).chain(known.iter().map(|k| cell(l, k))).collect())
         .collect();
-    let text = crate::fit::power::csv(&found.plateaus, &found.levels);
+    let text = crate::identify::curves::power::csv(&found.plateaus, &found.levels);
     let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<String>>());
     let raw_head = lines.next().unwrap_or_default();
     let raw: Vec<Vec<String>> = lines.collect();

@@ -5,13 +5,18 @@
 //! Units: on the axes.
 //! Reference: specification `identification.md`, item 5.
 
+pub mod almanac;
 mod beam;
 mod beside_runs;
 pub(crate) mod closed;
 mod designer;
 mod figure;
+pub mod flight;
+pub mod flight_almanac;
 mod history;
+pub mod inertial;
 mod isolability;
+pub mod joined;
 mod page;
 mod run;
 mod selection;
@@ -34,24 +39,3 @@ pub use selection::selection;
 pub use several::several;
 pub use sheet::{Sheet, write_figures};
 pub use shift::{filter_figures, study_figures};
-
-/// A number with five significant digits, as tables print it.
-#[must_use]
-pub fn number(v: f64) -> String {
-    if v == 0.0 {
-        return "0".to_owned();
-    }
-    if v.abs() < 1e-3 || v.abs() >= 1e5 { format!("{v:.4e}") } else { format!("{v:.5}") }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::number;
-
-    #[test]
-    fn small_numbers_keep_their_digits() {
-        assert_eq!(number(6.3e-5), "6.3000e-5");
-        assert_eq!(number(0.0), "0");
-        assert_eq!(number(1.5), "1.50000");
-    }
-}

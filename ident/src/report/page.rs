@@ -14,18 +14,19 @@ use super::designer::designer;
 use super::figure::{Figure, Layer};
 use super::run;
 use super::sheet::Sheet;
+use crate::channel::{Context, DIFFERENCES, Target, unit_of};
 use crate::close::Closed;
-use crate::context::{Context, DIFFERENCES, Target, unit_of};
 use crate::effects::unknown::variable;
-use crate::heldout::residuals;
-use crate::hypothesis::{Declared, Rows, fit};
+use crate::fit::heldout::residuals;
+use crate::fit::{Rows, fit};
 use crate::identify::identify;
 use crate::log::{Log, SPEED};
+use crate::model::Declared;
 use crate::model::Model;
-use crate::noise::median;
+use crate::numeric::order::median;
 use crate::several::Shown;
+use crate::verdict::words::{self, channel, heading};
 use crate::verdict::{EffectEntry, Unexplained, Verdict};
-use crate::words::{self, channel, heading};
 
 /// The report of a closed loop as one self-contained page.
 #[must_use]

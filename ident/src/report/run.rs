@@ -10,16 +10,16 @@ use super::designer::{designer, paired};
 use super::figure::{Figure, Layer, Mark};
 use super::sheet::Sheet;
 use super::shift::filter_figures;
-use crate::board;
-use crate::context::unit_of;
-use crate::fit::power::Level;
-use crate::fit::{Fitted, Law, ratio};
+use crate::channel::unit_of;
 use crate::identify::Identified;
+use crate::identify::curves::power::Level;
+use crate::identify::curves::{Fitted, Law, ratio};
+use crate::log::board;
 use crate::log::{Gaps, Log, SPEED};
-use crate::noise::median;
+use crate::numeric::order::median;
 use crate::plateau::Plateau;
-use crate::shift::{Settings, filters};
-use crate::words::{self, axis, channel, heading, upper};
+use crate::plateau::shift::{Settings, filters};
+use crate::verdict::words::{self, axis, channel, heading, upper};
 
 /// Colours of the speed channels.
 pub(super) const CLASSES: [&str; 5] = ["a", "b", "c", "e", "f"];

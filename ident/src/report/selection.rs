@@ -8,7 +8,7 @@
 
 use super::figure::{Figure, Layer, Mark};
 use super::sheet::Sheet;
-use crate::select::{Airframe, Need, Pair, Row, choose};
+use crate::sizing::select::{Airframe, Need, Pair, Row, choose};
 
 /// Colours in the order of the motors.
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];

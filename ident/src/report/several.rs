@@ -15,8 +15,8 @@ use crate::close::Closed;
 use crate::effects::{EffectEntry, Estimate};
 use crate::log::Log;
 use crate::several::{Outcome, Run, Shown, disagreement};
+use crate::verdict::words::{channel, digits, scaled, upper, upper_bound};
 use crate::verdict::{BeforeAfter, Channel, Channels, Figures, Parameter, Unexplained, Validation, Verdict};
-use crate::words::{channel, digits, scaled, upper, upper_bound};
 
 /// Most runs that have their numbers beneath a figure; of more every fifth has.
 const MOST_NAMES: usize = 12;

@@ -7,12 +7,12 @@
 
 use super::closed::{LOOK, SCRIPT};
 use super::figure::Figure;
-use super::number;
 use super::style::{COLOURS, DRAWING, PAGE};
 use super::svg::escape;
 use crate::log::write_whole;
+use crate::numeric::digits::number;
 use crate::verdict::Channels;
-use crate::words::upper;
+use crate::verdict::words::upper;
 use std::path::{Path, PathBuf};
 
 /// Most columns of a table that a phone shows as one.

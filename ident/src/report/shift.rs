@@ -6,10 +6,10 @@
 //! Reference: Beharie 2013, Figures 5.65 to 5.71 (filters) and 5.82 to 5.84 (thresholds).
 
 use super::figure::{Figure, Layer};
-use crate::context::unit_of;
+use crate::channel::unit_of;
+use crate::plateau::shift::Filters;
 use crate::plateau::study::{OFFSETS, Tried};
-use crate::shift::Filters;
-use crate::words;
+use crate::verdict::words;
 
 /// Filters 2 to 6 one above the other over time, and Filter 1 with its threshold.
 #[must_use]

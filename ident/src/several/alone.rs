@@ -6,9 +6,10 @@
 //! Reference: specification `closing-the-loop.md`.
 
 use super::Run;
-use crate::close::{CloseError, close};
+use crate::close::close;
+use crate::identify::CloseError;
 use crate::log::Log;
-use crate::parallel::in_parallel;
+use crate::numeric::parallel::in_parallel;
 use std::sync::Mutex;
 
 /// Why several runs cannot be fitted together.

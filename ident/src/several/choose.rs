@@ -8,12 +8,13 @@
 
 use super::joint::{Across, Compared, Joint, Shared, compared};
 use super::{FEWEST, Member};
+use crate::attribution::diagnose::NEEDED_REDUCTION;
+use crate::attribution::unexplained::LOUD;
+use crate::channel::Context;
 use crate::close::Closed;
-use crate::context::Context;
-use crate::diagnose::NEEDED_REDUCTION;
-use crate::effects::{self, Amplitude, Estimate, NEEDED_EVIDENCE, Scope};
-use crate::hypothesis::Placed;
-use crate::unexplained::LOUD;
+use crate::effects::placed::Placed;
+use crate::effects::{self, Amplitude, Estimate, NEEDED_EVIDENCE};
+use crate::verdict::Scope;
 
 /// Samples of a channel of one run that the shapes are sought on.
 pub(super) const SOUGHT: usize = 1500;
@@ -248,7 +249,7 @@ pub(super) fn estimates(joint: &Joint<'_, '_>, rig: &[Placed], k: usize, shared:
     let mut out: Vec<Estimate> =
         shapes.map(|(s, v)| Estimate { name: s.name.into(), unit: s.unit.into(), value: *v, se: f64::NAN }).collect();
     for (i, Amplitude { name, unit }) in p.effect.amplitudes(&p.instance).into_iter().enumerate() {
-        let label = crate::design::Label::Effect { effect: k, amplitude: i };
+        let label = crate::effects::design::Label::Effect { effect: k, amplitude: i };
         let of = |s: &Shared| {
             // a channel that the amplitude does not reach has nothing of it
             let j = s.labels.iter().position(|l| *l == label).filter(|j| s.coefficients[*j] != 0.0)?;

@@ -7,11 +7,12 @@
 //! Reference: random effects against fixed ones, Laird & Ware 1982, Biometrics 38:963; specification `formats.md`, "Scope".
 
 use super::FEWEST;
-use crate::beside::is_named;
+use crate::attribution::unexplained::LOUD;
 use crate::close::Closed;
-use crate::effects::{Estimate, Scope};
-use crate::hypothesis::Placed;
-use crate::unexplained::LOUD;
+use crate::effects::Estimate;
+use crate::effects::placed::Placed;
+use crate::effects::placed::is_named;
+use crate::verdict::Scope;
 
 /// Share of its own size by which a run's may be off from the others' before theirs is nearer to none than to its own.
 const HALF: f64 = 0.5;

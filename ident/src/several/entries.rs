@@ -11,15 +11,16 @@ use super::choose::Named;
 use super::joint::{Across, Joint};
 use super::own::Worth;
 use super::words::root_mean;
-use crate::close::parameter;
-use crate::context::{Context, is_contrast};
-use crate::effects::{EffectEntry, Estimate, Scope};
-use crate::hypothesis::Placed;
+use crate::attribution::rivals::TEMPERATURE;
+use crate::attribution::unexplained::LOUD;
+use crate::channel::{Context, is_contrast};
+use crate::effects::placed::Placed;
+use crate::effects::reported::parameter;
+use crate::effects::{EffectEntry, Estimate};
 use crate::model::{AddedEffect, RunLevel};
-use crate::rivals::TEMPERATURE;
-use crate::unexplained::LOUD;
+use crate::verdict::Scope;
+use crate::verdict::words::channel as spoken;
 use crate::verdict::{Alternative, Change, Channels, Kin, Unexplained};
-use crate::words::channel as spoken;
 
 /// What could stand in the place of a name, with its probability.
 pub(super) type Others = Vec<(&'static str, f64)>;

@@ -7,10 +7,12 @@
 //! Reference: partitioned least squares, Frisch & Waugh 1933, Econometrica 1:387; Schur complement.
 
 use super::Member;
-use crate::context::Target;
-use crate::design::{Label, TargetDesign};
-use crate::hypothesis::{Declared, Placed, design};
-use crate::solve::Normal;
+use crate::channel::Target;
+use crate::effects::design::{Label, TargetDesign};
+use crate::effects::placed::Placed;
+use crate::fit::design;
+use crate::model::Declared;
+use crate::numeric::solve::Normal;
 use nalgebra::DMatrix;
 
 /// The coefficients of a channel that all runs share, in order: powers of the declared polynomial above the constant, then amplitudes.

@@ -12,8 +12,9 @@ use super::choose::{self, Named};
 use super::joint::{Across, Compared, Joint, Shared, compared};
 use super::own::{self, Worth};
 use crate::effects::Estimate;
-use crate::hypothesis::{Placed, allow_for_the_form};
-use crate::parallel::in_parallel;
+use crate::effects::placed::Placed;
+use crate::fit::allow_for_the_form;
+use crate::numeric::parallel::in_parallel;
 
 /// The fit without one run.
 #[derive(Debug)]

@@ -7,12 +7,13 @@
 
 use super::equations::{left_on, of_run, residual_on, rms, shared, solved};
 use super::{FEWEST, Member, is_judged};
-use crate::context::Relation;
-use crate::design::{Label, covariance};
+use crate::channel::Relation;
 use crate::effects::Shape;
-use crate::hypothesis::Placed;
-use crate::search::{connected, nelder_mead};
-use crate::solve::Normal;
+use crate::effects::design::{Label, covariance};
+use crate::effects::placed::Placed;
+use crate::fit::search::connected;
+use crate::numeric::simplex::nelder_mead;
+use crate::numeric::solve::Normal;
 use nalgebra::DMatrix;
 
 /// Share of the noise floor below which a smaller residual counts no further.

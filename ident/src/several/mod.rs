@@ -16,18 +16,22 @@ mod folds;
 mod joint;
 mod outcome;
 mod own;
+pub mod runs;
 mod scatter;
 mod words;
 
+use crate::channel::{Context, Relation, Target};
 use crate::close::Closed;
-use crate::context::{Context, Relation, Target};
-use crate::effects::{Scope, Stage};
-use crate::hypothesis::{Declared, Placed, Rows, design};
-use crate::samples::Samples;
+use crate::effects::Stage;
+use crate::effects::placed::Placed;
+use crate::fit::samples::Samples;
+use crate::fit::{Rows, design};
+use crate::model::Declared;
+use crate::verdict::Scope;
 
-pub use crate::runs::Run;
 pub use alone::{RunsError, close_each};
 pub use outcome::{Outcome, Shown, close_together};
+pub use runs::Run;
 pub(crate) use scatter::disagreement;
 
 /// Fewest runs that can predict each other.

@@ -11,20 +11,20 @@ use super::folds::{self, Tenable};
 use super::joint::{Across, Joint, Shared, compared};
 use super::words::{self, Told};
 use super::{Member, Run, choose, differing, own, scatter};
-use crate::bad;
+use crate::channel::{Context, is_contrast};
 use crate::close::Closed;
-use crate::context::{Context, is_contrast};
+use crate::close::supply_limit;
 use crate::effects::Estimate;
-use crate::hypothesis::Placed;
+use crate::effects::placed::Placed;
 use crate::log::Log;
+use crate::log::sparse;
 use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors, stood};
-use crate::noise::median;
-use crate::parallel::in_parallel;
-use crate::report::Vocabulary;
-use crate::sparse;
-use crate::supply_limit;
+use crate::numeric::order::median;
+use crate::numeric::parallel::in_parallel;
+use crate::signal::bad;
 use crate::verdict::Verdict;
-use crate::words::{DISAGREE, OTHERWISE, digits};
+use crate::verdict::words::parameter_of;
+use crate::verdict::words::{DISAGREE, OTHERWISE, digits};
 
 /// What several runs amount to.
 #[derive(Debug, Clone)]
@@ -179,7 +179,7 @@ fn disagreement(context: &Context, placed: &Placed, shared: &[Estimate], alone: 
     let unit = shared.iter().find(|e| e.name == name).map_or("", |e| e.unit.as_str());
     let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
     let told = |v: f64| digits(v, 0.005 * v.abs());
-    let what = (Vocabulary::RIG.parameter)(placed.effect.id(), &name);
+    let what = parameter_of(placed.effect.id(), &name);
     let together = shared.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.value);
     let how = if (least..=most).contains(&together) { DISAGREE } else { OTHERWISE };
     Some(format!("{how}: alone they have {} to {}{unit} for the {what}", told(least), told(most)))

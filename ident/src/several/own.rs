@@ -9,14 +9,17 @@
 use super::Member;
 use super::equations::{centring, columns_of, of_run, own_columns, samples_less_fixed, shared};
 use super::joint::{Joint, Shared};
-use crate::context::Target;
-use crate::design::Label;
-use crate::effects::{NEEDED_EVIDENCE, Scope, library};
-use crate::hypothesis::{Declared, Placed, Rows, design, fit, is_plausible};
+use crate::channel::Target;
+use crate::effects::design::Label;
+use crate::effects::placed::Placed;
+use crate::effects::{NEEDED_EVIDENCE, library};
+use crate::fit::search::{base, refine_newest, scan};
+use crate::fit::{Rows, design, fit, is_plausible};
+use crate::model::Declared;
 use crate::model::{AddedEffect, RunLevel};
-use crate::parallel::in_parallel;
-use crate::search::{base, refine_newest, scan};
-use crate::solve::Normal;
+use crate::numeric::parallel::in_parallel;
+use crate::numeric::solve::Normal;
+use crate::verdict::Scope;
 
 /// Most drifts and events of one run.
 const MOST: usize = 3;

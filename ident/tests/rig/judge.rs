@@ -4,8 +4,8 @@
 
 use super::rig::{Run, Trouble};
 use ident::plateau::score::{Score, Truth};
+use ident::plateau::shift::{Form, Settings, filters};
 use ident::plateau::study::{self, Known};
-use ident::shift::{Form, Settings, filters};
 
 /// The troubles that the specification lists, one by one and together.
 pub const TROUBLES: [(&str, Trouble); 9] = {

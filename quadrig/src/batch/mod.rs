@@ -182,7 +182,11 @@ fn one(args: &Args, file: &str) -> Result<Option<Done>, Failure> {
     let folder = args.folders.then(|| args.output.join("runs").join(file));
     let done = close_one(file, key, folder.as_deref(), &|| {
         let own = is_own(&path)?;
-        open(&path, &if own { ident::import::Options { mappings: Vec::new(), ..options.clone() } } else { options.clone() }, true)
+        open(
+            &path,
+            &if own { ident::log::import::Options { mappings: Vec::new(), ..options.clone() } } else { options.clone() },
+            true,
+        )
     });
     if let Some(parent) = kept.parent() {
         std::fs::create_dir_all(parent).map_err(unwritten(&parent))?;

@@ -101,7 +101,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         let told =
             [("mission", mission.name.clone()), ("airframe", file.name.clone()), ("powerplant", summary.powerplant.clone())];
         let mut log = Vec::new();
-        ident::flight_log::write_to(&record::flight_log(&flight.rows, &airframe, &told), &mut log)?;
+        ident::log::flight_log::write_to(&record::flight_log(&flight.rows, &airframe, &told), &mut log)?;
         folder.add("states.csv", record::states(&flight.rows).into_bytes());
         folder.add("flight.csv", log);
         if !flight.seen.is_empty() {

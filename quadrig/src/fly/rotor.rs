@@ -13,9 +13,9 @@ use hal_sim::plant::PlantLevers;
 use hal_sim::plant::air::SEA_LEVEL_DENSITY;
 use hal_sim::plant::rig_plant::RPM_PER_RAD_S;
 use hal_sim::{PlantState, Powerplant};
-use ident::effects::Scope;
 use ident::log::{Column, Log};
 use ident::model::{AddedEffect, Model};
+use ident::verdict::Scope;
 use std::sync::Arc;
 
 /// Effects that belong to the rotor, its motor, its ESC or its supply, and fly.

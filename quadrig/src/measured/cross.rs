@@ -8,12 +8,13 @@
 //! Reference: specification `closing-the-loop.md` (`--validate`); `formats.md`, effects act in the run's own time.
 
 use super::Recorded;
+use ident::channel::{Context, Relation, Target};
 use ident::close::Closed;
-use ident::context::{Context, Relation, Target};
-use ident::hypothesis::{Declared, Rows, fit};
+use ident::fit::search::refine;
+use ident::fit::{Rows, fit};
 use ident::log::Log;
+use ident::model::Declared;
 use ident::model::Model;
-use ident::search::refine;
 
 /// Share of the error that a cause must remove on another run to hold there.
 const HOLDS: f64 = 0.02;

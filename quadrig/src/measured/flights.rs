@@ -11,7 +11,7 @@ use crate::Failure;
 use crate::progress::Bar;
 use crate::trouble::unwritten;
 use ident::flight::{Closed, close};
-use ident::import::flight;
+use ident::log::import::flight;
 use ident::log::{Column, Log, write_whole};
 use ident::report::{Figure, write_figures};
 use std::fmt::Write;
@@ -189,7 +189,7 @@ impl Page {
     /// Residuals of the flight that shows most, one figure a channel.
     fn figures(&self) -> Vec<Figure> {
         let Some((name, closed)) = self.closed().max_by_key(|c| c.1.verdict.effects.len()) else { return Vec::new() };
-        let mut all = ident::flight::figures(closed);
+        let mut all = ident::report::flight::figures(closed);
         all.retain(|f| SHOWN[..6].iter().any(|c| f.id == format!("residual-{c}")));
         for figure in &mut all {
             figure.title = format!("{}, {name}", figure.title);

@@ -8,11 +8,11 @@
 
 use super::set::SETS;
 use super::{Outcome, Recorded, Tried};
+use ident::channel::unit_of;
 use ident::close::Closed;
-use ident::context::unit_of;
 use ident::report::{Figure, Layer};
+use ident::verdict::words::{channel, list, plain, upper};
 use ident::verdict::{EffectEntry, Kind, Parameter};
-use ident::words::{channel, list, plain, upper};
 use std::fmt::Write;
 
 /// Runs above which a set is summed up instead of shown run by run.
@@ -312,7 +312,7 @@ fn figure(run: &Recorded, closed: &Closed, entry: &EffectEntry) -> Option<Figure
     })
 }
 
-fn column(context: &ident::context::Context, name: &str) -> Option<Vec<f64>> {
+fn column(context: &ident::channel::Context, name: &str) -> Option<Vec<f64>> {
     match name {
         "t_s" => Some(context.t.clone()),
         "rpm" => (!context.rpm.is_empty()).then(|| context.rpm.clone()),

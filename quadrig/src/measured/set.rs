@@ -6,8 +6,8 @@
 //! Reference: the `README.md` of each set.
 
 use crate::trouble::unread;
-use ident::import::import;
 use ident::log::Log;
+use ident::log::import::import;
 use std::path::{Path, PathBuf};
 
 /// A set.

@@ -8,7 +8,7 @@
 
 use super::Recorded;
 use super::transfer::{Prediction, Transfer, predicted_by};
-use ident::context::Context;
+use ident::channel::Context;
 use ident::several::{FEWEST, Outcome, Run, close_together};
 
 /// What several runs together are worth.

@@ -7,8 +7,8 @@
 //! Reference: specification `closing-the-loop.md`, "Real measurements".
 
 use super::Recorded;
+use ident::channel::Context;
 use ident::close::Closed;
-use ident::context::Context;
 use ident::log::{Log, MODELLED};
 use ident::model::Model;
 

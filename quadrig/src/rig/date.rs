@@ -3,7 +3,7 @@
 //! What it is: days as a board keeps them, 16 bits from 1970-01-01 on; today, and the name of a log that begins now.
 //! What can go wrong: a text that is no date, or lies outside 1970 to 2149-06-06, gives nothing.
 //! Units: days.
-//! Reference: [`ident::date`].
+//! Reference: [`ident::log::date`].
 
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -29,12 +29,12 @@ pub(crate) fn file_of_now() -> PathBuf {
 
 /// A day as `YYYY-MM-DD`.
 pub(crate) fn text(day: u16) -> String {
-    ident::date::text(i64::from(day))
+    ident::log::date::text(i64::from(day))
 }
 
 /// The day of `YYYY-MM-DD`.
 pub(crate) fn day(text: &str) -> Option<u16> {
-    ident::date::day(text).and_then(|day| u16::try_from(day).ok())
+    ident::log::date::day(text).and_then(|day| u16::try_from(day).ok())
 }
 
 #[cfg(test)]

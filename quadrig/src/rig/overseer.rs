@@ -1,6 +1,6 @@
 //! A model beside the run.
 //!
-//! What it is: every sample becomes a row of the watch ([`ident::watch`]), which a thread of its own judges; what it finds comes back when it is done. A virtual
+//! What it is: every sample becomes a row of the watch ([`ident::close::watch`]), which a thread of its own judges; what it finds comes back when it is done. A virtual
 //! board waits for each answer, so that the same run is judged the same.
 //! What can go wrong: a model that cannot be read; a board that is reset begins a new watch, and that is told.
 //! Units: noise floors; s of the run, from its first row.
@@ -13,8 +13,8 @@ use frame::calibration::{Calibration, Converted};
 use frame::message::Message;
 use frame::rig::{ADC_NAMES, CAPTURE_NAMES, RigSample};
 use frame::units::Ticks;
+use ident::close::watch::{Departure, Shown, Watch};
 use ident::model::Model;
-use ident::watch::{Departure, Shown, Watch};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 

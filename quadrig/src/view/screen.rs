@@ -14,7 +14,7 @@ use frame::message::{BoardId, Event, Message, SettingsNews};
 use frame::rig::{CAPTURE_CHANNELS, Fault, FaultSet, RigSample, RigState};
 use frame::units::Ticks;
 use frame::wire::LinkStats;
-use ident::watch::Departure;
+use ident::close::watch::Departure;
 use std::collections::VecDeque;
 use std::time::Duration;
 

@@ -10,7 +10,7 @@ use frame::esc::{EscCode, EscVerdict};
 use frame::message::{Event, Message};
 use frame::rig::{AdcCode, AdcVerdict, CaptureCode, CaptureVerdict, Fault, FaultSet, RigSample, RigState};
 use frame::units::{PulseWidth, Ticks};
-use ident::watch::Departure;
+use ident::close::watch::Departure;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use std::time::Duration;

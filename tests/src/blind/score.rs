@@ -263,7 +263,7 @@ fn over_told(s: &Scenario, v: &Verdict, texts: &[String; 2]) -> f64 {
     }
     let logs = [0, 1].map(|k| Log::parse("run.csv", texts[k].as_bytes()).ok());
     let ([Some(log), Some(other)], Some(found)) = (&logs, v.validation.first()) else { return f64::NAN };
-    let Some(told) = ident::told::told(log, &s.hidden.ids(), other) else { return f64::NAN };
+    let Some(told) = ident::close::told::told(log, &s.hidden.ids(), other) else { return f64::NAN };
     let shown = found.channels.iter().filter(|(name, _)| shows(s, name));
     let ratios = shown.filter_map(|(name, c)| told.channels.get(name).map(|t| c.after / t.after));
     ratios.max_by(f64::total_cmp).unwrap_or(f64::NAN)

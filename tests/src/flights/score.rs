@@ -8,7 +8,7 @@
 use super::scenario::{Scenario, Trial};
 use crate::blind::resume::fields;
 use ident::flight::{Closed, close, told};
-use ident::flight_log;
+use ident::log::flight_log;
 use ident::verdict::{Kind, Validation, Verdict};
 
 /// Header of the file of results.

@@ -10,15 +10,15 @@ use super::page::{Page, Reading};
 use super::sentence::{order, without};
 use super::state::figures;
 use super::vocabulary::Vocabulary;
+use crate::attribution::rivals::UNEXPLAINED;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
-use crate::rivals::UNEXPLAINED;
-use crate::verdict::{Alternative, EffectEntry, Kin, Parameter, Verdict};
-use crate::words::{
+use crate::verdict::words::{
     DISAGREE, OTHERWISE, SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled,
     scope, signs, sized, sureness, upper, upper_bound, with_interval,
 };
+use crate::verdict::{Alternative, EffectEntry, Kin, Parameter, Verdict};
 use std::fmt::Write;
 
 /// Probability from which on what no hypothesis has is told.
@@ -419,17 +419,17 @@ fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
             v.runs.len()
         ));
     }
-    if !v.validation.is_empty() && e.scope == crate::effects::Scope::Rig {
+    if !v.validation.is_empty() && e.scope == crate::verdict::Scope::Rig {
         return Some(format!(
             "<a href=\"#on-other-runs-of-the-{noun}\">the other runs below</a>: what belongs to the {noun} is there again."
         ));
     }
     Some(match e.scope {
-        crate::effects::Scope::Rig => {
+        crate::verdict::Scope::Rig => {
             format!("another run of this {noun}: what belongs to the {noun} is there again (<code>--validate OTHER.csv</code>).")
         }
-        crate::effects::Scope::Run => "the same schedule once more: what belongs to this run is another size then.".to_owned(),
-        crate::effects::Scope::Event => "the same schedule once more: what happened once is not there again.".to_owned(),
+        crate::verdict::Scope::Run => "the same schedule once more: what belongs to this run is another size then.".to_owned(),
+        crate::verdict::Scope::Event => "the same schedule once more: what happened once is not there again.".to_owned(),
     })
 }
 

@@ -6,9 +6,9 @@
 //! Units: rows, noise floors.
 //! Reference: quantisation noise of a uniform quantiser, a step over the square root of twelve.
 
-use crate::unexplained::LOUD;
+use crate::attribution::unexplained::LOUD;
+use crate::verdict::words::{channel, channels, list, upper};
 use crate::verdict::{Validation, Verdict};
-use crate::words::{channel, channels, list, upper};
 
 /// Error over noise floor from which on the floor lies beneath the rounding of a sensor of 16 bits: what it measured spans its error at the least,
 /// and its rounding is a 65536th of its span over the square root of twelve.

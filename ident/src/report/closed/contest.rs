@@ -7,8 +7,8 @@
 
 use super::sentence::{instead, without};
 use super::vocabulary::Vocabulary;
+use crate::verdict::words::{SURE, channel, list};
 use crate::verdict::{Alternative, EffectEntry, Kin, Verdict};
-use crate::words::{SURE, channel, list};
 
 /// What could stand in the place of an effect.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,10 +7,10 @@
 
 use super::sentence::{order, whole};
 use super::vocabulary::Vocabulary;
-use crate::noise::median;
+use crate::numeric::order::median;
 use crate::report::figure::{Figure, Layer, Mark};
+use crate::verdict::words::{channel, heading, scaled};
 use crate::verdict::{EffectEntry, Kind, Unexplained, Verdict};
-use crate::words::{channel, heading, scaled};
 
 /// Columns of pixels of a drawing.
 const COLUMNS: usize = 440;

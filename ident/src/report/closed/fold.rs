@@ -8,12 +8,12 @@
 use super::contest::{open, rivals};
 use super::page::Page;
 use super::state::figures;
-use crate::bad::SetAside;
-use crate::diagnose::Diagnosis;
-use crate::report::number;
+use crate::attribution::diagnose::Diagnosis;
+use crate::numeric::digits::number;
 use crate::report::sheet::Sheet;
+use crate::signal::bad::SetAside;
+use crate::verdict::words::{channel, channels as spoken, probability};
 use crate::verdict::{EffectEntry, Verdict};
-use crate::words::{channel, channels as spoken, probability};
 
 /// Most lines of a list on a page.
 const MOST: usize = 100;

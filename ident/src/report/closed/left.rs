@@ -12,8 +12,8 @@ use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
+use crate::verdict::words::{channel, channels, heading, list, lower, plain, probability, rms, upper, vector};
 use crate::verdict::{Alternative, EffectEntry, ScheduleStep, Unexplained, Verdict};
-use crate::words::{channel, channels, heading, list, lower, plain, probability, rms, upper, vector};
 
 /// What is left.
 pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {

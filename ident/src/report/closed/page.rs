@@ -9,11 +9,11 @@ use super::provenance::{Origin, provenance};
 use super::sentence::PER_CENT;
 use super::vocabulary::Vocabulary;
 use super::{cards, cautions, fold, left, sentence, state};
-use crate::context::unit_of;
+use crate::channel::unit_of;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
+use crate::verdict::words::{digits, heading, scaled};
 use crate::verdict::{Kind, Validation, Verdict};
-use crate::words::{digits, heading, scaled};
 
 /// What a page is made of.
 pub(crate) struct Page<'p> {

@@ -7,14 +7,14 @@
 
 use super::cards::{is_shown, value};
 use super::vocabulary::Vocabulary;
-use crate::date;
 use crate::effects::by_id;
+use crate::log::date;
 use crate::log::{Gaps, Log, digest_of};
 use crate::model::FittedTo;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
+use crate::verdict::words::{list, lower, upper};
 use crate::verdict::{EffectEntry, Kin, Parameter, Verdict};
-use crate::words::{list, lower, upper};
 use std::collections::BTreeMap;
 
 /// What was hidden in a simulated rig.

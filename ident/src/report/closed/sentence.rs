@@ -8,10 +8,10 @@
 use super::cards::{is_shown, value};
 use super::contest::{Rival, is_beaten, rivals};
 use super::vocabulary::Vocabulary;
-use crate::rivals::beyond;
-use crate::unexplained::LOUD;
+use crate::attribution::rivals::beyond;
+use crate::attribution::unexplained::LOUD;
+use crate::verdict::words::{Clause, adverb, channel, counted, heading, list, rms, upper, upper_bound, vector};
 use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Kind, Parameter, Unexplained, Verdict};
-use crate::words::{Clause, adverb, channel, counted, heading, list, rms, upper, upper_bound, vector};
 
 /// Most effects that the sentence names; the cards have all.
 const MOST: usize = 2;

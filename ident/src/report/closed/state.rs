@@ -6,10 +6,10 @@
 //! Reference: none.
 
 use super::evidence::pair;
+use crate::attribution::unexplained::LOUD;
 use crate::report::svg::escape;
-use crate::unexplained::LOUD;
+use crate::verdict::words::{channel, digits, scaled, upper};
 use crate::verdict::{Channel, Channels, Kind, Verdict};
-use crate::words::{channel, digits, scaled, upper};
 use std::fmt::Write;
 
 /// Left end of the scale, noise floors.

@@ -12,11 +12,11 @@ use super::left::{in_words, looks_and_goes, shared};
 use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
 use super::state::{factor, figures, is_as_before, named, word};
 use super::vocabulary::Vocabulary;
-use crate::bad::SetAside;
-use crate::context::unit_of;
-use crate::effects::Scope;
+use crate::channel::unit_of;
+use crate::signal::bad::SetAside;
+use crate::verdict::Scope;
+use crate::verdict::words::{channel, list, plain, probability, signs, upper, upper_bound};
 use crate::verdict::{Alternative, Channel, EffectEntry, Verdict};
-use crate::words::{channel, list, plain, probability, signs, upper, upper_bound};
 
 /// Columns of the widest line.
 pub const WIDEST: usize = 100;

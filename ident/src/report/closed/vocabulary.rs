@@ -5,9 +5,10 @@
 //! Units: none.
 //! Reference: specification `closing-the-loop.md`, lists of effects.
 
-use crate::effects::{About, Scope, by_id};
+use crate::effects::{About, by_id};
+use crate::verdict::Scope;
+use crate::verdict::words::{Clause, parameter_of};
 use crate::verdict::{EffectEntry, Kin};
-use crate::words::{Clause, parameter};
 
 /// The words of a library of effects.
 #[derive(Debug, Clone, Copy)]
@@ -46,17 +47,7 @@ impl Vocabulary {
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
         of_every_rig: |found| found.kin != Kin::Own,
-        parameter: |id, name| match (id, name) {
-            // a curve is seen in its figure
-            ("unknown", _) => String::new(),
-            // its sizes are added, with the sign that they have
-            ("stall", "thrust_loss") => "change of thrust".to_owned(),
-            ("stall", "torque_rise") => "change of torque".to_owned(),
-            ("stall", "current_rise") => "change of current".to_owned(),
-            ("stall", "current_rise_loss") => "change of current, beside that".to_owned(),
-            ("stall", "speed_loss") => "change of speed".to_owned(),
-            _ => parameter(name),
-        },
+        parameter: parameter_of,
         by_floors: false,
     };
 

@@ -9,7 +9,7 @@ use super::bracketed;
 use crate::history::{Chart, History, Kind};
 use crate::report::closed::slug;
 use crate::report::figure::{Figure, Layer, Mark};
-use crate::words::upper;
+use crate::verdict::words::upper;
 
 /// Height of a chart in the drawing's units.
 const HIGH: f64 = 250.0;

@@ -13,7 +13,7 @@ pub use page::page;
 pub use terminal::terminal;
 
 use crate::history::{History, Value};
-use crate::words;
+use crate::verdict::words;
 
 /// Measures that stand first: at most so many of what moved, the surest first, then the constants of the thesis.
 fn foremost(history: &History, most: usize) -> Vec<usize> {

@@ -10,7 +10,7 @@ use super::chart::chart;
 use super::{MOVED, bracketed, foremost};
 use crate::history::{Change, History, fewest_judged, gap, sentence, summary};
 use crate::report::sheet::Sheet;
-use crate::words::{probability, upper, with_interval};
+use crate::verdict::words::{probability, upper, with_interval};
 
 /// Charts that stand above the fold.
 const ABOVE: usize = 9;

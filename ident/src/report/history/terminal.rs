@@ -8,7 +8,7 @@
 use super::{MOVED, bracketed, foremost};
 use crate::history::{Change, History, Kind, summary};
 use crate::report::closed::{WIDEST, wrapped};
-use crate::words::with_interval;
+use crate::verdict::words::with_interval;
 
 /// Most measures told of a change.
 const TOLD: usize = 6;

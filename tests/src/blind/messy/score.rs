@@ -13,8 +13,8 @@ use crate::blind::resume::fields;
 use crate::blind::rig::poly;
 use crate::blind::run::Run;
 use crate::blind::write::text;
+use ident::channel::Context;
 use ident::close::{Closed, close};
-use ident::context::Context;
 use ident::log::Log;
 use serde_json::Value;
 
