@@ -13,6 +13,7 @@ use crate::trouble::unread;
 use ident::import::import;
 use ident::log::{FORMAT, Log, SPEED};
 use ident::plateau::score::Score;
+use ident::plateau::so_many;
 use ident::plateau::study::{Known, best, ours, threshold_study};
 use ident::report::{filter_figures, study_figures};
 use ident::shift::{Filters, Form, Padding, Settings, filters};
@@ -158,12 +159,12 @@ fn stem(path: &Path) -> String {
 /// The stretches of the algorithm beside our plateaus.
 fn text(path: &Path, log: &Log, channel: &str, f: &Filters) -> String {
     format!(
-        "{}: {channel}: threshold {:.4}, offset {}: {} stretches; ours: {} plateaus\n",
+        "{}: {channel}: threshold {:.4}, offset {}: {} stretches; ours: {}\n",
         path.display(),
         f.threshold,
         f.offset,
         f.stretches().len(),
-        ours(log, true).len()
+        so_many(ours(log, true).len())
     )
 }
 
