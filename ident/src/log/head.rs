@@ -37,20 +37,20 @@ const STATED: [Stated; 8] = [
 ];
 
 /// A key with a value that no rig can have, and what is expected in its place.
-pub(crate) fn odd(table: &toml::Table) -> Option<(&'static str, &Value, String)> {
+pub(crate) fn odd(table: &toml::Table) -> Option<(&'static str, &Value, &'static str)> {
     let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|n| n as f64)).filter(|v| v.is_finite());
     let odd = |stated: &Stated| {
         let found = table.get(stated.key).filter(|found| number(found).is_none_or(|v| !(stated.may_be)(v)))?;
-        Some((stated.key, found, format!("{}: mend it, or take the line out", stated.expected)))
+        Some((stated.key, found, stated.expected))
     };
     STATED.iter().find_map(odd)
 }
 
 /// Refuses a value of the head that no rig can have; `place` is its line.
 pub(crate) fn check(table: &toml::Table, place: &Place<'_>) -> Result<(), ReadError> {
-    odd(table).map_or(Ok(()), |(key, found, expected)| {
-        Err(place.refuse(None, format!("{key} = {}", short(&found.to_string())), expected))
-    })
+    let Some((key, value, wanted)) = odd(table) else { return Ok(()) };
+    let found = format!("{key} = {}", short(&value.to_string()));
+    Err(place.refuse(None, found, format!("{wanted}: mend it, or take the line out")))
 }
 
 /// The line of a key in the head of a file, from 1.

@@ -80,7 +80,8 @@ impl Log {
                 let file = path.display().to_string();
                 if let Some((line, value)) = line_of(path, column).zip(self.meta.get(column)) {
                     let found = format!("{column} = {}: {what}", short(&value.to_string()));
-                    return Err(Place { file: &file, line }.refuse(None, found, expected.replacen("column", "key", 1)));
+                    let expected = expected.replace("the column's", "the key's");
+                    return Err(Place { file: &file, line }.refuse(None, found, expected));
                 }
                 Err(Place { file: &file, line: head_of(path).len() + 1 }.refuse(Some(column), what, expected))
             }

@@ -121,12 +121,12 @@ impl Model {
             ..Self::default()
         };
         if let Some((key, found, expected)) = odd_in_head(&model.meta) {
-            return Err(within("rig", refusal(key, Some(found), &expected)));
+            return Err(within("rig", refusal(key, Some(found), expected)));
         }
         if let Some(pulse) = root.get("highest_pulse_us") {
             let highest = finite(pulse).filter(|us| *us > 0.0 && *us <= LONGEST_US);
-            let expected = format!("a pulse in us, above 0 and up to {LONGEST_US}");
-            model.highest_pulse_us = Some(highest.ok_or_else(|| refusal("highest_pulse_us", Some(pulse), &expected))?);
+            let wanted = || refusal("highest_pulse_us", Some(pulse), &format!("a pulse in us, above 0 and up to {LONGEST_US}"));
+            model.highest_pulse_us = Some(highest.ok_or_else(wanted)?);
         }
         if let Some(stood) = root.get(STOOD) {
             model.stood = stood.as_bool().ok_or_else(|| refusal(STOOD, Some(stood), "true or false"))?;

@@ -15,8 +15,8 @@ use std::io::BufRead;
 /// The header of a table of pairs.
 const HEADER: [&str; 4] = ["motor", "propeller", "thrust_n", "current_a"];
 
-/// Largest thrust, N, and current, A, of a pair: a hundred motors' that carry a person.
-const MOST: f64 = 1e5;
+/// Least and largest thrust, N, and current, A, of a pair: a meter's last digit, and a hundred motors that carry a person.
+const READ: [f64; 2] = [1e-3, 1e5];
 
 /// The figures that the thesis states.
 ///
@@ -101,11 +101,11 @@ fn maximum(thrust: &str, current: &str, place: &Place<'_>) -> Result<Option<Maxi
         return Ok(None);
     }
     let positive = |text: &str, column: &str| match text.parse::<f64>() {
-        Ok(v) if v > 0.0 && v <= MOST => Ok(v),
-        Ok(v) if v > MOST => Err(place.refuse(
+        Ok(v) if (READ[0]..=READ[1]).contains(&v) => Ok(v),
+        Ok(v) if v > 0.0 => Err(place.refuse(
             Some(column),
             format!("'{}'", short(text)),
-            format!("a number that a sensor can read ({MOST} at most), in the unit of the column's name"),
+            format!("a number that a sensor can read ({} to {}), in the unit of the column's name", READ[0], READ[1]),
         )),
         _ => Err(place.refuse(
             Some(column),
@@ -230,6 +230,7 @@ mod tests {
             (format!("{head}m,p,-1,2\n"), "p.csv:2: column thrust_n: '-1'"),
             (format!("{head}m,p,1e16,2\n"), "p.csv:2: column thrust_n: '1e16'; expected a number that a sensor can read"),
             (format!("{head}m,p,1,1e30\n"), "p.csv:2: column current_a: '1e30'; expected a number that a sensor can read"),
+            (format!("{head}m,p,1,1e-300\n"), "p.csv:2: column current_a: '1e-300'; expected a number that a sensor can read"),
             (format!("{head},p,9,3\n"), "p.csv:2: column motor: an empty field; expected a name"),
             (format!("{head}m,,9,3\n"), "p.csv:2: column propeller: an empty field; expected a name"),
         ] {
