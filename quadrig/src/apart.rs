@@ -1,15 +1,18 @@
 //! What a command reads and what it writes, kept apart.
 //!
 //! What it is: every command names its files before it begins ([`Paths`]); an output in the place of an input, or of another output, is
-//! refused, and nothing has been read or written yet. So is an input that can be read only once, and an output that is no regular file.
+//! refused, and nothing has been read or written yet. So is an input that can be read only once, an output that is no regular file, and one that
+//! cannot be written: a file is made where it will be made, and is gone at once.
 //! What can go wrong: files that lie in the same place under two names (a link, `./`) are the same file.
 //! Units: none.
 //! Reference: specification `formats.md`: no command writes over one of its own inputs.
 
 use crate::Failure;
+use crate::trouble::unwritten;
 use ident::log::{folder_of, no_regular_file, what_lies_at};
 use ident::model::beside;
 use std::borrow::Cow;
+use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
 /// The files and folders of one call.
@@ -55,10 +58,12 @@ impl<'a> Paths<'a> {
     /// Refuses what cannot be read twice, what cannot be written, and an output in the place of an input or of another output.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         self.inputs.iter().try_for_each(|input| is_readable_again(input))?;
+        self.folders.iter().chain(&self.kept).try_for_each(|(option, folder)| is_folder(option, folder))?;
         self.are_apart()?;
         self.files.iter().try_for_each(|(option, file)| is_regular(option, file))?;
-        self.folders.iter().chain(&self.kept).try_for_each(|(option, folder)| is_folder(option, folder))?;
-        self.files.iter().chain(&self.folders).chain(&self.kept).try_for_each(|(_, output)| has_folder(output))
+        self.files.iter().chain(&self.folders).chain(&self.kept).try_for_each(|(_, output)| has_folder(output))?;
+        self.files.iter().chain(&self.folders).try_for_each(|(_, output)| takes_files(output, folder_of(&led(output))))?;
+        self.kept.iter().try_for_each(|(_, folder)| takes_files(folder, folder))
     }
 
     fn are_apart(&self) -> Result<(), Failure> {
@@ -137,6 +142,26 @@ fn has_folder(output: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Where an output leads, links followed, if it is there.
+fn led(output: &Path) -> PathBuf {
+    output.canonicalize().unwrap_or_else(|_| output.to_owned())
+}
+
+/// Refuses an output in a folder that takes no files: asked before the work, by a file that is gone at once. Of a folder that is missing, the one that
+/// it will be made in is asked.
+fn takes_files(output: &Path, folder: &Path) -> Result<(), Failure> {
+    let Some(there) = folder.ancestors().map(|f| if f == Path::new("") { Path::new(".") } else { f }).find(|f| f.is_dir()) else {
+        return Ok(());
+    };
+    let why = match tempfile::tempfile_in(there) {
+        Ok(_) => return Ok(()),
+        Err(e) if e.kind() == ErrorKind::NotFound => Error::other(format!("{} takes no files", there.display())),
+        // the name of that file would tell nobody anything
+        Err(e) => e.kind().into(),
+    };
+    Err(unwritten(output)(why).into())
+}
+
 fn is_same(a: &Path, b: &Path) -> bool {
     place(a).zip(place(b)).is_some_and(|(a, b)| a == b)
 }
@@ -173,6 +198,35 @@ mod tests {
                 assert!(said.contains(why) && said.contains("expected a folder"), "{said}");
             }
         }
+    }
+
+    /// Not even the superuser makes a file in the kernel's own folder: it is said before the work, without the name of a temporary file.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_folder_that_takes_no_files_is_refused_before_the_work() {
+        for output in ["/proc/x", "/proc/x/y"].map(PathBuf::from) {
+            for paths in [Paths::default().writes("-o", [&output]), Paths::default().fills("-o", [&output])] {
+                let said = paths.check().expect_err("to be refused").to_string();
+                assert!(said.starts_with(&format!("{}: cannot be written (", output.display())), "{said}");
+                assert!(said.contains("expected a folder that is there") && !said.contains("tmp"), "{said}");
+            }
+        }
+        let kept = Paths::default().adds_to("-o", [&PathBuf::from("/proc")]).check();
+        assert!(kept.expect_err("to be refused").to_string().starts_with("/proc: cannot be written ("));
+        let at = tempfile::tempdir().expect("a folder");
+        let new = at.path().join("out");
+        Paths::default().writes("-o", [&new]).check().expect("it takes files");
+        assert_eq!(fs::read_dir(at.path()).expect("a folder").count(), 0, "and nothing is left there");
+    }
+
+    /// Where a folder is wanted and a file stands, that is what is said.
+    #[test]
+    fn a_file_in_the_place_of_a_folder_is_told_as_one() {
+        let at = tempfile::tempdir().expect("a folder");
+        let run = at.path().join("run.csv");
+        fs::write(&run, "").expect("a file");
+        let said = Paths::default().reads([&run]).fills("-o", [&run]).check().expect_err("to be refused").to_string();
+        assert!(said.contains("run.csv: is no folder; expected a folder for -o"), "{said}");
     }
 
     #[test]

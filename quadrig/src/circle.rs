@@ -11,6 +11,7 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::close_loop::{model_files, results};
 use crate::folder::Folder;
+use crate::kind::{SCENARIO, instead};
 use crate::progress::Bar;
 use crate::sim::{fly, fly_model};
 use hal_sim::Scenario;
@@ -64,7 +65,7 @@ struct Round {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let scenario = Scenario::load(&args.scenario)?;
+    let scenario = Scenario::load(&args.scenario).map_err(|why| instead(&args.scenario, SCENARIO, why))?;
     args.paths().reads_too(scenario.schedule.files(&args.scenario)).check()?;
     let folder = args.output.as_deref().map(|path| Folder::new(path, "loop")).transpose()?;
     let silent = quiet || args.json;

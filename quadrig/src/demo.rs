@@ -17,7 +17,7 @@ use ident::channel::{Context, unit_of};
 use ident::close::close;
 use ident::log::Log;
 use ident::numeric::digits::number;
-use ident::plateau::plateaus;
+use ident::plateau::{plateaus, so_many};
 use ident::report::{Hidden, Origin, Vocabulary, terminal, wrapped};
 use ident::verdict::words::{channel, digits, scaled};
 use std::path::PathBuf;
@@ -64,11 +64,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let log = fly(&scenario, None, "run.csv", "flying", quiet)?;
     let mut text = Vec::new();
     log.write_to(&mut text)?;
-    let found = plateaus(&Context::new(&log, None), &log).len();
-    say(format!(
-        "the rig firmware armed the ESC, flew an up-down staircase and logged {} samples; {found} plateaus\n",
-        log.len()
-    ));
+    let found = so_many(plateaus(&Context::new(&log, None), &log).len());
+    say(format!("the rig firmware armed the ESC, flew an up-down staircase and logged {} samples; {found}\n", log.len()));
 
     // from here on only the log is known, as it was written
     let log = Log::parse("run.csv", text.as_slice())?;

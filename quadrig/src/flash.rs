@@ -7,6 +7,8 @@
 
 use crate::Failure;
 use clap::ValueEnum;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -37,20 +39,30 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    args.elf.as_deref().map_or(Ok(()), is_image)?;
     find_probe()?;
     let elf = match &args.elf {
         Some(elf) => elf.clone(),
         None => build(args.board)?,
     };
-    if !elf.is_file() {
-        return Err(format!("{}: no such image; expected an ELF file: `cargo xtask image` builds it", elf.display()).into());
-    }
+    is_image(&elf)?;
     let status = Command::new("probe-rs").args(["run", "--chip", CHIP]).arg(&elf).status().map_err(missing)?;
     if status.success() {
         Ok(())
     } else {
         Err(format!("probe-rs ended with {status}; expected it to flash and attach: what it said stands above").into())
     }
+}
+
+/// Refuses what is no image, before anything is asked of a probe.
+fn is_image(elf: &Path) -> Result<(), Failure> {
+    let said = |what: &str| Err(format!("{}: {what}; expected an ELF file: `cargo xtask image` builds it", elf.display()).into());
+    if !elf.is_file() {
+        return said("no such image");
+    }
+    let mut head = [0; 4];
+    let read = File::open(elf).and_then(|mut file| file.read_exact(&mut head));
+    if read.is_ok() && head == *b"\x7fELF" { Ok(()) } else { said("no image of a board") }
 }
 
 fn missing(e: std::io::Error) -> String {

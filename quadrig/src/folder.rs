@@ -127,7 +127,8 @@ impl<'a> Folder<'a> {
         let target = fs::canonicalize(self.path).unwrap_or_else(|_| self.path.to_owned());
         let parent = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         fs::create_dir_all(parent)?;
-        let workshop = tempfile::Builder::new().prefix(".quadrig-").tempdir_in(parent)?;
+        // the name of the temporary folder would tell nobody anything
+        let workshop = tempfile::Builder::new().prefix(".quadrig-").tempdir_in(parent).map_err(|e| io::Error::from(e.kind()))?;
         let [new, old] = ["new", "old"].map(|name| workshop.path().join(name));
         fs::create_dir(&new)?;
         for (name, bytes) in &self.files {

@@ -73,8 +73,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let history = {
         let bar = Bar::new("comparing", quiet);
         let (logs, refused) = read(&files, args, &bar);
-        refused.iter().for_each(|line| note!("{line}"));
-        let (mut history, order) = History::of(&logs, &|share| bar.set(READ + (COMPARED - READ) * share))?;
+        let compared = History::of(&logs, &|share| bar.set(READ + (COMPARED - READ) * share));
+        let (mut history, order) = compared.map_err(|why| format!("{why}{}", without(&refused)))?;
+        refused.iter().for_each(|line| note!("left out: {line}"));
         let ordered: Vec<&Log> = order.iter().map(|k| &logs[*k]).collect();
         named(&mut history, &ordered, &|share| bar.set(COMPARED + (1.0 - COMPARED) * share));
         history
@@ -101,11 +102,20 @@ fn read(files: &[PathBuf], args: &Args, bar: &Bar) -> (Vec<Log>, Vec<String>) {
     for (k, path) in files.iter().enumerate() {
         match open(path, &options, true) {
             Ok(log) => logs.push(log),
-            Err(e) => refused.push(format!("left out: {}", e.to_string().replace('\n', " "))),
+            Err(e) => refused.push(e.to_string().replace('\n', " ")),
         }
         bar.set(READ * (k + 1) as f64 / files.len() as f64);
     }
     (logs, refused)
+}
+
+/// What a refusal says of the files that are none.
+fn without(refused: &[String]) -> String {
+    match refused {
+        [] => String::new(),
+        [only] => format!(" (left out: {only})"),
+        [first, ..] => format!(" ({} files are left out; the first: {first})", refused.len()),
+    }
 }
 
 /// The files, a folder's in the order of their names.

@@ -17,6 +17,7 @@ use ident::identify::curves::ratio;
 use ident::identify::{Identified, identify, identify_in};
 use ident::log::Log;
 use ident::numeric::digits::number;
+use ident::plateau::so_many;
 use ident::report::{Sheet, WIDEST, headline, wrapped};
 use ident::verdict::words::{bracketed, channel};
 use std::path::PathBuf;
@@ -184,8 +185,8 @@ const LEAST: usize = 14;
 /// The plateaus, a few channels at a time; channels without a reading are left out.
 fn levels(found: &Identified) -> String {
     let mut out = format!(
-        "{} plateaus as read (in brackets: half of the 95 % interval, in units of the last digit)\n{:>3}{:>9}{:>9}{:>7}{:>10}\n",
-        found.plateaus.len(),
+        "{} as read (in brackets: half of the 95 % interval, in units of the last digit)\n{:>3}{:>9}{:>9}{:>7}{:>10}\n",
+        so_many(found.plateaus.len()),
         "",
         "from s",
         "to s",

@@ -84,15 +84,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             .map_err(|why| crate::kind::another(&args.file).map_or(why.into(), Failure::from))?,
     };
     options.name(&mut log);
-    let (mut shown, mut joints) = (None, Vec::new());
+    let mut joined = None;
     if is_flight && !args.with.is_empty() {
         return Err(format!("--with: {} is a flight; expected a stand's log", args.file.display()).into());
     }
     if !args.with.is_empty() {
         log = as_written(&log)?;
         log.sha256 = None;
-        let (page, reports) = join(&mut log, &args.file, (&args.with, args.rotor), &options, quiet)?;
-        (shown, joints) = (Some(page), reports);
+        joined = Some(join(&mut log, &args.file, (&args.with, args.rotor), &options)?);
     }
     if is_flight {
         args.meta.iter().for_each(|Meta(key, value)| drop(log.meta.insert(key.clone(), value.clone())));
@@ -106,13 +105,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         as_written(&log)?;
         put_log(&args.output, &log)?;
     }
-    if let Some(page) = &shown {
+    if let Some(joined) = &joined {
         let path = args.output.with_extension("joint.html");
-        put(&path, page)?;
+        put(&path, &joined.page)?;
     }
     if !quiet {
+        joined.iter().flat_map(|j| &j.remarks).for_each(|line| note!("{line}"));
         crate::say::text(&report.table());
-        joints.iter().for_each(|r| crate::say::text(&r.table()));
+        joined.iter().flat_map(|j| &j.reports).for_each(|r| crate::say::text(&r.table()));
         say!(
             "{} rows, {:.3} s, columns t_s {}",
             log.len(),

@@ -9,6 +9,7 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
 use crate::folder::{Folder, name_of};
+use crate::kind::{SCENARIO, instead};
 use crate::open::open;
 use crate::progress::{Bar, Outlook};
 use crate::sim::fly;
@@ -80,7 +81,7 @@ fn comes_from(input: &Path) -> Result<Vec<(&'static str, String)>, Failure> {
 /// The log, and the effects that a scenario would have hidden in it.
 fn log_of(input: &Path, quiet: bool) -> Result<(Log, Vec<String>), Failure> {
     if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let AnyScenario::Rig(scenario) = AnyScenario::load(input)? else {
+        let AnyScenario::Rig(scenario) = AnyScenario::load(input).map_err(|why| instead(input, SCENARIO, why))? else {
             return Err(format!("{}: describes the IMU board; expected a scenario of the rig", input.display()).into());
         };
         let hidden = scenario.effects.iter().map(|e| e.id().to_owned()).collect();

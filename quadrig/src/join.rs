@@ -7,7 +7,7 @@
 //! Reference: specification `formats.md`, `quadrig import`; `ident/src/log/join`.
 
 use crate::Failure;
-use crate::open::{as_written, open, say};
+use crate::open::{as_written, found, opened};
 use ident::log::Log;
 use ident::log::import::{Options, Report, is_recording};
 use ident::log::join::{Joint, LABELS, align, merge};
@@ -40,32 +40,39 @@ impl std::str::FromStr for With {
     }
 }
 
-/// A further log: of a flight controller's own recording the rotor that is on the stand.
-fn open_further(file: &Path, rotor: Option<u32>, options: &Options, quiet: bool) -> Result<Log, Failure> {
+/// A further log, and what was found in it: of a flight controller's own recording the rotor that is on the stand.
+fn open_further(file: &Path, rotor: Option<u32>, options: &Options) -> Result<(Log, Vec<String>), Failure> {
     if !is_recording(file) {
-        return open(file, options, quiet);
+        return opened(file, options);
     }
     let wanted = || format!("--with: {} records several rotors; expected --rotor N, the one on the stand", file.display());
     let n = rotor.ok_or_else(wanted)?;
     let (log, report) = ident::log::import::rotor(file, n as usize)?.ok_or_else(wanted)?;
-    if !quiet {
-        say(file, &report);
-    }
-    as_written(&log)
+    Ok((as_written(&log)?, found(file, &report)))
 }
 
-/// Joins further logs to a stand's: the page, and what is to be said.
+/// What came of a joint.
+pub(crate) struct Joined {
+    /// The page that shows it.
+    pub(crate) page: String,
+    /// What was joined, a report for each logger.
+    pub(crate) reports: Vec<Report>,
+    /// What was found in the further logs.
+    pub(crate) remarks: Vec<String>,
+}
+
+/// Joins further logs to a stand's. Nothing is said before it is done: a refusal is one line.
 pub(crate) fn join(
     stand: &mut Log,
     file: &Path,
     (with, rotor): (&[With], Option<u32>),
     options: &Options,
-    quiet: bool,
-) -> Result<(String, Vec<Report>), Failure> {
+) -> Result<Joined, Failure> {
     let alone = stand.clone();
     let options =
         Options { mappings: Vec::new(), motor: None, propeller: None, supply: None, date: None, side: None, ..options.clone() };
-    let (mut logs, mut reports): (Vec<(Log, Joint)>, Vec<Report>) = (Vec::new(), Vec::new());
+    let mut logs: Vec<(Log, Joint)> = Vec::new();
+    let (mut reports, mut remarks) = (Vec::new(), Vec::new());
     for (k, w) in with.iter().enumerate() {
         if with[..k].iter().any(|b| b.label == w.label) {
             return Err(format!(
@@ -75,11 +82,12 @@ pub(crate) fn join(
             )
             .into());
         }
-        let log = open_further(&w.file, rotor, &options, quiet)?;
+        let (log, said) = open_further(&w.file, rotor, &options)?;
+        remarks.extend(said);
         let joint = align(&alone, &log).map_err(|e| format!("{} and {}: {e}", file.display(), w.file.display()))?;
         reports.push(merge(stand, &log, &joint, &w.label));
         logs.push((log, joint));
     }
     let joined: Vec<(&Log, &Joint)> = logs.iter().map(|(log, joint)| (log, joint)).collect();
-    Ok((page(&alone, &joined), reports))
+    Ok(Joined { page: page(&alone, &joined), reports, remarks })
 }

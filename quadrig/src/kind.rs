@@ -1,14 +1,17 @@
 //! What a file is that a command does not take.
 //!
 //! What it is: the two files of the IMU board, known by the names of their columns, and what is no table at all: a model, another TOML file, a
-//! verdict, a page. Each with what takes or makes it instead.
+//! verdict, a page; and which of the descriptions in TOML one is that another command takes. Each with what takes or makes it instead.
 //! What can go wrong: nothing; any other file is left to its reader's own words.
 //! Units: none.
 //! Reference: specification `formats.md`, "Attitude log"; docs/scenario.md.
 
 use crate::Failure;
 use crate::run_log::SIMULATED;
+use hal_sim::mission::Mission;
+use hal_sim::scenario::AnyScenario;
 use ident::log::digest;
+use schedule::Plan;
 use std::borrow::Cow;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -46,6 +49,32 @@ pub(crate) fn refuse_no_model(path: &Path) -> Result<(), Failure> {
     let expected = "expected a model written by `quadrig identify` or `close-loop`";
     let what = head(path).as_deref().and_then(kind_of).filter(|what| *what != MODEL);
     what.map_or(Ok(()), |what| Err(format!("{}:1:1: {what}; {expected}", path.display()).into()))
+}
+
+/// A scenario, as a command that takes one calls it.
+pub(crate) const SCENARIO: &str = "a scenario, such as examples/thin-lead.toml: docs/scenario.md lists its keys";
+
+/// Why a description in TOML is not the one that a command takes: what it is, where one other command takes it, and else its reader's own words.
+pub(crate) fn instead(path: &Path, expected: &str, why: impl Into<Failure>) -> Failure {
+    let file = path.display();
+    let scenario = match AnyScenario::load(path) {
+        Ok(AnyScenario::Rig(_)) => Some("a scenario"),
+        Ok(AnyScenario::Imu(_)) => Some("a scenario of the IMU board"),
+        Err(_) => None,
+    };
+    let kinds = [
+        crate::rig::file::read(path)
+            .is_ok()
+            .then(|| "the configuration of a board (`quadrig rig configure` takes it)".to_owned()),
+        Mission::load(path).is_ok().then(|| format!("a mission, which `quadrig fly {file}` flies")),
+        scenario.map(|what| format!("{what}, which `quadrig sim {file} -o LOG` runs")),
+        Plan::read(path).is_ok().then(|| format!("a schedule, which `quadrig rig run {file} -o LOG` plays")),
+    ];
+    // a few keys are those of several
+    match &kinds.into_iter().flatten().collect::<Vec<_>>()[..] {
+        [what] => format!("{file}:1:1: {what}; expected {expected}").into(),
+        _ => why.into(),
+    }
 }
 
 /// Whether what lies at `path` was computed, and is of the kind of what comes now (all of it, or how it begins): it can be computed again. A recording

@@ -106,8 +106,15 @@ pub(crate) fn is_own(path: &Path) -> Result<bool, Failure> {
     Ok(first.trim_start_matches('\u{feff}').strip_prefix('#').is_some_and(|l| l.trim_start().starts_with("quadrig-")))
 }
 
-/// Reads a run.
+/// Reads a run, and says what was found on the way.
 pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, Failure> {
+    let (log, remarks) = opened(path, options)?;
+    remarks.iter().filter(|_| !quiet).for_each(|line| note!("{line}"));
+    Ok(log)
+}
+
+/// Reads a run, with what was found on the way, a line each.
+pub(crate) fn opened(path: &Path, options: &Options) -> Result<(Log, Vec<String>), Failure> {
     crate::apart::is_readable_again(path)?;
     if is_own(path)? {
         if let Some(m) = options.mappings.first() {
@@ -116,34 +123,26 @@ pub(crate) fn open(path: &Path, options: &Options, quiet: bool) -> Result<Log, F
         }
         let mut log = Log::read(path)?;
         options.name(&mut log);
-        if let Some(gaps) = Gaps::of(&log).filter(|_| !quiet) {
-            note!("{}: t_s: {gaps}", path.display());
-        }
         log.refuse_absurd(path)?;
-        log.in_doubt().iter().filter(|_| !quiet).for_each(|doubt| note!("{}: {doubt}", path.display()));
-        return Ok(log);
+        // of rows that were dropped the log's own doubts speak
+        let gaps = Gaps::of(&log).filter(|gaps| !gaps.dropped || log.meta.contains_key("sample_hz"));
+        let gaps = gaps.map(|gaps| format!("t_s: {gaps}"));
+        let remarks = gaps.into_iter().chain(log.in_doubt()).map(|what| format!("{}: {what}", path.display())).collect();
+        return Ok((log, remarks));
     }
     let (log, report) = import_as(path, options).map_err(|why| crate::kind::another(path).map_or(why.into(), Failure::from))?;
     let log = as_written(&log)?;
-    if let Some(gaps) = Gaps::of(&log).filter(Gaps::are_dropped_rows) {
-        let why = "expected a row at every tick: use the whole export, or take what is left by `quadrig import` and its log";
-        return Err(format!("{}: t_s: {gaps}; {why}", path.display()).into());
-    }
-    if !quiet {
-        say(path, &report);
-    }
-    Ok(log)
+    Ok((log, found(path, &report)))
 }
 
-/// Says what was found: the file once, then one line each.
-pub(crate) fn say(path: &Path, report: &Report) {
-    if !report.notes.is_empty() {
-        note!("{}: read as an export; found on the way:", path.display());
-    }
-    for note in &report.notes {
+/// What was found in an export: the file once, then one line each.
+pub(crate) fn found(path: &Path, report: &Report) -> Vec<String> {
+    let title = (!report.notes.is_empty()).then(|| format!("{}: read as an export; found on the way:", path.display()));
+    let lines = report.notes.iter().map(|note| {
         let count = if note.count > 1 { format!(" ({})", note.count) } else { String::new() };
-        note!("{}", wrapped(&format!("  {}: {}{count}", note.column, note.what), 4));
-    }
+        wrapped(&format!("  {}: {}{count}", note.column, note.what), 4)
+    });
+    title.into_iter().chain(lines).collect()
 }
 
 /// The log as it reads once it is written: numbers to their digits, the digest of the file.

@@ -14,6 +14,7 @@ use ident::log::import::import;
 use ident::log::{FORMAT, Log, SPEED};
 use ident::plateau::score::Score;
 use ident::plateau::shift::{Filters, Form, Padding, Settings, filters};
+use ident::plateau::so_many;
 use ident::plateau::study::{Known, best, ours, threshold_study};
 use ident::report::{filter_figures, study_figures};
 use std::fmt::Write as _;
@@ -158,12 +159,12 @@ fn stem(path: &Path) -> String {
 /// The stretches of the algorithm beside our plateaus.
 fn text(path: &Path, log: &Log, channel: &str, f: &Filters) -> String {
     format!(
-        "{}: {channel}: threshold {:.4}, offset {}: {} stretches; ours: {} plateaus\n",
+        "{}: {channel}: threshold {:.4}, offset {}: {} stretches; ours: {}\n",
         path.display(),
         f.threshold,
         f.offset,
         f.stretches().len(),
-        ours(log, true).len()
+        so_many(ours(log, true).len())
     )
 }
 

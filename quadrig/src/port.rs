@@ -8,13 +8,14 @@
 
 use crate::Failure;
 use crate::apart::Paths;
+use crate::kind::{SCENARIO, instead};
 use frame::message::Beep;
 use hal_sim::scenario::AnyScenario;
 use serialport::SerialPort;
 use std::io::{Error, ErrorKind, Read, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use virtual_board::{Hand, Kind, Order, Pace, VirtualBoard, switch_on};
+use virtual_board::{BoardError, Hand, Kind, Order, Pace, VirtualBoard, switch_on};
 
 /// Longest wait in one read.
 const READ_TIME: Duration = Duration::from_millis(20);
@@ -85,7 +86,7 @@ impl PortArgs {
         };
         let speed = self.speed.unwrap_or(1.0);
         let order = Order { scenario, imu, flash: self.flash.clone(), image: self.image.clone() };
-        let board = switch_on(&order)?;
+        let board = on(&order)?;
         if (board.kind() == Kind::Imu) != imu {
             let wanted = if imu { "this command speaks with the IMU board" } else { "this command speaks with the rig board" };
             return Err(format!("{}: a virtual {}; {wanted}", self.port, board.kind().words()).into());
@@ -98,6 +99,14 @@ impl PortArgs {
             sent: Vec::new(),
         })))
     }
+}
+
+/// Switches a virtual board on; a file that is no scenario is told as what it is.
+pub(crate) fn on(order: &Order) -> Result<Box<dyn VirtualBoard>, Failure> {
+    switch_on(order).map_err(|why| match (&order.scenario, why) {
+        (Some(file), BoardError::Scenario(why)) => instead(file, SCENARIO, why),
+        (_, why) => why.into(),
+    })
 }
 
 /// A board in this program.
@@ -141,7 +150,9 @@ impl Port {
             let known: Vec<String> = serialport::available_ports().unwrap_or_default().into_iter().map(|p| p.port_name).collect();
             let known =
                 if known.is_empty() { "no serial port is there".to_owned() } else { format!("there are {}", known.join(", ")) };
-            format!("{name}: cannot be opened ({e}); expected a serial port ({known}), or sim for a virtual board")
+            // what answers no question of a serial line is told as "no typewriter"
+            let why = if e.description.contains("typewriter") { "it is no serial port".to_owned() } else { e.to_string() };
+            format!("{name}: cannot be opened ({why}); expected a serial port ({known}), or sim for a virtual board")
         })?;
         Ok(Self::Serial { name: name.to_owned(), baud, port, opened: Instant::now() })
     }

@@ -21,7 +21,7 @@ mod typed;
 use crate::Failure;
 use crate::apart::Paths;
 use crate::board::Board;
-use crate::kind::refuse_other;
+use crate::kind::{instead, refuse_other};
 use crate::port::PortArgs;
 use crate::record;
 use crate::view;
@@ -329,17 +329,19 @@ pub(super) fn reset_cause(flags: u8) -> &'static str {
     NAMES.iter().find(|(bit, _)| flags & bit != 0).map_or("unknown", |(_, name)| name)
 }
 
+/// What is expected of a file.
+const SCHEDULE: &str =
+    "a schedule, such as examples/schedule/constant.toml: docs/schedule.md lists the keys; --next takes a verdict";
+
 /// What is to be run: a schedule, or the next experiment of a verdict.
 fn planned(schedule: Option<&Path>, next: Option<&Path>) -> Result<Plan, Failure> {
     let Some(verdict) = next else {
         let file = schedule.unwrap_or(Path::new(""));
         let is_json = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         if !is_json {
-            let expected =
-                "a schedule, such as examples/schedule/constant.toml: docs/schedule.md lists the keys; --next takes a verdict";
-            refuse_other(file, expected)?;
+            refuse_other(file, SCHEDULE)?;
         }
-        return Ok(Plan::read(file)?);
+        return Plan::read(file).map_err(|why| instead(file, SCHEDULE, why));
     };
     Ok(Plan::next_experiment(verdict)?)
 }

@@ -11,17 +11,16 @@ mod imu;
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::kind::PINS;
+use crate::kind::{PINS, SCENARIO, instead};
 use crate::live;
 use crate::open::read_model;
 use crate::progress::{Bar, foretell};
 use crate::replace::{put_as, put_log};
 use crate::run_log::{IdentifiedPlant, to_log};
 use crate::view;
-use hal_sim::mission::Mission;
 use hal_sim::native::{PinRecord, Session};
 use hal_sim::scenario::AnyScenario;
-use hal_sim::{Powerplant, RunRecord, Scenario, ScenarioError, SimError, Truth};
+use hal_sim::{Powerplant, RunRecord, Scenario, SimError, Truth};
 use ident::log::{Log, SPEED};
 use ident::model::Model;
 use std::io::Write;
@@ -79,7 +78,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let scenario = match AnyScenario::load(&args.scenario).map_err(|why| no_scenario(&args.scenario, why))? {
+    let scenario = match AnyScenario::load(&args.scenario).map_err(|why| instead(&args.scenario, SCENARIO, why))? {
         AnyScenario::Rig(scenario) => *scenario,
         AnyScenario::Imu(scenario) => return imu::run(args, &scenario, quiet),
     };
@@ -112,21 +111,6 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         say!("{}: {} samples over {:.1} s", args.output.display(), log.len(), log.t[log.len() - 1]);
     }
     Ok(())
-}
-
-/// Why a file is no scenario: a board's configuration is TOML too.
-fn no_scenario(path: &Path, why: ScenarioError) -> Failure {
-    match crate::rig::file::read(path) {
-        Ok(_) => format!(
-            "{}:1:1: the configuration of a board (`quadrig rig configure` takes it); expected a scenario, such as examples/thin-lead.toml: docs/scenario.md lists its keys",
-            path.display()
-        )
-        .into(),
-        Err(_) if Mission::load(path).is_ok() => {
-            format!("{0}:1:1: a mission, which `quadrig fly {0}` flies; expected a scenario: docs/scenario.md lists its keys", path.display()).into()
-        }
-        Err(_) => why.into(),
-    }
 }
 
 /// The run that the arguments ask for, with the record of its pins where one is wanted.

@@ -5,12 +5,18 @@
 //! Units: none.
 //! Reference: docs/errors.md.
 
-use std::io::Error;
+use std::io::{Error, ErrorKind};
 use std::path::Path;
 
 /// A file that cannot be read.
 pub(crate) fn unread<P: AsRef<Path>>(path: P) -> impl FnOnce(Error) -> String {
-    move |e| format!("{}: cannot be read ({e}); expected a file: check name and folder", path.as_ref().display())
+    move |e| {
+        let file = path.as_ref().display();
+        match e.kind() {
+            ErrorKind::InvalidData => format!("{file}:1:1: bytes that are no text in UTF-8; expected a text file"),
+            _ => format!("{file}: cannot be read ({e}); expected a file: check name and folder"),
+        }
+    }
 }
 
 /// A file or folder that cannot be written.

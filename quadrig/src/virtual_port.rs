@@ -50,7 +50,7 @@ mod pty {
     use std::io::{IsTerminal, Write};
     use std::path::{Path, PathBuf};
     use std::sync::mpsc::{Receiver, TryRecvError};
-    use virtual_board::{Cable, Hand, Order, Pace, VirtualBoard, sound, switch_on};
+    use virtual_board::{Cable, Hand, Order, Pace, VirtualBoard, sound};
 
     /// A link to the port, ours to take away.
     struct Link(Option<PathBuf>);
@@ -84,7 +84,7 @@ mod pty {
     pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         let ended = Ended::watch()?;
         let order = Order { scenario: args.scenario.clone(), imu: false, flash: args.flash.clone(), image: args.image.clone() };
-        let mut board = switch_on(&order)?;
+        let mut board = crate::port::on(&order)?;
         let (mut cable, port) = Cable::new().map_err(|e| format!("no pseudo-terminal: {e}"))?;
         let _link = Link::new(args.link.as_deref(), &port)?;
         say!("{port}");

@@ -39,6 +39,11 @@ impl ScheduleError {
 
     /// The text of a file.
     pub(crate) fn text_of(file: &Path) -> Result<String, Self> {
-        std::fs::read_to_string(file).map_err(|source| Self::Unreadable { file: file.to_owned(), source })
+        std::fs::read_to_string(file).map_err(|source| match source.kind() {
+            std::io::ErrorKind::InvalidData => {
+                Self::at(file, "", 0, "bytes that are no text in UTF-8; expected a schedule in TOML, or a verdict in JSON")
+            }
+            _ => Self::Unreadable { file: file.to_owned(), source },
+        })
     }
 }

@@ -139,15 +139,32 @@ impl<'t> Keys<'t> {
 const SHORTEST_S: f64 = 0.001;
 const LONGEST_S: f64 = 86_400.0;
 
+/// What a value is, as a person calls it.
+fn in_words(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "a text",
+        DeValue::Integer(_) => "a whole number in another base than 10",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "a list",
+        DeValue::Table(_) => "a table",
+    }
+}
+
 /// A number, whole or not.
 pub(crate) fn number(value: &Spanned<DeValue<'_>>, key: &str) -> Result<f64, Refused> {
-    let read = match value.get_ref() {
+    let read: Option<f64> = match value.get_ref() {
         DeValue::Integer(n) if n.radix() == 10 => n.as_str().parse().ok(),
         DeValue::Float(n) => n.as_str().parse().ok(),
         _ => None,
     };
-    let found = value.get_ref().type_str();
-    read.filter(|n: &f64| n.is_finite()).ok_or_else(|| (value.span(), format!("{key}: expected a number, found a {found}")))
+    let found = match read {
+        Some(n) if n.is_finite() => return Ok(n),
+        Some(n) => format!("expected a number with an end, found {n}").to_lowercase(),
+        None => format!("expected a number, found {}", in_words(value.get_ref())),
+    };
+    Err((value.span(), format!("{key}: {found}")))
 }
 
 /// A pulse from its width in us.

@@ -132,6 +132,12 @@ fn a_batch_is_a_row_a_run_however_it_is_shared() {
 fn a_batch_refuses_what_is_none() {
     let bench = bench();
     call(&bench, &["batch", "nowhere", "-o", "out"], &[]).refused(&["nowhere"]);
+    fs::create_dir(bench.path("worse")).unwrap();
+    fs::copy(bench.path("runs/broken.csv"), bench.path("worse/broken.csv")).unwrap();
+    let none = call(&bench, &["batch", "worse", "-o", "none"], &[]);
+    assert_eq!(none.status, Some(1), "{}", none.err);
+    assert!(none.err.ends_with("quadrig: worse: not one of its runs closes (1 in all); expected one run at least that `quadrig close-loop` takes (why not: column message of none/manifest.csv)\n"), "{}", none.err);
+    assert!(bench.path("none/manifest.csv").exists(), "its row says why");
     fs::create_dir(bench.path("empty")).unwrap();
     call(&bench, &["batch", "empty", "-o", "out"], &[]).refused(&["empty: no file ends in .csv"]);
     let odd = [("SLURM_ARRAY_TASK_ID", "x")];

@@ -11,7 +11,7 @@
 //! | `sh data` | run where `$QUADRIG_DATA` (or `../shared/data`) is there, else only parsed |
 //! | `sh board` | run, a virtual board with an assistant in the place of the real one; `rig.toml` is a preset where the page wrote none |
 //! | `sh files` | run; the files that it reads and the page did not make are a simulated run |
-//! | `sh long`, `sh hardware` | only parsed, see [`parse`]: takes minutes, needs hands at a real board, a second terminal or files of other programs |
+//! | `sh long`, `sh hardware` | only parsed, see [`parse`]: takes minutes, needs hands at a real board, a second terminal, a cluster or files of other programs |
 //! | `text says` | its lines stand in this order in what the last block wrote |
 //! | `toml FILE`, `csv FILE` | written to that file |
 //!
@@ -152,6 +152,10 @@ fn parse(clone: &Clone, command: &str) -> Result<(), String> {
     let words: Vec<&str> = command.split_whitespace().skip_while(|word| word.contains('=')).collect();
     match words.first() {
         Some(&"cargo") => cargo(&words),
+        // a cluster's call wraps one of ours in quotes
+        Some(&"sbatch") => {
+            command.split('"').nth(1).map_or(Err("sbatch wraps no command".to_owned()), |inner| parse(clone, inner))
+        }
         Some(&"quadrig") => {
             let output = clone.shell(&format!("{command} --help"), None);
             if output.status.success() { Ok(()) } else { Err(said(&output)) }
@@ -319,6 +323,7 @@ fn what_is_wrong_on_a_page_is_told() {
         "```sh long\ncargo xtask imagine\n```\n",
         "```sh long\ncargo test --test no_such_test\n```\n",
         "```sh long\nrm x\n```\n",
+        "```sh hardware\nsbatch --wrap \"quadrig batch FOLDER --shrd 1/8 -o OUT\"\n```\n",
         "```sh never\nquadrig --version\n```\n",
         "```text says\nnobody said it\n```\n```sh\nquadrig --version\n```\n```text says\nnor this\n```\n",
     ] {

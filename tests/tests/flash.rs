@@ -28,11 +28,13 @@ fn a_probe_gets_the_image_and_stays_attached() {
     let elf = folder.path().join("image.elf");
     let elf = elf.to_str().expect("a name");
     probe.flash(&["rig", "--elf", elf]).refused(&["image.elf", "no such image"]);
-    std::fs::write(elf, "an image").expect("a file");
+    std::fs::write(elf, "a page").expect("a file");
+    probe.flash(&["rig", "--elf", elf]).refused(&["image.elf: no image of a board", "expected an ELF file"]);
+    std::fs::write(elf, "\u{7f}ELF, an image").expect("a file");
     let said = probe.flash(&["rig", "--elf", elf]);
     assert_eq!(said.status, Some(0), "{}", said.err);
     // `probe-rs run` flashes, starts the image and prints its defmt messages until it is interrupted
-    assert_eq!(probe.asked(), format!("list\nlist\nrun --chip STM32F405RGTx {elf}\n"));
+    assert_eq!(probe.asked(), format!("list\nrun --chip STM32F405RGTx {elf}\n"));
 }
 
 #[test]
@@ -40,6 +42,6 @@ fn a_probe_that_fails_is_told() {
     let folder = tempfile::tempdir().expect("a folder");
     let probe = Probe::new(folder.path(), &format!("if [ \"$1\" = list ]; then {ONE}; else exit 3; fi"));
     let elf = folder.path().join("image.elf");
-    std::fs::write(&elf, "an image").expect("a file");
+    std::fs::write(&elf, "\u{7f}ELF, an image").expect("a file");
     probe.flash(&["rig", "--elf", elf.to_str().expect("a name")]).refused(&["probe-rs ended with", "3"]);
 }

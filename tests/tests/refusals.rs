@@ -133,6 +133,10 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
         std::fs::create_dir_all(bench.path(name).parent().expect("a folder")).expect("a folder");
         write(name, b"mine");
     }
+    write(
+        "export.csv",
+        good_log().lines().skip(2).map(|l| l.replacen("t_s", "Time (s)", 1) + "\n").collect::<String>().as_bytes(),
+    );
     write("empty.toml", b"");
     write("short.toml", b"duration_s = 1\n");
     write("plan.toml", b"[[part]]\nkind = \"hold\"\npulse_us = 1200\nhold_s = 1\n");
@@ -144,11 +148,12 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
         _ => format!("{line}\n"),
     };
     write("no-command.csv", good_log().lines().map(without_command).collect::<String>().as_bytes());
-    let logs = [logs::logs(), logs::plain_words(), logs::impossible()];
-    let files = [files::kinds(), files::models(), files::scenarios(), files::missions(), files::schedules()];
+    let logs = [logs::logs(), logs::plain_words(), logs::heads(), logs::impossible()];
+    let files =
+        [files::kinds(), files::models(), files::scenarios(), files::descriptions(), files::missions(), files::schedules()];
     let commands = [commands::boards(), commands::arguments(), commands::outputs(), commands::attitudes()];
     let cases: Vec<Case> = logs.into_iter().chain(files).chain(commands).flatten().collect();
-    assert!(cases.len() >= 70, "{} cases", cases.len());
+    assert!(cases.len() >= 330, "{} cases", cases.len());
     let mut wrong = Vec::new();
     for case in &cases {
         if let Some((file, bytes)) = &case.file {

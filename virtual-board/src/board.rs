@@ -84,7 +84,7 @@ pub enum BoardError {
     },
     /// The settings' file is none.
     #[error(
-        "{file}: {found} bytes; the settings' sectors of a board are {expected} bytes: name another file, or delete this one"
+        "{file}: {found} bytes; expected the settings' sectors of a board, {expected} bytes: name another file, or delete this one"
     )]
     Length {
         /// The file.

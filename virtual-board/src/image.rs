@@ -120,7 +120,8 @@ impl ImageBoard {
     /// [`BoardError`] when the image is not there, or its settings have no place.
     pub fn new(scenario: &Scenario, image: &Path, mut file: Option<FlashFile>) -> Result<Self, BoardError> {
         let fails = |what: String| BoardError::Emulator { image: image.to_owned(), what };
-        std::fs::metadata(image).map_err(|e| fails(format!("cannot be read ({e}); `cargo xtask image` builds it")))?;
+        std::fs::metadata(image)
+            .map_err(|e| fails(format!("cannot be read ({e}); expected a board's ELF file: `cargo xtask image` builds it")))?;
         if !begins_as_an_image(image) {
             return Err(fails(
                 "no program of a board; expected its ELF file: `cargo xtask image` builds it and says where".to_owned(),

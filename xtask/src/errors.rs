@@ -129,6 +129,10 @@ const UNKNOWN: &str = "...";
 /// What stands above what was expected in the place of a value that a refusal repeats.
 const ECHOED: &str = "\nOther lines begin with a value as it was found. What was expected in its place is one of these:\n\n";
 
+/// The same where an area says nothing else.
+const ECHOED_ALONE: &str =
+    "\nEach line begins with the option and its value as it was found. What was expected in its place is one of these:\n\n";
+
 const HEAD: &str = "\
 # Refusals
 
@@ -152,15 +156,18 @@ fn page(root: &Path) -> Result<String, String> {
             let text = std::fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
             rows.extend(refusals(&text));
         }
-        let _ = write!(out, "\n## {heading}\n\n| it says | it expected, and what to try |\n| --- | --- |\n"); // a string takes everything
+        let _ = write!(out, "\n## {heading}\n"); // a string takes everything
         // what only repeats the reader's own words is known by what was expected in its place
         let (spoken, echoed): (Vec<_>, Vec<_>) = rows.into_iter().partition(|(found, expected)| said(found, expected).is_some());
+        if !spoken.is_empty() {
+            out += "\n| it says | it expected, and what to try |\n| --- | --- |\n";
+        }
         for (found, expected) in &spoken {
             let _ = writeln!(out, "| {} | {} |", said(found, expected).unwrap_or_default(), cell(expected));
         }
         let wanted: BTreeSet<String> = echoed.iter().map(|(_, expected)| cell(expected)).filter(|e| e != UNKNOWN).collect();
         if !wanted.is_empty() {
-            out += ECHOED;
+            out += if spoken.is_empty() { ECHOED_ALONE } else { ECHOED };
             wanted.iter().for_each(|expected| out += &format!("- {expected}\n"));
         }
     }
@@ -175,6 +182,10 @@ fn page(root: &Path) -> Result<String, String> {
 /// it found as it stands there.
 fn said(found: &str, expected: &str) -> Option<String> {
     match found {
+        // a key, a column or an option alone
+        found if found.contains(char::is_alphabetic) && !found.contains([' ', ':', '"']) => {
+            Some(format!("the value of `{found}`"))
+        }
         found if found.contains(char::is_alphabetic) => Some(cell(found)),
         // it is told at the end, behind the name of its key, option or field
         "" | "..." if expected.contains("found ") => Some("the name of what holds the value".to_owned()),
@@ -505,7 +516,16 @@ mod tests {
         for (heading, _) in AREAS {
             let part = page.split(&format!("\n## {heading}\n")).nth(1).and_then(|t| t.split("\n## ").next()).unwrap_or_default();
             assert!(part.lines().count() >= 4, "{heading}: {part}");
+            assert!(
+                !part.trim_end().ends_with("| --- | --- |") && !part.contains("| --- | --- |\n\n"),
+                "{heading}: an empty table"
+            );
         }
+        // what is found says more than the name of what holds it
+        assert!(page.contains("| the value of `-o` | "), "a word alone says nothing");
+        assert!(
+            !page.lines().any(|l| l.starts_with("| ") && l.split(" | ").next().is_some_and(|w| !w[2..].contains([' ', '-'])))
+        );
         assert!(page.lines().filter(|l| l.starts_with("| ")).count() > 200);
         let there = std::fs::read_to_string(root.join("docs/errors.md")).expect("docs/errors.md");
         assert!(there == page, "docs/errors.md is not what the source says: cargo xtask errors");

@@ -314,7 +314,7 @@ pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, 
     }
     let value = toml::from_str(text).map_err(|error| {
         let (byte, key) = blame::blame::<T>(text, &error);
-        let mut reason = in_words(&error.message().replace('\n', " "));
+        let mut reason = in_words(&error.message().replace('\n', " "), "docs/scenario.md");
         if let Some(key) = key.filter(|key| !reason.contains(&format!("`{key}`"))) {
             reason = format!("{key}: {reason}");
         }
@@ -324,17 +324,17 @@ pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, 
     Ok(value)
 }
 
-/// What a parser of TOML says, without its names of types: "a number" for "f64", "a table" for "struct Limit".
+/// What a parser of TOML says, without its names of types: "a number" for "f64", "a table" for "struct Limit". `page` lists the keys of such a file.
 #[must_use]
-pub fn in_words(message: &str) -> String {
+pub fn in_words(message: &str, page: &str) -> String {
     if message.starts_with("data did not match any variant of ") {
-        return "a value of another kind; expected one of the forms of docs/scenario.md".to_owned();
+        return format!("a value of another kind; expected one of the forms of {page}");
     }
     let Some((before, kind)) = message.rsplit_once("expected ") else {
         let expected = if message.starts_with("missing field") {
-            "expected this key as well: docs/scenario.md lists those of each table"
+            format!("expected this key as well: {page} lists those of each table")
         } else {
-            "expected TOML, as in docs/scenario.md"
+            format!("expected TOML, as in {page}")
         };
         return format!("{message}; {expected}");
     };

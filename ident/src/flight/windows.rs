@@ -144,7 +144,7 @@ impl Windows {
             .map(|k| {
                 let (a, b) = self.bounds[k];
                 let left = |i: usize| values[i] - means[k] - slopes[k] * (self.rows_t[i] - self.t[k]);
-                (a..b).map(|i| left(i).powi(2)).sum::<f64>() / (b - a - 2) as f64
+                (a..b).map(|i| left(i).powi(2)).sum::<f64>() / (b as f64 - a as f64 - 2.0)
             })
             .filter(|v| v.is_finite())
             .collect();

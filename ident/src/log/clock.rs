@@ -71,15 +71,6 @@ pub(super) fn check(log: &Log, file: &str, lines: &[usize]) -> Result<(), ReadEr
     steps.sort_by(f64::total_cmp);
     let middle = steps[steps.len() / 2];
     let stated = log.meta.get("sample_hz").and_then(|v| v.as_float().or_else(|| v.as_integer().map(|n| n as f64)));
-    if stated.is_none_or(|hz| !(hz.is_finite() && hz > 0.0))
-        && let Some(found) = log.meta.get("sample_hz")
-    {
-        return Err(Place { file, line: 1 }.refuse(
-            None,
-            format!("sample_hz = {found}"),
-            "a number of rows a second above 0 in the head",
-        ));
-    }
     let refuse = |found: String, expected: String| Err(place.refuse(Some("t_s"), found, expected));
     match stated {
         Some(hz) => {
@@ -95,7 +86,7 @@ pub(super) fn check(log: &Log, file: &str, lines: &[usize]) -> Result<(), ReadEr
             }
             if let Some((found, row)) = dropped(log, hz) {
                 let why = "rows were dropped (a bad line, a filter, a thinned export)";
-                let way_out = "use the whole log, or take sample_hz out of its head";
+                let way_out = "use the whole log, or take sample_hz out of its head and say there that the rows are right: # vouched = [\"t_s\"]";
                 let before = Place { file, line: lines.get(row).copied().unwrap_or(place.line) };
                 return Err(before.refuse(Some("t_s"), found, format!("a row each {} s; {why}: {way_out}", number(1.0 / hz))));
             }
@@ -243,9 +234,13 @@ mod tests {
         assert!(
             log("# sample_hz = \"ten\"\n", 1.0, |_| true)
                 .expect_err("a word")
-                .contains("run.csv:1: sample_hz = \"ten\"; expected a number")
+                .contains("run.csv:2: sample_hz = \"ten\"; expected a number")
         );
-        assert!(log("# sample_hz = 0\n", 1.0, |_| true).expect_err("none").contains("sample_hz = 0; expected a number of rows"));
+        assert!(
+            log("# sample_hz = 0\n", 1.0, |_| true)
+                .expect_err("none")
+                .contains("run.csv:2: sample_hz = 0; expected a number of rows")
+        );
         log("# time = \"row\"\n", 10_000.0, |_| true).expect("a table without time");
     }
 

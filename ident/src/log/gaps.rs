@@ -2,8 +2,8 @@
 //!
 //! What it is: how much of the run's time has no row, where the longest hole is, and whether the motor stood still on both sides of it. A recorder
 //! that is stopped between two blocks of a run leaves such holes, and that is no fault; rows that are lost while the motor turns are one.
-//! What can go wrong: uneven sampling is allowed, so that of a log without `sample_hz` nothing is refused: it is told. A clock that is coarser than
-//! the rows looks like rows that are missing.
+//! What can go wrong: uneven sampling is allowed, so that of a log without `sample_hz` holes are told, and refused only where single rows of an even
+//! clock are missing, and many. A clock that is coarser than the rows looks like rows that are missing: then the head says the rate, or vouches for the time.
 //! Units: s.
 //! Reference: specification `formats.md`, "Rig log"; docs/book/reference/log.md.
 
@@ -15,8 +15,12 @@ use std::fmt;
 const HOLE: f64 = 5.0;
 /// Share of the time, or of the rows, that is worth a line: half of the fifth from which on a run is no longer what it seems.
 const TOLD: f64 = 0.1;
-/// Share of the time from which on dropped rows are no accident: a fifth, but for a row at either end.
-const DROPPED: f64 = 0.19;
+/// Share of the time from which on dropped rows are no accident: a fifth, less what chance makes of one that is drawn
+/// at random from two hundred rows.
+const DROPPED: f64 = 0.17;
+/// Share of steps that are whole multiples of the shortest where that is refused: more than the 94 % of a stand that logs a mean of each level, whose
+/// levels take one, two or three times as long.
+const STRICT: f64 = 0.98;
 /// Share of the steps that are no longer than a tick of the clock.
 const SHORTEST: f64 = 0.25;
 /// Share of missing rows up to which that holds of rows that are dropped here and there. Beyond it the clock is only finer than its rows.
@@ -43,6 +47,8 @@ pub struct Gaps {
     pub standing: Option<usize>,
     /// Whether they are single rows of an even clock.
     pub single: bool,
+    /// Whether those single rows are so many that the run is no longer what it seems.
+    pub dropped: bool,
     /// Tick of that clock, s, where the rows follow each other as evenly as it can tell: its times may be coarse, and no row missing.
     pub coarse: Option<f64>,
 }
@@ -57,24 +63,23 @@ impl Gaps {
         let steps: Vec<f64> = log.t.windows(2).map(|w| w[1] - w[0]).collect();
         let usual = median(&mut steps.clone());
         let in_blocks = Self::among(log, &steps, usual, HOLE);
-        if in_blocks.missing_s >= TOLD * in_blocks.whole_s {
-            return Some(in_blocks);
-        }
         let mut sorted = steps.clone();
         sorted.sort_by(f64::total_cmp);
         let tick = sorted[(SHORTEST * sorted.len() as f64) as usize];
         let off = |step: f64| (step / tick - (step / tick).round()).abs();
-        let even = steps.iter().filter(|s| off(**s) <= EVEN[1]).count() as f64 >= EVEN[0] * steps.len() as f64;
+        let even = steps.iter().filter(|s| off(**s) <= EVEN[1]).count() as f64 / steps.len() as f64;
         let coarse = is_even(&log.t, tick).then_some(tick);
         let single = Self { single: true, coarse, ..Self::among(log, &steps, tick, 1.5) };
+        // what pauses take of the time is no row that was dropped
+        let scattered = (single.missing_s - in_blocks.missing_s) / (single.whole_s - in_blocks.missing_s);
+        if even >= STRICT && (DROPPED..=MOST_MISSING).contains(&scattered) {
+            return Some(Self { dropped: true, ..single });
+        }
+        if in_blocks.missing_s >= TOLD * in_blocks.whole_s {
+            return Some(in_blocks);
+        }
         let told = (TOLD..=MOST_MISSING).contains(&(single.missing_s / single.whole_s));
-        (even && told).then_some(single)
-    }
-
-    /// Whether rows of an even clock were dropped here and there, and so many that the run is no longer what it seems.
-    #[must_use]
-    pub fn are_dropped_rows(&self) -> bool {
-        self.single && self.coarse.is_none() && self.missing_s >= DROPPED * self.whole_s
+        (even >= EVEN[0] && told).then_some(single)
     }
 
     /// The holes that are longer than so many steps.
@@ -87,6 +92,7 @@ impl Gaps {
             longest: [0.0; 2],
             standing: stands.as_ref().map(|_| 0),
             single: false,
+            dropped: false,
             coarse: None,
         };
         for (i, hole) in steps.iter().enumerate().filter(|(_, s)| **s > longer * step) {
@@ -124,7 +130,7 @@ pub(super) fn standing(log: &Log) -> Option<Vec<bool>> {
 
 impl fmt::Display for Gaps {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { missing_s, whole_s, holes, longest: [at, longest], standing, single, coarse } = self;
+        let Self { missing_s, whole_s, holes, longest: [at, longest], standing, single, coarse, .. } = self;
         let share = 100.0 * missing_s / whole_s;
         let [missing, whole, longest, at] = [missing_s, whole_s, longest, at].map(|v| trimmed(*v, 2));
         let plural = if *holes == 1 { "one hole".to_owned() } else { format!("{holes} holes") };
@@ -201,7 +207,14 @@ mod tests {
         );
         // here and there
         let scattered = Gaps::of(&log(|n| (n * n + n / 7) % 5 != 3)).expect("rows are gone");
-        assert!(scattered.single && scattered.coarse.is_none() && scattered.are_dropped_rows(), "{scattered}");
+        assert!(scattered.single && scattered.coarse.is_none() && scattered.dropped, "{scattered}");
+        assert!(single.dropped, "every fifth is gone");
+        let few = Gaps::of(&log(|n| n % 8 != 3)).expect("every eighth is gone");
+        assert!(few.single && !few.dropped, "{few}");
+        // a pause of a third of the run beside them hides nothing, and alone is no row that was dropped
+        let both = Gaps::of(&log(|n| n % 5 != 3 && !(500..900).contains(&n))).expect("both");
+        assert!(both.dropped, "{both}");
+        assert!(!Gaps::of(&log(|n| !(500..900).contains(&n))).expect("a pause").dropped);
         assert!(scattered.to_string().contains("at uneven places: dropped by a filter"), "{scattered}");
         // rows that come when they like, by a clock that is finer than they are
         let mut fine = log(|_| true);

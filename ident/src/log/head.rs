@@ -1,9 +1,64 @@
 //! The head of a log: a comment line for each key and each event.
 //!
 //! What it is: values as TOML, each on one line.
-//! What can go wrong: a text may hold a line's end, however deep in a table it lies; it is escaped.
-//! Units: none.
+//! What can go wrong: a text may hold a line's end, however deep in a table it lies; it is escaped. A value that no rig can have is refused at its line.
+//! Units: as the keys state.
 //! Reference: specification `formats.md`, "Rig log"; TOML 1.0.
+
+use super::{Place, ReadError, short};
+use std::path::Path;
+use toml::Value;
+
+/// A number of a rig's head: its key, what it may be, and the same in words.
+struct Stated {
+    key: &'static str,
+    may_be: fn(f64) -> bool,
+    expected: &'static str,
+}
+
+/// The numbers that the program reckons with.
+const STATED: [Stated; 8] = [
+    Stated { key: "sample_hz", may_be: |hz| hz > 0.0, expected: "a number of rows a second above 0 in the head" },
+    Stated {
+        key: "pole_pairs",
+        may_be: |pairs| pairs.fract() == 0.0 && (1.0..=100.0).contains(&pairs),
+        expected: "a whole number of pole pairs from 1 to 100, half the motor's magnets",
+    },
+    Stated {
+        key: "blades",
+        may_be: |blades| blades.fract() == 0.0 && (1.0..=12.0).contains(&blades),
+        expected: "a whole number of blades from 1 to 12",
+    },
+    Stated { key: "diameter_m", may_be: |d| d > 0.0, expected: "the propeller's diameter in m, above 0" },
+    Stated { key: super::plausible::AIR, may_be: |air| air > 0.0, expected: "the air's density in kg/m^3, such as 1.2" },
+    Stated { key: "temp_c", may_be: |t| (-90.0..=200.0).contains(&t), expected: "a temperature from -90 to 200 degrees Celsius" },
+    Stated { key: "pressure_hpa", may_be: |p| (1.0..=2000.0).contains(&p), expected: "a pressure from 1 to 2000 hPa" },
+    Stated { key: "pressure_pa", may_be: |p| (100.0..=200_000.0).contains(&p), expected: "a pressure from 100 to 200000 Pa" },
+];
+
+/// A key with a value that no rig can have, and what is expected in its place.
+pub(crate) fn odd(table: &toml::Table) -> Option<(&'static str, &Value, &'static str)> {
+    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|n| n as f64)).filter(|v| v.is_finite());
+    let odd = |stated: &Stated| {
+        let found = table.get(stated.key).filter(|found| number(found).is_none_or(|v| !(stated.may_be)(v)))?;
+        Some((stated.key, found, stated.expected))
+    };
+    STATED.iter().find_map(odd)
+}
+
+/// Refuses a value of the head that no rig can have; `place` is its line.
+pub(crate) fn check(table: &toml::Table, place: &Place<'_>) -> Result<(), ReadError> {
+    let Some((key, value, wanted)) = odd(table) else { return Ok(()) };
+    let found = format!("{key} = {}", short(&value.to_string()));
+    Err(place.refuse(None, found, format!("{wanted}: mend it, or take the line out")))
+}
+
+/// The line of a key in the head of a file, from 1.
+pub(super) fn line_of(path: &Path, key: &str) -> Option<usize> {
+    let head = super::plausible::head_of(path);
+    let of = |line: &String| Some(line.strip_prefix('#')?.parse::<toml::Table>().ok()?.contains_key(key));
+    head.iter().position(|line| of(line) == Some(true)).map(|n| n + 1)
+}
 
 /// The comment line of a key and its value: one line, whatever the value.
 #[must_use]

@@ -22,7 +22,7 @@ mod whole;
 
 pub use disc::Disc;
 pub use gaps::Gaps;
-pub(crate) use head::event;
+pub(crate) use head::{check as check_head, event, odd as odd_in_head};
 pub use head::{event_line, meta_line};
 pub use whole::{folder_of, no_regular_file, place_of, what_lies_at, write_whole};
 
@@ -198,7 +198,9 @@ impl Log {
                 continue;
             }
             let place = lines.place();
-            if let Some(t) = clock::first_field(&line).filter(|t| log.t.last().is_some_and(|last| t < last)) {
+            // of a row that is cut short the time may be, too
+            let whole = header.len() <= fields_of(&line);
+            if let Some(t) = clock::first_field(&line).filter(|t| whole && log.t.last().is_some_and(|last| t < last)) {
                 return Err(clock::stepped_back(t, &log, &place, &mut lines)?);
             }
             row_lines.push(place.line);
@@ -406,6 +408,9 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
                         "each key once: which of the two is right?",
                     ));
                 }
+                if format == FORMAT {
+                    head::check(&table, &place)?;
+                }
                 log.meta.extend(table);
             }
             continue;
@@ -442,7 +447,11 @@ fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError>
         if names[..i].contains(name) {
             return Err(place.refuse(Some(name), "it stands twice", "each column once"));
         }
-        if let Some(right) = wrong_unit(name) {
+        if let Some(right) = other_letters(name) {
+            let expected = format!("{right}: rename the column, or give another quantity a name of its own");
+            return Err(place.refuse(Some(name), "a known column in other letters", expected));
+        }
+        if let Some(right) = wrong_unit(&name.to_lowercase()) {
             return Err(place.refuse(
                 Some(name),
                 "a known quantity in another unit",
@@ -466,6 +475,12 @@ pub(crate) fn named_shortly(name: &str, place: &Place<'_>) -> Result<(), ReadErr
     Err(place.refuse(Some(name), format!("a name of {length} characters"), expected))
 }
 
+/// The contract's name of a column that differs from it by small and capital letters alone.
+fn other_letters(name: &str) -> Option<&'static str> {
+    let mut known = MODELLED.into_iter().chain(["pulse_us", "temp_c", "t_s"]);
+    known.find(|known| *known != name && known.eq_ignore_ascii_case(name))
+}
+
 /// The contract's name for a column that carries a known quantity in a unit that the contract does not use.
 fn wrong_unit(name: &str) -> Option<&'static str> {
     const KNOWN: [(&str, &str, &[&str]); 7] = [
@@ -485,12 +500,17 @@ const READ: f64 = 1e7;
 /// Largest number of any column: sums of a million of its squares still have an end.
 pub(crate) const FARTHEST: f64 = 1e30;
 
+/// Number of fields of a row.
+fn fields_of(line: &str) -> usize {
+    1 + line.bytes().filter(|b| *b == b',').count()
+}
+
 fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> Result<(), ReadError> {
-    let fields = 1 + line.bytes().filter(|b| *b == b',').count();
+    let fields = fields_of(line);
     if let Some(missing) = header.get(fields) {
         return Err(place.refuse(
             Some(missing),
-            format!("the row ends before it ({fields} fields)"),
+            format!("the row ends before it ({fields} field{})", if fields == 1 { "" } else { "s" }),
             format!("{} as in the header (is the file truncated?)", header.len()),
         ));
     }
@@ -652,6 +672,18 @@ mod tests {
             (format!("{head}0,1000,1\n0,1000,1\n"), "run.csv:4: column t_s: 0 repeats"),
             (format!("{head}1,1000,1\n0.5,1000,1\n"), "run.csv:4: column t_s: 0.5 steps back from 1"),
             (format!("{head}0,7.5,1\n"), "column pulse_us: 7.5; expected 500 to 2500 us"),
+            (
+                format!("{head}1.5,1000,1\n1"),
+                "run.csv:4: column pulse_us: the row ends before it (1 field); expected 3 as in the header (is the file truncated?)",
+            ),
+            (
+                "# quadrig-log 1\nt_s,pulse_us,Thrust_N\n".to_owned(),
+                "run.csv:2: column Thrust_N: a known column in other letters; expected thrust_n",
+            ),
+            (
+                "# quadrig-log 1\nt_s,pulse_us,Thrust_G\n".to_owned(),
+                "run.csv:2: column Thrust_G: a known quantity in another unit; expected thrust_n",
+            ),
             (
                 "# quadrig-log 1\nt_s,pulse_us,thrust_g\n".to_owned(),
                 "run.csv:2: column thrust_g: a known quantity in another unit; expected thrust_n",

@@ -8,7 +8,7 @@
 //! 0.01 to 0.5 N/W from a 46 mm to a 1 m propeller at load (UIUC and maker's tables). A disc needs T^1.5/sqrt(2 rho A) of power at the least
 //! (momentum theory; a duct up to 0.7 of it); propellers need 1.3 to 4 times as much, and their C_T is 0.02 to 0.2.
 
-use super::{Disc, Log, Place, ReadError, SPEED, trimmed};
+use super::{Disc, Gaps, Log, Place, ReadError, SPEED, head::line_of, short, trimmed};
 use crate::numeric::order::median;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -18,7 +18,7 @@ use std::path::Path;
 pub(crate) const VOUCHED: &str = "vouched";
 
 /// Key of the head that holds the density of the air.
-const AIR: &str = "air_density_kg_m3";
+pub(super) const AIR: &str = "air_density_kg_m3";
 /// N, W, A, V, rev/min below which a meter's own error may be all there is.
 const FAINT: f64 = 0.5;
 /// Diameter of the largest propeller on a test stand, m.
@@ -36,10 +36,14 @@ pub(crate) fn doubts(log: &Log) -> impl Iterator<Item = Doubt> {
     [
         head(log),
         rate(log),
+        thinned(log),
+        backwards(log),
         still(log),
         speed(log),
         supply(log),
         reversed(log),
+        twisted(log),
+        heat(log),
         pushed(log),
         swapped(log),
         thrust(log),
@@ -61,7 +65,7 @@ impl Log {
     /// that it is there to mend.
     ///
     /// # Errors
-    /// [`ReadError::Content`] with file and column, at the line of the header.
+    /// [`ReadError::Content`] with file and column, at the line of the header; of a key of the head at its own line.
     pub fn refuse_absurd(&self, path: &Path) -> Result<(), ReadError> {
         let vouched = self.meta.get(VOUCHED).and_then(toml::Value::as_array);
         let vouched = |column: &str| vouched.is_some_and(|all| all.iter().any(|v| v.as_str() == Some(column)));
@@ -69,19 +73,26 @@ impl Log {
             None => Ok(()),
             Some(Doubt { column, what, .. }) => {
                 let way_out = format!("if it is right, say so in the head: # {VOUCHED} = [\"{column}\"]");
-                let expected = format!("what a rig can do, in the unit of the column's name ({way_out})");
+                let expected = match column {
+                    "t_s" if is_thinned(self) => format!("a row at every tick: use the whole log ({way_out})"),
+                    _ => format!("what a rig can do, in the unit of the column's name ({way_out})"),
+                };
                 let file = path.display().to_string();
-                Err(Place { file: &file, line: header_line(path) }.refuse(Some(column), what, expected))
+                if let Some((line, value)) = line_of(path, column).zip(self.meta.get(column)) {
+                    let found = format!("{column} = {}: {what}", short(&value.to_string()));
+                    let expected = expected.replace("the column's", "the key's");
+                    return Err(Place { file: &file, line }.refuse(None, found, expected));
+                }
+                Err(Place { file: &file, line: head_of(path).len() + 1 }.refuse(Some(column), what, expected))
             }
         }
     }
 }
 
-/// Line of a log's header, from 1.
-fn header_line(path: &Path) -> usize {
-    let Ok(file) = File::open(path) else { return 1 };
-    let comments = BufReader::new(file).lines().map_while(Result::ok).take_while(|line| line.starts_with(['#', '\u{feff}']));
-    comments.count() + 1
+/// The comment lines before a log's header.
+pub(super) fn head_of(path: &Path) -> Vec<String> {
+    let Ok(file) = File::open(path) else { return Vec::new() };
+    BufReader::new(file).lines().map_while(Result::ok).take_while(|line| line.starts_with(['#', '\u{feff}'])).collect()
 }
 
 fn doubt(column: &'static str, never: bool, what: String) -> Option<Doubt> {
@@ -137,6 +148,17 @@ fn rate(log: &Log) -> Option<Doubt> {
         s if s < 1e-4 => doubt("t_s", false, said("a unit too small?")),
         _ => None,
     }
+}
+
+/// Single rows of an even clock that are missing, a fifth and more, where nobody states a rate.
+fn thinned(log: &Log) -> Option<Doubt> {
+    let gaps = Gaps::of(log).filter(|gaps| gaps.dropped && !log.meta.contains_key("sample_hz"))?;
+    doubt("t_s", true, gaps.to_string())
+}
+
+/// Whether that is said of a log.
+pub(crate) fn is_thinned(log: &Log) -> bool {
+    thinned(log).is_some()
 }
 
 /// The units in which rows so far apart are a usual clock, with the seconds that they mean.
@@ -239,13 +261,13 @@ fn thrust(log: &Log) -> Option<Doubt> {
 /// What the head says of propeller and air.
 fn head(log: &Log) -> Option<Doubt> {
     let known = Disc::of(log);
-    if let Some(said) = log.meta.get(AIR).filter(|v| v.as_float().is_none() && v.as_integer().is_none()) {
-        return doubt(AIR, true, format!("{said} is no number; expected kg/m^3, such as 1.2"));
-    }
     if let Some(air) = known.density_kg_m3.filter(|air| !(0.1..=10.0).contains(air)) {
         return doubt(AIR, true, format!("air of {} kg/m^3: g/l, or a pressure of another unit?", trimmed(air, 6)));
     }
     let size = known.diameter_m.filter(|d| *d > LARGEST_M)?;
+    if log.meta.contains_key("diameter_m") {
+        return doubt("diameter_m", true, format!("a propeller of {size:.2} m: millimetres, or inches?"));
+    }
     doubt(
         "propeller",
         true,
@@ -259,6 +281,52 @@ fn reversed(log: &Log) -> Option<Doubt> {
     let negative = |name: &'static str| typical(log, name, &rows).filter(|v| *v < -FAINT).map(|v| (name, v));
     let (name, value) = SPEED.into_iter().chain(["voltage_v", "current_a"]).find_map(negative)?;
     doubt(name, true, format!("{} under load: the sign, or wires that are swapped?", trimmed(value, 3)))
+}
+
+/// What a column typically reads where it is far from zero: of its largest readings, whatever their sign.
+fn far(log: &Log, name: &str) -> Option<f64> {
+    let values = log.column(name)?;
+    let top = high(&values.iter().map(|v| v.abs()).collect::<Vec<f64>>())?;
+    let rows: Vec<usize> = (0..values.len()).filter(|i| values[*i].abs() > 0.7 * top).collect();
+    typical(log, name, &rows)
+}
+
+/// A speed that is below 0 throughout: no load tells when the rotor turns, where that is the load.
+fn backwards(log: &Log) -> Option<Doubt> {
+    let negative = |name: &'static str| far(log, name).filter(|v| *v < -FAINT).map(|v| (name, v));
+    let (name, value) = SPEED.into_iter().find_map(negative)?;
+    doubt(
+        name,
+        true,
+        format!("{} rev/min at the most: the sign? A rotor's speed reads above 0, whichever way it turns", trimmed(value, 1)),
+    )
+}
+
+/// A torque below 0: which sign it has is the way the rotor turns.
+fn twisted(log: &Log) -> Option<Doubt> {
+    let (rows, rest) = loaded(log);
+    let torque = typical(log, "torque_nm", &rows).filter(|v| *v < 0.0)?;
+    let zero = typical(log, "torque_nm", &rest).unwrap_or(0.0);
+    let turned = torque < zero && (torque - zero).abs() > 3.0 * zero.abs();
+    let what = format!(
+        "{} N.m under load: the sign, or a rotor that turns the other way round? What holds the rotor reads above 0",
+        trimmed(torque, 4)
+    );
+    turned.then_some(Doubt { column: "torque_nm", what, never: false })
+}
+
+/// A temperature that nothing on a rig has.
+fn heat(log: &Log) -> Option<Doubt> {
+    let rows: Vec<usize> = (0..log.len()).collect();
+    let temperature = typical(log, "temp_c", &rows)?;
+    let said = |likely: &str| format!("{} degrees Celsius: {likely}", trimmed(temperature, 1));
+    match temperature {
+        t if t > 200.0 => doubt("temp_c", true, said("kelvin? tenths of a degree?")),
+        t if t > 130.0 => doubt("temp_c", false, said("Fahrenheit?")),
+        t if t < -90.0 => doubt("temp_c", true, said("a sensor without signal, or an offset of another unit?")),
+        t if t < -40.0 => doubt("temp_c", false, said("a sensor without signal?")),
+        _ => None,
+    }
 }
 
 /// Thrust of the other sign: a load cell that is mounted the other way round, or a rotor that blows at it.
@@ -368,6 +436,56 @@ mod tests {
         assert!(blocked.in_doubt().iter().any(|d| d.contains("a blocked rotor?")), "{:?}", blocked.in_doubt());
     }
 
+    /// Every fifth row gone: refused where nobody states a rate, and taken where the head vouches for the time.
+    #[test]
+    fn a_fifth_of_an_even_clock_is_missed() {
+        let of = |head: &str, keep: &dyn Fn(usize) -> bool| {
+            let row = |n: usize| format!("{},{},{}\n", trimmed(0.1 * n as f64, 1), n / 80 * 1000, n / 80);
+            let rows: String = (0..400).filter(|n| keep(*n)).map(row).collect();
+            let folder = tempfile::TempDir::new().expect("a folder");
+            let path = folder.path().join("rig.csv");
+            std::fs::write(&path, format!("# quadrig-log 1\n{head}t_s,rpm,thrust_n\n{rows}")).expect("written");
+            Log::read(&path).and_then(|log| log.refuse_absurd(&path)).map_err(|e| e.to_string())
+        };
+        let fifth = of("", &|n| n % 5 != 3).expect_err("every fifth row is gone");
+        assert!(fifth.contains("rig.csv:2: column t_s: 20 % of the time has no row"), "{fifth}");
+        assert!(fifth.contains("expected a row at every tick: use the whole log"), "{fifth}");
+        of("# vouched = [\"t_s\"]\n", &|n| n % 5 != 3).expect("vouched for");
+        of("", &|n| n % 9 != 3).expect("one of nine");
+        of("", &|n| !(100..180).contains(&n)).expect("a pause");
+        of("# sample_hz = 8\n", &|n| n % 5 != 3).expect("eight rows a second by a clock of ten ticks");
+    }
+
+    /// A run with a torque and a temperature: what either does to the log, and what is said.
+    #[test]
+    fn speeds_below_0_kelvin_and_a_torque_of_the_other_sign_are_told() {
+        let of = |speed: f64, torque: f64, degrees: f64| {
+            let row = |k: i32| {
+                let rpm = 1000.0 * f64::from(k / 80);
+                let (thrust, torque) = (1.7e-7 * rpm * rpm, torque * 2.5e-9 * rpm * rpm);
+                format!("{},{},{thrust:.5},{torque:.6},{degrees}\n", 0.1 * f64::from(k), speed * rpm)
+            };
+            let rows: String = (0..400).map(row).collect();
+            let head = "# quadrig-log 1\nt_s,rpm_beam,thrust_n,torque_nm,temp_c\n";
+            let log = Log::parse("rig.csv", (head.to_owned() + &rows).as_bytes()).expect("a log");
+            doubts(&log).map(|d| (d.column, d.never, d.what)).collect::<Vec<_>>()
+        };
+        assert_eq!(of(1.0, 1.0, 15.0), []);
+        let backwards = of(-1.0, 1.0, 15.0);
+        assert!(matches!(&backwards[..], [("rpm_beam", true, what), ..] if what.contains("the sign?")), "{backwards:?}");
+        let twisted = of(1.0, -1.0, 15.0);
+        assert!(matches!(&twisted[..], [("torque_nm", false, what)] if what.contains("the other way round?")), "{twisted:?}");
+        for (degrees, never, likely) in [
+            (288.15, true, "kelvin?"),
+            (150.0, false, "Fahrenheit?"),
+            (-385.0, true, "an offset"),
+            (-60.0, false, "without signal"),
+        ] {
+            let found = of(1.0, 1.0, degrees);
+            assert!(matches!(&found[..], [("temp_c", n, what)] if *n == never && what.contains(likely)), "{degrees}: {found:?}");
+        }
+    }
+
     /// 2 N at 4000 rev/min of an 11 inch propeller: C_T is 0.06.
     #[test]
     fn what_no_disc_does_is_told() {
@@ -379,8 +497,10 @@ mod tests {
         assert!(electrical.in_doubt().iter().any(|d| d.contains("electrical turns?")), "{:?}", electrical.in_doubt());
         for (head, said) in [
             ("# air_density_kg_m3 = 0.001225\n", "0.001225 kg/m^3"),
-            ("# air_density_kg_m3 = \"banana\"\n", "is no number"),
-            ("# propeller = \"279x119\"\n", "millimetres?"),
+            ("# motor = \"A\"\n# air_density_kg_m3 = \"banana\"\n", "rig.csv:3: air_density_kg_m3 = \"banana\"; expected"),
+            ("# motor = \"A\"\n# propeller = \"279x119\"\n", "rig.csv:3: propeller = \"279x119\": a propeller of 7.09 m"),
+            ("# air_density_kg_m3 = 1e9\n", "rig.csv:2: air_density_kg_m3 = 1000000000.0: air of"),
+            ("# diameter_m = 280\n", "rig.csv:2: diameter_m = 280: a propeller of 280.00 m: millimetres, or inches?"),
         ] {
             let found = rig(head, |n, t, u, i| [n, t, u, i]).expect_err(head);
             assert!(found.contains(said), "{found}");

@@ -13,7 +13,7 @@ use super::{
 use crate::channel::{Context, Relation};
 use crate::effects::placed::Placed;
 use crate::effects::{self, Effect, Estimate, Instance};
-use crate::log::Log;
+use crate::log::{Log, odd_in_head, short};
 use crate::model::course::{COURSE_KEYS, Course};
 use crate::model::leftover::{CLASSES, Leftover, PARTS};
 use std::path::Path;
@@ -21,6 +21,16 @@ use toml::{Table, Value};
 
 /// Key, what stands there, what should.
 pub(super) type Refusal = (String, String, String);
+
+/// What is said of a file that is no text.
+const NO_TEXT: &str =
+    "bytes that are no text in UTF-8; expected a model written by `quadrig identify` or `close-loop`, which is TOML";
+/// Longest pulse that a log holds, us.
+const LONGEST_US: f64 = 2500.0;
+/// Largest coefficient: of a speed over the command, whose range may be narrow, and of any other channel over the speed. And largest size of an effect.
+const FARTHEST: [f64; 2] = [1e12, 1e7];
+/// Largest resistance of a supply's lead, ohm, as a scenario takes it.
+const RESISTANCE: f64 = 100.0;
 
 /// Keys of the file.
 const ROOT: [&str; 13] = [
@@ -61,7 +71,10 @@ impl Model {
     /// [`ModelError`] with file and key.
     pub fn read(path: &Path) -> Result<Self, ModelError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| ModelError::Io { file: file.clone(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
+            std::io::ErrorKind::InvalidData => ModelError::Syntax { file: format!("{file}:1:1"), message: NO_TEXT.to_owned() },
+            _ => ModelError::Io { file: file.clone(), source },
+        })?;
         Self::parse(&file, &text)?.complete(path, &text)
     }
 
@@ -102,14 +115,18 @@ impl Model {
             source: root.get("source").and_then(Value::as_str).unwrap_or_default().to_owned(),
             start_pulse_us: start
                 .and_then(finite)
-                .ok_or_else(|| refusal("start_pulse_us", start, "a finite number of microseconds"))?,
+                .filter(|us| (0.0..=LONGEST_US).contains(us))
+                .ok_or_else(|| refusal("start_pulse_us", start, &format!("a pulse from 0 to {LONGEST_US} us")))?,
             meta: root.get("rig").and_then(Value::as_table).cloned().unwrap_or_default(),
             ..Self::default()
         };
+        if let Some((key, found, expected)) = odd_in_head(&model.meta) {
+            return Err(within("rig", refusal(key, Some(found), expected)));
+        }
         if let Some(pulse) = root.get("highest_pulse_us") {
-            let highest = finite(pulse).filter(|p| *p > 0.0);
-            model.highest_pulse_us =
-                Some(highest.ok_or_else(|| refusal("highest_pulse_us", Some(pulse), "a finite number of microseconds"))?);
+            let highest = finite(pulse).filter(|us| *us > 0.0 && *us <= LONGEST_US);
+            let wanted = || refusal("highest_pulse_us", Some(pulse), &format!("a pulse in us, above 0 and up to {LONGEST_US}"));
+            model.highest_pulse_us = Some(highest.ok_or_else(wanted)?);
         }
         if let Some(stood) = root.get(STOOD) {
             model.stood = stood.as_bool().ok_or_else(|| refusal(STOOD, Some(stood), "true or false"))?;
@@ -224,9 +241,11 @@ fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {
     // a speed without a command is a constant: the only relation with two degrees
     let highest = keys.iter().rposition(|k| table.contains_key(k)).map_or(0, |k| k + 1);
     let count = if highest == alone { alone } else { full };
+    let farthest = FARTHEST[usize::from(!channel.starts_with("rpm"))];
     let read = |key: &String| {
         let value = table.get(key);
-        value.and_then(finite).ok_or_else(|| refusal(key, value, "a finite number"))
+        let found = value.and_then(finite).ok_or_else(|| refusal(key, value, "a finite number"))?;
+        within_reach(found, farthest).ok_or_else(|| refusal(key, value, &format!("what a rig can have, {farthest:e} at most")))
     };
     let coefficients = keys[..count].iter().map(read).collect::<Result<_, _>>()?;
     let error = |key: &String| {
@@ -348,7 +367,14 @@ fn amplitudes(
                     let wanted = if keys.is_empty() { "no key".to_owned() } else { format!("a key of {}", keys.join(", ")) };
                     refusal(&place(key), Some(value), &wanted)
                 })?;
-                values[known] = finite(value).ok_or_else(|| refusal(&place(key), Some(value), "a finite number"))?;
+                let found = finite(value).ok_or_else(|| refusal(&place(key), Some(value), "a finite number"))?;
+                let size = if key.ends_with("_ohm") {
+                    Some(found).filter(|ohm| (0.0..=RESISTANCE).contains(ohm)).ok_or(format!("from 0 to {RESISTANCE} ohm"))
+                } else {
+                    within_reach(found, FARTHEST[1]).ok_or(format!("{:e} at most", FARTHEST[1]))
+                };
+                values[known] =
+                    size.map_err(|range| refusal(&place(key), Some(value), &format!("what a rig can have, {range}")))?;
             }
         }
         out.push((channel.clone(), values));
@@ -435,6 +461,11 @@ pub(super) fn only(table: &Table, keys: &[&str]) -> Result<(), Refusal> {
     }
 }
 
+/// A number that is no farther from 0 than that.
+fn within_reach(found: f64, farthest: f64) -> Option<f64> {
+    Some(found).filter(|v| v.abs() <= farthest)
+}
+
 fn number(v: &Value) -> Option<f64> {
     v.as_float().or_else(|| v.as_integer().map(|i| i as f64))
 }
@@ -451,7 +482,7 @@ pub(super) fn refusal(key: &str, found: Option<&Value>, expected: &str) -> Refus
     let found = match found {
         None => "missing".to_owned(),
         Some(Value::Table(_)) => "a table".to_owned(),
-        Some(value) => value.to_string().replace('\n', " "),
+        Some(value) => short(&value.to_string().replace('\n', " ")),
     };
     (key.to_owned(), found, expected.to_owned())
 }

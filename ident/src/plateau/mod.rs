@@ -134,6 +134,12 @@ fn guide<'l>(log: &'l Log, speed: &'l [f64]) -> &'l [f64] {
     SPEED.iter().chain(&FOLLOWERS).find_map(|n| log.column(n)).unwrap_or(&[])
 }
 
+/// So many plateaus, in words.
+#[must_use]
+pub fn so_many(count: usize) -> String {
+    if count == 1 { "1 plateau".to_owned() } else { format!("{count} plateaus") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -17,8 +17,8 @@ use crate::identify::curves::{Fitted, Law, ratio};
 use crate::log::board;
 use crate::log::{Gaps, Log, SPEED};
 use crate::numeric::order::median;
-use crate::plateau::Plateau;
 use crate::plateau::shift::{Settings, filters};
+use crate::plateau::{Plateau, so_many};
 use crate::verdict::words::{self, axis, channel, heading, upper};
 
 /// Colours of the speed channels.
@@ -85,20 +85,22 @@ fn lead(log: &Log, found: &Identified) -> String {
     let rig: Vec<String> = ["motor", "propeller", "supply"].iter().filter_map(|k| text(k).map(str::to_owned)).collect();
     let rig = if rig.is_empty() { String::new() } else { format!("{}. ", rig.join(", ")) };
     format!(
-        "{}: {rig}{} rows over {:.1} {}, reduced to {} plateaus.",
+        "{}: {rig}{} rows over {:.1} {}, reduced to {}.",
         log.name,
         log.len(),
         log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0),
         if log.time_is_row() { "rows" } else { "s" },
-        found.plateaus.len()
+        so_many(found.plateaus.len())
     )
 }
 
 /// What the powerplant does at its highest level, and which law does not hold, in plain words.
 #[must_use]
 pub fn headline(found: &Identified) -> String {
-    let mut out = highest(&found.levels)
-        .unwrap_or_else(|| format!("{} plateaus were found, none of them with a thrust.", found.plateaus.len()));
+    let mut out = highest(&found.levels).unwrap_or_else(|| match found.plateaus.len() {
+        1 => "1 plateau was found, without a thrust.".to_owned(),
+        n => format!("{n} plateaus were found, none of them with a thrust."),
+    });
     let broken: Vec<String> = found
         .constants
         .iter()

@@ -45,8 +45,9 @@ pub(crate) fn span<'v>(values: impl Iterator<Item = &'v f64>) -> (f64, f64) {
     let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     if !lo.is_finite() {
         (0.0, 1.0)
-    } else if hi - lo < 1e-12 {
-        (lo - 0.5, hi + 0.5)
+    } else if hi - lo < 1e-12 || hi - lo <= f64::EPSILON * hi.abs() {
+        let half = 0.5_f64.max(1e-9 * hi.abs());
+        (lo - half, hi + half)
     } else {
         (lo, hi)
     }
@@ -91,6 +92,15 @@ mod tests {
     fn ticks_are_round_and_inside() {
         assert_eq!(ticks(0.0, 10.0, 5), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
         assert!(ticks(-0.013, 0.017, 5).iter().all(|v| (-0.013..=0.017).contains(v)));
+    }
+
+    /// Values so large that the next number is more than one away have an end of ticks, too.
+    #[test]
+    fn a_value_without_measure_has_ticks_with_an_end() {
+        for value in [12.0, 1e16, -1e30, 1e200] {
+            let (lo, hi) = span([value].iter());
+            assert!(lo < value && value < hi && (2..20).contains(&ticks(lo, hi, 5).len()), "{value}");
+        }
     }
 
     #[test]

@@ -123,7 +123,24 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
             n => say!("{n} runs of other shares are not there yet; the tables come with the last share"),
         }
     }
-    Ok(())
+    if left == 0 { one_closes(args, &all) } else { Ok(()) }
+}
+
+/// Refuses a batch of which not one run closes: its tables hold no figure.
+fn one_closes(args: &Args, all: &[String]) -> Result<(), Failure> {
+    let mut done = all.iter().filter_map(|file| Done::read(&result_path(args, file)));
+    if done.any(|done| done.state == "closed") {
+        return Ok(());
+    }
+    let expected = "expected one run at least that `quadrig close-loop` takes";
+    let why = args.output.join("manifest.csv");
+    Err(format!(
+        "{}: not one of its runs closes ({} in all); {expected} (why not: column message of {})",
+        args.folder.display(),
+        all.len(),
+        why.display()
+    )
+    .into())
 }
 
 /// How many runs were not closed, and where it stands why.

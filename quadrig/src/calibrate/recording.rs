@@ -125,9 +125,10 @@ fn matched(samples: &[Sample], points: &[Point]) -> Result<Vec<std::ops::Range<u
         })
         .collect();
     Err(format!(
-        "{} settled stretches for {} points: {}; give each point its time, as in 200 g@12..18",
+        "{} settled stretches for {} point{}: {}; expected one for each: give each point its time, as in 200 g@12..18",
         found.len(),
         points.len(),
+        if points.len() == 1 { "" } else { "s" },
         if list.is_empty() { "none".to_owned() } else { list.join(", ") }
     ))
 }

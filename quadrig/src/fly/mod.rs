@@ -15,6 +15,7 @@ use crate::Failure;
 use crate::apart::Paths;
 use crate::close_loop::{flight, inertial};
 use crate::folder::{Folder, name_of};
+use crate::kind::instead;
 use crate::open::read_model;
 use crate::progress::Bar;
 use crate::trouble::unread;
@@ -71,9 +72,12 @@ impl Rotors {
 /// Flight from which on it is said how long it is before it begins, s.
 const LONG_S: f64 = 600.0;
 
+/// What is expected of a file.
+const MISSION: &str = "a mission, such as examples/flight/takeoff.toml: docs/mission.md lists its keys";
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let (mission, file) = Mission::load(&args.mission)?;
+    let (mission, file) = Mission::load(&args.mission).map_err(|why| instead(&args.mission, MISSION, why))?;
     args.paths().reads(mission.files(&args.mission).iter().flatten()).check()?;
     let folder = args.output.as_deref().map(|path| Folder::new(path, "fly")).transpose()?;
     let airframe = file.airframe();

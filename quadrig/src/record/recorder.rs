@@ -269,6 +269,10 @@ impl Recorder {
         self.begin_anyhow();
         self.tell_pending(None);
         let stats = board.stats();
+        if self.rows == 0 {
+            self.spool.discard();
+            return Err(unheard(stats.good).into());
+        }
         if !quiet {
             // to a terminal that may be gone: what was recorded is closed all the same
             let mut out = std::io::stderr().lock();
@@ -282,10 +286,31 @@ impl Recorder {
                 let _ = writeln!(out, "{name:>12}: {:.3} % rms from the consensus, {:.3} % at most", rms * 100.0, worst * 100.0);
             }
         }
-        if self.rows == 0 {
-            self.spool.discard();
-            return Err("no sample arrived; nothing was recorded; expected samples: is the board powered?".into());
-        }
         self.spool.finish(quiet)
+    }
+}
+
+/// Why a recording holds nothing: a board that was not heard at all, or an end that came before its first sample.
+fn unheard(good: u32) -> String {
+    match good {
+        0 => "no sample arrived; nothing was recorded; expected samples: is the board powered?".to_owned(),
+        n => format!(
+            "the recording ended before the first sample ({n} good frames had come); nothing was recorded; expected it to go on for longer: without a terminal a session ends with its input"
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unheard;
+
+    #[test]
+    fn a_board_that_was_heard_is_powered() {
+        assert!(unheard(0).contains("is the board powered?"));
+        let early = unheard(12);
+        assert!(
+            early.contains("before the first sample (12 good frames had come)") && early.contains("ends with its input"),
+            "{early}"
+        );
     }
 }

@@ -494,7 +494,7 @@ pub(crate) fn read(path: &Path) -> Result<(RigConfig, bool), Failure> {
 }
 
 fn parse(text: &str, path: &Path) -> Result<(RigConfig, bool), String> {
-    let file: File = section(text, path)?;
+    let file: File = section(text, path, "docs/configuration.md")?;
     file.config().map_err(|reason| placed(text, path, reason))
 }
 
@@ -505,8 +505,8 @@ fn placed(text: &str, path: &Path, (span, reason): Refused) -> String {
     format!("{}:{line}:{column}: {reason}", path.display())
 }
 
-fn section<T: serde::de::DeserializeOwned>(text: &str, path: &Path) -> Result<T, String> {
-    let said = |error: &toml::de::Error| hal_sim::scenario::in_words(&error.message().replace('\n', " "));
+fn section<T: serde::de::DeserializeOwned>(text: &str, path: &Path, page: &str) -> Result<T, String> {
+    let said = |error: &toml::de::Error| hal_sim::scenario::in_words(&error.message().replace('\n', " "), page);
     toml::from_str(text).map_err(|error| placed(text, path, (error.span().unwrap_or(0..0), said(&error))))
 }
 
@@ -519,7 +519,7 @@ struct ScalesAlone {
 /// The calibrated scales of a file: of a configuration, or of one that `quadrig calibrate` wrote.
 pub(crate) fn scales(path: &Path) -> Result<[Option<Calibrated>; 5], Failure> {
     let text = std::fs::read_to_string(path).map_err(unread(&path))?;
-    let file: ScalesAlone = section(&text, path)?;
+    let file: ScalesAlone = section(&text, path, "docs/calibration.md")?;
     let found = file.calibrated.as_ref().map_or(Ok([None; 5]), Scales::all).map_err(|reason| placed(&text, path, reason))?;
     if found == [None; 5] {
         return Err(format!("{}: no section [calibrated.X]; expected a file of `quadrig calibrate`", path.display()).into());

@@ -23,6 +23,7 @@ const TOLD_AT: f64 = 8.0;
 
 /// The options.
 #[derive(clap::Args, Clone, Debug, Default)]
+#[group(skip)] // the commands that take it have a group of this name
 pub(crate) struct Args {
     /// Hold the run against this model while it goes on: each channel's residual in noise floors, and the row where the run leaves it.
     #[arg(long, value_name = "MODEL")]

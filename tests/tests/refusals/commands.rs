@@ -23,6 +23,33 @@ pub(super) fn boards() -> Vec<Case> {
             "rig --port sim --speed 0 configure nowhere.csv",
             &["nowhere.csv: no such setting, nor a file", "log-ms"],
         ),
+        alone("a device that is no port", "rig --port /dev/null status", &["/dev/null: cannot be opened (it is no serial port)"]),
+        alone(
+            "a log for the settings' sectors",
+            "rig --port sim --speed 0 --flash good.csv status",
+            &["good.csv: ", "expected the settings' sectors of a board"],
+        ),
+        with(
+            "a thrust without its bridge",
+            "bad.toml",
+            "[thrust]\nlength_m = 0.1\n",
+            "rig --port sim --speed 0 configure bad.toml",
+            &["bad.toml:1:1: missing field", "docs/configuration.md"],
+        ),
+        with(
+            "a scale without its zero",
+            "bad.toml",
+            "[calibrated.thrust]\nper_count = 0.1\n",
+            "recalibrate good.csv --with bad.toml -o out.csv",
+            &["bad.toml:1:1: missing field", "docs/calibration.md"],
+        ),
+        with(
+            "a configuration of bytes",
+            "bad.toml",
+            [0xFF_u8, 0xFE, 0x00, 0x81],
+            "rig --port sim --speed 0 configure bad.toml",
+            &["bad.toml:1:1: bytes that are no text"],
+        ),
         alone("a setting without its value", "rig --port sim --speed 0 configure slew", &["slew: no value", "log-ms 100"]),
         alone("a setting that is none", "rig --port sim --speed 0 configure colour 5", &["colour: no such setting", "log-ms"]),
         with(
@@ -119,6 +146,30 @@ pub(super) fn arguments() -> Vec<Case> {
             "import bad.csv --rotor 1 -o out.csv",
             &["--rotor 1: bad.csv is no PX4 ULog", "leave --rotor away"],
         ),
+        alone(
+            "an image that is not there",
+            "flash rig --elf nowhere.elf",
+            &["nowhere.elf: no such image", "`cargo xtask image`"],
+        ),
+        alone("a log in the place of an image", "flash ahrs --elf good.csv", &["good.csv: no image of a board", "an ELF file"]),
+        alone("a history of one run", "history good.csv -o out", &["at least", "runs before and after it"]),
+        alone("a history of nothing", "history nowhere -o out", &["nowhere: cannot be read"]),
+        alone("a history of a folder without a run", "history models -o out", &["models: no file ends in .csv"]),
+        with(
+            "a history with a run that is none",
+            "bad.csv",
+            "x\n",
+            "history good.csv bad.csv -o out",
+            &["at least", "left out: bad.csv:1"],
+        ),
+        alone("a history among notes", "history good.csv -o full", &["full: holds notes.csv, which no `quadrig history`"]),
+        with(
+            "an export joined to one that stood still",
+            "bad.csv",
+            good_log().lines().skip(2).take(50).map(|l| l.replacen("t_s", "Time (s)", 1) + "\n").collect::<String>(),
+            "import export.csv --with esc=bad.csv -o out.csv",
+            &["export.csv and bad.csv: "],
+        ),
         alone("data that are not there", "measured nowhere -o out", &["nowhere", "no such folder"]),
         alone(
             "from a command that was not logged",
@@ -200,6 +251,10 @@ pub(super) fn outputs() -> Vec<Case> {
             &["plan.toml: is an input"],
         ),
         alone("a recording over its board", "log --port sim:empty.toml --speed 0 -o empty.toml", &["empty.toml: is an input"]),
+        #[cfg(target_os = "linux")]
+        alone("a model that no folder takes", "identify good.csv -o /proc/x", &["/proc/x: cannot be written", "rights and room"]),
+        #[cfg(target_os = "linux")]
+        alone("results that none takes", "demo --seed 1 -o /proc/x", &["/proc/x: cannot be written (/proc takes no files)"]),
         alone(
             "one over its board's schedule",
             "log --port sim:on-file.toml --speed 0 --seconds 1 -o plan.toml",
@@ -251,7 +306,8 @@ pub(super) fn outputs() -> Vec<Case> {
         ),
         alone("a flight over a flight", "fly short.toml -o flown", &["flown: holds flight.csv, which no `quadrig fly` wrote"]),
         alone("figures over figures", "identify good.csv -o out.toml --svg drawn", &["drawn: holds thrust.svg, which no"]),
-        alone("a folder that is a file", "close-loop good.csv -o model.toml", &["model.toml: ", "a folder"]),
+        alone("a folder that is a file", "close-loop good.csv -o model.toml", &["model.toml: is no folder; ", "a folder"]),
+        alone("a folder that is the log", "close-loop good.csv -o good.csv", &["good.csv: is no folder; ", "a folder for -o"]),
         alone(
             "two folders that are not there",
             "identify good.csv -o absent/deep/out.toml",

@@ -154,6 +154,10 @@ pub(super) fn kinds() -> Vec<Case> {
 
 pub(super) fn models() -> Vec<Case> {
     const PREDICT: &str = "predict bad.toml good.csv -o out.csv";
+    let model = |name, head: &str, rest: &str, said| {
+        let start = if rest.contains("start_pulse_us") { "" } else { "start_pulse_us = 1000.0\n" };
+        with(name, "bad.toml", format!("format = \"quadrig-model 1\"\n{start}{head}{rest}"), PREDICT, said)
+    };
     vec![
         alone(
             "a log in the place of a model",
@@ -166,6 +170,38 @@ pub(super) fn models() -> Vec<Case> {
         alone("a model that is not there", "close-loop good.csv --model nowhere.toml", &["nowhere.toml: cannot be read"]),
         with("a model of another format", "bad.toml", "format = \"mine 1\"\n", PREDICT, &["bad.toml"]),
         with("a model cut short", "bad.toml", "format = \"quadrig-model 1\"\n[channel.rpm", PREDICT, &["bad.toml:2"]),
+        with(
+            "a model of bytes",
+            "bad.toml",
+            [0xFF_u8, 0xFE, 0x00, 0x81],
+            PREDICT,
+            &["bad.toml:1:1: bytes that are no text in UTF-8", "`quadrig identify`"],
+        ),
+        model(
+            "a pulse of less than nothing",
+            "highest_pulse_us = -5\n",
+            "",
+            &["bad.toml:3:1: key highest_pulse_us: -5; ", "up to 2500"],
+        ),
+        model(
+            "a start beyond all pulses",
+            "",
+            "start_pulse_us = 5000.0\n",
+            &["key start_pulse_us: 5000.0; ", "from 0 to 2500 us"],
+        ),
+        model(
+            "a thrust that no rig has",
+            "",
+            "[channel.thrust_n]\nc0_n = 0.0\nc1_n_per_krpm = 0.0\nc2_n_per_krpm2 = 1e200\n",
+            &["key channel.thrust_n.c2_n_per_krpm2: ", "1e7 at most"],
+        ),
+        model(
+            "a lead that no rig has",
+            "",
+            "[channel.voltage_v]\nc0_v = 12.0\n[[effect]]\nid = \"supply_sag\"\nchannels = [\"voltage_v\"]\nscope = \"rig\"\nshape = []\n[effect.amplitude.voltage_v]\nresistance_ohm = -4e9\n",
+            &["key effect[0].amplitude.voltage_v.resistance_ohm: -4000000000.0; ", "from 0 to 100 ohm"],
+        ),
+        model("a motor without poles", "", "[channel]\n[rig]\npole_pairs = -7\n", &["key rig.pole_pairs: -7; ", "from 1 to 100"]),
         with(
             "a flight that is no flight",
             "bad.toml",
@@ -293,6 +329,53 @@ pub(super) fn scenarios() -> Vec<Case> {
     ]
 }
 
+/// Descriptions in TOML that another command takes: each refusal says what it is, and which one.
+pub(super) fn descriptions() -> Vec<Case> {
+    const MISSION: &str =
+        "duration_s = 2\n[imu]\nchips = \"calibrated\"\n[[command]]\nrotors = [1]\nsteps = [{ pulse_us = 1700, hold_s = 2 }]\n";
+    const SCENARIO: &str = "seed = 1\nmotor = \"570KV\"\n[[effect]]\nid = \"supply_sag\"\nresistance_ohm = 0.08\n";
+    const PLAN: &str = "[[part]]\nkind = \"hold\"\npulse_us = 1200\nhold_s = 1\n";
+    const RUN: &str = "rig --port sim --speed 0 run bad.toml -o out.csv";
+    let mission = |name, words| {
+        with(name, "bad.toml", MISSION, words, &["bad.toml:1:1: a mission, which `quadrig fly bad.toml`", "a scenario"])
+    };
+    vec![
+        mission("a mission to simulate", "sim bad.toml -o out.csv"),
+        mission("a mission to loop", "loop bad.toml -o out"),
+        mission("a mission to isolate causes of", "isolability bad.toml -o out"),
+        mission("a mission for a virtual board", "virtual bad.toml --seconds 1"),
+        mission("a mission at a port", "log --port sim:bad.toml --speed 0 --seconds 1 -o out.csv"),
+        with(
+            "a mission to play",
+            "bad.toml",
+            MISSION,
+            RUN,
+            &["bad.toml:1:1: a mission, which `quadrig fly", "expected a schedule"],
+        ),
+        with(
+            "a scenario to play",
+            "bad.toml",
+            SCENARIO,
+            RUN,
+            &["bad.toml:1:1: a scenario, which `quadrig sim", "expected a schedule"],
+        ),
+        with(
+            "a scenario to fly",
+            "bad.toml",
+            SCENARIO,
+            "fly bad.toml -o out",
+            &["bad.toml:1:1: a scenario, which `quadrig sim bad.toml -o LOG` runs; expected a mission", "docs/mission.md"],
+        ),
+        with(
+            "a schedule to simulate",
+            "bad.toml",
+            PLAN,
+            "sim bad.toml -o out.csv",
+            &["bad.toml:1:1: a schedule, which `quadrig rig run", "expected a scenario"],
+        ),
+    ]
+}
+
 pub(super) fn missions() -> Vec<Case> {
     let case = |name, text: &str, said| with(name, "bad.toml", text, "fly bad.toml -o out", said);
     vec![
@@ -325,6 +408,16 @@ pub(super) fn schedules() -> Vec<Case> {
             "a schedule with a pulse out of range",
             "[[part]]\nkind = \"hold\"\npulse_us = 2500\nhold_s = 1\n",
             &["bad.toml:3:12: pulse_us: ", "found 2500"],
+        ),
+        case(
+            "a hold that is none",
+            "[[part]]\nkind = \"hold\"\npulse_us = 1500\nhold_s = nan\n",
+            &["bad.toml:4:10: hold_s: expected a number with an end, found nan"],
+        ),
+        case(
+            "a pulse without an end",
+            "[[part]]\nkind = \"hold\"\npulse_us = inf\nhold_s = 1\n",
+            &["bad.toml:3:12: pulse_us: expected a number with an end, found inf"],
         ),
         case("a part of no kind", "[[part]]\nkind = \"hld\"\n", &["bad.toml:2:8: ", "\"hld\"", "hold, staircase"]),
         case(

@@ -94,7 +94,7 @@ pub(super) fn logs() -> Vec<Case> {
             IDENTIFY,
             &["bad.csv:3: column t_s: whole numbers, 100 apart", "milliseconds"],
         ),
-        with("a rate in words", "bad.csv", head("10.0", "\"ten\""), IDENTIFY, &["bad.csv:1: sample_hz = \"ten\""]),
+        with("a rate in words", "bad.csv", head("10.0", "\"ten\""), IDENTIFY, &["bad.csv:2: sample_hz = \"ten\""]),
         with(
             "semicolons",
             "bad.csv",
@@ -123,6 +123,13 @@ pub(super) fn logs() -> Vec<Case> {
             head("thrust_n", "thrust_g"),
             IDENTIFY,
             &["bad.csv:3: column thrust_g", "thrust_n; convert the values"],
+        ),
+        with(
+            "a column in capitals",
+            "bad.csv",
+            head("thrust_n", "Thrust_N"),
+            IDENTIFY,
+            &["bad.csv:3: column Thrust_N: a known column in other letters", "thrust_n"],
         ),
         with(
             "milliamperes",
@@ -177,6 +184,16 @@ pub(super) fn logs() -> Vec<Case> {
             row(70, |row| row[..row.len() - 8].to_owned()),
             IDENTIFY,
             &["bad.csv:74: column voltage_v: the row ends before it"],
+        ),
+        with(
+            "a row cut short in its time",
+            "bad.csv",
+            good_log()
+                .lines()
+                .map(|line| line.strip_prefix("41.9,").map_or(format!("{line}\n"), |_| "41".to_owned()))
+                .collect::<String>(),
+            IDENTIFY,
+            &["bad.csv:423: column pulse_us: the row ends before it (1 field)", "is the file truncated?"],
         ),
         with("a field too many", "bad.csv", row(70, |row| format!("{row},1")), IDENTIFY, &["bad.csv:74: 7 fields"]),
         with(
@@ -233,12 +250,50 @@ pub(super) fn logs() -> Vec<Case> {
             &["bad.csv:4: column t_s: 0.5 does not come after 1"],
         ),
         with(
+            "a pair without its motor",
+            "bad.csv",
+            "motor,propeller,thrust_n,current_a\n,B,9,3\n",
+            "select bad.csv",
+            &["bad.csv:2: column motor: an empty field"],
+        ),
+        with(
+            "a pair that lifts a mountain",
+            "bad.csv",
+            "motor,propeller,thrust_n,current_a\nA,B,1e30,3\n",
+            "select bad.csv",
+            &["bad.csv:2: column thrust_n: '1e30'", "a sensor can read"],
+        ),
+        with(
             "a table of pairs with a word",
             "bad.csv",
             "motor,propeller,thrust_n,current_a\nA,B,x,1\n",
             "select bad.csv",
             &["bad.csv:2: column thrust_n: 'x'"],
         ),
+    ]
+}
+
+/// Keys of the head with values that no rig has: each at its own line.
+pub(super) fn heads() -> Vec<Case> {
+    let case = |name, line: &str, said| {
+        let text = good_log().replacen("# sample_hz", &format!("# motor = \"570KV\"\n{line}\n# sample_hz"), 1);
+        with(name, "bad.csv", text, IDENTIFY, said)
+    };
+    let foreign = good_log().replacen("# quadrig-log 1", "# pole_pairs = 0", 1);
+    vec![
+        case("pole pairs below 0", "# pole_pairs = -7", &["bad.csv:3: pole_pairs = -7; expected a whole number of pole pairs"]),
+        case("no pole pairs", "# pole_pairs = 0", &["bad.csv:3: pole_pairs = 0; ", "take the line out"]),
+        case("many pole pairs", "# pole_pairs = \"many\"", &["bad.csv:3: pole_pairs = \"many\"; "]),
+        case("no blades", "# blades = 0", &["bad.csv:3: blades = 0; ", "from 1 to 12"]),
+        case("a diameter below 0", "# diameter_m = -1", &["bad.csv:3: diameter_m = -1; ", "in m, above 0"]),
+        case("a diameter in mm", "# diameter_m = 280", &["bad.csv:3: diameter_m = 280: ", "millimetres"]),
+        case("air below 0", "# air_density_kg_m3 = -1", &["bad.csv:3: air_density_kg_m3 = -1; ", "such as 1.2"]),
+        case("thin air", "# air_density_kg_m3 = \"thin\"", &["bad.csv:3: air_density_kg_m3 = \"thin\"; ", "kg/m^3"]),
+        case("thick air", "# air_density_kg_m3 = 1e9", &["bad.csv:3: air_density_kg_m3 = 1000000000.0: air of", "vouched"]),
+        case("a propeller in mm", "# propeller = \"280x120\"", &["bad.csv:3: propeller = \"280x120\": ", "millimetres?"]),
+        case("a head in kelvin", "# temp_c = 288", &["bad.csv:3: temp_c = 288; ", "Celsius"]),
+        case("a pressure in pascal", "# pressure_hpa = 101325", &["bad.csv:3: pressure_hpa = 101325; ", "hPa"]),
+        with("an export without pole pairs", "bad.csv", foreign, "import bad.csv -o out.csv", &["bad.csv:1: pole_pairs = 0; "]),
     ]
 }
 
@@ -254,10 +309,24 @@ pub(super) fn impossible() -> Vec<Case> {
     };
     let turned = column(3, &|thrust| format!("{:.4}", -thrust.parse::<f64>().expect("a number")));
     let unseen = column(2, &|_| "0".to_owned());
+    let backwards = column(2, &|rpm| format!("{:.1}", -rpm.parse::<f64>().expect("a number")));
+    let warm = |line: &str| match line.split(',').count() {
+        6 if line.starts_with("t_s") => format!("{line},temp_c\n"),
+        6 => format!("{line},288.15\n"),
+        _ => format!("{line}\n"),
+    };
+    let kelvin: String = good_log().lines().map(warm).collect();
     let holed = rows(|mut rows| {
         rows.drain(200..300);
         rows
     });
+    let unrated = |keep: &dyn Fn(usize) -> bool| {
+        let kept = rows(|rows| rows.into_iter().enumerate().filter(|(n, _)| keep(*n)).map(|(_, row)| row).collect());
+        kept.replacen("# sample_hz = 10.0\n", "", 1)
+    };
+    let foreign = |keep: &dyn Fn(usize) -> bool| {
+        unrated(keep).lines().skip(1).map(|line| line.replacen("t_s", "Time (s)", 1) + "\n").collect::<String>()
+    };
     // an export of another program: rows of an even clock are gone here and there
     let thinned: String = good_log()
         .lines()
@@ -268,6 +337,8 @@ pub(super) fn impossible() -> Vec<Case> {
         .collect();
     vec![
         with("thrust of the other sign", "bad.csv", turned, IDENTIFY, &["bad.csv:3: column thrust_n: ", "the other way round?"]),
+        with("a speed of the other sign", "bad.csv", backwards, IDENTIFY, &["bad.csv:3: column rpm: -", "the sign?"]),
+        with("kelvin", "bad.csv", kelvin, IDENTIFY, &["bad.csv:3: column temp_c: 288.1", "kelvin?"]),
         with("a rotor that no sensor sees", "bad.csv", unseen, IDENTIFY, &["column rpm: 0 rev/min on every sensor", "A"]),
         with(
             "a thrust without measure",
@@ -285,7 +356,7 @@ pub(super) fn impossible() -> Vec<Case> {
             "bad.csv",
             good_log().replacen("sample_hz = 10.0", "sample_hz = 0", 1),
             IDENTIFY,
-            &["bad.csv:1: sample_hz = 0", "above 0"],
+            &["bad.csv:2: sample_hz = 0", "above 0"],
         ),
         with(
             "a hole in the midst",
@@ -299,7 +370,35 @@ pub(super) fn impossible() -> Vec<Case> {
             "bad.csv",
             thinned,
             IDENTIFY,
-            &["bad.csv: t_s: ", "use the whole export"],
+            &["bad.csv:1: column t_s: ", "use the whole export"],
+        ),
+        with(
+            "an export without every fifth row",
+            "bad.csv",
+            foreign(&|n| n % 5 != 3),
+            "import bad.csv -o out.csv",
+            &["bad.csv:1: column t_s: 20 % of the time has no row", "a thinned export", "--map 't_s=COLUMN*1'"],
+        ),
+        with(
+            "an export without a fifth of its rows",
+            "bad.csv",
+            foreign(&|n| n * 7919 % 97 >= 20),
+            "import bad.csv -o out.csv",
+            &["bad.csv:1: column t_s: ", "at uneven places", "use the whole export"],
+        ),
+        with(
+            "a log without every fifth row, and without a rate",
+            "bad.csv",
+            unrated(&|n| n % 5 != 3),
+            IDENTIFY,
+            &["bad.csv:2: column t_s: 20 % of the time has no row", "use the whole log", "# vouched = [\"t_s\"]"],
+        ),
+        with(
+            "a log without a fifth of its rows, and without a rate",
+            "bad.csv",
+            unrated(&|n| n * 7919 % 97 >= 20),
+            "close-loop bad.csv -o out",
+            &["bad.csv:2: column t_s: ", "at uneven places", "use the whole log"],
         ),
     ]
 }

@@ -107,7 +107,7 @@ pub(super) fn find<'t>(file: &str, text: &'t Text, options: &Options, report: &m
         cells.pop();
     }
     let (mut headless, mut data_from) = (false, line + 1);
-    let (meta, events, comment) = comments(&content, line);
+    let (meta, events, comment) = comments(file, &content, line)?;
     if cells.iter().all(|c| matches!(cell(c, POINT), Cell::Number(_))) || cells.iter().all(|c| c.parse::<f64>().is_ok()) {
         data_from = line;
         let width = cells.len();
@@ -168,19 +168,23 @@ fn separated<'t>(content: &'t str, known: &dyn Fn(&[String]) -> usize) -> (Cow<'
     }
 }
 
-/// Metadata, events and the last comment above a line.
-fn comments(content: &str, line: u64) -> (BTreeMap<String, toml::Value>, Vec<String>, Option<String>) {
+/// What the comments above a line tell: metadata, events, and the last of them.
+type Comments = (BTreeMap<String, toml::Value>, Vec<String>, Option<String>);
+
+/// The comments above a line.
+fn comments(file: &str, content: &str, line: u64) -> Result<Comments, ReadError> {
     let (mut meta, mut events, mut last) = (BTreeMap::new(), Vec::new(), None);
-    for text in content.lines().take(line.saturating_sub(1) as usize) {
+    for (n, text) in content.lines().take(line.saturating_sub(1) as usize).enumerate() {
         let Some(comment) = text.strip_prefix('#').map(str::trim) else { continue };
         if let Some(event) = log::event(comment) {
             events.push(event);
         } else if let Ok(table) = comment.parse::<toml::Table>() {
+            log::check_head(&table, &Place { file, line: n + 1 })?;
             meta.extend(table);
         }
         last = Some(comment.to_owned());
     }
-    (meta, events, last)
+    Ok((meta, events, last))
 }
 
 /// The marks of the numbers, from every cell.

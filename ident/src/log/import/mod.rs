@@ -25,7 +25,7 @@ mod unit;
 pub use flight::{flight, flight_from};
 pub use rotor::{is_recording, rotor};
 
-use crate::log::plausible::{VOUCHED, doubts};
+use crate::log::plausible::{VOUCHED, doubts, is_thinned};
 use crate::log::{Log, Place, ReadError};
 use std::fs::File;
 use std::io::Read;
@@ -202,6 +202,8 @@ pub fn import_from(file: &str, source: impl Read, options: &Options) -> Result<(
             "at least two of pulse, rpm, thrust, torque, current, voltage (name them with --map TARGET=SOURCE*FACTOR)",
         ));
     }
+    // a rate that the file states is its word for the clock
+    log.meta.extend(layout.meta.get_key_value("sample_hz").map(|(key, rate)| (key.clone(), rate.clone())));
     let vouched = judge(&place, &log, &mapped, &mut report)?;
     let row = log.time_is_row();
     log.meta.extend(layout.meta.into_iter().filter(|(key, _)| key != "time" || row));
@@ -219,6 +221,9 @@ fn judge(place: &Place<'_>, log: &Log, mapped: &[String], report: &mut Report) -
     for doubt in doubts(log) {
         if doubt.never && !mapped.iter().any(|m| m == doubt.column) {
             let expected = match doubt.column {
+                "t_s" if is_thinned(log) => {
+                    "a row at every tick: use the whole export; --map 't_s=COLUMN*1' keeps what is left as it is".to_owned()
+                }
                 "t_s" => "seconds: --map 't_s=COLUMN*0.001' reads milliseconds, *0.000001 microseconds, and *1 keeps it as it is"
                     .to_owned(),
                 column => format!("what a rig can do; --map {column}=COLUMN*FACTOR converts it, and *1 keeps it as it is"),

@@ -15,6 +15,9 @@ use std::io::BufRead;
 /// The header of a table of pairs.
 const HEADER: [&str; 4] = ["motor", "propeller", "thrust_n", "current_a"];
 
+/// Least and largest thrust, N, and current, A, of a pair: a meter's last digit, and a hundred motors that carry a person.
+const READ: [f64; 2] = [1e-3, 1e5];
+
 /// The figures that the thesis states.
 ///
 /// # Panics
@@ -75,6 +78,9 @@ fn pair(cells: &[&str], file: &str, place: &Place<'_>, known: &[Pair], places: &
     let [motor, propeller, thrust, current] = *cells else {
         return Err(place.refuse(None, format!("{} fields", cells.len()), "4 as in the header"));
     };
+    if let Some((column, _)) = HEADER.iter().zip([motor, propeller]).find(|(_, name)| name.is_empty()) {
+        return Err(place.refuse(Some(column), "an empty field", "a name: the choice names each pair"));
+    }
     let same = known.iter().zip(places).find(|(p, _)| p.motor == motor && p.propeller == propeller);
     if let Some((_, line)) = same {
         let found = format!("'{motor}' with '{propeller}' stands on line {line}, too");
@@ -95,7 +101,12 @@ fn maximum(thrust: &str, current: &str, place: &Place<'_>) -> Result<Option<Maxi
         return Ok(None);
     }
     let positive = |text: &str, column: &str| match text.parse::<f64>() {
-        Ok(v) if v.is_finite() && v > 0.0 => Ok(v),
+        Ok(v) if (READ[0]..=READ[1]).contains(&v) => Ok(v),
+        Ok(v) if v > 0.0 => Err(place.refuse(
+            Some(column),
+            format!("'{}'", short(text)),
+            format!("a number that a sensor can read ({} to {}), in the unit of the column's name", READ[0], READ[1]),
+        )),
         _ => Err(place.refuse(
             Some(column),
             format!("'{}'", short(text)),
@@ -217,6 +228,11 @@ mod tests {
             (format!("{head}m,p,1\n"), "p.csv:2: 3 fields"),
             (format!("{head}m,p,1,\n"), "p.csv:2: column current_a: ''; expected a positive number"),
             (format!("{head}m,p,-1,2\n"), "p.csv:2: column thrust_n: '-1'"),
+            (format!("{head}m,p,1e16,2\n"), "p.csv:2: column thrust_n: '1e16'; expected a number that a sensor can read"),
+            (format!("{head}m,p,1,1e30\n"), "p.csv:2: column current_a: '1e30'; expected a number that a sensor can read"),
+            (format!("{head}m,p,1,1e-300\n"), "p.csv:2: column current_a: '1e-300'; expected a number that a sensor can read"),
+            (format!("{head},p,9,3\n"), "p.csv:2: column motor: an empty field; expected a name"),
+            (format!("{head}m,,9,3\n"), "p.csv:2: column propeller: an empty field; expected a name"),
         ] {
             let message = read_table("p.csv", text.as_bytes()).unwrap_err().to_string();
             assert!(message.contains(wanted), "{message:?} lacks {wanted:?}");
