@@ -49,7 +49,8 @@ fn first(n: u32, active: u32) -> bool {
         let recorded = std::env::var_os("MUTANTS_REACHED");
         let active = std::env::var("MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0);
         if let Some(file) = recorded {
-            let file = OpenOptions::new().create(true).append(true).open(file).expect("MUTANTS_REACHED: a file that can be written");
+            let file =
+                OpenOptions::new().create(true).append(true).open(file).expect("MUTANTS_REACHED: a file that can be written");
             let _ = FILE.set(file);
             ACTIVE.store(RECORDS, Relaxed);
         } else {

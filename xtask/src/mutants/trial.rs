@@ -19,10 +19,17 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Shortest time after which a test counts as never ended.
+/// Shortest time after which a test counts as never ended, of the processor where the system counts it: others may be at work, too.
 const LEAST: Duration = Duration::from_secs(3);
 /// A test that takes so many times what it took never ends.
 const TIMES: u32 = 5;
+/// Longest that a test may take before anything is broken.
+const FIRST: Duration = Duration::from_secs(3600);
+/// So much longer on the clock: it waits for ever.
+const WAITS: u32 = if cfg!(unix) { 8 } else { 1 };
+/// What ends a program that has had its time of the processor.
+#[cfg(unix)]
+const SIGXCPU: i32 = 24;
 /// No test of ours needs a quarter of it, kB: a mutant that asks for ever more fails before the machine does.
 const MEMORY_KB: &str = "8000000";
 
@@ -58,7 +65,7 @@ impl<'p> Trial<'p> {
         let run = |(n, program, name): &(usize, &'p Program, String)| -> Result<(Duration, Vec<u32>), Failure> {
             let file = folder.join(n.to_string());
             let start = Instant::now();
-            let status = test(program, name).env("MUTANTS_REACHED", &file).status()?;
+            let status = test(program, name, FIRST).env("MUTANTS_REACHED", &file).status()?;
             if !status.success() {
                 return Err(Failure(format!("{name} of {} fails before anything is broken", program.path.display())));
             }
@@ -89,8 +96,9 @@ impl<'p> Trial<'p> {
     /// What becomes of a mutant.
     pub(super) fn fate(&self, id: u32) -> Result<Fate, Failure> {
         for test in self.reach.get(&id).into_iter().flatten().filter_map(|n| self.tests.get(*n)) {
-            let child = self::test(test.program, &test.name).env("MUTANT", id.to_string()).spawn()?;
-            match ended(child, LEAST.max(test.took * TIMES))? {
+            let longest = LEAST.max(test.took * TIMES);
+            let child = self::test(test.program, &test.name, longest).env("MUTANT", id.to_string()).spawn()?;
+            match ended(child, longest * WAITS)? {
                 None => return Ok(Fate::TimeOut),
                 Some(status) if !status.success() => return Ok(Fate::Caught),
                 Some(_) => {}
@@ -107,11 +115,12 @@ fn list(program: &Program) -> Result<Vec<String>, Failure> {
     Ok(text.lines().filter_map(|line| line.strip_suffix(": test")).map(str::to_owned).collect())
 }
 
-/// One test, alone; what it would draw anew is not kept for the next.
-fn test(program: &Program, name: &str) -> Command {
+/// One test, alone, that may use the processor for so long; what it draws is not kept for the next.
+fn test(program: &Program, name: &str, longest: Duration) -> Command {
     let mut command = if cfg!(unix) {
         let mut shell = Command::new("sh");
-        shell.args(["-c", "ulimit -v $0; exec \"$@\"", MEMORY_KB]).arg(&program.path);
+        let limits = format!("ulimit -v {MEMORY_KB}; ulimit -t {}; exec \"$0\" \"$@\"", longest.as_secs().max(1));
+        shell.args(["-c", &limits]).arg(&program.path);
         shell
     } else {
         Command::new(&program.path)
@@ -127,7 +136,7 @@ fn ended(mut child: Child, longest: Duration) -> Result<Option<ExitStatus>, Fail
     let start = Instant::now();
     loop {
         if let Some(status) = child.try_wait()? {
-            return Ok(Some(status));
+            return Ok(Some(status).filter(|status| !had_its_time(*status)));
         }
         let passed = start.elapsed();
         if passed > longest {
@@ -139,6 +148,18 @@ fn ended(mut child: Child, longest: Duration) -> Result<Option<ExitStatus>, Fail
     }
 }
 
+/// Whether the system ended a program because it had its time of the processor.
+#[cfg(unix)]
+fn had_its_time(status: ExitStatus) -> bool {
+    use std::os::unix::process::ExitStatusExt as _;
+    status.signal() == Some(SIGXCPU)
+}
+
+#[cfg(not(unix))]
+fn had_its_time(_: ExitStatus) -> bool {
+    false
+}
+
 #[cfg(test)]
 #[cfg(unix)]
 mod tests {
@@ -146,6 +167,8 @@ mod tests {
 
     #[test]
     fn what_never_ends_is_ended() {
+        let busy = Command::new("sh").args(["-c", "ulimit -t 1; while :; do :; done"]).spawn().unwrap();
+        assert_eq!(ended(busy, Duration::from_secs(600)).unwrap(), None);
         let child = |seconds: &str| Command::new("sleep").arg(seconds).spawn().unwrap();
         assert_eq!(ended(child("60"), Duration::from_millis(20)).unwrap(), None);
         assert!(ended(child("0"), Duration::from_secs(60)).unwrap().is_some_and(|status| status.success()));
