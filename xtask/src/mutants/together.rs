@@ -215,3 +215,56 @@ fn collect<'v>(message: &'v Value, spans: &mut Vec<&'v Value>) {
         collect(child, spans);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    /// Whom an error of this code is blamed on whose spans begin at these texts of the copy.
+    fn blamed(code: &str, returns: &str, spans: &[(&str, bool)]) -> BTreeMap<u32, Out> {
+        let plain = "fn f() { a - b }".to_owned();
+        let mutant = |genre, span, replacement: &str| Mutant {
+            name: String::new(),
+            file: "f.rs".to_owned(),
+            span,
+            replacement: replacement.to_owned(),
+            genre,
+            returns: returns.to_owned(),
+        };
+        let mutants = [
+            mutant(Genre::BinaryOperator, ((1, 12), (1, 13)), "+"),
+            mutant(Genre::BinaryOperator, ((1, 12), (1, 13)), "/"),
+            mutant(Genre::FnValue, ((1, 10), (1, 15)), "0"),
+        ];
+        let sites = Sites::of(&plain).unwrap();
+        let by_id: BTreeMap<u32, &Mutant> = (1..).zip(&mutants).collect();
+        let changes: BTreeMap<u32, Change> =
+            by_id.iter().map(|(id, mutant)| (*id, change(&plain, &sites, *id, mutant).unwrap())).collect();
+        let now = Rewritten::of(&plain, &changes.iter().map(|(id, change)| (*id, change)).collect::<Vec<_>>());
+        let span = |(text, primary): &(&str, bool)| {
+            let at = now.text.find(text).unwrap();
+            json!({"file_name": "f.rs", "byte_start": at, "is_primary": primary, "expansion": null})
+        };
+        let error = json!({"code": {"code": code}, "spans": spans.iter().map(span).collect::<Vec<_>>(), "children": []});
+        let sources = BTreeMap::from([("f.rs".to_owned(), Source { plain, changes, now })]);
+        let mut refused = BTreeMap::new();
+        blame(&error, &sources, &by_id, &mut refused);
+        refused
+    }
+
+    #[test]
+    fn an_error_is_blamed_on_the_mutant_whose_text_it_is_in() {
+        assert_eq!(blamed("E0369", "", &[("a / b", true)]), BTreeMap::from([(2, Out::NoProgram)]));
+        assert_eq!(blamed("E0505", "", &[("a / b", true)]), BTreeMap::from([(2, Out::NoSwitch)]));
+        assert_eq!(blamed("E0308", "-> u8", &[("return 0", true)]), BTreeMap::from([(3, Out::NoProgram)]));
+        assert_eq!(blamed("E0308", "-> impl Fn()", &[("return 0", true)]), BTreeMap::from([(3, Out::NoSwitch)]));
+    }
+
+    #[test]
+    fn an_error_beside_the_mutants_is_blamed_on_what_it_speaks_of_or_on_the_switch() {
+        assert_eq!(blamed("E0308", "", &[("a - b", true), ("a + b", false)]), BTreeMap::from([(1, Out::NoSwitch)]));
+        assert_eq!(blamed("E0282", "", &[("a - b", true)]), BTreeMap::from([(1, Out::NoSwitch), (2, Out::NoSwitch)]));
+        assert!(blamed("E0282", "", &[("fn f", true)]).is_empty());
+    }
+}
