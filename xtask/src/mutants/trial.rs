@@ -19,14 +19,16 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Shortest time after which a test counts as never ended, of the processor where the system counts it: others may be at work, too.
-const LEAST: Duration = Duration::from_secs(3);
+/// Shortest time after which a test counts as never ended: of the processor where the system counts it, for others may be at work, too.
+const LEAST: Duration = Duration::from_secs(2);
 /// A test that takes so many times what it took never ends.
 const TIMES: u32 = 5;
 /// Longest that a test may take before anything is broken.
 const FIRST: Duration = Duration::from_secs(3600);
 /// So much longer on the clock: it waits for ever.
-const WAITS: u32 = if cfg!(unix) { 8 } else { 1 };
+const WAITS: u32 = if cfg!(unix) { 60 } else { 1 };
+/// What the shell does with a program: where a file is named for it, what of the processor was used is written there.
+const RUN: &str = r#"[ "$MUTANTS_TIMES" ] || exec "$0" "$@"; "$0" "$@"; ended=$?; times > "$MUTANTS_TIMES"; exit $ended"#;
 /// What ends a program that has had its time of the processor.
 #[cfg(unix)]
 const SIGXCPU: i32 = 24;
@@ -64,13 +66,15 @@ impl<'p> Trial<'p> {
             names.into_iter().enumerate().map(|(n, (program, name))| (n, program, name)).collect();
         let run = |(n, program, name): &(usize, &'p Program, String)| -> Result<(Duration, Vec<u32>), Failure> {
             let file = folder.join(n.to_string());
+            let times = file.with_extension("times");
             let start = Instant::now();
-            let status = test(program, name, FIRST).env("MUTANTS_REACHED", &file).status()?;
+            let status = test(program, name, FIRST).env("MUTANTS_REACHED", &file).env("MUTANTS_TIMES", &times).status()?;
             if !status.success() {
                 return Err(Failure(format!("{name} of {} fails before anything is broken", program.path.display())));
             }
             let reached = fs::read_to_string(&file).unwrap_or_default();
-            Ok((start.elapsed(), reached.lines().filter_map(|line| line.parse().ok()).collect()))
+            let took = fs::read_to_string(times).ok().and_then(|times| processor(&times)).unwrap_or_else(|| start.elapsed());
+            Ok((took, reached.lines().filter_map(|line| line.parse().ok()).collect()))
         };
         let mut ran = Vec::new();
         side_by_side(&files, cores(), run, |(_, program, name), done| {
@@ -119,8 +123,8 @@ fn list(program: &Program) -> Result<Vec<String>, Failure> {
 fn test(program: &Program, name: &str, longest: Duration) -> Command {
     let mut command = if cfg!(unix) {
         let mut shell = Command::new("sh");
-        let limits = format!("ulimit -v {MEMORY_KB}; ulimit -t {}; exec \"$0\" \"$@\"", longest.as_secs().max(1));
-        shell.args(["-c", &limits]).arg(&program.path);
+        let limits = format!("ulimit -v {MEMORY_KB}; ulimit -t {}; ", longest.as_secs().max(1));
+        shell.args(["-c", &(limits + RUN)]).arg(&program.path);
         shell
     } else {
         Command::new(&program.path)
@@ -148,6 +152,15 @@ fn ended(mut child: Child, longest: Duration) -> Result<Option<ExitStatus>, Fail
     }
 }
 
+/// What the shell's `times` says of the processes below it: time of the processor, of the program and of the system.
+fn processor(times: &str) -> Option<Duration> {
+    let seconds = times.lines().nth(1)?.split_whitespace().map(|time| {
+        let (minutes, seconds) = time.strip_suffix('s')?.split_once('m')?;
+        Some(60.0 * minutes.parse::<f64>().ok()? + seconds.parse::<f64>().ok()?)
+    });
+    Duration::try_from_secs_f64(seconds.sum::<Option<f64>>()?).ok()
+}
+
 /// Whether the system ended a program because it had its time of the processor.
 #[cfg(unix)]
 fn had_its_time(status: ExitStatus) -> bool {
@@ -164,6 +177,16 @@ fn had_its_time(_: ExitStatus) -> bool {
 #[cfg(unix)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_shell_tells_what_of_the_processor_was_used() {
+        assert_eq!(processor("0m0.004s 0m0.000s\n1m2.500s 0m0.250s\n"), Some(Duration::from_millis(62_750)));
+        assert_eq!((processor(""), processor("a\nb c")), (None, None));
+        let file = std::env::temp_dir().join(format!("mutants-times-{}", std::process::id()));
+        let status = Command::new("sh").args(["-c", RUN, "false"]).env("MUTANTS_TIMES", &file).status().unwrap();
+        assert!(!status.success() && processor(&fs::read_to_string(&file).unwrap()).is_some());
+        fs::remove_file(file).unwrap();
+    }
 
     #[test]
     fn what_never_ends_is_ended() {
