@@ -123,7 +123,7 @@ fn list(program: &Program) -> Result<Vec<String>, Failure> {
 fn test(program: &Program, name: &str, longest: Duration) -> Command {
     let mut command = if cfg!(unix) {
         let mut shell = Command::new("sh");
-        let limits = format!("ulimit -v {MEMORY_KB}; ulimit -t {}; ", longest.as_secs().max(1));
+        let limits = format!("ulimit -v {MEMORY_KB}; ulimit -S -t {}; ", longest.as_secs().max(1));
         shell.args(["-c", &(limits + RUN)]).arg(&program.path);
         shell
     } else {
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn what_never_ends_is_ended() {
-        let busy = Command::new("sh").args(["-c", "ulimit -t 1; while :; do :; done"]).spawn().unwrap();
+        let busy = Command::new("sh").args(["-c", "ulimit -S -t 1; while :; do :; done"]).spawn().unwrap();
         assert_eq!(ended(busy, Duration::from_secs(600)).unwrap(), None);
         let child = |seconds: &str| Command::new("sleep").arg(seconds).spawn().unwrap();
         assert_eq!(ended(child("60"), Duration::from_millis(20)).unwrap(), None);
