@@ -68,6 +68,9 @@ pub(super) fn change(text: &str, sites: &Sites, id: u32, mutant: &Mutant) -> Res
     Ok(Change { range, text: changed, constant })
 }
 
+/// What a switch stands around, and all that hang on it.
+type Group<'c> = (Range<usize>, Vec<(u32, &'c Change)>);
+
 /// A text with switches, and which mutants stand where.
 #[derive(Debug, Default)]
 pub(super) struct Rewritten {
@@ -81,7 +84,7 @@ pub(super) struct Rewritten {
 impl Rewritten {
     /// `text` with all the changes.
     pub(super) fn of(text: &str, changes: &[(u32, &Change)]) -> Self {
-        let mut groups: Vec<(Range<usize>, Vec<(u32, &Change)>)> = Vec::new();
+        let mut groups: Vec<Group<'_>> = Vec::new();
         let mut sorted = changes.to_vec();
         // what is put in stands before what begins there, and the outer before the inner
         sorted.sort_by_key(|(id, change)| (change.range.start, !change.range.is_empty(), usize::MAX - change.range.end, *id));
@@ -98,7 +101,7 @@ impl Rewritten {
     }
 
     /// Writes a stretch of the text with the switches that lie in it.
-    fn put(&mut self, text: &str, range: Range<usize>, groups: &mut &[(Range<usize>, Vec<(u32, &Change)>)]) {
+    fn put(&mut self, text: &str, range: Range<usize>, groups: &mut &[Group<'_>]) {
         let mut at = range.start;
         while let Some(((inner, members), others)) = groups.split_first()
             && inner.start <= range.end
