@@ -39,6 +39,17 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    #[test]
+    fn it_is_the_division_where_a_millisecond_begins() {
+        for per_ms in [1, 2, 3, 84_000] {
+            let edges = (0..4).flat_map(|n| (n * u64::from(per_ms)).saturating_sub(1)..=n * u64::from(per_ms) + 1);
+            for ahead in edges {
+                let mut elapsed = Elapsed::since(Ticks(7));
+                assert_eq!(elapsed.ms(Ticks(7 + ahead), per_ms), ahead / u64::from(per_ms), "{ahead} of {per_ms}");
+            }
+        }
+    }
+
     proptest! {
         /// However often it is asked: the whole milliseconds of the time that has passed.
         #[test]

@@ -108,6 +108,7 @@ mod tests {
     #[test]
     fn verdicts() {
         assert_eq!(block(&[]).verdict(4095, true), AdcVerdict::Missing);
+        assert_eq!((block(&[]).mean(), block(&[2, 4]).mean()), (None, Some(3.0)));
         assert_eq!(block(&[0, 0]).verdict(4095, true), AdcVerdict::Open);
         assert_eq!(block(&[0, 1]).verdict(4095, true), AdcVerdict::Saturated);
         assert_eq!(block(&[0, 0]).verdict(4095, false), AdcVerdict::Nominal, "an unpowered supply reads zero");

@@ -190,6 +190,31 @@ fn a_meter_that_is_silent_or_counts_wrong_is_told_and_the_run_goes_on() {
     }
 }
 
+/// A meter may be off by what the sensors may, and a sample alone says nothing.
+#[test]
+fn a_meter_that_is_a_little_off_or_once_is_no_disagreement() {
+    let disagrees = |samples: &[RigSample]| {
+        let verdicts = samples.iter().map(|sample| sample.back_emf.expect("fitted").verdict);
+        verdicts.filter(|verdict| *verdict == CaptureVerdict::Disagrees).count()
+    };
+    for (off, told) in [(1.005, false), (1.02, true)] {
+        let mut desk = Desk::new(fitted(), ALL).running(4_000.0);
+        desk.wires.meter *= off;
+        desk.samples.clear();
+        desk.run(1_000);
+        assert_eq!(disagrees(&desk.samples) > 5, told, "{off}");
+    }
+    let mut desk = Desk::new(fitted(), ALL).running(4_000.0);
+    let period = desk.rig.config().log_period().as_ms();
+    desk.run(period - desk.ms % period);
+    desk.samples.clear();
+    desk.wires.meter *= 1.05;
+    desk.run(period);
+    desk.wires.meter /= 1.05;
+    desk.run(1_000);
+    assert_eq!(disagrees(&desk.samples), 0, "one sample is off");
+}
+
 /// Where no speed sensor is fitted the meter is the only one that sees a rotor that races; where one is, its word stops nothing.
 #[test]
 fn overspeed_is_judged_by_the_meter_where_nothing_else_sees_the_rotor() {

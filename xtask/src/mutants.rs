@@ -1,8 +1,8 @@
 //! `cargo xtask mutants`: the code broken in every small way, and the tests that notice.
 //!
-//! What it is: cargo-mutants over the packages of `budgets/mutants.toml`, in a copy of the sources. Each mutant meets the quick tests of its
-//! file first; what is left meets all tests of its package, then those of the packages that are named beside it. `docs/mutants.md` is
-//! written from what came of it.
+//! What it is: the mutants that cargo-mutants lists for the packages of `budgets/mutants.toml`, all of a package in one program in a copy of
+//! the sources. One is switched on at a time, and meets the tests that reach it. What no switch can express is broken one by one.
+//! `docs/mutants.md` is written from what came of it.
 //!
 //! What can go wrong: a mutant that no test notices and that the list does not accept; an accepted one that is caught after all, or that is
 //! gone; tests that fail before anything is broken: each is named, and the end is a failure.
@@ -12,8 +12,13 @@
 //! Reference: <https://mutants.rs>; `budgets/mutants.toml`.
 
 mod bench;
+mod listed;
 mod page;
 mod results;
+mod rewrite;
+mod sites;
+mod together;
+mod trial;
 
 use bench::Bench;
 use page::{count, left, stale, tell};
@@ -49,6 +54,8 @@ struct Package {
     name: String,
     /// Beginnings of paths below its folder that are left out.
     without: Vec<String>,
+    /// Beginnings of the paths that alone are broken; none: all.
+    only: Vec<String>,
     /// Integration tests that a file meets first, where their name is not the file's.
     first: BTreeMap<String, Vec<String>>,
     /// Tests that take too long to be run for each mutant.
@@ -221,6 +228,7 @@ fn read(place: &Place) -> Result<(Vec<Package>, Vec<Accepted>), Failure> {
         packages.push(Package {
             name: word(&row, "name")?,
             without: list("without"),
+            only: list("only"),
             first,
             skip: list("skip"),
             beside: list("beside"),
@@ -240,6 +248,13 @@ impl Package {
     fn all_tests(&self) -> Vec<&str> {
         let skip = self.skip.iter().flat_map(|test| ["--skip", test.as_str()]);
         ["--lib", "--tests", "--"].into_iter().chain(skip).collect()
+    }
+
+    /// Whether a file of this package is broken.
+    fn breaks(&self, file: &str) -> bool {
+        let below = file.strip_prefix(self.name.as_str()).and_then(|below| below.strip_prefix('/'));
+        let among = |list: &[String]| below.is_some_and(|below| list.iter().any(|start| below.starts_with(start.as_str())));
+        below.is_some() && !among(&self.without) && (self.only.is_empty() || among(&self.only))
     }
 
     /// Whether `place` is this package, or a file of it.
@@ -286,7 +301,7 @@ mod tests {
         let (place, packages, _) = whole();
         for package in &packages {
             let exists = |below: &str| place.root.join(&package.name).join(below).exists();
-            assert!(package.without.iter().all(|path| exists(path)), "{package:?}");
+            assert!(package.without.iter().chain(&package.only).all(|path| exists(path)), "{package:?}");
             assert!(package.first.keys().all(|file| exists(file)), "{package:?}");
             let tests = package.first.values().flatten();
             assert!(tests.into_iter().all(|test| exists(&format!("tests/{test}.rs"))), "{package:?}");

@@ -1,14 +1,19 @@
 //! Where mutants are made and meet their tests.
 //!
-//! What it is: cargo-mutants in a copy of the sources, one file after the other: its quick tests, all tests of its package, those beside it.
+//! What it is: all mutants of a package in one program, each switched on for the tests that reach it. What no switch can express is broken one
+//! by one by cargo-mutants itself: the quick tests of its file, all tests of its package, those beside it.
 //! What can go wrong: tests that fail before anything is broken; a mutant of which the tool says nothing. Both end it.
 //! Units: s.
 //! Reference: <https://mutants.rs>.
 
+use super::listed::{self, Mutant};
 use super::results::Results;
+use super::together::{Out, SWITCH_CRATE, Together};
+use super::trial::Trial;
 use super::{Asked, Fate, Fates, PROFILE, Package, QUICK_S, WHOLE_S, missed, words};
+use crate::folder;
 use crate::place::Place;
-use crate::run::{Failure, cargo, output, run, said};
+use crate::run::{Failure, cargo, cores, output, run, said, side_by_side};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,6 +33,7 @@ impl Bench<'_> {
     fn tool(&self, words: &[&str]) -> Command {
         let mut command = Command::new(&self.tool);
         command.arg("mutants").args(words).current_dir(&self.copy.root).env("CARGO_TARGET_DIR", &self.copy.target);
+        command.env("RUSTC_BOOTSTRAP", SWITCH_CRATE); // as where all are in one program: what is below both is built once
         command
     }
 
@@ -60,67 +66,135 @@ impl Bench<'_> {
         let start = Instant::now();
         let known = if difference.is_none() { self.results.known(&self.copy.root, package)? } else { Fates::new() };
         let whole = asked.places.is_empty() || asked.places.contains(&package.name.as_str());
-        let mut list = self.tool(&["--list", "-p", &package.name]);
-        if let Some((diff, _)) = difference {
-            list.arg("--in-diff").arg(diff);
-        }
-        let prefix = format!("{}/", package.name);
-        let mut files: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
         let mut fates = Fates::new();
-        for name in output(&mut list)?.lines() {
-            let file = name.split(':').next().unwrap_or_default();
-            let Some(below) = file.strip_prefix(&prefix) else { continue };
-            if package.without.iter().any(|start| below.starts_with(start.as_str())) {
-                continue;
-            }
-            let fate = known.get(name).copied().unwrap_or(Fate::Untried);
-            let wanted = whole || asked.places.contains(&file);
-            if wanted && (!asked.again || matches!(fate, Fate::Missed | Fate::Untried)) {
-                files.entry(below.to_owned()).or_default().insert(name.to_owned());
-                fates.insert(name.to_owned(), Fate::Untried);
-            } else {
-                fates.insert(name.to_owned(), fate);
+        let mut wanted = Vec::new();
+        for mutant in self.list(package, difference.map(|(diff, _)| diff))? {
+            let fate = known.get(&mutant.name).copied().unwrap_or(Fate::Untried);
+            let chosen = whole || asked.places.contains(&mutant.file.as_str());
+            let again = !asked.again || matches!(fate, Fate::Missed | Fate::Untried);
+            fates.insert(mutant.name.clone(), if chosen && again { Fate::Untried } else { fate });
+            if chosen && again {
+                wanted.push(mutant);
             }
         }
-        let all: usize = files.values().map(BTreeSet::len).sum();
-        println!("{}: {all} mutants in {} files", package.name, files.len());
-        if all == 0 {
+        println!("{}: {} mutants", package.name, wanted.len());
+        if wanted.is_empty() {
             return Ok(fates);
         }
-        run(&mut self.tests(package)).map_err(|error| Failure(format!("{error} before anything was broken")))?;
+        let mut keep = |came: Fates| {
+            fates.extend(came);
+            // whoever ends this goes on with --again
+            if difference.is_none() { self.results.keep(&self.copy.root, package, &fates) } else { Ok(()) }
+        };
+        let alone = self.together(package, &wanted, &mut keep)?;
+        self.alone(package, &alone, difference.map(|(_, until)| until), &mut keep)?;
+        println!("{}: {:.0} s", package.name, start.elapsed().as_secs_f64());
+        Ok(fates)
+    }
+
+    /// The mutants of a package as the tool lists them, of a difference those of its lines.
+    fn list(&self, package: &Package, difference: Option<&Path>) -> Result<Vec<Mutant>, Failure> {
+        let mut list = self.tool(&["--list", "--json", "-p", &package.name]);
+        if let Some(diff) = difference {
+            list.arg("--in-diff").arg(diff);
+        }
+        let mut mutants = listed::read(&output(&mut list)?)?;
+        mutants.retain(|mutant| package.breaks(&mutant.file));
+        Ok(mutants)
+    }
+
+    /// What becomes of the mutants that fit into one program; the others come back.
+    fn together<'m>(
+        &self,
+        package: &Package,
+        wanted: &'m [Mutant],
+        keep: &mut impl FnMut(Fates) -> Result<(), Failure>,
+    ) -> Result<Vec<&'m Mutant>, Failure> {
+        let start = Instant::now();
+        let numbered: Vec<(u32, &Mutant)> = (1..).zip(wanted).collect();
+        let copy = folder::sources(self.place, "target/mutation/switched")?;
+        let copy = Place { root: copy.root, target: self.copy.target.clone() };
+        let whole = Together::build(&copy, package, &numbered)?;
+        let of = |asked: Out| whole.out.values().filter(|out| **out == asked).count();
+        let (none, alone) = (of(Out::NoProgram), of(Out::NoSwitch));
+        println!(
+            "  {} in one program, {none} are none, {alone} alone, {:.0} s",
+            wanted.len() - none - alone,
+            start.elapsed().as_secs_f64()
+        );
+        let trial = Trial::record(&whole.programs, package, &self.place.root.join("target/mutation/reached"))?;
+        println!("  {}", trial.words());
+        let mut files: BTreeMap<&str, Vec<(u32, &Mutant)>> = BTreeMap::new();
+        numbered.iter().for_each(|(id, mutant)| files.entry(&mutant.file).or_default().push((*id, mutant)));
+        let mut left = Vec::new();
+        for (file, mutants) in files {
+            let mut came = Fates::new();
+            let fate = |(id, _): &(u32, &Mutant)| match whole.out.get(id) {
+                Some(Out::NoProgram) => Ok(Fate::Unviable),
+                Some(Out::NoSwitch) => Ok(Fate::Untried),
+                None => trial.fate(*id),
+            };
+            side_by_side(&mutants, cores(), fate, |(id, mutant), fate| {
+                let mut fate = fate?;
+                if fate == Fate::Missed && whole.constant.contains(id) {
+                    fate = Fate::Untried; // the compiler ran the function as it was
+                }
+                if fate == Fate::Untried {
+                    left.push(*mutant);
+                }
+                came.insert(mutant.name.clone(), fate);
+                Ok(())
+            })?;
+            told(file, &came, start);
+            keep(came)?;
+        }
+        Ok(left)
+    }
+
+    /// What becomes of mutants one by one.
+    fn alone(
+        &self,
+        package: &Package,
+        mutants: &[&Mutant],
+        until: Option<Instant>,
+        keep: &mut impl FnMut(Fates) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let start = Instant::now();
+        let mut files: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
+        for mutant in mutants {
+            files.entry(&mutant.file).or_default().insert(mutant.name.clone());
+        }
+        if !files.is_empty() {
+            println!("  {} one by one", mutants.len());
+            run(&mut self.tests(package))?;
+        }
         for (file, names) in files {
-            if difference.is_some_and(|(_, until)| Instant::now() > until) {
-                return Err(Failure(format!(
-                    "{prefix}{file}: its mutants, and what comes after, have no time left: name packages"
-                )));
+            if until.is_some_and(|until| Instant::now() > until) {
+                return Err(Failure(format!("{file}: its mutants, and what comes after, have no time left: name packages")));
             }
-            let quick: Vec<String> = self.quick(package, &file);
+            let below = file.strip_prefix(&format!("{}/", package.name)).unwrap_or(file);
+            let quick: Vec<String> = self.quick(package, below);
             let quick: Vec<&str> = quick.iter().map(String::as_str).collect();
-            let mut came = self.turn(package, &file, &names, &[], &quick, QUICK_S)?;
+            let mut came = self.turn(package, below, &names, &[], &quick, QUICK_S)?;
             let mut stages = vec![(package.name.as_str(), WHOLE_S)];
             stages.extend(package.beside.iter().map(|beside| (beside.as_str(), WHOLE_S)));
             for (tests, seconds) in stages {
                 let alive: BTreeSet<String> = missed(&came).map(str::to_owned).collect();
                 if !alive.is_empty() {
-                    came.extend(self.turn(package, &file, &alive, &["--test-package", tests], &package.all_tests(), seconds)?);
+                    came.extend(self.turn(package, below, &alive, &["--test-package", tests], &package.all_tests(), seconds)?);
                 }
             }
-            println!("  {file}: {}, {:.0} s", words(&came), start.elapsed().as_secs_f64());
-            for name in missed(&came) {
-                println!("    missed {name}");
-            }
-            fates.extend(came);
-            if difference.is_none() {
-                self.results.keep(&self.copy.root, package, &fates)?; // whoever ends this goes on with --again
-            }
+            told(file, &came, start);
+            keep(came)?;
         }
-        Ok(fates)
+        Ok(())
     }
 
-    /// `cargo test` of a package as the mutants will meet it.
+    /// The tests of a package, built before the first mutant is timed.
     fn tests(&self, package: &Package) -> Command {
-        let mut command = cargo(&self.copy, &["test", "--quiet", "--profile", PROFILE, "-p", &package.name]);
-        command.args(package.all_tests()).env("CARGO_TARGET_DIR", &self.copy.target).stdout(Stdio::null());
+        let mut command =
+            cargo(&self.copy, &["test", "--quiet", "--no-run", "--profile", PROFILE, "--lib", "--tests", "-p", &package.name]);
+        command.env("CARGO_TARGET_DIR", &self.copy.target).env("RUSTC_BOOTSTRAP", SWITCH_CRATE).stdout(Stdio::null());
         command
     }
 
@@ -167,6 +241,14 @@ impl Bench<'_> {
             Some(name) => Err(Failure(format!("{name}: cargo-mutants says nothing of it: {}", text.trim()))),
             None => Ok(came),
         }
+    }
+}
+
+/// Says what came of a file.
+fn told(file: &str, came: &Fates, start: Instant) {
+    println!("  {file}: {}, {:.0} s", words(came), start.elapsed().as_secs_f64());
+    for name in missed(came) {
+        println!("    missed {name}");
     }
 }
 

@@ -103,7 +103,9 @@ pub(super) fn page(rows: &[String], accepted: &[Accepted]) -> String {
         "# Broken on purpose: do the tests notice?\n\n\
          `cargo xtask mutants` breaks the code in every small way that cargo-mutants knows: a sign, a comparison, a function's result.\n\
          Each broken program is a mutant. It is caught when a test fails, and missed when all pass.\n\
-         Its own quick tests come first, then all tests of its package. This page is written by that command from `budgets/mutants.toml`.\n\n\
+         All mutants of a package are in one program, each behind a switch; one is switched on at a time and meets the tests that reach it, the\n\
+         fastest first. What no switch can express, a constant for instance, is broken and built by itself.\n\
+         This page is written by that command from `budgets/mutants.toml`.\n\n\
          - *Viable*: mutants that compile and do something else than the code.\n\
          - *Never ended*: the tests hang; that is noticed, too, and counts as caught.\n\
          - *Equivalent*: the mutant does what the code does. No test can tell, so it is left out of the share.\n\
