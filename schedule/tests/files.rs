@@ -19,7 +19,7 @@ fn what_is_wrong_is_named_with_its_place() {
         ("[[part]]\nkind = \"hodl\"\n", "plan.toml:2:8: ", "hold, staircase"),
         ("[[part]]\nkind = \"hold\"\npulse_us = 1500\n", "plan.toml:2:8: ", "a hold: expected hold_s"),
         ("[[part]]\nkind = \"hold\"\npulse_us = 2500\nhold_s = 1\n", "plan.toml:3:12: ", "from 1000 to 2000, found 2500"),
-        ("[[part]]\nkind = \"hold\"\npulse_us = \"full\"\nhold_s = 1\n", "plan.toml:3:12: ", "found a string"),
+        ("[[part]]\nkind = \"hold\"\npulse_us = \"full\"\nhold_s = 1\n", "plan.toml:3:12: ", "found a text"),
         ("[[part]]\nkind = \"hold\"\npulse_us = 1500\nhold_s = nan\n", "plan.toml:4:10: ", "a number"),
         ("[[part]]\nkind = \"hold\"\npulse_us = 1500\nhold_s = 1\nramp = true\n", "plan.toml:5:1: ", "hold_s, kind, pulse_us"),
         ("[[part]]\nkind = \"staircase\"\nstep_us = 50\ntop_us = 1020\nhold_s = 1\n", "plan.toml:4:10: ", "at least one step"),
