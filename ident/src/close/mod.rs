@@ -120,7 +120,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     };
     verdict.alternatives = alternatives(&diagnosis, &verdict.effects);
     marks::tell(&mut verdict, &mut after_model, &marks);
-    read_off::tell(&mut verdict, &context, declared);
+    read_off::tell(&mut verdict, &context);
     if let Some(limit) = &limit {
         supply_limit::tell(&mut verdict, limit, &supply_limit::missed(log, &context, &before_model, &at_limit));
     }

@@ -2,7 +2,7 @@
 //!
 //! What it is: values that repeat at even intervals are a hold, and values that lie on a grid far coarser than the noise are rounded, whether or not a
 //! prediction gets better by it. Where the search has named neither, they are named from the readings. No prediction changes.
-//! What can go wrong: few readings show neither; what the declared model says already is no news.
+//! What can go wrong: few readings show neither. Against a declared model nothing is told: it does not keep what its own day's readings showed.
 //! Units: s; the channel's.
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*; zero-order hold.
 
@@ -11,20 +11,20 @@ use crate::channel::{Context, Target};
 use crate::effects::acquisition::{quantisation, sample_hold};
 use crate::effects::reported::parameter;
 use crate::effects::{Effect, Estimate, Instance};
-use crate::model::Declared;
 use crate::verdict::words::channel;
 use crate::verdict::{BY_READINGS, EffectEntry, Kin, Verdict};
 
 /// An effect that a channel's readings show, with what they say of it.
 type Shown = (&'static dyn Effect, Instance, Vec<Estimate>);
 
-/// Adds to a verdict what the readings show and neither it nor the declared model says.
-pub(crate) fn tell(verdict: &mut Verdict, context: &Context, declared: Declared<'_>) {
+/// Adds to a verdict what the readings show and it does not say.
+pub(crate) fn tell(verdict: &mut Verdict, context: &Context) {
+    // a model has no term for it, and what the logger did on its day too is no news
+    if context.against_model {
+        return;
+    }
     let told = |verdict: &Verdict, (effect, instance, _): &Shown| {
-        let known = declared.model.into_iter().flat_map(|m| &m.effects);
-        let mut known = known.filter(|e| e.placed.effect.id() == effect.id());
-        let named = verdict.effects.iter().any(|e| e.id == effect.id() && e.channels.iter().any(|c| instance.touches(c)));
-        named || known.any(|e| instance.channels.iter().any(|c| e.placed.instance.touches(c)))
+        verdict.effects.iter().any(|e| e.id == effect.id() && e.channels.iter().any(|c| instance.touches(c)))
     };
     let judged = context.targets.iter().filter(|t| !t.relation.is_evidence());
     let news: Vec<EffectEntry> =
