@@ -19,7 +19,7 @@ pub(crate) const TURNS: f64 = 0.01;
 
 /// Pulse that parts standing from turning with the fewest exceptions, us: midway between the pulses on its two sides. Rows right
 /// after a jump of the command do not count, where enough others do: the rotor comes later than the command. A rotor that stands at the end of
-/// rows of one pulse only coasted in those before.
+/// rows of one pulse only coasted in those before. A row without a speed says nothing.
 pub(crate) fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 {
     let Some(pulse) = pulse.filter(|_| !rpm.is_empty()) else { return 1000.0 };
     let top = rpm.iter().copied().fold(0.0, f64::max);
@@ -34,7 +34,7 @@ pub(crate) fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 
         .collect();
     let turns = kept_turning(pulse, rpm, TURNS * top);
     let rows = |only_settled: bool| -> Vec<(f64, bool)> {
-        let chosen = (0..pulse.len()).filter(|i| !only_settled || settled[*i]);
+        let chosen = (0..pulse.len()).filter(|i| rpm[*i].is_finite() && (!only_settled || settled[*i]));
         chosen.map(|i| (pulse[i], turns[i])).collect()
     };
     let mut sorted = rows(true);
@@ -62,9 +62,10 @@ pub(crate) fn start_pulse(t: &[f64], pulse: Option<&[f64]>, rpm: &[f64]) -> f64 
     }
 }
 
-/// Whether the pulse of each row keeps the rotor turning: it does not where the rotor stands at the end of the rows of that very pulse.
+/// Whether the pulse of each row keeps the rotor turning: it does not where the rotor stands at the end of the rows of that very pulse. A row without
+/// a speed is no standing rotor.
 fn kept_turning(pulse: &[f64], rpm: &[f64], least: f64) -> Vec<bool> {
-    let mut out: Vec<bool> = rpm.iter().map(|v| *v > least).collect();
+    let mut out: Vec<bool> = rpm.iter().map(|v| !v.is_finite() || *v > least).collect();
     for i in (1..out.len()).rev() {
         out[i - 1] &= pulse[i - 1] != pulse[i] || out[i];
     }
@@ -105,6 +106,14 @@ mod tests {
         let cut = pulse.iter().rposition(|p| *p > 1000.0).unwrap() + 1;
         rpm[cut..].iter_mut().enumerate().for_each(|(k, v)| *v = (5600.0 - 130.0 * k as f64).max(0.0));
         assert!(rpm[cut..].iter().filter(|v| **v > 0.01 * 5600.0).count() > 40);
+        assert_eq!(start_pulse(&t, Some(&pulse), &rpm), 1050.0);
+    }
+
+    /// The sensor is lost at the end of a level: its rotor did not stand there.
+    #[test]
+    fn rows_without_a_speed_do_not_move_the_start() {
+        let (t, pulse, mut rpm) = late(&[(1000.0, 6.0), (1100.0, 6.0), (1400.0, 40.0), (1200.0, 6.0), (1000.0, 6.0)]);
+        rpm[500..530].fill(f64::NAN);
         assert_eq!(start_pulse(&t, Some(&pulse), &rpm), 1050.0);
     }
 
