@@ -342,9 +342,14 @@ fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
 
 /// The only speed channel together with all that is a function of the speed: what is slow or late in it alone is ahead in them.
 fn lone_speed<'a>(context: &Context) -> Option<Vec<&'a str>> {
+    every_speed(context).filter(|_| speeds(context).len() == 1)
+}
+
+/// The same of all speed channels, that are late together: a speed is the mean over some turns or over a while, the middle of which has passed.
+fn every_speed<'a>(context: &Context) -> Option<Vec<&'a str>> {
     let functions = present(context, &["thrust_n", "torque_nm", "current_a"]);
     let speeds = speeds(context);
-    let asked = !context.time_is_row && speeds.len() == 1 && !functions.is_empty();
+    let asked = !context.time_is_row && !speeds.is_empty() && !functions.is_empty();
     asked.then(|| speeds.into_iter().chain(functions).collect())
 }
 
@@ -369,6 +374,12 @@ fn through_meter(context: &Context, design: &mut TargetDesign, meter: impl Fn(&[
 /// Speed channels of the log.
 pub(crate) fn speeds(context: &Context) -> Vec<&'static str> {
     context.targets.iter().filter(|t| t.relation == Relation::SpeedFromPulse).map(|t| t.name).collect()
+}
+
+/// Whether the time constant of a slow cause lies on the lower end of its range: what is as quick is another cause.
+fn is_too_quick(shapes: &[Shape], fitted: &[Estimate]) -> bool {
+    let least = shapes.iter().find(|s| s.name == "tau").map_or(0.0, |s| s.range.0 * 1.001);
+    fitted.iter().any(|e| e.name == "tau" && e.value <= least)
 }
 
 fn geometric(from: f64, to: f64, n: usize) -> Vec<f64> {

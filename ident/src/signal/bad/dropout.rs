@@ -174,6 +174,14 @@ impl Judge<'_> {
         before.iter().filter(right).count() >= AGAIN && before.iter().take(2).any(fell)
     }
 
+    /// Whether the first readings are as much too low as a lost mark makes them, and by half of what the whole loss comes to. A rotor that coasts
+    /// down ahead of a late load gets there as well, but not at once; a load that rises late makes a steady reading look low, but not by much.
+    fn falls_at_once(&self, row: usize, depth: f64, witness: &Witness) -> bool {
+        let first = (row..self.read.len()).filter(|i| self.read[*i].is_finite()).take(AGAIN);
+        let off = first.map(|i| (witness.said[i] - self.read[i], witness.said[i]));
+        off.clone().any(|(off, said)| off > DEPTH * said) && off.clone().any(|(off, _)| off > HALF * depth)
+    }
+
     /// The loss that began at a row and that a witness tells on a later one to be so deep.
     fn event_by(&self, row: usize, tells: usize, first: f64, witness: &Witness) -> Option<Event> {
         if !self.falls(row, first, witness) {
@@ -206,7 +214,7 @@ impl Judge<'_> {
         // a single reading is for those who look at single readings
         let rows = row..end;
         let event = Event { expected: witness.said[worst], rows, worst, at_step: false, silent: false };
-        let loses = depth > DEPTH * event.expected;
+        let loses = depth > DEPTH * event.expected && self.falls_at_once(row, depth, witness);
         let stands = loses
             && event.rows.len() > super::SINGLE
             && !self.is_of_level(&event, depth)
