@@ -48,7 +48,7 @@ pub(crate) fn revise(
     while let Some(k) = settled.iter().position(|s| !s) {
         settled[k] = true;
         // what shares no channel with another name was chosen beside nothing
-        if looks == 0 || connected(&best.fit.placed, k).len() < 2 {
+        if looks == 0 || best.fit.placed[k].is_read_off() || connected(&best.fit.placed, k).len() < 2 {
             continue;
         }
         looks -= 1;

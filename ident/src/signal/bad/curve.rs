@@ -37,6 +37,11 @@ impl Curve {
         (!of_bins.is_empty()).then(|| Self(checked(&of_bins, &sure)))
     }
 
+    /// The lowest value that it was taken from, a median of some.
+    pub(crate) fn first(&self) -> f64 {
+        self.0.first().map_or(f64::NEG_INFINITY, |p| p.0)
+    }
+
     /// The reading at a value: straight lines between the points, the last ones beyond.
     pub(crate) fn at(&self, x: f64) -> f64 {
         let after = self.0.partition_point(|p| p.0 < x);

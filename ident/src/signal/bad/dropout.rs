@@ -275,7 +275,10 @@ fn load(witnesses: &Witnesses<'_>, read: &[f64]) -> Option<Witness> {
         let moves = spread(&witnesses.t, &said);
         let quiet = median(&mut moves.clone());
         let usual = usual(read, &said, &|i| moves[i] <= quiet)?;
-        let sd = moves.iter().map(|m| usual.hypot(HALF * m)).collect();
+        // next to no load tells slow from standing no better than its curve's first point does
+        let least = curve.first();
+        let unsure = |(m, (x, said)): (&f64, (&f64, &f64))| if *x <= least { said.max(usual) } else { usual.hypot(HALF * m) };
+        let sd = moves.iter().zip(signal.iter().zip(&said)).map(unsure).collect();
         Some(Witness::new(said, sd))
     };
     let all = ["thrust_n", "torque_nm", "current_a"].iter().filter_map(of_channel);
