@@ -174,12 +174,13 @@ impl Judge<'_> {
         before.iter().filter(right).count() >= AGAIN && before.iter().take(2).any(fell)
     }
 
-    /// Whether the first readings are as much too low as a lost mark makes them, and by half of what the whole loss comes to. A rotor that coasts
-    /// down ahead of a late load gets there as well, but not at once; a load that rises late makes a steady reading look low, but not by much.
+    /// Whether the reading itself has fallen by half of what the whole loss comes to, or is next to nothing of a rotor that turns. A rotor that coasts
+    /// down ahead of a late load gets there as well, but not at once; and a load that rises late makes a steady reading look low.
     fn falls_at_once(&self, row: usize, depth: f64, witness: &Witness) -> bool {
-        let first = (row..self.read.len()).filter(|i| self.read[*i].is_finite()).take(AGAIN);
-        let off = first.map(|i| (witness.said[i] - self.read[i], witness.said[i]));
-        off.clone().any(|(off, said)| off > DEPTH * said) && off.clone().any(|(off, _)| off > HALF * depth)
+        let is_read = |i: &usize| self.read[*i].is_finite();
+        let before = (self.block(row)..row).rev().filter(is_read).take(2).map(|i| self.read[i]).fold(0.0, f64::max);
+        let mut first = (row..self.read.len()).filter(is_read).take(AGAIN);
+        first.clone().all(|i| self.read[i] < DEPTH * witness.said[i]) || first.any(|i| before - self.read[i] > HALF * depth)
     }
 
     /// The loss that began at a row and that a witness tells on a later one to be so deep.
@@ -275,9 +276,9 @@ fn load(witnesses: &Witnesses<'_>, read: &[f64]) -> Option<Witness> {
         let moves = spread(&witnesses.t, &said);
         let quiet = median(&mut moves.clone());
         let usual = usual(read, &said, &|i| moves[i] <= quiet)?;
-        // next to no load tells slow from standing no better than its curve's first point does
-        let least = curve.first();
-        let unsure = |(m, (x, said)): (&f64, (&f64, &f64))| if *x <= least { said.max(usual) } else { usual.hypot(HALF * m) };
+        // next to no load does not tell slow from standing: the speed goes with its root, and the curve's first line knows nothing of that
+        let least = curve.first_line();
+        let unsure = |(m, (x, said)): (&f64, (&f64, &f64))| usual.hypot(HALF * m).max(if *x <= least { *said } else { 0.0 });
         let sd = moves.iter().zip(signal.iter().zip(&said)).map(unsure).collect();
         Some(Witness::new(said, sd))
     };
