@@ -42,6 +42,7 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         cards: cards(log, closed),
         left: left(closed),
         readings: readings_apart(&closed.context, v, ""),
+        counted: v.effects.iter().map(|e| counted(log, v, e)).collect(),
         parameters: Vec::new(),
         speeds: (SPEEDS, speeds(log, closed)),
     };
@@ -128,6 +129,30 @@ fn hero(log: &Log, closed: &Closed) -> Vec<Figure> {
 fn beside_others<'c>(closed: &'c Closed, e: &EffectEntry) -> Option<&'c Target> {
     let unseen = 1.0 - e.heldout_error_reduction > 1.0 / parts::SEEN;
     target(closed, &format!("{} - others", e.channels.first()?)).filter(|_| unseen)
+}
+
+/// Share of the speed that a reading which times one period loses with a pulse, and how near to it a loss must be.
+const HALVED: (f64, f64) = (0.5, 0.05);
+
+/// The share of its pulses that a sensor misses with the readings counted in that were set aside; each of them against the median of the other
+/// sensors in its row. Nothing where none was set aside.
+fn counted(log: &Log, v: &Verdict, e: &EffectEntry) -> Option<f64> {
+    let own = log.column(e.channels.first().filter(|_| e.id == "missed_pulses")?)?;
+    let fitted = e.parameter("probability")?.value;
+    let others: Vec<&[f64]> =
+        SPEED.iter().filter(|name| e.channels.first().is_none_or(|c| c != *name)).filter_map(|name| log.column(name)).collect();
+    let lost = |row: usize| {
+        let mut said: Vec<f64> = others.iter().filter_map(|c| c.get(row)).copied().filter(|v| v.is_finite()).collect();
+        let (of, truth) = (own.get(row)?, median(&mut said));
+        (truth > 0.0 && of.is_finite()).then(|| (1.0 - of / truth).clamp(0.0, 1.0))
+    };
+    // a reading of one period is halved by each pulse that it loses: what counts is how many are
+    let timed = e.parameter("depth").is_some_and(|d| (d.value - HALVED.0).abs() < HALVED.1);
+    let share = |loss: f64| if timed { f64::from(u8::from(loss > 0.5 * HALVED.0)) } else { loss };
+    let aside: Vec<f64> = parts::struck(v, e).flat_map(|a| a.row..a.row + a.rows).filter_map(lost).map(share).collect();
+    let judged = own.iter().filter(|v| **v > 0.0).count().saturating_sub(aside.len());
+    let all = (judged + aside.len()) as f64;
+    (!aside.is_empty()).then(|| (fitted * judged as f64 + aside.iter().sum::<f64>()) / all)
 }
 
 /// Rows before and after whose median a single reading is held against.

@@ -14,6 +14,7 @@ mod evidence;
 mod fold;
 mod left;
 mod look;
+mod lost;
 mod page;
 mod provenance;
 mod sentence;
@@ -25,6 +26,7 @@ pub(crate) use evidence::{
     ALONE, SEEN, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, shown_most, slug, thinned, two_ways,
 };
 pub(crate) use fold::{aside, candidates};
+pub(crate) use lost::struck;
 pub(crate) use look::{LOOK, SCRIPT};
 pub(crate) use page::{Page, Reading, begin};
 pub use provenance::{Hidden, Origin};

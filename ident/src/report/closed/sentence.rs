@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict".
 
 use super::cards::{is_shown, value};
+use super::lost;
 use super::contest::{Rival, is_beaten, rivals};
 use super::vocabulary::Vocabulary;
 use crate::attribution::rivals::beyond;
@@ -115,7 +116,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     let told = if told.is_empty() { vec![*first] } else { told };
     let more = causes(all).saturating_sub(told.len());
-    let clauses = by_subject(&told, words);
+    let clauses = by_subject(verdict, &told, words);
     let out = match own.is_empty() {
         true => format!(
             "{} What every {noun} has: {}.",
@@ -167,8 +168,8 @@ fn beaten(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> bool {
 }
 
 /// What an effect does, with its size, or with a bound where the run shows no more.
-fn sized_clause(words: Vocabulary, e: &EffectEntry) -> Clause {
-    let clause = words.said(e);
+fn sized_clause(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> Clause {
+    let clause = lost::said(verdict, words, e);
     if (words.clause)(e).does.contains(|c: char| c.is_ascii_digit()) {
         return clause;
     }
@@ -186,12 +187,12 @@ fn sized_clause(words: Vocabulary, e: &EffectEntry) -> Clause {
 }
 
 /// A clause for each effect; what differs from run to run is one clause with a part for each.
-fn by_subject(told: &[&EffectEntry], words: Vocabulary) -> Vec<String> {
+fn by_subject(verdict: &Verdict, told: &[&EffectEntry], words: Vocabulary) -> Vec<String> {
     let mut out: Vec<(&EffectEntry, Vec<String>)> = Vec::new();
     for e in told {
         match out.iter_mut().find(|(first, _)| first.run.is_some() && e.run.is_some() && first.id == e.id) {
-            Some((_, parts)) => parts.push(sized_clause(words, e).does),
-            None => out.push((e, vec![sized_clause(words, e).does])),
+            Some((_, parts)) => parts.push(sized_clause(verdict, words, e).does),
+            None => out.push((e, vec![sized_clause(verdict, words, e).does])),
         }
     }
     out.iter().map(|(e, parts)| Clause::new(words.said(e).who, list(parts)).with(adverb(e.probability))).collect()
@@ -218,7 +219,7 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
     let removed = |all: &[&EffectEntry]| all.iter().map(|e| e.heldout_error_reduction).fold(0.0, f64::max);
     let sure: Vec<&EffectEntry> = sure.filter(|e| !beaten(verdict, words, e)).take(MOST - 1).collect();
     let told = sure.len() + all.iter().filter(|e| disputed.iter().any(|d| std::ptr::eq(*d, **e))).count();
-    let said: Vec<String> = sure.iter().map(|e| sized_clause(words, e).with(adverb(e.probability))).collect();
+    let said: Vec<String> = sure.iter().map(|e| sized_clause(verdict, words, e).with(adverb(e.probability))).collect();
     let out = if sure.is_empty() {
         format!("{}.", since(news, &question))
     } else if removed(&sure) > removed(disputed) {
@@ -249,7 +250,7 @@ fn question(verdict: &Verdict, words: Vocabulary, disputed: &[&EffectEntry]) -> 
     let best = disputed.iter().map(|e| e.probability).fold(0.0, f64::max);
     let mut ways = vec![Rival {
         ids: Vec::new(),
-        said: list(&disputed.iter().map(|e| sized_clause(words, e).with("")).collect::<Vec<_>>()),
+        said: list(&disputed.iter().map(|e| sized_clause(verdict, words, e).with("")).collect::<Vec<_>>()),
         probability: best,
     }];
     if let Some(first) = disputed.first() {
