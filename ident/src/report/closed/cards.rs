@@ -5,8 +5,8 @@
 //! Units: as the parameters state.
 //! Reference: specification `formats.md`, "Verdict" (`effects`, `alternatives`).
 
-use super::lost;
 use super::contest::{Rival, reserve, rivals};
+use super::lost;
 use super::page::{Page, Reading};
 use super::sentence::{order, without};
 use super::state::figures;
@@ -230,7 +230,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
 fn with_those_set_aside(page: &Page<'_>, k: usize) -> Option<String> {
     let (v, e) = (page.verdict, page.verdict.effects.get(k)?);
     let whole = (*page.counted.get(k)?)?;
-    let per_cent = |share: f64| digits(100.0 * share, 5.0 * share);
+    let per_cent = |share: f64| digits(100.0 * share, 10.0 * share);
     let fitted = e.parameter("probability")?.value;
     Some(format!(
         "{} of its readings were set aside because they are too low. Counted in with them it misses {} % of its pulses, without them {} %.",

@@ -95,7 +95,8 @@ pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool, known: bool) ->
     let key = format!("<p class=\"soft\">The declared model: {declared}.{share}</p>\n");
     let stays = lost::key(v);
     let stays: String = stays.iter().map(|said| format!("<p class=\"soft\">{}</p>\n", escape(said))).collect();
-    let told = Told { left: &left, named: &named(v), stays: &lost::floors(v).into_iter().map(|f| f.0).collect::<Vec<_>>(), known };
+    let told =
+        Told { left: &left, named: &named(v), stays: &lost::floors(v).into_iter().map(|f| f.0).collect::<Vec<_>>(), known };
     drawn(&lost::drawn(v), &told, pair(v)) + &beside + &stays + &key
 }
 
