@@ -6,8 +6,9 @@
 //! Reference: specification `formats.md`, "Verdict".
 
 use super::cards::{is_shown, value};
-use super::lost;
 use super::contest::{Rival, is_beaten, rivals};
+use super::left::fitted;
+use super::lost;
 use super::vocabulary::Vocabulary;
 use crate::attribution::rivals::beyond;
 use crate::attribution::unexplained::LOUD;
@@ -320,7 +321,12 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
             false => format!("A smooth term without a name was fitted on {}; it goes with {}.", list(&on), list(&goes)),
         };
         let first = since(news, "no known effect explains what the model leaves over.");
-        return format!("{first} Most is left on {}: {}. {fitted}", channel(&loudest.channel), size_and_looks(verdict, loudest));
+        let beyond = beyond_the_fit(verdict, loudest);
+        return format!(
+            "{first} Most is left on {}: {}.{beyond} {fitted}",
+            channel(&loudest.channel),
+            size_and_looks(verdict, loudest)
+        );
     }
     let place = if on.is_empty() { String::new() } else { format!(" on {}", list(&on)) };
     let mut out = since(news, &format!("something is left{place} that no known effect explains."));
@@ -484,6 +490,19 @@ pub(super) fn size_left(verdict: &Verdict, u: &Unexplained) -> String {
     of.map_or_else(|| format!("{:.1} times the noise", u.over_floor), |c| rms(c.after.heldout_rms, &c.unit))
 }
 
+/// The unit of a channel on which something is left.
+fn unit_left<'v>(verdict: &'v Verdict, u: &Unexplained) -> &'v str {
+    verdict.channels.get(&u.channel).map_or("", |c| c.unit.as_str())
+}
+
+/// How far rows are missed that the fit did not see, where that is much farther than those that it saw; else empty.
+fn beyond_the_fit(verdict: &Verdict, u: &Unexplained) -> String {
+    if fitted(verdict, &u.channel).is_none() {
+        return String::new();
+    }
+    format!(" Rows left out of the fit are missed by {}: they lie beyond what the others show.", size_left(verdict, u))
+}
+
 /// The same in noise floors: of several runs that of all of them, as the state of the channels tells it.
 pub(super) fn floors_left(verdict: &Verdict, u: &Unexplained) -> f64 {
     verdict.channels.get(&u.channel).map_or(u.over_floor, |c| c.after.heldout_rms / c.noise_floor_rms)
@@ -509,7 +528,9 @@ fn largest(verdict: &Verdict) -> Option<Largest<'_>> {
     let largest = loud(verdict).filter(|u| sensors > 1 && quantity(&u.channel) == what).max_by(|a, b| of(a).total_cmp(&of(b)));
     let told = largest.unwrap_or(loudest);
     let up_to = if largest.is_some() { "up to " } else { "" };
-    Some(Largest { on, size: format!("{up_to}{} rms", size_left(verdict, told)), told })
+    let size =
+        fitted(verdict, &told.channel).map_or_else(|| size_left(verdict, told), |seen| rms(seen, unit_left(verdict, told)));
+    Some(Largest { on, size: format!("{up_to}{size} rms"), told })
 }
 
 /// What a remainder looks like, in its first words; the section on what is left has all.
@@ -523,7 +544,8 @@ fn looks(u: &Unexplained) -> String {
 }
 
 fn size_and_looks(verdict: &Verdict, u: &Unexplained) -> String {
-    format!("{} rms ({})", size_left(verdict, u), looks(u))
+    let size = fitted(verdict, &u.channel).map_or_else(|| size_left(verdict, u), |seen| rms(seen, unit_left(verdict, u)));
+    format!("{size} rms ({})", looks(u))
 }
 
 fn left(verdict: &Verdict) -> String {
@@ -534,8 +556,9 @@ fn left(verdict: &Verdict) -> String {
     let what = quantity(&told.channel);
     // what is left on the other channels stands beside their bars
     let unknown = if share(verdict, &told.channel).is_none_or(|s| s < HALF) { " No known effect explains it." } else { "" };
+    let beyond = beyond_the_fit(verdict, told);
     match loud(verdict).any(|u| quantity(&u.channel) != what) {
-        false => format!("On {on} {size} is left ({}).{unknown}", looks(told)),
-        true => format!("Most is left on {on}: {size} ({}).{unknown}", looks(told)),
+        false => format!("On {on} {size} is left ({}).{beyond}{unknown}", looks(told)),
+        true => format!("Most is left on {on}: {size} ({}).{beyond}{unknown}", looks(told)),
     }
 }

@@ -8,9 +8,9 @@
 use super::cards::{OPEN, alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value, why};
 use super::cautions::cautions;
 use super::contest::rivals;
+use super::left::{in_words, looks_and_goes, shared, size_told};
 use super::lost;
-use super::left::{in_words, looks_and_goes, shared};
-use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
+use super::sentence::{PER_CENT, floors_left, instead, order, sentence, without};
 use super::state::{STAYS, factor, figures, is_as_before, named, word};
 use super::vocabulary::Vocabulary;
 use crate::channel::unit_of;
@@ -194,7 +194,7 @@ fn left(verdict: &Verdict) -> String {
         let (looks, goes) = looks_and_goes(u, shared.as_deref());
         let silent = goes == "nothing in the log" || looks.contains("grows with the load") && u.depends_on.is_empty();
         let on = if silent { String::new() } else { format!(", goes with {goes}") };
-        let of = [channel(&u.channel), size_left(verdict, u), format!("{:.1} noise floors", floors_left(verdict, u))];
+        let of = [channel(&u.channel), size_told(verdict, u), format!("{:.1} noise floors", floors_left(verdict, u))];
         let [name, size, floors] = of;
         out += &format!("  {}\n", wrapped(&format!("{name}: {size}, {floors}, {looks}{on}"), 4));
     }
