@@ -861,3 +861,14 @@ fn an_extrapolation_is_no_size_of_what_is_left() {
     let text = terminal(&v, Vocabulary::RIG, false);
     assert!(text.contains("speed: 91.0 rev/min (4.10 rev/min where fitted)"), "{text}");
 }
+
+/// A noise floor may hold a part of what is named: all that is explained is what stood above it.
+#[test]
+fn all_is_what_stood_above_the_noise_floor() {
+    let mut v = verdict(Kind::Attributed, vec![filter(0.99)]);
+    if let Some(thrust) = v.channels.predicted.get_mut("thrust_n") {
+        thrust.after.heldout_rms = 0.0099;
+    }
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.contains("That explains all of what thrust had left above its noise floor."), "{said}");
+}

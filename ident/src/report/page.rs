@@ -220,7 +220,7 @@ pub(super) fn over_runs(verdict: &Verdict, shown: &Shown) -> Vec<Figure> {
 
 /// The figure of an effect that several runs share, on one of them.
 pub(super) fn card_across(closed: &Closed, e: &EffectEntry, shown: &Shown, id: &str) -> Option<Figure> {
-    Some(drawn(&closed.context, e, target(closed, shown.channel)?, &across(shown), id))
+    Some(drawn(closed, e, target(closed, shown.channel)?, &across(shown), id))
 }
 
 /// The figure of what one of several runs has alone: what is left when it is taken out of the model, one constant apart.
@@ -232,7 +232,7 @@ pub(super) fn card_alone(closed: &Closed, e: &EffectEntry, id: &str) -> Option<F
     let more: Vec<f64> = without.iter().zip(&whole.after).map(|(w, a)| w - a).filter(|d| d.is_finite()).collect();
     let mean = more.iter().sum::<f64>() / more.len().max(1) as f64;
     without.iter_mut().for_each(|w| *w -= mean);
-    Some(drawn(&closed.context, e, target, &whole.with_before(without), id))
+    Some(drawn(closed, e, target, &whole.with_before(without), id))
 }
 
 /// Figures of each effect: what its first channel leaves over without it and with it; of what whole levels show their readings.
@@ -262,11 +262,18 @@ fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<V
     let target = beside_others(closed, e).or_else(|| target(closed, e.channels.first()?))?;
     let whole = trace(closed, target)?;
     let trace = whole.with_before(without(closed, target, position)?);
-    (trace.before != trace.after).then(|| vec![drawn(&closed.context, e, target, &trace, id)])
+    (trace.before != trace.after).then(|| vec![drawn(closed, e, target, &trace, id)])
 }
 
 /// What is left of a channel without an effect and with it, over what the effect goes with.
-fn drawn(context: &Context, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Figure {
+fn drawn(closed: &Closed, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Figure {
+    let context = &closed.context;
+    if e.depends_on.iter().any(|v| v == "torque_nm")
+        && target.name != "torque_nm"
+        && let Some(x) = torque_beyond(closed, target).filter(|x| moves(x))
+    {
+        return against(trace, id, ("torque beyond its curve", unit_of("torque_nm")), &x, ALONE);
+    }
     if e.depends_on.iter().any(|v| v == "direction") && moves(&context.rpm) {
         let up = upwards(&context.rpm);
         let up: Vec<bool> = claimed(target).map(|k| up[target.rows[k]]).collect();
@@ -289,6 +296,15 @@ fn drawn(context: &Context, e: &EffectEntry, target: &Target, trace: &Trace, id:
             None => over_time(trace, id, ALONE),
         },
     }
+}
+
+/// What the torque is beyond its own curve over the speed, on the rows of another channel that count: the thrust's own curve takes the rest.
+fn torque_beyond(closed: &Closed, of: &Target) -> Option<Vec<f64>> {
+    let torque = target(closed, "torque_nm")?;
+    let beyond = residual(&closed.context, torque, &closed.declared)?;
+    let mut all = vec![f64::NAN; closed.context.len()];
+    claimed(torque).zip(beyond).for_each(|(k, left)| all[torque.rows[k]] = left);
+    Some(of_rows(of, &all))
 }
 
 /// What is left of a target without one of the effects. Where nothing was declared all others are fitted again, as they would be by who does not

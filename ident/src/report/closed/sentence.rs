@@ -439,17 +439,21 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool) -> Option<Exp
         s if s >= ALL && !rest => "all".to_owned(),
         s => format!("{:.0} %", (100.0 * s).min(99.0)),
     };
+    // a noise floor may hold a part of what is named: all is what stood above it
+    let over = |share: &str| if share == "all" { "above its noise floor" } else { "over" };
     let names: Vec<String> = shares.iter().map(|s| whole(verdict, s.0)).collect();
     let but: String = worse(verdict, &is_told).collect();
     let of_each: Vec<String> = shares.iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))).collect();
     let brief = format!("Explained: {}.{but}", list(&of_each));
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
-        let said = format!("{subject} {} of what {} had left over.{but}", per_cent(mean), list(&names));
+        let said = format!("{subject} {} of what {} had left {}.{but}", per_cent(mean), list(&names), over(&per_cent(mean)));
         return Some(Explained { said, brief, says_more: others });
     }
-    let parts: Vec<String> =
-        shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), whole(verdict, s.0))).collect();
+    let parts: Vec<String> = shares
+        .iter()
+        .map(|s| format!("{0} of what {1} had left {2}", per_cent(s.1), whole(verdict, s.0), over(&per_cent(s.1))))
+        .collect();
     let short: Vec<String> = std::iter::once(parts[0].clone())
         .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))))
         .collect();
