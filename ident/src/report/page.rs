@@ -268,6 +268,10 @@ fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<V
 /// What is left of a channel without an effect and with it, over what the effect goes with.
 fn drawn(closed: &Closed, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Figure {
     let context = &closed.context;
+    // a sum of means tells nothing of what scatters
+    if let Some(figure) = scattered(context, e, target, trace, id) {
+        return figure;
+    }
     if e.depends_on.iter().any(|v| v == "torque_nm")
         && target.name != "torque_nm"
         && let Some(x) = torque_beyond(closed, target).filter(|x| moves(x))
@@ -296,6 +300,23 @@ fn drawn(closed: &Closed, e: &EffectEntry, target: &Target, trace: &Trace, id: &
             None => over_time(trace, id, ALONE),
         },
     }
+}
+
+/// The figure of an effect that makes a channel scatter about a speed; nothing of any other.
+fn scattered(context: &Context, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Option<Figure> {
+    let size = e.parameter("scatter")?.value;
+    let (natural, damping) = (e.parameter("natural_frequency")?.value, e.parameter("damping_ratio")?.value);
+    if context.rpm.is_empty() || !moves(&context.rpm) {
+        return None;
+    }
+    let turns = if e.equation.ends_with("[blade_pass]") { 2.0 } else { 1.0 };
+    let peak = 1.0 / (2.0 * damping * (1.0 - damping * damping).sqrt());
+    let answers = |rpm: f64| {
+        let r2 = (rpm / 60.0 * turns / natural).powi(2);
+        r2 / ((1.0 - r2).powi(2) + 4.0 * damping * damping * r2).sqrt() / peak
+    };
+    let told = |rpm: f64| trace.floor.hypot(size * answers(rpm));
+    Some(parts::scatter(trace, id, &words::axis("rpm"), &of_rows(target, &context.rpm), &told))
 }
 
 /// What the torque is beyond its own curve over the speed, on the rows of another channel that count: the thrust's own curve takes the rest.

@@ -23,11 +23,12 @@ mod terminal;
 mod vocabulary;
 
 pub(crate) use evidence::{
-    ALONE, SEEN, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, shown_most, slug, thinned, two_ways,
+    ALONE, SEEN, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, scatter, shown_most, slug, thinned,
+    two_ways,
 };
 pub(crate) use fold::{aside, candidates};
-pub(crate) use lost::struck;
 pub(crate) use look::{LOOK, SCRIPT};
+pub(crate) use lost::struck;
 pub(crate) use page::{Page, Reading, begin};
 pub use provenance::{Hidden, Origin};
 pub use sentence::sentence;
