@@ -423,7 +423,9 @@ fn over_what(closed: &Closed, u: &Unexplained, target: &Target, trace: &Trace) -
 /// Figures of what is left.
 fn left(closed: &Closed) -> Vec<Figure> {
     let with_model = |u: &&Unexplained| !closed.verdict.channels.not_predicted.contains_key(&u.channel);
-    let own = |u: &&Unexplained| !is_drawn_together(closed, u);
+    let loudest = parts::loudest(&closed.verdict);
+    // the loudest has its figure where it is told, also where it is one of several that are drawn together
+    let own = |u: &&Unexplained| !is_drawn_together(closed, u) || loudest.is_some_and(|l| l == *u);
     closed.verdict.unexplained.iter().filter(own).filter(with_model).filter_map(|u| rest(closed, u)).collect()
 }
 

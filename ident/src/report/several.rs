@@ -27,7 +27,8 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
     let v = &*outcome.verdict.briefly();
     let alone: Vec<Closed> = (0..runs.len()).map(|run| of_run(runs, outcome, run)).collect();
     let first = outcome.shown.as_ref().map_or(0, |shown| shown.run);
-    let own = |u: &&Unexplained| !is_drawn_together(&alone[first], u);
+    let loudest = parts::loudest(v);
+    let own = |u: &&Unexplained| !is_drawn_together(&alone[first], u) || loudest.is_some_and(|l| l == *u);
     let on = |run: usize, figure: Figure| named(figure, &v.runs[run].run);
     let page = Page {
         verdict: v,

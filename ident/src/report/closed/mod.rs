@@ -31,6 +31,7 @@ pub(crate) use look::{LOOK, SCRIPT};
 pub(crate) use lost::struck;
 pub(crate) use page::{Page, Reading, begin};
 pub use provenance::{Hidden, Origin};
+pub(crate) use sentence::loudest;
 pub use sentence::sentence;
 pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal, wrapped};

@@ -484,7 +484,7 @@ fn quantity(name: &str) -> &str {
 }
 
 /// What is loudest among what is left.
-fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
+pub(crate) fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
     loud(verdict).max_by(|a, b| floors_left(verdict, a).total_cmp(&floors_left(verdict, b)))
 }
 
