@@ -100,7 +100,19 @@ pub(super) fn looks_and_goes(u: &Unexplained, shared: Option<&str>) -> (String, 
         ([], None) => "nothing in the log".to_owned(),
         (with, _) => with.join(", "),
     };
-    (looks.join("; "), goes)
+    (in_time(&looks.join("; ")), goes)
+}
+
+/// A text in which the memory of a remainder is called what it is: a time constant.
+pub(super) fn in_time(looks: &str) -> String {
+    let mut parts = looks.split("within ");
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let is_time = part.starts_with(|c: char| c.is_ascii_digit());
+        out += if is_time { "with a time constant of " } else { "within " };
+        out += part;
+    }
+    out
 }
 
 /// A row for each remainder; the axes of a vector that look alike share one.
@@ -253,6 +265,14 @@ mod tests {
             ]
         );
         assert_eq!(super::shared(&bare_verdict(vec![left("ax", "slow"), left("ay", "slow; a tail")])), None);
+    }
+
+    #[test]
+    fn a_memory_is_a_time_constant() {
+        let said = looks_and_goes(&left("acc_x", "slow, within 2.0 s; goes with time"), None).0;
+        assert_eq!(said, "slow, with a time constant of 2.0 s");
+        assert_eq!(in_time("within 0.05 s"), "with a time constant of 0.05 s");
+        assert_eq!(in_time("within a row"), "within a row");
     }
 
     /// What a short table cannot prove it says as far as it goes, where a reader looks for it.

@@ -7,7 +7,7 @@
 
 use super::cards::{is_shown, value};
 use super::contest::{Rival, is_beaten, rivals};
-use super::left::fitted;
+use super::left::{fitted, in_time};
 use super::lost;
 use super::vocabulary::Vocabulary;
 use crate::attribution::rivals::beyond;
@@ -542,8 +542,9 @@ fn looks(u: &Unexplained) -> String {
     let first = u.looks_like.split(';').next().unwrap_or_default();
     let first = first.strip_prefix("loudest on ").and_then(|rest| Some(rest.split_once(": ")?.1)).unwrap_or(first);
     let seems = u.looks_like.split("; ").find(|part| part.starts_with("goes with ")).filter(|_| u.depends_on.is_empty());
-    let first =
-        first.replace("in one stretch", "mostly in one stretch").replace("while the load is on its way", "as the load changes");
+    let first = in_time(first)
+        .replace("in one stretch", "mostly in one stretch")
+        .replace("while the load is on its way", "as the load changes");
     seems.map_or(first.clone(), |seems| format!("{first}; it {seems}"))
 }
 
