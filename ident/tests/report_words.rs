@@ -842,6 +842,8 @@ fn what_was_set_aside_is_told_with_the_fault() {
     let text = terminal(&v, Vocabulary::RIG, false);
     let row = text.lines().find(|l| l.starts_with("speed (optical)")).unwrap_or_default();
     assert!(row.ends_with("fault stays") && row.contains("0.550 rev/min"), "{row}");
+    let joined = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(joined.contains("1642 where the rest of the log says 2464"), "{text}");
     assert!(text.lines().all(|l| l.chars().count() <= WIDEST), "{text}");
 }
 
