@@ -13,7 +13,7 @@ use super::shift::filter_figures;
 use crate::channel::unit_of;
 use crate::identify::curves::power::Level;
 use crate::identify::curves::{Fitted, Law, ratio};
-use crate::identify::Identified;
+use crate::identify::{Constant, Identified};
 use crate::log::board;
 use crate::log::{Gaps, Log, SPEED};
 use crate::numeric::order::median;
@@ -153,7 +153,7 @@ pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
         .map(|c| {
             let [value, low, high] = words::with_interval(c.value, [c.value - c.half, c.value + c.half]);
             let interval = format!("{low} to {high}");
-            let law = c.law.map_or_else(|| "-".to_owned(), |law| law.words());
+            let law = c.law.map_or_else(|| "-".to_owned(), |law| law.words()) + hardly(c);
             vec![format!("{}, {}", c.words(), c.name), value, interval, c.unit.to_owned(), law]
         })
         .collect();
@@ -169,6 +169,18 @@ pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
         .collect();
     let raw_head = ["constant", "what", "value", "standard_error", "low_95", "high_95", "unit"];
     sheet.data("constants", &["constant", "value", "95 % interval", "unit", "its law"], &rows, Some((&raw_head, &raw)));
+}
+
+/// Share of a constant's value from which on half of its interval leaves it hardly known.
+const HARDLY: f64 = 0.5;
+
+/// That an interval leaves a constant open, behind its law.
+fn hardly(c: &Constant) -> &'static str {
+    match c.half / c.value.abs() {
+        share if !share.is_finite() || share >= 1.0 => "; not known: the interval spans zero",
+        share if share >= HARDLY => "; hardly known: the interval is wider than the value",
+        _ => "",
+    }
 }
 
 fn time_label(log: &Log) -> String {
@@ -549,6 +561,18 @@ mod tests {
     use super::*;
     use crate::identify::identify;
     use crate::log::Column;
+
+    fn constant(value: f64, half: f64) -> Constant {
+        Constant { name: "k_T", value, se: half / 1.96, half, unit: "N.s2", law: None }
+    }
+
+    #[test]
+    fn an_interval_that_leaves_all_open_is_told() {
+        assert_eq!(hardly(&constant(1.5e-5, 1e-6)), "");
+        assert!(hardly(&constant(1.5e-5, 0.9e-5)).starts_with("; hardly known"));
+        assert!(hardly(&constant(1.5e-5, 2e-5)).contains("spans zero"));
+        assert!(hardly(&constant(0.0, 0.0)).contains("not known"));
+    }
 
     /// Without a plateau the page says so once, and has no table without rows.
     #[test]
