@@ -253,7 +253,8 @@ pub(crate) fn scatter(trace: &Trace, id: &str, x_label: &str, x: &[f64], told: &
         Layer::Line { name: name.to_owned(), class, x, y }
     };
     let grid: Vec<f64> = (0..=240).map(|k| ends.0 + (ends.1 - ends.0) * f64::from(k) / 240.0).collect();
-    let expected = Layer::Line { name: "as found".into(), class: "c", y: grid.iter().map(|v| told(*v)).collect(), x: grid };
+    let expected =
+        Layer::Line { name: "scatter as found".into(), class: "c", y: grid.iter().map(|v| told(*v)).collect(), x: grid };
     let [without, with] = ALONE;
     let layers = floor.into_iter().chain([of(without, "b", &trace.before), of(with, "a", &trace.after), expected]);
     let title = format!("{} left over, rms about each speed", heading(&trace.channel));

@@ -12,7 +12,7 @@ use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
-use crate::verdict::words::{channel, channels, heading, list, lower, plain, probability, rms, upper, vector};
+use crate::verdict::words::{channel, channels, heading, list, lower, over_time, plain, probability, rms, upper, vector};
 use crate::verdict::{Alternative, EffectEntry, ScheduleStep, Unexplained, Verdict};
 
 /// What is left.
@@ -100,19 +100,7 @@ pub(super) fn looks_and_goes(u: &Unexplained, shared: Option<&str>) -> (String, 
         ([], None) => "nothing in the log".to_owned(),
         (with, _) => with.join(", "),
     };
-    (in_time(&looks.join("; ")), goes)
-}
-
-/// A text in which the memory of a remainder is called what it is: a time constant.
-pub(super) fn in_time(looks: &str) -> String {
-    let mut parts = looks.split("within ");
-    let mut out = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let is_time = part.starts_with(|c: char| c.is_ascii_digit());
-        out += if is_time { "with a time constant of " } else { "within " };
-        out += part;
-    }
-    out
+    (over_time(&looks.join("; ")), goes)
 }
 
 /// A row for each remainder; the axes of a vector that look alike share one.
@@ -271,8 +259,6 @@ mod tests {
     fn a_memory_is_a_time_constant() {
         let said = looks_and_goes(&left("acc_x", "slow, within 2.0 s; goes with time"), None).0;
         assert_eq!(said, "slow, with a time constant of 2.0 s");
-        assert_eq!(in_time("within 0.05 s"), "with a time constant of 0.05 s");
-        assert_eq!(in_time("within a row"), "within a row");
     }
 
     /// What a short table cannot prove it says as far as it goes, where a reader looks for it.

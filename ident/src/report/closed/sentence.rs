@@ -7,12 +7,12 @@
 
 use super::cards::{is_shown, value};
 use super::contest::{Rival, is_beaten, rivals};
-use super::left::{fitted, in_time};
+use super::left::fitted;
 use super::lost;
 use super::vocabulary::Vocabulary;
 use crate::attribution::rivals::beyond;
 use crate::attribution::unexplained::LOUD;
-use crate::verdict::words::{Clause, adverb, channel, counted, heading, list, rms, upper, upper_bound, vector};
+use crate::verdict::words::{Clause, adverb, channel, counted, heading, list, over_time, rms, upper, upper_bound, vector};
 use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Kind, Parameter, Unexplained, Verdict};
 
 /// Most effects that the sentence names; the cards have all.
@@ -542,7 +542,7 @@ fn looks(u: &Unexplained) -> String {
     let first = u.looks_like.split(';').next().unwrap_or_default();
     let first = first.strip_prefix("loudest on ").and_then(|rest| Some(rest.split_once(": ")?.1)).unwrap_or(first);
     let seems = u.looks_like.split("; ").find(|part| part.starts_with("goes with ")).filter(|_| u.depends_on.is_empty());
-    let first = in_time(first)
+    let first = over_time(first)
         .replace("in one stretch", "mostly in one stretch")
         .replace("while the load is on its way", "as the load changes");
     seems.map_or(first.clone(), |seems| format!("{first}; it {seems}"))
