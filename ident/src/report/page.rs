@@ -560,6 +560,9 @@ mod tests {
     use super::*;
     use crate::close::close;
     use crate::log::Column;
+    use crate::report::bare_entry;
+    use crate::signal::bad::SetAside;
+    use crate::verdict::Parameter;
 
     /// A staircase on a supply behind a lead of so many ohms: the speed follows the voltage.
     fn run(lead: f64) -> Log {
@@ -583,6 +586,51 @@ mod tests {
             values: values.into_iter().enumerate().map(|(i, v)| v + size * wave(i, 0.7 + k as f64)).collect(),
         };
         Log { name: "run.csv".into(), t, columns: columns.into_iter().enumerate().map(noisy).collect(), ..Log::default() }
+    }
+
+    /// The thrust's own curve takes what the torque does along its curve: a figure against the torque has the rest of it.
+    #[test]
+    fn torque_is_drawn_beyond_its_curve() {
+        let mut log = run(0.0);
+        let rpm = log.column("rpm").expect("a speed").to_vec();
+        let sway = |i: usize| 2e-3 * (0.05 * i as f64).sin();
+        let values: Vec<f64> = rpm.iter().enumerate().map(|(i, r)| 2e-9 * r * r + sway(i)).collect();
+        let most = values.iter().copied().fold(0.0, f64::max);
+        log.columns.push(Column { name: "torque_nm".into(), values });
+        let closed = close(&log, None, &[], &mut |_| {}).expect("a log");
+        let thrust = target(&closed, "thrust_n").expect("a thrust");
+        let beyond = torque_beyond(&closed, thrust).expect("a torque");
+        let largest = beyond.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+        assert!(beyond.len() == claimed(thrust).count() && largest < 0.2 * most && largest > 1e-3, "{largest} of {most}");
+    }
+
+    /// Readings that were set aside count with the pulses that the others lost.
+    #[test]
+    fn readings_set_aside_count_by_what_they_lost() {
+        let truth = vec![4000.0; 1000];
+        let own: Vec<f64> = (0..1000).map(|i| if (100..110).contains(&i) { 3000.0 } else { 4000.0 }).collect();
+        let columns = [("rpm_opto", own), ("rpm_hall", truth.clone()), ("rpm_beam", truth)];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        let log = Log { t: (0..1000).map(f64::from).collect(), columns, ..Log::default() };
+        let size = Parameter { name: "probability".into(), value: 0.01, unit: "1".into(), ci95: [0.008, 0.012] };
+        let e = EffectEntry { channels: vec!["rpm_opto".into()], parameters: vec![size], ..bare_entry("missed_pulses") };
+        let aside = SetAside {
+            channel: "rpm_opto".into(),
+            row: 100,
+            rows: 10,
+            t_s: 100.0,
+            until_s: 109.0,
+            value: 3000.0,
+            expected: 4000.0,
+            recurs: false,
+            silent: false,
+        };
+        let mut v = parts::bare_verdict(Vec::new());
+        assert_eq!(counted(&log, &v, &e), None);
+        v.set_aside = vec![aside];
+        // 990 readings that lose a hundredth, ten that lose a quarter
+        let whole = counted(&log, &v, &e).expect("some were set aside");
+        assert!((whole - (9.9 + 2.5) / 1000.0).abs() < 1e-9, "{whole}");
     }
 
     #[test]

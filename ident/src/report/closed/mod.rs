@@ -36,6 +36,6 @@ pub use sentence::sentence;
 pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal, wrapped};
 pub use vocabulary::Vocabulary;
-#[cfg(test)]
-pub(crate) use vocabulary::bare_entry;
 pub(crate) use vocabulary::{ALL_ROWS, bare};
+#[cfg(test)]
+pub(crate) use vocabulary::{bare_entry, bare_verdict};
