@@ -78,7 +78,7 @@ impl Effect for RotorInertia {
 
     fn shapes(&self, _: &Context, instance: &Instance) -> Vec<Shape> {
         let starts = vec![3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
-        let coast = Shape { name: "coast_drag", unit: "1/rad", range: COAST, starts };
+        let coast = Shape { name: COAST_DRAG, unit: "1/rad", range: COAST, starts };
         if is_one_way(instance) { vec![coast] } else { Vec::new() }
     }
 
@@ -105,7 +105,8 @@ impl Effect for RotorInertia {
 
     /// Speeding up takes, it does not give. Against a model it is a difference of two inertias.
     fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        context.against_model || fitted.iter().all(|e| e.value > -2.0 * e.se) && fitted.iter().any(|e| e.value > 0.0)
+        let mut taken = fitted.iter().filter(|e| e.name != COAST_DRAG);
+        context.against_model || taken.clone().all(|e| e.value > -2.0 * e.se) && taken.any(|e| e.value > 0.0)
     }
 }
 
@@ -116,6 +117,8 @@ const DRIVEN: &str = "driven";
 /// The two with a controller that lets no current flow back.
 const ONE_WAY: &str = "one_way";
 const DRIVEN_ONE_WAY: &str = "driven_one_way";
+/// Its parameter, of no other form.
+const COAST_DRAG: &str = "coast_drag";
 /// Deceleration of a rotor that nothing drives over the square of its speed, 1/rad: its torque's factor over its inertia. From a disc of
 /// a boat's screw to a bare blade of a toy.
 const COAST: (f64, f64) = (1e-4, 0.1);
