@@ -104,9 +104,11 @@ impl Effect for RotorInertia {
     }
 
     /// Speeding up takes, it does not give. Against a model it is a difference of two inertias.
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+    /// What one takes that stands is no inertia where none is seen on the way up.
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        let seen = !is_one_way(instance) || fitted.iter().any(|e| e.name == "power_gain" && e.value > 3.0 * e.se);
         let mut taken = fitted.iter().filter(|e| e.name != COAST_DRAG);
-        context.against_model || taken.clone().all(|e| e.value > -2.0 * e.se) && taken.any(|e| e.value > 0.0)
+        seen && (context.against_model || taken.clone().all(|e| e.value > -2.0 * e.se) && taken.any(|e| e.value > 0.0))
     }
 }
 
