@@ -119,10 +119,8 @@ fn card(recording: &Recording, closed: &Closed, k: usize, e: &EffectEntry) -> Op
     let first = e.channels.first()?;
     let sensor = closed.sensors.iter().find(|s| s.channels.contains(&first.as_str()))?;
     let shown = sensor.shown.iter().find(|s| s.id == e.id)?;
-    let moved = most_moved(recording, e).filter(|(axis, _)| *axis != shown.axis);
-    let (axis, added) = moved.unwrap_or_else(|| (shown.axis, shown.added.clone()));
-    let whole = trace(recording, sensor, axis);
-    let before = whole.after.iter().zip(&added).map(|(after, added)| after + added).collect();
+    let whole = trace(recording, sensor, shown.axis);
+    let before = whole.after.iter().zip(&shown.added).map(|(after, added)| after + added).collect();
     let trace = whole.with_before(before);
     let id = format!("effect-{}", k + 1);
     Some(match &shown.over {
@@ -132,27 +130,6 @@ fn card(recording: &Recording, closed: &Closed, k: usize, e: &EffectEntry) -> Op
             .and_then(|wide| parts::part(&trace, &id, parts::ALONE, wide))
             .unwrap_or_else(|| parts::over_time(&trace, &id, parts::ALONE)),
     })
-}
-
-/// Causes that add to each axis a size of its own times what is the same for all of them, and what those sizes are called.
-const BY_AXIS: [(&str, &str); 3] = [("hard_iron", "offset"), ("current_induced_field", "per_ampere"), ("gyro_bias", "step")];
-
-/// The axis to which such a cause adds most, and what it adds there row by row. Where its error is taken away best may be another one: an axis
-/// with little error is soon without any. Nothing of another cause, or where that size may be zero.
-fn most_moved(recording: &Recording, e: &EffectEntry) -> Option<(usize, Vec<f64>)> {
-    let (_, size) = BY_AXIS.iter().find(|(id, _)| *id == e.id)?;
-    let of = |axis: &str| e.parameter(&format!("{size}_{axis}"));
-    let sizes = ["x", "y", "z"].map(of);
-    let most = |k: &usize| sizes[*k].map_or(0.0, |p| p.value.abs());
-    let axis = (0..3).max_by(|a, b| most(a).total_cmp(&most(b)))?;
-    let largest = sizes[axis].filter(|p| p.ci95[0] * p.ci95[1] > 0.0)?.value;
-    let instant = |name: &str, none: f64| e.parameter(name).map_or(none, |p| p.value);
-    let (from, until) = (instant("t0", f64::NEG_INFINITY), instant("t1", f64::INFINITY));
-    let acts = |i: usize, t: f64| match e.id.as_str() {
-        "current_induced_field" => recording.current.get(i).copied().unwrap_or(f64::NAN),
-        _ => f64::from(u8::from((from..until).contains(&t))),
-    };
-    Some((axis, recording.t.iter().enumerate().map(|(i, t)| largest * acts(i, *t)).collect()))
 }
 
 fn overview(recording: &Recording, sensor: &Sensor) -> Figure {
@@ -173,35 +150,5 @@ fn overview(recording: &Recording, sensor: &Sensor) -> Figure {
         layers: (0..3).map(line).collect(),
         height: 260.0,
         ..Figure::default()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::verdict::Parameter;
-
-    #[test]
-    fn the_axis_that_a_magnet_moves_most_is_drawn() {
-        let recording = Recording { t: (0..10).map(f64::from).collect(), ..Recording::default() };
-        let size = |name: &str, value: f64, half: f64| Parameter {
-            name: name.to_owned(),
-            value,
-            unit: "uT".to_owned(),
-            ci95: [value - half, value + half],
-        };
-        let of = |z: f64, half: f64| EffectEntry {
-            parameters: vec![
-                size("offset_x", 0.8, 0.1),
-                size("offset_y", -1.2, 0.1),
-                size("offset_z", z, half),
-                size("t0", 4.0, 0.1),
-            ],
-            ..crate::report::bare_entry("hard_iron")
-        };
-        let (axis, added) = most_moved(&recording, &of(-16.0, 1.0)).expect("an axis");
-        assert_eq!((axis, added[3], added[4]), (2, 0.0, -16.0));
-        assert!(most_moved(&recording, &of(-16.0, 20.0)).is_none(), "it may be nothing");
-        assert!(most_moved(&recording, &crate::report::bare_entry("soft_iron")).is_none());
     }
 }
