@@ -172,8 +172,6 @@ impl SetAside {
     }
 }
 
-/// Fewest single readings that recur: two have no size in common that a third bears out.
-const FEWEST_THAT_RECUR: usize = 3;
 /// Fewest speed channels among which one can be outvoted, so that pulses too few or too many have a name.
 const VOTES: usize = 3;
 
@@ -190,8 +188,10 @@ fn of_no_effect(name: &str, column: &[f64], mut events: Vec<Event>, samples: usi
     let singles = events.len() - lasting;
     // what follows a step of the load at once is no glitch to any reader, unless others are
     let settled = events.iter().filter(|e| single(e) && !e.at_step).count();
-    let few = if speed { singles } else { settled } < FEWEST_THAT_RECUR;
-    if few || speed && (lasting * 3 >= singles || speeds < VOTES || !of_one_size(column, events.iter().filter(|e| single(e)))) {
+    if singles < 2
+        || !speed && settled < 2
+        || speed && (lasting * 3 >= singles || speeds < VOTES || !of_one_size(column, events.iter().filter(|e| single(e))))
+    {
         return (events, Vec::new());
     }
     // a speed of nothing at all is no pulse too few: the probe saw nothing

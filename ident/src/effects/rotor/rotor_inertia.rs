@@ -61,14 +61,16 @@ impl Effect for RotorInertia {
         let (torque, current) = (present(context, &["torque_nm"]), present(context, &["current_a"]));
         let both = present(context, &["torque_nm", "current_a"]);
         // where the speed steps between rows, meters that average over a row see the step in the row in which it ends
-        let forms: &[&str] = if operator::commands_abruptly(context) { &["", OVER_THE_ROW] } else { &[""] };
-        let of_any =
-            [&both, &torque, &current].into_iter().flat_map(|set| forms.iter().map(move |form| Instance::new(set, form)));
-        let of_command: &[&str] = if driven(context).is_some() { &[ONE_WAY, DRIVEN, DRIVEN_ONE_WAY] } else { &[ONE_WAY] };
-        let with_current = if current.is_empty() { vec![] } else { vec![&both, &current] };
-        let of_current = with_current.into_iter().flat_map(|set| of_command.iter().map(move |form| Instance::new(set, form)));
+        let over = operator::commands_abruptly(context).then_some([OVER_THE_ROW, OVER_THE_ROW_ONE_WAY]);
+        let of_command = driven(context).is_some().then_some([DRIVEN, DRIVEN_ONE_WAY]);
+        let of_all: Vec<&str> = [Some(["", ONE_WAY]), over].into_iter().flatten().flatten().collect();
+        let of_torque: Vec<&str> = of_all.iter().copied().filter(|form| !form.ends_with(ONE_WAY)).collect();
+        let of_current: Vec<&str> = of_all.iter().copied().chain(of_command.into_iter().flatten()).collect();
+        let of_both = if current.is_empty() { &of_torque } else { &of_all };
+        let sets = [(&both, of_both), (&torque, &of_torque), (&current, &of_current)];
+        let of_any = sets.into_iter().flat_map(|(set, forms)| forms.iter().map(move |form| Instance::new(set, form)));
         let mut out: Vec<Instance> = Vec::new();
-        for instance in of_any.chain(of_current).filter(|i| !i.channels.is_empty()) {
+        for instance in of_any.filter(|i| !i.channels.is_empty()) {
             if !out.contains(&instance) {
                 out.push(instance);
             }
@@ -88,7 +90,7 @@ impl Effect for RotorInertia {
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let mut of_row = match instance.form.as_str() {
-            OVER_THE_ROW => acceleration_of_rows(&context.t, &context.rpm, usual_step(&context.t)),
+            OVER_THE_ROW | OVER_THE_ROW_ONE_WAY => acceleration_of_rows(&context.t, &context.rpm, usual_step(&context.t)),
             DRIVEN | DRIVEN_ONE_WAY => driven(context).cloned().unwrap_or_else(|| acceleration(context)),
             _ => acceleration(context),
         };
@@ -116,8 +118,9 @@ impl Effect for RotorInertia {
 const OVER_THE_ROW: &str = "over_the_row";
 /// Form of a rotor that is on its way to where its command sends it: a reading within a row's step knows how far it is off.
 const DRIVEN: &str = "driven";
-/// The two with a controller that lets no current flow back.
+/// The three with a controller that lets no current flow back.
 const ONE_WAY: &str = "one_way";
+const OVER_THE_ROW_ONE_WAY: &str = "over_the_row_one_way";
 const DRIVEN_ONE_WAY: &str = "driven_one_way";
 /// Its parameter, of no other form.
 const COAST_DRAG: &str = "coast_drag";
@@ -126,7 +129,7 @@ const COAST_DRAG: &str = "coast_drag";
 const COAST: (f64, f64) = (1e-4, 0.1);
 
 fn is_one_way(instance: &Instance) -> bool {
-    [ONE_WAY, DRIVEN_ONE_WAY].contains(&instance.form.as_str())
+    instance.form.ends_with(ONE_WAY)
 }
 
 /// Makes some rows of the current those of a rotor that stands.
