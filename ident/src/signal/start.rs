@@ -109,12 +109,16 @@ mod tests {
         assert_eq!(start_pulse(&t, Some(&pulse), &rpm), 1050.0);
     }
 
-    /// The sensor is lost at the end of a level: its rotor did not stand there.
+    /// The sensor is lost at the ends of the low levels, where the rotor did not stand; and after the run, where it did not turn.
     #[test]
     fn rows_without_a_speed_do_not_move_the_start() {
-        let (t, pulse, mut rpm) = late(&[(1000.0, 6.0), (1100.0, 6.0), (1400.0, 40.0), (1200.0, 6.0), (1000.0, 6.0)]);
-        rpm[500..530].fill(f64::NAN);
-        assert_eq!(start_pulse(&t, Some(&pulse), &rpm), 1050.0);
+        let levels = [(1000.0, 6.0), (1100.0, 20.0), (1200.0, 20.0), (1400.0, 6.0), (1000.0, 20.0)];
+        let (ends, after): (Vec<usize>, Vec<usize>) = ((255..262).chain(455..462).collect(), (530..720).collect());
+        for lost in [ends, after] {
+            let (t, pulse, mut rpm) = late(&levels);
+            lost.iter().for_each(|row| rpm[*row] = f64::NAN);
+            assert_eq!(start_pulse(&t, Some(&pulse), &rpm), 1050.0, "{lost:?}");
+        }
     }
 
     #[test]
