@@ -20,6 +20,7 @@ mod witness;
 pub(crate) use curve::Curve;
 
 use crate::log::{Column, Log, MODELLED, SPEED};
+use crate::numeric::order::median;
 use excursion::Event;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -187,12 +188,22 @@ fn of_no_effect(name: &str, column: &[f64], mut events: Vec<Event>, samples: usi
     let singles = events.len() - lasting;
     // what follows a step of the load at once is no glitch to any reader, unless others are
     let settled = events.iter().filter(|e| single(e) && !e.at_step).count();
-    if singles < 2 || !speed && settled < 2 || speed && (lasting * 3 >= singles || speeds < VOTES) {
+    if singles < 2
+        || !speed && settled < 2
+        || speed && (lasting * 3 >= singles || speeds < VOTES || !of_one_size(column, events.iter().filter(|e| single(e))))
+    {
         return (events, Vec::new());
     }
     // a speed of nothing at all is no pulse too few: the probe saw nothing
     let saw_nothing = |e: &Event| speed && column[e.rows.start].abs() < 0.05 * e.expected.abs();
     events.into_iter().partition(|e| !single(e) || saw_nothing(e))
+}
+
+/// Whether most readings of a speed are off by about the same share of it: a pulse too few or too many always is.
+fn of_one_size<'e>(column: &[f64], events: impl Iterator<Item = &'e Event>) -> bool {
+    let off: Vec<f64> = events.map(|e| column[e.worst] / e.expected - 1.0).filter(|off| off.is_finite()).collect();
+    let usual = median(&mut off.clone());
+    2 * off.iter().filter(|off| (**off - usual).abs() <= 0.5 * usual.abs()).count() > off.len()
 }
 
 /// An event in the words of the list.

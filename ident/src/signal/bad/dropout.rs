@@ -174,6 +174,15 @@ impl Judge<'_> {
         before.iter().filter(right).count() >= AGAIN && before.iter().take(2).any(fell)
     }
 
+    /// Whether the reading itself has fallen by half of what the whole loss comes to, or is next to nothing of a rotor that turns. A rotor that coasts
+    /// down ahead of a late load gets there as well, but not at once; and a load that rises late makes a steady reading look low.
+    fn falls_at_once(&self, row: usize, depth: f64, witness: &Witness) -> bool {
+        let is_read = |i: &usize| self.read[*i].is_finite();
+        let before = (self.block(row)..row).rev().filter(is_read).take(2).map(|i| self.read[i]).fold(0.0, f64::max);
+        let mut first = (row..self.read.len()).filter(is_read).take(AGAIN);
+        first.clone().all(|i| self.read[i] < DEPTH * witness.said[i]) || first.any(|i| before - self.read[i] > HALF * depth)
+    }
+
     /// The loss that began at a row and that a witness tells on a later one to be so deep.
     fn event_by(&self, row: usize, tells: usize, first: f64, witness: &Witness) -> Option<Event> {
         if !self.falls(row, first, witness) {
@@ -206,7 +215,7 @@ impl Judge<'_> {
         // a single reading is for those who look at single readings
         let rows = row..end;
         let event = Event { expected: witness.said[worst], rows, worst, at_step: false, silent: false };
-        let loses = depth > DEPTH * event.expected;
+        let loses = depth > DEPTH * event.expected && self.falls_at_once(row, depth, witness);
         let stands = loses
             && event.rows.len() > super::SINGLE
             && !self.is_of_level(&event, depth)
@@ -267,7 +276,10 @@ fn load(witnesses: &Witnesses<'_>, read: &[f64]) -> Option<Witness> {
         let moves = spread(&witnesses.t, &said);
         let quiet = median(&mut moves.clone());
         let usual = usual(read, &said, &|i| moves[i] <= quiet)?;
-        let sd = moves.iter().map(|m| usual.hypot(HALF * m)).collect();
+        // next to no load does not tell slow from standing: the speed goes with its root, and the curve's first line knows nothing of that
+        let least = curve.first_line();
+        let unsure = |(m, (x, said)): (&f64, (&f64, &f64))| usual.hypot(HALF * m).max(if *x <= least { *said } else { 0.0 });
+        let sd = moves.iter().zip(signal.iter().zip(&said)).map(unsure).collect();
         Some(Witness::new(said, sd))
     };
     let all = ["thrust_n", "torque_nm", "current_a"].iter().filter_map(of_channel);
