@@ -118,6 +118,16 @@ fn two_wild_readings_are_listed_and_have_no_name() {
     }
 }
 
+/// A probe that loses its mark for a while loses it for single readings as well: two of them of one size are no pulses too few.
+#[test]
+fn single_losses_beside_lasting_ones_have_no_name() {
+    let mut log = run(&["rpm_beam", "rpm_hall", "rpm_encoder"], &[(1120, 15, 0.0, 0.1), (2050, 80, 0.0, 0.1)]);
+    let beam = log.columns.iter_mut().find(|c| c.name == "rpm_beam").expect("a beam");
+    [877, 1620].into_iter().for_each(|row| beam.values[row] *= 0.7);
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    assert!(!names(&closed).contains(&"missed_pulses".to_owned()), "{:?}", names(&closed));
+}
+
 /// Without a command the load is the only witness. One that comes late says still that the rotor turns when it has stopped: it coasted, and the probe
 /// read it all the way.
 #[test]
