@@ -67,7 +67,8 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
         return Vec::new();
     }
     let step = quantum(read).max(1e-4 * top);
-    let judge = Judge { read, all: &all, measured, top, step, steps: witnesses.jumps(), blocks: starts(&witnesses.log.t, read) };
+    let judge =
+        Judge { read, all: &all, measured, top, step, steps: witnesses.jumps(), blocks: starts(&witnesses.log.t, read, false) };
     let mut out = Vec::new();
     let (mut row, mut told) = (0, 0);
     while row < read.len() {
