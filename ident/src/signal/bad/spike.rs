@@ -82,25 +82,6 @@ fn stands_out(y: &[f64], k: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::stands_out;
-
-    /// A log that begins with the rotor's start, and one whose first reading is a spike; and both from the end.
-    #[test]
-    fn the_first_reading_of_a_rotor_that_starts_is_no_spike() {
-        let (starts, spike) = ([0.0, 48.0, 518.0, 1672.0, 3111.0], [60_000.0, 5000.0, 5002.0, 4999.0, 5001.0]);
-        assert_eq!(stands_out(&starts, 0), 0.0);
-        assert!(stands_out(&spike, 0) > 54_000.0);
-        let [stops, ends] = [starts, spike].map(|mut y| {
-            y.reverse();
-            y
-        });
-        assert_eq!(stands_out(&stops, 4), 0.0);
-        assert!(stands_out(&ends, 4) > 54_000.0);
-    }
-}
-
-#[cfg(test)]
-mod tests {
     use super::*;
 
     #[test]
@@ -128,5 +109,19 @@ mod tests {
         }
         let aside = crate::signal::bad::found(&crate::log::Log::parse("run.csv", text.as_bytes()).expect("a log"));
         assert!(aside.iter().all(|a| a.channel != "torque_nm"), "{aside:?}");
+    }
+
+    /// A log that begins with the rotor's start, and one whose first reading is a spike; and both from the end.
+    #[test]
+    fn the_first_reading_of_a_rotor_that_starts_is_no_spike() {
+        let (starts, spike) = ([0.0, 48.0, 518.0, 1672.0, 3111.0], [60_000.0, 5000.0, 5002.0, 4999.0, 5001.0]);
+        assert_eq!(stands_out(&starts, 0), 0.0);
+        assert!(stands_out(&spike, 0) > 54_000.0);
+        let [stops, ends] = [starts, spike].map(|mut y| {
+            y.reverse();
+            y
+        });
+        assert_eq!(stands_out(&stops, 4), 0.0);
+        assert!(stands_out(&ends, 4) > 54_000.0);
     }
 }
