@@ -46,14 +46,13 @@ pub(crate) fn odd(table: &toml::Table) -> Option<(&'static str, &Value, &'static
     STATED.iter().find_map(odd)
 }
 
-/// The texts of a rig's head that the program goes by.
+/// The texts of a rig's head that name it and its run.
 const TEXTS: [&str; 4] = ["motor", "propeller", "supply", "date"];
 
-/// Key and value of a comment that is no TOML although it states what the program goes by.
+/// Key and value of a comment that is no TOML although it names the rig.
 pub(super) fn misread(comment: &str) -> Option<(&str, &str)> {
     let (key, value) = comment.split_once('=').map(|(key, value)| (key.trim(), value.trim()))?;
-    let known = TEXTS.contains(&key) || STATED.iter().any(|s| s.key == key);
-    (known && !value.is_empty()).then_some((key, value))
+    (TEXTS.contains(&key) && !value.is_empty()).then_some((key, value))
 }
 
 /// Refuses a value of the head that no rig can have; `place` is its line.

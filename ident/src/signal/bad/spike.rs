@@ -55,12 +55,12 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
     out
 }
 
-/// How far a reading is beyond those before and after it; 0 where it is between them. The first and the last have one side only: what those beside
-/// them move by, as on a rotor that starts with the log, the reading may have moved by as well.
+/// How far a reading is beyond those before and after it; 0 where it is between them. The first and the last have one side only: by what those beside
+/// them move towards it, as on a rotor that starts with the log, the reading may have moved on.
 fn stands_out(y: &[f64], k: usize) -> f64 {
-    let beyond = |off: f64, beside: &[f64]| {
-        let (least, most) = beside.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        off.signum() * (off.abs() - (most - least)).max(0.0)
+    let beyond = |off: f64, (nearest, farthest): (f64, f64)| {
+        let moved = (off.signum() * (nearest - farthest)).max(0.0);
+        off.signum() * (off.abs() - moved).max(0.0)
     };
     let of = |from: usize, to: usize| (to > from).then(|| y[k] - median(&mut y[from..to].to_vec()));
     let before = of(k.saturating_sub(BESIDE), k);
@@ -74,8 +74,8 @@ fn stands_out(y: &[f64], k: usize) -> f64 {
             }
         }
         (Some(_), Some(_)) => 0.0,
-        (Some(off), None) => beyond(off, &y[k.saturating_sub(BESIDE)..k]),
-        (None, Some(off)) => beyond(off, &y[k + 1..(k + 1 + BESIDE).min(y.len())]),
+        (Some(off), None) => beyond(off, (y[k - 1], y[k.saturating_sub(BESIDE)])),
+        (None, Some(off)) => beyond(off, (y[k + 1], y[(k + BESIDE).min(y.len() - 1)])),
         (None, None) => 0.0,
     }
 }
