@@ -89,9 +89,7 @@ fn readers(log: &str) -> [Vec<&str>; 5] {
 #[test]
 fn the_good_log_is_good() {
     let bench = Bench::new();
-    // one that is a run to judge by as well: no run judges itself
-    fs::write(bench.path("again.csv"), good_log()).unwrap();
-    for words in readers("again.csv") {
+    for words in readers("good.csv") {
         bench.call(&words).succeeded();
     }
     bench.call(&["import", "good.csv", "-o", "imported.csv"]).succeeded();
