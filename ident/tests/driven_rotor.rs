@@ -142,6 +142,13 @@ fn is_written_as_it_is_said(closed: &Closed, today: &Day<'_>) {
     }
 }
 
+/// Six ways up are steep, and their readings of current and torque leave all others: that is how the rotor goes, and no absurd value.
+#[test]
+fn readings_that_stand_out_at_every_steep_step_are_the_rotors() {
+    let healthy = close(&log(&day(1, 0.05, jumps(0.05))), None, &[], &mut |_| {}).expect("a healthy day");
+    assert!(!ids(&healthy).contains(&"glitch_rows"), "{:?}", ids(&healthy));
+}
+
 #[test]
 fn the_next_day_is_the_same() {
     let closed = against(&day(1, 0.05, jumps(0.05)), &day(2, 0.05, jumps(0.05)));

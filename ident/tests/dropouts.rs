@@ -101,3 +101,48 @@ fn a_way_back_is_followed_to_its_end() {
     let (worst, row) = off.max_by(|a, b| a.0.total_cmp(&b.0)).expect("rows");
     assert!(worst < 0.02, "row {row} is {worst} off and not listed");
 }
+
+/// Two readings of one sensor of three that are far off, by a third and by five times: no pulses too many, for those are always the same share.
+#[test]
+fn two_wild_readings_are_listed_and_have_no_name() {
+    let mut log = run(&["rpm_beam", "rpm_hall", "rpm_encoder"], &[]);
+    let clean = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    let beam = log.columns.iter_mut().find(|c| c.name == "rpm_beam").expect("a beam");
+    beam.values[777] *= 1.35;
+    beam.values[1620] *= 6.0;
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    assert_eq!(names(&closed), names(&clean));
+    for row in [777, 1620] {
+        let listed = closed.context.set_aside.iter().any(|a| a.channel == "rpm_beam" && a.span() == (row..row + 1));
+        assert!(listed, "row {row}: {:?}", closed.context.set_aside);
+    }
+}
+
+/// A probe that loses its mark for a while loses it for single readings as well: two of them of one size are no pulses too few.
+#[test]
+fn single_losses_beside_lasting_ones_have_no_name() {
+    let mut log = run(&["rpm_beam", "rpm_hall", "rpm_encoder"], &[(1120, 15, 0.0, 0.1), (2050, 80, 0.0, 0.1)]);
+    let beam = log.columns.iter_mut().find(|c| c.name == "rpm_beam").expect("a beam");
+    [877, 1620].into_iter().for_each(|row| beam.values[row] *= 0.7);
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    assert!(!names(&closed).contains(&"missed_pulses".to_owned()), "{:?}", names(&closed));
+}
+
+/// Without a command the load is the only witness. One that comes late says still that the rotor turns when it has stopped: it coasted, and the probe
+/// read it all the way.
+#[test]
+fn a_rotor_that_coasts_ahead_of_a_late_load_is_no_drop_out() {
+    let mut log = run(&["rpm"], &[]);
+    log.columns.retain(|c| c.name != "pulse_us");
+    let stops = 2400;
+    let speed = &mut log.columns.iter_mut().find(|c| c.name == "rpm").expect("a speed").values;
+    let from = speed[stops];
+    speed[stops..].iter_mut().enumerate().for_each(|(i, v)| *v = (from / (1.0 + 0.04 * i as f64) - 8.0 * i as f64).max(0.0));
+    let speed = speed.clone();
+    let thrust = &mut log.columns.iter_mut().find(|c| c.name == "thrust_n").expect("a thrust").values;
+    let late = |i: usize| speed[i.saturating_sub(20)];
+    thrust.iter_mut().enumerate().for_each(|(i, v)| *v = 2.5e-7 * late(i).powi(2) + 0.01 * noise(i, 7));
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    let lost: Vec<_> = closed.context.set_aside.iter().filter(|a| a.channel == "rpm" && a.row >= stops).collect();
+    assert!(lost.is_empty(), "{lost:?}");
+}

@@ -214,6 +214,45 @@ fn what_nothing_explains_comes_with_what_is_nearest() {
     assert!(all < 1.0 + 1e-9, "{all}");
 }
 
+/// A cell that averages slowly and is read once a second: the hold is told from its repeats, and the lag from what is held.
+#[test]
+fn a_hold_and_the_lag_beneath_it_are_two() {
+    let c = Command::new(16);
+    let tau = 0.5;
+    let slow = lagged(&|t| thrust(c.speed(t)), tau);
+    let mut chance = Chance::new(17);
+    let noise: Vec<f64> = (0..ROWS).map(|_| 0.01 * chance.normal()).collect();
+    let held = |t: f64| {
+        let row = (((t + 1e-9).floor() / STEP).round() as usize).min(ROWS - 1);
+        slow[row] + noise[row]
+    };
+    let meters: [&dyn Fn(f64) -> f64; 4] = [&|t| c.speed(t), &held, &|t| torque(c.speed(t)), &|t| current(c.speed(t))];
+    let closed = verdict(&log(&c, meters, [NOISE[0], 0.0, NOISE[2], NOISE[3]]));
+    let mut found = names(&closed);
+    found.sort_unstable();
+    assert_eq!(found, ["channel_filter", "sample_hold"], "{:?}", closed.verdict.alternatives);
+    let filter = closed.verdict.effects.iter().find(|e| e.id == "channel_filter").expect("a filter");
+    let p = filter.parameters.iter().find(|p| p.name == "tau").unwrap_or_else(|| panic!("{:?}", filter.parameters));
+    assert!((p.value - tau).abs() < 0.05, "{p:?}");
+}
+
+/// Two speed sensors that average over the same while: no clock drifts, and neither is late alone.
+#[test]
+fn speeds_that_are_late_together_are_no_clock_that_drifts() {
+    let c = Command::new(18);
+    let late = 0.4;
+    let mut log =
+        log(&c, [&|t| c.speed(t - late), &|t| thrust(c.speed(t)), &|t| torque(c.speed(t)), &|t| current(c.speed(t))], NOISE);
+    let mut chance = Chance::new(19);
+    let second = log.t.iter().map(|t| 1.001 * c.speed(t - late) + NOISE[0] * chance.normal()).collect();
+    log.columns.iter_mut().find(|c| c.name == "rpm").expect("a speed").name = "rpm_hall".to_owned();
+    log.columns.insert(2, Column { name: "rpm_encoder".to_owned(), values: second });
+    let closed = verdict(&log);
+    assert_eq!(names(&closed), ["channel_delay"], "{:?}", closed.verdict.alternatives);
+    assert!(["rpm_hall", "rpm_encoder", "thrust_n"].iter().all(|c| closed.verdict.effects[0].channels.iter().any(|on| on == c)));
+    close_to(&closed, "delay", late, 0.03);
+}
+
 #[test]
 fn the_interval_of_held_values_is_known_to_the_clock_of_their_updates_although_rows_are_missing() {
     let c = Command::new(14);

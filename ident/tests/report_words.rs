@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict".
 
 use ident::report::{Hidden, Vocabulary, WIDEST, sentence, terminal};
+use ident::signal::bad::SetAside;
 use ident::verdict::Scope;
 use ident::verdict::{
     Alternative, BeforeAfter, Change, Channel, Channels, EffectEntry, FORMAT, Figures, Kin, Kind, NextExperiment, Parameter,
@@ -248,7 +249,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
 fn verdict_with_thrust_after(after: f64, effects: Vec<EffectEntry>) -> Verdict {
     let mut v = verdict(Kind::Attributed, effects);
     let thrust = v.channels.predicted.get_mut("thrust_n").expect("a channel");
-    thrust.after.heldout_rms = after;
+    (thrust.after.rms, thrust.after.heldout_rms) = (after, after);
     v
 }
 
@@ -806,4 +807,70 @@ fn a_flight_is_of_a_vehicle() {
     v.channels.predicted = [("mx".to_owned(), one)].into();
     let text = terminal(&v, ident::report::inertial::VOCABULARY, false);
     assert!(text.contains("what this board has") && text.contains("on field (x), board"), "{text}");
+}
+
+/// A verdict on a sensor that misses pulses: its own scatter is the fault, and its worst readings were set aside.
+fn missing_pulses() -> Verdict {
+    let fault = effect("missed_pulses", "rpm_opto", 0.99, 0.01, vec![parameter("probability", 0.0124, 0.002, "1")]);
+    let mut v = verdict(Kind::Attributed, vec![fault]);
+    let of = |rms: f64| Figures { rms, heldout_rms: rms, across_runs_rms: None, whiteness_p: 0.2 };
+    for (name, floor, after) in [("rpm_hall", 0.6, 0.7), ("rpm_beam", 0.5, 0.6), ("rpm_opto", 157.0, 176.0)] {
+        let channel = Channel { unit: "rev/min".into(), noise_floor_rms: floor, before: of(after), after: of(after) };
+        v.channels.predicted.insert(name.into(), channel);
+    }
+    let aside = |rows: usize| SetAside {
+        channel: "rpm_opto".into(),
+        row: 100,
+        rows,
+        t_s: 10.0,
+        until_s: 10.5,
+        value: 1642.17,
+        expected: 2464.06,
+        recurs: false,
+        silent: false,
+    };
+    v.set_aside = vec![aside(4), aside(3)];
+    v
+}
+
+/// Readings that were set aside because the fault struck them are told with the fault, and the bar of the sensor does not look healthy.
+#[test]
+fn what_was_set_aside_is_told_with_the_fault() {
+    let v = missing_pulses();
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.contains("misses 1.2 % of its pulses, beside 7 readings set aside as too low."), "{said}");
+    let text = terminal(&v, Vocabulary::RIG, false);
+    let row = text.lines().find(|l| l.starts_with("speed (optical)")).unwrap_or_default();
+    assert!(row.ends_with("fault stays") && row.contains("0.550 rev/min"), "{row}");
+    let joined = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(joined.contains("1642 where the rest of the log says 2464"), "{text}");
+    assert!(text.lines().all(|l| l.chars().count() <= WIDEST), "{text}");
+}
+
+/// Rows that lie beyond what a fit saw are missed by far more than those it saw: both are told, and which is which.
+#[test]
+fn an_extrapolation_is_no_size_of_what_is_left() {
+    let mut v = verdict(Kind::Attributed, vec![sag(0.9)]);
+    let after = Figures { rms: 4.1, heldout_rms: 91.0, across_runs_rms: None, whiteness_p: 0.2 };
+    let before = Figures { rms: 80.0, heldout_rms: 160.0, ..after };
+    v.channels.predicted.insert("rpm".into(), Channel { unit: "rev/min".into(), noise_floor_rms: 1.0, before, after });
+    v.unexplained = vec![left("rpm", 91.0)];
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(
+        said.contains("On speed 4.10 rev/min rms is left (slow). Rows left out of the fit are missed by 91.0 rev/min:"),
+        "{said}"
+    );
+    let text = terminal(&v, Vocabulary::RIG, false);
+    assert!(text.contains("speed: 91.0 rev/min (4.10 rev/min where fitted)"), "{text}");
+}
+
+/// A noise floor may hold a part of what is named: all that is explained is what stood above it.
+#[test]
+fn all_is_what_stood_above_the_noise_floor() {
+    let mut v = verdict(Kind::Attributed, vec![filter(0.99)]);
+    if let Some(thrust) = v.channels.predicted.get_mut("thrust_n") {
+        thrust.after.heldout_rms = 0.0099;
+    }
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.contains("That explains all of what thrust had left above its noise floor."), "{said}");
 }

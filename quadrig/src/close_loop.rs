@@ -16,7 +16,7 @@ use crate::folder::Folder;
 use crate::open::{Columns, Names, open, read_model};
 use crate::progress::Bar;
 use ident::close::{Closed, close};
-use ident::log::Log;
+use ident::log::{Log, Named, named_alike};
 use ident::model::{FittedTo, Model};
 use ident::report::{Origin, Vocabulary, closed_loop, terminal};
 use std::path::{Path, PathBuf};
@@ -73,10 +73,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let options = args.columns.options(&args.names);
     let log = open(args.log(), &options, quiet)?;
     let model = args.model.as_deref().map(|path| read_model(path, quiet)).transpose()?;
-    for same in args.validate.iter().filter(|p| p.canonicalize().ok() == args.log().canonicalize().ok()) {
-        note!("--validate {}: it is the log itself, whose figures validate nothing; give another run of the rig", same.display());
+    if let Some(same) = args.validate.iter().find(|p| p.canonicalize().ok() == args.log().canonicalize().ok()) {
+        let what = "it is the log itself, whose figures validate nothing; expected another run of the rig";
+        return Err(format!("--validate {}: {what}", same.display()).into());
     }
     let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    let path = args.model.as_ref().map(|m| m.display().to_string()).unwrap_or_default();
+    let declared = model.as_ref().map(|m| Named::by(&path, |key| m.meta.get(key)));
+    of_one_rig(declared.into_iter().chain(std::iter::once(&log).chain(&others).map(Log::names)))?;
     let closed = {
         let bar = Bar::new("searching", quiet);
         close(&log, model.as_ref(), &others, &mut |share| bar.set(share))?
@@ -101,6 +105,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     say_unwritten(args, quiet);
     Ok(())
+}
+
+/// Refuses what is of several rigs: names and values of one would stand for the other.
+fn of_one_rig<'a>(rigs: impl IntoIterator<Item = Named<'a>>) -> Result<(), Failure> {
+    named_alike(rigs).map_err(|e| format!("{e}; expected one rig: where a head is wrong, --motor and --propeller name it").into())
 }
 
 /// Says that what was shown is not kept.

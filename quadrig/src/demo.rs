@@ -78,7 +78,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let parameters = truth
         .parameters()
         .iter()
-        .map(|(n, v, u)| format!("{n} = {}{}", number(*v), if *u == "1" { String::new() } else { format!(" {u}") }))
+        .map(|(n, v, u)| format!("{n} = {}{}", size(*v), if *u == "1" { String::new() } else { format!(" {u}") }))
         .collect();
     let hidden = Hidden { seed, id: truth.id().to_owned(), parameters };
     let judged = hidden.judged(&closed.verdict);
@@ -117,6 +117,11 @@ fn resimulated(model: &ident::model::Model, again: &Log) -> String {
     out
 }
 
+/// A size of what was hidden; a whole number, such as that of a channel, as itself.
+fn size(value: f64) -> String {
+    if value.fract() == 0.0 { format!("{value}") } else { number(value) }
+}
+
 /// Spreads neighbouring seeds (splitmix64).
 fn mixed(seed: u64) -> u64 {
     let z = (seed.wrapping_add(0x9E37_79B9_7F4A_7C15)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -131,6 +136,11 @@ mod tests {
     #[test]
     fn the_simulator_knows_what_the_demonstration_hides() {
         assert!(HIDDEN.iter().all(|id| effect::find(id).is_some()));
+    }
+
+    #[test]
+    fn a_whole_number_has_no_decimals() {
+        assert_eq!((size(1.0), size(0.01343)), ("1".to_owned(), number(0.01343)));
     }
 
     #[test]

@@ -84,6 +84,11 @@ pub(crate) fn join(
         }
         let (log, said) = open_further(&w.file, rotor, &options)?;
         remarks.extend(said);
+        if log.t == alone.t && log.columns == alone.columns {
+            return Err(
+                format!("{}: the same log as {}; expected another logger of the run", w.file.display(), file.display()).into()
+            );
+        }
         let joint = align(&alone, &log).map_err(|e| format!("{} and {}: {e}", file.display(), w.file.display()))?;
         reports.push(merge(stand, &log, &joint, &w.label));
         logs.push((log, joint));

@@ -223,5 +223,11 @@ pub(crate) fn fly_model(scenario: &Scenario, model: &Model, like: &Log, name: &s
     let healthy = Scenario { effects: Vec::new(), ..scenario.clone() };
     let mut log = fly(&healthy, Some(Box::new(plant.clone())), name, "re-flying", quiet)?;
     plant.misread(&mut log);
+    // what flew is the model's motor and propeller
+    for key in ["motor", "propeller"] {
+        if let Some(own) = model.meta.get(key) {
+            log.meta.insert(key.to_owned(), own.clone());
+        }
+    }
     Ok(log)
 }

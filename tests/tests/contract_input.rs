@@ -89,7 +89,9 @@ fn readers(log: &str) -> [Vec<&str>; 5] {
 #[test]
 fn the_good_log_is_good() {
     let bench = Bench::new();
-    for words in readers("good.csv") {
+    // one that is a run to judge by as well: no run judges itself
+    fs::write(bench.path("again.csv"), good_log()).unwrap();
+    for words in readers("again.csv") {
         bench.call(&words).succeeded();
     }
     bench.call(&["import", "good.csv", "-o", "imported.csv"]).succeeded();

@@ -182,15 +182,40 @@ fn the_command_writes_the_rig_and_each_run_and_refuses_what_is_no_set_of_runs() 
     }
     assert!(at.join("out/runs/r2/verdict.json").is_file() && at.join("out/model.toml").is_file());
 
+    let of_another = std::fs::read_to_string(at.join("r2.csv")).unwrap().replacen("motor = \"570KV\"", "motor = \"1000KV\"", 1);
+    std::fs::write(at.join("other.csv"), of_another).unwrap();
     std::fs::write(at.join("imu.csv"), "t_s,gx,gy,gz,ax,ay,az\n0,0,0,0,0,0,9.8\n").unwrap();
     for (words, said) in [
-        (["close-loop", "r1.csv", "r1.csv"], "are the same log"),
-        (["close-loop", "r1.csv", "imu.csv"], "imu.csv: no log of a rig"),
-        (["close-loop", "r1.csv", "nothing.csv"], "nothing.csv"),
+        (&["close-loop", "r1.csv", "r1.csv"][..], "are the same log"),
+        (&["close-loop", "r1.csv", "imu.csv"], "imu.csv: no log of a rig"),
+        (&["close-loop", "r1.csv", "nothing.csv"], "nothing.csv"),
+        (&["close-loop", "r1.csv", "other.csv"], "r1.csv and other.csv are of different rigs: motor \"570KV\" and \"1000KV\""),
+        (&["close-loop", "r1.csv", "--validate", "other.csv"], "are of different rigs"),
+        (&["close-loop", "other.csv", "--model", "out/model.toml"], "out/model.toml and other.csv are of different rigs"),
     ] {
-        let refused = call(at, &words);
+        let refused = call(at, words);
         let _ = refused.refused(&[said]);
     }
+}
+
+/// A log without a command stands first: what a command makes of the speed is known from the others, and nothing is said of it on this one.
+#[test]
+fn a_speed_without_a_command_takes_no_part() {
+    let folder = TempDir::new().unwrap();
+    let mut logs: Vec<Log> = (1..=3).map(|n| flown(folder.path(), n, "", LEAD)).collect();
+    logs[0].columns.retain(|c| c.name != "pulse_us");
+    let (_, outcome) = together(logs.clone());
+    let speed = &outcome.verdict.channels["rpm_opto"];
+    assert!(speed.after.heldout_rms < 100.0, "{} rev/min of a run by the other", speed.after.heldout_rms);
+    let own = validation(&logs[0], &outcome.declared, &outcome.model);
+    assert!(!own.channels.contains_key("rpm_opto") && own.channels.contains_key("thrust_n"), "{:?}", own.channels.keys());
+
+    let (_, outcome) = together(logs.drain(..2).collect());
+    assert!(
+        outcome.verdict.channels.not_predicted["rpm_opto"].ends_with("on 1 of 2 runs"),
+        "{:?}",
+        outcome.verdict.channels.not_predicted
+    );
 }
 
 /// Three of these runs: a delay of the load cell joined for what a clock that runs apart explains better beside the others.

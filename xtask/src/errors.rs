@@ -41,6 +41,7 @@ const AREAS: [(&str, &[&str]); 14] = [
             "ident/src/log/plausible.rs",
             "ident/src/log/whole.rs",
             "ident/src/identify/mod.rs",
+            "quadrig/src/close_loop.rs",
             "quadrig/src/identify.rs",
             "quadrig/src/plateaus.rs",
         ],

@@ -17,6 +17,7 @@ use crate::attribution::suspects::{nearest, stand_beside, suspects};
 use crate::attribution::together::{Ground, choose_together};
 use crate::channel::{Context, Relation, Target};
 pub(crate) use crate::effects::NEEDED_EVIDENCE;
+use crate::effects::acquisition::sample_hold::{self, SampleHold};
 use crate::effects::placed::Placed;
 use crate::effects::placed::is_named;
 use crate::effects::{self, Effect, Estimate, Instance};
@@ -151,6 +152,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let mut all = offers(context);
     let mut offers: Vec<&mut Scanned> = all.iter_mut().collect();
     tare(context, declared, &start, &mut best);
+    hold(context, declared, &start, &mut best);
     if !best.fit.placed.is_empty() {
         errors = heldout::errors(context, declared, &best.fit, &folds);
         rounds.extend(best.fit.placed.iter().map(|_| (1.0, Vec::new())));
@@ -341,6 +343,25 @@ fn tare(context: &Context, declared: Declared<'_>, start: &Fit, best: &mut Candi
     }
 }
 
+/// A channel whose readings repeat at even intervals holds them, whatever else its meter does: what it holds is sought beneath. A filter that is as
+/// wide as the hold would be taken for both.
+fn hold(context: &Context, declared: Declared<'_>, start: &Fit, best: &mut Candidate) {
+    if context.against_model || context.time_is_row || context.is_table() {
+        return;
+    }
+    let shown = |target: &Target| {
+        let (instance, estimates) = sample_hold::by_readings(context, target)?;
+        Some(Placed { effect: &SampleHold, instance, shape: estimates.iter().map(|e| e.value).collect() })
+    };
+    let shown: Vec<Placed> = context.targets.iter().filter(|t| !t.relation.is_evidence()).filter_map(shown).collect();
+    let placed: Vec<Placed> = best.fit.placed.iter().cloned().chain(shown).collect();
+    if placed.len() > best.fit.placed.len()
+        && let Some(fit) = fit(context, declared, &placed, Some(start), Rows::All)
+    {
+        *best = Candidate { evidence: evidence_over(context, &fit, start), fit };
+    }
+}
+
 /// What a scan of one instance gave; it stays valid until an effect is added on one of its channels.
 pub(crate) struct Scanned {
     pub(crate) effect: &'static dyn Effect,
@@ -384,14 +405,19 @@ pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instan
                 && !p.effect.never_beside().contains(&effect.id())
                 && !effect.never_beside().contains(&p.effect.id())
         };
-        let room = effect.is_of_every_rig() || there.iter().filter(|p| !p.effect.is_of_every_rig()).count() < MOST_ON_A_CHANNEL;
+        let room = effect.is_of_every_rig() || there.iter().filter(|p| takes_a_place(p)).count() < MOST_ON_A_CHANNEL;
         room && there.iter().all(apart)
     })
 }
 
 /// How many effects there are beside what every rig has.
 fn of_this_rig(placed: &[Placed]) -> usize {
-    placed.iter().filter(|p| !p.effect.is_of_every_rig()).count()
+    placed.iter().filter(|p| takes_a_place(p)).count()
+}
+
+/// Whether a name is one of the few that a run or a channel may have: what every rig has and what the readings show by themselves is told besides.
+fn takes_a_place(placed: &Placed) -> bool {
+    !placed.effect.is_of_every_rig() && !placed.is_read_off()
 }
 
 /// Scans the grids of some offers beside what is there already, on all cores, each with what it remembers of the rows.

@@ -48,12 +48,14 @@ pub(crate) fn revise(
     while let Some(k) = settled.iter().position(|s| !s) {
         settled[k] = true;
         // what shares no channel with another name was chosen beside nothing
-        if looks == 0 || connected(&best.fit.placed, k).len() < 2 {
+        if looks == 0 || best.fit.placed[k].is_read_off() || connected(&best.fit.placed, k).len() < 2 {
             continue;
         }
         looks -= 1;
         let Some((base, ranked)) = apply_for(context, declared, start, &best.fit, k, &mut all) else { continue };
-        let own = ranked.iter().position(|c| newest_is(c, &best.fit.placed[k]));
+        let in_place_now = &best.fit.placed[k];
+        let own =
+            ranked.iter().position(|c| is_as(c, in_place_now)).or_else(|| ranked.iter().position(|c| newest_is(c, in_place_now)));
         let standing = own.map_or(f64::NEG_INFINITY, |o| ranked[o].evidence);
         let clearly = |c: &Candidate| c.evidence > standing + CLEARLY_BETTER && c.evidence > NEEDED_EVIDENCE;
         // the ranking asks first what the noise's own colour speaks for: more evidence may stand behind
@@ -96,6 +98,11 @@ pub(crate) fn predicts_as_well(context: &Context, declared: Declared<'_>, folds:
 /// The same of one channel. Where no fold could predict it, all its samples lying in one block, it says nothing.
 fn as_well(new: &Held, old: &Held) -> bool {
     old.rms.is_nan() || new.share_gone(old) > -SPOILT
+}
+
+/// Whether a candidate's newest effect is this one, on the same channels and in the same form.
+fn is_as(candidate: &Candidate, placed: &Placed) -> bool {
+    newest_is(candidate, placed) && candidate.fit.placed.last().is_some_and(|p| p.instance == placed.instance)
 }
 
 /// Whether a candidate's newest effect is this one, in whatever form.

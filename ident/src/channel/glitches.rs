@@ -7,6 +7,7 @@
 
 use super::lattice;
 use super::{Context, Relation, Target};
+use crate::numeric::chance::gathers;
 use crate::numeric::order::median;
 
 /// Departure from the running median, in robust standard deviations, from which a row is absurd.
@@ -17,6 +18,19 @@ const AROUND: usize = 10;
 const WIDE: f64 = 0.02;
 /// Readings beyond these shares of the speed are absurd: no pulse too few or too many.
 pub(crate) const PULSES: std::ops::Range<f64> = 0.3..2.5;
+
+/// Takes out what is near steps of the load, where more is than chance brings there: it belongs to the rotor.
+fn without_recurring(context: &Context, target: &Target, glitches: &mut Vec<(usize, f64)>) {
+    let there = |g: &(usize, f64)| moving(context, g.0);
+    let hits = glitches.iter().filter(|g| there(g)).count();
+    if hits < 2 {
+        return;
+    }
+    let share = target.rows.iter().filter(|row| moving(context, **row)).count() as f64 / target.rows.len() as f64;
+    if gathers(hits, glitches.len(), share) {
+        glitches.retain(|g| !there(g));
+    }
+}
 
 /// Rows of a channel about which nothing is claimed: its glitches, where they are two at the least and fewer than one in twenty.
 /// The log alone decides, so that they are the same before and after, whatever is named.
@@ -68,5 +82,8 @@ pub(crate) fn glitches(context: &Context, target: &Target) -> Vec<(usize, f64)> 
             && !(speed && PULSES.contains(&share))
             && (d.abs() > span || !moving(context, target.rows[k]))
     };
-    departures.iter().enumerate().filter(|(k, d)| absurd(k + 2, **d)).map(|(k, d)| (target.rows[k + 2], *d)).collect()
+    let found = departures.iter().enumerate().filter(|(k, d)| absurd(k + 2, **d));
+    let mut found: Vec<(usize, f64)> = found.map(|(k, d)| (target.rows[k + 2], *d)).collect();
+    without_recurring(context, target, &mut found);
+    found
 }

@@ -412,7 +412,7 @@ impl Context {
             t: log.t.clone(),
             time_is_row: log.time_is_row(),
             pulse,
-            starts: if log.time_is_row() { Vec::new() } else { starts(&log.t, &rpm) },
+            starts: if log.time_is_row() { Vec::new() } else { starts(&log.t, &rpm, settling.first() == Some(&true)) },
             rpm,
             rpm_sd,
             consensus,

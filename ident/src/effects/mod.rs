@@ -19,6 +19,7 @@ pub(crate) mod unknown;
 
 use crate::channel::{Context, DIFFERENCES, Relation};
 use crate::effects::design::TargetDesign;
+use crate::log::SPEED;
 use crate::verdict::Kin;
 pub(crate) use crate::verdict::words::Clause;
 pub(crate) use crate::verdict::{EffectEntry, Scope};
@@ -38,8 +39,10 @@ pub enum Stage {
     Gain,
     /// A further term.
     Term,
-    /// On the reading: filter, delay, hold.
+    /// On the reading: filter, delay.
     Output,
+    /// On what the meter gives out: it holds a value that its filter has made.
+    Hold,
     /// On single readings, after all that the meter does.
     Readings,
 }
@@ -319,7 +322,7 @@ fn repeats_loads(context: &Context) -> bool {
 
 /// The sets of meters that may be slow or late together: each alone, the two of the load cell, and each speed sensor beside
 /// its difference from the others (alone where there are only two). A single one is told from the rotor itself by what is a
-/// function of its speed: see [`lone_speed`].
+/// function of its speed: see [`every_speed`].
 fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
     if context.time_is_row {
         return Vec::new();
@@ -340,12 +343,19 @@ fn meters<'a>(context: &Context) -> Vec<Vec<&'a str>> {
     sets
 }
 
-/// The only speed channel together with all that is a function of the speed: what is slow or late in it alone is ahead in them.
-fn lone_speed<'a>(context: &Context) -> Option<Vec<&'a str>> {
+/// All speed channels together with all that is a function of the speed: what is slow or late in the speed is ahead in them. One alone is so, and
+/// several are so together: a speed is the mean over some turns or over a while, the middle of which has passed.
+fn every_speed<'a>(context: &Context) -> Option<Vec<&'a str>> {
     let functions = present(context, &["thrust_n", "torque_nm", "current_a"]);
-    let speeds = speeds(context);
-    let asked = !context.time_is_row && speeds.len() == 1 && !functions.is_empty();
+    let read = |name: &&&str| context.consensus.channels.iter().any(|c| c == **name);
+    let speeds: Vec<&str> = SPEED.iter().filter(read).copied().collect();
+    let asked = !context.time_is_row && !speeds.is_empty() && !functions.is_empty();
     asked.then(|| speeds.into_iter().chain(functions).collect())
+}
+
+/// The same of one speed channel alone that the command predicts: what several have in common may be the rotor's own lag.
+fn lone_speed<'a>(context: &Context) -> Option<Vec<&'a str>> {
+    every_speed(context).filter(|_| speeds(context).len() == 1)
 }
 
 /// Whether an instance holds the speed channel as its meter, and this relation is a function of its reading.
@@ -369,6 +379,12 @@ fn through_meter(context: &Context, design: &mut TargetDesign, meter: impl Fn(&[
 /// Speed channels of the log.
 pub(crate) fn speeds(context: &Context) -> Vec<&'static str> {
     context.targets.iter().filter(|t| t.relation == Relation::SpeedFromPulse).map(|t| t.name).collect()
+}
+
+/// Whether the time constant of a slow cause lies on the lower end of its range: what is as quick is another cause.
+fn is_too_quick(shapes: &[Shape], fitted: &[Estimate]) -> bool {
+    let least = shapes.iter().find(|s| s.name == "tau").map_or(0.0, |s| s.range.0 * 1.001);
+    fitted.iter().any(|e| e.name == "tau" && e.value <= least)
 }
 
 fn geometric(from: f64, to: f64, n: usize) -> Vec<f64> {

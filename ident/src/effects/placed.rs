@@ -5,6 +5,7 @@
 //! Units: those of the shapes.
 //! Reference: none needed.
 
+use super::acquisition::sample_hold::BENEATH;
 use super::{BEFORE, Effect, EffectEntry, Instance, Stage};
 
 /// An effect placed in a hypothesis.
@@ -37,6 +38,11 @@ impl Placed {
     /// Where it acts in the causal chain.
     pub(crate) fn stage(&self) -> Stage {
         self.effect.stage_of(&self.instance)
+    }
+
+    /// Whether the readings show it by themselves: a hold whose values repeat.
+    pub(crate) fn is_read_off(&self) -> bool {
+        self.effect.id() == "sample_hold" && self.instance.form != BENEATH
     }
 
     /// Whether it is a zero that is older than the run: a load cell is tared anew before every run.

@@ -49,7 +49,7 @@ impl Steps {
 
     /// The effects of a hypothesis that touch the design's target, applied in causal order.
     pub(crate) fn apply(&mut self, context: &Context, placed: &[Placed], mut design: TargetDesign) -> TargetDesign {
-        let in_a_row = |p: &Placed| p.stage() == Stage::Output && context.is_table();
+        let in_a_row = |p: &Placed| matches!(p.stage(), Stage::Output | Stage::Hold) && context.is_table();
         let acts = |i: &usize| placed[*i].instance.touches(design.name) && !in_a_row(&placed[*i]);
         let mut order: Vec<usize> = (0..placed.len()).filter(acts).collect();
         order.sort_by_key(|i| placed[*i].stage());

@@ -8,29 +8,15 @@
 
 use super::measure::Measure;
 use super::{Entry, HistoryError};
-use crate::log::Log;
+use crate::log::{Log, OtherRig};
 
 /// Times between the largest and the smallest gain from which on two runs are of different rigs.
 const APART: f64 = 3.0;
 
-/// Refuses logs whose heads name different motors, propellers, or numbers of blades.
+/// Refuses logs whose heads name different motors or propellers.
 pub(super) fn named_alike(logs: &[Log]) -> Result<(), HistoryError> {
-    for key in ["motor", "propeller"] {
-        let mut known: Option<(&Log, String)> = None;
-        for log in logs {
-            let Some(own) = log.meta.get(key).and_then(|v| v.as_str()) else { continue };
-            let plain = own.trim().to_lowercase();
-            match &known {
-                Some((first, name)) if *name != plain => {
-                    let why = format!("{key} \"{}\" and \"{}\"", first.meta[key].as_str().unwrap_or_default(), own);
-                    return Err(HistoryError::Rigs { first: first.name.clone(), second: log.name.clone(), why });
-                }
-                Some(_) => {}
-                None => known = Some((log, plain)),
-            }
-        }
-    }
-    Ok(())
+    let different = |OtherRig { first, second, why }| HistoryError::Rigs { first, second, why };
+    crate::log::named_alike(logs.iter().map(Log::names)).map_err(different)
 }
 
 /// Refuses runs that differ by more than any effect can make them.

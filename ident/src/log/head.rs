@@ -46,6 +46,15 @@ pub(crate) fn odd(table: &toml::Table) -> Option<(&'static str, &Value, &'static
     STATED.iter().find_map(odd)
 }
 
+/// The texts of a rig's head that name it and its run.
+const TEXTS: [&str; 4] = ["motor", "propeller", "supply", "date"];
+
+/// Key and value of a comment that is no TOML although it names the rig.
+pub(super) fn misread(comment: &str) -> Option<(&str, &str)> {
+    let (key, value) = comment.split_once('=').map(|(key, value)| (key.trim(), value.trim()))?;
+    (TEXTS.contains(&key) && !value.is_empty()).then_some((key, value))
+}
+
 /// Refuses a value of the head that no rig can have; `place` is its line.
 pub(crate) fn check(table: &toml::Table, place: &Place<'_>) -> Result<(), ReadError> {
     let Some((key, value, wanted)) = odd(table) else { return Ok(()) };

@@ -17,6 +17,7 @@ pub mod import;
 pub mod join;
 pub(crate) mod plausible;
 pub mod quantity;
+mod rig;
 pub mod sparse;
 mod whole;
 
@@ -24,6 +25,7 @@ pub use disc::Disc;
 pub use gaps::Gaps;
 pub(crate) use head::{check as check_head, event, odd as odd_in_head};
 pub use head::{event_line, meta_line};
+pub use rig::{Named, OtherRig, named_alike};
 pub use whole::{folder_of, no_regular_file, place_of, what_lies_at, write_whole};
 
 use sha2::{Digest, Sha256};
@@ -412,6 +414,9 @@ fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) 
                     head::check(&table, &place)?;
                 }
                 log.meta.extend(table);
+            } else if let Some((key, value)) = head::misread(comment) {
+                let expected = format!("a value in TOML, a text in quotes: {key} = \"{}\"", value.trim_matches(['"', '\'']));
+                return Err(place.refuse(Some(key), short(value), expected));
             }
             continue;
         }

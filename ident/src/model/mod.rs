@@ -272,6 +272,10 @@ impl Model {
 
     fn design(&self, context: &Context, target: &Target, placed: &[Placed]) -> Option<(TargetDesign, Vec<f64>)> {
         let polynomial = self.polynomials.iter().find(|p| p.channel == target.name)?;
+        // a speed goes with the command: where none was logged nothing is said of it
+        if target.relation == Relation::SpeedAlone && polynomial.coefficients.len() > 1 {
+            return None;
+        }
         let base =
             polynomial.coefficients.iter().enumerate().map(|(k, c)| Told { label: Label::Base(k), value: *c, stands: true });
         let of_effect = |(effect, added): (usize, &AddedEffect)| {

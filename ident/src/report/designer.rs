@@ -45,11 +45,12 @@ pub(super) fn designer(sheet: &mut Sheet, found: &Identified, thin: impl Fn(Figu
 /// Channels that the table of plateaus shows.
 const ELSEWHERE: [&str; 4] = ["rpm", "torque_nm", "current_a", "voltage_v"];
 
-/// A value and half of its 95 % interval, to two digits of the latter; `se` is its standard error.
+/// A value and half of its 95 % interval, to two digits of the latter; `se` is its standard error. One without an error has five digits, a whole
+/// number its own.
 pub(super) fn paired(value: f64, se: f64) -> String {
     let half = 1.96 * se;
     if !(half.is_finite() && half > 0.0) {
-        return format!("{value}");
+        return if value.fract() == 0.0 { format!("{value}") } else { number(value) };
     }
     let places = (1 - half.log10().floor() as i32).clamp(0, 7) as usize;
     format!("{value:.places$} \u{b1} {half:.places$}")

@@ -16,6 +16,7 @@ use crate::report::closed::{self as parts, Page, Trace};
 use crate::report::{Figure, Layer, Origin, Vocabulary};
 use crate::verdict::EffectEntry;
 use crate::verdict::words::{channel, parameter};
+use nalgebra::Vector3;
 
 /// The words of the flight's library.
 pub const VOCABULARY: Vocabulary = Vocabulary {
@@ -57,6 +58,7 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         cards: cards(closed, &traces),
         left: parts::rest(v, &alone),
         readings: Vec::new(),
+        counted: Vec::new(),
         parameters: Vec::new(),
         speeds: ("The rotors' speeds", speeds(closed, &of_rotors)),
     };
@@ -127,16 +129,43 @@ fn cards(closed: &Closed, traces: &[Trace]) -> Vec<Vec<Figure>> {
             return Some(parts::over_time(&traces[at], &id, parts::pair(&closed.verdict)));
         };
         let trace = traces[at].with_before(without.clone());
-        let over = e
-            .depends_on
-            .iter()
-            .find_map(|name| against(closed, &scene, name, &trace.channel).filter(|(_, _, x)| parts::moves(x)));
+        let over = e.depends_on.iter().find_map(|name| {
+            against(closed, &scene, name, &goes_on(e, name, &trace.channel)).filter(|(_, _, x)| parts::moves(x))
+        });
+        let over = turning_force(closed, &scene, e, &trace.channel).or(over);
         Some(match over {
             Some((label, unit, x)) => parts::against(&trace, &id, (&label, unit), &x, parts::ALONE),
             None => parts::over_time(&trace, &id, parts::ALONE),
         })
     };
     closed.verdict.effects.iter().enumerate().map(|e| card(e).into_iter().collect()).collect()
+}
+
+/// The channel by whose axis a variable of an effect is meant: air along one axis turns the body about the other.
+fn goes_on(e: &EffectEntry, variable: &str, channel: &str) -> String {
+    let crossed = e.id == "hub_moment" && variable == "vel";
+    match channel.rsplit_once('_').filter(|_| crossed) {
+        Some((of, "x")) => format!("{of}_y"),
+        Some((of, "y")) => format!("{of}_x"),
+        _ => channel.to_owned(),
+    }
+}
+
+/// Of an accelerometer off the centre of gravity: the force that turning makes at the place that was found, along the axis of a channel.
+fn turning_force(closed: &Closed, scene: &Scene<'_>, e: &EffectEntry, channel: &str) -> Option<(String, &'static str, Vec<f64>)> {
+    if e.id != "lever_arm" {
+        return None;
+    }
+    let size = |name: &str| e.parameter(name).map(|p| p.value);
+    let arm = Vector3::new(size("arm_x")?, size("arm_y")?, size("arm_z")?);
+    let axis = ["_x", "_y", "_z"].iter().position(|end| channel.ends_with(end))?;
+    let windows = &closed.flight.windows;
+    let rate = closed.flight.record.rate.as_ref()?;
+    let [x, y, z] = [0, 1, 2].map(|k| windows.slope(&rate[k]));
+    let swing: Vec<f64> = (0..scene.len()).map(|row| scene.rate_at(row)).map(|w| w.cross(&w.cross(&arm))[axis]).collect();
+    let turned = (0..windows.len()).map(|i| Vector3::new(x[i], y[i], z[i]).cross(&arm)[axis]);
+    let force = windows.mean(&swing).iter().zip(turned).map(|(swing, turned)| swing + turned).collect();
+    Some(("force of turning at the place found".to_owned(), "m/s^2", force))
 }
 
 /// What an effect of a channel goes with, its unit, and its mean in each window; `None` where the flight lacks it.
@@ -200,5 +229,21 @@ fn residual(closed: &Closed, channel: usize) -> Figure {
         height: 260.0,
         categories: Vec::new(),
         captioned: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Air along one axis pitches the body about the other; a rate turns it back about its own.
+    #[test]
+    fn a_hub_moment_is_drawn_against_the_air_that_makes_it() {
+        let hub = crate::report::bare_entry("hub_moment");
+        assert_eq!(goes_on(&hub, "vel", "ang_acc_x"), "ang_acc_y");
+        assert_eq!(goes_on(&hub, "vel", "ang_acc_y"), "ang_acc_x");
+        assert_eq!(goes_on(&hub, "gyro", "ang_acc_x"), "ang_acc_x");
+        let drag = EffectEntry { id: "rotor_drag".to_owned(), ..hub };
+        assert_eq!(goes_on(&drag, "vel", "acc_x"), "acc_x");
     }
 }

@@ -42,6 +42,7 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         cards: cards(log, closed),
         left: left(closed),
         readings: readings_apart(&closed.context, v, ""),
+        counted: v.effects.iter().map(|e| counted(log, v, e)).collect(),
         parameters: Vec::new(),
         speeds: (SPEEDS, speeds(log, closed)),
     };
@@ -130,6 +131,30 @@ fn beside_others<'c>(closed: &'c Closed, e: &EffectEntry) -> Option<&'c Target> 
     target(closed, &format!("{} - others", e.channels.first()?)).filter(|_| unseen)
 }
 
+/// Share of the speed that a reading which times one period loses with a pulse, and how near to it a loss must be.
+const HALVED: (f64, f64) = (0.5, 0.05);
+
+/// The share of its pulses that a sensor misses with the readings counted in that were set aside; each of them against the median of the other
+/// sensors in its row. Nothing where none was set aside.
+fn counted(log: &Log, v: &Verdict, e: &EffectEntry) -> Option<f64> {
+    let own = log.column(e.channels.first().filter(|_| e.id == "missed_pulses")?)?;
+    let fitted = e.parameter("probability")?.value;
+    let others: Vec<&[f64]> =
+        SPEED.iter().filter(|name| e.channels.first().is_none_or(|c| c != *name)).filter_map(|name| log.column(name)).collect();
+    let lost = |row: usize| {
+        let mut said: Vec<f64> = others.iter().filter_map(|c| c.get(row)).copied().filter(|v| v.is_finite()).collect();
+        let (of, truth) = (own.get(row)?, median(&mut said));
+        (truth > 0.0 && of.is_finite()).then(|| (1.0 - of / truth).clamp(0.0, 1.0))
+    };
+    // a reading of one period is halved by each pulse that it loses: what counts is how many are
+    let timed = e.parameter("depth").is_some_and(|d| (d.value - HALVED.0).abs() < HALVED.1);
+    let share = |loss: f64| if timed { f64::from(u8::from(loss > 0.5 * HALVED.0)) } else { loss };
+    let aside: Vec<f64> = parts::struck(v, e).flat_map(|a| a.row..a.row + a.rows).filter_map(lost).map(share).collect();
+    let judged = own.iter().filter(|v| **v > 0.0).count().saturating_sub(aside.len());
+    let all = (judged + aside.len()) as f64;
+    (!aside.is_empty()).then(|| (fitted * judged as f64 + aside.iter().sum::<f64>()) / all)
+}
+
 /// Rows before and after whose median a single reading is held against.
 const BESIDE: usize = 2;
 
@@ -195,7 +220,7 @@ pub(super) fn over_runs(verdict: &Verdict, shown: &Shown) -> Vec<Figure> {
 
 /// The figure of an effect that several runs share, on one of them.
 pub(super) fn card_across(closed: &Closed, e: &EffectEntry, shown: &Shown, id: &str) -> Option<Figure> {
-    Some(drawn(&closed.context, e, target(closed, shown.channel)?, &across(shown), id))
+    Some(drawn(closed, e, target(closed, shown.channel)?, &across(shown), id))
 }
 
 /// The figure of what one of several runs has alone: what is left when it is taken out of the model, one constant apart.
@@ -207,7 +232,7 @@ pub(super) fn card_alone(closed: &Closed, e: &EffectEntry, id: &str) -> Option<F
     let more: Vec<f64> = without.iter().zip(&whole.after).map(|(w, a)| w - a).filter(|d| d.is_finite()).collect();
     let mean = more.iter().sum::<f64>() / more.len().max(1) as f64;
     without.iter_mut().for_each(|w| *w -= mean);
-    Some(drawn(&closed.context, e, target, &whole.with_before(without), id))
+    Some(drawn(closed, e, target, &whole.with_before(without), id))
 }
 
 /// Figures of each effect: what its first channel leaves over without it and with it; of what whole levels show their readings.
@@ -237,11 +262,22 @@ fn card(closed: &Closed, e: &EffectEntry, position: usize, id: &str) -> Option<V
     let target = beside_others(closed, e).or_else(|| target(closed, e.channels.first()?))?;
     let whole = trace(closed, target)?;
     let trace = whole.with_before(without(closed, target, position)?);
-    (trace.before != trace.after).then(|| vec![drawn(&closed.context, e, target, &trace, id)])
+    (trace.before != trace.after).then(|| vec![drawn(closed, e, target, &trace, id)])
 }
 
 /// What is left of a channel without an effect and with it, over what the effect goes with.
-fn drawn(context: &Context, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Figure {
+fn drawn(closed: &Closed, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Figure {
+    let context = &closed.context;
+    // a sum of means tells nothing of what scatters
+    if let Some(figure) = scattered(context, e, target, trace, id) {
+        return figure;
+    }
+    if e.depends_on.iter().any(|v| v == "torque_nm")
+        && target.name != "torque_nm"
+        && let Some(x) = torque_beyond(closed, target).filter(|x| moves(x))
+    {
+        return against(trace, id, ("torque beyond its curve", unit_of("torque_nm")), &x, ALONE);
+    }
     if e.depends_on.iter().any(|v| v == "direction") && moves(&context.rpm) {
         let up = upwards(&context.rpm);
         let up: Vec<bool> = claimed(target).map(|k| up[target.rows[k]]).collect();
@@ -264,6 +300,32 @@ fn drawn(context: &Context, e: &EffectEntry, target: &Target, trace: &Trace, id:
             None => over_time(trace, id, ALONE),
         },
     }
+}
+
+/// The figure of an effect that makes a channel scatter about a speed; nothing of any other.
+fn scattered(context: &Context, e: &EffectEntry, target: &Target, trace: &Trace, id: &str) -> Option<Figure> {
+    let size = e.parameter("scatter")?.value;
+    let (natural, damping) = (e.parameter("natural_frequency")?.value, e.parameter("damping_ratio")?.value);
+    if context.rpm.is_empty() || !moves(&context.rpm) {
+        return None;
+    }
+    let turns = if e.equation.ends_with("[blade_pass]") { 2.0 } else { 1.0 };
+    let peak = 1.0 / (2.0 * damping * (1.0 - damping * damping).sqrt());
+    let answers = |rpm: f64| {
+        let r2 = (rpm / 60.0 * turns / natural).powi(2);
+        r2 / ((1.0 - r2).powi(2) + 4.0 * damping * damping * r2).sqrt() / peak
+    };
+    let told = |rpm: f64| trace.floor.hypot(size * answers(rpm));
+    Some(parts::scatter(trace, id, &words::axis("rpm"), &of_rows(target, &context.rpm), &told))
+}
+
+/// What the torque is beyond its own curve over the speed, on the rows of another channel that count: the thrust's own curve takes the rest.
+fn torque_beyond(closed: &Closed, of: &Target) -> Option<Vec<f64>> {
+    let torque = target(closed, "torque_nm")?;
+    let beyond = residual(&closed.context, torque, &closed.declared)?;
+    let mut all = vec![f64::NAN; closed.context.len()];
+    claimed(torque).zip(beyond).for_each(|(k, left)| all[torque.rows[k]] = left);
+    Some(of_rows(of, &all))
 }
 
 /// What is left of a target without one of the effects. Where nothing was declared all others are fitted again, as they would be by who does not
@@ -361,7 +423,9 @@ fn over_what(closed: &Closed, u: &Unexplained, target: &Target, trace: &Trace) -
 /// Figures of what is left.
 fn left(closed: &Closed) -> Vec<Figure> {
     let with_model = |u: &&Unexplained| !closed.verdict.channels.not_predicted.contains_key(&u.channel);
-    let own = |u: &&Unexplained| !is_drawn_together(closed, u);
+    let loudest = parts::loudest(&closed.verdict);
+    // the loudest has its figure where it is told, also where it is one of several that are drawn together
+    let own = |u: &&Unexplained| !is_drawn_together(closed, u) || loudest.is_some_and(|l| l == *u);
     closed.verdict.unexplained.iter().filter(own).filter(with_model).filter_map(|u| rest(closed, u)).collect()
 }
 
@@ -496,6 +560,9 @@ mod tests {
     use super::*;
     use crate::close::close;
     use crate::log::Column;
+    use crate::report::bare_entry;
+    use crate::signal::bad::SetAside;
+    use crate::verdict::Parameter;
 
     /// A staircase on a supply behind a lead of so many ohms: the speed follows the voltage.
     fn run(lead: f64) -> Log {
@@ -519,6 +586,51 @@ mod tests {
             values: values.into_iter().enumerate().map(|(i, v)| v + size * wave(i, 0.7 + k as f64)).collect(),
         };
         Log { name: "run.csv".into(), t, columns: columns.into_iter().enumerate().map(noisy).collect(), ..Log::default() }
+    }
+
+    /// The thrust's own curve takes what the torque does along its curve: a figure against the torque has the rest of it.
+    #[test]
+    fn torque_is_drawn_beyond_its_curve() {
+        let mut log = run(0.0);
+        let rpm = log.column("rpm").expect("a speed").to_vec();
+        let sway = |i: usize| 2e-3 * (0.05 * i as f64).sin();
+        let values: Vec<f64> = rpm.iter().enumerate().map(|(i, r)| 2e-9 * r * r + sway(i)).collect();
+        let most = values.iter().copied().fold(0.0, f64::max);
+        log.columns.push(Column { name: "torque_nm".into(), values });
+        let closed = close(&log, None, &[], &mut |_| {}).expect("a log");
+        let thrust = target(&closed, "thrust_n").expect("a thrust");
+        let beyond = torque_beyond(&closed, thrust).expect("a torque");
+        let largest = beyond.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+        assert!(beyond.len() == claimed(thrust).count() && largest < 0.2 * most && largest > 1e-3, "{largest} of {most}");
+    }
+
+    /// Readings that were set aside count with the pulses that the others lost.
+    #[test]
+    fn readings_set_aside_count_by_what_they_lost() {
+        let truth = vec![4000.0; 1000];
+        let own: Vec<f64> = (0..1000).map(|i| if (100..110).contains(&i) { 3000.0 } else { 4000.0 }).collect();
+        let columns = [("rpm_opto", own), ("rpm_hall", truth.clone()), ("rpm_beam", truth)];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        let log = Log { t: (0..1000).map(f64::from).collect(), columns, ..Log::default() };
+        let size = Parameter { name: "probability".into(), value: 0.01, unit: "1".into(), ci95: [0.008, 0.012] };
+        let e = EffectEntry { channels: vec!["rpm_opto".into()], parameters: vec![size], ..bare_entry("missed_pulses") };
+        let aside = SetAside {
+            channel: "rpm_opto".into(),
+            row: 100,
+            rows: 10,
+            t_s: 100.0,
+            until_s: 109.0,
+            value: 3000.0,
+            expected: 4000.0,
+            recurs: false,
+            silent: false,
+        };
+        let mut v = parts::bare_verdict(Vec::new());
+        assert_eq!(counted(&log, &v, &e), None);
+        v.set_aside = vec![aside];
+        // 990 readings that lose a hundredth, ten that lose a quarter
+        let whole = counted(&log, &v, &e).expect("some were set aside");
+        assert!((whole - (9.9 + 2.5) / 1000.0).abs() < 1e-9, "{whole}");
     }
 
     #[test]

@@ -11,9 +11,9 @@ use super::figure::{Figure, Layer, Mark};
 use super::sheet::Sheet;
 use super::shift::filter_figures;
 use crate::channel::unit_of;
-use crate::identify::Identified;
 use crate::identify::curves::power::Level;
 use crate::identify::curves::{Fitted, Law, ratio};
+use crate::identify::{Constant, Identified};
 use crate::log::board;
 use crate::log::{Gaps, Log, SPEED};
 use crate::numeric::order::median;
@@ -33,7 +33,7 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
         sheet.warn(&format!("{gaps}."));
     }
     constants(&mut sheet, found);
-    sheet.section("The run, with its plateaus");
+    sheet.section(if found.plateaus.is_empty() { "The run" } else { "The run, with its plateaus" });
     let time: Vec<Figure> =
         ["thrust_n", "torque_nm", "current_a", "voltage_v"].iter().filter_map(|c| over_time(log, found, c)).collect();
     let speed: Vec<Figure> = SPEED.iter().filter_map(|c| over_time(log, found, c)).collect();
@@ -42,22 +42,20 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
     sheet.section("How the channels and the plateaus come about");
     let differences = differences(log, &found.plateaus);
     sheet.figures(differences.into_iter().chain(binary_shift(log, found)).collect());
-    sheet.section("Relations, with 95 % bands");
-    if !found.curves.is_empty() {
-        sheet.say("Dark band: where the curve lies. Light band: where a further plateau would lie. Rings: plateau means with their 95 % intervals; point at one to read it.");
+    if !found.plateaus.is_empty() {
+        relations(&mut sheet, found);
     }
-    sheet.figures(found.curves.iter().map(relation).collect());
-    sheet.section("Power, efficiency, coefficients");
-    designer(&mut sheet, found, |figure| figure);
     if let Some((log_b, found_b)) = other {
         sheet.section(&format!("Beside {}", log_b.name));
         sheet.figures(side_by_side((log, found), (log_b, found_b)));
     }
-    sheet.section("Plateaus");
-    sheet.say("Half widths of 95 % intervals beside the means.");
-    plateaus(&mut sheet, log, found);
-    sheet.section("Coefficients");
-    coefficients(&mut sheet, found);
+    if !found.plateaus.is_empty() {
+        sheet.section("Plateaus");
+        sheet.say("Half widths of 95 % intervals beside the means.");
+        plateaus(&mut sheet, log, found);
+        sheet.section("Coefficients");
+        coefficients(&mut sheet, found);
+    }
     let told = board::told(log);
     if !told.is_empty() {
         sheet.section("What the board told");
@@ -66,6 +64,17 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
     }
     origin(&mut sheet, std::iter::once(log).chain(other.map(|(log, _)| log)));
     sheet
+}
+
+/// What the plateaus tell together.
+fn relations(sheet: &mut Sheet, found: &Identified) {
+    sheet.section("Relations, with 95 % bands");
+    if !found.curves.is_empty() {
+        sheet.say("Dark band: where the curve lies. Light band: where a further plateau would lie. Rings: plateau means with their 95 % intervals; point at one to read it.");
+    }
+    sheet.figures(found.curves.iter().map(relation).collect());
+    sheet.section("Power, efficiency, coefficients");
+    designer(sheet, found, |figure| figure);
 }
 
 /// The program, and the logs with their digests.
@@ -94,10 +103,14 @@ fn lead(log: &Log, found: &Identified) -> String {
     )
 }
 
+/// Said in the place of all that comes from plateaus.
+const NO_PLATEAU: &str = "No plateau was found: the load never held still long enough for a mean, so that there are no levels, curves or coefficients. Hold each level for some seconds.";
+
 /// What the powerplant does at its highest level, and which law does not hold, in plain words.
 #[must_use]
 pub fn headline(found: &Identified) -> String {
     let mut out = highest(&found.levels).unwrap_or_else(|| match found.plateaus.len() {
+        0 => NO_PLATEAU.to_owned(),
         1 => "1 plateau was found, without a thrust.".to_owned(),
         n => format!("{n} plateaus were found, none of them with a thrust."),
     });
@@ -140,7 +153,7 @@ pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
         .map(|c| {
             let [value, low, high] = words::with_interval(c.value, [c.value - c.half, c.value + c.half]);
             let interval = format!("{low} to {high}");
-            let law = c.law.map_or_else(|| "-".to_owned(), |law| law.words());
+            let law = c.law.map_or_else(|| "-".to_owned(), |law| law.words()) + hardly(c);
             vec![format!("{}, {}", c.words(), c.name), value, interval, c.unit.to_owned(), law]
         })
         .collect();
@@ -156,6 +169,18 @@ pub(super) fn constants(sheet: &mut Sheet, found: &Identified) {
         .collect();
     let raw_head = ["constant", "what", "value", "standard_error", "low_95", "high_95", "unit"];
     sheet.data("constants", &["constant", "value", "95 % interval", "unit", "its law"], &rows, Some((&raw_head, &raw)));
+}
+
+/// Share of a constant's value from which on half of its interval leaves it hardly known.
+const HARDLY: f64 = 0.5;
+
+/// That an interval leaves a constant open, behind its law.
+fn hardly(c: &Constant) -> &'static str {
+    match c.half / c.value.abs() {
+        share if !share.is_finite() || share >= 1.0 => "; not known: the interval spans zero",
+        share if share >= HARDLY => "; hardly known: the interval is wider than the value",
+        _ => "",
+    }
 }
 
 fn time_label(log: &Log) -> String {
@@ -529,4 +554,42 @@ pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
         })
         .collect();
     sheet.listed("coefficients", &["relation", "coefficient", "value", "\u{b1}", "chi2/dof", "order by AICc"], &rows, None);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::identify;
+    use crate::log::Column;
+
+    fn constant(value: f64, half: f64) -> Constant {
+        Constant { name: "k_T", value, se: half / 1.96, half, unit: "N.s2", law: None }
+    }
+
+    #[test]
+    fn an_interval_that_leaves_all_open_is_told() {
+        assert_eq!(hardly(&constant(1.5e-5, 1e-6)), "");
+        assert!(hardly(&constant(1.5e-5, 0.9e-5)).starts_with("; hardly known"));
+        assert!(hardly(&constant(1.5e-5, 2e-5)).contains("spans zero"));
+        assert!(hardly(&constant(0.0, 0.0)).contains("not known"));
+    }
+
+    /// Without a plateau the page says so once, and has no table without rows.
+    #[test]
+    fn a_run_without_a_plateau_has_no_empty_tables() {
+        let t: Vec<f64> = (0..600).map(|i| 0.1 * f64::from(i)).collect();
+        let pulse: Vec<f64> = t.iter().map(|t| 1100.0 + 80.0 * (t / 10.0).floor()).collect();
+        let wave = |i: usize| (0.7 * (i * i) as f64).sin();
+        let rpm: Vec<f64> = pulse.iter().enumerate().map(|(i, p)| 7.0 * (p - 1000.0) + 4.0 * wave(i)).collect();
+        let thrust = rpm.iter().enumerate().map(|(i, r)| 1e-7 * r * r + 0.01 * wave(i + 3)).collect();
+        let columns = [("pulse_us", pulse), ("rpm", rpm), ("thrust_n", thrust)];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        let log = Log { name: "run.csv".to_owned(), t, columns, ..Log::default() };
+        let found = identify(&log).expect("a log");
+        let with = run(&log, &found, None).html();
+        assert!(!found.plateaus.is_empty() && with.contains("Coefficients") && !with.contains("No plateau was found"));
+        let none = Identified { plateaus: Vec::new(), levels: Vec::new(), curves: Vec::new(), ..found };
+        let html = run(&log, &none, None).html();
+        assert!(html.contains("No plateau was found") && !html.contains("Coefficients") && !html.contains("Relations, with"));
+    }
 }

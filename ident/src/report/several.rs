@@ -27,7 +27,8 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
     let v = &*outcome.verdict.briefly();
     let alone: Vec<Closed> = (0..runs.len()).map(|run| of_run(runs, outcome, run)).collect();
     let first = outcome.shown.as_ref().map_or(0, |shown| shown.run);
-    let own = |u: &&Unexplained| !is_drawn_together(&alone[first], u);
+    let loudest = parts::loudest(v);
+    let own = |u: &&Unexplained| !is_drawn_together(&alone[first], u) || loudest.is_some_and(|l| l == *u);
     let on = |run: usize, figure: Figure| named(figure, &v.runs[run].run);
     let page = Page {
         verdict: v,
@@ -39,6 +40,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         cards: v.effects.iter().enumerate().map(|(k, e)| card(&alone, outcome, v, k, e)).collect(),
         left: v.unexplained.iter().zip(&outcome.left).filter(|(u, _)| own(u)).filter_map(|(u, shown)| left_of(&alone, u, shown.as_ref())).map(|(run, figure)| on(run, figure)).collect(),
         readings: outcome.contexts.iter().zip(&v.runs).flat_map(|(c, run)| readings_apart(c, v, &run.run)).collect(),
+        counted: Vec::new(),
         parameters: parameters(outcome, v),
         speeds: (SPEEDS, speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| on(first, figure)).collect()),
     };

@@ -116,10 +116,15 @@ impl<'m, 'a> Joint<'m, 'a> {
 
     /// For each run the equations of a channel; nothing where it does not teach or lacks the channel.
     fn equations(&self, channel: &str, rig: &[Placed], most: usize) -> (Vec<Label>, Vec<Option<(Normal, f64)>>) {
-        let of = |m: &Member<'_>| m.context.target(channel).map(|k| (k, shared(rig, &m.context.targets[k])));
-        let labels = self.members.iter().find_map(of).map(|(_, labels)| labels).unwrap_or_default();
+        // a run without a command says nothing of what a speed makes of one
+        let relation = |m: &Member<'_>| m.context.target(channel).map(|k| m.context.targets[k].relation);
+        let commanded = self.members.iter().any(|m| relation(m) == Some(Relation::SpeedFromPulse));
+        let place =
+            |m: &Member<'_>| m.context.target(channel).filter(|_| !commanded || relation(m) != Some(Relation::SpeedAlone));
+        let of = |m: &Member<'_>| place(m).map(|k| shared(rig, &m.context.targets[k]));
+        let labels = self.members.iter().find_map(of).unwrap_or_default();
         let each = |(m, teaches): (&Member<'_>, &bool)| {
-            let k = m.context.target(channel).filter(|_| *teaches)?;
+            let k = place(m).filter(|_| *teaches)?;
             let stride = m.context.targets[k].rows.len().div_ceil(most).max(1);
             Some((of_run(m, k, rig, &labels, stride)?, m.independent[k]))
         };

@@ -76,7 +76,7 @@ impl<'a> Member<'a> {
 
 /// Whether a run can tell of an effect: it has one of its channels, and is no table of levels where the effect acts between two levels.
 fn tells(context: &Context, p: &Placed) -> bool {
-    let acts = p.stage() != Stage::Output || !context.is_table();
+    let acts = !matches!(p.stage(), Stage::Output | Stage::Hold) || !context.is_table();
     acts && p.instance.channels.iter().any(|c| context.target(c).is_some())
 }
 

@@ -118,8 +118,10 @@ fn channels(told: &Told<'_, '_>) -> Channels {
         if out.predicted.contains_key(name) || out.not_predicted.contains_key(name) {
             continue;
         }
-        if target.relation == Relation::SpeedAlone {
-            let without = contexts.iter().filter(|c| c.pulse.is_none()).count();
+        let compared: Vec<&Compared> = tenable.compared.iter().filter(|c| c.before.channel == name).collect();
+        let without = contexts.iter().filter(|c| c.pulse.is_none()).count();
+        let speed = matches!(target.relation, Relation::SpeedAlone | Relation::SpeedFromPulse);
+        if compared.is_empty() && speed && without > 0 {
             let reason = if without == contexts.len() {
                 NO_COMMAND.to_owned()
             } else {
@@ -128,7 +130,6 @@ fn channels(told: &Told<'_, '_>) -> Channels {
             out.not_predicted.insert(name.to_owned(), reason);
             continue;
         }
-        let compared: Vec<&Compared> = tenable.compared.iter().filter(|c| c.before.channel == name).collect();
         if compared.is_empty() {
             out.not_predicted.insert(name.to_owned(), "no second run measured it".to_owned());
             continue;

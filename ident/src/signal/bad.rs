@@ -20,6 +20,7 @@ mod witness;
 pub(crate) use curve::Curve;
 
 use crate::log::{Column, Log, MODELLED, SPEED};
+use crate::numeric::order::median;
 use excursion::Event;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -110,7 +111,7 @@ pub fn found(log: &Log) -> Vec<SetAside> {
             witnesses.take_out(name, &more);
             events.extend(more);
         }
-        let (mut events, recurring) = of_no_effect(name, column, events, samples, speeds);
+        let (mut events, recurring) = of_no_effect(name, column, events, samples, Probes { speeds, lost: lost.len() });
         events.extend(lost.into_iter().chain(off));
         events.sort_by_key(|e| e.rows.start);
         witnesses.settle(name, &events);
@@ -171,11 +172,20 @@ impl SetAside {
     }
 }
 
+/// What is known of the speed probes.
+#[derive(Clone, Copy)]
+struct Probes {
+    /// How many there are.
+    speeds: usize,
+    /// How often the one that is judged has lost its mark.
+    lost: usize,
+}
+
 /// Fewest speed channels among which one can be outvoted, so that pulses too few or too many have a name.
 const VOTES: usize = 3;
 
 /// Those departures of a channel that are bad samples and no effect of it, and the single ones that an effect speaks of.
-fn of_no_effect(name: &str, column: &[f64], mut events: Vec<Event>, samples: usize, speeds: usize) -> (Vec<Event>, Vec<Event>) {
+fn of_no_effect(name: &str, column: &[f64], mut events: Vec<Event>, samples: usize, probes: Probes) -> (Vec<Event>, Vec<Event>) {
     events.sort_by_key(|e| e.rows.start);
     let bad: usize = events.iter().map(|e| e.rows.len()).sum();
     if bad as f64 > MOST * samples as f64 {
@@ -183,16 +193,27 @@ fn of_no_effect(name: &str, column: &[f64], mut events: Vec<Event>, samples: usi
     }
     let speed = SPEED.contains(&name);
     let single = |e: &Event| e.rows.len() <= SINGLE;
-    let lasting = events.iter().filter(|e| !single(e)).count();
-    let singles = events.len() - lasting;
+    let singles = events.iter().filter(|e| single(e)).count();
+    // a probe that loses its mark for a while loses it for a single reading as well
+    let lasting = events.len() - singles + probes.lost;
     // what follows a step of the load at once is no glitch to any reader, unless others are
     let settled = events.iter().filter(|e| single(e) && !e.at_step).count();
-    if singles < 2 || !speed && settled < 2 || speed && (lasting * 3 >= singles || speeds < VOTES) {
+    if singles < 2
+        || !speed && settled < 2
+        || speed && (lasting * 3 >= singles || probes.speeds < VOTES || !of_one_size(column, events.iter().filter(|e| single(e))))
+    {
         return (events, Vec::new());
     }
     // a speed of nothing at all is no pulse too few: the probe saw nothing
     let saw_nothing = |e: &Event| speed && column[e.rows.start].abs() < 0.05 * e.expected.abs();
     events.into_iter().partition(|e| !single(e) || saw_nothing(e))
+}
+
+/// Whether most readings of a speed are off by about the same share of it: a pulse too few or too many always is.
+fn of_one_size<'e>(column: &[f64], events: impl Iterator<Item = &'e Event>) -> bool {
+    let off: Vec<f64> = events.map(|e| column[e.worst] / e.expected - 1.0).filter(|off| off.is_finite()).collect();
+    let usual = median(&mut off.clone());
+    2 * off.iter().filter(|off| (**off - usual).abs() <= 0.5 * usual.abs()).count() > off.len()
 }
 
 /// An event in the words of the list.

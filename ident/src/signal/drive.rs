@@ -65,7 +65,7 @@ impl Drive {
         let goal: Vec<f64> = pulse.iter().map(|p| if turns(*p) { curve.at(*p).max(0.0) } else { 0.0 }).collect();
         // what the rotor did in a gap is not known: behind it the speed is the one that is measured there
         let first = speed.first().copied().filter(|v| v.is_finite()).map(|v| (0, v));
-        let begins: Vec<(usize, f64)> = first.into_iter().chain(starts(t, speed)).collect();
+        let begins: Vec<(usize, f64)> = first.into_iter().chain(starts(t, speed, false)).collect();
         let speed_of = |up: f64, down: f64| follow(t, &goal, &begins, up, down);
         let error = |up: f64, down: f64| -> f64 {
             speed_of(up, down).iter().zip(speed).filter(|(_, y)| y.is_finite()).map(|(p, y)| (p - y).abs()).sum()

@@ -43,12 +43,14 @@ pub(crate) const FEWEST_OF_A_KIND: usize = 10;
 /// Time steps that are a gap.
 pub(crate) const GAP: f64 = 5.0;
 
-/// Rows before which a log says nothing of the rotor, those after gaps in time, with the speed there.
-pub(crate) fn starts(t: &[f64], rpm: &[f64]) -> Vec<(usize, f64)> {
+/// Rows before which a log says nothing of the rotor, with the speed there: those after gaps in time, and the first where it is on its way
+/// already. One that has arrived stood as its command says.
+pub(crate) fn starts(t: &[f64], rpm: &[f64], on_its_way: bool) -> Vec<(usize, f64)> {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let usual = median(&mut steps);
     let begins = |i: &usize| t[*i] - t[*i - 1] > GAP * usual && rpm[*i].is_finite();
-    (1..rpm.len()).filter(begins).map(|i| (i, rpm[i])).collect()
+    let first = rpm.first().filter(|v| on_its_way && v.is_finite()).map(|v| (0, *v));
+    first.into_iter().chain((1..rpm.len()).filter(begins).map(|i| (i, rpm[i]))).collect()
 }
 
 /// Rows at the head of each steady stretch in which the speed has not arrived yet.

@@ -10,7 +10,7 @@ pub(crate) mod plain;
 
 use crate::verdict::Scope;
 use crate::verdict::{EffectEntry, Parameter};
-pub use plain::{channels, curve, in_force, plain};
+pub use plain::{channels, curve, in_force, over_time, plain};
 
 /// What a cause does, in two parts: an adverb fits between them.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -5,12 +5,13 @@
 //! Units: as the channels state.
 //! Reference: specification `formats.md`, "Command line".
 
-use super::{Args, flight, inertial, model_files, results, say_unwritten};
+use super::{Args, flight, inertial, model_files, of_one_rig, results, say_unwritten};
 use crate::Failure;
 use crate::folder::Folder;
 use crate::open::open;
 use crate::progress::Bar;
 use ident::close::validation;
+use ident::log::Log;
 use ident::report::{Origin, Vocabulary, several, terminal};
 use ident::several::{Outcome, Run, close_each, close_together};
 use std::path::Path;
@@ -29,6 +30,7 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let options = args.columns.options(&args.names);
     let logs = args.logs.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
     let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    of_one_rig(logs.iter().chain(&others).map(Log::names))?;
     let (runs, mut outcome) = {
         let bar = Bar::new("searching", quiet);
         let runs = close_each(logs, &|share| bar.set(0.7 * share))?;

@@ -104,6 +104,11 @@ pub(super) fn arguments() -> Vec<Case> {
         alone("a declination beyond the pole", "ahrs good.csv out.csv --declination 700", &["--declination 700", "-180 to 180"]),
         alone("a channel that is none", "plateaus good.csv --channel thrust", &["no column thrust", "thrust_n"]),
         alone("a thrust that is none", "select --thrust nan", &["--thrust nan: expected N from 0"]),
+        alone(
+            "a run that is to judge itself",
+            "close-loop good.csv --validate good.csv -o out",
+            &["--validate good.csv: it is the log itself", "another run of the rig"],
+        ),
         alone("a seed below 0", "demo --seed -1 -o out", &["--seed -1: expected a seed, a whole number from 0"]),
         alone(
             "cells below 0",

@@ -274,6 +274,9 @@ pub(super) fn logs() -> Vec<Case> {
 }
 
 /// Keys of the head with values that no rig has: each at its own line.
+/// An export whose head says grams.
+const IN_GRAMS: &str = "t_s,rpm,Load(g)\n0,1000,10\n0.1,1000,10\n0.2,1000,10\n";
+
 pub(super) fn heads() -> Vec<Case> {
     let case = |name, line: &str, said| {
         let text = good_log().replacen("# sample_hz", &format!("# motor = \"570KV\"\n{line}\n# sample_hz"), 1);
@@ -293,6 +296,25 @@ pub(super) fn heads() -> Vec<Case> {
         case("a propeller in mm", "# propeller = \"280x120\"", &["bad.csv:3: propeller = \"280x120\": ", "millimetres?"]),
         case("a head in kelvin", "# temp_c = 288", &["bad.csv:3: temp_c = 288; ", "Celsius"]),
         case("a pressure in pascal", "# pressure_hpa = 101325", &["bad.csv:3: pressure_hpa = 101325; ", "hPa"]),
+        case(
+            "a propeller without quotes",
+            "# propeller = 11x4.7",
+            &["bad.csv:3: column propeller: 11x4.7; ", "propeller = \"11x4.7\""],
+        ),
+        with(
+            "an export in grams",
+            "bad.csv",
+            IN_GRAMS,
+            "import bad.csv -o out.csv --map thrust_n=Load(g)",
+            &["bad.csv:1: column Load(g): its head says g", "--map 'thrust_n=Load(g)*0.00980665'"],
+        ),
+        with(
+            "a channel without its unit",
+            "bad.csv",
+            IN_GRAMS,
+            "import bad.csv -o out.csv --map thrust=Load(g)*0.0098",
+            &["bad.csv:1: column Load(g): no channel is called thrust; ", "--map 'thrust_n=...'"],
+        ),
         with("an export without pole pairs", "bad.csv", foreign, "import bad.csv -o out.csv", &["bad.csv:1: pole_pairs = 0; "]),
     ]
 }

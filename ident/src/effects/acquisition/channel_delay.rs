@@ -8,7 +8,7 @@
 use crate::channel::Context;
 use crate::effects::design::TargetDesign;
 use crate::effects::{
-    About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, lone_speed, meters, operator,
+    About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, every_speed, meters, operator,
     reads_meter, through_meter,
 };
 
@@ -46,7 +46,7 @@ impl Effect for ChannelDelay {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         meters(context)
             .iter()
-            .chain(&lone_speed(context))
+            .chain(&every_speed(context))
             .flat_map(|s| {
                 operator::courses(context).iter().map(|jumps| Instance::new(s, if *jumps { operator::OF_STEPS } else { "" }))
             })

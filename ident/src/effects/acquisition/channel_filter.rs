@@ -58,8 +58,8 @@ impl Effect for ChannelFilter {
         let forms: &[&str] = if operator::abrupt(context) { &FORMS[2..] } else { &FORMS[..2] };
         let of_meters = meters(context);
         // an average cannot be undone: the truth is read off a lag only; the lag itself hides whether the load jumps
-        let of_lone = lone_speed(context).into_iter().flat_map(|s| [FORMS[1], FORMS[3]].map(|form| Instance::new(&s, form)));
-        of_meters.iter().flat_map(|s| forms.iter().map(|form| Instance::new(s, form))).chain(of_lone).collect()
+        let of_speed = lone_speed(context).into_iter().flat_map(|s| [FORMS[1], FORMS[3]].map(|form| Instance::new(&s, form)));
+        of_meters.iter().flat_map(|s| forms.iter().map(|form| Instance::new(s, form))).chain(of_speed).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {

@@ -45,7 +45,7 @@ impl Effect for SampleHold {
     }
 
     fn stage(&self) -> Stage {
-        Stage::Output
+        Stage::Hold
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
@@ -118,7 +118,7 @@ impl Effect for SampleHold {
 /// Form of a coarse display: not every update changes the reading.
 const SKIPPING: &str = "skipping";
 /// Form in which the noise comes after the hold, so that no value repeats.
-const BENEATH: &str = "beneath the noise";
+pub(crate) const BENEATH: &str = "beneath the noise";
 
 /// Interval of the updates and its standard error, s, as the form of an instance reads it off.
 fn found(context: &Context, instance: &Instance, target: &Target) -> Option<(f64, f64)> {

@@ -8,7 +8,8 @@
 use crate::channel::Context;
 use crate::effects::design::TargetDesign;
 use crate::effects::{
-    About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, geometric, operator, thrust_over_time,
+    About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, is_too_quick, operator,
+    thrust_over_time,
 };
 
 /// See the module.
@@ -63,6 +64,10 @@ impl Effect for Creep {
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         Vec::new()
+    }
+
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        !is_too_quick(&self.shapes(context, instance), fitted)
     }
 
     fn apply(&self, context: &Context, _: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {

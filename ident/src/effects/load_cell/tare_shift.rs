@@ -6,7 +6,7 @@
 //! Units: N, s.
 //! Reference: step change with unknown instant, Basseville & Nikiforov 1993, section 2.2.
 
-use crate::channel::Context;
+use crate::channel::{Context, STANDSTILL};
 use crate::effects::design::TargetDesign;
 use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, thrust_over_time};
 
@@ -86,6 +86,11 @@ impl Effect for TareShift {
         design.add(position, 0, offset);
     }
 
+    /// A zero that jumps when the rotor first turns, and never is seen again, is the curve's own way to rest.
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        instance.form == BEFORE || !fitted.iter().any(|e| e.name == "t0" && sets_in_at_the_start(context, e.value))
+    }
+
     fn report(&self, context: &Context, instance: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
         with_first_instant(context, instance, fitted)
     }
@@ -106,6 +111,19 @@ pub(crate) fn with_first_instant(context: &Context, instance: &Instance, mut fit
     }
     fitted
 }
+
+/// Whether the rotor stands on all rows up to an instant, a second of its way apart, and on none after it.
+fn sets_in_at_the_start(context: &Context, t0: f64) -> bool {
+    let stands = |i: &usize| context.rpm[*i] < STANDSTILL;
+    let rows = || 0..context.rpm.len();
+    let on_its_way = |i: &usize| (context.t[*i] - t0).abs() < ON_ITS_WAY;
+    let away = || rows().filter(|i| !on_its_way(i));
+    let before = away().filter(|i| context.t[*i] < t0).all(|i| stands(&i));
+    before && !context.rpm.is_empty() && rows().any(|i| stands(&i)) && !away().any(|i| context.t[i] >= t0 && stands(&i))
+}
+
+/// Time about an instant in which a rotor starts, s.
+const ON_ITS_WAY: f64 = 1.0;
 
 /// The instant at which something sets in: 48 starts over the run.
 pub(crate) fn onset(context: &Context) -> Shape {

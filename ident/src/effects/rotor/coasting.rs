@@ -9,7 +9,7 @@
 //! Reference: J dw/dt = kt i - kQ w^2 - Q_f with i = (V - kt w)/R, not below 0 where nothing brakes: Beharie 2013, Eq. 2.21 as corrected and
 //! 5.11. At a voltage that holds the speed g this is dv/dt = (g - v) (a + b (g + v)), with a = kt^2/(R J) and b = kQ w_max/J.
 
-use crate::channel::Context;
+use crate::channel::{Context, STANDSTILL};
 use crate::effects::operator::{Decay, weight_of_ramp};
 
 /// Parts that a row is cut into while the rotor coasts; the way of a driven one is exact.
@@ -161,7 +161,8 @@ impl Coasting {
         let goals: Vec<f64> =
             pulse.iter().map(|p| if *p < context.start_pulse_us { 0.0 } else { (p - 1000.0).max(0.0) / 1000.0 }).collect();
         let latency = rotor.latency.max(0.0);
-        let (mut speed, mut row, mut parts) = (goals[0], 0, Vec::with_capacity(PARTS + REACH));
+        let at_rest = context.starts.first().is_some_and(|(row, rpm)| *row == 0 && *rpm < STANDSTILL);
+        let (mut speed, mut row, mut parts) = (if at_rest { 0.0 } else { goals[0] }, 0, Vec::with_capacity(PARTS + REACH));
         let mut decay = Decay::new();
         let mut settled: Option<(f64, Row)> = None;
         let interval = |i: usize| {

@@ -2,16 +2,19 @@
 //!
 //! What it is: torque_nm += inertia * domega/dt, current_a += power_gain * omega * domega/dt. The supply pays for the power that goes into the
 //! rotor: J omega domega/dt = V dI. The acceleration is that of the measured speed, or what a rotor has that is off its command's speed.
+//! Most controllers let no current flow back (forms `one_way`): a rotor that falls faster than the air alone brakes it, domega/dt below
+//! -coast_drag omega^2, takes what one takes that stands.
 //! What can go wrong: shows only in transients; a lag between the channels looks alike, and so does, with the other sign, a current that a turning
 //! rotor draws beyond its curve: a negative inertia is refused, but against a declared model, whose rotor may have been heavier.
 //! Units: kg.m2, A.s3/rad2.
 //! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt); first-order rotor, section 5.7.3 (dw/dt = (goal - w)/tau).
 
 use crate::channel::{Context, Relation};
-use crate::effects::design::TargetDesign;
+use crate::effects::design::{Label, TargetDesign};
 use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
-use crate::numeric::order::usual_step;
+use crate::numeric::order::{median, usual_step};
 use crate::signal::drive::{Drive, acceleration_of_rows};
+use std::sync::Arc;
 
 /// See the module.
 pub(crate) struct RotorInertia;
@@ -58,12 +61,16 @@ impl Effect for RotorInertia {
         let (torque, current) = (present(context, &["torque_nm"]), present(context, &["current_a"]));
         let both = present(context, &["torque_nm", "current_a"]);
         // where the speed steps between rows, meters that average over a row see the step in the row in which it ends
-        let forms: &[&str] = if operator::commands_abruptly(context) { &["", OVER_THE_ROW] } else { &[""] };
-        let of_any =
-            [&both, &torque, &current].into_iter().flat_map(|set| forms.iter().map(move |form| Instance::new(set, form)));
-        let of_current = (!current.is_empty() && driven(context).is_some()).then(|| Instance::new(&current, DRIVEN));
+        let over = operator::commands_abruptly(context).then_some([OVER_THE_ROW, OVER_THE_ROW_ONE_WAY]);
+        let of_command = driven(context).is_some().then_some([DRIVEN, DRIVEN_ONE_WAY]);
+        let of_all: Vec<&str> = [Some(["", ONE_WAY]), over].into_iter().flatten().flatten().collect();
+        let of_torque: Vec<&str> = of_all.iter().copied().filter(|form| !form.ends_with(ONE_WAY)).collect();
+        let of_current: Vec<&str> = of_all.iter().copied().chain(of_command.into_iter().flatten()).collect();
+        let of_both = if current.is_empty() { &of_torque } else { &of_all };
+        let sets = [(&both, of_both), (&torque, &of_torque), (&current, &of_current)];
+        let of_any = sets.into_iter().flat_map(|(set, forms)| forms.iter().map(move |form| Instance::new(set, form)));
         let mut out: Vec<Instance> = Vec::new();
-        for instance in of_any.chain(of_current).filter(|i| !i.channels.is_empty()) {
+        for instance in of_any.filter(|i| !i.channels.is_empty()) {
             if !out.contains(&instance) {
                 out.push(instance);
             }
@@ -71,30 +78,39 @@ impl Effect for RotorInertia {
         out
     }
 
-    fn shapes(&self, _: &Context, _: &Instance) -> Vec<Shape> {
-        Vec::new()
+    fn shapes(&self, _: &Context, instance: &Instance) -> Vec<Shape> {
+        let starts = vec![3e-4, 1e-3, 3e-3, 1e-2, 3e-2];
+        let coast = Shape { name: COAST_DRAG, unit: "1/rad", range: COAST, starts };
+        if is_one_way(instance) { vec![coast] } else { Vec::new() }
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
         vec![Amplitude { name: "inertia", unit: "kg.m2" }, Amplitude { name: "power_gain", unit: "A.s3/rad2" }]
     }
 
-    fn apply(&self, context: &Context, instance: &Instance, _: &[f64], position: usize, design: &mut TargetDesign) {
+    fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let mut of_row = match instance.form.as_str() {
-            OVER_THE_ROW => acceleration_of_rows(&context.t, &context.rpm, usual_step(&context.t)),
-            DRIVEN => driven(context).cloned().unwrap_or_else(|| acceleration(context)),
+            OVER_THE_ROW | OVER_THE_ROW_ONE_WAY => acceleration_of_rows(&context.t, &context.rpm, usual_step(&context.t)),
+            DRIVEN | DRIVEN_ONE_WAY => driven(context).cloned().unwrap_or_else(|| acceleration(context)),
             _ => acceleration(context),
         };
         let of_power = design.relation == Relation::Current;
         if of_power {
-            of_row.iter_mut().zip(&context.rpm).for_each(|(a, rpm)| *a *= rpm * std::f64::consts::TAU / 60.0);
+            let omega: Vec<f64> = context.rpm.iter().map(|rpm| rpm * std::f64::consts::TAU / 60.0).collect();
+            let coast = |i: usize| shape.first().is_some_and(|drag| of_row[i] < -drag * omega[i].powi(2));
+            let coasts: Vec<bool> = (0..omega.len()).map(coast).collect();
+            of_row.iter_mut().zip(&omega).zip(&coasts).for_each(|((a, w), coasts)| *a *= if *coasts { 0.0 } else { *w });
+            stand_still(design, &context.rpm, &coasts);
         }
         design.add(position, usize::from(of_power), of_row);
     }
 
     /// Speeding up takes, it does not give. Against a model it is a difference of two inertias.
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
-        context.against_model || fitted.iter().all(|e| e.value > -2.0 * e.se) && fitted.iter().any(|e| e.value > 0.0)
+    /// What one takes that stands is no inertia where none is seen on the way up.
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        let seen = !is_one_way(instance) || fitted.iter().any(|e| e.name == "power_gain" && e.value > 3.0 * e.se);
+        let mut taken = fitted.iter().filter(|e| e.name != COAST_DRAG);
+        seen && (context.against_model || taken.clone().all(|e| e.value > -2.0 * e.se) && taken.any(|e| e.value > 0.0))
     }
 }
 
@@ -102,11 +118,53 @@ impl Effect for RotorInertia {
 const OVER_THE_ROW: &str = "over_the_row";
 /// Form of a rotor that is on its way to where its command sends it: a reading within a row's step knows how far it is off.
 const DRIVEN: &str = "driven";
+/// The three with a controller that lets no current flow back.
+const ONE_WAY: &str = "one_way";
+const OVER_THE_ROW_ONE_WAY: &str = "over_the_row_one_way";
+const DRIVEN_ONE_WAY: &str = "driven_one_way";
+/// Its parameter, of no other form.
+const COAST_DRAG: &str = "coast_drag";
+/// Deceleration of a rotor that nothing drives over the square of its speed, 1/rad: its torque's factor over its inertia. From a disc of
+/// a boat's screw to a bare blade of a toy.
+const COAST: (f64, f64) = (1e-4, 0.1);
 
-/// Acceleration by the command, rad/s^2; nothing without a command.
+fn is_one_way(instance: &Instance) -> bool {
+    instance.form.ends_with(ONE_WAY)
+}
+
+/// Makes some rows of the current those of a rotor that stands.
+fn stand_still(design: &mut TargetDesign, rpm: &[f64], rows: &[bool]) {
+    if !rows.contains(&true) {
+        return;
+    }
+    for column in design.columns.iter_mut().filter(|c| c.label != Label::Base(0)) {
+        Arc::make_mut(&mut column.values).iter_mut().zip(rows).filter(|(_, stands)| **stands).for_each(|(v, _)| *v = 0.0);
+    }
+    let standing = design.fixed.iter().zip(rpm).min_by(|a, b| a.1.total_cmp(b.1)).map(|(fixed, _)| *fixed);
+    if let Some(standing) = standing {
+        design.fixed.iter_mut().zip(rows).filter(|(_, stands)| **stands).for_each(|(v, _)| *v = standing);
+    }
+}
+
+/// Acceleration by the command, rad/s^2. Without one, by the levels that the speed settles on.
 fn driven(context: &Context) -> Option<&Vec<f64>> {
-    let of_command = || Some(Drive::of_command(&context.t, context.pulse.as_deref()?, &context.rpm)?.acceleration(&context.rpm));
-    context.facts.driven.get_or_init(of_command).as_ref()
+    let of_levels = || {
+        let command = context.pulse.clone().or_else(|| settles_on(context))?;
+        Some(Drive::of_command(&context.t, &command, &context.rpm)?.acceleration(&context.rpm))
+    };
+    context.facts.driven.get_or_init(of_levels).as_ref()
+}
+
+/// For each row the speed on which the rotor comes to rest next, rev/min; nothing where it seldom does.
+fn settles_on(context: &Context) -> Option<Vec<f64>> {
+    let mut out = Vec::with_capacity(context.rpm.len());
+    for (from, to) in &context.steady {
+        let level = median(&mut context.rpm[*from..*to].to_vec());
+        out.resize(*to, level);
+    }
+    let last = *out.last()?;
+    out.resize(context.rpm.len(), last);
+    Some(out)
 }
 
 /// Angular acceleration by central differences of the consensus speed, rad/s^2.

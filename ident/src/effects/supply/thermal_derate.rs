@@ -9,7 +9,8 @@ use crate::channel::{Context, Relation};
 use crate::effects::design::TargetDesign;
 use crate::effects::tachometer::speed_channel::expected;
 use crate::effects::{
-    About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, present, speeds,
+    About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, geometric, is_too_quick, present,
+    speeds,
 };
 
 /// See the module.
@@ -106,7 +107,10 @@ impl Effect for ThermalDerate {
         fitted
     }
 
-    fn plausible(&self, context: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
+    fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
+        if is_too_quick(&self.shapes(context, instance), fitted) {
+            return false;
+        }
         let top = load(context).iter().copied().fold(0.0, f64::max);
         let costs = fitted.iter().filter(|e| e.name == "current_rise").all(|e| e.value > -3.0 * e.se);
         costs && fitted.iter().any(|e| e.name == "derate" && e.value > 3.0 * e.se && e.value * top * top < 0.8)

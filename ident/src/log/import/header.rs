@@ -28,6 +28,14 @@ pub(super) enum Target {
     UnknownUnit(&'static str),
 }
 
+/// What a channel of the contract measures.
+pub(super) fn quantity_of(channel: &str) -> Option<Quantity> {
+    if channel.starts_with("rpm") && TIDY.contains(&channel) {
+        return Some(Quantity::Speed);
+    }
+    NAMES.iter().find(|(_, _, column)| *column == channel).map(|(_, quantity, _)| *quantity)
+}
+
 /// A header cell, sorted.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sorted {
@@ -116,6 +124,8 @@ const NAMES: [(Names, Quantity, &str); 11] = [
             "stromst\u{e4}rke",
             "courant",
             "corriente",
+            "amps",
+            "amperage",
         ],
         Quantity::Current,
         "current_a",

@@ -86,6 +86,8 @@ pub struct Mapping {
     pub factor: f64,
     /// Added after that.
     pub offset: f64,
+    /// Whether the factor was written, be it 1: the user answers for the unit.
+    pub stated: bool,
 }
 
 /// Factors between two units of a quantity, their signs apart.
@@ -104,15 +106,15 @@ impl std::str::FromStr for Mapping {
             Some((s, o)) if s.contains('*') => (s, number(o)?),
             _ => (rest, 0.0),
         };
-        let (source, factor) = match rest.rsplit_once('*') {
-            Some((s, f)) => (s, number(f)?),
-            None => (rest, 1.0),
+        let (source, factor, stated) = match rest.rsplit_once('*') {
+            Some((s, f)) => (s, number(f)?, true),
+            None => (rest, 1.0, false),
         };
         if !FACTORS.contains(&factor.abs()) || offset.is_nan() || offset.abs() > *FACTORS.end() {
             let expected = "expected a FACTOR from 1e-12 to 1e12 (or the same below 0) and an OFFSET of 1e12 at most";
             return Err(format!("{expected}, such as thrust_n=Load*0.00980665"));
         }
-        Ok(Self { target: target.trim().to_owned(), source: source.trim().to_owned(), factor, offset })
+        Ok(Self { target: target.trim().to_owned(), source: source.trim().to_owned(), factor, offset, stated })
     }
 }
 

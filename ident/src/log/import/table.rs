@@ -7,10 +7,10 @@
 //! Reference: specification `formats.md`, `quadrig import`.
 
 use super::clock::{Stamp, stamp};
-use super::header::{ELECTRICAL, Target, clean, sort_all};
+use super::header::{ELECTRICAL, Target, clean, quantity_of, sort_all, split_unit};
 use super::layout::{Layout, Records};
 use super::number::{Cell, cell};
-use super::{Options, Report};
+use super::{Mapping, Options, Report};
 use crate::log::{Place, ReadError, named_shortly, short};
 
 /// How a field becomes a number.
@@ -66,6 +66,8 @@ pub(super) fn plan(
                 format!("one of: {}", layout.cells.join(", ")),
             ));
         }
+        in_the_unit_of_its_target(m, &place)?;
+        is_a_channel(m, &place, report)?;
     }
     let sorted = sort_all(&layout.cells);
     let sides = || sorted.iter().filter_map(|s| s.side);
@@ -159,6 +161,42 @@ fn said(name: &str, cell: &str, reading: Reading, report: &mut Report) {
         _ => return,
     };
     report.add(name, what, 1);
+}
+
+/// Refuses a column whose own head names another unit than its target's, where no factor says what to do about it.
+fn in_the_unit_of_its_target(m: &Mapping, place: &Place<'_>) -> Result<(), ReadError> {
+    let Some(((factor, offset), unit)) = converted(&m.target, &m.source).filter(|(c, _)| !m.stated && *c != (1.0, 0.0)) else {
+        return Ok(());
+    };
+    let plus = if offset == 0.0 { String::new() } else { format!("+{offset}") };
+    let (target, source) = (&m.target, &m.source);
+    let expected = format!("a factor: --map '{target}={source}*{factor}{plus}' converts it, *1 keeps it as it is");
+    Err(place.refuse(Some(source), format!("its head says {unit}, and {target} is in another unit"), expected))
+}
+
+/// Factor and offset by which a column's own unit becomes its target's, and that unit.
+fn converted<'s>(target: &str, source: &'s str) -> Option<((f64, f64), &'s str)> {
+    let unit = split_unit(source).1?;
+    Some((quantity_of(target)?.of_unit(unit)?, unit))
+}
+
+/// Refuses a target that is a channel's name without its unit; says of any other that no channel has it.
+fn is_a_channel(m: &Mapping, place: &Place<'_>, report: &mut Report) -> Result<(), ReadError> {
+    if quantity_of(&m.target).is_some() || m.target == "thrust_rms_n" {
+        return Ok(());
+    }
+    let meant = ["t_s", "pulse_us", "thrust_n", "torque_nm", "current_a", "voltage_v", "temp_c"];
+    let stem = |channel: &&str| channel.rsplit_once('_').is_some_and(|(stem, _)| stem == m.target.to_lowercase());
+    if let Some(channel) = meant.iter().find(|c| stem(c)) {
+        return Err(place.refuse(
+            Some(&m.source),
+            format!("no channel is called {}", m.target),
+            format!("--map '{channel}=...'"),
+        ));
+    }
+    let known = format!("no channel is called so: a further column; the channels are rpm, {}", meant.join(", "));
+    report.add(&m.target, known, 1);
+    Ok(())
 }
 
 /// Reads every row into the fields.

@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict" (`effects`, `alternatives`).
 
 use super::contest::{Rival, reserve, rivals};
+use super::lost;
 use super::page::{Page, Reading};
 use super::sentence::{order, without};
 use super::state::figures;
@@ -176,7 +177,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     let title = match &rather {
         _ if nameless => format!("Something on {on} that goes with {}.", channels(&e.depends_on)),
         Some(both) => both.clone(),
-        None => page.words.said(e).sentence(),
+        None => lost::said(v, page.words, e).sentence(),
     };
     let number = number.map(|n| format!("<span class=\"nr\">{n}</span> ")).unwrap_or_default();
     let mut html = format!(
@@ -197,6 +198,9 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     }
     if let Some(open) = open_sizes(e) {
         let _ = writeln!(html, "<p class=\"soft\">{}</p>", escape(&open));
+    }
+    if let Some(said) = with_those_set_aside(page, k) {
+        let _ = writeln!(html, "<p class=\"warn\">{}</p>", escape(&said));
     }
     sheet.html_part(&html);
     let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
@@ -220,6 +224,20 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
     }
     sheet.html_part(&format!("{html}</div></div></article>\n"));
+}
+
+/// What a sensor loses with the readings counted in that were set aside, and without them.
+fn with_those_set_aside(page: &Page<'_>, k: usize) -> Option<String> {
+    let (v, e) = (page.verdict, page.verdict.effects.get(k)?);
+    let whole = (*page.counted.get(k)?)?;
+    let per_cent = |share: f64| digits(100.0 * share, 10.0 * share);
+    let fitted = e.parameter("probability")?.value;
+    Some(format!(
+        "{} of its readings were set aside because they are too low. Counted in with them it misses {} % of its pulses, without them {} %.",
+        lost::readings(v, e),
+        per_cent(whole),
+        per_cent(fitted),
+    ))
 }
 
 /// The title where a rival is likelier than the name that the model holds: both, the likelier first.

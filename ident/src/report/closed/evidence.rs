@@ -232,6 +232,51 @@ pub(crate) fn against(trace: &Trace, id: &str, (variable, unit): (&str, &str), x
     trace.figure(&format!("{id}-against-{}", slug(variable)), title, x_label, layers)
 }
 
+/// Places along the abscissa of a figure of scatter, and fewest samples of one that is drawn.
+const PLACES: usize = 48;
+const FEWEST: usize = 6;
+
+/// Root mean square of what is left, place by place along a variable: without an effect that scatters, with it, and as the effect has it. `told`
+/// is that last one at a value of the variable.
+pub(crate) fn scatter(trace: &Trace, id: &str, x_label: &str, x: &[f64], told: &dyn Fn(f64) -> f64) -> Figure {
+    let ends =
+        x.iter().copied().filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    let floor = (trace.floor > 0.0).then(|| Layer::Band {
+        name: "noise floor".into(),
+        class: "d",
+        x: vec![ends.0, ends.1],
+        lower: vec![0.0; 2],
+        upper: vec![trace.floor; 2],
+    });
+    let of = |name: &str, class, y: &[f64]| {
+        let (x, y) = by_place(x, y, ends);
+        Layer::Line { name: name.to_owned(), class, x, y }
+    };
+    let grid: Vec<f64> = (0..=240).map(|k| ends.0 + (ends.1 - ends.0) * f64::from(k) / 240.0).collect();
+    let expected =
+        Layer::Line { name: "scatter as found".into(), class: "c", y: grid.iter().map(|v| told(*v)).collect(), x: grid };
+    let [without, with] = ALONE;
+    let layers = floor.into_iter().chain([of(without, "b", &trace.before), of(with, "a", &trace.after), expected]);
+    let title = format!("{} left over, rms about each speed", heading(&trace.channel));
+    let mut figure = trace.figure(&format!("{id}-scatter"), title, x_label.to_owned(), layers.collect());
+    figure.y_label = figure.y_label.replace("left over", "rms left over");
+    figure
+}
+
+/// Root mean squares of values at places along a variable; a place with too few is left out.
+fn by_place(x: &[f64], y: &[f64], ends: (f64, f64)) -> (Vec<f64>, Vec<f64>) {
+    let wide = ((ends.1 - ends.0) / PLACES as f64).max(f64::MIN_POSITIVE);
+    // sums of the variable and of squares, and how many
+    let mut sums = vec![(0.0, 0.0, 0_usize); PLACES];
+    for (x, y) in x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite()) {
+        let place = (((x - ends.0) / wide) as usize).min(PLACES - 1);
+        let sum = &mut sums[place];
+        *sum = (sum.0 + x, sum.1 + y * y, sum.2 + 1);
+    }
+    let told = sums.into_iter().filter(|s| s.2 >= FEWEST);
+    told.map(|(x, squares, n)| (x / n as f64, (squares / n as f64).sqrt())).unzip()
+}
+
 /// Over the load of a residual whose way up and way down part: the two told apart, before; and both, after. `up` tells which way a row is on.
 pub(crate) fn two_ways(trace: &Trace, id: &str, x_label: &str, x: &[f64], up: &[bool]) -> Figure {
     let way = |asked: bool| -> Vec<f64> {
@@ -481,6 +526,23 @@ mod tests {
         assert!(figure.title.ends_with("(1 off the scale)"), "{}", figure.title);
         let Some(Layer::Dots { y, .. }) = figure.layers.iter().find(|l| matches!(l, Layer::Dots { .. })) else { panic!("dots") };
         assert!(y.iter().all(|v| v.abs() < 1.0));
+    }
+
+    /// What scatters about one speed shows there, where its mean is nothing.
+    #[test]
+    fn scatter_is_seen_where_the_mean_is_none() {
+        let x: Vec<f64> = (0..4800).map(|i| f64::from(i) / 4.8).collect();
+        let at = |v: f64| if (500.0..540.0).contains(&v) { 2.0 } else { 0.5 };
+        let before: Vec<f64> = x.iter().enumerate().map(|(i, v)| if i % 2 == 0 { at(*v) } else { -at(*v) }).collect();
+        let channel = "thrust_n".to_owned();
+        let trace = Trace { channel, floor: 0.5, t: x.clone(), after: before.clone(), before, ..Trace::default() };
+        let figure = scatter(&trace, "x", "speed, rpm", &x, &at);
+        let Some(Layer::Line { x, y, .. }) = figure.layers.iter().find(|l| matches!(l, Layer::Line { .. })) else {
+            panic!("a line")
+        };
+        let peak = x.iter().zip(y).max_by(|a, b| a.1.total_cmp(b.1)).expect("places");
+        assert!((500.0..545.0).contains(peak.0) && *peak.1 > 1.5, "{peak:?}");
+        assert!(y.iter().filter(|v| **v < 0.6).count() > 40 && figure.y_label.starts_with("rms left over"));
     }
 
     #[test]

@@ -80,10 +80,20 @@ pub(super) fn sureness(sheet: &mut Sheet, page: &Page<'_>) {
     });
 }
 
+/// Digits of a reading that was set aside.
+const FIGURES: f64 = 4.0;
+
+/// Samples that were set aside, the reading to as many digits as what was expected of it.
+pub(super) fn told(a: &SetAside) -> String {
+    let places = (FIGURES - 1.0 - a.expected.abs().max(1e-6).log10().floor()).clamp(0.0, 9.0) as usize;
+    let value = format!("{:.places$}", a.value).parse().unwrap_or(a.value);
+    SetAside { value, ..a.clone() }.to_string()
+}
+
 /// Samples and channels that took no part.
 pub(crate) fn aside(sheet: &mut Sheet, verdict: &Verdict) {
     let mut lines: Vec<Vec<String>> = verdict.left_out.iter().map(|l| vec![l.to_string()]).collect();
-    lines.extend(verdict.set_aside.iter().map(|a| vec![a.to_string()]));
+    lines.extend(verdict.set_aside.iter().map(|a| vec![told(a)]));
     if lines.is_empty() {
         return;
     }
@@ -137,4 +147,19 @@ pub(crate) fn candidates(sheet: &mut Sheet, diagnosis: &Diagnosis) {
         );
         sheet.data("candidates", &["round", "effect", "evidence", "fate", "channels"], &rows, None);
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reading_has_no_more_digits_than_what_was_expected() {
+        let of = |value: f64, expected: f64| {
+            let channel = "rpm_beam".to_owned();
+            told(&SetAside { channel, row: 1, rows: 1, t_s: 0.1, until_s: 0.1, value, expected, recurs: false, silent: false })
+        };
+        assert!(of(2417.082, 3625.4).ends_with(": 2417 where the rest of the log says 3625; set aside"));
+        assert!(of(0.123_456, 1.5).ends_with(": 0.123 where the rest of the log says 1.500; set aside"));
+    }
 }

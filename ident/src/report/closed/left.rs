@@ -12,7 +12,7 @@ use super::vocabulary::Vocabulary;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
-use crate::verdict::words::{channel, channels, heading, list, lower, plain, probability, rms, upper, vector};
+use crate::verdict::words::{channel, channels, heading, list, lower, over_time, plain, probability, rms, upper, vector};
 use crate::verdict::{Alternative, EffectEntry, ScheduleStep, Unexplained, Verdict};
 
 /// What is left.
@@ -100,7 +100,7 @@ pub(super) fn looks_and_goes(u: &Unexplained, shared: Option<&str>) -> (String, 
         ([], None) => "nothing in the log".to_owned(),
         (with, _) => with.join(", "),
     };
-    (looks.join("; "), goes)
+    (over_time(&looks.join("; ")), goes)
 }
 
 /// A row for each remainder; the axes of a vector that look alike share one.
@@ -124,7 +124,7 @@ fn alike(v: &Verdict, told: &[&Unexplained], shared: Option<&str>) -> Vec<Vec<St
             _ => ("up to ", upper(&channels(&group.iter().map(|u| u.channel.clone()).collect::<Vec<_>>()))),
         };
         let largest = |of: fn(&Verdict, &Unexplained) -> f64| group.iter().copied().max_by(|a, b| of(v, a).total_cmp(&of(v, b)));
-        let size = largest(rms_left).map(|u| size_left(v, u)).unwrap_or_default();
+        let size = largest(rms_left).map(|u| size_told(v, u)).unwrap_or_default();
         let floors = largest(floors_left).map_or(0.0, |u| floors_left(v, u));
         Some(vec![name, format!("{up_to}{floors:.1}"), format!("{up_to}{size}"), looks, goes])
     };
@@ -138,6 +138,22 @@ fn rms_left(v: &Verdict, u: &Unexplained) -> f64 {
 
 /// Times the error on rows that the fit saw from which on that on rows it did not see is told apart.
 const BEYOND: f64 = 2.0;
+
+/// The error on the rows that the fit saw, where rows that it did not see are missed by much more: these lie between or beyond its levels. Of
+/// several runs each is predicted whole, so that no level of it is left out.
+pub(super) fn fitted(v: &Verdict, name: &str) -> Option<f64> {
+    let after = v.channels.get(name).filter(|_| v.runs.is_empty())?.after;
+    (after.heldout_rms > BEYOND * after.rms).then_some(after.rms)
+}
+
+/// The error that is left, with unit, and that on the rows of the fit where it is much smaller.
+pub(super) fn size_told(v: &Verdict, u: &Unexplained) -> String {
+    let size = size_left(v, u);
+    match fitted(v, &u.channel).zip(v.channels.get(&u.channel)) {
+        Some((seen, c)) => format!("{size} ({} where fitted)", rms(seen, &c.unit)),
+        None => size,
+    }
+}
 
 /// The errors of a channel whose left-out rows are missed by much more than those that the fit saw.
 fn beyond_what_was_seen(v: &Verdict, name: &str) -> Option<String> {
@@ -237,6 +253,12 @@ mod tests {
             ]
         );
         assert_eq!(super::shared(&bare_verdict(vec![left("ax", "slow"), left("ay", "slow; a tail")])), None);
+    }
+
+    #[test]
+    fn a_memory_is_a_time_constant() {
+        let said = looks_and_goes(&left("acc_x", "slow, within 2.0 s; goes with time"), None).0;
+        assert_eq!(said, "slow, with a time constant of 2.0 s");
     }
 
     /// What a short table cannot prove it says as far as it goes, where a reader looks for it.

@@ -14,6 +14,7 @@ mod evidence;
 mod fold;
 mod left;
 mod look;
+mod lost;
 mod page;
 mod provenance;
 mod sentence;
@@ -22,16 +23,19 @@ mod terminal;
 mod vocabulary;
 
 pub(crate) use evidence::{
-    ALONE, SEEN, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, shown_most, slug, thinned, two_ways,
+    ALONE, SEEN, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, scatter, shown_most, slug, thinned,
+    two_ways,
 };
 pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};
+pub(crate) use lost::struck;
 pub(crate) use page::{Page, Reading, begin};
 pub use provenance::{Hidden, Origin};
+pub(crate) use sentence::loudest;
 pub use sentence::sentence;
 pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal, wrapped};
 pub use vocabulary::Vocabulary;
-#[cfg(test)]
-pub(crate) use vocabulary::bare_entry;
 pub(crate) use vocabulary::{ALL_ROWS, bare};
+#[cfg(test)]
+pub(crate) use vocabulary::{bare_entry, bare_verdict};

@@ -113,6 +113,8 @@ pub struct Origin {
     pub of_a_rig: bool,
     /// What the logs lack in time, a sentence each.
     pub lacks: Vec<String>,
+    /// What is unusual in the logs' values, a sentence each.
+    pub doubts: Vec<String>,
     /// The other logs, where the page is of several runs.
     pub others: Vec<FittedTo>,
 }
@@ -135,7 +137,8 @@ impl Origin {
             .collect();
         let seconds = log.t.first().zip(log.t.last()).map(|(a, b)| b - a).filter(|_| !log.time_is_row());
         let lacks = Gaps::of(log).map(|gaps| format!("{}: {gaps}", log.name)).into_iter().collect();
-        Self { log: FittedTo::of(log), seconds, states, of_a_rig: true, lacks, ..Self::default() }
+        let doubts = log.in_doubt().into_iter().map(|doubt| format!("{}: {doubt}", log.name)).collect();
+        Self { log: FittedTo::of(log), seconds, states, of_a_rig: true, lacks, doubts, ..Self::default() }
     }
 
     /// Of several logs of one rig: what they all state.
@@ -149,6 +152,7 @@ impl Origin {
             out.seconds = out.seconds.zip(other.seconds).map(|(a, b)| a + b);
             out.others.push(other.log.clone());
             out.lacks.extend(other.lacks.iter().cloned());
+            out.doubts.extend(other.doubts.iter().cloned());
         }
         out
     }

@@ -7,10 +7,12 @@
 
 use super::cards::{is_shown, value};
 use super::contest::{Rival, is_beaten, rivals};
+use super::left::fitted;
+use super::lost;
 use super::vocabulary::Vocabulary;
 use crate::attribution::rivals::beyond;
 use crate::attribution::unexplained::LOUD;
-use crate::verdict::words::{Clause, adverb, channel, counted, heading, list, rms, upper, upper_bound, vector};
+use crate::verdict::words::{Clause, adverb, channel, counted, heading, list, over_time, rms, upper, upper_bound, vector};
 use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Kind, Parameter, Unexplained, Verdict};
 
 /// Most effects that the sentence names; the cards have all.
@@ -115,7 +117,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     let told = if told.is_empty() { vec![*first] } else { told };
     let more = causes(all).saturating_sub(told.len());
-    let clauses = by_subject(&told, words);
+    let clauses = by_subject(verdict, &told, words);
     let out = match own.is_empty() {
         true => format!(
             "{} What every {noun} has: {}.",
@@ -167,8 +169,8 @@ fn beaten(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> bool {
 }
 
 /// What an effect does, with its size, or with a bound where the run shows no more.
-fn sized_clause(words: Vocabulary, e: &EffectEntry) -> Clause {
-    let clause = words.said(e);
+fn sized_clause(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> Clause {
+    let clause = lost::said(verdict, words, e);
     if (words.clause)(e).does.contains(|c: char| c.is_ascii_digit()) {
         return clause;
     }
@@ -186,12 +188,12 @@ fn sized_clause(words: Vocabulary, e: &EffectEntry) -> Clause {
 }
 
 /// A clause for each effect; what differs from run to run is one clause with a part for each.
-fn by_subject(told: &[&EffectEntry], words: Vocabulary) -> Vec<String> {
+fn by_subject(verdict: &Verdict, told: &[&EffectEntry], words: Vocabulary) -> Vec<String> {
     let mut out: Vec<(&EffectEntry, Vec<String>)> = Vec::new();
     for e in told {
         match out.iter_mut().find(|(first, _)| first.run.is_some() && e.run.is_some() && first.id == e.id) {
-            Some((_, parts)) => parts.push(sized_clause(words, e).does),
-            None => out.push((e, vec![sized_clause(words, e).does])),
+            Some((_, parts)) => parts.push(sized_clause(verdict, words, e).does),
+            None => out.push((e, vec![sized_clause(verdict, words, e).does])),
         }
     }
     out.iter().map(|(e, parts)| Clause::new(words.said(e).who, list(parts)).with(adverb(e.probability))).collect()
@@ -218,7 +220,7 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
     let removed = |all: &[&EffectEntry]| all.iter().map(|e| e.heldout_error_reduction).fold(0.0, f64::max);
     let sure: Vec<&EffectEntry> = sure.filter(|e| !beaten(verdict, words, e)).take(MOST - 1).collect();
     let told = sure.len() + all.iter().filter(|e| disputed.iter().any(|d| std::ptr::eq(*d, **e))).count();
-    let said: Vec<String> = sure.iter().map(|e| sized_clause(words, e).with(adverb(e.probability))).collect();
+    let said: Vec<String> = sure.iter().map(|e| sized_clause(verdict, words, e).with(adverb(e.probability))).collect();
     let out = if sure.is_empty() {
         format!("{}.", since(news, &question))
     } else if removed(&sure) > removed(disputed) {
@@ -249,7 +251,7 @@ fn question(verdict: &Verdict, words: Vocabulary, disputed: &[&EffectEntry]) -> 
     let best = disputed.iter().map(|e| e.probability).fold(0.0, f64::max);
     let mut ways = vec![Rival {
         ids: Vec::new(),
-        said: list(&disputed.iter().map(|e| sized_clause(words, e).with("")).collect::<Vec<_>>()),
+        said: list(&disputed.iter().map(|e| sized_clause(verdict, words, e).with("")).collect::<Vec<_>>()),
         probability: best,
     }];
     if let Some(first) = disputed.first() {
@@ -319,7 +321,12 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
             false => format!("A smooth term without a name was fitted on {}; it goes with {}.", list(&on), list(&goes)),
         };
         let first = since(news, "no known effect explains what the model leaves over.");
-        return format!("{first} Most is left on {}: {}. {fitted}", channel(&loudest.channel), size_and_looks(verdict, loudest));
+        let beyond = beyond_the_fit(verdict, loudest);
+        return format!(
+            "{first} Most is left on {}: {}.{beyond} {fitted}",
+            channel(&loudest.channel),
+            size_and_looks(verdict, loudest)
+        );
     }
     let place = if on.is_empty() { String::new() } else { format!(" on {}", list(&on)) };
     let mut out = since(news, &format!("something is left{place} that no known effect explains."));
@@ -432,17 +439,21 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool) -> Option<Exp
         s if s >= ALL && !rest => "all".to_owned(),
         s => format!("{:.0} %", (100.0 * s).min(99.0)),
     };
+    // a noise floor may hold a part of what is named: all is what stood above it
+    let over = |share: &str| if share == "all" { "above its noise floor" } else { "over" };
     let names: Vec<String> = shares.iter().map(|s| whole(verdict, s.0)).collect();
     let but: String = worse(verdict, &is_told).collect();
     let of_each: Vec<String> = shares.iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))).collect();
     let brief = format!("Explained: {}.{but}", list(&of_each));
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
-        let said = format!("{subject} {} of what {} had left over.{but}", per_cent(mean), list(&names));
+        let said = format!("{subject} {} of what {} had left {}.{but}", per_cent(mean), list(&names), over(&per_cent(mean)));
         return Some(Explained { said, brief, says_more: others });
     }
-    let parts: Vec<String> =
-        shares.iter().map(|s| format!("{} of what {} had left over", per_cent(s.1), whole(verdict, s.0))).collect();
+    let parts: Vec<String> = shares
+        .iter()
+        .map(|s| format!("{0} of what {1} had left {2}", per_cent(s.1), whole(verdict, s.0), over(&per_cent(s.1))))
+        .collect();
     let short: Vec<String> = std::iter::once(parts[0].clone())
         .chain(shares[1..].iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))))
         .collect();
@@ -473,7 +484,7 @@ fn quantity(name: &str) -> &str {
 }
 
 /// What is loudest among what is left.
-fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
+pub(crate) fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
     loud(verdict).max_by(|a, b| floors_left(verdict, a).total_cmp(&floors_left(verdict, b)))
 }
 
@@ -481,6 +492,19 @@ fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
 pub(super) fn size_left(verdict: &Verdict, u: &Unexplained) -> String {
     let of = verdict.channels.get(&u.channel);
     of.map_or_else(|| format!("{:.1} times the noise", u.over_floor), |c| rms(c.after.heldout_rms, &c.unit))
+}
+
+/// The unit of a channel on which something is left.
+fn unit_left<'v>(verdict: &'v Verdict, u: &Unexplained) -> &'v str {
+    verdict.channels.get(&u.channel).map_or("", |c| c.unit.as_str())
+}
+
+/// How far rows are missed that the fit did not see, where that is much farther than those that it saw; else empty.
+fn beyond_the_fit(verdict: &Verdict, u: &Unexplained) -> String {
+    if fitted(verdict, &u.channel).is_none() {
+        return String::new();
+    }
+    format!(" Rows left out of the fit are missed by {}: they lie beyond what the others show.", size_left(verdict, u))
 }
 
 /// The same in noise floors: of several runs that of all of them, as the state of the channels tells it.
@@ -508,7 +532,9 @@ fn largest(verdict: &Verdict) -> Option<Largest<'_>> {
     let largest = loud(verdict).filter(|u| sensors > 1 && quantity(&u.channel) == what).max_by(|a, b| of(a).total_cmp(&of(b)));
     let told = largest.unwrap_or(loudest);
     let up_to = if largest.is_some() { "up to " } else { "" };
-    Some(Largest { on, size: format!("{up_to}{} rms", size_left(verdict, told)), told })
+    let size =
+        fitted(verdict, &told.channel).map_or_else(|| size_left(verdict, told), |seen| rms(seen, unit_left(verdict, told)));
+    Some(Largest { on, size: format!("{up_to}{size} rms"), told })
 }
 
 /// What a remainder looks like, in its first words; the section on what is left has all.
@@ -516,13 +542,15 @@ fn looks(u: &Unexplained) -> String {
     let first = u.looks_like.split(';').next().unwrap_or_default();
     let first = first.strip_prefix("loudest on ").and_then(|rest| Some(rest.split_once(": ")?.1)).unwrap_or(first);
     let seems = u.looks_like.split("; ").find(|part| part.starts_with("goes with ")).filter(|_| u.depends_on.is_empty());
-    let first =
-        first.replace("in one stretch", "mostly in one stretch").replace("while the load is on its way", "as the load changes");
+    let first = over_time(first)
+        .replace("in one stretch", "mostly in one stretch")
+        .replace("while the load is on its way", "as the load changes");
     seems.map_or(first.clone(), |seems| format!("{first}; it {seems}"))
 }
 
 fn size_and_looks(verdict: &Verdict, u: &Unexplained) -> String {
-    format!("{} rms ({})", size_left(verdict, u), looks(u))
+    let size = fitted(verdict, &u.channel).map_or_else(|| size_left(verdict, u), |seen| rms(seen, unit_left(verdict, u)));
+    format!("{size} rms ({})", looks(u))
 }
 
 fn left(verdict: &Verdict) -> String {
@@ -533,8 +561,9 @@ fn left(verdict: &Verdict) -> String {
     let what = quantity(&told.channel);
     // what is left on the other channels stands beside their bars
     let unknown = if share(verdict, &told.channel).is_none_or(|s| s < HALF) { " No known effect explains it." } else { "" };
+    let beyond = beyond_the_fit(verdict, told);
     match loud(verdict).any(|u| quantity(&u.channel) != what) {
-        false => format!("On {on} {size} is left ({}).{unknown}", looks(told)),
-        true => format!("Most is left on {on}: {size} ({}).{unknown}", looks(told)),
+        false => format!("On {on} {size} is left ({}).{beyond}{unknown}", looks(told)),
+        true => format!("Most is left on {on}: {size} ({}).{beyond}{unknown}", looks(told)),
     }
 }

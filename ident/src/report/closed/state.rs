@@ -6,6 +6,7 @@
 //! Reference: none.
 
 use super::evidence::pair;
+use super::lost;
 use crate::attribution::unexplained::LOUD;
 use crate::report::svg::escape;
 use crate::verdict::words::{channel, digits, scaled, upper};
@@ -92,15 +93,45 @@ pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool, known: bool) ->
         ""
     };
     let key = format!("<p class=\"soft\">The declared model: {declared}.{share}</p>\n");
-    drawn(&v.channels, &left, &named(v), known, pair(v)) + &beside + &key
+    let stays = lost::key(v);
+    let stays: String = stays.iter().map(|said| format!("<p class=\"soft\">{}</p>\n", escape(said))).collect();
+    let told =
+        Told { left: &left, named: &named(v), stays: &lost::floors(v).into_iter().map(|f| f.0).collect::<Vec<_>>(), known };
+    drawn(&lost::drawn(v), &told, pair(v)) + &beside + &stays + &key
 }
 
 /// The bars; `left` are the channels on which more than noise is left, `named` those that a name improves.
 pub(crate) fn bars(channels: &Channels, left: &[&str], named: &[&str], names: [&str; 2]) -> String {
-    drawn(channels, left, named, false, names)
+    drawn(channels, &Told { left, named, stays: &[], known: false }, names)
 }
 
-fn drawn(channels: &Channels, left: &[&str], named: &[&str], known: bool, [_, after]: [&str; 2]) -> String {
+/// What is known of the channels beside their errors.
+struct Told<'t> {
+    /// Those on which more than noise is left.
+    left: &'t [&'t str],
+    /// Those that a name improves.
+    named: &'t [&'t str],
+    /// Those whose scatter is a fault that has a name.
+    stays: &'t [&'t str],
+    /// Whether nothing has changed since the declared model was made.
+    known: bool,
+}
+
+impl Told<'_> {
+    /// The state of a channel in a word.
+    fn word(&self, name: &str, floors: [f64; 2]) -> &'static str {
+        if self.stays.contains(&name) {
+            return STAYS;
+        }
+        let [left, named] = [self.left, self.named].map(|list| list.contains(&name));
+        word(floors, left, named, self.known)
+    }
+}
+
+/// The state of a sensor whose scatter is a fault that has a name.
+pub(super) const STAYS: &str = "fault stays";
+
+fn drawn(channels: &Channels, told: &Told<'_>, [_, after]: [&str; 2]) -> String {
     let scale = Scale::of(channels);
     let mut out = String::from("<div class=\"state\" role=\"table\" aria-label=\"error of each channel before and after\">\n");
     out +=
@@ -117,7 +148,6 @@ fn drawn(channels: &Channels, left: &[&str], named: &[&str], known: bool, [_, af
     out += "</span><span role=\"columnheader\">before</span><span role=\"columnheader\">after</span><span role=\"columnheader\">factor</span><span role=\"columnheader\">state</span></div>\n";
     for (name, c) in channels {
         let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
-        let [left, named] = [left, named].map(|list| list.contains(&name.as_str()));
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
         let label = format!("{}: before {:.1}, after {:.1} noise floors", channel(name), floors[0], floors[1]);
         let _ = write!(
@@ -143,7 +173,7 @@ fn drawn(channels: &Channels, left: &[&str], named: &[&str], known: bool, [_, af
             out,
             "</span><span class=\"num\" role=\"cell\" data-of=\"before\">{before}</span><span class=\"num\" role=\"cell\" data-of=\"after\">{after}</span><span class=\"num\" role=\"cell\" data-of=\"factor\">{}</span><span class=\"word\" role=\"cell\">{}</span></div>",
             factor(c.before.heldout_rms, c.after.heldout_rms),
-            word(floors, left, named, known),
+            told.word(name, floors),
         );
     }
     for (name, reason) in &channels.not_predicted {

@@ -8,9 +8,11 @@
 use super::cards::{OPEN, alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value, why};
 use super::cautions::cautions;
 use super::contest::rivals;
-use super::left::{in_words, looks_and_goes, shared};
-use super::sentence::{PER_CENT, floors_left, instead, order, sentence, size_left, without};
-use super::state::{factor, figures, is_as_before, named, word};
+use super::fold::told;
+use super::left::{in_words, looks_and_goes, shared, size_told};
+use super::lost;
+use super::sentence::{PER_CENT, floors_left, instead, order, sentence, without};
+use super::state::{STAYS, factor, figures, is_as_before, named, word};
 use super::vocabulary::Vocabulary;
 use crate::channel::unit_of;
 use crate::signal::bad::SetAside;
@@ -112,17 +114,19 @@ fn whose(verdict: &Verdict) -> String {
 
 fn channels(verdict: &Verdict, known: bool) -> String {
     let error = if verdict.runs.is_empty() { "held-out error" } else { "across runs" };
-    let named = named(verdict);
+    let (named, stays) = (named(verdict), lost::floors(verdict));
     let row = |(name, c): (&String, &Channel)| {
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
         let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
         let left = verdict.unexplained.iter().any(|u| u.channel == *name);
         let named = named.contains(&name.as_str());
         let times = factor(c.before.heldout_rms, c.after.heldout_rms);
-        [channel(name), floor, before, after, times, word(floors, left, named, known).to_owned()]
+        let state = if stays.iter().any(|s| s.0 == name) { STAYS } else { word(floors, left, named, known) };
+        [channel(name), floor, before, after, times, state.to_owned()]
     };
+    let shown = lost::drawn(verdict);
     let head = [error, "noise floor", "before", "after", "factor", "state"].map(str::to_owned);
-    let rows: Vec<[String; 6]> = std::iter::once(head).chain(verdict.channels.iter().map(row)).collect();
+    let rows: Vec<[String; 6]> = std::iter::once(head).chain(shown.iter().map(row)).collect();
     let letters = |text: &str| text.chars().count();
     let longest = |k: usize| rows.iter().map(|r| letters(&r[k])).max().unwrap_or_default();
     let names = verdict.channels.not_predicted.keys();
@@ -138,6 +142,7 @@ fn channels(verdict: &Verdict, known: bool) -> String {
     for (name, reason) in &verdict.channels.not_predicted {
         out += &format!("{:<first$}not predicted: {reason}\n", channel(name));
     }
+    lost::key(verdict).iter().for_each(|said| out += &format!("{}\n", wrapped(said, 0)));
     out
 }
 
@@ -151,7 +156,7 @@ fn effect(verdict: &Verdict, words: Vocabulary, group: &[usize]) -> String {
     let scope = words.scope_word(e.scope);
     let mut out = format!("{}\n", wrapped(&format!("  {} ({p}) on {}, {scope}{since}", e.id, channels_of(verdict, group)), 4));
     if e.id != "unknown" {
-        out += &format!("    {}\n", wrapped(&words.said(e).sentence(), 4));
+        out += &format!("    {}\n", wrapped(&lost::said(verdict, words, e).sentence(), 4));
         let against = group.first().and_then(|k| rivals(verdict, words, *k).into_iter().next());
         if let Some(rival) = against.filter(|r| r.probability >= OPEN) {
             let said = format!("or else: {} (p {})", plain(&rival.said), probability(rival.probability));
@@ -190,7 +195,7 @@ fn left(verdict: &Verdict) -> String {
         let (looks, goes) = looks_and_goes(u, shared.as_deref());
         let silent = goes == "nothing in the log" || looks.contains("grows with the load") && u.depends_on.is_empty();
         let on = if silent { String::new() } else { format!(", goes with {goes}") };
-        let of = [channel(&u.channel), size_left(verdict, u), format!("{:.1} noise floors", floors_left(verdict, u))];
+        let of = [channel(&u.channel), size_told(verdict, u), format!("{:.1} noise floors", floors_left(verdict, u))];
         let [name, size, floors] = of;
         out += &format!("  {}\n", wrapped(&format!("{name}: {size}, {floors}, {looks}{on}"), 4));
     }
@@ -207,7 +212,7 @@ fn set_aside(verdict: &Verdict) -> String {
         return String::new();
     }
     let mut out = String::from("\nset aside\n");
-    all.iter().take(ASIDE).for_each(|aside| out += &format!("  {}\n", wrapped(&upper(&aside.to_string()), 4)));
+    all.iter().take(ASIDE).for_each(|aside| out += &format!("  {}\n", wrapped(&upper(&told(aside)), 4)));
     if all.len() > ASIDE {
         let more = match all.len() - ASIDE {
             1 => "one more stretch".to_owned(),

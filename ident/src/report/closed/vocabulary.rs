@@ -7,7 +7,7 @@
 
 use crate::effects::{About, by_id};
 use crate::verdict::Scope;
-use crate::verdict::words::{Clause, parameter_of};
+use crate::verdict::words::{Clause, over_time, parameter_of};
 use crate::verdict::{EffectEntry, Kin};
 
 /// The words of a library of effects.
@@ -55,6 +55,7 @@ impl Vocabulary {
     #[must_use]
     pub fn said(self, found: &EffectEntry) -> Clause {
         let clause = (self.clause)(found);
+        let clause = Clause { does: over_time(&clause.does), ..clause };
         match &found.run {
             Some(run) => Clause::new(clause.who, format!("{} in run {run}", clause.does)),
             None => clause,

@@ -15,6 +15,14 @@ pub use terminal::terminal;
 use crate::history::{History, Value};
 use crate::verdict::words;
 
+/// Why values that differ are no change.
+const NO_CHANGE: &str = "Runs that differ by more than their own intervals are no change by themselves. An interval holds what one run's rows show; days differ by more, by air, warmth and how the rig was set up. A change is a level that stays: the runs before a gap lie together, those after it lie together elsewhere, by more than days differ.";
+
+/// That said of a history without a change; nothing where a change was found.
+fn why_no_change(history: &History) -> Option<&'static str> {
+    history.changes.is_empty().then_some(NO_CHANGE)
+}
+
 /// Measures that stand first: at most so many of what moved, the surest first, then the constants of the thesis.
 fn foremost(history: &History, most: usize) -> Vec<usize> {
     let mut moved: Vec<_> = history.changes.iter().flat_map(|c| &c.moved).collect();

@@ -7,7 +7,7 @@
 //! Reference: Tufte, "The Visual Display of Quantitative Information" (small multiples).
 
 use super::chart::chart;
-use super::{MOVED, bracketed, foremost};
+use super::{MOVED, bracketed, foremost, why_no_change};
 use crate::history::{Change, History, fewest_judged, gap, sentence, summary};
 use crate::report::sheet::Sheet;
 use crate::verdict::words::{probability, upper, with_interval};
@@ -24,6 +24,9 @@ pub fn page(history: &History) -> String {
     let (above, below) = shown.split_at(shown.len().min(ABOVE));
     sheet.section("Control charts");
     sheet.say(&key(history));
+    if let Some(why) = why_no_change(history) {
+        sheet.say(why);
+    }
     sheet.multiples(above.iter().filter_map(|m| chart(history, *m)).collect());
     for change in &history.changes {
         of_change(&mut sheet, history, change);
@@ -59,7 +62,7 @@ fn key(history: &History) -> String {
     let fewest = fewest_judged();
     if history.changes.is_empty() && history.runs.len() < fewest {
         return format!(
-            "A ring is a run with its 95 % interval, the line the mean of all. There are no limits: of fewer than {fewest} runs none can lie more than three of their own standard deviations from their mean."
+            "A ring is a run with its 95 % interval, the line the centre of all: their mean, of what is compared by its quotient the geometric mean. There are no limits: of fewer than {fewest} runs none can lie more than three of their own standard deviations from their mean."
         );
     }
     let before = if history.changes.is_empty() { "all runs" } else { "the runs before the first change" };
@@ -133,6 +136,11 @@ mod tests {
         assert_eq!(html.matches("<svg").count(), 4);
         assert!(html.contains("12 runs, run 1 to run 12") && !html.contains("http://www.example"));
         let quiet = page(&stepped(12, 12));
-        assert!(quiet.contains("<h1>Nothing changed over 12 runs"));
+        assert!(
+            quiet.contains("<h1>Nothing changed over 12 runs")
+                && quiet.contains(super::super::NO_CHANGE)
+                && !html.contains(super::super::NO_CHANGE)
+        );
+        assert!(page(&stepped(4, 4)).contains("the geometric mean"));
     }
 }

@@ -5,7 +5,7 @@
 //! Units: in the heads.
 //! Reference: specification `report.md`.
 
-use super::{MOVED, bracketed, foremost};
+use super::{MOVED, bracketed, foremost, why_no_change};
 use crate::history::{Change, History, Kind, summary};
 use crate::report::closed::{WIDEST, wrapped};
 use crate::verdict::words::with_interval;
@@ -20,6 +20,7 @@ const WIDE: usize = 18;
 #[must_use]
 pub fn terminal(history: &History) -> String {
     let mut out = format!("{}\n", wrapped(&summary(history), 0));
+    why_no_change(history).iter().for_each(|why| out += &format!("{}\n", wrapped(why, 0)));
     for change in &history.changes {
         out += &moved(history, change);
     }

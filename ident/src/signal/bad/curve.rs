@@ -37,6 +37,11 @@ impl Curve {
         (!of_bins.is_empty()).then(|| Self(checked(&of_bins, &sure)))
     }
 
+    /// The value up to which its first line reaches.
+    pub(crate) fn first_line(&self) -> f64 {
+        self.0.get(1).or(self.0.first()).map_or(f64::NEG_INFINITY, |p| p.0)
+    }
+
     /// The reading at a value: straight lines between the points, the last ones beyond.
     pub(crate) fn at(&self, x: f64) -> f64 {
         let after = self.0.partition_point(|p| p.0 < x);

@@ -12,6 +12,7 @@ use super::excursion::{Event, LONGEST};
 use super::scale::times;
 use super::witness::Witnesses;
 use crate::log::SPEED;
+use crate::numeric::chance::gathers;
 use crate::numeric::order::{median, quantum};
 use crate::signal::drive::{Drive, SIGMA};
 use crate::signal::stretches::{bridge, starts};
@@ -24,8 +25,6 @@ const HALF: f64 = 0.5;
 const REACH: usize = 4 * LONGEST;
 /// Rows after a step of the command in which what recurs belongs to the rotor.
 const RIGHT_AFTER: usize = 4;
-/// Probability below which it is no chance that departures begin there.
-const CHANCE: f64 = 1e-3;
 /// Least share of the speed that a probe without its mark loses: less is what rotors, supplies and other causes do.
 const DEPTH: f64 = 0.1;
 /// Scales within which a reading is back.
@@ -68,7 +67,8 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
         return Vec::new();
     }
     let step = quantum(read).max(1e-4 * top);
-    let judge = Judge { read, all: &all, measured, top, step, steps: witnesses.jumps(), blocks: starts(&witnesses.log.t, read) };
+    let judge =
+        Judge { read, all: &all, measured, top, step, steps: witnesses.jumps(), blocks: starts(&witnesses.log.t, read, false) };
     let mut out = Vec::new();
     let (mut row, mut told) = (0, 0);
     while row < read.len() {
@@ -149,7 +149,7 @@ impl Judge<'_> {
         };
         let share = (0..self.read.len()).filter(|row| after(*row)).count() as f64 / self.read.len() as f64;
         let there = events.iter().filter(|e| after(e.rows.start)).count();
-        if at_least(there, events.len(), share) < CHANCE {
+        if gathers(there, events.len(), share) {
             events.retain(|e| !after(e.rows.start));
         }
     }
@@ -174,6 +174,21 @@ impl Judge<'_> {
         before.iter().filter(right).count() >= AGAIN && before.iter().take(2).any(fell)
     }
 
+    /// Whether the reading itself has lost half of the share that the whole loss comes to, or is next to nothing of a rotor that turns. A rotor that
+    /// coasts down ahead of a late load gets there as well, but not at once; and a load that rises late makes a steady reading look low.
+    fn falls_at_once(&self, row: usize, worst: usize, witness: &Witness) -> bool {
+        let is_read = |i: &usize| self.read[*i].is_finite();
+        let before = (self.block(row)..row).rev().filter(is_read).take(2).map(|i| self.read[i]).fold(0.0, f64::max);
+        let mut first = (row..self.read.len()).filter(is_read).take(AGAIN);
+        let most = before * (1.0 - HALF * self.loses(worst, witness));
+        first.clone().all(|i| self.read[i] < DEPTH * witness.said[i]) || first.any(|i| self.read[i] < most)
+    }
+
+    /// Share of the speed that the reading lacks.
+    fn loses(&self, row: usize, witness: &Witness) -> f64 {
+        1.0 - self.read[row] / witness.said[row]
+    }
+
     /// The loss that began at a row and that a witness tells on a later one to be so deep.
     fn event_by(&self, row: usize, tells: usize, first: f64, witness: &Witness) -> Option<Event> {
         if !self.falls(row, first, witness) {
@@ -194,7 +209,7 @@ impl Judge<'_> {
             if BACK * sd > (BACK * usual).max(RECOVERED * depth) {
                 continue;
             }
-            let near = off < BACK * sd || self.rests(i, depth, witness);
+            let near = off < BACK * sd || self.rests(row, i, worst, witness);
             back = if near && i > tells { back + 1 } else { 0 };
             if back == 0 {
                 end = i + 1;
@@ -206,7 +221,7 @@ impl Judge<'_> {
         // a single reading is for those who look at single readings
         let rows = row..end;
         let event = Event { expected: witness.said[worst], rows, worst, at_step: false, silent: false };
-        let loses = depth > DEPTH * event.expected;
+        let loses = depth > DEPTH * event.expected && self.falls_at_once(row, worst, witness);
         let stands = loses
             && event.rows.len() > super::SINGLE
             && !self.is_of_level(&event, depth)
@@ -214,31 +229,20 @@ impl Judge<'_> {
         stands.then_some(event)
     }
 
-    /// Whether a reading has come back to where the next ones are as well, most of the way: what is left is what the witness is off by.
-    fn rests(&self, row: usize, depth: f64, witness: &Witness) -> bool {
+    /// Whether a reading has come most of its way back and stays there, for as long again as it took: what is left is what the witness is off by.
+    fn rests(&self, from: usize, row: usize, worst: usize, witness: &Witness) -> bool {
         let off = |i: usize| witness.said[i] - self.read[i];
-        let next = (row + 1..self.read.len()).filter(|i| self.read[*i].is_finite()).take(ALONG);
+        let long = ALONG.max(row - from);
+        let next = (row + 1..self.read.len()).filter(|i| self.read[*i].is_finite()).take(long);
         let mut next: Vec<f64> = next.map(off).collect();
-        if next.len() < ALONG {
+        if self.loses(row, witness) > HALF * self.loses(worst, witness) || next.len() < ALONG {
             return false;
         }
         // from one reading to the next: a way back that goes on is no noise
         let mut steps: Vec<f64> = next.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
         let noise = SIGMA * std::f64::consts::FRAC_1_SQRT_2 * median(&mut steps);
-        let ahead = median(&mut next);
-        off(row) < RECOVERED * depth && off(row) - ahead < BACK * noise.max(self.step)
+        off(row) - median(&mut next) < BACK * noise.max(self.step)
     }
-}
-
-/// Probability of at least `hits` of `n` where each has the probability `p`: the binomial distribution's upper tail.
-fn at_least(hits: usize, n: usize, p: f64) -> f64 {
-    let mut term = (1.0 - p).powi(n as i32);
-    let mut below = 0.0;
-    for k in 0..hits {
-        below += term;
-        term *= (n - k) as f64 / (k + 1) as f64 * p / (1.0 - p).max(f64::MIN_POSITIVE);
-    }
-    1.0 - below
 }
 
 /// The other probes: the highest of them that two agree on, or the only one.
@@ -267,7 +271,10 @@ fn load(witnesses: &Witnesses<'_>, read: &[f64]) -> Option<Witness> {
         let moves = spread(&witnesses.t, &said);
         let quiet = median(&mut moves.clone());
         let usual = usual(read, &said, &|i| moves[i] <= quiet)?;
-        let sd = moves.iter().map(|m| usual.hypot(HALF * m)).collect();
+        // next to no load does not tell slow from standing: the speed goes with its root, and the curve's first line knows nothing of that
+        let least = curve.first_line();
+        let unsure = |(m, (x, said)): (&f64, (&f64, &f64))| usual.hypot(HALF * m).max(if *x <= least { *said } else { 0.0 });
+        let sd = moves.iter().zip(signal.iter().zip(&said)).map(unsure).collect();
         Some(Witness::new(said, sd))
     };
     let all = ["thrust_n", "torque_nm", "current_a"].iter().filter_map(of_channel);

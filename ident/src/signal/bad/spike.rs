@@ -55,8 +55,13 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
     out
 }
 
-/// How far a reading is beyond those before and after it; 0 where it is between them.
+/// How far a reading is beyond those before and after it; 0 where it is between them. The first and the last have one side only: by what those beside
+/// them move towards it, as on a rotor that starts with the log, the reading may have moved on.
 fn stands_out(y: &[f64], k: usize) -> f64 {
+    let beyond = |off: f64, (nearest, farthest): (f64, f64)| {
+        let moved = (off.signum() * (nearest - farthest)).max(0.0);
+        off.signum() * (off.abs() - moved).max(0.0)
+    };
     let of = |from: usize, to: usize| (to > from).then(|| y[k] - median(&mut y[from..to].to_vec()));
     let before = of(k.saturating_sub(BESIDE), k);
     let after = of(k + 1, (k + 1 + BESIDE).min(y.len()));
@@ -69,7 +74,9 @@ fn stands_out(y: &[f64], k: usize) -> f64 {
             }
         }
         (Some(_), Some(_)) => 0.0,
-        (one, other) => one.or(other).unwrap_or(0.0),
+        (Some(off), None) => beyond(off, (y[k - 1], y[k.saturating_sub(BESIDE)])),
+        (None, Some(off)) => beyond(off, (y[k + 1], y[(k + BESIDE).min(y.len() - 1)])),
+        (None, None) => 0.0,
     }
 }
 
@@ -102,5 +109,19 @@ mod tests {
         }
         let aside = crate::signal::bad::found(&crate::log::Log::parse("run.csv", text.as_bytes()).expect("a log"));
         assert!(aside.iter().all(|a| a.channel != "torque_nm"), "{aside:?}");
+    }
+
+    /// A log that begins with the rotor's start, and one whose first reading is a spike; and both from the end.
+    #[test]
+    fn the_first_reading_of_a_rotor_that_starts_is_no_spike() {
+        let (starts, spike) = ([0.0, 48.0, 518.0, 1672.0, 3111.0], [60_000.0, 5000.0, 5002.0, 4999.0, 5001.0]);
+        assert_eq!(stands_out(&starts, 0), 0.0);
+        assert!(stands_out(&spike, 0) > 54_000.0);
+        let [stops, ends] = [starts, spike].map(|mut y| {
+            y.reverse();
+            y
+        });
+        assert_eq!(stands_out(&stops, 4), 0.0);
+        assert!(stands_out(&ends, 4) > 54_000.0);
     }
 }

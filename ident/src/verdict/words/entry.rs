@@ -80,9 +80,19 @@ impl EffectEntry {
         sized(&whole).map_or_else(|| without.to_owned(), |v| with(&v))
     }
 
-    /// The meter of its first channel: "the load cell".
+    /// The meter of its first channel: "the load cell". Where a speed is late, the other channels are those that are ahead of it.
     #[must_use]
     pub fn meter(&self) -> String {
+        let speeds: Vec<&String> = self
+            .channels
+            .iter()
+            .filter(|c| c.starts_with("rpm") && crate::channel::DIFFERENCES.iter().all(|d| d.1 != **c))
+            .collect();
+        match speeds.as_slice() {
+            [] => {}
+            [one] => return meter(one),
+            _ => return "every speed sensor".to_owned(),
+        }
         // of one amplifier for both cells of a stand the one that measures thrust is the one that is known
         let known = self.channels.iter().find(|c| *c == "thrust_n").or(self.channels.first());
         known.map_or_else(|| "a meter".to_owned(), |c| meter(c))

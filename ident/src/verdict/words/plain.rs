@@ -46,6 +46,19 @@ pub fn plain(text: &str) -> String {
     out + rest
 }
 
+/// A text in which the time that something takes is called what it is: a time constant, not the time in which it is over.
+#[must_use]
+pub fn over_time(text: &str) -> String {
+    let mut parts = text.split("within ");
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let is_time = part.starts_with(|c: char| c.is_ascii_digit());
+        out += if is_time { "with a time constant of " } else { "within " };
+        out += part;
+    }
+    out
+}
+
 /// Channels in a row; those of one quantity share its name: "voltage and speed (beam and Hall)", "speed of rotors 1 and 2".
 #[must_use]
 pub fn channels(names: &[String]) -> String {
@@ -156,6 +169,16 @@ mod tests {
         let (equation, form) = formula("torque_nm += inertia d(omega)/dt [over_the_row]");
         assert_eq!((equation, form.as_deref()), ("torque_nm += inertia d(omega)/dt", Some("over the row")));
         assert_eq!(formula("a[k] = 1"), ("a[k] = 1", None));
+    }
+
+    #[test]
+    fn a_time_constant_is_no_bound() {
+        assert_eq!(
+            over_time("slows down as it heats up, within 2.0 s"),
+            "slows down as it heats up, with a time constant of 2.0 s"
+        );
+        assert_eq!(over_time("within 0.05 s"), "with a time constant of 0.05 s");
+        assert_eq!(over_time("within a row"), "within a row");
     }
 
     #[test]
