@@ -82,7 +82,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     crate::kind::refuse_no_model(&args.model)?;
     let model = Model::read(&args.model)?;
     let log = open(&args.log, &args.columns.options(&args.names), false)?;
-    let model = if args.events { Cow::Borrowed(&model) } else { model.on(&log) };
+    let model = if args.events && !model.is_of(&log) { Cow::Borrowed(&model) } else { model.on(&log) };
     let columns = match args.from {
         From::Relations => by_relations(&model, &log),
         From::Command => by_command(&model, &log)?,

@@ -82,7 +82,7 @@ impl Model {
     }
 
     /// The model for the rows of a log: as it stands on a run that it was fitted to, with what belongs to that run, else what carries over
-    /// to it.
+    /// to it. A run of its own is predicted as it was fitted: its constants hold its supply already.
     #[must_use]
     pub fn on(&self, log: &Log) -> Cow<'_, Self> {
         if self.runs.is_empty() {
@@ -92,7 +92,7 @@ impl Model {
             return Cow::Owned(self.elsewhere());
         }
         if self.own.is_empty() {
-            return Cow::Borrowed(self);
+            return self.at_its_own_supply();
         }
         let digest = log.digest();
         match self.runs.iter().zip(&self.own).find(|(run, _)| run.sha256 == digest) {

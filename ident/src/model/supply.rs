@@ -29,10 +29,10 @@ const DIGITS: usize = 6;
 /// Voltage of a run by the load of a channel, from low to high.
 pub(crate) type ByLoad = Vec<(f64, f64)>;
 
-/// Voltage at a load and its standard error.
+/// What was measured at a load and its standard error.
 struct Level {
     load: f64,
-    volts: f64,
+    value: f64,
     se: f64,
 }
 
@@ -83,7 +83,7 @@ impl Model {
             let mut volts = self.follows_by_itself(target).then(|| readings(context))??;
             self.less_what_it_says(context, target, &mut volts)?;
             let levels = levels(&volts, &context.regressor(target.relation)?);
-            let by_load: ByLoad = levels.iter().map(|l| (l.load, l.volts)).collect();
+            let by_load: ByLoad = levels.iter().map(|l| (l.load, l.value)).collect();
             (!by_load.is_empty()).then(|| (target.name.to_owned(), by_load))
         };
         self.supply = context.targets.iter().filter_map(of_target).collect();
@@ -109,18 +109,25 @@ impl Model {
         let (power, loads) = (power(target.relation)?, context.regressor(target.relation)?);
         // what a supply gives hangs on the command, also where it cannot give what the motor asks for
         let commands = context.regressor(Relation::SpeedFromPulse).unwrap_or_else(|| loads.clone());
-        let measured = readings(context)?;
-        let levels = levels(&measured, &commands);
-        let (volts, errors): (ByLoad, ByLoad) = levels.iter().map(|l| ((l.load, l.volts), (l.load, l.se))).unzip();
-        let trend = trend(context, &measured, |row| along(&volts, commands[row]));
+        // as many times the voltage of the model's own run at the same load, where both have settled: a rotor on its way is at another load
+        let mut times = readings(context)?;
+        times.iter_mut().for_each(|(row, v)| *v /= along(own, loads[*row]));
+        let levels = levels(&times, &commands);
+        let (settled, errors): (ByLoad, ByLoad) = levels.iter().map(|l| ((l.load, l.value), (l.load, l.se))).unzip();
+        let trend = trend(context, &times, |row| along(&settled, commands[row]));
         let mut out = self.without_what_it_says(context, target).predict_at_its_own_supply(context, target.name)?;
         for (row, p) in out.iter_mut().enumerate() {
-            let (volts, se) = (along(&volts, commands[row]) + trend[row], along(&errors, commands[row]));
-            let (apart, open) = ((volts / along(own, loads[row])).max(LEAST).ln(), 2.0 * (se / volts).powi(2));
+            let (times, se) = ((along(&settled, commands[row]) + trend[row]).max(LEAST), along(&errors, commands[row]));
+            let (apart, open) = (times.ln(), 2.0 * (se / times).powi(2));
             // two supplies that only the noise of their meters tells apart are one
             *p *= (power * apart.powi(3) / (apart * apart + open).max(f64::MIN_POSITIVE)).exp();
         }
         Some(out)
+    }
+
+    /// The model for the run that it was fitted to.
+    pub(super) fn at_its_own_supply(&self) -> Cow<'_, Self> {
+        if self.supply.is_empty() { Cow::Borrowed(self) } else { Cow::Owned(Self { supply: Vec::new(), ..self.clone() }) }
     }
 
     /// Whether no effect of the model says already how a channel follows the voltage.
@@ -173,17 +180,17 @@ fn readings(context: &Context) -> Option<Vec<(usize, f64)>> {
     (!out.is_empty()).then_some(out)
 }
 
-/// The voltage by a load.
-fn levels(volts: &[(usize, f64)], loads: &[f64]) -> Vec<Level> {
-    binned(volts.iter().map(|(row, v)| (loads[*row], *v)).collect()).iter().map(|part| level(part)).collect()
+/// Readings by a load.
+fn levels(readings: &[(usize, f64)], loads: &[f64]) -> Vec<Level> {
+    binned(readings.iter().map(|(row, v)| (loads[*row], *v)).collect()).iter().map(|part| level(part)).collect()
 }
 
-/// What the voltage does on each row beside its levels: a straight line in time, as a battery that empties.
-fn trend(context: &Context, volts: &[(usize, f64)], level: impl Fn(usize) -> f64) -> Vec<f64> {
-    let n = volts.len() as f64;
-    let middle = volts.iter().map(|(row, _)| context.t[*row]).sum::<f64>() / n;
+/// What readings do on each row beside their levels: a straight line in time, as a battery that empties.
+fn trend(context: &Context, readings: &[(usize, f64)], level: impl Fn(usize) -> f64) -> Vec<f64> {
+    let n = readings.len() as f64;
+    let middle = readings.iter().map(|(row, _)| context.t[*row]).sum::<f64>() / n;
     let (mut with, mut square) = (0.0, 0.0);
-    for (row, v) in volts {
+    for (row, v) in readings {
         let t = context.t[*row] - middle;
         with += t * (v - level(*row));
         square += t * t;
@@ -192,12 +199,12 @@ fn trend(context: &Context, volts: &[(usize, f64)], level: impl Fn(usize) -> f64
     context.t.iter().map(|t| slope * (t - middle)).collect()
 }
 
-/// Median voltage of rows of about one load.
+/// Median of the readings of about one load.
 fn level(rows: &[(f64, f64)]) -> Level {
     let n = rows.len() as f64;
-    let volts = median(&mut rows.iter().map(|r| r.1).collect::<Vec<f64>>());
-    let spread = rows.iter().map(|r| (r.1 - volts).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    Level { load: rows.iter().map(|r| r.0).sum::<f64>() / n, volts, se: (spread / n).sqrt() }
+    let value = median(&mut rows.iter().map(|r| r.1).collect::<Vec<f64>>());
+    let spread = rows.iter().map(|r| (r.1 - value).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    Level { load: rows.iter().map(|r| r.0).sum::<f64>() / n, value, se: (spread / n).sqrt() }
 }
 
 /// For the table of a channel whose readings follow the supply.
@@ -273,6 +280,54 @@ mod tests {
         blind.columns.retain(|c| c.name != "voltage_v");
         let context = Context::new(&blind, Some(closed.model.start_pulse_us));
         assert_eq!(closed.model.predict(&context, "rpm"), closed.model.predict_at_its_own_supply(&context, "rpm"));
+    }
+
+    /// The same with a rotor that takes a second to follow; the current is that of its speed, 11.1 V at every load.
+    fn slow(k: f64) -> Log {
+        let mut log = run(11.1);
+        let noise = |i: usize| (k * (i * i) as f64).sin();
+        let target: Vec<f64> = log.column("rpm").expect("a speed").to_vec();
+        let mut krpm = 0.0;
+        let speed: Vec<f64> = target
+            .iter()
+            .map(|r| {
+                krpm += 0.1 * (r / 1000.0 - krpm);
+                krpm
+            })
+            .collect();
+        for column in &mut log.columns {
+            for (i, v) in column.values.iter_mut().enumerate() {
+                match column.name.as_str() {
+                    "rpm" => *v = 1000.0 * speed[i] + 5.0 * noise(i),
+                    "current_a" => *v = 0.0011 * speed[i].powi(3) + 0.02 * noise(i + 1),
+                    "voltage_v" => *v = 11.1 - 0.15 * speed[i] + 0.01 * noise(i + 2),
+                    _ => {}
+                }
+            }
+        }
+        Log { name: format!("slow {k}.csv"), ..log }
+    }
+
+    #[test]
+    fn a_rotor_on_its_way_is_at_no_other_supply() {
+        let (own, other) = (slow(0.7), slow(1.9));
+        let closed = close(&own, None, &[], &mut |_| {}).expect("a run");
+        assert!(!closed.model.supply.is_empty());
+        let context = Context::new(&other, Some(closed.model.start_pulse_us));
+        let moved = closed.model.predict(&context, "current_a").expect("a prediction");
+        let stays = closed.model.predict_at_its_own_supply(&context, "current_a").expect("a prediction");
+        let most = moved.iter().zip(&stays).map(|(a, b)| (a - b).abs() / b.abs().max(0.1)).fold(0.0, f64::max);
+        assert!(most < 2e-3, "moved by {most}");
+    }
+
+    #[test]
+    fn the_run_of_the_fit_is_predicted_as_it_was_fitted() {
+        let own = slow(0.7);
+        let model = close(&own, None, &[], &mut |_| {}).expect("a run").model;
+        let context = Context::new(&own, Some(model.start_pulse_us));
+        for name in ["rpm", "current_a"] {
+            assert_eq!(model.on(&own).predict(&context, name), model.predict_at_its_own_supply(&context, name));
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::set::SETS;
 use super::{Outcome, Recorded, Tried};
 use ident::channel::unit_of;
 use ident::close::Closed;
+use ident::model::Model;
 use ident::report::{Figure, Layer};
 use ident::verdict::words::{channel, list, plain, upper};
 use ident::verdict::{EffectEntry, Kind, Parameter};
@@ -289,7 +290,8 @@ fn figure_name(run: &Recorded, entry: &EffectEntry) -> String {
 fn figure(run: &Recorded, closed: &Closed, entry: &EffectEntry) -> Option<Figure> {
     let context = &closed.context;
     let target = &context.targets[context.target(entry.channels.first()?)?];
-    let (before, after) = (closed.declared.predict(context, target.name)?, closed.model.predict(context, target.name)?);
+    let as_fitted = |model: &Model| model.predict_at_its_own_supply(context, target.name);
+    let (before, after) = (as_fitted(&closed.declared)?, as_fitted(&closed.model)?);
     let named = entry.depends_on.iter().find_map(|d| Some((d.clone(), column(context, d)?)));
     let (label, values) = named.unwrap_or_else(|| ("t_s".to_owned(), context.t.clone()));
     let over_time = label == "t_s";
