@@ -62,7 +62,7 @@ const FIRST_S: f64 = 1.5e-3;
 /// Where the lag of a rotor that follows is taken, us.
 const MIDDLE_US: f64 = 1500.0;
 /// Forms of a rotor between winding and air; its last shape is the latency.
-const ROTORS: [&str; 3] = ["coasting", "braked", "held"];
+const ROTORS: [&str; 2] = ["coasting", "braked"];
 /// How such a form ends that was seen through rows between which the command jumps.
 const OF_STEPS: &str = "_of_steps";
 /// Rows and time that each level is held.

@@ -1,17 +1,17 @@
 //! `spinup_lag`: the rotor takes time to follow the command.
 //!
 //! What it is: rpm follows its static value by a first-order lag, with different time constants up and down, or as a rotor between winding and
-//! air does, with a controller that brakes while it runs (`braked`), also when it is off (`held`), or does not (`coasting`): see [`crate::effects::rotor::coasting`].
+//! air does, with a controller that brakes (`braked`) or does not (`coasting`): see [`crate::effects::rotor::coasting`].
 //! What can go wrong: needs steps and samples inside the transient; with none it is not offered. After a gap in time
 //! its state is the speed that the first row measures.
 //! Units: s.
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3 (settling after each step).
 
-use crate::channel::{Context, STANDSTILL};
+use crate::channel::Context;
 use crate::effects::design::TargetDesign;
-use crate::effects::rotor::coasting::{Brakes, Coasting, Rotor};
-use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, speeds};
-use crate::signal::stretches::{CALM_US, latest};
+use crate::effects::rotor::coasting::{Coasting, Rotor};
+use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Instance, Scope, Shape, Stage, operator, speeds};
+use crate::signal::stretches::CALM_US;
 
 /// See the module.
 pub(crate) struct SpinupLag;
@@ -24,15 +24,8 @@ const COASTING_OF_STEPS: &str = "coasting_of_steps";
 const BRAKED: &str = "braked";
 /// The same where the command jumps from row to row.
 const BRAKED_OF_STEPS: &str = "braked_of_steps";
-/// Form of a rotor that the controller brakes when it is off as well.
-const HELD: &str = "held";
-/// The same where the command jumps from row to row.
-const HELD_OF_STEPS: &str = "held_of_steps";
 /// Time constant of the quickest rotors, s.
 const QUICK: f64 = 0.04;
-/// Time in which the air alone halves the full speed, s: 0.05 s of a motor of three grams at 40 000 rev/min, whose inertia is 6e-8 kg.m2 at
-/// 0.0055 N.m, to that of a flywheel.
-const AIR: (f64, f64) = (0.01, 60.0);
 /// What meters and a command that is let go slowly add to the latency, s.
 const LATE: f64 = 0.05;
 
@@ -49,7 +42,7 @@ impl Effect for SpinupLag {
     fn about(&self) -> About {
         About {
             title: "Rotor follows the command with a lag",
-            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down; a rotor between winding and air, v = rpm over that at 2000 us, g = v_static(t - latency): dv/dt = (g - v) (1/tau_up + (g + v - 1)/tau_air); not below -v^2/tau_air - friction where nothing brakes: throughout (coasting), when the motor is off (braked), never (held)",
+            equation: "tau d(rpm)/dt = rpm_static(pulse) - rpm, tau = tau_up or tau_down; a rotor between winding and air, v = rpm over that at 2000 us, g = v_static(t - latency): dv/dt = (g - v) (1/tau_up + (g + v - 1)/tau_air); not below -v^2/tau_air - friction where nothing brakes (coasting) or the motor is off",
             source: "Beharie 2013, section 5.7.3; rotor: J dw/dt = kt i - kQ w^2 - Q_f with i = (V - kt w)/R, coasting: not below 0, Eq. 2.21 as corrected and 5.11",
             depends_on: &["pulse_us", "time_since_step"],
             signature: "rpm(pulse) is off for a moment after every step and right before the next; thrust(rpm) holds throughout",
@@ -78,13 +71,9 @@ impl Effect for SpinupLag {
         if context.time_is_row || channels.is_empty() {
             return Vec::new();
         }
-        let [coasting, braked, held] = if operator::commands_abruptly(context) {
-            [COASTING_OF_STEPS, BRAKED_OF_STEPS, HELD_OF_STEPS]
-        } else {
-            [COASTING, BRAKED, HELD]
-        };
-        let held = is_switched_off(context).then_some(held);
-        ["", coasting, braked].into_iter().chain(held).map(|form| Instance::new(&channels, form)).collect()
+        let forms =
+            if operator::commands_abruptly(context) { ["", COASTING_OF_STEPS, BRAKED_OF_STEPS] } else { ["", COASTING, BRAKED] };
+        forms.iter().map(|form| Instance::new(&channels, form)).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
@@ -93,10 +82,10 @@ impl Effect for SpinupLag {
             let base = dt.max(QUICK);
             let (up, late) = ([0.6, 1.5].map(|k| k * base), [0.4, 1.6].map(|k| f64::min(k * dt, 0.5 * dt + LATE)));
             let tau_up = Shape { name: "tau_up", unit: "s", range: (0.02 * dt, (100.0 * dt).max(5.0)), starts: up.to_vec() };
-            let tau_air = Shape { name: "tau_air", unit: "s", range: AIR, starts: vec![0.3, 1.0] };
+            let tau_air = Shape { name: "tau_air", unit: "s", range: (0.1, 60.0), starts: vec![0.3, 1.0] };
             let friction = Shape { name: "friction", unit: "1/s", range: (0.0, 10.0), starts: vec![0.1] };
-            let latency = Shape { name: "latency", unit: "s", range: (0.0, latest(&context.t)), starts: late.to_vec() };
-            return if is_held(instance) { vec![tau_up, tau_air, latency] } else { vec![tau_up, tau_air, friction, latency] };
+            let latency = Shape { name: "latency", unit: "s", range: (0.0, 3.0 * dt + LATE), starts: late.to_vec() };
+            return vec![tau_up, tau_air, friction, latency];
         }
         // on a log of many rows a second ten rows are still quick for a rotor
         let slow = [0.5, 2.0].into_iter().filter(|tau| *tau > 15.0 * dt);
@@ -109,11 +98,8 @@ impl Effect for SpinupLag {
         ]
     }
 
-    fn prior(&self, instance: &Instance, shape: &[f64]) -> f64 {
+    fn prior(&self, _: &Instance, shape: &[f64]) -> f64 {
         let [up, down, _] = shape else { return 0.0 };
-        if !instance.form.is_empty() {
-            return 0.0;
-        }
         -0.5 * (((down / up).max(f64::MIN_POSITIVE).ln() - SLOWER.0) / SLOWER.1).powi(2)
     }
 
@@ -121,18 +107,9 @@ impl Effect for SpinupLag {
         Vec::new()
     }
 
-    /// The air has not more than all of the approach.
-    fn report(&self, _: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
-        let Some((up, se)) = fitted.iter().find(|e| e.name == "tau_up").map(|e| (e.value, e.se)) else { return fitted };
-        for air in fitted.iter_mut().filter(|e| e.name == "tau_air" && e.value < up) {
-            (air.value, air.se) = (up, se);
-        }
-        fitted
-    }
-
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         if let Some(rotor) = rotor(instance, shape) {
-            let jumps = instance.form.ends_with(operator::OF_STEPS);
+            let jumps = [COASTING_OF_STEPS, BRAKED_OF_STEPS].contains(&instance.form.as_str());
             let coasting = Coasting::new(context, rotor, jumps).starting_at(&context.starts);
             design.map_together(|columns| coasting.of(columns));
             starts(context, design, || coasting.carried(&context.starts));
@@ -165,28 +142,9 @@ impl Effect for SpinupLag {
 
 /// The rotor of a shape; nothing for a lag of first order.
 fn rotor(instance: &Instance, shape: &[f64]) -> Option<Rotor> {
-    let (tau_up, tau_air, friction, latency) = match *shape {
-        [tau_up, tau_air, friction, latency] => (tau_up, tau_air, friction, latency),
-        [tau_up, tau_air, latency] if is_held(instance) => (tau_up, tau_air, 0.0, latency),
-        _ => return None,
-    };
-    let brakes = match instance.form.as_str() {
-        COASTING | COASTING_OF_STEPS => Brakes::Never,
-        BRAKED | BRAKED_OF_STEPS => Brakes::Running,
-        _ => Brakes::Always,
-    };
-    Some(Rotor { tau_up, tau_air, friction, latency, brakes })
-}
-
-fn is_held(instance: &Instance) -> bool {
-    [HELD, HELD_OF_STEPS].contains(&instance.form.as_str())
-}
-
-/// Whether the log shows a rotor that is switched off while it turns.
-fn is_switched_off(context: &Context) -> bool {
-    let Some(pulse) = &context.pulse else { return false };
-    let start = context.start_pulse_us;
-    pulse.windows(2).zip(context.rpm.windows(2)).any(|(p, v)| p[0] >= start && p[1] < start && v[0] > STANDSTILL)
+    let [tau_up, tau_air, friction, latency] = *shape else { return None };
+    let braked = [BRAKED, BRAKED_OF_STEPS].contains(&instance.form.as_str());
+    Some(Rotor { tau_up, tau_air, friction, latency, braked })
 }
 
 /// Where the log did not see what the rotor did before a row, it begins there with the speed that was measured.
