@@ -14,7 +14,7 @@ use crate::signal::bad::{self, SetAside};
 use crate::signal::consensus::{self, Consensus};
 use crate::signal::noise::{self, Noise};
 use crate::signal::start::start_pulse;
-use crate::signal::stretches::{self, CALM_US, FEWEST_OF_A_KIND, STILL_US, bridge, starts};
+use crate::signal::stretches::{self, CALM_US, FEWEST_OF_A_KIND, STILL_US, bridge};
 use powers::{Values, powers_of};
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -182,6 +182,18 @@ const NOISIER: f64 = 4.0;
 const FEWEST_BEYOND: usize = 4;
 /// Below this speed, rev/min, a rotor counts as standing: slower than any brushless motor runs without position sensors.
 pub(crate) const STANDSTILL: f64 = 100.0;
+
+/// Rows at which the rotor's speed is known by itself, whatever came before ([`Context::starts`]).
+fn states(t: &[f64], rpm: &[f64], pulse: Option<&[f64]>, start_us: f64, settling: &[bool]) -> Vec<(usize, f64)> {
+    let mut out = stretches::starts(t, rpm, settling.first() == Some(&true));
+    if let Some(pulse) = pulse.filter(|_| !rpm.is_empty()) {
+        let held_back = stretches::held_back(t, stretches::latest(t), |i| pulse[i] >= start_us, |i| rpm[i] < STANDSTILL);
+        out.extend(held_back.into_iter().map(|i| (i, rpm[i])));
+        out.sort_unstable_by_key(|(row, _)| *row);
+        out.dedup_by_key(|(row, _)| *row);
+    }
+    out
+}
 
 impl Target {
     fn new(context: &Context, name: &'static str, relation: Relation, rows: Vec<usize>, y: Vec<f64>, noise: Noise) -> Self {
@@ -411,8 +423,8 @@ impl Context {
             name: log.name.clone(),
             t: log.t.clone(),
             time_is_row: log.time_is_row(),
+            starts: if log.time_is_row() { Vec::new() } else { states(&log.t, &rpm, pulse.as_deref(), start, &settling) },
             pulse,
-            starts: if log.time_is_row() { Vec::new() } else { starts(&log.t, &rpm, settling.first() == Some(&true)) },
             rpm,
             rpm_sd,
             consensus,

@@ -11,6 +11,7 @@ mod curve;
 mod dropout;
 mod excursion;
 mod first_turns;
+mod last_turns;
 mod scale;
 mod spike;
 mod stuck;
@@ -48,7 +49,7 @@ pub struct SetAside {
     /// One of several single readings of its channel: it stays in the log for the effect that speaks of them.
     #[serde(skip)]
     pub recurs: bool,
-    /// The zeros of a tachometer before its second mark: no reading to judge by, but what it reads then is known.
+    /// The zeros of a sensor that does not see the rotor turn yet, or any more: no reading to judge by, but what it reads then is known.
     #[serde(skip)]
     pub silent: bool,
 }
@@ -130,10 +131,11 @@ pub fn found(log: &Log) -> Vec<SetAside> {
         .collect()
 }
 
-/// What a probe has not seen: a start's zeros, which would be taken for a mark that was lost, and the marks that it has lost. It reads nothing
-/// then, however often: no effect speaks of it.
+/// What a probe has not seen: a start's zeros and a coasting rotor's, which would be taken for a mark that was lost, and the marks that it has
+/// lost. It reads nothing then, however often: no effect speaks of it.
 fn of_probe(witnesses: &mut Witnesses<'_>, name: &'static str) -> Vec<Event> {
-    let silent = first_turns::found(witnesses, name);
+    let mut silent = first_turns::found(witnesses, name);
+    silent.extend(last_turns::found(witnesses, name));
     witnesses.take_out(name, &silent);
     let lost = dropout::found(witnesses, name);
     witnesses.take_out(name, &lost);

@@ -3,6 +3,7 @@
 //! What it is: the way of a rotor from one speed to another as an operator on columns. Winding and air both pull it to its new speed, the air the
 //! more the faster it turns. Where the controller does not brake, no current flows far above the new speed: air and friction alone slow it down.
 //! So they do wherever the command is below that of the start: no controller holds a motor that is off.
+//! Where a block of rows begins nothing is known of the command before, so that no latency is counted there.
 //! What can go wrong: the rates are those of a rotor whose speed goes with the command above 1000 us; a curve that bends much makes
 //! them rough. How a standing rotor starts is the controller's programme and is not in it.
 //! Units: s; speeds as a share of that at 2000 us.
@@ -11,6 +12,8 @@
 
 use crate::channel::{Context, STANDSTILL};
 use crate::effects::operator::{Decay, weight_of_ramp};
+use crate::numeric::order::usual_step;
+use crate::signal::stretches::GAP;
 
 /// Parts that a row is cut into while the rotor coasts; the way of a driven one is exact.
 const PARTS: usize = 8;
@@ -47,15 +50,19 @@ impl Rotor {
         v * v * self.air() + self.friction
     }
 
-    /// Rate of the air at full speed, 1/s.
+    /// Rate of the air at full speed, 1/s: not more than the winding leaves of the approach at half speed.
     fn air(&self) -> f64 {
-        1.0 / self.tau_air.max(1e-6)
+        (1.0 / self.tau_air.max(1e-6)).min((1.0 - LEAST_OF_WINDING) * self.approach() / (2.0 * HALF))
     }
 
     /// Rate of the winding, 1/s: what the air leaves of the approach at half speed.
     fn winding(&self) -> f64 {
-        let whole = 1.0 / self.tau_up.max(1e-6);
-        (whole - 2.0 * HALF * self.air()).max(LEAST_OF_WINDING * whole)
+        self.approach() - 2.0 * HALF * self.air()
+    }
+
+    /// Rate of a small change about half speed while current flows, 1/s.
+    fn approach(&self) -> f64 {
+        1.0 / self.tau_up.max(1e-6)
     }
 
     /// Rate of approach, 1/s, at speed `v` towards `goal`.
@@ -114,6 +121,47 @@ impl Course {
     }
 }
 
+/// Where the log did not see what the rotor did before.
+struct Blocks(Vec<Block>);
+
+struct Block {
+    /// Its first row.
+    row: usize,
+    /// About the share of full speed with which it begins: the curve is taken for a straight line.
+    speed: f64,
+    /// From when on the command is known, s: the log has a gap before. Of a standing rotor that has not set out yet it is known throughout.
+    known_from: f64,
+}
+
+impl Blocks {
+    fn of(context: &Context, goals: &[f64]) -> Self {
+        let highest = |values: &[f64]| values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+        let share = highest(goals) / highest(&context.rpm).max(f64::MIN_POSITIVE);
+        let speed = |rpm: f64| if rpm < STANDSTILL { 0.0 } else { rpm * share };
+        let gap = GAP * usual_step(&context.t);
+        let mut known_from = f64::NEG_INFINITY;
+        let mut last = None;
+        let block = |(row, rpm): &(usize, f64)| {
+            let t = context.t[*row];
+            if row.checked_sub(1).is_none_or(|before| t - context.t[before] > gap)
+                || (known_from.is_finite() && last == row.checked_sub(1))
+            {
+                known_from = t;
+            } else {
+                known_from = f64::NEG_INFINITY;
+            }
+            last = Some(*row);
+            Block { row: *row, speed: speed(*rpm), known_from }
+        };
+        Self(context.starts.iter().map(block).collect())
+    }
+
+    /// The block that a row is in; nothing before the first.
+    fn of_row(&self, row: usize) -> Option<&Block> {
+        self.0[..self.0.partition_point(|block| block.row <= row)].last()
+    }
+}
+
 /// What one row of the output keeps of the row before, and takes of the input.
 #[derive(Debug, Clone, Copy)]
 struct Row {
@@ -161,11 +209,15 @@ impl Coasting {
         let goals: Vec<f64> =
             pulse.iter().map(|p| if *p < context.start_pulse_us { 0.0 } else { (p - 1000.0).max(0.0) / 1000.0 }).collect();
         let latency = rotor.latency.max(0.0);
-        let at_rest = context.starts.first().is_some_and(|(row, rpm)| *row == 0 && *rpm < STANDSTILL);
-        let (mut speed, mut row, mut parts) = (if at_rest { 0.0 } else { goals[0] }, 0, Vec::with_capacity(PARTS + REACH));
+        let blocks = Blocks::of(context, &goals);
+        let (mut speed, mut row, mut parts) = (goals[0], 0, Vec::with_capacity(PARTS + REACH));
         let mut decay = Decay::new();
         let mut settled: Option<(f64, Row)> = None;
         let interval = |i: usize| {
+            let block = blocks.of_row(i - 1);
+            if let Some(block) = block.filter(|block| block.row == i - 1) {
+                (speed, row, settled) = (block.speed, block.row, None);
+            }
             // once it stands at its speed every row is like the one before
             let length = t[i] - t[i - 1];
             let stands = goals[row..=i].iter().all(|g| (g - speed).abs() < STANDS);
@@ -175,6 +227,7 @@ impl Coasting {
                 return *last;
             }
             let (from, to) = (t[i - 1] - latency, t[i] - latency);
+            let known_from = block.map_or(f64::NEG_INFINITY, |block| block.known_from);
             let calm = goals[row..=i].iter().all(|g| (g - speed).abs() < ARRIVED);
             let step = (t[i] - t[i - 1]) / if calm { 1.0 } else { PARTS as f64 };
             parts.clear();
@@ -185,10 +238,15 @@ impl Coasting {
                 }
                 // a part ends at the next row at the latest: there a command that jumps does so
                 let next = if t[row + 1] > now + 1e-9 * step { t[row + 1] } else { f64::INFINITY };
-                let course =
-                    Course { from: goals[row], change: goals[row + 1] - goals[row], jumps: jumps.then_some(now >= t[0]) };
-                let share = |at: f64| course.share((at - t[row]) / (t[row + 1] - t[row]));
-                let mut whole = to.min(next);
+                // before its block nothing is known of a command: a rotor there is on its way to the first that was logged
+                let unseen = now < known_from - 1e-9 * step;
+                let course = Course {
+                    from: goals[row],
+                    change: if unseen { 0.0 } else { goals[row + 1] - goals[row] },
+                    jumps: jumps.then_some(now >= t[0]),
+                };
+                let share = |at: f64| if unseen { 0.0 } else { course.share((at - t[row]) / (t[row + 1] - t[row])) };
+                let mut whole = to.min(if unseen { known_from } else { next });
                 // on a slope the rate changes with the goal
                 if !calm && share(now) != share(whole) {
                     whole = whole.min(now + step);
@@ -298,7 +356,7 @@ mod tests {
         for _ in 0..n {
             let driven = (goal - v) * (1.0 / rotor.tau_up - air + air * (goal + v));
             let alone = -(v * v * air + rotor.friction);
-            v += s / f64::from(n) * if rotor.braked && goal > 0.0 { driven } else { driven.max(alone) };
+            v += s / f64::from(n) * if rotor.holds(goal) { driven } else { driven.max(alone) };
         }
         v
     }
@@ -323,6 +381,28 @@ mod tests {
                 assert!((v[row] - exact).abs() < 0.012, "{from} {to} row {row}: {} {exact}", v[row]);
             }
         }
+    }
+
+    /// The log has a gap in which the command has jumped; the rotor sets out with the block's first row.
+    #[test]
+    fn no_latency_is_counted_where_the_log_begins_anew() {
+        let t: Vec<f64> = (0..120).map(|i| 0.02 * f64::from(i) + if i < 60 { 0.0 } else { 9.0 }).collect();
+        let pulse: Vec<f64> = (0..120).map(|i| if i < 60 { 1800.0 } else { 1500.0 }).collect();
+        let rest = Rotor { tau_air: 0.4, ..ROTOR };
+        let way = |i: i32| 0.2 + 0.3 * (1.0 - (-f64::from(i) * 0.02 / 0.04).exp());
+        let rpm = (0..120).map(|i| 7000.0 * if i < 60 { 0.8 } else { way(i - 60) }).collect();
+        let column = |name: &str, values: Vec<f64>| Column { name: name.to_owned(), values };
+        let log = Log { t, columns: vec![column("pulse_us", pulse), column("rpm", rpm)], ..Log::default() };
+        let context = Context::bare(&log, Some(1050.0));
+        assert_eq!(context.starts.iter().map(|s| s.0).collect::<Vec<_>>(), [60]);
+        let goal: Vec<f64> = (0..120).map(|i| if i < 60 { 0.8 } else { 0.5 }).collect();
+        let after = |latency: f64| {
+            let coasting = Coasting::new(&context, Rotor { latency, ..rest }, true).starting_at(&context.starts);
+            let (of, carried) = (coasting.of(&[&goal]).remove(0), coasting.carried(&[(60, 0.2)]));
+            of[63] + carried[63]
+        };
+        assert!((after(0.0) - after(0.05)).abs() < 1e-3, "{} {}", after(0.0), after(0.05));
+        assert!(after(0.05) > 0.35 && after(0.05) < 0.5, "{}", after(0.05));
     }
 
     #[test]

@@ -15,7 +15,7 @@ use crate::log::SPEED;
 use crate::numeric::chance::gathers;
 use crate::numeric::order::{median, quantum};
 use crate::signal::drive::{Drive, SIGMA};
-use crate::signal::stretches::{bridge, starts};
+use crate::signal::stretches::{blocks, bridge};
 
 /// Share of a channel's readings that may be lost: one that loses more has a fault with a name.
 const MOST: f64 = 1.0 / 3.0;
@@ -68,7 +68,7 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
     }
     let step = quantum(read).max(1e-4 * top);
     let judge =
-        Judge { read, all: &all, measured, top, step, steps: witnesses.jumps(), blocks: starts(&witnesses.log.t, read, false) };
+        Judge { read, all: &all, measured, top, step, steps: witnesses.jumps(), blocks: blocks(&witnesses.log.t, read, false) };
     let mut out = Vec::new();
     let (mut row, mut told) = (0, 0);
     while row < read.len() {

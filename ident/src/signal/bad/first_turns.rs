@@ -19,16 +19,8 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
     let Some(read) = witnesses.clean(name) else { return Vec::new() };
     let measured: Vec<usize> = (0..read.len()).filter(|i| read[*i].is_finite()).collect();
     let rests = |i: &usize| read[*i] <= 0.0;
-    // readings at each command, and those that say nothing: at one at which the rotor stands most of them do
-    let mut at_command: BTreeMap<i64, [usize; 2]> = BTreeMap::new();
-    let level = |row: usize| witnesses.pulse().map_or(0, |p| (p[row] / CALM_US).round() as i64);
-    for row in &measured {
-        let [all, none] = at_command.entry(level(*row)).or_default();
-        *all += 1;
-        *none += usize::from(rests(row));
-    }
-    let stands =
-        |row: usize| witnesses.pulse().is_none() || at_command.get(&level(row)).is_some_and(|[all, none]| 2 * none > *all);
+    let standing = stands(witnesses, read);
+    let stands = |row: usize| witnesses.pulse().is_none() || standing(row);
     let first_readings = measured.windows(2).enumerate().filter(|(_, w)| rests(&w[0]) && !rests(&w[1]));
     first_readings
         .filter_map(|(k, w)| {
@@ -42,6 +34,20 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
             Some(Event { rows: start..first, worst: start, expected: read[first], at_step: true, silent: true })
         })
         .collect()
+}
+
+/// Whether the rotor stands at the command of a row: most readings at that command say nothing. At no row of a log without a command.
+pub(super) fn stands<'w>(witnesses: &'w Witnesses<'_>, read: &[f64]) -> impl Fn(usize) -> bool + use<'w> {
+    let level = |p: f64| (p / CALM_US).round() as i64;
+    // readings at each command, and those that say nothing
+    let mut at_command: BTreeMap<i64, [usize; 2]> = BTreeMap::new();
+    let pulse = witnesses.pulse();
+    for (p, v) in pulse.into_iter().flatten().zip(read).filter(|(_, v)| v.is_finite()) {
+        let [all, none] = at_command.entry(level(*p)).or_default();
+        *all += 1;
+        *none += usize::from(*v <= 0.0);
+    }
+    move |row| pulse.and_then(|p| at_command.get(&level(p[row]))).is_some_and(|[all, none]| 2 * none > *all)
 }
 
 #[cfg(test)]
