@@ -14,7 +14,7 @@ use crate::effects::placed::Placed;
 use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{Effect, Instance};
 use crate::fit::heldout::{self, Held};
-use crate::fit::{Designs, Fit, Rows, fit_target};
+use crate::fit::{Designs, Fit, Rows};
 use crate::log::MODELLED;
 use crate::model::Declared;
 use crate::signal::residual::whiteness;
@@ -109,8 +109,7 @@ pub(crate) fn correction(context: &Context, declared: Declared<'_>, base: &Fit, 
     let mut targets = base.targets.clone();
     let mut designs = Designs::new(context, declared, &placed);
     for k in group {
-        let target = &context.targets[*k];
-        targets[*k] = fit_target(target, designs.of(target), Rows::All)?;
+        targets[*k] = designs.fit(*k, Rows::All)?;
     }
     Some(Fit { placed, targets })
 }

@@ -8,7 +8,7 @@
 use crate::channel::{Context, Target};
 use crate::effects::placed::Placed;
 use crate::fit::search::{refine, refine_group};
-use crate::fit::{Designs, Fit, Rows, fit_target};
+use crate::fit::{Designs, Fit, Rows};
 use crate::model::Declared;
 
 /// For each fold the rows that are left out.
@@ -127,10 +127,11 @@ pub fn errors_around_newest(
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
         let placed = refine_group(context, declared, &fit.placed, &[others.len()], Rows::Where(&keep), EVALUATIONS);
         let (mut with, mut without) = (Designs::new(context, declared, &placed), Designs::new(context, declared, others));
-        for (target, sums) in context.targets.iter().zip(&mut sums).filter(|(t, _)| newest.instance.touches(t.name)) {
-            let (with, without) = (with.of(target), without.of(target));
-            let fits = (fit_target(target, with, Rows::Where(&keep)), fit_target(target, without, Rows::Where(&keep)));
+        let targets = context.targets.iter().zip(&mut sums).enumerate();
+        for (k, (target, sums)) in targets.filter(|(_, (t, _))| newest.instance.touches(t.name)) {
+            let fits = (with.fit(k, Rows::Where(&keep)), without.fit(k, Rows::Where(&keep)));
             let (Some(fitted), Some(plain)) = fits else { continue };
+            let (with, without) = (with.of(target), without.of(target));
             let new = with.predict(&fitted.coefficients, context.len());
             let old = without.predict(&plain.coefficients, context.len());
             let left = left_over(target, &new, &keep);
@@ -191,10 +192,9 @@ pub(crate) fn left_out(
     let taught = |p: Placed| Placed { shape: p.effect.taught(context, &p.instance, &p.shape, &keep), ..p };
     let placed: Vec<Placed> = refined(&keep).into_iter().map(taught).collect();
     let mut designs = Designs::new(context, declared, &placed);
-    for ((target, sum), _) in context.targets.iter().zip(&mut sums).zip(wanted).filter(|(_, w)| **w) {
-        let design = designs.of(target);
-        let Some(fitted) = fit_target(target, design, Rows::Where(&keep)) else { continue };
-        let prediction = design.predict(&fitted.coefficients, context.len());
+    for (k, (target, sum)) in context.targets.iter().zip(&mut sums).enumerate().filter(|(k, _)| wanted[*k]) {
+        let Some(fitted) = designs.fit(k, Rows::Where(&keep)) else { continue };
+        let prediction = designs.of(target).predict(&fitted.coefficients, context.len());
         for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| out[**row]) {
             sum.add(target, *row, y - prediction[*row]);
         }

@@ -6,6 +6,7 @@
 //! Units: log-likelihood in nats; parameters in the units that the effects state.
 //! Reference: Golub & Pereyra 1973; Nelder & Mead 1965; profile likelihood, Barndorff-Nielsen & Cox 1994, section 3.4.
 
+mod agreed;
 pub mod heldout;
 pub(crate) mod remembered;
 pub(crate) mod samples;
@@ -17,6 +18,7 @@ use crate::effects::Estimate;
 use crate::effects::design::{Label, TargetDesign, covariance};
 use crate::effects::placed::Placed;
 use crate::effects::steps::Steps;
+use crate::fit::agreed::{Agreed, contrast_of};
 use crate::fit::samples::{Samples, Taught};
 use crate::model::Declared;
 use crate::numeric::solve::Solution;
@@ -122,6 +124,20 @@ impl<'a> Designs<'a> {
         });
         &self.last.insert((touching, made)).1
     }
+
+    /// Fits the target at a position, with what its contrast says of the amplitudes that they share.
+    pub(crate) fn fit(&mut self, k: usize, rows: Rows<'_>) -> Option<TargetFit> {
+        let agreed = self.agreed(k, rows);
+        let target = &self.context.targets[k];
+        fit_with(target, self.of(target), rows, agreed.as_ref())
+    }
+
+    fn agreed(&mut self, k: usize, rows: Rows<'_>) -> Option<Agreed> {
+        let contrast = &self.context.targets[contrast_of(self.context, self.placed, &self.context.targets[k])?];
+        let samples = Samples::new(contrast, rows, self.context.len());
+        let design = self.of(contrast);
+        samples.solve(design, false, None).map(|(solution, ..)| Agreed::of(design, &solution, samples.len()))
+    }
 }
 
 /// Which rows may teach: all, or those that a mask leaves in.
@@ -140,9 +156,13 @@ pub enum Rows<'a> {
 /// The likelihood counts samples as independent; [`TargetFit::share`] says how many of them the colour of the residual leaves.
 #[must_use]
 pub fn fit_target(target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
+    fit_with(target, design, rows, None)
+}
+
+fn fit_with(target: &Target, design: &TargetDesign, rows: Rows<'_>, agreed: Option<&Agreed>) -> Option<TargetFit> {
     let log_rows = design.columns.first().map_or(design.fixed.len(), |c| c.values.len());
     let samples = Samples::new(target, rows, log_rows);
-    let (Solution { coefficients, inverse, .. }, loglik, kept) = samples.solve(design, true)?;
+    let (Solution { coefficients, inverse, .. }, loglik, kept) = samples.solve(design, true, agreed)?;
     let mut residual = kept.residual(&coefficients);
     residual.iter_mut().zip(&kept.floored).for_each(|(r, v)| *r /= v.sqrt());
     if let Some((unsettled, excess)) = &kept.jumps {
@@ -165,7 +185,7 @@ pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: O
         let touched = placed.iter().any(|p| p.instance.touches(target.name));
         match rest {
             Some(rest) if !touched => targets.push(rest.targets[i].clone()),
-            _ => targets.push(fit_target(target, designs.of(target), rows)?),
+            _ => targets.push(designs.fit(i, rows)?),
         }
     }
     Some(Fit { placed: placed.to_vec(), targets })

@@ -11,6 +11,7 @@ use crate::channel::{Context, Relation, Target};
 use crate::effects::design::TargetDesign;
 use crate::effects::placed::Placed;
 use crate::effects::steps::Steps;
+use crate::fit::agreed::{Agreed, contrast_of};
 use crate::fit::{Designs, Likelihood, Rows};
 use crate::model::Declared;
 use crate::numeric::solve::{Normal, Solution, dot};
@@ -111,6 +112,11 @@ impl<'c> Samples<'c> {
         }
     }
 
+    /// Number of them.
+    pub(crate) fn len(&self) -> usize {
+        self.chosen.len()
+    }
+
     /// What a row weighs of which every so many are taken: what is known before any run must not count for more beside fewer of them.
     pub(crate) fn unit(&self) -> f64 {
         1.0 / self.stride as f64
@@ -173,7 +179,13 @@ impl<'c> Samples<'c> {
 
     /// Solves for the coefficients with levelled weights (see [`crate::signal::noise::Noise::weight_variance`]) and counts the likelihood
     /// of the mean, and that of the scatter too where `scattering` asks for it or an effect adds scatter.
-    pub(crate) fn solve<'d>(&'d self, design: &'d TargetDesign, scattering: bool) -> Option<(Solution, Likelihood, Kept<'d>)> {
+    /// What another reading of the same effects has said of their amplitudes is `agreed`.
+    pub(crate) fn solve<'d>(
+        &'d self,
+        design: &'d TargetDesign,
+        scattering: bool,
+        agreed: Option<&Agreed>,
+    ) -> Option<(Solution, Likelihood, Kept<'d>)> {
         if self.chosen.len() < design.columns.len() + 3 {
             return None;
         }
@@ -203,6 +215,9 @@ impl<'c> Samples<'c> {
             (columns, [whole, late])
         };
         design.expect(&mut normal, self.unit());
+        if let Some(agreed) = agreed {
+            agreed.tell(design, &mut normal);
+        }
         let mut kept = Kept { columns, y, floored, jumps: None };
         let mut solution = normal.solve()?;
         let n = self.chosen.len() as f64;
@@ -306,9 +321,19 @@ impl<'c> Taught<'c> {
     fn of_target(&self, k: usize, designs: &mut Designs<'_>, scattering: bool) -> Option<f64> {
         let target = &self.context.targets[k];
         let view = scattering && target.relation == Relation::Thrust;
-        let samples = self.samples[k].get_or_init(|| Samples::new(target, self.rows, self.context.len()));
+        let agreed = contrast_of(self.context, designs.placed, target).and_then(|k| self.agreed(k, designs));
         let design = designs.after(target, &mut self.steps.borrow_mut()[k]);
-        samples.solve(design, view).map(|(_, loglik, _)| loglik.of(view))
+        self.of(k).solve(design, view, agreed.as_ref()).map(|(_, loglik, _)| loglik.of(view))
+    }
+
+    fn agreed(&self, contrast: usize, designs: &mut Designs<'_>) -> Option<Agreed> {
+        let design = designs.after(&self.context.targets[contrast], &mut self.steps.borrow_mut()[contrast]);
+        let samples = self.of(contrast);
+        samples.solve(design, false, None).map(|(solution, ..)| Agreed::of(design, &solution, samples.len()))
+    }
+
+    fn of(&self, k: usize) -> &Samples<'c> {
+        self.samples[k].get_or_init(|| Samples::new(&self.context.targets[k], self.rows, self.context.len()))
     }
 }
 

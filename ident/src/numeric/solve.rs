@@ -124,6 +124,18 @@ impl Normal {
         self.yy += weight * held * held;
     }
 
+    /// Adds what other rows have said of some columns: their coefficients, and how surely, in weights of one row.
+    pub(crate) fn tell(&mut self, columns: &[usize], values: &DVector<f64>, precision: &DMatrix<f64>) {
+        let pull = precision * values;
+        for (a, j) in columns.iter().enumerate() {
+            for (b, k) in columns.iter().enumerate().filter(|(_, k)| *k <= j) {
+                self.gram[(*j, *k)] += precision[(a, b)];
+            }
+            self.rhs[*j] += pull[a];
+        }
+        self.yy += values.dot(&pull);
+    }
+
     /// Adds what went into another of the same columns.
     pub fn absorb(&mut self, other: &Self) {
         self.gram += &other.gram;

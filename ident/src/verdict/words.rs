@@ -79,8 +79,6 @@ pub fn parameter(name: &str) -> String {
         "tau_down" => "time constant as it slows down".to_owned(),
         "tau_air" => "time constant of coasting".to_owned(),
         "power_gain" => "current for each unit of power that speeds the rotor up".to_owned(),
-        "slope_of_pulse" => "slope with the pulse".to_owned(),
-        "bend_of_pulse" => "bend with the pulse".to_owned(),
         "viscous" => "friction that grows with speed".to_owned(),
         "constant" => "friction at any speed".to_owned(),
         "slack" => "play before it turns".to_owned(),

@@ -63,19 +63,12 @@ pub(crate) fn add_hinge(context: &Context, onset: f64, position: usize, design: 
         return;
     }
     let over: Vec<f64> = speed(context, design.relation).iter().map(|r| (r - onset).max(0.0)).collect();
-    let first = if design.relation == Relation::SpeedDifference { 0 } else { 2 };
-    design.add(position, first + 1, over.iter().map(|v| v * v / onset.max(1.0)).collect());
-    design.add(position, first, over);
+    design.add(position, 1, over.iter().map(|v| v * v / onset.max(1.0)).collect());
+    design.add(position, 0, over);
 }
 
-/// Amplitudes of a departure that grows above an onset: of the difference, then of the channel's own relation, whose cubic
-/// leaves them uncertain.
-pub(crate) const HINGE: [Amplitude; 4] = [
-    Amplitude { name: "slope", unit: "1" },
-    Amplitude { name: "bend", unit: "1" },
-    Amplitude { name: "slope_of_pulse", unit: "1" },
-    Amplitude { name: "bend_of_pulse", unit: "1" },
-];
+/// Amplitudes of a departure that grows above an onset: the same of the channel and of its difference from the others.
+pub(crate) const HINGE: [Amplitude; 2] = [Amplitude { name: "slope", unit: "1" }, Amplitude { name: "bend", unit: "1" }];
 
 /// Whether a channel leaves the others to one side (`sign`). Where another channel leaves to the other side by more, it takes the others along, and
 /// this one only seems to leave.
