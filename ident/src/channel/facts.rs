@@ -29,6 +29,8 @@ pub(crate) struct Facts {
     pub(crate) winding: OnceLock<f64>,
     /// Angular acceleration on the way to where the command sends the rotor, rad/s^2; nothing without a command.
     pub(crate) driven: OnceLock<Option<Vec<f64>>>,
+    /// Deceleration over the square of the speed at which no current is left, 1/rad; nothing where the run does not say.
+    pub(crate) balance: OnceLock<Option<f64>>,
     /// Share of the voltage that goes with each Ah drawn, 1/Ah.
     pub(crate) discharge: OnceLock<f64>,
     /// Slope of the static speed curve on each row, rev/min per us.

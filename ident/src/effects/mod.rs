@@ -192,7 +192,7 @@ pub trait Effect: Sync {
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape>;
     /// What is known of the shapes before any run: the logarithm of their density, nats, up to a constant. It decides where a run says
     /// nothing of a shape.
-    fn prior(&self, _instance: &Instance, _shape: &[f64]) -> f64 {
+    fn prior(&self, _context: &Context, _instance: &Instance, _shape: &[f64]) -> f64 {
         0.0
     }
     /// Linear parameters.

@@ -7,6 +7,7 @@
 
 use super::acquisition::sample_hold::BENEATH;
 use super::{BEFORE, Effect, EffectEntry, Instance, Stage};
+use crate::channel::Context;
 
 /// An effect placed in a hypothesis.
 #[derive(Clone)]
@@ -31,8 +32,8 @@ impl Placed {
     }
 
     /// What is known of its shapes before any run, nats.
-    pub(crate) fn prior(&self) -> f64 {
-        self.effect.prior(&self.instance, &self.shape)
+    pub(crate) fn prior(&self, context: &Context) -> f64 {
+        self.effect.prior(context, &self.instance, &self.shape)
     }
 
     /// Where it acts in the causal chain.

@@ -40,7 +40,9 @@ impl Agreed {
         let shared = self.amplitudes.iter().enumerate().filter_map(|(k, (label, value))| Some((k, column(*label)?, *value)));
         let shared: Vec<(usize, usize, f64)> = shared.collect();
         let own: Vec<usize> = shared.iter().map(|s| s.0).collect();
-        let Some(precision) = self.covariance.select_rows(&own).select_columns(&own).cholesky().map(|c| c.inverse()) else { return };
+        let Some(precision) = self.covariance.select_rows(&own).select_columns(&own).cholesky().map(|c| c.inverse()) else {
+            return;
+        };
         let values = DVector::from_iterator(shared.len(), shared.iter().map(|s| s.2));
         normal.tell(&shared.iter().map(|s| s.1).collect::<Vec<_>>(), &values, &precision);
     }

@@ -297,7 +297,7 @@ impl Fit {
         let value = |x: &[f64]| {
             let mut placed = self.placed.clone();
             placed[position].shape = x.to_vec();
-            let known = placed[position].prior();
+            let known = placed[position].prior(context);
             if context.against_model {
                 // speeds are coloured by what the model leaves over of them, and a load cell that knows the shape is not
                 return known

@@ -64,7 +64,7 @@ pub(crate) fn scan(
             .collect();
         let mut placed = base.placed.to_vec();
         placed.push(Placed { effect, instance: instance.clone(), shape: shape.clone() });
-        let known = placed.last().map_or(0.0, Placed::prior);
+        let known = placed.last().map_or(0.0, |p| p.prior(context));
         let gain = base.taught.loglik(&placed, &moving, scattering) + known - before;
         if gain.is_finite() && best.as_ref().is_none_or(|b| gain > b.1) {
             best = Some((shape, gain));
@@ -85,7 +85,8 @@ pub(crate) fn between_starts(context: &Context, declared: Declared<'_>, placed: 
     let moving: Vec<&str> = newest.instance.channels.iter().map(String::as_str).collect();
     let scattering = placed.iter().any(|p| p.effect.scatters());
     let taught = Taught::new(context, declared, rows);
-    let likelihood = |placed: &[Placed]| taught.loglik(placed, &moving, scattering) + placed.last().map_or(0.0, Placed::prior);
+    let likelihood =
+        |placed: &[Placed]| taught.loglik(placed, &moving, scattering) + placed.last().map_or(0.0, |p| p.prior(context));
     let (shapes, grid) = (newest.effect.shapes(context, &newest.instance), &newest.shape);
     let mut most = likelihood(&out);
     for half in 1..=HALVED {
@@ -191,7 +192,7 @@ pub(crate) fn refine_group(
             // a soft wall keeps the simplex inside the plausible box
             let wall: f64 = free.iter().zip(x).map(|(i, v)| ((v - full[*i]) / (ranges[*i].1 - ranges[*i].0)).abs()).sum();
             let placed = with_shapes(placed, &full);
-            let known: f64 = group.iter().map(|k| placed[*k].prior()).sum();
+            let known: f64 = group.iter().map(|k| placed[*k].prior(context)).sum();
             -taught.loglik(&placed, &moving, scattering) - known + 1e3 * wall
         };
         let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();

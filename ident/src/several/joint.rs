@@ -188,7 +188,8 @@ impl<'m, 'a> Joint<'m, 'a> {
             };
             let wall: f64 = free.iter().zip(x).map(beyond).sum();
             let placed = with(x);
-            let known: f64 = placed.iter().map(Placed::prior).sum();
+            let of_first = self.members.first().map(|m| m.context);
+            let known: f64 = of_first.map_or(0.0, |context| placed.iter().map(|p| p.prior(context)).sum());
             1e3 * wall - known - self.loglik(&placed, &channels, most)
         };
         let x0: Vec<f64> = free.iter().map(|(k, i, _)| rig[*k].shape[*i]).collect();

@@ -189,12 +189,16 @@ const VOTES: usize = 3;
 /// Those departures of a channel that are bad samples and no effect of it, and the single ones that an effect speaks of.
 fn of_no_effect(name: &str, column: &[f64], mut events: Vec<Event>, samples: usize, probes: Probes) -> (Vec<Event>, Vec<Event>) {
     events.sort_by_key(|e| e.rows.start);
-    let bad: usize = events.iter().map(|e| e.rows.len()).sum();
-    if bad as f64 > MOST * samples as f64 {
-        return (Vec::new(), Vec::new());
-    }
     let speed = SPEED.contains(&name);
     let single = |e: &Event| e.rows.len() <= SINGLE;
+    let too_many = |events: &[Event]| events.iter().map(|e| e.rows.len()).sum::<usize>() as f64 > MOST * samples as f64;
+    if too_many(&events) {
+        // what lasts has a cause; single readings beside it are as bad as ever
+        events.retain(single);
+    }
+    if too_many(&events) {
+        return (Vec::new(), Vec::new());
+    }
     let singles = events.iter().filter(|e| single(e)).count();
     // a probe that loses its mark for a while loses it for a single reading as well
     let lasting = events.len() - singles + probes.lost;

@@ -82,8 +82,8 @@ pub(crate) fn of(log: &Log) -> Fused {
     Fused { rpm: bridge(&log.t, &rpm), sd, how }
 }
 
-/// Fills stretches without a speed with what the command makes of the rotor, moved to the readings at both ends; what is left is bridged
-/// by straight lines. The standard deviation of each row that was filled; empty where none was.
+/// Fills stretches without a speed with what the command makes of the rotor, moved to the readings at both ends: by what its level is off all along,
+/// by what it is off on its way for as long as the way takes. What is left is bridged by straight lines. The standard deviation of each row that was filled; empty where none was.
 fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
     let measured: Vec<usize> = (0..rpm.len()).filter(|i| rpm[*i].is_finite()).collect();
     let stretches: Vec<(usize, usize)> = measured.windows(2).filter(|w| w[1] - w[0] > STRETCH).map(|w| (w[0], w[1])).collect();
@@ -94,10 +94,11 @@ fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
     let Some(drive) = Drive::of(log, rpm) else { return Vec::new() };
     let mut sd = vec![0.0; rpm.len()];
     for (from, to) in stretches {
-        let off = [from, to].map(|i| rpm[i] - drive.speed[i]);
+        let off = [from, to].map(|i| drive.off(i, rpm[i]));
         for i in from + 1..to {
             let share = (log.t[i] - log.t[from]) / (log.t[to] - log.t[from]);
-            rpm[i] = (drive.speed[i] + off[0] + share * (off[1] - off[0])).max(0.0);
+            let of_end = |end: usize, (level, moving): (f64, f64)| level + moving * drive.left(end, log.t[i] - log.t[end]);
+            rpm[i] = (drive.speed[i] + (1.0 - share) * of_end(from, off[0]) + share * of_end(to, off[1])).max(0.0);
             // what is known at both ends is known less in between
             sd[i] = drive.sd[i] * (4.0 * share * (1.0 - share)).sqrt();
         }

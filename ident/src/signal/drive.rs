@@ -19,6 +19,8 @@ const HELD: usize = 6;
 const CONSTANTS: (f64, f64, usize) = (0.02, 3.0, 24);
 /// Time constants that are tried between the neighbours of the best one.
 const FINE: usize = 9;
+/// Standard deviations by which the level of a held command may be off.
+const LEVEL: f64 = 3.0;
 /// Share of the way still to go that is uncertain while a rotor is on it: one time constant stands for a rotor that has several.
 const ON_ITS_WAY: f64 = 0.15;
 
@@ -45,6 +47,8 @@ pub(crate) struct Drive {
     on_its_way: Vec<bool>,
     /// Time constants up and down, s.
     constants: [f64; 2],
+    /// Standard deviation of the speed of a held command, rev/min.
+    usual: f64,
 }
 
 impl Drive {
@@ -93,7 +97,22 @@ impl Drive {
         let sd = (0..goal.len()).map(|i| usual.hypot(ON_ITS_WAY * (goal[i] - speed_made[i])).hypot(0.5 * jump(i))).collect();
         let on_its_way = (0..goal.len()).map(|i| turns(pulse[i]) && (goal[i] - speed_made[i]).abs() > usual).collect();
         let goal = reached(goal, &stretches, speed);
-        Some(Self { speed: speed_made, sd, goal, on_its_way, constants: [up, down] })
+        Some(Self { speed: speed_made, sd, goal, on_its_way, constants: [up, down], usual })
+    }
+
+    /// By how much a reading is off what the command makes, rev/min: as its level is, and because the way began at another moment. The latter is
+    /// what is beyond the scatter of held commands, and no more than the speed changes from the row before to the one after.
+    pub(crate) fn off(&self, row: usize, reading: f64) -> (f64, f64) {
+        let off = reading - self.speed[row];
+        let most = (self.speed[(row + 1).min(self.speed.len() - 1)] - self.speed[row.saturating_sub(1)]).abs();
+        let moving = (off - off.clamp(-LEVEL * self.usual, LEVEL * self.usual)).clamp(-most, most);
+        (off - moving, moving)
+    }
+
+    /// What is left of what a moment of the way at a row was off, so long before or after it, s.
+    pub(crate) fn left(&self, row: usize, since: f64) -> f64 {
+        let [up, down] = self.constants;
+        (-since.abs() / if self.goal[row] > self.speed[row] { up } else { down }).exp()
     }
 
     /// Angular acceleration of a rotor that has these speeds on its way to where the command sends it, rad/s^2; none once it is there, where a

@@ -101,7 +101,7 @@ impl Effect for SpinupLag {
         ]
     }
 
-    fn prior(&self, instance: &Instance, shape: &[f64]) -> f64 {
+    fn prior(&self, _: &Context, instance: &Instance, shape: &[f64]) -> f64 {
         let [up, down, _] = shape else { return 0.0 };
         if !instance.form.is_empty() {
             return 0.0;

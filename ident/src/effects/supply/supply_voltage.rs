@@ -103,7 +103,7 @@ impl Effect for SupplyVoltage {
         Vec::new()
     }
 
-    fn prior(&self, instance: &Instance, shape: &[f64]) -> f64 {
+    fn prior(&self, _: &Context, instance: &Instance, shape: &[f64]) -> f64 {
         let ((mean, sd), Some(exponent)) = (known(instance), shape.first()) else { return 0.0 };
         -0.5 * ((exponent - mean) / sd).powi(2)
     }

@@ -174,14 +174,18 @@ impl Judge<'_> {
         before.iter().filter(right).count() >= AGAIN && before.iter().take(2).any(fell)
     }
 
-    /// Whether the reading itself has lost half of the share that the whole loss comes to, or is next to nothing of a rotor that turns. A rotor that
-    /// coasts down ahead of a late load gets there as well, but not at once; and a load that rises late makes a steady reading look low.
+    /// Whether the reading itself has lost half of the share that the whole loss comes to, beside its witness too, or is next to nothing of a rotor
+    /// that turns. A rotor that coasts down ahead of what the witness says gets there as well, but not at once; and a load that rises late makes a
+    /// steady reading look low.
     fn falls_at_once(&self, row: usize, worst: usize, witness: &Witness) -> bool {
         let is_read = |i: &usize| self.read[*i].is_finite();
-        let before = (self.block(row)..row).rev().filter(is_read).take(2).map(|i| self.read[i]).fold(0.0, f64::max);
+        let before = || (self.block(row)..row).rev().filter(is_read).take(2);
+        let share = |i: usize| self.read[i] / witness.said[i];
+        let (reading, beside) = (before().map(|i| self.read[i]).fold(0.0, f64::max), before().map(share).fold(0.0, f64::max));
         let mut first = (row..self.read.len()).filter(is_read).take(AGAIN);
-        let most = before * (1.0 - HALF * self.loses(worst, witness));
-        first.clone().all(|i| self.read[i] < DEPTH * witness.said[i]) || first.any(|i| self.read[i] < most)
+        let kept = 1.0 - HALF * self.loses(worst, witness);
+        first.clone().all(|i| self.read[i] < DEPTH * witness.said[i])
+            || first.any(|i| self.read[i] < kept * reading && share(i) < kept * beside)
     }
 
     /// Share of the speed that the reading lacks.
