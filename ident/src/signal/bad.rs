@@ -238,3 +238,28 @@ fn told(log: &Log, name: &str, column: &[f64], event: &Event) -> Option<SetAside
         silent: event.silent,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two doubled readings beside a fault that lasts for a fifth of the run.
+    #[test]
+    fn what_lasts_does_not_hide_single_readings() {
+        let event =
+            |rows: Range<usize>, expected: f64| Event { worst: rows.start, rows, expected, at_step: false, silent: false };
+        let mut column = vec![4000.0; 1000];
+        column[300] = 8000.0;
+        column[600] = 8000.0;
+        column[700..900].fill(1500.0);
+        let events = || vec![event(300..301, 4000.0), event(600..601, 4000.0), event(700..900, 4000.0)];
+        let (bad, recurring) = of_no_effect("rpm_opto", &column, events(), 1000, Probes { speeds: 3, lost: 0 });
+        let rows = |events: &[Event]| events.iter().map(|e| e.rows.start).collect::<Vec<_>>();
+        assert_eq!((rows(&bad), rows(&recurring)), (vec![], vec![300, 600]), "two of one size have a name");
+        let (bad, _) = of_no_effect("thrust_n", &column, events().split_off(1), 1000, Probes { speeds: 3, lost: 0 });
+        assert_eq!(rows(&bad), [600], "one alone is bad");
+        let many = (0..60).map(|k| event(10 * k..10 * k + 1, 4000.0)).collect();
+        let (bad, recurring) = of_no_effect("thrust_n", &column, many, 1000, Probes { speeds: 3, lost: 0 });
+        assert!(bad.is_empty() && recurring.is_empty(), "one that is bad so often has a fault");
+    }
+}

@@ -218,6 +218,38 @@ fn remove_dropouts(rpm: &mut [f64], scale: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::Column;
+
+    /// A rotor that follows levels of the command; its only probe reads nothing from a start on, or is lost along a ramp that the levels know
+    /// little of.
+    #[test]
+    fn a_gap_is_bridged_by_the_way_the_rotor_had() {
+        let n = 3000;
+        let t: Vec<f64> = (0..n).map(|i| 0.05 * f64::from(i)).collect();
+        let ramp = |i: i32| (2000..2600).contains(&i).then(|| 1200.0 + f64::from(i - 2000) * 0.5);
+        let level = |i: i32| if i < 100 { 1000.0 } else { 1150.0 + f64::from(i / 100 * 7 % 9) * 80.0 };
+        let pulse: Vec<f64> = (0..n).map(|i| ramp(i).unwrap_or_else(|| level(i))).collect();
+        // steps come half a row before they are logged, and a ramp is on another curve than the levels
+        let goal = |i: usize| if ramp(i as i32).is_some() { 6.3 } else { 6.0 } * (pulse[i] - 1000.0);
+        let mut truth = vec![0.0];
+        for i in 1..pulse.len() {
+            let late = if (pulse[i] - pulse[i - 1]).abs() > 10.0 { 0.5 } else { 1.0 };
+            let last: f64 = truth[i - 1];
+            truth.push(goal(i) + (last - goal(i)) * f64::exp(-0.05 * late / 0.2));
+        }
+        for lost in [101..140, 2150..2400] {
+            let mut rpm = truth.clone();
+            // the first reading of the start is one of nothing yet
+            rpm[100] = 0.0;
+            rpm[lost.clone()].fill(f64::NAN);
+            let columns = [("pulse_us", pulse.clone()), ("rpm", rpm)].map(|(name, values)| Column { name: name.into(), values });
+            let log = Log { t: t.clone(), columns: columns.to_vec(), ..Log::default() };
+            let found = of(&log).rpm;
+            let off = |i: usize| (found[i] - truth[i]).abs();
+            let most = lost.clone().skip(4).map(off).fold(0.0, f64::max);
+            assert!(most < 0.1 * truth[lost.end], "{lost:?}: {most} of {} rev/min", truth[lost.end]);
+        }
+    }
 
     /// One of two sensors drops out while the rotor speeds up; of three one is lost and one on its way back. On the way up both of two may be right.
     #[test]

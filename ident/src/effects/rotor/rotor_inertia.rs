@@ -226,6 +226,31 @@ mod tests {
     use super::*;
     use crate::log::{Column, Log};
 
+    /// A run that only climbs says where a coasting rotor draws nothing.
+    #[test]
+    fn a_climb_tells_how_a_rotor_coasts() {
+        let (draw, gain, tau) = (4e-8, 1e-5, 0.15);
+        let t: Vec<f64> = (0..2000).map(|i| 0.05 * f64::from(i)).collect();
+        let pulse: Vec<f64> = (0..2000).map(|i| 1000.0 + 100.0 * f64::from(i / 200)).collect();
+        let (mut rpm, mut current) = (Vec::new(), Vec::new());
+        let mut speed = 0.0_f64;
+        for (i, p) in pulse.iter().enumerate() {
+            let goal = 7.5 * (p - 1000.0);
+            let omega = std::f64::consts::TAU / 60.0;
+            let power = speed * omega * (goal - speed) * omega / tau;
+            rpm.push(speed);
+            current.push(0.05 + draw * (speed * omega).powi(3) + gain * power + 0.01 * (0.7 * (i * i) as f64).sin());
+            speed = goal + (speed - goal) * f64::exp(-0.05 / tau);
+        }
+        let columns = [("pulse_us", pulse), ("rpm", rpm), ("current_a", current)];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.into(), values }).collect();
+        let context = Context::new(&Log { t, columns, ..Log::default() }, Some(1050.0));
+        let found = balance(&context).expect("a climb tells it");
+        assert!((found / (draw / gain)).ln().abs() < 0.2, "{found} for {}", draw / gain);
+        let [of_one_way] = &RotorInertia.shapes(&context, &Instance::new(&["current_a"], DRIVEN_ONE_WAY))[..] else { panic!() };
+        assert_eq!(of_one_way.starts.first(), Some(&found));
+    }
+
     #[test]
     fn two_rows_at_once_make_no_acceleration() {
         let t = vec![0.0, 1.0, 2.0, 2.00004, 3.0, 4.0, 5.0];

@@ -317,3 +317,36 @@ fn bridged(witnesses: &Witnesses<'_>, values: &[f64]) -> Option<Vec<f64>> {
     let samples = values.iter().filter(|v| v.is_finite()).count();
     (samples >= super::FEWEST).then(|| bridge(&witnesses.log.t, values))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether the readings have fallen at once at their third row, beside a witness.
+    fn fell(read: &[f64], said: &[f64], worst: usize) -> bool {
+        let witness = Witness::new(said.to_vec(), vec![6.0; said.len()]);
+        let (steps, blocks, top) = (vec![0], Vec::new(), read.iter().copied().fold(0.0, f64::max));
+        let judge = Judge { read, all: &[], measured: read.len(), top, step: 0.1, steps, blocks };
+        judge.falls_at_once(2, worst, &witness)
+    }
+
+    /// A rotor that slows down a little faster than two time constants say is below its witness in the end, and never lost its mark.
+    #[test]
+    fn a_rotor_that_slows_down_has_not_fallen_at_once() {
+        let read = [
+            3412.0, 2983.0, 2623.0, 2321.0, 2064.0, 1848.0, 1668.0, 1514.0, 1379.0, 1270.0, 1177.0, 1098.0, 1030.0, 970.0, 920.0,
+            881.0, 845.0,
+        ];
+        let said = [
+            3420.0, 3003.0, 2671.0, 2384.0, 2140.0, 1931.0, 1754.0, 1603.0, 1475.0, 1366.0, 1272.0, 1193.0, 1126.0, 1068.0,
+            1019.0, 978.0, 942.0,
+        ];
+        assert!(!fell(&read, &said, 16));
+        // the same way down, the mark lost on it
+        let lost = [3412.0, 2983.0, 1900.0, 1700.0, 1500.0, 1350.0, 1200.0, 1100.0, 1000.0];
+        assert!(fell(&lost, &said[..9], 8));
+        // a witness that rises late beside a steady reading
+        let steady = [3000.0; 9];
+        assert!(!fell(&steady, &[3000.0, 3001.0, 3600.0, 3900.0, 4000.0, 4000.0, 4000.0, 4000.0, 4000.0], 4));
+    }
+}

@@ -26,12 +26,7 @@ pub(super) fn found(witnesses: &Witnesses<'_>, name: &'static str) -> Vec<Event>
         .filter_map(|(k, w)| {
             let first = w[1];
             let rest: Vec<usize> = measured[..=k].iter().rev().copied().take_while(rests).collect();
-            // in the row in which the command comes the rotor may not have moved yet
-            let commanded = |i: usize| {
-                witnesses
-                    .pulse()
-                    .is_none_or(|p| (p[i.saturating_sub(1)] - p[first]).abs().max((p[i] - p[first]).abs()) <= CALM_US)
-            };
+            let commanded = |i: usize| witnesses.pulse().is_none_or(|p| (p[i] - p[first]).abs() <= CALM_US);
             let silent = |i: &&usize| witnesses.t[first] - witnesses.t[**i] < SILENT / read[first] && commanded(**i);
             let rows = rest.iter().take_while(silent).count();
             // a stretch without a row of rest before it is a drop-out, and no start
