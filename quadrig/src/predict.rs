@@ -115,7 +115,7 @@ fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
     let claim = |name: &'static str| {
         let mut values = model.predict(&context, name)?;
         let target = &context.targets[context.target(name)?];
-        for row in target.unclaimed.iter().chain(&target.aside) {
+        for row in target.unclaimed.iter().chain(&target.aside).chain(&target.given) {
             values[*row] = f64::NAN; // an empty field
         }
         // a tachometer that has not seen its second mark reads nothing, whatever the rotor does

@@ -158,6 +158,9 @@ pub struct Target {
     pub unclaimed: Vec<usize>,
     /// Rows whose samples were set aside as bad ones (see [`crate::signal::bad`]), in order.
     pub aside: Vec<usize>,
+    /// Rows at which a speed is taken as it was read, in order: of a rotor that is told to turn and does not yet. They are no samples here: what is
+    /// given is not predicted.
+    pub given: Vec<usize>,
     /// Error that a declared model is known to make, on every row of the log; empty without one.
     pub known: Vec<f64>,
     /// Share of the noise in the scatter that it is known to leave about that, on every row of the log; empty without one.
@@ -220,6 +223,7 @@ impl Target {
             floored,
             unclaimed: Vec::new(),
             aside: Vec::new(),
+            given: Vec::new(),
             known: Vec::new(),
             trust: Vec::new(),
             usual: 0.0,
@@ -410,6 +414,12 @@ impl Context {
         off && self.rpm.get(row).is_some_and(|r| *r > STANDSTILL)
     }
 
+    /// Whether a rotor that is told to turn stands at a row.
+    fn is_held_back(&self, row: usize) -> bool {
+        let on = self.pulse.as_ref().is_some_and(|p| p[row] >= self.start_pulse_us);
+        on && self.rpm.get(row).is_some_and(|r| *r < STANDSTILL)
+    }
+
     /// What every declared relation needs and no more: command, consensus speed, steady stretches. No targets; see [`Context::declared`].
     #[must_use]
     pub fn bare(log: &Log, start_pulse_us: Option<f64>) -> Self {
@@ -575,7 +585,12 @@ fn target(log: &Log, context: &Context, name: &'static str, counts: &dyn Fn(usiz
     if needs_rpm && context.rpm.is_empty() {
         return None;
     }
-    let rows: Vec<usize> = (0..column.len()).filter(|i| column[*i].is_finite() && counts(*i)).collect();
+    let given: Vec<usize> = match relation {
+        Relation::SpeedFromPulse => context.starts.iter().map(|s| s.0).filter(|row| context.is_held_back(*row)).collect(),
+        _ => Vec::new(),
+    };
+    let judged = |i: &usize| column[*i].is_finite() && counts(*i) && given.binary_search(i).is_err();
+    let rows: Vec<usize> = (0..column.len()).filter(judged).collect();
     if rows.is_empty() {
         return None;
     }
@@ -583,7 +598,7 @@ fn target(log: &Log, context: &Context, name: &'static str, counts: &dyn Fn(usiz
     let noise = noise::estimate(&rows, &y, &less_speed(context, relation, &rows, &y), &context.rpm, context.stretches());
     let speeds = SPEED.into_iter().filter(|s| log.column(s).is_some()).count().max(1);
     let weight = if matches!(relation, Relation::SpeedFromPulse | Relation::SpeedAlone) { 1.0 / speeds as f64 } else { 1.0 };
-    let mut target = Target { weight, ..Target::new(context, name, relation, rows, y, noise) };
+    let mut target = Target { weight, given, ..Target::new(context, name, relation, rows, y, noise) };
     if needs_rpm && !context.rpm_sd.is_empty() {
         target.allow_for_speed(context);
     }
