@@ -98,7 +98,7 @@ mod tests {
         let plain = design(&context, Declared::default(), &placed, target);
         let alone = fit_target(target, &plain, Rows::Where(&keep)).expect("a fit");
         assert!((slope(&alone) + 0.02).abs() > 0.02, "the channel by itself does not know it: {}", slope(&alone));
-        // a sensor without others has nobody to agree with
+        // a sensor that the fault does not touch shares nothing
         assert!(contrast_of(&context, &placed, &context.targets[0]).is_none());
     }
 }

@@ -134,9 +134,7 @@ impl<'a> Designs<'a> {
 
     fn agreed(&mut self, k: usize, rows: Rows<'_>) -> Option<Agreed> {
         let contrast = &self.context.targets[contrast_of(self.context, self.placed, &self.context.targets[k])?];
-        let samples = Samples::new(contrast, rows, self.context.len());
-        let design = self.of(contrast);
-        samples.solve(design, false, None).map(|(solution, ..)| Agreed::of(design, &solution, samples.len()))
+        Samples::new(contrast, rows, self.context.len()).say(self.of(contrast))
     }
 }
 

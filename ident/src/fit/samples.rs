@@ -112,9 +112,9 @@ impl<'c> Samples<'c> {
         }
     }
 
-    /// Number of them.
-    pub(crate) fn len(&self) -> usize {
-        self.chosen.len()
+    /// What they say of the amplitudes of a contrast's effects.
+    pub(crate) fn say(&self, contrast: &TargetDesign) -> Option<Agreed> {
+        self.solve(contrast, false, None).map(|(solution, ..)| Agreed::of(contrast, &solution, self.chosen.len()))
     }
 
     /// What a row weighs of which every so many are taken: what is known before any run must not count for more beside fewer of them.
@@ -328,8 +328,7 @@ impl<'c> Taught<'c> {
 
     fn agreed(&self, contrast: usize, designs: &mut Designs<'_>) -> Option<Agreed> {
         let design = designs.after(&self.context.targets[contrast], &mut self.steps.borrow_mut()[contrast]);
-        let samples = self.of(contrast);
-        samples.solve(design, false, None).map(|(solution, ..)| Agreed::of(design, &solution, samples.len()))
+        self.of(contrast).say(design)
     }
 
     fn of(&self, k: usize) -> &Samples<'c> {

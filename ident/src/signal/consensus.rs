@@ -83,7 +83,8 @@ pub(crate) fn of(log: &Log) -> Fused {
 }
 
 /// Fills stretches without a speed with what the command makes of the rotor, moved to the readings at both ends: by what its level is off all along,
-/// by what it is off on its way for as long as the way takes. What is left is bridged by straight lines. The standard deviation of each row that was filled; empty where none was.
+/// by what it is off on its way for as long as the way takes. What is left is bridged by straight lines. Gives the standard deviation of each
+/// row that was filled; empty where none was.
 fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
     let measured: Vec<usize> = (0..rpm.len()).filter(|i| rpm[*i].is_finite()).collect();
     let stretches: Vec<(usize, usize)> = measured.windows(2).filter(|w| w[1] - w[0] > STRETCH).map(|w| (w[0], w[1])).collect();
