@@ -223,6 +223,11 @@ pub trait Effect: Sync {
     fn scatters(&self) -> bool {
         false
     }
+    /// Whether what it takes away, and what it adds, may go on beyond what its run has shown. What only moves a reading in time gives a channel no
+    /// value that the channel does not have, however large the step.
+    fn runs_on(&self, _instance: &Instance) -> [bool; 2] {
+        [true, true]
+    }
     /// Whether single rows are its nature.
     fn is_of_moments(&self, _instance: &Instance) -> bool {
         false

@@ -12,9 +12,6 @@ use crate::effects::placed::Placed;
 use crate::numeric::solve::{Normal, Solution};
 use nalgebra::{DMatrix, DVector};
 
-/// Least scale of a contrast's variances: a tenth of its noise's standard deviation, as in every fit.
-const LEAST_SCALE: f64 = 0.01;
-
 /// What the fit of a contrast says of the amplitudes of its effects.
 pub(crate) struct Agreed {
     /// Each with its value.
@@ -23,11 +20,11 @@ pub(crate) struct Agreed {
 }
 
 impl Agreed {
-    /// From the solution of a contrast on so many samples.
-    pub(crate) fn of(contrast: &TargetDesign, solution: &Solution, samples: usize) -> Self {
+    /// From the solution of a contrast on so many samples, whose variances have this least scale.
+    pub(crate) fn of(contrast: &TargetDesign, solution: &Solution, samples: usize, least_scale: f64) -> Self {
         let of_effect = |j: &usize| matches!(contrast.columns[*j].label, Label::Effect { .. });
         let chosen: Vec<usize> = (0..contrast.columns.len()).filter(of_effect).collect();
-        let scale = (solution.rss / samples as f64).max(LEAST_SCALE);
+        let scale = (solution.rss / samples as f64).max(least_scale);
         Self {
             amplitudes: chosen.iter().map(|j| (contrast.columns[*j].label, solution.coefficients[*j])).collect(),
             covariance: solution.inverse.select_rows(&chosen).select_columns(&chosen) * scale,

@@ -114,7 +114,8 @@ impl<'c> Samples<'c> {
 
     /// What they say of the amplitudes of a contrast's effects.
     pub(crate) fn say(&self, contrast: &TargetDesign) -> Option<Agreed> {
-        self.solve(contrast, false, None).map(|(solution, ..)| Agreed::of(contrast, &solution, self.chosen.len()))
+        let (solution, ..) = self.solve(contrast, false, None)?;
+        Some(Agreed::of(contrast, &solution, self.chosen.len(), self.target.least_scale()))
     }
 
     /// What a row weighs of which every so many are taken: what is known before any run must not count for more beside fewer of them.

@@ -14,6 +14,8 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
+mod similar;
+
 /// Key in a log's head: the columns whose values are right although no rig is known to do that.
 pub(crate) const VOUCHED: &str = "vouched";
 
@@ -49,6 +51,7 @@ pub(crate) fn doubts(log: &Log) -> impl Iterator<Item = Doubt> {
         thrust(log),
         disc(log),
         torque(log),
+        similar::similar(log),
     ]
     .into_iter()
     .flatten()

@@ -4,6 +4,7 @@
 //! a longer run, a higher load, a parabola that goes on. What goes beyond is an extrapolation, and is taken in the measure in which the
 //! parameters carry it. Before the extrapolation is looked at, it may be as large as what was seen, `m`; the parameters say `e` with a
 //! standard error `s`; together they say `e m^2 / (m^2 + s^2)`.
+//! What only moves readings in time is no extrapolation, whatever the step ([`crate::effects::Effect::runs_on`]).
 //! What can go wrong: a form that is wrong may have narrow errors, and then runs on. What lies within the range that was seen is not touched,
 //! however little its parameters are known. Errors of amplitudes and of shapes count as independent.
 //! Units: those of the channel.
@@ -62,10 +63,19 @@ impl Reach {
         (self.channel.clone(), Value::Table(t))
     }
 
-    /// What is to be taken off a contribution with a standard error.
-    fn excess(&self, contribution: f64, error: impl FnOnce() -> f64) -> f64 {
+    /// How far a contribution goes beyond what was seen, of an effect that runs on downward, upward.
+    fn beyond(&self, contribution: f64, [down, up]: [bool; 2]) -> f64 {
         let [low, high] = self.seen;
-        let beyond = contribution - contribution.clamp(low, high);
+        match contribution {
+            v if v < low && down => v - low,
+            v if v > high && up => v - high,
+            _ => 0.0,
+        }
+    }
+
+    /// What is to be taken off a contribution that goes so far beyond, with a standard error.
+    fn excess(&self, beyond: f64, error: impl FnOnce() -> f64) -> f64 {
+        let [low, high] = self.seen;
         if beyond == 0.0 {
             return 0.0;
         }
@@ -137,7 +147,9 @@ impl Model {
         for (k, added) in self.effects.iter().enumerate() {
             let Some(reach) = added.reach.iter().find(|r| r.channel == target.name) else { continue };
             let part = self.part(context, target, &all, k)?;
-            if part.iter().all(|p| (reach.seen[0]..=reach.seen[1]).contains(p)) {
+            let runs_on = added.placed.effect.runs_on(&added.placed.instance);
+            let beyond: Vec<f64> = part.iter().map(|p| reach.beyond(*p, runs_on)).collect();
+            if beyond.iter().all(|b| *b == 0.0) {
                 continue;
             }
             let moved = added.moved(|i, to| self.varied(context, target, |placed| placed[k].shape[i] = to));
@@ -146,8 +158,8 @@ impl Model {
                 (of_shapes + variance(whole.0, k, &reach.covariance, row)).sqrt()
             };
             let out = out.get_or_insert_with(|| vec![0.0; n]);
-            for (row, (o, p)) in out.iter_mut().zip(&part).enumerate() {
-                *o += reach.excess(*p, || error(row));
+            for (row, (o, b)) in out.iter_mut().zip(&beyond).enumerate() {
+                *o += reach.excess(*b, || error(row));
             }
         }
         out
@@ -206,7 +218,7 @@ mod tests {
     #[test]
     fn what_was_seen_is_not_touched() {
         for inside in [-0.5, -0.2, 0.0, 0.1] {
-            assert_eq!(reach().excess(inside, || 100.0), 0.0);
+            assert_eq!(reach().beyond(inside, [true; 2]), 0.0);
         }
     }
 
@@ -214,10 +226,17 @@ mod tests {
     fn an_extrapolation_is_believed_as_far_as_its_parameters_carry_it() {
         // sure parameters: all of it; as open as what was seen is large: half of it; wide open: next to nothing
         let beyond = -2.0;
-        let left = |error: f64| beyond - reach().excess(beyond - 0.5, || error);
+        let left = |error: f64| beyond - reach().excess(reach().beyond(beyond - 0.5, [true; 2]), || error);
         assert_eq!(left(0.0), beyond);
         assert!((left(0.5) - 0.5 * beyond).abs() < 1e-12);
         assert!(left(50.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn what_does_not_run_on_is_no_extrapolation() {
+        assert_eq!(reach().beyond(-2.0, [false, true]), 0.0);
+        assert!((reach().beyond(2.0, [false, true]) - 1.9).abs() < 1e-12);
+        assert_eq!(reach().beyond(2.0, [true, false]), 0.0);
     }
 
     /// Constant current, a battery whose parabola turns at 0.1 Ah; on its own run no more than 0.1 Ah were drawn.

@@ -35,7 +35,7 @@ pub fn quantum(y: &[f64]) -> f64 {
     steps[steps.len() / 20]
 }
 
-/// Usual distance of two readings, s.
+/// Usual distance of two readings, s; one of a single reading.
 pub(crate) fn usual_step(t: &[f64]) -> f64 {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     if steps.is_empty() { 1.0 } else { median(&mut steps) }

@@ -7,7 +7,7 @@
 //! Reference: first-order motor model, Beharie 2013, section 5.7.3; least absolute deviations, Huber & Ronchetti 2009, chapter 7.
 
 use crate::log::Log;
-use crate::numeric::order::{median, quantum};
+use crate::numeric::order::{median, quantum, usual_step};
 use crate::signal::bad::Curve;
 use crate::signal::start::start_pulse;
 use crate::signal::stretches::{GAP, STILL_US, bridge, starts};
@@ -17,6 +17,8 @@ use std::ops::Range;
 const HELD: usize = 6;
 /// Time constants that are tried, s: quick rotors of toys to large ones that coast.
 const CONSTANTS: (f64, f64, usize) = (0.02, 3.0, 24);
+/// Share of a row's step that stands for a rotor that arrives at once.
+const AT_ONCE: f64 = 0.2;
 /// Time constants that are tried between the neighbours of the best one.
 const FINE: usize = 9;
 /// Standard deviations by which the level of a held command may be off.
@@ -41,6 +43,8 @@ pub(crate) struct Drive {
     pub(crate) speed: Vec<f64>,
     /// Standard deviation of that on every row, rev/min, where the rotor has no other cause to turn otherwise.
     pub(crate) sd: Vec<f64>,
+    /// Speed that the curve has at its command, rev/min.
+    pub(crate) asked: Vec<f64>,
     /// Speed that it goes to, rev/min: where a command is held long enough the speed that is reached there, else that of the curve.
     goal: Vec<f64>,
     /// Rows on which more of the way is left than the speed of a held command scatters by, and the motor is on.
@@ -76,7 +80,9 @@ impl Drive {
         };
         let (from, to, n) = CONSTANTS;
         let ratio = f64::powf(to / from, 1.0 / (n - 1) as f64);
-        let constants: Vec<f64> = (0..n).map(|k| from * ratio.powi(k as i32)).collect();
+        let at_once = AT_ONCE * usual_step(t);
+        let constants: Vec<f64> =
+            std::iter::once(at_once).filter(|tau| *tau < from).chain((0..n).map(|k| from * ratio.powi(k as i32))).collect();
         let best = |among: &[f64], of: &dyn Fn(f64) -> f64| {
             among.iter().map(|tau| (of(*tau), *tau)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
         };
@@ -96,8 +102,8 @@ impl Drive {
         let jump = |i: usize| (goal[i] - goal[i.saturating_sub(1)]).abs();
         let sd = (0..goal.len()).map(|i| usual.hypot(ON_ITS_WAY * (goal[i] - speed_made[i])).hypot(0.5 * jump(i))).collect();
         let on_its_way = (0..goal.len()).map(|i| turns(pulse[i]) && (goal[i] - speed_made[i]).abs() > usual).collect();
-        let goal = reached(goal, &stretches, speed);
-        Some(Self { speed: speed_made, sd, goal, on_its_way, constants: [up, down], usual })
+        let (asked, goal) = (goal.clone(), reached(goal, &stretches, speed));
+        Some(Self { speed: speed_made, sd, asked, goal, on_its_way, constants: [up, down], usual })
     }
 
     /// By how much a reading is off what the command makes, rev/min: as its level is, and because the way began at another moment. The latter is

@@ -6,7 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, step 2 (noise within plateaus).
 
 use super::settle;
-use crate::numeric::order::median;
+use crate::numeric::order::usual_step;
 
 /// Change of the command from row to row, us, below which it holds still.
 pub(crate) const STILL_US: f64 = 0.5;
@@ -49,14 +49,13 @@ const ON_ITS_WAY: usize = 20;
 const RESTS: f64 = 0.05;
 
 /// What meters and a command that is let go slowly add to the latency of a rotor, s.
-const LATE_S: f64 = 0.05;
+pub(crate) const LATE_S: f64 = 0.05;
 /// Rows by which a command's instant and a reading's may be off.
 const LATE_ROWS: f64 = 3.0;
 
 /// Longest time by which a rotor may follow every command late, s.
 pub(crate) fn latest(t: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    LATE_ROWS * if steps.is_empty() { 0.0 } else { median(&mut steps) } + LATE_S
+    LATE_ROWS * usual_step(t) + LATE_S
 }
 
 /// Longest programme by which a controller starts a motor, s: aligning the rotor and speeding it up blindly takes up to a second or two.
@@ -65,8 +64,7 @@ const PROGRAMME_S: f64 = 3.0;
 /// Rows before which a log says nothing of the rotor, with the speed there: those after gaps in time, and the first where it is on its way
 /// already. One that has arrived stood as its command says.
 pub(crate) fn blocks(t: &[f64], rpm: &[f64], on_its_way: bool) -> Vec<(usize, f64)> {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    let usual = median(&mut steps);
+    let usual = usual_step(t);
     let begins = |i: &usize| t[*i] - t[*i - 1] > GAP * usual && rpm[*i].is_finite();
     let first = (on_its_way && rpm.first().is_some_and(|v| v.is_finite())).then_some(0);
     first.into_iter().chain((1..rpm.len()).filter(begins)).map(|i| (i, rpm[i])).collect()
@@ -88,8 +86,7 @@ pub(crate) fn starts(t: &[f64], rpm: &[f64], on_its_way: bool) -> Vec<(usize, f6
 /// Rows in which a rotor still stands although it is told to turn, and then does: when it sets out is the programme of its controller, which
 /// no command tells. `driven` and `stands` are of rows. What sets out within `latest` s is only late, as on every step.
 pub(crate) fn held_back(t: &[f64], latest: f64, driven: impl Fn(usize) -> bool, stands: impl Fn(usize) -> bool) -> Vec<usize> {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    let gap = GAP * median(&mut steps);
+    let gap = GAP * usual_step(t);
     let rested = |i: usize| i == 0 || t[i] - t[i - 1] > gap || !driven(i - 1) && stands(i - 1);
     let told = (0..t.len()).filter(|i| driven(*i) && stands(*i) && rested(*i));
     let programme = latest..=PROGRAMME_S;

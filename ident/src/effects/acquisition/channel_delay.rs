@@ -43,6 +43,10 @@ impl Effect for ChannelDelay {
         Stage::Output
     }
 
+    fn runs_on(&self, _: &Instance) -> [bool; 2] {
+        [false, false]
+    }
+
     fn instances(&self, context: &Context) -> Vec<Instance> {
         meters(context)
             .iter()

@@ -54,6 +54,10 @@ impl Effect for ChannelFilter {
         Stage::Output
     }
 
+    fn runs_on(&self, _: &Instance) -> [bool; 2] {
+        [false, false]
+    }
+
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let forms: &[&str] = if operator::abrupt(context) { &FORMS[2..] } else { &FORMS[..2] };
         let of_meters = meters(context);

@@ -48,6 +48,10 @@ impl Effect for SampleHold {
         Stage::Hold
     }
 
+    fn runs_on(&self, _: &Instance) -> [bool; 2] {
+        [false, false]
+    }
+
     fn instances(&self, context: &Context) -> Vec<Instance> {
         if context.time_is_row {
             return Vec::new();

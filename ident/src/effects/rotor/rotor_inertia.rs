@@ -55,6 +55,11 @@ impl Effect for RotorInertia {
         Stage::Term
     }
 
+    /// A rotor that coasts takes what one takes that stands, and no less.
+    fn runs_on(&self, instance: &Instance) -> [bool; 2] {
+        [!is_one_way(instance), true]
+    }
+
     fn instances(&self, context: &Context) -> Vec<Instance> {
         if context.time_is_row || context.rpm.is_empty() {
             return Vec::new();

@@ -11,7 +11,7 @@ use crate::channel::Context;
 use crate::effects::design::TargetDesign;
 use crate::effects::rotor::coasting::{Coasting, Rotor};
 use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, speeds};
-use crate::signal::stretches::{CALM_US, latest};
+use crate::signal::stretches::{CALM_US, LATE_S, latest};
 
 /// See the module.
 pub(crate) struct SpinupLag;
@@ -29,9 +29,6 @@ const QUICK: f64 = 0.04;
 /// Time in which the air alone halves the full speed, s: 0.05 s of a motor of three grams at 40 000 rev/min, whose inertia is 6e-8 kg.m2 at
 /// 0.0055 N.m, to that of a flywheel.
 const AIR: (f64, f64) = (0.01, 60.0);
-/// What meters and a command that is let go slowly add to the latency, s.
-const LATE: f64 = 0.05;
-
 /// Logarithm of how many times longer a rotor takes on its way down than on its way up, and its standard deviation: from one time, where
 /// the controller brakes, to two, where the air does (0.0125 and 0.025 s in RotorS: Furrer et al. 2016), so that both ends are one standard
 /// deviation out. A run that only climbs says nothing of the way down.
@@ -69,6 +66,10 @@ impl Effect for SpinupLag {
         Stage::Output
     }
 
+    fn runs_on(&self, _: &Instance) -> [bool; 2] {
+        [false, false]
+    }
+
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let channels = speeds(context);
         if context.time_is_row || channels.is_empty() {
@@ -83,7 +84,7 @@ impl Effect for SpinupLag {
         let dt = context.step();
         if !instance.form.is_empty() {
             let base = dt.max(QUICK);
-            let (up, late) = ([0.6, 1.5].map(|k| k * base), [0.4, 1.6].map(|k| f64::min(k * dt, 0.5 * dt + LATE)));
+            let (up, late) = ([0.6, 1.5].map(|k| k * base), [0.4, 1.6].map(|k| f64::min(k * dt, 0.5 * dt + LATE_S)));
             let tau_up = Shape { name: "tau_up", unit: "s", range: (0.02 * dt, (100.0 * dt).max(5.0)), starts: up.to_vec() };
             let tau_air = Shape { name: "tau_air", unit: "s", range: AIR, starts: vec![0.3, 1.0] };
             let friction = Shape { name: "friction", unit: "1/s", range: (0.0, 10.0), starts: vec![0.1] };

@@ -47,12 +47,14 @@ struct Witness {
     sd: Vec<f64>,
     /// The same on most rows.
     usual: f64,
+    /// How far above what it said the speed may be for all it knows, rev/min.
+    above: Vec<f64>,
 }
 
 impl Witness {
     fn new(said: Vec<f64>, sd: Vec<f64>) -> Self {
         let usual = median(&mut sd.clone());
-        Self { said, sd, usual }
+        Self { usual, above: vec![0.0; said.len()], said, sd }
     }
 }
 
@@ -127,7 +129,7 @@ impl Judge<'_> {
         let gone = |i: &usize| self.read[*i].is_finite() && self.low(best, *i).0 > HALF * depth;
         let rows: Vec<usize> = event.rows.clone().filter(gone).collect();
         let says_no = |w: &Witness| {
-            let able: Vec<usize> = rows.iter().copied().filter(|i| BACK * self.sd(w, *i) < HALF * depth).collect();
+            let able: Vec<usize> = rows.iter().copied().filter(|i| BACK * self.sd(w, *i) + w.above[*i] < HALF * depth).collect();
             let against = able.iter().filter(|i| self.low(w, **i).0 < HALF * depth).count();
             2 * against > able.len()
         };
@@ -261,9 +263,13 @@ fn others(witnesses: &Witnesses<'_>, name: &str, read: &[f64]) -> Option<Witness
     Some(Witness::new(said, sd))
 }
 
-/// The command and the rotor's own dynamics.
+/// The command and the rotor's own dynamics. A rotor that slows down is anywhere between what one time constant says and where it goes to: what
+/// it is at least is the lower of the two.
 fn drive(witnesses: &Witnesses<'_>, read: &[f64]) -> Option<Witness> {
-    Drive::of(witnesses.log, read).map(|d| Witness::new(d.speed, d.sd))
+    let drive = Drive::of(witnesses.log, read)?;
+    let least: Vec<f64> = drive.speed.iter().zip(&drive.asked).map(|(speed, asked)| speed.min(*asked)).collect();
+    let above = drive.speed.iter().zip(&least).map(|(speed, least)| speed - least).collect();
+    Some(Witness { above, ..Witness::new(least, drive.sd) })
 }
 
 /// What the load says of the speed that makes it.
