@@ -670,14 +670,15 @@ fn largest_reduction(context: &Context, candidate: &Candidate, held: &[Held], be
         .fold(0.0, f64::max)
 }
 
-/// Price of an effect: half a log of the effective sample for each parameter, and half a log of the grid that was searched.
+/// Price of an effect: half a log of the effective sample for each parameter that the run has to tell, and half a log of the grid that was searched.
 pub(crate) fn penalty(context: &Context, placed: &Placed, shares: &[f64]) -> f64 {
     let touched = context.targets.iter().zip(shares).filter(|(t, _)| placed.instance.touches(t.name));
     let n: f64 = touched.map(|(t, share)| t.rows.len() as f64 * t.weight * share).sum();
+    let priced = placed.effect.priced(context, &placed.instance);
     let shapes = placed.effect.shapes(context, &placed.instance);
-    let grid: usize = shapes.iter().map(|s| s.starts.len()).product();
+    let grid: usize = if priced > 0 { shapes.iter().map(|s| s.starts.len()).product() } else { 1 };
     let amplitudes = placed.effect.amplitudes(&placed.instance).len().min(placed.instance.channels.len().max(1));
-    0.5 * (shapes.len() + amplitudes) as f64 * n.max(2.0).ln() + (grid as f64).ln().max(0.0) * 0.5
+    0.5 * (priced + amplitudes) as f64 * n.max(2.0).ln() + (grid as f64).ln().max(0.0) * 0.5
 }
 
 /// Distance between a channel's lowest and highest reading.

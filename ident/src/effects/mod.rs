@@ -195,6 +195,10 @@ pub trait Effect: Sync {
     fn prior(&self, _context: &Context, _instance: &Instance, _shape: &[f64]) -> f64 {
         0.0
     }
+    /// How many of its shapes a run has to pay for: not those that are taken, nor those of which all that is known was known before.
+    fn priced(&self, context: &Context, instance: &Instance) -> usize {
+        self.shapes(context, instance).len()
+    }
     /// Linear parameters.
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude>;
     /// Changes the design of one target that this instance touches.

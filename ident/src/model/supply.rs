@@ -12,6 +12,8 @@
 use super::read::{Refusal, finite, refusal};
 use super::{AddedEffect, Model, load_unit};
 use crate::channel::{Context, Relation, Target};
+use crate::effects::placed::Placed;
+use crate::effects::supply::supply_sag;
 use crate::effects::supply::supply_voltage::{OF_CURRENT, OF_SPEED};
 use crate::model::leftover::{along, binned};
 use crate::numeric::digits;
@@ -132,7 +134,12 @@ impl Model {
 
     /// Whether no effect of the model says already how a channel follows the voltage.
     fn follows_by_itself(&self, target: &Target) -> bool {
-        !self.effects.iter().any(|e| e.placed.effect.id() == "supply_voltage" && e.placed.instance.touches(target.name))
+        let says = |p: &Placed| match p.effect.id() {
+            "supply_voltage" => p.instance.touches(target.name),
+            "supply_sag" => supply_sag::follows(&p.instance, target.name),
+            _ => false,
+        };
+        !self.effects.iter().any(|e| says(&e.placed))
     }
 
     /// Positions of the effects that speak of the voltage and of this channel.

@@ -9,7 +9,7 @@
 //! Units: kg.m2, A.s3/rad2.
 //! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt); first-order rotor, section 5.7.3 (dw/dt = (goal - w)/tau).
 
-use crate::channel::{Context, Relation};
+use crate::channel::{Context, Relation, STANDSTILL};
 use crate::effects::design::{Label, TargetDesign};
 use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
 use crate::numeric::order::{median, usual_step};
@@ -66,10 +66,11 @@ impl Effect for RotorInertia {
         }
         let (torque, current) = (present(context, &["torque_nm"]), present(context, &["current_a"]));
         let both = present(context, &["torque_nm", "current_a"]);
+        // of two forms that a run cannot tell apart the first one stands: no current below that of a motor at rest is claimed
         // where the speed steps between rows, meters that average over a row see the step in the row in which it ends
-        let over = operator::commands_abruptly(context).then_some([OVER_THE_ROW, OVER_THE_ROW_ONE_WAY]);
-        let of_command = driven(context).is_some().then_some([DRIVEN, DRIVEN_ONE_WAY]);
-        let of_all: Vec<&str> = [Some(["", ONE_WAY]), over].into_iter().flatten().flatten().collect();
+        let over = operator::commands_abruptly(context).then_some([OVER_THE_ROW_ONE_WAY, OVER_THE_ROW]);
+        let of_command = driven(context).is_some().then_some([DRIVEN_ONE_WAY, DRIVEN]);
+        let of_all: Vec<&str> = [Some([ONE_WAY, ""]), over].into_iter().flatten().flatten().collect();
         let of_torque: Vec<&str> = of_all.iter().copied().filter(|form| !form.ends_with(ONE_WAY)).collect();
         let of_current: Vec<&str> = of_all.iter().copied().chain(of_command.into_iter().flatten()).collect();
         let of_both = if current.is_empty() { &of_torque } else { &of_all };
@@ -96,6 +97,11 @@ impl Effect for RotorInertia {
     fn prior(&self, context: &Context, _: &Instance, shape: &[f64]) -> f64 {
         let ([drag], Some(balance)) = (shape, balance(context)) else { return 0.0 };
         -0.5 * ((drag / balance).max(f64::MIN_POSITIVE).ln() / ABOUT_BALANCE).powi(2)
+    }
+
+    /// A run on which nothing coasts says nothing of it.
+    fn priced(&self, context: &Context, instance: &Instance) -> usize {
+        usize::from(is_one_way(instance) && may_coast(context))
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
@@ -166,6 +172,15 @@ fn balance(context: &Context) -> Option<f64> {
         (COAST.0..COAST.1).contains(&drag).then_some(drag)
     };
     *context.facts.balance.get_or_init(found)
+}
+
+/// Whether a row falls as fast as a coasting rotor may for all that is known before.
+fn may_coast(context: &Context) -> bool {
+    let Some(balance) = balance(context) else { return true };
+    let (rate, least) =
+        (driven(context).cloned().unwrap_or_else(|| acceleration(context)), balance * (-2.0 * ABOUT_BALANCE).exp());
+    let coasts = |(rate, rpm): (&f64, &f64)| *rpm > STANDSTILL && *rate < -least * (rpm * std::f64::consts::TAU / 60.0).powi(2);
+    rate.iter().zip(&context.rpm).any(coasts)
 }
 
 fn is_one_way(instance: &Instance) -> bool {

@@ -7,6 +7,6 @@
 
 pub(super) mod battery_discharge;
 pub(super) mod current_limit;
-pub(super) mod supply_sag;
+pub(crate) mod supply_sag;
 pub(crate) mod supply_voltage;
 pub(super) mod thermal_derate;

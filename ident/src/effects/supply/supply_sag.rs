@@ -4,11 +4,14 @@
 //! What can go wrong: without a measured voltage it cannot be told from a lower KV, and is a suspect only; without a measured
 //! current the resistance is as uncertain as the efficiency that the current is estimated with. Where no torque was measured either, a
 //! propeller's current goes with the cube of its speed, and how many amperes it is stays unknown: the sag is told by the speed.
-//! Units: ohm; V for each (1000 rev/min)^3.
+//! The same power from a lower voltage is more current: form `same_power`, for a current that bends away from its cubic. Its reference is the
+//! median voltage of the run, and only says at which voltage the cubic stands.
+//! Units: ohm; V for each (1000 rev/min)^3; exponent 1; reference V.
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
 
 use crate::channel::{Context, Relation};
 use crate::effects::design::TargetDesign;
+use crate::effects::supply::supply_voltage;
 use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present};
 use crate::numeric::order::median;
 
@@ -19,6 +22,13 @@ pub(crate) struct SupplySag;
 const UNSEEN: &str = "unseen";
 /// Form of a sag whose current nobody measured, nor a torque from which it follows.
 const BY_SPEED: &str = "by_speed";
+/// Form of a sag that the current at a speed shows, too.
+const SAME_POWER: &str = "same_power";
+
+/// Whether an instance says how a channel follows the voltage that was measured, on any run.
+pub(crate) fn follows(instance: &Instance, channel: &str) -> bool {
+    instance.form == SAME_POWER && channel != "voltage_v" && instance.touches(channel)
+}
 
 impl Effect for SupplySag {
     fn id(&self) -> &'static str {
@@ -28,7 +38,7 @@ impl Effect for SupplySag {
     fn about(&self) -> About {
         About {
             title: "Supply voltage sags with the current",
-            equation: "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a, current_a += current_rise * current_a rpm^3, or voltage_v = V0 - sag * rpm^3 (no current measured)",
+            equation: "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a, current_a += current_rise * current_a rpm^3, or voltage_v = V0 - sag * rpm^3 (no current measured); same power: current_a *= (voltage_v / reference)^-exponent",
             source: "Ohm's law; Beharie 2013, Eq. 5.11 as corrected",
             depends_on: &["current_a"],
             signature: "the voltage residual mirrors the current; thrust(rpm) and torque(rpm) hold",
@@ -67,7 +77,9 @@ impl Effect for SupplySag {
                 channels.extend(present(context, &["current_a"]));
                 channels.extend(crate::effects::speeds(context));
             }
-            vec![Instance::new(&channels, "")]
+            let both = present(context, &["voltage_v", "current_a"]);
+            let of_power = (!context.against_model && both.len() == 2).then(|| Instance::new(&both, SAME_POWER));
+            std::iter::once(Instance::new(&channels, "")).chain(of_power).collect()
         }
     }
 
@@ -79,6 +91,9 @@ impl Effect for SupplySag {
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
+        if instance.form == SAME_POWER {
+            return supply_voltage::shapes(context, supply_voltage::OF_CURRENT);
+        }
         if instance.touches("voltage_v") && instance.channels.len() < 2 {
             return Vec::new();
         }
@@ -95,7 +110,7 @@ impl Effect for SupplySag {
             return vec![Amplitude { name: "sag", unit: "V/krpm3" }];
         }
         let mut out = vec![Amplitude { name: "resistance", unit: "ohm" }];
-        if instance.touches("current_a") {
+        if instance.touches("current_a") && instance.form != SAME_POWER {
             out.push(Amplitude { name: "current_rise", unit: "1/krpm3" });
         }
         out
@@ -105,6 +120,12 @@ impl Effect for SupplySag {
         if instance.form == BY_SPEED {
             if design.relation == Relation::Voltage {
                 design.add(position, 0, context.rpm.iter().map(|r| -(r / 1000.0).powi(3)).collect());
+            }
+            return;
+        }
+        if instance.form == SAME_POWER && design.relation == Relation::Current {
+            if let [exponent, reference] = shape {
+                supply_voltage::scale(context, -exponent, *reference, design);
             }
             return;
         }
@@ -123,13 +144,23 @@ impl Effect for SupplySag {
         design.add(position, 0, current.iter().map(|i| -i).collect());
     }
 
-    /// A current that was only estimated is known to a seventh.
+    fn prior(&self, _: &Context, instance: &Instance, shape: &[f64]) -> f64 {
+        if instance.form == SAME_POWER { supply_voltage::log_prior(supply_voltage::OF_CURRENT, shape) } else { 0.0 }
+    }
+
+    /// The reference is taken, not sought.
+    fn priced(&self, context: &Context, instance: &Instance) -> usize {
+        self.shapes(context, instance).len() - usize::from(instance.form == SAME_POWER)
+    }
+
+    /// A current that was only estimated is known to a seventh. The reference is no finding.
     fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
         if context.draw().is_some_and(|(_, measured)| !measured) {
             for e in &mut fitted {
                 e.se = e.se.hypot(e.value / 7.0);
             }
         }
+        fitted.retain(|e| e.name != supply_voltage::REFERENCE);
         fitted
     }
 

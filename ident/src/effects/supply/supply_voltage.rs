@@ -91,12 +91,7 @@ impl Effect for SupplyVoltage {
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
-        let usual = context.voltage.as_ref().map_or(1.0, |v| median(&mut v.clone()));
-        vec![
-            Shape { name: "exponent", unit: "1", range: EXPONENTS, starts: vec![known(instance).0] },
-            // known, not fitted: it stands in the model with the rest
-            Shape { name: "reference", unit: "V", range: (usual, usual), starts: vec![usual] },
-        ]
+        shapes(context, known(instance))
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
@@ -104,25 +99,52 @@ impl Effect for SupplyVoltage {
     }
 
     fn prior(&self, _: &Context, instance: &Instance, shape: &[f64]) -> f64 {
-        let ((mean, sd), Some(exponent)) = (known(instance), shape.first()) else { return 0.0 };
-        -0.5 * ((exponent - mean) / sd).powi(2)
+        log_prior(known(instance), shape)
+    }
+
+    /// The reference is taken, not sought.
+    fn priced(&self, _: &Context, _: &Instance) -> usize {
+        1
     }
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
-        let (Some(voltage), [exponent, reference]) = (&context.voltage, shape) else { return };
+        let [exponent, reference] = shape else { return };
         let exponent = if instance.form == CURRENT { -exponent } else { *exponent };
-        let factor: Vec<f64> = voltage.iter().map(|v| (v / reference).max(0.1).powf(exponent)).collect();
-        design.scale(&factor);
+        scale(context, exponent, *reference, design);
     }
 
     /// The reference is no finding.
     fn report(&self, _: &Context, _: &Instance, fitted: Vec<Estimate>) -> Vec<Estimate> {
-        fitted.into_iter().filter(|e| e.name != "reference").collect()
+        fitted.into_iter().filter(|e| e.name != REFERENCE).collect()
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
         fitted.iter().any(|e| e.name == "exponent" && e.value > 0.0)
     }
+}
+
+/// Name of the voltage at which a curve stands.
+pub(crate) const REFERENCE: &str = "reference";
+
+/// An exponent of the voltage of which that much is known, and the reference.
+pub(crate) fn shapes(context: &Context, known: (f64, f64)) -> Vec<Shape> {
+    let usual = context.voltage.as_ref().map_or(1.0, |v| median(&mut v.clone()));
+    vec![
+        Shape { name: "exponent", unit: "1", range: EXPONENTS, starts: vec![known.0] },
+        // known, not fitted: it stands in the model with the rest
+        Shape { name: REFERENCE, unit: "V", range: (usual, usual), starts: vec![usual] },
+    ]
+}
+
+/// What is known of the exponent before any run, nats.
+pub(crate) fn log_prior((mean, sd): (f64, f64), shape: &[f64]) -> f64 {
+    shape.first().map_or(0.0, |exponent| -0.5 * ((exponent - mean) / sd).powi(2))
+}
+
+/// Scales a design by a power of the measured voltage over the reference.
+pub(crate) fn scale(context: &Context, power: f64, reference: f64, design: &mut TargetDesign) {
+    let Some(voltage) = &context.voltage else { return };
+    design.scale(&voltage.iter().map(|v| (v / reference).max(0.1).powf(power)).collect::<Vec<f64>>());
 }
 
 /// Form of the current.

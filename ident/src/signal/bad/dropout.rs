@@ -159,7 +159,8 @@ impl Judge<'_> {
     /// First row of its block from which on the reading is half as low as on this one: while the rotor is on its way nobody can tell at once.
     fn begins(&self, row: usize, depth: f64, witness: &Witness) -> usize {
         let block = self.block(row);
-        let low = |i: &usize| !self.read[*i].is_finite() || witness.said[*i] - self.read[*i] > HALF * depth;
+        // on the row of a step the rotor has made a small part of its way, of which a lost mark shows nothing
+        let low = |i: &usize| !self.read[*i].is_finite() || witness.said[*i] - self.read[*i] > HALF * depth.min(witness.said[*i]);
         (block..row).rev().take(REACH).take_while(low).last().unwrap_or(row)
     }
 
