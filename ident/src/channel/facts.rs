@@ -8,6 +8,17 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+/// Deceleration at which no current is left of a rotor that slows down: drag omega^2 + friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Coast {
+    /// 1/rad.
+    pub(crate) drag: f64,
+    /// rad/s^2.
+    pub(crate) friction: f64,
+    /// All of it at the highest speed, rad/s^2.
+    pub(crate) at_top: f64,
+}
+
 /// What effects read off a log once and ask for again and again.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Facts {
@@ -29,8 +40,8 @@ pub(crate) struct Facts {
     pub(crate) winding: OnceLock<f64>,
     /// Angular acceleration on the way to where the command sends the rotor, rad/s^2; nothing without a command.
     pub(crate) driven: OnceLock<Option<Vec<f64>>>,
-    /// Deceleration over the square of the speed at which no current is left, 1/rad; nothing where the run does not say.
-    pub(crate) balance: OnceLock<Option<f64>>,
+    /// When a rotor that slows down draws nothing; nothing where the run does not say.
+    pub(crate) balance: OnceLock<Option<Coast>>,
     /// Share of the voltage that goes with each Ah drawn, 1/Ah.
     pub(crate) discharge: OnceLock<f64>,
     /// Slope of the static speed curve on each row, rev/min per us.

@@ -28,7 +28,7 @@ mod target;
 
 #[cfg(test)]
 pub(crate) use facts::Remembered;
-pub(crate) use facts::{Draw, Facts, Question, Rail, SawTooth};
+pub(crate) use facts::{Coast, Draw, Facts, Question, Rail, SawTooth};
 pub use relation::{DIFFERENCES, Relation, is_contrast, unit_of};
 pub use target::Target;
 

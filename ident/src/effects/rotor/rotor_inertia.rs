@@ -2,14 +2,14 @@
 //!
 //! What it is: torque_nm += inertia * domega/dt, current_a += power_gain * omega * domega/dt. The supply pays for the power that goes into the
 //! rotor: J omega domega/dt = V dI. The acceleration is that of the measured speed, or what a rotor has that is off its command's speed.
-//! Most controllers let no current flow back (forms `one_way`): a rotor that falls faster than the air alone brakes it, domega/dt below
-//! -coast_drag omega^2, takes what one takes that stands.
+//! Most controllers let no current flow back (forms `one_way`): a rotor that falls faster than air and friction alone brake it, domega/dt below
+//! -(coast_drag omega^2 + coast_friction), takes what one takes that stands.
 //! What can go wrong: shows only in transients; a lag between the channels looks alike, and so does, with the other sign, a current that a turning
 //! rotor draws beyond its curve: a negative inertia is refused, but against a declared model, whose rotor may have been heavier.
 //! Units: kg.m2, A.s3/rad2.
 //! Reference: errata to Beharie 2013, Eq. 2.21 (Q = k_Q w^2 + J dw/dt); first-order rotor, section 5.7.3 (dw/dt = (goal - w)/tau).
 
-use crate::channel::{Context, Relation, STANDSTILL};
+use crate::channel::{Coast, Context, Relation, STANDSTILL};
 use crate::effects::design::{Label, TargetDesign};
 use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, operator, present};
 use crate::numeric::order::{median, usual_step};
@@ -89,14 +89,19 @@ impl Effect for RotorInertia {
         if !is_one_way(instance) {
             return Vec::new();
         }
-        let starts =
-            balance(context).map_or_else(|| vec![3e-4, 1e-3, 3e-3, 1e-2, 3e-2], |drag| vec![drag, 0.4 * drag, 2.5 * drag]);
-        vec![Shape { name: COAST_DRAG, unit: "1/rad", range: COAST, starts }]
+        let known = balance(context);
+        let drags = known.map_or_else(|| vec![3e-4, 1e-3, 3e-3, 1e-2, 3e-2], |b| vec![b.drag, 0.4 * b.drag, 2.5 * b.drag]);
+        vec![
+            Shape { name: COAST_DRAG, unit: "1/rad", range: COAST, starts: drags },
+            Shape { name: COAST_FRICTION, unit: "rad/s2", range: FRICTION, starts: vec![known.map_or(0.0, |b| b.friction)] },
+        ]
     }
 
     fn prior(&self, context: &Context, _: &Instance, shape: &[f64]) -> f64 {
-        let ([drag], Some(balance)) = (shape, balance(context)) else { return 0.0 };
-        -0.5 * ((drag / balance).max(f64::MIN_POSITIVE).ln() / ABOUT_BALANCE).powi(2)
+        let ([drag, friction], Some(known)) = (shape, balance(context)) else { return 0.0 };
+        let of_drag = (drag / known.drag).max(f64::MIN_POSITIVE).ln() / ABOUT_BALANCE;
+        let of_friction = (friction - known.friction) / (ABOUT_BALANCE * known.friction.max(LEAST_FRICTION * known.at_top));
+        -0.5 * (of_drag.powi(2) + of_friction.powi(2))
     }
 
     /// A run on which nothing coasts says nothing of it.
@@ -117,8 +122,10 @@ impl Effect for RotorInertia {
         let of_power = design.relation == Relation::Current;
         if of_power {
             let omega: Vec<f64> = context.rpm.iter().map(|rpm| rpm * std::f64::consts::TAU / 60.0).collect();
-            let coast = |i: usize| shape.first().is_some_and(|drag| of_row[i] < -drag * omega[i].powi(2));
-            let coasts: Vec<bool> = (0..omega.len()).map(coast).collect();
+            let coasts: Vec<bool> = match shape {
+                [drag, friction] => of_row.iter().zip(&omega).map(|(a, w)| *a < -(drag * w * w + friction)).collect(),
+                _ => vec![false; omega.len()],
+            };
             of_row.iter_mut().zip(&omega).zip(&coasts).for_each(|((a, w), coasts)| *a *= if *coasts { 0.0 } else { *w });
             stand_still(design, &context.rpm, &coasts);
         }
@@ -129,7 +136,7 @@ impl Effect for RotorInertia {
     /// What one takes that stands is no inertia where none is seen on the way up.
     fn plausible(&self, context: &Context, instance: &Instance, fitted: &[Estimate]) -> bool {
         let seen = !is_one_way(instance) || fitted.iter().any(|e| e.name == "power_gain" && e.value > 3.0 * e.se);
-        let mut taken = fitted.iter().filter(|e| e.name != COAST_DRAG);
+        let mut taken = fitted.iter().filter(|e| ![COAST_DRAG, COAST_FRICTION].contains(&e.name.as_str()));
         seen && (context.against_model || taken.clone().all(|e| e.value > -2.0 * e.se) && taken.any(|e| e.value > 0.0))
     }
 }
@@ -142,19 +149,26 @@ const DRIVEN: &str = "driven";
 const ONE_WAY: &str = "one_way";
 const OVER_THE_ROW_ONE_WAY: &str = "over_the_row_one_way";
 const DRIVEN_ONE_WAY: &str = "driven_one_way";
-/// Its parameter, of no other form.
+/// Their parameters, of no other form.
 const COAST_DRAG: &str = "coast_drag";
+const COAST_FRICTION: &str = "coast_friction";
 /// Deceleration of a rotor that nothing drives over the square of its speed, 1/rad: its torque's factor over its inertia. From a disc of
 /// a boat's screw to a bare blade of a toy.
 const COAST: (f64, f64) = (1e-4, 0.1);
+/// What friction and the motor's losses add to that, rad/s^2: up to that of a toy's rotor, which stands within a tenth of a second.
+const FRICTION: (f64, f64) = (0.0, 5000.0);
 
-/// Standard deviation of the logarithm of a coasting rotor's drag about that: the winding's share in the two is not the same, and the efficiency
-/// of motors of this size goes from 0.65 to 0.85.
+/// Standard deviation of the logarithm of a coasting rotor's drag about its balance: the winding's share in the two is not the same, and the
+/// efficiency of motors of this size goes from 0.65 to 0.85. Of the friction likewise, but no better than a part of the whole at full speed.
 const ABOUT_BALANCE: f64 = 0.27;
+const LEAST_FRICTION: f64 = 0.02;
+
+/// Parts of the range of speeds at which the balance is taken.
+const PARTS: usize = 8;
 
 /// Where no current is left of a rotor that slows down: what its speed draws, over what its acceleration adds to that, by the held rows and those
 /// on the way up. A run that never coasts tells a coasting rotor so, and no other way.
-fn balance(context: &Context) -> Option<f64> {
+fn balance(context: &Context) -> Option<Coast> {
     let found = || {
         let target = context.targets.iter().find(|t| t.relation == Relation::Current)?;
         let rate = driven(context).cloned().unwrap_or_else(|| acceleration(context));
@@ -168,19 +182,25 @@ fn balance(context: &Context) -> Option<f64> {
         let rising = readings().map(|(i, y)| (rate[*i] * omega(*i), y - drawn(omega(*i))));
         let (added, squares) = rising.filter(|(power, _)| *power > 0.0).fold((0.0, 0.0), |s, (p, y)| (s.0 + p * y, s.1 + p * p));
         let top = target.rows.iter().map(|i| omega(*i)).fold(0.0, f64::max);
-        let drag = (drawn(top) - drawn(0.0)) / top.powi(3) * squares / added;
-        (COAST.0..COAST.1).contains(&drag).then_some(drag)
+        let at = |omega: f64| (drawn(omega) - drawn(0.0)) / omega * squares / added;
+        let speeds = (1..=PARTS).map(|k| top * k as f64 / PARTS as f64);
+        let line = Normal::of_polynomial(1, speeds.map(|w| (w * w, at(w), 1.0))).solve()?.coefficients;
+        // what falls with the speed is no friction
+        let (drag, friction) = if line[0] > 0.0 { (line[1], line[0]) } else { (at(top) / top.powi(2), 0.0) };
+        (COAST.0..COAST.1).contains(&drag).then_some(Coast { drag, friction: friction.min(FRICTION.1), at_top: at(top) })
     };
     *context.facts.balance.get_or_init(found)
 }
 
 /// Whether a row falls as fast as a coasting rotor may for all that is known before.
 fn may_coast(context: &Context) -> bool {
-    let Some(balance) = balance(context) else { return true };
-    let (rate, least) =
-        (driven(context).cloned().unwrap_or_else(|| acceleration(context)), balance * (-2.0 * ABOUT_BALANCE).exp());
-    let coasts = |(rate, rpm): (&f64, &f64)| *rpm > STANDSTILL && *rate < -least * (rpm * std::f64::consts::TAU / 60.0).powi(2);
-    rate.iter().zip(&context.rpm).any(coasts)
+    let Some(known) = balance(context) else { return true };
+    let rate = driven(context).cloned().unwrap_or_else(|| acceleration(context));
+    let least = |rpm: f64| {
+        let omega = rpm * std::f64::consts::TAU / 60.0;
+        (known.drag * omega * omega + known.friction) * (-2.0 * ABOUT_BALANCE).exp()
+    };
+    rate.iter().zip(&context.rpm).any(|(rate, rpm)| *rpm > STANDSTILL && *rate < -least(*rpm))
 }
 
 fn is_one_way(instance: &Instance) -> bool {
@@ -265,7 +285,7 @@ mod tests {
         let columns = [("pulse_us", pulse), ("rpm", rpm), ("current_a", current)];
         let columns = columns.into_iter().map(|(name, values)| Column { name: name.into(), values }).collect();
         let context = Context::new(&Log { t, columns, ..Log::default() }, Some(1050.0));
-        let found = balance(&context).expect("a climb tells it");
+        let found = balance(&context).expect("a climb tells it").drag;
         assert!((found / (draw / gain)).ln().abs() < 0.2, "{found} for {}", draw / gain);
         let [of_one_way] = &RotorInertia.shapes(&context, &Instance::new(&["current_a"], DRIVEN_ONE_WAY))[..] else { panic!() };
         assert_eq!(of_one_way.starts.first(), Some(&found));
