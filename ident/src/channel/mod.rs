@@ -56,6 +56,8 @@ pub struct Context {
     pub rpm: Vec<f64>,
     /// Standard deviation of the consensus speed beyond that of its sensors where it was bridged, rev/min; empty where it was measured throughout.
     pub rpm_sd: Vec<f64>,
+    /// Rows on which no sensor read the speed while the rotor went from one to another, in order.
+    pub(crate) unread: Vec<usize>,
     /// Rows before which the log did not see the rotor, in order, and its speed there, rev/min: after gaps in time.
     pub(crate) starts: Vec<(usize, f64)>,
     /// How it was made.
@@ -174,7 +176,7 @@ impl Context {
     #[must_use]
     pub fn bare(log: &Log, start_pulse_us: Option<f64>) -> Self {
         let pulse = log.column("pulse_us").filter(|c| c.iter().any(|v| v.is_finite())).map(|c| bridge(&log.t, c));
-        let consensus::Fused { rpm, sd: rpm_sd, how: consensus } = consensus::of(log);
+        let consensus::Fused { rpm, sd: rpm_sd, unread, how: consensus } = consensus::of(log);
         let steady = stretches::steady(&log.t, pulse.as_deref(), &rpm, STILL_US);
         let calm = stretches::steady(&log.t, pulse.as_deref(), &rpm, CALM_US);
         let settling = if pulse.is_some() { stretches::settling(&log.t, &rpm, &steady) } else { Vec::new() };
@@ -187,6 +189,7 @@ impl Context {
             pulse,
             rpm,
             rpm_sd,
+            unread,
             consensus,
             set_aside: Vec::new(),
             current: None,

@@ -70,6 +70,12 @@ impl Relation {
         })
     }
 
+    /// Whether a channel is a load that the speed makes.
+    #[must_use]
+    pub fn is_of_speed(self) -> bool {
+        matches!(self, Self::Thrust | Self::Torque | Self::Current | Self::ThrustRms)
+    }
+
     /// Whether the relation only bears witness: no verdict speaks of it.
     #[must_use]
     pub fn is_evidence(self) -> bool {

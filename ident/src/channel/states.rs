@@ -20,9 +20,12 @@ pub(super) fn known(t: &[f64], rpm: &[f64], pulse: Option<&[f64]>, start_us: f64
     out
 }
 
-/// Rows at which a speed is taken as it was read, in order: of a rotor that is told to turn and does not yet.
+/// Rows at which a relation predicts nothing, in order: a rotor that is told to turn and does not yet, and loads of a speed that nobody read while the
+/// rotor went from one to another.
 pub(super) fn given(context: &Context, relation: Relation) -> Vec<usize> {
-    let Some(pulse) = context.pulse.as_ref().filter(|_| relation == Relation::SpeedFromPulse) else { return Vec::new() };
+    let Some(pulse) = context.pulse.as_ref().filter(|_| relation == Relation::SpeedFromPulse) else {
+        return if relation.is_of_speed() { context.unread.clone() } else { Vec::new() };
+    };
     let held_back = |row: &usize| {
         let stands = context.rpm.get(*row).is_some_and(|r| *r < STANDSTILL);
         stands && pulse[*row] >= context.start_pulse_us

@@ -34,8 +34,8 @@ pub struct Target {
     pub unclaimed: Vec<usize>,
     /// Rows whose samples were set aside as bad ones (see [`crate::signal::bad`]), in order.
     pub aside: Vec<usize>,
-    /// Rows at which a speed is taken as it was read, in order: of a rotor that is told to turn and does not yet. They are no samples here: what is
-    /// given is not predicted.
+    /// Rows at which nothing is predicted, in order; they are no samples here. Of a speed those of a rotor that is told to turn and does not yet: it is
+    /// taken as it was read. Of a load those on which nobody read the speed that makes it, while the rotor went from one to another.
     pub given: Vec<usize>,
     /// Error that a declared model is known to make, on every row of the log; empty without one.
     pub known: Vec<f64>,
@@ -95,7 +95,7 @@ impl Target {
     /// Whether predictions of a row are to be judged.
     #[must_use]
     pub fn claims(&self, row: usize) -> bool {
-        self.unclaimed.binary_search(&row).is_err() && self.aside.binary_search(&row).is_err()
+        [&self.unclaimed, &self.aside, &self.given].iter().all(|rows| rows.binary_search(&row).is_err())
     }
 
     /// A residual in the measure in which it is news: against a declared model less where that is known to be rough.
@@ -169,7 +169,7 @@ pub(super) fn all(log: &Log, context: &Context) -> Vec<Target> {
 pub(super) fn of(log: &Log, context: &Context, name: &'static str, counts: &dyn Fn(usize) -> bool) -> Option<Target> {
     let column = log.column(name)?;
     let relation = Relation::of(name, context.pulse.is_some())?;
-    let needs_rpm = matches!(relation, Relation::Thrust | Relation::Torque | Relation::Current | Relation::ThrustRms);
+    let needs_rpm = relation.is_of_speed();
     if needs_rpm && context.rpm.is_empty() {
         return None;
     }

@@ -26,6 +26,9 @@ pub struct Consensus {
 /// Fewest rows in a row without a speed that the command bridges: fewer are a straight line.
 const STRETCH: usize = 4;
 
+/// Part of the higher one by which two readings are far apart: halfway between them a line may be off by half of it, and a load by all of it.
+const FAR: f64 = 0.1;
+
 /// Share within which healthy sensors on real rigs agree (specification `rig.md`).
 const HEALTHY: f64 = 0.01;
 /// Share of the speed within which most readings of a healthy sensor stay about its gain.
@@ -41,6 +44,8 @@ pub(crate) struct Fused {
     pub(crate) rpm: Vec<f64>,
     /// Standard deviation beyond that of the sensors where the speed was bridged, rev/min; 0 where it was measured, empty where it was everywhere.
     pub(crate) sd: Vec<f64>,
+    /// Rows on which nobody read it while the rotor went from one speed to another, in order.
+    pub(crate) unread: Vec<usize>,
     /// How it was made.
     pub(crate) how: Consensus,
 }
@@ -50,7 +55,7 @@ pub(crate) fn of(log: &Log) -> Fused {
     let present: Vec<&str> =
         SPEED.into_iter().filter(|s| log.column(s).is_some_and(|c| c.iter().any(|v| v.is_finite()))).collect();
     if present.is_empty() {
-        return Fused { rpm: Vec::new(), sd: Vec::new(), how: Consensus::default() };
+        return Fused { rpm: Vec::new(), sd: Vec::new(), unread: Vec::new(), how: Consensus::default() };
     }
     let all = median_of(log, &present, &vec![1.0; present.len()]);
     let scale = all.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max).max(1.0);
@@ -73,13 +78,14 @@ pub(crate) fn of(log: &Log) -> Fused {
     }
     let dropped = remove_dropouts(&mut rpm, scale);
     let sd = bridge_by_command(log, &mut rpm);
+    let unread = unread(&rpm);
     let bridged_rows = dropped + sd.iter().filter(|sd| **sd > 0.0).count();
     let how = Consensus {
         channels: kept.iter().map(|s| (*s).to_owned()).collect(),
         excluded: excluded.iter().map(|s| (*s).to_owned()).collect(),
         bridged_rows,
     };
-    Fused { rpm: bridge(&log.t, &rpm), sd, how }
+    Fused { rpm: bridge(&log.t, &rpm), sd, unread, how }
 }
 
 /// Fills stretches without a speed with what the command makes of the rotor, moved to the readings at both ends: by what its level is off all along,
@@ -105,6 +111,15 @@ fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
         }
     }
     sd
+}
+
+/// Rows without a speed between readings that are far apart: a straight line says nothing of when the rotor went from the one to the other. None
+/// where the speed is logged on some rows only: there lines are all there is.
+fn unread(rpm: &[f64]) -> Vec<usize> {
+    let measured: Vec<usize> = (0..rpm.len()).filter(|i| rpm[*i].is_finite()).collect();
+    let far = |a: usize, b: usize| (rpm[a] - rpm[b]).abs() > FAR * rpm[a].max(rpm[b]);
+    let between = measured.windows(2).filter(|w| far(w[0], w[1])).flat_map(|w| w[0] + 1..w[1]);
+    if measured.len() * 2 > rpm.len() { between.collect() } else { Vec::new() }
 }
 
 /// One sensor of the speed.

@@ -173,7 +173,9 @@ impl Judge<'_> {
     fn falls(&self, row: usize, depth: f64, witness: &Witness) -> bool {
         let before: Vec<usize> = (self.block(row)..row).rev().filter(|i| self.read[*i].is_finite()).take(2 * AGAIN - 1).collect();
         let right = |i: &&usize| (witness.said[**i] - self.read[**i]).abs() < HALF * depth;
-        let fell = |i: &usize| (self.read[*i] - self.read[row]) - (witness.said[*i] - witness.said[row]) > HALF * depth;
+        // its first readings may be missing already: zeros are no readings
+        let Some(first) = (row..self.read.len()).find(|i| self.read[*i].is_finite()) else { return false };
+        let fell = |i: &usize| (self.read[*i] - self.read[first]) - (witness.said[*i] - witness.said[first]) > HALF * depth;
         before.iter().filter(right).count() >= AGAIN && before.iter().take(2).any(fell)
     }
 
