@@ -163,6 +163,8 @@ const FRICTION: (f64, f64) = (0.0, 5000.0);
 const ABOUT_BALANCE: f64 = 0.27;
 const LEAST_FRICTION: f64 = 0.02;
 
+/// rad/s of the unit in which a curve is solved for.
+const KILO: f64 = 1000.0;
 /// Parts of the range of speeds at which the balance is taken.
 const PARTS: usize = 8;
 
@@ -175,14 +177,19 @@ fn balance(context: &Context) -> Option<Coast> {
         let omega = |row: usize| context.rpm[row] * std::f64::consts::TAU / 60.0;
         let mut held = vec![false; context.len()];
         context.steady.iter().for_each(|(from, to)| held[*from..*to].fill(true));
-        let readings = || target.rows.iter().zip(&target.y);
-        let points = readings().filter(|(i, _)| held[**i]).map(|(i, y)| (omega(*i), *y, 1.0));
-        let curve = Normal::of_polynomial(target.relation.degree(), points).solve()?.coefficients;
-        let drawn = |omega: f64| curve.iter().rev().fold(0.0, |sum, c| sum * omega + c);
-        let rising = readings().map(|(i, y)| (rate[*i] * omega(*i), y - drawn(omega(*i))));
-        let (added, squares) = rising.filter(|(power, _)| *power > 0.0).fold((0.0, 0.0), |s, (p, y)| (s.0 + p * y, s.1 + p * p));
+        // held rows and those on the way up, together: a run of ramps holds next to no speed
+        let terms = target.relation.degree() + 1;
+        let mut normal = Normal::new(terms + 1);
+        for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| held[**row] || rate[**row] > 0.0) {
+            let mut columns: Vec<f64> = (0..terms).map(|k| (omega(*row) / KILO).powi(k as i32)).collect();
+            columns.push(rate[*row] * omega(*row) / KILO);
+            normal.add(&columns, *y, 1.0);
+        }
+        let mut curve = normal.solve()?.coefficients;
+        let gain = curve.pop().filter(|gain| *gain > 0.0)? / KILO;
+        let drawn = |omega: f64| curve.iter().rev().fold(0.0, |sum, c| sum * omega / KILO + c);
         let top = target.rows.iter().map(|i| omega(*i)).fold(0.0, f64::max);
-        let at = |omega: f64| (drawn(omega) - drawn(0.0)) / omega * squares / added;
+        let at = |omega: f64| (drawn(omega) - drawn(0.0)) / (omega * gain);
         let speeds = (1..=PARTS).map(|k| top * k as f64 / PARTS as f64);
         let line = Normal::of_polynomial(1, speeds.map(|w| (w * w, at(w), 1.0))).solve()?.coefficients;
         // what falls with the speed is no friction
