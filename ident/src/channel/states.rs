@@ -54,4 +54,18 @@ mod tests {
         assert!(thrust.given.is_empty(), "a load follows the speed as it was read");
         assert_eq!(thrust.rows.len(), rows as usize);
     }
+
+    /// A probe that misses the row of a step: nothing tells the speed there, and no load is predicted from it.
+    #[test]
+    fn a_load_of_a_speed_that_nobody_read_is_not_predicted() {
+        let level = |i: usize| if i / 50 % 2 == 0 { 2000.0 } else { 6000.0 };
+        let rpm = (0..300).map(|i| if [150, 220].contains(&i) { f64::NAN } else { level(i) }).collect();
+        let thrust = (0..300).map(|i| 1e-7 * level(i) * level(i)).collect();
+        let columns = [("rpm", rpm), ("thrust_n", thrust)].map(|(name, values)| Column { name: name.into(), values });
+        let log = Log { t: (0..300).map(|i| 0.02 * f64::from(i)).collect(), columns: columns.to_vec(), ..Log::default() };
+        let context = Context::new(&log, None);
+        let target = &context.targets[context.target("thrust_n").expect("a channel")];
+        assert_eq!(target.given, [150]);
+        assert!(!target.claims(150) && target.claims(220), "a level says what its rows read");
+    }
 }

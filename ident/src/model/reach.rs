@@ -299,4 +299,35 @@ mod tests {
         assert!(refused("[effect.seen.voltage_v]", "[effect.seen.thrust_n]").contains("effect[0].seen.thrust_n"));
         assert!(refused("[1.0, -12.0], ", "").contains("2 lists of 2 finite numbers"));
     }
+
+    /// A meter that is one row late has shown that on small steps: it is as late on large ones.
+    #[test]
+    fn a_late_meter_is_as_late_on_a_larger_step() {
+        let text = r#"
+            format = "quadrig-model 1"
+            source = "staircase.csv"
+            start_pulse_us = 1000.0
+            [consensus]
+            channels = ["rpm"]
+            [channel.thrust_n]
+            c0_n = 0.0
+            c1_n_per_krpm = 1.0
+            c2_n_per_krpm2 = 0.0
+            [[effect]]
+            id = "channel_delay"
+            channels = ["thrust_n"]
+            scope = "rig"
+            shape = [0.1]
+            shape_se = [0.05]
+            [effect.seen.thrust_n]
+            lowest_n = -0.1
+            highest_n = 0.1
+        "#;
+        let rpm = (0..40).map(|i| if i < 20 { 1000.0 } else { 8000.0 }).collect();
+        let columns = vec![Column { name: "rpm".into(), values: rpm }, Column { name: "thrust_n".into(), values: vec![1.0; 40] }];
+        let log = Log { t: (0..40).map(|i| 0.1 * f64::from(i)).collect(), columns, ..Log::default() };
+        let model = Model::parse("m.toml", text).expect("a model");
+        let thrust = model.predict(&Context::new(&log, Some(1000.0)), "thrust_n").expect("a prediction");
+        assert!((thrust[20] - 1.0).abs() < 1e-9 && (thrust[21] - 8.0).abs() < 1e-9, "{:?}", &thrust[18..23]);
+    }
 }

@@ -229,6 +229,11 @@ mod tests {
 
     /// A motor behind a lead of 20 mohm: V duty = k omega + b omega^2, current from the power, 21 levels of 40 rows.
     fn run(volts: f64) -> Log {
+        behind(volts, 0.02)
+    }
+
+    /// The same behind another lead, ohm.
+    fn behind(volts: f64, lead: f64) -> Log {
         let noise = |i: usize, k: f64| (k * (i * i) as f64).sin();
         let pulse: Vec<f64> = (0..840).map(|i| 1100.0 + 45.0 * (i / 40 * 8 % 21) as f64).collect();
         let steady = |p: f64| {
@@ -236,7 +241,7 @@ mod tests {
             let mut amperes = 0.0;
             let mut krpm = 0.0;
             for _ in 0..50 {
-                v = volts - 0.02 * amperes;
+                v = volts - lead * amperes;
                 let drive = v * (p - 1000.0) / 1000.0;
                 krpm = (-k + f64::sqrt(k * k + 4.0 * b * drive)) / (2.0 * b);
                 amperes = 0.012 * f64::powi(krpm, 3) / v;
@@ -266,6 +271,18 @@ mod tests {
                 assert!(error.after < 0.4 * error.before, "{own} V on {other} V, {name}: {error:?}");
             }
         }
+    }
+
+    /// The same power from a lower voltage is more current: no cubic of the speed holds that of a weak lead, and one run shows it.
+    #[test]
+    fn a_weak_lead_bends_the_current() {
+        let closed = close(&behind(11.1, 0.25), None, &[behind(12.0, 0.25)], &mut |_| {}).expect("a run");
+        let sag = closed.verdict.effects.iter().find(|e| e.id == "supply_sag").expect("a lead");
+        assert!(sag.channels.iter().any(|c| c == "current_a"), "{:?}", sag.channels);
+        let left = closed.verdict.effects.iter().find(|e| e.id == "unknown" && e.channels.iter().any(|c| c == "current_a"));
+        assert!(left.is_none(), "{left:?}");
+        let error = closed.verdict.validation[0].channels["current_a"];
+        assert!(error.after < 0.1, "{error:?}");
     }
 
     #[test]
@@ -379,7 +396,7 @@ mod tests {
 
     #[test]
     fn it_stands_in_the_model_s_file() {
-        let model = close(&run(11.1), None, &[], &mut |_| {}).expect("a run").model;
+        let model = close(&slow(0.7), None, &[], &mut |_| {}).expect("a run").model;
         let text = model.to_toml();
         let again = Model::parse("m.toml", &text).expect("what was written");
         assert_eq!(again.supply.len(), 2);

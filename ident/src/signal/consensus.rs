@@ -267,6 +267,19 @@ mod tests {
         }
     }
 
+    /// Rows without a reading between two levels are unread; those of a level, and those of a speed that is seldom logged, are lines.
+    #[test]
+    fn nobody_has_read_the_rows_between_two_levels() {
+        let levels: Vec<f64> = (0..60).map(|i| if i < 30 { 1000.0 } else { 4000.0 }).collect();
+        let without = |rows: &[usize]| {
+            let mut rpm = levels.clone();
+            rows.iter().for_each(|row| rpm[*row] = f64::NAN);
+            unread(&rpm)
+        };
+        assert_eq!(without(&[10, 30, 31, 50]), vec![30, 31]);
+        assert_eq!(without(&(0..60).filter(|i| i % 3 > 0).collect::<Vec<_>>()), Vec::<usize>::new());
+    }
+
     /// One of two sensors drops out while the rotor speeds up; of three one is lost and one on its way back. On the way up both of two may be right.
     #[test]
     fn the_rows_around_outvote_a_drop_out() {

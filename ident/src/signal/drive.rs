@@ -210,4 +210,14 @@ mod tests {
             drive.speed.iter().zip(&truth).zip(&drive.sd).filter(|((a, b), sd)| (*a - *b).abs() > 4.0 * **sd + 30.0).count();
         assert!(far * 100 < truth.len(), "{far} rows");
     }
+
+    #[test]
+    fn a_rotor_that_follows_at_once_is_not_on_its_way() {
+        let t: Vec<f64> = (0..600).map(|i| 0.02 * f64::from(i)).collect();
+        let pulse: Vec<f64> = (0..600).map(|i| 1100.0 + 100.0 * f64::from(i / 50 * 5 % 9)).collect();
+        let read: Vec<f64> = pulse.iter().map(|p| 6.0 * (p - 1000.0)).collect();
+        let drive = Drive::of_command(&t, &pulse, &read).expect("a command");
+        let most = drive.speed.iter().zip(&read).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(most < 50.0, "{most} rev/min of jumps of 3000");
+    }
 }

@@ -294,8 +294,14 @@ mod tests {
         let context = Context::new(&Log { t, columns, ..Log::default() }, Some(1050.0));
         let found = balance(&context).expect("a climb tells it").drag;
         assert!((found / (draw / gain)).ln().abs() < 0.2, "{found} for {}", draw / gain);
-        let [of_one_way] = &RotorInertia.shapes(&context, &Instance::new(&["current_a"], DRIVEN_ONE_WAY))[..] else { panic!() };
+        let [of_one_way, _] = &RotorInertia.shapes(&context, &Instance::new(&["current_a"], DRIVEN_ONE_WAY))[..] else {
+            panic!()
+        };
         assert_eq!(of_one_way.starts.first(), Some(&found));
+        // nothing coasts on it: the shape costs nothing, and of two forms that it cannot tell the one that gives nothing back comes first
+        let instances = RotorInertia.instances(&context);
+        let [first, ..] = &instances[..] else { panic!() };
+        assert!(is_one_way(first) && RotorInertia.priced(&context, first) == 0, "{instances:?}");
     }
 
     #[test]

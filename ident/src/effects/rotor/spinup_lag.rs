@@ -170,3 +170,22 @@ fn starts(context: &Context, design: &mut TargetDesign, carried: impl FnOnce() -
         design.fixed.iter_mut().zip(carried()).for_each(|(f, c)| *f += c);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Log;
+
+    #[test]
+    fn a_rotor_does_not_take_ten_times_longer_on_its_way_down() {
+        let context = Context::new(&Log::default(), None);
+        for form in ["", COASTING] {
+            let prior = |down: f64| SpinupLag.prior(&context, &Instance::new(&["rpm"], form), &[0.1, down, 0.0, 0.05]);
+            assert!(prior(0.14) > -0.1 && prior(0.2) > -0.6, "{form}");
+            assert!(prior(1.0) < -10.0, "{form}");
+        }
+        // air that would have more than all of the approach has all of it
+        let all = |air: f64| SpinupLag.prior(&context, &Instance::new(&["rpm"], COASTING), &[0.1, air, 0.0, 0.05]);
+        assert_eq!(all(0.1), all(0.01));
+    }
+}

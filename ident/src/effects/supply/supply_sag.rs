@@ -144,6 +144,11 @@ impl Effect for SupplySag {
         design.add(position, 0, current.iter().map(|i| -i).collect());
     }
 
+    /// What follows a voltage that is measured goes as far as that does.
+    fn runs_on(&self, instance: &Instance) -> [bool; 2] {
+        [instance.form != SAME_POWER; 2]
+    }
+
     fn prior(&self, _: &Context, instance: &Instance, shape: &[f64]) -> f64 {
         if instance.form == SAME_POWER { supply_voltage::log_prior(supply_voltage::OF_CURRENT, shape) } else { 0.0 }
     }

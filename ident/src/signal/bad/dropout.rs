@@ -159,9 +159,15 @@ impl Judge<'_> {
     /// First row of its block from which on the reading is half as low as on this one: while the rotor is on its way nobody can tell at once.
     fn begins(&self, row: usize, depth: f64, witness: &Witness) -> usize {
         let block = self.block(row);
-        // on the row of a step the rotor has made a small part of its way, of which a lost mark shows nothing
-        let low = |i: &usize| !self.read[*i].is_finite() || witness.said[*i] - self.read[*i] > HALF * depth.min(witness.said[*i]);
+        let low = |i: &usize| !self.read[*i].is_finite() || witness.said[*i] - self.read[*i] > HALF * depth;
         (block..row).rev().take(REACH).take_while(low).last().unwrap_or(row)
+    }
+
+    /// The same, or the row of a step right before it: there the rotor has made a small part of its way, of which a lost mark shows next to nothing.
+    fn head(&self, row: usize, witness: &Witness) -> usize {
+        let before = row.saturating_sub(1);
+        let low = self.read[before] < HALF * witness.said[before];
+        if low && before >= self.block(row) && self.steps.binary_search(&before).is_ok() { before } else { row }
     }
 
     /// First row of the stretch without a gap in time that a row is in.
@@ -172,7 +178,10 @@ impl Judge<'_> {
     /// Whether the reading has fallen at once, and by itself, from where it was right. Of a rotor that the log has not seen turn yet nobody knows.
     fn falls(&self, row: usize, depth: f64, witness: &Witness) -> bool {
         let before: Vec<usize> = (self.block(row)..row).rev().filter(|i| self.read[*i].is_finite()).take(2 * AGAIN - 1).collect();
-        let right = |i: &&usize| (witness.said[**i] - self.read[**i]).abs() < HALF * depth;
+        let right = |i: &&usize| {
+            let low = witness.said[**i] - self.read[**i];
+            (-HALF * depth - witness.above[**i]..HALF * depth).contains(&low)
+        };
         // its first readings may be missing already: zeros are no readings
         let Some(first) = (row..self.read.len()).find(|i| self.read[*i].is_finite()) else { return false };
         let fell = |i: &usize| (self.read[*i] - self.read[first]) - (witness.said[*i] - witness.said[first]) > HALF * depth;
@@ -228,7 +237,7 @@ impl Judge<'_> {
             }
         }
         // a single reading is for those who look at single readings
-        let rows = row..end;
+        let rows = self.head(row, witness)..end;
         let event = Event { expected: witness.said[worst], rows, worst, at_step: false, silent: false };
         let loses = depth > DEPTH * event.expected && self.falls_at_once(row, worst, witness);
         let stands = loses
@@ -357,5 +366,41 @@ mod tests {
         // a witness that rises late beside a steady reading
         let steady = [3000.0; 9];
         assert!(!fell(&steady, &[3000.0, 3001.0, 3600.0, 3900.0, 4000.0, 4000.0, 4000.0, 4000.0, 4000.0], 4));
+    }
+
+    /// A rotor that comes down quicker than one time constant says, and a probe that is lost on such a way.
+    fn lost(read: impl Fn(usize, f64) -> f64) -> Vec<std::ops::Range<usize>> {
+        let rows = 1500;
+        let pulse: Vec<f64> = (0..rows).map(|i| [1900.0, 1100.0, 1500.0][i / 100 % 3]).collect();
+        let mut rpm = vec![0.0_f64];
+        for i in 1..rows {
+            let (last, goal) = (rpm[i - 1], 7.0 * (pulse[i] - 1000.0));
+            // the higher it turns the harder the air brakes it
+            let tau = if goal > last { 0.2 } else { 0.2 / (0.4 + last / 4000.0) };
+            rpm.push(goal + (last - goal) * f64::exp(-0.04 / tau) + 2.0 * (0.7 * (i * i) as f64).sin());
+        }
+        let read = rpm.iter().enumerate().map(|(i, v)| read(i, *v)).collect();
+        let columns = [("pulse_us", pulse), ("rpm", read)].map(|(name, values)| crate::log::Column { name: name.into(), values });
+        let t = (0..rows).map(|i| 0.04 * i as f64).collect();
+        let log = crate::log::Log { t, columns: columns.to_vec(), ..Default::default() };
+        found(&Witnesses::of(&log), "rpm").into_iter().map(|e| e.rows).collect()
+    }
+
+    #[test]
+    fn a_rotor_on_its_way_down_has_not_lost_its_mark() {
+        assert_eq!(lost(|_, v| v), Vec::<std::ops::Range<usize>>::new());
+        // below where the command sends it no rotor goes
+        let deep = lost(|i, v| if (708..740).contains(&i) { 0.1 * v } else { v });
+        assert!(matches!(&deep[..], [rows] if (708..711).contains(&rows.start) && (736..744).contains(&rows.end)), "{deep:?}");
+    }
+
+    #[test]
+    fn the_way_back_of_a_probe_is_found_behind_missing_zeros() {
+        let back = lost(|i, v| match i {
+            840..850 => f64::NAN,
+            850..890 => v * (1.0 - f64::exp(-((i - 849) as f64) / 10.0)),
+            _ => v,
+        });
+        assert!(matches!(&back[..], [rows] if rows.start <= 850 && (865..895).contains(&rows.end)), "{back:?}");
     }
 }
