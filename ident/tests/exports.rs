@@ -281,10 +281,10 @@ fn what_is_in_doubt_is_refused_with_the_likely_reason() {
 /// The user's word stands against a doubt, and the doubt is said all the same.
 #[test]
 fn a_mapping_vouches_for_its_column() {
-    let rows: String = (0..60).map(|i| format!("{i},{},{},5,12\n", 5000 + i, 204)).collect();
+    let rows: String = (0..60).map(|i| format!("{i},{},{},2.5,12\n", 5000 + i, 204)).collect();
     let text = format!("t_s,rpm,Load,current_a,voltage_v\n{rows}");
     let (_, report) = import(text.as_bytes(), &maps(&["thrust_n=Load"])).expect("taken");
-    assert!(report.table().contains("in doubt: 204.000 N for 60.0 W: grams?"), "{}", report.table());
+    assert!(report.table().contains("in doubt: 204.000 N for 30.0 W: grams?"), "{}", report.table());
     let (log, report) = import(text.as_bytes(), &maps(&["thrust_n=Load*0.00980665"])).expect("taken");
     assert!(!report.table().contains("in doubt") && (log.column("thrust_n").unwrap()[0] - 2.000_556_6).abs() < 1e-6);
 }

@@ -178,10 +178,7 @@ impl Judge<'_> {
     /// Whether the reading has fallen at once, and by itself, from where it was right. Of a rotor that the log has not seen turn yet nobody knows.
     fn falls(&self, row: usize, depth: f64, witness: &Witness) -> bool {
         let before: Vec<usize> = (self.block(row)..row).rev().filter(|i| self.read[*i].is_finite()).take(2 * AGAIN - 1).collect();
-        let right = |i: &&usize| {
-            let low = witness.said[**i] - self.read[**i];
-            (-HALF * depth - witness.above[**i]..HALF * depth).contains(&low)
-        };
+        let right = |i: &&usize| (witness.said[**i] - self.read[**i]).abs() < HALF * depth;
         // its first readings may be missing already: zeros are no readings
         let Some(first) = (row..self.read.len()).find(|i| self.read[*i].is_finite()) else { return false };
         let fell = |i: &usize| (self.read[*i] - self.read[first]) - (witness.said[*i] - witness.said[first]) > HALF * depth;
@@ -227,7 +224,8 @@ impl Judge<'_> {
             if BACK * sd > (BACK * usual).max(RECOVERED * depth) {
                 continue;
             }
-            let near = off < BACK * sd || self.rests(row, i, worst, witness);
+            // what was lost is so until it reads as much as the rotor's way says
+            let near = off + witness.above[i] < BACK * sd || self.rests(row, i, worst, witness);
             back = if near && i > tells { back + 1 } else { 0 };
             if back == 0 {
                 end = i + 1;
@@ -249,7 +247,7 @@ impl Judge<'_> {
 
     /// Whether a reading has come most of its way back and stays there, for as long again as it took: what is left is what the witness is off by.
     fn rests(&self, from: usize, row: usize, worst: usize, witness: &Witness) -> bool {
-        let off = |i: usize| witness.said[i] - self.read[i];
+        let off = |i: usize| witness.said[i] + witness.above[i] - self.read[i];
         let long = ALONG.max(row - from);
         let next = (row + 1..self.read.len()).filter(|i| self.read[*i].is_finite()).take(long);
         let mut next: Vec<f64> = next.map(off).collect();
@@ -390,8 +388,8 @@ mod tests {
     fn a_rotor_on_its_way_down_has_not_lost_its_mark() {
         assert_eq!(lost(|_, v| v), Vec::<std::ops::Range<usize>>::new());
         // below where the command sends it no rotor goes
-        let deep = lost(|i, v| if (708..740).contains(&i) { 0.1 * v } else { v });
-        assert!(matches!(&deep[..], [rows] if (708..711).contains(&rows.start) && (736..744).contains(&rows.end)), "{deep:?}");
+        let deep = lost(|i, v| if (730..750).contains(&i) { 0.1 * v } else { v });
+        assert!(matches!(&deep[..], [rows] if (730..733).contains(&rows.start) && (748..753).contains(&rows.end)), "{deep:?}");
     }
 
     #[test]
