@@ -508,7 +508,27 @@ pub(crate) fn round_of(
         c.fit = fitted.unwrap_or_else(|| c.fit.clone());
     }
     weigh(context, best, &mut out);
+    on_fewer_channels(&mut out);
     out
+}
+
+/// Puts an instance before one of the same effect on more channels that brings less than a name needs beyond it: a name claims no channel that does
+/// not show it.
+fn on_fewer_channels(candidates: &mut [Candidate]) {
+    let newest = |c: &Candidate| c.fit.placed.last().map(|p| (p.effect.id(), p.instance.clone()));
+    for k in 0..candidates.len() {
+        let Some((id, whole)) = newest(&candidates[k]) else { continue };
+        let part = |c: &Candidate| {
+            newest(c).is_some_and(|(other, part)| {
+                let fewer = part.channels.len() < whole.channels.len() && part.channels.iter().all(|c| whole.touches(c));
+                other == id && part.form == whole.form && fewer
+            })
+        };
+        let enough = candidates[k].evidence - NEEDED_EVIDENCE;
+        if let Some(j) = (k + 1..candidates.len()).find(|j| part(&candidates[*j]) && candidates[*j].evidence > enough) {
+            candidates[k..=j].rotate_right(1);
+        }
+    }
 }
 
 /// Evidence of each candidate beyond what it was added to. In the order in which they are asked: by the evidence that they have where the noise
