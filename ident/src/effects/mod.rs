@@ -232,6 +232,10 @@ pub trait Effect: Sync {
     fn runs_on(&self, _instance: &Instance) -> [bool; 2] {
         [true, true]
     }
+    /// Whether several runs have a form of their own for what it says of one.
+    fn is_of_one_run(&self, _instance: &Instance) -> bool {
+        false
+    }
     /// Whether single rows are its nature.
     fn is_of_moments(&self, _instance: &Instance) -> bool {
         false

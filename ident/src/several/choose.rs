@@ -48,7 +48,8 @@ fn pool(joint: &Joint<'_, '_>, runs: &[&Closed]) -> Vec<Vec<Placed>> {
     let mut out: Vec<Vec<Placed>> = Vec::new();
     let mut add = |p: &Placed| {
         // what one run alone can tell stays with that run
-        if p.effect.id() == "unknown" || p.effect.scope(&p.instance) != Scope::Rig || joint.tellers(p) < FEWEST {
+        let of_rig = p.effect.id() != "unknown" && p.effect.scope(&p.instance) == Scope::Rig && joint.tellers(p) >= FEWEST;
+        if !of_rig || p.effect.is_of_one_run(&p.instance) {
             return;
         }
         // and what has a size of its own on each run with those

@@ -144,6 +144,11 @@ impl Effect for SupplySag {
         design.add(position, 0, current.iter().map(|i| -i).collect());
     }
 
+    /// Between runs the current follows the voltage by `supply_voltage`, about one reference for all.
+    fn is_of_one_run(&self, instance: &Instance) -> bool {
+        instance.form == SAME_POWER
+    }
+
     /// What follows a voltage that is measured goes as far as that does.
     fn runs_on(&self, instance: &Instance) -> [bool; 2] {
         [instance.form != SAME_POWER; 2]
