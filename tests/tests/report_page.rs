@@ -78,7 +78,9 @@ fn a_page_begins_with_the_sentence_that_heads_the_terminal() {
     // a simulated run says what fed it, and that it has no day
     assert!(read.contains("Supply bench supply, ") && read.contains("Date simulated"), "{read}");
     // the equation is the one in force, as it stands
-    assert!(read.contains("voltage_v = V0 - resistance * current_a Shows as") && !read.contains('`'), "{read}");
+    let in_force =
+        "voltage_v = V0 - resistance * current_a; at the same power also current_a *= (voltage_v / reference)^-exponent Shows as";
+    assert!(read.contains(in_force) && !read.contains('`'), "{read}");
     // other causes are told by what they are, and a factor is told once
     assert!(read.contains("Easily taken for: battery discharges during the run."), "{read}");
     assert!(!read.contains("the held-out error of voltage_v is"), "{read}");

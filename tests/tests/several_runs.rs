@@ -104,8 +104,8 @@ fn what_differs_from_run_to_run_is_of_each_run() {
     let (_, outcome) = together(logs);
     let effects = &outcome.verdict.effects;
     let leads: Vec<&EffectEntry> = effects.iter().filter(|e| e.id == "supply_sag").collect();
-    let ohms: Vec<(Option<&str>, f64)> =
-        leads.iter().map(|e| (e.run.as_deref(), (100.0 * e.parameters[0].value).round() / 100.0)).collect();
+    let ohm = |e: &EffectEntry| e.parameters.iter().find(|p| p.name == "resistance").map_or(f64::NAN, |p| p.value);
+    let ohms: Vec<(Option<&str>, f64)> = leads.iter().map(|e| (e.run.as_deref(), (100.0 * ohm(e)).round() / 100.0)).collect();
     assert_eq!(ohms, [(Some("r1.csv"), 0.08), (Some("r2.csv"), 0.08), (Some("r3.csv"), 0.2)], "{effects:?}");
     assert!(leads.iter().all(|e| e.scope == Scope::Run));
     assert!(!effects.iter().any(|e| e.id == "battery_discharge"), "{effects:?}");

@@ -45,7 +45,7 @@ fn nine_steps_say_each_its_own() {
     let depends = table("depends");
     let share = row(&depends, &["voltage_v", "current_a"]);
     assert!(number(&share[2]) > 0.95 && number(&share[3]) <= 0.01, "{share:?}");
-    assert_eq!(table("candidates")["rows"][0][0], "supply_sag");
+    assert_eq!(table("candidates")["rows"][0][0], "supply_sag [same_power]");
     assert!(table("choose")["rows"][0][1].as_str().is_some_and(|ids| ids.contains("supply_sag")));
     assert!(number(&row(&table("nameless"), &["voltage_v"])[2]) > 0.9);
     let report = table("report");

@@ -49,7 +49,9 @@ pub(super) fn settle(members: &mut [Member<'_>], rig: &[Placed]) -> Vec<Vec<Wort
             let Some(newest) = best(&member, rig, &shared) else { break };
             member.own.push(newest);
         }
-        let told = |k: usize| Worth { rivals: rivals(&member, rig, &shared, k), ..worth(&member, rig, &shared, k) };
+        exchange(&mut member, rig, &shared);
+        let rivals = |k: usize| others(&member, rig, &shared, k).into_iter().map(|(p, gain)| (p.effect.id(), gain)).collect();
+        let told = |k: usize| Worth { rivals: rivals(k), ..worth(&member, rig, &shared, k) };
         let all = (0..member.own.len()).map(told).collect();
         (member.own, all)
     };
@@ -110,12 +112,22 @@ fn refined(member: &Member<'_>, rig: &[Placed], shared: &[Shared], start: &Place
 }
 
 /// The drifts and events that could stand in the place of one of a run's own, with their evidence: those on its channels that come closest.
-fn rivals(member: &Member<'_>, rig: &[Placed], shared: &[Shared], k: usize) -> Vec<(&'static str, f64)> {
+fn others(member: &Member<'_>, rig: &[Placed], shared: &[Shared], k: usize) -> Vec<(Placed, f64)> {
     let mut without = member.clone();
     let taken = without.own.remove(k);
     let other = |p: &Placed| p.effect.id() != taken.effect.id() && p.instance.channels.iter().any(|c| taken.instance.touches(c));
     let close = scanned(&without, rig).into_iter().filter(other).take(RIVALS);
-    close.filter_map(|start| Some((start.effect.id(), refined(&without, rig, shared, &start)?.1))).collect()
+    close.filter_map(|start| refined(&without, rig, shared, &start)).collect()
+}
+
+/// What explains more in the place of a drift or an event takes it: one that a run had alone may have stood for what the rig has.
+fn exchange(member: &mut Member<'_>, rig: &[Placed], shared: &[Shared]) {
+    for k in 0..member.own.len() {
+        let best = others(member, rig, shared, k).into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((other, _)) = best.filter(|(_, gain)| *gain > worth(member, rig, shared, k).gain) {
+            member.own[k] = other;
+        }
+    }
 }
 
 /// What one of a run's own effects is worth: how much worse its samples are fitted without it, less the penalty for its parameters.

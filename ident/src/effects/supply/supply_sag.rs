@@ -5,7 +5,7 @@
 //! current the resistance is as uncertain as the efficiency that the current is estimated with. Where no torque was measured either, a
 //! propeller's current goes with the cube of its speed, and how many amperes it is stays unknown: the sag is told by the speed.
 //! The same power from a lower voltage is more current: form `same_power`, for a current that bends away from its cubic. Its reference is the
-//! median voltage of the run, and only says at which voltage the cubic stands.
+//! median voltage of the run, and only says at which voltage the cubic stands. A run without a voltage is taken to have that one.
 //! Units: ohm; V for each (1000 rev/min)^3; exponent 1; reference V.
 //! Reference: Ohm's law; errata to Beharie 2013, Eq. 5.11 (rpm = KV (V - I R)).
 
@@ -38,7 +38,7 @@ impl Effect for SupplySag {
     fn about(&self) -> About {
         About {
             title: "Supply voltage sags with the current",
-            equation: "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a, current_a += current_rise * current_a rpm^3, or voltage_v = V0 - sag * rpm^3 (no current measured); same power: current_a *= (voltage_v / reference)^-exponent",
+            equation: "voltage_v = V0 - resistance * current_a; at the same power also current_a *= (voltage_v / reference)^-exponent; against a declared model also rpm *= 1 - speed_loss * current_a, current_a += current_rise * current_a rpm^3, or voltage_v = V0 - sag * rpm^3 (no current measured)",
             source: "Ohm's law; Beharie 2013, Eq. 5.11 as corrected",
             depends_on: &["current_a"],
             signature: "the voltage residual mirrors the current; thrust(rpm) and torque(rpm) hold",

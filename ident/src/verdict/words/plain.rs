@@ -116,8 +116,23 @@ fn formula(equation: &str) -> (&str, Option<String>) {
 /// What stands between two ways in which an effect may act, the second of which is a form of its own.
 const EITHER: [&str; 5] =
     ["; or, as play: ", "; smooth: ", "; form whole_blade: ", "; a rotor between winding and air, ", ", or "];
-/// What stands before what an effect does besides against a declared model.
-const BESIDES: &str = "; against a declared model also ";
+/// What stands before what an effect does besides: in a form of its own, and against a declared model.
+const BESIDES: [&str; 2] = ["; at the same power also ", "; against a declared model also "];
+
+/// An equation without what an effect that has none of these parameters does not do besides.
+fn with_besides(equation: &str, has: impl Fn(&str) -> usize) -> String {
+    let mut at: Vec<(usize, &str)> = BESIDES.iter().flat_map(|mark| equation.match_indices(mark)).collect();
+    at.sort_unstable();
+    let mut out = equation[..at.first().map_or(equation.len(), |first| first.0)].to_owned();
+    for (k, (from, mark)) in at.iter().enumerate() {
+        let part = &equation[from + mark.len()..at.get(k + 1).map_or(equation.len(), |next| next.0)];
+        if has(part) > 0 {
+            out += mark;
+            out += part;
+        }
+    }
+    out
+}
 
 /// The equation that is in force: of an effect that may act in several ways the one whose parameters it has, without quotation marks, and its
 /// form in words where the equation alone does not tell it.
@@ -125,10 +140,9 @@ const BESIDES: &str = "; against a declared model also ";
 pub fn in_force(e: &EffectEntry) -> (String, Option<String>) {
     let (whole, form) = formula(&e.equation);
     let has = |text: &str| e.parameters.iter().filter(|p| is_told_in(&p.name, text)).count();
-    let whole = match whole.split_once(BESIDES) {
-        Some((alone, besides)) if has(besides) == 0 => alone,
-        _ => whole,
-    };
+    let whole = with_besides(whole, has);
+    let whole = whole.as_str();
+    let form = form.filter(|f| !BESIDES.iter().any(|mark| mark.contains(f.as_str()) && whole.contains(mark)));
     let ways = EITHER.iter().find_map(|between| Some((between, whole.split_once(between)?)));
     // ways that share a part, such as that of the heat, are told together
     let apart = |second: &str| second.contains('=') && second.starts_with(|c: char| c.is_ascii_alphabetic());
@@ -211,6 +225,11 @@ mod tests {
         let sag = "voltage_v = V0 - resistance * current_a; against a declared model also rpm *= 1 - speed_loss * current_a";
         assert_eq!(of(sag, &["resistance"]).0, "voltage_v = V0 - resistance * current_a");
         assert_eq!(of(sag, &["resistance", "speed_loss"]).0, sag);
+        let power =
+            "voltage_v = V0 - resistance * current_a; at the same power also current_a *= (voltage_v / reference)^-exponent";
+        let all = format!("{power}; against a declared model also rpm *= 1 - speed_loss * current_a");
+        assert_eq!(of(&format!("{all} [same_power]"), &["exponent", "resistance"]), (power.to_owned(), None));
+        assert_eq!(of(&all, &["resistance"]).0, "voltage_v = V0 - resistance * current_a");
         let turns = "rpm_x = rpm (1 + angle/180) or rpm (1 - angle/180), by turns";
         assert_eq!(of(turns, &["angle"]).0, turns);
     }
