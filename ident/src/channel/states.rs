@@ -58,7 +58,7 @@ mod tests {
     /// A probe that misses the row of a step: nothing tells the speed there, and no load is predicted from it.
     #[test]
     fn a_load_of_a_speed_that_nobody_read_is_not_predicted() {
-        let level = |i: usize| if i / 50 % 2 == 0 { 2000.0 } else { 6000.0 };
+        let level = |i: usize| [2000.0, 6000.0][i / 50 % 2];
         let rpm = (0..300).map(|i| if [150, 220].contains(&i) { f64::NAN } else { level(i) }).collect();
         let thrust = (0..300).map(|i| 1e-7 * level(i) * level(i)).collect();
         let columns = [("rpm", rpm), ("thrust_n", thrust)].map(|(name, values)| Column { name: name.into(), values });
