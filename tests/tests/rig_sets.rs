@@ -203,3 +203,34 @@ fn the_powers_of_the_supply_s_voltage_are_those_of_the_pairs() {
     assert!(pairs.iter().all(|n| *n > 40), "{pairs:?}");
     assert!(near(found[0], 0.97) && near(found[1], 0.82) && near(found[2], -0.70), "{found:?}");
 }
+
+/// Without torque and propeller the power alone speaks of the units: of no run of these five stands, in rev/min; of nearly all, in rad/s or in
+/// electrical turns.
+#[test]
+fn a_speed_of_another_unit_shows_in_the_power_of_real_runs() {
+    let Some(rig) = data("real runs in other units") else { return };
+    let sets = ["fivein-static-tables", "dualcell-eco2814c", "lever-rig-10x45", "stand1585-micro", "stand1585-sov5"];
+    let mut told = [0; 3];
+    let mut runs = 0;
+    for file in sets.iter().flat_map(|set| files(&rig.join("rig").join(set).join("tidy"), |name| name.ends_with(".csv"))) {
+        let Ok((mut log, _)) = import(&file, &[]) else { continue };
+        let needed = ["rpm", "thrust_n", "current_a", "voltage_v"];
+        if needed.iter().any(|name| log.column(name).is_none()) {
+            continue;
+        }
+        log.columns.retain(|c| c.name != "torque_nm");
+        log.meta.retain(|key, _| key != "propeller" && key != "diameter_m");
+        runs += 1;
+        for (count, times) in told.iter_mut().zip([1.0, std::f64::consts::TAU / 60.0, 7.0]) {
+            let mut other = log.clone();
+            let speed = other.columns.iter_mut().find(|c| c.name == "rpm").expect("a speed");
+            speed.values.iter_mut().for_each(|v| *v *= times);
+            let doubts = other.in_doubt();
+            let said = doubts.iter().any(|d| d.contains("times what propellers usually take"));
+            assert!(!said || times != 1.0, "{}: {doubts:?}", file.display());
+            *count += usize::from(said);
+        }
+    }
+    println!("of {runs} runs {told:?} are in doubt in rev/min, rad/s and electrical turns");
+    assert!(runs > 100 && 10 * told[1] > 9 * runs && 10 * told[2] > 9 * runs, "{told:?} of {runs}");
+}

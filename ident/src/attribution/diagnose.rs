@@ -515,17 +515,15 @@ pub(crate) fn round_of(
 /// Puts an instance before one of the same effect on more channels that brings less than a name needs beyond it: a name claims no channel that does
 /// not show it.
 fn on_fewer_channels(candidates: &mut [Candidate]) {
-    let newest = |c: &Candidate| c.fit.placed.last().map(|p| (p.effect.id(), p.instance.clone()));
+    let is_part = |of: &Candidate, whole: &Candidate| {
+        let (Some(part), Some(all)) = (of.fit.placed.last(), whole.fit.placed.last()) else { return false };
+        let fewer = part.instance.channels.len() < all.instance.channels.len();
+        let same = part.effect.id() == all.effect.id() && part.instance.form == all.instance.form;
+        same && fewer && part.instance.channels.iter().all(|c| all.instance.touches(c))
+    };
     for k in 0..candidates.len() {
-        let Some((id, whole)) = newest(&candidates[k]) else { continue };
-        let part = |c: &Candidate| {
-            newest(c).is_some_and(|(other, part)| {
-                let fewer = part.channels.len() < whole.channels.len() && part.channels.iter().all(|c| whole.touches(c));
-                other == id && part.form == whole.form && fewer
-            })
-        };
-        let enough = candidates[k].evidence - NEEDED_EVIDENCE;
-        if let Some(j) = (k + 1..candidates.len()).find(|j| part(&candidates[*j]) && candidates[*j].evidence > enough) {
+        let stands_first = |c: &Candidate| is_part(c, &candidates[k]) && c.evidence > candidates[k].evidence - NEEDED_EVIDENCE;
+        if let Some(j) = (k + 1..candidates.len()).find(|j| stands_first(&candidates[*j])) {
             candidates[k..=j].rotate_right(1);
         }
     }

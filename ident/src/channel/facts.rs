@@ -17,6 +17,8 @@ pub(crate) struct Coast {
     pub(crate) friction: f64,
     /// All of it at the highest speed, rad/s^2.
     pub(crate) at_top: f64,
+    /// Whether a row of the run falls as fast as a coasting rotor may for all that is known before.
+    pub(crate) shown: bool,
 }
 
 /// What effects read off a log once and ask for again and again.

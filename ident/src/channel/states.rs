@@ -1,6 +1,7 @@
-//! Rows at which the rotor's state is known by itself.
+//! Rows at which the rotor's state is known by itself, and those at which it is not known.
 //!
-//! What it is: behind a gap, at a run's start and while a controller starts its motor, no command tells the speed; the reading does.
+//! What it is: behind a gap, at a run's start and while a controller starts its motor, no command tells the speed; the reading does. Where nobody read
+//! a speed on its way, nothing does.
 //! What can go wrong: a rotor that is told to turn and never does is none of these: that is a fault, and is predicted.
 //! Units: s, us, rev/min.
 //! Reference: specification `closing-the-loop.md`, step 2 (blocks after gaps).

@@ -99,19 +99,19 @@ pub(crate) fn index(outcomes: &[Outcome]) -> String {
     out
 }
 
-/// Parameters with their intervals. A term without a name is said in words; the verdict has its coefficients.
+/// Parameters with their intervals, a line each. A term without a name is said in words; the verdict has its coefficients.
 fn parameters(e: &EffectEntry) -> String {
     if e.id == "unknown" {
         let of: Vec<String> = e.depends_on.iter().map(|d| channel(d)).collect();
         return if of.is_empty() {
-            "no correction".to_owned()
+            "- no correction".to_owned()
         } else {
-            format!("a smooth function of {}, whose coefficients the verdict has", list(&of))
+            format!("- a smooth function of {}, whose coefficients the verdict has", list(&of))
         };
     }
     let told =
-        |p: &Parameter| format!("{} = {} {} ({} to {})", p.name, three(p.value), p.unit, three(p.ci95[0]), three(p.ci95[1]));
-    e.parameters.iter().map(told).collect::<Vec<_>>().join(", ")
+        |p: &Parameter| format!("- {} = {} {} ({} to {})", p.name, three(p.value), p.unit, three(p.ci95[0]), three(p.ci95[1]));
+    e.parameters.iter().map(told).collect::<Vec<_>>().join("\n")
 }
 
 /// Clauses as sentences of their own.
@@ -259,12 +259,12 @@ fn run(out: &mut String, figures: &mut Vec<Figure>, run: &Recorded, closed: &Clo
     for e in &v.effects {
         let _ = writeln!(
             out,
-            "\n**{}** (p = {:.2}) on {}: {}. {}.",
+            "\n**{}** (p = {:.2}) on {}. {}.\n\n{}",
             e.id,
             e.probability,
             e.channels.join(", "),
-            parameters(e),
-            sentences(&e.evidence)
+            sentences(&e.evidence),
+            parameters(e)
         );
     }
     if !v.alternatives.is_empty() {

@@ -15,6 +15,7 @@ use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, In
 use crate::numeric::order::{median, usual_step};
 use crate::numeric::solve::Normal;
 use crate::signal::drive::{Drive, acceleration_of_rows};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// See the module.
@@ -106,7 +107,7 @@ impl Effect for RotorInertia {
 
     /// A run on which nothing coasts says nothing of it.
     fn priced(&self, context: &Context, instance: &Instance) -> usize {
-        usize::from(is_one_way(instance) && may_coast(context))
+        usize::from(is_one_way(instance) && balance(context).is_none_or(|known| known.shown))
     }
 
     fn amplitudes(&self, _: &Instance) -> Vec<Amplitude> {
@@ -173,7 +174,7 @@ const PARTS: usize = 8;
 fn balance(context: &Context) -> Option<Coast> {
     let found = || {
         let target = context.targets.iter().find(|t| t.relation == Relation::Current)?;
-        let rate = driven(context).cloned().unwrap_or_else(|| acceleration(context));
+        let rate = driven(context).map_or_else(|| Cow::Owned(acceleration(context)), Cow::Borrowed);
         let omega = |row: usize| context.rpm[row] * std::f64::consts::TAU / 60.0;
         let mut held = vec![false; context.len()];
         context.steady.iter().for_each(|(from, to)| held[*from..*to].fill(true));
@@ -194,20 +195,12 @@ fn balance(context: &Context) -> Option<Coast> {
         let line = Normal::of_polynomial(1, speeds.map(|w| (w * w, at(w), 1.0))).solve()?.coefficients;
         // what falls with the speed is no friction
         let (drag, friction) = if line[0] > 0.0 { (line[1], line[0]) } else { (at(top) / top.powi(2), 0.0) };
-        (COAST.0..COAST.1).contains(&drag).then_some(Coast { drag, friction: friction.min(FRICTION.1), at_top: at(top) })
+        let friction = friction.min(FRICTION.1);
+        let least = |row: usize| (drag * omega(row).powi(2) + friction) * (-2.0 * ABOUT_BALANCE).exp();
+        let shown = (0..context.len()).any(|row| context.rpm[row] > STANDSTILL && rate[row] < -least(row));
+        (COAST.0..COAST.1).contains(&drag).then_some(Coast { drag, friction, at_top: at(top), shown })
     };
     *context.facts.balance.get_or_init(found)
-}
-
-/// Whether a row falls as fast as a coasting rotor may for all that is known before.
-fn may_coast(context: &Context) -> bool {
-    let Some(known) = balance(context) else { return true };
-    let rate = driven(context).cloned().unwrap_or_else(|| acceleration(context));
-    let least = |rpm: f64| {
-        let omega = rpm * std::f64::consts::TAU / 60.0;
-        (known.drag * omega * omega + known.friction) * (-2.0 * ABOUT_BALANCE).exp()
-    };
-    rate.iter().zip(&context.rpm).any(|(rate, rpm)| *rpm > STANDSTILL && *rate < -least(*rpm))
 }
 
 fn is_one_way(instance: &Instance) -> bool {

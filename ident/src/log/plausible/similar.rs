@@ -4,8 +4,8 @@
 //! neither torque nor propeller is known, a wrong unit of the speed shows in nothing else.
 //! What can go wrong: small brushed motors waste half of it, so that a thrust below 1 N says nothing of too much power.
 //! Units: N, W, n in rev/s, kg/m^3.
-//! Reference: similarity of propellers, McCormick 1995, Aerodynamics, Aeronautics and Flight Mechanics, section 6.5; 136 runs of six stands under
-//! `data/rig/` lie between 0.59 and 1.19, of which the geometric mean is 0.84.
+//! Reference: similarity of propellers, McCormick 1995, Aerodynamics, Aeronautics and Flight Mechanics, section 6.5; what the recorded stands say is
+//! counted by `a_speed_of_another_unit_shows_in_the_power_of_real_runs`.
 
 use super::{Doubt, FAINT, doubt, loaded, turning, typical};
 use crate::log::{Disc, Log, trimmed};
@@ -20,7 +20,7 @@ const AIR: f64 = 1.2;
 const BEYOND_TOYS: f64 = 1.0;
 
 /// Times the power of a usual propeller. A speed in rev/s makes it 7.7, one in rad/s 3.1 and electrical turns of seven pole pairs 0.38 times as
-/// large, a thrust in kilograms 17 times. Each bound lies between these and what the stands show: 0.7 to 1.4.
+/// large, a thrust in kilograms 17 times. Each bound lies between these and one.
 const BOUNDS: [f64; 3] = [0.55, 2.0, 5.0];
 
 /// What the power says of the speed and the thrust.
