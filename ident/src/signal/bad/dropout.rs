@@ -367,7 +367,7 @@ mod tests {
     }
 
     /// A rotor that comes down quicker than one time constant says, and a probe that is lost on such a way.
-    fn lost(read: impl Fn(usize, f64) -> f64) -> Vec<std::ops::Range<usize>> {
+    fn run(read: impl Fn(usize, f64) -> f64) -> crate::log::Log {
         let rows = 1500;
         let pulse: Vec<f64> = (0..rows).map(|i| [1900.0, 1100.0, 1500.0][i / 100 % 3]).collect();
         let mut rpm = vec![0.0_f64];
@@ -380,8 +380,22 @@ mod tests {
         let read = rpm.iter().enumerate().map(|(i, v)| read(i, *v)).collect();
         let columns = [("pulse_us", pulse), ("rpm", read)].map(|(name, values)| crate::log::Column { name: name.into(), values });
         let t = (0..rows).map(|i| 0.04 * i as f64).collect();
-        let log = crate::log::Log { t, columns: columns.to_vec(), ..Default::default() };
-        found(&Witnesses::of(&log), "rpm").into_iter().map(|e| e.rows).collect()
+        crate::log::Log { t, columns: columns.to_vec(), ..Default::default() }
+    }
+
+    /// The rows that are found lost of it.
+    fn lost(read: impl Fn(usize, f64) -> f64) -> Vec<std::ops::Range<usize>> {
+        found(&Witnesses::of(&run(read)), "rpm").into_iter().map(|e| e.rows).collect()
+    }
+
+    /// The command says where a rotor goes to, and that it may be anywhere above that on its way down.
+    #[test]
+    fn on_its_way_down_a_rotor_is_somewhere_above_where_it_goes_to() {
+        let log = run(|_, v| v);
+        let witness = drive(&Witnesses::of(&log), log.column("rpm").expect("a speed")).expect("a command");
+        // from 6 300 to 700 rev/min at row 700, from 700 to 3 500 at row 800
+        assert!((701..704).all(|i| witness.said[i] < 900.0 && witness.above[i] > 500.0), "{:?}", &witness.said[700..705]);
+        assert!((801..810).all(|i| witness.above[i] < 1.0), "{:?}", &witness.above[800..810]);
     }
 
     #[test]
