@@ -62,7 +62,7 @@ const NOISE: [f64; 5] = [0.007, 3e-4, 0.03, 0.01, 0.1];
 fn expectation(id: &str) -> (&'static [&'static str], [bool; 5]) {
     let load_cell = [false, true, true, true, true];
     match id {
-        "supply_sag" | "battery_discharge" => (&["rpm", "voltage"], [false, false, false, false, true]),
+        "supply_sag" | "battery_discharge" | "battery_relaxation" => (&["rpm", "voltage"], [false, false, false, false, true]),
         "spinup_lag" | "throttle_quantisation" => (&["rpm"], [false, false, false, true, true]),
         "thermal_derate" => (&["rpm"], [false, false, false, true, true]),
         "current_limit" => (&["rpm", "current"], [false, false, false, true, true]),

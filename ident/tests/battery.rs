@@ -62,24 +62,42 @@ fn names(closed: &Closed) -> Vec<&str> {
     out
 }
 
-/// The library has no name for the part that answers late: the lead keeps its own resistance, and the rest is told.
+/// A resistance that answers late stands beside the lead's own, each with its size, and is claimed of no battery that has none.
 #[test]
-fn a_battery_that_answers_late_leaves_the_lead_its_name() {
+fn a_battery_that_answers_late_leaves_the_lead_its_size() {
     let of = |late: (f64, f64)| close(&log(&Day { late, ..DAY }), None, &[], &mut |_| {}).expect("a verdict");
-    let ohm = |closed: &Closed| {
-        let sag = closed.verdict.effects.iter().find(|e| e.id == "supply_sag").unwrap_or_else(|| panic!("{:?}", names(closed)));
-        sag.parameters.iter().find(|p| p.name == "resistance").expect("a resistance").clone()
+    let holds = |closed: &Closed, (id, name, truth): (&str, &str, f64)| {
+        let found = closed.verdict.effects.iter().find(|e| e.id == id).unwrap_or_else(|| panic!("{:?}", names(closed)));
+        let size = found.parameters.iter().find(|p| p.name == name).expect(name);
+        assert!(size.ci95[0] < truth && truth < size.ci95[1], "{size:?} {truth}");
     };
     let at_once = of((0.0, 1.0));
     assert_eq!(names(&at_once), ["supply_sag"]);
-    let found = ohm(&at_once);
-    assert!(found.ci95[0] < 0.03 && 0.03 < found.ci95[1], "{found:?}");
-    // between what answers at once and all of it
-    let late = of((0.04, 4.0));
-    let found = ohm(&late);
-    assert!(0.03 < found.value && found.value < 0.07, "{found:?}");
-    let voltage = &late.verdict.channels["voltage_v"];
-    assert!(voltage.after.heldout_rms < 0.5 * voltage.before.heldout_rms, "{voltage:?}");
+    holds(&at_once, ("supply_sag", "resistance", 0.03));
+    for late in [(0.04, 4.0), (0.015, 2.0)] {
+        let closed = of(late);
+        assert_eq!(names(&closed), ["battery_relaxation", "supply_sag"]);
+        holds(&closed, ("supply_sag", "resistance", 0.03));
+        holds(&closed, ("battery_relaxation", "resistance", late.0));
+        holds(&closed, ("battery_relaxation", "tau", late.1));
+        let voltage = &closed.verdict.channels["voltage_v"];
+        assert!(voltage.after.heldout_rms < 1.1 * voltage.noise_floor_rms, "{voltage:?}");
+    }
+}
+
+/// A voltmeter that is slow beside a lead is no battery: nothing of the drop comes at once.
+#[test]
+fn a_slow_voltmeter_is_no_battery() {
+    let mut log = log(&DAY);
+    let column = log.columns.iter_mut().find(|column| column.name == "voltage_v").expect("a voltage");
+    let kept = (-STEP / 0.5_f64).exp();
+    let mut state = column.values[0];
+    for value in &mut column.values {
+        state = kept * state + (1.0 - kept) * *value;
+        *value = state;
+    }
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    assert_eq!(names(&closed), ["channel_filter", "supply_sag"]);
 }
 
 /// A rig without a current sensor and a torque cell: a propeller's current goes with the cube of its speed, and so does what the lead takes.

@@ -160,6 +160,7 @@ macro_rules! effects {
 effects! {
     supply_sag::SupplySag,
     battery_discharge::BatteryDischarge,
+    battery_relaxation::BatteryRelaxation,
     current_limit::CurrentLimit,
     thermal_derate::ThermalDerate,
     throttle_quantisation::ThrottleQuantisation,

@@ -23,7 +23,7 @@ struct Range {
 
 /// A lead of 100 ohm starts no motor; a propeller has no thrust left at -1, and none grows to ten times its own.
 const RANGES: [Range; 6] = [
-    Range { keys: &["resistance_ohm", "late_ohm"], low: 0.0, high: 100.0, above: false, words: "a resistance from 0 to 100 ohm" },
+    Range { keys: &["resistance_ohm"], low: 0.0, high: 100.0, above: false, words: "a resistance from 0 to 100 ohm" },
     Range {
         keys: &["thrust_change", "torque_change"],
         low: -1.0,
@@ -34,7 +34,7 @@ const RANGES: [Range; 6] = [
     Range { keys: &["capacity_ah"], low: 0.0, high: 1000.0, above: true, words: "a charge above 0 and up to 1000 A.h" },
     Range { keys: &["charge", "probability", "slip", "share"], low: 0.0, high: 1.0, above: false, words: "a share from 0 to 1" },
     Range {
-        keys: &["tau_s", "tau_up_s", "tau_down_s", "late_s"],
+        keys: &["tau_s", "tau_up_s", "tau_down_s"],
         low: 0.0,
         high: 86_400.0,
         above: false,

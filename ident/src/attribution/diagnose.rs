@@ -20,7 +20,7 @@ pub(crate) use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::acquisition::sample_hold::{self, SampleHold};
 use crate::effects::placed::Placed;
 use crate::effects::placed::is_named;
-use crate::effects::{self, Effect, Estimate, Instance};
+use crate::effects::{self, Effect, Estimate, Instance, Shape};
 use crate::fit::heldout::{self, Around, Held};
 use crate::fit::search::{base, between_starts, connected, refine, refine_newest, scan, stride};
 use crate::fit::{Fit, Rows, TargetFit, fit, plausible, scatters};
@@ -159,14 +159,14 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     }
     let mut round = 0;
     let mut together = false;
-    while of_this_rig(&best.fit.placed) < MOST_EFFECTS {
+    while of_this_rig(context, &best.fit.placed) < MOST_EFFECTS {
         let begun = (round as f64 / (MOST_EFFECTS as f64 + 1.0)).min(LATE);
         round += 1;
         let done = (round as f64 / (MOST_EFFECTS as f64 + 1.0)).min(LATE);
         let ranked = round_of(context, declared, &best, (&mut offers, REFINED), &mut |p| progress(begun + p * (done - begun)));
         candidates.push(ranked.iter().take(SHOWN).cloned().collect());
         let Some(chosen) = choose(context, declared, &ranked, &best, &errors, &folds) else {
-            let room = MOST_EFFECTS - of_this_rig(&best.fit.placed);
+            let room = MOST_EFFECTS - of_this_rig(context, &best.fit.placed);
             if together || room < 2 {
                 break;
             }
@@ -393,7 +393,7 @@ pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
 }
 
 /// Whether an instance may join: not twice the same effect on a channel, not too many effects on one channel.
-pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
+pub(crate) fn may_join(context: &Context, placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
     instance.channels.iter().all(|c| {
         let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
         // what is older than the run may have happened once more
@@ -405,19 +405,31 @@ pub(crate) fn may_join(placed: &[Placed], effect: &dyn Effect, instance: &Instan
                 && !p.effect.never_beside().contains(&effect.id())
                 && !effect.never_beside().contains(&p.effect.id())
         };
-        let room = effect.is_of_every_rig() || there.iter().filter(|p| takes_a_place(p)).count() < MOST_ON_A_CHANNEL;
+        let room = effect.is_of_every_rig() || there.iter().filter(|p| takes_a_place(context, p)).count() < MOST_ON_A_CHANNEL;
         room && there.iter().all(apart)
     })
 }
 
 /// How many effects there are beside what every rig has.
-fn of_this_rig(placed: &[Placed]) -> usize {
-    placed.iter().filter(|p| takes_a_place(p)).count()
+fn of_this_rig(context: &Context, placed: &[Placed]) -> usize {
+    placed.iter().filter(|p| takes_a_place(context, p)).count()
 }
 
-/// Whether a name is one of the few that a run or a channel may have: what every rig has and what the readings show by themselves is told besides.
-fn takes_a_place(placed: &Placed) -> bool {
-    !placed.effect.is_of_every_rig() && !placed.is_read_off()
+/// Whether a name is one of the few that a run or a channel may have. What every rig and every logger has, what single rows hold, and what the
+/// readings show by themselves is told besides.
+fn takes_a_place(context: &Context, placed: &Placed) -> bool {
+    let (effect, instance) = (placed.effect, &placed.instance);
+    if effect.is_of_every_rig() || effect.is_of_moments(instance) || placed.is_read_off() {
+        return false;
+    }
+    let of = |(shape, value): (Shape, &f64)| Estimate {
+        name: shape.name.into(),
+        unit: shape.unit.into(),
+        value: *value,
+        se: f64::NAN,
+    };
+    let shapes: Vec<Estimate> = effect.shapes(context, instance).into_iter().zip(&placed.shape).map(of).collect();
+    effect.kin(context, instance, &shapes) == Kin::Own
 }
 
 /// Scans the grids of some offers beside what is there already, on all cores, each with what it remembers of the rows.
@@ -447,7 +459,7 @@ pub(crate) fn round_of(
     let whole = vec![1.0; context.targets.len()];
     let loud = loud(context, declared, &best.fit);
     let mut ranked: Vec<(f64, Vec<Placed>)> = Vec::new();
-    let joining = |o: &Scanned| may_join(&best.fit.placed, o.effect, &o.instance);
+    let joining = |o: &Scanned| may_join(context, &best.fit.placed, o.effect, &o.instance);
     let stale = |o: &Scanned| newest.is_some_and(|n| o.instance.channels.iter().any(|c| n.instance.touches(c)));
     offers.iter_mut().filter(|o| stale(o)).for_each(|o| o.found = None);
     scan_all(

@@ -244,7 +244,7 @@ impl AllRows<'_> {
     fn of_rows(&self, best: &mut Candidate, errors: &mut Vec<Held>) {
         let (context, declared) = (self.context, self.declared);
         for offer in offers(context).into_iter().filter(|o| OF_ROWS.contains(&o.effect.id())) {
-            if !may_join(&best.fit.placed, offer.effect, &offer.instance) {
+            if !may_join(context, &best.fit.placed, offer.effect, &offer.instance) {
                 continue;
             }
             let shape = offer.effect.shapes(context, &offer.instance).iter().map(|s| s.range.0).collect();

@@ -131,7 +131,7 @@ fn apply_for(
         .flat_map(|g| whole.placed[g].instance.channels.iter().map(String::as_str))
         .collect();
     let (mut near, _): (Vec<&mut Scanned>, Vec<&mut Scanned>) = all.iter_mut().partition(|o| {
-        may_join(&placed, o.effect, &o.instance) && o.instance.channels.iter().any(|c| group.contains(&c.as_str()))
+        may_join(context, &placed, o.effect, &o.instance) && o.instance.channels.iter().any(|c| group.contains(&c.as_str()))
     });
     let ranked = round_of(context, declared, &Candidate { fit: base.clone(), evidence: 0.0 }, (&mut near, REFINED), &mut |_| {});
     Some((base, ranked))

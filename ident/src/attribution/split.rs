@@ -61,7 +61,7 @@ fn one_on_each(
     let from = k - usize::from(goes.is_some_and(|j| j < k));
     for (part, channel) in shared.instance.channels.iter().enumerate() {
         let is_own = |o: &&Scanned| o.effect.id() == shared.effect.id() && o.instance.channels == [channel.clone()];
-        let own = offers.iter().filter(is_own).filter(|o| may_join(&placed, o.effect, &o.instance));
+        let own = offers.iter().filter(is_own).filter(|o| may_join(context, &placed, o.effect, &o.instance));
         let base = base(context, declared, &placed);
         let scanned = own.filter_map(|o| Some((o, scan(context, &base, o.effect, &o.instance, &loud)?)));
         let (offer, (shape, _)) = scanned.max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;

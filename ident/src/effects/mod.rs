@@ -258,6 +258,7 @@ pub fn library() -> &'static [&'static dyn Effect] {
         &supply::supply_sag::SupplySag,
         &supply::supply_voltage::SupplyVoltage,
         &supply::battery_discharge::BatteryDischarge,
+        &supply::battery_relaxation::BatteryRelaxation,
         &rotor::spinup_lag::SpinupLag,
         &rotor::rotor_inertia::RotorInertia,
         &load_cell::zero_drift::ZeroDrift,

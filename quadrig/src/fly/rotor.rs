@@ -19,10 +19,11 @@ use ident::verdict::Scope;
 use std::sync::Arc;
 
 /// Effects that belong to the rotor, its motor, its ESC or its supply, and fly.
-const FLIES: [&str; 13] = [
+const FLIES: [&str; 14] = [
     "supply_sag",
     "supply_voltage",
     "battery_discharge",
+    "battery_relaxation",
     "spinup_lag",
     "rotor_inertia",
     "blade_damage",

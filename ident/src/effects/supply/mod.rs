@@ -6,6 +6,7 @@
 //! Reference: specification `closing-the-loop.md`, list of effects.
 
 pub(super) mod battery_discharge;
+pub(super) mod battery_relaxation;
 pub(super) mod current_limit;
 pub(crate) mod supply_sag;
 pub(crate) mod supply_voltage;
