@@ -856,12 +856,22 @@ fn an_extrapolation_is_no_size_of_what_is_left() {
     v.channels.predicted.insert("rpm".into(), Channel { unit: "rev/min".into(), noise_floor_rms: 1.0, before, after });
     v.unexplained = vec![left("rpm", 91.0)];
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(
-        said.contains("On speed 4.10 rev/min rms is left (slow). Rows left out of the fit are missed by 91.0 rev/min:"),
-        "{said}"
-    );
+    assert!(said.contains("On speed 91.0 rev/min rms is left (slow). On the rows of the fit it is 4.10 rev/min:"), "{said}");
     let text = terminal(&v, Vocabulary::RIG, false);
     assert!(text.contains("speed: 91.0 rev/min (4.10 rev/min where fitted)"), "{text}");
+}
+
+/// A size that is true of no run is told with those of the runs.
+#[test]
+fn a_mean_of_runs_that_disagree_is_told_as_one() {
+    let mut lead = sag(0.995);
+    lead.parameters[0].ci95 = [0.5 * lead.parameters[0].value, 1.5 * lead.parameters[0].value];
+    lead.evidence += "; the runs disagree: alone they have 0.0799 to 0.200 ohm for the resistance";
+    let said = sentence(&verdict(Kind::Attributed, vec![lead.clone()]), Vocabulary::RIG, false);
+    assert!(said.contains(" per ampere on average, and the runs disagree (0.0799 to 0.200 ohm)."), "{said}");
+    lead.parameters[0].ci95 = [0.95 * lead.parameters[0].value, 1.05 * lead.parameters[0].value];
+    let said = sentence(&verdict(Kind::Attributed, vec![lead]), Vocabulary::RIG, false);
+    assert!(!said.contains("disagree"), "{said}");
 }
 
 /// A noise floor may hold a part of what is named: all that is explained is what stood above it.

@@ -104,7 +104,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 
 /// What the corrected model leaves over on the run that was simulated with it.
 fn resimulated(model: &ident::model::Model, again: &Log) -> String {
-    let context = Context::new(again, Some(model.start_pulse_us));
+    let context = model.context(again);
     let mut out = String::from("the corrected model as the plant, same schedule:\n");
     for target in context.targets.iter().filter(|t| ident::log::MODELLED.contains(&t.name)) {
         let Some(prediction) = model.predict(&context, target.name) else { continue };

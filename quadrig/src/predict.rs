@@ -11,7 +11,6 @@ use crate::close_loop::{flight, inertial};
 use crate::open::{Columns, Names, open};
 use crate::replace::put_as;
 use clap::ValueEnum;
-use ident::channel::Context;
 use ident::log::{Column, Log};
 use ident::model::Model;
 use ident::model::simulate::from_command;
@@ -111,7 +110,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn by_relations(model: &Model, log: &Log) -> Vec<Column> {
-    let context = Context::new(log, Some(model.start_pulse_us));
+    let context = model.context(log);
     let claim = |name: &'static str| {
         let mut values = model.predict(&context, name)?;
         let target = &context.targets[context.target(name)?];

@@ -117,7 +117,7 @@ pub(crate) fn along(model: &Model, log: &Log) -> Option<(Vec<PlantState>, Log)> 
         .collect();
     let predicted = from_command(model, &log.name, &log.t, &pulse, &covariates);
     // the speed that every other relation hangs on is the consensus of the channels
-    let speed = ident::channel::Context::new(&predicted, Some(model.start_pulse_us)).rpm;
+    let speed = model.context(&predicted).rpm;
     if speed.is_empty() {
         return None;
     }

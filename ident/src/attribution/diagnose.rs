@@ -183,8 +183,13 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         rounds.push((chosen.probability, chosen.rivals));
     }
     if rounds.len() > 1 {
+        let names = rounds.len();
         revise(context, declared, &start, &folds, &mut best, &mut rounds);
         errors = heldout::errors(context, declared, &best.fit, &folds);
+        if rounds.len() < names {
+            offers.iter_mut().for_each(|o| o.found = None);
+            join_again((context, declared, &folds), &mut offers, &mut best, &mut errors, &mut rounds);
+        }
     }
     let mut probability: f64 = rounds.iter().map(|r| r.0).product();
     let mut inclusion: Vec<f64> = rounds.iter().map(|r| r.0).collect();
@@ -306,6 +311,22 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
         folds,
         candidates,
     })
+}
+
+/// Lets names join once more, where a second look has taken some away: what had no place beside one that went may have it beside those that stayed.
+fn join_again(
+    (context, declared, folds): (&Context, Declared<'_>, &[Vec<bool>]),
+    offers: &mut [&mut Scanned],
+    best: &mut Candidate,
+    errors: &mut Vec<Held>,
+    rounds: &mut Vec<(f64, Vec<(Candidate, f64)>)>,
+) {
+    while of_this_rig(context, &best.fit.placed) < MOST_EFFECTS {
+        let ranked = round_of(context, declared, best, (&mut *offers, REFINED), &mut |_| {});
+        let Some(chosen) = choose(context, declared, &ranked, best, errors, folds) else { return };
+        (*best, *errors) = (chosen.winner, chosen.held);
+        rounds.push((chosen.probability, chosen.rivals));
+    }
 }
 
 /// Takes the name at a position of the winner out of the rivals that hold it, and forgets how sure it was. What would have stood in its place

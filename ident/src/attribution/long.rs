@@ -107,6 +107,7 @@ pub(crate) fn diagnose_any(log: &Log, context: &Context, declared: Declared<'_>,
         return Some(Found { diagnosis: diagnose(context, declared, progress)?, searched: None, estimates: None });
     };
     let mut few = Context::of_clean(&thinned(log, &rows), Some(context.start_pulse_us));
+    few.steady_speed(context.consensus.sensor_share);
     if let Some(us) = context.limited_from {
         few.leave_out_from(&thinned(log, &rows), us);
     }
@@ -136,6 +137,7 @@ pub(crate) fn diagnose_any(log: &Log, context: &Context, declared: Declared<'_>,
 fn means(log: &Log, context: &Context, declared: Declared<'_>, rows: &[usize]) -> Context {
     let (all, log) = (log.len(), &averaged(log, rows));
     let mut means = Context::of_clean(log, Some(context.start_pulse_us));
+    means.steady_speed(context.consensus.sensor_share);
     if let Some(us) = context.limited_from {
         means.leave_out_from(log, us);
     }

@@ -24,16 +24,15 @@ pub(crate) mod lattice;
 pub mod powers;
 mod relation;
 mod states;
+mod steadied;
 mod target;
 
+pub(crate) use crate::log::STANDSTILL;
 #[cfg(test)]
 pub(crate) use facts::Remembered;
 pub(crate) use facts::{Coast, Draw, Facts, Question, Rail, SawTooth};
 pub use relation::{DIFFERENCES, Relation, is_contrast, unit_of};
 pub use target::Target;
-
-/// Below this speed, rev/min, a rotor counts as standing: slower than any brushless motor runs without position sensors.
-pub(crate) const STANDSTILL: f64 = 100.0;
 
 /// Time after which a rotor of this size has arrived at its new speed, s: five time constants of 0.05 s.
 const ARRIVED: f64 = 0.25;

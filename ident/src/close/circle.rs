@@ -67,7 +67,7 @@ impl Circle {
 /// Judges a run that was simulated with `model`.
 #[must_use]
 pub fn circle(again: &Log, model: &Model) -> Circle {
-    let mut context = Context::new(again, Some(model.start_pulse_us));
+    let mut context = model.context(again);
     settle(&mut context, model);
     tare(&mut context, model);
     let channels = context

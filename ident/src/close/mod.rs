@@ -70,6 +70,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
     let log = &*bad::without(log, &aside);
     let mut context = Context::of_clean(log, model.map(|m| m.start_pulse_us));
     context.leave_aside(aside);
+    context.steady_speed(model.map_or_else(|| context.sensor_share(), |m| m.sensor_share));
     let model = model.map(|m| m.on(whole));
     let declared = Declared { model: model.as_deref() };
     let limit = if model.is_none() { supply_limit::found(log, &context) } else { None };
@@ -314,7 +315,7 @@ fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
 #[must_use]
 pub fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
     let (before, after) = (&*before.on(other), &*after.on(other));
-    let context = Context::new(other, Some(after.start_pulse_us));
+    let context = after.context(other);
     let error = |model: &Model, name: &'static str| -> Option<f64> {
         let prediction = model.predict(&context, name)?;
         let target = &context.targets[context.target(name)?];

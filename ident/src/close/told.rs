@@ -27,7 +27,8 @@ const PROMISING: usize = 4;
 /// Nothing where a name cannot be placed on the log.
 #[must_use]
 pub fn told(log: &Log, names: &[&str], other: &Log) -> Option<Validation> {
-    let context = Context::new(log, None);
+    let mut context = Context::new(log, None);
+    context.steady_speed(context.sensor_share());
     let declared = Declared::default();
     let start = fit(&context, declared, &[], None, Rows::All)?;
     let mut placed = Vec::new();

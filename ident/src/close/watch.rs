@@ -54,6 +54,7 @@ impl Expected {
 #[must_use]
 pub fn expected(model: &Model, log: &Log) -> Vec<Expected> {
     let mut context = Context::of_clean(log, Some(model.start_pulse_us));
+    context.steady_speed(model.sensor_share);
     context.against(Declared { model: Some(model) });
     let classes = leftover::classes(&context);
     let jumps = jumps(model, &context);

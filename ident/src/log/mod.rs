@@ -16,6 +16,7 @@ mod head;
 pub mod import;
 pub mod join;
 pub(crate) mod plausible;
+pub(crate) use plausible::STANDSTILL;
 pub mod quantity;
 mod rig;
 pub mod sparse;

@@ -21,6 +21,8 @@ pub(crate) const VOUCHED: &str = "vouched";
 
 /// Key of the head that holds the density of the air.
 pub(super) const AIR: &str = "air_density_kg_m3";
+/// Below this speed, rev/min, a rotor counts as standing: slower than any brushless motor runs without position sensors.
+pub(crate) const STANDSTILL: f64 = 100.0;
 /// N, W, A, V, rev/min below which a meter's own error may be all there is.
 const FAINT: f64 = 0.5;
 /// Diameter of the largest propeller on a test stand, m.
@@ -184,7 +186,9 @@ fn speed(log: &Log) -> Option<Doubt> {
         v if v > 300_000.0 => doubt(name, true, format!("{v:.0} rev/min: electrical turns?")),
         v if v > 60_000.0 => doubt(name, false, format!("{v:.0} rev/min: electrical turns?")),
         v if v > 0.0 && v < 200.0 && current > 0.5 => {
-            doubt(name, v < 60.0, format!("{v:.1} rev/min at {current:.1} A: rev/s, or thousands?"))
+            // a rotor that lifts something turns faster than that
+            let lifts = typical(log, "thrust_n", &rows).is_some_and(|n| n > FAINT);
+            doubt(name, v < 60.0 || lifts && v < STANDSTILL, format!("{v:.1} rev/min at {current:.1} A: rev/s, or thousands?"))
         }
         _ => None,
     }
@@ -253,7 +257,8 @@ fn thrust(log: &Log) -> Option<Doubt> {
     let per_watt = thrust / power;
     let said = |likely: &str| format!("{thrust:.3} N for {power:.1} W: {likely}");
     match per_watt {
-        p if p > 1.5 => doubt("thrust_n", true, said("grams? kiloamperes or kilovolts?")),
+        p if p > 30.0 => doubt("thrust_n", true, said("millinewtons? kiloamperes or kilovolts?")),
+        p if p > 1.5 => doubt("thrust_n", true, said("grams?")),
         p if p > 0.6 => doubt("thrust_n", false, said("grams? a current of another unit?")),
         p if p < 0.001 => doubt("thrust_n", true, said("kilograms? columns swapped?")),
         p if p < 0.008 => doubt("thrust_n", false, said("kilograms?")),
@@ -427,6 +432,16 @@ mod tests {
             let found = rig("", |n, t, u, i| [n, t, of[0] * u, of[1] * i]).expect_err(column);
             assert!(found.contains("thrust_n") && found.contains("kilo"), "{column}: {found}");
         }
+    }
+
+    /// A speed in rev/s is no rotor that stands: it lifts.
+    #[test]
+    fn a_rotor_that_lifts_something_does_not_stand() {
+        let per_second = |n: f64| n / 60.0;
+        let found = rig("", |n, t, u, i| [1.4 * per_second(n), 3.0 * t, u, i]).expect_err("rev/s");
+        assert!(found.contains("rpm") && found.contains("93.3 rev/min at 12.8 A: rev/s, or thousands?"), "{found}");
+        let grams = rig("", |n, t, u, i| [n, 102.0 * t, u, 3.0 * i]).expect_err("grams");
+        assert!(grams.contains("grams?") && !grams.contains("kilo"), "{grams}");
     }
 
     #[test]

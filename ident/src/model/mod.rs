@@ -91,6 +91,8 @@ pub struct Model {
     pub stood: bool,
     /// Channels of the consensus speed.
     pub consensus: Vec<String>,
+    /// Share of the fluctuations of their speed within a level that is the sensor's own error; it is taken off.
+    pub sensor_share: f64,
     /// Declared polynomials.
     pub polynomials: Vec<Polynomial>,
     /// Added effects.
@@ -215,6 +217,14 @@ fn load_unit(channel: &str) -> &'static str {
 }
 
 impl Model {
+    /// A log made ready for the model: the rotor starts where the model says, and of its sensor's error as much is taken off.
+    #[must_use]
+    pub fn context(&self, log: &Log) -> Context {
+        let mut context = Context::new(log, Some(self.start_pulse_us));
+        context.steady_speed(self.sensor_share);
+        context
+    }
+
     /// The model of a log with these polynomials and no effect.
     #[must_use]
     pub fn of(context: &Context, log: &Log, polynomials: Vec<Polynomial>) -> Self {
@@ -225,6 +235,7 @@ impl Model {
             highest_pulse_us: highest_held(log),
             stood: stood(context),
             consensus: context.consensus.channels.clone(),
+            sensor_share: context.consensus.sensor_share,
             polynomials,
             ..Self::default()
         }
@@ -355,6 +366,9 @@ impl Model {
             "median of the channels without their drop-outs; where none reads, what the command makes of the rotor, moved to the readings around".into(),
         );
         consensus.insert("channels".into(), self.consensus.clone().into());
+        if self.sensor_share > 0.0 {
+            consensus.insert("sensor_share".into(), digits::plain(self.sensor_share).into());
+        }
         root.insert("consensus".into(), consensus.into());
         let mut channels = Table::new();
         for p in &self.polynomials {

@@ -137,11 +137,15 @@ impl Model {
         }
         if let Some(consensus) = root.get("consensus") {
             let table = consensus.as_table().ok_or_else(|| refusal("consensus", Some(consensus), "a table"))?;
-            only(table, &["rule", "channels"]).map_err(|refusal| within("consensus", refusal))?;
+            only(table, &["rule", "channels", "sensor_share"]).map_err(|refusal| within("consensus", refusal))?;
         }
         if let Some(channels) = root.get("consensus").and_then(|c| c.get("channels")) {
             model.consensus =
                 strings(channels).ok_or_else(|| refusal("consensus.channels", Some(channels), "a list of channels"))?;
+        }
+        if let Some(share) = root.get("consensus").and_then(|c| c.get("sensor_share")) {
+            let known = finite(share).filter(|s| (0.0..=1.0).contains(s));
+            model.sensor_share = known.ok_or_else(|| refusal("consensus.sensor_share", Some(share), "a share from 0 to 1"))?;
         }
         (model.runs, model.own) = run::read(root.get("run"))?;
         let channels = root.get("channel");

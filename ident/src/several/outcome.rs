@@ -107,7 +107,8 @@ fn shown_without(tenable: &Tenable<'_>, k: usize, without: &[Across], quoted: &s
 #[must_use]
 pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> Outcome {
     let start = start_pulse(runs);
-    let contexts: Vec<Context> = runs.iter().map(|run| prepared(&run.log, start)).collect();
+    let share = median(&mut runs.iter().map(|r| r.closed.context.consensus.sensor_share).collect::<Vec<f64>>());
+    let contexts: Vec<Context> = runs.iter().map(|run| prepared(&run.log, (start, share))).collect();
     let mut members: Vec<Member<'_>> = runs.iter().zip(&contexts).map(|(run, c)| Member::of(&run.closed, c, &contexts)).collect();
     let closed: Vec<&Closed> = runs.iter().map(|r| &r.closed).collect();
     let differing = differing::found(&closed);
@@ -158,12 +159,13 @@ fn start_pulse(runs: &[Run]) -> f64 {
     median(&mut runs.iter().map(|r| r.closed.context.start_pulse_us).collect::<Vec<f64>>())
 }
 
-fn prepared(log: &Log, start: f64) -> Context {
+fn prepared(log: &Log, (start, share): (f64, f64)) -> Context {
     let log = &*sparse::without(log, &sparse::left_out(log));
     let aside = bad::found(log);
     let log = &*bad::without(log, &aside);
     let mut context = Context::of_clean(log, Some(start));
     context.leave_aside(aside);
+    context.steady_speed(share);
     if let Some(limit) = supply_limit::found(log, &context) {
         context.leave_out_from(log, limit.begins_us());
     }

@@ -21,6 +21,8 @@ pub struct Consensus {
     pub excluded: Vec<String>,
     /// Rows without a speed that can be believed: bridged.
     pub bridged_rows: usize,
+    /// Share of the fluctuations within a level that is the sensor's own error, and was taken off.
+    pub sensor_share: f64,
 }
 
 /// Fewest rows in a row without a speed that the command bridges: fewer are a straight line.
@@ -84,6 +86,7 @@ pub(crate) fn of(log: &Log) -> Fused {
         channels: kept.iter().map(|s| (*s).to_owned()).collect(),
         excluded: excluded.iter().map(|s| (*s).to_owned()).collect(),
         bridged_rows,
+        sensor_share: 0.0,
     };
     Fused { rpm: bridge(&log.t, &rpm), sd, unread, how }
 }

@@ -72,7 +72,7 @@ pub(crate) fn across(runs: &[Recorded], progress: &mut dyn FnMut(f64)) -> Vec<Tr
             let moments = placed.effect.is_of_moments(&placed.instance);
             for other in runs.iter().filter(|o| o.rig == run.rig && o.name != run.name) {
                 let Some(there) = &other.log else { continue };
-                let context = Context::new(there, Some(closed.model.start_pulse_us));
+                let context = closed.model.context(there);
                 let best = context
                     .targets
                     .iter()

@@ -127,7 +127,7 @@ fn predicted(closed: &Closed, log: &Log) -> Vec<Prediction> {
 
 /// The same by a declared and a corrected model.
 pub(crate) fn predicted_by(models: [&Model; 2], log: &Log) -> Vec<Prediction> {
-    let context = Context::new(log, Some(models[1].start_pulse_us));
+    let context = models[1].context(log);
     let [declared, corrected] = models.map(|model| model.on(log));
     let of_channel = |channel: &'static str| {
         let before = error(&declared, &context, channel)?;

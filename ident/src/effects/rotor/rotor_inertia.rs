@@ -3,7 +3,7 @@
 //! What it is: torque_nm += inertia * domega/dt, current_a += power_gain * omega * domega/dt. The supply pays for the power that goes into the
 //! rotor: J omega domega/dt = V dI. The acceleration is that of the measured speed, or what a rotor has that is off its command's speed.
 //! Most controllers let no current flow back (forms `one_way`): a rotor that falls faster than air and friction alone brake it, domega/dt below
-//! -(coast_drag omega^2 + coast_friction), takes what one takes that stands.
+//! -(coast_drag omega^2 + coast_friction), takes what one takes that stands. So does one whose motor is off by its command.
 //! What can go wrong: shows only in transients; a lag between the channels looks alike, and so does, with the other sign, a current that a turning
 //! rotor draws beyond its curve: a negative inertia is refused, but against a declared model, whose rotor may have been heavier.
 //! Units: kg.m2, A.s3/rad2.
@@ -124,7 +124,10 @@ impl Effect for RotorInertia {
         if of_power {
             let omega: Vec<f64> = context.rpm.iter().map(|rpm| rpm * std::f64::consts::TAU / 60.0).collect();
             let coasts: Vec<bool> = match shape {
-                [drag, friction] => of_row.iter().zip(&omega).map(|(a, w)| *a < -(drag * w * w + friction)).collect(),
+                [drag, friction] => {
+                    let falls = |row: usize| of_row[row] < -(drag * omega[row].powi(2) + friction);
+                    (0..omega.len()).map(|row| falls(row) || context.runs_down(row)).collect()
+                }
                 _ => vec![false; omega.len()],
             };
             of_row.iter_mut().zip(&omega).zip(&coasts).for_each(|((a, w), coasts)| *a *= if *coasts { 0.0 } else { *w });

@@ -16,8 +16,8 @@ use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::report::svg::escape;
 use crate::verdict::words::{
-    DISAGREE, OTHERWISE, SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled,
-    scope, signs, sized, sureness, upper, upper_bound, with_interval,
+    SURE, channel, channels, counted, curve, digits, heading, in_force, lower, plain, probability, scaled, scope, signs, sized,
+    sureness, upper, upper_bound, with_interval,
 };
 use crate::verdict::{Alternative, EffectEntry, Kin, Parameter, Verdict};
 use std::fmt::Write;
@@ -210,12 +210,12 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     parameters(sheet, page.words, e);
     let mut html = format!("<p class=\"soft\">{}</p>\n", written(e));
     // how the sizes of the runs stand to each other, in a line of its own
-    let apart = [DISAGREE, OTHERWISE].into_iter().find_map(|how| Some((how, e.evidence.split_once(&format!("; {how}:"))?)));
-    let known = apart.map_or(e.evidence.as_str(), |(_, (known, _))| known);
+    let apart = e.apart();
+    let known = apart.map_or(e.evidence.as_str(), |(known, ..)| known);
     let _ = writeln!(html, "<p><b>{}:</b> {}.</p>", upper(why(page.words, e)), escape(&plain(signs(known))));
-    if let Some((how, (_, rest))) = apart {
+    if let Some((_, how, rest)) = apart {
         let (how, rest) = (escape(&upper(how)), escape(&plain(rest)));
-        let _ = writeln!(html, "<p class=\"warn\"><b>{how}:</b>{rest}. The value above is of what they share.</p>");
+        let _ = writeln!(html, "<p class=\"warn\"><b>{how}:</b> {rest}. The value above is of what they share.</p>");
     }
     if !nameless {
         let _ = writeln!(html, "<p><b>Could also be:</b> {}</p>", escape(&others(page, e, &against)));
@@ -260,6 +260,7 @@ fn contest(e: &EffectEntry, sure: &str, against: &[Rival], none: f64) -> String 
     match against.first().filter(|r| r.probability >= COUNTED) {
         Some(rival) => format!("{sure}: p {p}, rival {}", equals(&probability(rival.probability))),
         None if none >= OPEN => format!("{sure}: p {p}, other names or none {}", equals(&probability(none))),
+        None if e.of_no_run().is_some() => format!("{sure}: p {p}, no rival; its size differs from run to run"),
         None => format!("{sure}: p {p}, no rival"),
     }
 }

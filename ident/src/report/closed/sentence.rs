@@ -168,8 +168,20 @@ fn beaten(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> bool {
     is_beaten(verdict, words, place(verdict, e))
 }
 
-/// What an effect does, with its size, or with a bound where the run shows no more.
+/// What an effect does, with its size, and the sizes of the runs where one value is true of none.
 fn sized_clause(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> Clause {
+    let clause = bounded_clause(verdict, words, e);
+    let does = match e.of_no_run() {
+        Some(alone) => {
+            format!("{} on average, and the runs disagree ({})", clause.does, alone.split(" for ").next().unwrap_or(alone))
+        }
+        None => clause.does,
+    };
+    Clause { does, ..clause }
+}
+
+/// What an effect does, with its size, or with a bound where the run shows no more.
+fn bounded_clause(verdict: &Verdict, words: Vocabulary, e: &EffectEntry) -> Clause {
     let clause = lost::said(verdict, words, e);
     if (words.clause)(e).does.contains(|c: char| c.is_ascii_digit()) {
         return clause;
@@ -499,12 +511,12 @@ fn unit_left<'v>(verdict: &'v Verdict, u: &Unexplained) -> &'v str {
     verdict.channels.get(&u.channel).map_or("", |c| c.unit.as_str())
 }
 
-/// How far rows are missed that the fit did not see, where that is much farther than those that it saw; else empty.
+/// What is left on the rows of the fit, where rows that it did not see are missed by much more; else empty.
 fn beyond_the_fit(verdict: &Verdict, u: &Unexplained) -> String {
-    if fitted(verdict, &u.channel).is_none() {
-        return String::new();
-    }
-    format!(" Rows left out of the fit are missed by {}: they lie beyond what the others show.", size_left(verdict, u))
+    let on_its_own = |seen| {
+        format!(" On the rows of the fit it is {}: levels are missed that the fit did not see.", rms(seen, unit_left(verdict, u)))
+    };
+    fitted(verdict, &u.channel).map(on_its_own).unwrap_or_default()
 }
 
 /// The same in noise floors: of several runs that of all of them, as the state of the channels tells it.
@@ -532,9 +544,7 @@ fn largest(verdict: &Verdict) -> Option<Largest<'_>> {
     let largest = loud(verdict).filter(|u| sensors > 1 && quantity(&u.channel) == what).max_by(|a, b| of(a).total_cmp(&of(b)));
     let told = largest.unwrap_or(loudest);
     let up_to = if largest.is_some() { "up to " } else { "" };
-    let size =
-        fitted(verdict, &told.channel).map_or_else(|| size_left(verdict, told), |seen| rms(seen, unit_left(verdict, told)));
-    Some(Largest { on, size: format!("{up_to}{size} rms"), told })
+    Some(Largest { on, size: format!("{up_to}{} rms", size_left(verdict, told)), told })
 }
 
 /// What a remainder looks like, in its first words; the section on what is left has all.
@@ -549,8 +559,7 @@ fn looks(u: &Unexplained) -> String {
 }
 
 fn size_and_looks(verdict: &Verdict, u: &Unexplained) -> String {
-    let size = fitted(verdict, &u.channel).map_or_else(|| size_left(verdict, u), |seen| rms(seen, unit_left(verdict, u)));
-    format!("{size} rms ({})", looks(u))
+    format!("{} rms ({})", size_left(verdict, u), looks(u))
 }
 
 fn left(verdict: &Verdict) -> String {

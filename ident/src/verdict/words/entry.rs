@@ -5,11 +5,14 @@
 //! Units: as the parameters state.
 //! Reference: GUM, clause 7.2.6 (digits of a result).
 
-use super::{POSITIVE, meter, sized};
+use super::{DISAGREE, OTHERWISE, POSITIVE, meter, parameter_of, sized};
 use crate::verdict::BY_READINGS;
 use crate::verdict::OF_THE_SUPPLY;
 use crate::verdict::TOLD_BY_THE_BOARD;
 use crate::verdict::{EffectEntry, Parameter};
+
+/// Width of an interval, as a share of its value, from which on one value is true of no run: one that a reader would miss by a fifth.
+const OF_NO_RUN: f64 = 0.4;
 
 impl EffectEntry {
     /// Whether it tells of a few readings alone: of no cause that a rig has, and not worth a headline beside one.
@@ -124,6 +127,24 @@ impl EffectEntry {
         let open = sizes.iter().filter(|p| p.ci95[0] <= 0.0 && p.ci95[1] >= 0.0).count();
         let known = sizes.iter().any(|p| sized(p).is_some());
         (self.id != "unknown" && !known && open > 1 && 2 * open > sizes.len()).then_some((open, sizes.len()))
+    }
+
+    /// How the runs that share it stand to each other, where they do not agree: what is known of it besides, how they differ, and their sizes.
+    #[must_use]
+    pub(crate) fn apart(&self) -> Option<(&str, &'static str, &str)> {
+        [DISAGREE, OTHERWISE].into_iter().find_map(|how| {
+            let (known, rest) = self.evidence.split_once(&format!("; {how}:"))?;
+            Some((known, how, rest.trim()))
+        })
+    }
+
+    /// The sizes of the runs that share it, where they differ so much that one value is true of none: "0.08 to 0.2 ohm for the resistance".
+    #[must_use]
+    pub(crate) fn of_no_run(&self) -> Option<&str> {
+        let (_, _, alone) = self.apart().filter(|(_, how, _)| *how == DISAGREE)?;
+        let wide = |p: &Parameter| p.ci95[1] - p.ci95[0] > OF_NO_RUN * p.value.abs();
+        self.parameters.iter().any(|p| alone.ends_with(&parameter_of(&self.id, &p.name)) && wide(p)).then_some(())?;
+        alone.strip_prefix("alone they have ")
     }
 
     /// Whether it was there before the run began.

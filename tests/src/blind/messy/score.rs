@@ -13,7 +13,6 @@ use crate::blind::resume::fields;
 use crate::blind::rig::poly;
 use crate::blind::run::Run;
 use crate::blind::write::text;
-use ident::channel::Context;
 use ident::close::{Closed, close};
 use ident::log::Log;
 use serde_json::Value;
@@ -214,7 +213,7 @@ fn ratios(m: &Messy, closed: &Closed, other: &Log, second: &(Run, Vec<Vec<bool>>
     if matches!(m.top, Top::Unknown | Top::Both) || m.effects.iter().any(Effect::by_chance) {
         return Vec::new();
     }
-    let context = Context::new(other, Some(closed.model.start_pulse_us));
+    let context = closed.model.context(other);
     let model = closed.model.elsewhere();
     let (run, made_up) = second;
     let still = m.still(1);
