@@ -65,6 +65,7 @@ fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
         left_out: vec![],
         set_aside: vec![],
         guessed_floors: None,
+        sensor_share: None,
         at_rest: false,
         validation: vec![],
         runs: vec![],
@@ -728,6 +729,9 @@ fn floors_that_are_no_measure_are_told() {
     let said = |v: &Verdict| terminal(v, Vocabulary::RIG, false).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(!said(&plain).contains("guesses") && !said(&plain).contains("16-bit"));
     assert!(said(&Verdict { guessed_floors: Some(11), ..plain.clone() }).contains("Only 11 rows, one for each level"));
+    let erring = |share: f64| said(&Verdict { sensor_share: Some(share), ..plain.clone() });
+    assert!(erring(0.976).contains("Of what the speed sensor reads off the course of a level, 98 % is its own error"));
+    assert!(!erring(0.2).contains("its own error"));
     let mut silent = plain;
     if let Some(c) = silent.channels.predicted.get_mut("voltage_v") {
         c.noise_floor_rms = 1e-6;

@@ -90,6 +90,32 @@ fn a_lead_shows_through_a_voltage_that_wanders() {
     }
 }
 
+/// A battery that gives way further for seconds, and recovers: two propellers on two days, three cells and four. What the speed's telemetry reads
+/// within a level is its own error, by thrust, torque and current.
+#[test]
+fn a_battery_recovers_and_a_telemetry_errs_on_a_recorded_stand() {
+    let Some(data) = data("the battery of a recorded stand") else { return };
+    for run in ["grp02__dualsky_eco2814c-v2_graupner-12x6_3s", "grp01__dualsky-eco2814c-v2_graupner-10x6_4s"] {
+        let log = data.join(format!("rig/dualcell-eco2814c/tidy/{run}.csv"));
+        let folder = TempDir::new().unwrap();
+        let said = call(folder.path(), &["--quiet", "close-loop", text(&log), "-o", "out", "--json"]).succeeded();
+        let verdict: Value = serde_json::from_str(&said.out).expect("the verdict is JSON");
+        let size = |id: &str, name: &str| {
+            let effects = verdict["effects"].as_array().expect("effects");
+            let found = effects.iter().find(|e| e["id"] == id).unwrap_or_else(|| panic!("{run}: {effects:?}"));
+            let parameter = found["parameters"].as_array().expect("parameters").iter().find(|p| p["name"] == name);
+            parameter.and_then(|p| p["value"].as_f64()).expect("a size")
+        };
+        let tau = size("battery_relaxation", "tau");
+        assert!((2.0..8.0).contains(&tau), "{run}: {tau} s");
+        let share = size("battery_relaxation", "resistance") / size("supply_sag", "resistance");
+        assert!((0.3..0.9).contains(&share), "{run}: {share}");
+        let model = std::fs::read_to_string(folder.path().join("out/model.toml")).expect("a model");
+        let share = model.lines().find_map(|line| line.strip_prefix("sensor_share = ")).expect("of the speed's sensor");
+        assert!(share.parse::<f64>().is_ok_and(|share| share > 0.9), "{run}: {share}");
+    }
+}
+
 #[test]
 fn the_loop_closes_on_three_recorded_runs() {
     let Some(data) = data("the loop on recorded runs") else { return };

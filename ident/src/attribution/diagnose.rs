@@ -779,3 +779,27 @@ pub(crate) fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, 
     let placed = refine(context, declared, &placed, Rows::All, 60);
     fit(context, declared, &placed, Some(start), Rows::All)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::library;
+    use crate::log::{Column, Log};
+
+    /// A filter of half a row is what every logger has; one of ten rows is this one's own, and single absurd rows are no cause.
+    #[test]
+    fn what_every_logger_has_takes_no_place() {
+        let t: Vec<f64> = (0..40).map(|i| 0.1 * f64::from(i)).collect();
+        let columns = vec![
+            Column { name: "rpm".into(), values: (0..40).map(|i| 100.0 * f64::from(i)).collect() },
+            Column { name: "thrust_n".into(), values: (0..40).map(|i| 0.1 * f64::from(i)).collect() },
+        ];
+        let context = Context::new(&Log { t, columns, ..Log::default() }, Some(1000.0));
+        let takes = |id: &str, form: &str, shape: &[f64]| {
+            let effect = *library().iter().find(|e| e.id() == id).expect("in the library");
+            takes_a_place(&context, &Placed { effect, instance: Instance::new(&["thrust_n"], form), shape: shape.to_vec() })
+        };
+        assert!(!takes("channel_filter", "first_order", &[0.04]) && takes("channel_filter", "first_order", &[1.0]));
+        assert!(!takes("glitch_rows", "", &[]) && takes("zero_drift", "", &[]));
+    }
+}

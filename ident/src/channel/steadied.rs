@@ -9,6 +9,7 @@
 //! Reference: Fuller 1987, Measurement Error Models, section 1.1; local lines, Cleveland 1979, J. Am. Stat. Assoc. 74:829.
 
 use super::{Context, Relation};
+use crate::log::Log;
 use crate::numeric::solve::Normal;
 
 /// Rows on either side that tell the course of a level at a row: an error is left with less than a quarter of its size, and a course that bends
@@ -20,6 +21,13 @@ const UNKNOWN: f64 = 0.2;
 const LAGS: std::ops::RangeInclusive<isize> = -2..=5;
 
 impl Context {
+    /// A run made ready for a fit of its own.
+    pub(crate) fn of_run(log: &Log) -> Self {
+        let mut context = Self::new(log, None);
+        context.steady_speed(context.sensor_share());
+        context
+    }
+
     /// Share of the fluctuations of the speed within a level that no load follows; 0 where the loads do not tell.
     pub(crate) fn sensor_share(&self) -> f64 {
         if self.consensus.channels.len() != 1 || self.time_is_row || self.is_table() {

@@ -65,7 +65,7 @@ pub(crate) struct Start {
 
 impl Start {
     fn new(log: &Log) -> Option<Self> {
-        let context = Context::new(log, None);
+        let context = Context::of_run(log);
         let fit = fit(&context, Declared::default(), &[], None, Rows::All)?;
         let residuals = heldout::residuals(&context, Declared::default(), &fit);
         let stated = log.meta.get("blades").and_then(|v| v.as_integer()).filter(|b| (1..=12).contains(b));

@@ -115,6 +115,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         left_out,
         set_aside: context.set_aside.clone(),
         at_rest: never_turned(&context),
+        sensor_share: Some(context.consensus.sensor_share).filter(|share| *share > 0.0),
         guessed_floors: is_table(&context, log).then(|| log.len()),
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
         runs: Vec::new(),

@@ -27,8 +27,7 @@ const PROMISING: usize = 4;
 /// Nothing where a name cannot be placed on the log.
 #[must_use]
 pub fn told(log: &Log, names: &[&str], other: &Log) -> Option<Validation> {
-    let mut context = Context::new(log, None);
-    context.steady_speed(context.sensor_share());
+    let context = Context::of_run(log);
     let declared = Declared::default();
     let start = fit(&context, declared, &[], None, Rows::All)?;
     let mut placed = Vec::new();

@@ -47,12 +47,12 @@ impl Words {
                 ),
             };
         }
-        let plural = if terms == 1 { "" } else { "s" };
+        let (plural, of_one) = if terms == 1 { ("", "s") } else { ("s", "") };
         Self {
             depends_on: vec![variable.to_owned()],
             equation: format!("{} [{form}]", Unknown.about().equation),
             evidence: format!(
-                "no known effect explains it; of all that was tried ({tried}) {terms} term{plural} in {variable} predict held-out rows best, plain ones first: of the held-out error of {channel} {left:.2} is left"
+                "no known effect explains it; of all that was tried ({tried}) {terms} term{plural} in {variable} predict{of_one} held-out rows best, plain ones first: of the held-out error of {channel} {left:.2} is left"
             ),
         }
     }

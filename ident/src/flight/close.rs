@@ -331,6 +331,7 @@ impl<'w> Whole<'w> {
             alternatives: alternatives.collect(),
             set_aside: aside.collect(),
             guessed_floors: None,
+            sensor_share: None,
             at_rest: false,
             left_out: Vec::new(),
             validation: Vec::new(),

@@ -126,6 +126,7 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         left_out: Vec::new(),
         set_aside: Vec::new(),
         guessed_floors: None,
+        sensor_share: None,
         at_rest: false,
         validation: Vec::new(),
         runs: Vec::new(),

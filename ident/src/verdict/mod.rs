@@ -323,6 +323,9 @@ pub struct Verdict {
     /// Rows of a table with one row for each level: none has two to compare, so that the noise floors are guesses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guessed_floors: Option<usize>,
+    /// Share of what a lone speed sensor reads off the course of a level that is its own error; it was taken off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor_share: Option<f64>,
     /// The motor never turned: nothing is seen of what a load brings about.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub at_rest: bool,

@@ -300,6 +300,23 @@ mod tests {
         assert!(is_one_way(first) && RotorInertia.priced(&context, first) == 0, "{instances:?}");
     }
 
+    /// A motor that is off draws nothing, although its rotor has hardly slowed down yet.
+    #[test]
+    fn a_motor_that_is_off_draws_what_one_draws_that_stands() {
+        let t: Vec<f64> = (0..60).map(|i| 0.1 * f64::from(i)).collect();
+        let pulse: Vec<f64> = (0..60).map(|i| if i < 40 { 1800.0 } else { 1000.0 }).collect();
+        let rpm: Vec<f64> = (0..60).map(|i| 6000.0 - 20.0 * f64::from((i - 39).max(0))).collect();
+        let current = pulse.iter().map(|p| if *p > 1100.0 { 20.0 } else { 0.2 }).collect();
+        let columns = [("pulse_us", pulse), ("rpm", rpm), ("current_a", current)];
+        let columns = columns.map(|(name, values)| Column { name: name.into(), values }).to_vec();
+        let context = Context::new(&Log { t, columns, ..Log::default() }, Some(1100.0));
+        let instance = Instance::new(&["current_a"], ONE_WAY);
+        let mut design = TargetDesign::baseline(&context, "current_a", Relation::Current);
+        RotorInertia.apply(&context, &instance, &[1e-3, 50.0], 0, &mut design);
+        let of_speed = |row: usize| design.columns.iter().filter(|c| c.label != Label::Base(0)).all(|c| c.values[row] == 0.0);
+        assert!(of_speed(41) && !of_speed(38), "{:?}", design.columns);
+    }
+
     #[test]
     fn two_rows_at_once_make_no_acceleration() {
         let t = vec![0.0, 1.0, 2.0, 2.00004, 3.0, 4.0, 5.0];

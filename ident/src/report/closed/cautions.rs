@@ -1,7 +1,7 @@
 //! What a reader must know before the figures.
 //!
-//! What it is: noise floors that are guesses, floors that no meter has, and other runs on which the model is far off; a sentence or two each, for page
-//! and terminal alike.
+//! What it is: noise floors that are guesses, floors that no meter has, a speed sensor whose own error was taken off, and other runs on which the
+//! model is far off; a sentence or two each, for page and terminal alike.
 //! What can go wrong: nothing; most runs have none.
 //! Units: rows, noise floors.
 //! Reference: quantisation noise of a uniform quantiser, a step over the square root of twelve.
@@ -14,12 +14,18 @@ use crate::verdict::{Validation, Verdict};
 /// and its rounding is a 65536th of its span over the square root of twelve.
 const FINEST: f64 = 65_536.0 / 3.464_101_6;
 
+/// Share of its fluctuations from which on a speed sensor reads its own error rather than the rotor.
+const MOSTLY: f64 = 0.5;
+
 /// The cautions of a verdict.
 pub(super) fn cautions(v: &Verdict) -> Vec<String> {
     let guessed = v.guessed_floors.map(|rows| {
         format!("Only {rows} rows, one for each level: none has two to compare, so that the noise floors are guesses, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.")
     });
-    guessed.into_iter().chain(without_noise(v)).chain(far_off(v)).collect()
+    let own_error = v.sensor_share.filter(|share| *share > MOSTLY).map(|share| {
+        format!("Of what the speed sensor reads off the course of a level, {:.0} % is its own error: thrust, torque and current do not follow it. It was taken off before they were predicted.", 100.0 * share)
+    });
+    guessed.into_iter().chain(without_noise(v)).chain(own_error).chain(far_off(v)).collect()
 }
 
 fn without_noise(v: &Verdict) -> Option<String> {

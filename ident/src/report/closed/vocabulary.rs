@@ -116,6 +116,7 @@ pub(crate) fn bare_verdict(unexplained: Vec<crate::verdict::Unexplained>) -> cra
         left_out: Vec::new(),
         set_aside: Vec::new(),
         guessed_floors: None,
+        sensor_share: None,
         at_rest: false,
         validation: Vec::new(),
         runs: Vec::new(),
