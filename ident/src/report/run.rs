@@ -36,12 +36,10 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
     sheet.section(if found.plateaus.is_empty() { "The run" } else { "The run, with its plateaus" });
     let time: Vec<Figure> =
         ["thrust_n", "torque_nm", "current_a", "voltage_v"].iter().filter_map(|c| over_time(log, found, c)).collect();
-    let speed: Vec<Figure> = SPEED.iter().filter_map(|c| over_time(log, found, c)).collect();
-    sheet.figures([speed, time].concat());
-    sheet.figures([overlaid(log), over_current(log, found)].into_iter().flatten().collect());
-    sheet.section("How the channels and the plateaus come about");
-    let differences = differences(log, &found.plateaus);
-    sheet.figures(differences.into_iter().chain(binary_shift(log, found)).collect());
+    sheet.figures([speeds_over_time(log, found), time].concat());
+    sheet.figures(over_current(log, found).into_iter().collect());
+    sheet.section("How the plateaus come about");
+    sheet.figures(binary_shift(log, found));
     if !found.plateaus.is_empty() {
         relations(&mut sheet, found);
     }
@@ -215,19 +213,29 @@ fn spans(plateaus: &[Plateau]) -> Layer {
     Layer::Spans { name: "plateaus".into(), ranges: plateaus.iter().map(|p| (p.from_s, p.to_s)).collect() }
 }
 
+/// The speed over time: of several channels one drawing, and how they differ.
+fn speeds_over_time(log: &Log, found: &Identified) -> Vec<Figure> {
+    let Some(together) = overlaid(log) else { return SPEED.iter().filter_map(|c| over_time(log, found, c)).collect() };
+    let channels = SPEED.into_iter().filter(|c| log.column(c).is_some()).zip(CLASSES);
+    let marks = channels.map(|(c, class)| Layer::Marks { name: String::new(), class, marks: means(log, found, c) });
+    let layers = std::iter::once(spans(&found.plateaus)).chain(together.layers).chain(marks).collect();
+    std::iter::once(Figure { layers, ..together }).chain(differences(log, &found.plateaus)).collect()
+}
+
+/// The plateau means of a channel, each to be asked.
+fn means(log: &Log, found: &Identified, channel: &str) -> Vec<Mark> {
+    let unit = unit_of(channel);
+    let mark = |(k, p): (usize, &Plateau)| {
+        let (mean, se) = p.of(log, channel)?;
+        let text = format!("{}: {mean:.4} \u{b1} {:.4} {unit}, {} rows", k + 1, 1.96 * se, p.rows);
+        Some(Mark { x: 0.5 * (p.from_s + p.to_s), y: mean, error: 0.0, text })
+    };
+    found.plateaus.iter().enumerate().filter_map(mark).collect()
+}
+
 fn over_time(log: &Log, found: &Identified, channel: &str) -> Option<Figure> {
     let (x, y) = present(&log.t, log.column(channel)?);
-    let unit = unit_of(channel);
-    let marks = found
-        .plateaus
-        .iter()
-        .enumerate()
-        .filter_map(|(k, p)| {
-            let (mean, se) = p.of(log, channel)?;
-            let text = format!("{}: {mean:.4} \u{b1} {:.4} {unit}, {} rows", k + 1, 1.96 * se, p.rows);
-            Some(Mark { x: 0.5 * (p.from_s + p.to_s), y: mean, error: 0.0, text })
-        })
-        .collect();
+    let marks = means(log, found, channel);
     Some(Figure {
         id: format!("time-{}", channel.replace('_', "-")),
         title: format!("{} over time", heading(channel)),
@@ -572,6 +580,23 @@ mod tests {
         assert!(hardly(&constant(1.5e-5, 0.9e-5)).starts_with("; hardly known"));
         assert!(hardly(&constant(1.5e-5, 2e-5)).contains("spans zero"));
         assert!(hardly(&constant(0.0, 0.0)).contains("not known"));
+    }
+
+    /// Two speed sensors share a drawing, with how they differ beneath; one has a drawing of its own.
+    #[test]
+    fn speed_channels_share_a_drawing() {
+        let t: Vec<f64> = (0..200).map(|i| 0.1 * f64::from(i)).collect();
+        let rpm: Vec<f64> = t.iter().map(|t| 3000.0 + 5.0 * t.sin()).collect();
+        let found = |log: &Log| Identified { plateaus: Vec::new(), levels: Vec::new(), ..identify(log).expect("a log") };
+        let titles = |names: &[&str]| -> Vec<String> {
+            let columns = names.iter().map(|n| Column { name: (*n).to_owned(), values: rpm.clone() }).collect();
+            let log = Log { name: "run.csv".to_owned(), t: t.clone(), columns, ..Log::default() };
+            speeds_over_time(&log, &found(&log)).into_iter().map(|f| f.title).collect()
+        };
+        let two = titles(&["rpm_beam", "rpm_encoder"]);
+        assert_eq!(two[0], "Speed channels over time");
+        assert!(two.len() == 2 && two[1].starts_with("Speed channels less"), "{two:?}");
+        assert_eq!(titles(&["rpm_beam"]).len(), 1);
     }
 
     /// Without a plateau the page says so once, and has no table without rows.
