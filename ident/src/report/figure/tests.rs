@@ -109,7 +109,7 @@ fn before_and_after_differ_without_colour() {
 #[test]
 fn read_outs_stay_inside() {
     let mut out = String::new();
-    let f = Frame { x: (0.0, 1.0), y: (0.0, 1.0), left: LEFT, top: TOP, height: 330.0 };
+    let f = Frame { x: (0.0, 1.0), y: (0.0, 1.0), left: LEFT, top: TOP, bottom: BOTTOM, height: 330.0 };
     mark(&mut out, "a", &Mark { x: 1.0, y: 1.0, error: 0.0, text: "a read-out of forty characters, about so".into() }, &f);
     let number = |key: &str| -> f64 {
         out.split("class=\"tip\"").nth(1).unwrap().split(key).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
