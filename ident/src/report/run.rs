@@ -16,6 +16,7 @@ use crate::identify::curves::{Fitted, Law, ratio};
 use crate::identify::{Constant, Identified};
 use crate::log::board;
 use crate::log::{Gaps, Log, SPEED};
+use crate::numeric::digits::significant;
 use crate::numeric::order::median;
 use crate::plateau::shift::{Settings, filters};
 use crate::plateau::{Plateau, so_many};
@@ -541,13 +542,30 @@ fn said(f: &Fitted) -> String {
     format!("{}, dof {}{}", ratio(law.chi2), law.freedom, if law.holds { "" } else { ", does not hold" })
 }
 
-/// A value and half of its interval, to two digits of the latter.
+/// Significant digits of a coefficient: a polynomial is known far better than each of its coefficients.
+const OF_COEFFICIENT: usize = 7;
+
+/// A coefficient with all digits that its curve asks for, and half of its interval to two.
 fn as_known(value: f64, half: f64) -> [String; 2] {
-    [value, half].map(|v| words::digits(v, half))
+    let to = |v: f64, digits: usize| {
+        let near = significant(v, digits);
+        if near != 0.0 && !(1e-3..1e7).contains(&near.abs()) { format!("{near:e}") } else { format!("{near}") }
+    };
+    [to(value, OF_COEFFICIENT), to(half, 2)]
+}
+
+/// The unit of a coefficient: the ordinate's for each power of the regressor.
+fn unit_of_coefficient(f: &Fitted, k: usize) -> String {
+    let regressor = if f.x == "pulse_us" { "kus" } else { "krpm" };
+    match k {
+        0 => unit_of(&f.y).to_owned(),
+        1 => format!("{} per {regressor}", unit_of(&f.y)),
+        k => format!("{} per {regressor}^{k}", unit_of(&f.y)),
+    }
 }
 
 pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
-    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. Half widths of 95 % intervals. Chi2/dof is the scatter of the plateaus about the curve over what their own errors promise, squared, for each degree of freedom: 1 where both agree; where chance does not explain it (p below 0.01) the curve does not hold, and the interval is as much wider.");
+    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. All digits belong to the curve: its coefficients are known far better together than each alone. Half widths of 95 % intervals. Chi2/dof is the scatter of the plateaus about the curve over what their own errors promise, squared, for each degree of freedom: 1 where both agree; where chance does not explain it (p below 0.01) the curve does not hold, and the interval is as much wider.");
     let rows: Vec<Vec<String>> = found
         .curves
         .iter()
@@ -557,11 +575,16 @@ pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
                 let c = f.curve.coefficient(k);
                 let (chi2, chosen) = if k == 0 { (said(f), chosen.clone()) } else { Default::default() };
                 let [value, half] = as_known(c.value, c.half);
-                vec![over(f), format!("c{k}"), value, half, chi2, chosen]
+                vec![over(f), format!("c{k}"), value, half, unit_of_coefficient(f, k), chi2, chosen]
             })
         })
         .collect();
-    sheet.listed("coefficients", &["relation", "coefficient", "value", "\u{b1}", "chi2/dof", "order by AICc"], &rows, None);
+    sheet.listed(
+        "coefficients",
+        &["relation", "coefficient", "value", "\u{b1}", "unit", "chi2/dof", "order by AICc"],
+        &rows,
+        None,
+    );
 }
 
 #[cfg(test)]
@@ -580,6 +603,14 @@ mod tests {
         assert!(hardly(&constant(1.5e-5, 0.9e-5)).starts_with("; hardly known"));
         assert!(hardly(&constant(1.5e-5, 2e-5)).contains("spans zero"));
         assert!(hardly(&constant(0.0, 0.0)).contains("not known"));
+    }
+
+    /// A polynomial can be used with what the page prints of it.
+    #[test]
+    fn coefficients_have_the_digits_of_their_curve() {
+        assert_eq!(as_known(-21.345_678_9, 201.3), ["-21.34568", "200"]);
+        assert_eq!(as_known(1.234_567_89e-5, 1.26e-6), ["1.234568e-5", "1.3e-6"]);
+        assert_eq!(as_known(8_437.123_456, 0.0), ["8437.123", "0"]);
     }
 
     /// Two speed sensors share a drawing, with how they differ beneath; one has a drawing of its own.
