@@ -613,16 +613,26 @@ mod tests {
         assert_eq!(as_known(8_437.123_456, 0.0), ["8437.123", "0"]);
     }
 
+    /// A staircase with these speed channels, all alike.
+    fn staircase(speeds: &[&str]) -> Log {
+        let t: Vec<f64> = (0..600).map(|i| 0.1 * f64::from(i)).collect();
+        let pulse: Vec<f64> = t.iter().map(|t| 1100.0 + 80.0 * (t / 10.0).floor()).collect();
+        let wave = |i: usize| (0.7 * (i * i) as f64).sin();
+        let rpm: Vec<f64> = pulse.iter().enumerate().map(|(i, p)| 7.0 * (p - 1000.0) + 4.0 * wave(i)).collect();
+        let thrust = rpm.iter().enumerate().map(|(i, r)| 1e-7 * r * r + 0.01 * wave(i + 3)).collect();
+        let speeds = speeds.iter().map(|name| (*name, rpm.clone()));
+        let columns = std::iter::once(("pulse_us", pulse)).chain(speeds).chain([("thrust_n", thrust)]);
+        let columns = columns.map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        Log { name: "run.csv".to_owned(), t, columns, ..Log::default() }
+    }
+
     /// Two speed sensors share a drawing, with how they differ beneath; one has a drawing of its own.
     #[test]
     fn speed_channels_share_a_drawing() {
-        let t: Vec<f64> = (0..200).map(|i| 0.1 * f64::from(i)).collect();
-        let rpm: Vec<f64> = t.iter().map(|t| 3000.0 + 5.0 * t.sin()).collect();
-        let found = |log: &Log| Identified { plateaus: Vec::new(), levels: Vec::new(), ..identify(log).expect("a log") };
         let titles = |names: &[&str]| -> Vec<String> {
-            let columns = names.iter().map(|n| Column { name: (*n).to_owned(), values: rpm.clone() }).collect();
-            let log = Log { name: "run.csv".to_owned(), t: t.clone(), columns, ..Log::default() };
-            speeds_over_time(&log, &found(&log)).into_iter().map(|f| f.title).collect()
+            let log = staircase(names);
+            let found = identify(&log).expect("a log");
+            speeds_over_time(&log, &found).into_iter().map(|f| f.title).collect()
         };
         let two = titles(&["rpm_beam", "rpm_encoder"]);
         assert_eq!(two[0], "Speed channels over time");
@@ -633,14 +643,7 @@ mod tests {
     /// Without a plateau the page says so once, and has no table without rows.
     #[test]
     fn a_run_without_a_plateau_has_no_empty_tables() {
-        let t: Vec<f64> = (0..600).map(|i| 0.1 * f64::from(i)).collect();
-        let pulse: Vec<f64> = t.iter().map(|t| 1100.0 + 80.0 * (t / 10.0).floor()).collect();
-        let wave = |i: usize| (0.7 * (i * i) as f64).sin();
-        let rpm: Vec<f64> = pulse.iter().enumerate().map(|(i, p)| 7.0 * (p - 1000.0) + 4.0 * wave(i)).collect();
-        let thrust = rpm.iter().enumerate().map(|(i, r)| 1e-7 * r * r + 0.01 * wave(i + 3)).collect();
-        let columns = [("pulse_us", pulse), ("rpm", rpm), ("thrust_n", thrust)];
-        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
-        let log = Log { name: "run.csv".to_owned(), t, columns, ..Log::default() };
+        let log = staircase(&["rpm"]);
         let found = identify(&log).expect("a log");
         let with = run(&log, &found, None).html();
         assert!(!found.plateaus.is_empty() && with.contains("Coefficients") && !with.contains("No plateau was found"));
