@@ -10,7 +10,7 @@ use crate::apart::Paths;
 use crate::join::{With, join};
 use crate::open::{Columns, Names, as_written};
 use crate::replace::{put, put_as, put_log};
-use ident::log::import::{Note, Report};
+use ident::log::import::Report;
 use ident::report::{WIDEST, wrapped};
 use std::path::PathBuf;
 
@@ -124,19 +124,22 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 
 /// What was found on the way, a table no wider than a terminal.
 fn table(report: &Report) -> String {
-    let width = report.notes.iter().map(|n| n.column.chars().count()).max().unwrap_or(0).max("column".len());
-    let mut out = format!("{:<width$}  {:>7}  finding\n", "column", "count");
-    for Note { column, what, count } in &report.notes {
-        // beneath the column of findings, as far as that leaves room for one
-        let indent = (width + 11).min(WIDEST / 2);
-        out += &format!("{column:<width$}  {count:>7}  {}\n", wrapped(what, indent));
-    }
-    out
+    let whole = report.table();
+    let findings = whole.find("finding").unwrap_or(0);
+    // further lines stand beneath the first, as far as that leaves room for them
+    let line = |line: &str| match line.split_at_checked(findings) {
+        Some((lead, what)) if line.chars().count() > WIDEST => {
+            format!("{lead}{}\n", wrapped(what, findings.min(WIDEST / 2)))
+        }
+        _ => format!("{line}\n"),
+    };
+    whole.lines().map(line).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ident::log::import::Note;
 
     #[test]
     fn findings_fit_a_terminal() {

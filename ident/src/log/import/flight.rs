@@ -230,7 +230,7 @@ mod tests {
         near("pulse_us_1", 2000.0);
         near("voltage_v", 3.7);
         assert!(log.column("rpm_1").unwrap()[1].is_nan() && log.len() == 2);
-        let said: String = report.notes.iter().map(|n| format!("{}: {}\n", n.column, n.what)).collect();
+        let said = report.table();
         assert!(said.contains("kalman.s") && said.contains("row left out") && said.contains("forward-right-down"), "{said}");
     }
 

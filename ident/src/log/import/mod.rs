@@ -62,6 +62,17 @@ impl Report {
             self.notes.push(Note { column: column.to_owned(), what: what.into(), count });
         }
     }
+
+    /// The report as an aligned table.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let width = self.notes.iter().map(|n| n.column.len()).max().unwrap_or(6).max(6);
+        let mut out = format!("{:<width$}  {:>7}  finding\n", "column", "count");
+        for n in &self.notes {
+            out += &format!("{:<width$}  {:>7}  {}\n", n.column, n.count, n.what);
+        }
+        out
+    }
 }
 
 /// A user's own mapping of one column: `target = source * factor + offset`.
