@@ -832,6 +832,7 @@ fn missing_pulses() -> Verdict {
         expected: 2464.06,
         recurs: false,
         silent: false,
+        stuck: false,
     };
     v.set_aside = vec![aside(4), aside(3)];
     v

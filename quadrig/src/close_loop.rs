@@ -12,7 +12,7 @@ mod several;
 
 use crate::Failure;
 use crate::apart::Paths;
-use crate::folder::Folder;
+use crate::folder::{Folder, tell_apart};
 use crate::open::{Columns, Names, open, read_model};
 use crate::progress::Bar;
 use ident::close::{Closed, close};
@@ -52,6 +52,11 @@ impl Args {
         self.logs.first().map_or(Path::new(""), PathBuf::as_path)
     }
 
+    /// Every run, those that take no part last.
+    fn runs(&self) -> Vec<&Path> {
+        self.logs.iter().chain(&self.validate).map(PathBuf::as_path).collect()
+    }
+
     /// What it reads and writes.
     pub(crate) fn paths(&self) -> Paths<'_> {
         Paths::default().reads(&self.logs).reads(&self.model).reads(&self.validate).fills("-o", &self.output)
@@ -71,13 +76,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     let folder = args.output.as_deref().map(|path| Folder::new(path, "close-loop")).transpose()?;
     let options = args.columns.options(&args.names);
-    let log = open(args.log(), &options, quiet)?;
+    let mut log = open(args.log(), &options, quiet)?;
     let model = args.model.as_deref().map(|path| read_model(path, quiet)).transpose()?;
     if let Some(same) = args.validate.iter().find(|p| p.canonicalize().ok() == args.log().canonicalize().ok()) {
         let what = "it is the log itself, whose figures validate nothing; expected another run of the rig";
         return Err(format!("--validate {}: {what}", same.display()).into());
     }
-    let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    let mut others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    tell_apart(std::iter::once(&mut log).chain(&mut others), &args.runs());
     let path = args.model.as_ref().map(|m| m.display().to_string()).unwrap_or_default();
     let declared = model.as_ref().map(|m| Named::by(&path, |key| m.meta.get(key)));
     of_one_rig(declared.into_iter().chain(std::iter::once(&log).chain(&others).map(Log::names)))?;

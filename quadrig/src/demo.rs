@@ -16,7 +16,6 @@ use hal_sim::{Scenario, effect};
 use ident::channel::{Context, unit_of};
 use ident::close::close;
 use ident::log::Log;
-use ident::numeric::digits::number;
 use ident::plateau::{plateaus, so_many};
 use ident::report::{Hidden, Origin, Vocabulary, terminal, wrapped};
 use ident::verdict::words::{channel, digits, scaled};
@@ -26,14 +25,22 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// The effects among which the seed draws.
 const HIDDEN: [&str; 6] = ["supply_sag", "battery_discharge", "thermal_zero", "zero_drift", "beam_resonance", "channel_filter"];
 
+/// What `--effect` says.
+fn effect_help() -> String {
+    let list = |names: &[&str]| ident::verdict::words::list(&names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
+    let (drawn, unknown) = (list(&HIDDEN), list(&effect::UNKNOWN));
+    format!(
+        "Hides this effect; without it one is drawn of {drawn}. The library of the identification does not know {unknown}: these are never named"
+    )
+}
+
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Draws the hidden effect and every noise; from the clock when not given.
     #[arg(long, value_parser = crate::number::whole::<u64>(0, u64::MAX, "a seed"))]
     seed: Option<u64>,
-    /// Hides this effect instead of drawing one of six.
-    #[arg(long, value_parser = PossibleValuesParser::new(effect::catalogue().iter().map(|e| e.id)))]
+    #[arg(long, help = effect_help(), value_parser = PossibleValuesParser::new(effect::catalogue().iter().map(|e| e.id)))]
     effect: Option<String>,
     /// Folder for log, model, verdict and report.
     #[arg(short, long, default_value = "out/demo")]
@@ -119,7 +126,13 @@ fn resimulated(model: &ident::model::Model, again: &Log) -> String {
 
 /// A size of what was hidden; a whole number, such as that of a channel, as itself.
 fn size(value: f64) -> String {
-    if value.fract() == 0.0 { format!("{value}") } else { number(value) }
+    if value.fract() == 0.0 { format!("{value}") } else { four(value) }
+}
+
+/// To four significant digits.
+fn four(value: f64) -> String {
+    let near: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    if near.abs() < 1e-3 { format!("{near:e}") } else { format!("{near}") }
 }
 
 /// Spreads neighbouring seeds (splitmix64).
@@ -140,7 +153,8 @@ mod tests {
 
     #[test]
     fn a_whole_number_has_no_decimals() {
-        assert_eq!((size(1.0), size(0.01343)), ("1".to_owned(), number(0.01343)));
+        let sizes = [1.0, 0.013_431_7, 68.284_88, 0.592_01, 6.300_04e-5].map(size);
+        assert_eq!(sizes, ["1", "0.01343", "68.28", "0.592", "6.3e-5"]);
     }
 
     #[test]

@@ -9,7 +9,7 @@
 
 use crate::Failure;
 use crate::trouble::unwritten;
-use ident::log::digest;
+use ident::log::{Log, digest};
 use ident::report::Figure;
 use std::collections::BTreeMap;
 use std::fs;
@@ -39,6 +39,36 @@ pub(crate) fn changed(folder: &Path, name: &str, command: &str) -> Failure {
 /// The last part of a path, as a page tells it.
 pub(crate) fn name_of(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// Gives runs whose files are named alike as much of their paths for a name as tells them apart.
+pub(crate) fn tell_apart<'l>(logs: impl IntoIterator<Item = &'l mut Log>, paths: &[&Path]) {
+    let mut logs: Vec<&mut Log> = logs.into_iter().collect();
+    let names: Vec<String> = logs.iter().map(|log| log.name.clone()).collect();
+    for (k, log) in logs.iter_mut().enumerate() {
+        let alike = names.iter().zip(paths).filter(|(name, _)| **name == names[k]).map(|(_, path)| *path);
+        let alike: Vec<&Path> = alike.collect();
+        if let Some(path) = paths.get(k).filter(|_| alike.len() > 1) {
+            log.name = end_of(path, parts_that_differ(&alike));
+        }
+    }
+}
+
+/// Fewest last parts by which every path of these is another; of one that stands twice as many as the longest has.
+fn parts_that_differ(paths: &[&Path]) -> usize {
+    let most = paths.iter().map(|path| path.components().count()).max().unwrap_or(1);
+    let differ = |parts: &usize| {
+        let mut ends: Vec<String> = paths.iter().map(|path| end_of(path, *parts)).collect();
+        ends.sort_unstable();
+        ends.windows(2).all(|pair| pair[0] != pair[1])
+    };
+    (1..most).find(differ).unwrap_or(most)
+}
+
+/// The last parts of a path.
+fn end_of(path: &Path, parts: usize) -> String {
+    let all: Vec<_> = path.components().collect();
+    all[all.len().saturating_sub(parts)..].iter().collect::<PathBuf>().display().to_string()
 }
 
 /// Files to be written.
@@ -183,6 +213,21 @@ fn moved(from: &Path, to: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn runs_that_are_named_alike_have_more_of_their_paths() {
+        let apart = |paths: &[&str]| -> Vec<String> {
+            let paths: Vec<&Path> = paths.iter().map(Path::new).collect();
+            let named = |path: &&Path| Log { name: name_of(path), ..Log::default() };
+            let mut logs: Vec<Log> = paths.iter().map(named).collect();
+            tell_apart(&mut logs, &paths);
+            logs.into_iter().map(|log| log.name).collect()
+        };
+        assert_eq!(apart(&["calm/flight.csv", "gusty/flight.csv", "a/b.csv"]), ["calm/flight.csv", "gusty/flight.csv", "b.csv"]);
+        assert_eq!(apart(&["1/out/run.csv", "2/out/run.csv"]), ["1/out/run.csv", "2/out/run.csv"]);
+        assert_eq!(apart(&["run.csv", "other/run.csv"]), ["run.csv", "other/run.csv"]);
+        assert_eq!(apart(&["run.csv", "run.csv"]), ["run.csv", "run.csv"]);
+    }
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<String> = fs::read_dir(folder)

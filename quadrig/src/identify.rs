@@ -19,7 +19,7 @@ use ident::log::Log;
 use ident::numeric::digits::number;
 use ident::plateau::so_many;
 use ident::report::{Sheet, WIDEST, headline, wrapped};
-use ident::verdict::words::{bracketed, channel};
+use ident::verdict::words::{bracketed, channel, to_error};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -163,15 +163,8 @@ fn text(found: &Identified) -> String {
         out += "\nconstants\n";
     }
     for c in &found.constants {
-        out += &format!(
-            "{:<9} {} +- {} {} (95 %: {} to {})\n",
-            c.name,
-            number(c.value),
-            number(c.se),
-            c.unit,
-            number(c.value - c.half),
-            number(c.value + c.half)
-        );
+        let [value, se, low, high] = to_error([c.value, c.se, c.value - c.half, c.value + c.half], c.se);
+        out += &format!("{:<9} {value} +- {se} {} (95 %: {low} to {high})\n", c.name, c.unit);
         if let Some(law) = c.law {
             out += &format!("{:<9} {}\n", "", wrapped(&law.words(), 10));
         }

@@ -10,6 +10,8 @@ use crate::apart::Paths;
 use crate::join::{With, join};
 use crate::open::{Columns, Names, as_written};
 use crate::replace::{put, put_as, put_log};
+use ident::log::import::Report;
+use ident::report::{WIDEST, wrapped};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -111,14 +113,40 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     if !quiet {
         joined.iter().flat_map(|j| &j.remarks).for_each(|line| note!("{line}"));
-        crate::say::text(&report.table());
-        joined.iter().flat_map(|j| &j.reports).for_each(|r| crate::say::text(&r.table()));
-        say!(
-            "{} rows, {:.3} s, columns t_s {}",
-            log.len(),
-            log.t[log.len() - 1] - log.t[0],
-            log.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" ")
-        );
+        crate::say::text(&table(&report));
+        joined.iter().flat_map(|j| &j.reports).for_each(|r| crate::say::text(&table(r)));
+        let columns = log.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" ");
+        let told = format!("{} rows, {:.3} s, columns t_s {columns}", log.len(), log.t[log.len() - 1] - log.t[0]);
+        say!("{}", wrapped(&told, 2));
     }
     Ok(())
+}
+
+/// What was found on the way, a table no wider than a terminal.
+fn table(report: &Report) -> String {
+    let whole = report.table();
+    let findings = whole.find("finding").unwrap_or(0);
+    // further lines stand beneath the first, as far as that leaves room for them
+    let line = |line: &str| match line.split_at_checked(findings) {
+        Some((lead, what)) if line.chars().count() > WIDEST => {
+            format!("{lead}{}\n", wrapped(what, findings.min(WIDEST / 2)))
+        }
+        _ => format!("{line}\n"),
+    };
+    whole.lines().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ident::log::import::Note;
+
+    #[test]
+    fn findings_fit_a_terminal() {
+        let what = "glitches: one or two samples far from both neighbours; kept, left out of means and fits".to_owned();
+        let notes = vec![Note { column: "rpm_electrical".to_owned(), what, count: 1 }];
+        let said = table(&Report { notes });
+        assert!(said.lines().all(|l| l.chars().count() <= WIDEST) && said.lines().count() == 3, "{said}");
+        assert!(said.lines().last().is_some_and(|l| l.starts_with(&" ".repeat(25))), "{said}");
+    }
 }

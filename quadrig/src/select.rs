@@ -22,7 +22,7 @@ use ident::identify::settled;
 use ident::log::digest;
 use ident::log::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::plateau::plateaus;
-use ident::report::{WIDEST, selection, wrapped};
+use ident::report::{WIDEST, selection, tenths, wrapped};
 use ident::sizing::select::{Airframe, Need, Pair, Row, choose, from_log, is_repeated, misses, read_table, row, thesis, why};
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -262,12 +262,13 @@ fn fly(motor: &str, propeller: &str) -> Pair {
         schedule: Schedule::Staircase { step_us: 100.0, hold_s: 3.0, top_us: 2000.0 },
         ..Scenario::default()
     };
-    let nothing = Pair {
+    let nothing = |why: String| Pair {
         motor: motor.to_owned(),
         propeller: propeller.to_owned(),
         maximum: None,
         clipped: false,
         levels: Vec::new(),
+        without: Some(why),
         source: scenario.name.clone(),
     };
     match hal_sim::run(&scenario, None, &mut |_| {}) {
@@ -276,9 +277,15 @@ fn fly(motor: &str, propeller: &str) -> Pair {
             let pair = from_log(&log, &plateaus(&Context::new(&log, None), &log));
             // a run that a protection cut short says nothing of full throttle
             let top = log.column("pulse_us").map_or(0.0, |p| p.iter().copied().fold(0.0, f64::max));
-            if top < 1999.0 { nothing } else { pair }
+            if record.truth.iter().all(|t| t.plant.rpm == 0.0) {
+                nothing("the motor does not turn this propeller at any pulse".to_owned())
+            } else if top < 1999.0 {
+                nothing(format!("the firmware stopped the run at {top:.0} us"))
+            } else {
+                pair
+            }
         }
-        Err(_) => nothing,
+        Err(e) => nothing(e.to_string()),
     }
 }
 
@@ -295,8 +302,8 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         _ => (MOTOR, PROPELLER),
     };
     let mut out = format!(
-        "{:<m$} {:<p$} {:>8} {:>8} {:>5} {:>7} {:>9}",
-        "motor", "propeller", "thrust N", "A", "N/A", "hovers", "resultant"
+        "{:<m$} {:<p$} {:>8} {:>6} {:>7} {:>7} {:>9}",
+        "motor", "propeller", "thrust N", "A", "N per A", "hovers", "resultant"
     );
     let counts: Vec<u32> = rows.first().map_or_else(Vec::new, |r| r.with_batteries.iter().map(|w| w.batteries).collect());
     for n in &counts {
@@ -315,12 +322,12 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         }
         let [motor, propeller] = if fits { [motor, propeller] } else { [""; 2] };
         out += &format!(
-            "{motor:<m$} {propeller:<p$} {:>8.3} {:>8.2} {:>5.2} {:>4.2} kg {:>7.1} N",
+            "{motor:<m$} {propeller:<p$} {:>8.3} {:>6.2} {:>7.2} {:>4.2} kg {:>7} N",
             r.total_thrust_n.0 / 4.0,
             r.pair.maximum.map_or(f64::NAN, |m| m.current_a.0),
             r.efficiency_n_per_a,
             r.hover_mass_kg.0,
-            with.map_or(f64::NAN, |w| w.resultant_n.0)
+            with.map_or_else(|| "-".to_owned(), |w| tenths(w.resultant_n.0))
         );
         for w in &r.with_batteries {
             out += &format!(" {:>7.1}", w.full_throttle_min.0);
@@ -334,7 +341,9 @@ fn table(pairs: &[Pair], rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         }
     }
     for pair in pairs.iter().filter(|p| p.maximum.is_none()) {
-        out += &format!("{:<m$} {:<p$} no result\n", pair.motor, pair.propeller);
+        let why = pair.without.as_ref().map_or_else(String::new, |why| format!(": {why}"));
+        let told = wrapped(&format!("no result{why}"), m + p + 2);
+        out += &format!("{:<m$} {:<p$} {told}\n", pair.motor, pair.propeller);
     }
     out += &format!("{}\n", wrapped(&why(rows, chosen, need), 0));
     out

@@ -125,8 +125,8 @@ fn the_square() {
         assert!(said[0][0] < -290.0 && said[5].iter().all(|roll| roll.abs() < 15.0), "from its power-up on, 200 rows a second");
         let page = std::fs::read_to_string(at.join("out/flight.html")).expect("the page");
         assert!(
-            page.contains("<h1>It ended so: after 10")
-                && page.contains(" s: landed, motors off.</h1>\n<p class=\"lead\">At the most it was 2.")
+            page.contains("<h1>After 10")
+                && page.contains(" s it landed and the motors went off.</h1>\n<p class=\"lead\">At the most it was 2.")
         );
         assert!(page.contains("The board was off by up to "));
         assert!(["board-error", "board-roll", "wind"].iter().all(|id| page.contains(&format!("<figure id=\"{id}\">"))));

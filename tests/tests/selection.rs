@@ -33,6 +33,8 @@ fn the_thesis_choice_with_its_page() {
         page.contains("<h1>570KV with 11x4.7 is the most efficient of the pairs that give enough"),
         "the choice heads the page"
     );
+    assert!(!page.contains("N/A") && page.contains("N per A"), "a unit that reads as not available");
+    assert!(!page.contains("hover 1, min") && page.contains("No pair tells how long it hovers with 1, 2 and 3 batteries"));
     assert!(page.contains("download=\"pairs.csv\"") && page.contains("the figures that the thesis states"));
     for name in ["fig-6-2-thrust", "fig-6-3-current", "fig-6-4-efficiency", "model-mass", "endurance-570kv-3"] {
         stands_alone(&std::fs::read_to_string(folder.path().join(format!("figures/{name}.svg"))).unwrap());
@@ -114,12 +116,12 @@ fn a_bad_file_costs_its_own_row_alone() {
     assert!(said.out.lines().all(|l| l.chars().count() <= 100), "{}", said.out);
     let told = said.out.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        told.contains("choice: B with 11x5: 0.78 N/A, most thrust for each ampere of the 2 that meet every need"),
+        told.contains("choice: B with 11x5: 0.78 N per A, most thrust for each ampere of the 2 that meet every need"),
         "{}",
         said.out
     );
     assert!(
-        told.contains("next A with 10x5, 0.75 N/A") && told.contains("C with 9x5 gives 1.33 N/A but 16.00 N of 19.62 N"),
+        told.contains("next A with 10x5, 0.75 N per A") && told.contains("C with 9x5 gives 1.33 N per A but 16.00 N of 19.62 N"),
         "{}",
         said.out
     );

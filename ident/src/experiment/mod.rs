@@ -18,6 +18,7 @@ use crate::log::{Column, Log, SPEED};
 use crate::model::Declared;
 use crate::model::simulate::from_command;
 use crate::model::{AddedEffect, Model};
+use crate::verdict::words::digits;
 use crate::verdict::{NextExperiment, ScheduleStep};
 use std::borrow::Cow;
 
@@ -89,13 +90,18 @@ pub(crate) fn between(context: &Context, model: &Model, other: &Model, [own, riv
     let separates = apart >= TOLD;
     let why = if separates {
         let lent = if context.pulse.is_some() { "" } else { LENT };
-        format!("{both}; {good}: their predictions then differ by {apart:.1} times the noise (rms){lent}")
+        format!("{both}; {good}: their predictions then differ by {} times the noise (rms){lent}", times(apart))
     } else {
         format!(
             "{both}, and no run at hand separates them: on every schedule that was tried their predictions differ by less than {TOLD} times the noise (rms)"
         )
     };
     Some(NextExperiment { why, separates, schedule })
+}
+
+/// To a tenth, to three digits from a hundred on.
+fn times(apart: f64) -> String {
+    if apart < 100.0 { format!("{apart:.1}") } else { digits(apart, 0.0) }
 }
 
 /// What is said where a log has no command of its own.
@@ -244,6 +250,11 @@ mod tests {
         diagnosis.rivals = vec![crate::attribution::rivals::Rival { ids, probability: 0.5, fit: fitted("zero_drift") }];
         let model = Model::from_fit(&closed.context, &Log::default(), declared, &diagnosis.best.fit);
         next(&closed.context, declared, &model, &diagnosis).expect("a rival")
+    }
+
+    #[test]
+    fn large_ratios_have_three_digits() {
+        assert_eq!([2.94, 12.34, 1228.2].map(times), ["2.9", "12.3", "1230"]);
     }
 
     #[test]

@@ -323,6 +323,7 @@ impl<'w> Whole<'w> {
             expected: s.expected,
             recurs: false,
             silent: false,
+            stuck: false,
         });
         Verdict {
             format: FORMAT,

@@ -15,6 +15,7 @@ use super::record::Record;
 use crate::attribution::columns::{Column, Design, Placed, UNKNOWN};
 use crate::log::Log;
 use crate::verdict::Scope;
+use std::path::Path;
 
 /// A flight as a model sees it: the model's sizes, and its vehicle where the log does not say.
 ///
@@ -36,7 +37,13 @@ pub fn seen_by(model: &FlightModel, log: &Log) -> Result<Flight, FlightError> {
 #[must_use]
 pub fn is_own(model: &FlightModel, flight: &Flight) -> bool {
     let t = &flight.record.t;
-    flight.record.name == model.source && [t.first(), t.last()] == [model.span_s.first(), model.span_s.last()]
+    same_file(&flight.record.name, &model.source) && [t.first(), t.last()] == [model.span_s.first(), model.span_s.last()]
+}
+
+/// Whether two names may be of one file: one of them may say more of the path.
+fn same_file(a: &str, b: &str) -> bool {
+    let (a, b) = (Path::new(a), Path::new(b));
+    a.ends_with(b) || b.ends_with(a)
 }
 
 /// The terms of a model that apply to a flight: where they stand in its library, and the model's entry.
@@ -73,4 +80,16 @@ pub fn over_windows(flight: &Flight, columns: &[(Column, f64)]) -> Vec<Vec<f64>>
 #[must_use]
 pub fn is_by_row(target: Target) -> bool {
     matches!(target, Target::Speed(_) | Target::Voltage)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A model of one of two flights that are named alike has more of the path, and its own flight stays its own.
+    #[test]
+    fn a_file_is_known_by_the_end_of_its_path() {
+        assert!(same_file("flight.csv", "flight.csv") && same_file("flight.csv", "calm/flight.csv"));
+        assert!(!same_file("gusty/flight.csv", "calm/flight.csv") && !same_file("light.csv", "calm/flight.csv"));
+    }
 }

@@ -9,6 +9,7 @@
 //! (momentum theory; a duct up to 0.7 of it); propellers need 1.3 to 4 times as much, and their C_T is 0.02 to 0.2.
 
 use super::{Disc, Gaps, Log, Place, ReadError, SPEED, head::line_of, short, trimmed};
+use crate::numeric::digits::significant;
 use crate::numeric::order::median;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -145,7 +146,8 @@ fn rate(log: &Log) -> Option<Doubt> {
         return None;
     }
     let (step, whole) = (median(&mut steps), log.t[log.t.len() - 1] - log.t[0]);
-    let said = |likely: &str| format!("rows {step} s apart, {whole:.0} s in all: {likely}");
+    let apart = significant(step, 4);
+    let said = |likely: &str| format!("rows {apart} s apart, {whole:.0} s in all: {likely}");
     match step {
         s if s > 60.0 || (s >= 2.0 && whole > 6.0 * 3600.0) => doubt("t_s", true, said(&units_of(s))),
         s if s > 10.0 => doubt("t_s", false, said(&units_of(s))),
@@ -544,6 +546,13 @@ mod tests {
         assert_eq!(of(1.0), None);
         assert!(of(1.8).is_some_and(|(never, what)| !never && what.contains("an ideal disc has 1")), "{:?}", of(1.8));
         assert!(of(2.5).is_some_and(|(never, _)| never) && of(0.06).is_some_and(|(never, _)| !never), "{:?}", of(0.06));
+    }
+
+    #[test]
+    fn a_rounding_error_of_the_clock_is_not_told() {
+        let t = (0..3200).map(|i| 0.1 + 7.0 * f64::from(i) + 1e-11 * f64::from(i % 2)).collect();
+        let found = rate(&Log { t, ..Log::default() }).expect("a doubt");
+        assert!(found.never && found.what.starts_with("rows 7 s apart, 22393 s in all: milliseconds"), "{}", found.what);
     }
 
     #[test]

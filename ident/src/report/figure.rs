@@ -27,6 +27,8 @@ const ROW_CAPTIONED: f64 = 24.0;
 /// What a caption beside the drawing saves at its upper edge.
 const NO_TITLE: f64 = 20.0;
 const BOTTOM: f64 = 46.0;
+/// Least room between the names of two categories.
+const BETWEEN: f64 = 8.0;
 
 /// One layer, first drawn at the bottom.
 #[derive(Debug, Clone)]
@@ -150,6 +152,8 @@ struct Frame {
     left: f64,
     /// Upper edge of the axes, under the legend's rows.
     top: f64,
+    /// Height under the axes, the categories' rows included.
+    bottom: f64,
     height: f64,
 }
 
@@ -159,7 +163,7 @@ impl Frame {
     }
 
     fn py(&self, y: f64) -> f64 {
-        self.height - BOTTOM - (y - self.y.0) / (self.y.1 - self.y.0) * (self.height - self.top - BOTTOM)
+        self.height - self.bottom - (y - self.y.0) / (self.y.1 - self.y.0) * (self.height - self.top - self.bottom)
     }
 }
 
@@ -243,12 +247,21 @@ impl Figure {
         let rows = self.entries().last().map_or(0, |e| e.row);
         let legend = self.row() * rows as f64;
         let left = if self.captioned { LEFT_CAPTIONED } else { LEFT };
-        Frame { x, y: (low, y.1 + margin), left, top: TOP + legend, height: height + legend }
+        let further = self.row() * (self.name_rows(left) - 1) as f64;
+        Frame { x, y: (low, y.1 + margin), left, top: TOP + legend, bottom: BOTTOM + further, height: height + legend + further }
     }
 
     /// Height of a row of the legend.
     fn row(&self) -> f64 {
         if self.captioned { ROW_CAPTIONED } else { ROW }
+    }
+
+    /// Rows that the names of the categories take, so that none runs into the next.
+    fn name_rows(&self, left: f64) -> usize {
+        let place = (WIDTH - left - RIGHT) / self.categories.len().max(1) as f64;
+        let wide = |name: &String| if self.captioned { on_a_phone(name) } else { 8.0 * name.chars().count() as f64 };
+        let widest = self.categories.iter().map(wide).fold(0.0, f64::max);
+        (((widest + BETWEEN) / place).ceil() as usize).clamp(1, self.categories.len().max(1))
     }
 
     /// Label of a tick among those that stand on its axis.
@@ -296,15 +309,16 @@ impl Figure {
     }
 
     fn axes(&self, out: &mut String, f: &Frame) {
-        let (floor, right) = (f.height - BOTTOM, WIDTH - RIGHT);
+        let (floor, right) = (f.height - f.bottom, WIDTH - RIGHT);
         let left = f.left;
         let under = floor + if self.captioned { 18.0 } else { 16.0 };
+        let rows = self.name_rows(left);
         for (k, name) in self.categories.iter().enumerate() {
             let _ = write!(
                 out,
                 "<text class=\"tick\" text-anchor=\"middle\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
                 f.px(k as f64),
-                under,
+                under + self.row() * (k % rows) as f64,
                 escape(name)
             );
         }
@@ -462,7 +476,7 @@ fn draw_layer(out: &mut String, layer: &Layer, f: &Frame) {
                     "<rect class=\"span\" x=\"{a:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>",
                     f.top,
                     (b - a).max(0.5),
-                    f.height - f.top - BOTTOM
+                    f.height - f.top - f.bottom
                 );
             }
         }
@@ -472,9 +486,9 @@ fn draw_layer(out: &mut String, layer: &Layer, f: &Frame) {
                 out,
                 "<line class=\"rule\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/><text class=\"tick\" transform=\"translate({:.1} {:.1}) rotate(-90)\">{}</text>",
                 f.top,
-                f.height - BOTTOM,
+                f.height - f.bottom,
                 at - 4.0,
-                f.height - BOTTOM - 6.0,
+                f.height - f.bottom - 6.0,
                 escape(text)
             );
         }

@@ -35,7 +35,7 @@ pub use history::{page as history_page, terminal as history_terminal};
 pub use isolability::{isolability, isolability_csv, isolability_svg};
 pub use page::closed_loop;
 pub use run::{headline, run};
-pub use selection::selection;
+pub use selection::{selection, tenths};
 pub use several::several;
 pub use sheet::{Sheet, write_figures};
 pub use shift::{filter_figures, study_figures};

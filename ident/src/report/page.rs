@@ -624,6 +624,7 @@ mod tests {
             expected: 4000.0,
             recurs: false,
             silent: false,
+            stuck: false,
         };
         let mut v = parts::bare_verdict(Vec::new());
         assert_eq!(counted(&log, &v, &e), None);

@@ -16,6 +16,7 @@ use crate::identify::curves::{Fitted, Law, ratio};
 use crate::identify::{Constant, Identified};
 use crate::log::board;
 use crate::log::{Gaps, Log, SPEED};
+use crate::numeric::digits::significant;
 use crate::numeric::order::median;
 use crate::plateau::shift::{Settings, filters};
 use crate::plateau::{Plateau, so_many};
@@ -36,12 +37,10 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
     sheet.section(if found.plateaus.is_empty() { "The run" } else { "The run, with its plateaus" });
     let time: Vec<Figure> =
         ["thrust_n", "torque_nm", "current_a", "voltage_v"].iter().filter_map(|c| over_time(log, found, c)).collect();
-    let speed: Vec<Figure> = SPEED.iter().filter_map(|c| over_time(log, found, c)).collect();
-    sheet.figures([speed, time].concat());
-    sheet.figures([overlaid(log), over_current(log, found)].into_iter().flatten().collect());
-    sheet.section("How the channels and the plateaus come about");
-    let differences = differences(log, &found.plateaus);
-    sheet.figures(differences.into_iter().chain(binary_shift(log, found)).collect());
+    sheet.figures([speeds_over_time(log, found), time].concat());
+    sheet.figures(over_current(log, found).into_iter().collect());
+    sheet.section("How the plateaus come about");
+    sheet.figures(binary_shift(log, found));
     if !found.plateaus.is_empty() {
         relations(&mut sheet, found);
     }
@@ -215,19 +214,29 @@ fn spans(plateaus: &[Plateau]) -> Layer {
     Layer::Spans { name: "plateaus".into(), ranges: plateaus.iter().map(|p| (p.from_s, p.to_s)).collect() }
 }
 
+/// The speed over time: of several channels one drawing, and how they differ.
+fn speeds_over_time(log: &Log, found: &Identified) -> Vec<Figure> {
+    let Some(together) = overlaid(log) else { return SPEED.iter().filter_map(|c| over_time(log, found, c)).collect() };
+    let channels = SPEED.into_iter().filter(|c| log.column(c).is_some()).zip(CLASSES);
+    let marks = channels.map(|(c, class)| Layer::Marks { name: String::new(), class, marks: means(log, found, c) });
+    let layers = std::iter::once(spans(&found.plateaus)).chain(together.layers).chain(marks).collect();
+    std::iter::once(Figure { layers, ..together }).chain(differences(log, &found.plateaus)).collect()
+}
+
+/// The plateau means of a channel, each to be asked.
+fn means(log: &Log, found: &Identified, channel: &str) -> Vec<Mark> {
+    let unit = unit_of(channel);
+    let mark = |(k, p): (usize, &Plateau)| {
+        let (mean, se) = p.of(log, channel)?;
+        let text = format!("{}: {mean:.4} \u{b1} {:.4} {unit}, {} rows", k + 1, 1.96 * se, p.rows);
+        Some(Mark { x: 0.5 * (p.from_s + p.to_s), y: mean, error: 0.0, text })
+    };
+    found.plateaus.iter().enumerate().filter_map(mark).collect()
+}
+
 fn over_time(log: &Log, found: &Identified, channel: &str) -> Option<Figure> {
     let (x, y) = present(&log.t, log.column(channel)?);
-    let unit = unit_of(channel);
-    let marks = found
-        .plateaus
-        .iter()
-        .enumerate()
-        .filter_map(|(k, p)| {
-            let (mean, se) = p.of(log, channel)?;
-            let text = format!("{}: {mean:.4} \u{b1} {:.4} {unit}, {} rows", k + 1, 1.96 * se, p.rows);
-            Some(Mark { x: 0.5 * (p.from_s + p.to_s), y: mean, error: 0.0, text })
-        })
-        .collect();
+    let marks = means(log, found, channel);
     Some(Figure {
         id: format!("time-{}", channel.replace('_', "-")),
         title: format!("{} over time", heading(channel)),
@@ -533,13 +542,30 @@ fn said(f: &Fitted) -> String {
     format!("{}, dof {}{}", ratio(law.chi2), law.freedom, if law.holds { "" } else { ", does not hold" })
 }
 
-/// A value and half of its interval, to two digits of the latter.
+/// Significant digits of a coefficient: a polynomial is known far better than each of its coefficients.
+const OF_COEFFICIENT: usize = 7;
+
+/// A coefficient with all digits that its curve asks for, and half of its interval to two.
 fn as_known(value: f64, half: f64) -> [String; 2] {
-    [value, half].map(|v| words::digits(v, half))
+    let to = |v: f64, digits: usize| {
+        let near = significant(v, digits);
+        if near != 0.0 && !(1e-3..1e7).contains(&near.abs()) { format!("{near:e}") } else { format!("{near}") }
+    };
+    [to(value, OF_COEFFICIENT), to(half, 2)]
+}
+
+/// The unit of a coefficient: the ordinate's for each power of the regressor.
+fn unit_of_coefficient(f: &Fitted, k: usize) -> String {
+    let regressor = if f.x == "pulse_us" { "kus" } else { "krpm" };
+    match k {
+        0 => unit_of(&f.y).to_owned(),
+        1 => format!("{} per {regressor}", unit_of(&f.y)),
+        k => format!("{} per {regressor}^{k}", unit_of(&f.y)),
+    }
 }
 
 pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
-    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. Half widths of 95 % intervals. Chi2/dof is the scatter of the plateaus about the curve over what their own errors promise, squared, for each degree of freedom: 1 where both agree; where chance does not explain it (p below 0.01) the curve does not hold, and the interval is as much wider.");
+    sheet.say("Regressors: krpm = rpm/1000 and kus = (pulse - 1000)/1000. All digits belong to the curve: its coefficients are known far better together than each alone. Half widths of 95 % intervals. Chi2/dof is the scatter of the plateaus about the curve over what their own errors promise, squared, for each degree of freedom: 1 where both agree; where chance does not explain it (p below 0.01) the curve does not hold, and the interval is as much wider.");
     let rows: Vec<Vec<String>> = found
         .curves
         .iter()
@@ -549,11 +575,16 @@ pub(super) fn coefficients(sheet: &mut Sheet, found: &Identified) {
                 let c = f.curve.coefficient(k);
                 let (chi2, chosen) = if k == 0 { (said(f), chosen.clone()) } else { Default::default() };
                 let [value, half] = as_known(c.value, c.half);
-                vec![over(f), format!("c{k}"), value, half, chi2, chosen]
+                vec![over(f), format!("c{k}"), value, half, unit_of_coefficient(f, k), chi2, chosen]
             })
         })
         .collect();
-    sheet.listed("coefficients", &["relation", "coefficient", "value", "\u{b1}", "chi2/dof", "order by AICc"], &rows, None);
+    sheet.listed(
+        "coefficients",
+        &["relation", "coefficient", "value", "\u{b1}", "unit", "chi2/dof", "order by AICc"],
+        &rows,
+        None,
+    );
 }
 
 #[cfg(test)]
@@ -574,17 +605,45 @@ mod tests {
         assert!(hardly(&constant(0.0, 0.0)).contains("not known"));
     }
 
-    /// Without a plateau the page says so once, and has no table without rows.
+    /// A polynomial can be used with what the page prints of it.
     #[test]
-    fn a_run_without_a_plateau_has_no_empty_tables() {
+    fn coefficients_have_the_digits_of_their_curve() {
+        assert_eq!(as_known(-21.345_678_9, 201.3), ["-21.34568", "200"]);
+        assert_eq!(as_known(1.234_567_89e-5, 1.26e-6), ["1.234568e-5", "1.3e-6"]);
+        assert_eq!(as_known(8_437.123_456, 0.0), ["8437.123", "0"]);
+    }
+
+    /// A staircase with these speed channels, all alike.
+    fn staircase(speeds: &[&str]) -> Log {
         let t: Vec<f64> = (0..600).map(|i| 0.1 * f64::from(i)).collect();
         let pulse: Vec<f64> = t.iter().map(|t| 1100.0 + 80.0 * (t / 10.0).floor()).collect();
         let wave = |i: usize| (0.7 * (i * i) as f64).sin();
         let rpm: Vec<f64> = pulse.iter().enumerate().map(|(i, p)| 7.0 * (p - 1000.0) + 4.0 * wave(i)).collect();
         let thrust = rpm.iter().enumerate().map(|(i, r)| 1e-7 * r * r + 0.01 * wave(i + 3)).collect();
-        let columns = [("pulse_us", pulse), ("rpm", rpm), ("thrust_n", thrust)];
-        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
-        let log = Log { name: "run.csv".to_owned(), t, columns, ..Log::default() };
+        let speeds = speeds.iter().map(|name| (*name, rpm.clone()));
+        let columns = std::iter::once(("pulse_us", pulse)).chain(speeds).chain([("thrust_n", thrust)]);
+        let columns = columns.map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        Log { name: "run.csv".to_owned(), t, columns, ..Log::default() }
+    }
+
+    /// Two speed sensors share a drawing, with how they differ beneath; one has a drawing of its own.
+    #[test]
+    fn speed_channels_share_a_drawing() {
+        let titles = |names: &[&str]| -> Vec<String> {
+            let log = staircase(names);
+            let found = identify(&log).expect("a log");
+            speeds_over_time(&log, &found).into_iter().map(|f| f.title).collect()
+        };
+        let two = titles(&["rpm_beam", "rpm_encoder"]);
+        assert_eq!(two[0], "Speed channels over time");
+        assert!(two.len() == 2 && two[1].starts_with("Speed channels less"), "{two:?}");
+        assert_eq!(titles(&["rpm_beam"]).len(), 1);
+    }
+
+    /// Without a plateau the page says so once, and has no table without rows.
+    #[test]
+    fn a_run_without_a_plateau_has_no_empty_tables() {
+        let log = staircase(&["rpm"]);
         let found = identify(&log).expect("a log");
         let with = run(&log, &found, None).html();
         assert!(!found.plateaus.is_empty() && with.contains("Coefficients") && !with.contains("No plateau was found"));

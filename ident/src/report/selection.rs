@@ -2,13 +2,14 @@
 //!
 //! What it is: maxima of every pair as columns, efficiency against the mass that can hover, endurance and efficiency against
 //! resultant force for each battery count, the table, and what is chosen.
-//! What can go wrong: pairs without a result are named under the table.
+//! What can go wrong: pairs without a result are named under the table, with why.
 //! Units: N, A, kg, min.
 //! Reference: Beharie 2013, section 6.1 and Appendix A.
 
 use super::figure::{Figure, Layer, Mark};
 use super::sheet::Sheet;
 use crate::sizing::select::{Airframe, Need, Pair, Row, choose};
+use crate::verdict::words::list;
 
 /// Colours in the order of the motors.
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
@@ -27,7 +28,7 @@ pub fn selection(
         "Motor, propeller and battery",
         &match chosen.first() {
             Some(best) => format!(
-                "{} is the most efficient of the pairs that give enough ({:.2} N/A). Of {} pairs with a result, {} give at least {:.2} N in total {}with {} x {:.1} A.h.",
+                "{} is the most efficient of the pairs that give enough ({:.2} N per A). Of {} pairs with a result, {} give at least {:.2} N in total {}with {} x {:.1} A.h.",
                 best.pair.name(),
                 best.efficiency_n_per_a,
                 rows.len(),
@@ -52,9 +53,9 @@ pub fn selection(
     sheet.data("mass", &["batteries", "mass, kg", "charge, mA.h"], &masses, None);
     sheet.section("Performance of each pair (Table 9)");
     table(&mut sheet, rows, &chosen, batteries);
-    let missing: Vec<String> = pairs.iter().filter(|p| p.maximum.is_none()).map(Pair::name).collect();
+    let missing: Vec<String> = pairs.iter().filter(|p| p.maximum.is_none()).map(Pair::without_result).collect();
     if !missing.is_empty() {
-        sheet.say(&format!("No result: {}.", missing.join(", ")));
+        sheet.say(&format!("No result: {}.", missing.join("; ")));
     }
     let clipped: Vec<String> = pairs.iter().filter(|p| p.clipped).map(Pair::name).collect();
     if !clipped.is_empty() {
@@ -69,7 +70,7 @@ pub fn selection(
         columns(rows, "fig-6-3-current", "Current at full throttle", "current of one motor, A", |r| {
             r.pair.maximum.map_or(f64::NAN, |m| m.current_a.0)
         }),
-        columns(rows, "fig-6-4-efficiency", "Thrust for each ampere (Eq. 6.1)", "N/A", |r| r.efficiency_n_per_a),
+        columns(rows, "fig-6-4-efficiency", "Thrust for each ampere (Eq. 6.1)", "N per A", |r| r.efficiency_n_per_a),
         hover_mass(rows),
     ]);
     sheet.section("Endurance and efficiency against resultant force (Figures A.13 to A.30)");
@@ -81,9 +82,11 @@ pub fn selection(
 
 fn table(sheet: &mut Sheet, rows: &[Row], chosen: &[&Row], batteries: u32) {
     let mut header: Vec<String> =
-        ["motor", "propeller", "thrust, N", "current, A", "N/A", "hovers, kg"].map(str::to_owned).to_vec();
+        ["motor", "propeller", "thrust, N", "current, A", "N per A", "hovers, kg"].map(str::to_owned).to_vec();
+    let hovers = |n: u32| rows.iter().any(|r| r.with_batteries.iter().any(|w| w.batteries == n && w.hover_min.is_some()));
     for n in 1..=batteries {
-        header.extend([format!("resultant {n}, N"), format!("full throttle {n}, min"), format!("hover {n}, min")]);
+        header.extend([format!("resultant {n}, N"), format!("full throttle {n}, min")]);
+        header.extend(hovers(n).then(|| format!("hover {n}, min")));
     }
     let cells: Vec<Vec<String>> = rows
         .iter()
@@ -97,17 +100,28 @@ fn table(sheet: &mut Sheet, rows: &[Row], chosen: &[&Row], batteries: u32) {
                 format!("{:.2}", r.hover_mass_kg.0),
             ];
             for w in &r.with_batteries {
-                row.extend([
-                    format!("{:.1}", w.resultant_n.0),
-                    format!("{:.1}", w.full_throttle_min.0),
-                    w.hover_min.map_or_else(|| "-".to_owned(), |m| format!("{:.1}", m.0)),
-                ]);
+                row.extend([tenths(w.resultant_n.0), format!("{:.1}", w.full_throttle_min.0)]);
+                let hover = || w.hover_min.map_or_else(|| "-".to_owned(), |m| format!("{:.1}", m.0));
+                row.extend(hovers(w.batteries).then(hover));
             }
             row
         })
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     sheet.chosen("pairs", &header, &cells, |i| chosen.iter().any(|c| std::ptr::eq(*c, &rows[i])));
+    let without: Vec<String> = (1..=batteries).filter(|n| !hovers(*n)).map(|n| n.to_string()).collect();
+    if !without.is_empty() && !rows.is_empty() {
+        let with = format!("{} batter{}", list(&without), if without == ["1"] { "y" } else { "ies" });
+        sheet.say(&format!(
+            "No pair tells how long it hovers with {with} on board: that takes levels below and above the thrust in hover."
+        ));
+    }
+}
+
+/// To a tenth, without a minus before nothing.
+#[must_use]
+pub fn tenths(value: f64) -> String {
+    format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0)
 }
 
 fn motors(rows: &[Row]) -> Vec<String> {
@@ -173,7 +187,10 @@ fn hover_mass(rows: &[Row]) -> Figure {
                     x: r.efficiency_n_per_a,
                     y: r.hover_mass_kg.0,
                     error: 0.0,
-                    text: format!("{motor} {}: {:.2} kg, {:.2} N/A", r.pair.propeller, r.hover_mass_kg.0, r.efficiency_n_per_a),
+                    text: format!(
+                        "{motor} {}: {:.2} kg, {:.2} N per A",
+                        r.pair.propeller, r.hover_mass_kg.0, r.efficiency_n_per_a
+                    ),
                 })
                 .collect(),
         })
@@ -181,7 +198,7 @@ fn hover_mass(rows: &[Row]) -> Figure {
     Figure {
         id: "model-mass".to_owned(),
         title: "Largest mass in hover against efficiency".to_owned(),
-        x_label: "thrust for each ampere, N/A".to_owned(),
+        x_label: "thrust for each ampere, N per A".to_owned(),
         y_label: "mass, kg".to_owned(),
         layers,
         ..Figure::default()
@@ -209,15 +226,15 @@ fn endurance(rows: &[Row], motor: &str, batteries: u32) -> Figure {
         Some((w.full_throttle_min.0, format!("{:.1} min", w.full_throttle_min.0)))
     });
     // one axis: ten times the efficiency lies in the range of the minutes
-    let efficiency = of(&|r| Some((10.0 * r.efficiency_n_per_a, format!("{:.2} N/A", r.efficiency_n_per_a))));
+    let efficiency = of(&|r| Some((10.0 * r.efficiency_n_per_a, format!("{:.2} N per A", r.efficiency_n_per_a))));
     Figure {
         id: format!("endurance-{}-{batteries}", motor.to_lowercase()),
         title: format!("{motor} with {batteries} batter{}", if batteries == 1 { "y" } else { "ies" }),
         x_label: "resultant force at full throttle, N".to_owned(),
-        y_label: "min; 10 x N/A".to_owned(),
+        y_label: "min; 10 x N per A".to_owned(),
         layers: vec![
             Layer::Marks { name: "endurance, min".to_owned(), class: "a", marks: minutes },
-            Layer::Marks { name: "10 x efficiency, N/A".to_owned(), class: "b", marks: efficiency },
+            Layer::Marks { name: "10 x efficiency, N per A".to_owned(), class: "b", marks: efficiency },
         ],
         ..Figure::default()
     }

@@ -20,7 +20,7 @@ mod witness;
 
 pub(crate) use curve::Curve;
 
-use crate::log::{Column, Log, MODELLED, SPEED};
+use crate::log::{Column, Log, MODELLED, SPEED, trimmed};
 use crate::numeric::order::median;
 use excursion::Event;
 use serde::Serialize;
@@ -52,20 +52,50 @@ pub struct SetAside {
     /// The zeros of a sensor that does not see the rotor turn yet, or any more: no reading to judge by, but what it reads then is known.
     #[serde(skip)]
     pub silent: bool,
+    /// The same reading row after row, and not nothing.
+    #[serde(skip)]
+    pub stuck: bool,
 }
 
 impl fmt::Display for SetAside {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { channel, row, rows, t_s, until_s, value, expected, .. } = self;
+        let Self { channel, row, rows, t_s, until_s, .. } = self;
         let place = if *rows == 1 {
             format!("row {row} ({t_s:.3} s)")
         } else {
             format!("{rows} rows from {row} on ({t_s:.3} to {until_s:.3} s)")
         };
-        // four figures that count
-        let digits = (3.0 - expected.abs().max(1e-6).log10().floor()).clamp(0.0, 9.0) as usize;
-        write!(f, "column {channel}, {place}: {value} where the rest of the log says {expected:.digits$}; set aside")
+        write!(f, "column {channel}, {place}: {}; set aside", self.off())
     }
+}
+
+/// Figures of a reading that was set aside, and of what was expected of it.
+const FIGURES: f64 = 4.0;
+/// Most decimals of both.
+const DECIMALS: usize = 9;
+
+impl SetAside {
+    /// What it reads, and what is expected there where that is another: to four figures, or to as many as part the two.
+    fn off(&self) -> String {
+        let size = if self.expected == 0.0 { self.value } else { self.expected };
+        let places = (FIGURES - 1.0 - size.abs().max(1e-6).log10().floor()).clamp(0.0, DECIMALS as f64) as usize;
+        let of = |places: usize| [self.value, self.expected].map(|v| shown(v, places));
+        let stuck = if self.stuck { "stuck at " } else { "" };
+        match of(places) {
+            [value, expected] if value == expected && self.stuck => format!("stuck at {}", trimmed(self.value, places)),
+            _ => {
+                let apart = (places..=DECIMALS).map(of).find(|[value, expected]| value != expected);
+                let [value, expected] = apart.unwrap_or_else(|| of(places));
+                format!("{stuck}{value} where the rest of the log says {expected}")
+            }
+        }
+    }
+}
+
+/// To so many decimals; nothing is 0.
+fn shown(value: f64, places: usize) -> String {
+    let text = format!("{value:.places$}");
+    if text.chars().all(|c| matches!(c, '-' | '0' | '.')) { "0".to_owned() } else { text }
 }
 
 /// Fewest samples of a channel whose scatter can be told.
@@ -226,22 +256,65 @@ fn of_one_size<'e>(column: &[f64], events: impl Iterator<Item = &'e Event>) -> b
 fn told(log: &Log, name: &str, column: &[f64], event: &Event) -> Option<SetAside> {
     let mut measured = event.rows.clone().filter(|r| column[*r].is_finite());
     let (first, last) = (measured.next()?, measured.next_back());
+    let rows = last.map_or(1, |last| last + 1 - first);
+    let value = column[first];
+    let stuck = rows > SINGLE && value != 0.0 && column[first..first + rows].iter().all(|v| v.is_nan() || *v == value);
+    // what a line through other channels says beneath rest is rest
+    let expected = if SPEED.contains(&name) { event.expected.max(0.0) } else { event.expected };
     Some(SetAside {
         channel: name.to_owned(),
         row: first,
-        rows: last.map_or(1, |last| last + 1 - first),
+        rows,
         t_s: log.t[first],
         until_s: log.t[last.unwrap_or(first)],
         value: column[event.worst],
-        expected: event.expected,
+        expected,
         recurs: false,
         silent: event.silent,
+        stuck,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn aside(value: f64, expected: f64, stuck: bool) -> String {
+        let (channel, rows) = ("rpm_beam".to_owned(), if stuck { 12 } else { 1 });
+        let one =
+            SetAside { channel, row: 1, rows, t_s: 0.1, until_s: 0.1, value, expected, recurs: false, silent: false, stuck };
+        one.to_string()
+    }
+
+    #[test]
+    fn a_reading_and_what_was_expected_are_never_told_alike() {
+        for (value, expected, said) in [
+            (2417.082, 3625.4, "2417 where the rest of the log says 3625"),
+            (0.123_456, 1.5, "0.123 where the rest of the log says 1.500"),
+            (270.71, 270.74, "270.71 where the rest of the log says 270.74"),
+            (2080.0, 0.0, "2080 where the rest of the log says 0"),
+            (0.0, 511.04, "0 where the rest of the log says 511.0"),
+        ] {
+            let told = aside(value, expected, false);
+            assert!(told.ends_with(&format!(": {said}; set aside")), "{told}");
+        }
+        assert!(aside(302.0, 302.04, true).ends_with("12 rows from 1 on (0.100 to 0.100 s): stuck at 302; set aside"));
+        assert!(aside(302.0, 350.0, true).ends_with("stuck at 302.0 where the rest of the log says 350.0; set aside"));
+    }
+
+    /// A speed is never expected to be less than none, and rows that repeat a reading are told from others.
+    #[test]
+    fn a_speed_is_expected_to_be_none_at_the_least() {
+        let log = Log { t: (0..9).map(f64::from).collect(), ..Log::default() };
+        let of = |name: &str, column: &[f64], expected: f64| {
+            let event = Event { rows: 2..6, worst: 3, expected, at_step: false, silent: false };
+            told(&log, name, column, &event).map(|a| (a.expected, a.stuck))
+        };
+        let stuck = [0.0, 0.0, 7.0, 7.0, 7.0, 7.0, 0.0, 0.0, 0.0];
+        assert_eq!(of("rpm_beam", &stuck, -237.1), Some((0.0, true)));
+        assert_eq!(of("thrust_n", &stuck, -0.5), Some((-0.5, true)));
+        assert_eq!(of("rpm_beam", &[0.0; 9], 500.0), Some((500.0, false)));
+    }
 
     /// Two doubled readings beside a fault that lasts for a fifth of the run.
     #[test]

@@ -419,6 +419,32 @@ pub fn bracketed(value: f64, half: f64) -> Option<String> {
     Some(format!("{digits}({:.0}){exponent}", half * 10f64.powf(-last)))
 }
 
+/// Figures to the second digit of a standard error, all with the power of ten of the first.
+#[must_use]
+pub fn to_error<const N: usize>(figures: [f64; N], se: f64) -> [String; N] {
+    let known = se > 0.0 && se.is_finite();
+    // the exponent as two digits print it: 0.0999 is 0.10
+    let of = |v: f64, digits: usize| format!("{v:.digits$e}").rsplit('e').next().and_then(|e| e.parse::<i32>().ok()).unwrap_or(0);
+    let first = figures.first().copied().unwrap_or(0.0);
+    if !known || !first.is_finite() {
+        return figures.map(crate::numeric::digits::number);
+    }
+    let last = of(se, 1) - 1;
+    let power = of(if first.abs() > se { first } else { se }, 5);
+    let unsigned = |text: String| match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
+        _ => text,
+    };
+    if (-3..5).contains(&power) {
+        // of a speed that is known to 30 the last figure is no news
+        let round = |v: f64| if last > 0 { (v / 10f64.powi(last)).round() * 10f64.powi(last) } else { v };
+        return figures.map(|v| unsigned(format!("{:.*}", usize::try_from(-last).unwrap_or(0), round(v))));
+    }
+    figures.map(|v| {
+        unsigned(format!("{:.*}", usize::try_from(power - last).unwrap_or(0), v / 10f64.powi(power))) + &format!("e{power}")
+    })
+}
+
 /// Words in a row: "a", "a and b", "a, b and c".
 #[must_use]
 pub fn list(words: &[String]) -> String {
@@ -452,6 +478,16 @@ mod tests {
 
     fn parameter(value: f64, half: f64, unit: &str) -> Parameter {
         Parameter { name: "x".into(), value, unit: unit.into(), ci95: [value - half, value + half] }
+    }
+
+    #[test]
+    fn figures_have_the_digits_that_their_error_supports() {
+        let said = to_error([568.988_17, 0.631_83, 567.704_13, 570.272_2], 0.631_83);
+        assert_eq!(said, ["568.99", "0.63", "567.70", "570.27"]);
+        assert_eq!(to_error([1.234_567e-5, 2.3e-7], 2.3e-7), ["1.235e-5", "0.023e-5"]);
+        assert_eq!(to_error([8_437.3, 312.0], 312.0), ["8440", "310"]);
+        assert_eq!(to_error([-0.001, 0.099_9], 0.099_9), ["0.00", "0.10"]);
+        assert_eq!(to_error([1.5], 0.0), ["1.50000"]);
     }
 
     #[test]

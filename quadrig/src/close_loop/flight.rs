@@ -8,7 +8,7 @@
 use super::inertial::is_attitude_log;
 use super::{Args, say_unwritten};
 use crate::Failure;
-use crate::folder::Folder;
+use crate::folder::{Folder, tell_apart};
 use crate::progress::Bar;
 use crate::replace::put;
 use crate::trouble::unread;
@@ -41,9 +41,10 @@ fn begins_as(path: &Path, format: &str) -> bool {
 /// Runs the command.
 pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let folder = args.output.as_deref().map(|path| Folder::new(path, "close-loop")).transpose()?;
-    let log = flight_log::read(args.log())?;
+    let mut log = flight_log::read(args.log())?;
     let model = args.model.as_deref().map(read_model).transpose()?;
-    let others = args.validate.iter().map(|p| other_flight(p)).collect::<Result<Vec<_>, _>>()?;
+    let mut others = args.validate.iter().map(|p| other_flight(p)).collect::<Result<Vec<_>, _>>()?;
+    tell_apart(std::iter::once(&mut log).chain(&mut others), &args.runs());
     let closed = {
         let bar = Bar::new("searching", quiet);
         close(&log, model.as_ref(), &others, &mut |share| bar.set(share))?

@@ -7,7 +7,7 @@
 
 use super::{Args, flight, inertial, model_files, of_one_rig, results, say_unwritten};
 use crate::Failure;
-use crate::folder::Folder;
+use crate::folder::{Folder, tell_apart};
 use crate::open::open;
 use crate::progress::Bar;
 use ident::close::validation;
@@ -28,8 +28,9 @@ pub(super) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     let folder = args.output.as_deref().map(|path| Folder::new(path, "close-loop")).transpose()?;
     let options = args.columns.options(&args.names);
-    let logs = args.logs.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
-    let others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    let mut logs = args.logs.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    let mut others = args.validate.iter().map(|p| open(p, &options, quiet)).collect::<Result<Vec<_>, _>>()?;
+    tell_apart(logs.iter_mut().chain(&mut others), &args.runs());
     of_one_rig(logs.iter().chain(&others).map(Log::names))?;
     let (runs, mut outcome) = {
         let bar = Bar::new("searching", quiet);

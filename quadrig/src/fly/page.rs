@@ -45,10 +45,15 @@ pub(super) fn page(summary: &Summary, flight: &Flight, from: &[(&str, String)]) 
         ..Figure::default()
     };
     sheet.figures(vec![
-        course("place", "Displacement (as 7.6, 7.12, 7.17, 7.23)", "m", [("north", &north), ("east", &east), ("up", &up)]),
+        course(
+            "place",
+            "Displacement (figures 7.6, 7.12, 7.17 and 7.23 of the thesis)",
+            "m",
+            [("north", &north), ("east", &east), ("up", &up)],
+        ),
         course(
             "velocity",
-            "Velocity in body axes (as 7.7, 7.13, 7.18, 7.24)",
+            "Velocity in body axes (figures 7.7, 7.13, 7.18 and 7.24 of the thesis)",
             "m/s",
             [
                 ("u, forward", &|f| body_velocity(f).x),
@@ -58,13 +63,13 @@ pub(super) fn page(summary: &Summary, flight: &Flight, from: &[(&str, String)]) 
         ),
         course(
             "angles",
-            "Angles (as 7.8, 7.14, 7.19, 7.25)",
+            "Angles (figures 7.8, 7.14, 7.19 and 7.25 of the thesis)",
             "deg",
             [("roll", &|f| angle(f, 0)), ("pitch", &|f| angle(f, 1)), ("yaw", &|f| angle(f, 2))],
         ),
         course(
             "rates",
-            "Angular rates (as 7.9, 7.15, 7.20, 7.26)",
+            "Angular rates (figures 7.9, 7.15, 7.20 and 7.26 of the thesis)",
             "deg/s",
             [
                 ("p, roll", &|f| f.motion.rate.x.to_degrees()),
@@ -178,7 +183,9 @@ fn rotors(id: &str, title: &str, unit: &str, rows: &[Flying], of: &dyn Fn(&Flyin
 }
 
 fn pulses(rows: &[Flying]) -> Figure {
-    rotors("pulses", "Pulses (as 7.5, 7.11, 7.16, 7.22)", "duty of 20 ms, %", rows, &|f, i| f.pulses_us[i] / 200.0)
+    rotors("pulses", "Pulses (figures 7.5, 7.11, 7.16 and 7.22 of the thesis)", "duty of 20 ms, %", rows, &|f, i| {
+        f.pulses_us[i] / 200.0
+    })
 }
 
 /// Thrust of each rotor, with its share of the weight and, where it comes near, what full throttle gives.
@@ -230,7 +237,7 @@ fn view(rows: &[Flying], from: &str, x: Axis<'_>, y: Axis<'_>) -> Figure {
     let (first, last) = (end("start", "c", 0), end("end", "b", rows.len() - 1));
     Figure {
         id: format!("path-{}", from.replace(' ', "-")),
-        title: format!("Path {from} (as 7.10, 7.21, 7.27)"),
+        title: format!("Path {from} (figures 7.10, 7.21 and 7.27 of the thesis)"),
         x_label: x.0.to_owned(),
         y_label: y.0.to_owned(),
         layers: vec![Layer::Line { name: String::new(), class: "a", x: xs.clone(), y: ys.clone() }, first, last],

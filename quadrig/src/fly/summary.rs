@@ -129,11 +129,11 @@ impl Summary {
 
     /// How it ended, how far it went and how well the board kept up, in plain words.
     pub(super) fn told(&self) -> String {
-        let ended: Vec<String> = self.events.iter().map(|(t, what)| format!("after {t:.1} s: {what}")).collect();
+        let ended: Vec<String> = self.events.iter().map(|(t, what)| sentence(*t, what)).collect();
         let height = shown(-self.place_m[2]);
         let touched = self.touched();
         let end = match (ended.is_empty(), self.ends_in_touch) {
-            (false, _) => format!("It ended so: {}.", ended.join("; ")),
+            (false, _) => ended.join(" "),
             (true, true) => touched.clone(),
             (true, false) if self.on_ground => format!("{touched} After {:.1} s it is on the ground.", self.flight_s),
             (true, false) => {
@@ -211,8 +211,8 @@ impl Summary {
             (
                 "hover",
                 format!(
-                    "{pulse:.1} us ({:.3} %), {:.0} rev/min, {:.3} N and {:.2} A a rotor",
-                    pulse / 200.0,
+                    "{pulse:.1} us ({:.1} % throttle), {:.0} rev/min, {:.3} N and {:.2} A a rotor",
+                    (pulse - 1000.0) / 10.0,
                     rotor.rpm,
                     rotor.thrust_n,
                     rotor.current_a
@@ -288,6 +288,19 @@ impl Summary {
     }
 }
 
+/// What the controller did, and when, as a sentence.
+fn sentence(t_s: f64, what: &str) -> String {
+    let at = format!("After {t_s:.1} s");
+    let why = |kind: &str| what.strip_prefix(kind).and_then(|rest| rest.strip_prefix(": "));
+    match (what, why("motors off"), why("no take-off"), why("controlled descent")) {
+        ("landed, motors off", ..) => format!("{at} it landed and the motors went off."),
+        (_, Some(why), ..) => format!("{at} the motors went off: {why}."),
+        (_, _, Some(why), _) => format!("{at} it had not taken off: {why}."),
+        (_, _, _, Some(why)) => format!("{at} a controlled descent began: {why}."),
+        _ => format!("{at}: {what}."),
+    }
+}
+
 /// A number without the sign of a rounding error.
 fn shown(value: f64) -> f64 {
     if value.abs() < 5e-3 { 0.0 } else { value }
@@ -296,4 +309,19 @@ fn shown(value: f64) -> f64 {
 /// Angle between body and earth vertical, rad.
 fn tilt(f: &Flying) -> f64 {
     (f.motion.attitude * hal_sim::flight::Vector::z()).z.clamp(-1.0, 1.0).acos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_controller_did_is_a_sentence() {
+        assert_eq!(sentence(106.61, "landed, motors off"), "After 106.6 s it landed and the motors went off.");
+        assert_eq!(sentence(3.0, "motors off: the gyro is lost"), "After 3.0 s the motors went off: the gyro is lost.");
+        assert_eq!(sentence(0.0, "no take-off: the gyro is lost"), "After 0.0 s it had not taken off: the gyro is lost.");
+        let descends = sentence(30.0, "controlled descent: the magnetometer is lost");
+        assert_eq!(descends, "After 30.0 s a controlled descent began: the magnetometer is lost.");
+        assert_eq!(sentence(1.0, "something else"), "After 1.0 s: something else.");
+    }
 }

@@ -9,7 +9,7 @@ use super::contest::{open, rivals};
 use super::page::Page;
 use super::state::figures;
 use crate::attribution::diagnose::Diagnosis;
-use crate::numeric::digits::number;
+use crate::effects::placed::Placed;
 use crate::report::sheet::Sheet;
 use crate::signal::bad::SetAside;
 use crate::verdict::words::{channel, channels as spoken, probability};
@@ -80,20 +80,10 @@ pub(super) fn sureness(sheet: &mut Sheet, page: &Page<'_>) {
     });
 }
 
-/// Digits of a reading that was set aside.
-const FIGURES: f64 = 4.0;
-
-/// Samples that were set aside, the reading to as many digits as what was expected of it.
-pub(super) fn told(a: &SetAside) -> String {
-    let places = (FIGURES - 1.0 - a.expected.abs().max(1e-6).log10().floor()).clamp(0.0, 9.0) as usize;
-    let value = format!("{:.places$}", a.value).parse().unwrap_or(a.value);
-    SetAside { value, ..a.clone() }.to_string()
-}
-
 /// Samples and channels that took no part.
 pub(crate) fn aside(sheet: &mut Sheet, verdict: &Verdict) {
     let mut lines: Vec<Vec<String>> = verdict.left_out.iter().map(|l| vec![l.to_string()]).collect();
-    lines.extend(verdict.set_aside.iter().map(|a| vec![told(a)]));
+    lines.extend(verdict.set_aside.iter().map(|a| vec![a.to_string()]));
     if lines.is_empty() {
         return;
     }
@@ -114,24 +104,33 @@ pub(crate) fn aside(sheet: &mut Sheet, verdict: &Verdict) {
     });
 }
 
+/// An effect, and its form where it has several.
+fn named(placed: &Placed) -> String {
+    let form = &placed.instance.form;
+    if form.is_empty() { placed.effect.id().to_owned() } else { format!("{} ({form})", placed.effect.id()) }
+}
+
+/// Whether what was asked is in the result, on the same channels and in the same form.
+fn fate(best: &[Placed], asked: &Placed) -> &'static str {
+    if best.iter().any(|kept| kept.is_like(asked)) { "kept" } else { "lost" }
+}
+
 /// The candidates of each round, with their evidence.
 pub(crate) fn candidates(sheet: &mut Sheet, diagnosis: &Diagnosis) {
-    let best = diagnosis.best.ids();
+    let best = &diagnosis.best.fit.placed;
     let rows: Vec<Vec<String>> = diagnosis
         .candidates
         .iter()
         .enumerate()
         .flat_map(|(round, list)| {
-            let best = &best;
             list.iter().filter_map(move |c| {
                 let placed = c.fit.placed.last()?;
                 let on: Vec<String> = placed.instance.channels.iter().map(|c| channel(c)).collect();
-                let fate = if best.iter().any(|id| id == placed.effect.id()) { "kept" } else { "lost" };
                 Some(vec![
                     (round + 1).to_string(),
-                    placed.effect.id().to_owned(),
-                    number(c.evidence),
-                    fate.to_owned(),
+                    named(placed),
+                    format!("{:.1}", c.evidence),
+                    fate(best, placed).to_owned(),
                     on.join(", "),
                 ])
             })
@@ -152,14 +151,16 @@ pub(crate) fn candidates(sheet: &mut Sheet, diagnosis: &Diagnosis) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::{Instance, by_id};
 
+    /// The same effect on another channel, or in another form, was not kept.
     #[test]
-    fn a_reading_has_no_more_digits_than_what_was_expected() {
-        let of = |value: f64, expected: f64| {
-            let channel = "rpm_beam".to_owned();
-            told(&SetAside { channel, row: 1, rows: 1, t_s: 0.1, until_s: 0.1, value, expected, recurs: false, silent: false })
-        };
-        assert!(of(2417.082, 3625.4).ends_with(": 2417 where the rest of the log says 3625; set aside"));
-        assert!(of(0.123_456, 1.5).ends_with(": 0.123 where the rest of the log says 1.500; set aside"));
+    fn only_what_is_in_the_result_was_kept() {
+        let effect = by_id("channel_filter").expect("an effect");
+        let of = |channel: &str, form: &str| Placed { effect, instance: Instance::new(&[channel], form), shape: vec![0.5] };
+        let best = [of("thrust_n", "")];
+        let asked = [of("thrust_n", ""), of("torque_nm", ""), of("thrust_n", "rms")];
+        assert_eq!(asked.each_ref().map(|p| fate(&best, p)), ["kept", "lost", "lost"]);
+        assert_eq!(asked.each_ref().map(named), ["channel_filter", "channel_filter", "channel_filter (rms)"]);
     }
 }

@@ -8,7 +8,6 @@
 use super::cards::{OPEN, alike, channels_of, is_shown, open_sizes, removed, that_it_is_there, value, why};
 use super::cautions::cautions;
 use super::contest::rivals;
-use super::fold::told;
 use super::left::{in_words, looks_and_goes, shared, size_told};
 use super::lost;
 use super::sentence::{PER_CENT, floors_left, instead, order, sentence, without};
@@ -212,7 +211,7 @@ fn set_aside(verdict: &Verdict) -> String {
         return String::new();
     }
     let mut out = String::from("\nset aside\n");
-    all.iter().take(ASIDE).for_each(|aside| out += &format!("  {}\n", wrapped(&upper(&told(aside)), 4)));
+    all.iter().take(ASIDE).for_each(|aside| out += &format!("  {}\n", wrapped(&upper(&aside.to_string()), 4)));
     if all.len() > ASIDE {
         let more = match all.len() - ASIDE {
             1 => "one more stretch".to_owned(),

@@ -55,6 +55,28 @@ fn points_have_room_above_the_names_of_categories() {
     assert!(low(marks) < 0.449 && low(columns) == 0.0);
 }
 
+/// Names that are wider than their places stand on rows by turns, with the same drawing above them.
+#[test]
+fn names_of_categories_do_not_collide() {
+    let names = ["9x4.5x3", "9x4.7", "10x4.5", "11x4.5", "11x4.7", "12x4.5"].map(str::to_owned);
+    let columns = Layer::Columns { name: String::new(), class: "a", place: (0, 1), values: vec![(0, 1.0, String::new())] };
+    let figure = Figure { layers: vec![columns], categories: names.to_vec(), ..Figure::default() };
+    let phone = Figure { captioned: true, ..figure.clone() };
+    let rows = |f: &Figure| {
+        let svg = f.svg();
+        let of = |name: &String| {
+            svg.split(&format!("\">{name}</text>")).next().and_then(|s| s.rsplit("y=\"").next().map(str::to_owned))
+        };
+        let all: Vec<Option<String>> = names.iter().map(of).collect();
+        assert!(all.iter().all(Option::is_some), "{svg}");
+        let drawn = f.frame().height - f.frame().bottom - f.frame().top;
+        (all[0] != all[1], all[0] == all[2], drawn)
+    };
+    let [wide, narrow] = [rows(&figure), rows(&phone)];
+    assert_eq!((wide.0, narrow.0, narrow.1), (false, true, true));
+    assert!((wide.2 - narrow.2).abs() < 1e-9, "the drawing keeps its height");
+}
+
 #[test]
 fn nothing_to_show_is_said() {
     assert!(Figure::default().is_empty());
@@ -87,7 +109,7 @@ fn before_and_after_differ_without_colour() {
 #[test]
 fn read_outs_stay_inside() {
     let mut out = String::new();
-    let f = Frame { x: (0.0, 1.0), y: (0.0, 1.0), left: LEFT, top: TOP, height: 330.0 };
+    let f = Frame { x: (0.0, 1.0), y: (0.0, 1.0), left: LEFT, top: TOP, bottom: BOTTOM, height: 330.0 };
     mark(&mut out, "a", &Mark { x: 1.0, y: 1.0, error: 0.0, text: "a read-out of forty characters, about so".into() }, &f);
     let number = |key: &str| -> f64 {
         out.split("class=\"tip\"").nth(1).unwrap().split(key).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()

@@ -34,6 +34,9 @@ pub struct Pair {
     /// Thrust and current at each level of the run, where one was measured: the endurance in hover comes from it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<Maximum>,
+    /// Why it gave no result, where that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without: Option<String>,
     /// Where the figures come from.
     pub source: String,
 }
@@ -90,7 +93,7 @@ impl Airframe {
 pub struct Row {
     /// The pair.
     pub pair: Pair,
-    /// Thrust for each ampere at full throttle, N/A (Eq. 6.1).
+    /// Thrust for each ampere at full throttle, N per A (Eq. 6.1).
     pub efficiency_n_per_a: f64,
     /// Thrust of all four motors.
     pub total_thrust_n: Newton,

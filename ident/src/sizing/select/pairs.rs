@@ -18,13 +18,20 @@ const HEADER: [&str; 4] = ["motor", "propeller", "thrust_n", "current_a"];
 /// Least and largest thrust, N, and current, A, of a pair: a meter's last digit, and a hundred motors that carry a person.
 const READ: [f64; 2] = [1e-3, 1e5];
 
+/// Why a line of a table has no result, as far as the table tells.
+const NO_FIGURES: &str = "its line states neither thrust nor current";
+/// The same of the thesis' one pair without.
+const NOT_STARTED: &str = "the thesis states none; simulated, this motor does not start this propeller";
+
 /// The figures that the thesis states.
 ///
 /// # Panics
 /// Never: the table is part of the program and read by a test.
 #[must_use]
 pub fn thesis() -> Vec<Pair> {
-    read_table("thesis.csv", include_str!("thesis.csv").as_bytes()).unwrap_or_default().pairs
+    let mut pairs = read_table("thesis.csv", include_str!("thesis.csv").as_bytes()).unwrap_or_default().pairs;
+    pairs.iter_mut().filter(|p| p.without.is_some()).for_each(|p| p.without = Some(NOT_STARTED.to_owned()));
+    pairs
 }
 
 /// Pairs of a table, and why lines of it hold none.
@@ -86,12 +93,14 @@ fn pair(cells: &[&str], file: &str, place: &Place<'_>, known: &[Pair], places: &
         let found = format!("'{motor}' with '{propeller}' stands on line {line}, too");
         return Err(place.refuse(None, found, "each pair once: take one line out, or give them names of their own"));
     }
+    let maximum = maximum(thrust, current, place)?;
     Ok(Pair {
         motor: motor.to_owned(),
         propeller: propeller.to_owned(),
-        maximum: maximum(thrust, current, place)?,
+        maximum,
         clipped: false,
         levels: Vec::new(),
+        without: maximum.is_none().then(|| NO_FIGURES.to_owned()),
         source: file.to_owned(),
     })
 }
@@ -148,11 +157,18 @@ pub fn from_log(log: &Log, plateaus: &[Plateau]) -> Pair {
         clipped: clipped(log, plateaus),
         maximum: maximum.max_by(|a, b| a.thrust_n.0.total_cmp(&b.thrust_n.0)),
         levels,
+        without: None,
         source: log.name.clone(),
     }
 }
 
 impl Pair {
+    /// The pair's name, and why it gave no result where that is known.
+    #[must_use]
+    pub fn without_result(&self) -> String {
+        self.without.as_ref().map_or_else(|| self.name(), |why| format!("{} ({why})", self.name()))
+    }
+
     /// Motor and propeller in words; a run that names neither is called by its file.
     #[must_use]
     pub fn name(&self) -> String {

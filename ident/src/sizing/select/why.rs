@@ -2,7 +2,7 @@
 //!
 //! What it is: the needs that a row misses, with the figure and what is needed; the choice in one or two sentences.
 //! What can go wrong: nothing; without a pair that meets every need the one that comes nearest is named.
-//! Units: N, min, N/A.
+//! Units: N, min, N per A.
 //! Reference: Beharie 2013, section 6.1.
 
 use super::{Need, Row};
@@ -21,11 +21,21 @@ pub fn misses(row: &Row, need: &Need) -> Vec<String> {
                 out.push(format!("{:.1} min of {:.1} min at full throttle", w.full_throttle_min.0, need.full_throttle_min.0));
             }
             if w.resultant_n < need.resultant_n {
-                out.push(format!("{:.1} N of {:.1} N above the weight", w.resultant_n.0, need.resultant_n.0));
+                out.push(short_of(w.resultant_n.0, need.resultant_n.0));
             }
         }
     }
     out
+}
+
+/// What full throttle leaves above the weight, N, against what is needed.
+fn short_of(resultant: f64, needed: f64) -> String {
+    if resultant >= 0.0 {
+        return format!("{resultant:.1} N of {needed:.1} N above the weight");
+    }
+    let places = if resultant > -0.1 { 2 } else { 1 };
+    let above = if needed > 0.0 { format!(", {needed:.1} N above it needed") } else { String::new() };
+    format!("full throttle {:.places$} N short of the weight{above}", -resultant)
 }
 
 /// A pair's name, and where its figures come from where another row has the same name.
@@ -56,16 +66,16 @@ pub fn why(rows: &[Row], chosen: &[&Row], need: &Need) -> String {
         format!("most thrust for each ampere of the {} that meet every need", chosen.len())
     };
     let runner_up =
-        chosen.get(1).map_or_else(String::new, |r| format!("; next {}, {:.2} N/A", named(rows, r), r.efficiency_n_per_a));
+        chosen.get(1).map_or_else(String::new, |r| format!("; next {}, {:.2} N per A", named(rows, r), r.efficiency_n_per_a));
     let thrifty = rows
         .iter()
         .filter(|r| r.efficiency_n_per_a > best.efficiency_n_per_a)
         .max_by(|a, b| a.efficiency_n_per_a.total_cmp(&b.efficiency_n_per_a));
     let thrifty = thrifty.map_or_else(String::new, |r| {
-        format!("; {} gives {:.2} N/A but {}", named(rows, r), r.efficiency_n_per_a, misses(r, need).join(", "))
+        format!("; {} gives {:.2} N per A but {}", named(rows, r), r.efficiency_n_per_a, misses(r, need).join(", "))
     });
     let bound = if best.pair.clipped { "; its thrust reading is clipped, a lower bound" } else { "" };
-    format!("choice: {}: {:.2} N/A, {of}{bound}{runner_up}{thrifty}", named(rows, best), best.efficiency_n_per_a)
+    format!("choice: {}: {:.2} N per A, {of}{bound}{runner_up}{thrifty}", named(rows, best), best.efficiency_n_per_a)
 }
 
 #[cfg(test)]
@@ -85,12 +95,20 @@ mod tests {
         let said = why(&rows, &choose(&rows, &need), &need);
         assert!(said.starts_with("choice: 570KV with 11x4.7: 0.7"), "{said}");
         assert!(
-            said.contains("N/A, most thrust for each ampere of the 3 that meet every need; next 570KV with 11x4.5"),
+            said.contains("N per A, most thrust for each ampere of the 3 that meet every need; next 570KV with 11x4.5"),
             "{said}"
         );
         assert!(said.contains("570KV with 9x4.5x3 gives 0.94") && said.contains("of 19.62 N in total"), "{said}");
         let patient = Need { full_throttle_min: Minute(8.8), ..need };
         assert!(why(&rows, &choose(&rows, &patient), &patient).contains("the only one of 6 that meets every need"));
+    }
+
+    #[test]
+    fn what_does_not_lift_itself_falls_short_of_its_weight() {
+        assert_eq!(short_of(-4.83, 0.0), "full throttle 4.8 N short of the weight");
+        assert_eq!(short_of(-0.04, 0.0), "full throttle 0.04 N short of the weight");
+        assert_eq!(short_of(-4.83, 2.0), "full throttle 4.8 N short of the weight, 2.0 N above it needed");
+        assert_eq!(short_of(1.5, 2.0), "1.5 N of 2.0 N above the weight");
     }
 
     #[test]
