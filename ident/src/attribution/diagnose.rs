@@ -425,6 +425,7 @@ pub(crate) fn may_join(context: &Context, placed: &[Placed], effect: &dyn Effect
             (p.effect.id() != effect.id() || older(p))
                 && !p.effect.never_beside().contains(&effect.id())
                 && !effect.never_beside().contains(&p.effect.id())
+                && !(effect.follows_supply(instance, c) && p.effect.follows_supply(&p.instance, c))
         };
         let room = effect.is_of_every_rig() || there.iter().filter(|p| takes_a_place(context, p)).count() < MOST_ON_A_CHANNEL;
         room && there.iter().all(apart)
@@ -800,6 +801,17 @@ mod tests {
             takes_a_place(&context, &Placed { effect, instance: Instance::new(&["thrust_n"], form), shape: shape.to_vec() })
         };
         assert!(!takes("channel_filter", "first_order", &[0.04]) && takes("channel_filter", "first_order", &[1.0]));
+        // a current that follows its voltage by one name does not follow it by another
+        let placed = |id: &str, channels: &[&str], form: &str| {
+            let effect = *library().iter().find(|e| e.id() == id).expect("in the library");
+            Placed { effect, instance: Instance::new(channels, form), shape: vec![0.7, 12.0] }
+        };
+        let lead = [placed("supply_sag", &["voltage_v", "current_a"], "same_power")];
+        let joins = |channels: &[&str]| {
+            let battery = placed("battery_discharge", channels, "straight");
+            may_join(&context, &lead, battery.effect, &battery.instance)
+        };
+        assert!(joins(&["voltage_v"]) && !joins(&["voltage_v", "current_a", "rpm"]));
         assert!(!takes("glitch_rows", "", &[]) && takes("zero_drift", "", &[]));
     }
 }

@@ -101,6 +101,8 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         )
     };
     let before_model = left(Model::from_fit(&context, log, declared, &diagnosis.declared), &diagnosis.declared);
+    // the declared relations take the speed as it was read
+    let before_model = Model { sensor_share: model.as_ref().map_or(0.0, |m| m.sensor_share), ..before_model };
     let after_model = Model::of_estimates(&context, log, declared, fit, estimates.clone()).believing(&diagnosis.inclusion);
     let mut after_model = left(after_model, fit).supplied_by(&context);
     let mut verdict = Verdict {
@@ -316,9 +318,9 @@ fn words(placed: &Placed, first: &str, reduction: f64) -> Words {
 #[must_use]
 pub fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
     let (before, after) = (&*before.on(other), &*after.on(other));
-    let context = after.context(other);
-    let error = |model: &Model, name: &'static str| -> Option<f64> {
-        let prediction = model.predict(&context, name)?;
+    let [as_read, context] = [before, after].map(|model| model.context(other));
+    let error = |model: &Model, context: &Context, name: &'static str| -> Option<f64> {
+        let prediction = model.predict(context, name)?;
         let target = &context.targets[context.target(name)?];
         let judged = target.rows.iter().zip(&target.y).filter(|(i, _)| target.claims(**i));
         let (sum, n) = judged.fold((0.0, 0.0), |(s, n), (i, y)| (s + (y - prediction[*i]).powi(2), n + 1.0));
@@ -328,7 +330,10 @@ pub fn validation(other: &Log, before: &Model, after: &Model) -> Validation {
         .targets
         .iter()
         .filter(|t| !t.relation.is_evidence())
-        .filter_map(|t| Some((t.name.to_owned(), BeforeAfter { before: error(before, t.name)?, after: error(after, t.name)? })))
+        .filter_map(|t| {
+            let (before, after) = (error(before, &as_read, t.name)?, error(after, &context, t.name)?);
+            Some((t.name.to_owned(), BeforeAfter { before, after }))
+        })
         .collect();
     Validation { run: other.name.clone(), channels }
 }

@@ -219,6 +219,10 @@ pub trait Effect: Sync {
     fn seen(&self, _context: &Context, _instance: &Instance) -> f64 {
         0.0
     }
+    /// Whether it says how a channel follows the supply's voltage: one that is said twice is followed twice.
+    fn follows_supply(&self, _instance: &Instance, _channel: &str) -> bool {
+        false
+    }
     /// Whether it adds nothing to its channel, whose own curve over the command holds it already: what a sensor reads beside the others shows it alone.
     fn shows_beside_others_alone(&self) -> bool {
         false

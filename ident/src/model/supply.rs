@@ -13,7 +13,6 @@ use super::read::{Refusal, finite, refusal};
 use super::{AddedEffect, Model, load_unit};
 use crate::channel::{Context, Relation, Target};
 use crate::effects::placed::Placed;
-use crate::effects::supply::supply_sag;
 use crate::effects::supply::supply_voltage::{OF_CURRENT, OF_SPEED};
 use crate::model::leftover::{along, binned};
 use crate::numeric::digits;
@@ -136,7 +135,7 @@ impl Model {
     fn follows_by_itself(&self, target: &Target) -> bool {
         let says = |p: &Placed| match p.effect.id() {
             "supply_voltage" => p.instance.touches(target.name),
-            "supply_sag" => supply_sag::follows(&p.instance, target.name),
+            "supply_sag" => p.effect.follows_supply(&p.instance, target.name),
             _ => false,
         };
         !self.effects.iter().any(|e| says(&e.placed))

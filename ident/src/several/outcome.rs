@@ -152,7 +152,8 @@ pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> O
 fn declared(runs: &[Run], contexts: &[Context], members: &[Member<'_>]) -> Model {
     let bare: Vec<Member<'_>> = members.iter().map(|m| Member { own: Vec::new(), ..m.clone() }).collect();
     let shared = Joint::of(&bare).shared(&[]);
-    model(runs, contexts, &shared, &[], &[], bare.iter().map(|m| own::of(m, &[], &shared)).collect())
+    let own = bare.iter().map(|m| own::of(m, &[], &shared)).collect();
+    Model { sensor_share: 0.0, ..model(runs, contexts, &shared, &[], &[], own) }
 }
 
 fn start_pulse(runs: &[Run]) -> f64 {

@@ -127,10 +127,10 @@ fn predicted(closed: &Closed, log: &Log) -> Vec<Prediction> {
 
 /// The same by a declared and a corrected model.
 pub(crate) fn predicted_by(models: [&Model; 2], log: &Log) -> Vec<Prediction> {
-    let context = models[1].context(log);
+    let [as_read, context] = models.map(|model| model.context(log));
     let [declared, corrected] = models.map(|model| model.on(log));
     let of_channel = |channel: &'static str| {
-        let before = error(&declared, &context, channel)?;
+        let before = error(&declared, &as_read, channel)?;
         let after = error(&corrected, &context, channel)?;
         let floor = context.targets[context.target(channel)?].noise.rms;
         Some(Prediction { from: String::new(), on: String::new(), channel, floor, before, after })

@@ -56,6 +56,10 @@ impl Effect for BatteryDischarge {
         Scope::Rig
     }
 
+    fn follows_supply(&self, instance: &Instance, channel: &str) -> bool {
+        instance.form != OTHER_SUPPLY && channel != "voltage_v" && instance.touches(channel)
+    }
+
     fn stage(&self) -> Stage {
         Stage::Gain
     }

@@ -25,11 +25,6 @@ const BY_SPEED: &str = "by_speed";
 /// Form of a sag that the current at a speed shows, too.
 const SAME_POWER: &str = "same_power";
 
-/// Whether an instance says how a channel follows the voltage that was measured, on any run.
-pub(crate) fn follows(instance: &Instance, channel: &str) -> bool {
-    instance.form == SAME_POWER && channel != "voltage_v" && instance.touches(channel)
-}
-
 impl Effect for SupplySag {
     fn id(&self) -> &'static str {
         "supply_sag"
@@ -142,6 +137,10 @@ impl Effect for SupplySag {
             return;
         }
         design.add(position, 0, current.iter().map(|i| -i).collect());
+    }
+
+    fn follows_supply(&self, instance: &Instance, channel: &str) -> bool {
+        instance.form == SAME_POWER && channel != "voltage_v" && instance.touches(channel)
     }
 
     /// Between runs the current follows the voltage by `supply_voltage`, about one reference for all.
