@@ -17,6 +17,8 @@ use crate::numeric::solve::Normal;
 const BESIDE: usize = 10;
 /// Standard error of a share from which on a channel says nothing of it.
 const UNKNOWN: f64 = 0.2;
+/// Standard errors from which on a share is none by chance: one in a thousand among the tries of three loads.
+const BY_CHANCE: f64 = 4.0;
 /// Rows by which a meter may be early or late.
 const LAGS: std::ops::RangeInclusive<isize> = -2..=5;
 
@@ -94,7 +96,8 @@ fn share_of(context: &Context, load: &super::Target, speed: &[f64]) -> Option<f6
         };
         let ((ee, _), (er, _), (rr, n)) = (sum(&|e, r| e * e + 0.0 * r), sum(&|e, r| e * r), sum(&|e, r| r * r + 0.0 * e));
         let se = (rr / n / ee).sqrt();
-        (se < UNKNOWN).then_some(er / ee)
+        // of three loads at eight lags the largest is a few standard errors by chance
+        (se < UNKNOWN).then_some(if er / ee > BY_CHANCE * se { er / ee } else { 0.0 })
     };
     LAGS.filter_map(at).reduce(f64::max)
 }

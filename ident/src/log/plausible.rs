@@ -259,7 +259,7 @@ fn thrust(log: &Log) -> Option<Doubt> {
     let per_watt = thrust / power;
     let said = |likely: &str| format!("{thrust:.3} N for {power:.1} W: {likely}");
     match per_watt {
-        p if p > 30.0 => doubt("thrust_n", true, said("millinewtons? kiloamperes or kilovolts?")),
+        p if p > 12.0 => doubt("thrust_n", true, said("millinewtons? kiloamperes or kilovolts?")),
         p if p > 1.5 => doubt("thrust_n", true, said("grams?")),
         p if p > 0.6 => doubt("thrust_n", false, said("grams? a current of another unit?")),
         p if p < 0.001 => doubt("thrust_n", true, said("kilograms? columns swapped?")),
@@ -441,8 +441,8 @@ mod tests {
     fn a_rotor_that_lifts_something_does_not_stand() {
         let per_second = |n: f64| n / 60.0;
         let found = rig("", |n, t, u, i| [1.4 * per_second(n), 3.0 * t, u, i]).expect_err("rev/s");
-        assert!(found.contains("rpm") && found.contains("93.3 rev/min at 12.8 A: rev/s, or thousands?"), "{found}");
-        let grams = rig("", |n, t, u, i| [n, 102.0 * t, u, 3.0 * i]).expect_err("grams");
+        assert!(found.contains("rpm") && found.contains("93.3 rev/min at 9.1 A: rev/s, or thousands?"), "{found}");
+        let grams = rig("", |n, t, u, i| [n, 102.0 * t, u, i]).expect_err("grams");
         assert!(grams.contains("grams?") && !grams.contains("kilo"), "{grams}");
     }
 

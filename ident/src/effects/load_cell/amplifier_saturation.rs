@@ -49,9 +49,11 @@ impl Effect for AmplifierSaturation {
     fn shapes(&self, context: &Context, _: &Instance) -> Vec<Shape> {
         let mut shape = crate::effects::rotor::blade_flex::upper_speeds(context, 24);
         let top = context.rpm.iter().copied().fold(1.0, f64::max);
-        shape.range.1 = 0.999 * top;
+        // a level that is held stands nowhere but at its own speed
+        let rail = rail_of(context).map(|r| r.reached);
+        shape.range.1 = rail.unwrap_or(0.0).max(0.999 * top);
         shape.starts.extend([0.965 * top, 0.99 * top]);
-        shape.starts.extend(rail_of(context).map(|r| r.reached).filter(|r| (shape.range.0..shape.range.1).contains(r)));
+        shape.starts.extend(rail.filter(|r| (shape.range.0..=shape.range.1).contains(r)));
         vec![Shape { name: "reached_at", ..shape }]
     }
 
