@@ -3,7 +3,7 @@
 //! What it is: thrust, torque and current follow what the rotor does, and not what its sensor adds: the slope of their fluctuations over those of
 //! the speed, against the slope of their curve, is the share that is real (reliability ratio). Of the rest the speed is freed, so that no load is
 //! predicted from a sensor's error.
-//! What can go wrong: of a rig whose loads say too little nothing is known, and the speed stays as it was read. Several sensors check each other,
+//! What can go wrong: a slow meter shows less than there is, so that what is alike from row to row counts as real. Of a rig whose loads say too little nothing is known, and the speed stays as it was read. Several sensors check each other,
 //! and stay too.
 //! Units: rev/min; shares 0 to 1.
 //! Reference: Fuller 1987, Measurement Error Models, section 1.1; local lines, Cleveland 1979, J. Am. Stat. Assoc. 74:829.
@@ -38,8 +38,8 @@ impl Context {
         let speed = self.about_levels(&self.rpm);
         let loads = self.targets.iter().filter(|t| matches!(t.relation, Relation::Thrust | Relation::Torque | Relation::Current));
         let shares: Vec<f64> = loads.filter_map(|load| share_of(self, load, &speed)).collect();
-        // a slow meter follows less than there is
-        if shares.is_empty() { 0.0 } else { 1.0 - shares.into_iter().fold(0.0, f64::max).min(1.0) }
+        // a slow meter follows less than there is; what is alike from row to row is no error that a reading has by itself
+        if shares.is_empty() { 0.0 } else { 1.0 - shares.into_iter().fold(alike(&speed), f64::max).min(1.0) }
     }
 
     /// Takes a share of each row's distance from the course of its level off the speed.
@@ -64,6 +64,13 @@ impl Context {
         }
         out
     }
+}
+
+/// Share of the fluctuations that a row has in common with the next one: an error of single readings has none.
+fn alike(about: &[f64]) -> f64 {
+    let sum = |of: fn(f64, f64) -> f64| about.windows(2).map(|w| of(w[0], w[1])).filter(|v| v.is_finite()).sum::<f64>();
+    let (common, all) = (sum(|a, b| a * b), sum(|a, b| 0.5 * (a * a + b * b)));
+    if all > 0.0 { (common / all).max(0.0) } else { 0.0 }
 }
 
 /// The value at a row of the straight line through those beside it, within bounds.
@@ -127,6 +134,15 @@ mod tests {
             let found = context.sensor_share();
             assert!((found - share).abs() < 0.1, "{found} for {share}");
         }
+    }
+
+    /// A rotor that wanders slowly is real, although the meters are too slow to tell.
+    #[test]
+    fn what_is_alike_from_row_to_row_is_no_error_of_a_reading() {
+        let wave: Vec<f64> = (0..400).map(|k| (0.8 * f64::from(k)).sin()).collect();
+        assert!((super::alike(&wave) - 0.8_f64.cos()).abs() < 0.02, "{}", super::alike(&wave));
+        let signs: Vec<f64> = (0..400).map(|k| if k % 4 < 2 { 1.0 } else { -1.0 }).collect();
+        assert!(super::alike(&signs) < 0.02);
     }
 
     #[test]

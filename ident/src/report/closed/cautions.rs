@@ -23,7 +23,8 @@ pub(super) fn cautions(v: &Verdict) -> Vec<String> {
         format!("Only {rows} rows, one for each level: none has two to compare, so that the noise floors are guesses, and a row that is left out is guessed from its neighbours. A staircase with many rows on each level tells more.")
     });
     let own_error = v.sensor_share.filter(|share| *share > MOSTLY).map(|share| {
-        format!("Of what the speed sensor reads off the course of a level, {:.0} % is its own error: thrust, torque and current do not follow it. It was taken off before they were predicted.", 100.0 * share)
+        let part = if share > 0.995 { "all".to_owned() } else { format!("{:.0} %", 100.0 * share) };
+        format!("Of what the speed sensor reads off the course of a level, {part} is its own error: thrust, torque and current do not follow it. It was taken off before they were predicted.")
     });
     guessed.into_iter().chain(without_noise(v)).chain(own_error).chain(far_off(v)).collect()
 }
