@@ -112,7 +112,7 @@ fn a_battery_recovers_and_a_telemetry_errs_on_a_recorded_stand() {
         assert!((0.3..0.9).contains(&share), "{run}: {share}");
         let model = std::fs::read_to_string(folder.path().join("out/model.toml")).expect("a model");
         let share = model.lines().find_map(|line| line.strip_prefix("sensor_share = ")).expect("of the speed's sensor");
-        assert!(share.parse::<f64>().is_ok_and(|share| share > 0.9), "{run}: {share}");
+        assert!(share.parse::<f64>().is_ok_and(|share| share > 0.8), "{run}: {share}");
     }
 }
 
