@@ -3,8 +3,8 @@
 //! What it is: thrust, torque and current follow what the rotor does, and not what its sensor adds: the slope of their fluctuations over those of
 //! the speed, against the slope of their curve, is the share that is real (reliability ratio). Of the rest the speed is freed, so that no load is
 //! predicted from a sensor's error.
-//! What can go wrong: a slow meter shows less than there is, so that what is alike from row to row counts as real. Of a rig whose loads say too little nothing is known, and the speed stays as it was read. Several sensors check each other,
-//! and stay too.
+//! What can go wrong: a slow meter shows less than there is, so that what is alike from row to row counts as real. Where the loads say too little
+//! nothing is known, and the speed stays as it was read. Several sensors check each other, and stay too.
 //! Units: rev/min; shares 0 to 1.
 //! Reference: Fuller 1987, Measurement Error Models, section 1.1; local lines, Cleveland 1979, J. Am. Stat. Assoc. 74:829.
 
