@@ -116,12 +116,18 @@ mod tests {
 
     /// Levels of 4 s at which the rotor wanders by `real` and the sensor errs by `error`, rev/min, every row anew.
     fn context(real: f64, error: f64) -> (Context, Vec<f64>) {
-        let noise = |k: usize, seed: f64| (12.9898 * k as f64 + seed).sin() * 43758.5453 % 1.0 * 1.7;
+        // evenly spread, of variance one, no two rows alike (splitmix64)
+        let noise = |k: usize, seed: u64| {
+            let mut z = (k as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(seed << 40);
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) as f64 / u64::MAX as f64 - 0.5) * 12.0_f64.sqrt()
+        };
         let rows = 0..2400;
         let pulse: Vec<f64> = rows.clone().map(|k| 1200.0 + 100.0 * (k / 80 % 7) as f64).collect();
-        let truth: Vec<f64> = rows.clone().map(|k| 6.0 * (pulse[k] - 1000.0) + real * noise(k, 0.0)).collect();
-        let rpm = rows.clone().map(|k| truth[k] + error * noise(k, 1.0)).collect();
-        let thrust = rows.clone().map(|k| 2e-7 * truth[k].powi(2) + 0.004 * noise(k, 2.0)).collect();
+        let truth: Vec<f64> = rows.clone().map(|k| 6.0 * (pulse[k] - 1000.0) + real * noise(k, 0)).collect();
+        let rpm = rows.clone().map(|k| truth[k] + error * noise(k, 1)).collect();
+        let thrust = rows.clone().map(|k| 2e-7 * truth[k].powi(2) + 0.004 * noise(k, 2)).collect();
         let columns = [("pulse_us", pulse), ("rpm", rpm), ("thrust_n", thrust)];
         let columns = columns.map(|(name, values)| Column { name: name.into(), values }).to_vec();
         (Context::new(&Log { t: rows.map(|k| 0.05 * k as f64).collect(), columns, ..Log::default() }, Some(1100.0)), truth)
